@@ -1,0 +1,3 @@
+"""Airborne measures athletes in flight from ordinary multi-camera colour video."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,108 @@
+"""Cameras and rigs: values that map world points to pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from airborne.cameras.distortion import distort
+from airborne.errors import CalibrationError
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Camera:
+    """A pinhole camera with Brown distortion: x right, y down, z forward; pixel centres at whole numbers.
+
+    World points are in metres. `camera_from_world` is the rigid map from world to camera axes.
+    """
+
+    name: str
+    K: Array  # (3, 3) [px]
+    size: tuple[int, int]  # (width, height) [px]
+    camera_from_world: RigidTransform
+    distortion: Array = field(default_factory=lambda: np.zeros(5))  # k1, k2, p1, p2, k3
+
+    @property
+    def centre(self) -> Array:
+        """The camera's position in the world: (3,) [m]."""
+        return self.camera_from_world.inv().translation
+
+    @property
+    def is_distorted(self) -> bool:
+        """Whether any distortion coefficient differs from zero."""
+        return bool(np.any(self.distortion))
+
+    @property
+    def P(self) -> Array:
+        """The projection matrix without distortion: (3, 4), `px ~ P [X; 1]`."""
+        return self.K @ self.camera_from_world.as_matrix()[:3]
+
+    def px_from_world(self, points: Array) -> Array:
+        """Project points (..., 3) [m] to the image: (..., 2) [px]; NaN behind the camera."""
+        points = np.asarray(points, float)
+        xyz = points @ self.camera_from_world.rotation.as_matrix().T + self.camera_from_world.translation
+        z = np.where(xyz[..., 2:] > 0, xyz[..., 2:], np.nan)
+        xy = xyz[..., :2] / z
+        if self.is_distorted:
+            xy = distort(xy, self.distortion)
+        return xy @ self.K[:2, :2].T + self.K[:2, 2]
+
+    def resampled(
+        self, *, scale: tuple[float, float], offset: tuple[float, float] = (0.0, 0.0), size: tuple[int, int]
+    ) -> Camera:
+        """Return the camera of an image whose pixel (i, j) is this image's pixel `scale * (i, j) + offset`.
+
+        One home for fields (scale (1, 2), offset (0, parity)), reduced images and crops.
+        """
+        new_from_old = np.array(
+            [[1 / scale[0], 0, -offset[0] / scale[0]], [0, 1 / scale[1], -offset[1] / scale[1]], [0, 0, 1.0]]
+        )
+        return replace(self, K=new_from_old @ self.K, size=size)
+
+    def field(self, parity: int) -> Camera:
+        """Return the camera of one field: the rows `parity, parity + 2, ...` kept at their own places."""
+        width, height = self.size
+        return self.resampled(scale=(1, 2), offset=(0, parity), size=(width, (height - parity + 1) // 2))
+
+    def undistorted(self) -> Camera:
+        """Return the same camera without distortion."""
+        return replace(self, distortion=np.zeros(5))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rig:
+    """The cameras of one recording, in a fixed order."""
+
+    cameras: tuple[Camera, ...]
+
+    def __post_init__(self) -> None:
+        names = [camera.name for camera in self.cameras]
+        if len(set(names)) != len(names):
+            raise CalibrationError(f"two cameras share a name: {', '.join(names)}; give each its own")
+
+    def __len__(self) -> int:
+        return len(self.cameras)
+
+    def __iter__(self) -> Iterator[Camera]:
+        return iter(self.cameras)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The cameras' names, in order."""
+        return tuple(camera.name for camera in self.cameras)
+
+    def __getitem__(self, name: str) -> Camera:
+        for camera in self.cameras:
+            if camera.name == name:
+                return camera
+        raise CalibrationError(f"camera '{name}' not in rig; it has: {', '.join(self.names)}")
+
+    def select(self, names: Sequence[str]) -> Rig:
+        """Return the rig of the named cameras, in that order; raises CalibrationError for an unknown name."""
+        return Rig(tuple(self[name] for name in names))
