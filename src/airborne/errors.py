@@ -1,5 +1,12 @@
 """Errors a user can cause. Each message says what was found, what was expected and what to do, in one line."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
 
 class AirborneError(Exception):
     """Base of every error that Airborne raises on purpose; the command line prints it and exits with 2."""
@@ -23,3 +30,12 @@ class TrialError(AirborneError):
 
 class ResultError(AirborneError):
     """A run folder or truth file is unusable."""
+
+
+def one_line(error: ValidationError) -> str:
+    """Say a pydantic error's first complaint in one line: where, what, what was given."""
+    first = error.errors(include_url=False)[0]
+    place = ".".join(str(step) for step in first["loc"]) or "the file"
+    given = "" if first["type"] == "missing" else f" (found {str(first['input'])[:60]!r})"
+    more = f"; and {error.error_count() - 1} more" if error.error_count() > 1 else ""
+    return f"{place}: {first['msg']}{given}{more}"

@@ -1,1 +1,18 @@
-"""."""
+"""Bodies: in come body files, out come `BodyModel`, `Pose` and `PosedBody`; knows no camera and no image."""
+
+from airborne.body.geometry import Geometry, geometry
+from airborne.body.model import BodyModel, Box, Ellipsoid, Mesh, Part, Pose, PosedBody, Segment, Shape
+
+__all__ = [
+    "BodyModel",
+    "Box",
+    "Ellipsoid",
+    "Geometry",
+    "Mesh",
+    "Part",
+    "Pose",
+    "PosedBody",
+    "Segment",
+    "Shape",
+    "geometry",
+]

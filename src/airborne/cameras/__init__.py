@@ -1,5 +1,25 @@
-"""Cameras: in come control points or calibration files, out come `Camera` and `Rig`; knows no video and no body."""
+"""Cameras and how they are found.
 
+In come control points or calibration files; out go `Camera` and `Rig`, and a `Calibration` that says how far to trust
+them. Knows no video, no body and no trial.
+"""
+
+from airborne.cameras.calibration import Calibration, CameraFit, calibrate
 from airborne.cameras.camera import Camera, Rig
+from airborne.cameras.control_points import ControlPoints, read_control_points
+from airborne.cameras.files import read_rig, write_pose2sim
+from airborne.cameras.report import describe, to_dict
 
-__all__ = ["Camera", "Rig"]
+__all__ = [
+    "Calibration",
+    "Camera",
+    "CameraFit",
+    "ControlPoints",
+    "Rig",
+    "calibrate",
+    "describe",
+    "read_control_points",
+    "read_rig",
+    "to_dict",
+    "write_pose2sim",
+]

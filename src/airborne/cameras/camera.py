@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from airborne.cameras.distortion import distort
+from airborne.cameras.distortion import distort, undistort
 from airborne.errors import CalibrationError
+from airborne.geometry.triangulation import triangulate
 
 Array = NDArray[np.floating]
 
@@ -52,6 +53,17 @@ class Camera:
         if self.is_distorted:
             xy = distort(xy, self.distortion)
         return xy @ self.K[:2, :2].T + self.K[:2, 2]
+
+    def undistorted_px(self, px: Array) -> Array:
+        """Move pixels (..., 2) [px] to where the same camera without distortion would see them: (..., 2) [px].
+
+        NaN stays NaN, and comes out where the lens model has no inverse.
+        """
+        px = np.asarray(px, float)
+        if not self.is_distorted:
+            return px
+        xy = (px - self.K[:2, 2]) @ np.linalg.inv(self.K[:2, :2]).T
+        return undistort(xy, self.distortion) @ self.K[:2, :2].T + self.K[:2, 2]
 
     def resampled(
         self, *, scale: tuple[float, float], offset: tuple[float, float] = (0.0, 0.0), size: tuple[int, int]
@@ -106,3 +118,17 @@ class Rig:
     def select(self, names: Sequence[str]) -> Rig:
         """Return the rig of the named cameras, in that order; raises CalibrationError for an unknown name."""
         return Rig(tuple(self[name] for name in names))
+
+    @property
+    def P(self) -> Array:
+        """The projection matrices without distortion: (cameras, 3, 4)."""
+        return np.stack([camera.P for camera in self.cameras])
+
+    def points_from_px(self, px: Array) -> Array:
+        """Triangulate pixels (..., cameras, 2) [px], NaN where not seen: (..., 3) [m].
+
+        Lens distortion is taken out first; NaN where fewer than two cameras see the point (see `triangulate`).
+        """
+        px = np.asarray(px, float)
+        straight = [camera.undistorted_px(px[..., i, :]) for i, camera in enumerate(self.cameras)]
+        return triangulate(self.P, np.stack(straight, axis=-2))

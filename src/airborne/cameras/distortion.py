@@ -7,10 +7,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
 
+N_STEPS = 20  # Newton steps; four are enough for ordinary lenses
+UNSOLVED = 1e-9  # a point still this far off lies where the lens model has no inverse
+
 
 def distort(xy: Array, coefficients: Array) -> Array:
     """Move ideal normalised points (..., 2) to where the lens puts them: (..., 2)."""
-    k1, k2, p1, p2, k3 = np.pad(coefficients, (0, 5 - len(coefficients)))
+    k1, k2, p1, p2, k3 = (*coefficients, 0.0, 0.0, 0.0, 0.0)[:5]
     x, y = xy[..., 0], xy[..., 1]
     r2 = x * x + y * y
     radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
@@ -21,3 +24,34 @@ def distort(xy: Array, coefficients: Array) -> Array:
         ],
         axis=-1,
     )
+
+
+def undistort(xy: Array, coefficients: Array) -> Array:
+    """Move normalised points (..., 2) from where the lens puts them to the ideal ones: (..., 2).
+
+    The inverse of `distort` by Newton's iteration; NaN where a strong lens model folds back and has no inverse.
+    """
+    xy = np.asarray(xy, float)
+    ideal = xy.copy()
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a diverging point ends as NaN below
+        for _ in range(N_STEPS):
+            miss = distort(ideal, coefficients) - xy
+            ideal = ideal - np.einsum("...ij,...j->...i", _inverse_slope(ideal, coefficients), miss)
+        miss = np.abs(distort(ideal, coefficients) - xy).max(axis=-1)
+        is_before_fold = np.linalg.det(_inverse_slope(ideal, coefficients)) > 0
+    is_solved = is_before_fold & (miss <= UNSOLVED * (1 + np.abs(xy).max(axis=-1)))
+    return np.where(is_solved[..., None], ideal, np.nan)
+
+
+def _inverse_slope(xy: Array, coefficients: Array) -> Array:
+    """Return the inverse of the derivative of `distort` at xy (..., 2): (..., 2, 2)."""
+    k1, k2, p1, p2, k3 = (*coefficients, 0.0, 0.0, 0.0, 0.0)[:5]
+    x, y = xy[..., 0], xy[..., 1]
+    r2 = x * x + y * y
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    radial_slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))  # d radial / d r2, twice: times x or y below
+    xx = radial + x * x * radial_slope + 2 * p1 * y + 6 * p2 * x
+    yy = radial + y * y * radial_slope + 6 * p1 * y + 2 * p2 * x
+    xy_ = x * y * radial_slope + 2 * p1 * x + 2 * p2 * y  # the derivative is symmetric
+    determinant = xx * yy - xy_ * xy_
+    return np.stack([np.stack([yy, -xy_], -1), np.stack([-xy_, xx], -1)], -2) / determinant[..., None, None]

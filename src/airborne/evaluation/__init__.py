@@ -1,1 +1,36 @@
-"""."""
+"""Evaluation: in come a `Motion` and what is known to be true, out come errors with their units.
+
+Truth is a table of poses, points clicked by hand (paper B), or a known pose that a search has to find again.
+Knows no image and no search.
+"""
+
+from airborne.evaluation.basin import Basin, is_recovered, perturbed
+from airborne.evaluation.compare import Calibration, Comparison, OrientationErrors, PositionErrors, compare
+from airborne.evaluation.digitised import (
+    Digitised,
+    DigitisedComparison,
+    DigitisedPoses,
+    compare_digitised,
+    digitised_poses,
+    read_digitised,
+)
+from airborne.evaluation.truth import Truth, read_truth
+
+__all__ = [
+    "Basin",
+    "Calibration",
+    "Comparison",
+    "Digitised",
+    "DigitisedComparison",
+    "DigitisedPoses",
+    "OrientationErrors",
+    "PositionErrors",
+    "Truth",
+    "compare",
+    "compare_digitised",
+    "digitised_poses",
+    "is_recovered",
+    "perturbed",
+    "read_digitised",
+    "read_truth",
+]

@@ -1,0 +1,104 @@
+"""Body files: TOML with segments, joints and coloured parts; meshes beside it as OBJ, PLY or STL."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import trimesh
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.body.model import BodyModel, Box, Ellipsoid, Mesh, Part, Segment, Shape
+from airborne.errors import BodyError, one_line
+
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Channel = Annotated[float, Field(ge=0, le=255)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class _PartTable(_Strict):
+    name: str
+    shape: Literal["box", "ellipsoid", "mesh"]
+    size_m: Vector | None = None
+    semi_axes_m: Vector | None = None
+    file: str | None = None
+    scale: float = Field(1.0, gt=0)  # metres per unit of the mesh file
+    centre_m: Vector = [0.0, 0.0, 0.0]
+    rotation_deg: Vector = [0.0, 0.0, 0.0]  # about the segment's x, then the new y, then the new z
+    colour_srgb: Annotated[list[Channel], Field(min_length=3, max_length=3)] | None = None
+    colour: Literal["sample"] | None = None
+
+
+class _SegmentTable(_Strict):
+    name: str
+    parent: str | None = None
+    joint_m: Vector = [0.0, 0.0, 0.0]
+    part: list[_PartTable] = []
+
+
+class _BodyTable(_Strict):
+    name: str
+    segment: Annotated[list[_SegmentTable], Field(min_length=1)]
+
+
+def read_body(path: Path) -> BodyModel:
+    """Read a body file; raises BodyError, naming the file and what is wrong, for anything unusable."""
+    try:
+        table = _BodyTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise BodyError(f"{path.name}: cannot be read ({error.strerror})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise BodyError(f"{path.name}: not a TOML file: {error}") from error
+    except ValidationError as error:
+        raise BodyError(f"{path.name}: {one_line(error)}") from error
+    return BodyModel(table.name, tuple(_segment(segment, path) for segment in table.segment))
+
+
+def _segment(table: _SegmentTable, path: Path) -> Segment:
+    parts = tuple(_part(part, path) for part in table.part)
+    return Segment(table.name, table.parent, np.array(table.joint_m), parts)
+
+
+def _part(table: _PartTable, path: Path) -> Part:
+    if (table.colour_srgb is None) == (table.colour is None):
+        raise BodyError(f'{path.name}: part \'{table.name}\' needs colour_srgb = [r, g, b] or colour = "sample", one of them')
+    place = RigidTransform.from_components(table.centre_m, Rotation.from_euler("XYZ", table.rotation_deg, degrees=True))
+    colour = None if table.colour_srgb is None else np.array(table.colour_srgb)
+    return Part(table.name, _shape(table, path), place, colour)
+
+
+def _shape(table: _PartTable, path: Path) -> Shape:
+    key = {"box": "size_m", "ellipsoid": "semi_axes_m", "mesh": "file"}[table.shape]
+    value = getattr(table, key)
+    if value is None:
+        raise BodyError(f"{path.name}: part '{table.name}' is a {table.shape} and needs {key}")
+    for other in {"size_m", "semi_axes_m", "file"} - {key}:
+        if getattr(table, other) is not None:
+            raise BodyError(f"{path.name}: part '{table.name}' is a {table.shape}; {other} does not belong to it")
+    try:
+        if table.shape == "box":
+            return Box(np.array(value))
+        if table.shape == "ellipsoid":
+            return Ellipsoid(np.array(value))
+    except BodyError as error:
+        raise BodyError(f"{path.name}: part '{table.name}': {error}") from error
+    return _mesh(path.parent / value, table.scale)
+
+
+def _mesh(path: Path, scale: float) -> Mesh:
+    if not path.is_file():
+        raise BodyError(f"mesh file {path.name} not found beside the body file")
+    try:
+        mesh = trimesh.load_mesh(path)
+        vertices, faces = np.asarray(mesh.vertices, float) * scale, np.asarray(mesh.faces, np.int64)
+    except Exception as error:  # trimesh raises whatever its parsers raise
+        raise BodyError(f"{path.name}: not a readable OBJ, PLY or STL mesh ({error})") from error
+    if not len(faces) or not np.all(np.isfinite(vertices)):
+        raise BodyError(f"{path.name}: the mesh has no faces, or corners that are not numbers")
+    return Mesh(vertices, faces if mesh.volume >= 0 else faces[:, ::-1])

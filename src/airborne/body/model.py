@@ -1,0 +1,158 @@
+"""Bodies: a tree of segments, each carrying coloured parts; a pose makes a body a posed one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.errors import BodyError
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ellipsoid:
+    """An ellipsoid about its own origin."""
+
+    semi_axes_m: Array  # (3,) [m]
+
+    def __post_init__(self) -> None:
+        _require_positive(self.semi_axes_m, "semi_axes_m")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Box:
+    """A rectangular prism about its own origin."""
+
+    size_m: Array  # (3,) full lengths [m]
+
+    def __post_init__(self) -> None:
+        _require_positive(self.size_m, "size_m")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """A closed triangle mesh, faces counter-clockwise from outside."""
+
+    vertices_m: Array  # (v, 3) [m]
+    faces: NDArray[np.integer]  # (f, 3)
+
+
+Shape = Ellipsoid | Box | Mesh
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """One coloured solid, fixed in its segment."""
+
+    name: str
+    shape: Shape
+    segment_from_part: RigidTransform
+    colour: Array | None  # (3,) sRGB 0..255; None: to be sampled from the video at the first pose
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Segment:
+    """A rigid piece of the body; it turns about a point fixed in its parent."""
+
+    name: str
+    parent: str | None
+    joint_m: Array  # (3,) the joint in the parent's frame [m]; the segment's own origin
+    parts: tuple[Part, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pose:
+    """A body's degrees of freedom: the root's place in the world and the joint angles."""
+
+    world_from_root: RigidTransform
+    joint_angles: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (segments - 1, 3) x-y-z [rad]
+
+    def moved(self, translation_m: Array, rotation_vector: Array) -> Pose:
+        """Return the pose moved by a world translation (3,) [m] and turned about its root by a world vector (3,) [rad]."""
+        root = self.world_from_root
+        turned = RigidTransform.from_components(
+            root.translation + translation_m, Rotation.from_rotvec(rotation_vector) * root.rotation
+        )
+        return replace(self, world_from_root=turned)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyModel:
+    """A body without a pose: x = subject's left, y = posterior, z = toward the head [m]."""
+
+    name: str
+    segments: tuple[Segment, ...]  # parents before children; the first is the root
+
+    def __post_init__(self) -> None:
+        known: list[str] = []
+        for segment in self.segments:
+            if segment.name in known:
+                raise BodyError(f"two segments are named '{segment.name}'; give each its own name")
+            if (segment.parent is None) != (not known):
+                raise BodyError(f"segment '{segment.name}': exactly the first segment has no parent")
+            if segment.parent is not None and segment.parent not in known:
+                listed = ", ".join(known)
+                raise BodyError(
+                    f"segment '{segment.name}': parent '{segment.parent}' must stand before it; so far: {listed}"
+                )
+            known.append(segment.name)
+        if not any(segment.parts for segment in self.segments):
+            raise BodyError(f"body '{self.name}' has no part to see; add a [[segment.part]]")
+
+    @cached_property
+    def parents(self) -> NDArray[np.int64]:
+        """The index of each segment's parent, -1 for the root: (segments,)."""
+        names = [segment.name for segment in self.segments]
+        return np.array([-1 if s.parent is None else names.index(s.parent) for s in self.segments])
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Every part, in the order of the segments."""
+        return tuple(part for segment in self.segments for part in segment.parts)
+
+    @property
+    def needs_colours(self) -> bool:
+        """Whether a part's colour is still to be sampled from the video."""
+        return any(part.colour is None for part in self.parts)
+
+    def with_colours(self, colours: Array) -> BodyModel:
+        """Return the body with the colours (parts, 3), sRGB 0..255, in the order of `parts`."""
+        queue = iter(np.asarray(colours, float))
+        segments = tuple(
+            replace(s, parts=tuple(replace(part, colour=next(queue)) for part in s.parts)) for s in self.segments
+        )
+        return replace(self, segments=segments)
+
+    def with_pose(self, pose: Pose) -> PosedBody:
+        """Place the body in the world."""
+        angles = pose.joint_angles if pose.joint_angles.size else np.zeros((len(self.segments) - 1, 3))
+        if angles.shape != (len(self.segments) - 1, 3):
+            raise BodyError(f"body '{self.name}' has {len(self.segments) - 1} joints, the pose {len(angles)}")
+        placed = [pose.world_from_root]
+        for segment, parent, xyz in zip(self.segments[1:], self.parents[1:], angles, strict=True):
+            parent_from_segment = RigidTransform.from_components(segment.joint_m, Rotation.from_euler("XYZ", xyz))
+            placed.append(placed[parent] * parent_from_segment)
+        return PosedBody(
+            self,
+            np.stack([p.rotation.as_matrix() for p in placed]),
+            np.stack([p.translation for p in placed]),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosedBody:
+    """A body in the world."""
+
+    model: BodyModel
+    R: Array  # (segments, 3, 3) world from segment, rotations
+    t: Array  # (segments, 3) world from segment, translations [m]
+
+
+def _require_positive(values: Array, name: str) -> None:
+    if values.shape != (3,) or not np.all(np.isfinite(values)) or np.any(values <= 0):
+        raise BodyError(f"{name} is {np.asarray(values).tolist()}; it needs three lengths above zero, in metres")

@@ -1,0 +1,113 @@
+"""Which turns of a rigid body no camera can tell from the body itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.body.model import BodyModel, Box, Ellipsoid, Pose, Shape
+
+Array = NDArray[np.floating]
+
+_SAME_PLACE_M = 1e-6
+_SAME_SPREAD_M2 = 1e-7
+_SAME_COLOUR = 1.0  # grey levels
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solid:
+    """A part in the root's frame, free of how its axes are named."""
+
+    index: int
+    points: Array  # (p, 3) corners, or vertices and face centres, or an ellipsoid's centre [m]
+    spread: Array  # (3, 3) an ellipsoid's axes as a sum of squares [m^2]; zero for other shapes
+    colour: Array | None
+
+    def turned(self, R: Array) -> _Solid:
+        return _Solid(self.index, self.points @ R.T, R @ self.spread @ R.T, self.colour)
+
+    def looks_like(self, other: _Solid) -> bool:
+        if len(self.points) != len(other.points) or not self._has_colour_of(other):
+            return False
+        if np.any(np.abs(self.spread - other.spread) > _SAME_SPREAD_M2):
+            return False
+        there, _ = KDTree(other.points).query(self.points)
+        back, _ = KDTree(self.points).query(other.points)
+        return bool(max(there.max(), back.max()) < _SAME_PLACE_M)
+
+    def _has_colour_of(self, other: _Solid) -> bool:
+        if self.colour is None or other.colour is None:
+            return self.index == other.index
+        return bool(np.all(np.abs(self.colour - other.colour) <= _SAME_COLOUR))
+
+
+def symmetries(model: BodyModel) -> list[Array]:
+    """Find the rotations (3, 3) about the root's origin under which the body, joints straight, looks the same.
+
+    Searched among the 24 rotations of the cube; the identity is always the first. A body seen at `R` and at `R @ S`
+    gives the same images. A part whose colour is still to be sampled is like no other part.
+    """
+    solids = _solids(model)
+    found = [R for R in Rotation.create_group("O").as_matrix().round() + 0.0 if _is_same(R, solids)]
+    return sorted(found, key=lambda R: -float(np.trace(R)))
+
+
+def continuous_axes(model: BodyModel) -> Array:
+    """Find the axes through the root's origin about which no turn can be seen: unit rows (k, 3), root's frame.
+
+    None for most bodies, one for spheroids and spheres lined up, and all three where every axis is one (a ball).
+    """
+    axes: list[Array] = []  # directions that a symmetry axis must have
+    for part, solid in zip(model.parts, _solids(model), strict=True):
+        if not isinstance(part.shape, Ellipsoid):
+            return np.zeros((0, 3))
+        centre = solid.points[0]
+        if np.linalg.norm(centre) > _SAME_PLACE_M:
+            axes.append(centre / np.linalg.norm(centre))
+        variances, directions = np.linalg.eigh(solid.spread)
+        steps = np.diff(np.sqrt(variances)) > _SAME_PLACE_M
+        if steps.all():
+            return np.zeros((0, 3))
+        if steps.any():
+            axes.append(directions[:, 0] if steps[0] else directions[:, 2])
+    if not axes:
+        return np.eye(3)
+    is_one_axis = all(np.linalg.norm(np.cross(axes[0], axis)) < _SAME_PLACE_M for axis in axes)
+    return axes[0][None] if is_one_axis else np.zeros((0, 3))
+
+
+def _solids(model: BodyModel) -> list[_Solid]:
+    posed = model.with_pose(Pose(world_from_root=RigidTransform.identity()))
+    solids: list[_Solid] = []
+    for segment, R, t in zip(model.segments, posed.R, posed.t, strict=True):
+        for part in segment.parts:
+            turn = R @ part.segment_from_part.rotation.as_matrix()
+            place = R @ part.segment_from_part.translation + t
+            spread = np.zeros((3, 3))
+            if isinstance(part.shape, Ellipsoid):
+                spread = turn @ np.diag(np.square(part.shape.semi_axes_m)) @ turn.T
+            solids.append(_Solid(len(solids), _points(part.shape) @ turn.T + place, spread, part.colour))
+    return solids
+
+
+def _points(shape: Shape) -> Array:
+    if isinstance(shape, Ellipsoid):
+        return np.zeros((1, 3))
+    if isinstance(shape, Box):
+        return np.array(list(product((-0.5, 0.5), repeat=3))) * shape.size_m
+    return np.concatenate([shape.vertices_m, shape.vertices_m[shape.faces].mean(axis=1)])
+
+
+def _is_same(R: Array, solids: list[_Solid]) -> bool:
+    left = list(solids)
+    for solid in (solid.turned(R) for solid in solids):
+        twin = next((other for other in left if solid.looks_like(other)), None)
+        if twin is None:
+            return False
+        left.remove(twin)
+    return True

@@ -1,0 +1,213 @@
+"""How far a measured motion is from the true one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from airborne.errors import ResultError
+from airborne.evaluation.truth import Truth
+from airborne.geometry.rotations import angles_from_matrix, geodesic, is_near_singular, wrapped
+from airborne.motion import Motion
+from airborne.tracking import Status
+
+Array = NDArray[np.floating]
+Triple = tuple[float, float, float]
+
+_SAME_TIME_S = 1e-6  # where neither table has two times to tell its period
+
+
+@dataclass(frozen=True, slots=True)
+class PositionErrors:
+    """Errors of the root's position: x, y, z, and the distance in space."""
+
+    rms_mm: Triple
+    largest_mm: Triple
+    rms_3d_mm: float
+    largest_3d_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class OrientationErrors:
+    """Errors of somersault, tilt and twist, and of the whole orientation (the geodesic angle)."""
+
+    rms_deg: Triple
+    largest_deg: Triple
+    geodesic_rms_deg: float
+    geodesic_largest_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Shares of the errors, axis by axis, inside one and two reported standard deviations; NaN for n = 0.
+
+    Normal errors with honest deviations give 0.683 and 0.954. Infinite and unknown deviations are not counted.
+    """
+
+    within_1sd: float
+    within_2sd: float
+    n: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """A motion against the truth, over the frames whose times match."""
+
+    n_frames: int  # of the motion
+    n_truth: int
+    n_matched: int
+    n_tracked: int  # of the matched, likewise the next two
+    n_uncertain: int
+    n_lost: int
+    largest_time_offset_s: float
+    position: PositionErrors
+    raw: OrientationErrors
+    modulo_run: OrientationErrors  # the one symmetry of the body that suits the whole run best
+    modulo_frame: OrientationErrors  # the nearest symmetry in every frame
+    n_symmetries: int  # with the identity
+    n_flips: int  # frames whose nearest symmetry is not that of the frame before
+    n_singular: int  # true tilts near +-90 degrees, where somersault and twist errors mean little
+    position_calibration: Calibration
+    rotation_calibration: Calibration
+
+    def to_dict(self) -> dict:
+        """Return the numbers for a JSON file; what is unknown is None."""
+        return _without_nan(asdict(self))
+
+    def describe(self) -> str:
+        """Return the numbers as a short plain table."""
+        lines = [
+            f"{self.n_matched} of {self.n_truth} reference times matched, at most "
+            f"{1e3 * self.largest_time_offset_s:.1f} ms off: "
+            f"{self.n_tracked} tracked, {self.n_uncertain} uncertain, {self.n_lost} lost",
+            f"{'position [mm]':<18}{'RMS':>9}{'max':>9}",
+        ]
+        position = self.position
+        rms, largest = (*position.rms_mm, position.rms_3d_mm), (*position.largest_mm, position.largest_3d_mm)
+        for name, a, b in zip(("x", "y", "z", "in space"), rms, largest, strict=True):
+            lines.append(f"  {name:<16}{a:9.2f}{b:9.2f}")
+        kinds = {"": self.raw}
+        if self.n_symmetries > 1:
+            kinds |= {" modulo symmetry, whole run": self.modulo_run, " modulo symmetry, by frame": self.modulo_frame}
+        for title, errors in kinds.items():
+            lines.append(f"orientation [deg]{title}")
+            rms = (*errors.rms_deg, errors.geodesic_rms_deg)
+            largest = (*errors.largest_deg, errors.geodesic_largest_deg)
+            for name, a, b in zip(("somersault", "tilt", "twist", "whole"), rms, largest, strict=True):
+                lines.append(f"  {name:<16}{a:9.2f}{b:9.2f}")
+        if self.n_singular:
+            lines.append(f"{self.n_singular} frames near 90 degrees of tilt: their somersault and twist mean little")
+        if self.n_flips:
+            lines.append(f"{self.n_flips} jumps between poses that look the same")
+        for name, share in (("position", self.position_calibration), ("rotation", self.rotation_calibration)):
+            if share.n:
+                lines.append(
+                    f"{name} errors within 1 sd {share.within_1sd:.0%} (normal: 68%), "
+                    f"within 2 sd {share.within_2sd:.0%} (95%), n = {share.n}"
+                )
+        return "\n".join(lines)
+
+
+def compare(motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> Comparison:
+    """Compare a motion with the truth, or another reference, frame by frame.
+
+    Each frame goes with the nearest time of the truth, less than half a period of the finer of the two away.
+    `symmetries` are the body's (see `airborne.body.symmetry`), the identity among them: a body at `R` looks like one
+    at `R @ S`. Raises ResultError where no frame with a pose has a true time.
+    """
+    frames, rows, offset = _match(motion.time_s, truth.time_s)
+    status = motion.status[frames]
+    has_pose = motion.has_pose[frames]
+    frames, rows, offset_seen = frames[has_pose], rows[has_pose], offset[has_pose]
+    if not len(frames):
+        raise ResultError(
+            f"no pose to compare: motion {_span(motion.time_s)} with {int(motion.has_pose.sum())} poses, "
+            f"truth {_span(truth.time_s)}; give the truth of this recording"
+        )
+    R, true_R = motion.R[frames], truth.R[rows]
+    alike = R[:, None] @ np.stack(list(symmetries))  # (n, symmetries, 3, 3)
+    angle = geodesic(alike, true_R[:, None])
+    nearest = np.argmin(angle, axis=1)
+    nearest_R = alike[np.arange(len(R)), nearest]
+    best = int(np.argmin(np.mean(angle**2, axis=0)))
+    position_error = motion.position[frames] - truth.position[rows]
+    rotation_error = Rotation.from_matrix(nearest_R @ np.swapaxes(true_R, -1, -2)).as_rotvec()
+    return Comparison(
+        n_frames=len(motion),
+        n_truth=len(truth.time_s),
+        n_matched=len(status),
+        n_tracked=int(np.sum(status == Status.TRACKED.value)),
+        n_uncertain=int(np.sum(status == Status.UNCERTAIN.value)),
+        n_lost=int(np.sum(status == Status.LOST.value)),
+        largest_time_offset_s=float(offset_seen.max()),
+        position=_position_errors(position_error),
+        raw=_orientation_errors(R, true_R),
+        modulo_run=_orientation_errors(alike[:, best], true_R),
+        modulo_frame=_orientation_errors(nearest_R, true_R),
+        n_symmetries=len(symmetries),
+        n_flips=int(np.sum(np.diff(nearest) != 0)),
+        n_singular=int(np.sum(is_near_singular(angles_from_matrix(true_R)))),
+        position_calibration=_calibration(position_error, motion.position_sd[frames]),
+        rotation_calibration=_calibration(rotation_error, motion.rotation_sd[frames]),
+    )
+
+
+def _match(time_s: Array, true_time_s: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Rows of the motion, rows of the truth nearest in time, and the time between them [s]."""
+    periods = [float(np.median(np.diff(t))) for t in (time_s, true_time_s) if len(t) > 1]
+    reach = min(periods) / 2 if periods else _SAME_TIME_S
+    rows = np.searchsorted((true_time_s[1:] + true_time_s[:-1]) / 2, time_s)
+    offset = np.abs(time_s - true_time_s[rows])
+    frames = np.flatnonzero(offset < reach)
+    return frames, rows[frames], offset[frames]
+
+
+def _position_errors(error: Array) -> PositionErrors:
+    distance = np.linalg.norm(error, axis=-1)
+    return PositionErrors(
+        _triple(1e3 * _rms(error)),
+        _triple(1e3 * np.abs(error).max(axis=0)),
+        float(1e3 * _rms(distance)),
+        float(1e3 * distance.max()),
+    )
+
+
+def _orientation_errors(R: Array, true_R: Array) -> OrientationErrors:
+    error = np.rad2deg(wrapped(angles_from_matrix(R) - angles_from_matrix(true_R)))
+    angle = np.rad2deg(geodesic(R, true_R))
+    return OrientationErrors(
+        _triple(_rms(error)), _triple(np.abs(error).max(axis=0)), float(_rms(angle)), float(angle.max())
+    )
+
+
+def _calibration(error: Array, sd: Array) -> Calibration:
+    is_known = np.isfinite(sd)
+    ratio, spread = np.abs(error[is_known]), sd[is_known]
+    if not len(ratio):
+        return Calibration(math.nan, math.nan, 0)
+    return Calibration(float(np.mean(ratio <= spread)), float(np.mean(ratio <= 2 * spread)), len(ratio))
+
+
+def _rms(values: Array) -> Array:
+    return np.sqrt(np.mean(values**2, axis=0))
+
+
+def _triple(values: Array) -> Triple:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+def _span(time_s: Array) -> str:
+    return f"{time_s[0]:.3f} to {time_s[-1]:.3f} s" if len(time_s) else "empty"
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    return None if isinstance(value, float) and math.isnan(value) else value

@@ -1,0 +1,177 @@
+"""Paper B's comparison (its figs 9, 10): tracked poses against poses from points that a person clicked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from airborne.body import BodyModel, Box, Pose
+from airborne.cameras import Rig
+from airborne.errors import ResultError
+from airborne.evaluation.compare import Comparison, compare
+from airborne.evaluation.table import read_table
+from airborne.evaluation.truth import Truth
+from airborne.motion import Motion
+
+Array = NDArray[np.floating]
+
+_EXPECTED = "a table of clicked points with the columns field, <point>_<camera>_u, <point>_<camera>_v, ..."
+_COLLINEAR = 1e-6  # of the largest spread: points nearer to one line give no orientation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Digitised:
+    """Points clicked by hand, as `<part>_minus` and `<part>_plus`: the ends of a bar."""
+
+    index: NDArray[np.int64]  # (n,) frame or field numbers
+    points: tuple[str, ...]
+    px: Array  # (n, points, cameras, 2) [px], in the rig's order; NaN where not clicked
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class DigitisedPoses:
+    """The body's root as the clicked points place it; NaN where too few were clicked."""
+
+    index: NDArray[np.int64]  # (n,)
+    position: Array  # (n, 3) [m]
+    R: Array  # (n, 3, 3) world from root
+    residual: Array  # (n, points) distance between a point and its place on the fitted body [m]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DigitisedComparison:
+    """Tracked minus digitised, and how well the digitised points fit a rigid body."""
+
+    tracked_minus_digitised: Comparison
+    rigid_fit_residual_rms_mm: float
+    n_poses: int  # digitised
+
+    def to_dict(self) -> dict:
+        """Return the numbers for a JSON file; what is unknown is None."""
+        return {
+            "tracked_minus_digitised": self.tracked_minus_digitised.to_dict(),
+            "rigid_fit_residual_rms_mm": self.rigid_fit_residual_rms_mm,
+            "n_poses": self.n_poses,
+        }
+
+    def describe(self) -> str:
+        """Return the numbers as a short plain table."""
+        fit = f"{self.n_poses} digitised poses; rigid fit residual RMS {self.rigid_fit_residual_rms_mm:.2f} mm"
+        return f"{fit}\n{self.tracked_minus_digitised.describe()}"
+
+
+def read_digitised(path: Path, rig: Rig) -> Digitised:
+    """Read clicked points; blank cells are points not clicked. Raises ResultError in one line.
+
+    Pixels are those of the full image, (0, 0) the centre of its top-left pixel, with the lens's distortion.
+    """
+    table = read_table(path, _EXPECTED)
+    if table.names[0] not in ("field", "frame"):
+        raise ResultError(f"{path} begins with column {table.names[0]}; expected {_EXPECTED}")
+    columns = {name: _point_and_camera(path, name, rig) for name in table.names[1:]}
+    points = tuple(dict.fromkeys(point for point, _, _ in columns.values()))
+    if not points:
+        raise ResultError(f"{path} has no clicked points; expected {_EXPECTED}")
+    values = table.numbers(list(columns))
+    px = np.full((len(values), len(points), len(rig), 2), np.nan)
+    for k, (point, camera, axis) in enumerate(columns.values()):
+        px[:, points.index(point), camera, axis] = values[:, k]
+    return Digitised(index=table.whole_numbers(table.names[0]), points=points, px=px)
+
+
+def body_points(model: BodyModel, points: Sequence[str]) -> Array:
+    """Place clicked points on the body, in the root's frame, joints straight: (points, 3) [m].
+
+    `<stem>_minus` and `<stem>_plus` are the ends of the longest axis of the box whose part's name begins with the
+    stem. Raises ResultError where no single box answers to the name.
+    """
+    posed = model.with_pose(Pose(world_from_root=RigidTransform.identity()))
+    boxes: dict[str, tuple[Array, Array]] = {}  # centre and half of the longest axis
+    for segment, R, t in zip(model.segments, posed.R, posed.t, strict=True):
+        for part in segment.parts:
+            if isinstance(part.shape, Box):
+                half = np.where(np.arange(3) == np.argmax(part.shape.size_m), part.shape.size_m / 2, 0.0)
+                place = part.segment_from_part
+                boxes[part.name] = (R @ place.translation + t, R @ place.rotation.apply(half))
+    return np.stack([_end(point, boxes) for point in points])
+
+
+def digitised_poses(digitised: Digitised, rig: Rig, model: BodyModel) -> DigitisedPoses:
+    """Triangulate the clicked points and fit the rigid body to them, each weighted by the cameras that saw it."""
+    on_body = body_points(model, digitised.points)
+    in_world = rig.points_from_px(digitised.px)
+    n_views = np.isfinite(digitised.px).all(axis=-1).sum(axis=-1)
+    fits = [fit_rigid(on_body, points, views) for points, views in zip(in_world, n_views, strict=True)]
+    R, position = np.stack([fit[0] for fit in fits]), np.stack([fit[1] for fit in fits])
+    fitted = np.einsum("nij,pj->npi", R, on_body) + position[:, None]
+    residual = np.linalg.norm(fitted - in_world, axis=-1)
+    return DigitisedPoses(index=digitised.index, position=position, R=R, residual=residual)
+
+
+def compare_digitised(motion: Motion, poses: DigitisedPoses, symmetries: Sequence[Array]) -> DigitisedComparison:
+    """Compare the tracked poses with the digitised ones of the same frame or field numbers.
+
+    `symmetries` as in `compare`. Raises ResultError where the two have no frame in common.
+    """
+    is_known = np.isfinite(poses.position).all(axis=-1)
+    _, rows, frames = np.intersect1d(poses.index[is_known], motion.index, return_indices=True)
+    if not len(rows):
+        raise ResultError(
+            f"no digitised pose belongs to a frame of the motion ({int(is_known.sum())} poses, {len(motion)} frames); "
+            "click at least three points, not in a line, in two cameras, in frames that were tracked"
+        )
+    truth = Truth(
+        index=motion.index[frames],
+        time_s=motion.time_s[frames],
+        position=poses.position[is_known][rows],
+        R=poses.R[is_known][rows],
+    )
+    unrated = replace(motion, covariance=np.full_like(motion.covariance, np.nan))  # clicks err too: they test no sd
+    return DigitisedComparison(
+        tracked_minus_digitised=compare(unrated, truth, symmetries),
+        rigid_fit_residual_rms_mm=float(1e3 * np.sqrt(np.nanmean(poses.residual**2))),
+        n_poses=int(is_known.sum()),
+    )
+
+
+def fit_rigid(source: Array, target: Array, weights: Array) -> tuple[Array, Array]:
+    """Find R (3, 3), t (3,) [m] that least `sum w |R source + t - target|^2`, points (p, 3); NaN targets are left out.
+
+    Kabsch's solution by SVD. NaN where fewer than three points are left, or they lie in a line.
+    """
+    is_known = np.isfinite(target).all(axis=-1) & (weights > 0)
+    a, b, w = source[is_known], target[is_known], weights[is_known, None]
+    if len(a) >= 3:
+        mean_a, mean_b = (w * a).sum(axis=0) / w.sum(), (w * b).sum(axis=0) / w.sum()
+        U, spread, Vt = np.linalg.svd((w * (b - mean_b)).T @ (a - mean_a))
+        if spread[1] > _COLLINEAR * spread[0]:
+            R = U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
+            return R, mean_b - R @ mean_a
+    return np.full((3, 3), np.nan), np.full(3, np.nan)
+
+
+def _point_and_camera(path: Path, name: str, rig: Rig) -> tuple[str, int, int]:
+    stem, _, axis = name.rpartition("_")
+    for camera in sorted(rig.names, key=len, reverse=True):  # the longest first: "far_left" also ends with "_left"
+        point = stem.removesuffix(f"_{camera}")
+        if point and point != stem and axis in ("u", "v"):
+            return point, rig.names.index(camera), "uv".index(axis)
+    raise ResultError(f"{path}: column {name} is no <point>_<camera>_u or _v; cameras: {', '.join(rig.names)}")
+
+
+def _end(point: str, boxes: dict[str, tuple[Array, Array]]) -> Array:
+    stem, _, end = point.rpartition("_")
+    found = [name for name in boxes if name.startswith(stem)] if stem and end in ("minus", "plus") else []
+    if len(found) != 1:
+        listed = ", ".join(boxes) or "none"
+        raise ResultError(
+            f"point '{point}' is the end of no single box of the body; name it <part>_minus or <part>_plus, "
+            f"with one of the boxes: {listed}"
+        )
+    centre, half = boxes[found[0]]
+    return centre + half if end == "plus" else centre - half

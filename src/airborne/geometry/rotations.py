@@ -1,0 +1,89 @@
+"""Somersault, tilt and twist: R = Rx(somersault) Ry(tilt) Rz(twist), body to world; angles are stacked in that order.
+
+Source: paper B, "Method" (successive rotations about a lateral, a frontal and a longitudinal axis). The angles lose
+their meaning where tilt nears +-90 degrees: `is_near_singular` says where. NaN rows in give NaN rows out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating]
+
+SINGULAR_MARGIN_RAD = np.deg2rad(5.0)  # closer to +-90 degrees of tilt, errors grow over elevenfold
+_RATE_ROWS = 5  # rows before a gap whose mean turning rate is carried across it
+
+
+def matrix_from_angles(angles: Array) -> Array:
+    """Build rotation matrices (..., 3, 3), body to world, from somersault, tilt, twist (..., 3) [rad]."""
+    (cx, cy, cz), (sx, sy, sz) = (np.moveaxis(f(np.asarray(angles, float)), -1, 0) for f in (np.cos, np.sin))
+    rows = [
+        [cy * cz, -cy * sz, sy],
+        [cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, -sx * cy],
+        [sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def angles_from_matrix(R: Array) -> Array:
+    """Read somersault, tilt, twist (..., 3) [rad] from rotation matrices (..., 3, 3); tilt lies in [-pi/2, pi/2].
+
+    The twist is read after the somersault is undone, so the angles give R back even where tilt is +-90 degrees.
+    """
+    R = np.asarray(R, float)
+    somersault = np.arctan2(-R[..., 1, 2], R[..., 2, 2])
+    tilt = np.arctan2(R[..., 0, 2], np.hypot(R[..., 0, 0], R[..., 0, 1]))
+    c, s = np.cos(somersault), np.sin(somersault)
+    twist = np.arctan2(c * R[..., 1, 0] + s * R[..., 2, 0], c * R[..., 1, 1] + s * R[..., 2, 1])
+    return np.stack([somersault, tilt, twist], axis=-1)
+
+
+def is_near_singular(angles: Array) -> NDArray[np.bool_]:
+    """Say where tilt is within 5 degrees of +-90, so that somersault and twist cannot be told apart: (...)."""
+    return np.abs(np.asarray(angles, float)[..., 1]) > np.pi / 2 - SINGULAR_MARGIN_RAD
+
+
+def unwrapped(angles: Array, time_s: Array) -> Array:
+    """Add whole turns to somersault and twist (n, 3) [rad] so that they run on over time (n,) [s].
+
+    Each row lands within half a turn of the row before. Over a gap (NaN rows) it lands within half a turn of where
+    the mean rate of the last rows before the gap leads.
+    """
+    result = np.array(angles, float)
+    known = np.flatnonzero(np.isfinite(result).all(axis=-1))
+    for k in range(1, len(known)):
+        row, before = known[k], known[max(k - _RATE_ROWS, 0) : k]
+        guess = result[before[-1]]
+        if row > before[-1] + 1 and len(before) > 1:
+            step = (time_s[row] - time_s[before[-1]]) / (time_s[before[-1]] - time_s[before[0]])
+            guess = guess + step * (guess - result[before[0]])
+        result[row, ::2] += 2 * np.pi * np.round((guess - result[row]) / (2 * np.pi))[::2]
+    return result
+
+
+def angles_from_world_rotation(angles: Array) -> Array:
+    """Differentiate the angles by a small world rotation vector: (..., 3, 3), rows somersault, tilt, twist.
+
+    From w = som' e_x + tilt' Rx e_y + twist' Rx Ry e_z. NaN where `is_near_singular`.
+    """
+    angles = np.asarray(angles, float)
+    somersault, tilt = angles[..., 0], angles[..., 1]
+    c, s = np.cos(somersault), np.sin(somersault)
+    cos_tilt = np.where(is_near_singular(angles), np.nan, np.cos(tilt))
+    zero, one = np.zeros_like(tilt), np.ones_like(tilt)
+    twist_row = np.stack([zero, -s, c], axis=-1) / cos_tilt[..., None]
+    somersault_row = np.stack([one, zero, zero], axis=-1) - np.sin(tilt)[..., None] * twist_row
+    return np.stack([somersault_row, np.stack([zero, c, s], axis=-1), twist_row], axis=-2)
+
+
+def geodesic(A: Array, B: Array) -> Array:
+    """Measure the smallest angle that turns A into B, rotation matrices (..., 3, 3): (...) [rad], 0..pi."""
+    relative = np.swapaxes(A, -1, -2) @ B
+    axis = relative[..., (2, 0, 1), (1, 2, 0)] - relative[..., (1, 2, 0), (2, 0, 1)]  # 2 sin(angle) times the axis
+    return np.arctan2(np.linalg.norm(axis, axis=-1), np.trace(relative, axis1=-2, axis2=-1) - 1)
+
+
+def wrapped(angle: Array) -> Array:
+    """Bring angles to the half turn on either side of zero, [-pi, pi) [rad]."""
+    return np.remainder(np.asarray(angle, float) + np.pi, 2 * np.pi) - np.pi

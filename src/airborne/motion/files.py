@@ -1,0 +1,157 @@
+"""motion.csv: one row per finished frame, written as a run goes, read back to the last bit."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import Pose
+from airborne.errors import ResultError
+from airborne.motion.motion import Motion, rigid_transform
+from airborne.motion.tables import cell, motion_columns
+from airborne.tracking import Estimate, Status
+
+_UPPER = np.triu_indices(6)
+_COVARIANCE = [f"cov_{i}{j}" for i, j in zip(*_UPPER, strict=True)]
+_ROTATION = [f"r{i}{j}" for i in range(3) for j in range(3)]
+
+
+class MotionWriter:
+    """Appends estimates to motion.csv; each row is on the disk before the next frame is begun.
+
+    A killed run leaves whole rows and at most one torn last line, which `read_estimates` drops.
+    """
+
+    def __init__(self, path: Path, joints: tuple[str, ...] = (), *, resume: bool = False) -> None:
+        """Start the file anew, or with `resume` keep its finished rows and cut a torn last line.
+
+        `joints` are the names of the body's segments after the root. Raises ResultError where the file to resume is
+        not a motion of that body.
+        """
+        kept = _whole_lines(path) if resume and path.exists() else b""
+        if kept and _parse(path)[0] != joints:
+            listed = ", ".join(joints) or "none"
+            raise ResultError(f"{path} was written for another body; joints here: {listed}; start in a new folder")
+        self._joints = joints
+        self._file = path.open("r+b" if kept else "wb")
+        self._file.truncate(len(kept))
+        self._file.seek(len(kept))
+        if not kept:
+            self._write_line(_header(joints))
+
+    def __enter__(self) -> MotionWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def append(self, estimate: Estimate) -> None:
+        """Write one frame and wait until the disk has it."""
+        motion = Motion.collect([estimate], self._joints)
+        public = [cell(column[0]) for column in motion_columns(motion).values()]
+        covariance = map(cell, motion.covariance[0][_UPPER])
+        pose = map(cell, [*motion.R[0].ravel(), *motion.joint_angles[0].ravel()])
+        self._write_line([*public, *covariance, str(estimate.time_s), *pose])
+
+    def _write_line(self, cells: list[str]) -> None:
+        self._file.write((",".join(cells) + "\n").encode())
+        self._file.flush()
+        os.fsync(self._file.fileno())
+
+
+def read_estimates(path: Path) -> list[Estimate]:
+    """Read the estimates of motion.csv, with exactly the floats and times that were written.
+
+    A torn last line is dropped. A covariance comes back symmetric, from its upper triangle. Raises ResultError in one
+    line for a file that is missing or not a motion.csv.
+    """
+    return _parse(path)[1]
+
+
+def read_motion(path: Path) -> Motion:
+    """Read motion.csv as a `Motion`; same rules as `read_estimates`."""
+    joints, estimates = _parse(path)
+    return Motion.collect(estimates, joints)
+
+
+def _header(joints: tuple[str, ...]) -> list[str]:
+    angles = [f"{joint}_{axis}_rad" for joint in joints for axis in "xyz"]
+    return [*motion_columns(Motion.collect([])), *_COVARIANCE, "time_exact", *_ROTATION, *angles]
+
+
+def _whole_lines(path: Path) -> bytes:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ResultError(f"{path} cannot be read ({error.strerror}); expected the motion.csv of a run") from error
+    return data[: data.rfind(b"\n") + 1]
+
+
+def _parse(path: Path) -> tuple[tuple[str, ...], list[Estimate]]:
+    data = _whole_lines(path)
+    try:
+        rows = list(csv.reader(data.decode().splitlines()))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ResultError(f"{path} is not a text table ({error}); expected the motion.csv of a run") from error
+    joints = _joints_of(path, rows[0] if rows else [])
+    header, estimates = _header(joints), []
+    for number, cells in enumerate(rows[1:], start=2):
+        try:
+            estimate = _estimate(dict(zip(header, cells, strict=True)), len(joints))
+            if estimates and estimate.index <= estimates[-1].index:
+                raise ValueError(f"frame {estimate.index} after frame {estimates[-1].index}, expected a later one")
+            estimates.append(estimate)
+        except (ValueError, ZeroDivisionError) as error:
+            reason = f"{len(cells)} cells, expected {len(header)}" if len(cells) != len(header) else error
+            raise ResultError(f"{path} line {number}: {reason}; mend the line or track again") from error
+    return joints, estimates
+
+
+def _joints_of(path: Path, header: list[str]) -> tuple[str, ...]:
+    fixed = _header(())
+    joints = tuple(name.removesuffix("_x_rad") for name in header[len(fixed) :: 3])
+    if header != _header(joints):
+        missing = [name for name in fixed if name not in header]
+        found = f"has no column {', '.join(missing[:3])}" if missing else "has its columns in another order"
+        raise ResultError(f"{path} {found if header else 'is empty'}; expected the motion.csv of a run; track again")
+    return joints
+
+
+def _estimate(row: dict[str, str], n_joints: int) -> Estimate:
+    status = Status(row["status"])
+    position = _numbers(row, ["x_m", "y_m", "z_m"])
+    R = _numbers(row, _ROTATION).reshape(3, 3)
+    upper = _numbers(row, _COVARIANCE)
+    covariance = np.empty((6, 6))
+    covariance[_UPPER] = covariance.T[_UPPER] = upper
+    pose = None
+    if status is not Status.LOST:
+        if not np.abs(R.T @ R - np.eye(3)).max() < 1e-6:
+            raise ValueError(f"r00..r22 of a {status} frame are not a rotation")
+        if not np.isfinite(position).all():
+            raise ValueError(f"a {status} frame has no position")
+        angles = _numbers(row, list(row)[-3 * n_joints :] if n_joints else []).reshape(n_joints, 3)
+        pose = Pose(world_from_root=rigid_transform(R, position), joint_angles=angles)
+    return Estimate(
+        index=int(row["frame"]),
+        time_s=Fraction(row["time_exact"]),
+        status=status,
+        score=_number(row["score"]),
+        pose=pose,
+        covariance=None if np.isnan(upper).all() else covariance,
+        n_views=int(row["n_views"]),
+    )
+
+
+def _numbers(row: dict[str, str], names: list[str]) -> NDArray[np.float64]:
+    return np.array([_number(row[name]) for name in names])
+
+
+def _number(text: str) -> float:
+    return float(text) if text else math.nan

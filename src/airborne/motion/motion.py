@@ -1,0 +1,133 @@
+"""A body's motion: every frame of a run as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.body import Pose
+from airborne.tracking import Estimate, Status
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motion:
+    """The root's pose and its uncertainty over time; rows of lost frames are NaN.
+
+    The covariance is that of `Estimate`: position [m], then a rotation vector in world axes [rad]. A variance is
+    infinite where the images do not show that direction, NaN where it is unknown.
+    """
+
+    index: NDArray[np.int64]  # (n,) frame or field numbers
+    time_s: Array  # (n,) [s]
+    status: NDArray[np.str_]  # (n,) values of `Status`
+    score: Array  # (n,) RMS colour difference [grey levels]
+    n_views: NDArray[np.int64]  # (n,)
+    position: Array  # (n, 3) [m]
+    R: Array  # (n, 3, 3) world from root
+    covariance: Array  # (n, 6, 6)
+    joints: tuple[str, ...]  # names of the segments after the root; () for a body in one piece
+    joint_angles: Array  # (n, joints, 3) x-y-z [rad]
+
+    @classmethod
+    def collect(cls, estimates: Sequence[Estimate], joints: tuple[str, ...] = ()) -> Motion:
+        """Stack the estimates of a run, in their order; `joints` names the rows of their poses' joint angles."""
+        n = len(estimates)
+        position, R, covariance = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((n, 6, 6), np.nan)
+        joint_angles = np.full((n, len(joints), 3), np.nan)
+        for row, estimate in enumerate(estimates):
+            if estimate.pose is not None:
+                world_from_root = estimate.pose.world_from_root.as_matrix()
+                position[row], R[row] = world_from_root[:3, 3], world_from_root[:3, :3]
+                joint_angles[row] = estimate.pose.joint_angles if estimate.pose.joint_angles.size else 0.0
+            if estimate.covariance is not None:
+                covariance[row] = estimate.covariance
+        return cls(
+            index=np.array([e.index for e in estimates], np.int64),
+            time_s=np.array([float(e.time_s) for e in estimates], float),
+            status=np.array([e.status.value for e in estimates], np.str_),
+            score=np.array([e.score for e in estimates], float),
+            n_views=np.array([e.n_views for e in estimates], np.int64),
+            position=position,
+            R=R,
+            covariance=covariance,
+            joints=joints,
+            joint_angles=joint_angles,
+        )
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def pose(self, row: int | np.integer) -> Pose:
+        """Return the pose of one row that has one, bit for bit."""
+        return Pose(
+            world_from_root=rigid_transform(self.R[row], self.position[row]), joint_angles=self.joint_angles[row]
+        )
+
+    @property
+    def has_pose(self) -> NDArray[np.bool_]:
+        """Which frames claim a pose: (n,)."""
+        return np.asarray(np.isfinite(self.position).all(axis=-1))
+
+    @property
+    def quaternion(self) -> Array:
+        """World from root as x, y, z, w with w >= 0: (n, 4)."""
+        quaternion = np.full((len(self), 4), np.nan)
+        if self.has_pose.any():
+            quaternion[self.has_pose] = Rotation.from_matrix(self.R[self.has_pose]).as_quat(canonical=True)
+        return quaternion
+
+    @property
+    def position_sd(self) -> Array:
+        """Standard deviations of the position: (n, 3) [m]."""
+        return _sd(self.covariance)[:, :3]
+
+    @property
+    def rotation_sd(self) -> Array:
+        """Standard deviations of the orientation, as a rotation vector in world axes: (n, 3) [rad]."""
+        return _sd(self.covariance)[:, 3:]
+
+    def count(self, status: Status) -> int:
+        """Count the frames of one status."""
+        return int(np.sum(self.status == status.value))
+
+
+def rigid_transform(R: Array, position: Array) -> RigidTransform:
+    """Build the rigid map x -> R x + position, keeping every bit of R (3, 3), which must be a rotation."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = R, position
+    return RigidTransform(matrix, normalize=False)
+
+
+def dataset(motion: Motion, history: Sequence[str] = ()) -> xr.Dataset:
+    """Label a motion: coordinate `time` [s], units in the attributes, `history` the operations that led to it."""
+    time, vector, angle = ("time",), ("time", "space"), ("time", "joint", "space")
+    variables = {
+        "status": (time, motion.status, {}),
+        "score": (time, motion.score, {"units": "grey levels"}),
+        "n_views": (time, motion.n_views, {"units": "1"}),
+        "position": (vector, motion.position, {"units": "m", "frame": "world"}),
+        "position_sd": (vector, motion.position_sd, {"units": "m", "frame": "world"}),
+        "quaternion": (("time", "component"), motion.quaternion, {"units": "1", "map": "world_from_root"}),
+        "rotation_sd": (vector, motion.rotation_sd, {"units": "rad", "frame": "world"}),
+        "joint_angle": (angle, motion.joint_angles, {"units": "rad", "order": "x, y, z, body-fixed"}),
+    }
+    coordinates = {
+        "time": (time, motion.time_s, {"units": "s"}),
+        "frame": (time, motion.index),
+        "space": list("xyz"),
+        "component": list("xyzw"),
+        "joint": list(motion.joints),
+    }
+    return xr.Dataset(variables, coordinates, {"history": list(history)})
+
+
+def _sd(covariance: Array) -> Array:
+    variance = np.diagonal(covariance, axis1=-2, axis2=-1)
+    return np.sqrt(np.where(variance >= 0, variance, np.nan))

@@ -1,0 +1,55 @@
+"""The kernel that draws what each pixel of one view shows of a body: which part, how near, facing where."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from airborne.rendering.rows import BLOCK, LANES, NX, NY, NZ, SHAPE, W, count_rows, draw_row, find_spans, new_row
+from airborne.rendering.shapes import KERNEL, outline_all, place
+
+
+@njit(**KERNEL)
+def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
+    """Fill the maps of one view with the surface nearest to the camera.
+
+    shapes: workspace of `new_shapes`; R (s, 3, 3), t (s, 3) [m] world from segment; view (18,) packed.
+    part (h, w) int16: index into BodyModel.parts, -1 where there is none; inverse_depth (h, w) float32 [1/m], 0 where
+    there is none; normals (3, h, w) float32: outward unit normals in camera axes, left as they are where there is none.
+    """
+    height, width = part.shape
+    part[:] = -1
+    inverse_depth[:] = 0
+    place(shapes, geometry, R, t)
+    outline_all(shapes, geometry, view, width, height)
+    row_start, row_stop = np.empty(height + 1, np.int64), np.empty(height, np.int64)
+    n_spans = count_rows(shapes.rows, row_start)
+    ends, curves = np.empty((n_spans, 3), np.int64), np.empty((n_spans, 2))
+    find_spans(shapes, geometry, width, row_start, row_stop, ends, curves)
+    row = new_row(width)
+    n_ellipsoids = len(geometry.ellipsoid_part)
+    for v in range(height):
+        start, stop = row_start[v], row_stop[v]
+        if stop == start:
+            continue
+        first, last = width, -1
+        for k in range(start, stop):
+            first, last = min(first, ends[k, 0]), max(last, ends[k, 1])
+        first_block = first // LANES
+        draw_row(row, shapes.outline, shapes.surface, ends, curves, start, stop, v, first_block)
+        for u in range(first, last + 1):
+            at = (u // LANES - first_block) * BLOCK + u % LANES
+            w = row[at + W]
+            if w > 0:
+                shape = int(row[at + SHAPE])
+                if shape < n_ellipsoids:
+                    part[v, u] = geometry.ellipsoid_part[shape]
+                else:
+                    part[v, u] = geometry.polygon_part[shape - n_ellipsoids]
+                inverse_depth[v, u] = w
+                x, y, z = row[at + NX], row[at + NY], row[at + NZ]
+                length = np.sqrt(x * x + y * y + z * z)
+                normals[0, v, u], normals[1, v, u], normals[2, v, u] = x / length, y / length, z / length
+        for b in range(last // LANES - first_block + 1):
+            for j in range(LANES):
+                row[b * BLOCK + W + j] = 0

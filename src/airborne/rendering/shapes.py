@@ -1,0 +1,220 @@
+"""Kernels that place a body's shapes in the world and outline them in one view, in float64.
+
+Every shape, ellipsoid or polygon, becomes one row of numbers for the same pixel loop (`rows.py`):
+
+    w(u, v) = B (u, v, 1) + sqrt(alpha max(half(v)^2 - (u - mid(v))^2, 0))      inverse depth of the near surface
+    n(u, v) = N (u, v, 1) - w g                                                outward normal, any positive length
+
+For an ellipsoid (x - c)'M(x - c) = 1 in camera axes with g = M c and k = c'M c - 1: B = K^-T g / k, N = M K^-1, and the
+outline is (u, v, 1) Q (u, v, 1)' >= 0 with Q = B B' - K^-T M K^-1 / k, alpha = -Q00. A polygon of the plane m.x = d has
+B = K^-T m / d, alpha = 0, N = 0 and g = -m; a row cuts it between its edges, each a half-plane of the image that the
+camera's centre and the edge span, so nothing has to be clipped where corners lie behind the camera.
+
+Numba's cache looks at the file of the calling kernel only: after a change here, delete the folder's `__pycache__`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+INNER: dict[str, Any] = {"nogil": True, "fastmath": True, "error_model": "numpy"}  # called by kernels only
+KERNEL: dict[str, Any] = {**INNER, "cache": True}  # called from Python
+INNER = {**INNER, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+# columns of a packed view: world to camera (R row by row, t), then the two rows of K^-1
+VIEW_R, VIEW_T, VIEW_K, VIEW_COLUMNS = 0, 9, 12, 18
+# columns of an outline (float64)
+B_U, B_V, B_1, MID_V, MID_1, HALF_1, HALF_V, HALF_VV, NORMAL, OUTLINE_COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 8, 17
+# columns of a surface (float32): what the pixel loop holds fixed along a span
+ALPHA, W_STEP, N_STEP, G, COLOUR, ID, SURFACE_COLUMNS = 0, 1, 2, 5, 8, 11, 12
+
+
+class Shapes(NamedTuple):
+    """One thread's workspace: e ellipsoids, then p polygons with c corners; s = e + p shapes."""
+
+    centre: Any  # (e, 3) [m] world
+    axes: Any  # (e, 3, 3) columns: world axes over semi-axes [1/m]
+    corners: Any  # (c, 3) [m] world
+    normals: Any  # (p, 3) world
+    outline: Any  # (s, OUTLINE_COLUMNS)
+    surface: Any  # (s, SURFACE_COLUMNS) float32
+    rows: Any  # (s, 2) first and last row seen, last < first where none is
+    edges: Any  # (c, 3) side (+1 lower bound, -1 upper bound, 0 a condition on the row), slope, offset
+
+
+@njit(**INNER)
+def new_shapes(geometry):
+    """Allocate the workspace for a body and fill in what no pose changes."""
+    e, p, c = len(geometry.ellipsoid_segment), len(geometry.polygon_segment), len(geometry.corners)
+    surface = np.zeros((e + p, SURFACE_COLUMNS), np.float32)
+    for i in range(e + p):
+        part = geometry.ellipsoid_part[i] if i < e else geometry.polygon_part[i - e]
+        for k in range(3):
+            surface[i, COLOUR + k] = geometry.colours[part, k]
+        surface[i, ID] = i
+    return Shapes(
+        np.empty((e, 3)),
+        np.empty((e, 3, 3)),
+        np.empty((c, 3)),
+        np.empty((p, 3)),
+        np.zeros((e + p, OUTLINE_COLUMNS)),
+        surface,
+        np.empty((e + p, 2), np.int64),
+        np.empty((c, 3)),
+    )
+
+
+@njit(**INNER)
+def place(shapes, geometry, R, t):
+    """Move the shapes to the world with the segments' R (s, 3, 3) and t (s, 3) [m]."""
+    for e in range(len(geometry.ellipsoid_segment)):
+        segment = geometry.ellipsoid_segment[e]
+        for i in range(3):
+            a, b, c = R[segment, i, 0], R[segment, i, 1], R[segment, i, 2]
+            centre, axes = geometry.ellipsoid_centre[e], geometry.ellipsoid_axes[e]
+            shapes.centre[e, i] = a * centre[0] + b * centre[1] + c * centre[2] + t[segment, i]
+            for j in range(3):
+                length = geometry.ellipsoid_semi_axes[e, j]
+                shapes.axes[e, i, j] = (a * axes[0, j] + b * axes[1, j] + c * axes[2, j]) / length
+    for p in range(len(geometry.polygon_segment)):
+        segment = geometry.polygon_segment[p]
+        for i in range(3):
+            a, b, c = R[segment, i, 0], R[segment, i, 1], R[segment, i, 2]
+            normal = geometry.normals[p]
+            shapes.normals[p, i] = a * normal[0] + b * normal[1] + c * normal[2]
+            for k in range(geometry.start[p], geometry.start[p + 1]):
+                corner = geometry.corners[k]
+                shapes.corners[k, i] = a * corner[0] + b * corner[1] + c * corner[2] + t[segment, i]
+
+
+@njit(**INNER)
+def outline_all(shapes, geometry, view, width, height):
+    """Outline every placed shape in a view of `width` pixels a row and `height` rows."""
+    n_ellipsoids = len(geometry.ellipsoid_segment)
+    for s in range(len(shapes.rows)):
+        if s < n_ellipsoids:
+            is_seen = _outline_ellipsoid(shapes, s, view, height)
+        else:
+            p = s - n_ellipsoids
+            is_seen = _outline_polygon(shapes, s, p, geometry.start[p], geometry.start[p + 1], view, height)
+        if not is_seen:
+            shapes.rows[s, 0] = 0
+            shapes.rows[s, 1] = -1
+
+
+@njit(**INNER)
+def _turned(view, x, y, z):
+    return (
+        view[0] * x + view[1] * y + view[2] * z,
+        view[3] * x + view[4] * y + view[5] * z,
+        view[6] * x + view[7] * y + view[8] * z,
+    )
+
+
+@njit(**INNER)
+def _outline_ellipsoid(shapes, s, view, height):
+    """Outline one ellipsoid; False where it reaches the camera's plane, or no row meets it."""
+    m00 = m01 = m02 = m11 = m12 = m22 = 0.0
+    for j in range(3):
+        a, b, c = _turned(view, shapes.axes[s, 0, j], shapes.axes[s, 1, j], shapes.axes[s, 2, j])
+        m00 += a * a
+        m01 += a * b
+        m02 += a * c
+        m11 += b * b
+        m12 += b * c
+        m22 += c * c
+    cx, cy, cz = _turned(view, shapes.centre[s, 0], shapes.centre[s, 1], shapes.centre[s, 2])
+    cx, cy, cz = cx + view[VIEW_T], cy + view[VIEW_T + 1], cz + view[VIEW_T + 2]
+    g0, g1, g2 = m00 * cx + m01 * cy + m02 * cz, m01 * cx + m11 * cy + m12 * cz, m02 * cx + m12 * cy + m22 * cz
+    k = g0 * cx + g1 * cy + g2 * cz - 1
+    if k <= 0 or cz <= 0:
+        return False
+    k00, k01, k02 = view[VIEW_K], view[VIEW_K + 1], view[VIEW_K + 2]
+    k10, k11, k12 = view[VIEW_K + 3], view[VIEW_K + 4], view[VIEW_K + 5]
+    n00, n01, n02 = m00 * k00 + m01 * k10, m00 * k01 + m01 * k11, m00 * k02 + m01 * k12 + m02
+    n10, n11, n12 = m01 * k00 + m11 * k10, m01 * k01 + m11 * k11, m01 * k02 + m11 * k12 + m12
+    n20, n21, n22 = m02 * k00 + m12 * k10, m02 * k01 + m12 * k11, m02 * k02 + m12 * k12 + m22
+    b0, b1, b2 = (k00 * g0 + k10 * g1) / k, (k01 * g0 + k11 * g1) / k, (k02 * g0 + k12 * g1 + g2) / k
+    q00, q01, q02 = b0 * b0 - (k00 * n00 + k10 * n10) / k, b0 * b1 - (k00 * n01 + k10 * n11) / k, 0.0
+    q02 = b0 * b2 - (k00 * n02 + k10 * n12) / k
+    q11, q12 = b1 * b1 - (k01 * n01 + k11 * n11) / k, b1 * b2 - (k01 * n02 + k11 * n12) / k
+    q22 = b2 * b2 - (k02 * n02 + k12 * n12 + n22) / k
+    if q00 >= 0:
+        return False
+    mid_v, mid_1 = -q01 / q00, -q02 / q00
+    half_vv, half_v, half_1 = -(q11 + q01 * mid_v) / q00, -2 * (q12 + q01 * mid_1) / q00, -(q22 + q02 * mid_1) / q00
+    discriminant = half_v * half_v - 4 * half_vv * half_1
+    if half_vv >= 0 or discriminant <= 0:
+        return False
+    root = math.sqrt(discriminant)
+    shapes.rows[s, 0] = math.ceil(min(max((-half_v + root) / (2 * half_vv), 0.0), float(height)))
+    shapes.rows[s, 1] = math.floor(max(min((-half_v - root) / (2 * half_vv), height - 1.0), -1.0))
+    outline, surface = shapes.outline[s], shapes.surface[s]
+    outline[B_U], outline[B_V], outline[B_1] = b0, b1, b2
+    outline[MID_V], outline[MID_1] = mid_v, mid_1
+    outline[HALF_1], outline[HALF_V], outline[HALF_VV] = half_1, half_v, half_vv
+    outline[NORMAL], outline[NORMAL + 1], outline[NORMAL + 2] = n00, n01, n02
+    outline[NORMAL + 3], outline[NORMAL + 4], outline[NORMAL + 5] = n10, n11, n12
+    outline[NORMAL + 6], outline[NORMAL + 7], outline[NORMAL + 8] = n20, n21, n22
+    surface[ALPHA], surface[W_STEP] = -q00, b0
+    surface[N_STEP], surface[N_STEP + 1], surface[N_STEP + 2] = n00, n10, n20
+    surface[G], surface[G + 1], surface[G + 2] = g0, g1, g2
+    return True
+
+
+@njit(**INNER)
+def _outline_polygon(shapes, s, p, start, stop, view, height):
+    """Outline one convex polygon; False where it faces away, or no row meets it."""
+    m0, m1, m2 = _turned(view, shapes.normals[p, 0], shapes.normals[p, 1], shapes.normals[p, 2])
+    low, high, is_in_front, d = float(height), -1.0, True, 0.0
+    for i in range(start, stop):
+        x, y, z = _in_camera(view, shapes.corners[i])
+        d += (m0 * x + m1 * y + m2 * z) / (stop - start)
+        if z > 1e-9:
+            v = _row_of(view, x / z, y / z)
+            low, high = min(low, v), max(high, v)
+        else:
+            is_in_front = False
+    if d >= -1e-12:
+        return False
+    if not is_in_front:
+        low, high = 0.0, height - 1.0
+    shapes.rows[s, 0] = math.ceil(max(low, 0.0))
+    shapes.rows[s, 1] = math.floor(min(high, height - 1.0))
+    k00, k01, k02 = view[VIEW_K], view[VIEW_K + 1], view[VIEW_K + 2]
+    k10, k11, k12 = view[VIEW_K + 3], view[VIEW_K + 4], view[VIEW_K + 5]
+    for i in range(start, stop):
+        x, y, z = _in_camera(view, shapes.corners[i])
+        x1, y1, z1 = _in_camera(view, shapes.corners[i + 1 if i + 1 < stop else start])
+        x2, y2, z2 = _in_camera(view, shapes.corners[start + (i + 2 - start) % (stop - start)])
+        e0, e1, e2 = y * z1 - z * y1, z * x1 - x * z1, x * y1 - y * x1
+        side = math.copysign(1.0, e0 * x2 + e1 * y2 + e2 * z2)  # inside is where the next corner lies
+        a, b, c = side * (k00 * e0 + k10 * e1), side * (k01 * e0 + k11 * e1), side * (k02 * e0 + k12 * e1 + e2)
+        edge = shapes.edges[i]
+        if a == 0:
+            edge[0], edge[1], edge[2] = 0.0, b, c
+        else:
+            edge[0], edge[1], edge[2] = math.copysign(1.0, a), -b / a, -c / a
+    outline, surface = shapes.outline[s], shapes.surface[s]
+    outline[B_U], outline[B_V] = (k00 * m0 + k10 * m1) / d, (k01 * m0 + k11 * m1) / d
+    outline[B_1] = (k02 * m0 + k12 * m1 + m2) / d
+    surface[W_STEP] = outline[B_U]
+    surface[G], surface[G + 1], surface[G + 2] = -m0, -m1, -m2
+    return True
+
+
+@njit(**INNER)
+def _in_camera(view, point):
+    x, y, z = _turned(view, point[0], point[1], point[2])
+    return x + view[VIEW_T], y + view[VIEW_T + 1], z + view[VIEW_T + 2]
+
+
+@njit(**INNER)
+def _row_of(view, x, y):
+    """Return the row v of the ray (x, y, 1): the second unknown of K^-1 (u, v, 1) = (x, y, 1)."""
+    k00, k01, k10, k11 = view[VIEW_K], view[VIEW_K + 1], view[VIEW_K + 3], view[VIEW_K + 4]
+    return (k00 * (y - view[VIEW_K + 5]) - k10 * (x - view[VIEW_K + 2])) / (k00 * k11 - k01 * k10)

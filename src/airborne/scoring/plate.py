@@ -1,0 +1,108 @@
+"""The empty scene as each camera sees it, learned from the pixels that the body does not cover."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+START_SD = 6.0  # grey levels: what one look at a pixel is worth
+_SLOWEST = 0.05  # a pixel's newest look counts at least this much: slow changes of light are followed
+
+
+class Plate:
+    """Mean and spread of every background pixel of one camera [sRGB grey levels]; owned and updated by its tracker."""
+
+    __slots__ = ("looks", "mean", "sd")
+
+    def __init__(self, height: int, width: int) -> None:
+        self.mean = np.zeros((height, width, 3), np.float32)
+        self.sd = np.full((height, width), START_SD, np.float32)
+        self.looks: NDArray[np.uint8] = np.zeros((height, width), np.uint8)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def look(rgb, covered, mean, sd, looks):
+    """Learn from one picture: rgb (h, w, 3) uint8, covered (h, w) bool where the body may be; the rest in place."""
+    h, w, _ = rgb.shape
+    for y in range(h):
+        for x in range(w):
+            if covered[y, x]:
+                continue
+            n = looks[y, x]
+            if n == 0:
+                for k in range(3):
+                    mean[y, x, k] = rgb[y, x, k]
+            else:
+                rate = max(np.float32(1.0) / (n + 1), np.float32(_SLOWEST))
+                d2 = np.float32(0)
+                for k in range(3):
+                    d = rgb[y, x, k] - mean[y, x, k]
+                    mean[y, x, k] += rate * d
+                    d2 += d * d
+                variance = sd[y, x] * sd[y, x]
+                sd[y, x] = np.sqrt(max(variance + rate * (d2 / 3 - variance), np.float32(4.0)))
+            looks[y, x] = min(n + 1, 250)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def fill(mean, looks, out):
+    """Copy mean (h, w, 3) to out, growing known pixels into never-seen ones, ring by ring. Returns False if none is known."""
+    h, w, _ = mean.shape
+    done = np.zeros((h, w), np.uint8)
+    queue = np.empty(h * w, np.int32)
+    tail = 0
+    for y in range(h):
+        for x in range(w):
+            if looks[y, x] > 0:
+                done[y, x] = 1
+                for k in range(3):
+                    out[y, x, k] = mean[y, x, k]
+    for y in range(h):
+        for x in range(w):
+            if not done[y, x] and _known_neighbours(done, y, x) > 0:
+                done[y, x] = 2
+                queue[tail] = y * w + x
+                tail += 1
+    if tail == 0:
+        return done[0, 0] > 0
+    head = 0
+    while head < tail:
+        ring_end = tail
+        for i in range(head, ring_end):
+            y, x = queue[i] // w, queue[i] % w
+            n, s0, s1, s2 = 0, np.float32(0), np.float32(0), np.float32(0)
+            for dy in range(-1, 2):
+                for dx in range(-1, 2):
+                    yy, xx = y + dy, x + dx
+                    if 0 <= yy < h and 0 <= xx < w and done[yy, xx] == 1:
+                        n += 1
+                        s0 += out[yy, xx, 0]
+                        s1 += out[yy, xx, 1]
+                        s2 += out[yy, xx, 2]
+            out[y, x, 0], out[y, x, 1], out[y, x, 2] = s0 / n, s1 / n, s2 / n
+        for i in range(head, ring_end):
+            done[queue[i] // w, queue[i] % w] = 1
+        for i in range(head, ring_end):
+            y, x = queue[i] // w, queue[i] % w
+            for dy in range(-1, 2):
+                for dx in range(-1, 2):
+                    yy, xx = y + dy, x + dx
+                    if 0 <= yy < h and 0 <= xx < w and done[yy, xx] == 0:
+                        done[yy, xx] = 2
+                        queue[tail] = yy * w + xx
+                        tail += 1
+        head = ring_end
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _known_neighbours(done, y, x):
+    h, w = done.shape
+    n = 0
+    for dy in range(-1, 2):
+        for dx in range(-1, 2):
+            yy, xx = y + dy, x + dx
+            if 0 <= yy < h and 0 <= xx < w and done[yy, xx] == 1:
+                n += 1
+    return n

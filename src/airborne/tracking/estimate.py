@@ -1,0 +1,39 @@
+"""What tracking says of one time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import Pose
+
+Array = NDArray[np.floating]
+
+
+class Status(StrEnum):
+    """How far an estimate can be trusted."""
+
+    TRACKED = "tracked"
+    UNCERTAIN = "uncertain"
+    LOST = "lost"  # nothing is claimed: the pose is None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Estimate:
+    """The pose at one time, with its uncertainty.
+
+    The covariance is over the root's position [m] and a rotation vector in world axes [rad]: (6, 6).
+    A direction that the images do not show has an infinite variance.
+    """
+
+    index: int
+    time_s: Fraction
+    status: Status
+    score: float  # RMS colour difference inside the mask [grey levels]; NaN when lost
+    pose: Pose | None
+    covariance: Array | None
+    n_views: int  # cameras that had an image and saw the body

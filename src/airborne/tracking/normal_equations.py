@@ -1,0 +1,207 @@
+"""Gauss-Newton kernels: how a blurred synthetic picture would change if the body moved, against what the camera saw.
+
+Arrays in, arrays out. Planes are (channels, h, w) float32. A window (x0, y0) is where a plane's pixel (0, 0) lies in the
+region of interest whose intrinsics are K.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from airborne.rendering.maps import surface_maps
+from airborne.rendering.shapes import KERNEL
+from airborne.scoring.lighting import compose, fit_light
+
+BLOCK_PX = 16  # residuals this close are not independent: the side of a block of the covariance's sandwich
+_EDGE = 0.01  # blurred coverage below which a pixel says nothing of the body
+
+
+def gaussian_taps(sigma_px: float) -> np.ndarray:
+    """Return the odd, normalised taps of a Gaussian of the given sd, cut at three sd."""
+    radius = max(1, int(np.ceil(3 * sigma_px)))
+    x = np.arange(-radius, radius + 1)
+    taps = np.exp(-0.5 * (x / sigma_px) ** 2)
+    return (taps / taps.sum()).astype(np.float32)
+
+
+@njit(**KERNEL)
+def blur(planes, taps_u, taps_v, scratch, out):
+    """Blur planes (c, h, w) with separable taps into out; outside the planes the border is repeated. scratch (h, w)."""
+    c, h, w = planes.shape
+    ru, rv = taps_u.size // 2, taps_v.size // 2
+    for k in range(c):
+        for y in range(h):
+            row = scratch[y]
+            source = planes[k, y]
+            for x in range(w):
+                row[x] = np.float32(0)
+            for j in range(-ru, ru + 1):
+                tap = taps_u[j + ru]
+                a, b = min(max(0, -j), w), max(min(w, w - j), 0)
+                for x in range(a, b):
+                    row[x] += tap * source[x + j]
+                for x in range(0, a):
+                    row[x] += tap * source[0]
+                for x in range(max(a, b), w):
+                    row[x] += tap * source[w - 1]
+        for y in range(h):
+            row = out[k, y]
+            for x in range(w):
+                row[x] = np.float32(0)
+            for j in range(-rv, rv + 1):
+                tap = taps_v[j + rv]
+                source = scratch[min(max(y + j, 0), h - 1)]
+                for x in range(w):
+                    row[x] += tap * source[x]
+
+
+@njit(**KERNEL)
+def window_of(part, pad_u, pad_v):
+    """Return the window (x0, y0, x1, y1) round the pixels of the body, padded; empty (0, 0, 0, 0) where there is none."""
+    h, w = part.shape
+    x0, y0, x1, y1 = w, h, -1, -1
+    for y in range(h):
+        for x in range(w):
+            if part[y, x] >= 0:
+                x0, x1 = min(x0, x), max(x1, x)
+                y0, y1 = min(y0, y), max(y1, y)
+    if x1 < 0:
+        return 0, 0, 0, 0
+    return max(x0 - pad_u, 0), max(y0 - pad_v, 0), min(x1 + pad_u + 1, w), min(y1 + pad_v + 1, h)
+
+
+@njit(**KERNEL)
+def accumulate(residual, shape, coverage, inverse_depth, certainty, x0, y0, K, view, origin, clip, A, g, S):
+    """Add one view's normal equations for a rigid motion about `origin` [m]: A motion = g.
+
+    residual, shape (c, h, w): blurred observed minus rendered, and the blurred difference that the body makes to the
+    empty scene; coverage, inverse_depth (h, w) blurred alike; certainty (region) in (0, 1] scales a pixel's weight;
+    clip: the residual at which a pixel's weight has fallen to a quarter. The motion is a translation [m] and a rotation
+    vector [rad] in world axes. Of A (6, 6) the lower triangle is filled; S (6, 6) gathers the spread of g over blocks.
+    Returns (weighted squared residual, weight).
+    """
+    c, h, w = residual.shape
+    fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
+    a, b = np.zeros(6), np.zeros(6)
+    blocks_a_row = w // BLOCK_PX + 1
+    blocks = np.zeros(((h // BLOCK_PX + 1) * blocks_a_row, 6))
+    total, weight_sum = 0.0, 0.0
+    inverse_clip2 = 1.0 / (clip * clip)
+    for y in range(1, h - 1):
+        ry = (y + y0 - cy) / fy
+        for x in range(1, w - 1):
+            m = coverage[y, x]
+            if m < _EDGE:
+                continue
+            sxx, sxy, syy, sx, sy, e2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for k in range(c):
+                gx = 0.5 * (shape[k, y, x + 1] - shape[k, y, x - 1])
+                gy = 0.5 * (shape[k, y + 1, x] - shape[k, y - 1, x])
+                r = residual[k, y, x]
+                sxx += gx * gx
+                sxy += gx * gy
+                syy += gy * gy
+                sx += gx * r
+                sy += gy * r
+                e2 += r * r
+            down = 1.0 / (1.0 + e2 * inverse_clip2)
+            weight = down * down * certainty[y + y0, x + x0]
+            total += weight * e2
+            weight_sum += weight
+            if sxx + syy < 1e-10:
+                continue
+            inv_z = inverse_depth[y, x] / m
+            rx = (x + x0 - cx) / fx
+            px, py, pz = rx / inv_z - view[9], ry / inv_z - view[10], 1.0 / inv_z - view[11]
+            ox = view[0] * px + view[3] * py + view[6] * pz - origin[0]
+            oy = view[1] * px + view[4] * py + view[7] * pz - origin[1]
+            oz = view[2] * px + view[5] * py + view[8] * pz - origin[2]
+            for i in range(3):
+                a[i] = fx * inv_z * (view[i] - rx * view[6 + i])
+                b[i] = fy * inv_z * (view[3 + i] - ry * view[6 + i])
+            a[3], a[4], a[5] = oy * a[2] - oz * a[1], oz * a[0] - ox * a[2], ox * a[1] - oy * a[0]
+            b[3], b[4], b[5] = oy * b[2] - oz * b[1], oz * b[0] - ox * b[2], ox * b[1] - oy * b[0]
+            sxx *= weight
+            sxy *= weight
+            syy *= weight
+            sx *= weight
+            sy *= weight
+            block = blocks[(y // BLOCK_PX) * blocks_a_row + x // BLOCK_PX]
+            for i in range(6):
+                # a body that moves by du takes its picture along: the picture changes by -gradient du
+                block[i] -= sx * a[i] + sy * b[i]
+                ai = sxx * a[i] + sxy * b[i]
+                bi = sxy * a[i] + syy * b[i]
+                for j in range(i + 1):
+                    A[i, j] += ai * a[j] + bi * b[j]
+    for n in range(len(blocks)):
+        for i in range(6):
+            g[i] += blocks[n, i]
+            for j in range(6):
+                S[i, j] += blocks[n, i] * blocks[n, j]
+    return total, weight_sum
+
+
+@njit(**KERNEL)
+def _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v, scratch):
+    planes = np.empty((2, y1 - y0, x1 - x0), np.float32)
+    for y in range(y1 - y0):
+        for x in range(x1 - x0):
+            planes[0, y, x] = 1.0 if part[y + y0, x + x0] >= 0 else 0.0
+            planes[1, y, x] = inverse_depth[y + y0, x + x0]
+    out = np.empty_like(planes)
+    blur(planes, taps_u, taps_v, scratch, out)
+    return out
+
+
+@njit(**KERNEL)
+def silhouette_equations(shapes, geometry, R, t, view, K, posterior, certainty, maps, taps_u, taps_v, A, g, S):
+    """Add one view's normal equations of `blurred posterior - blurred mask`; see `accumulate`.
+
+    posterior (h, w): the probability of each pixel to be body; maps: workspace (part, inverse_depth, normals).
+    Returns (weighted squared residual, weight).
+    """
+    part, inverse_depth, normals = maps
+    surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals)
+    x0, y0, x1, y1 = window_of(part, 3 * (taps_u.size // 2), 3 * (taps_v.size // 2))
+    if x1 - x0 < 3 or y1 - y0 < 3:
+        return 0.0, 0.0
+    scratch = np.empty((y1 - y0, x1 - x0), np.float32)
+    blurred = _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v, scratch)
+    seen = np.empty((1, y1 - y0, x1 - x0), np.float32)
+    for y in range(y1 - y0):
+        for x in range(x1 - x0):
+            seen[0, y, x] = posterior[y + y0, x + x0]
+    residual, shape = np.empty_like(seen), np.empty_like(seen)
+    blur(seen, taps_u, taps_v, scratch, residual)
+    for y in range(y1 - y0):
+        for x in range(x1 - x0):
+            shape[0, y, x] = np.float32(0.5) * (residual[0, y, x] + blurred[0, y, x])
+            residual[0, y, x] -= blurred[0, y, x]
+    return accumulate(residual, shape, blurred[0], blurred[1], certainty, x0, y0, K, view, t[0], 0.5, A, g, S)
+
+
+@njit(**KERNEL)
+def photometric_equations(
+    shapes, geometry, R, t, view, K, observed, scene, certainty, albedo, light, rounds, maps, taps_u, taps_v, clip, A, g, S
+):
+    """Add one view's normal equations of `blurred observed - blurred composite`; see `accumulate`.
+
+    observed, scene (3, h, w): linear light of the picture and of the empty scene; albedo (parts, 3) linear; light (3, 4)
+    the view's fitted light, refitted in place by `rounds` robust rounds. Returns (weighted squared residual, weight).
+    """
+    part, inverse_depth, normals = maps
+    surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals)
+    x0, y0, x1, y1 = window_of(part, 3 * (taps_u.size // 2), 3 * (taps_v.size // 2))
+    if x1 - x0 < 3 or y1 - y0 < 3:
+        return 0.0, 0.0
+    fit_light(observed, part, normals, albedo, light, rounds, x0, y0, x1, y1)
+    scratch = np.empty((y1 - y0, x1 - x0), np.float32)
+    blurred = _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v, scratch)
+    sharp, residual = np.empty((3, y1 - y0, x1 - x0), np.float32), np.empty((3, y1 - y0, x1 - x0), np.float32)
+    body, shape = np.empty_like(sharp), np.empty_like(sharp)
+    compose(observed, scene, part, normals, albedo, light, x0, y0, sharp, body)
+    blur(sharp, taps_u, taps_v, scratch, residual)
+    blur(body, taps_u, taps_v, scratch, shape)
+    return accumulate(residual, shape, blurred[0], blurred[1], certainty, x0, y0, K, view, t[0], clip, A, g, S)

@@ -1,0 +1,148 @@
+"""A trial: one recording described by one TOML file; paths in it are relative to it."""
+
+from __future__ import annotations
+
+import tomllib
+from fractions import Fraction
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.body import Pose
+from airborne.errors import TrialError, one_line
+from airborne.geometry.rotations import matrix_from_angles
+
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Method = Literal["refined", "stepping", "simplex"]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class CameraTable(_Strict):
+    """One camera's video, and how its pixels lie in the calibration's image."""
+
+    name: str
+    video: str
+    fields: Literal["progressive", "top-first", "bottom-first", "auto"] = "progressive"
+    offset_s: float = 0.0  # added to this camera's times
+    calibrated_as: str | None = None  # the camera's name in the calibration file, where it differs
+    saved_scale: float = Field(1.0, gt=0)  # calibration px = saved_scale * video px + saved_offset_px
+    saved_offset_px: Annotated[list[float], Field(min_length=2, max_length=2)] = [0.0, 0.0]
+
+
+class CalibrationTable(_Strict):
+    """Where the cameras come from: a calibration file, or control points."""
+
+    file: str | None = None
+    control_points: str | None = None
+    method: Literal["lm", "annealing"] = "lm"
+
+    @model_validator(mode="after")
+    def _one_source(self) -> CalibrationTable:
+        if (self.file is None) == (self.control_points is None):
+            raise ValueError("give file = \"...\" or control_points = \"...\", one of them")
+        return self
+
+
+class BodyTable(_Strict):
+    """Which body: a body file."""
+
+    file: str
+
+
+class StartTable(_Strict):
+    """The first pose, set by hand."""
+
+    frame: Annotated[int, Field(ge=0)] = 0
+    position_m: Vector
+    rotation_matrix: Annotated[list[Vector], Field(min_length=3, max_length=3)] | None = None
+    quaternion_xyzw: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
+    somersault_tilt_twist_deg: Vector | None = None
+
+    @model_validator(mode="after")
+    def _a_rotation(self) -> StartTable:
+        given = [self.rotation_matrix, self.quaternion_xyzw, self.somersault_tilt_twist_deg]
+        if sum(value is not None for value in given) != 1:
+            raise ValueError("give rotation_matrix, quaternion_xyzw or somersault_tilt_twist_deg, one of them")
+        if self.rotation_matrix is not None:
+            R = np.array(self.rotation_matrix)
+            if not np.allclose(R @ R.T, np.eye(3), atol=1e-3) or np.linalg.det(R) < 0:
+                raise ValueError("rotation_matrix is no rotation: its rows must be unit, square to each other, right-handed")
+        return self
+
+    @property
+    def pose(self) -> Pose:
+        """The start as a pose."""
+        if self.rotation_matrix is not None:
+            rotation = Rotation.from_matrix(self.rotation_matrix)
+        elif self.quaternion_xyzw is not None:
+            rotation = Rotation.from_quat(self.quaternion_xyzw)
+        else:
+            angles = np.radians(self.somersault_tilt_twist_deg or [0.0, 0.0, 0.0])
+            rotation = Rotation.from_matrix(matrix_from_angles(angles))
+        return Pose(world_from_root=RigidTransform.from_components(self.position_m, rotation))
+
+
+class TrackTable(_Strict):
+    """How to track; each method reads its own settings."""
+
+    method: Method = "refined"
+    every: Annotated[int, Field(ge=1)] = 1  # track every n-th frame or field
+    stop: Annotated[int, Field(ge=1)] | None = None  # one past the last frame or field
+    prediction: Literal["smooth", "ballistic", "none"] = "smooth"
+    colour: Literal["raw", "normalised", "blend", "union"] = "normalised"  # stepping and simplex: paper B's score
+    v_rule: Literal["v_literal", "v_sym"] = "v_sym"  # stepping
+    steps_mm: list[float] = [50, 30, 20, 10, 10, 5, 5]  # stepping: one loop each
+    steps_deg: list[float] = [5, 3, 2, 1, 1, 0.5, 0.5]
+
+    @model_validator(mode="after")
+    def _equal_loops(self) -> TrackTable:
+        if len(self.steps_mm) != len(self.steps_deg) or not self.steps_mm:
+            raise ValueError("steps_mm and steps_deg need one number a loop each, equally many")
+        return self
+
+
+class Trial(_Strict):
+    """A whole trial file."""
+
+    name: str
+    camera: Annotated[list[CameraTable], Field(min_length=1)]
+    calibration: CalibrationTable
+    body: BodyTable
+    start: StartTable
+    track: TrackTable = TrackTable()
+    folder: Path = Path()
+
+    def path(self, name: str) -> Path:
+        """Resolve a path of the trial file."""
+        return self.folder / name
+
+
+def read_trial(path: Path) -> Trial:
+    """Read a trial file; raises TrialError, naming the file and what is wrong, for anything unusable."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        trial = Trial.model_validate({**table, "folder": path.parent})
+    except OSError as error:
+        raise TrialError(f"{path}: cannot be read ({error.strerror}); give the path of a trial's TOML file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise TrialError(f"{path.name}: not a TOML file: {error}") from error
+    except ValidationError as error:
+        raise TrialError(f"{path.name}: {one_line(error)}") from error
+    names = [camera.name for camera in trial.camera]
+    if len(set(names)) != len(names):
+        raise TrialError(f"{path.name}: two cameras share a name: {', '.join(names)}; give each its own")
+    for name in [trial.body.file, trial.calibration.file or trial.calibration.control_points or ""]:
+        if not trial.path(name).is_file():
+            raise TrialError(f"{path.name}: {name} not found beside it")
+    return trial
+
+
+def offset(camera: CameraTable) -> Fraction:
+    """Return a camera's offset as an exact number of seconds, as written."""
+    return Fraction(repr(camera.offset_s))

@@ -1,0 +1,228 @@
+"""One camera's file: what it is, and its pictures in order of time, each decoded once."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Literal, NamedTuple, get_args
+
+import av
+from av.container import InputContainer
+from av.error import BlockingIOError as NothingYet
+from av.error import FFmpegError
+from av.filter import Graph
+from av.video.stream import VideoStream
+
+from airborne.errors import VideoError
+from airborne.video.pixels import Image, field_frame, rgb_from_frame
+
+Fields = Literal["progressive", "top-first", "bottom-first"]
+FieldsWanted = Literal["progressive", "top-first", "bottom-first", "auto"]
+
+
+@dataclass(frozen=True, slots=True)
+class VideoSource:
+    """One camera's video file."""
+
+    name: str  # the camera's name
+    path: Path
+    fields: FieldsWanted = "progressive"
+    offset_s: Fraction | float = 0  # added to this camera's times [s]
+
+    def __post_init__(self) -> None:
+        if self.fields not in get_args(FieldsWanted):
+            known = ", ".join(get_args(FieldsWanted))
+            raise VideoError(f"{self.name}: fields = '{self.fields}' is not known; use one of: {known}")
+
+
+@dataclass(frozen=True, slots=True)
+class VideoFacts:
+    """What a video file says of itself, and how it will be read."""
+
+    size: tuple[int, int]  # (width, height) as shown, after any rotation [px]
+    frame_rate: Fraction  # [1/s]; two fields count as one frame
+    duration_s: Fraction | None  # None where the file does not say
+    flagged: Fields  # what the stream's own flags say
+    fields: Fields  # how it is read
+    rotation_deg: int  # anticlockwise quarter turns that the file asks for
+
+    @property
+    def parities(self) -> tuple[int | None, ...]:
+        """The images of one frame in order of time: (None,) for a whole frame, else 0 for top and 1 for bottom."""
+        return {"progressive": (None,), "top-first": (0, 1), "bottom-first": (1, 0)}[self.fields]
+
+    @property
+    def image_rate(self) -> Fraction:
+        """Images in a second: frames, or fields where the file is read by fields."""
+        return self.frame_rate * len(self.parities)
+
+    @property
+    def n_images(self) -> int | None:
+        """How many images the file promises; None where it does not say."""
+        return None if self.duration_s is None else round(self.duration_s * self.image_rate)
+
+    @property
+    def stored_size(self) -> tuple[int, int]:
+        """The size before rotation."""
+        width, height = self.size
+        return (height, width) if self.rotation_deg % 180 else (width, height)
+
+
+class Picture(NamedTuple):
+    """One image, still in the file's own colours."""
+
+    time_s: Fraction  # since the file's first picture [s]
+    frame: av.VideoFrame
+    parity: int | None  # of the field; None for a whole frame
+
+
+def inspect(source: VideoSource) -> VideoFacts:
+    """Open a file, look at its first picture and close it again.
+
+    Raises VideoError, in one line, where there is no readable video, or fields are asked of a rotated one.
+    """
+    with _opened(source) as (container, stream):
+        frame = next((picture for _, picture in _sound_frames(container, stream, size=None)), None)
+        if frame is None:
+            raise VideoError(f"{source.name}: no picture of {source.path} can be decoded; copy or convert it again")
+        rate = stream.average_rate or stream.guessed_rate
+        if not rate:
+            raise VideoError(f"{source.name}: {source.path} states no frame rate; convert it to a constant rate")
+        if frame.rotation % 90:
+            raise VideoError(f"{source.name}: {source.path} asks to be turned by {frame.rotation}°; only quarter turns")
+        flagged = _flagged_fields(stream, frame)
+        fields = flagged if source.fields == "auto" else source.fields
+        if fields != "progressive" and frame.rotation:
+            raise VideoError(f"{source.name}: {source.path} is both interlaced and rotated; remove its rotation tag")
+        width, height = frame.width, frame.height
+        return VideoFacts(
+            size=(height, width) if frame.rotation % 180 else (width, height),
+            frame_rate=_exact_rate(rate),
+            duration_s=_duration_s(container, stream),
+            flagged=flagged,
+            fields=fields,
+            rotation_deg=frame.rotation % 360,
+        )
+
+
+def pictures(source: VideoSource, facts: VideoFacts) -> Generator[Picture]:
+    """Decode a file from its start; pictures come in order of time, fields at their own times.
+
+    Time 0 is the first picture's stamp. A stamp is exact: `pts * time_base`, put on the multiples of the frame's
+    duration where it lies within the stamp's own resolution of one. Damaged pictures are left out, and after a damaged
+    key frame all pictures up to the next one. Decoding runs on one thread, so that damage never depends on the machine.
+    """
+    with _opened(source) as (container, stream):
+        tick = stream.time_base or Fraction(1, 1_000_000)
+        for n_ticks, frame in _sound_frames(container, stream, size=facts.stored_size):
+            time_s = _on_grid(n_ticks * tick, facts.frame_rate, tick)
+            for j, parity in enumerate(facts.parities):
+                yield Picture(time_s + j / facts.image_rate, frame, parity)
+
+
+def rgb_from_picture(picture: Picture, facts: VideoFacts) -> Image:
+    """Convert a picture to sRGB (h, w, 3), a field with its own rows only."""
+    frame = picture.frame if picture.parity is None else field_frame(picture.frame, picture.parity)
+    return rgb_from_frame(frame, short_side=min(facts.size), rotation_deg=facts.rotation_deg)
+
+
+@contextmanager
+def _opened(source: VideoSource) -> Iterator[tuple[InputContainer, VideoStream]]:
+    path = Path(source.path)
+    if not path.is_file():
+        raise VideoError(f"{source.name}: video {path} not found; check its path")
+    if path.stat().st_size == 0:
+        raise VideoError(f"{source.name}: video {path} is empty (0 bytes); copy it again")
+    try:
+        container = av.open(path)
+    except (FFmpegError, OSError) as error:
+        raise VideoError(
+            f"{source.name}: {path} cannot be opened as a video ({error.strerror}); "
+            "it is of another kind or was cut off; copy or convert it again"
+        ) from error
+    with container:
+        if not container.streams.video:
+            raise VideoError(
+                f"{source.name}: {path} holds no video stream that can be read; give a video, or copy it again"
+            )
+        stream = container.streams.video[0]
+        stream.thread_type = "NONE"
+        yield container, stream
+
+
+def _sound_frames(
+    container: InputContainer, stream: VideoStream, *, size: tuple[int, int] | None
+) -> Iterator[tuple[int, av.VideoFrame]]:
+    """Yield (ticks since the first picture, frame) for every frame that is whole, and of `size` if given."""
+    first, last, step = None, None, 1
+    first_stamp = None  # of the packets, which tells when a damaged beginning would have been shown
+    is_damaged = False
+    key_stamps: set[int] = set()  # key frames sent to the decoder that have not come out whole
+    for packet in _packets(container, stream):
+        if packet.pts is not None and not packet.is_discard:
+            first_stamp = packet.pts if first_stamp is None else min(first_stamp, packet.pts)
+            if packet.is_keyframe:
+                key_stamps.add(packet.pts)
+            step = packet.duration or step
+        try:
+            frames = stream.decode(packet)
+        except FFmpegError:
+            is_damaged = True
+            continue
+        for frame in frames:
+            stamp = frame.pts if frame.pts is not None else (0 if last is None else last + step)
+            if frame.is_corrupt or (size and (frame.width, frame.height) != size):
+                is_damaged = True
+                continue
+            if is_damaged and not frame.key_frame and any(key <= stamp for key in key_stamps):
+                continue
+            if first is None:
+                first = first_stamp if is_damaged and first_stamp is not None else stamp
+            is_damaged = is_damaged and not frame.key_frame
+            key_stamps = {key for key in key_stamps if key > stamp or is_damaged}
+            if last is None or stamp > last:
+                yield stamp - first, frame
+            last = stamp
+
+
+def _packets(container: InputContainer, stream: VideoStream) -> Iterator[av.Packet]:
+    """Yield the packets up to the end, or up to where the file breaks off; the last, empty one drains the decoder."""
+    try:
+        yield from container.demux(stream)
+    except FFmpegError:
+        yield av.Packet()
+
+
+def _exact_rate(rate: Fraction) -> Fraction:
+    """Return n · 1000/1001 where a container could store that rate only nearly (Matroska has 19001/317 for 59.94)."""
+    broadcast = Fraction(round(rate * 1001 / 1000) * 1000, 1001)
+    return broadcast if abs(broadcast - rate) < rate / 1_000_000 else rate
+
+
+def _on_grid(time_s: Fraction, rate: Fraction, tick: Fraction) -> Fraction:
+    nearest = round(time_s * rate) / rate
+    return nearest if abs(nearest - time_s) <= tick else time_s
+
+
+def _duration_s(container: InputContainer, stream: VideoStream) -> Fraction | None:
+    if stream.duration and stream.time_base:
+        return stream.duration * stream.time_base
+    return Fraction(container.duration, av.time_base) if container.duration else None
+
+
+def _flagged_fields(stream: VideoStream, frame: av.VideoFrame) -> Fields:
+    """Ask the decoded frame for its field order; the codec's own note of it is wrong for some bottom-first files."""
+    if not frame.interlaced_frame:
+        return "progressive"
+    graph = Graph()
+    top_first = graph.add("select", "eq(interlace_type,TOPFIRST)")
+    graph.link_nodes(graph.add_buffer(template=stream), top_first, graph.add("buffersink")).configure()
+    graph.vpush(frame)
+    try:
+        graph.vpull()
+    except NothingYet:
+        return "bottom-first"
+    return "top-first"

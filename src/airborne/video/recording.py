@@ -1,0 +1,206 @@
+"""Several cameras' files as one stream of `Frames`, aligned by time."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal, get_args
+
+from airborne.cameras import Camera, Rig
+from airborne.errors import VideoError
+from airborne.video.ahead import ahead
+from airborne.video.decoding import Picture, VideoFacts, VideoSource, inspect, pictures, rgb_from_picture
+from airborne.video.fields import fill_rows
+from airborne.video.frames import Frames, View
+from airborne.video.lens import Lens, lens_of
+
+FieldsAs = Literal["rows", "interpolated"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """The videos of one trial; iterating decodes them from the start and yields `Frames`.
+
+    The first camera is the clock: index and time are those of its frames (or fields), continued at its rate over
+    pictures that it lost and past its end, until every camera has ended. Another camera gives the picture nearest in
+    time, if within half of the clock's period, else None.
+    """
+
+    sources: tuple[VideoSource, ...]  # in the rig's order
+    facts: tuple[VideoFacts, ...]
+    rig: Rig
+    fields_as: FieldsAs
+    every: int
+    start: int
+    stop: int | None
+    events: list[str] = field(default_factory=list)  # what the user should know, one line each; grows while reading
+
+    @property
+    def rate(self) -> Fraction:
+        """`Frames` in a second."""
+        return self.facts[0].image_rate / self.every
+
+    @property
+    def n_frames(self) -> int | None:
+        """How many `Frames` to expect by what the files promise; None where the clock's file does not say."""
+        ends = [_offset_s(s) + f.duration_s for s, f in zip(self.sources, self.facts, strict=True) if f.duration_s]
+        if self.facts[0].duration_s is None:
+            return None
+        n = round((max(ends) - _offset_s(self.sources[0])) * self.facts[0].image_rate)
+        return len(range(self.start, n if self.stop is None else min(n, self.stop), self.every))
+
+    def __iter__(self) -> Iterator[Frames]:
+        period_s = 1 / self.facts[0].image_rate
+        lenses = [self._lenses(camera, facts) for camera, facts in zip(self.rig, self.facts, strict=True)]
+        with ExitStack() as open_files:
+            cursors = [
+                _Cursor(open_files.enter_context(closing(self._timed(source, facts))), half_s=period_s / 2)
+                for source, facts in zip(self.sources, self.facts, strict=True)
+            ]
+            pool = open_files.enter_context(ThreadPoolExecutor(len(cursors)))
+            times = _clock(cursors, start_s=_offset_s(self.sources[0]), period_s=period_s)
+            for index, time_s in enumerate(times):
+                if self.stop is not None and index >= self.stop:
+                    return
+                seen = [cursor.picture_at(time_s) for cursor in cursors]
+                if index >= self.start and (index - self.start) % self.every == 0:
+                    yield Frames(index, time_s, tuple(pool.map(self._view, seen, self.facts, lenses)))
+
+    def _lenses(self, camera: Camera, facts: VideoFacts) -> dict[int | None, Lens]:
+        """Return the lens of each kind of image that the file gives: whole (None), top field (0), bottom field (1)."""
+        is_whole = facts.fields == "progressive" or self.fields_as == "interpolated"
+        return {parity: lens_of(camera if is_whole else camera.field(parity or 0)) for parity in facts.parities}
+
+    def _view(self, picture: Picture | None, facts: VideoFacts, lenses: dict[int | None, Lens]) -> View | None:
+        if picture is None:
+            return None
+        rgb = rgb_from_picture(picture, facts)
+        if picture.parity is not None and self.fields_as == "interpolated":
+            rgb = fill_rows(rgb, picture.parity, facts.size[1])
+        return lenses[picture.parity].view(rgb)
+
+    def _timed(self, source: VideoSource, facts: VideoFacts) -> Generator[Picture]:
+        """Yield a camera's pictures on the trial's clock, and note every gap and an early end."""
+        period_s, offset_s = 1 / facts.image_rate, _offset_s(source)
+        expected_s = offset_s
+        with closing(ahead(pictures(source, facts))) as stream:
+            for picture in stream:
+                time_s = picture.time_s + offset_s
+                if time_s > expected_s + period_s / 2:
+                    self._note(
+                        f"{source.name}: no picture from {float(expected_s):.3f} s to {float(time_s):.3f} s (damaged "
+                        "or missing); pictures after it may carry damage up to the next key frame"
+                    )
+                yield picture._replace(time_s=time_s)
+                expected_s = time_s + period_s
+        if facts.duration_s and expected_s < offset_s + facts.duration_s - period_s / 2:
+            end_s = offset_s + facts.duration_s
+            self._note(
+                f"{source.name}: the pictures end at {float(expected_s):.3f} s; the file promises {float(end_s):.3f} s"
+            )
+
+    def _note(self, event: str) -> None:
+        if event not in self.events:  # a recording may be read twice
+            self.events.append(event)
+
+
+def open_recording(
+    sources: Sequence[VideoSource],
+    rig: Rig,
+    *,
+    fields_as: FieldsAs = "rows",
+    every: int = 1,
+    start: int = 0,
+    stop: int | None = None,
+) -> Recording:
+    """Check the cameras' videos against the calibration and return their `Recording`; only first pictures are decoded.
+
+    Each camera of the rig has one source of the same name; the rig's first camera is the clock. `fields_as` says what
+    becomes of the fields of interlaced files: "rows" keeps the field's own rows with a camera of that half-height
+    image; "interpolated" keeps the full height and fills the missing rows from their neighbours (rigid-body tracking
+    paper), with the camera unchanged. Of the clock's images `start, start + every, ...` below `stop` are read.
+
+    Raises VideoError where a file cannot be read, a size differs from the calibration's, or names do not match.
+    """
+    if fields_as not in get_args(FieldsAs):
+        raise VideoError(f"fields_as = '{fields_as}' is not known; use one of: {', '.join(get_args(FieldsAs))}")
+    if every < 1 or start < 0 or (stop is not None and stop <= start):
+        raise VideoError(f"every = {every}, start = {start}, stop = {stop}; expected every >= 1 and 0 <= start < stop")
+    by_name = {source.name: source for source in sources}
+    if len(by_name) != len(sources) or set(by_name) != set(rig.names):
+        given = ", ".join(source.name for source in sources) or "none"
+        raise VideoError(
+            f"videos are given for {given}; the calibration has {', '.join(rig.names)}; give each one video"
+        )
+    ordered = tuple(by_name[name] for name in rig.names)
+    facts = tuple(inspect(source) for source in ordered)
+    for source, camera, fact in zip(ordered, rig, facts, strict=True):
+        if fact.size != tuple(camera.size):
+            found, expected = ("×".join(map(str, size)) for size in (fact.size, camera.size))
+            raise VideoError(
+                f"{source.name}: {source.path} is {found} px, but the calibration's camera is {expected} px; "
+                "give the video that was calibrated, or the calibration of this size"
+            )
+    recording = Recording(ordered, facts, rig, fields_as, every, start, stop)
+    recording.events.extend(_notes(ordered, facts))
+    return recording
+
+
+def _notes(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> Iterator[str]:
+    for source, fact in zip(sources, facts, strict=True):
+        if source.fields == "auto":
+            yield f"{source.name}: the file's flags say {fact.flagged}"
+        elif fact.flagged != fact.fields:
+            yield f"{source.name}: read as {fact.fields}, though the file's flags say {fact.flagged}"
+
+
+def _offset_s(source: VideoSource) -> Fraction:
+    """Return the offset as the decimal number that was written, not as its nearest binary one."""
+    return Fraction(str(source.offset_s))
+
+
+class _Cursor:
+    """One camera's pictures, passed through once, with the one ahead known."""
+
+    def __init__(self, pictures: Iterator[Picture], *, half_s: Fraction) -> None:
+        self._pictures = pictures
+        self._half_s = half_s  # half of the clock's period
+        self._current: Picture | None = None
+        self._next = next(pictures, None)
+
+    def picture_at(self, time_s: Fraction) -> Picture | None:
+        """Return the picture nearest to a time, if within half a period; times never go back, a tie takes the later."""
+        self._advance(time_s)
+        if self._current and -self._half_s < self._current.time_s - time_s <= self._half_s:
+            return self._current
+        return None
+
+    def time_after(self, time_s: Fraction) -> Fraction | None:
+        """Return the time of the first picture after a time that was asked for; None at the end."""
+        known = (picture for picture in (self._current, self._next) if picture)
+        return next((picture.time_s for picture in known if picture.time_s > time_s), None)
+
+    def is_over(self, time_s: Fraction) -> bool:
+        """Whether no picture is left for a time or any later one; times never go back."""
+        self._advance(time_s)
+        return self._next is None and (self._current is None or self._current.time_s <= time_s - self._half_s)
+
+    def _advance(self, time_s: Fraction) -> None:
+        while self._next and (
+            self._current is None or abs(self._next.time_s - time_s) <= abs(self._current.time_s - time_s)
+        ):
+            self._current, self._next = self._next, next(self._pictures, None)
+
+
+def _clock(cursors: Sequence[_Cursor], *, start_s: Fraction, period_s: Fraction) -> Iterator[Fraction]:
+    """Yield the first camera's times; over a gap and past its end they go on by the period, until all are over."""
+    time_s = start_s
+    while not all(cursor.is_over(time_s) for cursor in cursors):
+        yield time_s
+        following_s = cursors[0].time_after(time_s)
+        if following_s is None or following_s >= time_s + period_s * Fraction(3, 2):
+            following_s = time_s + period_s
+        time_s = following_s

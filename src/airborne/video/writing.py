@@ -1,0 +1,103 @@
+"""Writing of videos, progressive or interlaced."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import av
+import numpy as np
+from av.codec.context import Flags
+from av.error import FFmpegError
+from av.filter import Graph
+from av.video.reformatter import ColorRange, Colorspace
+
+from airborne.errors import VideoError
+from airborne.video.decoding import Fields
+from airborne.video.pixels import Image, frame_from_rgb, matrix_for, woven_frame
+
+N_THREADS = 4  # fixed, for the encoder's output depends on it
+FRAGMENTED = {"movflags": "frag_keyframe+empty_moov+default_base_moof", "flush_packets": "1"}
+BT709, SMPTE170M = 1, 6  # colour matrix tags
+CODED_FIELD_ORDER = {"top-first": 2, "bottom-first": 3}  # FFmpeg's AV_FIELD_TT, AV_FIELD_BB
+
+
+class VideoWriter:
+    """Writes an MP4 (H.264, 4:2:0) picture by picture; use it in a `with` block.
+
+    The file is written in fragments of about a second, so that what a killed run left can be played. An odd width or
+    height is made even by repeating the last column or row. A file of `fields` "top-first" or "bottom-first" takes
+    woven pictures (see `weave`), is encoded field by field and flagged so; its height is a multiple of four.
+    """
+
+    def __init__(
+        self, path: Path, *, size: tuple[int, int], rate: Fraction, fields: Fields = "progressive", crf: int = 18
+    ) -> None:
+        """Start a file of pictures of `size` (width, height) [px] at `rate` [1/s]; `crf` 0 is lossless, 51 worst.
+
+        Raises VideoError where the file cannot be written or the height does not suit the fields.
+        """
+        width, height = size
+        if fields != "progressive" and height % 4:
+            raise VideoError(
+                f"{path}: an interlaced video's height is a multiple of 4, found {height}; pad the picture"
+            )
+        self.path, self.size, self.fields = path, size, fields
+        self._time_base = 1 / Fraction(rate)
+        self._container = av.open(path, "w", format="mp4", options=FRAGMENTED)
+        self._stream = self._container.add_stream("libx264", rate=rate, options={"crf": str(crf), "bf": "0"})
+        codec = self._stream.codec_context
+        codec.width, codec.height, codec.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
+        codec.gop_size = round(rate) or 1
+        codec.thread_count = N_THREADS
+        codec.colorspace = BT709 if matrix_for(min(size)) == Colorspace.ITU709 else SMPTE170M
+        codec.color_range = ColorRange.MPEG
+        self._flagged: Graph | None = None
+        if fields != "progressive":
+            codec.flags |= Flags.interlaced_dct | Flags.interlaced_me
+            codec.field_order = CODED_FIELD_ORDER[fields]
+            self._flagged = _flagging_graph(codec, "tff" if fields == "top-first" else "bff", self._time_base)
+        try:
+            self._container.start_encoding()
+        except (FFmpegError, OSError) as error:
+            raise VideoError(f"{path} cannot be written ({error.strerror}); check its folder") from error
+        self._n_written = 0
+
+    def write(self, rgb: Image) -> None:
+        """Append a picture (h, w, 3) sRGB; raises VideoError where its size is not the file's."""
+        width, height = self.size
+        if rgb.shape != (height, width, 3):
+            found = "×".join(map(str, rgb.shape))
+            raise VideoError(f"{self.path}: a picture of {found} was given, expected {height}×{width}×3")
+        even = np.pad(rgb, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+        side = min(self.size)
+        if self._flagged is None:
+            frame = frame_from_rgb(even, short_side=side)
+        else:
+            frame = woven_frame(*(frame_from_rgb(even[parity::2], short_side=side) for parity in (0, 1)))
+        frame.pts, frame.time_base = self._n_written, self._time_base
+        self._n_written += 1
+        if self._flagged is not None:
+            self._flagged.vpush(frame)
+            frame = self._flagged.vpull()
+        self._container.mux(self._stream.encode(frame))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Finish the file; after an error too, so that it holds what was written."""
+        self._container.mux(self._stream.encode(None))
+        self._container.close()
+
+
+def _flagging_graph(codec: av.VideoCodecContext, order: str, time_base: Fraction) -> Graph:
+    """Return a filter that marks frames as interlaced, which PyAV's frames cannot say of themselves."""
+    graph = Graph()
+    source = graph.add_buffer(width=codec.width, height=codec.height, format=codec.format, time_base=time_base)
+    graph.link_nodes(source, graph.add("setfield", order), graph.add("buffersink")).configure()
+    return graph

@@ -1,0 +1,42 @@
+import cv2
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from airborne.cameras.distortion import distort, undistort
+from tests.cameras.examples import LENS
+from tests.tolerances import ROUNDTRIP
+
+XY = np.random.default_rng(0).uniform(-0.6, 0.6, (50, 2))
+
+
+def test_distortion_is_that_of_opencv():
+    points = np.column_stack([XY, np.ones(len(XY))])
+    oracle, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), np.eye(3), LENS)
+    assert np.allclose(distort(XY, LENS), oracle[:, 0], atol=ROUNDTRIP)
+
+
+@given(
+    st.tuples(
+        *(st.floats(-size, size) for size in (0.3, 0.1, 0.01, 0.01, 0.05)),
+    ),
+    st.sampled_from([(), (1,), (3, 1, 2)]),
+)
+@settings(max_examples=50, deadline=None, derandomize=True)
+def test_undistort_takes_back_distort(lens, batch):
+    xy = np.random.default_rng(1).uniform(-0.5, 0.5, (*batch, 2))
+    assert np.allclose(undistort(distort(xy, np.array(lens)), np.array(lens)), xy, atol=ROUNDTRIP)
+
+
+def test_four_terms_mean_that_the_fifth_is_zero():
+    assert np.array_equal(distort(XY, LENS[:4]), distort(XY, np.append(LENS[:4], 0)))
+
+
+def test_where_the_lens_folds_back_there_is_no_inverse():
+    lens = np.array([-0.3, 0, 0, 0, 0])  # no point comes out farther than 0.703 from the axis
+    assert np.isnan(undistort(np.array([0.75, 0.0]), lens)).all()
+    assert np.isfinite(undistort(np.array([0.65, 0.0]), lens)).all()
+
+
+def test_a_missing_point_stays_missing():
+    assert np.isnan(undistort(np.array([np.nan, np.nan]), LENS)).all()

@@ -1,0 +1,138 @@
+"""The tables of a run."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.body import BodyModel, Box, Part, Pose, Segment
+from airborne.geometry.rotations import angles_from_matrix
+from airborne.motion import Motion, angles, write_angles, write_joints, write_motion_parquet
+from airborne.tracking import Status
+from tests.motion.helpers import estimate, run_with_gap, somersault
+from tests.tolerances import EXACT, ROUNDTRIP, sampled
+
+
+def rows_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def jointed_body():
+    part = Part("part", Box(np.ones(3)), RigidTransform.identity(), None)
+    trunk = Segment("trunk", None, np.zeros(3), (part,))
+    return BodyModel("body", (trunk, Segment("head", "trunk", np.array([0.0, 0, 0.6]), ())))
+
+
+def test_angles_of_a_steady_somersault_run_on_past_half_a_turn():
+    estimates, truth = somersault(turns=2.0)
+    table = angles(Motion.collect(estimates))
+    for k, name in enumerate(("somersault", "tilt", "twist")):
+        np.testing.assert_allclose(table[name], np.rad2deg(truth[:, k]), atol=1e3 * ROUNDTRIP)
+        assert table[name].attrs["units"] == "deg"
+
+
+def test_angles_run_on_over_lost_frames():
+    estimates, truth = somersault()
+    for i in range(10, 16):
+        estimates[i] = replace(estimates[i], status=Status.LOST, pose=None, covariance=None)
+    table = angles(Motion.collect(estimates))
+    assert np.isnan(table["somersault"][10:16]).all()
+    np.testing.assert_allclose(table["somersault"][16:], np.rad2deg(truth[16:, 0]), atol=1e3 * ROUNDTRIP)
+
+
+def test_angle_deviations_are_those_of_sampled_rotations():
+    item = estimate(2)
+    covariance = item.covariance * 1e-3
+    table = angles(Motion.collect([replace(item, covariance=covariance)]))
+    n = 20000
+    vectors = np.random.default_rng(0).multivariate_normal(np.zeros(3), covariance[3:, 3:], size=n)
+    R = item.pose.world_from_root.rotation.as_matrix()
+    sampled_angles = angles_from_matrix(Rotation.from_rotvec(vectors).as_matrix() @ R)
+    for k, name in enumerate(("somersault", "tilt", "twist")):
+        expected = np.rad2deg(sampled_angles[:, k].std())
+        assert float(table[f"{name}_sd"][0]) == pytest.approx(expected, rel=sampled(n))
+
+
+def test_angle_deviations_are_unknown_where_the_covariance_is_infinite_or_missing():
+    blind = estimate(0)
+    blind.covariance[4, 4] = np.inf
+    table = angles(Motion.collect([blind, estimate(1, covariance=False), estimate(2)]))
+    assert np.isnan(table["twist_sd"]).to_numpy().tolist() == [True, True, False]
+
+
+def test_angles_near_ninety_degrees_of_tilt_carry_a_sign_and_no_deviation(tmp_path):
+    tilted = Rotation.from_euler("XYZ", [20, 88, 40], degrees=True)
+    item = replace(estimate(0), pose=Pose(world_from_root=RigidTransform.from_components(np.zeros(3), tilted)))
+    write_angles(tmp_path / "angles.csv", Motion.collect([item]))
+    (row,) = rows_of(tmp_path / "angles.csv")
+    assert row["is_singular"] == "1"
+    assert row["twist_deg_sd"] == ""
+    assert float(row["tilt_deg"]) == pytest.approx(88, abs=ROUNDTRIP)
+
+
+def test_angles_table_has_empty_cells_where_lost(tmp_path):
+    write_angles(tmp_path / "angles.csv", Motion.collect(run_with_gap(4, lost=[2])))
+    rows = rows_of(tmp_path / "angles.csv")
+    columns = "frame,time_s,somersault_deg,tilt_deg,twist_deg,somersault_deg_sd,tilt_deg_sd,twist_deg_sd,is_singular"
+    assert list(rows[0]) == columns.split(",")
+    assert [row["tilt_deg"] == "" for row in rows] == [False, False, True, False]
+
+
+@pytest.mark.parametrize("n", [0, 1, 5])
+def test_parquet_holds_the_motion_with_units(tmp_path, n):
+    motion = Motion.collect(run_with_gap(n, lost=[3], n_joints=1), ("head",))
+    write_motion_parquet(tmp_path / "motion.parquet", motion)
+    table = pq.read_table(tmp_path / "motion.parquet")
+    units = {field.name: field.metadata[b"units"].decode() for field in table.schema}
+    assert (units["x_m"], units["rx_deg_sd"], units["time_s"], units["x_m_sd"]) == ("m", "deg", "s", "m")
+    assert (units["qw"], units["score"], units["head_x_deg"]) == ("1", "grey levels", "deg")
+    assert table["x_m"].null_count == (n > 3)
+    known = table["z_m"].to_numpy()[motion.has_pose]
+    np.testing.assert_array_equal(known, motion.position[motion.has_pose, 2])
+
+
+def test_joints_are_the_segments_origins(tmp_path):
+    motion = Motion.collect(run_with_gap(3, lost=[1], n_joints=1), ("head",))
+    write_joints(tmp_path / "joints.csv", motion, jointed_body())
+    rows = rows_of(tmp_path / "joints.csv")
+    assert [(row["frame"], row["joint"]) for row in rows] == [(str(f), j) for f in range(3) for j in ("trunk", "head")]
+    assert all(row[column] == "" for row in rows[2:4] for column in ("x_m", "y_m", "z_m", "sd_m"))
+    head = [float(rows[1][column]) for column in ("x_m", "y_m", "z_m")]
+    np.testing.assert_allclose(head, motion.position[0] + motion.R[0] @ [0, 0, 0.6], atol=EXACT)
+
+
+def test_joint_deviation_grows_with_the_distance_from_the_root(tmp_path):
+    estimates, _ = somersault(2, variance=(1e-6, 1e-4))
+    write_joints(tmp_path / "joints.csv", Motion.collect(estimates), jointed_body())
+    trunk, head = rows_of(tmp_path / "joints.csv")[:2]
+    assert float(trunk["sd_m"]) == pytest.approx(1e-3, rel=ROUNDTRIP)
+    # two of the three axes move with the rotation: per-axis variance 1e-6 + 2/3 * 0.6^2 * 1e-4
+    assert float(head["sd_m"]) == pytest.approx(np.sqrt(1e-6 + 2 / 3 * 0.36 * 1e-4), rel=ROUNDTRIP)
+
+
+def test_joint_deviation_is_that_of_sampled_poses(tmp_path):
+    item = estimate(0, n_joints=1)
+    covariance = item.covariance * 1e-3
+    write_joints(
+        tmp_path / "joints.csv", Motion.collect([replace(item, covariance=covariance)], ("head",)), jointed_body()
+    )
+    n = 20000
+    moves = np.random.default_rng(0).multivariate_normal(np.zeros(6), covariance, size=n)
+    offset = item.pose.world_from_root.rotation.apply([0, 0, 0.6])
+    heads = moves[:, :3] + Rotation.from_rotvec(moves[:, 3:]).apply(offset)
+    expected = np.sqrt(heads.var(axis=0).mean())
+    assert float(rows_of(tmp_path / "joints.csv")[1]["sd_m"]) == pytest.approx(expected, rel=sampled(n))
+
+
+def test_unseen_rotation_leaves_the_roots_own_deviation_finite(tmp_path):
+    item = estimate(0)
+    item.covariance[3:] = item.covariance[:, 3:] = np.nan
+    item.covariance[3, 3] = np.inf
+    write_joints(tmp_path / "joints.csv", Motion.collect([item], ("head",)), jointed_body())
+    trunk, head = rows_of(tmp_path / "joints.csv")
+    assert float(trunk["sd_m"]) > 0
+    assert head["sd_m"] == ""
