@@ -152,6 +152,16 @@ class PosedBody:
     R: Array  # (segments, 3, 3) world from segment, rotations
     t: Array  # (segments, 3) world from segment, translations [m]
 
+    def moved(self, motion: Array) -> PosedBody:
+        """Move the whole body: motion (6,) is a translation [m] and a turn about the root's origin [rad], world axes."""
+        turn = Rotation.from_rotvec(motion[3:]).as_matrix()
+        return PosedBody(self.model, turn @ self.R, (self.t - self.t[0]) @ turn.T + self.t[0] + motion[:3])
+
+    @property
+    def world_from_root(self) -> RigidTransform:
+        """Where the root is."""
+        return RigidTransform.from_components(self.t[0], Rotation.from_matrix(self.R[0]))
+
 
 def _require_positive(values: Array, name: str) -> None:
     if values.shape != (3,) or not np.all(np.isfinite(values)) or np.any(values <= 0):

@@ -4,16 +4,39 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
+from airborne.cameras import Camera
 from airborne.rendering.rows import BLOCK, LANES, NX, NY, NZ, SHAPE, W, count_rows, draw_row, find_spans, new_row
-from airborne.rendering.shapes import KERNEL, outline_all, place
+from airborne.rendering.shapes import KERNEL, new_shapes, outline_all, place
+
+
+def packed_view(camera: Camera) -> NDArray[np.float64]:
+    """Pack a camera without distortion for the kernels: R row by row, t, the two rows of K^-1: (18,)."""
+    place = camera.camera_from_world
+    return np.concatenate([place.rotation.as_matrix().ravel(), place.translation, np.linalg.inv(camera.K)[:2].ravel()])
+
+
+def empty_maps(size: tuple[int, int]) -> tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.float32]]:
+    """Allocate part, inverse depth and normals for a view of (width, height)."""
+    width, height = size
+    return (
+        np.empty((height, width), np.int16),
+        np.empty((height, width), np.float32),
+        np.zeros((3, height, width), np.float32),
+    )
+
+
+def workspace(geometry):
+    """Allocate the shapes that `surface_maps` places: one workspace a body and thread."""
+    return new_shapes(geometry)
 
 
 @njit(**KERNEL)
 def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
     """Fill the maps of one view with the surface nearest to the camera.
 
-    shapes: workspace of `new_shapes`; R (s, 3, 3), t (s, 3) [m] world from segment; view (18,) packed.
+    shapes: a `workspace` of the body; R (s, 3, 3), t (s, 3) [m] world from segment; view (18,) packed.
     part (h, w) int16: index into BodyModel.parts, -1 where there is none; inverse_depth (h, w) float32 [1/m], 0 where
     there is none; normals (3, h, w) float32: outward unit normals in camera axes, left as they are where there is none.
     """

@@ -30,6 +30,7 @@ from airborne.rendering.shapes import (
     NORMAL,
     W_STEP,
     G,
+    outline_all,
 )
 
 LANES = 16
@@ -97,6 +98,26 @@ def find_spans(shapes, geometry, width, row_start, row_stop, ends, curves):
 
 
 @njit(**INNER)
+def all_spans(shapes, geometry, view, width, height):
+    """Outline the placed shapes in a view and list their spans: row_start, row_stop, ends, curves of `find_spans`."""
+    outline_all(shapes, geometry, view, width, height)
+    row_start, row_stop = np.empty(height + 1, np.int64), np.empty(height, np.int64)
+    n_spans = count_rows(shapes.rows, row_start)
+    ends, curves = np.empty((n_spans, 3), np.int64), np.empty((n_spans, 2))
+    find_spans(shapes, geometry, width, row_start, row_stop, ends, curves)
+    return row_start, row_stop, ends, curves
+
+
+@njit(**INNER)
+def covered_blocks(ends, start, stop):
+    """Return the first block that the spans `start` to `stop - 1` touch, and the last."""
+    first, last = ends[start, 0], ends[start, 1]
+    for i in range(start + 1, stop):
+        first, last = min(first, ends[i, 0]), max(last, ends[i, 1])
+    return first // LANES, last // LANES
+
+
+@njit(**INNER)
 def draw_row(row, outlines, surfaces, ends, curves, start, stop, v, first_block):
     """Draw the spans `start` to `stop - 1` of row v into the blocks of `row`, the nearest surface on top."""
     for i in range(start, stop):
@@ -146,7 +167,7 @@ def light_block(block, lights, x, x_step, y, y_step):
         for j in range(LANES):
             w, n0, n1, n2 = block[W + j], block[NX + j], block[NY + j], block[NZ + j]
             a0, a1, a2 = w * p0 - (x + x_step * f4(j)), w * p1 - (y + y_step * f4(j)), w * p2 - f4(1)
-            away = a0 * a0 + a1 * a1 + a2 * a2
-            is_lit = -(a0 * d0 + a1 * d1 + a2 * d2) >= cone * np.sqrt(away)
-            facing = max(n0 * a0 + n1 * a1 + n2 * a2, f4(0)) / np.sqrt((n0 * n0 + n1 * n1 + n2 * n2) * away)
+            near = f4(1) / np.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
+            facing = max(n0 * a0 + n1 * a1 + n2 * a2, f4(0)) * near * (f4(1) / np.sqrt(n0 * n0 + n1 * n1 + n2 * n2))
+            is_lit = -(a0 * d0 + a1 * d1 + a2 * d2) * near >= cone
             block[SHADE + j] += intensity * facing if is_lit else f4(0)

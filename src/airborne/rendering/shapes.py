@@ -21,9 +21,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-INNER: dict[str, Any] = {"nogil": True, "fastmath": True, "error_model": "numpy"}  # called by kernels only
-KERNEL: dict[str, Any] = {**INNER, "cache": True}  # called from Python
-INNER = {**INNER, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+from airborne.body import Geometry
+
+_COMMON: dict[str, Any] = {"nogil": True, "fastmath": True, "error_model": "numpy"}
+KERNEL = {**_COMMON, "cache": True}  # called from Python
+INNER = {**_COMMON, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # called by kernels only
 
 # columns of a packed view: world to camera (R row by row, t), then the two rows of K^-1
 VIEW_R, VIEW_T, VIEW_K, VIEW_COLUMNS = 0, 9, 12, 18
@@ -46,16 +48,13 @@ class Shapes(NamedTuple):
     edges: Any  # (c, 3) side (+1 lower bound, -1 upper bound, 0 a condition on the row), slope, offset
 
 
-@njit(**INNER)
-def new_shapes(geometry):
+def new_shapes(geometry: Geometry) -> Shapes:
     """Allocate the workspace for a body and fill in what no pose changes."""
     e, p, c = len(geometry.ellipsoid_segment), len(geometry.polygon_segment), len(geometry.corners)
     surface = np.zeros((e + p, SURFACE_COLUMNS), np.float32)
-    for i in range(e + p):
-        part = geometry.ellipsoid_part[i] if i < e else geometry.polygon_part[i - e]
-        for k in range(3):
-            surface[i, COLOUR + k] = geometry.colours[part, k]
-        surface[i, ID] = i
+    parts = np.concatenate([geometry.ellipsoid_part, geometry.polygon_part])
+    surface[:, COLOUR : COLOUR + 3] = geometry.colours[parts]
+    surface[:, ID] = np.arange(e + p)
     return Shapes(
         np.empty((e, 3)),
         np.empty((e, 3, 3)),
@@ -139,7 +138,7 @@ def _outline_ellipsoid(shapes, s, view, height):
     n10, n11, n12 = m01 * k00 + m11 * k10, m01 * k01 + m11 * k11, m01 * k02 + m11 * k12 + m12
     n20, n21, n22 = m02 * k00 + m12 * k10, m02 * k01 + m12 * k11, m02 * k02 + m12 * k12 + m22
     b0, b1, b2 = (k00 * g0 + k10 * g1) / k, (k01 * g0 + k11 * g1) / k, (k02 * g0 + k12 * g1 + g2) / k
-    q00, q01, q02 = b0 * b0 - (k00 * n00 + k10 * n10) / k, b0 * b1 - (k00 * n01 + k10 * n11) / k, 0.0
+    q00, q01 = b0 * b0 - (k00 * n00 + k10 * n10) / k, b0 * b1 - (k00 * n01 + k10 * n11) / k
     q02 = b0 * b2 - (k00 * n02 + k10 * n12) / k
     q11, q12 = b1 * b1 - (k01 * n01 + k11 * n11) / k, b1 * b2 - (k01 * n02 + k11 * n12) / k
     q22 = b2 * b2 - (k02 * n02 + k12 * n12 + n22) / k

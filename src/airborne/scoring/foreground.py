@@ -11,7 +11,9 @@ from numba import njit
 
 BINS = 32
 EVIDENCE_LIMIT = 5.0  # nats; no single pixel may shout louder
-_UNSEEN = 2e-5  # probability given to a colour never seen, a bin
+_UNSEEN = np.float32(2e-5)  # probability given to a colour never seen, a bin
+_BIN_AT_PEAK = np.float32(37.1)  # a bin's volume times the Student density's peak at a spread of one grey level
+_HALF = np.float32(0.5)
 _SPREAD = np.array([0.25, 0.5, 0.25], np.float32)  # a colour also counts in its neighbours' bins
 
 
@@ -41,14 +43,14 @@ def count_colours(rgb, chosen, stride, counts):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def evidence(rgb, body, background, plate, plate_sd, known, evidence_out, posterior_out):
-    """Fill evidence_out (h, w) [nats] and posterior_out (h, w), the body's probability at even odds.
+def posterior(rgb, body, background, plate, plate_sd, known, out):
+    """Fill out (h, w) with each pixel's probability to be body, at even odds.
 
     rgb (h, w, 3) uint8; body, background (32, 32, 32) probabilities; plate (h, w, 3) the empty scene's sRGB with sd
-    plate_sd (h, w) grey levels, used where known (h, w) is above zero.
+    plate_sd (h, w) grey levels, used where known (h, w) is above zero: half of the background's chance is then a
+    Student distribution (5 degrees of freedom) about the plate.
     """
     h, w, _ = rgb.shape
-    limit = np.float32(EVIDENCE_LIMIT)
     for y in range(h):
         for x in range(w):
             r, g, b = rgb[y, x, 0], rgb[y, x, 1], rgb[y, x, 2]
@@ -56,10 +58,45 @@ def evidence(rgb, body, background, plate, plate_sd, known, evidence_out, poster
             p_back = background[r >> 3, g >> 3, b >> 3] + _UNSEEN
             if known[y, x] > 0:
                 d0, d1, d2 = r - plate[y, x, 0], g - plate[y, x, 1], b - plate[y, x, 2]
-                s = plate_sd[y, x]
-                mass = 32.5 / (s * s * s)  # a bin's share of the normal density at its centre: 8^3 / (2 pi)^1.5
-                near = min(mass, 1.0) * np.exp(-0.5 * (d0 * d0 + d1 * d1 + d2 * d2) / (s * s))
-                p_back = 0.5 * p_back + 0.5 * near
-            value = np.log(p_body / p_back)
-            evidence_out[y, x] = min(max(value, -limit), limit)
-            posterior_out[y, x] = p_body / (p_body + p_back)
+                s2 = plate_sd[y, x] * plate_sd[y, x]
+                near = _BIN_AT_PEAK / (s2 * plate_sd[y, x])
+                far2 = np.float32(1) + (d0 * d0 + d1 * d1 + d2 * d2) / (np.float32(5) * s2)
+                far4 = far2 * far2
+                p_back = _HALF * p_back + _HALF * min(near, np.float32(1)) / (far4 * far4)
+            out[y, x] = p_body / (p_body + p_back)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def evidence(posterior, out):
+    """Fill out (h, w) with the evidence [nats] of posterior (h, w)."""
+    limit = np.float32(EVIDENCE_LIMIT)
+    h, w = posterior.shape
+    for y in range(h):
+        for x in range(w):
+            p = min(max(posterior[y, x], np.float32(1e-6)), np.float32(1 - 1e-6))
+            out[y, x] = min(max(np.log(p / (np.float32(1) - p)), -limit), limit)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def agreement(posterior, part, margin_u, margin_v):
+    """Compare a mask, part (h, w) >= 0, with the posterior (h, w).
+
+    Returns (pixels of the mask, posterior summed inside, posterior summed over the mask's box widened by the margins,
+    evidence summed inside [nats]).
+    """
+    h, w = part.shape
+    x0, y0, x1, y1 = w, h, -1, -1
+    pixels, inside, nats = 0.0, 0.0, 0.0
+    for y in range(h):
+        for x in range(w):
+            if part[y, x] >= 0:
+                x0, x1, y0, y1 = min(x0, x), max(x1, x), min(y0, y), max(y1, y)
+                p = min(max(posterior[y, x], np.float32(1e-6)), np.float32(1 - 1e-6))
+                pixels += 1
+                inside += p
+                nats += min(max(np.log(p / (1 - p)), -EVIDENCE_LIMIT), EVIDENCE_LIMIT)
+    near = 0.0
+    for y in range(max(y0 - margin_v, 0), min(y1 + margin_v + 1, h)):
+        for x in range(max(x0 - margin_u, 0), min(x1 + margin_u + 1, w)):
+            near += posterior[y, x]
+    return pixels, inside, near, nats

@@ -12,13 +12,23 @@ from numba import njit
 _srgb = np.arange(1024) / 1023
 TO_LIGHT = np.where(_srgb <= 0.04045, _srgb / 12.92, ((_srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
 _RIDGE = 1e-4  # pull of the direction-dependent part toward zero, per pixel of unit albedo
-_MOST_SAMPLES = 1500
+_MOST_SAMPLES = 500
 
 
 def light_from_srgb(colours):
     """Turn sRGB 0..255 into linear light 0..1, any shape."""
     c = np.asarray(colours, float) / 255
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def light_planes(image, table, out):
+    """Turn an image (h, w, 3), sRGB 0..255 of any type, into planes (3, h, w) by a table of 1024 entries (`TO_LIGHT`)."""
+    h, w, _ = image.shape
+    for k in range(3):
+        for y in range(h):
+            for x in range(w):
+                out[k, y, x] = table[int(image[y, x, k] * np.float32(1023 / 255) + np.float32(0.5))]
 
 
 @njit(cache=True, nogil=True, fastmath=True)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.cameras import Camera
-from airborne.scoring.foreground import BINS, count_colours, evidence
+from airborne.scoring.foreground import BINS, count_colours, posterior
 from airborne.scoring.plate import START_SD, Plate, look
 
 COLOUR_RATE = 0.1  # share of the newest frame in the colour histograms
@@ -30,6 +30,7 @@ class Region:
     rgb: NDArray[np.uint8]  # (h, w, 3)
     picture: NDArray[np.uint8]  # (H, W, 3) the whole view
     source: tuple[str, bytes]  # camera name and raster: views that share it show the same pixels of the scene
+    packed: NDArray[np.float64]  # (18,) the camera for the kernels
 
     @property
     def aspect(self) -> float:
@@ -92,13 +93,12 @@ class Appearance:
             return np.zeros((height, width, 3), np.float32), np.full((height, width), START_SD, np.float32), unseen
         return tuple(np.ascontiguousarray(region.crop(whole)) for whole in (plate.mean, plate.sd, plate.looks))
 
-    def evidence(self, region: Region) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return each pixel's evidence for the body [nats] and its probability at even odds: (h, w) both."""
-        shape = region.rgb.shape[:2]
-        out, posterior = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    def posterior(self, region: Region) -> NDArray[np.float32]:
+        """Return each pixel's probability (h, w) to be body, at even odds."""
+        out = np.empty(region.rgb.shape[:2], np.float32)
         name = region.camera.name
-        evidence(region.rgb, self.body[name], self.background[name], *self.scene(region), out, posterior)
-        return out, posterior
+        posterior(region.rgb, self.body[name], self.background[name], *self.scene(region), out)
+        return out
 
 
 def _kernel(radius_px: int, aspect: float) -> NDArray[np.uint8]:

@@ -1,33 +1,30 @@
 """Gauss-Newton by synthesis: the pose moves until its picture agrees with every camera's at once.
 
 Far out, the blurred mask is fitted to the blurred probability of each pixel to be body, on reduced pictures
-(`silhouettes`). Close in, the composite of the lit body over the empty scene is fitted to the picture itself
-(`photometric`), which is not pulled toward bright edges as any classification is.
+(`fit_silhouettes`). Close in, the composite of the lit body over the empty scene is fitted to the picture itself
+(`fit_pictures`), which is not pulled toward bright edges as any classification is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from airborne.body import BodyModel, Geometry, Pose, geometry
-from airborne.cameras import Camera
-from airborne.rendering.maps import surface_maps
-from airborne.rendering.shapes import new_shapes
-from airborne.scoring.lighting import TO_LIGHT, light_from_srgb
-from airborne.scoring.plate import fill
+from airborne.body import BodyModel, Geometry, PosedBody, geometry
+from airborne.rendering.maps import empty_maps, packed_view, surface_maps, workspace
+from airborne.scoring.lighting import TO_LIGHT, light_from_srgb, light_planes
+from airborne.scoring.plate import START_SD, fill
 from airborne.tracking.appearance import Appearance, Region
 from airborne.tracking.normal_equations import gaussian_taps, photometric_equations, silhouette_equations
 
 Array = NDArray[np.floating]
 
-# reduction of the picture, iterations
-FAR, NEAR = ((8, 5), (4, 4), (2, 3)), ((4, 2), (2, 2))
+FAR, NEAR = ((8, 5), (4, 4), (2, 3)), ((4, 2), (2, 2))  # reduction of the picture, iterations
 _COARSE_SIGMA_PX = 1.2  # of the reduced picture
 _FINE_SIGMA_PX = 1.2  # of a full frame
 _CLIP = 0.1  # linear light, 0..1: a residual this large counts a quarter
@@ -35,15 +32,142 @@ _OVERSTEP = 1.6  # robust weights and refitted light make each step about this m
 _MOST_STEPS = 12
 _SETTLED = 0.5  # squared length of the last step, in sds of the pose
 _PRIOR_SD = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])  # [m], [rad]: keeps what the pictures do not show where it is
-UNSEEN_SD = np.array([0.25, 0.25, 0.25, 0.5, 0.5, 0.5])  # [m], [rad]: an sd above this is no knowledge
-_LEVER_M = 0.3  # length that makes metres and radians comparable
+_LEVER_M = 0.3  # the length that makes metres and radians comparable
+_UNSEEN_SD_M = 0.15  # a direction known less well than this, at the lever's length, is not known
 
 
-@dataclass(slots=True)
-class Workspace:
-    """A body's arrays for the kernels; made once, reused by every call of one thread."""
+@dataclass(frozen=True, slots=True)
+class Synthesis:
+    """A body made ready for the kernels; its workspace serves one thread."""
 
     model: BodyModel
     geometry: Geometry
-    shapes: NamedTuple  # type: ignore[valid-type]
+    shapes: Any
     albedo: NDArray[np.float32]  # (parts, 3) linear light
+
+    @classmethod
+    def of(cls, model: BodyModel) -> Synthesis:
+        """Make a body ready."""
+        flat = geometry(model)
+        return cls(model, flat, workspace(flat), light_from_srgb(flat.colours).astype(np.float32))
+
+    def parts(self, posed: PosedBody, region: Region) -> NDArray[np.int16]:
+        """Draw which part each pixel of a region shows: (h, w), -1 where none."""
+        maps = empty_maps(region.camera.size)
+        surface_maps(self.shapes, self.geometry, posed.R, posed.t, region.packed, *maps)
+        return maps[0]
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Where a fit ended."""
+
+    posed: PosedBody
+    covariance: Array  # (6, 6) position [m], world rotation vector [rad]; infinite where the pictures show nothing
+    rms_light: float  # blurred residual, linear light 0..1
+    steps: int
+
+
+def fit_silhouettes(
+    synthesis: Synthesis,
+    posed: PosedBody,
+    regions: Sequence[Region],
+    posteriors: Sequence[Array],
+    levels: Sequence[tuple[int, int]] = NEAR,
+) -> PosedBody:
+    """Move the body until its masks agree with the posteriors (h, w) of the regions, from coarse to fine."""
+    taps = gaussian_taps(_COARSE_SIGMA_PX)
+    correlated = 4 * np.pi * _COARSE_SIGMA_PX**2
+    body = synthesis.shapes, synthesis.geometry
+    for reduction, steps in levels:
+        views = [_reduced(region, posterior, reduction) for region, posterior in zip(regions, posteriors, strict=True)]
+        for _ in range(steps):
+            A, g, S, totals = _zeros()
+            for view in views:
+                totals += silhouette_equations(*body, posed.R, posed.t, *view, taps, taps, A, g, S)
+            posed = posed.moved(_solve(_whole(A), g, correlated * _mean_square(totals)))
+    return posed
+
+
+def fit_pictures(synthesis: Synthesis, posed: PosedBody, regions: Sequence[Region], appearance: Appearance) -> Fit:
+    """Move the body until the composite of body and empty scene agrees with the pictures; say how sure that is."""
+    views = [_photometric_view(region, appearance) for region in regions]
+    rows_sigma_px = [max(_FINE_SIGMA_PX * region.aspect, 0.5) for region in regions]
+    taps = [(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma)) for sigma in rows_sigma_px]
+    correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px))
+    body = synthesis.shapes, synthesis.geometry
+    for step in range(1, _MOST_STEPS + 1):
+        A, g, S, totals = _zeros()
+        rounds = 3 if step == 1 else 1
+        for (fixed, light, maps), (taps_u, taps_v) in zip(views, taps, strict=True):
+            totals += photometric_equations(
+                *body, posed.R, posed.t, *fixed, synthesis.albedo, light, rounds, maps, taps_u, taps_v, _CLIP, A, g, S
+            )
+        A, noise = _whole(A), correlated * _mean_square(totals)
+        motion = _solve(A, g, noise)
+        posed = posed.moved(_OVERSTEP * motion)
+        if motion @ A @ motion <= _SETTLED * noise:
+            break
+    return Fit(posed, _covariance(A, S, noise), _mean_square(totals) ** 0.5, step)
+
+
+def _photometric_view(region: Region, appearance: Appearance) -> tuple[tuple, Array, tuple]:
+    """Make a region ready: what stays (packed view, K, observed, scene, certainty), its light, its maps."""
+    mean, sd, looks = appearance.scene(region)
+    filled = np.empty_like(mean)
+    if not fill(mean, looks, filled):
+        filled[:] = region.rgb
+    observed, scene = np.empty((2, 3, *sd.shape), np.float32)
+    light_planes(region.rgb, TO_LIGHT, observed)
+    light_planes(filled, TO_LIGHT, scene)
+    certainty = np.minimum(1, (START_SD / sd) ** 2)
+    light = np.zeros((3, 4), np.float32)
+    light[:, 0] = 1
+    return (region.packed, region.camera.K, observed, scene, certainty), light, empty_maps(region.camera.size)
+
+
+def _reduced(region: Region, posterior: Array, reduction: int) -> tuple:
+    """Reduce a region by area averaging to about square pixels."""
+    rows = max(1, round(reduction * region.aspect))
+    height, width = posterior.shape
+    size = (max(width // reduction, 1), max(height // rows, 1))
+    whole = posterior[: size[1] * rows, : size[0] * reduction]
+    plane = cv2.resize(whole, size, interpolation=cv2.INTER_AREA)
+    camera = region.camera.resampled(scale=(reduction, rows), offset=((reduction - 1) / 2, (rows - 1) / 2), size=size)
+    return packed_view(camera), camera.K, plane, np.ones_like(plane), empty_maps(size)
+
+
+def _zeros() -> tuple[Array, Array, Array, Array]:
+    return np.zeros((6, 6)), np.zeros(6), np.zeros((6, 6)), np.zeros(2)
+
+
+def _mean_square(totals: Array) -> float:
+    return totals[0] / totals[1] if totals[1] > 0 else 1.0
+
+
+def _whole(A: Array) -> Array:
+    return A + np.tril(A, -1).T
+
+
+def _solve(A: Array, g: Array, noise: float) -> Array:
+    """Solve for the motion (6,), held back where the pictures say little (Tikhonov)."""
+    return np.linalg.solve(A + np.diag(noise / _PRIOR_SD**2), g)
+
+
+def _covariance(A: Array, S: Array, noise: float) -> Array:
+    """Turn the curvature A and the blocks' spread S into a covariance; directions not seen get an infinite variance.
+
+    Along each principal direction the larger of two variances holds: what independent noise would give, and what the
+    residuals' own patches give (the sandwich estimate), which also counts wrong light and wrong shape.
+    """
+    scale = np.array([1, 1, 1, 1 / _LEVER_M, 1 / _LEVER_M, 1 / _LEVER_M])
+    curvature, directions = np.linalg.eigh(A * np.outer(scale, scale))
+    spread = np.einsum("ij,ik,kj->j", directions, S * np.outer(scale, scale), directions)
+    curvature = np.maximum(curvature, 1e-12 * max(curvature[-1], 1e-12))
+    variance = np.maximum(noise / curvature, spread / curvature**2)
+    seen = variance < _UNSEEN_SD_M**2
+    covariance = (directions[:, seen] * variance[seen]) @ directions[:, seen].T * np.outer(scale, scale)
+    hidden = np.any(np.abs(directions[:, ~seen]) > 0.1, axis=1)
+    covariance[hidden] = covariance[:, hidden] = 0
+    covariance[hidden, hidden] = np.inf
+    return (covariance + covariance.T) / 2

@@ -14,50 +14,56 @@ from airborne.rendering.shapes import KERNEL
 from airborne.scoring.lighting import compose, fit_light
 
 BLOCK_PX = 16  # residuals this close are not independent: the side of a block of the covariance's sandwich
+RADIUS_PX = 4  # reach of the blur: three sds of the widest one used
+_PAD_PX = RADIUS_PX + 3  # beyond it, the blurred mask is nothing
 _EDGE = 0.01  # blurred coverage below which a pixel says nothing of the body
 
 
 def gaussian_taps(sigma_px: float) -> np.ndarray:
-    """Return the odd, normalised taps of a Gaussian of the given sd, cut at three sd."""
-    radius = max(1, int(np.ceil(3 * sigma_px)))
-    x = np.arange(-radius, radius + 1)
-    taps = np.exp(-0.5 * (x / sigma_px) ** 2)
-    return (taps / taps.sum()).astype(np.float32)
+    """Return the five taps of a Gaussian, centre first: the four on either side are equal and are stored once."""
+    taps = np.exp(-0.5 * (np.arange(RADIUS_PX + 1) / sigma_px) ** 2)
+    return (taps / (2 * taps.sum() - taps[0])).astype(np.float32)
 
 
 @njit(**KERNEL)
-def blur(planes, taps_u, taps_v, scratch, out):
-    """Blur planes (c, h, w) with separable taps into out; outside the planes the border is repeated. scratch (h, w)."""
+def blur(planes, taps_u, taps_v, out):
+    """Blur planes (c, h, w) with separable symmetric taps (5,) into out; outside the planes the border is repeated."""
     c, h, w = planes.shape
-    ru, rv = taps_u.size // 2, taps_v.size // 2
+    u0, u1, u2, u3, u4 = taps_u[0], taps_u[1], taps_u[2], taps_u[3], taps_u[4]
+    v0, v1, v2, v3, v4 = taps_v[0], taps_v[1], taps_v[2], taps_v[3], taps_v[4]
+    padded = np.empty(w + 2 * RADIUS_PX, np.float32)
+    rows = np.empty((h + 2 * RADIUS_PX, w), np.float32)
     for k in range(c):
         for y in range(h):
-            row = scratch[y]
-            source = planes[k, y]
+            for x in range(RADIUS_PX):
+                padded[x] = planes[k, y, 0]
+                padded[w + RADIUS_PX + x] = planes[k, y, w - 1]
             for x in range(w):
-                row[x] = np.float32(0)
-            for j in range(-ru, ru + 1):
-                tap = taps_u[j + ru]
-                a, b = min(max(0, -j), w), max(min(w, w - j), 0)
-                for x in range(a, b):
-                    row[x] += tap * source[x + j]
-                for x in range(0, a):
-                    row[x] += tap * source[0]
-                for x in range(max(a, b), w):
-                    row[x] += tap * source[w - 1]
+                padded[RADIUS_PX + x] = planes[k, y, x]
+            for x in range(w):
+                rows[y + RADIUS_PX, x] = (
+                    u0 * padded[x + 4]
+                    + u1 * (padded[x + 3] + padded[x + 5])
+                    + u2 * (padded[x + 2] + padded[x + 6])
+                    + u3 * (padded[x + 1] + padded[x + 7])
+                    + u4 * (padded[x] + padded[x + 8])
+                )
+        for y in range(RADIUS_PX):
+            rows[y] = rows[RADIUS_PX]
+            rows[h + RADIUS_PX + y] = rows[h + RADIUS_PX - 1]
         for y in range(h):
-            row = out[k, y]
             for x in range(w):
-                row[x] = np.float32(0)
-            for j in range(-rv, rv + 1):
-                tap = taps_v[j + rv]
-                source = scratch[min(max(y + j, 0), h - 1)]
-                for x in range(w):
-                    row[x] += tap * source[x]
+                out[k, y, x] = (
+                    v0 * rows[y + 4, x]
+                    + v1 * (rows[y + 3, x] + rows[y + 5, x])
+                    + v2 * (rows[y + 2, x] + rows[y + 6, x])
+                    + v3 * (rows[y + 1, x] + rows[y + 7, x])
+                    + v4 * (rows[y, x] + rows[y + 8, x])
+                )
 
 
 @njit(**KERNEL)
-def window_of(part, pad_u, pad_v):
+def window_of(part):
     """Return the window (x0, y0, x1, y1) round the pixels of the body, padded; empty (0, 0, 0, 0) where there is none."""
     h, w = part.shape
     x0, y0, x1, y1 = w, h, -1, -1
@@ -68,7 +74,7 @@ def window_of(part, pad_u, pad_v):
                 y0, y1 = min(y0, y), max(y1, y)
     if x1 < 0:
         return 0, 0, 0, 0
-    return max(x0 - pad_u, 0), max(y0 - pad_v, 0), min(x1 + pad_u + 1, w), min(y1 + pad_v + 1, h)
+    return max(x0 - _PAD_PX, 0), max(y0 - _PAD_PX, 0), min(x1 + _PAD_PX + 1, w), min(y1 + _PAD_PX + 1, h)
 
 
 @njit(**KERNEL)
@@ -144,14 +150,14 @@ def accumulate(residual, shape, coverage, inverse_depth, certainty, x0, y0, K, v
 
 
 @njit(**KERNEL)
-def _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v, scratch):
+def _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v):
     planes = np.empty((2, y1 - y0, x1 - x0), np.float32)
     for y in range(y1 - y0):
         for x in range(x1 - x0):
             planes[0, y, x] = 1.0 if part[y + y0, x + x0] >= 0 else 0.0
             planes[1, y, x] = inverse_depth[y + y0, x + x0]
     out = np.empty_like(planes)
-    blur(planes, taps_u, taps_v, scratch, out)
+    blur(planes, taps_u, taps_v, out)
     return out
 
 
@@ -164,17 +170,16 @@ def silhouette_equations(shapes, geometry, R, t, view, K, posterior, certainty, 
     """
     part, inverse_depth, normals = maps
     surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals)
-    x0, y0, x1, y1 = window_of(part, 3 * (taps_u.size // 2), 3 * (taps_v.size // 2))
+    x0, y0, x1, y1 = window_of(part)
     if x1 - x0 < 3 or y1 - y0 < 3:
         return 0.0, 0.0
-    scratch = np.empty((y1 - y0, x1 - x0), np.float32)
-    blurred = _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v, scratch)
+    blurred = _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v)
     seen = np.empty((1, y1 - y0, x1 - x0), np.float32)
     for y in range(y1 - y0):
         for x in range(x1 - x0):
             seen[0, y, x] = posterior[y + y0, x + x0]
     residual, shape = np.empty_like(seen), np.empty_like(seen)
-    blur(seen, taps_u, taps_v, scratch, residual)
+    blur(seen, taps_u, taps_v, residual)
     for y in range(y1 - y0):
         for x in range(x1 - x0):
             shape[0, y, x] = np.float32(0.5) * (residual[0, y, x] + blurred[0, y, x])
@@ -193,15 +198,14 @@ def photometric_equations(
     """
     part, inverse_depth, normals = maps
     surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals)
-    x0, y0, x1, y1 = window_of(part, 3 * (taps_u.size // 2), 3 * (taps_v.size // 2))
+    x0, y0, x1, y1 = window_of(part)
     if x1 - x0 < 3 or y1 - y0 < 3:
         return 0.0, 0.0
     fit_light(observed, part, normals, albedo, light, rounds, x0, y0, x1, y1)
-    scratch = np.empty((y1 - y0, x1 - x0), np.float32)
-    blurred = _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v, scratch)
+    blurred = _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v)
     sharp, residual = np.empty((3, y1 - y0, x1 - x0), np.float32), np.empty((3, y1 - y0, x1 - x0), np.float32)
     body, shape = np.empty_like(sharp), np.empty_like(sharp)
     compose(observed, scene, part, normals, albedo, light, x0, y0, sharp, body)
-    blur(sharp, taps_u, taps_v, scratch, residual)
-    blur(body, taps_u, taps_v, scratch, shape)
+    blur(sharp, taps_u, taps_v, residual)
+    blur(body, taps_u, taps_v, shape)
     return accumulate(residual, shape, blurred[0], blurred[1], certainty, x0, y0, K, view, t[0], clip, A, g, S)

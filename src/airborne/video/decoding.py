@@ -60,11 +60,6 @@ class VideoFacts:
         return self.frame_rate * len(self.parities)
 
     @property
-    def n_images(self) -> int | None:
-        """How many images the file promises; None where it does not say."""
-        return None if self.duration_s is None else round(self.duration_s * self.image_rate)
-
-    @property
     def stored_size(self) -> tuple[int, int]:
         """The size before rotation."""
         width, height = self.size

@@ -44,7 +44,7 @@ class VideoWriter:
             raise VideoError(
                 f"{path}: an interlaced video's height is a multiple of 4, found {height}; pad the picture"
             )
-        self.path, self.size, self.fields = path, size, fields
+        self.path, self.size = path, size
         self._time_base = 1 / Fraction(rate)
         self._container = av.open(path, "w", format="mp4", options=FRAGMENTED)
         self._stream = self._container.add_stream("libx264", rate=rate, options={"crf": str(crf), "bf": "0"})

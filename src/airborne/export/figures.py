@@ -1,0 +1,182 @@
+"""The figures of a run over time: pose.png, score.png, and against a reference digitised.png and errors.png."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from airborne.evaluation import DigitisedPoses, Truth
+from airborne.export import panels
+from airborne.export.palette import REFERENCE_RGB, web
+from airborne.geometry.rotations import angles_from_matrix, geodesic, unwrapped, wrapped
+from airborne.motion import Motion, angles
+
+Array = NDArray[np.floating]
+Rows = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+_AXIS_STYLES = (("x", "-", 1.6), ("y", "--", 1.2), ("z", ":", 1.6))
+_CLICKED = {"linestyle": "", "marker": "o", "markersize": 4.5, "markerfacecolor": "none", "color": web(REFERENCE_RGB)}
+
+
+def write_pose(path: Path, motion: Motion) -> None:
+    """Draw x, y, z [m] and somersault, tilt, twist [deg] over time with bands of two standard deviations.
+
+    Lost frames are gaps, shaded; frames in which some direction cannot be seen are hatched.
+    """
+    table = angles(motion)
+    unseen = panels.is_unseen(motion.position_sd), panels.is_unseen(motion.rotation_sd)
+    singular = _singular(motion)
+    figure, grid = panels.panel_figure(3, 2, row_in=1.75)
+    for k, (axis, angle) in enumerate(zip("xyz", panels.ANGLES, strict=True)):
+        left, right = grid[k]
+        for axes, label, values, sd, mask in (
+            (left, f"{axis} [m]", motion.position[:, k], motion.position_sd[:, k], unseen[0]),
+            (right, f"{angle} [°]", table[angle].to_numpy(), table[f"{angle}_sd"].to_numpy(), unseen[1]),
+        ):
+            panels.draw_band(axes, motion.time_s, values, sd)
+            panels.draw_estimate(axes, motion, values)
+            panels.shade(axes, motion.time_s, mask, panels.UNSEEN)
+            panels.name_panel(axes, label)
+        if angle != "tilt":
+            panels.shade(right, motion.time_s, singular, panels.SINGULAR)
+    handles = [*panels.unseen_handles(unseen[0] | unseen[1]), *panels.singular_handles(singular)]
+    panels.finish(figure, path, motion, [panels.band_handle("± 2 standard deviations"), *handles])
+
+
+def write_score(path: Path, motion: Motion) -> None:
+    """Draw the score [grey levels] and the standard deviations of position [mm] and rotation [deg] over time."""
+    figure, grid = panels.panel_figure(3, 1, row_in=1.6)
+    (score,), (position,), (rotation,) = grid
+    panels.draw_estimate(score, motion, motion.score)
+    panels.name_panel(score, "score [grey levels]")
+    score.set_ylim(bottom=0)
+    for axes, sd, label in (
+        (position, 1e3 * motion.position_sd, "position sd [mm]"),
+        (rotation, np.rad2deg(motion.rotation_sd), "rotation sd [°]"),
+    ):
+        for k, (name, style, width) in enumerate(_AXIS_STYLES):
+            finite = np.where(np.isfinite(sd[:, k]), sd[:, k], np.nan)
+            axes.plot(motion.time_s, finite, style, color=panels.LINE, linewidth=width, label=f"world {name}")
+        panels.name_panel(axes, label)
+        panels.shade_lost(axes, motion)
+        panels.shade(axes, motion.time_s, panels.is_unseen(sd), panels.UNSEEN)
+        axes.set_ylim(bottom=0)
+    position.legend(fontsize=panels.FONT_PT - 1, frameon=False, ncols=3, labelcolor=panels.TEXT)
+    unseen = panels.is_unseen(motion.position_sd) | panels.is_unseen(motion.rotation_sd)
+    panels.finish(figure, path, motion, panels.unseen_handles(unseen))
+
+
+def write_errors(path: Path, motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> None:
+    """Draw estimate minus truth, position [mm] and angles [deg], with bands of two standard deviations about zero.
+
+    A frame goes with the true pose nearest in time, if within half a frame. `symmetries` (3, 3) as in
+    `evaluation.compare`: the motion is shown turned by the one that suits the whole run best.
+    """
+    rows, truth_rows = _nearest(motion.time_s, truth.time_s)
+    reference = _reference(motion, rows, truth.position[truth_rows], truth.R[truth_rows])
+    motion = _turned_alike(motion, reference, symmetries)
+    table, singular = angles(motion), _singular(motion)
+    position_mm, angle_deg = _differences(motion, reference)
+    zero = np.zeros(len(motion))
+    figure, grid = panels.panel_figure(2, 3, row_in=2.1)
+    for k, (axis, angle) in enumerate(zip("xyz", panels.ANGLES, strict=True)):
+        above, below = grid[0][k], grid[1][k]
+        panels.draw_band(above, motion.time_s, zero, 1e3 * motion.position_sd[:, k])
+        panels.draw_band(below, motion.time_s, zero, table[f"{angle}_sd"].to_numpy())
+        _draw_error(above, motion, position_mm[:, k])
+        _draw_error(below, motion, angle_deg[:, k])
+        panels.name_panel(above, f"error of {axis} [mm]")
+        panels.name_panel(below, f"error of {angle} [°]")
+        if angle != "tilt":
+            panels.shade(below, motion.time_s, singular, panels.SINGULAR)
+    handles = [panels.band_handle("± 2 sd about zero"), *panels.singular_handles(singular)]
+    panels.finish(figure, path, motion, handles)
+
+
+def write_digitised(path: Path, motion: Motion, poses: DigitisedPoses, symmetries: Sequence[Array]) -> None:
+    """Draw the tracked pose with the poses from points clicked by hand, and their difference below.
+
+    Source: paper B, figs 9 and 10. Frames go together by number; `symmetries` as in `write_errors`.
+    """
+    _, rows, pose_rows = np.intersect1d(motion.index, poses.index, return_indices=True)
+    reference = _reference(motion, rows, poses.position[pose_rows], poses.R[pose_rows])
+    motion = _turned_alike(motion, reference, symmetries)
+    table, singular = angles(motion), _singular(motion)
+    tracked_deg = np.stack([table[name].to_numpy() for name in panels.ANGLES], axis=1)
+    clicked_deg = _same_turn(tracked_deg, np.rad2deg(unwrapped(angles_from_matrix(reference.R), motion.time_s)))
+    position_mm, angle_deg = _differences(motion, reference)
+    figure, grid = panels.panel_figure(4, 3, row_in=1.6)
+    for k, (axis, angle) in enumerate(zip("xyz", panels.ANGLES, strict=True)):
+        for row, label, tracked, clicked, difference in (
+            (0, f"{axis} [m]", motion.position[:, k], reference.position[:, k], position_mm[:, k]),
+            (2, f"{angle} [°]", tracked_deg[:, k], clicked_deg[:, k], angle_deg[:, k]),
+        ):
+            panels.draw_estimate(grid[row][k], motion, tracked)
+            grid[row][k].plot(motion.time_s, clicked, **_CLICKED)
+            panels.name_panel(grid[row][k], label)
+            _draw_error(grid[row + 1][k], motion, difference)
+            panels.name_panel(grid[row + 1][k], f"difference [{'mm' if row == 0 else '°'}]")
+        for row in (2, 3):
+            if angle != "tilt":
+                panels.shade(grid[row][k], motion.time_s, singular, panels.SINGULAR)
+    clicked_handle = Line2D([], [], **_CLICKED, label="digitised by hand")
+    panels.finish(figure, path, motion, [clicked_handle, *panels.singular_handles(singular)])
+
+
+class _Reference(NamedTuple):
+    """Poses to compare with, one for each frame of the motion; NaN where there is none."""
+
+    position: Array  # (n, 3) [m]
+    R: Array  # (n, 3, 3) world from root
+
+
+def _reference(motion: Motion, rows: Rows, position: Array, R: Array) -> _Reference:
+    spread = _Reference(np.full_like(motion.position, np.nan), np.full_like(motion.R, np.nan))
+    spread.position[rows], spread.R[rows] = position, R
+    return spread
+
+
+def _nearest(time_s: Array, reference_s: Array) -> tuple[Rows, Rows]:
+    """Match each time with the nearest reference time within half a period: rows of both."""
+    half_s = np.median(np.diff(time_s)) / 2 if len(time_s) > 1 else np.inf
+    nearest = np.searchsorted((reference_s[1:] + reference_s[:-1]) / 2, time_s)
+    rows = np.flatnonzero(np.abs(reference_s[nearest] - time_s) < half_s)
+    return rows, nearest[rows]
+
+
+def _turned_alike(motion: Motion, reference: _Reference, symmetries: Sequence[Array]) -> Motion:
+    """Turn the whole motion by the symmetry of the body that brings it nearest to the reference."""
+    alike = motion.R[:, None] @ np.stack(list(symmetries))  # (n, symmetries, 3, 3)
+    angle = geodesic(alike, reference.R[:, None])
+    return replace(motion, R=alike[:, np.argmin(np.nansum(angle**2, axis=0))])
+
+
+def _differences(motion: Motion, reference: _Reference) -> tuple[Array, Array]:
+    """Motion minus reference: position (n, 3) [mm], somersault, tilt, twist (n, 3) [deg]."""
+    turn = wrapped(angles_from_matrix(motion.R) - angles_from_matrix(reference.R))
+    return 1e3 * (motion.position - reference.position), np.rad2deg(turn)
+
+
+def _same_turn(tracked_deg: Array, reference_deg: Array) -> Array:
+    """Add whole turns to reference angles (n, 3) so that they lie by the tracked ones; where lost, by most of them."""
+    turns = np.round((tracked_deg - reference_deg) / 360)
+    is_known = np.isfinite(turns).all(axis=1)
+    usual = np.median(turns[is_known], axis=0) if is_known.any() else np.zeros(3)
+    return reference_deg + 360 * np.where(is_known[:, None], turns, np.round(usual))
+
+
+def _singular(motion: Motion) -> Mask:
+    return angles(motion)["is_singular"].to_numpy() & motion.has_pose
+
+
+def _draw_error(axes: Axes, motion: Motion, error: Array) -> None:
+    axes.axhline(0, color=panels.TEXT, linewidth=0.6)
+    panels.draw_estimate(axes, motion, error)

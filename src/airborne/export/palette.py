@@ -1,0 +1,15 @@
+"""The colours of every picture of a run, told apart by colour-blind readers too (Okabe and Ito's set)."""
+
+from __future__ import annotations
+
+from airborne.tracking import Status
+
+STATUS_RGB = {Status.TRACKED: (0, 158, 115), Status.UNCERTAIN: (230, 159, 0), Status.LOST: (213, 94, 0)}
+ESTIMATE_RGB = (0, 114, 178)
+REFERENCE_RGB = (30, 30, 30)
+TEXT_RGB = (51, 51, 51)
+
+
+def web(rgb: tuple[int, int, int]) -> str:
+    """Write a colour as `#rrggbb`."""
+    return "#{:02x}{:02x}{:02x}".format(*rgb)

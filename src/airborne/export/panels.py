@@ -1,0 +1,124 @@
+"""What the figures of a run share: panels over time, error bands, and signs for what is lost or cannot be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from airborne.export.palette import ESTIMATE_RGB, STATUS_RGB, TEXT_RGB, web
+from airborne.motion import Motion
+from airborne.tracking import Status
+
+Array = NDArray[np.floating]
+Mask = NDArray[np.bool_]
+
+WIDTH_IN = 7.6
+DPI = 150
+FONT_PT = 9
+ANGLES = ("somersault", "tilt", "twist")
+TEXT, LINE, FAINT = web(TEXT_RGB), web(ESTIMATE_RGB), "#dddddd"
+MARKERS = {Status.TRACKED: "o", Status.UNCERTAIN: "D"}
+BAND = {"facecolor": LINE, "alpha": 0.25, "linewidth": 0}
+LOST = {"facecolor": "#cccccc", "edgecolor": "none", "alpha": 0.8}
+UNSEEN = {"facecolor": "none", "edgecolor": "#cc79a7", "hatch": "////", "linewidth": 0.0}
+SINGULAR = {"facecolor": "#cc79a7", "edgecolor": "none", "alpha": 0.18}
+
+
+def panel_figure(n_rows: int, n_columns: int, *, row_in: float) -> tuple[Figure, list[list[Axes]]]:
+    """Start a figure of report width with a grid of panels that share their time axis."""
+    figure = Figure((WIDTH_IN, n_rows * row_in + 0.7), dpi=DPI, layout="constrained")
+    grid = figure.subplots(n_rows, n_columns, sharex=True, squeeze=False)
+    for axes in grid.ravel():
+        axes.tick_params(labelsize=FONT_PT - 1, color=TEXT, labelcolor=TEXT)
+        axes.grid(True, color=FAINT, linewidth=0.6)
+        axes.set_axisbelow(True)
+        for side in ("top", "right"):
+            axes.spines[side].set_visible(False)
+    for axes in grid[-1]:
+        axes.set_xlabel("time [s]", fontsize=FONT_PT, color=TEXT)
+    return figure, grid.tolist()
+
+
+def name_panel(axes: Axes, label: str) -> None:
+    """Label a panel's vertical axis; no offset is left to be added to its numbers."""
+    axes.set_ylabel(label, fontsize=FONT_PT, color=TEXT)
+    axes.ticklabel_format(axis="y", useOffset=False, style="plain")
+
+
+def draw_estimate(axes: Axes, motion: Motion, values: Array) -> None:
+    """Draw values (n,) with a marker for each status; gaps are gaps, and lost frames are shaded."""
+    axes.plot(motion.time_s, values, color=LINE, linewidth=1.0)
+    for status, marker in MARKERS.items():
+        is_it = motion.status == status.value
+        axes.plot(motion.time_s[is_it], values[is_it], marker, color=web(STATUS_RGB[status]), markersize=2.8)
+    shade_lost(axes, motion)
+
+
+def shade_lost(axes: Axes, motion: Motion) -> None:
+    """Shade the frames that were lost."""
+    shade(axes, motion.time_s, motion.status == Status.LOST.value, LOST)
+
+
+def shade(axes: Axes, time_s: Array, mask: Mask, look: dict) -> None:
+    """Shade the stretches of time (n,) where `mask` (n,) holds."""
+    for start_s, stop_s in _stretches(time_s, mask):
+        axes.axvspan(start_s, stop_s, zorder=0, **look)
+
+
+def is_unseen(sd: Array) -> Mask:
+    """Say which frames have an infinite standard deviation (n, axes) in some direction: (n,)."""
+    return np.isinf(sd).any(axis=1)
+
+
+def finish(figure: Figure, path: Path, motion: Motion, extra: Sequence[Artist] = ()) -> None:
+    """Put the legend of what the figure shows on top and write the PNG."""
+    counts = {status: motion.count(status) for status in Status}
+    handles: list[Artist] = [
+        Line2D([], [], color=LINE, marker=marker, markerfacecolor=web(STATUS_RGB[status]), markeredgewidth=0,
+               markersize=4, label=f"{status} ({counts[status]})")
+        for status, marker in MARKERS.items()
+        if counts[status]
+    ]  # fmt: skip
+    if counts[Status.LOST]:
+        handles.append(Patch(**LOST, label=f"lost ({counts[Status.LOST]})"))
+    figure.legend(
+        handles=[*handles, *extra], loc="outside upper center", ncols=4, fontsize=FONT_PT - 1, frameon=False,
+        labelcolor=TEXT,
+    )  # fmt: skip
+    figure.savefig(path)
+
+
+def draw_band(axes: Axes, time_s: Array, middle: Array, sd: Array) -> None:
+    """Draw a band of two standard deviations (n,) about `middle` (n,); none where they are infinite or unknown."""
+    spread = 2 * np.where(np.isfinite(sd), sd, np.nan)
+    axes.fill_between(time_s, middle - spread, middle + spread, **BAND)
+
+
+def band_handle(label: str) -> Patch:
+    """Return the legend entry of `draw_band`."""
+    return Patch(**BAND, label=label)
+
+
+def unseen_handles(unseen: Mask) -> list[Patch]:
+    """Return the legend entry of the stretches shaded as `UNSEEN`, if any."""
+    return [Patch(**UNSEEN, label="a direction cannot be seen (infinite deviation)")] if unseen.any() else []
+
+
+def singular_handles(singular: Mask) -> list[Patch]:
+    """Return the legend entry of the stretches shaded as `SINGULAR`, if any."""
+    return [Patch(**SINGULAR, label="tilt near ±90°: somersault and twist mix")] if singular.any() else []
+
+
+def _stretches(time_s: Array, mask: Mask) -> Iterator[tuple[float, float]]:
+    half_s = float(np.median(np.diff(time_s))) / 2 if len(time_s) > 1 else 0.5
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
+    for first, stop in edges.reshape(-1, 2):
+        yield float(time_s[first]) - half_s, float(time_s[stop - 1]) + half_s

@@ -1,0 +1,133 @@
+"""`refined`, the default tracker: predict, choose, fit coarse to fine; search widely when the body was missed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import BodyModel, Pose, PosedBody
+from airborne.tracking import predictors
+from airborne.tracking.appearance import Appearance, Region
+from airborne.tracking.estimate import Estimate, Status
+from airborne.tracking.gauss_newton import FAR, NEAR, Fit, Synthesis, fit_pictures, fit_silhouettes
+from airborne.tracking.loss import Agreement, agreement, status_of
+from airborne.tracking.regions import regions_round
+from airborne.tracking.wide import Reach, search_widely
+from airborne.video import Frames
+
+Array = NDArray[np.floating]
+
+_MARGIN_PX, _FIRST_MARGIN_PX = 32, 56  # of a full frame
+_REMEMBERED = 3
+
+PREDICTIONS: dict[str, tuple[Callable[[predictors.Past, Fraction], Pose], ...]] = {
+    "smooth": (predictors.quadratic, predictors.linear),
+    "ballistic": (predictors.ballistic, predictors.quadratic),
+    "none": (predictors.stay,),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class RefinedState:
+    """What the next frame needs."""
+
+    past: tuple[tuple[Fraction, Pose], ...] = ()  # the last poses found, oldest first
+    appearance: Appearance = field(default_factory=Appearance)
+
+
+class Refined:
+    """Track by Gauss-Newton on all cameras' pictures; see `gauss_newton`."""
+
+    def __init__(self, model: BodyModel, start: Pose, *, prediction: str = "smooth") -> None:
+        self._synthesis = Synthesis.of(model)
+        self._start = start
+        self._predict = PREDICTIONS[prediction]
+
+    def init(self) -> RefinedState:
+        """Return the state before the first frame."""
+        return RefinedState()
+
+    def search(self, state: RefinedState, frames: Frames) -> Estimate:
+        """Find the body in the frames, without learning from them."""
+        past = state.past
+        poses = [predict(past, frames.time_s) for predict in self._predict] if past else [self._start]
+        guesses = [self._synthesis.model.with_pose(pose) for pose in poses]
+        fit, agreed = self._fit(guesses, frames, state.appearance, is_first=not past)
+        if past and (agreed is None or not agreed.is_good):
+            reach = Reach.after(float(frames.time_s - past[-1][0]))
+            wide = search_widely(self._synthesis, guesses, frames, state.appearance, reach)
+            again, agreed_again = self._fit(wide, frames, state.appearance)
+            if agreed_again is not None and (agreed is None or agreed_again.evidence > agreed.evidence):
+                fit, agreed = again, agreed_again
+        return _estimate(frames, fit, agreed)
+
+    def learn(self, state: RefinedState, frames: Frames, estimate: Estimate) -> RefinedState:
+        """Return the state after the frames, given where the body was found."""
+        if estimate.pose is None:
+            return state
+        body = self._synthesis.model.with_pose(estimate.pose)
+        if estimate.status is Status.TRACKED or not state.past:
+            for region in regions_round([body], self._synthesis.geometry, frames, _MARGIN_PX):
+                mask = self._synthesis.parts(body, region) >= 0
+                state.appearance.learn_colours(region, mask)
+                state.appearance.learn_scene(region, mask)
+        past = (*state.past, (frames.time_s, estimate.pose))[-_REMEMBERED:]
+        return RefinedState(past, state.appearance)
+
+    def _fit(
+        self, guesses: Sequence[PosedBody], frames: Frames, appearance: Appearance, *, is_first: bool = False
+    ) -> tuple[Fit | None, Agreement | None]:
+        """Fit from the guess that the pictures like best; (None, None) where no view sees any."""
+        margin_px = _FIRST_MARGIN_PX if is_first else _MARGIN_PX
+        regions = regions_round(guesses, self._synthesis.geometry, frames, margin_px)
+        if is_first and regions:
+            appearance = self._first_look(guesses[0], regions)
+        regions = [region for region in regions if appearance.knows(region)]
+        if not regions:
+            return None, None
+        posteriors = [appearance.posterior(region) for region in regions]
+        best = guesses[0]
+        if len(guesses) > 1:
+            best = max(guesses, key=lambda guess: agreement(self._synthesis, guess, regions, posteriors).evidence)
+        posed = fit_silhouettes(self._synthesis, best, regions, posteriors, FAR if is_first else NEAR)
+        fit = fit_pictures(self._synthesis, posed, regions, self._with_scenes(appearance, posed, regions))
+        return fit, agreement(self._synthesis, fit.posed, regions, posteriors)
+
+    def _first_look(self, posed: PosedBody, regions: Sequence[Region]) -> Appearance:
+        """Learn the colours from a pose set by hand, mend the pose by them, and learn them again."""
+        for _ in range(3):
+            appearance = Appearance()
+            for region in regions:
+                appearance.learn_colours(region, self._synthesis.parts(posed, region) >= 0)
+            known = [region for region in regions if appearance.knows(region)]
+            posteriors = [appearance.posterior(region) for region in known]
+            posed = fit_silhouettes(self._synthesis, posed, known, posteriors, FAR)
+        return appearance
+
+    def _with_scenes(self, appearance: Appearance, posed: PosedBody, regions: Sequence[Region]) -> Appearance:
+        """Give every region an empty scene to compare with: where none is known yet, this picture outside the mask."""
+        unknown = [region for region in regions if region.source not in appearance.plates]
+        if not unknown:
+            return appearance
+        supplemented = Appearance(appearance.body, appearance.background, dict(appearance.plates))
+        for region in unknown:
+            supplemented.learn_scene(region, self._synthesis.parts(posed, region) >= 0)
+        return supplemented
+
+
+def _estimate(frames: Frames, fit: Fit | None, agreed: Agreement | None) -> Estimate:
+    status = Status.LOST if fit is None or agreed is None else status_of(fit, agreed)
+    is_lost = fit is None or agreed is None or status is Status.LOST
+    return Estimate(
+        index=frames.index,
+        time_s=frames.time_s,
+        status=status,
+        score=np.nan if is_lost else fit.rms_light * 255,
+        pose=None if is_lost else Pose(world_from_root=fit.posed.world_from_root),
+        covariance=None if is_lost else fit.covariance,
+        n_views=0 if is_lost else agreed.n_views,
+    )

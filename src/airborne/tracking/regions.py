@@ -1,0 +1,59 @@
+"""Which part of each view to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import Geometry, PosedBody
+from airborne.rendering.maps import packed_view
+from airborne.tracking.appearance import Region
+from airborne.video import Frames, View
+
+_ROUND_TO_PX = 8  # regions are whole multiples of the coarsest reduction
+
+
+def regions_round(bodies: Sequence[PosedBody], geometry: Geometry, frames: Frames, margin_px: float) -> list[Region]:
+    """Cut out the part of every view that holds the posed bodies and a margin; views that see none are left out."""
+    points = np.concatenate([outermost_points(body, geometry) for body in bodies])
+    found = [_region(view, points, margin_px) for view in frames.views if view is not None]
+    return [region for region in found if region is not None]
+
+
+def outermost_points(body: PosedBody, geometry: Geometry) -> NDArray:
+    """Return world points (n, 3) [m] whose hull holds the body: corners, and the boxes round the ellipsoids."""
+    segments = geometry.polygon_segment.repeat(np.diff(geometry.start))
+    corners = np.einsum("nij,nj->ni", body.R[segments], geometry.corners) + body.t[segments]
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8)
+    boxes = (geometry.ellipsoid_axes * geometry.ellipsoid_semi_axes[:, None]) @ signs
+    local = geometry.ellipsoid_centre[:, None] + boxes.transpose(0, 2, 1)
+    owner = geometry.ellipsoid_segment
+    round_ellipsoids = np.einsum("nij,nkj->nki", body.R[owner], local) + body.t[owner][:, None]
+    return np.concatenate([corners, round_ellipsoids.reshape(-1, 3)])
+
+
+def _region(view: View, points: NDArray, margin_px: float) -> Region | None:
+    camera = view.camera
+    px = camera.px_from_world(points)
+    px = px[np.isfinite(px).all(axis=1)]
+    if not len(px):
+        return None
+    margin = margin_px * np.array([1, camera.K[1, 1] / camera.K[0, 0]])
+    size = np.array(camera.size)
+    low = np.clip(np.floor(px.min(axis=0) - margin), 0, size).astype(int)
+    high = np.clip(np.ceil(px.max(axis=0) + margin) + 1, 0, size).astype(int)
+    width, height = (high - low) // _ROUND_TO_PX * _ROUND_TO_PX
+    if min(width, height) < 2 * _ROUND_TO_PX:
+        return None
+    x0, y0 = int(low[0]), int(low[1])
+    own = camera.resampled(scale=(1, 1), offset=(x0, y0), size=(int(width), int(height)))
+    return Region(
+        camera=own,
+        corner=(x0, y0),
+        rgb=np.ascontiguousarray(view.rgb[y0 : y0 + height, x0 : x0 + width]),
+        picture=view.rgb,
+        source=(camera.name, camera.K.tobytes()),
+        packed=packed_view(own),
+    )
