@@ -72,7 +72,7 @@ class StartTable(_Strict):
         if self.rotation_matrix is not None:
             R = np.array(self.rotation_matrix)
             if not np.allclose(R @ R.T, np.eye(3), atol=1e-3) or np.linalg.det(R) < 0:
-                raise ValueError("rotation_matrix is no rotation: its rows must be unit, square to each other, right-handed")
+                raise ValueError("rotation_matrix is no rotation: rows must be unit, at right angles, right-handed")
         return self
 
     @property

@@ -22,7 +22,7 @@ Array = NDArray[np.floating]
 Rows = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-_AXIS_STYLES = (("x", "-", 1.6), ("y", "--", 1.2), ("z", ":", 1.6))
+_AXIS_LOOKS = (("x", "-", "#0072b2"), ("y", "--", "#cc79a7"), ("z", ":", "#333333"))
 _CLICKED = {"linestyle": "", "marker": "o", "markersize": 4.5, "markerfacecolor": "none", "color": web(REFERENCE_RGB)}
 
 
@@ -31,9 +31,7 @@ def write_pose(path: Path, motion: Motion) -> None:
 
     Lost frames are gaps, shaded; frames in which some direction cannot be seen are hatched.
     """
-    table = angles(motion)
-    unseen = panels.is_unseen(motion.position_sd), panels.is_unseen(motion.rotation_sd)
-    singular = _singular(motion)
+    table, singular, unseen = angles(motion), _singular(motion), _unseen(motion)
     figure, grid = panels.panel_figure(3, 2, row_in=1.75)
     for k, (axis, angle) in enumerate(zip("xyz", panels.ANGLES, strict=True)):
         left, right = grid[k]
@@ -57,21 +55,20 @@ def write_score(path: Path, motion: Motion) -> None:
     (score,), (position,), (rotation,) = grid
     panels.draw_estimate(score, motion, motion.score)
     panels.name_panel(score, "score [grey levels]")
-    score.set_ylim(bottom=0)
+    panels.begin_at_zero(score)
     for axes, sd, label in (
         (position, 1e3 * motion.position_sd, "position sd [mm]"),
         (rotation, np.rad2deg(motion.rotation_sd), "rotation sd [°]"),
     ):
-        for k, (name, style, width) in enumerate(_AXIS_STYLES):
+        for k, (name, style, colour) in enumerate(_AXIS_LOOKS):
             finite = np.where(np.isfinite(sd[:, k]), sd[:, k], np.nan)
-            axes.plot(motion.time_s, finite, style, color=panels.LINE, linewidth=width, label=f"world {name}")
+            axes.plot(motion.time_s, finite, style, marker=".", markersize=3, color=colour, label=f"world {name}")
         panels.name_panel(axes, label)
         panels.shade_lost(axes, motion)
-        panels.shade(axes, motion.time_s, panels.is_unseen(sd), panels.UNSEEN)
-        axes.set_ylim(bottom=0)
+        panels.shade(axes, motion.time_s, _is_unseen(sd), panels.UNSEEN)
+        panels.begin_at_zero(axes)
     position.legend(fontsize=panels.FONT_PT - 1, frameon=False, ncols=3, labelcolor=panels.TEXT)
-    unseen = panels.is_unseen(motion.position_sd) | panels.is_unseen(motion.rotation_sd)
-    panels.finish(figure, path, motion, panels.unseen_handles(unseen))
+    panels.finish(figure, path, motion, panels.unseen_handles(np.logical_or(*_unseen(motion))))
 
 
 def write_errors(path: Path, motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> None:
@@ -85,7 +82,7 @@ def write_errors(path: Path, motion: Motion, truth: Truth, symmetries: Sequence[
     motion = _turned_alike(motion, reference, symmetries)
     table, singular = angles(motion), _singular(motion)
     position_mm, angle_deg = _differences(motion, reference)
-    zero = np.zeros(len(motion))
+    zero, unseen = np.zeros(len(motion)), _unseen(motion)
     figure, grid = panels.panel_figure(2, 3, row_in=2.1)
     for k, (axis, angle) in enumerate(zip("xyz", panels.ANGLES, strict=True)):
         above, below = grid[0][k], grid[1][k]
@@ -93,12 +90,14 @@ def write_errors(path: Path, motion: Motion, truth: Truth, symmetries: Sequence[
         panels.draw_band(below, motion.time_s, zero, table[f"{angle}_sd"].to_numpy())
         _draw_error(above, motion, position_mm[:, k])
         _draw_error(below, motion, angle_deg[:, k])
+        panels.shade(above, motion.time_s, unseen[0], panels.UNSEEN)
+        panels.shade(below, motion.time_s, unseen[1], panels.UNSEEN)
         panels.name_panel(above, f"error of {axis} [mm]")
         panels.name_panel(below, f"error of {angle} [°]")
         if angle != "tilt":
             panels.shade(below, motion.time_s, singular, panels.SINGULAR)
-    handles = [panels.band_handle("± 2 sd about zero"), *panels.singular_handles(singular)]
-    panels.finish(figure, path, motion, handles)
+    handles = [*panels.unseen_handles(unseen[0] | unseen[1]), *panels.singular_handles(singular)]
+    panels.finish(figure, path, motion, [panels.band_handle("± 2 sd about zero"), *handles])
 
 
 def write_digitised(path: Path, motion: Motion, poses: DigitisedPoses, symmetries: Sequence[Array]) -> None:
@@ -168,13 +167,22 @@ def _differences(motion: Motion, reference: _Reference) -> tuple[Array, Array]:
 def _same_turn(tracked_deg: Array, reference_deg: Array) -> Array:
     """Add whole turns to reference angles (n, 3) so that they lie by the tracked ones; where lost, by most of them."""
     turns = np.round((tracked_deg - reference_deg) / 360)
-    is_known = np.isfinite(turns).all(axis=1)
+    is_known = np.asarray(np.isfinite(turns).all(axis=1))
     usual = np.median(turns[is_known], axis=0) if is_known.any() else np.zeros(3)
     return reference_deg + 360 * np.where(is_known[:, None], turns, np.round(usual))
 
 
 def _singular(motion: Motion) -> Mask:
     return angles(motion)["is_singular"].to_numpy() & motion.has_pose
+
+
+def _unseen(motion: Motion) -> tuple[Mask, Mask]:
+    """Say in which frames some direction of the position, and of the rotation, cannot be seen: (n,) each."""
+    return _is_unseen(motion.position_sd), _is_unseen(motion.rotation_sd)
+
+
+def _is_unseen(sd: Array) -> Mask:
+    return np.asarray(np.isinf(sd).any(axis=1))
 
 
 def _draw_error(axes: Axes, motion: Motion, error: Array) -> None:

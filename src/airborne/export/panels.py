@@ -73,9 +73,11 @@ def shade(axes: Axes, time_s: Array, mask: Mask, look: dict) -> None:
         axes.axvspan(start_s, stop_s, zorder=0, **look)
 
 
-def is_unseen(sd: Array) -> Mask:
-    """Say which frames have an infinite standard deviation (n, axes) in some direction: (n,)."""
-    return np.isinf(sd).any(axis=1)
+def begin_at_zero(axes: Axes) -> None:
+    """Let the vertical axis of a panel, once drawn, run from zero to a little above its largest value."""
+    axes.update_datalim([(axes.dataLim.x0, 0.0)] if np.isfinite(axes.dataLim.x0) else [])
+    axes.autoscale_view()
+    axes.set_ylim(bottom=0)
 
 
 def finish(figure: Figure, path: Path, motion: Motion, extra: Sequence[Artist] = ()) -> None:
@@ -93,6 +95,7 @@ def finish(figure: Figure, path: Path, motion: Motion, extra: Sequence[Artist] =
         handles=[*handles, *extra], loc="outside upper center", ncols=4, fontsize=FONT_PT - 1, frameon=False,
         labelcolor=TEXT,
     )  # fmt: skip
+    figure.align_ylabels()
     figure.savefig(path)
 
 

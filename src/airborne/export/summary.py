@@ -68,7 +68,7 @@ def write_json(path: Path, values: Mapping[str, Any]) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Turn arrays, fractions, paths and numbers into what JSON knows, all the way down; NaN and infinite become None."""
+    """Turn arrays, fractions and paths into what JSON knows, all the way down; NaN and infinite become None."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

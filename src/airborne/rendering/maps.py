@@ -6,15 +6,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airborne.cameras import Camera
-from airborne.rendering.rows import BLOCK, LANES, NX, NY, NZ, SHAPE, W, count_rows, draw_row, find_spans, new_row
-from airborne.rendering.shapes import KERNEL, new_shapes, outline_all, place
+from airborne.rendering.packing import packed_view
+from airborne.rendering.rows import BLOCK, LANES, NX, NY, NZ, SHAPE, W, all_spans, draw_row, new_row
+from airborne.rendering.shapes import KERNEL, new_shapes, place
 
-
-def packed_view(camera: Camera) -> NDArray[np.float64]:
-    """Pack a camera without distortion for the kernels: R row by row, t, the two rows of K^-1: (18,)."""
-    place = camera.camera_from_world
-    return np.concatenate([place.rotation.as_matrix().ravel(), place.translation, np.linalg.inv(camera.K)[:2].ravel()])
+__all__ = ["empty_maps", "packed_view", "surface_maps", "workspace"]
 
 
 def empty_maps(size: tuple[int, int]) -> tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.float32]]:
@@ -44,11 +40,7 @@ def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
     part[:] = -1
     inverse_depth[:] = 0
     place(shapes, geometry, R, t)
-    outline_all(shapes, geometry, view, width, height)
-    row_start, row_stop = np.empty(height + 1, np.int64), np.empty(height, np.int64)
-    n_spans = count_rows(shapes.rows, row_start)
-    ends, curves = np.empty((n_spans, 3), np.int64), np.empty((n_spans, 2))
-    find_spans(shapes, geometry, width, row_start, row_stop, ends, curves)
+    row_start, row_stop, ends, curves = all_spans(shapes, geometry, view, width, height)
     row = new_row(width)
     n_ellipsoids = len(geometry.ellipsoid_part)
     for v in range(height):

@@ -1,9 +1,10 @@
 """Kernels that turn outlines into spans and spans into pixels: one row at a time, 16 pixels at a time, float32.
 
-A row's pixels live in blocks of 16: each block holds PLANES planes of 16 numbers side by side, so that every distance
-in memory is a constant and LLVM can put a whole plane into one register. Inverse depth is the z-buffer: larger is nearer.
-A lane loop that is too small gets unrolled instead of vectorised, and then costs ten times as much: measure with
-`benchmarks/speed/yardstick.py` after any change, and delete the folder's `__pycache__` before (see `shapes.py`).
+A row's pixels live in blocks of 16: each block holds nine planes of 16 numbers side by side, so that every distance in
+memory is a constant and LLVM can put a whole plane into one register. Inverse depth is the z-buffer: larger is nearer.
+A lane loop that is too small gets unrolled instead of vectorised, and then costs ten times as much; so does one that
+adds to memory under a condition (add a selected value instead). Measure with `benchmarks/speed/yardstick.py` after any
+change, and delete the folder's `__pycache__` before (see `shapes.py`).
 """
 
 from __future__ import annotations
@@ -42,7 +43,10 @@ f4 = np.float32
 @njit(**INNER)
 def new_row(width):
     """Allocate the blocks of one row, all empty."""
-    return np.zeros((width // LANES + 2) * BLOCK, np.float32)
+    row = np.empty((width // LANES + 2) * BLOCK, np.float32)
+    for i in range(len(row)):
+        row[i] = 0
+    return row
 
 
 @njit(**INNER)

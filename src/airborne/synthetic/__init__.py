@@ -1,1 +1,24 @@
-"""."""
+"""Synthetic recordings with truth: in comes a `Scene`, out come its frames or a whole trial; knows no tracker."""
+
+from airborne.synthetic.flight import Flight, Launch, Mass, fly, mass_of
+from airborne.synthetic.light import Ambient, Spot
+from airborne.synthetic.pictures import frames
+from airborne.synthetic.scene import Scene, thrown_cross
+from airborne.synthetic.surroundings import gym
+from airborne.synthetic.writing import write_thrown_cross, write_trial
+
+__all__ = [
+    "Ambient",
+    "Flight",
+    "Launch",
+    "Mass",
+    "Scene",
+    "Spot",
+    "fly",
+    "frames",
+    "gym",
+    "mass_of",
+    "thrown_cross",
+    "write_thrown_cross",
+    "write_trial",
+]

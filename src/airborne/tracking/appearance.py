@@ -85,7 +85,7 @@ class Appearance:
             look(region.rgb, covered, region.crop(plate.mean), region.crop(plate.sd), region.crop(plate.looks))
 
     def scene(self, region: Region) -> tuple[NDArray, NDArray, NDArray]:
-        """Return the empty scene of a region: mean (h, w, 3), sd (h, w), looks (h, w); looks are 0 where it is unknown."""
+        """Return the empty scene of a region: mean (h, w, 3), sd (h, w), looks (h, w), which are 0 where unknown."""
         plate = self.plates.get(region.source)
         if plate is None:
             height, width = region.rgb.shape[:2]

@@ -37,3 +37,8 @@ class Estimate:
     pose: Pose | None
     covariance: Array | None
     n_views: int  # cameras that had an image and saw the body
+
+
+def lost(index: int, time_s: Fraction) -> Estimate:
+    """Say that the body was not found."""
+    return Estimate(index=index, time_s=time_s, status=Status.LOST, score=np.nan, pose=None, covariance=None, n_views=0)

@@ -20,6 +20,7 @@ from airborne.rendering.maps import empty_maps, packed_view, surface_maps, works
 from airborne.scoring.lighting import TO_LIGHT, light_from_srgb, light_planes
 from airborne.scoring.plate import START_SD, fill
 from airborne.tracking.appearance import Appearance, Region
+from airborne.tracking.covariance import covariance_of
 from airborne.tracking.normal_equations import gaussian_taps, photometric_equations, silhouette_equations
 
 Array = NDArray[np.floating]
@@ -32,8 +33,6 @@ _OVERSTEP = 1.6  # robust weights and refitted light make each step about this m
 _MOST_STEPS = 12
 _SETTLED = 0.5  # squared length of the last step, in sds of the pose
 _PRIOR_SD = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])  # [m], [rad]: keeps what the pictures do not show where it is
-_LEVER_M = 0.3  # the length that makes metres and radians comparable
-_UNSEEN_SD_M = 0.15  # a direction known less well than this, at the lever's length, is not known
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +107,7 @@ def fit_pictures(synthesis: Synthesis, posed: PosedBody, regions: Sequence[Regio
         posed = posed.moved(_OVERSTEP * motion)
         if motion @ A @ motion <= _SETTLED * noise:
             break
-    return Fit(posed, _covariance(A, S, noise), _mean_square(totals) ** 0.5, step)
+    return Fit(posed, covariance_of(A, noise=noise, spread=S), _mean_square(totals) ** 0.5, step)
 
 
 def _photometric_view(region: Region, appearance: Appearance) -> tuple[tuple, Array, tuple]:
@@ -152,22 +151,3 @@ def _whole(A: Array) -> Array:
 def _solve(A: Array, g: Array, noise: float) -> Array:
     """Solve for the motion (6,), held back where the pictures say little (Tikhonov)."""
     return np.linalg.solve(A + np.diag(noise / _PRIOR_SD**2), g)
-
-
-def _covariance(A: Array, S: Array, noise: float) -> Array:
-    """Turn the curvature A and the blocks' spread S into a covariance; directions not seen get an infinite variance.
-
-    Along each principal direction the larger of two variances holds: what independent noise would give, and what the
-    residuals' own patches give (the sandwich estimate), which also counts wrong light and wrong shape.
-    """
-    scale = np.array([1, 1, 1, 1 / _LEVER_M, 1 / _LEVER_M, 1 / _LEVER_M])
-    curvature, directions = np.linalg.eigh(A * np.outer(scale, scale))
-    spread = np.einsum("ij,ik,kj->j", directions, S * np.outer(scale, scale), directions)
-    curvature = np.maximum(curvature, 1e-12 * max(curvature[-1], 1e-12))
-    variance = np.maximum(noise / curvature, spread / curvature**2)
-    seen = variance < _UNSEEN_SD_M**2
-    covariance = (directions[:, seen] * variance[seen]) @ directions[:, seen].T * np.outer(scale, scale)
-    hidden = np.any(np.abs(directions[:, ~seen]) > 0.1, axis=1)
-    covariance[hidden] = covariance[:, hidden] = 0
-    covariance[hidden, hidden] = np.inf
-    return (covariance + covariance.T) / 2

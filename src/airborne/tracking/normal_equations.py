@@ -1,7 +1,7 @@
 """Gauss-Newton kernels: how a blurred synthetic picture would change if the body moved, against what the camera saw.
 
-Arrays in, arrays out. Planes are (channels, h, w) float32. A window (x0, y0) is where a plane's pixel (0, 0) lies in the
-region of interest whose intrinsics are K.
+Arrays in, arrays out. Planes are (channels, h, w) float32. A window (x0, y0) is where a
+plane's pixel (0, 0) lies in the region of interest whose intrinsics are K.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def blur(planes, taps_u, taps_v, out):
 
 @njit(**KERNEL)
 def window_of(part):
-    """Return the window (x0, y0, x1, y1) round the pixels of the body, padded; empty (0, 0, 0, 0) where there is none."""
+    """Return the padded window (x0, y0, x1, y1) round the body's pixels; (0, 0, 0, 0) where there is none."""
     h, w = part.shape
     x0, y0, x1, y1 = w, h, -1, -1
     for y in range(h):
@@ -189,12 +189,30 @@ def silhouette_equations(shapes, geometry, R, t, view, K, posterior, certainty, 
 
 @njit(**KERNEL)
 def photometric_equations(
-    shapes, geometry, R, t, view, K, observed, scene, certainty, albedo, light, rounds, maps, taps_u, taps_v, clip, A, g, S
+    shapes,
+    geometry,
+    R,
+    t,
+    view,
+    K,
+    observed,
+    scene,
+    certainty,
+    albedo,
+    light,
+    rounds,
+    maps,
+    taps_u,
+    taps_v,
+    clip,
+    A,
+    g,
+    S,
 ):
     """Add one view's normal equations of `blurred observed - blurred composite`; see `accumulate`.
 
-    observed, scene (3, h, w): linear light of the picture and of the empty scene; albedo (parts, 3) linear; light (3, 4)
-    the view's fitted light, refitted in place by `rounds` robust rounds. Returns (weighted squared residual, weight).
+    observed, scene (3, h, w): linear light of the picture and of the empty scene; albedo (parts, 3) linear; light
+    (3, 4) the view's fitted light, refitted in place by `rounds` robust rounds. Returns (weighted squared residual, weight).
     """
     part, inverse_depth, normals = maps
     surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from airborne.body import BodyModel, Pose, PosedBody
 from airborne.tracking import predictors
 from airborne.tracking.appearance import Appearance, Region
-from airborne.tracking.estimate import Estimate, Status
+from airborne.tracking.estimate import Estimate, Status, lost
 from airborne.tracking.gauss_newton import FAR, NEAR, Fit, Synthesis, fit_pictures, fit_silhouettes
 from airborne.tracking.loss import Agreement, agreement, status_of
 from airborne.tracking.regions import regions_round
@@ -120,14 +120,14 @@ class Refined:
 
 
 def _estimate(frames: Frames, fit: Fit | None, agreed: Agreement | None) -> Estimate:
-    status = Status.LOST if fit is None or agreed is None else status_of(fit, agreed)
-    is_lost = fit is None or agreed is None or status is Status.LOST
+    if fit is None or agreed is None or (status := status_of(fit, agreed)) is Status.LOST:
+        return lost(frames.index, frames.time_s)
     return Estimate(
         index=frames.index,
         time_s=frames.time_s,
         status=status,
-        score=np.nan if is_lost else fit.rms_light * 255,
-        pose=None if is_lost else Pose(world_from_root=fit.posed.world_from_root),
-        covariance=None if is_lost else fit.covariance,
-        n_views=0 if is_lost else agreed.n_views,
+        score=fit.rms_light * 255,
+        pose=Pose(world_from_root=fit.posed.world_from_root),
+        covariance=fit.covariance,
+        n_views=agreed.n_views,
     )

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 from scipy.special import ndtri
+from scipy.stats import qmc
 
 from airborne.body import PosedBody
-from airborne.cameras import Camera
 from airborne.rendering.maps import empty_maps, packed_view, surface_maps
-from airborne.scoring.foreground import agreement, evidence
+from airborne.scoring.foreground import agreement
 from airborne.tracking.appearance import Appearance, Region
 from airborne.tracking.gauss_newton import Synthesis
 from airborne.tracking.regions import regions_round
@@ -73,9 +72,7 @@ def _evidence_view(region: Region, posterior: Array) -> tuple[Array, Array, tupl
     height, width = posterior.shape
     size = (width // _REDUCTION, height // rows)
     plane = cv2.resize(posterior[: size[1] * rows, : size[0] * _REDUCTION], size, interpolation=cv2.INTER_AREA)
-    camera = region.camera.resampled(
-        scale=(_REDUCTION, rows), offset=((_REDUCTION - 1) / 2, (rows - 1) / 2), size=size
-    )
+    camera = region.camera.resampled(scale=(_REDUCTION, rows), offset=((_REDUCTION - 1) / 2, (rows - 1) / 2), size=size)
     return packed_view(camera), plane, empty_maps(size)
 
 

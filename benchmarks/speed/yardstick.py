@@ -1,0 +1,134 @@
+"""How fast a pose is scored, against the same algorithm in C++: `python benchmarks/speed/yardstick.py [FOLDER]`.
+
+FOLDER holds the yardstick (run.py, scene18.py, score18.cpp; needs g++); by default `../shared/yardstick` beside the
+project. Its scene of 18 ellipsoids, 3 views and 2 lamps is rebuilt as an Airborne body; both engines then score the
+same hypotheses, from 57 numbers each, in turns, on one thread. Printed: medians of CPU time, their ratio, how far the
+scores differ, and the time from starting Python to the first score, with Numba's cache empty and full.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.body import BodyModel, Ellipsoid, Part, Segment, geometry
+from airborne.cameras import Camera
+from airborne.rendering import RULES, Lamp, Lights, place_segments, score, targets
+from airborne.video import View
+
+HERE = Path(__file__).resolve()
+DEFAULT = HERE.parents[3] / "shared" / "yardstick"
+N_HYPOTHESES, ROUNDS, START_RUNS = 100, 25, 3
+
+
+def rebuilt_body(scene) -> BodyModel:
+    """Rebuild the scene's person, one ellipsoid a segment."""
+    names = [row[0] for row in scene._S]
+    segments = []
+    for e, name in enumerate(names):
+        place = RigidTransform.from_translation(scene.COFF[e])
+        part = Part(name, Ellipsoid(scene.AX[e]), place, scene.COL[e])
+        parent = None if scene.PARENT[e] < 0 else names[scene.PARENT[e]]
+        segments.append(Segment(name, parent, scene.JOFF[e], (part,)))
+    return BodyModel("yardstick", tuple(segments))
+
+
+def rebuilt_targets(scene, yardstick, case: str):
+    """Rebuild the scene's views, from the very images that the other engine compares with."""
+    cams = scene.cams(case)
+    views = []
+    for v in range(3):
+        place = RigidTransform.from_components(cams.t[v], Rotation.from_matrix(cams.R[v]))
+        camera = Camera(name=f"cam{v}", K=cams.K[v], size=(cams.W, cams.H), camera_from_world=place)
+        planes = yardstick.images[v, :, :, : cams.H]  # (channel, column, row)
+        views.append(View(camera, np.ascontiguousarray(planes.transpose(2, 1, 0)).astype(np.uint8)))
+    lamps = tuple(Lamp(p, float(k)) for p, k in zip(scene.LIGHTS, scene.LINT, strict=True))
+    return targets(views, Lights(scene.AMB, lamps))
+
+
+def airborne_numbers(poses: np.ndarray) -> np.ndarray:
+    """Turn the yardstick's 57 numbers into ours: the joints' rotation vectors become successive x, y, z angles."""
+    joints = Rotation.from_rotvec(poses[:, 6:].reshape(-1, 3)).as_euler("XYZ").reshape(len(poses), -1)
+    return np.hstack([poses[:, :6], joints])
+
+
+def compare(case: str) -> None:
+    """Time both engines in turns and print the ratio."""
+    import run
+    import scene18 as scene
+
+    yardstick = run.Yardstick(case)
+    yardstick.images[:] = np.rint(yardstick.images)  # whole grey levels, as a camera gives them
+    model, target = rebuilt_body(scene), rebuilt_targets(scene, yardstick, case)
+    shapes = geometry(model)
+    poses = run.hypotheses(N_HYPOTHESES)
+    numbers = airborne_numbers(poses)
+
+    def ours() -> np.ndarray:
+        root = Rotation.from_rotvec(numbers[:, 3:6]).as_matrix()
+        R, t = place_segments(model, root, numbers[:, :3], numbers[:, 6:].reshape(len(numbers), -1, 3))
+        return score(shapes, target, R, t, RULES["raw"])
+
+    difference = np.abs(ours() - yardstick(poses)).max()
+    times = np.empty((ROUNDS, 2))
+    for k in range(ROUNDS):
+        for engine, call in enumerate((ours, lambda: yardstick(poses))):
+            start = time.thread_time()
+            call()
+            times[k, engine] = time.thread_time() - start
+    mine, bound = np.median(times, axis=0) / N_HYPOTHESES * 1e6
+    print(
+        f"{case.upper()}: {mine:.1f} us per hypothesis, C++ {bound:.1f} us, ratio {mine / bound:.2f}; "
+        f"scores differ by at most {difference:.4f} grey levels"
+    )
+
+
+FIRST_SCORE = """
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+from airborne.body import BodyModel, Ellipsoid, Part, Segment, geometry
+from airborne.cameras import Camera
+from airborne.rendering import FLAT, score, targets
+from airborne.video import View
+part = Part("part", Ellipsoid(np.ones(3)), RigidTransform.identity(), np.full(3, 128.0))
+shapes = geometry(BodyModel("body", (Segment("root", None, np.zeros(3), (part,)),)))
+K = np.array([[700.0, 0, 384], [0, 700, 288], [0, 0, 1]])
+camera = Camera(name="camera", K=K, size=(768, 576), camera_from_world=RigidTransform.from_translation([0, 0, 5.0]))
+seen = targets([View(camera, np.zeros((576, 768, 3), np.uint8))], FLAT)
+score(shapes, seen, np.eye(3)[None, None], np.zeros((1, 1, 3)))
+"""
+
+
+def first_score_s(cache: str) -> float:
+    """Return the time [s] from starting Python to the first score, imports included."""
+    start = time.perf_counter()
+    subprocess.run([sys.executable, "-c", FIRST_SCORE], check=True, env={**os.environ, "NUMBA_CACHE_DIR": cache})
+    return time.perf_counter() - start
+
+
+def main() -> int:
+    """Run the comparison; 2 where the yardstick is missing."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT
+    if not (folder / "score18.cpp").is_file():
+        print(f"no yardstick in {folder}: expected run.py, scene18.py and score18.cpp; give their folder as argument")
+        return 2
+    sys.path.insert(0, str(folder))
+    sys.dont_write_bytecode = True
+    for case in ("sd", "hd"):
+        compare(case)
+    with tempfile.TemporaryDirectory() as cache:
+        cold = first_score_s(cache)
+        warm = np.median([first_score_s(cache) for _ in range(START_RUNS)])
+    print(f"first score: {cold:.1f} s with an empty cache, {warm:.2f} s with a full one")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

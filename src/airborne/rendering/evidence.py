@@ -1,0 +1,96 @@
+"""How much evidence a body's mask gathers: the wide search's fast score.
+
+A map holds each pixel's evidence for the body, such as log p(colour | body) - log p(colour | background) [nats]. Its
+sums along the image's columns are kept, so that a span of the mask costs two reads, however long it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airborne.body import Geometry
+from airborne.cameras import Camera
+from airborne.rendering.packing import packed_view
+from airborne.rendering.reduction import reduced, reduced_camera
+from airborne.rendering.rows import all_spans
+from airborne.rendering.shapes import KERNEL, new_shapes, place
+from airborne.rendering.threads import in_threads
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EvidenceMaps:
+    """Summed maps of several views. A kernel's row is a column of the image."""
+
+    views: NDArray[np.float64]  # (v, 18) packed cameras
+    sizes: NDArray[np.int64]  # (v, 3) pixels a row, rows, offset in `sums`
+    sums: NDArray[np.float32]  # row by row, pixels + 1 sums from the row's start
+    totals: NDArray[np.float64]  # (v,) sum over the whole view
+
+
+def evidence_maps(cameras: Sequence[Camera], maps: Sequence[Array], *, scale: int = 1) -> EvidenceMaps:
+    """Sum the maps (h, w) of the cameras' images, reduced `scale` times by averaging; a reduced pixel counts once."""
+    small_maps = [reduced(np.asarray(plane, np.float32), scale) for plane in maps]
+    small_cameras = [reduced_camera(camera, scale) for camera in cameras]
+    assert len(small_cameras) == len(small_maps), "one map a camera"
+    columns = [np.zeros((plane.shape[1], plane.shape[0] + 1), np.float32) for plane in small_maps]
+    for sums, plane in zip(columns, small_maps, strict=True):
+        np.cumsum(plane.T, axis=1, dtype=np.float32, out=sums[:, 1:])
+    offsets = np.cumsum([0] + [sums.size for sums in columns])
+    return EvidenceMaps(
+        views=np.array([packed_view(camera, transposed=True) for camera in small_cameras]).reshape(-1, 18),
+        sizes=np.array(
+            [(c.size[1], c.size[0], at) for c, at in zip(small_cameras, offsets, strict=False)], np.int64
+        ).reshape(-1, 3),
+        sums=np.concatenate([sums.ravel() for sums in columns]),
+        totals=np.array([sums[:, -1].sum(dtype=float) for sums in columns]),
+    )
+
+
+def mask_evidence(geometry: Geometry, maps: EvidenceMaps, R: Array, t: Array, *, threads: int = 1) -> Array:
+    """Sum each map over the body's mask, each pixel once: (n, views).
+
+    R (n, s, 3, 3), t (n, s, 3) [m] place the segments of n hypotheses in the world. The result is the same for any
+    number of threads.
+    """
+    R, t = np.ascontiguousarray(R, float), np.ascontiguousarray(t, float)
+    out = np.zeros((len(R), len(maps.views)))
+
+    def fill(part: slice) -> None:
+        shapes = new_shapes(geometry)
+        _sum_evidence(shapes, geometry, R[part], t[part], maps.views, maps.sizes, maps.sums, out[part])
+
+    in_threads(fill, len(R), threads)
+    return out
+
+
+@njit(**KERNEL)
+def _sum_evidence(shapes, geometry, R, t, views, sizes, sums, out):
+    """Fill `out` (n, views); see `mask_evidence`. In each row the spans are taken from the left and joined."""
+    for h in range(len(R)):
+        place(shapes, geometry, R[h], t[h])
+        for i in range(len(views)):
+            width, height, offset = sizes[i, 0], sizes[i, 1], sizes[i, 2]
+            row_start, row_stop, ends, _ = all_spans(shapes, geometry, views[i], width, height)
+            total = 0.0
+            for v in range(height):
+                start, stop = row_start[v], row_stop[v]
+                for k in range(start + 1, stop):
+                    first, last, at = ends[k, 0], ends[k, 1], k
+                    while at > start and ends[at - 1, 0] > first:
+                        ends[at, 0], ends[at, 1] = ends[at - 1, 0], ends[at - 1, 1]
+                        at -= 1
+                    ends[at, 0], ends[at, 1] = first, last
+                base, covered = offset + v * (width + 1), -1
+                for k in range(start, stop):
+                    first, last = max(ends[k, 0], covered + 1), ends[k, 1]
+                    if last >= first:
+                        total += sums[base + last + 1] - sums[base + first]
+                        covered = last
+            out[h, i] = total

@@ -1,0 +1,46 @@
+"""Cameras and lights as the kernels take them: plain rows of numbers, in camera axes."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.cameras import Camera
+from airborne.errors import CalibrationError
+from airborne.rendering.lights import Lights
+
+_NO_CONE = -2.0  # below every cosine
+
+
+@lru_cache(maxsize=256)
+def packed_view(camera: Camera, *, transposed: bool = False) -> NDArray:
+    """Pack a camera: world to camera (R row by row, t), then the two rows of K^-1: (18,).
+
+    Transposed, rows and columns of the image change places, and with them the camera's x and y. Raises
+    CalibrationError for a camera with distortion, because straight lines are drawn straight.
+    """
+    if camera.is_distorted:
+        raise CalibrationError(
+            f"camera '{camera.name}' has lens distortion; straighten its images and draw with camera.undistorted()"
+        )
+    order = [1, 0, 2] if transposed else [0, 1, 2]
+    camera_from_world = camera.camera_from_world.as_matrix()[:3][order]
+    ray_from_px = np.linalg.inv(camera.K)[np.ix_(order, order)][:2]
+    return np.concatenate([camera_from_world[:, :3].ravel(), camera_from_world[:, 3], ray_from_px.ravel()])
+
+
+@lru_cache(maxsize=256)
+def packed_lights(lights: Lights, camera: Camera, *, transposed: bool = False) -> NDArray[np.float32]:
+    """Pack the lamps for one camera: position, intensity, axis, cosine of the half angle, in camera axes: (l, 8)."""
+    order = [1, 0, 2] if transposed else [0, 1, 2]
+    rotation = camera.camera_from_world.rotation
+    packed = np.zeros((len(lights.lamps), 8), np.float32)
+    for row, lamp in zip(packed, lights.lamps, strict=True):
+        row[:3] = camera.camera_from_world.apply(lamp.position_m)[order]
+        row[3], row[7] = lamp.intensity, _NO_CONE
+        if lamp.direction is not None and lamp.half_angle_rad is not None:
+            row[4:7] = (rotation.apply(lamp.direction) / np.linalg.norm(lamp.direction))[order]
+            row[7] = np.cos(lamp.half_angle_rad)
+    return packed

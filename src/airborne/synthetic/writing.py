@@ -1,0 +1,182 @@
+"""A scene written as a trial: videos, cameras, control points, body, start and truth."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import BodyModel, Box
+from airborne.cameras import write_pose2sim
+from airborne.errors import TrialError
+from airborne.synthetic.flight import Flight
+from airborne.synthetic.measurements import control_points, digitised, lights_table, start_pose
+from airborne.synthetic.pictures import frames
+from airborne.synthetic.scene import Preset, Scene, thrown_cross
+from airborne.video import VideoWriter, weave
+
+Progress = Callable[[int, int], None]  # pictures done, pictures in all
+
+_CRF = 16
+
+
+def write_thrown_cross(
+    folder: Path,
+    *,
+    preset: Preset = "half-twist",
+    seed: int = 0,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> None:
+    """Write a trial of a `thrown_cross` preset; see `write_trial`."""
+    write_trial(thrown_cross(preset, seed=seed), folder, overwrite=overwrite, progress=progress)
+
+
+def write_trial(scene: Scene, folder: Path, *, overwrite: bool = False, progress: Progress | None = None) -> None:
+    """Record a scene into a folder, which is made; `trial.toml` is written last, so it stands for a whole trial.
+
+    `<camera>.mp4`, `calib_true.toml` (exact), `control_points.csv` (surveyed exactly, clicked), `<body>.toml`,
+    `digitised.csv` (clicked), `lights.json` (roughly measured), `truth.csv` (the root's pose in every picture) and
+    `trial.toml` (with a hand-set start). `progress` is told after every picture how many of how many are done. Raises
+    TrialError for a folder that holds anything, unless `overwrite`: then files of these names are replaced.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise TrialError(f"{folder} is a file; give a folder for the trial")
+    if not overwrite and folder.is_dir() and any(folder.iterdir()):
+        raise TrialError(f"{folder} is not empty; give another folder, or overwrite it")
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "trial.toml").unlink(missing_ok=True)
+    flight = scene.flight(np.array([float(scene.time_s(i)) for i in range(scene.n_pictures)]))
+    write_pose2sim(folder / "calib_true.toml", scene.rig)
+    _write_control_points(folder / "control_points.csv", scene)
+    (folder / _body_name(scene)).write_text(body_toml(scene.body), encoding="utf-8")
+    _write_digitised(folder / "digitised.csv", scene, flight)
+    (folder / "lights.json").write_text(json.dumps(lights_table(scene), indent=1) + "\n", encoding="utf-8")
+    _write_truth(folder / "truth.csv", scene, flight)
+    _write_videos(folder, scene, progress)
+    (folder / "trial.toml").write_text(trial_toml(scene), encoding="utf-8")
+
+
+def body_toml(model: BodyModel) -> str:
+    """Return the body file of a body of coloured boxes."""
+    lines = [f"name = {json.dumps(model.name)}"]
+    for segment in model.segments:
+        lines += ["", "[[segment]]", f"name = {json.dumps(segment.name)}"]
+        if segment.parent is not None:
+            lines += [f"parent = {json.dumps(segment.parent)}", f"joint_m = {_numbers(segment.joint_m)}"]
+        for part in segment.parts:
+            if not isinstance(part.shape, Box) or part.colour is None:
+                raise TrialError(f"part '{part.name}' is no coloured box; a synthetic body is made of those only")
+            angles = part.segment_from_part.rotation.as_euler("XYZ", degrees=True) + 0.0  # no -0
+            lines += [
+                "",
+                "[[segment.part]]",
+                f"name = {json.dumps(part.name)}",
+                'shape = "box"',
+                f"size_m = {_numbers(part.shape.size_m)}",
+                f"centre_m = {_numbers(part.segment_from_part.translation)}",
+                f"rotation_deg = {_numbers(angles)}",
+                f"colour_srgb = {_numbers(part.colour)}",
+            ]
+    return "\n".join(lines) + "\n"
+
+
+def trial_toml(scene: Scene) -> str:
+    """Return the trial file of a scene's recording."""
+    start = start_pose(scene).world_from_root
+    lines = [f"name = {json.dumps(scene.name)}"]
+    for camera in scene.rig:
+        lines += ["", "[[camera]]", f"name = {json.dumps(camera.name)}", f"video = {json.dumps(camera.name + '.mp4')}"]
+        lines += ['fields = "top-first"'] if scene.is_interlaced else []
+    off = f"{1000 * scene.start_error_m:.0f} mm and {np.degrees(scene.start_error_rad):.1f} degrees off"
+    lines += [
+        "",
+        "[calibration]",
+        'control_points = "control_points.csv"     # calib_true.toml holds the exact cameras',
+        "",
+        "[body]",
+        f"file = {json.dumps(_body_name(scene))}",
+        "",
+        f"[start]                                   # as set by hand: {off}",
+        "frame = 0",
+        f"position_m = {_numbers(np.round(start.translation, 5))}",
+        f"rotation_matrix = [{', '.join(_numbers(row) for row in np.round(start.rotation.as_matrix(), 6))}]",
+        "",
+        "[track]",
+        'method = "refined"',
+        f"stop = {scene.n_pictures}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _write_videos(folder: Path, scene: Scene, progress: Progress | None) -> None:
+    rate, fields = (scene.rate / 2, "top-first") if scene.is_interlaced else (scene.rate, "progressive")
+    with ExitStack() as stack:
+        writers = [
+            stack.enter_context(
+                VideoWriter(folder / f"{camera.name}.mp4", size=camera.size, rate=rate, fields=fields, crf=_CRF)
+            )
+            for camera in scene.rig
+        ]
+        tops: list[NDArray[np.uint8]] = []
+        for recorded in frames(scene):
+            pictures = [view.rgb for view in recorded.views if view is not None]
+            if scene.is_interlaced and scene.parity(recorded.index) == 0:
+                tops = pictures
+            else:
+                whole = [weave(*pair) for pair in zip(tops, pictures, strict=True)] if tops else pictures
+                for writer, picture in zip(writers, whole, strict=True):
+                    writer.write(picture)
+            if progress is not None:
+                progress(recorded.index + 1, scene.n_shown)
+
+
+def _write_control_points(path: Path, scene: Scene) -> None:
+    points = control_points(scene)
+    header = ["point", "x_m", "y_m", "z_m", *(f"{camera}_{axis}" for camera in points.cameras for axis in "uv")]
+    rows = [
+        [name, *(f"{x:.4f}" for x in world), *map(_pixel, px.ravel())]
+        for name, world, px in zip(points.names, points.world, points.px, strict=True)
+    ]
+    _write_csv(path, header, rows)
+
+
+def _write_digitised(path: Path, scene: Scene, flight: Flight) -> None:
+    points = digitised(scene, flight)
+    header = [f"{point}_{camera}_{axis}" for point in points for camera in scene.rig.names for axis in "uv"]
+    values = np.concatenate([px.reshape(len(px), -1) for px in points.values()], axis=1)
+    _write_csv(path, [_index_name(scene), *header], [[i, *map(_pixel, row)] for i, row in enumerate(values)])
+
+
+def _write_truth(path: Path, scene: Scene, flight: Flight) -> None:
+    header = [_index_name(scene), "time_s", "x_m", "y_m", "z_m", *(f"r{i}{j}" for i in range(3) for j in range(3))]
+    values = np.column_stack([flight.time_s, flight.position, flight.R.reshape(-1, 9)])
+    _write_csv(path, header, [[i, *map(repr, row.tolist())] for i, row in enumerate(values)])
+
+
+def _write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
+
+
+def _index_name(scene: Scene) -> str:
+    return "field" if scene.is_interlaced else "frame"
+
+
+def _body_name(scene: Scene) -> str:
+    return f"{scene.body.segments[0].name}.toml"
+
+
+def _pixel(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.2f}"
+
+
+def _numbers(values: NDArray) -> str:
+    return "[" + ", ".join(repr(float(value)) for value in values) + "]"

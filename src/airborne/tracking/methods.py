@@ -1,0 +1,80 @@
+"""The rigid-body methods by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import BodyModel, Pose, geometry
+from airborne.body.colours import with_sampled_colours
+from airborne.rendering import FLAT, RULES, Lights, render
+from airborne.tracking import predictors
+from airborne.tracking.direct import Direct, Search, simplex_search, stepping_search
+from airborne.tracking.refined import Refined
+from airborne.tracking.stepping import VRule
+from airborne.tracking.tracker import Tracker
+from airborne.video import Frames
+
+Array = NDArray[np.floating]
+Method = Literal["refined", "stepping", "simplex"]
+Prediction = Literal["smooth", "ballistic", "none"]
+
+# stepping and simplex see what paper B saw: full frames whose missing rows are interpolated
+FIELDS_AS: dict[Method, Literal["rows", "interpolated"]] = {
+    "refined": "rows",
+    "stepping": "interpolated",
+    "simplex": "interpolated",
+}
+_SIMPLEX_SIZE = np.array([0.03] * 3 + [0.06] * 3)  # [m], [rad]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """What a method may be told; the defaults are paper B's for video."""
+
+    method: Method = "refined"
+    prediction: Prediction = "smooth"
+    colour: Literal["raw", "normalised", "blend", "union"] = "normalised"
+    v_rule: VRule = "v_sym"
+    loops: Sequence[tuple[float, float]] = ()  # stepping: a step in position [m] and in angle [rad] for each loop
+    scale: Literal[1, 2, 4] = 1  # stepping, simplex: reduction of the pictures
+    lights: Lights | None = None  # None: unknown
+
+
+def tracker_of(settings: Settings, model: BodyModel, start: Pose) -> Tracker:
+    """Make the tracker of a method."""
+    if settings.method == "refined":
+        return Refined(model, start, prediction=settings.prediction)
+    predict: Callable = {
+        "smooth": predictors.linear,
+        "ballistic": predictors.ballistic,
+        "none": predictors.stay,
+    }[settings.prediction]
+    rule = RULES[settings.colour]
+    if settings.lights is None:
+        rule = replace(rule, fits_gain=True)
+    return Direct(model, start, _search(settings), rule, settings.lights or FLAT, scale=settings.scale, predict=predict)
+
+
+def _search(settings: Settings) -> Search:
+    if settings.method == "simplex":
+        return simplex_search(_SIMPLEX_SIZE)
+    return stepping_search([np.repeat(steps, 3) for steps in settings.loops], settings.v_rule)
+
+
+def sampled(model: BodyModel, start: Pose, frames: Frames) -> BodyModel:
+    """Give parts with `colour = "sample"` the colour that the first frames show at the first pose."""
+    if not model.needs_colours:
+        return model
+    posed, flat = model.with_pose(start), geometry(model)
+    seen: list[list[Array]] = [[np.zeros((0, 3), np.uint8)] for _ in model.parts]
+    for view in frames.views:
+        if view is not None:
+            part = render(flat, posed, view.camera, FLAT).part
+            for index, pixels in enumerate(seen):
+                pixels.append(view.rgb[part == index])
+    return with_sampled_colours(model, [np.concatenate(pixels) for pixels in seen])

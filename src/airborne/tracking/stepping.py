@@ -1,0 +1,73 @@
+"""Paper B's downhill stepping: one variable at a time, in loops of shrinking steps, ended by the V rule.
+
+Works on any score (n, d) -> (n,); knows no body and no picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating]
+Score = Callable[[Array], Array]
+VRule = Literal["v_literal", "v_sym"]
+
+_MOST_STEPS = 40  # in one direction; a score that falls for ever has lost the body
+
+
+def stepping(score: Score, start: Array, loops: Sequence[Array], *, v_rule: VRule) -> tuple[Array, int]:
+    """Minimise from start (d,), one loop over the variables for each row of steps (d,); return (best, evaluations).
+
+    Paper B, "Method": a variable is stepped downhill until the score has risen twice in a row, then set by the V rule.
+    """
+    x, evaluations = np.array(start, float), 0
+    for steps in loops:
+        for variable, step in enumerate(steps):
+            if step == 0:
+                continue
+            line = _Line(score, x, variable, step)
+            x[variable] += step * _minimum_on_line(line, v_rule)
+            evaluations += len(line.known)
+    return x, evaluations
+
+
+def v_literal(before: float, lowest: float, after: float, last: float) -> float:
+    """Cross the lines (-1, before)-(0, lowest) and (1, after)-(2, last); steps from the lowest point, in [-1, 1].
+
+    As the paper has it. Where the true minimum lies before the lowest point the answer is 0.
+    """
+    down, up = before - lowest, last - after
+    if down + up <= 0:
+        return 0.0
+    return float(np.clip((up - (after - lowest)) / (down + up), -1, 1))
+
+
+class _Line:
+    """The score along one variable, at whole numbers of steps; nothing is evaluated twice."""
+
+    def __init__(self, score: Score, x: Array, variable: int, step: float) -> None:
+        self._score, self._x, self._variable, self._step = score, x, variable, step
+        self.known: dict[int, float] = {}
+
+    def __call__(self, k: int) -> float:
+        if k not in self.known:
+            x = self._x.copy()
+            x[self._variable] += k * self._step
+            self.known[k] = float(self._score(x[None])[0])
+        return self.known[k]
+
+
+def _minimum_on_line(line: _Line, v_rule: VRule) -> float:
+    """Return where the score is lowest, in steps from 0."""
+    way = 1 if line(1) < line(0) else -1
+    k = 0
+    while k < _MOST_STEPS and (line(way * (k + 1)) < line(way * k) or line(way * (k + 2)) < line(way * (k + 1))):
+        k += 1
+    lowest = min(range(k + 1), key=lambda i: line(way * i))
+    before, middle, after = (line(way * (lowest + i)) for i in (-1, 0, 1))
+    if v_rule == "v_sym" and before < after:
+        return way * (lowest - v_literal(after, middle, before, line(way * (lowest - 2))))
+    return way * (lowest + v_literal(before, middle, after, line(way * (lowest + 2))))

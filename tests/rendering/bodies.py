@@ -1,0 +1,80 @@
+"""Bodies, poses, cameras and pictures that several tests draw."""
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.body import BodyModel, Box, Ellipsoid, Geometry, Mesh, Part, Pose, PosedBody, Segment, geometry
+from airborne.cameras import Camera
+from airborne.rendering import Lamp, Lights
+from airborne.video import View
+
+LIGHTS = Lights(
+    0.3,
+    (
+        Lamp(np.array([1.5, -2.0, 2.0]), 0.5),
+        Lamp(np.array([-2.0, -1.0, 1.0]), 0.4, np.array([2.0, 1.0, -1.0]), np.radians(12)),
+    ),
+)
+
+
+def camera(name: str = "front", *, turn: float = 0.0, size: tuple[int, int] = (90, 70), skew: float = 0.0) -> Camera:
+    """A camera 4 m from the origin, `turn` round the vertical, that looks at it; about 25 px a metre."""
+    centre = np.array([4 * np.sin(turn), -4 * np.cos(turn), 0.3])
+    z = -centre / np.linalg.norm(centre)
+    x = np.cross(z, [0, 0, 1.0])
+    x /= np.linalg.norm(x)
+    rotation = Rotation.from_matrix(np.stack([x, np.cross(z, x), z]))
+    K = np.array([[100, skew, (size[0] - 1) / 2], [0, 105.0, (size[1] - 1) / 2], [0, 0, 1.0]])
+    return Camera(
+        name=name, K=K, size=size, camera_from_world=RigidTransform.from_components(-rotation.apply(centre), rotation)
+    )
+
+
+def part(shape, name: str, rng: np.random.Generator, *, spread: float = 0.25) -> Part:
+    place = RigidTransform.from_components(rng.normal(0, spread, 3), Rotation.random(rng=rng))
+    return Part(name, shape, place, rng.uniform(30, 220, 3))
+
+
+def random_shape(kind: str, rng: np.random.Generator):
+    if kind == "ellipsoid":
+        return Ellipsoid(rng.uniform(0.1, 0.5, 3))
+    if kind == "box":
+        return Box(rng.uniform(0.15, 0.8, 3))
+    tip = np.array([[0, 0, 0.5], [0.4, 0, -0.2], [-0.2, 0.35, -0.2], [-0.2, -0.35, -0.2]])
+    return Mesh(tip * rng.uniform(0.5, 1.5), np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]))
+
+
+def random_body(kinds: list[str], rng: np.random.Generator) -> BodyModel:
+    """Two segments that share the parts; the second hangs on the first."""
+    parts = [part(random_shape(kind, rng), f"{kind}{i}", rng) for i, kind in enumerate(kinds)]
+    half = (len(parts) + 1) // 2
+    return BodyModel(
+        "random",
+        (
+            Segment("root", None, np.zeros(3), tuple(parts[:half])),
+            Segment("limb", "root", np.array([0.1, 0.0, 0.2]), tuple(parts[half:])),
+        ),
+    )
+
+
+def random_pose(rng: np.random.Generator, *, spread: float = 0.15) -> Pose:
+    root = RigidTransform.from_components(rng.normal(0, spread, 3), Rotation.random(rng=rng))
+    return Pose(world_from_root=root, joint_angles=rng.normal(0, 0.6, (1, 3)))
+
+
+def posed_random(kinds: list[str], seed: int) -> tuple[Geometry, PosedBody]:
+    rng = np.random.default_rng(seed)
+    model = random_body(kinds, rng)
+    return geometry(model), model.with_pose(random_pose(rng))
+
+
+def noise_view(seen_by: Camera, seed: int) -> View:
+    rng = np.random.default_rng(seed)
+    return View(seen_by, rng.integers(0, 256, (seen_by.size[1], seen_by.size[0], 3), dtype=np.uint8))
+
+
+def batch(model: BodyModel, n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """R (n, s, 3, 3) and t (n, s, 3) of n random poses."""
+    rng = np.random.default_rng(seed)
+    bodies = [model.with_pose(random_pose(rng)) for _ in range(n)]
+    return np.stack([body.R for body in bodies]), np.stack([body.t for body in bodies])

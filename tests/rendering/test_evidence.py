@@ -1,0 +1,32 @@
+import numpy as np
+import pytest
+
+from airborne.body import geometry
+from airborne.rendering import FLAT, evidence_maps, mask_evidence, render
+from airborne.rendering.reduction import reduced, reduced_camera
+from tests.rendering.bodies import batch, camera, random_body
+
+CAMERAS = [camera("a"), camera("b", turn=2.0, size=(77, 90))]
+MAPS = [np.random.default_rng(i).normal(0, 2, c.size[::-1]).astype(np.float32) for i, c in enumerate(CAMERAS)]
+SUM = 5e-2  # nats, of sums over hundreds of pixels in float32
+
+
+@pytest.mark.parametrize(
+    "kinds", [["ellipsoid"] * 6, ["box"] * 4, ["ellipsoid", "box", "mesh", "box"]], ids=lambda k: k[0]
+)
+@pytest.mark.parametrize("scale", [1, 2])
+def test_evidence_is_the_sum_over_the_drawn_mask_each_pixel_once(kinds, scale):
+    model = random_body(kinds, np.random.default_rng(3))
+    shapes, (R, t) = geometry(model), batch(model, 6, 4)
+    gathered = mask_evidence(shapes, evidence_maps(CAMERAS, MAPS, scale=scale), R, t)
+    for hypothesis, R_h, t_h in zip(gathered, R, t, strict=True):
+        body = type("Body", (), {"R": R_h, "t": t_h})
+        for total, seen_by, plane in zip(hypothesis, CAMERAS, MAPS, strict=True):
+            mask = render(shapes, body, reduced_camera(seen_by, scale), FLAT).mask  # type: ignore[arg-type]
+            assert mask.sum() > 50
+            assert total == pytest.approx(reduced(plane, scale)[mask].sum(dtype=float), abs=SUM)
+
+
+def test_totals_are_the_sums_of_the_whole_maps():
+    totals = evidence_maps(CAMERAS, MAPS).totals
+    np.testing.assert_allclose(totals, [plane.sum(dtype=float) for plane in MAPS], atol=SUM)
