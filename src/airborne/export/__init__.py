@@ -1,1 +1,25 @@
-"""."""
+"""Export: in come `Motion`, `Frames` with posed bodies, and a summary; out come what people open.
+
+Overlay videos, a sheet of what the cameras saw through the mask, figures, summary.json and a self-contained report.
+Knows no search and decides nothing.
+"""
+
+from airborne.export.figures import write_digitised, write_errors, write_figures, write_pose, write_score
+from airborne.export.overlays import OverlayVideos
+from airborne.export.report import write_report
+from airborne.export.sheet import ContactSheet
+from airborne.export.summary import headline, warnings, write_json
+
+__all__ = [
+    "ContactSheet",
+    "OverlayVideos",
+    "headline",
+    "warnings",
+    "write_digitised",
+    "write_errors",
+    "write_figures",
+    "write_json",
+    "write_pose",
+    "write_report",
+    "write_score",
+]

@@ -26,6 +26,26 @@ _AXIS_LOOKS = (("x", "-", "#0072b2"), ("y", "--", "#cc79a7"), ("z", ":", "#33333
 _CLICKED = {"linestyle": "", "marker": "o", "markersize": 4.5, "markerfacecolor": "none", "color": web(REFERENCE_RGB)}
 
 
+def write_figures(
+    folder: Path,
+    motion: Motion,
+    *,
+    truth: Truth | None = None,
+    digitised: DigitisedPoses | None = None,
+    symmetries: Sequence[Array] = (np.eye(3),),
+) -> None:
+    """Write every figure that the data allow into a run's folder: pose.png, score.png, errors.png, digitised.png.
+
+    `symmetries` (3, 3) are the body's, the identity among them, as in `evaluation.compare`.
+    """
+    write_pose(folder / "pose.png", motion)
+    write_score(folder / "score.png", motion)
+    if truth is not None:
+        write_errors(folder / "errors.png", motion, truth, symmetries)
+    if digitised is not None:
+        write_digitised(folder / "digitised.png", motion, digitised, symmetries)
+
+
 def write_pose(path: Path, motion: Motion) -> None:
     """Draw x, y, z [m] and somersault, tilt, twist [deg] over time with bands of two standard deviations.
 

@@ -11,10 +11,10 @@ from typing import Self
 import cv2
 import numpy as np
 
-from airborne.body import BodyModel, PosedBody, geometry
+from airborne.body import PosedBody
 from airborne.cameras import Camera, Rig
 from airborne.export.palette import STATUS_RGB
-from airborne.export.views import Picture, seen_by
+from airborne.export.views import Picture, seen_by, shapes_of
 from airborne.rendering import FLAT, render
 from airborne.tracking import Status
 from airborne.video import Frames, VideoWriter
@@ -32,12 +32,11 @@ class OverlayVideos:
     A killed run leaves videos that can be played up to about a second before its end.
     """
 
-    def __init__(self, folder: Path, rig: Rig, model: BodyModel, rate: Fraction) -> None:
+    def __init__(self, folder: Path, rig: Rig, rate: Fraction) -> None:
         """Start `overlay_<camera>.mp4` for each camera of the rig, whose sizes are those of whole pictures.
 
         rate: pictures in a second. Raises VideoError where a file cannot be written.
         """
-        self._geometry = geometry(model)
         self._cameras = [_reduced(camera.undistorted()) for camera in rig]
         with ExitStack() as opened:
             self._writers = [
@@ -52,7 +51,7 @@ class OverlayVideos:
         for view, camera, writer in zip(frames.views, self._cameras, self._writers, strict=True):
             picture = _empty(camera) if view is None else seen_by(view, camera)
             if view is not None and posed is not None:
-                _draw_outline(picture, render(self._geometry, posed, camera, FLAT).mask, STATUS_RGB[status])
+                _draw_outline(picture, render(shapes_of(posed.model), posed, camera, FLAT).mask, STATUS_RGB[status])
             if status is Status.LOST:
                 _draw_border(picture, STATUS_RGB[status])
             _draw_label(picture, label, STATUS_RGB[status])

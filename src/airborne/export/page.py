@@ -17,7 +17,7 @@ h1 { font-size: 1.8rem; line-height: 1.2; margin: 0 0 1.5rem; }
 h2 { font-size: 1.15rem; margin: 2.5rem 0 .75rem; padding-bottom: .25rem; border-bottom: 1px solid #ddd; }
 .tiles { display: grid; grid-template-columns: repeat(auto-fill, minmax(12.5rem, 1fr)); gap: 1rem; margin: 1.25rem 0; }
 .tile { border: 1px solid #ddd; border-radius: .4rem; padding: .75rem 1rem; }
-.tile b { display: block; font-size: 1.45rem; line-height: 1.3; font-weight: 600; }
+.tile b { display: block; font-size: 1.35rem; line-height: 1.3; font-weight: 600; }
 .tile span, figcaption { color: #555; font-size: .85rem; }
 .bar { display: flex; height: .7rem; border-radius: .35rem; overflow: hidden; background: #eee; }
 .warnings { border-left: .3rem solid #d55e00; background: #fdf3ec; padding: .75rem 1.25rem; margin: 1.25rem 0; }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -44,7 +44,7 @@ def headline(motion: Motion) -> dict[str, Any]:
         "n_lost": motion.count(Status.LOST),
         "start_s": float(ends[0]),
         "duration_s": float(ends[1] - ends[0]),
-        "rate_hz": float(1 / np.median(np.diff(motion.time_s))) if len(motion) > 1 else math.nan,
+        "rate_hz": round(1 / float(np.median(np.diff(motion.time_s))), 6) if len(motion) > 1 else math.nan,
         "median_score": _median(motion.score[has_pose]),
         "median_position_sd_mm": 1e3 * _median(_rms_over_axes(position_sd)),
         "median_rotation_sd_deg": math.degrees(_median(_rms_over_axes(rotation_sd))),
@@ -57,6 +57,35 @@ def headline(motion: Motion) -> dict[str, Any]:
         "n_near_singular": int(table["is_singular"].to_numpy()[rows].sum()),
         "has_gap": bool(len(rows) and rows[-1] - rows[0] + 1 > len(rows)),
     }
+
+
+def warnings(head: Mapping[str, Any]) -> Iterator[str]:
+    """Say in plain sentences what the reader of a `headline` must not miss; nothing where every frame is sound."""
+    n, n_posed = head["n_frames"], head["n_tracked"] + head["n_uncertain"]
+    if not n_posed:
+        yield "The body was found in no frame: this run measured nothing."
+    elif head["n_lost"]:
+        yield f"{head['n_lost']} of {n} frames are lost; they hold no numbers."
+    if head["n_uncertain"]:
+        yield f"{head['n_uncertain']} of {n} frames are uncertain; look at them in the overlay videos before use."
+    for what in ("position", "rotation"):
+        if head[f"n_{what}_unobservable"]:
+            yield (
+                f"In {head[f'n_{what}_unobservable']} of {n_posed} frames with a pose, some direction of the {what} "
+                "cannot be seen in the pictures: its standard deviation is infinite, and its number is only a guess."
+            )
+        elif n_posed and head[f"median_{what}_sd_{'mm' if what == 'position' else 'deg'}"] is None:
+            yield f"The uncertainty of the {what} is not known."
+    if head["n_near_singular"]:
+        yield (
+            f"In {head['n_near_singular']} frames tilt is within 5° of ±90°: somersault and twist mean little there, "
+            "and their numbers of turns may be miscounted. The quaternions are sound."
+        )
+    if head["has_gap"]:
+        yield (
+            "Somersault and twist were counted across lost frames, at the rate before them: they may be off by whole "
+            "turns."
+        )
 
 
 def write_json(path: Path, values: Mapping[str, Any]) -> None:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from airborne.body import geometry
 from airborne.cameras import Camera
 from airborne.video import View
 
 Picture = NDArray[np.uint8]
+
+shapes_of = lru_cache(maxsize=2)(geometry)  # flattened once per body, not once per picture
 
 
 def seen_by(view: View, camera: Camera) -> Picture:

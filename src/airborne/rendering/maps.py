@@ -6,11 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airborne.rendering.packing import packed_view
 from airborne.rendering.rows import BLOCK, LANES, NX, NY, NZ, SHAPE, W, all_spans, draw_row, new_row
-from airborne.rendering.shapes import KERNEL, new_shapes, place
-
-__all__ = ["empty_maps", "packed_view", "surface_maps", "workspace"]
+from airborne.rendering.shapes import B_1, B_U, B_V, KERNEL, place
 
 
 def empty_maps(size: tuple[int, int]) -> tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.float32]]:
@@ -23,18 +20,14 @@ def empty_maps(size: tuple[int, int]) -> tuple[NDArray[np.int16], NDArray[np.flo
     )
 
 
-def workspace(geometry):
-    """Allocate the shapes that `surface_maps` places: one workspace a body and thread."""
-    return new_shapes(geometry)
-
-
 @njit(**KERNEL)
 def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
     """Fill the maps of one view with the surface nearest to the camera.
 
-    shapes: a `workspace` of the body; R (s, 3, 3), t (s, 3) [m] world from segment; view (18,) packed.
+    shapes: a workspace of `new_shapes(geometry)`; R (s, 3, 3), t (s, 3) [m] world from segment; view (18,) packed.
     part (h, w) int16: index into BodyModel.parts, -1 where there is none; inverse_depth (h, w) float32 [1/m], 0 where
-    there is none; normals (3, h, w) float32: outward unit normals in camera axes, left as they are where there is none.
+    there is none, and for an ellipsoid that of the plane in which its outline lies, because only the outline moves the
+    picture; normals (3, h, w) float32: outward unit normals in camera axes, left as they are where there is none.
     """
     height, width = part.shape
     part[:] = -1
@@ -58,10 +51,12 @@ def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
             if w > 0:
                 shape = int(row[at + SHAPE])
                 if shape < n_ellipsoids:
+                    outline = shapes.outline[shape]
                     part[v, u] = geometry.ellipsoid_part[shape]
+                    inverse_depth[v, u] = outline[B_U] * u + outline[B_V] * v + outline[B_1]
                 else:
                     part[v, u] = geometry.polygon_part[shape - n_ellipsoids]
-                inverse_depth[v, u] = w
+                    inverse_depth[v, u] = w
                 x, y, z = row[at + NX], row[at + NY], row[at + NZ]
                 length = np.sqrt(x * x + y * y + z * z)
                 normals[0, v, u], normals[1, v, u], normals[2, v, u] = x / length, y / length, z / length

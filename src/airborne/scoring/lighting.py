@@ -99,24 +99,44 @@ def fit_light(observed, part, normals, albedo, coefficients, rounds, x0, y0, x1,
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def compose(observed, scene, part, normals, albedo, coefficients, x0, y0, residual, shape):
-    """Fill residual = observed - composite and shape = composite - empty scene, both (3, h, w) linear light.
+def compose(observed, scene, part, normals, albedo, is_faceted, coefficients, x0, y0, residual, shape):
+    """Fill residual = observed - composite and shape = the body's light on black, both (3, h, w) linear light.
 
-    scene (3, ...) is the empty scene; the composite shows the lit body in front of it. (x0, y0) is the first pixel of
-    the window that residual and shape cover.
+    scene (3, ...) is the empty scene; the composite shows the lit body in front of it. In `shape`, which says how the
+    picture would move with the body, a part that is not faceted has its mean light all over: shading does not turn with
+    a smooth surface. (x0, y0) is the first pixel of the window that residual and shape cover.
     """
     _, h, w = residual.shape
+    total, count = np.empty(len(albedo), np.float32), np.empty(len(albedo), np.float32)
     for k in range(3):
+        total[:] = 0
+        count[:] = 1e-6
         for y in range(h):
             for x in range(w):
                 p = part[y + y0, x + x0]
+                empty = scene[k, y + y0, x + x0]
                 if p < 0:
-                    residual[k, y, x] = observed[k, y + y0, x + x0] - scene[k, y + y0, x + x0]
+                    residual[k, y, x] = observed[k, y + y0, x + x0] - empty
                     shape[k, y, x] = 0
-                else:
-                    light = coefficients[k, 0]
-                    for q in range(3):
-                        light += coefficients[k, q + 1] * normals[q, y + y0, x + x0]
-                    colour = albedo[p, k] * max(light, np.float32(0))
-                    residual[k, y, x] = observed[k, y + y0, x + x0] - colour
-                    shape[k, y, x] = colour - scene[k, y + y0, x + x0]
+                    continue
+                light = coefficients[k, 0]
+                for q in range(3):
+                    light += coefficients[k, q + 1] * normals[q, y + y0, x + x0]
+                light = max(light, np.float32(0))
+                colour = albedo[p, k] * light
+                residual[k, y, x] = observed[k, y + y0, x + x0] - colour
+                shape[k, y, x] = colour
+                total[p] += light
+                count[p] += 1
+        for p in range(len(albedo)):
+            if not is_faceted[p] and count[p] > 1:
+                _paint_evenly(part, k, p, albedo[p, k] * total[p] / count[p], x0, y0, shape)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _paint_evenly(part, k, p, colour, x0, y0, shape):
+    _, h, w = shape.shape
+    for y in range(h):
+        for x in range(w):
+            if part[y + y0, x + x0] == p:
+                shape[k, y, x] = colour

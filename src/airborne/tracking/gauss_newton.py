@@ -15,8 +15,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body import BodyModel, Geometry, PosedBody, geometry
-from airborne.rendering.maps import empty_maps, packed_view, surface_maps, workspace
+from airborne.body import BodyModel, Box, Geometry, PosedBody, geometry
+from airborne.body.symmetry import continuous_axes
+from airborne.rendering.maps import empty_maps, surface_maps
+from airborne.rendering.packing import packed_view
+from airborne.rendering.shapes import new_shapes
 from airborne.scoring.lighting import TO_LIGHT, light_from_srgb, light_planes
 from airborne.scoring.plate import START_SD, fill
 from airborne.tracking.appearance import Appearance, Region
@@ -43,12 +46,21 @@ class Synthesis:
     geometry: Geometry
     shapes: Any
     albedo: NDArray[np.float32]  # (parts, 3) linear light
+    is_faceted: NDArray[np.bool_]  # (parts,) boxes: the edges between their sides can be seen
+    free_axes: Array  # (k, 3) in the root's frame: turns about them change nothing
 
     @classmethod
     def of(cls, model: BodyModel) -> Synthesis:
         """Make a body ready."""
         flat = geometry(model)
-        return cls(model, flat, workspace(flat), light_from_srgb(flat.colours).astype(np.float32))
+        albedo = light_from_srgb(flat.colours).astype(np.float32)
+        is_faceted = np.array([isinstance(part.shape, Box) for part in model.parts])
+        return cls(model, flat, new_shapes(flat), albedo, is_faceted, continuous_axes(model))
+
+    def visible(self, posed: PosedBody) -> Array:
+        """Return the projection (6, 6) of motions, in world axes, onto those that change the picture at all."""
+        hidden = np.concatenate([np.zeros_like(self.free_axes), self.free_axes @ posed.R[0].T], axis=1)
+        return np.eye(6) - hidden.T @ hidden
 
     def parts(self, posed: PosedBody, region: Region) -> NDArray[np.int16]:
         """Draw which part each pixel of a region shows: (h, w), -1 where none."""
@@ -84,7 +96,8 @@ def fit_silhouettes(
             A, g, S, totals = _zeros()
             for view in views:
                 totals += silhouette_equations(*body, posed.R, posed.t, *view, taps, taps, A, g, S)
-            posed = posed.moved(_solve(_whole(A), g, correlated * _mean_square(totals)))
+            motion = _solve(_whole(A), g, correlated * _mean_square(totals))
+            posed = posed.moved(synthesis.visible(posed) @ motion)
     return posed
 
 
@@ -94,16 +107,17 @@ def fit_pictures(synthesis: Synthesis, posed: PosedBody, regions: Sequence[Regio
     rows_sigma_px = [max(_FINE_SIGMA_PX * region.aspect, 0.5) for region in regions]
     taps = [(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma)) for sigma in rows_sigma_px]
     correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px))
-    body = synthesis.shapes, synthesis.geometry
+    body, paint = (synthesis.shapes, synthesis.geometry), (synthesis.albedo, synthesis.is_faceted)
     for step in range(1, _MOST_STEPS + 1):
         A, g, S, totals = _zeros()
         rounds = 3 if step == 1 else 1
         for (fixed, light, maps), (taps_u, taps_v) in zip(views, taps, strict=True):
             totals += photometric_equations(
-                *body, posed.R, posed.t, *fixed, synthesis.albedo, light, rounds, maps, taps_u, taps_v, _CLIP, A, g, S
+                *body, posed.R, posed.t, *fixed, *paint, light, rounds, maps, taps_u, taps_v, _CLIP, A, g, S
             )
-        A, noise = _whole(A), correlated * _mean_square(totals)
-        motion = _solve(A, g, noise)
+        visible, noise = synthesis.visible(posed), correlated * _mean_square(totals)
+        A, S = visible @ _whole(A) @ visible, visible @ S @ visible
+        motion = visible @ _solve(A, g, noise)
         posed = posed.moved(_OVERSTEP * motion)
         if motion @ A @ motion <= _SETTLED * noise:
             break
@@ -133,7 +147,7 @@ def _reduced(region: Region, posterior: Array, reduction: int) -> tuple:
     whole = posterior[: size[1] * rows, : size[0] * reduction]
     plane = cv2.resize(whole, size, interpolation=cv2.INTER_AREA)
     camera = region.camera.resampled(scale=(reduction, rows), offset=((reduction - 1) / 2, (rows - 1) / 2), size=size)
-    return packed_view(camera), camera.K, plane, np.ones_like(plane), empty_maps(size)
+    return packed_view(camera), camera.K, plane, np.zeros((1, *plane.shape), np.float32), np.ones_like(plane), empty_maps(size)
 
 
 def _zeros() -> tuple[Array, Array, Array, Array]:

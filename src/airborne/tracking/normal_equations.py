@@ -78,12 +78,12 @@ def window_of(part):
 
 
 @njit(**KERNEL)
-def accumulate(residual, shape, coverage, inverse_depth, certainty, x0, y0, K, view, origin, clip, A, g, S):
+def accumulate(residual, shape, coverage, inverse_depth, scene, certainty, x0, y0, K, view, origin, clip, A, g, S):
     """Add one view's normal equations for a rigid motion about `origin` [m]: A motion = g.
 
-    residual, shape (c, h, w): blurred observed minus rendered, and the blurred difference that the body makes to the
-    empty scene; coverage, inverse_depth (h, w) blurred alike; certainty (region) in (0, 1] scales a pixel's weight;
-    clip: the residual at which a pixel's weight has fallen to a quarter. The motion is a translation [m] and a rotation
+    residual, shape (c, h, w): blurred observed minus rendered, and the blurred colours of the body on black; coverage,
+    inverse_depth (h, w) blurred alike; scene (c, region) what the body moves in front of; certainty (region) in (0, 1]
+    scales a pixel's weight; clip: the residual at which a pixel's weight has fallen to a quarter. The motion is a translation [m] and a rotation
     vector [rad] in world axes. Of A (6, 6) the lower triangle is filled; S (6, 6) gathers the spread of g over blocks.
     Returns (weighted squared residual, weight).
     """
@@ -101,9 +101,12 @@ def accumulate(residual, shape, coverage, inverse_depth, certainty, x0, y0, K, v
             if m < _EDGE:
                 continue
             sxx, sxy, syy, sx, sy, e2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            mx = 0.5 * (coverage[y, x + 1] - coverage[y, x - 1])
+            my = 0.5 * (coverage[y + 1, x] - coverage[y - 1, x])
             for k in range(c):
-                gx = 0.5 * (shape[k, y, x + 1] - shape[k, y, x - 1])
-                gy = 0.5 * (shape[k, y + 1, x] - shape[k, y - 1, x])
+                behind = scene[k, y + y0, x + x0]  # the body uncovers it where it leaves
+                gx = 0.5 * (shape[k, y, x + 1] - shape[k, y, x - 1]) - behind * mx
+                gy = 0.5 * (shape[k, y + 1, x] - shape[k, y - 1, x]) - behind * my
                 r = residual[k, y, x]
                 sxx += gx * gx
                 sxy += gx * gy
@@ -162,11 +165,11 @@ def _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v):
 
 
 @njit(**KERNEL)
-def silhouette_equations(shapes, geometry, R, t, view, K, posterior, certainty, maps, taps_u, taps_v, A, g, S):
+def silhouette_equations(shapes, geometry, R, t, view, K, posterior, black, certainty, maps, taps_u, taps_v, A, g, S):
     """Add one view's normal equations of `blurred posterior - blurred mask`; see `accumulate`.
 
-    posterior (h, w): the probability of each pixel to be body; maps: workspace (part, inverse_depth, normals).
-    Returns (weighted squared residual, weight).
+    posterior (h, w): the probability of each pixel to be body; black (1, h, w) zeros, certainty (h, w) ones;
+    maps: workspace (part, inverse_depth, normals). Returns (weighted squared residual, weight).
     """
     part, inverse_depth, normals = maps
     surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals)
@@ -184,7 +187,7 @@ def silhouette_equations(shapes, geometry, R, t, view, K, posterior, certainty, 
         for x in range(x1 - x0):
             shape[0, y, x] = np.float32(0.5) * (residual[0, y, x] + blurred[0, y, x])
             residual[0, y, x] -= blurred[0, y, x]
-    return accumulate(residual, shape, blurred[0], blurred[1], certainty, x0, y0, K, view, t[0], 0.5, A, g, S)
+    return accumulate(residual, shape, blurred[0], blurred[1], black, certainty, x0, y0, K, view, t[0], 0.5, A, g, S)
 
 
 @njit(**KERNEL)
@@ -199,6 +202,7 @@ def photometric_equations(
     scene,
     certainty,
     albedo,
+    is_faceted,
     light,
     rounds,
     maps,
@@ -211,8 +215,8 @@ def photometric_equations(
 ):
     """Add one view's normal equations of `blurred observed - blurred composite`; see `accumulate`.
 
-    observed, scene (3, h, w): linear light of the picture and of the empty scene; albedo (parts, 3) linear; light
-    (3, 4) the view's fitted light, refitted in place by `rounds` robust rounds. Returns (weighted squared residual, weight).
+    observed, scene (3, h, w): linear light of the picture and of the empty scene; albedo (parts, 3) linear and
+    is_faceted (parts,): see `compose`; light (3, 4) the view's fitted light, refitted in place by `rounds` robust rounds. Returns (weighted squared residual, weight).
     """
     part, inverse_depth, normals = maps
     surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals)
@@ -223,7 +227,7 @@ def photometric_equations(
     blurred = _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v)
     sharp, residual = np.empty((3, y1 - y0, x1 - x0), np.float32), np.empty((3, y1 - y0, x1 - x0), np.float32)
     body, shape = np.empty_like(sharp), np.empty_like(sharp)
-    compose(observed, scene, part, normals, albedo, light, x0, y0, sharp, body)
+    compose(observed, scene, part, normals, albedo, is_faceted, light, x0, y0, sharp, body)
     blur(sharp, taps_u, taps_v, residual)
     blur(body, taps_u, taps_v, shape)
-    return accumulate(residual, shape, blurred[0], blurred[1], certainty, x0, y0, K, view, t[0], clip, A, g, S)
+    return accumulate(residual, shape, blurred[0], blurred[1], scene, certainty, x0, y0, K, view, t[0], clip, A, g, S)

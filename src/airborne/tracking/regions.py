@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import Geometry, PosedBody
-from airborne.rendering.maps import packed_view
+from airborne.rendering.packing import packed_view
 from airborne.tracking.appearance import Region
 from airborne.video import Frames, View
 

@@ -12,7 +12,8 @@ from scipy.special import ndtri
 from scipy.stats import qmc
 
 from airborne.body import PosedBody
-from airborne.rendering.maps import empty_maps, packed_view, surface_maps
+from airborne.rendering.maps import empty_maps, surface_maps
+from airborne.rendering.packing import packed_view
 from airborne.scoring.foreground import agreement
 from airborne.tracking.appearance import Appearance, Region
 from airborne.tracking.gauss_newton import Synthesis

@@ -1,0 +1,163 @@
+"""Small clips with truth: a coloured body thrown over a cluttered background, seen by up to four cameras."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.body import BodyModel, Box, Ellipsoid, Part, Pose, Segment, geometry
+from airborne.cameras import Camera
+from airborne.rendering import Lamp, Lights, render
+from airborne.tracking import Estimate
+from airborne.tracking.refined import Refined
+from airborne.tracking.tracker import Tracker, step
+from airborne.video import Frames, View
+
+SIZE = (320, 240)
+FPS = 50
+LIGHTS = Lights(0.6, (Lamp(np.array([3.0, -4.0, 5.0]), 0.4),))
+GRAVITY = np.array([0, 0, -9.81])
+YELLOW, BLUE, RED = (220.0, 190.0, 40.0), (40.0, 60.0, 190.0), (200.0, 40.0, 40.0)
+
+
+def part(name: str, shape, centre, colour) -> Part:
+    place = RigidTransform.from_components(np.array(centre, float), Rotation.identity())
+    return Part(name, shape, place, np.array(colour))
+
+
+def rigid_body(*parts: Part) -> BodyModel:
+    return BodyModel("body", (Segment("root", None, np.zeros(3), parts),))
+
+
+CROSS = rigid_body(
+    part("long", Box(np.array([0.08, 0.8, 0.06])), (0, 0, 0), YELLOW),
+    part("short", Box(np.array([0.5, 0.08, 0.06])), (0, 0.15, 0), BLUE),
+    part("head", Ellipsoid(np.array([0.07, 0.09, 0.07])), (0, 0.4, 0.03), RED),
+)
+BALL = rigid_body(part("ball", Ellipsoid(np.array([0.2, 0.2, 0.2])), (0, 0, 0), YELLOW))
+SPINDLE = rigid_body(part("spindle", Ellipsoid(np.array([0.12, 0.12, 0.35])), (0, 0, 0), YELLOW))
+
+
+def camera(name: str, turn: float) -> Camera:
+    """A camera 4 m from the place of the throw, `turn` [rad] round the vertical; about 100 px a metre."""
+    centre, target = np.array([4 * np.sin(turn), -4 * np.cos(turn), 1.9]), np.array([0.0, 0.0, 1.4])
+    z = (target - centre) / np.linalg.norm(target - centre)
+    x = np.cross(z, [0, 0, 1.0]) / np.linalg.norm(np.cross(z, [0, 0, 1.0]))
+    rotation = Rotation.from_matrix(np.stack([x, np.cross(z, x), z]))
+    K = np.array([[400, 0, (SIZE[0] - 1) / 2], [0, 400.0, (SIZE[1] - 1) / 2], [0, 0, 1.0]])
+    place = RigidTransform.from_components(-rotation.apply(centre), rotation)
+    return Camera(name=name, K=K, size=SIZE, camera_from_world=place)
+
+
+CAMERAS = tuple(camera(f"cam{i}", turn) for i, turn in enumerate((0.0, 1.4, 2.7, -1.1)))
+
+
+def thrown(time_s: Fraction) -> Pose:
+    """Where the body is: thrown up at 1 m/s, turning at 5 rad/s."""
+    t = float(time_s)
+    place = np.array([-0.1, 0.05, 1.35]) + np.array([0.6, 0.2, 1.0]) * t + 0.5 * GRAVITY * t**2
+    turn = Rotation.from_rotvec(np.array([3.5, 1.0, 3.4]) * t) * Rotation.from_euler("xyz", [0.4, 0.3, 0.9])
+    return Pose(world_from_root=RigidTransform.from_components(place, turn))
+
+
+def clutter(seed: int, *colours) -> np.ndarray:
+    """A background (h, w, 3) sRGB: soft blotches of dull colours, sharp boxes, and boxes of the given colours."""
+    rng = np.random.default_rng(seed)
+    picture = cv2.resize(rng.uniform(70, 150, (6, 8, 3)), SIZE, interpolation=cv2.INTER_CUBIC)
+    dull = [np.full(3, grey) + rng.uniform(-12, 12, 3) for grey in rng.uniform(50, 170, 12)]
+    for colour in (*dull, *colours):
+        x, y = rng.integers(0, SIZE[0] - 40), rng.integers(0, SIZE[1] - 40)
+        picture[y : y + rng.integers(10, 40), x : x + rng.integers(10, 40)] = colour
+    return picture
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is filmed; every picture is a pure function of it."""
+
+    model: BodyModel = CROSS
+    motion: Callable[[Fraction], Pose | None] = thrown  # None: the body is not there
+    cameras: Sequence[Camera] = CAMERAS
+    backgrounds: Sequence[np.ndarray] = tuple(clutter(seed) for seed in range(4))
+    brightness: Callable[[int], float] = lambda index: 1.0
+    noise_grey: float = 2.0
+    is_dark: Callable[[int, str], bool] = lambda index, name: False  # a camera without an image at a frame
+
+    def frames(self, index: int) -> Frames:
+        time_s = Fraction(index, FPS)
+        pose = self.motion(time_s)
+        views = [
+            None if self.is_dark(index, seen_by.name) else View(seen_by, self._picture(index, i, seen_by, pose))
+            for i, seen_by in enumerate(self.cameras)
+        ]
+        return Frames(index, time_s, tuple(views))
+
+    def _picture(self, index: int, i: int, seen_by: Camera, pose: Pose | None) -> np.ndarray:
+        picture = self.backgrounds[i].copy()
+        if pose is not None:
+            fine = seen_by.resampled(scale=(0.5, 0.5), offset=(-0.25, -0.25), size=(2 * SIZE[0], 2 * SIZE[1]))
+            drawn = render(geometry(self.model), self.model.with_pose(pose), fine, LIGHTS)
+            share = cv2.resize(drawn.mask.astype(np.float32), SIZE, interpolation=cv2.INTER_AREA)[..., None]
+            picture = (1 - share) * picture + cv2.resize(drawn.colour, SIZE, interpolation=cv2.INTER_AREA)
+        rng = np.random.default_rng([index, i])
+        noisy = picture * self.brightness(index) + rng.normal(0, self.noise_grey, picture.shape)
+        return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
+
+    def start(self, index: int = 0) -> Pose:
+        """The true pose, of a frame that shows the body."""
+        pose = self.motion(Fraction(index, FPS))
+        assert pose is not None
+        return pose
+
+
+def track(scene: Scene, indices: Sequence[int], tracker: Tracker | None = None) -> list[Estimate]:
+    """Track the frames of the scene, by `Refined` from the true pose of the first if no tracker is given."""
+    tracker = tracker or Refined(scene.model, scene.start(indices[0]))
+    state, estimates = tracker.init(), []
+    for index in indices:
+        state, estimate = step(tracker, state, scene.frames(index))
+        estimates.append(estimate)
+    return estimates
+
+
+def errors(scene: Scene, estimate: Estimate) -> tuple[float, float]:
+    """How far an estimate is from the truth: [mm], [degrees]."""
+    truth = scene.motion(estimate.time_s)
+    assert truth is not None and estimate.pose is not None
+    return difference(truth, estimate.pose)
+
+
+def difference(a: Pose, b: Pose) -> tuple[float, float]:
+    """How far two poses are apart: [mm], [degrees]."""
+    between = a.world_from_root.inv() * b.world_from_root
+    return 1000 * float(np.linalg.norm(between.translation)), float(np.degrees(between.rotation.magnitude()))
+
+
+def worst(scene: Scene, estimates: Sequence[Estimate]) -> tuple[float, float]:
+    """The largest errors of the estimates that have a pose: [mm], [degrees]."""
+    both = np.array([errors(scene, estimate) for estimate in estimates if estimate.pose is not None])
+    return float(both[:, 0].max()), float(both[:, 1].max())
+
+
+def statuses(estimates: Sequence[Estimate]) -> list[str]:
+    return [str(estimate.status) for estimate in estimates]
+
+
+__all__ = [
+    "BALL",
+    "CAMERAS",
+    "CROSS",
+    "SPINDLE",
+    "Scene",
+    "clutter",
+    "difference",
+    "errors",
+    "replace",
+    "statuses",
+    "thrown",
+    "track",
+    "worst",
+]
