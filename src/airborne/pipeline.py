@@ -5,93 +5,123 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
-from dataclasses import dataclass
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from airborne import __version__
 from airborne.body import BodyModel
-from airborne.body.files import read_body
-from airborne.cameras import Calibration, Camera, Rig, calibrate, read_control_points, read_rig
+from airborne.body.files import mesh_files, read_body
+from airborne.cameras import Calibration, Camera, Rig, calibrate, read_control_points, read_rig, write_pose2sim
 from airborne.errors import ResultError, TrialError
 from airborne.export import ContactSheet, OverlayVideos, headline, write_figures, write_json, write_report
-from airborne.motion import Motion, MotionWriter, read_estimates, read_motion
-from airborne.motion import write_angles, write_joints, write_motion_parquet
-from airborne.tracking import Estimate, Status
-from airborne.tracking.methods import METHODS, sampled, tracker_of
+from airborne.motion import (
+    Motion,
+    MotionWriter,
+    read_estimates,
+    read_motion,
+    write_angles,
+    write_joints,
+    write_motion_parquet,
+)
+from airborne.tracking import Estimate
+from airborne.tracking.methods import FIELDS_AS, sampled, tracker_of
 from airborne.trial import CameraTable, Trial
-from airborne.video import Frames, Recording, VideoSource, inspect, open_recording
+from airborne.video import Recording, VideoSource, inspect, open_recording
 
 Progress = Callable[[int, int | None], None]  # frames done, frames expected
 
-_HASHED_BYTES = 8 << 20  # of a large file, its first and last half of this and its length stand for it
+UNCERTAINTY = (
+    "Standard deviations hold what the pictures leave open: noise, wrong light, wrong shape. They do not hold errors of "
+    "the calibration, of the body's measures or of the cameras' times."
+)
+_HASHED_BYTES = 8 << 20  # larger files are told apart by their first and last so many bytes and their length
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """What a finished run leaves in memory; the same lies in its folder."""
+    """What a finished run leaves; the same lies in its folder."""
 
     motion: Motion
-    model: BodyModel
-    rig: Rig
     summary: dict[str, Any]
 
 
-def track(trial: Trial, folder: Path, *, resume: bool = False, pictures: bool = True, progress: Progress | None = None) -> Run:
-    """Track a trial and leave its results in a folder; see the docs for what is in it.
+def track(
+    trial: Trial, folder: Path, *, resume: bool = False, pictures: bool = True, progress: Progress | None = None
+) -> Run:
+    """Track a trial and leave the results in a folder.
 
     A run that was killed goes on with `resume`, to the same result. `pictures=False` leaves out videos, figures and
-    report. Raises an AirborneError for unusable input, or a folder that holds another run.
+    report. Raises an AirborneError for input that cannot be used, and for a folder that holds another run.
     """
-    sources = [_source(trial, camera) for camera in trial.camera]
-    rig, calibration = cameras_of(trial)
+    begun_s = time.monotonic()
+    recording, calibration = open_trial(trial)
+    rig = recording.rig
     model = read_body(trial.path(trial.body.file))
-    recording = open_recording(
-        sources, rig, fields_as=METHODS[trial.track.method].fields_as, every=trial.track.every,
-        start=trial.start.frame, stop=trial.track.stop,
-    )  # fmt: skip
-    facts = _inputs(trial, calibration)
-    done = _open_folder(folder, facts, resume)
-    start_s = time.monotonic()
-    model = _run(trial, model, recording, folder, done, pictures, progress)
+    done = _begin(folder, trial, resume)
+    _keep_inputs(folder, trial, rig, model)
+    read_s = time.monotonic()
+    model = _track_frames(trial, model, recording, folder, done, pictures, progress)
+    tracked_s = time.monotonic()
     motion = read_motion(folder / "motion.csv")
-    summary = {
-        "name": trial.name,
-        **headline(motion),
-        **facts,
-        "events": recording.events,
-        "wall_s": time.monotonic() - start_s,
+    _write_tables(folder, motion, model)
+    summary = _summary(trial, rig, calibration, recording, motion, folder)
+    if pictures:
+        write_figures(folder, motion)
+    summary["timings_s"] = {
+        "opening": read_s - begun_s,
+        "tracking": tracked_s - read_s,
+        "writing": time.monotonic() - tracked_s,
     }
-    _write_results(folder, motion, model, summary, pictures)
-    return Run(motion, model, rig, summary)
+    write_json(folder / "summary.json", summary)
+    if pictures:
+        write_report(folder, summary)
+    return Run(motion, summary)
+
+
+def open_trial(trial: Trial) -> tuple[Recording, Calibration | None]:
+    """Open the videos of a trial with its cameras, the way its method sees fields; and the calibration, if one was made."""
+    rig, calibration = cameras_of(trial)
+    recording = open_recording(
+        [_source(trial, camera) for camera in trial.camera],
+        rig,
+        fields_as=FIELDS_AS[trial.track.method],
+        every=trial.track.every,
+        start=trial.start.frame,
+        stop=trial.track.stop,
+    )
+    return recording, calibration
 
 
 def cameras_of(trial: Trial) -> tuple[Rig, Calibration | None]:
-    """Return the cameras of the trial's videos, in its order; a calibration where it is made from control points."""
+    """Return the cameras of the trial's videos in its order, and the calibration if control points gave them."""
     sizes = {camera.name: inspect(_source(trial, camera)).size for camera in trial.camera}
     if trial.calibration.control_points is not None:
         points = read_control_points(trial.path(trial.calibration.control_points))
-        calibration = calibrate(points, sizes, method=trial.calibration.method)
-        return calibration.rig.select([camera.name for camera in trial.camera]), calibration
+        missing = [name for name in sizes if name not in points.cameras]
+        if missing:
+            raise TrialError(
+                f"{trial.calibration.control_points} has no points clicked in {', '.join(missing)}; "
+                f"it has: {', '.join(points.cameras)}"
+            )
+        calibration = calibrate(points.select(list(sizes)), sizes, method=trial.calibration.method)
+        return calibration.rig, calibration
     rig = read_rig(trial.path(trial.calibration.file or ""))
     return Rig(tuple(_as_saved(rig, camera, sizes[camera.name]) for camera in trial.camera)), None
 
 
 def _as_saved(rig: Rig, table: CameraTable, size: tuple[int, int]) -> Camera:
-    """Turn a calibrated camera into the camera of the video's own pixels."""
-    from dataclasses import replace
-
+    """Return a calibrated camera as the camera of its video's own pixels."""
     camera = replace(rig[table.calibrated_as or table.name], name=table.name)
-    if table.saved_scale == 1 and table.saved_offset_px == [0, 0]:
-        return camera
     du, dv = table.saved_offset_px
+    if table.saved_scale == 1 and (du, dv) == (0, 0):
+        return camera
     return camera.resampled(scale=(table.saved_scale, table.saved_scale), offset=(du, dv), size=size)
 
 
@@ -99,23 +129,58 @@ def _source(trial: Trial, camera: CameraTable) -> VideoSource:
     return VideoSource(camera.name, trial.path(camera.video), camera.fields, camera.offset_s)
 
 
-def _run(
-    trial: Trial, model: BodyModel, recording: Recording, folder: Path, done: list[Estimate], pictures: bool, progress: Progress | None
+def _begin(folder: Path, trial: Trial, resume: bool) -> list[Estimate]:
+    """Make the folder ready and return the frames that are finished already."""
+    identity = {"inputs": inputs_of(trial), "track": trial.track.model_dump(), "version": __version__}
+    motion, record = folder / "motion.csv", folder / "run.json"
+    folder.mkdir(parents=True, exist_ok=True)
+    if motion.exists() and not resume:
+        raise ResultError(f"{folder} already holds a run; give --resume to go on with it, or another folder")
+    if not motion.exists() or not record.exists():
+        write_json(record, identity)
+        motion.unlink(missing_ok=True)
+        return []
+    known = json.loads(record.read_text(encoding="utf-8"))
+    changed = [key for key in identity if known.get(key) != json.loads(json.dumps(identity[key]))]
+    if changed:
+        raise ResultError(
+            f"{folder} holds a run of another trial (its {' and '.join(changed)} differ); track into another folder"
+        )
+    return read_estimates(motion)
+
+
+def _keep_inputs(folder: Path, trial: Trial, rig: Rig, model: BodyModel) -> None:
+    """Leave the cameras and the body beside the results, for `airborne evaluate` and for other tools."""
+    write_pose2sim(folder / "calib.toml", rig)
+    body = trial.path(trial.body.file)
+    shutil.copyfile(body, folder / "body.toml")
+    for name in mesh_files(body):
+        target = folder / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(body.parent / name, target)
+
+
+def _track_frames(
+    trial: Trial,
+    model: BodyModel,
+    recording: Recording,
+    folder: Path,
+    done: list[Estimate],
+    pictures: bool,
+    progress: Progress | None,
 ) -> BodyModel:
-    """Track every frame, writing each as it is finished; frames in `done` are only learned from."""
-    frames = iter(recording)
-    first = next(frames, None)
-    if first is None:
-        raise TrialError(f"{trial.name}: no frame from number {trial.start.frame} on; the start frame lies past the end")
-    model = sampled(model, trial.start.pose, first)
-    tracker = tracker_of(trial.track, model, trial.start.pose)
-    state = tracker.init()
-    finished = iter(done)
-    joints = tuple(segment.name for segment in model.segments[1:])
+    """Track every frame and write it as soon as it is found; of frames in `done` the tracker only learns."""
     with ExitStack() as stack:
-        stack.callback(getattr(frames, "close", lambda: None))
+        frames = stack.enter_context(closing(iter(recording)))
+        first = next(frames, None)
+        if first is None:
+            raise TrialError(f"{trial.name}: there is no frame {trial.start.frame}; start.frame lies past the end")
+        model = sampled(model, trial.start.pose, first)
+        tracker = tracker_of(trial.settings, model, trial.start.pose)
+        joints = tuple(segment.name for segment in model.segments[1:])
         writer = stack.enter_context(MotionWriter(folder / "motion.csv", joints, resume=bool(done)))
         artists = [stack.enter_context(artist) for artist in _artists(folder, recording, pictures)]
+        state, finished = tracker.init(), iter(done)
         for number, seen in enumerate(chain([first], frames), start=1):
             estimate = next(finished, None)
             if estimate is None:
@@ -128,3 +193,72 @@ def _run(
             if progress is not None:
                 progress(number, recording.n_frames)
     return model
+
+
+def _artists(folder: Path, recording: Recording, pictures: bool) -> Iterator[Any]:
+    """Return what draws the frames as they go by: context managers with `write`."""
+    if pictures:
+        yield OverlayVideos(folder, recording.rig, recording.rate)
+        yield ContactSheet(folder / "through_mask.png", recording.rig)
+
+
+def _write_tables(folder: Path, motion: Motion, model: BodyModel) -> None:
+    write_motion_parquet(folder / "motion.parquet", motion)
+    write_angles(folder / "angles.csv", motion)
+    write_joints(folder / "joints.csv", motion, model)
+
+
+def _summary(
+    trial: Trial, rig: Rig, calibration: Calibration | None, recording: Recording, motion: Motion, folder: Path
+) -> dict[str, Any]:
+    fits = {} if calibration is None else {fit.name: fit for fit in calibration.fits}
+    cameras = [
+        {
+            "name": camera.name,
+            "position_m": [round(float(x), 4) for x in camera.centre],
+            "focal_px": round(float(camera.K[0, 0]), 2),
+            "calibration_rms_px": fits[camera.name].rms_px if camera.name in fits else None,
+            "held_out_rms_mm": fits[camera.name].held_out_m * 1e3 if camera.name in fits else None,
+        }
+        for camera in rig
+    ]
+    return {
+        "name": trial.name,
+        **headline(motion),
+        "uncertainty": UNCERTAINTY,
+        "warnings": [] if calibration is None else list(calibration.warnings),
+        "events": recording.events,
+        "method": trial.track.model_dump(),
+        "cameras": cameras,
+        "versions": versions(),
+        "inputs": inputs_of(trial),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of everything that a result may depend on."""
+    packages = ("numpy", "scipy", "numba", "av", "opencv-python-headless")
+    return {"airborne": __version__, "python": platform.python_version(), **{name: version(name) for name in packages}}
+
+
+def inputs_of(trial: Trial) -> dict[str, str]:
+    """Return the SHA-256 of each input file, by the name that the trial gives it."""
+    names = [*(camera.video for camera in trial.camera), trial.body.file]
+    names += [name for name in (trial.calibration.file, trial.calibration.control_points) if name]
+    start = json.dumps([trial.start.model_dump(), trial.lights and trial.lights.model_dump()])
+    hashes = {name: _sha256(trial.path(name)) for name in names}
+    return {**hashes, "start and lights": hashlib.sha256(start.encode()).hexdigest()}
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        if size <= 2 * _HASHED_BYTES:
+            digest.update(file.read())
+        else:
+            digest.update(file.read(_HASHED_BYTES))
+            file.seek(-_HASHED_BYTES, 2)
+            digest.update(file.read())
+            digest.update(str(size).encode())
+    return digest.hexdigest()

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import tomllib
-from fractions import Fraction
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -14,9 +14,11 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import Pose
 from airborne.errors import TrialError, one_line
 from airborne.geometry.rotations import matrix_from_angles
+from airborne.rendering import Lamp, Lights
+from airborne.tracking.methods import Colour, Method, Prediction, Settings
+from airborne.tracking.stepping import VRule
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
-Method = Literal["refined", "stepping", "simplex"]
 
 
 class _Strict(BaseModel):
@@ -45,7 +47,7 @@ class CalibrationTable(_Strict):
     @model_validator(mode="after")
     def _one_source(self) -> CalibrationTable:
         if (self.file is None) == (self.control_points is None):
-            raise ValueError("give file = \"...\" or control_points = \"...\", one of them")
+            raise ValueError('give file = "..." or control_points = "...", one of them')
         return self
 
 
@@ -88,17 +90,45 @@ class StartTable(_Strict):
         return Pose(world_from_root=RigidTransform.from_components(self.position_m, rotation))
 
 
+class LampTable(_Strict):
+    """A lamp: a point light, or with a direction and a half angle a spot light."""
+
+    position_m: Vector
+    intensity: float = Field(ge=0)  # what a matt surface facing it gets, as a share of its colour
+    direction: Vector | None = None
+    half_angle_deg: float | None = Field(None, gt=0, lt=90)
+
+    @model_validator(mode="after")
+    def _both_or_none(self) -> LampTable:
+        if (self.direction is None) != (self.half_angle_deg is None) or self.direction == [0, 0, 0]:
+            raise ValueError("a spot light needs a direction with a length and half_angle_deg; a point light neither")
+        return self
+
+
+class LightsTable(_Strict):
+    """Measured lights, for `stepping` and `simplex`; without this table the light is unknown."""
+
+    ambient: float = Field(ge=0)
+    lamp: list[LampTable] = []
+
+    @property
+    def lights(self) -> Lights:
+        """The lights as the renderer takes them."""
+        return Lights(self.ambient, tuple(_lamp(lamp) for lamp in self.lamp))
+
+
 class TrackTable(_Strict):
     """How to track; each method reads its own settings."""
 
     method: Method = "refined"
     every: Annotated[int, Field(ge=1)] = 1  # track every n-th frame or field
     stop: Annotated[int, Field(ge=1)] | None = None  # one past the last frame or field
-    prediction: Literal["smooth", "ballistic", "none"] = "smooth"
-    colour: Literal["raw", "normalised", "blend", "union"] = "normalised"  # stepping and simplex: paper B's score
-    v_rule: Literal["v_literal", "v_sym"] = "v_sym"  # stepping
+    prediction: Prediction = "smooth"
+    colour: Colour = "normalised"  # stepping and simplex: paper B's score
+    v_rule: VRule = "v_sym"  # stepping
     steps_mm: list[float] = [50, 30, 20, 10, 10, 5, 5]  # stepping: one loop each
     steps_deg: list[float] = [5, 3, 2, 1, 1, 0.5, 0.5]
+    scale: Literal[1, 2, 4] = 1  # stepping and simplex: reduction of the pictures
 
     @model_validator(mode="after")
     def _equal_loops(self) -> TrackTable:
@@ -115,18 +145,38 @@ class Trial(_Strict):
     calibration: CalibrationTable
     body: BodyTable
     start: StartTable
+    lights: LightsTable | None = None
     track: TrackTable = TrackTable()
     folder: Path = Path()
+
+    @property
+    def settings(self) -> Settings:
+        """What the tracking method is told."""
+        track = self.track
+        steps = zip(track.steps_mm, track.steps_deg, strict=True)
+        return Settings(
+            method=track.method,
+            prediction=track.prediction,
+            colour=track.colour,
+            v_rule=track.v_rule,
+            loops=tuple((mm / 1000, float(np.radians(deg))) for mm, deg in steps),
+            scale=track.scale,
+            lights=None if self.lights is None else self.lights.lights,
+        )
 
     def path(self, name: str) -> Path:
         """Resolve a path of the trial file."""
         return self.folder / name
 
 
-def read_trial(path: Path) -> Trial:
-    """Read a trial file; raises TrialError, naming the file and what is wrong, for anything unusable."""
+def read_trial(path: Path, track: dict[str, Any] | None = None, cameras: Sequence[str] | None = None) -> Trial:
+    """Read a trial file; raises TrialError, naming the file and what is wrong, for anything unusable.
+
+    `track` replaces entries of its [track] table; `cameras` keeps only the named cameras.
+    """
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
+        table["track"] = {**table.get("track", {}), **(track or {})}
         trial = Trial.model_validate({**table, "folder": path.parent})
     except OSError as error:
         raise TrialError(f"{path}: cannot be read ({error.strerror}); give the path of a trial's TOML file") from error
@@ -134,15 +184,28 @@ def read_trial(path: Path) -> Trial:
         raise TrialError(f"{path.name}: not a TOML file: {error}") from error
     except ValidationError as error:
         raise TrialError(f"{path.name}: {one_line(error)}") from error
+    _check(path, trial)
+    return trial if cameras is None else _only(path, trial, cameras)
+
+
+def _check(path: Path, trial: Trial) -> None:
     names = [camera.name for camera in trial.camera]
     if len(set(names)) != len(names):
         raise TrialError(f"{path.name}: two cameras share a name: {', '.join(names)}; give each its own")
     for name in [trial.body.file, trial.calibration.file or trial.calibration.control_points or ""]:
         if not trial.path(name).is_file():
             raise TrialError(f"{path.name}: {name} not found beside it")
-    return trial
 
 
-def offset(camera: CameraTable) -> Fraction:
-    """Return a camera's offset as an exact number of seconds, as written."""
-    return Fraction(repr(camera.offset_s))
+def _only(path: Path, trial: Trial, cameras: Sequence[str]) -> Trial:
+    known = {camera.name: camera for camera in trial.camera}
+    unknown = [name for name in cameras if name not in known]
+    if unknown:
+        raise TrialError(f"{path.name}: no camera {', '.join(unknown)}; it has: {', '.join(known)}")
+    return trial.model_copy(update={"camera": [known[name] for name in cameras]})
+
+
+def _lamp(table: LampTable) -> Lamp:
+    angle = None if table.half_angle_deg is None else float(np.radians(table.half_angle_deg))
+    direction = None if table.direction is None else np.array(table.direction)
+    return Lamp(np.array(table.position_m), table.intensity, direction, angle)

@@ -82,7 +82,7 @@ def test_file_says_segments_parts_places_and_colours(tmp_path):
         ('name = "leg"', "", "name: Field required"),
         ("centre_m", "center_m", "segment.0.part.0.center_m: Extra inputs are not permitted"),
         ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, -0.2, 0.4]", "part 'upper': size_m is [0.1, -0.2, 0.4]"),
-        ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2, nan]", "part 'upper': size_m is [0.1, 0.2, nan]"),
+        ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2, nan]", "segment.0.part.0.size_m.2: Input should be a finite"),
         ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2]", "segment.0.part.0.size_m"),
         ("size_m = [0.1, 0.2, 0.4]", "", "part 'upper' is a box and needs size_m"),
         ("size_m = [0.1, 0.2, 0.4]", "semi_axes_m = [1, 1, 1]", "part 'upper' is a box and needs size_m"),

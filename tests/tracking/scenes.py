@@ -10,7 +10,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Ellipsoid, Part, Pose, Segment, geometry
 from airborne.cameras import Camera
-from airborne.rendering import Lamp, Lights, render
+from airborne.rendering import FLAT, Lamp, Lights, render
+from airborne.scoring.lighting import light_from_srgb
 from airborne.tracking import Estimate
 from airborne.tracking.refined import Refined
 from airborne.tracking.tracker import Tracker, step
@@ -18,6 +19,7 @@ from airborne.video import Frames, View
 
 SIZE = (320, 240)
 FPS = 50
+FINER, REACH_PX = 4, 64  # drawn pixels a pixel; half the side of the square that holds the body
 LIGHTS = Lights(0.6, (Lamp(np.array([3.0, -4.0, 5.0]), 0.4),))
 GRAVITY = np.array([0, 0, -9.81])
 YELLOW, BLUE, RED = (220.0, 190.0, 40.0), (40.0, 60.0, 190.0), (200.0, 40.0, 40.0)
@@ -96,14 +98,12 @@ class Scene:
         return Frames(index, time_s, tuple(views))
 
     def _picture(self, index: int, i: int, seen_by: Camera, pose: Pose | None) -> np.ndarray:
-        picture = self.backgrounds[i].copy()
+        light = light_from_srgb(self.backgrounds[i])
         if pose is not None:
-            fine = seen_by.resampled(scale=(0.5, 0.5), offset=(-0.25, -0.25), size=(2 * SIZE[0], 2 * SIZE[1]))
-            drawn = render(geometry(self.model), self.model.with_pose(pose), fine, LIGHTS)
-            share = cv2.resize(drawn.mask.astype(np.float32), SIZE, interpolation=cv2.INTER_AREA)[..., None]
-            picture = (1 - share) * picture + cv2.resize(drawn.colour, SIZE, interpolation=cv2.INTER_AREA)
+            share, shown = _drawn(self.model, pose, seen_by)
+            light = (1 - share) * light + shown
         rng = np.random.default_rng([index, i])
-        noisy = picture * self.brightness(index) + rng.normal(0, self.noise_grey, picture.shape)
+        noisy = srgb_from_light(light * self.brightness(index)) + rng.normal(0, self.noise_grey, light.shape)
         return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
 
     def start(self, index: int = 0) -> Pose:
@@ -111,6 +111,33 @@ class Scene:
         pose = self.motion(Fraction(index, FPS))
         assert pose is not None
         return pose
+
+
+def srgb_from_light(light: np.ndarray) -> np.ndarray:
+    """Turn linear light 0..1 into sRGB 0..255, any shape."""
+    light = np.clip(light, 0, 1)
+    return 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def _drawn(model: BodyModel, pose: Pose, seen_by: Camera) -> tuple[np.ndarray, np.ndarray]:
+    """The body's share of each pixel (h, w, 1), and its linear light in it (h, w, 3): averaged over finer pixels."""
+    width, height = SIZE
+    fine_size = (FINER * width, FINER * height)
+    offset = -(FINER - 1) / (2 * FINER)
+    fine = seen_by.resampled(scale=(1 / FINER, 1 / FINER), offset=(offset, offset), size=fine_size)
+    share, shown = np.zeros((height, width, 1)), np.zeros((height, width, 3))
+    u, v = np.rint(seen_by.px_from_world(pose.world_from_root.translation)).astype(int)
+    x0, x1 = np.clip([u - REACH_PX, u + REACH_PX], 0, width)
+    y0, y1 = np.clip([v - REACH_PX, v + REACH_PX], 0, height)
+    if x0 < x1 and y0 < y1:
+        posed, flat = model.with_pose(pose), geometry(model)
+        drawn = render(flat, posed, fine, LIGHTS, region=(FINER * x0, FINER * y0, FINER * x1, FINER * y1))
+        plain = render(flat, posed, fine, FLAT, region=drawn.region)
+        light = light_from_srgb(plain.colour) * drawn.colour / np.maximum(plain.colour, 1)
+        size = (int(x1 - x0), int(y1 - y0))
+        share[y0:y1, x0:x1, 0] = cv2.resize(drawn.mask.astype(float), size, interpolation=cv2.INTER_AREA)
+        shown[y0:y1, x0:x1] = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
+    return share, shown
 
 
 def track(scene: Scene, indices: Sequence[int], tracker: Tracker | None = None) -> list[Estimate]:

@@ -8,13 +8,13 @@ from typing import Annotated, Literal
 
 import numpy as np
 import trimesh
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body.model import BodyModel, Box, Ellipsoid, Mesh, Part, Segment, Shape
 from airborne.errors import BodyError, one_line
 
-Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 Channel = Annotated[float, Field(ge=0, le=255)]
 
 
@@ -57,7 +57,11 @@ def read_body(path: Path) -> BodyModel:
         raise BodyError(f"{path.name}: not a TOML file: {error}") from error
     except ValidationError as error:
         raise BodyError(f"{path.name}: {one_line(error)}") from error
-    return BodyModel(table.name, tuple(_segment(segment, path) for segment in table.segment))
+    segments = tuple(_segment(segment, path) for segment in table.segment)
+    try:
+        return BodyModel(table.name, segments)
+    except BodyError as error:
+        raise BodyError(f"{path.name}: {error}") from error
 
 
 def _segment(table: _SegmentTable, path: Path) -> Segment:
@@ -67,7 +71,9 @@ def _segment(table: _SegmentTable, path: Path) -> Segment:
 
 def _part(table: _PartTable, path: Path) -> Part:
     if (table.colour_srgb is None) == (table.colour is None):
-        raise BodyError(f'{path.name}: part \'{table.name}\' needs colour_srgb = [r, g, b] or colour = "sample", one of them')
+        raise BodyError(
+            f"{path.name}: part '{table.name}' needs colour_srgb = [r, g, b] or colour = \"sample\", one of them"
+        )
     place = RigidTransform.from_components(table.centre_m, Rotation.from_euler("XYZ", table.rotation_deg, degrees=True))
     colour = None if table.colour_srgb is None else np.array(table.colour_srgb)
     return Part(table.name, _shape(table, path), place, colour)
@@ -102,3 +108,9 @@ def _mesh(path: Path, scale: float) -> Mesh:
     if not len(faces) or not np.all(np.isfinite(vertices)):
         raise BodyError(f"{path.name}: the mesh has no faces, or corners that are not numbers")
     return Mesh(vertices, faces if mesh.volume >= 0 else faces[:, ::-1])
+
+
+def mesh_files(path: Path) -> list[str]:
+    """Return the mesh files that a readable body file names, relative to it."""
+    table = _BodyTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    return [part.file for segment in table.segment for part in segment.part if part.file is not None]

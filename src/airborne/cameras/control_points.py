@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +30,10 @@ class ControlPoints:
     def seen_by(self, camera: str) -> NDArray[np.bool_]:
         """Say which points the named camera sees: (n,)."""
         return ~np.isnan(self.px[:, self.cameras.index(camera), 0])
+
+    def select(self, cameras: Sequence[str]) -> ControlPoints:
+        """Return the points with the named cameras only, in that order."""
+        return replace(self, cameras=tuple(cameras), px=self.px[:, [self.cameras.index(name) for name in cameras]])
 
 
 def read_control_points(path: str | Path) -> ControlPoints:

@@ -20,7 +20,7 @@ from airborne.tracking import Status
 from airborne.video import Frames, VideoWriter
 
 LONGEST_SIDE_PX = 1280  # larger pictures are reduced to it
-LINE_SHARE = 1 / 350  # of the picture's height
+LINE_SHARE = 1 / 240  # of the picture's height
 TEXT_SHARE = 1 / 30
 MISSING_GREY = 40
 FONT = cv2.FONT_HERSHEY_SIMPLEX

@@ -21,7 +21,6 @@ from airborne.rendering.sums import PIXELS
 from airborne.tracking.appearance import Appearance
 from airborne.tracking.covariance import covariance_of
 from airborne.tracking.estimate import Estimate, Status, lost
-from airborne.tracking.predictors import Past
 from airborne.tracking.regions import regions_round
 from airborne.tracking.stepping import VRule, stepping
 from airborne.video import Frames

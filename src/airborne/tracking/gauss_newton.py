@@ -147,7 +147,14 @@ def _reduced(region: Region, posterior: Array, reduction: int) -> tuple:
     whole = posterior[: size[1] * rows, : size[0] * reduction]
     plane = cv2.resize(whole, size, interpolation=cv2.INTER_AREA)
     camera = region.camera.resampled(scale=(reduction, rows), offset=((reduction - 1) / 2, (rows - 1) / 2), size=size)
-    return packed_view(camera), camera.K, plane, np.zeros((1, *plane.shape), np.float32), np.ones_like(plane), empty_maps(size)
+    return (
+        packed_view(camera),
+        camera.K,
+        plane,
+        np.zeros((1, *plane.shape), np.float32),
+        np.ones_like(plane),
+        empty_maps(size),
+    )
 
 
 def _zeros() -> tuple[Array, Array, Array, Array]:

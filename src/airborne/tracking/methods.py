@@ -22,6 +22,7 @@ from airborne.video import Frames
 Array = NDArray[np.floating]
 Method = Literal["refined", "stepping", "simplex"]
 Prediction = Literal["smooth", "ballistic", "none"]
+Colour = Literal["raw", "normalised", "blend", "union"]
 
 # stepping and simplex see what paper B saw: full frames whose missing rows are interpolated
 FIELDS_AS: dict[Method, Literal["rows", "interpolated"]] = {
@@ -38,7 +39,7 @@ class Settings:
 
     method: Method = "refined"
     prediction: Prediction = "smooth"
-    colour: Literal["raw", "normalised", "blend", "union"] = "normalised"
+    colour: Colour = "normalised"
     v_rule: VRule = "v_sym"
     loops: Sequence[tuple[float, float]] = ()  # stepping: a step in position [m] and in angle [rad] for each loop
     scale: Literal[1, 2, 4] = 1  # stepping, simplex: reduction of the pictures

@@ -1,0 +1,53 @@
+"""A finished run against what is known: the truth, or points clicked by hand; its report then shows both."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from airborne.body.files import read_body
+from airborne.body.symmetry import symmetries
+from airborne.cameras import read_rig
+from airborne.errors import ResultError
+from airborne.evaluation import (
+    Comparison,
+    DigitisedComparison,
+    compare,
+    compare_digitised,
+    digitised_poses,
+    read_digitised,
+    read_truth,
+)
+from airborne.export import write_figures, write_json, write_report
+from airborne.motion import read_motion
+
+
+def assess(folder: Path, truth: Path | None, digitised: Path | None) -> dict[str, Comparison | DigitisedComparison]:
+    """Compare the run in a folder, and put the comparison into its summary, figures and report.
+
+    Raises ResultError where the folder holds no finished run or a file cannot be read.
+    """
+    if truth is None and digitised is None:
+        raise ResultError("nothing to compare with; give a truth.csv, or --digitised with clicked points")
+    if not (folder / "motion.csv").is_file():
+        raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
+    motion, model = read_motion(folder / "motion.csv"), read_body(folder / "body.toml")
+    alike = symmetries(model)
+    found: dict[str, Comparison | DigitisedComparison] = {}
+    true_poses = clicked = None
+    if truth is not None:
+        true_poses = read_truth(truth)
+        found["truth"] = compare(motion, true_poses, alike)
+    if digitised is not None:
+        rig = read_rig(folder / "calib.toml")
+        clicked = digitised_poses(read_digitised(digitised, rig), rig, model)
+        found["digitised"] = compare_digitised(motion, clicked, alike)
+    summary = folder / "summary.json"
+    if summary.is_file():
+        values = json.loads(summary.read_text(encoding="utf-8"))
+        values |= {name: comparison.to_dict() for name, comparison in found.items()}
+        write_json(summary, values)
+        if (folder / "report.html").is_file():
+            write_figures(folder, motion, truth=true_poses, digitised=clicked, symmetries=alike)
+            write_report(folder, values)
+    return found

@@ -1,0 +1,223 @@
+"""The command line: thin, one function a command."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from airborne import __version__
+from airborne.errors import AirborneError
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Measure athletes in flight from ordinary multi-camera colour video.",
+)
+synth = typer.Typer(no_args_is_help=True, help="Write a synthetic trial with its truth.")
+app.add_typer(synth, name="synth")
+
+errors = Console(stderr=True, highlight=False, soft_wrap=True)
+
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Out = Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.")]
+
+
+def main() -> None:
+    """Run the command line; a user's error is one line on stderr and exit code 2."""
+    try:
+        app(standalone_mode=True)
+    except AirborneError as error:
+        errors.print(f"airborne: {error}", style="red", markup=False)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        errors.print("airborne: stopped; the frames finished so far are in the output folder, --resume goes on")
+        sys.exit(130)
+
+
+@app.callback(invoke_without_command=True)
+def _version(version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False) -> None:
+    if version:
+        print(__version__)
+        raise typer.Exit
+
+
+@app.command()
+def demo(
+    output: Out = Path("airborne-demo"),
+    as_json: Json = False,
+) -> None:
+    """Track the bundled example, a thrown cross, and compare it with its truth.
+
+    Example: airborne demo
+    """
+    from airborne.examples import example_trial
+
+    shutil.rmtree(output, ignore_errors=True)
+    trial = example_trial("thrown_cross")
+    _track(trial, output, resume=False, pictures=True, as_json=False)
+    evaluate(output, trial.parent / "truth.csv", trial.parent / "digitised.csv", as_json=as_json)
+    if not as_json:
+        print(f"report: {output / 'report.html'}")
+
+
+@app.command()
+def track(
+    trial: Annotated[Path, typer.Argument(help="The trial's TOML file.")],
+    output: Out,
+    resume: Annotated[bool, typer.Option(help="Go on with a run that was stopped.")] = False,
+    method: Annotated[str | None, typer.Option(help="Instead of the trial's: refined, stepping, simplex.")] = None,
+    every: Annotated[int | None, typer.Option(min=1, help="Track every n-th frame or field.")] = None,
+    cameras: Annotated[str | None, typer.Option(help="Only these cameras, separated by commas.")] = None,
+    pictures: Annotated[bool, typer.Option(help="Write overlay videos, figures and the report.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Track a trial; results appear in the output folder as they are found.
+
+    Example: airborne track trial.toml -o results
+    """
+    changes = {key: value for key, value in (("method", method), ("every", every)) if value is not None}
+    _track(trial, output, resume=resume, pictures=pictures, as_json=as_json, changes=changes, cameras=cameras)
+
+
+def _track(
+    path: Path,
+    output: Path,
+    *,
+    resume: bool,
+    pictures: bool,
+    as_json: bool,
+    changes: dict | None = None,
+    cameras: str | None = None,
+) -> None:
+    from airborne import pipeline
+    from airborne.trial import read_trial
+
+    trial = read_trial(path, changes or {}, None if cameras is None else cameras.split(","))
+    with _progress(f"tracking {trial.name}") as report:
+        run = pipeline.track(trial, output, resume=resume, pictures=pictures, progress=report)
+    if as_json:
+        print((output / "summary.json").read_text(encoding="utf-8"))
+        return
+    print(_in_short(run.summary))
+    print(f"results: {output}")
+
+
+def _in_short(summary: dict) -> str:
+    counts = ", ".join(f"{summary[f'n_{status}']} {status}" for status in ("tracked", "uncertain", "lost"))
+    lines = [f"{summary['n_frames']} frames at {summary['rate_hz']:.5g} Hz: {counts}"]
+    lines.append(
+        f"median sd: {summary['median_position_sd_mm']:.2g} mm, {summary['median_rotation_sd_deg']:.2g} degrees "
+        "(noise and model; not calibration)"
+    )
+    lines += [f"note: {text}" for text in [*summary["warnings"], *summary["events"]]]
+    return "\n".join(lines)
+
+
+@app.command()
+def calibrate(
+    points: Annotated[Path, typer.Argument(help="Control points: point,x_m,y_m,z_m,<camera>_u,<camera>_v,...")],
+    size: Annotated[str, typer.Option(help="Image size in pixels, WIDTHxHEIGHT, or name=WIDTHxHEIGHT,...")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Calibration file to write (Pose2Sim TOML).")],
+    method: Annotated[
+        Literal["lm", "annealing"], typer.Option(help="Fit: least squares, or paper B's annealing.")
+    ] = "lm",
+    as_json: Json = False,
+) -> None:
+    """Find the cameras from surveyed control points.
+
+    Example: airborne calibrate control_points.csv --size 768x576 -o calib.toml
+    """
+    from airborne import cameras
+
+    table = cameras.read_control_points(points)
+    calibration = cameras.calibrate(table, _sizes(size, table.cameras), method=method)
+    cameras.write_pose2sim(output, calibration.rig, errors_px={fit.name: fit.rms_px for fit in calibration.fits})
+    print(json.dumps(cameras.to_dict(calibration)) if as_json else cameras.describe(calibration))
+    if not as_json:
+        print(f"written: {output}")
+
+
+def _sizes(text: str, names: tuple[str, ...]) -> dict[str, tuple[int, int]]:
+    """Parse 768x576 for all cameras, or cam1=768x576,cam2=1920x1080."""
+    sizes = {}
+    try:
+        for item in text.split(","):
+            name, _, numbers = item.rpartition("=")
+            width, height = (int(number) for number in numbers.lower().split("x"))
+            sizes |= {n: (width, height) for n in ([name] if name else names)}
+    except ValueError:
+        raise AirborneError(f"--size {text}: expected WIDTHxHEIGHT such as 768x576, or cam1=768x576,cam2=...") from None
+    missing = [name for name in names if name not in sizes]
+    if missing:
+        raise AirborneError(f"--size gives no size for {', '.join(missing)}; add {missing[0]}=WIDTHxHEIGHT")
+    return sizes
+
+
+@app.command()
+def evaluate(
+    results: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    truth: Annotated[Path | None, typer.Argument(help="True poses: field,time_s,x_m,y_m,z_m,r00,...,r22")] = None,
+    digitised: Annotated[Path | None, typer.Option(help="Points clicked by hand, to compare as paper B does.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Compare a run with the truth, or with points clicked by hand; the report then shows both.
+
+    Example: airborne evaluate results truth.csv --digitised digitised.csv
+    """
+    from airborne.assessment import assess
+
+    found = assess(results, truth, digitised)
+    if as_json:
+        print(json.dumps({name: comparison.to_dict() for name, comparison in found.items()}))
+        return
+    for name, comparison in found.items():
+        print(f"against the {name}" if name == "truth" else "against digitising by hand")
+        print(comparison.describe())
+
+
+@synth.command("cross")
+def synth_cross(
+    output: Out,
+    preset: Annotated[Literal["half-twist", "side"], typer.Option(help="The throw.")] = "half-twist",
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+) -> None:
+    """Write a thrown wooden cross: interlaced videos of three cameras, calibration, clicks, truth.
+
+    Example: airborne synth cross -o my-trial --seed 3
+    """
+    from airborne.synthetic import write_thrown_cross
+
+    with _progress("rendering") as report:
+        write_thrown_cross(output, preset=preset, seed=seed, progress=report)
+    print(f"trial: {output / 'trial.toml'}")
+
+
+@app.command()
+def bench(as_json: Json = False) -> None:
+    """Measure the speed of this machine on the bundled example: CPU time per field, and per hypothesis.
+
+    Example: airborne bench
+    """
+    from airborne.bench import measure_speed
+
+    found = measure_speed()
+    print(json.dumps(found) if as_json else "\n".join(f"{name}: {value:.3g}" for name, value in found.items()))
+
+
+@contextmanager
+def _progress(what: str) -> Iterator:
+    """Show a bar on stderr while frames go by."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=errors, transient=True) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)

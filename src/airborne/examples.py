@@ -1,0 +1,17 @@
+"""Where the bundled example trials are: in the installed package, or in a checkout."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from airborne.errors import TrialError
+
+_PLACES = (Path(__file__).parent / "example_trials", Path(__file__).parents[2] / "examples")
+
+
+def example_trial(name: str) -> Path:
+    """Return the trial file of a bundled example; raises TrialError where it was not installed."""
+    for place in _PLACES:
+        if (place / name / "trial.toml").is_file():
+            return place / name / "trial.toml"
+    raise TrialError(f"the example '{name}' is not installed; install Airborne from its repository or its wheel")

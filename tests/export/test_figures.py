@@ -1,0 +1,119 @@
+from dataclasses import replace
+
+import cv2
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from airborne.evaluation import DigitisedPoses, Truth
+from airborne.export import panels, write_digitised, write_errors, write_figures, write_pose
+from airborne.export.figures import _differences, _reference, _same_turn, _turned_alike
+from tests.export.scenes import HALF_TURN, run
+from tests.tolerances import ROUNDTRIP
+
+NAMES = ["digitised.png", "errors.png", "pose.png", "score.png"]
+
+
+@pytest.fixture(autouse=True)
+def small_figures(monkeypatch):
+    monkeypatch.setattr(panels, "DPI", 50)
+
+
+def truth_of(motion):
+    return Truth(index=motion.index, time_s=motion.time_s, position=motion.position, R=motion.R)
+
+
+def digitised_of(motion):
+    return DigitisedPoses(index=motion.index, position=motion.position, R=motion.R, residual=np.zeros((len(motion), 4)))
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [run(lost=(4, 5), uncertain=(6,), unseen=(9,)), run(1), run(3, lost=(0, 1, 2))],
+    ids=["mixed", "one frame", "all lost"],
+)
+def test_every_figure_is_written_at_report_width_whatever_the_run_holds(tmp_path, motion):
+    settings = dict(matplotlib.rcParams)
+    sound = run()
+    write_figures(tmp_path, motion, truth=truth_of(sound), digitised=digitised_of(sound))
+    assert sorted(path.name for path in tmp_path.iterdir()) == NAMES
+    for name in NAMES:
+        assert cv2.imread(str(tmp_path / name)).shape[1] == panels.WIDTH_IN * panels.DPI
+    assert dict(matplotlib.rcParams) == settings
+
+
+def test_no_comparison_is_drawn_where_nothing_is_known_to_compare_with(tmp_path):
+    write_figures(tmp_path, run())
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["pose.png", "score.png"]
+
+
+def test_an_infinite_deviation_shows(tmp_path):
+    seen, unseen = run(), run(unseen=(9,))
+    write_pose(tmp_path / "seen.png", seen)
+    write_pose(tmp_path / "unseen.png", unseen)
+    assert (tmp_path / "seen.png").read_bytes() != (tmp_path / "unseen.png").read_bytes()
+
+
+@pytest.mark.parametrize("write", [write_errors, write_digitised])
+def test_a_motion_turned_by_a_symmetry_of_the_body_gives_the_same_figure(tmp_path, write):
+    motion = run(lost=(4, 5))
+    turned = replace(motion, R=motion.R @ HALF_TURN)
+    reference = truth_of(run()) if write is write_errors else digitised_of(run())
+    for name, shown, symmetries in (
+        ("plain", motion, [np.eye(3), HALF_TURN]),
+        ("turned", turned, [np.eye(3), HALF_TURN]),
+        ("rigid", turned, [np.eye(3)]),
+    ):
+        write(tmp_path / f"{name}.png", shown, reference, symmetries)
+    plain, turned_alike, rigid = ((tmp_path / f"{n}.png").read_bytes() for n in ("plain", "turned", "rigid"))
+    assert plain == turned_alike
+    assert plain != rigid
+
+
+def test_differences_are_motion_minus_reference_in_millimetres_and_degrees():
+    motion = run(lost=(3,))
+    reference = _reference(motion, np.arange(20), run().position - [0.001, 0, -0.002], run().R)
+    position_mm, angle_deg = _differences(motion, reference)
+    assert np.isnan(position_mm[3]).all() and np.isnan(angle_deg[3]).all()
+    is_known = np.arange(20) != 3
+    np.testing.assert_allclose(position_mm[is_known], np.tile([1.0, 0, -2.0], (19, 1)), atol=ROUNDTRIP)
+    np.testing.assert_allclose(angle_deg[is_known], 0, atol=1e-6)  # degrees, through arc functions
+
+
+def test_one_symmetry_is_chosen_for_the_whole_run():
+    motion = run()
+    R = motion.R.copy()
+    R[:5] = R[:5] @ HALF_TURN
+    reference = _reference(motion, np.arange(20), motion.position, motion.R)
+    chosen = _turned_alike(replace(motion, R=R), reference, [np.eye(3), HALF_TURN])
+    np.testing.assert_allclose(chosen.R, R)
+
+
+def test_reference_angles_lie_in_the_turn_of_the_tracked_ones():
+    tracked = np.array([[370.0, 1.0, -350.0], [np.nan] * 3, [380.0, 1.0, -340.0]])
+    reference = np.array([[12.0, 1.0, 9.0], [15.0, 1.0, 15.0], [21.0, 1.0, 22.0]])
+    np.testing.assert_allclose(_same_turn(tracked, reference), reference + np.array([360, 0, -360]))
+
+
+def test_the_line_breaks_where_frames_are_lost_and_the_gap_is_shaded():
+    motion = run(lost=(4, 5))
+    axes = Figure().subplots()
+    panels.draw_estimate(axes, motion, motion.position[:, 0])
+    line, tracked, uncertain = axes.lines
+    assert np.flatnonzero(np.isnan(np.asarray(line.get_ydata()))).tolist() == [4, 5]
+    assert len(np.asarray(tracked.get_xdata())) == 18
+    assert len(np.asarray(uncertain.get_xdata())) == 0
+    (span,) = axes.patches
+    x = span.get_extents().transformed(axes.transData.inverted())
+    assert (x.x0, x.x1) == pytest.approx((0.07, 0.11))
+
+
+def test_the_band_is_two_standard_deviations_wide_and_absent_where_they_are_infinite():
+    axes = Figure().subplots()
+    panels.draw_band(axes, np.arange(5.0), np.full(5, 3.0), np.array([0.5, 0.5, np.inf, 0.5, 0.5]))
+    (band,) = axes.collections
+    corners = np.concatenate([path.vertices for path in band.get_paths()])
+    assert corners[:, 1].min() == 2.0
+    assert corners[:, 1].max() == 4.0
+    assert 2.0 not in corners[:, 0]

@@ -1,0 +1,92 @@
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+
+from airborne.body import geometry
+from airborne.cameras import Rig
+from airborne.errors import VideoError
+from airborne.export import OverlayVideos
+from airborne.export.overlays import LONGEST_SIDE_PX
+from airborne.export.palette import STATUS_RGB
+from airborne.export.views import seen_by
+from airborne.rendering import FLAT, render
+from airborne.tracking import Status
+from airborne.video import View
+from tests.export.scenes import BOX, RIG, SCENE_GREY, camera, frames, posed
+
+CODED = 30  # grey levels that 4:2:0 coding may move a thin coloured line
+
+
+def pictures(path):
+    with av.open(str(path)) as video:
+        return [frame.to_ndarray(format="rgb24").astype(int) for frame in video.decode(video=0)]
+
+
+def written(folder, shots, rig=RIG):
+    with OverlayVideos(folder, rig, Fraction(50)) as videos:
+        for shot in shots:
+            videos.write(*shot)
+    return [pictures(folder / f"overlay_{name}.mp4") for name in rig.names]
+
+
+def far_from(picture, rgb):
+    return np.abs(picture - np.array(rgb)).max(axis=-1)
+
+
+@pytest.mark.parametrize("status", [Status.TRACKED, Status.UNCERTAIN])
+def test_the_outline_has_the_colour_of_the_status_and_hides_none_of_the_body(tmp_path, status):
+    rig = Rig((camera(size=(960, 720)),))
+    body = posed(position=(0.1, 0.0, -0.1))
+    ((picture,),) = written(tmp_path, [(frames(rig=rig), body, status)], rig)
+    mask = render(geometry(BOX), body, rig.cameras[0], FLAT).mask
+    rows, columns = np.nonzero(mask)
+    middle, left = round(rows.mean()), columns.min()
+    line = picture[middle, left - 2]
+    others = [rgb for other, rgb in STATUS_RGB.items() if other is not status] + [(SCENE_GREY,) * 3, (0, 0, 0)]
+    assert far_from(line, STATUS_RGB[status]) < min(far_from(line, rgb) for rgb in others)
+    inside = picture[rows.min() + 4 : rows.max() - 3, columns.min() + 4 : columns.max() - 3]
+    assert far_from(inside, [SCENE_GREY] * 3).max() < CODED
+
+
+def test_a_lost_frame_has_a_border_and_no_outline(tmp_path):
+    ((lost, found), _) = written(tmp_path, [(frames(0), None, Status.LOST), (frames(1), posed(), Status.TRACKED)])
+    assert far_from(lost[1, 100:-100], STATUS_RGB[Status.LOST]).mean() < CODED
+    assert far_from(found[1, 100:-100], STATUS_RGB[Status.LOST]).mean() > 3 * CODED
+    assert far_from(lost[60:-10, 10:-10], [SCENE_GREY] * 3).max() < CODED
+    assert far_from(found[60:-10, 10:-10], [SCENE_GREY] * 3).max() > CODED
+
+
+def test_a_missing_view_is_a_dark_picture_that_says_so_and_keeps_the_size(tmp_path):
+    seen, missing = written(tmp_path, [(frames(missing=(1,)), posed(), Status.TRACKED)])
+    assert seen[0].shape == missing[0].shape
+    assert np.median(missing[0]) < SCENE_GREY / 2
+    assert missing[0][60:-60].max() > SCENE_GREY  # the words
+
+
+def test_every_time_gives_one_picture_in_every_video(tmp_path):
+    shots = [(frames(i, missing=(i % 2,)), None, Status.LOST) for i in range(5)]
+    assert [len(video) for video in written(tmp_path, shots)] == [5, 5]
+
+
+def test_large_pictures_are_reduced_in_proportion(tmp_path):
+    rig = Rig((camera(size=(2 * LONGEST_SIDE_PX, LONGEST_SIDE_PX)),))
+    ((picture,),) = written(tmp_path, [(frames(rig=rig), posed(), Status.TRACKED)], rig)
+    assert picture.shape == (LONGEST_SIDE_PX // 2, LONGEST_SIDE_PX, 3)
+
+
+def test_a_still_scene_does_not_move_between_its_fields():
+    whole = camera()
+    rows = np.arange(whole.size[1], dtype=float)[:, None, None]
+    scene = np.broadcast_to(128 + 100 * np.sin(rows / 15), (whole.size[1], whole.size[0], 3)).round().astype(np.uint8)
+    for parity in (0, 1):
+        shown = seen_by(View(whole.field(parity), scene[parity::2]), whole)
+        assert shown.shape == scene.shape
+        np.testing.assert_array_equal(shown[parity::2][1:-1], scene[parity::2][1:-1])
+        assert np.abs(shown[2:-2].astype(int) - scene[2:-2]).max() <= 2
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(VideoError, match="overlay_cam1"):
+        OverlayVideos(tmp_path / "missing", RIG, Fraction(50))

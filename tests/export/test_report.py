@@ -1,0 +1,101 @@
+import re
+
+import numpy as np
+import pytest
+
+from airborne.errors import ResultError
+from airborne.evaluation import Truth, compare
+from airborne.export import headline, write_figures, write_report
+from airborne.export.page import label, shown
+from airborne.motion import Motion
+from tests.export.scenes import HALF_TURN, run
+
+
+def html_of(folder, motion, **more):
+    return write_report(folder, {"name": "a throw", **headline(motion), **more}).read_text("utf-8")
+
+
+def test_the_page_needs_nothing_but_itself(tmp_path):
+    write_figures(tmp_path, run())
+    html = html_of(tmp_path, run())
+    sources = re.findall(r'(?:src|href)\s*=\s*"([^"]{0,30})', html)
+    assert len(sources) == 2
+    assert all(source.startswith("data:image/png;base64,") for source in sources)
+    for word in ("http", "<script", "@import", "url("):
+        assert word not in html.replace("<!doctype html>", "")
+
+
+def test_text_of_the_user_is_escaped_wherever_it_stands(tmp_path):
+    bad = '<img src=x onerror="alert(1)">&'
+    html = html_of(
+        tmp_path,
+        run(),
+        name=bad,
+        uncertainty=bad,
+        warnings=[bad],
+        events=[bad],
+        method={bad: bad},
+        cameras=[{"name": bad, bad: [bad]}],
+        versions={bad: bad},
+        inputs={bad: bad},
+        timings_s={bad: 1.0},
+    )
+    assert "<img" not in html
+    assert html.count("&lt;img") >= 13
+
+
+def test_headline_numbers_stand_on_the_page(tmp_path):
+    html = html_of(tmp_path, run(21, uncertain=(3,), lost=(20,)))
+    for words in ("21 frames: 19 tracked, 1 uncertain, 1 lost", "± 2 mm", "± 0.57°", "0.95 turns", "0.4 s"):
+        assert words in html
+
+
+def test_what_cannot_be_seen_is_said_plainly_and_has_no_number(tmp_path):
+    html = html_of(tmp_path, run(unseen=range(20)))
+    assert "<b>cannot be seen</b>" in html
+    assert "In 20 of 20 frames with a pose" in html
+    assert "inf" not in re.sub(r"infinite|Infinite", "", html)
+
+
+def test_a_sound_run_is_said_to_be_sound_and_another_is_not(tmp_path):
+    words = "Every frame was tracked"
+    assert words in html_of(tmp_path, run())
+    for weak in (run(lost=(4,)), run(unseen=(4,)), Motion.collect([])):
+        assert words not in html_of(tmp_path, weak)
+    assert words not in html_of(tmp_path, run(), warnings=["cam2 does not fit its calibration"])
+
+
+def test_a_comparison_with_the_truth_becomes_a_table(tmp_path):
+    motion = run()
+    truth = Truth(
+        index=motion.index, time_s=motion.time_s, position=motion.position + np.array([0.003, 0, 0]), R=motion.R
+    )
+    html = html_of(tmp_path, motion, truth=compare(motion, truth, [np.eye(3), HALF_TURN]).to_dict())
+    assert "Against the truth" in html
+    assert "<th>x [mm]</th><td>3.00</td><td>3.00</td>" in html
+    assert "20 of 20 reference times matched" in html
+
+
+def test_a_number_missing_from_the_summary_is_named(tmp_path):
+    summary = {"name": "a throw", **headline(run())}
+    del summary["n_lost"]
+    with pytest.raises(ResultError, match="has no n_lost; track again"):
+        write_report(tmp_path, summary)
+
+
+def test_keys_become_words_with_their_unit():
+    assert label("reprojection_rms_px") == "reprojection rms [px]"
+    assert label("rate_hz") == "rate [1/s]"
+    assert label("range_mm") == "range [mm]"
+    assert label("body") == "body"
+
+
+def test_values_are_shown_as_a_reader_would_write_them():
+    assert [shown(v) for v in (None, True, 3, 0.123456, [768, 576], "x")] == [
+        "not known",
+        "yes",
+        "3",
+        "0.1235",
+        "768, 576",
+        "x",
+    ]

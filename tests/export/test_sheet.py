@@ -1,0 +1,65 @@
+import cv2
+import numpy as np
+import pytest
+
+from airborne.export import ContactSheet
+from airborne.export.sheet import BACKGROUND_GREY, CELL_PX, N_HELD, ROOM, _cell, _close_up
+from airborne.tracking import Status
+from tests.export.scenes import BALL, BOX, RIG, SCENE_GREY, camera, frames, posed
+
+
+def shown_px(camera, position):
+    view = frames(rig=[camera]).views[0]
+    cell = _cell(view, camera, posed(BALL, position))
+    return np.sum(cell[..., 0] != BACKGROUND_GREY)
+
+
+@pytest.mark.parametrize("distance_m", [3.0, 12.0])
+@pytest.mark.parametrize("position", [(0, 0, 0), (0.3, 2.0, -0.2)])
+def test_the_body_has_one_size_in_all_cells_however_far_it_is(distance_m, position):
+    disc_px = np.pi / 4 * (CELL_PX / ROOM) ** 2
+    assert shown_px(camera(distance_m=distance_m), position) == pytest.approx(disc_px, rel=0.04)
+
+
+def test_a_cell_shows_the_scene_inside_the_mask_only():
+    cell = _cell(frames().views[0], RIG.cameras[0], posed())
+    assert set(np.unique(cell)) == {SCENE_GREY, BACKGROUND_GREY}
+
+
+def test_fields_and_whole_pictures_give_the_same_cell():
+    whole = camera()
+    seen = [shown_px(view, (0.2, 0, 0.1)) for view in (whole, whole.field(0), whole.field(1))]
+    assert seen[1:] == pytest.approx([seen[0]] * 2, rel=0.01)
+
+
+def test_there_is_no_cell_behind_the_camera_or_without_a_view():
+    assert _close_up(camera(), np.array([0, -10.0, 0]), 1.0) is None
+    assert _cell(None, camera(), posed()) is None
+
+
+def test_memory_stays_flat_and_the_times_evenly_spaced(tmp_path):
+    with ContactSheet(tmp_path / "sheet.png", RIG) as sheet:
+        for i in range(150):
+            sheet.write(frames(i), posed(BOX, (0.01 * i, 0, 0)), Status.TRACKED)
+            assert len(sheet._columns) <= N_HELD
+        held = [int(column.title.split()[1]) for column in sheet._columns]
+    assert held[0] == 0
+    assert set(np.diff(held)) == {8}
+    assert held[-1] > 150 - 2 * 8
+
+
+def test_the_sheet_is_written_with_a_row_for_each_camera_and_missing_views(tmp_path):
+    path = tmp_path / "sheet.png"
+    with ContactSheet(path, RIG) as sheet:
+        for i in range(3):
+            sheet.write(frames(i, missing=(i % 2,)), posed(), Status.UNCERTAIN)
+    height, width = cv2.imread(str(path)).shape[:2]
+    assert height < width
+
+
+def test_no_sheet_is_left_where_the_body_was_never_found(tmp_path):
+    path = tmp_path / "sheet.png"
+    path.write_text("of an earlier run")
+    with ContactSheet(path, RIG) as sheet:
+        sheet.write(frames(), None, Status.LOST)
+    assert not path.exists()

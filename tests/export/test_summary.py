@@ -1,0 +1,103 @@
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airborne.export import headline, warnings, write_json
+from airborne.export.summary import plain
+from airborne.motion import Motion
+from tests.export.scenes import run
+from tests.tolerances import ROUNDTRIP
+
+
+def test_headline_counts_frames_turns_and_time():
+    head = headline(run(21, uncertain=(4, 5)))
+    assert (head["n_frames"], head["n_tracked"], head["n_uncertain"], head["n_lost"]) == (21, 19, 2, 0)
+    assert head["duration_s"] == pytest.approx(0.4, abs=ROUNDTRIP)
+    assert head["rate_hz"] == 50
+    assert head["somersault_rev"] == pytest.approx(1.0, abs=ROUNDTRIP)
+    assert head["twist_rev"] == pytest.approx(0.5, abs=ROUNDTRIP)
+    assert head["range_m"] == pytest.approx([2.0, 0.0, 0.0], abs=ROUNDTRIP)
+    assert head["median_position_sd_mm"] == pytest.approx(2.0, abs=ROUNDTRIP)
+    assert head["median_rotation_sd_deg"] == pytest.approx(np.rad2deg(0.01), abs=ROUNDTRIP)
+
+
+def test_backward_turns_are_negative():
+    assert headline(run(turns=-2.0))["somersault_rev"] == pytest.approx(-2.0, abs=ROUNDTRIP)
+
+
+def test_median_spread_is_infinite_where_most_frames_do_not_show_a_direction():
+    head = headline(run(10, unseen=range(6)))
+    assert head["median_rotation_sd_deg"] == np.inf
+    assert (head["n_rotation_unobservable"], head["n_position_unobservable"]) == (6, 0)
+
+
+def test_only_lost_frames_between_poses_make_a_gap():
+    assert headline(run(10, lost=(4,)))["has_gap"]
+    assert not headline(run(10, lost=(0, 1, 9)))["has_gap"]
+
+
+@pytest.mark.parametrize("motion", [Motion.collect([]), run(3, lost=(0, 1, 2))], ids=["no frame", "all lost"])
+def test_a_run_without_poses_claims_no_number(motion):
+    head = plain(headline(motion))
+    for key in ("somersault_rev", "twist_rev", "median_position_sd_mm", "median_rotation_sd_deg", "median_score"):
+        assert head[key] is None
+    assert head["range_m"] == [None] * 3
+    assert head["tilt_range_deg"] == [None] * 2
+    assert "found in no frame" in " ".join(warnings(head))
+
+
+def test_a_sound_run_warns_of_nothing():
+    assert list(warnings(plain(headline(run())))) == []
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "words"),
+    [
+        ({"lost": (0,)}, "1 of 20 frames are lost"),
+        ({"uncertain": (1, 2)}, "2 of 20 frames are uncertain"),
+        ({"unseen": (5,)}, "its standard deviation is infinite"),
+        ({"lost": (7,)}, "off by whole turns"),
+    ],
+)
+def test_each_weakness_has_its_warning(kwargs, words):
+    assert words in " ".join(warnings(plain(headline(run(**kwargs)))))
+
+
+def test_unknown_spread_is_warned_of():
+    head = plain(headline(run())) | {"median_position_sd_mm": None}
+    assert "uncertainty of the position is not known" in " ".join(warnings(head))
+
+
+def test_json_holds_null_for_what_is_not_a_number(tmp_path):
+    values = {
+        "nan": float("nan"),
+        "nested": [{"infinite": np.float64(-np.inf)}, np.array([1.5, np.nan])],
+        "fraction": Fraction(1, 4),
+        "count": np.int64(3),
+        "flag": np.bool_(True),
+        "path": Path("a") / "b",
+        "text": "Übung",
+    }
+    write_json(tmp_path / "summary.json", values)
+    read = json.loads((tmp_path / "summary.json").read_text("utf-8"), parse_constant=pytest.fail)
+    assert read == {
+        "nan": None,
+        "nested": [{"infinite": None}, [1.5, None]],
+        "fraction": 0.25,
+        "count": 3,
+        "flag": True,
+        "path": str(Path("a") / "b"),
+        "text": "Übung",
+    }
+
+
+def test_json_that_cannot_be_written_leaves_the_old_file_whole(tmp_path):
+    path = tmp_path / "summary.json"
+    write_json(path, {"a": 1})
+    with pytest.raises(TypeError):
+        write_json(path, {"a": object()})
+    assert json.loads(path.read_text()) == {"a": 1}
+    assert list(tmp_path.iterdir()) == [path]

@@ -1,0 +1,143 @@
+"""The code keeps to its plan: imports go down the page, kernels know no nouns, files and functions stay short."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).resolve().parents[1] / "src" / "airborne"
+PACKAGES = [
+    "geometry",
+    "cameras",
+    "video",
+    "body",
+    "rendering",
+    "synthetic",
+    "scoring",
+    "tracking",
+    "motion",
+    "evaluation",
+    "export",
+]
+ORDER = [*PACKAGES, "trial", "pipeline", "cli"]  # a module may import what stands before it, and its own package
+FOR_ALL = {"", "errors"}  # the package's own name holds its version
+NEEDS_TRIAL = {"trial", "pipeline", "cli"}
+NOUNS = ("cameras", "video", "body")  # packages whose public names are values with a meaning, not arrays
+KERNELS = [
+    "cameras/distortion.py",
+    *sorted(f"geometry/{path.name}" for path in (SOURCE / "geometry").glob("[a-z]*.py")),
+    "tracking/stepping.py",
+    "scoring/foreground.py",
+    "scoring/lighting.py",
+    "scoring/plate.py",
+]
+MOST_LINES_A_FILE, MOST_LINES_A_FUNCTION = 450, 90
+HEAVY = ("matplotlib", "nicegui", "tkinter", "PyQt5", "PySide6", "typer", "ezc3d", "yeadon")
+FILES = sorted(SOURCE.rglob("*.py"))
+
+
+def name_of(path):
+    return str(path.relative_to(SOURCE))
+
+
+def layer_of(path):
+    """The package that a file belongs to, or its own name at the top."""
+    return path.relative_to(SOURCE).parts[0].removesuffix(".py").replace("__init__", "")
+
+
+def imports_of(source):
+    """Every module of airborne that a source text imports, as paths below it: ("body", "model")."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+            assert node.level == 0, "imports are absolute"
+        else:
+            continue
+        found += [tuple(name.split(".")[1:]) for name in names if name.split(".")[0] == "airborne"]
+    return found
+
+
+def layers_of(source):
+    return {(path or ("",))[0] for path in imports_of(source)}
+
+
+def upward_arrows(layer, source):
+    """What a module of a layer imports although it stands later in the order."""
+    known = {*ORDER, "errors"}
+    layers = {imported for imported in layers_of(source) if imported in known}
+    return {imported for imported in layers - FOR_ALL if ORDER.index(imported) > ORDER.index(layer)}
+
+
+def functions_of(source):
+    """Every function and its length in lines without its docstring."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            length = node.end_lineno - node.lineno + 1
+            if ast.get_docstring(node) is not None:
+                length -= node.body[0].end_lineno - node.body[0].lineno + 1
+            yield node.name, length
+
+
+def test_arrows_are_told_apart():
+    assert upward_arrows("body", "from airborne.tracking.loss import x\nimport airborne.cameras") == {"tracking"}
+    assert upward_arrows("video", "from airborne import body, errors") == {"body"}
+    assert upward_arrows("video", "def f():\n    import airborne.export.page") == {"export"}
+    assert upward_arrows("export", "from airborne import __version__\nfrom airborne.errors import x") == set()
+
+
+def test_every_module_has_its_place_in_the_order():
+    assert {layer_of(path) for path in FILES} - FOR_ALL <= set(ORDER)
+    assert {layer_of(path) for path in FILES} >= set(PACKAGES)
+
+
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_imports_only_go_down_the_page(path):
+    if layer_of(path) in FOR_ALL:
+        assert layers_of(path.read_text()) == set(), "errors and the package itself import nothing of it"
+    else:
+        assert upward_arrows(layer_of(path), path.read_text()) == set()
+
+
+def test_trial_files_are_known_only_to_those_who_run_them():
+    users = {layer_of(path) for path in FILES if "trial" in layers_of(path.read_text())}
+    assert users <= NEEDS_TRIAL
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_array_kernels_know_no_nouns(name):
+    assert layers_of((SOURCE / name).read_text()) & set(NOUNS) == set()
+
+
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_files_and_functions_are_short(path):
+    source = path.read_text()
+    assert len(source.splitlines()) <= MOST_LINES_A_FILE
+    assert {name: length for name, length in functions_of(source) if length > MOST_LINES_A_FUNCTION} == {}
+
+
+def test_length_of_a_function_leaves_its_docstring_out():
+    source = 'def f():\n    """One.\n\n    Two.\n    """\n    return 1\n'
+    assert dict(functions_of(source)) == {"f": 2}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_package_says_what_it_is_and_what_is_public(package):
+    tree = ast.parse((SOURCE / package / "__init__.py").read_text())
+    assert len((ast.get_docstring(tree) or "").split()) >= 5, "a docstring that says what comes in and what goes out"
+    lists = [node.value for node in tree.body if isinstance(node, ast.Assign) and node.targets[0].id == "__all__"]
+    assert len(lists) == 1, "__all__ lists the public names"
+    names = ast.literal_eval(lists[0])
+    assert names
+    assert len(set(names)) == len(names)
+
+
+def test_tracking_loads_no_figures_and_no_windows():
+    code = f"import sys, airborne.tracking, airborne.tracking.methods; print([m for m in {HEAVY} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stderr == ""
+    assert done.stdout.strip() == "[]"
