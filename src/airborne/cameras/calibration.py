@@ -98,7 +98,7 @@ def calibrate(
     for name in points.cameras:
         candidates = _solve(points, name, sizes[name], decompositions[name], method, seed)
         solutions[name] = choose(candidates)
-        cameras.append(_camera(name, sizes[name], solutions[name].pinhole))
+        cameras.append(_camera(name, sizes[name], solutions[name]))
         fits.append(_describe_fit(points, name, solutions[name], candidates))
     return Calibration(
         rig=Rig(tuple(cameras)),
@@ -128,7 +128,8 @@ def _solve(
     ]
 
 
-def _camera(name: str, size: tuple[int, int], pinhole: Pinhole) -> Camera:
+def _camera(name: str, size: tuple[int, int], solution: Solution) -> Camera:
+    pinhole = solution.pinhole
     f, (u0, v0) = pinhole.focal_px, pinhole.principal_point
     return Camera(
         name=name,
@@ -136,6 +137,7 @@ def _camera(name: str, size: tuple[int, int], pinhole: Pinhole) -> Camera:
         size=size,
         camera_from_world=RigidTransform.from_components(-pinhole.R @ pinhole.centre, Rotation.from_matrix(pinhole.R)),
         distortion=np.array([pinhole.k1, 0, 0, 0, 0]),
+        shift_sd_px=solution.shift_sd_px,
     )
 
 

@@ -28,6 +28,7 @@ class Camera:
     size: tuple[int, int]  # (width, height) [px]
     camera_from_world: RigidTransform
     distortion: Array = field(default_factory=lambda: np.zeros(5))  # k1, k2, p1, p2, k3
+    shift_sd_px: float = 0.0  # how far the calibration may displace a picture as a whole, right or down [px]
 
     @property
     def centre(self) -> Array:

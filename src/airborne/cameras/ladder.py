@@ -29,6 +29,12 @@ class Solution:
         return self.px - self.pinhole.px_from_world(self.world)
 
     @property
+    def shift_sd_px(self) -> float:
+        """How far the fit leaves a projected point open, in one direction, on average over the points [px]."""
+        n, p = 2 * len(self.world), self.model.n_parameters
+        return float(np.sqrt(np.sum(self.residual_px**2) / max(n - p, 1) * p / n))
+
+    @property
     def held_out_px(self) -> Array:
         """The same for the camera that has not seen the point (n, 2) [px]."""
         return self.px - np.array([p.px_from_world(x) for p, x in zip(self.held_out, self.world, strict=True)])

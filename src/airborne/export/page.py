@@ -35,7 +35,8 @@ dd { margin: 0; }
 @media print {
   :root { background: #fff; font-size: 10.5pt; }
   body { max-width: none; margin: 0; padding: 0; box-shadow: none; }
-  .tile, .warnings, .fine, tr, dt, dd { break-inside: avoid; }
+  .tiles { grid-template-columns: repeat(4, 1fr); gap: .6rem; }
+  .tile, .warnings, .fine, table, dt, dd { break-inside: avoid; }
   h2 { break-after: avoid; }
   .bar, .warnings, .fine { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
 }

@@ -119,7 +119,7 @@ def _cross() -> BodyModel:
 def _spots(rng: np.random.Generator) -> tuple[Spot, ...]:
     places = np.array([[-3.0, -3.2, 3.7], [3.2, -2.5, 3.9]]) + rng.normal(0, 0.15, (2, 3))
     targets = np.array([[-0.2, 0.3, 1.3], [0.3, 0.2, 1.5]]) + rng.normal(0, 0.1, (2, 3))
-    light = np.array([[1.0, 0.97, 0.9], [0.96, 0.97, 1.0]]) * rng.uniform([[21.5], [17.5]], [[24.5], [20.5]])
+    light = np.array([[1.0, 0.97, 0.9], [0.96, 0.97, 1.0]]) * rng.uniform([[19.5], [16.0]], [[22.5], [19.0]])
     return tuple(
         Spot(position=place, target=target, light_at_1m=power, cone_rad=np.radians(32.0))
         for place, target, power in zip(places, targets, light, strict=True)

@@ -24,7 +24,7 @@ from airborne.scoring.lighting import TO_LIGHT, light_from_srgb, light_planes
 from airborne.scoring.plate import START_SD, fill
 from airborne.tracking.appearance import Appearance, Region
 from airborne.tracking.covariance import covariance_of
-from airborne.tracking.normal_equations import gaussian_taps, photometric_equations, silhouette_equations
+from airborne.tracking.normal_equations import Sums, gaussian_taps, photometric_equations, silhouette_equations
 
 Array = NDArray[np.floating]
 
@@ -33,6 +33,7 @@ _COARSE_SIGMA_PX = 1.2  # of the reduced picture
 _FINE_SIGMA_PX = 1.2  # of a full frame
 _CLIP = 0.1  # linear light, 0..1: a residual this large counts a quarter
 _OVERSTEP = 1.6  # robust weights and refitted light make each step about this much too short
+_SHIFT_SD_PX = 0.05  # of a full frame: what light and edges that are not quite as modelled may displace a picture by
 _MOST_STEPS = 12
 _SETTLED = 0.5  # squared length of the last step, in sds of the pose
 _PRIOR_SD = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])  # [m], [rad]: keeps what the pictures do not show where it is
@@ -93,10 +94,10 @@ def fit_silhouettes(
     for reduction, steps in levels:
         views = [_reduced(region, posterior, reduction) for region, posterior in zip(regions, posteriors, strict=True)]
         for _ in range(steps):
-            A, g, S, totals = _zeros()
+            sums, totals = Sums.zero(), np.zeros(2)
             for view in views:
-                totals += silhouette_equations(*body, posed.R, posed.t, *view, taps, taps, A, g, S)
-            motion = _solve(_whole(A), g, correlated * _mean_square(totals))
+                totals += silhouette_equations(*body, posed.R, posed.t, *view, taps, taps, sums)
+            motion = _solve(sums.curvature, sums.g, correlated * _mean_square(totals))
             posed = posed.moved(synthesis.visible(posed) @ motion)
     return posed
 
@@ -107,21 +108,25 @@ def fit_pictures(synthesis: Synthesis, posed: PosedBody, regions: Sequence[Regio
     rows_sigma_px = [max(_FINE_SIGMA_PX * region.aspect, 0.5) for region in regions]
     taps = [(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma)) for sigma in rows_sigma_px]
     correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px))
+    shifts_px = [np.hypot(_SHIFT_SD_PX, r.camera.shift_sd_px) * np.array([1, r.aspect]) for r in regions]
     body, paint = (synthesis.shapes, synthesis.geometry), (synthesis.albedo, synthesis.is_faceted)
     for step in range(1, _MOST_STEPS + 1):
-        A, g, S, totals = _zeros()
+        sums, totals, spread = Sums.zero(), np.zeros(2), np.zeros((6, 6))
         rounds = 3 if step == 1 else 1
-        for (fixed, light, maps), (taps_u, taps_v) in zip(views, taps, strict=True):
+        for (fixed, light, maps), (taps_u, taps_v), shift_sd_px in zip(views, taps, shifts_px, strict=True):
+            sums.B[:] = 0
             totals += photometric_equations(
-                *body, posed.R, posed.t, *fixed, *paint, light, rounds, maps, taps_u, taps_v, _CLIP, A, g, S
+                *body, posed.R, posed.t, *fixed, *paint, light, rounds, maps, taps_u, taps_v, _CLIP, sums
             )
+            spread += (sums.B * shift_sd_px**2) @ sums.B.T
         visible, noise = synthesis.visible(posed), correlated * _mean_square(totals)
-        A, S = visible @ _whole(A) @ visible, visible @ S @ visible
-        motion = visible @ _solve(A, g, noise)
+        A = visible @ sums.curvature @ visible
+        motion = visible @ _solve(A, sums.g, noise)
         posed = posed.moved(_OVERSTEP * motion)
         if motion @ A @ motion <= _SETTLED * noise:
             break
-    return Fit(posed, covariance_of(A, noise=noise, spread=S), _mean_square(totals) ** 0.5, step)
+    spread = visible @ (sums.S + spread) @ visible
+    return Fit(posed, covariance_of(A, noise=noise, spread=spread), _mean_square(totals) ** 0.5, step)
 
 
 def _photometric_view(region: Region, appearance: Appearance) -> tuple[tuple, Array, tuple]:
@@ -157,16 +162,8 @@ def _reduced(region: Region, posterior: Array, reduction: int) -> tuple:
     )
 
 
-def _zeros() -> tuple[Array, Array, Array, Array]:
-    return np.zeros((6, 6)), np.zeros(6), np.zeros((6, 6)), np.zeros(2)
-
-
 def _mean_square(totals: Array) -> float:
     return totals[0] / totals[1] if totals[1] > 0 else 1.0
-
-
-def _whole(A: Array) -> Array:
-    return A + np.tril(A, -1).T
 
 
 def _solve(A: Array, g: Array, noise: float) -> Array:

@@ -6,6 +6,8 @@ plane's pixel (0, 0) lies in the region of interest whose intrinsics are K.
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -17,6 +19,25 @@ BLOCK_PX = 16  # residuals this close are not independent: the side of a block o
 RADIUS_PX = 4  # reach of the blur: three sds of the widest one used
 _PAD_PX = RADIUS_PX + 3  # beyond it, the blurred mask is nothing
 _EDGE = 0.01  # blurred coverage below which a pixel says nothing of the body
+
+
+class Sums(NamedTuple):
+    """Normal equations of a motion (6,): A motion = g, summed over pixels and views."""
+
+    A: Any  # (6, 6) curvature; the lower triangle is filled
+    g: Any  # (6,) gradient
+    S: Any  # (6, 6) sum of g g' over blocks of the pictures
+    B: Any  # (6, 2) what a shift of the whole picture by one pixel, right or down, does to g
+
+    @classmethod
+    def zero(cls) -> Sums:
+        """Begin with nothing."""
+        return cls(np.zeros((6, 6)), np.zeros(6), np.zeros((6, 6)), np.zeros((6, 2)))
+
+    @property
+    def curvature(self) -> np.ndarray:
+        """A with both triangles (6, 6)."""
+        return self.A + np.tril(self.A, -1).T
 
 
 def gaussian_taps(sigma_px: float) -> np.ndarray:
@@ -78,15 +99,16 @@ def window_of(part):
 
 
 @njit(**KERNEL)
-def accumulate(residual, shape, coverage, inverse_depth, scene, certainty, x0, y0, K, view, origin, clip, A, g, S):
+def accumulate(residual, shape, coverage, inverse_depth, scene, certainty, x0, y0, K, view, origin, clip, sums):
     """Add one view's normal equations for a rigid motion about `origin` [m]: A motion = g.
 
     residual, shape (c, h, w): blurred observed minus rendered, and the blurred colours of the body on black; coverage,
     inverse_depth (h, w) blurred alike; scene (c, region) what the body moves in front of; certainty (region) in (0, 1]
-    scales a pixel's weight; clip: the residual at which a pixel's weight has fallen to a quarter. The motion is a translation [m] and a rotation
-    vector [rad] in world axes. Of A (6, 6) the lower triangle is filled; S (6, 6) gathers the spread of g over blocks.
-    Returns (weighted squared residual, weight).
+    scales a pixel's weight; clip: the residual at which a pixel's weight has fallen to a quarter. The motion is a
+    translation [m] and a rotation vector [rad] in world axes. Adds to `sums`; returns (weighted squared residual,
+    weight).
     """
+    A, g, S, B = sums
     c, h, w = residual.shape
     fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
     a, b = np.zeros(6), np.zeros(6)
@@ -142,6 +164,8 @@ def accumulate(residual, shape, coverage, inverse_depth, scene, certainty, x0, y
                 block[i] -= sx * a[i] + sy * b[i]
                 ai = sxx * a[i] + sxy * b[i]
                 bi = sxy * a[i] + syy * b[i]
+                B[i, 0] += ai
+                B[i, 1] += bi
                 for j in range(i + 1):
                     A[i, j] += ai * a[j] + bi * b[j]
     for n in range(len(blocks)):
@@ -165,7 +189,7 @@ def _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v):
 
 
 @njit(**KERNEL)
-def silhouette_equations(shapes, geometry, R, t, view, K, posterior, black, certainty, maps, taps_u, taps_v, A, g, S):
+def silhouette_equations(shapes, geometry, R, t, view, K, posterior, black, certainty, maps, taps_u, taps_v, sums):
     """Add one view's normal equations of `blurred posterior - blurred mask`; see `accumulate`.
 
     posterior (h, w): the probability of each pixel to be body; black (1, h, w) zeros, certainty (h, w) ones;
@@ -187,7 +211,7 @@ def silhouette_equations(shapes, geometry, R, t, view, K, posterior, black, cert
         for x in range(x1 - x0):
             shape[0, y, x] = np.float32(0.5) * (residual[0, y, x] + blurred[0, y, x])
             residual[0, y, x] -= blurred[0, y, x]
-    return accumulate(residual, shape, blurred[0], blurred[1], black, certainty, x0, y0, K, view, t[0], 0.5, A, g, S)
+    return accumulate(residual, shape, blurred[0], blurred[1], black, certainty, x0, y0, K, view, t[0], 0.5, sums)
 
 
 @njit(**KERNEL)
@@ -209,14 +233,13 @@ def photometric_equations(
     taps_u,
     taps_v,
     clip,
-    A,
-    g,
-    S,
+    sums,
 ):
     """Add one view's normal equations of `blurred observed - blurred composite`; see `accumulate`.
 
     observed, scene (3, h, w): linear light of the picture and of the empty scene; albedo (parts, 3) linear and
-    is_faceted (parts,): see `compose`; light (3, 4) the view's fitted light, refitted in place by `rounds` robust rounds. Returns (weighted squared residual, weight).
+    is_faceted (parts,): see `compose`; light (3, 4) the view's fitted light, refitted in place by `rounds` robust
+    rounds. Returns (weighted squared residual, weight).
     """
     part, inverse_depth, normals = maps
     surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals)
@@ -230,4 +253,4 @@ def photometric_equations(
     compose(observed, scene, part, normals, albedo, is_faceted, light, x0, y0, sharp, body)
     blur(sharp, taps_u, taps_v, residual)
     blur(body, taps_u, taps_v, shape)
-    return accumulate(residual, shape, blurred[0], blurred[1], scene, certainty, x0, y0, K, view, t[0], clip, A, g, S)
+    return accumulate(residual, shape, blurred[0], blurred[1], scene, certainty, x0, y0, K, view, t[0], clip, sums)

@@ -1,0 +1,132 @@
+"""Unknown light is found from the surface's own normals."""
+
+import numpy as np
+import pytest
+
+from airborne.scoring.lighting import TO_LIGHT, compose, fit_light, light_from_srgb, light_planes
+from tests.tolerances import EXACT
+
+SHAPE = (40, 50)
+WHOLE = (0, 0, SHAPE[1], SHAPE[0])
+LIGHT = np.array([[0.6, 0.2, -0.1, -0.3], [0.5, 0.1, 0.05, -0.2], [0.7, -0.2, 0.1, -0.25]])
+ALBEDO = np.array([[0.8, 0.6, 0.1], [0.2, 0.3, 0.9]], np.float32)
+FOUND = 5e-3  # of the light: the fit holds its slopes back by a ten-thousandth
+
+
+def body(seed=0):
+    """A mask of two parts with unit normals toward the camera, and its light as the model has it."""
+    rng = np.random.default_rng(seed)
+    normals = rng.normal(size=(3, *SHAPE))
+    normals[2] = -np.abs(normals[2])
+    normals /= np.linalg.norm(normals, axis=0)
+    part = np.full(SHAPE, -1, np.int16)
+    part[5:35, 5:25], part[5:35, 25:45] = 0, 1
+    shade = LIGHT[:, 0, None, None] + np.einsum("kq,qyx->kyx", LIGHT[:, 1:], normals)
+    observed = np.where(part >= 0, ALBEDO.T[:, part] * shade, 0.05)
+    return part, normals.astype(np.float32), observed.astype(np.float32)
+
+
+def even_light():
+    light = np.zeros((3, 4), np.float32)
+    light[:, 0] = 1
+    return light
+
+
+def test_light_is_found_from_a_shaded_body():
+    part, normals, observed = body()
+    light = even_light()
+    sd = fit_light(observed, part, normals, ALBEDO, light, 3, *WHOLE)
+    np.testing.assert_allclose(light, LIGHT, atol=FOUND)
+    assert sd < 2e-3
+
+
+def test_shadow_over_a_fifth_of_the_body_does_not_matter():
+    part, normals, observed = body()
+    shadowed = observed.copy()
+    shadowed[:, 5:11] *= 0.2
+    light = even_light()
+    fit_light(shadowed, part, normals, ALBEDO, light, 8, *WHOLE)
+    np.testing.assert_allclose(light, LIGHT, atol=0.03)
+
+
+def test_noise_averages_out_and_its_size_is_told():
+    part, normals, observed = body()
+    noise = np.random.default_rng(1).normal(0, 0.02, observed.shape).astype(np.float32)
+    light = even_light()
+    sd = fit_light(observed + noise, part, normals, ALBEDO, light, 4, *WHOLE)
+    assert np.abs(light - LIGHT).max() < 0.05
+    assert 0.02 < sd < 3 * 1.5 * 0.02
+
+
+def test_too_few_pixels_leave_the_light_as_it_was():
+    part, normals, observed = body()
+    few = np.full(SHAPE, -1, np.int16)
+    few[10, 10:23] = 0  # thirteen in a row: eleven within the border
+    light = even_light()
+    assert fit_light(observed, few, normals, ALBEDO, light, 3, *WHOLE) == 1
+    np.testing.assert_array_equal(light, even_light())
+    few[10, 10:24] = 0
+    fit_light(observed, few, normals, ALBEDO, light, 3, *WHOLE)
+    assert np.abs(light - even_light()).max() > 0.05
+
+
+def test_only_the_window_is_looked_at():
+    part, normals, observed = body()
+    observed[:, :, 25:] = 9.0
+    light = even_light()
+    fit_light(observed, part, normals, ALBEDO, light, 3, 0, 0, 25, SHAPE[0])
+    np.testing.assert_allclose(light, LIGHT, atol=FOUND)
+
+
+def test_black_body_leaves_a_finite_light():
+    part, normals, observed = body()
+    light = even_light()
+    fit_light(observed, part, normals, np.zeros_like(ALBEDO), light, 3, *WHOLE)
+    assert np.isfinite(light).all()
+
+
+@pytest.mark.parametrize("is_faceted", [True, False])
+def test_composite_of_the_right_body_and_light_leaves_no_residual(is_faceted):
+    part, normals, observed = body()
+    scene = np.full((3, *SHAPE), 0.05, np.float32)
+    residual, shape = np.empty((2, 3, *SHAPE), np.float32)
+    facets = np.full(2, is_faceted)
+    compose(observed, scene, part, normals, ALBEDO, facets, LIGHT.astype(np.float32), 0, 0, residual, shape)
+    np.testing.assert_allclose(residual, 0, atol=1e-6)
+    assert np.all(shape[:, part < 0] == 0)
+
+
+def test_shape_of_a_faceted_part_is_its_light_and_of_a_smooth_one_its_mean_light():
+    part, normals, observed = body()
+    scene = np.zeros((3, *SHAPE), np.float32)
+    residual, shape = np.empty((2, 3, *SHAPE), np.float32)
+    facets = np.array([True, False])
+    compose(observed, scene, part, normals, ALBEDO, facets, LIGHT.astype(np.float32), 0, 0, residual, shape)
+    np.testing.assert_allclose(shape[:, part == 0], observed[:, part == 0], atol=1e-6)
+    mean = observed[:, part == 1].mean(axis=1, keepdims=True)
+    np.testing.assert_allclose(shape[:, part == 1], np.broadcast_to(mean, (3, (part == 1).sum())), rtol=1e-4)
+
+
+def test_composite_covers_the_window_it_is_asked_for():
+    part, normals, observed = body()
+    scene = np.random.default_rng(2).uniform(0, 1, (3, *SHAPE)).astype(np.float32)
+    arrays = observed, scene, part, normals, ALBEDO, np.array([True, True]), even_light()
+    whole, window = np.empty((2, 3, *SHAPE), np.float32), np.empty((2, 3, 20, 25), np.float32)
+    compose(*arrays, 0, 0, *whole)
+    compose(*arrays, 12, 7, *window)
+    np.testing.assert_array_equal(window, whole[:, :, 7:27, 12:37])
+
+
+def test_light_of_srgb_has_its_known_values():
+    np.testing.assert_allclose(light_from_srgb([0, 255]), [0, 1], atol=EXACT)
+    np.testing.assert_allclose(light_from_srgb(0.04045 * 255), 0.04045 / 12.92, atol=EXACT)
+    np.testing.assert_allclose(light_from_srgb(188), 0.5029, atol=1e-4)
+
+
+def test_planes_of_an_image_are_the_light_of_its_channels():
+    image = np.random.default_rng(4).integers(0, 256, (*SHAPE, 3), dtype=np.uint8)
+    planes = np.empty((3, *SHAPE), np.float32)
+    light_planes(image, TO_LIGHT, planes)
+    np.testing.assert_allclose(planes, light_from_srgb(image).transpose(2, 0, 1), atol=2e-3)
+    light_planes(image.astype(np.float32), TO_LIGHT, planes)
+    np.testing.assert_allclose(planes, light_from_srgb(image).transpose(2, 0, 1), atol=2e-3)
