@@ -188,7 +188,7 @@ def evaluate(
 @synth.command("cross")
 def synth_cross(
     output: Out,
-    preset: Annotated[Literal["half-twist", "side"], typer.Option(help="The throw.")] = "half-twist",
+    preset: Annotated[Literal["half-twist", "side-somersault"], typer.Option(help="The throw.")] = "half-twist",
     seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
 ) -> None:
     """Write a thrown wooden cross: interlaced videos of three cameras, calibration, clicks, truth.

@@ -1,7 +1,7 @@
 """Small clips with truth: a coloured body thrown over a cluttered background, seen by up to four cameras."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 
 import cv2
@@ -10,7 +10,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Ellipsoid, Part, Pose, Segment, geometry
 from airborne.cameras import Camera
-from airborne.rendering import FLAT, Lamp, Lights, render
+from airborne.rendering import Lamp, Lights, render
 from airborne.scoring.lighting import light_from_srgb
 from airborne.tracking import Estimate
 from airborne.tracking.refined import Refined
@@ -19,8 +19,11 @@ from airborne.video import Frames, View
 
 SIZE = (320, 240)
 FPS = 50
-FINER, REACH_PX = 4, 64  # drawn pixels a pixel; half the side of the square that holds the body
+FINER, REACH = 4, 0.16  # drawn pixels a pixel; half the side of the square that holds the body, in focal lengths
 LIGHTS = Lights(0.6, (Lamp(np.array([3.0, -4.0, 5.0]), 0.4),))
+_light = np.linspace(0, 1, 1 << 14)
+_srgb = np.where(_light <= 0.0031308, 12.92 * _light, 1.055 * _light ** (1 / 2.4) - 0.055)
+SRGB = (255 * _srgb).astype(np.float32)
 GRAVITY = np.array([0, 0, -9.81])
 YELLOW, BLUE, RED = (220.0, 190.0, 40.0), (40.0, 60.0, 190.0), (200.0, 40.0, 40.0)
 
@@ -43,18 +46,19 @@ BALL = rigid_body(part("ball", Ellipsoid(np.array([0.2, 0.2, 0.2])), (0, 0, 0), 
 SPINDLE = rigid_body(part("spindle", Ellipsoid(np.array([0.12, 0.12, 0.35])), (0, 0, 0), YELLOW))
 
 
-def camera(name: str, turn: float) -> Camera:
-    """A camera 4 m from the place of the throw, `turn` [rad] round the vertical; about 100 px a metre."""
+def camera(name: str, turn: float, focal_px: float = 400.0) -> Camera:
+    """A camera 4 m from the place of the throw, `turn` [rad] round the vertical; 100 px a metre unless told otherwise."""
     centre, target = np.array([4 * np.sin(turn), -4 * np.cos(turn), 1.9]), np.array([0.0, 0.0, 1.4])
     z = (target - centre) / np.linalg.norm(target - centre)
     x = np.cross(z, [0, 0, 1.0]) / np.linalg.norm(np.cross(z, [0, 0, 1.0]))
     rotation = Rotation.from_matrix(np.stack([x, np.cross(z, x), z]))
-    K = np.array([[400, 0, (SIZE[0] - 1) / 2], [0, 400.0, (SIZE[1] - 1) / 2], [0, 0, 1.0]])
+    K = np.array([[focal_px, 0, (SIZE[0] - 1) / 2], [0, focal_px, (SIZE[1] - 1) / 2], [0, 0, 1.0]])
     place = RigidTransform.from_components(-rotation.apply(centre), rotation)
     return Camera(name=name, K=K, size=SIZE, camera_from_world=place)
 
 
-CAMERAS = tuple(camera(f"cam{i}", turn) for i, turn in enumerate((0.0, 1.4, 2.7, -1.1)))
+TURNS = (0.0, 1.4, 2.7, -1.1)
+CAMERAS = tuple(camera(f"cam{i}", turn) for i, turn in enumerate(TURNS))
 
 
 def thrown(time_s: Fraction) -> Pose:
@@ -66,14 +70,14 @@ def thrown(time_s: Fraction) -> Pose:
 
 
 def clutter(seed: int, *colours) -> np.ndarray:
-    """A background (h, w, 3) sRGB: soft blotches of dull colours, sharp boxes, and boxes of the given colours."""
+    """A background (h, w, 3), linear light: soft blotches, sharp dull boxes, and boxes of the given sRGB colours."""
     rng = np.random.default_rng(seed)
     picture = cv2.resize(rng.uniform(70, 150, (6, 8, 3)), SIZE, interpolation=cv2.INTER_CUBIC)
     dull = [np.full(3, grey) + rng.uniform(-12, 12, 3) for grey in rng.uniform(50, 170, 12)]
     for colour in (*dull, *colours):
         x, y = rng.integers(0, SIZE[0] - 40), rng.integers(0, SIZE[1] - 40)
         picture[y : y + rng.integers(10, 40), x : x + rng.integers(10, 40)] = colour
-    return picture
+    return light_from_srgb(picture).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -98,12 +102,13 @@ class Scene:
         return Frames(index, time_s, tuple(views))
 
     def _picture(self, index: int, i: int, seen_by: Camera, pose: Pose | None) -> np.ndarray:
-        light = light_from_srgb(self.backgrounds[i])
+        light = self.backgrounds[i]
         if pose is not None:
             share, shown = _drawn(self.model, pose, seen_by)
             light = (1 - share) * light + shown
         rng = np.random.default_rng([index, i])
-        noisy = srgb_from_light(light * self.brightness(index)) + rng.normal(0, self.noise_grey, light.shape)
+        noise = self.noise_grey * rng.standard_normal(light.shape, np.float32)
+        noisy = srgb_from_light(light * np.float32(self.brightness(index))) + noise
         return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
 
     def start(self, index: int = 0) -> Pose:
@@ -114,9 +119,8 @@ class Scene:
 
 
 def srgb_from_light(light: np.ndarray) -> np.ndarray:
-    """Turn linear light 0..1 into sRGB 0..255, any shape."""
-    light = np.clip(light, 0, 1)
-    return 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    """Turn linear light 0..1 into sRGB 0..255, any shape; brighter light is cut."""
+    return SRGB[np.rint(np.clip(light, 0, 1) * (len(SRGB) - 1)).astype(int)]
 
 
 def _drawn(model: BodyModel, pose: Pose, seen_by: Camera) -> tuple[np.ndarray, np.ndarray]:
@@ -125,17 +129,19 @@ def _drawn(model: BodyModel, pose: Pose, seen_by: Camera) -> tuple[np.ndarray, n
     fine_size = (FINER * width, FINER * height)
     offset = -(FINER - 1) / (2 * FINER)
     fine = seen_by.resampled(scale=(1 / FINER, 1 / FINER), offset=(offset, offset), size=fine_size)
-    share, shown = np.zeros((height, width, 1)), np.zeros((height, width, 3))
+    share, shown = np.zeros((height, width, 1), np.float32), np.zeros((height, width, 3), np.float32)
+    reach_px = round(REACH * seen_by.K[0, 0])
     u, v = np.rint(seen_by.px_from_world(pose.world_from_root.translation)).astype(int)
-    x0, x1 = np.clip([u - REACH_PX, u + REACH_PX], 0, width)
-    y0, y1 = np.clip([v - REACH_PX, v + REACH_PX], 0, height)
+    x0, x1 = np.clip([u - reach_px, u + reach_px], 0, width)
+    y0, y1 = np.clip([v - reach_px, v + reach_px], 0, height)
     if x0 < x1 and y0 < y1:
         posed, flat = model.with_pose(pose), geometry(model)
         drawn = render(flat, posed, fine, LIGHTS, region=(FINER * x0, FINER * y0, FINER * x1, FINER * y1))
-        plain = render(flat, posed, fine, FLAT, region=drawn.region)
-        light = light_from_srgb(plain.colour) * drawn.colour / np.maximum(plain.colour, 1)
+        red = np.append(flat.colours[:, 0], 1.0)[drawn.part]  # the last one stands for no part
+        albedo = np.append(light_from_srgb(flat.colours), np.zeros((1, 3)), axis=0).astype(np.float32)
+        light = albedo[drawn.part] * (drawn.colour[..., 0] / red)[..., None].astype(np.float32)
         size = (int(x1 - x0), int(y1 - y0))
-        share[y0:y1, x0:x1, 0] = cv2.resize(drawn.mask.astype(float), size, interpolation=cv2.INTER_AREA)
+        share[y0:y1, x0:x1, 0] = cv2.resize(drawn.mask.astype(np.float32), size, interpolation=cv2.INTER_AREA)
         shown[y0:y1, x0:x1] = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
     return share, shown
 
@@ -172,19 +178,3 @@ def worst(scene: Scene, estimates: Sequence[Estimate]) -> tuple[float, float]:
 def statuses(estimates: Sequence[Estimate]) -> list[str]:
     return [str(estimate.status) for estimate in estimates]
 
-
-__all__ = [
-    "BALL",
-    "CAMERAS",
-    "CROSS",
-    "SPINDLE",
-    "Scene",
-    "clutter",
-    "difference",
-    "errors",
-    "replace",
-    "statuses",
-    "thrown",
-    "track",
-    "worst",
-]

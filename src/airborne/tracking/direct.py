@@ -137,6 +137,7 @@ class Direct:
             return targets(frames.views, self._lights, scale=self._scale)
         appearance = state.appearance
         if not state.past:
+            appearance = Appearance()
             self._learn_colours(appearance, start, frames)
         regions = regions_round([self._model.with_pose(start)], self._geometry, frames, _MARGIN_PX)
         known = {region.camera.name: region for region in regions if appearance.knows(region)}

@@ -20,7 +20,7 @@ from airborne.body.symmetry import continuous_axes
 from airborne.rendering.maps import empty_maps, surface_maps
 from airborne.rendering.packing import packed_view
 from airborne.rendering.shapes import new_shapes
-from airborne.scoring.lighting import TO_LIGHT, light_from_srgb, light_planes
+from airborne.scoring.lighting import TERMS, TO_LIGHT, light_from_srgb, light_planes
 from airborne.scoring.plate import START_SD, fill
 from airborne.tracking.appearance import Appearance, Region
 from airborne.tracking.covariance import covariance_of
@@ -33,7 +33,7 @@ _COARSE_SIGMA_PX = 1.2  # of the reduced picture
 _FINE_SIGMA_PX = 1.2  # of a full frame
 _CLIP = 0.1  # linear light, 0..1: a residual this large counts a quarter
 _OVERSTEP = 1.6  # robust weights and refitted light make each step about this much too short
-_SHIFT_SD_PX = 0.05  # of a full frame: what light and edges that are not quite as modelled may displace a picture by
+_SHIFT_SD_PX = 0.12  # of a full frame: what light and edges that are not quite as modelled may displace a picture by
 _MOST_STEPS = 12
 _SETTLED = 0.5  # squared length of the last step, in sds of the pose
 _PRIOR_SD = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])  # [m], [rad]: keeps what the pictures do not show where it is
@@ -139,7 +139,7 @@ def _photometric_view(region: Region, appearance: Appearance) -> tuple[tuple, Ar
     light_planes(region.rgb, TO_LIGHT, observed)
     light_planes(filled, TO_LIGHT, scene)
     certainty = np.minimum(1, (START_SD / sd) ** 2)
-    light = np.zeros((3, 4), np.float32)
+    light = np.zeros((3, TERMS), np.float32)
     light[:, 0] = 1
     return (region.packed, region.camera.K, observed, scene, certainty), light, empty_maps(region.camera.size)
 
@@ -168,4 +168,4 @@ def _mean_square(totals: Array) -> float:
 
 def _solve(A: Array, g: Array, noise: float) -> Array:
     """Solve for the motion (6,), held back where the pictures say little (Tikhonov)."""
-    return np.linalg.solve(A + np.diag(noise / _PRIOR_SD**2), g)
+    return np.linalg.solve(A + np.diag(max(noise, 1e-9) / _PRIOR_SD**2), g)

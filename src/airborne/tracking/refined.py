@@ -23,6 +23,7 @@ Array = NDArray[np.floating]
 
 _MARGIN_PX, _FIRST_MARGIN_PX = 32, 56  # of a full frame
 _REMEMBERED = 3
+_FITTED_AFTER_SEARCH = 3
 
 PREDICTIONS: dict[str, tuple[Callable[[predictors.Past, Fraction], Pose], ...]] = {
     "smooth": (predictors.quadratic, predictors.linear),
@@ -60,7 +61,7 @@ class Refined:
         if past and (agreed is None or not agreed.is_good):
             reach = Reach.after(float(frames.time_s - past[-1][0]))
             wide = search_widely(self._synthesis, guesses, frames, state.appearance, reach)
-            again, agreed_again = self._fit(wide, frames, state.appearance)
+            again, agreed_again = self._fit(wide, frames, state.appearance, n_fitted=_FITTED_AFTER_SEARCH)
             if agreed_again is not None and (agreed is None or agreed_again.evidence > agreed.evidence):
                 fit, agreed = again, agreed_again
         return _estimate(frames, fit, agreed)
@@ -79,9 +80,18 @@ class Refined:
         return RefinedState(past, state.appearance)
 
     def _fit(
-        self, guesses: Sequence[PosedBody], frames: Frames, appearance: Appearance, *, is_first: bool = False
+        self,
+        guesses: Sequence[PosedBody],
+        frames: Frames,
+        appearance: Appearance,
+        *,
+        is_first: bool = False,
+        n_fitted: int = 1,
     ) -> tuple[Fit | None, Agreement | None]:
-        """Fit from the guess that the pictures like best; (None, None) where no view sees any."""
+        """Fit from the guesses that the pictures like best, and keep the best fit; (None, None) where no view sees any.
+
+        With `n_fitted` above 1, every guess is first fitted to the silhouettes.
+        """
         margin_px = _FIRST_MARGIN_PX if is_first else _MARGIN_PX
         regions = regions_round(guesses, self._synthesis.geometry, frames, margin_px)
         if is_first and regions:
@@ -90,11 +100,21 @@ class Refined:
         if not regions:
             return None, None
         posteriors = [appearance.posterior(region) for region in regions]
-        best = guesses[0]
-        if len(guesses) > 1:
-            best = max(guesses, key=lambda guess: agreement(self._synthesis, guess, regions, posteriors).evidence)
-        posed = fit_silhouettes(self._synthesis, best, regions, posteriors, FAR if is_first else NEAR)
-        fit = fit_pictures(self._synthesis, posed, regions, self._with_scenes(appearance, posed, regions))
+
+        def evidence(body: PosedBody) -> float:
+            return agreement(self._synthesis, body, regions, posteriors).evidence
+
+        def to_silhouettes(body: PosedBody) -> PosedBody:
+            return fit_silhouettes(self._synthesis, body, regions, posteriors, FAR if is_first else NEAR)
+
+        def to_pictures(body: PosedBody) -> Fit:
+            return fit_pictures(self._synthesis, body, regions, self._with_scenes(appearance, body, regions))
+
+        if n_fitted == 1:
+            fit = to_pictures(to_silhouettes(max(guesses, key=evidence) if len(guesses) > 1 else guesses[0]))
+        else:
+            bodies = sorted(map(to_silhouettes, guesses), key=evidence, reverse=True)[:n_fitted]
+            fit = max(map(to_pictures, bodies), key=lambda each: evidence(each.posed))
         return fit, agreement(self._synthesis, fit.posed, regions, posteriors)
 
     def _first_look(self, posed: PosedBody, regions: Sequence[Region]) -> Appearance:

@@ -37,10 +37,11 @@ def stepping(score: Score, start: Array, loops: Sequence[Array], *, v_rule: VRul
 def v_literal(before: float, lowest: float, after: float, last: float) -> float:
     """Cross the lines (-1, before)-(0, lowest) and (1, after)-(2, last); steps from the lowest point, in [-1, 1].
 
-    As the paper has it. Where the true minimum lies before the lowest point the answer is 0.
+    As the paper has it. Where the true minimum lies before the lowest point the answer is 0, and also where a
+    neighbour is infinite.
     """
     down, up = before - lowest, last - after
-    if down + up <= 0:
+    if not 0 < down + up < np.inf:
         return 0.0
     return float(np.clip((up - (after - lowest)) / (down + up), -1, 1))
 

@@ -22,7 +22,7 @@ from airborne.video import Frames
 
 Array = NDArray[np.floating]
 
-_ROUNDS = ((512, 24), (256, 12), (128, 4))  # proposals, kept; each round half as wide
+_ROUNDS = ((512, 32), (256, 16), (128, 8))  # proposals, kept; each round half as wide
 _REDUCTION = 4  # of the pictures
 
 

@@ -1,0 +1,56 @@
+"""A run that was broken off goes on from its estimates to the same result, bit for bit."""
+
+import numpy as np
+import pytest
+
+from airborne.tracking.methods import Settings, tracker_of
+from tests.tracking.scenes import FPS, Scene, clutter, thrown, track
+
+FRAMES, ABSENT = 8, 2
+SCENE = Scene(
+    motion=lambda time_s: None if time_s * FPS == ABSENT else thrown(time_s),
+    backgrounds=tuple(clutter(seed, (220.0, 190.0, 40.0)) for seed in range(4)),
+)
+METHODS = {
+    "refined": Settings(),
+    "union": Settings(method="stepping", colour="union", loops=((0.01, 0.02), (0.005, 0.01))),
+    "simplex": Settings(method="simplex"),
+}
+
+
+def tracker(name):
+    return tracker_of(METHODS[name], SCENE.model, SCENE.start())
+
+
+def assert_same(a, b):
+    assert (a.index, a.time_s, a.status, a.n_views) == (b.index, b.time_s, b.status, b.n_views)
+    np.testing.assert_array_equal(a.score, b.score)
+    assert (a.pose is None) == (b.pose is None)
+    if a.pose is not None:
+        np.testing.assert_array_equal(a.pose.world_from_root.as_matrix(), b.pose.world_from_root.as_matrix())
+        np.testing.assert_array_equal(a.covariance, b.covariance)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_learning_the_first_frames_and_searching_on_is_searching_all(name):
+    searched = track(SCENE, range(FRAMES), tracker(name))
+    resumed = tracker(name)
+    state = resumed.init()
+    for estimate in searched[:5]:
+        state = resumed.learn(state, SCENE.frames(estimate.index), estimate)
+    for before in searched[5:]:
+        frames = SCENE.frames(before.index)
+        estimate = resumed.search(state, frames)
+        assert_same(estimate, before)
+        state = resumed.learn(state, frames, estimate)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_searching_teaches_nothing(name):
+    seeker = tracker(name)
+    state = seeker.init()
+    for index in range(2):
+        frames = SCENE.frames(index)
+        first = seeker.search(state, frames)
+        assert_same(seeker.search(state, frames), first)
+        state = seeker.learn(state, frames, first)
