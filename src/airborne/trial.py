@@ -19,10 +19,11 @@ from airborne.tracking.methods import Colour, Method, Prediction, Settings
 from airborne.tracking.stepping import VRule
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Steps = list[Annotated[float, Field(gt=0)]]
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class CameraTable(_Strict):
@@ -71,6 +72,8 @@ class StartTable(_Strict):
         given = [self.rotation_matrix, self.quaternion_xyzw, self.somersault_tilt_twist_deg]
         if sum(value is not None for value in given) != 1:
             raise ValueError("give rotation_matrix, quaternion_xyzw or somersault_tilt_twist_deg, one of them")
+        if self.quaternion_xyzw is not None and not any(self.quaternion_xyzw):
+            raise ValueError("quaternion_xyzw is all zeros; give x, y, z, w of a rotation, of any length above zero")
         if self.rotation_matrix is not None:
             R = np.array(self.rotation_matrix)
             if not np.allclose(R @ R.T, np.eye(3), atol=1e-3) or np.linalg.det(R) < 0:
@@ -126,8 +129,8 @@ class TrackTable(_Strict):
     prediction: Prediction = "smooth"
     colour: Colour = "normalised"  # stepping and simplex: paper B's score
     v_rule: VRule = "v_sym"  # stepping
-    steps_mm: list[float] = [50, 30, 20, 10, 10, 5, 5]  # stepping: one loop each
-    steps_deg: list[float] = [5, 3, 2, 1, 1, 0.5, 0.5]
+    steps_mm: Steps = [50, 30, 20, 10, 10, 5, 5]  # stepping: one loop each
+    steps_deg: Steps = [5, 3, 2, 1, 1, 0.5, 0.5]
     scale: Literal[1, 2, 4] = 1  # stepping and simplex: reduction of the pictures
 
     @model_validator(mode="after")
@@ -176,7 +179,8 @@ def read_trial(path: Path, track: dict[str, Any] | None = None, cameras: Sequenc
     """
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-        table["track"] = {**table.get("track", {}), **(track or {})}
+        if isinstance(settings := table.setdefault("track", {}), dict):
+            settings.update(track or {})
         trial = Trial.model_validate({**table, "folder": path.parent})
     except OSError as error:
         raise TrialError(f"{path}: cannot be read ({error.strerror}); give the path of a trial's TOML file") from error

@@ -19,7 +19,7 @@ from airborne.video import Frames, View
 
 SIZE = (320, 240)
 FPS = 50
-FINER, REACH = 4, 0.16  # drawn pixels a pixel; half the side of the square that holds the body, in focal lengths
+FINER, REACH = 3, 0.16  # drawn pixels a pixel; half the side of the square that holds the body, in focal lengths
 LIGHTS = Lights(0.6, (Lamp(np.array([3.0, -4.0, 5.0]), 0.4),))
 _light = np.linspace(0, 1, 1 << 14)
 _srgb = np.where(_light <= 0.0031308, 12.92 * _light, 1.055 * _light ** (1 / 2.4) - 0.055)

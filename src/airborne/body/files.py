@@ -8,18 +8,18 @@ from typing import Annotated, Literal
 
 import numpy as np
 import trimesh
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body.model import BodyModel, Box, Ellipsoid, Mesh, Part, Segment, Shape
 from airborne.errors import BodyError, one_line
 
-Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Channel = Annotated[float, Field(ge=0, le=255)]
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class _PartTable(_Strict):

@@ -16,9 +16,24 @@ from airborne.tracking.gauss_newton import Fit, Synthesis
 
 _NEAR_PX = 12  # of a full frame: body-like pixels this close to the mask's box should be in the mask
 _FEWEST_PX = 20  # a mask smaller than this does not count as seen
-GOOD_INSIDE, GOOD_FOUND = 0.8, 0.7
-_LOST_INSIDE, _LOST_FOUND = 0.5, 0.35
 _UNCERTAIN_SD_M = 0.05
+_NEWEST = 0.2  # share of the newest frame in what is usual
+# shares of the usual agreement, inside and found, below which ...
+_SEARCH, _UNCERTAIN, _LOST = (0.95, 0.92), (0.85, 0.8), (0.5, 0.4)
+
+
+@dataclass(frozen=True, slots=True)
+class Usual:
+    """The agreement of a body that is where it is said to be, in this recording."""
+
+    inside: float = 0.9
+    found: float = 0.9
+
+    def learned(self, agreed: Agreement) -> Usual:
+        """Follow the newest frame."""
+        return Usual(
+            (1 - _NEWEST) * self.inside + _NEWEST * agreed.inside, (1 - _NEWEST) * self.found + _NEWEST * agreed.found
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +45,13 @@ class Agreement:
     evidence: float  # sum over the mask [nats]
     n_views: int  # views in which the body is seen
 
-    @property
-    def is_good(self) -> bool:
-        """Whether there is no reason to look elsewhere."""
-        return self.inside >= GOOD_INSIDE and self.found >= GOOD_FOUND
+    def is_suspect(self, usual: Usual) -> bool:
+        """Whether it is worth looking elsewhere."""
+        return self.falls_short(usual, _SEARCH)
+
+    def falls_short(self, usual: Usual, shares: tuple[float, float]) -> bool:
+        """Whether less than these shares of the usual agreement, inside and found, are left."""
+        return self.inside < shares[0] * usual.inside or self.found < shares[1] * usual.found
 
 
 def agreement(
@@ -51,11 +69,11 @@ def agreement(
     return Agreement(inside / max(pixels, 1), inside / max(near, 1e-9), evidence, n_views)
 
 
-def status_of(fit: Fit, agreed: Agreement) -> Status:
-    """Judge a fit: lost, where less than half of the mask looks like the body or most of what does lies outside it."""
-    if agreed.n_views == 0 or agreed.inside < _LOST_INSIDE or agreed.found < _LOST_FOUND:
+def status_of(fit: Fit, agreed: Agreement, usual: Usual) -> Status:
+    """Judge a fit by how far its agreement lies below the usual one, and by its spread."""
+    if agreed.n_views == 0 or agreed.falls_short(usual, _LOST):
         return Status.LOST
     position_sd = np.sqrt(np.diag(fit.covariance)[:3])
-    if not agreed.is_good or np.any(position_sd > _UNCERTAIN_SD_M):
+    if agreed.falls_short(usual, _UNCERTAIN) or np.any(position_sd > _UNCERTAIN_SD_M):
         return Status.UNCERTAIN
     return Status.TRACKED

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import numpy as np
@@ -14,7 +14,7 @@ from airborne.tracking import predictors
 from airborne.tracking.appearance import Appearance, Region
 from airborne.tracking.estimate import Estimate, Status, lost
 from airborne.tracking.gauss_newton import FAR, NEAR, Fit, Synthesis, fit_pictures, fit_silhouettes
-from airborne.tracking.loss import Agreement, agreement, status_of
+from airborne.tracking.loss import Agreement, Usual, agreement, status_of
 from airborne.tracking.regions import regions_round
 from airborne.tracking.wide import Reach, search_widely
 from airborne.video import Frames
@@ -38,6 +38,7 @@ class RefinedState:
 
     past: tuple[tuple[Fraction, Pose], ...] = ()  # the last poses found, oldest first
     appearance: Appearance = field(default_factory=Appearance)
+    usual: Usual = field(default_factory=Usual)
 
 
 class Refined:
@@ -58,26 +59,30 @@ class Refined:
         poses = [predict(past, frames.time_s) for predict in self._predict] if past else [self._start]
         guesses = [self._synthesis.model.with_pose(pose) for pose in poses]
         fit, agreed = self._fit(guesses, frames, state.appearance, is_first=not past)
-        if past and (agreed is None or not agreed.is_good):
+        if past and (agreed is None or agreed.is_suspect(state.usual)):
             reach = Reach.after(float(frames.time_s - past[-1][0]))
             wide = search_widely(self._synthesis, guesses, frames, state.appearance, reach)
             again, agreed_again = self._fit(wide, frames, state.appearance, n_fitted=_FITTED_AFTER_SEARCH)
             if agreed_again is not None and (agreed is None or agreed_again.evidence > agreed.evidence):
                 fit, agreed = again, agreed_again
-        return _estimate(frames, fit, agreed)
+        return _estimate(frames, fit, agreed, state.usual)
 
     def learn(self, state: RefinedState, frames: Frames, estimate: Estimate) -> RefinedState:
         """Return the state after the frames, given where the body was found."""
         if estimate.pose is None:
             return state
-        body = self._synthesis.model.with_pose(estimate.pose)
-        if estimate.status is Status.TRACKED or not state.past:
-            for region in regions_round([body], self._synthesis.geometry, frames, _MARGIN_PX):
-                mask = self._synthesis.parts(body, region) >= 0
-                state.appearance.learn_colours(region, mask)
-                state.appearance.learn_scene(region, mask)
         past = (*state.past, (frames.time_s, estimate.pose))[-_REMEMBERED:]
-        return RefinedState(past, state.appearance)
+        if estimate.status is not Status.TRACKED and state.past:
+            return replace(state, past=past)
+        body, appearance = self._synthesis.model.with_pose(estimate.pose), state.appearance
+        regions = regions_round([body], self._synthesis.geometry, frames, _MARGIN_PX)
+        for region in regions:
+            mask = self._synthesis.parts(body, region) >= 0
+            appearance.learn_colours(region, mask)
+            appearance.learn_scene(region, mask)
+        known = [region for region in regions if appearance.knows(region)]
+        agreed = agreement(self._synthesis, body, known, [appearance.posterior(region) for region in known])
+        return RefinedState(past, appearance, state.usual.learned(agreed) if known else state.usual)
 
     def _fit(
         self,
@@ -139,8 +144,8 @@ class Refined:
         return supplemented
 
 
-def _estimate(frames: Frames, fit: Fit | None, agreed: Agreement | None) -> Estimate:
-    if fit is None or agreed is None or (status := status_of(fit, agreed)) is Status.LOST:
+def _estimate(frames: Frames, fit: Fit | None, agreed: Agreement | None, usual: Usual) -> Estimate:
+    if fit is None or agreed is None or (status := status_of(fit, agreed, usual)) is Status.LOST:
         return lost(frames.index, frames.time_s)
     return Estimate(
         index=frames.index,
