@@ -84,7 +84,7 @@ def test_method_is_refined_unless_told(folder):
 
 
 def test_lights_become_lamps(folder):
-    lamps = '[lights]\nambient = 0.3\n[[lights.lamp]]\nposition_m = [1, 2, 3]\nintensity = 0.5\n'
+    lamps = "[lights]\nambient = 0.3\n[[lights.lamp]]\nposition_m = [1, 2, 3]\nintensity = 0.5\n"
     spot = "[[lights.lamp]]\nposition_m = [1, 2, 3]\nintensity = 0.5\ndirection = [0, 0, -1]\nhalf_angle_deg = 30\n"
     lights = read(folder, GOOD + lamps + spot).settings.lights
     assert lights.ambient == 0.3

@@ -67,7 +67,9 @@ def test_file_says_segments_parts_places_and_colours(tmp_path):
     assert isinstance(upper.shape, Box) and isinstance(lower.shape, Ellipsoid)
     np.testing.assert_array_equal(upper.shape.size_m, [0.1, 0.2, 0.4])
     np.testing.assert_array_equal(upper.segment_from_part.translation, [0, 0.01, -0.2])
-    turns = [Rotation.from_rotvec(np.radians(angle) * axis) for angle, axis in zip((10, 20, 30), np.eye(3), strict=True)]
+    turns = [
+        Rotation.from_rotvec(np.radians(angle) * axis) for angle, axis in zip((10, 20, 30), np.eye(3), strict=True)
+    ]
     expected = turns[0] * turns[1] * turns[2]
     np.testing.assert_allclose(upper.segment_from_part.rotation.as_matrix(), expected.as_matrix(), atol=EXACT)
     np.testing.assert_array_equal(upper.colour, [10, 20, 30])

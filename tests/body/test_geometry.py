@@ -49,9 +49,7 @@ def test_areas_of_a_closed_surface_sum_to_nothing_and_its_normals_agree_with_the
         flat = geometry(body(shape))
         areas = np.array([area_vector(loop) for loop in loops(flat)])
         np.testing.assert_allclose(areas.sum(axis=0), 0, atol=ROUNDTRIP)
-        np.testing.assert_allclose(
-            flat.normals, areas / np.linalg.norm(areas, axis=1, keepdims=True), atol=ROUNDTRIP
-        )
+        np.testing.assert_allclose(flat.normals, areas / np.linalg.norm(areas, axis=1, keepdims=True), atol=ROUNDTRIP)
 
 
 def test_polygons_enclose_the_shapes_volume():

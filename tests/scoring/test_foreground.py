@@ -27,7 +27,9 @@ def histogram(*chances):
 def chance(picture, body, background, plate=None, sd=START_SD):
     """The posterior where every pixel's empty scene is `plate`, or unknown."""
     out = np.empty(SHAPE, np.float32)
-    mean = np.zeros((*SHAPE, 3), np.float32) if plate is None else np.broadcast_to(plate, (*SHAPE, 3)).astype(np.float32)
+    mean = (
+        np.zeros((*SHAPE, 3), np.float32) if plate is None else np.broadcast_to(plate, (*SHAPE, 3)).astype(np.float32)
+    )
     known = np.full(SHAPE, 0 if plate is None else 9, np.uint8)
     posterior(picture, body, background, mean, np.full(SHAPE, sd, np.float32), known, out)
     return out

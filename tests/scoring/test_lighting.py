@@ -3,31 +3,39 @@
 import numpy as np
 import pytest
 
-from airborne.scoring.lighting import TO_LIGHT, compose, fit_light, light_from_srgb, light_planes
+from airborne.scoring.lighting import TERMS, TO_LIGHT, compose, fit_light, light_from_srgb, light_planes
 from tests.tolerances import EXACT
 
 SHAPE = (40, 50)
 WHOLE = (0, 0, SHAPE[1], SHAPE[0])
-LIGHT = np.array([[0.6, 0.2, -0.1, -0.3], [0.5, 0.1, 0.05, -0.2], [0.7, -0.2, 0.1, -0.25]])
+LIGHT = np.array(  # even, by normal (3), by place (2)
+    [
+        [0.6, 0.2, -0.1, -0.3, 0.05, -0.03],
+        [0.5, 0.1, 0.05, -0.2, 0.0, 0.04],
+        [0.7, -0.2, 0.1, -0.25, -0.06, 0.02],
+    ]
+)
 ALBEDO = np.array([[0.8, 0.6, 0.1], [0.2, 0.3, 0.9]], np.float32)
 FOUND = 5e-3  # of the light: the fit holds its slopes back by a ten-thousandth
+FACET_PX = 5
 
 
 def body(seed=0):
-    """A mask of two parts with unit normals toward the camera, and its light as the model has it."""
+    """A mask of two parts whose many facets face the camera, and its light as the model has it."""
     rng = np.random.default_rng(seed)
-    normals = rng.normal(size=(3, *SHAPE))
+    normals = rng.normal(size=(3, SHAPE[0] // FACET_PX, SHAPE[1] // FACET_PX))
     normals[2] = -np.abs(normals[2])
-    normals /= np.linalg.norm(normals, axis=0)
+    normals = (normals / np.linalg.norm(normals, axis=0)).repeat(FACET_PX, axis=1).repeat(FACET_PX, axis=2)
     part = np.full(SHAPE, -1, np.int16)
     part[5:35, 5:25], part[5:35, 25:45] = 0, 1
-    shade = LIGHT[:, 0, None, None] + np.einsum("kq,qyx->kyx", LIGHT[:, 1:], normals)
-    observed = np.where(part >= 0, ALBEDO.T[:, part] * shade, 0.05)
+    v, u = (2 * np.indices(SHAPE) / np.array(SHAPE)[:, None, None]) - 1
+    terms = np.stack([np.ones(SHAPE), *normals, u, v])
+    observed = np.where(part >= 0, ALBEDO.T[:, part] * np.einsum("kq,qyx->kyx", LIGHT, terms), 0.05)
     return part, normals.astype(np.float32), observed.astype(np.float32)
 
 
 def even_light():
-    light = np.zeros((3, 4), np.float32)
+    light = np.zeros((3, TERMS), np.float32)
     light[:, 0] = 1
     return light
 
@@ -61,13 +69,23 @@ def test_noise_averages_out_and_its_size_is_told():
 def test_too_few_pixels_leave_the_light_as_it_was():
     part, normals, observed = body()
     few = np.full(SHAPE, -1, np.int16)
-    few[10, 10:23] = 0  # thirteen in a row: eleven within the border
+    few[10, 10:21] = 0
     light = even_light()
     assert fit_light(observed, few, normals, ALBEDO, light, 3, *WHOLE) == 1
     np.testing.assert_array_equal(light, even_light())
-    few[10, 10:24] = 0
+    few[10, 10:22] = 0
     fit_light(observed, few, normals, ALBEDO, light, 3, *WHOLE)
     assert np.abs(light - even_light()).max() > 0.05
+
+
+def test_mixed_pixels_at_the_borders_of_facets_hardly_count():
+    part, normals, observed = body()
+    y, x = np.indices(SHAPE)
+    is_border = (y % FACET_PX == 0) | (y % FACET_PX == FACET_PX - 1) | (x % FACET_PX == 0) | (x % FACET_PX == 4)
+    mixed = np.where(is_border, 0.8 * observed, observed).astype(np.float32)
+    light = even_light()
+    fit_light(mixed, part, normals, ALBEDO, light, 8, *WHOLE)
+    np.testing.assert_allclose(light, LIGHT, atol=0.03)
 
 
 def test_only_the_window_is_looked_at():

@@ -177,4 +177,3 @@ def worst(scene: Scene, estimates: Sequence[Estimate]) -> tuple[float, float]:
 
 def statuses(estimates: Sequence[Estimate]) -> list[str]:
     return [str(estimate.status) for estimate in estimates]
-

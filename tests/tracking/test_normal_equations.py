@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import correlate1d, gaussian_filter
 
-from airborne.scoring.lighting import TO_LIGHT, light_planes
 from airborne.rendering.maps import empty_maps
+from airborne.scoring.lighting import TERMS, TO_LIGHT, light_planes
 from airborne.tracking.gauss_newton import Synthesis
 from airborne.tracking.normal_equations import (
     RADIUS_PX,
@@ -79,7 +79,7 @@ class Filmed:
         light_planes(self._region.rgb, TO_LIGHT, self._observed)
         background = self._region.crop(scene.backgrounds[0]).transpose(2, 0, 1)
         self._scene = np.ascontiguousarray(background, np.float32)
-        self._light = np.zeros((3, 4), np.float32)
+        self._light = np.zeros((3, TERMS), np.float32)
         self._light[:, 0] = 1
         self.photometric(self.truth, rounds=5)
 

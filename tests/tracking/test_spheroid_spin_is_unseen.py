@@ -32,5 +32,8 @@ def test_spindle_shows_where_its_axis_points_and_not_its_spin():
 
 def test_unseen_spin_stays_as_it_was():
     scene = Scene(model=BALL)
-    turned = [estimate.pose.world_from_root.rotation * scene.start().world_from_root.rotation.inv() for estimate in track(scene, range(3))]
+    turned = [
+        estimate.pose.world_from_root.rotation * scene.start().world_from_root.rotation.inv()
+        for estimate in track(scene, range(3))
+    ]
     assert max(rotation.magnitude() for rotation in turned) < 1e-6

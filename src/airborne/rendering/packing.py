@@ -31,6 +31,14 @@ def packed_view(camera: Camera, *, transposed: bool = False) -> NDArray:
     return np.concatenate([camera_from_world[:, :3].ravel(), camera_from_world[:, 3], ray_from_px.ravel()])
 
 
+def moved_view(view: NDArray, x0: float, y0: float) -> NDArray:
+    """Return the packed view (18,) of the image that begins at pixel (x0, y0) of this one."""
+    moved = view.copy()
+    moved[14] += view[12] * x0 + view[13] * y0
+    moved[17] += view[15] * x0 + view[16] * y0
+    return moved
+
+
 @lru_cache(maxsize=256)
 def packed_lights(lights: Lights, camera: Camera, *, transposed: bool = False) -> NDArray[np.float32]:
     """Pack the lamps for one camera: position, intensity, axis, cosine of the half angle, in camera axes: (l, 8)."""

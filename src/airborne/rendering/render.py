@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from airborne.body import Geometry, PosedBody
 from airborne.cameras import Camera
 from airborne.rendering.lights import Lights
-from airborne.rendering.packing import packed_lights, packed_view
+from airborne.rendering.packing import moved_view, packed_lights, packed_view
 from airborne.rendering.rows import (
     BLOCK,
     BLUE,
@@ -65,9 +65,7 @@ def render(
     width, height = camera.size
     x0, y0, x1, y1 = region or (0, 0, width, height)
     x0, y0, x1, y1 = max(x0, 0), max(y0, 0), min(x1, width), min(y1, height)
-    view = packed_view(camera).copy()
-    view[VIEW_K + 2] += view[VIEW_K] * x0 + view[VIEW_K + 1] * y0
-    view[VIEW_K + 5] += view[VIEW_K + 3] * x0 + view[VIEW_K + 4] * y0
+    view = moved_view(packed_view(camera), x0, y0)
     size = (max(y1 - y0, 0), max(x1 - x0, 0))
     part, segment = np.full(size, -1, np.int16), np.full(size, -1, np.int16)
     inverse_depth, colour = np.zeros(size, np.float32), np.zeros((*size, 3), np.float32)

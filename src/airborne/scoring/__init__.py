@@ -1,1 +1,21 @@
-"""."""
+"""Scoring: in come pictures and masks as plain arrays, out come chances, light and the empty scene.
+
+Knows no body, no camera and no search.
+"""
+
+from airborne.scoring.foreground import agreement, count_colours, posterior
+from airborne.scoring.lighting import compose, fit_light, light_from_srgb, light_planes
+from airborne.scoring.plate import Plate, fill, look
+
+__all__ = [
+    "Plate",
+    "agreement",
+    "compose",
+    "count_colours",
+    "fill",
+    "fit_light",
+    "light_from_srgb",
+    "light_planes",
+    "look",
+    "posterior",
+]

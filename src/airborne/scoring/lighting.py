@@ -13,7 +13,7 @@ _srgb = np.arange(1024) / 1023
 TO_LIGHT = np.where(_srgb <= 0.04045, _srgb / 12.92, ((_srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
 _RIDGE = 1e-4  # pull of the direction-dependent part toward zero, per pixel of unit albedo
 TERMS = 6  # even light, normal (3), place in the picture (2)
-_MOST_SAMPLES = 600
+_MOST_SAMPLES = 400
 _BORDER_TRUST = np.float32(0.02)  # weight of a mixed pixel: it speaks only for faces that have no other
 _SAME_FACE = 0.9  # cosine between neighbouring normals
 
@@ -36,9 +36,9 @@ def light_planes(image, table, out):
 
 @njit(cache=True, nogil=True, fastmath=True)
 def fit_light(observed, part, normals, albedo, coefficients, rounds, x0, y0, x1, y1):
-    """Fit coefficients (3, 4) in place so that albedo * (a + b . n) is the observed light inside the mask.
+    """Fit coefficients (3, TERMS) in place so that albedo * (a + b . n + c . place) is the light seen inside the mask.
 
-    observed (3, h, w) linear light, part (h, w) index or -1, normals (3, h, w) unit, albedo (parts, 3); only the window
+    place (2,) runs from -1 to 1 over the picture. observed (3, h, w) linear light, part (h, w) index or -1, normals (3, h, w) unit, albedo (parts, 3); only the window
     x0 <= x < x1, y0 <= y < y1 is looked at. Pixels at a border of the mask or of a face are mixed and count little. Under
     twelve pixels, the coefficients stay. Returns the robust sd of what stays unexplained.
     """
@@ -90,12 +90,14 @@ def fit_light(observed, part, normals, albedo, coefficients, rounds, x0, y0, x1,
                 weight *= weight * own[j, k] * trust[j]
                 for p in range(TERMS):
                     right[p] += weight * rows[j, p] * seen[j, k]
-                    for r in range(TERMS):
+                    for r in range(p + 1):
                         normal_matrix[p, r] += weight * own[j, k] * rows[j, p] * rows[j, r]
             trace = normal_matrix[0, 0]
             normal_matrix[0, 0] += 1e-9
             for p in range(1, TERMS):
                 normal_matrix[p, p] += _RIDGE * trace + 1e-9
+                for r in range(p):
+                    normal_matrix[r, p] = normal_matrix[p, r]
             solved = np.linalg.solve(normal_matrix, right)
             for p in range(TERMS):
                 coefficients[k, p] = solved[p]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Box, Geometry, PosedBody, geometry
 from airborne.body.symmetry import continuous_axes
+from airborne.cameras import Camera
 from airborne.rendering.maps import empty_maps, surface_maps
 from airborne.rendering.packing import packed_view
 from airborne.rendering.shapes import new_shapes
@@ -35,7 +36,7 @@ _CLIP = 0.1  # linear light, 0..1: a residual this large counts a quarter
 _OVERSTEP = 1.6  # robust weights and refitted light make each step about this much too short
 _SHIFT_SD_PX = 0.12  # of a full frame: what light and edges that are not quite as modelled may displace a picture by
 _MOST_STEPS = 12
-_SETTLED = 0.5  # squared length of the last step, in sds of the pose
+_SETTLED = 2.0  # squared length of the last step, in sds of the pose
 _PRIOR_SD = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])  # [m], [rad]: keeps what the pictures do not show where it is
 
 
@@ -92,7 +93,7 @@ def fit_silhouettes(
     correlated = 4 * np.pi * _COARSE_SIGMA_PX**2
     body = synthesis.shapes, synthesis.geometry
     for reduction, steps in levels:
-        views = [_reduced(region, posterior, reduction) for region, posterior in zip(regions, posteriors, strict=True)]
+        views = [_silhouette_view(*each, reduction) for each in zip(regions, posteriors, strict=True)]
         for _ in range(steps):
             sums, totals = Sums.zero(), np.zeros(2)
             for view in views:
@@ -144,22 +145,21 @@ def _photometric_view(region: Region, appearance: Appearance) -> tuple[tuple, Ar
     return (region.packed, region.camera.K, observed, scene, certainty), light, empty_maps(region.camera.size)
 
 
-def _reduced(region: Region, posterior: Array, reduction: int) -> tuple:
-    """Reduce a region by area averaging to about square pixels."""
+def reduced_region(region: Region, plane: Array, reduction: int) -> tuple[Camera, NDArray[np.float32]]:
+    """Reduce a plane (h, w) of a region by averaging areas to about square pixels; return its camera and itself."""
     rows = max(1, round(reduction * region.aspect))
-    height, width = posterior.shape
+    height, width = plane.shape
     size = (max(width // reduction, 1), max(height // rows, 1))
-    whole = posterior[: size[1] * rows, : size[0] * reduction]
-    plane = cv2.resize(whole, size, interpolation=cv2.INTER_AREA)
-    camera = region.camera.resampled(scale=(reduction, rows), offset=((reduction - 1) / 2, (rows - 1) / 2), size=size)
-    return (
-        packed_view(camera),
-        camera.K,
-        plane,
-        np.zeros((1, *plane.shape), np.float32),
-        np.ones_like(plane),
-        empty_maps(size),
-    )
+    small = cv2.resize(plane[: size[1] * rows, : size[0] * reduction], size, interpolation=cv2.INTER_AREA)
+    middle = ((reduction - 1) / 2, (rows - 1) / 2)
+    return region.camera.resampled(scale=(reduction, rows), offset=middle, size=size), small
+
+
+def _silhouette_view(region: Region, posterior: Array, reduction: int) -> tuple:
+    """Make a reduced region ready: packed view, K, posterior, black, certainty, maps."""
+    camera, plane = reduced_region(region, posterior, reduction)
+    black, certainty = np.zeros((1, *plane.shape), np.float32), np.ones_like(plane)
+    return packed_view(camera), camera.K, plane, black, certainty, empty_maps(camera.size)
 
 
 def _mean_square(totals: Array) -> float:

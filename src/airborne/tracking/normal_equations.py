@@ -238,7 +238,7 @@ def photometric_equations(
     """Add one view's normal equations of `blurred observed - blurred composite`; see `accumulate`.
 
     observed, scene (3, h, w): linear light of the picture and of the empty scene; albedo (parts, 3) linear and
-    is_faceted (parts,): see `compose`; light (3, 4) the view's fitted light, refitted in place by `rounds` robust
+    is_faceted (parts,): see `compose`; light (3, TERMS) the view's fitted light, refitted in place by `rounds` robust
     rounds. Returns (weighted squared residual, weight).
     """
     part, inverse_depth, normals = maps

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import Geometry, PosedBody
-from airborne.rendering.packing import packed_view
+from airborne.rendering.packing import moved_view, packed_view
 from airborne.tracking.appearance import Region
 from airborne.video import Frames, View
 
@@ -35,11 +35,12 @@ def outermost_points(body: PosedBody, geometry: Geometry) -> NDArray:
 
 
 def _region(view: View, points: NDArray, margin_px: float) -> Region | None:
-    camera = view.camera
-    px = camera.px_from_world(points)
-    px = px[np.isfinite(px).all(axis=1)]
-    if not len(px):
+    camera, packed = view.camera, packed_view(view.camera)
+    xyz = points @ packed[:9].reshape(3, 3).T + packed[9:12]
+    xyz = xyz[xyz[:, 2] > 0]
+    if not len(xyz):
         return None
+    px = (xyz[:, :2] / xyz[:, 2:]) @ camera.K[:2, :2].T + camera.K[:2, 2]
     margin = margin_px * np.array([1, camera.K[1, 1] / camera.K[0, 0]])
     size = np.array(camera.size)
     low = np.clip(np.floor(px.min(axis=0) - margin), 0, size).astype(int)
@@ -55,5 +56,5 @@ def _region(view: View, points: NDArray, margin_px: float) -> Region | None:
         rgb=np.ascontiguousarray(view.rgb[y0 : y0 + height, x0 : x0 + width]),
         picture=view.rgb,
         source=(camera.name, camera.K.tobytes()),
-        packed=packed_view(own),
+        packed=moved_view(packed, x0, y0),
     )
