@@ -1,5 +1,7 @@
 """Trial files: what is read, and what is refused in one line."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -198,9 +200,9 @@ def test_value_where_a_table_belongs_is_refused(folder, wrong):
     key = wrong.split()[0]
     lines = [line for line in GOOD.splitlines() if line]
     starts = [i for i, line in enumerate(lines) if line.startswith("[")] + [len(lines)]
-    kept = [lines[a:b] for a, b in zip(starts, starts[1:], strict=False) if lines[a].strip("[]") != key]
-    text = "\n".join([lines[0], wrong, *sum(kept, [])])
-    assert f"{key}" in complaint(folder, text)
+    kept = [lines[a:b] for a, b in pairwise(starts) if lines[a].strip("[]") != key]
+    text = "\n".join([lines[0], wrong, *(line for table in kept for line in table)])
+    assert key in complaint(folder, text)
 
 
 def test_empty_missing_or_binary_file_is_refused(folder):

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
 from rich.console import Console
@@ -16,6 +15,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from airborne import __version__
 from airborne.errors import AirborneError
+
+if TYPE_CHECKING:
+    from airborne.pipeline import Run
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -37,11 +39,14 @@ def main() -> None:
     try:
         app(standalone_mode=True)
     except AirborneError as error:
-        errors.print(f"airborne: {error}", style="red", markup=False)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        errors.print("airborne: stopped; the frames finished so far are in the output folder, --resume goes on")
-        sys.exit(130)
+        _refuse(str(error))
+    except OSError as error:
+        _refuse(f"{error.filename or 'a file'}: {error.strerror or error}; give a path that can be read or written")
+
+
+def _refuse(reason: str) -> NoReturn:
+    errors.print(f"airborne: {reason}", style="red", markup=False)
+    sys.exit(2)
 
 
 @app.callback(invoke_without_command=True)
@@ -62,12 +67,26 @@ def demo(
     """
     from airborne.examples import example_trial
 
-    shutil.rmtree(output, ignore_errors=True)
     trial = example_trial("thrown_cross")
-    _track(trial, output, resume=False, pictures=True, as_json=False)
+    _forget_demo(trial, output)
+    run = _track(trial, output, resume=False, pictures=True)
+    if not as_json:
+        print(_in_short(run.summary))
     evaluate(output, trial.parent / "truth.csv", trial.parent / "digitised.csv", as_json=as_json)
     if not as_json:
         print(f"report: {output / 'report.html'}")
+
+
+def _forget_demo(path: Path, output: Path) -> None:
+    """Let the demo be run again in its own folder; a folder with any other run is left alone."""
+    from airborne.pipeline import inputs_of
+    from airborne.trial import read_trial
+
+    trial, record = read_trial(path), output / "run.json"
+    if record.is_file():
+        known = json.loads(record.read_text(encoding="utf-8"))
+        if known.get("inputs") == inputs_of(trial) and known.get("track") == trial.track.model_dump():
+            (output / "motion.csv").unlink(missing_ok=True)
 
 
 @app.command()
@@ -86,7 +105,11 @@ def track(
     Example: airborne track trial.toml -o results
     """
     changes = {key: value for key, value in (("method", method), ("every", every)) if value is not None}
-    _track(trial, output, resume=resume, pictures=pictures, as_json=as_json, changes=changes, cameras=cameras)
+    run = _track(trial, output, resume=resume, pictures=pictures, changes=changes, cameras=cameras)
+    if as_json:
+        print((output / "summary.json").read_text(encoding="utf-8"), end="")
+    else:
+        print(f"{_in_short(run.summary)}\nresults: {output}")
 
 
 def _track(
@@ -95,29 +118,28 @@ def _track(
     *,
     resume: bool,
     pictures: bool,
-    as_json: bool,
     changes: dict | None = None,
     cameras: str | None = None,
-) -> None:
+) -> Run:
     from airborne import pipeline
     from airborne.trial import read_trial
 
-    trial = read_trial(path, changes or {}, None if cameras is None else cameras.split(","))
-    with _progress(f"tracking {trial.name}") as report:
-        run = pipeline.track(trial, output, resume=resume, pictures=pictures, progress=report)
-    if as_json:
-        print((output / "summary.json").read_text(encoding="utf-8"))
-        return
-    print(_in_short(run.summary))
-    print(f"results: {output}")
+    names = None if cameras is None else [name.strip() for name in cameras.split(",")]
+    trial = read_trial(path, changes or {}, names)
+    try:
+        with _progress(f"tracking {trial.name}") as report:
+            return pipeline.track(trial, output, resume=resume, pictures=pictures, progress=report)
+    except KeyboardInterrupt:
+        errors.print(f"airborne: stopped; the frames found so far are in {output}; --resume goes on", markup=False)
+        raise typer.Exit(130) from None
 
 
 def _in_short(summary: dict) -> str:
     counts = ", ".join(f"{summary[f'n_{status}']} {status}" for status in ("tracked", "uncertain", "lost"))
     lines = [f"{summary['n_frames']} frames at {summary['rate_hz']:.5g} Hz: {counts}"]
     lines.append(
-        f"median sd: {summary['median_position_sd_mm']:.2g} mm, {summary['median_rotation_sd_deg']:.2g} degrees "
-        "(noise and model; not calibration)"
+        f"median sd: {summary['median_position_sd_mm']:.2g} mm, {summary['median_rotation_sd_deg']:.2g} degrees; "
+        "summary.json says which errors it holds"
     )
     lines += [f"note: {text}" for text in [*summary["warnings"], *summary["events"]]]
     return "\n".join(lines)
@@ -218,6 +240,6 @@ def bench(as_json: Json = False) -> None:
 def _progress(what: str) -> Iterator:
     """Show a bar on stderr while frames go by."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=errors, transient=True) as bar:
+    with Progress(*columns, console=errors, transient=True, disable=not errors.is_terminal) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)

@@ -67,7 +67,7 @@ def test_noise_averages_out_and_its_size_is_told():
 
 
 def test_too_few_pixels_leave_the_light_as_it_was():
-    part, normals, observed = body()
+    _, normals, observed = body()
     few = np.full(SHAPE, -1, np.int16)
     few[10, 10:21] = 0
     light = even_light()

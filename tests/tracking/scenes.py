@@ -47,7 +47,7 @@ SPINDLE = rigid_body(part("spindle", Ellipsoid(np.array([0.12, 0.12, 0.35])), (0
 
 
 def camera(name: str, turn: float, focal_px: float = 400.0) -> Camera:
-    """A camera 4 m from the place of the throw, `turn` [rad] round the vertical; 100 px a metre unless told otherwise."""
+    """A camera 4 m from the place of the throw, `turn` [rad] round the vertical; 100 px a metre by default."""
     centre, target = np.array([4 * np.sin(turn), -4 * np.cos(turn), 1.9]), np.array([0.0, 0.0, 1.4])
     z = (target - centre) / np.linalg.norm(target - centre)
     x = np.cross(z, [0, 0, 1.0]) / np.linalg.norm(np.cross(z, [0, 0, 1.0]))

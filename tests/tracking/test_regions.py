@@ -24,7 +24,7 @@ def regions(*bodies, frames=None):
 
 
 def test_region_is_a_crop_whose_camera_sees_the_same_points_at_the_same_pixels():
-    points = np.random.default_rng(0).normal(0, 0.3, (20, 3)) + [0, 0, 1.4]
+    points = np.random.default_rng(0).normal([0, 0, 1.4], 0.3, (20, 3))
     for region, view in zip(regions(posed()), SCENE.frames(0).views, strict=True):
         x0, y0 = region.corner
         width, height = region.camera.size

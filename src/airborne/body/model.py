@@ -73,7 +73,7 @@ class Pose:
     joint_angles: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (segments - 1, 3) x-y-z [rad]
 
     def moved(self, translation_m: Array, rotation_vector: Array) -> Pose:
-        """Return the pose moved by a world translation (3,) [m] and turned about its root by a world vector (3,) [rad]."""
+        """Return the pose moved by (3,) [m] and turned about its root by a rotation vector (3,) [rad], world axes."""
         root = self.world_from_root
         turned = RigidTransform.from_components(
             root.translation + translation_m, Rotation.from_rotvec(rotation_vector) * root.rotation
@@ -153,7 +153,7 @@ class PosedBody:
     t: Array  # (segments, 3) world from segment, translations [m]
 
     def moved(self, motion: Array) -> PosedBody:
-        """Move the whole body: motion (6,) is a translation [m] and a turn about the root's origin [rad], world axes."""
+        """Move the whole body: motion (6,) is a translation [m], a turn about the root's origin [rad], world axes."""
         turn = Rotation.from_rotvec(motion[3:]).as_matrix()
         return PosedBody(self.model, turn @ self.R, (self.t - self.t[0]) @ turn.T + self.t[0] + motion[:3])
 

@@ -26,7 +26,7 @@ def light_from_srgb(colours):
 
 @njit(cache=True, nogil=True, fastmath=True)
 def light_planes(image, table, out):
-    """Turn an image (h, w, 3), sRGB 0..255 of any type, into planes (3, h, w) by a table of 1024 entries (`TO_LIGHT`)."""
+    """Turn an image (h, w, 3), sRGB 0..255 of any type, into planes (3, h, w) by a table of 1024 (`TO_LIGHT`)."""
     h, w, _ = image.shape
     for k in range(3):
         for y in range(h):
@@ -38,9 +38,10 @@ def light_planes(image, table, out):
 def fit_light(observed, part, normals, albedo, coefficients, rounds, x0, y0, x1, y1):
     """Fit coefficients (3, TERMS) in place so that albedo * (a + b . n + c . place) is the light seen inside the mask.
 
-    place (2,) runs from -1 to 1 over the picture. observed (3, h, w) linear light, part (h, w) index or -1, normals (3, h, w) unit, albedo (parts, 3); only the window
-    x0 <= x < x1, y0 <= y < y1 is looked at. Pixels at a border of the mask or of a face are mixed and count little. Under
-    twelve pixels, the coefficients stay. Returns the robust sd of what stays unexplained.
+    place (2,) runs from -1 to 1 over the picture. observed (3, h, w) linear light, part (h, w) index or -1, normals
+    (3, h, w) unit, albedo (parts, 3); only the window x0 <= x < x1, y0 <= y < y1 is looked at. Pixels at a border of
+    the mask or of a face are mixed and count little. Under twelve pixels, the coefficients stay. Returns the robust sd
+    of what stays unexplained.
     """
     inside = 0
     for y in range(y0, y1):

@@ -47,7 +47,7 @@ def look(rgb, covered, mean, sd, looks):
 
 @njit(cache=True, nogil=True, fastmath=True)
 def fill(mean, looks, out):
-    """Copy mean (h, w, 3) to out, growing known pixels into never-seen ones, ring by ring. Returns False if none is known."""
+    """Copy mean (h, w, 3) to out, growing known pixels into unseen ones, ring by ring; False if none is known."""
     h, w, _ = mean.shape
     done = np.zeros((h, w), np.uint8)
     queue = np.empty(h * w, np.int32)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
 
+SHIFT_SD_PX = 0.12  # of a full frame: light and edges that are not quite as modelled may displace a picture by this
 _LEVER_M = 0.3  # the length that makes metres and radians comparable
 _UNSEEN_SD_M = 0.15  # a direction known less well than this, at the lever's length, is not known
 

@@ -6,7 +6,7 @@ A pose is a vector of six numbers: x, y, z [m], somersault, tilt, twist [rad].
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import numpy as np
@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import BodyModel, Pose, geometry
+from airborne.body import BodyModel, Pose, PosedBody, geometry
+from airborne.cameras import Camera
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.rendering import FLAT, Lights, ScoreRule, Targets, measure, render, score, targets
+from airborne.rendering.packing import moved_view
 from airborne.rendering.sums import PIXELS
 from airborne.tracking.appearance import Appearance
-from airborne.tracking.covariance import covariance_of
+from airborne.tracking.covariance import SHIFT_SD_PX, covariance_of
 from airborne.tracking.estimate import Estimate, Status, lost
 from airborne.tracking.regions import regions_round
 from airborne.tracking.stepping import VRule, stepping
@@ -90,7 +92,7 @@ class Direct:
     def search(self, state: DirectState, frames: Frames) -> Estimate:
         """Find the body in the frames."""
         start = self._predict(state.past, frames.time_s) if state.past else self._start
-        seen = self._targets(state, start, frames)
+        seen, cameras = self._targets(state, start, frames)
         if not len(seen.views) or not np.isfinite(self._objective(seen)(_vector(start)[None])[0]):
             return lost(frames.index, frames.time_s)
         objective = self._objective(seen)
@@ -108,7 +110,7 @@ class Direct:
             status=status,
             score=value,
             pose=pose,
-            covariance=self._covariance(seen, pose, value, float(pixels.sum())),
+            covariance=self._covariance(seen, cameras, pose, value, float(pixels.sum())),
             n_views=int(np.count_nonzero(pixels)),
         )
 
@@ -132,9 +134,11 @@ class Direct:
         turns = matrix_from_angles(vectors[:, 3:])[:, None]
         return turns @ self._at_origin.R, (turns @ self._at_origin.t[..., None])[..., 0] + vectors[:, None, :3]
 
-    def _targets(self, state: DirectState, start: Pose, frames: Frames) -> Targets:
+    def _targets(self, state: DirectState, start: Pose, frames: Frames) -> tuple[Targets, list[Camera]]:
+        """Lay out the views to compare with; "union" needs those whose colours are known."""
         if not self._rule.counts_missed:
-            return targets(frames.views, self._lights, scale=self._scale)
+            views = [view for view in frames.views if view is not None]
+            return targets(views, self._lights, scale=self._scale), [view.camera for view in views]
         appearance = state.appearance
         if not state.past:
             appearance = Appearance()
@@ -147,30 +151,51 @@ class Direct:
             region, whole = known[view.camera.name], np.full(view.rgb.shape[:2], -1, np.float32)
             region.crop(whole)[:] = appearance.posterior(region) - 0.5
             maps.append(whole)
-        return targets(views, self._lights, scale=self._scale, evidence=maps or None)
+        laid_out = targets(views, self._lights, scale=self._scale, evidence=maps or None)
+        return laid_out, [view.camera for view in views]
 
     def _learn_colours(self, appearance: Appearance, pose: Pose, frames: Frames) -> None:
         posed = self._model.with_pose(pose)
         for region in regions_round([posed], self._geometry, frames, _MARGIN_PX):
             appearance.learn_colours(region, render(self._geometry, posed, region.camera, FLAT).mask)
 
-    def _covariance(self, seen: Targets, pose: Pose, value: float, pixels: float) -> Array:
-        """Return the covariance of position and world rotation from the curvature of the squared score."""
+    def _covariance(self, seen: Targets, cameras: Sequence[Camera], pose: Pose, value: float, pixels: float) -> Array:
+        """Return the covariance of position and world rotation from the curvature of the squared score.
+
+        n |r|^2 / (2 s^2) is the log-likelihood of n independent pixels; s^2 is the score's own square.
+        """
         posed = self._model.with_pose(pose)
         rows, columns = np.triu_indices(6)
         i, j = np.eye(6)[rows] * _PROBE, np.eye(6)[columns] * _PROBE
-        motions = np.concatenate([i + j, i - j, j - i, -i - j])
+        squared = self._squared(seen, posed, np.concatenate([i + j, i - j, j - i, -i - j])).reshape(4, -1)
+        gradient = self._gradient(seen, posed)
+        if not (np.isfinite(squared).all() and np.isfinite(gradient).all()):  # at the pictures' edge
+            return np.diag(np.full(6, np.inf))
+        curvature = np.zeros((6, 6))
+        second = (squared[0] - squared[1] - squared[2] + squared[3]) / (4 * _PROBE[rows] * _PROBE[columns])
+        curvature[rows, columns] = curvature[columns, rows] = second
+        spread = np.zeros((6, 6))
+        for number, camera in enumerate(cameras):
+            sd_px = np.hypot(SHIFT_SD_PX, camera.shift_sd_px) / self._scale
+            for x0, y0 in ((sd_px, 0), (0, sd_px)):
+                views = seen.views.copy()
+                views[number] = moved_view(views[number], x0, y0)
+                change = np.nan_to_num(self._gradient(replace(seen, views=views), posed) - gradient)
+                spread += np.outer(change, change)
+        likelihood = pixels / (2 * max(value, 1e-3) ** 2)
+        shared = max(_SHARED_NOISE_PX / self._scale**2, 1)
+        return covariance_of(curvature * likelihood, noise=shared, spread=spread * likelihood**2)
+
+    def _gradient(self, seen: Targets, posed: PosedBody) -> Array:
+        steps = np.diag(_PROBE)
+        squared = self._squared(seen, posed, np.concatenate([steps, -steps])).reshape(2, 6)
+        return (squared[0] - squared[1]) / (2 * _PROBE)
+
+    def _squared(self, seen: Targets, posed: PosedBody, motions: Array) -> Array:
+        """Return the squared score (n,) of a body moved by motions (n, 6)."""
         moved = [posed.moved(motion) for motion in motions]
         R, t = np.stack([p.R for p in moved]), np.stack([p.t for p in moved])
-        squared = score(self._geometry, seen, R, t, self._rule).reshape(4, -1) ** 2
-        if not np.isfinite(squared).all():  # at the pictures' edge
-            return np.diag(np.full(6, np.inf))
-        second = (squared[0] - squared[1] - squared[2] + squared[3]) / (4 * _PROBE[rows] * _PROBE[columns])
-        curvature = np.zeros((6, 6))
-        curvature[rows, columns] = curvature[columns, rows] = second
-        # n |r|^2 / (2 s^2) is the log-likelihood of n independent pixels; s^2 is the score's own square
-        shared = max(_SHARED_NOISE_PX / self._scale**2, 1)
-        return covariance_of(curvature * pixels / (2 * max(value, 1e-3) ** 2), noise=shared)
+        return score(self._geometry, seen, R, t, self._rule) ** 2
 
 
 def _status(value: float, scores: Sequence[float]) -> Status:

@@ -24,17 +24,18 @@ from airborne.rendering.shapes import new_shapes
 from airborne.scoring.lighting import TERMS, TO_LIGHT, light_from_srgb, light_planes
 from airborne.scoring.plate import START_SD, fill
 from airborne.tracking.appearance import Appearance, Region
-from airborne.tracking.covariance import covariance_of
+from airborne.tracking.covariance import SHIFT_SD_PX, covariance_of
 from airborne.tracking.normal_equations import Sums, gaussian_taps, photometric_equations, silhouette_equations
 
 Array = NDArray[np.floating]
+Levels = Sequence[tuple[int, int]]
 
-FAR, NEAR = ((8, 5), (4, 4), (2, 3)), ((4, 2), (2, 2))  # reduction of the picture, iterations
+# reduction of the picture, iterations
+FAR, NEAR, CLOSE = ((8, 5), (4, 4), (2, 3)), ((4, 2), (2, 2)), ((2, 2),)
 _COARSE_SIGMA_PX = 1.2  # of the reduced picture
 _FINE_SIGMA_PX = 1.2  # of a full frame
 _CLIP = 0.1  # linear light, 0..1: a residual this large counts a quarter
 _OVERSTEP = 1.6  # robust weights and refitted light make each step about this much too short
-_SHIFT_SD_PX = 0.12  # of a full frame: what light and edges that are not quite as modelled may displace a picture by
 _MOST_STEPS = 12
 _SETTLED = 2.0  # squared length of the last step, in sds of the pose
 _PRIOR_SD = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])  # [m], [rad]: keeps what the pictures do not show where it is
@@ -86,7 +87,7 @@ def fit_silhouettes(
     posed: PosedBody,
     regions: Sequence[Region],
     posteriors: Sequence[Array],
-    levels: Sequence[tuple[int, int]] = NEAR,
+    levels: Levels,
 ) -> PosedBody:
     """Move the body until its masks agree with the posteriors (h, w) of the regions, from coarse to fine."""
     taps = gaussian_taps(_COARSE_SIGMA_PX)
@@ -109,7 +110,7 @@ def fit_pictures(synthesis: Synthesis, posed: PosedBody, regions: Sequence[Regio
     rows_sigma_px = [max(_FINE_SIGMA_PX * region.aspect, 0.5) for region in regions]
     taps = [(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma)) for sigma in rows_sigma_px]
     correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px))
-    shifts_px = [np.hypot(_SHIFT_SD_PX, r.camera.shift_sd_px) * np.array([1, r.aspect]) for r in regions]
+    shifts_px = [np.hypot(SHIFT_SD_PX, r.camera.shift_sd_px) * np.array([1, r.aspect]) for r in regions]
     body, paint = (synthesis.shapes, synthesis.geometry), (synthesis.albedo, synthesis.is_faceted)
     for step in range(1, _MOST_STEPS + 1):
         sums, totals, spread = Sums.zero(), np.zeros(2), np.zeros((6, 6))

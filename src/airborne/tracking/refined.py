@@ -13,7 +13,7 @@ from airborne.body import BodyModel, Pose, PosedBody
 from airborne.tracking import predictors
 from airborne.tracking.appearance import Appearance, Region
 from airborne.tracking.estimate import Estimate, Status, lost
-from airborne.tracking.gauss_newton import FAR, NEAR, Fit, Synthesis, fit_pictures, fit_silhouettes
+from airborne.tracking.gauss_newton import CLOSE, FAR, NEAR, Fit, Levels, Synthesis, fit_pictures, fit_silhouettes
 from airborne.tracking.loss import Agreement, Usual, agreement, status_of
 from airborne.tracking.regions import regions_round
 from airborne.tracking.wide import Reach, search_widely
@@ -58,11 +58,11 @@ class Refined:
         past = state.past
         poses = [predict(past, frames.time_s) for predict in self._predict] if past else [self._start]
         guesses = [self._synthesis.model.with_pose(pose) for pose in poses]
-        fit, agreed = self._fit(guesses, frames, state.appearance, is_first=not past)
+        fit, agreed = self._fit(guesses, frames, state, is_first=not past)
         if past and (agreed is None or agreed.is_suspect(state.usual)):
             reach = Reach.after(float(frames.time_s - past[-1][0]))
             wide = search_widely(self._synthesis, guesses, frames, state.appearance, reach)
-            again, agreed_again = self._fit(wide, frames, state.appearance, n_fitted=_FITTED_AFTER_SEARCH)
+            again, agreed_again = self._fit(wide, frames, state, n_fitted=_FITTED_AFTER_SEARCH)
             if agreed_again is not None and (agreed is None or agreed_again.evidence > agreed.evidence):
                 fit, agreed = again, agreed_again
         return _estimate(frames, fit, agreed, state.usual)
@@ -88,7 +88,7 @@ class Refined:
         self,
         guesses: Sequence[PosedBody],
         frames: Frames,
-        appearance: Appearance,
+        state: RefinedState,
         *,
         is_first: bool = False,
         n_fitted: int = 1,
@@ -99,6 +99,7 @@ class Refined:
         """
         margin_px = _FIRST_MARGIN_PX if is_first else _MARGIN_PX
         regions = regions_round(guesses, self._synthesis.geometry, frames, margin_px)
+        appearance = state.appearance
         if is_first and regions:
             appearance = self._first_look(guesses[0], regions)
         regions = [region for region in regions if appearance.knows(region)]
@@ -106,21 +107,25 @@ class Refined:
             return None, None
         posteriors = [appearance.posterior(region) for region in regions]
 
-        def evidence(body: PosedBody) -> float:
-            return agreement(self._synthesis, body, regions, posteriors).evidence
+        def agreed(body: PosedBody) -> Agreement:
+            return agreement(self._synthesis, body, regions, posteriors)
 
-        def to_silhouettes(body: PosedBody) -> PosedBody:
-            return fit_silhouettes(self._synthesis, body, regions, posteriors, FAR if is_first else NEAR)
+        def to_silhouettes(body: PosedBody, levels: Levels) -> PosedBody:
+            return fit_silhouettes(self._synthesis, body, regions, posteriors, levels)
 
         def to_pictures(body: PosedBody) -> Fit:
             return fit_pictures(self._synthesis, body, regions, self._with_scenes(appearance, body, regions))
 
-        if n_fitted == 1:
-            fit = to_pictures(to_silhouettes(max(guesses, key=evidence) if len(guesses) > 1 else guesses[0]))
+        if n_fitted > 1:
+            bodies = [to_silhouettes(guess, NEAR) for guess in guesses]
+            bodies = sorted(bodies, key=lambda body: agreed(body).evidence, reverse=True)[:n_fitted]
+            fit = max(map(to_pictures, bodies), key=lambda each: agreed(each.posed).evidence)
+        elif is_first:
+            fit = to_pictures(to_silhouettes(guesses[0], FAR))
         else:
-            bodies = sorted(map(to_silhouettes, guesses), key=evidence, reverse=True)[:n_fitted]
-            fit = max(map(to_pictures, bodies), key=lambda each: evidence(each.posed))
-        return fit, agreement(self._synthesis, fit.posed, regions, posteriors)
+            best = max(((guess, agreed(guess)) for guess in guesses), key=lambda each: each[1].evidence)
+            fit = to_pictures(to_silhouettes(best[0], NEAR if best[1].is_suspect(state.usual) else CLOSE))
+        return fit, agreed(fit.posed)
 
     def _first_look(self, posed: PosedBody, regions: Sequence[Region]) -> Appearance:
         """Learn the colours from a pose set by hand, mend the pose by them, and learn them again."""
