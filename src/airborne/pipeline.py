@@ -38,8 +38,9 @@ from airborne.video import Recording, VideoSource, inspect, open_recording
 Progress = Callable[[int, int | None], None]  # frames done, frames expected
 
 UNCERTAINTY = (
-    "Standard deviations hold what the pictures leave open: noise, wrong light, wrong shape. They do not hold errors of "
-    "the calibration, of the body's measures or of the cameras' times."
+    "Standard deviations hold what the pictures leave open (noise, wrong light, wrong shape) and how far the control "
+    "points leave each camera's picture open. They do not hold errors of a calibration file, of the body's measures "
+    "or of the cameras' times."
 )
 _HASHED_BYTES = 8 << 20  # larger files are told apart by their first and last so many bytes and their length
 
@@ -86,7 +87,7 @@ def track(
 
 
 def open_trial(trial: Trial) -> tuple[Recording, Calibration | None]:
-    """Open the videos of a trial with its cameras, the way its method sees fields; and the calibration, if one was made."""
+    """Open a trial's videos with its cameras, fields as its method sees them; and the calibration, if one is made."""
     rig, calibration = cameras_of(trial)
     recording = open_recording(
         [_source(trial, camera) for camera in trial.camera],

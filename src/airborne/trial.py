@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
@@ -150,7 +150,7 @@ class Trial(_Strict):
     start: StartTable
     lights: LightsTable | None = None
     track: TrackTable = TrackTable()
-    folder: Path = Path()
+    _folder: Path = PrivateAttr(default=Path())
 
     @property
     def settings(self) -> Settings:
@@ -169,7 +169,7 @@ class Trial(_Strict):
 
     def path(self, name: str) -> Path:
         """Resolve a path of the trial file."""
-        return self.folder / name
+        return self._folder / name
 
 
 def read_trial(path: Path, track: dict[str, Any] | None = None, cameras: Sequence[str] | None = None) -> Trial:
@@ -181,13 +181,14 @@ def read_trial(path: Path, track: dict[str, Any] | None = None, cameras: Sequenc
         table = tomllib.loads(path.read_text(encoding="utf-8"))
         if isinstance(settings := table.setdefault("track", {}), dict):
             settings.update(track or {})
-        trial = Trial.model_validate({**table, "folder": path.parent})
+        trial = Trial.model_validate(table)
     except OSError as error:
         raise TrialError(f"{path}: cannot be read ({error.strerror}); give the path of a trial's TOML file") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise TrialError(f"{path.name}: not a TOML file: {error}") from error
     except ValidationError as error:
         raise TrialError(f"{path.name}: {one_line(error)}") from error
+    trial._folder = path.parent
     _check(path, trial)
     return trial if cameras is None else _only(path, trial, cameras)
 

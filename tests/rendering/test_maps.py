@@ -1,7 +1,9 @@
 import numpy as np
 
 from airborne.rendering import FLAT, render
-from airborne.rendering.maps import empty_maps, packed_view, surface_maps, workspace
+from airborne.rendering.maps import empty_maps, surface_maps
+from airborne.rendering.packing import packed_view
+from airborne.rendering.shapes import new_shapes
 from tests.rendering.bodies import camera, posed_random
 from tests.tolerances import SOLVED
 
@@ -10,10 +12,15 @@ def test_surface_maps_are_the_rendering_with_normals_that_point_at_the_camera():
     shapes, posed = posed_random(["ellipsoid", "box", "mesh", "ellipsoid"], 1)
     seen_by = camera(turn=0.7)
     part, inverse_depth, normals = empty_maps(seen_by.size)
-    surface_maps(workspace(shapes), shapes, posed.R, posed.t, packed_view(seen_by), part, inverse_depth, normals)
+    surface_maps(new_shapes(shapes), shapes, posed.R, posed.t, packed_view(seen_by), part, inverse_depth, normals)
     drawn = render(shapes, posed, seen_by, FLAT)
     assert np.array_equal(part, drawn.part)
-    assert np.array_equal(inverse_depth, drawn.inverse_depth)
+    is_flat = np.isin(part, [1, 2])  # the box and the mesh
+    assert is_flat.any()
+    assert np.array_equal(inverse_depth[is_flat], drawn.inverse_depth[is_flat])
+    is_round = np.isin(part, [0, 3])  # the outline lies behind what is seen
+    assert np.all(inverse_depth[is_round] <= drawn.inverse_depth[is_round] + 1e-6)
+    assert np.all(inverse_depth[is_round] > 0)
     v, u = np.nonzero(drawn.mask)
     rays = np.stack([u, v, np.ones_like(u)], axis=1) @ np.linalg.inv(seen_by.K).T
     seen = normals[:, v, u].T

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from airborne.scoring.lighting import TERMS, TO_LIGHT, compose, fit_light, light_from_srgb, light_planes
+from airborne.rendering.srgb import light_from_srgb
+from airborne.scoring.lighting import TERMS, TO_LIGHT, compose, fit_light, light_planes
 from tests.tolerances import EXACT
 
 SHAPE = (40, 50)

@@ -5,7 +5,8 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Part, Pose, Segment
-from airborne.synthetic.light import Ambient, Spot, boxes_of, is_lit, light_from_srgb, spot_light, srgb_from_light
+from airborne.rendering.srgb import light_from_srgb, srgb_from_light
+from airborne.synthetic.light import Ambient, Spot, boxes_of, is_lit, spot_light
 from tests.tolerances import EXACT
 
 UP = np.array([[0.0, 0.0, 1.0]])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from airborne.body import geometry
+from airborne.rendering.srgb import light_from_srgb
 from airborne.synthetic import frames, thrown_cross
-from airborne.synthetic.light import light_from_srgb
 from airborne.synthetic.pictures import background, linear_picture, surface
 from tests.synthetic.helpers import small_scene
 from tests.tolerances import sampled

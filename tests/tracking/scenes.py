@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import BodyModel, Box, Ellipsoid, Part, Pose, Segment, geometry
 from airborne.cameras import Camera
 from airborne.rendering import Lamp, Lights, render
-from airborne.scoring.lighting import light_from_srgb
+from airborne.rendering.srgb import light_from_srgb
 from airborne.tracking import Estimate
 from airborne.tracking.refined import Refined
 from airborne.tracking.tracker import Tracker, step

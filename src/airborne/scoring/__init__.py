@@ -4,7 +4,7 @@ Knows no body, no camera and no search.
 """
 
 from airborne.scoring.foreground import agreement, count_colours, posterior
-from airborne.scoring.lighting import compose, fit_light, light_from_srgb, light_planes
+from airborne.scoring.lighting import compose, fit_light, light_planes
 from airborne.scoring.plate import Plate, fill, look
 
 __all__ = [
@@ -14,7 +14,6 @@ __all__ = [
     "count_colours",
     "fill",
     "fit_light",
-    "light_from_srgb",
     "light_planes",
     "look",
     "posterior",

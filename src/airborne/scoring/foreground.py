@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 BINS = 32
 EVIDENCE_LIMIT = 5.0  # nats; no single pixel may shout louder
@@ -100,3 +101,23 @@ def agreement(posterior, part, margin_u, margin_v):
         for x in range(max(x0 - margin_u, 0), min(x1 + margin_u + 1, w)):
             near += posterior[y, x]
     return pixels, inside, near, nats
+
+
+def body_like(rgb: NDArray[np.uint8], part: NDArray[np.int16], colours: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Say which pixels of a mask have a hue nearer to their part's colour than to the background's: (h, w).
+
+    rgb (h, w, 3); part (h, w) index or -1; colours (parts, 3) sRGB. Hues are chromaticities, which do not depend on the
+    light's strength. Where fewer than a tenth of the mask would be left, all of it is.
+    """
+    seen, own = _chromaticity(rgb), _chromaticity(colours)
+    inside = part >= 0
+    if not inside.any() or inside.all():
+        return inside
+    background = np.median(seen[~inside], axis=0)
+    to_body = np.linalg.norm(seen - own[part], axis=-1)
+    alike = inside & (to_body < np.linalg.norm(seen - background, axis=-1))
+    return alike if np.count_nonzero(alike) > 0.1 * np.count_nonzero(inside) else inside
+
+
+def _chromaticity(rgb: NDArray) -> NDArray[np.floating]:
+    return rgb / (np.sum(rgb, axis=-1, keepdims=True, dtype=float) + 1)

@@ -9,19 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-_srgb = np.arange(1024) / 1023
-TO_LIGHT = np.where(_srgb <= 0.04045, _srgb / 12.92, ((_srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
+from airborne.rendering.srgb import light_from_srgb
+
+TO_LIGHT = light_from_srgb(np.arange(1024) * (255 / 1023)).astype(np.float32)
 _RIDGE = 1e-4  # pull of the direction-dependent part toward zero, per pixel of unit albedo
 TERMS = 6  # even light, normal (3), place in the picture (2)
 _MOST_SAMPLES = 400
 _BORDER_TRUST = np.float32(0.02)  # weight of a mixed pixel: it speaks only for faces that have no other
 _SAME_FACE = 0.9  # cosine between neighbouring normals
-
-
-def light_from_srgb(colours):
-    """Turn sRGB 0..255 into linear light 0..1, any shape."""
-    c = np.asarray(colours, float) / 255
-    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
 @njit(cache=True, nogil=True, fastmath=True)

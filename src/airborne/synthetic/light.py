@@ -13,7 +13,6 @@ from airborne.body import Box, PosedBody
 Array = NDArray[np.floating]
 
 _CLEARANCE_M = 1e-3  # a surface is no obstacle to itself
-_LEVELS = 1 << 14
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -95,23 +94,3 @@ def _see(points, target, boxes, out):
             if enter < leave:
                 out[i] = False
                 break
-
-
-def light_from_srgb(colours: Array) -> Array:
-    """Turn sRGB 0..255 into linear light 0..1, any shape. Source: IEC 61966-2-1."""
-    c = np.asarray(colours, float) / 255
-    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
-
-
-def srgb_from_light(light: Array) -> NDArray[np.float32]:
-    """Turn linear light into sRGB 0..255, any shape, not rounded; what is brighter than 1 is clipped to 255."""
-    index = np.clip(light * (_LEVELS - 1) + 0.5, 0, _LEVELS - 1).astype(np.int32)
-    return _SRGB[index]
-
-
-def _srgb_table() -> NDArray[np.float32]:
-    c = np.arange(_LEVELS) / (_LEVELS - 1)
-    return (255 * np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055)).astype(np.float32)
-
-
-_SRGB = _srgb_table()

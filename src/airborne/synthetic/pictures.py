@@ -16,7 +16,8 @@ from airborne.cameras import Camera
 from airborne.rendering.maps import surface_maps
 from airborne.rendering.packing import packed_view
 from airborne.rendering.shapes import new_shapes
-from airborne.synthetic.light import boxes_of, is_lit, light_from_srgb, spot_light, srgb_from_light
+from airborne.rendering.srgb import light_from_srgb, srgb_from_light
+from airborne.synthetic.light import boxes_of, is_lit, spot_light
 from airborne.synthetic.scene import Scene
 from airborne.video import Frames, View
 

@@ -56,10 +56,15 @@ class Appearance:
         """Whether this camera's colours have been learned."""
         return region.camera.name in self.body
 
-    def learn_colours(self, region: Region, mask: NDArray[np.bool_], rate: float = COLOUR_RATE) -> None:
-        """Learn the colours inside the mask's core and clear of it; mask (h, w) of the region."""
+    def learn_colours(self, region: Region, mask: NDArray[np.bool_], *, body: NDArray[np.bool_] | None = None) -> None:
+        """Learn the colours inside the mask's core and clear of it; mask (h, w) of the region.
+
+        `body` (h, w) says which pixels of the core to take, if not all of them.
+        """
         solid = mask.astype(np.uint8)
         core = cv2.erode(solid, np.ones((1, 3), np.uint8)) > 0
+        if body is not None:
+            core &= body
         clear = cv2.dilate(solid, _kernel(_CLEAR_PX + 1, region.aspect)) == 0
         name = region.camera.name
         for histograms, chosen in ((self.body, core), (self.background, clear)):
@@ -70,7 +75,7 @@ class Appearance:
                 continue
             counts /= taken
             old = histograms.get(name)
-            histograms[name] = counts if old is None else (1 - rate) * old + rate * counts
+            histograms[name] = counts if old is None else np.asarray(old + COLOUR_RATE * (counts - old), np.float32)
 
     def learn_scene(self, region: Region, mask: NDArray[np.bool_]) -> None:
         """Learn the empty scene wherever the body is not: the whole view at first, the region from then on."""
@@ -91,7 +96,8 @@ class Appearance:
             height, width = region.rgb.shape[:2]
             unseen = np.zeros((height, width), np.uint8)
             return np.zeros((height, width, 3), np.float32), np.full((height, width), START_SD, np.float32), unseen
-        return tuple(np.ascontiguousarray(region.crop(whole)) for whole in (plate.mean, plate.sd, plate.looks))
+        mean, sd, looks = (np.ascontiguousarray(region.crop(whole)) for whole in (plate.mean, plate.sd, plate.looks))
+        return mean, sd, looks
 
     def posterior(self, region: Region) -> NDArray[np.float32]:
         """Return each pixel's probability (h, w) to be body, at even odds."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -21,7 +21,8 @@ from airborne.cameras import Camera
 from airborne.rendering.maps import empty_maps, surface_maps
 from airborne.rendering.packing import packed_view
 from airborne.rendering.shapes import new_shapes
-from airborne.scoring.lighting import TERMS, TO_LIGHT, light_from_srgb, light_planes
+from airborne.rendering.srgb import light_from_srgb
+from airborne.scoring.lighting import TERMS, TO_LIGHT, light_planes
 from airborne.scoring.plate import START_SD, fill
 from airborne.tracking.appearance import Appearance, Region
 from airborne.tracking.covariance import SHIFT_SD_PX, covariance_of
@@ -94,7 +95,7 @@ def fit_silhouettes(
     correlated = 4 * np.pi * _COARSE_SIGMA_PX**2
     body = synthesis.shapes, synthesis.geometry
     for reduction, steps in levels:
-        views = [_silhouette_view(*each, reduction) for each in zip(regions, posteriors, strict=True)]
+        views = [_outlined(*each, reduction) for each in zip(regions, posteriors, strict=True)]
         for _ in range(steps):
             sums, totals = Sums.zero(), np.zeros(2)
             for view in views:
@@ -106,7 +107,7 @@ def fit_silhouettes(
 
 def fit_pictures(synthesis: Synthesis, posed: PosedBody, regions: Sequence[Region], appearance: Appearance) -> Fit:
     """Move the body until the composite of body and empty scene agrees with the pictures; say how sure that is."""
-    views = [_photometric_view(region, appearance) for region in regions]
+    views = [(_pictured(r, appearance), _even_light(), empty_maps(r.camera.size)) for r in regions]
     rows_sigma_px = [max(_FINE_SIGMA_PX * region.aspect, 0.5) for region in regions]
     taps = [(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma)) for sigma in rows_sigma_px]
     correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px))
@@ -115,10 +116,10 @@ def fit_pictures(synthesis: Synthesis, posed: PosedBody, regions: Sequence[Regio
     for step in range(1, _MOST_STEPS + 1):
         sums, totals, spread = Sums.zero(), np.zeros(2), np.zeros((6, 6))
         rounds = 3 if step == 1 else 1
-        for (fixed, light, maps), (taps_u, taps_v), shift_sd_px in zip(views, taps, shifts_px, strict=True):
+        for (view, light, maps), (taps_u, taps_v), shift_sd_px in zip(views, taps, shifts_px, strict=True):
             sums.B[:] = 0
             totals += photometric_equations(
-                *body, posed.R, posed.t, *fixed, *paint, light, rounds, maps, taps_u, taps_v, _CLIP, sums
+                *body, posed.R, posed.t, *view, *paint, light, rounds, maps, taps_u, taps_v, _CLIP, sums
             )
             spread += (sums.B * shift_sd_px**2) @ sums.B.T
         visible, noise = synthesis.visible(posed), correlated * _mean_square(totals)
@@ -131,8 +132,28 @@ def fit_pictures(synthesis: Synthesis, posed: PosedBody, regions: Sequence[Regio
     return Fit(posed, covariance_of(A, noise=noise, spread=spread), _mean_square(totals) ** 0.5, step)
 
 
-def _photometric_view(region: Region, appearance: Appearance) -> tuple[tuple, Array, tuple]:
-    """Make a region ready: what stays (packed view, K, observed, scene, certainty), its light, its maps."""
+class _Pictured(NamedTuple):
+    """A region as `photometric_equations` takes it."""
+
+    packed: Array
+    K: Array
+    observed: NDArray[np.float32]
+    scene: NDArray[np.float32]
+    certainty: NDArray[np.float32]
+
+
+class _Outlined(NamedTuple):
+    """A reduced region as `silhouette_equations` takes it."""
+
+    packed: Array
+    K: Array
+    posterior: NDArray[np.float32]
+    black: NDArray[np.float32]
+    certainty: NDArray[np.float32]
+    maps: Any
+
+
+def _pictured(region: Region, appearance: Appearance) -> _Pictured:
     mean, sd, looks = appearance.scene(region)
     filled = np.empty_like(mean)
     if not fill(mean, looks, filled):
@@ -141,9 +162,13 @@ def _photometric_view(region: Region, appearance: Appearance) -> tuple[tuple, Ar
     light_planes(region.rgb, TO_LIGHT, observed)
     light_planes(filled, TO_LIGHT, scene)
     certainty = np.minimum(1, (START_SD / sd) ** 2)
+    return _Pictured(region.packed, region.camera.K, observed, scene, certainty)
+
+
+def _even_light() -> NDArray[np.float32]:
     light = np.zeros((3, TERMS), np.float32)
     light[:, 0] = 1
-    return (region.packed, region.camera.K, observed, scene, certainty), light, empty_maps(region.camera.size)
+    return light
 
 
 def reduced_region(region: Region, plane: Array, reduction: int) -> tuple[Camera, NDArray[np.float32]]:
@@ -153,14 +178,13 @@ def reduced_region(region: Region, plane: Array, reduction: int) -> tuple[Camera
     size = (max(width // reduction, 1), max(height // rows, 1))
     small = cv2.resize(plane[: size[1] * rows, : size[0] * reduction], size, interpolation=cv2.INTER_AREA)
     middle = ((reduction - 1) / 2, (rows - 1) / 2)
-    return region.camera.resampled(scale=(reduction, rows), offset=middle, size=size), small
+    return region.camera.resampled(scale=(reduction, rows), offset=middle, size=size), np.asarray(small, np.float32)
 
 
-def _silhouette_view(region: Region, posterior: Array, reduction: int) -> tuple:
-    """Make a reduced region ready: packed view, K, posterior, black, certainty, maps."""
+def _outlined(region: Region, posterior: Array, reduction: int) -> _Outlined:
     camera, plane = reduced_region(region, posterior, reduction)
     black, certainty = np.zeros((1, *plane.shape), np.float32), np.ones_like(plane)
-    return packed_view(camera), camera.K, plane, black, certainty, empty_maps(camera.size)
+    return _Outlined(packed_view(camera), camera.K, plane, black, certainty, empty_maps(camera.size))
 
 
 def _mean_square(totals: Array) -> float:

@@ -66,7 +66,7 @@ def agreement(
         px, sum_inside, sum_near, nats = view_agreement(posterior, part, _NEAR_PX, margin_v)
         pixels, inside, near, evidence = pixels + px, inside + sum_inside, near + sum_near, evidence + nats
         n_views += px >= _FEWEST_PX
-    return Agreement(inside / max(pixels, 1), inside / max(near, 1e-9), evidence, n_views)
+    return Agreement(float(inside / max(pixels, 1)), float(inside / max(near, 1e-9)), float(evidence), n_views)
 
 
 def status_of(fit: Fit, agreed: Agreement, usual: Usual) -> Status:

@@ -72,7 +72,7 @@ def sampled(model: BodyModel, start: Pose, frames: Frames) -> BodyModel:
     if not model.needs_colours:
         return model
     posed, flat = model.with_pose(start), geometry(model)
-    seen: list[list[Array]] = [[np.zeros((0, 3), np.uint8)] for _ in model.parts]
+    seen: list[list[NDArray[np.uint8]]] = [[np.zeros((0, 3), np.uint8)] for _ in model.parts]
     for view in frames.views:
         if view is not None:
             part = render(flat, posed, view.camera, FLAT).part

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose, PosedBody
+from airborne.scoring.foreground import body_like
 from airborne.tracking import predictors
 from airborne.tracking.appearance import Appearance, Region
 from airborne.tracking.estimate import Estimate, Status, lost
@@ -128,11 +129,17 @@ class Refined:
         return fit, agreed(fit.posed)
 
     def _first_look(self, posed: PosedBody, regions: Sequence[Region]) -> Appearance:
-        """Learn the colours from a pose set by hand, mend the pose by them, and learn them again."""
-        for _ in range(3):
+        """Learn the colours from a pose set by hand, mend the pose by them, and learn them again.
+
+        The first time, pixels of the mask that are more like the background than like the body's own colours are left
+        out: the pose may be off by more than the body is wide.
+        """
+        for look in range(3):
             appearance = Appearance()
             for region in regions:
-                appearance.learn_colours(region, self._synthesis.parts(posed, region) >= 0)
+                part = self._synthesis.parts(posed, region)
+                body = body_like(region.rgb, part, self._synthesis.geometry.colours) if look == 0 else None
+                appearance.learn_colours(region, part >= 0, body=body)
             known = [region for region in regions if appearance.knows(region)]
             posteriors = [appearance.posterior(region) for region in known]
             posed = fit_silhouettes(self._synthesis, posed, known, posteriors, FAR)

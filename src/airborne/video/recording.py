@@ -52,7 +52,7 @@ class Recording:
         n = round((max(ends) - _offset_s(self.sources[0])) * self.facts[0].image_rate)
         return len(range(self.start, n if self.stop is None else min(n, self.stop), self.every))
 
-    def __iter__(self) -> Iterator[Frames]:
+    def __iter__(self) -> Generator[Frames]:
         period_s = 1 / self.facts[0].image_rate
         lenses = [self._lenses(camera, facts) for camera, facts in zip(self.rig, self.facts, strict=True)]
         with ExitStack() as open_files:
