@@ -7,7 +7,6 @@ views and triangulated.
 
 from __future__ import annotations
 
-import csv
 import sys
 import tempfile
 from pathlib import Path
@@ -16,7 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from rows import ROOT, append  # noqa: E402
+from rows import ROOT, append
 
 from airborne import pipeline
 from airborne.geometry.triangulation import triangulate

@@ -17,6 +17,7 @@ from airborne.rendering.threads import in_threads
 
 Array = NDArray[np.floating]
 
+GAINS = (0.5, 2.0)  # least and largest brightness that unknown light may give: a black body fits any dark wall
 MISSED_GREY = 64.0  # what a foreground pixel outside the mask counts, a channel: about a wrong colour's difference
 
 
@@ -90,11 +91,13 @@ def measure(
 def scores_from_sums(sums: Array, rule: ScoreRule, missed: Array | None = None) -> Array:
     """Turn sums (n, views, SUMS), and the missed pixels (n, views), into scores (n,) [grey levels].
 
-    The fitted gain is the least-squares a of |seen - a model|^2 = sum r^2 - (sum r model)^2 / sum model^2 at its best.
+    The fitted gain is the least-squares a of |seen - a model|^2, kept within GAINS: |seen - a model|^2 is
+    sum r^2 - (a - 1) (2 sum r model - (a - 1) sum model^2).
     """
     raw = sums[..., ERROR]
     if rule.fits_gain:
-        raw = np.maximum(raw - sums[..., CROSS] ** 2 / np.maximum(sums[..., MODEL], 1e-9), 0)
+        change = np.clip(sums[..., CROSS] / np.maximum(sums[..., MODEL], 1e-9), GAINS[0] - 1, GAINS[1] - 1)
+        raw = np.maximum(raw - change * (2 * sums[..., CROSS] - change * sums[..., MODEL]), 0)
     result = np.zeros(len(sums))
     if rule.normalised < 1:
         result += (1 - rule.normalised) * _rms(raw, sums[..., PIXELS], rule, missed)

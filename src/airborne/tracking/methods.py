@@ -56,8 +56,8 @@ def tracker_of(settings: Settings, model: BodyModel, start: Pose) -> Tracker:
         "none": predictors.stay,
     }[settings.prediction]
     rule = RULES[settings.colour]
-    if settings.lights is None:
-        rule = replace(rule, fits_gain=True)
+    if settings.lights is None:  # brightness means little: fit it, and let "union" compare hues
+        rule = replace(rule, fits_gain=True, normalised=1.0 if settings.colour == "union" else rule.normalised)
     return Direct(model, start, _search(settings), rule, settings.lights or FLAT, scale=settings.scale, predict=predict)
 
 

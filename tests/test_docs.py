@@ -1,0 +1,267 @@
+"""The documentation says what the program does: commands, keys, files, columns, constants, links."""
+
+import csv
+import importlib
+import json
+import os
+import re
+import shlex
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+import typer
+from pydantic import BaseModel
+
+from airborne import pipeline
+from airborne import trial as trials
+from airborne.assessment import assess
+from airborne.body import files as bodies
+from airborne.body.files import read_body
+from airborne.cli import app
+from airborne.motion.files import _header
+from airborne.trial import Trial, read_trial
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(DOCS.glob("*.md"))]
+TREE = typer.main.get_command(app)
+LARGEST_IMAGES_BYTES = 300_000
+
+
+def commands_below(command, name="airborne"):
+    """Every command that does something, by its full name."""
+    below = getattr(command, "commands", {})
+    if not below:
+        yield name, command
+    for word, child in below.items():
+        yield from commands_below(child, f"{name} {word}")
+
+
+COMMANDS = dict(commands_below(TREE))
+
+
+def fences(text, language):
+    """The fenced blocks of a page in one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def shown_commands(page):
+    """Every `airborne ...` of a page: lines of its shell blocks, and inline code."""
+    text = page.read_text(encoding="utf-8")
+    lines = [part.strip() for block in fences(text, "bash") for line in block.splitlines() for part in line.split("&&")]
+    prose = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    lines += [" ".join(code.split()) for code in re.findall(r"`(airborne [^`]*)`", prose)]
+    return [line.removeprefix(".venv/bin/") for line in lines if re.match(r"(\.venv/bin/)?airborne\b", line)]
+
+
+def complaint(line):
+    """What is wrong with a command line as the program understands it; None where nothing is."""
+    words, command, name = shlex.split(line)[1:], TREE, "airborne"
+    while words and words[0] in getattr(command, "commands", {}):
+        name = f"{name} {words[0]}"
+        command = command.commands[words.pop(0)]
+    if name not in COMMANDS and (words or name == "airborne"):
+        return f"no command {' '.join([name, *words[:1]])}"
+    options = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)}
+    unknown = [word for word in words if word.startswith("-") and word not in options]
+    return f"{name} has no {', '.join(unknown)}" if unknown else None
+
+
+def table_of(page, heading):
+    """The rows below a heading, as lists of cells."""
+    text = page.read_text(encoding="utf-8")
+    found = re.search(rf"^#+ {re.escape(heading)}\n(.*?)(?=^#|\Z)", text, re.MULTILINE | re.DOTALL)
+    assert found, f"{page.name} has no heading {heading}"
+    rows = [line.strip().strip("|").split(" | ") for line in found[1].splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in row] for row in rows[2:]]
+
+
+def named(cell):
+    """The names in a table's cell, spans such as `r00` … `r22` written out by their ends."""
+    return re.findall(r"`([^`]+)`", cell)
+
+
+def test_a_wrong_command_is_noticed():
+    assert complaint("airborne trick trial.toml") == "no command airborne trick"
+    assert complaint("airborne track trial.toml --fast") == "airborne track has no --fast"
+    assert complaint("airborne synth cross -o x --seed 3") is None
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_command_shown_exists_with_its_options(page):
+    assert [wrong for line in shown_commands(page) if (wrong := complaint(line))] == []
+
+
+def test_every_command_is_shown_somewhere():
+    shown = " ".join(f"{line} " for page in PAGES for line in shown_commands(page))
+    assert [name for name in COMMANDS if f"{name} " not in shown] == []
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_a_page_of_help_with_an_example_that_exists(name):
+    command = COMMANDS[name]
+    example = re.search(r"Example: (airborne .*)", command.help or "")
+    assert example, f"{name} --help shows no example"
+    assert example[1].startswith(name)
+    assert complaint(example[1]) is None
+    assert all(getattr(parameter, "help", "") for parameter in command.params if parameter.name != "help")
+
+
+def slug(heading):
+    """The name by which the repository's page links to a heading."""
+    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_link_leads_somewhere(page):
+    broken = []
+    for link in re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
+        if link.startswith("https://"):
+            continue
+        path, _, anchor = link.partition("#")
+        target = page.parent / path if path else page
+        if not target.is_file() or (
+            anchor and anchor not in map(slug, re.findall(r"^#+ (.*)", target.read_text(encoding="utf-8"), re.M))
+        ):
+            broken.append(link)
+    assert broken == []
+
+
+def test_the_readme_links_every_page():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert [page.name for page in DOCS.glob("*.md") if f"(docs/{page.name})" not in readme] == []
+
+
+def test_images_are_small():
+    assert sum(path.stat().st_size for path in (DOCS / "images").iterdir()) < LARGEST_IMAGES_BYTES
+
+
+MODELS = {
+    "`[[camera]]`": trials.CameraTable,
+    "`[calibration]`": trials.CalibrationTable,
+    "`[body]`": trials.BodyTable,
+    "`[start]`": trials.StartTable,
+    "`[lights]`": trials.LightsTable,
+    "`[[lights.lamp]]`": trials.LampTable,
+    "`[track]`": trials.TrackTable,
+    "Body": bodies._BodyTable,
+    "`[[segment]]`": bodies._SegmentTable,
+    "`[[segment.part]]`": bodies._PartTable,
+}
+
+
+@pytest.mark.parametrize("heading", MODELS)
+def test_every_key_is_documented_with_its_default(heading):
+    model: type[BaseModel] = MODELS[heading]
+    documented = {row[0].strip("`"): row[1].strip("`") for row in table_of(DOCS / "trial.md", heading)}
+    assert list(documented) == list(model.model_fields)
+    for key, field in model.model_fields.items():
+        if field.is_required():
+            assert documented[key] == "required", key
+        elif field.default is None:
+            assert documented[key] == "none", key
+        else:
+            assert tomllib.loads(f"value = {documented[key]}")["value"] == field.default, key
+
+
+def test_every_table_of_the_trial_file_has_a_section():
+    text = (DOCS / "trial.md").read_text(encoding="utf-8")
+    rows = {row[0].strip("`") for row in table_of(DOCS / "trial.md", "Top level")}
+    headings = {slug(heading) for heading in re.findall(r"^## (.*)", text, re.MULTILINE)}
+    assert set(Trial.model_fields) == rows | (headings & set(Trial.model_fields))
+
+
+def test_examples_of_trial_files_are_valid():
+    trial, body = fences((DOCS / "trial.md").read_text(encoding="utf-8"), "toml")
+    short = fences((ROOT / "README.md").read_text(encoding="utf-8"), "toml")[0]
+    assert len(Trial.model_validate(tomllib.loads(trial)).camera) == 3
+    assert len(Trial.model_validate(tomllib.loads(short)).camera) == 2
+    assert len(bodies._BodyTable.model_validate(tomllib.loads(body)).segment) == 2
+
+
+def test_the_example_body_is_a_body(tmp_path):
+    _, body = fences((DOCS / "trial.md").read_text(encoding="utf-8"), "toml")
+    (tmp_path / "body.toml").write_text(body)
+    corners = ["0 0 0", "100 0 0", "0 100 0", "0 0 100"]
+    faces = ["1 3 2", "1 2 4", "1 4 3", "2 3 4"]
+    (tmp_path / "cap.obj").write_text("\n".join([*(f"v {c}" for c in corners), *(f"f {f}" for f in faces)]) + "\n")
+    assert [segment.name for segment in read_body(tmp_path / "body.toml").segments] == ["torso", "head"]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """The folder of a short run with everything that a run can leave."""
+    example = ROOT / "examples" / "thrown_cross"
+    folder = tmp_path_factory.mktemp("docs") / "run"
+    pipeline.track(read_trial(example / "trial.toml", {"stop": 2}), folder)
+    assess(folder, example / "truth.csv", example / "digitised.csv")
+    return folder
+
+
+def test_every_file_of_a_run_is_documented(run):
+    left = {re.sub(r"_cam\d", "_<camera>", path.name) for path in run.iterdir()}
+    assert left == {name for row in table_of(DOCS / "results.md", "Files") for name in named(row[0])}
+
+
+def test_every_number_of_the_summary_is_documented(run):
+    keys = list(json.loads((run / "summary.json").read_text(encoding="utf-8")))
+    documented = [name for row in table_of(DOCS / "results.md", "`summary.json`") for name in named(row[0])]
+    assert sorted(keys) == sorted(documented)
+
+
+@pytest.mark.parametrize("name", ["angles.csv", "joints.csv"])
+def test_every_column_is_documented(run, name):
+    with (run / name).open(encoding="utf-8") as file:
+        header = next(csv.reader(file))
+    assert header == [column for row in table_of(DOCS / "results.md", f"`{name}`") for column in named(row[0])]
+
+
+def test_every_column_of_the_motion_is_documented():
+    documented = [name for row in table_of(DOCS / "results.md", "`motion.csv`") for name in named(row[0])]
+    header = _header(("<segment>",))
+    spans = (("cov_00", "cov_55"), ("r00", "r22"))  # written by their ends
+    for first, last in spans:
+        del header[header.index(first) + 1 : header.index(last)]
+    assert header == documented
+
+
+def test_constants_in_the_methods_page_are_those_of_the_code():
+    text = (DOCS / "methods.md").read_text(encoding="utf-8")
+    checked = 0
+    for line in text.splitlines():
+        for module, name in re.findall(r"`((?:\w+\.)+\w+)\.(_[A-Z_]+)`", line):
+            value = getattr(importlib.import_module(f"airborne.{module}"), name)
+            values = value if isinstance(value, tuple) else (value,)
+            context = text[max(text.index(line) - 120, 0) : text.index(line) + len(line)]
+            missing = [v for v in values if not re.search(rf"(?<![\d.]){re.escape(str(v))}(?![\d]|\.\d)", context)]
+            assert missing == [], f"{module}.{name} is {value}"
+            checked += 1
+    assert checked >= 6
+
+
+def test_continuous_integration_runs_the_command_of_the_readme():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = re.search(r"^<!-- tests -->\n```bash\n(.*)\n```$", text, re.MULTILINE)
+    assert shown and "pytest" in shown[1]
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    assert os.access(ROOT / ".ci" / "run", os.X_OK)
+    reading = next(line for line in script.splitlines() if line.startswith("command="))
+    done = subprocess.run(["bash", "-c", f'{reading}; echo "$command"'], cwd=ROOT, capture_output=True, text=True)
+    assert done.stdout == shown[1] + "\n"
+    assert 'bash -euo pipefail -c "$command"' in script
+
+
+def test_constraints_pin_every_package_that_is_asked_for():
+    pins = dict(line.split("==") for line in (ROOT / "constraints.txt").read_text().splitlines())
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    asked = [*project["dependencies"], *(one for extra in project["optional-dependencies"].values() for one in extra)]
+    names = {re.match(r"[\w-]+", one)[0].lower() for one in asked} - {"airborne"}
+    assert names <= {name.lower().replace("_", "-") for name in pins}
+    assert "airborne" not in pins
+
+
+def test_all_text_is_free_of_machine_paths():
+    texts = {page.name: page.read_text(encoding="utf-8") for page in [*PAGES, ROOT / ".ci" / "run"]}
+    assert [name for name, text in texts.items() if re.search(r"(?<![\w.])/(home|tmp|root|opt|usr/local)/", text)] == []
