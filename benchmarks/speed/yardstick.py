@@ -3,7 +3,8 @@
 FOLDER holds the yardstick (run.py, scene18.py, score18.cpp; needs g++); by default `../shared/yardstick` beside the
 project. Its scene of 18 ellipsoids, 3 views and 2 lamps is rebuilt as an Airborne body; both engines then score the
 same hypotheses, from 57 numbers each, in turns, on one thread. Printed: medians of CPU time, their ratio, how far the
-scores differ, and the time from starting Python to the first score, with Numba's cache empty and full.
+scores differ, the time from starting Python to the first score, with Numba's cache empty and full, and the CPU time of
+each method on the thrown cross.
 """
 
 from __future__ import annotations
@@ -18,6 +19,11 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from rows import append
+
+from airborne.bench import measure_speed
 from airborne.body import BodyModel, Ellipsoid, Part, Segment, geometry
 from airborne.cameras import Camera
 from airborne.rendering import RULES, Lamp, Lights, place_segments, score, targets
@@ -59,7 +65,7 @@ def airborne_numbers(poses: np.ndarray) -> np.ndarray:
     return np.hstack([poses[:, :6], joints])
 
 
-def compare(case: str) -> None:
+def compare(case: str) -> list[dict]:
     """Time both engines in turns and print the ratio."""
     import run
     import scene18 as scene
@@ -84,10 +90,12 @@ def compare(case: str) -> None:
             call()
             times[k, engine] = time.thread_time() - start
     mine, bound = np.median(times, axis=0) / N_HYPOTHESES * 1e6
-    print(
-        f"{case.upper()}: {mine:.1f} us per hypothesis, C++ {bound:.1f} us, ratio {mine / bound:.2f}; "
-        f"scores differ by at most {difference:.4f} grey levels"
-    )
+    base = {"data": f"18 ellipsoids, 3 views, {case.upper()}", "method": "score", "n": ROUNDS}
+    return [
+        {**base, "metric": "CPU per hypothesis", "unit": "us", "value": float(mine)},
+        {**base, "metric": "CPU over the C++ bound's", "unit": "", "value": float(mine / bound), "floor": 1.15},
+        {**base, "metric": "largest difference of scores", "unit": "grey", "value": float(difference)},
+    ]
 
 
 FIRST_SCORE = """
@@ -121,12 +129,21 @@ def main() -> int:
         return 2
     sys.path.insert(0, str(folder))
     sys.dont_write_bytecode = True
-    for case in ("sd", "hd"):
-        compare(case)
+    rows = compare("sd") + compare("hd")
     with tempfile.TemporaryDirectory() as cache:
         cold = first_score_s(cache)
         warm = np.median([first_score_s(cache) for _ in range(START_RUNS)])
-    print(f"first score: {cold:.1f} s with an empty cache, {warm:.2f} s with a full one")
+    base = {"data": "import to first score", "method": "score", "unit": "s"}
+    rows += [
+        {**base, "metric": "wall time, empty cache", "value": cold, "n": 1},
+        {**base, "metric": "wall time, full cache", "value": float(warm), "n": START_RUNS, "floor": 1.5},
+    ]
+    speeds = measure_speed()
+    rows += [
+        {"data": "thrown_cross, 3 views", "method": "speed", "metric": name, "unit": "", "value": value}
+        for name, value in speeds.items()
+    ]
+    append("speed", rows)
     return 0
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Segment, geometry
+from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Segment, geometry, has_flat_sides
 from tests.tolerances import EXACT, ROUNDTRIP
 
 TURN = Rotation.from_euler("XYZ", [0.3, -0.8, 1.1])
@@ -77,3 +77,11 @@ def test_ellipsoid_keeps_its_place_axes_and_semi_axes():
     np.testing.assert_allclose(flat.ellipsoid_centre, [CENTRE], atol=EXACT)
     np.testing.assert_allclose(flat.ellipsoid_axes, [TURN.as_matrix()], atol=EXACT)
     np.testing.assert_array_equal(flat.ellipsoid_semi_axes, [SIZE])
+
+
+def test_sides_are_flat_where_all_edges_are_sharp():
+    cube, ball = trimesh.creation.box(extents=[0.1, 0.2, 0.3]), trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+    assert has_flat_sides(Box(np.ones(3)))
+    assert has_flat_sides(Mesh(np.asarray(cube.vertices), np.asarray(cube.faces)))
+    assert not has_flat_sides(Mesh(np.asarray(ball.vertices), np.asarray(ball.faces)))
+    assert not has_flat_sides(Ellipsoid(np.ones(3)))

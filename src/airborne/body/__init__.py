@@ -1,6 +1,6 @@
 """Bodies: in come body files, out come `BodyModel`, `Pose` and `PosedBody`; knows no camera and no image."""
 
-from airborne.body.geometry import Geometry, geometry
+from airborne.body.geometry import Geometry, geometry, has_flat_sides
 from airborne.body.model import BodyModel, Box, Ellipsoid, Mesh, Part, Pose, PosedBody, Segment, Shape
 
 __all__ = [
@@ -15,4 +15,5 @@ __all__ = [
     "Segment",
     "Shape",
     "geometry",
+    "has_flat_sides",
 ]

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
-from airborne.body.model import BodyModel, Box, Ellipsoid, Mesh
+from airborne.body.model import BodyModel, Box, Ellipsoid, Mesh, Shape
 
 Array = NDArray[np.floating]
 Indices = NDArray[np.int64]
@@ -21,6 +22,7 @@ _BOX_FACES = [  # corners of each side, counter-clockwise from outside
     (0, 2, 6, 4),
     (1, 5, 7, 3),
 ]
+_FLAT_RAD, _SHARP_RAD = 0.01, 0.5  # neighbouring faces turned by less are one side; by more, their edge is seen
 _UNSAMPLED = np.full(3, 128.0)  # stands in for a colour not yet sampled
 
 
@@ -71,6 +73,15 @@ def geometry(model: BodyModel) -> Geometry:
         normals=np.array([_normal(loop) for loop in loops], float).reshape(-1, 3),
         colours=np.array([_UNSAMPLED if p.colour is None else p.colour for p in model.parts], float),
     )
+
+
+def has_flat_sides(shape: Shape) -> bool:
+    """Say whether the edges between a shape's sides can be seen: boxes, and meshes without a gently curved part."""
+    if not isinstance(shape, Mesh):
+        return isinstance(shape, Box)
+    angles = trimesh.Trimesh(shape.vertices_m, shape.faces).face_adjacency_angles
+    bends = angles[angles > _FLAT_RAD]
+    return bool(len(bends) and np.all(bends > _SHARP_RAD))
 
 
 def _loops(shape: Box | Mesh) -> list[Array]:

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body import BodyModel, Box, Geometry, PosedBody, geometry
+from airborne.body import BodyModel, Geometry, PosedBody, geometry, has_flat_sides
 from airborne.body.symmetry import continuous_axes
 from airborne.cameras import Camera
 from airborne.rendering.maps import empty_maps, surface_maps
@@ -50,7 +50,7 @@ class Synthesis:
     geometry: Geometry
     shapes: Any
     albedo: NDArray[np.float32]  # (parts, 3) linear light
-    is_faceted: NDArray[np.bool_]  # (parts,) boxes: the edges between their sides can be seen
+    is_faceted: NDArray[np.bool_]  # (parts,) the edges between their sides can be seen
     free_axes: Array  # (k, 3) in the root's frame: turns about them change nothing
 
     @classmethod
@@ -58,7 +58,7 @@ class Synthesis:
         """Make a body ready."""
         flat = geometry(model)
         albedo = light_from_srgb(flat.colours).astype(np.float32)
-        is_faceted = np.array([isinstance(part.shape, Box) for part in model.parts])
+        is_faceted = np.array([has_flat_sides(part.shape) for part in model.parts])
         return cls(model, flat, new_shapes(flat), albedo, is_faceted, continuous_axes(model))
 
     def visible(self, posed: PosedBody) -> Array:
