@@ -95,6 +95,8 @@ class Comparison:
         kinds = {"": self.raw}
         if self.n_symmetries > 1:
             kinds |= {" modulo symmetry, whole run": self.modulo_run, " modulo symmetry, by frame": self.modulo_frame}
+        if all(errors == self.raw for errors in kinds.values()):
+            kinds = {", raw and modulo symmetry" if len(kinds) > 1 else "": self.raw}
         for title, errors in kinds.items():
             lines.append(f"orientation [deg]{title}")
             rms = (*errors.rms_deg, errors.geodesic_rms_deg)
