@@ -20,7 +20,15 @@ from airborne.body import BodyModel
 from airborne.body.files import mesh_files, read_body
 from airborne.cameras import Calibration, Camera, Rig, calibrate, read_control_points, read_rig, write_pose2sim
 from airborne.errors import ResultError, TrialError
-from airborne.export import ContactSheet, OverlayVideos, headline, write_figures, write_json, write_report
+from airborne.export import (
+    ContactSheet,
+    MatchingPicture,
+    OverlayVideos,
+    headline,
+    write_figures,
+    write_json,
+    write_report,
+)
 from airborne.motion import (
     Motion,
     MotionWriter,
@@ -201,6 +209,7 @@ def _artists(folder: Path, recording: Recording, pictures: bool) -> Iterator[Any
     if pictures:
         yield OverlayVideos(folder, recording.rig, recording.rate)
         yield ContactSheet(folder / "through_mask.png", recording.rig)
+        yield MatchingPicture(folder / "matching.png", recording.rig)
 
 
 def _write_tables(folder: Path, motion: Motion, model: BodyModel) -> None:

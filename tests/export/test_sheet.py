@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 
 from airborne.export import ContactSheet
-from airborne.export.sheet import BACKGROUND_GREY, CELL_PX, N_HELD, ROOM, _cell, _close_up
+from airborne.export.sheet import BACKGROUND_GREY, N_HELD, _cell
+from airborne.export.views import CELL_PX, ROOM, close_up
 from airborne.tracking import Status
 from tests.export.scenes import BALL, BOX, RIG, SCENE_GREY, camera, frames, posed
 
@@ -33,7 +34,7 @@ def test_fields_and_whole_pictures_give_the_same_cell():
 
 
 def test_there_is_no_cell_behind_the_camera_or_without_a_view():
-    assert _close_up(camera(), np.array([0, -10.0, 0]), 1.0) is None
+    assert close_up(camera(), posed(BALL, (0, -10.0, 0))) is None
     assert _cell(None, camera(), posed()) is None
 
 

@@ -5,6 +5,7 @@ Knows no search and decides nothing.
 """
 
 from airborne.export.figures import write_digitised, write_errors, write_figures, write_pose, write_score
+from airborne.export.matching import MatchingPicture
 from airborne.export.overlays import OverlayVideos
 from airborne.export.report import write_report
 from airborne.export.sheet import ContactSheet
@@ -12,6 +13,7 @@ from airborne.export.summary import headline, warnings, write_json
 
 __all__ = [
     "ContactSheet",
+    "MatchingPicture",
     "OverlayVideos",
     "headline",
     "warnings",

@@ -23,6 +23,11 @@ PICTURES = {  # titles and captions, in the order of the page
         "What the cameras saw where the tracked body is drawn, all at one scale. Where the scene shows through, or the "
         "body is cut off, the pose is off. Times in amber are uncertain.",
     ),
+    "matching.png": (
+        "How picture and body are compared",
+        "The first tracked frame: what a camera saw, the body as drawn in flat colours, its mask, the picture through "
+        "the mask, and their agreement, the brighter the better.",
+    ),
     "score.png": ("Score and spread", "Score, and standard deviations of position and rotation, over time."),
     "digitised.png": (
         "Beside digitising by hand",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
@@ -11,24 +10,18 @@ from typing import NamedTuple, Self
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
-from airborne.body import BodyModel, Pose, PosedBody
+from airborne.body import PosedBody
 from airborne.cameras import Camera, Rig
 from airborne.export.palette import STATUS_RGB, TEXT_RGB, web
 from airborne.export.panels import FONT_PT, WIDTH_IN
-from airborne.export.views import Picture, seen_by, shapes_of
+from airborne.export.views import Picture, close_up, seen_by, shapes_of
 from airborne.rendering import FLAT, render, through_mask
 from airborne.tracking import Status
 from airborne.video import Frames, View
 
-Array = NDArray[np.floating]
-
 N_COLUMNS = 8
 N_HELD = 32  # columns kept while reading; when full, every second one is dropped
-CELL_PX = 160
-ROOM = 1.1  # a cell's side in the body's diameters
 DPI = 200
 BACKGROUND_GREY = 205
 
@@ -89,14 +82,14 @@ def _sheet_figure(columns: Sequence[_Column], names: Sequence[str]) -> Figure:
     for k, column in enumerate(columns):
         grid[0, k].set_title(column.title, fontsize=FONT_PT - 2, color=column.colour)
         for i, cell in enumerate(column.cells):
-            _draw_cell(grid[i, k], cell)
+            draw_cell(grid[i, k], cell)
     for axes, name in zip(grid[:, 0], names, strict=True):
         axes.set_ylabel(name, fontsize=FONT_PT - 1, color=web(TEXT_RGB))
     return figure
 
 
 def _cell(view: View | None, camera: Camera, posed: PosedBody) -> Picture | None:
-    crop = _close_up(camera, _centre(_points(posed)), ROOM * _diameter_m(posed.model))
+    crop = close_up(camera, posed)
     if view is None or crop is None:
         return None
     rendering = render(shapes_of(posed.model), posed, crop, FLAT)
@@ -105,7 +98,8 @@ def _cell(view: View | None, camera: Camera, posed: PosedBody) -> Picture | None
     return picture
 
 
-def _draw_cell(axes: Axes, cell: Picture | None) -> None:
+def draw_cell(axes: Axes, cell: Picture | None) -> None:
+    """Show a picture without axes, or say that there is none."""
     axes.set_xticks([])
     axes.set_yticks([])
     for spine in axes.spines.values():
@@ -115,37 +109,3 @@ def _draw_cell(axes: Axes, cell: Picture | None) -> None:
         axes.text(0.5, 0.5, "no picture", ha="center", va="center", fontsize=FONT_PT - 2, transform=axes.transAxes)
     else:
         axes.imshow(cell)
-
-
-def _close_up(camera: Camera, centre: Array, side_m: float) -> Camera | None:
-    """Return the camera of a square crop, `side_m` wide where the body is; None behind the camera."""
-    depth_m = camera.camera_from_world.apply(centre)[2]
-    if depth_m <= 0:
-        return None
-    step = side_m / depth_m / CELL_PX * camera.K.diagonal()[:2]  # pixels of the camera to one of the crop
-    corner = camera.px_from_world(centre) - step * (CELL_PX - 1) / 2
-    return camera.resampled(
-        scale=(float(step[0]), float(step[1])), offset=(float(corner[0]), float(corner[1])), size=(CELL_PX, CELL_PX)
-    )
-
-
-@lru_cache(maxsize=2)
-def _diameter_m(model: BodyModel) -> float:
-    """Measure twice the body's largest distance from its middle, joints straight."""
-    points = _points(model.with_pose(Pose(world_from_root=RigidTransform.identity())))
-    return 2 * float(np.linalg.norm(points - _centre(points), axis=1).max())
-
-
-def _points(posed: PosedBody) -> Array:
-    """Return corners, and ends of the ellipsoids' axes, in the world: (p, 3) [m]."""
-    shapes = shapes_of(posed.model)
-    half = np.swapaxes(shapes.ellipsoid_axes * shapes.ellipsoid_semi_axes[:, None], 1, 2)  # rows: half axes
-    ends = np.concatenate([shapes.ellipsoid_centre[:, None] + half, shapes.ellipsoid_centre[:, None] - half], axis=1)
-    points = np.concatenate([ends.reshape(-1, 3), shapes.corners])
-    corner_segment = np.repeat(shapes.polygon_segment, np.diff(shapes.start))
-    segment = np.concatenate([np.repeat(shapes.ellipsoid_segment, 6), corner_segment])
-    return np.einsum("pij,pj->pi", posed.R[segment], points) + posed.t[segment]
-
-
-def _centre(points: Array) -> Array:
-    return (points.min(axis=0) + points.max(axis=0)) / 2

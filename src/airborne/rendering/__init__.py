@@ -3,7 +3,7 @@
 from airborne.rendering.evidence import EvidenceMaps, evidence_maps, mask_evidence
 from airborne.rendering.kinematics import place_segments
 from airborne.rendering.lights import FLAT, Lamp, Lights
-from airborne.rendering.pictures import full_height, mask_picture, match_picture, model_picture, overlay, through_mask
+from airborne.rendering.pictures import mask_picture, match_picture, model_picture, through_mask
 from airborne.rendering.reference import render_reference
 from airborne.rendering.render import Rendering, render
 from airborne.rendering.scores import RULES, ScoreRule, measure, score, scores_from_sums
@@ -19,13 +19,11 @@ __all__ = [
     "ScoreRule",
     "Targets",
     "evidence_maps",
-    "full_height",
     "mask_evidence",
     "mask_picture",
     "match_picture",
     "measure",
     "model_picture",
-    "overlay",
     "place_segments",
     "render",
     "render_reference",

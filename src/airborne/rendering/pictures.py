@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from airborne.rendering.render import Rendering
 
 Picture = NDArray[np.uint8]
-
-OUTLINE_RGB = (0, 255, 80)
 
 
 def model_picture(rendering: Rendering) -> Picture:
@@ -37,31 +34,6 @@ def match_picture(rgb: Picture, rendering: Rendering) -> Picture:
     grey = 255 - np.sqrt(np.mean(difference**2, axis=2))
     grey = np.where(rendering.mask, np.clip(np.rint(grey), 0, 255), 0).astype(np.uint8)
     return np.repeat(grey[..., None], 3, axis=2)
-
-
-def overlay(rgb: Picture, rendering: Rendering, *, height: int | None = None) -> Picture:
-    """Draw the mask's outline on a view (H, W, 3), which is first stretched to `height` rows where it is a field.
-
-    The rendering must be of the whole view.
-    """
-    picture, mask = rgb.copy(), rendering.mask
-    if height is not None:
-        picture = full_height(picture, height)
-        mask = full_height(mask.astype(np.float32), height) > 0.5
-    picture[outline(mask)] = OUTLINE_RGB
-    return picture
-
-
-def outline(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the mask's edge: the pixels (h, w) that have a neighbour above, below, left or right outside it."""
-    inside = np.pad(mask, 1)
-    core = inside[:-2, 1:-1] & inside[2:, 1:-1] & inside[1:-1, :-2] & inside[1:-1, 2:]
-    return mask & ~core
-
-
-def full_height(image: NDArray, height: int) -> NDArray:
-    """Stretch a field's image (h, w, ...) to `height` rows by linear interpolation."""
-    return cv2.resize(image, (image.shape[1], height), interpolation=cv2.INTER_LINEAR)
 
 
 def _region_of(rgb: Picture, rendering: Rendering) -> Picture:

@@ -1,0 +1,70 @@
+"""matching.png: how a picture and the body drawn in it are compared, camera by camera (paper B, fig. 2)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from matplotlib.figure import Figure
+
+from airborne.body import PosedBody
+from airborne.cameras import Camera, Rig
+from airborne.export.palette import TEXT_RGB, web
+from airborne.export.panels import FONT_PT, WIDTH_IN
+from airborne.export.sheet import DPI, draw_cell
+from airborne.export.views import Picture, close_up, seen_by, shapes_of
+from airborne.rendering import FLAT, mask_picture, match_picture, model_picture, render, through_mask
+from airborne.tracking import Status
+from airborne.video import Frames, View
+
+TITLES = ("picture", "body", "mask", "through the mask", "match")
+
+
+class MatchingPicture:
+    """Draws the first frame in which the body was tracked; use it in a `with` block."""
+
+    def __init__(self, path: Path, rig: Rig) -> None:
+        """Begin; one row for each camera of the rig, whose sizes are those of whole pictures."""
+        path.unlink(missing_ok=True)
+        self._path = path
+        self._cameras = [camera.undistorted() for camera in rig]
+        self._is_drawn = False
+
+    def write(self, frames: Frames, posed: PosedBody | None, status: Status) -> None:
+        """Draw what every camera saw, the first time that the body is tracked."""
+        if self._is_drawn or posed is None or status is not Status.TRACKED:
+            return
+        rows = [_row(view, camera, posed) for view, camera in zip(frames.views, self._cameras, strict=True)]
+        _figure(rows, [camera.name for camera in self._cameras]).savefig(self._path)
+        self._is_drawn = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End; the picture is already written."""
+
+
+def _row(view: View | None, camera: Camera, posed: PosedBody) -> list[Picture | None]:
+    crop = close_up(camera, posed)
+    if view is None or crop is None:
+        return [None] * len(TITLES)
+    seen, drawn = seen_by(view, crop), render(shapes_of(posed.model), posed, crop, FLAT)
+    return [seen, model_picture(drawn), mask_picture(drawn), through_mask(seen, drawn), match_picture(seen, drawn)]
+
+
+def _figure(rows: list[list[Picture | None]], names: list[str]) -> Figure:
+    cell_in = (WIDTH_IN - 0.5) / len(TITLES)
+    figure = Figure((WIDTH_IN, 0.4 + cell_in * len(rows)), dpi=DPI)
+    figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.02, wspace=0, hspace=0)
+    grid = figure.subplots(len(rows), len(TITLES), squeeze=False)
+    for axes, title in zip(grid[0], TITLES, strict=True):
+        axes.set_title(title, fontsize=FONT_PT - 1, color=web(TEXT_RGB))
+    for i, (row, name) in enumerate(zip(rows, names, strict=True)):
+        for axes, cell in zip(grid[i], row, strict=True):
+            draw_cell(axes, cell)
+        grid[i, 0].set_ylabel(name, fontsize=FONT_PT - 1, color=web(TEXT_RGB))
+    return figure
