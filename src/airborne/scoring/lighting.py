@@ -14,7 +14,7 @@ from airborne.rendering.srgb import light_from_srgb
 TO_LIGHT = light_from_srgb(np.arange(1024) * (255 / 1023)).astype(np.float32)
 _RIDGE = 1e-4  # pull of the direction-dependent part toward zero, per pixel of unit albedo
 TERMS = 6  # even light, normal (3), place in the picture (2)
-_MOST_SAMPLES = 400
+_MOST_SAMPLES = 300
 _BORDER_TRUST = np.float32(0.02)  # weight of a mixed pixel: it speaks only for faces that have no other
 _SAME_FACE = 0.9  # cosine between neighbouring normals
 
@@ -132,37 +132,36 @@ def compose(observed, scene, part, normals, albedo, is_faceted, coefficients, x0
     a smooth surface. (x0, y0) is the first pixel of the window that residual and shape cover.
     """
     _, h, w = residual.shape
-    total, count = np.empty(len(albedo), np.float32), np.empty(len(albedo), np.float32)
     for k in range(3):
-        total[:] = 0
-        count[:] = 1e-6
         for y in range(h):
             for x in range(w):
-                p = part[y + y0, x + x0]
-                empty = scene[k, y + y0, x + x0]
-                if p < 0:
-                    residual[k, y, x] = observed[k, y + y0, x + x0] - empty
-                    shape[k, y, x] = 0
-                    continue
-                u, v = _place(part, y + y0, x + x0)
-                light = coefficients[k, 0] + coefficients[k, 4] * u + coefficients[k, 5] * v
-                for q in range(3):
-                    light += coefficients[k, q + 1] * normals[q, y + y0, x + x0]
-                light = max(light, np.float32(0))
-                colour = albedo[p, k] * light
-                residual[k, y, x] = observed[k, y + y0, x + x0] - colour
-                shape[k, y, x] = colour
-                total[p] += light
-                count[p] += 1
-        for p in range(len(albedo)):
-            if not is_faceted[p] and count[p] > 1:
-                _paint_evenly(part, k, p, albedo[p, k] * total[p] / count[p], x0, y0, shape)
+                residual[k, y, x] = observed[k, y + y0, x + x0] - scene[k, y + y0, x + x0]
+                shape[k, y, x] = 0
+    total, count = np.zeros((len(albedo), 3), np.float32), np.zeros(len(albedo), np.int64)
+    for y in range(h):
+        for x in range(w):
+            p = part[y + y0, x + x0]
+            if p < 0:
+                continue
+            u, v = _place(part, y + y0, x + x0)
+            n0, n1, n2 = normals[0, y + y0, x + x0], normals[1, y + y0, x + x0], normals[2, y + y0, x + x0]
+            count[p] += 1
+            for k in range(3):
+                c = coefficients[k]
+                light = max(c[0] + c[1] * n0 + c[2] * n1 + c[3] * n2 + c[4] * u + c[5] * v, np.float32(0))
+                total[p, k] += light
+                shape[k, y, x] = albedo[p, k] * light
+                residual[k, y, x] = observed[k, y + y0, x + x0] - shape[k, y, x]
+    for p in range(len(albedo)):
+        if count[p] and not is_faceted[p]:
+            _paint_evenly(part, p, albedo[p] * total[p] / np.float32(count[p]), x0, y0, shape)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _paint_evenly(part, k, p, colour, x0, y0, shape):
+def _paint_evenly(part, p, colour, x0, y0, shape):
     _, h, w = shape.shape
     for y in range(h):
         for x in range(w):
             if part[y + y0, x + x0] == p:
-                shape[k, y, x] = colour
+                for k in range(3):
+                    shape[k, y, x] = colour[k]
