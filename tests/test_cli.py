@@ -256,8 +256,18 @@ def test_arguments_that_name_nothing_get_one_line(trial, tmp_path, capsys):
 def test_a_folder_with_a_run_is_not_overwritten(trial, short_run, capsys):
     before = (short_run / "motion.csv").read_bytes()
     assert "already holds a run" in refusal(capsys, "track", trial, "-o", short_run)
-    assert "another trial" in refusal(capsys, "track", trial, "-o", short_run, "--resume", "--every", "2")
+    assert "another run" in refusal(capsys, "track", trial, "-o", short_run, "--resume", "--every", "2")
     assert (short_run / "motion.csv").read_bytes() == before
+
+
+def test_a_damaged_record_of_a_run_is_not_guessed(trial, short_run, tmp_path, capsys):
+    run = tmp_path / "run"
+    shutil.copytree(short_run, run)
+    (run / "run.json").write_text("{")
+    assert "missing or damaged" in refusal(capsys, "track", trial, "-o", run, "--resume")
+    (run / "run.json").unlink()
+    assert "missing or damaged" in refusal(capsys, "track", trial, "-o", run, "--resume")
+    assert (run / "motion.csv").read_bytes() == (short_run / "motion.csv").read_bytes()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a path below a file fails in another way there")

@@ -214,3 +214,11 @@ def test_empty_missing_or_binary_file_is_refused(folder):
     (folder / "binary.toml").write_bytes(bytes(range(256)))
     with pytest.raises(TrialError, match=r"binary\.toml: not a TOML file"):
         read_trial(folder / "binary.toml")
+
+
+def test_saved_pixels_go_with_a_calibration_file_only(folder):
+    saved = GOOD.replace('fields = "top-first"', "saved_scale = 1.01")
+    assert read(folder, saved).camera[0].saved_scale == 1.01
+    (folder / "points.csv").write_text("")
+    clicked = saved.replace('file = "calib.toml"', 'control_points = "points.csv"')
+    assert "camera 'left': calibrated_as, saved_scale" in complaint(folder, clicked)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,6 +28,8 @@ app = typer.Typer(
 )
 synth = typer.Typer(no_args_is_help=True, help="Write a synthetic trial with its truth.")
 app.add_typer(synth, name="synth")
+
+_SECONDS_A_LINE = 5.0
 
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -79,14 +82,11 @@ def demo(
 
 def _forget_demo(path: Path, output: Path) -> None:
     """Let the demo be run again in its own folder; a folder with any other run is left alone."""
-    from airborne.pipeline import inputs_of
+    from airborne.pipeline import holds_run_of
     from airborne.trial import read_trial
 
-    trial, record = read_trial(path), output / "run.json"
-    if record.is_file():
-        known = json.loads(record.read_text(encoding="utf-8"))
-        if known.get("inputs") == inputs_of(trial) and known.get("track") == trial.track.model_dump():
-            (output / "motion.csv").unlink(missing_ok=True)
+    if holds_run_of(read_trial(path), output):
+        (output / "motion.csv").unlink(missing_ok=True)
 
 
 @app.command()
@@ -238,8 +238,23 @@ def bench(as_json: Json = False) -> None:
 
 @contextmanager
 def _progress(what: str) -> Iterator:
-    """Show a bar on stderr while frames go by."""
+    """Show a bar on stderr while frames go by; where stderr is no terminal, a line every few seconds."""
+    if not errors.is_terminal:
+        yield _Lines(what)
+        return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=errors, transient=True, disable=not errors.is_terminal) as bar:
+    with Progress(*columns, console=errors, transient=True) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+class _Lines:
+    """Progress as plain lines."""
+
+    def __init__(self, what: str) -> None:
+        self._what, self._next_s = what, time.monotonic() + _SECONDS_A_LINE
+
+    def __call__(self, done: int, total: int | None) -> None:
+        if time.monotonic() >= self._next_s:
+            self._next_s = time.monotonic() + _SECONDS_A_LINE
+            errors.print(f"{self._what}: {done} of {total or 'unknown'}", markup=False)

@@ -140,22 +140,39 @@ def _source(trial: Trial, camera: CameraTable) -> VideoSource:
 
 def _begin(folder: Path, trial: Trial, resume: bool) -> list[Estimate]:
     """Make the folder ready and return the frames that are finished already."""
-    identity = {"inputs": inputs_of(trial), "track": trial.track.model_dump(), "version": __version__}
-    motion, record = folder / "motion.csv", folder / "run.json"
+    identity, motion, record = _identity(trial), folder / "motion.csv", folder / "run.json"
     folder.mkdir(parents=True, exist_ok=True)
     if motion.exists() and not resume:
         raise ResultError(f"{folder} already holds a run; give --resume to go on with it, or another folder")
-    if not motion.exists() or not record.exists():
+    if not motion.exists():
         write_json(record, identity)
-        motion.unlink(missing_ok=True)
         return []
-    known = json.loads(record.read_text(encoding="utf-8"))
-    changed = [key for key in identity if known.get(key) != json.loads(json.dumps(identity[key]))]
+    known = _read_record(record)
+    changed = [name for name in identity if known.get(name) != identity[name]]
     if changed:
-        raise ResultError(
-            f"{folder} holds a run of another trial (its {' and '.join(changed)} differ); track into another folder"
-        )
+        raise ResultError(f"{folder} holds another run (other {', other '.join(changed)}); track into another folder")
     return read_estimates(motion)
+
+
+def holds_run_of(trial: Trial, folder: Path) -> bool:
+    """Say whether a folder holds a run of exactly this trial, finished or not."""
+    record = folder / "run.json"
+    return record.is_file() and _read_record(record) == _identity(trial)
+
+
+def _identity(trial: Trial) -> dict[str, Any]:
+    settings = {"inputs": inputs_of(trial), "settings": trial.track.model_dump(), "version": __version__}
+    return json.loads(json.dumps(settings))
+
+
+def _read_record(path: Path) -> dict[str, Any]:
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        return record if isinstance(record, dict) else {}
+    except (OSError, ValueError) as error:
+        raise ResultError(
+            f"{path} is missing or damaged, so it cannot be told whose run this is; use another folder"
+        ) from error
 
 
 def _keep_inputs(folder: Path, trial: Trial, rig: Rig, model: BodyModel) -> None:

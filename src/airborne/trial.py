@@ -150,6 +150,21 @@ class Trial(_Strict):
     start: StartTable
     lights: LightsTable | None = None
     track: TrackTable = TrackTable()
+
+    @model_validator(mode="after")
+    def _saved_needs_a_file(self) -> Trial:
+        for camera in self.camera:
+            if self.calibration.file is None and camera.model_fields_set & {
+                "calibrated_as",
+                "saved_scale",
+                "saved_offset_px",
+            }:
+                raise ValueError(
+                    f"camera '{camera.name}': calibrated_as, saved_scale and saved_offset_px need a calibration file, "
+                    "because control points are clicked in the video's own pixels"
+                )
+        return self
+
     _folder: Path = PrivateAttr(default=Path())
 
     @property

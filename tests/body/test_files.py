@@ -175,3 +175,14 @@ def test_unusable_mesh_file_is_refused_in_one_line(tmp_path, name, content, said
     if content is not None:
         (tmp_path / name).write_bytes(content)
     assert said in complaint(tmp_path, MESH.replace("FILE", name))
+
+
+@pytest.mark.parametrize("name", ["../ball.stl", "/ball.stl"])
+def test_mesh_file_elsewhere_is_refused(tmp_path, name):
+    path = tmp_path / "body.toml"
+    path.write_text(
+        f'name = "ball"\n[[segment]]\nname = "ball"\n[[segment.part]]\nname = "ball"\nshape = "mesh"\nfile = "{name}"\n'
+        'colour = "sample"\n'
+    )
+    with pytest.raises(BodyError, match="must lie beside the body file or below it"):
+        read_body(path)

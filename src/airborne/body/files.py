@@ -94,6 +94,10 @@ def _shape(table: _PartTable, path: Path) -> Shape:
             return Ellipsoid(np.array(value))
     except BodyError as error:
         raise BodyError(f"{path.name}: part '{table.name}': {error}") from error
+    if Path(value).is_absolute() or ".." in Path(value).parts:
+        raise BodyError(
+            f"{path.name}: part '{table.name}': mesh file {value} must lie beside the body file or below it"
+        )
     return _mesh(path.parent / value, table.scale)
 
 
