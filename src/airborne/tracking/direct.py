@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,24 +30,34 @@ from airborne.video import Frames
 
 Array = NDArray[np.floating]
 Objective = Callable[[Array], Array]  # (n, 6) -> (n,)
-Search = Callable[[Objective, Array], Array]  # objective, start (6,) -> best (6,)
+
+
+class Search(NamedTuple):
+    """A way to minimise, and how far from the minimum it may stop."""
+
+    run: Callable[[Objective, Array], Array]  # objective, start (6,) -> best (6,)
+    resolution: Array  # (6,) standard deviations [m, rad]
+
 
 _UNCERTAIN_RATIO, _LOST_RATIO = 1.6, 2.5  # of a frame's score to the median of those tracked
 _REMEMBERED, _REMEMBERED_SCORES = 2, 25
 _PROBE = np.array([0.004] * 3 + [0.012] * 3)  # [m], [rad]: the differences that give the curvature
 _SHARED_NOISE_PX = 8  # this many pixels have one pixel's worth of independent noise: compression, interpolated rows
 _MARGIN_PX = 40
+_V_RULE_SD = 0.2  # of the last step: the RMS error of the V rule as printed
 
 
 def stepping_search(loops: Sequence[Array], v_rule: VRule) -> Search:
     """Search by paper B's stepping; loops: steps (6,) [m, rad] for each loop."""
-    return lambda objective, start: stepping(objective, start, loops, v_rule=v_rule)[0]
+    return Search(
+        lambda objective, start: stepping(objective, start, loops, v_rule=v_rule)[0], _V_RULE_SD * np.asarray(loops[-1])
+    )
 
 
 def simplex_search(size: Array) -> Search:
     """Search by Nelder and Mead's simplex, all variables at once, started `size` (6,) [m, rad] wide, and once more."""
 
-    def search(objective: Objective, start: Array) -> Array:
+    def run(objective: Objective, start: Array) -> Array:
         best = start
         for share in (1.0, 0.2):
             corners = np.vstack([best, best + share * np.diag(size)])
@@ -54,7 +65,7 @@ def simplex_search(size: Array) -> Search:
             best = minimize(lambda x: float(objective(x[None])[0]), best, method="Nelder-Mead", options=options).x
         return best
 
-    return search
+    return Search(run, np.zeros(6))
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +107,7 @@ class Direct:
         if not len(seen.views) or not np.isfinite(self._objective(seen)(_vector(start)[None])[0]):
             return lost(frames.index, frames.time_s)
         objective = self._objective(seen)
-        best = self._search(objective, _vector(start))
+        best = self._search.run(objective, _vector(start))
         value = float(objective(best[None])[0])
         sums = measure(self._geometry, seen, *self._placed(best[None]), with_chroma=False)
         pixels = sums[0, :, PIXELS]
@@ -184,7 +195,8 @@ class Direct:
                 spread += np.outer(change, change)
         likelihood = pixels / (2 * max(value, 1e-3) ** 2)
         shared = max(_SHARED_NOISE_PX / self._scale**2, 1)
-        return covariance_of(curvature * likelihood, noise=shared, spread=spread * likelihood**2)
+        covariance = covariance_of(curvature * likelihood, noise=shared, spread=spread * likelihood**2)
+        return covariance + np.diag(self._search.resolution**2)
 
     def _gradient(self, seen: Targets, posed: PosedBody) -> Array:
         steps = np.diag(_PROBE)
