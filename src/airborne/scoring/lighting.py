@@ -44,8 +44,8 @@ def fit_light(observed, part, normals, albedo, coefficients, rounds, x0, y0, x1,
             inside += part[y, x] >= 0
     if inside < 12:
         return np.float32(1.0)
-    stride = max(1, inside // _MOST_SAMPLES)
-    n = inside // stride
+    n = min(inside, _MOST_SAMPLES)
+    share = np.uint64(n / inside * 2**32)
     rows, trust = np.empty((n, TERMS), np.float32), np.empty(n, np.float32)
     seen, own = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
     i, count = 0, 0
@@ -53,7 +53,8 @@ def fit_light(observed, part, normals, albedo, coefficients, rounds, x0, y0, x1,
         for x in range(x0, x1):
             if part[y, x] < 0:
                 continue
-            if count % stride == 0 and i < n:
+            scattered = (np.uint64(count) * np.uint64(2654435761)) & np.uint64(0xFFFFFFFF)  # no pattern of the body's
+            if i < n and (n == inside or scattered < share):
                 trust[i] = 1 if _is_surrounded(part, normals, y, x) else _BORDER_TRUST
                 rows[i, 0] = 1
                 rows[i, 4], rows[i, 5] = _place(part, y, x)

@@ -111,7 +111,7 @@ def fit_pictures(synthesis: Synthesis, posed: PosedBody, regions: Sequence[Regio
     rows_sigma_px = [max(_FINE_SIGMA_PX * region.aspect, 0.5) for region in regions]
     taps = [(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma)) for sigma in rows_sigma_px]
     correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px))
-    shifts_px = [np.hypot(SHIFT_SD_PX, r.camera.shift_sd_px) * np.array([1, r.aspect]) for r in regions]
+    shifts_px = [_shifts_px(region) for region in regions]
     body, paint = (synthesis.shapes, synthesis.geometry), (synthesis.albedo, synthesis.is_faceted)
     for step in range(1, _MOST_STEPS + 1):
         sums, totals, spread = Sums.zero(), np.zeros(2), np.zeros((6, 6))
@@ -163,6 +163,12 @@ def _pictured(region: Region, appearance: Appearance) -> _Pictured:
     light_planes(filled, TO_LIGHT, scene)
     certainty = np.minimum(1, (START_SD / sd) ** 2)
     return _Pictured(region.packed, region.camera.K, observed, scene, certainty)
+
+
+def _shifts_px(region: Region) -> Array:
+    """Return the sds of a picture's shift right and down, in its own pixels, and of its outline's width: (3,) [px]."""
+    shift_px = np.hypot(SHIFT_SD_PX, region.camera.shift_sd_px)
+    return np.array([shift_px, shift_px * region.aspect, SHIFT_SD_PX])
 
 
 def _even_light() -> NDArray[np.float32]:

@@ -27,12 +27,12 @@ class Sums(NamedTuple):
     A: Any  # (6, 6) curvature; the lower triangle is filled
     g: Any  # (6,) gradient
     S: Any  # (6, 6) sum of g g' over blocks of the pictures
-    B: Any  # (6, 2) what a shift of the whole picture by one pixel, right or down, does to g
+    B: Any  # (6, 3) what a picture shifted right or down by a pixel, or an outline a pixel fatter, does to g
 
     @classmethod
     def zero(cls) -> Sums:
         """Begin with nothing."""
-        return cls(np.zeros((6, 6)), np.zeros(6), np.zeros((6, 6)), np.zeros((6, 2)))
+        return cls(np.zeros((6, 6)), np.zeros(6), np.zeros((6, 6)), np.zeros((6, 3)))
 
     @property
     def curvature(self) -> np.ndarray:
@@ -115,7 +115,7 @@ def accumulate(residual, shape, coverage, inverse_depth, scene, certainty, x0, y
     blocks_a_row = w // BLOCK_PX + 1
     blocks = np.zeros(((h // BLOCK_PX + 1) * blocks_a_row, 6))
     total, weight_sum = 0.0, 0.0
-    inverse_clip2 = 1.0 / (clip * clip)
+    inverse_clip2, aspect = 1.0 / (clip * clip), fy / fx
     for y in range(1, h - 1):
         ry = (y + y0 - cy) / fy
         for x in range(1, w - 1):
@@ -158,6 +158,8 @@ def accumulate(residual, shape, coverage, inverse_depth, scene, certainty, x0, y
             syy *= weight
             sx *= weight
             sy *= weight
+            steepness = np.sqrt(mx * mx + aspect * aspect * my * my) + 1e-9
+            out_x, out_y = -mx / steepness, -aspect * aspect * my / steepness
             block = blocks[(y // BLOCK_PX) * blocks_a_row + x // BLOCK_PX]
             for i in range(6):
                 # a body that moves by du takes its picture along: the picture changes by -gradient du
@@ -166,6 +168,7 @@ def accumulate(residual, shape, coverage, inverse_depth, scene, certainty, x0, y
                 bi = sxy * a[i] + syy * b[i]
                 B[i, 0] += ai
                 B[i, 1] += bi
+                B[i, 2] += ai * out_x + bi * out_y
                 for j in range(i + 1):
                     A[i, j] += ai * a[j] + bi * b[j]
     for n in range(len(blocks)):
