@@ -294,3 +294,18 @@ def test_calibrate_says_what_it_lacks(trial, tmp_path, capsys):
     assert "cam2" in refusal(capsys, "calibrate", points, "--size", "cam1=768x576", "-o", out)
     assert "no column point" in refusal(capsys, "calibrate", trial.parent / "truth.csv", "--size", "768x576", "-o", out)
     assert not out.exists()
+
+
+def test_a_folder_with_anything_but_a_run_is_left_alone(trial, capsys):
+    before = {path.name: path.read_bytes() for path in trial.parent.iterdir() if path.is_file()}
+    assert "is not empty and holds no run" in refusal(capsys, "track", trial, "-o", trial.parent)
+    assert {path.name: path.read_bytes() for path in trial.parent.iterdir() if path.is_file()} == before
+
+
+def test_a_body_found_nowhere_is_said_plainly(trial, tmp_path, capsys):
+    far = changed(trial, "far.toml", ("position_m = [-0.42419,", "position_m = [40.0,"))
+    assert in_process("track", far, "-o", tmp_path / "run", "--no-pictures") == 1
+    out, _ = capsys.readouterr()
+    assert "found in no frame" in out
+    assert "the start pose lies in no camera's picture" in out
+    assert "nan" not in out

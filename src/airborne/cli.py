@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 from rich.console import Console
@@ -30,6 +31,7 @@ synth = typer.Typer(no_args_is_help=True, help="Write a synthetic trial with its
 app.add_typer(synth, name="synth")
 
 _SECONDS_A_LINE = 5.0
+_UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
 
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -40,7 +42,15 @@ Out = Annotated[Path, typer.Option("-o", "--output", help="Folder for the result
 def main() -> None:
     """Run the command line; a user's error is one line on stderr and exit code 2."""
     try:
-        app(standalone_mode=True)
+        sys.exit(app(standalone_mode=False))
+    except _UsageError as error:
+        said, context = error.format_message(), getattr(error, "ctx", None)
+        if "Usage:" in said or not said:  # a command without arguments: its help
+            print(said, end="")
+            sys.exit(2)
+        _refuse(f"{' '.join(said.split())} See: {context.command_path if context else 'airborne'} --help")
+    except (KeyboardInterrupt, typer.Abort):
+        sys.exit(130)
     except AirborneError as error:
         _refuse(str(error))
     except OSError as error:
@@ -110,6 +120,8 @@ def track(
         print((output / "summary.json").read_text(encoding="utf-8"), end="")
     else:
         print(f"{_in_short(run.summary)}\nresults: {output}")
+    if run.summary["n_frames"] == run.summary["n_lost"]:
+        raise typer.Exit(1)
 
 
 def _track(
@@ -137,12 +149,20 @@ def _track(
 def _in_short(summary: dict) -> str:
     counts = ", ".join(f"{summary[f'n_{status}']} {status}" for status in ("tracked", "uncertain", "lost"))
     lines = [f"{summary['n_frames']} frames at {summary['rate_hz']:.5g} Hz: {counts}"]
-    lines.append(
-        f"median sd: {summary['median_position_sd_mm']:.2g} mm, {summary['median_rotation_sd_deg']:.2g} degrees; "
-        "summary.json says which errors it holds"
-    )
+    if summary["n_frames"] == summary["n_lost"]:
+        lines.append("the body was found in no frame: look at the first picture of the overlay videos, mend [start]")
+    else:
+        position, rotation = summary["median_position_sd_mm"], summary["median_rotation_sd_deg"]
+        lines.append(
+            f"median sd: position {_or_unseen(position, 'mm')}, rotation {_or_unseen(rotation, 'degrees')}; "
+            "summary.json says which errors it holds"
+        )
     lines += [f"note: {text}" for text in [*summary["warnings"], *summary["events"]]]
     return "\n".join(lines)
+
+
+def _or_unseen(sd: float, unit: str) -> str:
+    return f"{sd:.2g} {unit}" if math.isfinite(sd) else "not seen in the pictures"
 
 
 @app.command()
@@ -151,7 +171,7 @@ def calibrate(
     size: Annotated[str, typer.Option(help="Image size in pixels, WIDTHxHEIGHT, or name=WIDTHxHEIGHT,...")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Calibration file to write (Pose2Sim TOML).")],
     method: Annotated[
-        Literal["lm", "annealing"], typer.Option(help="Fit: least squares, or paper B's annealing.")
+        Literal["lm", "annealing"], typer.Option(help="Fit: least squares, or simulated annealing.")
     ] = "lm",
     as_json: Json = False,
 ) -> None:
@@ -189,7 +209,9 @@ def _sizes(text: str, names: tuple[str, ...]) -> dict[str, tuple[int, int]]:
 def evaluate(
     results: Annotated[Path, typer.Argument(help="Folder of a run.")],
     truth: Annotated[Path | None, typer.Argument(help="True poses: field,time_s,x_m,y_m,z_m,r00,...,r22")] = None,
-    digitised: Annotated[Path | None, typer.Option(help="Points clicked by hand, to compare as paper B does.")] = None,
+    digitised: Annotated[
+        Path | None, typer.Option(help="Points clicked by hand, to compare with, as the rigid-body paper does.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Compare a run with the truth, or with points clicked by hand; the report then shows both.

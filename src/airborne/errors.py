@@ -32,10 +32,15 @@ class ResultError(AirborneError):
     """A run folder or truth file is unusable."""
 
 
+_PLAIN = {"missing": "is missing", "extra_forbidden": "unknown key"}
+
+
 def one_line(error: ValidationError) -> str:
     """Say a pydantic error's first complaint in one line: where, what, what was given."""
     first = error.errors(include_url=False)[0]
     place = ".".join(str(step) for step in first["loc"]) or "the file"
-    given = "" if first["type"] == "missing" else f" (found {str(first['input'])[:60]!r})"
-    more = f"; and {error.error_count() - 1} more" if error.error_count() > 1 else ""
-    return f"{place}: {first['msg']}{given}{more}"
+    said = _PLAIN.get(first["type"], first["msg"].removeprefix("Value error, "))
+    is_whole_table = isinstance(first["input"], dict) or first["type"] == "missing"
+    given = "" if is_whole_table else f" (found {str(first['input'])[:60]!r})"
+    more = f"; and {error.error_count() - 1} more mistakes" if error.error_count() > 1 else ""
+    return f"{place}: {said}{given}{more}"

@@ -7,6 +7,7 @@ import json
 import platform
 import shutil
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
@@ -15,8 +16,10 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from airborne import __version__
-from airborne.body import BodyModel
+from airborne.body import BodyModel, PosedBody, geometry
 from airborne.body.files import mesh_files, read_body
 from airborne.cameras import Calibration, Camera, Rig, calibrate, read_control_points, read_rig, write_pose2sim
 from airborne.errors import ResultError, TrialError
@@ -38,18 +41,20 @@ from airborne.motion import (
     write_joints,
     write_motion_parquet,
 )
+from airborne.rendering import FLAT, render
 from airborne.tracking import Estimate
 from airborne.tracking.methods import FIELDS_AS, sampled, tracker_of
 from airborne.trial import CameraTable, Trial
-from airborne.video import Recording, VideoSource, inspect, open_recording
+from airborne.video import Recording, VideoSource, View, inspect, open_recording
 
 Progress = Callable[[int, int | None], None]  # frames done, frames expected
 
 UNCERTAINTY = (
-    "Standard deviations hold what the pictures leave open (noise, wrong light, wrong shape) and how far the control "
-    "points leave each camera's picture open. They do not hold errors of a calibration file, of the body's measures "
-    "or of the cameras' times."
+    "Standard deviations hold what the pictures leave open: noise, light, and edges that are not where the drawn body "
+    "has them. They do not hold a body measured wrongly all over, or wrong times of the cameras."
 )
+OF_POINTS = " They hold how far the control points leave each camera's picture open."
+OF_FILE = "the calibration comes from a file that does not say how good it is; the standard deviations take it as exact"
 _HASHED_BYTES = 8 << 20  # larger files are told apart by their first and last so many bytes and their length
 
 
@@ -142,6 +147,8 @@ def _begin(folder: Path, trial: Trial, resume: bool) -> list[Estimate]:
     """Make the folder ready and return the frames that are finished already."""
     identity, motion, record = _identity(trial), folder / "motion.csv", folder / "run.json"
     folder.mkdir(parents=True, exist_ok=True)
+    if not record.exists() and not motion.exists() and any(folder.iterdir()):
+        raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
     if motion.exists() and not resume:
         raise ResultError(f"{folder} already holds a run; give --resume to go on with it, or another folder")
     if not motion.exists():
@@ -206,19 +213,32 @@ def _track_frames(
         joints = tuple(segment.name for segment in model.segments[1:])
         writer = stack.enter_context(MotionWriter(folder / "motion.csv", joints, resume=bool(done)))
         artists = [stack.enter_context(artist) for artist in _artists(folder, recording, pictures)]
-        state, finished = tracker.init(), iter(done)
+        state, finished, missing = tracker.init(), iter(done), Counter[str]()
+        if not np.any([_shows(view, model.with_pose(trial.start.pose)) for view in first.views]):
+            recording.events.append("the start pose lies in no camera's picture; check start.position_m, in metres")
         for number, seen in enumerate(chain([first], frames), start=1):
             estimate = next(finished, None)
             if estimate is None:
                 estimate = tracker.search(state, seen)
                 writer.append(estimate)
             state = tracker.learn(state, seen, estimate)
-            posed = None if estimate.pose is None else model.with_pose(estimate.pose)
+            missing.update(camera.name for camera, view in zip(recording.rig, seen.views, strict=True) if view is None)
+            pose = (
+                trial.start.pose if number == 1 and estimate.pose is None else estimate.pose
+            )  # show a start that failed
+            posed = None if pose is None else model.with_pose(pose)
             for artist in artists:
                 artist.write(seen, posed, estimate.status)
             if progress is not None:
                 progress(number, recording.n_frames)
+        for name, n in missing.items():
+            recording.events.append(f"{name}: no picture at {n} of {number} frames")
     return model
+
+
+def _shows(view: View | None, posed: PosedBody) -> bool:
+    """Say whether any of the body lies in a view."""
+    return view is not None and bool(render(geometry(posed.model), posed, view.camera, FLAT).mask.any())
 
 
 def _artists(folder: Path, recording: Recording, pictures: bool) -> Iterator[Any]:
@@ -252,8 +272,8 @@ def _summary(
     return {
         "name": trial.name,
         **headline(motion),
-        "uncertainty": UNCERTAINTY,
-        "warnings": [] if calibration is None else list(calibration.warnings),
+        "uncertainty": UNCERTAINTY if calibration is None else UNCERTAINTY + OF_POINTS,
+        "warnings": [OF_FILE] if calibration is None else list(calibration.warnings),
         "events": recording.events,
         "method": trial.track.model_dump(),
         "cameras": cameras,

@@ -193,7 +193,7 @@ def read_trial(path: Path, track: dict[str, Any] | None = None, cameras: Sequenc
     `track` replaces entries of its [track] table; `cameras` keeps only the named cameras.
     """
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
         if isinstance(settings := table.setdefault("track", {}), dict):
             settings.update(track or {})
         trial = Trial.model_validate(table)

@@ -80,9 +80,9 @@ def test_file_says_segments_parts_places_and_colours(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('name = "leg"', 'name = "leg"\nheight = 3', "height: Extra inputs are not permitted"),
-        ('name = "leg"', "", "name: Field required"),
-        ("centre_m", "center_m", "segment.0.part.0.center_m: Extra inputs are not permitted"),
+        ('name = "leg"', 'name = "leg"\nheight = 3', "height: unknown key"),
+        ('name = "leg"', "", "name: is missing"),
+        ("centre_m", "center_m", "segment.0.part.0.center_m: unknown key"),
         ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, -0.2, 0.4]", "part 'upper': size_m is [0.1, -0.2, 0.4]"),
         ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2, nan]", "segment.0.part.0.size_m.2: Input should be a finite"),
         ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2]", "segment.0.part.0.size_m"),
@@ -114,7 +114,7 @@ def test_malformed_file_is_refused_in_one_line_that_names_it_and_the_fault(tmp_p
 
 def test_file_without_segments_is_refused(tmp_path):
     assert "segment" in complaint(tmp_path, 'name = "a"\nsegment = []')
-    assert "Field required" in complaint(tmp_path, "")
+    assert "is missing" in complaint(tmp_path, "")
 
 
 def test_body_without_parts_is_refused(tmp_path):
@@ -186,3 +186,17 @@ def test_mesh_file_elsewhere_is_refused(tmp_path, name):
     )
     with pytest.raises(BodyError, match="must lie beside the body file or below it"):
         read_body(path)
+
+
+def test_open_mesh_is_refused(tmp_path):
+    box = trimesh.creation.box(extents=[0.1, 0.2, 0.3])
+    box.update_faces(np.arange(len(box.faces)) > 2)
+    box.export(tmp_path / "lump.obj")
+    assert "lump.obj: the mesh is not closed" in complaint(tmp_path, MESH.replace("FILE", "lump.obj"))
+
+
+def test_measures_in_millimetres_are_noticed(tmp_path):
+    trimesh.creation.box(extents=[100, 200, 300]).export(tmp_path / "lump.stl")
+    assert "is in millimetres" in complaint(tmp_path, MESH.replace("FILE", "lump.stl"))
+    with pytest.raises(BodyError, match="is it in millimetres"):
+        Box(np.array([60.0, 900.0, 45.0]))

@@ -11,7 +11,7 @@ import trimesh
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body.model import BodyModel, Box, Ellipsoid, Mesh, Part, Segment, Shape
+from airborne.body.model import LONGEST_M, BodyModel, Box, Ellipsoid, Mesh, Part, Segment, Shape
 from airborne.errors import BodyError, one_line
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -50,7 +50,7 @@ class _BodyTable(_Strict):
 def read_body(path: Path) -> BodyModel:
     """Read a body file; raises BodyError, naming the file and what is wrong, for anything unusable."""
     try:
-        table = _BodyTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        table = _BodyTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8-sig")))
     except OSError as error:
         raise BodyError(f"{path.name}: cannot be read ({error.strerror})") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -111,10 +111,16 @@ def _mesh(path: Path, scale: float) -> Mesh:
         raise BodyError(f"{path.name}: not a readable OBJ, PLY or STL mesh ({error})") from error
     if not len(faces) or not np.all(np.isfinite(vertices)):
         raise BodyError(f"{path.name}: the mesh has no faces, or corners that are not numbers")
+    if not mesh.is_watertight:
+        raise BodyError(f"{path.name}: the mesh is not closed; fill its holes, so that inside and outside can be told")
+    if np.ptp(vertices, axis=0).max() > LONGEST_M:
+        raise BodyError(
+            f"{path.name}: the mesh is over {LONGEST_M:.0f} m long; give scale = 0.001 if it is in millimetres"
+        )
     return Mesh(vertices, faces if mesh.volume >= 0 else faces[:, ::-1])
 
 
 def mesh_files(path: Path) -> list[str]:
     """Return the mesh files that a readable body file names, relative to it."""
-    table = _BodyTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    table = _BodyTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8-sig")))
     return [part.file for segment in table.segment for part in segment.part if part.file is not None]

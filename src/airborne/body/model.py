@@ -44,6 +44,8 @@ class Mesh:
 
 Shape = Ellipsoid | Box | Mesh
 
+LONGEST_M = 20.0  # no part of a body is longer
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
@@ -166,3 +168,5 @@ class PosedBody:
 def _require_positive(values: Array, name: str) -> None:
     if values.shape != (3,) or not np.all(np.isfinite(values)) or np.any(values <= 0):
         raise BodyError(f"{name} is {np.asarray(values).tolist()}; it needs three lengths above zero, in metres")
+    if np.any(values > LONGEST_M):
+        raise BodyError(f"{name} is {np.asarray(values).tolist()}: over {LONGEST_M:.0f} m; is it in millimetres?")

@@ -21,6 +21,8 @@ Array = NDArray[np.floating]
 Triple = tuple[float, float, float]
 
 _SAME_TIME_S = 1e-6  # where neither table has two times to tell its period
+_HARDLY_ANY = 0.2
+_SAME_SHARE = 0.1  # of the shorter period: times further apart are not the same time
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,13 +115,15 @@ class Comparison:
                     f"{name} errors within 1 sd {share.within_1sd:.0%} (normal: 68%), "
                     f"within 2 sd {share.within_2sd:.0%} (95%), n = {share.n}"
                 )
+        if self.position_calibration.n and self.position_calibration.within_2sd < _HARDLY_ANY:
+            lines.append("hardly any position lies within 2 sd: is this the reference of this recording, in its world?")
         return "\n".join(lines)
 
 
 def compare(motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> Comparison:
     """Compare a motion with the truth, or another reference, frame by frame.
 
-    Each frame goes with the nearest time of the truth, less than half a period of the finer of the two away.
+    Each frame goes with the nearest time of the truth, less than a tenth of the shorter period of the two away.
     `symmetries` are the body's (see `airborne.body.symmetry`), the identity among them: a body at `R` looks like one
     at `R @ S`. Raises ResultError where no frame with a pose has a true time.
     """
@@ -163,7 +167,7 @@ def compare(motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> Compar
 def _match(time_s: Array, true_time_s: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Rows of the motion, rows of the truth nearest in time, and the time between them [s]."""
     periods = [float(np.median(np.diff(t))) for t in (time_s, true_time_s) if len(t) > 1]
-    reach = min(periods) / 2 if periods else _SAME_TIME_S
+    reach = _SAME_SHARE * min(periods) if periods else _SAME_TIME_S
     rows = np.searchsorted((true_time_s[1:] + true_time_s[:-1]) / 2, time_s)
     offset = np.abs(time_s - true_time_s[rows])
     frames = np.flatnonzero(offset < reach)

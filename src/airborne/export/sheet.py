@@ -48,8 +48,8 @@ class ContactSheet:
         self._every, self._n_seen = 1, 0
 
     def write(self, frames: Frames, posed: PosedBody | None, status: Status) -> None:
-        """Consider what every camera saw at one time; nothing is taken where `posed` is None."""
-        if posed is None:
+        """Consider what every camera saw at one time; nothing is taken where the body is lost."""
+        if posed is None or status is Status.LOST:
             return
         if self._n_seen % self._every == 0:
             if len(self._columns) == N_HELD:
