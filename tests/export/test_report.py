@@ -54,6 +54,8 @@ def test_what_cannot_be_seen_is_said_plainly_and_has_no_number(tmp_path):
     html = html_of(tmp_path, run(unseen=range(20)))
     assert "<b>cannot be seen</b>" in html
     assert "In 20 of 20 frames with a pose" in html
+    assert "somersault, first to last pose" not in html
+    assert "somersault, first to last pose" in html_of(tmp_path, run(unseen=range(19)))
     assert "inf" not in re.sub(r"infinite|Infinite", "", html)
 
 

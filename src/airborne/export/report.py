@@ -133,10 +133,13 @@ def _tiles(head: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield _with_unit(head["duration_s"], "{:.3g} s"), f"at {_with_unit(head['rate_hz'], '{:.5g}')} frames a second"
     yield _spread(head, "position", "mm"), "position, median standard deviation of an axis"
     yield _spread(head, "rotation", "deg"), "orientation, median standard deviation about an axis"
-    yield _with_unit(head["somersault_rev"], "{:.2f} turns"), "somersault, first to last pose"
-    yield _with_unit(head["twist_rev"], "{:.2f} turns"), "twist, first to last pose"
-    low, high = head["tilt_range_deg"]
-    yield "not known" if low is None else f"{low:.0f}° to {high:.0f}°".replace("-", "−"), "tilt"
+    if head["n_rotation_unobservable"] == head["n_tracked"] + head["n_uncertain"] > 0:
+        yield "cannot be seen", "turns: in every frame some direction of the orientation is hidden"
+    else:
+        yield _with_unit(head["somersault_rev"], "{:.2f} turns"), "somersault, first to last pose"
+        yield _with_unit(head["twist_rev"], "{:.2f} turns"), "twist, first to last pose"
+        low, high = head["tilt_range_deg"]
+        yield "not known" if low is None else f"{low:.0f}° to {high:.0f}°".replace("-", "−"), "tilt"
     ranges = head["range_m"]
     yield (
         "not known" if ranges[0] is None else " · ".join(f"{r:.2f}" for r in ranges) + " m",
