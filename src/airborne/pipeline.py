@@ -76,16 +76,16 @@ def track(
     """
     begun_s = time.monotonic()
     recording, calibration = open_trial(trial)
-    rig = recording.rig
     model = read_body(trial.path(trial.body.file))
-    done = _begin(folder, trial, resume)
-    _keep_inputs(folder, trial, rig, model)
+    identity = _identity(trial)
+    done = _begin(folder, identity, resume)
+    _keep_inputs(folder, trial, recording.rig)
     read_s = time.monotonic()
     model = _track_frames(trial, model, recording, folder, done, pictures, progress)
     tracked_s = time.monotonic()
     motion = read_motion(folder / "motion.csv")
     _write_tables(folder, motion, model)
-    summary = _summary(trial, rig, calibration, recording, motion, folder)
+    summary = _summary(trial, calibration, recording, motion, identity["inputs"])
     if pictures:
         write_figures(folder, motion)
     summary["timings_s"] = {
@@ -143,9 +143,9 @@ def _source(trial: Trial, camera: CameraTable) -> VideoSource:
     return VideoSource(camera.name, trial.path(camera.video), camera.fields, camera.offset_s)
 
 
-def _begin(folder: Path, trial: Trial, resume: bool) -> list[Estimate]:
+def _begin(folder: Path, identity: dict[str, Any], resume: bool) -> list[Estimate]:
     """Make the folder ready and return the frames that are finished already."""
-    identity, motion, record = _identity(trial), folder / "motion.csv", folder / "run.json"
+    motion, record = folder / "motion.csv", folder / "run.json"
     folder.mkdir(parents=True, exist_ok=True)
     if not record.exists() and not motion.exists() and any(folder.iterdir()):
         raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
@@ -182,7 +182,7 @@ def _read_record(path: Path) -> dict[str, Any]:
         ) from error
 
 
-def _keep_inputs(folder: Path, trial: Trial, rig: Rig, model: BodyModel) -> None:
+def _keep_inputs(folder: Path, trial: Trial, rig: Rig) -> None:
     """Leave the cameras and the body beside the results, for `airborne evaluate` and for other tools."""
     write_pose2sim(folder / "calib.toml", rig)
     body = trial.path(trial.body.file)
@@ -256,7 +256,7 @@ def _write_tables(folder: Path, motion: Motion, model: BodyModel) -> None:
 
 
 def _summary(
-    trial: Trial, rig: Rig, calibration: Calibration | None, recording: Recording, motion: Motion, folder: Path
+    trial: Trial, calibration: Calibration | None, recording: Recording, motion: Motion, inputs: dict[str, str]
 ) -> dict[str, Any]:
     fits = {} if calibration is None else {fit.name: fit for fit in calibration.fits}
     cameras = [
@@ -267,7 +267,7 @@ def _summary(
             "calibration_rms_px": fits[camera.name].rms_px if camera.name in fits else None,
             "held_out_rms_mm": fits[camera.name].held_out_m * 1e3 if camera.name in fits else None,
         }
-        for camera in rig
+        for camera in recording.rig
     ]
     return {
         "name": trial.name,
@@ -278,7 +278,7 @@ def _summary(
         "method": trial.track.model_dump(),
         "cameras": cameras,
         "versions": versions(),
-        "inputs": inputs_of(trial),
+        "inputs": inputs,
     }
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airborne.rendering.rows import BLOCK, LANES, NX, NY, NZ, SHAPE, W, all_spans, draw_row, new_row
+from airborne.rendering.rows import BLOCK, LANES, NX, NY, NZ, SHAPE, W, all_spans, covered_blocks, draw_row, new_row
 from airborne.rendering.shapes import B_1, B_U, B_V, KERNEL, place
 
 
@@ -40,13 +40,10 @@ def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
         start, stop = row_start[v], row_stop[v]
         if stop == start:
             continue
-        first, last = width, -1
-        for k in range(start, stop):
-            first, last = min(first, ends[k, 0]), max(last, ends[k, 1])
-        first_block = first // LANES
-        draw_row(row, shapes.outline, shapes.surface, ends, curves, start, stop, v, first_block)
-        for u in range(first, last + 1):
-            at = (u // LANES - first_block) * BLOCK + u % LANES
+        first, last = covered_blocks(ends, start, stop)
+        draw_row(row, shapes.outline, shapes.surface, ends, curves, start, stop, v, first)
+        for u in range(first * LANES, min((last + 1) * LANES, width)):
+            at = (u // LANES - first) * BLOCK + u % LANES
             w = row[at + W]
             if w > 0:
                 shape = int(row[at + SHAPE])
@@ -60,6 +57,6 @@ def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
                 x, y, z = row[at + NX], row[at + NY], row[at + NZ]
                 length = np.sqrt(x * x + y * y + z * z)
                 normals[0, v, u], normals[1, v, u], normals[2, v, u] = x / length, y / length, z / length
-        for b in range(last // LANES - first_block + 1):
+        for b in range(last - first + 1):
             for j in range(LANES):
                 row[b * BLOCK + W + j] = 0

@@ -28,7 +28,7 @@ KERNEL = {**_COMMON, "cache": True}  # called from Python
 INNER = {**_COMMON, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # called by kernels only
 
 # columns of a packed view: world to camera (R row by row, t), then the two rows of K^-1
-VIEW_R, VIEW_T, VIEW_K, VIEW_COLUMNS = 0, 9, 12, 18
+VIEW_T, VIEW_K, VIEW_COLUMNS = 9, 12, 18
 # columns of an outline (float64)
 B_U, B_V, B_1, MID_V, MID_1, HALF_1, HALF_V, HALF_VV, NORMAL, OUTLINE_COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 8, 17
 # columns of a surface (float32): what the pixel loop holds fixed along a span
