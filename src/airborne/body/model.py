@@ -45,6 +45,8 @@ class Mesh:
 Shape = Ellipsoid | Box | Mesh
 
 LONGEST_M = 20.0  # no part of a body is longer
+WHOLE = (-np.inf, np.inf)  # a part that is not cut
+UNLIMITED = np.tile([-np.inf, np.inf], (3, 1))  # a joint that turns freely
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +57,32 @@ class Part:
     shape: Shape
     segment_from_part: RigidTransform
     colour: Array | None  # (3,) sRGB 0..255; None: to be sampled from the video at the first pose
+    slab_m: tuple[float, float] = WHOLE  # ellipsoids: only what lies between these heights along the part's own z
+
+    def __post_init__(self) -> None:
+        low, high = self.slab_m
+        if not low < high:
+            raise BodyError(f"part '{self.name}': slab_m is [{low}, {high}]; give the lower height first, in metres")
+        if self.slab_m != WHOLE and not isinstance(self.shape, Ellipsoid):
+            raise BodyError(f"part '{self.name}': only an ellipsoid can be cut to a slab; leave slab_m out")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inertia:
+    """The mass of a segment and how it lies in the segment's frame."""
+
+    mass_kg: float
+    centre_m: Array  # (3,) centre of mass, segment's frame [m]
+    tensor_kg_m2: Array  # (3, 3) about the centre of mass, segment's axes [kg m^2]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Landmark:
+    """A named point fixed in a segment: a joint centre, a toe, the head."""
+
+    name: str
+    segment: str
+    position_m: Array  # (3,) segment's frame [m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,6 +93,8 @@ class Segment:
     parent: str | None
     joint_m: Array  # (3,) the joint in the parent's frame [m]; the segment's own origin
     parts: tuple[Part, ...]
+    limits_rad: Array = field(default_factory=lambda: UNLIMITED)  # (3, 2) least and greatest x, y, z joint angle [rad]
+    inertia: Inertia | None = None  # None: not known
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,6 +119,7 @@ class BodyModel:
 
     name: str
     segments: tuple[Segment, ...]  # parents before children; the first is the root
+    landmarks: tuple[Landmark, ...] = ()  # empty: the origin of every segment, under the segment's name
 
     def __post_init__(self) -> None:
         known: list[str] = []
@@ -102,7 +133,19 @@ class BodyModel:
                 raise BodyError(
                     f"segment '{segment.name}': parent '{segment.parent}' must stand before it; so far: {listed}"
                 )
+            if segment.limits_rad.shape != (3, 2) or not np.all(segment.limits_rad[:, 0] <= segment.limits_rad[:, 1]):
+                raise BodyError(f"segment '{segment.name}': each joint limit needs a least and a greatest angle")
             known.append(segment.name)
+        for landmark in self.landmarks:
+            if landmark.segment not in known:
+                raise BodyError(
+                    f"landmark '{landmark.name}': no segment '{landmark.segment}'; it has: {', '.join(known)}"
+                )
+        if len({landmark.name for landmark in self.landmarks}) < len(self.landmarks):
+            raise BodyError(f"two landmarks of body '{self.name}' share a name; give each its own")
+        if not self.landmarks:
+            origins = tuple(Landmark(segment.name, segment.name, np.zeros(3)) for segment in self.segments)
+            object.__setattr__(self, "landmarks", origins)
         if not any(segment.parts for segment in self.segments):
             raise BodyError(f"body '{self.name}' has no part to see; add a [[segment.part]]")
 
@@ -111,6 +154,18 @@ class BodyModel:
         """The index of each segment's parent, -1 for the root: (segments,)."""
         names = [segment.name for segment in self.segments]
         return np.array([-1 if s.parent is None else names.index(s.parent) for s in self.segments])
+
+    @cached_property
+    def limits_rad(self) -> Array:
+        """The least and greatest angles of every joint: (segments - 1, 3, 2) [rad]; infinite where a joint is free."""
+        return np.array([segment.limits_rad for segment in self.segments[1:]]).reshape(-1, 3, 2)
+
+    def index_of(self, segment: str) -> int:
+        """Return a segment's index; raises BodyError for a name that is not there."""
+        names = [each.name for each in self.segments]
+        if segment not in names:
+            raise BodyError(f"body '{self.name}' has no segment '{segment}'; it has: {', '.join(names)}")
+        return names.index(segment)
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -153,6 +208,13 @@ class PosedBody:
     model: BodyModel
     R: Array  # (segments, 3, 3) world from segment, rotations
     t: Array  # (segments, 3) world from segment, translations [m]
+
+    @property
+    def landmarks(self) -> Array:
+        """Where the model's landmarks are: (landmarks, 3) world [m]."""
+        owners = [self.model.index_of(landmark.segment) for landmark in self.model.landmarks]
+        local = np.array([landmark.position_m for landmark in self.model.landmarks])
+        return np.einsum("nij,nj->ni", self.R[owners], local) + self.t[owners]
 
     def moved(self, motion: Array) -> PosedBody:
         """Move the whole body: motion (6,) is a translation [m], a turn about the root's origin [rad], world axes."""

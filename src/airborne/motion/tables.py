@@ -82,15 +82,15 @@ def write_angles(path: Path, motion: Motion) -> None:
 
 
 def write_joints(path: Path, motion: Motion, model: BodyModel) -> None:
-    """Write joints.csv, long: one row per frame and segment, at the segment's origin; empty cells where lost.
+    """Write joints.csv, long: one row per frame and landmark; empty cells where lost.
 
     `sd_m` is the root mean square, over the three axes, of the standard deviations that the root's uncertainty gives
     to that point; joint angles count as exact.
     """
-    names = [segment.name for segment in model.segments]
+    names = [landmark.name for landmark in model.landmarks]
     points = np.full((len(motion), len(names), 3), np.nan)
     for row in np.flatnonzero(motion.has_pose):
-        points[row] = model.with_pose(motion.pose(row)).t
+        points[row] = model.with_pose(motion.pose(row)).landmarks
     sd = _point_sd(motion.covariance[:, None], points - motion.position[:, None])
     per_frame, flat = len(names), points.reshape(-1, 3)
     columns: dict[str, NDArray] = {
