@@ -4,17 +4,18 @@ Knows no body, no camera and no search.
 """
 
 from airborne.scoring.foreground import agreement, count_colours, posterior
-from airborne.scoring.lighting import compose, fit_light, light_planes
+from airborne.scoring.lighting import fit_light, light_planes, light_up, paint_evenly
 from airborne.scoring.plate import Plate, fill, look
 
 __all__ = [
     "Plate",
     "agreement",
-    "compose",
     "count_colours",
     "fill",
     "fit_light",
     "light_planes",
+    "light_up",
     "look",
+    "paint_evenly",
     "posterior",
 ]

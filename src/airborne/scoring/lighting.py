@@ -125,20 +125,12 @@ def _is_surrounded(part, normals, y, x):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def compose(observed, scene, part, normals, albedo, is_faceted, coefficients, x0, y0, residual, shape):
-    """Fill residual = observed - composite and shape = the body's light on black, both (3, h, w) linear light.
+def light_up(part, normals, albedo, coefficients, x0, y0, lit):
+    """Fill lit (3, h, w), zero before, with the body's linear light; (x0, y0) is the first pixel of its window.
 
-    scene (3, ...) is the empty scene; the composite shows the lit body in front of it. In `shape`, which says how the
-    picture would move with the body, a part that is not faceted has its mean light all over: shading does not turn with
-    a smooth surface. (x0, y0) is the first pixel of the window that residual and shape cover.
+    part (H, W) index or -1, normals (3, H, W) unit, albedo (parts, 3), coefficients (3, TERMS) as `fit_light` has them.
     """
-    _, h, w = residual.shape
-    for k in range(3):
-        for y in range(h):
-            for x in range(w):
-                residual[k, y, x] = observed[k, y + y0, x + x0] - scene[k, y + y0, x + x0]
-                shape[k, y, x] = 0
-    total, count = np.zeros((len(albedo), 3), np.float32), np.zeros(len(albedo), np.int64)
+    _, h, w = lit.shape
     for y in range(h):
         for x in range(w):
             p = part[y + y0, x + x0]
@@ -146,23 +138,30 @@ def compose(observed, scene, part, normals, albedo, is_faceted, coefficients, x0
                 continue
             u, v = _place(part, y + y0, x + x0)
             n0, n1, n2 = normals[0, y + y0, x + x0], normals[1, y + y0, x + x0], normals[2, y + y0, x + x0]
-            count[p] += 1
             for k in range(3):
                 c = coefficients[k]
                 light = max(c[0] + c[1] * n0 + c[2] * n1 + c[3] * n2 + c[4] * u + c[5] * v, np.float32(0))
-                total[p, k] += light
-                shape[k, y, x] = albedo[p, k] * light
-                residual[k, y, x] = observed[k, y + y0, x + x0] - shape[k, y, x]
-    for p in range(len(albedo)):
-        if count[p] and not is_faceted[p]:
-            _paint_evenly(part, p, albedo[p] * total[p] / np.float32(count[p]), x0, y0, shape)
+                lit[k, y, x] = albedo[p, k] * light
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _paint_evenly(part, p, colour, x0, y0, shape):
-    _, h, w = shape.shape
+def paint_evenly(part, is_faceted, x0, y0, lit):
+    """Give every part that is not faceted its mean light all over: shading does not turn with a smooth surface.
+
+    What is left says how the picture would move with the body; see `light_up` for the arguments.
+    """
+    _, h, w = lit.shape
+    total, count = np.zeros((len(is_faceted), 3), np.float32), np.zeros(len(is_faceted), np.float32)
     for y in range(h):
         for x in range(w):
-            if part[y + y0, x + x0] == p:
+            p = part[y + y0, x + x0]
+            if p >= 0:
+                count[p] += 1
                 for k in range(3):
-                    shape[k, y, x] = colour[k]
+                    total[p, k] += lit[k, y, x]
+    for y in range(h):
+        for x in range(w):
+            p = part[y + y0, x + x0]
+            if p >= 0 and not is_faceted[p]:
+                for k in range(3):
+                    lit[k, y, x] = total[p, k] / count[p]

@@ -8,20 +8,20 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating]
 
 SHIFT_SD_PX = 0.12  # of a full frame: light and edges that are not quite as modelled may displace a picture by this
-_LEVER_M = 0.3  # the length that makes metres and radians comparable
+LEVER_M = 0.3  # the length that makes metres and radians comparable
 _UNSEEN_SD_M = 0.15  # a direction known less well than this, at the lever's length, is not known
 
 
 def covariance_of(curvature: Array, *, noise: float, spread: Array | None = None) -> Array:
-    """Return the covariance (6, 6) of position [m] and world rotation vector [rad].
+    """Return the covariance (d, d) of a position (3,) [m] and rotation vectors [rad].
 
-    curvature (6, 6): half the second derivative of the summed squares; noise: their variance, already multiplied by how
-    many pixels share it. `spread` (6, 6) is the sum of g g' over patches of the pictures, g the gradient: along each
+    curvature (d, d): half the second derivative of the summed squares; noise: their variance, already multiplied by how
+    many pixels share it. `spread` (d, d) is the sum of g g' over patches of the pictures, g the gradient: along each
     principal direction the larger of two variances holds, that of independent noise and that of the patches (the
     sandwich estimate), which also counts wrong light and wrong shape. A direction with an sd above 0.15 m, or above
     0.5 rad, counts as not seen: what it touches has an infinite variance.
     """
-    scale = np.array([1, 1, 1, 1 / _LEVER_M, 1 / _LEVER_M, 1 / _LEVER_M])
+    scale = np.where(np.arange(len(curvature)) < 3, 1, 1 / LEVER_M)
     steepness, directions = np.linalg.eigh(curvature * np.outer(scale, scale))
     steepness = np.maximum(steepness, 1e-12 * max(steepness[-1], 1e-12))
     variance = noise / steepness

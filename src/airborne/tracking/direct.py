@@ -1,6 +1,6 @@
 """Trackers that only ask for a score: `stepping` (paper B's own search) and `simplex` (paper B's suggestion).
 
-A pose is a vector of six numbers: x, y, z [m], somersault, tilt, twist [rad].
+A pose is a vector of six numbers: x, y, z [m], somersault, tilt, twist [rad]; joints stay as they are at the start.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ class Direct:
         self._model, self._geometry = model, geometry(model)
         self._start, self._search, self._rule, self._lights = start, search, rule, lights
         self._scale, self._predict = scale, predict
-        self._at_origin = model.with_pose(Pose(world_from_root=RigidTransform.identity()))
+        self._at_origin = model.with_pose(replace(start, world_from_root=RigidTransform.identity()))
 
     def init(self) -> DirectState:
         """Return the state before the first frame."""
@@ -114,7 +114,7 @@ class Direct:
         status = _status(value, state.scores)
         if status is Status.LOST:
             return lost(frames.index, frames.time_s)
-        pose = _pose(best)
+        pose = _pose(best, self._start)
         return Estimate(
             index=frames.index,
             time_s=frames.time_s,
@@ -181,7 +181,7 @@ class Direct:
         squared = self._squared(seen, posed, np.concatenate([i + j, i - j, j - i, -i - j])).reshape(4, -1)
         gradient = self._gradient(seen, posed)
         if not (np.isfinite(squared).all() and np.isfinite(gradient).all()):  # at the pictures' edge
-            return np.diag(np.full(6, np.inf))
+            return self._whole(np.diag(np.full(6, np.inf)))
         curvature = np.zeros((6, 6))
         second = (squared[0] - squared[1] - squared[2] + squared[3]) / (4 * _PROBE[rows] * _PROBE[columns])
         curvature[rows, columns] = curvature[columns, rows] = second
@@ -196,7 +196,12 @@ class Direct:
         likelihood = pixels / (2 * max(value, 1e-3) ** 2)
         shared = max(_SHARED_NOISE_PX / self._scale**2, 1)
         covariance = covariance_of(curvature * likelihood, noise=shared, spread=spread * likelihood**2)
-        return covariance + np.diag(self._search.resolution**2)
+        return self._whole(covariance + np.diag(self._search.resolution**2))
+
+    def _whole(self, covariance: Array) -> Array:
+        """Widen the covariance of the root (6, 6) by the joints, which do not move."""
+        n_joints = len(self._model.segments) - 1
+        return np.pad(covariance, (0, 3 * n_joints))
 
     def _gradient(self, seen: Targets, posed: PosedBody) -> Array:
         steps = np.diag(_PROBE)
@@ -222,6 +227,6 @@ def _vector(pose: Pose) -> Array:
     return np.concatenate([place.translation, angles_from_matrix(place.rotation.as_matrix())])
 
 
-def _pose(vector: Array) -> Pose:
+def _pose(vector: Array, start: Pose) -> Pose:
     rotation = Rotation.from_matrix(matrix_from_angles(vector[3:]))
-    return Pose(world_from_root=RigidTransform.from_components(vector[:3], rotation))
+    return replace(start, world_from_root=RigidTransform.from_components(vector[:3], rotation))

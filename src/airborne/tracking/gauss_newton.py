@@ -7,26 +7,25 @@ Far out, the blurred mask is fitted to the blurred probability of each pixel to 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body import BodyModel, Geometry, PosedBody, geometry, has_flat_sides
-from airborne.body.symmetry import continuous_axes
-from airborne.cameras import Camera
-from airborne.rendering.maps import empty_maps, surface_maps
-from airborne.rendering.packing import packed_view
-from airborne.rendering.shapes import new_shapes
-from airborne.rendering.srgb import light_from_srgb
-from airborne.scoring.lighting import TERMS, TO_LIGHT, light_planes
-from airborne.scoring.plate import START_SD, fill
+from airborne.body import Pose, PosedBody
 from airborne.tracking.appearance import Appearance, Region
-from airborne.tracking.covariance import SHIFT_SD_PX, covariance_of
-from airborne.tracking.normal_equations import Sums, gaussian_taps, photometric_equations, silhouette_equations
+from airborne.tracking.covariance import covariance_of
+from airborne.tracking.freedom import Freedom, Prior
+from airborne.tracking.normal_equations import (
+    Sums,
+    gaussian_taps,
+    lit_equations,
+    new_blocks,
+    photometric_equations,
+    silhouette_equations,
+)
+from airborne.tracking.synthesis import Laid, Synthesis, outlined, pictured, shifts_px
 
 Array = NDArray[np.floating]
 Levels = Sequence[tuple[int, int]]
@@ -36,167 +35,197 @@ FAR, NEAR, CLOSE = ((8, 5), (4, 4), (2, 3)), ((4, 2), (2, 2)), ((2, 2),)
 _COARSE_SIGMA_PX = 1.2  # of the reduced picture
 _FINE_SIGMA_PX = 1.2  # of a full frame
 _CLIP = 0.1  # linear light, 0..1: a residual this large counts a quarter
+_CLIP_MASK = 0.5  # the same of a mask
 _OVERSTEP = 1.6  # robust weights and refitted light make each step about this much too short
 _MOST_STEPS = 12
-_SETTLED = 2.0  # squared length of the last step, in sds of the pose
-_PRIOR_SD = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])  # [m], [rad]: keeps what the pictures do not show where it is
-
-
-@dataclass(frozen=True, slots=True)
-class Synthesis:
-    """A body made ready for the kernels; its workspace serves one thread."""
-
-    model: BodyModel
-    geometry: Geometry
-    shapes: Any
-    albedo: NDArray[np.float32]  # (parts, 3) linear light
-    is_faceted: NDArray[np.bool_]  # (parts,) the edges between their sides can be seen
-    free_axes: Array  # (k, 3) in the root's frame: turns about them change nothing
-
-    @classmethod
-    def of(cls, model: BodyModel) -> Synthesis:
-        """Make a body ready."""
-        flat = geometry(model)
-        albedo = light_from_srgb(flat.colours).astype(np.float32)
-        is_faceted = np.array([has_flat_sides(part.shape) for part in model.parts])
-        return cls(model, flat, new_shapes(flat), albedo, is_faceted, continuous_axes(model))
-
-    def visible(self, posed: PosedBody) -> Array:
-        """Return the projection (6, 6) of motions, in world axes, onto those that change the picture at all."""
-        hidden = np.concatenate([np.zeros_like(self.free_axes), self.free_axes @ posed.R[0].T], axis=1)
-        return np.eye(6) - hidden.T @ hidden
-
-    def parts(self, posed: PosedBody, region: Region) -> NDArray[np.int16]:
-        """Draw which part each pixel of a region shows: (h, w), -1 where none."""
-        maps = empty_maps(region.camera.size)
-        surface_maps(self.shapes, self.geometry, posed.R, posed.t, region.packed, *maps)
-        return maps[0]
+_SETTLED = 1 / 3  # squared length of the last step, in sds of the pose, for each degree of freedom
+_SHORTER = 0.4
+_SLACK = 1e-3  # of the objective: refitted light makes it waver
 
 
 @dataclass(frozen=True, slots=True)
 class Fit:
     """Where a fit ended."""
 
-    posed: PosedBody
-    covariance: Array  # (6, 6) position [m], world rotation vector [rad]; infinite where the pictures show nothing
+    pose: Pose
+    covariance: Array  # (6 + 3 joints,) squared, see `body.chain`; infinite where the pictures show nothing
     rms_light: float  # blurred residual, linear light 0..1
     steps: int
 
 
+@dataclass(frozen=True, slots=True)
+class _Evaluation:
+    """The normal equations at one pose, mapped to the free degrees of freedom."""
+
+    pose: Pose
+    A: Array  # (d, d)
+    g: Array  # (d,)
+    spread: Array  # (d, d)
+    cost: float  # robust squared residual
+    noise: float  # mean square of the weighted residual, times how many pixels share it
+
+    def objective(self, noise: float, prior_cost: float) -> float:
+        """Return minus the log-likelihood and the prior's, for a given variance of the noise."""
+        return 0.5 * self.cost / noise + prior_cost
+
+
 def fit_silhouettes(
     synthesis: Synthesis,
-    posed: PosedBody,
+    pose: Pose,
     regions: Sequence[Region],
     posteriors: Sequence[Array],
     levels: Levels,
-) -> PosedBody:
+    freedom: Freedom,
+    prior: Prior | None = None,
+) -> Pose:
     """Move the body until its masks agree with the posteriors (h, w) of the regions, from coarse to fine."""
     taps = gaussian_taps(_COARSE_SIGMA_PX)
     correlated = 4 * np.pi * _COARSE_SIGMA_PX**2
-    body = synthesis.shapes, synthesis.geometry
     for reduction, steps in levels:
-        views = [_outlined(*each, reduction) for each in zip(regions, posteriors, strict=True)]
-        for _ in range(steps):
-            sums, totals = Sums.zero(), np.zeros(2)
+        posed = synthesis.place(pose)
+        views = [outlined(synthesis, posed, *each, reduction) for each in zip(regions, posteriors, strict=True)]
+        views = [view for view in views if view.is_seen]
+
+        def evaluate(pose: Pose, _: int, views: list[Laid] = views) -> _Evaluation:
+            posed, n = synthesis.place(pose), len(synthesis.model.segments)
+            sums, totals, blocks = Sums.zero(n), np.zeros(3), []
             for view in views:
-                totals += silhouette_equations(*body, posed.R, posed.t, *view, taps, taps, sums)
-            motion = _solve(sums.curvature, sums.g, correlated * _mean_square(totals))
-            posed = posed.moved(synthesis.visible(posed) @ motion)
-    return posed
+                blocks.append(_blocks(view, n))
+                through = view.window, taps, taps, _CLIP_MASK
+                args = synthesis.body, _place(posed, view), view.seen, through, view.maps, sums, blocks[-1]
+                totals += np.array(silhouette_equations(*args))
+            return _mapped(synthesis, freedom, pose, posed, sums, blocks, [], totals, correlated)
+
+        pose = _descend(evaluate, freedom, pose, prior, most_steps=steps, overstep=1.0).pose
+    return pose
 
 
-def fit_pictures(synthesis: Synthesis, posed: PosedBody, regions: Sequence[Region], appearance: Appearance) -> Fit:
+def fit_pictures(
+    synthesis: Synthesis,
+    pose: Pose,
+    regions: Sequence[Region],
+    appearance: Appearance,
+    freedom: Freedom,
+    prior: Prior | None = None,
+) -> Fit:
     """Move the body until the composite of body and empty scene agrees with the pictures; say how sure that is."""
-    views = [(_pictured(r, appearance), _even_light(), empty_maps(r.camera.size)) for r in regions]
-    rows_sigma_px = [max(_FINE_SIGMA_PX * region.aspect, 0.5) for region in regions]
+    posed = synthesis.place(pose)
+    laid_out = [(pictured(synthesis, posed, region, appearance), region) for region in regions]
+    laid_out = [(view, region) for view, region in laid_out if view.is_seen]
+    rows_sigma_px = [max(_FINE_SIGMA_PX * region.aspect, 0.5) for _, region in laid_out]
     taps = [(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma)) for sigma in rows_sigma_px]
-    correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px))
-    shifts_px = [_shifts_px(region) for region in regions]
-    body, paint = (synthesis.shapes, synthesis.geometry), (synthesis.albedo, synthesis.is_faceted)
-    for step in range(1, _MOST_STEPS + 1):
-        sums, totals, spread = Sums.zero(), np.zeros(2), np.zeros((6, 6))
-        rounds = 3 if step == 1 else 1
-        for (view, light, maps), (taps_u, taps_v), shift_sd_px in zip(views, taps, shifts_px, strict=True):
+    correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px or [_FINE_SIGMA_PX]))
+    shifts = [shifts_px(region) for _, region in laid_out]
+
+    def evaluate(pose: Pose, step: int) -> _Evaluation:
+        posed, n = synthesis.place(pose), len(synthesis.model.segments)
+        sums, totals, blocks, shifted = Sums.zero(n), np.zeros(3), [], []
+        for (view, _), (taps_u, taps_v), shift in zip(laid_out, taps, shifts, strict=True):
             sums.B[:] = 0
-            totals += photometric_equations(
-                *body, posed.R, posed.t, *view, *paint, light, rounds, maps, taps_u, taps_v, _CLIP, sums
-            )
-            spread += (sums.B * shift_sd_px**2) @ sums.B.T
-        visible, noise = synthesis.visible(posed), correlated * _mean_square(totals)
-        A = visible @ sums.curvature @ visible
-        motion = visible @ _solve(A, sums.g, noise)
-        posed = posed.moved(_OVERSTEP * motion)
-        if motion @ A @ motion <= _SETTLED * noise:
+            blocks.append(_blocks(view, n))
+            totals += _compare(synthesis, posed, view, (taps_u, taps_v), 3 if step == 1 else 1, sums, blocks[-1])
+            shifted.append(sums.B * shift)
+        return _mapped(synthesis, freedom, pose, posed, sums, blocks, shifted, totals, correlated)
+
+    last = _descend(evaluate, freedom, pose, prior, most_steps=_MOST_STEPS, overstep=_OVERSTEP, settled=_SETTLED)
+    found = last.evaluation
+    covariance = covariance_of(found.A, noise=found.noise, spread=found.spread)
+    whole = np.zeros((len(freedom.whole(found.g)),) * 2)
+    whole[np.ix_(freedom.columns, freedom.columns)] = covariance
+    return Fit(last.pose, whole, (found.noise / correlated) ** 0.5, last.steps)
+
+
+def _compare(
+    synthesis: Synthesis,
+    posed: PosedBody,
+    view: Laid,
+    taps: tuple[Array, Array],
+    rounds: int,
+    sums: Sums,
+    blocks: Array,
+) -> Array:
+    """Add one view's equations; return the cost, the weighted squared residual and the weight."""
+    through = view.window, *taps, _CLIP
+    args = synthesis.body, _place(posed, view), view.seen, through, view.maps
+    if synthesis.lights is None:
+        paint = synthesis.albedo, synthesis.is_faceted
+        return np.array(photometric_equations(*args, paint, view.light, rounds, sums, blocks))
+    size = view.maps[0].shape
+    drawn = (
+        np.empty(size, np.int16),
+        np.empty(size, np.int16),
+        np.empty(size, np.float32),
+        np.empty((*size, 3), np.float32),
+    )
+    lamps, ambient = view.light
+    return np.array(lit_equations(*args, drawn, synthesis.is_faceted, lamps, ambient, sums, blocks))
+
+
+def _place(posed: PosedBody, view: Laid) -> tuple:
+    return posed.R, posed.t, view.packed, view.K, posed.t[0]
+
+
+def _blocks(view: Laid, n_segments: int) -> Array:
+    x0, y0, x1, y1 = view.window
+    return new_blocks(x1 - x0, y1 - y0, n_segments)
+
+
+@dataclass(frozen=True, slots=True)
+class _Descent:
+    pose: Pose  # after the last step
+    evaluation: _Evaluation  # before it
+    steps: int
+
+
+def _descend(
+    evaluate: Callable[[Pose, int], _Evaluation],
+    freedom: Freedom,
+    pose: Pose,
+    prior: Prior | None,
+    *,
+    most_steps: int,
+    overstep: float,
+    settled: float = 0.0,
+) -> _Descent:
+    """Step downhill; a step after which the pictures agree less is taken back and shortened."""
+    best, motion, share, objective = None, np.zeros(0), overstep, np.inf
+    for step in range(1, most_steps + 1):
+        tried = evaluate(pose, step)
+        noise = max(tried.noise if best is None else best.noise, 1e-9)
+        reached = tried.objective(noise, freedom.prior_cost(pose, prior))
+        if best is not None and reached > objective * (1 + _SLACK):
+            share *= _SHORTER
+            pose = freedom.moved(best.pose, share * motion)
+            continue
+        best, share, noise = tried, overstep, max(tried.noise, 1e-9)
+        objective = best.objective(noise, freedom.prior_cost(pose, prior))
+        motion = freedom.step(best.pose, best.A / noise, best.g / noise, prior)
+        pose = freedom.moved(best.pose, share * motion)
+        if motion @ best.A @ motion <= settled * len(motion) * noise:
             break
-    spread = visible @ (sums.S + spread) @ visible
-    return Fit(posed, covariance_of(A, noise=noise, spread=spread), _mean_square(totals) ** 0.5, step)
+    assert best is not None
+    return _Descent(pose if share == overstep else best.pose, best, step)
 
 
-class _Pictured(NamedTuple):
-    """A region as `photometric_equations` takes it."""
-
-    packed: Array
-    K: Array
-    observed: NDArray[np.float32]
-    scene: NDArray[np.float32]
-    certainty: NDArray[np.float32]
-
-
-class _Outlined(NamedTuple):
-    """A reduced region as `silhouette_equations` takes it."""
-
-    packed: Array
-    K: Array
-    posterior: NDArray[np.float32]
-    black: NDArray[np.float32]
-    certainty: NDArray[np.float32]
-    maps: Any
-
-
-def _pictured(region: Region, appearance: Appearance) -> _Pictured:
-    mean, sd, looks = appearance.scene(region)
-    filled = np.empty_like(mean)
-    if not fill(mean, looks, filled):
-        filled[:] = region.rgb
-    observed, scene = np.empty((2, 3, *sd.shape), np.float32)
-    light_planes(region.rgb, TO_LIGHT, observed)
-    light_planes(filled, TO_LIGHT, scene)
-    certainty = np.minimum(1, (START_SD / sd) ** 2)
-    return _Pictured(region.packed, region.camera.K, observed, scene, certainty)
-
-
-def _shifts_px(region: Region) -> Array:
-    """Return the sds of a picture's shift right and down, in its own pixels, and of its outline's width: (3,) [px]."""
-    shift_px = np.hypot(SHIFT_SD_PX, region.camera.shift_sd_px)
-    return np.array([shift_px, shift_px * region.aspect, SHIFT_SD_PX])
-
-
-def _even_light() -> NDArray[np.float32]:
-    light = np.zeros((3, TERMS), np.float32)
-    light[:, 0] = 1
-    return light
-
-
-def reduced_region(region: Region, plane: Array, reduction: int) -> tuple[Camera, NDArray[np.float32]]:
-    """Reduce a plane (h, w) of a region by averaging areas to about square pixels; return its camera and itself."""
-    rows = max(1, round(reduction * region.aspect))
-    height, width = plane.shape
-    size = (max(width // reduction, 1), max(height // rows, 1))
-    small = cv2.resize(plane[: size[1] * rows, : size[0] * reduction], size, interpolation=cv2.INTER_AREA)
-    middle = ((reduction - 1) / 2, (rows - 1) / 2)
-    return region.camera.resampled(scale=(reduction, rows), offset=middle, size=size), np.asarray(small, np.float32)
-
-
-def _outlined(region: Region, posterior: Array, reduction: int) -> _Outlined:
-    camera, plane = reduced_region(region, posterior, reduction)
-    black, certainty = np.zeros((1, *plane.shape), np.float32), np.ones_like(plane)
-    return _Outlined(packed_view(camera), camera.K, plane, black, certainty, empty_maps(camera.size))
-
-
-def _mean_square(totals: Array) -> float:
-    return totals[0] / totals[1] if totals[1] > 0 else 1.0
-
-
-def _solve(A: Array, g: Array, noise: float) -> Array:
-    """Solve for the motion (6,), held back where the pictures say little (Tikhonov)."""
-    return np.linalg.solve(A + np.diag(max(noise, 1e-9) / _PRIOR_SD**2), g)
+def _mapped(
+    synthesis: Synthesis,
+    freedom: Freedom,
+    pose: Pose,
+    posed: PosedBody,
+    sums: Sums,
+    blocks: Sequence[Array],
+    shifted: Sequence[Array],
+    totals: Array,
+    correlated: float,
+) -> _Evaluation:
+    """Map the segments' equations through the chain of joints."""
+    n = len(synthesis.model.segments)
+    J = synthesis.jacobian(posed, freedom)
+    stacked = J.reshape(6 * n, -1)
+    A = stacked.T @ (sums.curvature @ J).reshape(stacked.shape)
+    g = stacked.T @ sums.g.ravel()
+    rows = [each.reshape(-1, 6 * n) for each in blocks] + [each.reshape(6 * n, 3).T for each in shifted]
+    G = np.concatenate(rows or [np.zeros((0, 6 * n))]) @ stacked
+    cost, total, weight = totals
+    noise = correlated * (total / weight if weight > 0 else 1.0)
+    return _Evaluation(pose, A, g, G.T @ G, float(cost), float(noise))

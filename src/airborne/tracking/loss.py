@@ -12,7 +12,8 @@ from airborne.body import PosedBody
 from airborne.scoring.foreground import agreement as view_agreement
 from airborne.tracking.appearance import Region
 from airborne.tracking.estimate import Status
-from airborne.tracking.gauss_newton import Fit, Synthesis
+from airborne.tracking.gauss_newton import Fit
+from airborne.tracking.synthesis import Synthesis
 
 _NEAR_PX = 12  # of a full frame: body-like pixels this close to the mask's box should be in the mask
 _FEWEST_PX = 20  # a mask smaller than this does not count as seen
@@ -20,6 +21,7 @@ _UNCERTAIN_SD_M = 0.05
 _NEWEST = 0.2  # share of the newest frame in what is usual
 # shares of the usual agreement, inside and found, below which ...
 _SEARCH, _UNCERTAIN, _LOST = (0.95, 0.92), (0.85, 0.8), (0.5, 0.4)
+_UNCERTAIN_AT_FIRST = 0.85, 0.6  # the empty scene is not known yet: what is coloured like the body counts as found
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,11 +30,14 @@ class Usual:
 
     inside: float = 0.9
     found: float = 0.9
+    is_learned: bool = False  # from frames of this recording
 
     def learned(self, agreed: Agreement) -> Usual:
         """Follow the newest frame."""
         return Usual(
-            (1 - _NEWEST) * self.inside + _NEWEST * agreed.inside, (1 - _NEWEST) * self.found + _NEWEST * agreed.found
+            (1 - _NEWEST) * self.inside + _NEWEST * agreed.inside,
+            (1 - _NEWEST) * self.found + _NEWEST * agreed.found,
+            True,
         )
 
 
@@ -74,6 +79,7 @@ def status_of(fit: Fit, agreed: Agreement, usual: Usual) -> Status:
     if agreed.n_views == 0 or agreed.falls_short(usual, _LOST):
         return Status.LOST
     position_sd = np.sqrt(np.diag(fit.covariance)[:3])
-    if agreed.falls_short(usual, _UNCERTAIN) or np.any(position_sd > _UNCERTAIN_SD_M):
+    shares = _UNCERTAIN if usual.is_learned else _UNCERTAIN_AT_FIRST
+    if agreed.falls_short(usual, shares) or np.any(position_sd > _UNCERTAIN_SD_M):
         return Status.UNCERTAIN
     return Status.TRACKED

@@ -1,4 +1,4 @@
-"""The rigid-body methods by name."""
+"""The methods by name."""
 
 from __future__ import annotations
 
@@ -20,13 +20,15 @@ from airborne.tracking.tracker import Tracker
 from airborne.video import Frames
 
 Array = NDArray[np.floating]
-Method = Literal["refined", "stepping", "simplex"]
+Method = Literal["refined", "joint", "hierarchical", "stepping", "simplex"]
 Prediction = Literal["smooth", "ballistic", "none"]
 Colour = Literal["raw", "normalised", "blend", "union"]
 
 # stepping and simplex see what paper B saw: full frames whose missing rows are interpolated
 FIELDS_AS: dict[Method, Literal["rows", "interpolated"]] = {
     "refined": "rows",
+    "joint": "rows",
+    "hierarchical": "rows",
     "stepping": "interpolated",
     "simplex": "interpolated",
 }
@@ -35,7 +37,7 @@ _SIMPLEX_SIZE = np.array([0.03] * 3 + [0.06] * 3)  # [m], [rad]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """What a method may be told; the defaults are paper B's for video."""
+    """What a method may be told; for stepping and simplex the defaults are paper B's for video."""
 
     method: Method = "refined"
     prediction: Prediction = "smooth"
@@ -44,12 +46,20 @@ class Settings:
     loops: Sequence[tuple[float, float]] = ()  # stepping: a step in position [m] and in angle [rad] for each loop
     scale: Literal[1, 2, 4] = 1  # stepping, simplex: reduction of the pictures
     lights: Lights | None = None  # None: unknown
+    fixed_shape: bool = False  # joints stay as they are at the start; stepping and simplex never move them
 
 
 def tracker_of(settings: Settings, model: BodyModel, start: Pose) -> Tracker:
     """Make the tracker of a method."""
-    if settings.method == "refined":
-        return Refined(model, start, prediction=settings.prediction)
+    if settings.method in ("refined", "joint", "hierarchical"):
+        return Refined(
+            model,
+            start,
+            prediction=settings.prediction,
+            lights=settings.lights,
+            order=settings.method,
+            fixed_shape=settings.fixed_shape,
+        )
     predict: Callable = {
         "smooth": predictors.linear,
         "ballistic": predictors.ballistic,

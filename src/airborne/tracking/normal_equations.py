@@ -1,7 +1,11 @@
 """Gauss-Newton kernels: how a blurred synthetic picture would change if the body moved, against what the camera saw.
 
-Arrays in, arrays out. Planes are (channels, h, w) float32. A window (x0, y0) is where a
-plane's pixel (0, 0) lies in the region of interest whose intrinsics are K.
+Arrays in, arrays out, in tuples: `body` is shapes, geometry and the segment of each part; `place` is R (s, 3, 3),
+t (s, 3) [m], the packed view (18,), its intrinsics K and the origin (3,) [m] of all motions; `seen` is the observed
+planes (c, H, W), those of the empty scene that the body moves in front of, and each pixel's certainty (H, W) in (0, 1],
+which scales its weight; `through` is the window x0, y0, x1, y1 of the picture (H, W) that is compared, the taps of the
+blur along rows and columns, and the residual at which a pixel's weight has fallen to a quarter; `maps` is the workspace
+of `surface_maps`. Planes are float32; (h, w) is the size of the window.
 """
 
 from __future__ import annotations
@@ -12,32 +16,41 @@ import numpy as np
 from numba import njit
 
 from airborne.rendering.maps import surface_maps
+from airborne.rendering.render import draw_maps
 from airborne.rendering.shapes import KERNEL
-from airborne.scoring.lighting import compose, fit_light
+from airborne.scoring.lighting import fit_light, light_up, paint_evenly
 
 BLOCK_PX = 16  # residuals this close are not independent: the side of a block of the covariance's sandwich
 RADIUS_PX = 4  # reach of the blur: three sds of the widest one used
+REACH_PX = 2  # an edge is felt this far away: most of the blur's weight
 _PAD_PX = RADIUS_PX + 3  # beyond it, the blurred mask is nothing
 _EDGE = 0.01  # blurred coverage below which a pixel says nothing of the body
 
 
 class Sums(NamedTuple):
-    """Normal equations of a motion (6,): A motion = g, summed over pixels and views."""
+    """Normal equations of the rigid motion (6,) of each of s segments, summed over pixels: A motion = g.
 
-    A: Any  # (6, 6) curvature; the lower triangle is filled
-    g: Any  # (6,) gradient
-    S: Any  # (6, 6) sum of g g' over blocks of the pictures
-    B: Any  # (6, 3) what a picture shifted right or down by a pixel, or an outline a pixel fatter, does to g
+    A pixel belongs to one segment, so nothing couples two of them but the chain of joints, which is not known here.
+    """
+
+    A: Any  # (s, 6, 6) curvature; the lower triangles are filled
+    g: Any  # (s, 6) gradient
+    B: Any  # (s, 6, 3) what a picture shifted right or down by a pixel, or an outline a pixel fatter, does to g
 
     @classmethod
-    def zero(cls) -> Sums:
+    def zero(cls, n_segments: int) -> Sums:
         """Begin with nothing."""
-        return cls(np.zeros((6, 6)), np.zeros(6), np.zeros((6, 6)), np.zeros((6, 3)))
+        return cls(np.zeros((n_segments, 6, 6)), np.zeros((n_segments, 6)), np.zeros((n_segments, 6, 3)))
 
     @property
     def curvature(self) -> np.ndarray:
-        """A with both triangles (6, 6)."""
-        return self.A + np.tril(self.A, -1).T
+        """A with both triangles (s, 6, 6)."""
+        return self.A + np.tril(self.A, -1).swapaxes(1, 2)
+
+
+def new_blocks(width: int, height: int, n_segments: int) -> np.ndarray:
+    """Allocate the gradients of each block of a picture, segment by segment: (rows, columns, s, 6)."""
+    return np.zeros((height // BLOCK_PX + 1, width // BLOCK_PX + 1, n_segments, 6))
 
 
 def gaussian_taps(sigma_px: float) -> np.ndarray:
@@ -99,30 +112,69 @@ def window_of(part):
 
 
 @njit(**KERNEL)
-def accumulate(residual, shape, coverage, inverse_depth, scene, certainty, x0, y0, K, view, origin, clip, sums):
-    """Add one view's normal equations for a rigid motion about `origin` [m]: A motion = g.
+def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
+    """Say which segment moves each pixel's edges: of all surfaces within REACH_PX the one nearest to the camera.
 
-    residual, shape (c, h, w): blurred observed minus rendered, and the blurred colours of the body on black; coverage,
-    inverse_depth (h, w) blurred alike; scene (c, region) what the body moves in front of; certainty (region) in (0, 1]
-    scales a pixel's weight; clip: the residual at which a pixel's weight has fallen to a quarter. The motion is a
-    translation [m] and a rotation vector [rad] in world axes. Adds to `sums`; returns (weighted squared residual,
-    weight).
+    An outline moves with the surface in front of it, never with what it hides. part, inverse_depth (H, W) maps of a
+    region; owner (h, w) segment or -1, nearness (h, w) its inverse depth [1/m], both of the window at (x0, y0).
     """
-    A, g, S, B = sums
+    h, w = owner.shape
+    height, width = part.shape
+    across = np.empty((h + 2 * REACH_PX, w), np.float32)
+    who = np.empty((h + 2 * REACH_PX, w), np.int16)
+    for y in range(h + 2 * REACH_PX):
+        v = y + y0 - REACH_PX
+        for x in range(w):
+            best, front = np.float32(0), -1
+            if 0 <= v < height:
+                for u in range(max(x + x0 - REACH_PX, 0), min(x + x0 + REACH_PX + 1, width)):
+                    if inverse_depth[v, u] > best:
+                        best, front = inverse_depth[v, u], part[v, u]
+            across[y, x], who[y, x] = best, front
+    for y in range(h):
+        for x in range(w):
+            best, front = np.float32(0), -1
+            for k in range(2 * REACH_PX + 1):
+                if across[y + k, x] > best:
+                    best, front = across[y + k, x], who[y + k, x]
+            nearness[y, x] = best
+            owner[y, x] = segment_of_part[front] if front >= 0 else -1
+
+
+@njit(**KERNEL)
+def accumulate(residual, shape, coverage, owner, nearness, place, seen, through, sums, blocks):
+    """Add one view's normal equations for the rigid motion of each segment about the origin: A motion = g.
+
+    residual, shape (c, h, w): blurred observed minus rendered, and the blurred colours of the body on black; coverage
+    (h, w) blurred alike; owner, nearness (h, w) as `find_owners` has them. A motion is a translation [m] and a rotation
+    vector [rad] in world axes. Adds to `sums`, and to `blocks` of `new_blocks` the gradients block by block. Returns
+    (robust squared residual of the whole window, weighted squared residual, weight), the last two where there is body.
+    """
+    _, _, view, K, origin = place
+    _, scene, certainty = seen
+    window, _, _, clip = through
+    A, g, B = sums
     c, h, w = residual.shape
+    x0, y0 = window[0], window[1]
     fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
     a, b = np.zeros(6), np.zeros(6)
-    blocks_a_row = w // BLOCK_PX + 1
-    blocks = np.zeros(((h // BLOCK_PX + 1) * blocks_a_row, 6))
-    total, weight_sum = 0.0, 0.0
+    cost, total, weight_sum = 0.0, 0.0, 0.0
     inverse_clip2, aspect = 1.0 / (clip * clip), fy / fx
     for y in range(1, h - 1):
         ry = (y + y0 - cy) / fy
         for x in range(1, w - 1):
             m = coverage[y, x]
-            if m < _EDGE:
+            e2 = 0.0
+            for k in range(c):
+                e2 += residual[k, y, x] * residual[k, y, x]
+            down = 1.0 / (1.0 + e2 * inverse_clip2)
+            weight = certainty[y + y0, x + x0]
+            cost += weight * e2 * down
+            e = owner[y, x]
+            if m < _EDGE or e < 0:
                 continue
-            sxx, sxy, syy, sx, sy, e2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            weight *= down * down
+            sxx, sxy, syy, sx, sy = 0.0, 0.0, 0.0, 0.0, 0.0
             mx = 0.5 * (coverage[y, x + 1] - coverage[y, x - 1])
             my = 0.5 * (coverage[y + 1, x] - coverage[y - 1, x])
             for k in range(c):
@@ -135,14 +187,11 @@ def accumulate(residual, shape, coverage, inverse_depth, scene, certainty, x0, y
                 syy += gy * gy
                 sx += gx * r
                 sy += gy * r
-                e2 += r * r
-            down = 1.0 / (1.0 + e2 * inverse_clip2)
-            weight = down * down * certainty[y + y0, x + x0]
             total += weight * e2
             weight_sum += weight
             if sxx + syy < 1e-10:
                 continue
-            inv_z = inverse_depth[y, x] / m
+            inv_z = nearness[y, x]
             rx = (x + x0 - cx) / fx
             px, py, pz = rx / inv_z - view[9], ry / inv_z - view[10], 1.0 / inv_z - view[11]
             ox = view[0] * px + view[3] * py + view[6] * pz - origin[0]
@@ -160,100 +209,127 @@ def accumulate(residual, shape, coverage, inverse_depth, scene, certainty, x0, y
             sy *= weight
             steepness = np.sqrt(mx * mx + aspect * aspect * my * my) + 1e-9
             out_x, out_y = -mx / steepness, -aspect * aspect * my / steepness
-            block = blocks[(y // BLOCK_PX) * blocks_a_row + x // BLOCK_PX]
+            block = blocks[y // BLOCK_PX, x // BLOCK_PX, e]
+            A_e, B_e = A[e], B[e]
             for i in range(6):
                 # a body that moves by du takes its picture along: the picture changes by -gradient du
                 block[i] -= sx * a[i] + sy * b[i]
                 ai = sxx * a[i] + sxy * b[i]
                 bi = sxy * a[i] + syy * b[i]
-                B[i, 0] += ai
-                B[i, 1] += bi
-                B[i, 2] += ai * out_x + bi * out_y
+                B_e[i, 0] += ai
+                B_e[i, 1] += bi
+                B_e[i, 2] += ai * out_x + bi * out_y
                 for j in range(i + 1):
-                    A[i, j] += ai * a[j] + bi * b[j]
-    for n in range(len(blocks)):
-        for i in range(6):
-            g[i] += blocks[n, i]
-            for j in range(6):
-                S[i, j] += blocks[n, i] * blocks[n, j]
-    return total, weight_sum
+                    A_e[i, j] += ai * a[j] + bi * b[j]
+    for row in range(blocks.shape[0]):
+        for column in range(blocks.shape[1]):
+            for e in range(len(g)):
+                for i in range(6):
+                    g[e, i] += blocks[row, column, e, i]
+    return cost, total, weight_sum
 
 
 @njit(**KERNEL)
-def _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v):
-    planes = np.empty((2, y1 - y0, x1 - x0), np.float32)
-    for y in range(y1 - y0):
-        for x in range(x1 - x0):
-            planes[0, y, x] = 1.0 if part[y + y0, x + x0] >= 0 else 0.0
-            planes[1, y, x] = inverse_depth[y + y0, x + x0]
-    out = np.empty_like(planes)
-    blur(planes, taps_u, taps_v, out)
-    return out
-
-
-@njit(**KERNEL)
-def silhouette_equations(shapes, geometry, R, t, view, K, posterior, black, certainty, maps, taps_u, taps_v, sums):
+def silhouette_equations(body, place, seen, through, maps, sums, blocks):
     """Add one view's normal equations of `blurred posterior - blurred mask`; see `accumulate`.
 
-    posterior (h, w): the probability of each pixel to be body; black (1, h, w) zeros, certainty (h, w) ones;
-    maps: workspace (part, inverse_depth, normals). Returns (weighted squared residual, weight).
+    The plane observed is the posterior (1, H, W), the probability of each pixel to be body, and the scene is black.
     """
-    part, inverse_depth, normals = maps
-    surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals)
-    x0, y0, x1, y1 = window_of(part)
-    if x1 - x0 < 3 or y1 - y0 < 3:
-        return 0.0, 0.0
-    blurred = _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v)
-    seen = np.empty((1, y1 - y0, x1 - x0), np.float32)
+    posterior, _, _ = seen
+    window, taps_u, taps_v, _ = through
+    owner, nearness = _draw(body, place, maps, window)
+    x0, y0, x1, y1 = window
+    residual = np.empty((1, y1 - y0, x1 - x0), np.float32)
+    blur(posterior[:, y0:y1, x0:x1], taps_u, taps_v, residual)
+    coverage = _blurred_mask(maps[0], through)
+    shape = np.empty_like(residual)
     for y in range(y1 - y0):
         for x in range(x1 - x0):
-            seen[0, y, x] = posterior[y + y0, x + x0]
-    residual, shape = np.empty_like(seen), np.empty_like(seen)
-    blur(seen, taps_u, taps_v, residual)
-    for y in range(y1 - y0):
-        for x in range(x1 - x0):
-            shape[0, y, x] = np.float32(0.5) * (residual[0, y, x] + blurred[0, y, x])
-            residual[0, y, x] -= blurred[0, y, x]
-    return accumulate(residual, shape, blurred[0], blurred[1], black, certainty, x0, y0, K, view, t[0], 0.5, sums)
+            shape[0, y, x] = np.float32(0.5) * (residual[0, y, x] + coverage[0, y, x])
+            residual[0, y, x] -= coverage[0, y, x]
+    return accumulate(residual, shape, coverage[0], owner, nearness, place, seen, through, sums, blocks)
 
 
 @njit(**KERNEL)
-def photometric_equations(
-    shapes,
-    geometry,
-    R,
-    t,
-    view,
-    K,
-    observed,
-    scene,
-    certainty,
-    albedo,
-    is_faceted,
-    light,
-    rounds,
-    maps,
-    taps_u,
-    taps_v,
-    clip,
-    sums,
-):
-    """Add one view's normal equations of `blurred observed - blurred composite`; see `accumulate`.
+def photometric_equations(body, place, seen, through, maps, paint, light, rounds, sums, blocks):
+    """Add one view's normal equations of `blurred observed - blurred composite`, in linear light; see `accumulate`.
 
-    observed, scene (3, h, w): linear light of the picture and of the empty scene; albedo (parts, 3) linear and
-    is_faceted (parts,): see `compose`; light (3, TERMS) the view's fitted light, refitted in place by `rounds` robust
-    rounds. Returns (weighted squared residual, weight).
+    paint: albedo (parts, 3) linear and is_faceted (parts,), see `paint_evenly`; light (3, TERMS) the view's fitted
+    light, refitted in place by `rounds` robust rounds.
     """
+    observed, _, _ = seen
+    albedo, is_faceted = paint
+    window, _, _, _ = through
+    owner, nearness = _draw(body, place, maps, window)
+    part, _, normals = maps
+    x0, y0, x1, y1 = window
+    fit_light(observed, part, normals, albedo, light, rounds, x0, y0, x1, y1)
+    lit = np.zeros((3, y1 - y0, x1 - x0), np.float32)
+    light_up(part, normals, albedo, light, x0, y0, lit)
+    return _of_composite(lit, is_faceted, part, owner, nearness, place, seen, through, sums, blocks)
+
+
+@njit(**KERNEL)
+def lit_equations(body, place, seen, through, maps, drawn, is_faceted, lamps, ambient, sums, blocks):
+    """Add one view's normal equations under known lights, in shares of full sRGB; see `photometric_equations`.
+
+    lamps (l, 8), ambient as `draw_maps` takes them; drawn: workspace (part, segment, inverse_depth, colour).
+    """
+    window, _, _, _ = through
+    owner, nearness = _draw(body, place, maps, window)
+    R, t, view, _, _ = place
+    colour = drawn[3]
+    colour[:] = 0
+    draw_maps(body[0], body[1], R, t, view, lamps, ambient, drawn[0], drawn[1], drawn[2], colour)
+    x0, y0, x1, y1 = window
+    lit = np.empty((3, y1 - y0, x1 - x0), np.float32)
+    for k in range(3):
+        for y in range(y1 - y0):
+            for x in range(x1 - x0):
+                lit[k, y, x] = min(colour[y + y0, x + x0, k] * np.float32(1 / 255), np.float32(1))
+    return _of_composite(lit, is_faceted, maps[0], owner, nearness, place, seen, through, sums, blocks)
+
+
+@njit(**KERNEL)
+def _draw(body, place, maps, window):
+    """Draw the maps of a view; return who owns each pixel of the window, and how near that is."""
+    shapes, geometry, segment_of_part = body
+    R, t, view, _, _ = place
     part, inverse_depth, normals = maps
     surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals)
-    x0, y0, x1, y1 = window_of(part)
-    if x1 - x0 < 3 or y1 - y0 < 3:
-        return 0.0, 0.0
-    fit_light(observed, part, normals, albedo, light, rounds, x0, y0, x1, y1)
-    blurred = _coverage_and_depth(part, inverse_depth, x0, y0, x1, y1, taps_u, taps_v)
-    sharp, residual = np.empty((3, y1 - y0, x1 - x0), np.float32), np.empty((3, y1 - y0, x1 - x0), np.float32)
-    body, shape = np.empty_like(sharp), np.empty_like(sharp)
-    compose(observed, scene, part, normals, albedo, is_faceted, light, x0, y0, sharp, body)
+    x0, y0, x1, y1 = window
+    owner, nearness = np.empty((y1 - y0, x1 - x0), np.int16), np.empty((y1 - y0, x1 - x0), np.float32)
+    find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness)
+    return owner, nearness
+
+
+@njit(**KERNEL)
+def _blurred_mask(part, through):
+    window, taps_u, taps_v, _ = through
+    x0, y0, x1, y1 = window
+    mask, coverage = np.empty((1, y1 - y0, x1 - x0), np.float32), np.empty((1, y1 - y0, x1 - x0), np.float32)
+    for y in range(y1 - y0):
+        for x in range(x1 - x0):
+            mask[0, y, x] = 1.0 if part[y + y0, x + x0] >= 0 else 0.0
+    blur(mask, taps_u, taps_v, coverage)
+    return coverage
+
+
+@njit(**KERNEL)
+def _of_composite(lit, is_faceted, part, owner, nearness, place, seen, through, sums, blocks):
+    """Compare the picture with the lit body (3, h, w) before the scene."""
+    observed, scene, _ = seen
+    window, taps_u, taps_v, _ = through
+    x0, y0, _, _ = window
+    sharp, residual = np.empty_like(lit), np.empty_like(lit)
+    for k in range(3):
+        for y in range(lit.shape[1]):
+            for x in range(lit.shape[2]):
+                shown = lit[k, y, x] if part[y + y0, x + x0] >= 0 else scene[k, y + y0, x + x0]
+                sharp[k, y, x] = observed[k, y + y0, x + x0] - shown
     blur(sharp, taps_u, taps_v, residual)
-    blur(body, taps_u, taps_v, shape)
-    return accumulate(residual, shape, blurred[0], blurred[1], scene, certainty, x0, y0, K, view, t[0], clip, sums)
+    coverage = _blurred_mask(part, through)
+    paint_evenly(part, is_faceted, x0, y0, lit)
+    shape = sharp
+    blur(lit, taps_u, taps_v, shape)
+    return accumulate(residual, shape, coverage[0], owner, nearness, place, seen, through, sums, blocks)

@@ -1,4 +1,7 @@
-"""Where the body will be: extrapolation of past poses, in position and in rotation, over any time steps."""
+"""Where the body will be: extrapolation of past poses over any time steps.
+
+Every predictor extrapolates the root; joints turn on at their last rate, or with `stay` not at all.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,13 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from airborne.body import Pose
+from airborne.body.chain import motion_between, moved_pose
 
 GRAVITY = np.array([0.0, 0.0, -9.81])  # [m/s2], world z up
+
+_TURN = slice(3, 6)  # the root's turn in a motion
 
 Past = Sequence[tuple[Fraction, Pose]]  # oldest first; not empty
 
@@ -26,8 +31,7 @@ def linear(past: Past, time_s: Fraction) -> Pose:
         return stay(past, time_s)
     (before, earlier), (now, last) = past[-2:]
     share = float((time_s - now) / (now - before))
-    velocity, turn = _difference(earlier, last)
-    return last.moved(share * velocity, share * turn)
+    return moved_pose(last, share * motion_between(earlier, last))
 
 
 def quadratic(past: Past, time_s: Fraction) -> Pose:
@@ -36,11 +40,11 @@ def quadratic(past: Past, time_s: Fraction) -> Pose:
         return linear(past, time_s)
     (first, oldest), (before, earlier), (now, last) = past[-3:]
     ahead, step, step_before = float(time_s - now), float(now - before), float(before - first)
-    velocity, turn = _difference(earlier, last)
-    rate = turn / step
-    change = (rate - _difference(oldest, earlier)[1] / step_before) / (0.5 * (step + step_before))
-    mean_rate = rate + change * 0.5 * (ahead + step)
-    return last.moved(velocity * ahead / step, mean_rate * ahead)
+    rate = motion_between(earlier, last) / step
+    rate_before = motion_between(oldest, earlier) / step_before
+    change = (rate - rate_before)[_TURN] / (0.5 * (step + step_before))
+    rate[_TURN] += change * 0.5 * (ahead + step)
+    return moved_pose(last, rate * ahead)
 
 
 def ballistic(past: Past, time_s: Fraction) -> Pose:
@@ -50,9 +54,3 @@ def ballistic(past: Past, time_s: Fraction) -> Pose:
     now, before = past[-1][0], past[-2][0]
     ahead, step = float(time_s - now), float(now - before)
     return quadratic(past, time_s).moved(0.5 * GRAVITY * ahead * (ahead + step), np.zeros(3))
-
-
-def _difference(earlier: Pose, later: Pose) -> tuple[np.ndarray, np.ndarray]:
-    a, b = earlier.world_from_root, later.world_from_root
-    turn = b.rotation * a.rotation.inv()
-    return b.translation - a.translation, Rotation.as_rotvec(turn)

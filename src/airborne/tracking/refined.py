@@ -1,36 +1,50 @@
-"""`refined`, the default tracker: predict, choose, fit coarse to fine; search widely when the body was missed."""
+"""`refined`, the default tracker: predict, choose, fit coarse to fine; search widely when the body was missed.
+
+A body in one piece moves by its root. A body with joints is fitted by `joint` (all degrees of freedom at once),
+`hierarchical` (the trunk first, then outward, as paper B plans), or `refined`: the second feeding the first.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose, PosedBody
+from airborne.rendering import Lights
 from airborne.scoring.foreground import body_like
 from airborne.tracking import predictors
 from airborne.tracking.appearance import Appearance, Region
 from airborne.tracking.estimate import Estimate, Status, lost
-from airborne.tracking.gauss_newton import CLOSE, FAR, NEAR, Fit, Levels, Synthesis, fit_pictures, fit_silhouettes
+from airborne.tracking.freedom import Freedom, Prior, all_joints, outward, root_only
+from airborne.tracking.gauss_newton import CLOSE, FAR, NEAR, Fit, Levels, fit_pictures, fit_silhouettes
 from airborne.tracking.loss import Agreement, Usual, agreement, status_of
-from airborne.tracking.regions import regions_round
+from airborne.tracking.regions import regions_round, share_in_pictures
+from airborne.tracking.synthesis import Synthesis
 from airborne.tracking.wide import Reach, search_widely
 from airborne.video import Frames
 
 Array = NDArray[np.floating]
+Order = Literal["refined", "joint", "hierarchical"]
 
 _MARGIN_PX, _FIRST_MARGIN_PX = 32, 56  # of a full frame
 _REMEMBERED = 3
 _FITTED_AFTER_SEARCH = 3
+_LEAST_IN_PICTURES = 0.4  # of the body, in the view that holds most of it; less is not enough to be sure
+_TRUNK_AT = 4  # pictures reduced so far, or farther, show no more of a body with joints than its trunk
 
 PREDICTIONS: dict[str, tuple[Callable[[predictors.Past, Fraction], Pose], ...]] = {
     "smooth": (predictors.quadratic, predictors.linear),
     "ballistic": (predictors.ballistic, predictors.quadratic),
     "none": (predictors.stay,),
 }
+# how well a pose is expected: at once, and after a second's square of unknown acceleration
+_EXPECTED_SD = (0.05, 30.0), (0.15, 150.0), (0.08, 120.0)  # root's place [m], root's turn [rad], joints [rad]
+_START_SD = (0.1, 0.3, 0.25)  # of a first pose set by hand: [m], [rad], [rad]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +59,23 @@ class RefinedState:
 class Refined:
     """Track by Gauss-Newton on all cameras' pictures; see `gauss_newton`."""
 
-    def __init__(self, model: BodyModel, start: Pose, *, prediction: str = "smooth") -> None:
-        self._synthesis = Synthesis.of(model)
+    def __init__(
+        self,
+        model: BodyModel,
+        start: Pose,
+        *,
+        prediction: str = "smooth",
+        lights: Lights | None = None,
+        order: Order = "refined",
+        fixed_shape: bool = False,
+    ) -> None:
+        self._synthesis = Synthesis.of(model, lights)
         self._start = start
         self._predict = PREDICTIONS[prediction]
+        self._is_jointed = len(model.segments) > 1 and not fixed_shape
+        self._order = order
+        self._root, self._stages = root_only(model), outward(model) if self._is_jointed else [root_only(model)]
+        self._all = all_joints(model) if self._is_jointed else self._root
 
     def init(self) -> RefinedState:
         """Return the state before the first frame."""
@@ -58,15 +85,15 @@ class Refined:
         """Find the body in the frames, without learning from them."""
         past = state.past
         poses = [predict(past, frames.time_s) for predict in self._predict] if past else [self._start]
-        guesses = [self._synthesis.model.with_pose(pose) for pose in poses]
-        fit, agreed = self._fit(guesses, frames, state, is_first=not past)
+        prior = self._prior(poses[-1], float(frames.time_s - past[-1][0]) if past else None)
+        fit, agreed = self._fit(poses, frames, state, prior, is_first=not past)
         if past and (agreed is None or agreed.is_suspect(state.usual)):
             reach = Reach.after(float(frames.time_s - past[-1][0]))
-            wide = search_widely(self._synthesis, guesses, frames, state.appearance, reach)
-            again, agreed_again = self._fit(wide, frames, state, n_fitted=_FITTED_AFTER_SEARCH)
+            wide = search_widely(self._synthesis, poses, frames, state.appearance, reach)
+            again, agreed_again = self._fit(wide, frames, state, None, n_fitted=_FITTED_AFTER_SEARCH)
             if agreed_again is not None and (agreed is None or agreed_again.evidence > agreed.evidence):
                 fit, agreed = again, agreed_again
-        return _estimate(frames, fit, agreed, state.usual)
+        return self._estimate(frames, fit, agreed, state.usual)
 
     def learn(self, state: RefinedState, frames: Frames, estimate: Estimate) -> RefinedState:
         """Return the state after the frames, given where the body was found."""
@@ -75,7 +102,7 @@ class Refined:
         past = (*state.past, (frames.time_s, estimate.pose))[-_REMEMBERED:]
         if estimate.status is not Status.TRACKED and state.past:
             return replace(state, past=past)
-        body, appearance = self._synthesis.model.with_pose(estimate.pose), state.appearance
+        body, appearance = self._synthesis.place(estimate.pose), state.appearance
         regions = regions_round([body], self._synthesis.geometry, frames, _MARGIN_PX)
         for region in regions:
             mask = self._synthesis.parts(body, region) >= 0
@@ -85,11 +112,36 @@ class Refined:
         agreed = agreement(self._synthesis, body, known, [appearance.posterior(region) for region in known])
         return RefinedState(past, appearance, state.usual.learned(agreed) if known else state.usual)
 
+    def _estimate(self, frames: Frames, fit: Fit | None, agreed: Agreement | None, usual: Usual) -> Estimate:
+        if fit is None or agreed is None or (status := status_of(fit, agreed, usual)) is Status.LOST:
+            return lost(frames.index, frames.time_s)
+        posed = self._synthesis.place(fit.pose)
+        if share_in_pictures(posed, self._synthesis.geometry, frames) < _LEAST_IN_PICTURES:
+            status = Status.UNCERTAIN
+        return Estimate(
+            index=frames.index,
+            time_s=frames.time_s,
+            status=status,
+            score=fit.rms_light * 255,
+            pose=fit.pose,
+            covariance=fit.covariance,
+            n_views=agreed.n_views,
+        )
+
+    def _prior(self, expected: Pose, gap_s: float | None) -> Prior | None:
+        """Say how well a body with joints is expected where it is predicted; one in one piece is free."""
+        if not self._is_jointed:
+            return None
+        sds = _START_SD if gap_s is None else [now + 0.5 * later * gap_s**2 for now, later in _EXPECTED_SD]
+        n_joints = len(self._synthesis.model.segments) - 1
+        return Prior(expected, np.repeat(np.minimum(sds, 1.5), [3, 3, 3 * n_joints]))
+
     def _fit(
         self,
-        guesses: Sequence[PosedBody],
+        guesses: Sequence[Pose],
         frames: Frames,
         state: RefinedState,
+        prior: Prior | None,
         *,
         is_first: bool = False,
         n_fitted: int = 1,
@@ -99,36 +151,60 @@ class Refined:
         With `n_fitted` above 1, every guess is first fitted to the silhouettes.
         """
         margin_px = _FIRST_MARGIN_PX if is_first else _MARGIN_PX
-        regions = regions_round(guesses, self._synthesis.geometry, frames, margin_px)
+        bodies = [self._synthesis.place(guess) for guess in guesses]
+        regions = regions_round(bodies, self._synthesis.geometry, frames, margin_px)
         appearance = state.appearance
         if is_first and regions:
-            appearance = self._first_look(guesses[0], regions)
+            appearance = self._first_look(guesses[0], regions, prior)
         regions = [region for region in regions if appearance.knows(region)]
         if not regions:
             return None, None
         posteriors = [appearance.posterior(region) for region in regions]
 
-        def agreed(body: PosedBody) -> Agreement:
-            return agreement(self._synthesis, body, regions, posteriors)
+        def agreed(pose: Pose) -> Agreement:
+            return agreement(self._synthesis, self._synthesis.place(pose), regions, posteriors)
 
-        def to_silhouettes(body: PosedBody, levels: Levels) -> PosedBody:
-            return fit_silhouettes(self._synthesis, body, regions, posteriors, levels)
+        def to_silhouettes(pose: Pose, levels: Levels) -> Pose:
+            return self._to_silhouettes(pose, regions, posteriors, levels, prior)
 
-        def to_pictures(body: PosedBody) -> Fit:
-            return fit_pictures(self._synthesis, body, regions, self._with_scenes(appearance, body, regions))
+        def to_pictures(pose: Pose) -> Fit:
+            posed = self._synthesis.place(pose)
+            scenes = self._with_scenes(appearance, posed, regions)
+            return self._to_pictures(pose, regions, scenes, prior)
 
         if n_fitted > 1:
-            bodies = [to_silhouettes(guess, NEAR) for guess in guesses]
-            bodies = sorted(bodies, key=lambda body: agreed(body).evidence, reverse=True)[:n_fitted]
-            fit = max(map(to_pictures, bodies), key=lambda each: agreed(each.posed).evidence)
+            poses = [to_silhouettes(guess, NEAR) for guess in guesses]
+            poses = sorted(poses, key=lambda pose: agreed(pose).evidence, reverse=True)[:n_fitted]
+            fit = max(map(to_pictures, poses), key=lambda each: agreed(each.pose).evidence)
         elif is_first:
             fit = to_pictures(to_silhouettes(guesses[0], FAR))
         else:
             best = max(((guess, agreed(guess)) for guess in guesses), key=lambda each: each[1].evidence)
             fit = to_pictures(to_silhouettes(best[0], NEAR if best[1].is_suspect(state.usual) else CLOSE))
-        return fit, agreed(fit.posed)
+        return fit, agreed(fit.pose)
 
-    def _first_look(self, posed: PosedBody, regions: Sequence[Region]) -> Appearance:
+    def _to_silhouettes(
+        self, pose: Pose, regions: Sequence[Region], posteriors: Sequence[Array], levels: Levels, prior: Prior | None
+    ) -> Pose:
+        """Fit the masks level by level; the coarsest shows no more than the trunk."""
+        for level in levels:
+            freedom = self._all
+            if self._is_jointed and self._order != "joint":
+                freedom = self._stages[0] if level[0] >= _TRUNK_AT else self._all
+            pose = fit_silhouettes(self._synthesis, pose, regions, posteriors, [level], freedom, prior)
+        return pose
+
+    def _to_pictures(self, pose: Pose, regions: Sequence[Region], appearance: Appearance, prior: Prior | None) -> Fit:
+        stages: Sequence[Freedom] = [self._all]
+        if self._is_jointed and self._order == "hierarchical":
+            stages = self._stages
+        fits = []
+        for freedom in stages:
+            fits.append(fit_pictures(self._synthesis, pose, regions, appearance, freedom, prior))
+            pose = fits[-1].pose
+        return fits[-1]
+
+    def _first_look(self, pose: Pose, regions: Sequence[Region], prior: Prior | None) -> Appearance:
         """Learn the colours from a pose set by hand, mend the pose by them, and learn them again.
 
         The first time, pixels of the mask that are more like the background than like the body's own colours are left
@@ -136,13 +212,14 @@ class Refined:
         """
         for look in range(3):
             appearance = Appearance()
+            posed = self._synthesis.place(pose)
             for region in regions:
                 part = self._synthesis.parts(posed, region)
                 body = body_like(region.rgb, part, self._synthesis.geometry.colours) if look == 0 else None
                 appearance.learn_colours(region, part >= 0, body=body)
             known = [region for region in regions if appearance.knows(region)]
             posteriors = [appearance.posterior(region) for region in known]
-            posed = fit_silhouettes(self._synthesis, posed, known, posteriors, FAR)
+            pose = self._to_silhouettes(pose, known, posteriors, FAR, prior)
         return appearance
 
     def _with_scenes(self, appearance: Appearance, posed: PosedBody, regions: Sequence[Region]) -> Appearance:
@@ -154,17 +231,3 @@ class Refined:
         for region in unknown:
             supplemented.learn_scene(region, self._synthesis.parts(posed, region) >= 0)
         return supplemented
-
-
-def _estimate(frames: Frames, fit: Fit | None, agreed: Agreement | None, usual: Usual) -> Estimate:
-    if fit is None or agreed is None or (status := status_of(fit, agreed, usual)) is Status.LOST:
-        return lost(frames.index, frames.time_s)
-    return Estimate(
-        index=frames.index,
-        time_s=frames.time_s,
-        status=status,
-        score=fit.rms_light * 255,
-        pose=Pose(world_from_root=fit.posed.world_from_root),
-        covariance=fit.covariance,
-        n_views=agreed.n_views,
-    )

@@ -22,6 +22,18 @@ def regions_round(bodies: Sequence[PosedBody], geometry: Geometry, frames: Frame
     return [region for region in found if region is not None]
 
 
+def share_in_pictures(body: PosedBody, geometry: Geometry, frames: Frames) -> float:
+    """Return the largest share of the body, by its outermost points, that lies inside one view's picture."""
+    points = outermost_points(body, geometry)
+    shares = [0.0]
+    for view in frames.views:
+        if view is not None:
+            px = view.camera.px_from_world(points)
+            with np.errstate(invalid="ignore"):
+                shares.append(float(np.mean(np.all((px >= 0) & (px < view.camera.size), axis=1))))
+    return max(shares)
+
+
 def outermost_points(body: PosedBody, geometry: Geometry) -> NDArray:
     """Return world points (n, 3) [m] whose hull holds the body: corners, and the boxes round the ellipsoids."""
     segments = geometry.polygon_segment.repeat(np.diff(geometry.start))

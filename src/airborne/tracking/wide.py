@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from airborne.body import PosedBody
+from airborne.body import Pose
 from airborne.rendering import EvidenceMaps, evidence_maps, mask_evidence
 from airborne.scoring.foreground import evidence
 from airborne.tracking.appearance import Appearance, Region
-from airborne.tracking.gauss_newton import Synthesis, reduced_region
 from airborne.tracking.regions import regions_round
+from airborne.tracking.synthesis import Synthesis, reduced_region
 from airborne.video import Frames
 
 Array = NDArray[np.floating]
@@ -40,39 +40,49 @@ class Reach:
 
 
 def search_widely(
-    synthesis: Synthesis, guesses: Sequence[PosedBody], frames: Frames, appearance: Appearance, reach: Reach
-) -> list[PosedBody]:
-    """Return the best bodies found round the guesses, best first; the guesses where no view sees them."""
+    synthesis: Synthesis, guesses: Sequence[Pose], frames: Frames, appearance: Appearance, reach: Reach
+) -> list[Pose]:
+    """Return the best poses found by moving the guesses' roots, best first; the guesses where no view sees them."""
+    bodies = [synthesis.place(guess) for guess in guesses]
     margin_px = min(2.5 * reach.position_sd_m, _MOST_REGION_M) * _px_per_m(guesses[0], frames)
-    regions = [r for r in regions_round(guesses, synthesis.geometry, frames, margin_px) if appearance.knows(r)]
+    regions = [r for r in regions_round(bodies, synthesis.geometry, frames, margin_px) if appearance.knows(r)]
     if not regions:
         return list(guesses)
     maps = _evidence(regions, appearance)
-    R, t = np.stack([guess.R for guess in guesses]), np.stack([guess.t for guess in guesses])
+    # candidates: which guess each comes from, and how far its root has moved from there
+    origin, motions = np.arange(len(guesses)), np.zeros((len(guesses), 6))
+    R, t = np.stack([body.R for body in bodies]), np.stack([body.t for body in bodies])
     width = np.array([reach.position_sd_m] * 3 + [reach.rotation_sd_rad] * 3)
     for number, (n_proposals, n_kept) in enumerate(_ROUNDS):
-        motions = ndtri(qmc.Sobol(6, rng=number).random(n_proposals)) * width / 2**number
-        moved_R, moved_t = _moved(
-            np.resize(R, (n_proposals, *R.shape[1:])), np.resize(t, (n_proposals, *t.shape[1:])), motions
+        steps = ndtri(qmc.Sobol(6, rng=number).random(n_proposals)) * width / 2**number
+        parents = np.arange(n_proposals) % len(origin)
+        moved = np.concatenate(
+            [motions[parents, :3] + steps[:, :3], _after(steps[:, 3:], motions[parents, 3:])], axis=1
         )
-        R, t = np.concatenate([R, moved_R]), np.concatenate([t, moved_t])
-        scores = mask_evidence(synthesis.geometry, maps, R, t).sum(axis=1)
+        origin, motions = np.concatenate([origin, origin[parents]]), np.concatenate([motions, moved])
+        placed = _moved(R[origin], t[origin], motions)
+        scores = mask_evidence(synthesis.geometry, maps, *placed).sum(axis=1)
         best = np.argsort(-scores, kind="stable")[:n_kept]
-        R, t = R[best], t[best]
-    return [PosedBody(synthesis.model, *place) for place in zip(R, t, strict=True)]
+        origin, motions = origin[best], motions[best]
+    return [guesses[int(i)].moved(motion[:3], motion[3:]) for i, motion in zip(origin, motions, strict=True)]
+
+
+def _after(later: Array, earlier: Array) -> Array:
+    """Return the rotation vectors (n, 3) of two turns in world axes, one after the other."""
+    return (Rotation.from_rotvec(later) * Rotation.from_rotvec(earlier)).as_rotvec()
 
 
 def _moved(R: Array, t: Array, motions: Array) -> tuple[Array, Array]:
-    """Move bodies R (n, s, 3, 3), t (n, s, 3) by motions (n, 6), as `PosedBody.moved` does."""
+    """Move bodies R (n, s, 3, 3), t (n, s, 3) by motions (n, 6) of their roots."""
     turns = Rotation.from_rotvec(motions[:, 3:]).as_matrix()[:, None]
     origin = t[:, :1]
     return turns @ R, (turns @ (t - origin)[..., None])[..., 0] + origin + motions[:, None, :3]
 
 
-def _px_per_m(posed: PosedBody, frames: Frames) -> float:
+def _px_per_m(pose: Pose, frames: Frames) -> float:
     """Return the largest scale at which a view shows the body's root."""
     scales = [
-        view.camera.K[0, 0] / max(view.camera.camera_from_world.apply(posed.t[0])[2], 0.1)
+        view.camera.K[0, 0] / max(view.camera.camera_from_world.apply(pose.world_from_root.translation)[2], 0.1)
         for view in frames.views
         if view is not None
     ]

@@ -1,0 +1,124 @@
+"""The chain of joints: how a body's points and segments move with its degrees of freedom, to first order.
+
+A motion vector (6 + 3 joints,) is the root's translation [m] and rotation vector [rad], both in world axes, then for
+the joint of every segment after the root a rotation vector [rad] in that segment's own axes. Covariances are over the
+same numbers in the same order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from airborne.body.model import BodyModel, Pose, PosedBody
+from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
+
+Array = NDArray[np.floating]
+
+_LOCKED = 1e-8  # cosine of the middle angle below which the other two are one angle
+
+
+def moved_pose(pose: Pose, motion: Array) -> Pose:
+    """Apply a motion vector (6 + 3 joints,) to a pose.
+
+    The root moves by the translation and turns about its own origin; a joint's parent_from_segment is followed by the
+    turn in the segment's axes. The new joint angles lie on the branch nearest to the old ones.
+    """
+    moved = pose.moved(motion[:3], motion[3:6])
+    n_joints = (len(motion) - 6) // 3
+    if not n_joints:
+        return moved
+    angles = _angles_of(pose, n_joints)
+    turns = Rotation.from_rotvec(np.reshape(motion[6:], (n_joints, 3))).as_matrix()
+    return replace(moved, joint_angles=_angles_near(matrix_from_angles(angles) @ turns, angles))
+
+
+def motion_between(earlier: Pose, later: Pose) -> Array:
+    """Return the motion vector (6 + 3 joints,) that takes one pose to another: the inverse of `moved_pose`."""
+    a, b = earlier.world_from_root, later.world_from_root
+    root = np.concatenate([b.translation - a.translation, (b.rotation * a.rotation.inv()).as_rotvec()])
+    n_joints = max(len(earlier.joint_angles), len(later.joint_angles))
+    if not n_joints:
+        return root
+    first, second = (matrix_from_angles(_angles_of(pose, n_joints)) for pose in (earlier, later))
+    turns = Rotation.from_matrix(np.swapaxes(first, -1, -2) @ second)
+    return np.concatenate([root, turns.as_rotvec().ravel()])
+
+
+def joint_angles_of(model: BodyModel, R: Array, near: Array | None = None) -> Array:
+    """Read the joint angles (..., joints, 3) [rad] off the rotations, world from segment, (..., segments, 3, 3).
+
+    `near` (..., joints, 3) are angles whose branch to stay on; without it y lies in [-pi/2, pi/2].
+    """
+    parent_from_segment = np.swapaxes(R[..., model.parents[1:], :, :], -1, -2) @ R[..., 1:, :, :]
+    return angles_from_matrix(parent_from_segment) if near is None else _angles_near(parent_from_segment, near)
+
+
+def nearest_angles(angles: Array, near: Array) -> Array:
+    """Return, of all x-y-z angles (..., 3) [rad] of the same rotation, those nearest to `near` (..., 3).
+
+    (x, y, z) and (x + pi, pi - y, z + pi) are the same rotation, and so are whole turns more. NaN stays NaN.
+    """
+    angles = np.asarray(angles, float)
+    other = np.stack([angles[..., 0] + np.pi, np.pi - angles[..., 1], angles[..., 2] + np.pi], axis=-1)
+    both = np.stack([angles, other])
+    both = both + 2 * np.pi * np.round((near - both) / (2 * np.pi))
+    distance = np.sum((both - near) ** 2, axis=-1)
+    return np.where((distance[1] < distance[0])[..., None], both[1], both[0])
+
+
+def segment_jacobians(posed: PosedBody, origin: Array) -> Array:
+    """Differentiate every segment's rigid motion by the motion vector: (segments, 6, 6 + 3 joints).
+
+    Rows are the translation of that point of the segment which is now at `origin` (3,) world [m], and the segment's
+    rotation vector [rad], both in world axes.
+    """
+    jacobian = np.zeros((len(posed.R), 6, 6 + 3 * (len(posed.R) - 1)))
+    jacobian[:, :3] = point_jacobian(posed, np.arange(len(posed.R)), origin)
+    jacobian[:, 3:, 3:6] = np.eye(3)
+    axes = np.where(_is_carried(posed.model)[:, :, None, None], posed.R[1:], 0.0)
+    jacobian[:, 3:, 6:] = np.moveaxis(axes, 1, 2).reshape(len(posed.R), 3, -1)
+    return jacobian
+
+
+def point_jacobian(posed: PosedBody, segment: int | NDArray[np.integer], points: Array) -> Array:
+    """Differentiate world points (..., 3) [m], fixed in `segment` (...), by the motion vector: (..., 3, 6 + 3 joints).
+
+    The root gives I and w x (p - t_root), the joint of an ancestor k, or of the segment itself, a x (p - t_k) for each
+    axis a of segment k; other joints give 0. `segment` holds indices, one for all points or one each.
+    """
+    segment, points = np.asarray(segment), np.asarray(points, float)
+    shape = np.broadcast_shapes(segment.shape, points.shape[:-1])
+    axes = np.concatenate([np.eye(3)[None], posed.R[1:]])  # (segments, 3, 3): columns are what each turns about
+    lever = points[..., None, :] - posed.t  # (..., segments, 3)
+    turned = np.cross(np.swapaxes(axes, -1, -2), lever[..., None, :])  # (..., segments, axis, 3)
+    is_carried = np.concatenate([np.ones((len(axes), 1), bool), _is_carried(posed.model)], axis=1)[segment]
+    turned = np.where(is_carried[..., None, None], turned, 0.0)
+    columns = np.moveaxis(turned.reshape(*shape, 3 * len(axes), 3), -1, -2)
+    return np.concatenate([np.broadcast_to(np.eye(3), (*shape, 3, 3)), columns], axis=-1)
+
+
+def _angles_of(pose: Pose, n_joints: int) -> Array:
+    """Return the joint angles (joints, 3) of a pose, which leaves them out where all joints are straight."""
+    return pose.joint_angles if pose.joint_angles.size else np.zeros((n_joints, 3))
+
+
+def _is_carried(model: BodyModel) -> NDArray[np.bool_]:
+    """Say which segments each joint carries along: (segments, joints); joint k belongs to segment k + 1."""
+    carried = np.zeros((len(model.segments), len(model.segments)), bool)
+    for segment, parent in enumerate(model.parents[1:], start=1):
+        carried[segment] = carried[parent]
+        carried[segment, segment] = True
+    return carried[:, 1:]
+
+
+def _angles_near(matrix: Array, near: Array) -> Array:
+    """Read x-y-z angles off matrices on the branch nearest to `near`; where y is +-90 degrees, x stays as it was."""
+    angles = angles_from_matrix(matrix)
+    x = np.where(np.hypot(matrix[..., 1, 2], matrix[..., 2, 2]) < _LOCKED, near[..., 0], angles[..., 0])
+    c, s = np.cos(x), np.sin(x)
+    z = np.arctan2(c * matrix[..., 1, 0] + s * matrix[..., 2, 0], c * matrix[..., 1, 1] + s * matrix[..., 2, 1])
+    return nearest_angles(np.stack([x, angles[..., 1], z], axis=-1), near)
