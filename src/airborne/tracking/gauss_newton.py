@@ -102,15 +102,18 @@ def fit_silhouettes(
 
 def fit_pictures(
     synthesis: Synthesis,
-    pose: Pose,
+    poses: Sequence[Pose],
     regions: Sequence[Region],
     appearance: Appearance,
     freedom: Freedom,
     prior: Prior | None = None,
 ) -> Fit:
-    """Move the body until the composite of body and empty scene agrees with the pictures; say how sure that is."""
-    posed = synthesis.place(pose)
-    laid_out = [(pictured(synthesis, posed, region, appearance), region) for region in regions]
+    """Move the body until the composite of body and empty scene agrees with the pictures; say how sure that is.
+
+    From several poses, the one is kept that ends in the best agreement with pictures and prior.
+    """
+    bodies = [synthesis.place(pose) for pose in poses]
+    laid_out = [(pictured(synthesis, bodies, region, appearance), region) for region in regions]
     laid_out = [(view, region) for view, region in laid_out if view.is_seen]
     rows_sigma_px = [max(_FINE_SIGMA_PX * region.aspect, 0.5) for _, region in laid_out]
     taps = [(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma)) for sigma in rows_sigma_px]
@@ -127,7 +130,12 @@ def fit_pictures(
             shifted.append(sums.B * shift)
         return _mapped(synthesis, freedom, pose, posed, sums, blocks, shifted, totals, correlated)
 
-    last = _descend(evaluate, freedom, pose, prior, most_steps=_MOST_STEPS, overstep=_OVERSTEP, settled=_SETTLED)
+    ends = [
+        _descend(evaluate, freedom, pose, prior, most_steps=_MOST_STEPS, overstep=_OVERSTEP, settled=_SETTLED)
+        for pose in poses
+    ]
+    noise = min(end.evaluation.noise for end in ends)
+    last = min(ends, key=lambda end: end.evaluation.objective(noise, freedom.prior_cost(end.evaluation.pose, prior)))
     found = last.evaluation
     covariance = covariance_of(found.A, noise=found.noise, spread=found.spread)
     whole = np.zeros((len(freedom.whole(found.g)),) * 2)

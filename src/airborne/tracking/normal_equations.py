@@ -22,7 +22,7 @@ from airborne.scoring.lighting import fit_light, light_up, paint_evenly
 
 BLOCK_PX = 16  # residuals this close are not independent: the side of a block of the covariance's sandwich
 RADIUS_PX = 4  # reach of the blur: three sds of the widest one used
-REACH_PX = 2  # an edge is felt this far away: most of the blur's weight
+REACH_PX = 3  # an edge is felt this far away: most of the blur's weight
 _PAD_PX = RADIUS_PX + 3  # beyond it, the blurred mask is nothing
 _EDGE = 0.01  # blurred coverage below which a pixel says nothing of the body
 

@@ -24,6 +24,7 @@ from airborne.tracking.freedom import Freedom, Prior, all_joints, outward, root_
 from airborne.tracking.gauss_newton import CLOSE, FAR, NEAR, Fit, Levels, fit_pictures, fit_silhouettes
 from airborne.tracking.loss import Agreement, Usual, agreement, status_of
 from airborne.tracking.regions import regions_round, share_in_pictures
+from airborne.tracking.swaps import is_nearer, swapped
 from airborne.tracking.synthesis import Synthesis
 from airborne.tracking.wide import Reach, search_widely
 from airborne.video import Frames
@@ -167,21 +168,29 @@ class Refined:
         def to_silhouettes(pose: Pose, levels: Levels) -> Pose:
             return self._to_silhouettes(pose, regions, posteriors, levels, prior)
 
-        def to_pictures(pose: Pose) -> Fit:
-            posed = self._synthesis.place(pose)
-            scenes = self._with_scenes(appearance, posed, regions)
-            return self._to_pictures(pose, regions, scenes, prior)
+        def to_pictures(poses: Sequence[Pose]) -> Fit:
+            scenes = self._with_scenes(appearance, self._synthesis.place(poses[0]), regions)
+            return self._to_pictures(poses, regions, scenes, prior)
 
         if n_fitted > 1:
             poses = [to_silhouettes(guess, NEAR) for guess in guesses]
             poses = sorted(poses, key=lambda pose: agreed(pose).evidence, reverse=True)[:n_fitted]
-            fit = max(map(to_pictures, poses), key=lambda each: agreed(each.pose).evidence)
+            fit = max((to_pictures([pose]) for pose in poses), key=lambda each: agreed(each.pose).evidence)
         elif is_first:
-            fit = to_pictures(to_silhouettes(guesses[0], FAR))
+            pose = to_silhouettes(guesses[0], FAR)
+            fit = to_pictures([pose, *self._swapped(pose)])
         else:
             best = max(((guess, agreed(guess)) for guess in guesses), key=lambda each: each[1].evidence)
-            fit = to_pictures(to_silhouettes(best[0], NEAR if best[1].is_suspect(state.usual) else CLOSE))
+            fit = to_pictures([to_silhouettes(best[0], NEAR if best[1].is_suspect(state.usual) else CLOSE)])
+            if swaps := [
+                pose for pose in self._swapped(fit.pose) if is_nearer(self._synthesis.model, pose, fit.pose, best[0])
+            ]:
+                fit = to_pictures([fit.pose, *swaps])
         return fit, agreed(fit.pose)
+
+    def _swapped(self, pose: Pose) -> list[Pose]:
+        """Return the poses with the limbs of one side in the places of the other's; none for a body in one piece."""
+        return swapped(self._synthesis.model, pose) if self._is_jointed else []
 
     def _to_silhouettes(
         self, pose: Pose, regions: Sequence[Region], posteriors: Sequence[Array], levels: Levels, prior: Prior | None
@@ -194,14 +203,16 @@ class Refined:
             pose = fit_silhouettes(self._synthesis, pose, regions, posteriors, [level], freedom, prior)
         return pose
 
-    def _to_pictures(self, pose: Pose, regions: Sequence[Region], appearance: Appearance, prior: Prior | None) -> Fit:
+    def _to_pictures(
+        self, poses: Sequence[Pose], regions: Sequence[Region], appearance: Appearance, prior: Prior | None
+    ) -> Fit:
         stages: Sequence[Freedom] = [self._all]
         if self._is_jointed and self._order == "hierarchical":
             stages = self._stages
         fits = []
         for freedom in stages:
-            fits.append(fit_pictures(self._synthesis, pose, regions, appearance, freedom, prior))
-            pose = fits[-1].pose
+            fits.append(fit_pictures(self._synthesis, poses, regions, appearance, freedom, prior))
+            poses = [fits[-1].pose]
         return fits[-1]
 
     def _first_look(self, pose: Pose, regions: Sequence[Region], prior: Prior | None) -> Appearance:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -79,13 +80,17 @@ class Synthesis:
         surface_maps(self.shapes, self.geometry, posed.R, posed.t, region.packed, *maps)
         return maps[0]
 
-    def window(self, posed: PosedBody, camera: Camera, packed: Array) -> Window:
-        """Return the part of a picture that holds the body with room to move; empty where nothing is seen."""
+    def window(self, bodies: Sequence[PosedBody], camera: Camera, packed: Array) -> Window:
+        """Return the part of a picture that holds the bodies with room to move; empty where nothing is seen."""
         maps = empty_maps(camera.size)
-        surface_maps(self.shapes, self.geometry, posed.R, posed.t, packed, *maps)
-        x0, y0, x1, y1 = window_of(maps[0])
-        if x1 <= x0:
+        found = []
+        for posed in bodies:
+            surface_maps(self.shapes, self.geometry, posed.R, posed.t, packed, *maps)
+            found.append(window_of(maps[0]))
+        found = np.array([window for window in found if window[2] > window[0]])
+        if not len(found):
             return 0, 0, 0, 0
+        (x0, y0), (x1, y1) = found[:, :2].min(axis=0).tolist(), found[:, 2:].max(axis=0).tolist()
         width, height = camera.size
         room_v = round(_ROOM_PX * camera.K[1, 1] / camera.K[0, 0])
         return max(x0 - _ROOM_PX, 0), max(y0 - room_v, 0), min(x1 + _ROOM_PX, width), min(y1 + room_v, height)
@@ -108,7 +113,7 @@ class Laid(NamedTuple):
         return x1 - x0 >= 3 and y1 - y0 >= 3
 
 
-def pictured(synthesis: Synthesis, posed: PosedBody, region: Region, appearance: Appearance) -> Laid:
+def pictured(synthesis: Synthesis, bodies: Sequence[PosedBody], region: Region, appearance: Appearance) -> Laid:
     """Lay out a region: linear light where the lights are unknown, shares of full sRGB where they are known."""
     mean, sd, looks = appearance.scene(region)
     filled = np.empty_like(mean)
@@ -124,7 +129,7 @@ def pictured(synthesis: Synthesis, posed: PosedBody, region: Region, appearance:
         light[:, 0] = 1
     else:
         light = packed_lights(synthesis.lights, region.camera), np.float32(synthesis.lights.ambient)
-    window = synthesis.window(posed, region.camera, region.packed)
+    window = synthesis.window(bodies, region.camera, region.packed)
     maps = empty_maps(region.camera.size)
     return Laid(region.packed, region.camera.K, (observed, scene, certainty), maps, window, light)
 
@@ -134,7 +139,7 @@ def outlined(synthesis: Synthesis, posed: PosedBody, region: Region, posterior: 
     camera, plane = reduced_region(region, posterior, reduction)
     seen = plane[None], np.zeros((1, *plane.shape), np.float32), np.ones_like(plane)
     packed = packed_view(camera)
-    window = synthesis.window(posed, camera, packed)
+    window = synthesis.window([posed], camera, packed)
     return Laid(packed, camera.K, seen, empty_maps(camera.size), window)
 
 
