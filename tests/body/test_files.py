@@ -3,10 +3,22 @@
 import numpy as np
 import pytest
 import trimesh
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import Box, Ellipsoid, Mesh, geometry
-from airborne.body.files import read_body
+from airborne.body import (
+    SAMPLED,
+    BodyModel,
+    Box,
+    Ellipsoid,
+    Inertia,
+    Landmark,
+    Mesh,
+    Part,
+    Segment,
+    geometry,
+    human18,
+)
+from airborne.body.files import body_toml, mesh_files, read_body, write_body
 from airborne.errors import BodyError
 from tests.tolerances import EXACT
 
@@ -31,6 +43,24 @@ shape = "ellipsoid"
 semi_axes_m = [0.05, 0.06, 0.2]
 colour = "sample"
 """
+FULL = (
+    GOOD.replace(
+        "joint_m = [0.0, 0.0, -0.4]", "joint_m = [0.0, 0.0, -0.4]\nlimits_deg = [[-5, 140], [0, 0], [-inf, 10]]"
+    )
+    + """slab_m = [-inf, 0.05]
+[segment.inertia]
+mass_kg = 3.5
+centre_m = [0.0, 0.01, -0.17]
+tensor_kg_m2 = [[0.05, 0.0, 0.0], [0.0, 0.05, 0.001], [0.0, 0.001, 0.01]]
+[[landmark]]
+name = "knee"
+segment = "shank"
+[[landmark]]
+name = "ankle"
+segment = "shank"
+position_m = [0.0, 0.0, -0.4]
+"""
+)
 MESH = """
 name = "lump"
 [[segment]]
@@ -200,3 +230,134 @@ def test_measures_in_millimetres_are_noticed(tmp_path):
     assert "is in millimetres" in complaint(tmp_path, MESH.replace("FILE", "lump.stl"))
     with pytest.raises(BodyError, match="is it in millimetres"):
         Box(np.array([60.0, 900.0, 45.0]))
+
+
+def test_file_says_limits_slabs_inertia_and_landmarks(tmp_path):
+    thigh, shank = (model := read(tmp_path, FULL)).segments
+    np.testing.assert_array_equal(thigh.limits_rad, np.tile([-np.inf, np.inf], (3, 1)))
+    np.testing.assert_allclose(shank.limits_rad, np.radians([[-5, 140], [0, 0], [-np.inf, 10]]), atol=EXACT)
+    assert shank.parts[0].slab_m == (-np.inf, 0.05)
+    assert thigh.inertia is None
+    assert shank.inertia.mass_kg == 3.5
+    np.testing.assert_array_equal(shank.inertia.centre_m, [0, 0.01, -0.17])
+    np.testing.assert_array_equal(shank.inertia.tensor_kg_m2, [[0.05, 0, 0], [0, 0.05, 0.001], [0, 0.001, 0.01]])
+    assert [(mark.name, mark.segment) for mark in model.landmarks] == [("knee", "shank"), ("ankle", "shank")]
+    np.testing.assert_array_equal(model.landmarks[1].position_m, [0, 0, -0.4])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[[-5, 140], ", "[[140, -5], ", "segment 'shank': each joint limit needs a least and a greatest angle"),
+        ("[[-5, 140], ", "[[nan, 140], ", "segment 'shank': each joint limit needs a least and a greatest angle"),
+        ("[[-5, 140], ", "[", "segment.1.limits_deg"),
+        ("[[-5, 140], ", "[[-5], ", "segment.1.limits_deg.0"),
+        ("slab_m = [-inf, 0.05]", "slab_m = [0.05, -0.05]", "part 'lower': slab_m is [0.05, -0.05]"),
+        ("slab_m = [-inf, 0.05]", "slab_m = [nan, 0.05]", "part 'lower': slab_m"),
+        ("slab_m = [-inf, 0.05]", "slab_m = [0.05]", "segment.1.part.0.slab_m"),
+        ("rotation_deg = [10", "slab_m = [0, 0.1]\nrotation_deg = [10", "part 'upper': only an ellipsoid can be cut"),
+        ("mass_kg = 3.5", "mass_kg = 0", "segment.1.inertia.mass_kg"),
+        ("mass_kg = 3.5", "", "segment.1.inertia.mass_kg: is missing"),
+        ("[[0.05, 0.0, 0.0], ", "[[0.05, 0.01, 0.0], ", "segment 'shank': tensor_kg_m2 belongs to no solid"),
+        ("[[0.05, 0.0, 0.0], ", "[[0.5, 0.0, 0.0], ", "segment 'shank': tensor_kg_m2 belongs to no solid"),
+        ("[[0.05, 0.0, 0.0], ", "[[-0.05, 0.0, 0.0], ", "segment 'shank': tensor_kg_m2 belongs to no solid"),
+        ("[[0.05, 0.0, 0.0], ", "[", "segment.1.inertia.tensor_kg_m2"),
+        (
+            'name = "ankle"\nsegment = "shank"',
+            'name = "ankle"\nsegment = "foot"',
+            "landmark 'ankle': no segment 'foot'",
+        ),
+        ('name = "ankle"', 'name = "knee"', "two landmarks of body 'leg' share a name"),
+        ("position_m = [0.0, 0.0, -0.4]", "position_m = [0.0, inf, -0.4]", "landmark.1.position_m"),
+    ],
+)
+def test_faulty_limit_slab_inertia_or_landmark_is_refused_in_one_line(tmp_path, old, new, said):
+    assert old in FULL
+    message = complaint(tmp_path, FULL.replace(old, new, 1))
+    assert message.startswith("body.toml: ")
+    assert said in message
+
+
+def same(a, b):
+    """Every number of two bodies, to rounding; of meshes the triangles, in any order."""
+    assert a.name == b.name
+    np.testing.assert_array_equal(a.parents, b.parents)
+    assert [(mark.name, mark.segment) for mark in a.landmarks] == [(mark.name, mark.segment) for mark in b.landmarks]
+    pairs = [(m.position_m, n.position_m) for m, n in zip(a.landmarks, b.landmarks, strict=True)]
+    for s, u in zip(a.segments, b.segments, strict=True):
+        assert (s.name, s.inertia is None) == (u.name, u.inertia is None)
+        pairs += [(s.joint_m, u.joint_m), (s.limits_rad, u.limits_rad)]
+        if s.inertia is not None:
+            pairs += [(getattr(s.inertia, k), getattr(u.inertia, k)) for k in ("mass_kg", "centre_m", "tensor_kg_m2")]
+        for p, q in zip(s.parts, u.parts, strict=True):
+            assert (p.name, type(p.shape), p.colour is None) == (q.name, type(q.shape), q.colour is None)
+            pairs += [(p.slab_m, q.slab_m), (p.segment_from_part.as_matrix(), q.segment_from_part.as_matrix())]
+            pairs += [] if p.colour is None else [(p.colour, q.colour)]
+            if isinstance(p.shape, Mesh):
+                pairs.append(tuple(triangles(part.shape) for part in (p, q)))
+            else:
+                pairs.append(tuple(getattr(x.shape, "size_m", None) for x in (p, q)))
+                pairs.append(tuple(getattr(x.shape, "semi_axes_m", None) for x in (p, q)))
+    for x, y in pairs:
+        if x is not None:
+            np.testing.assert_allclose(x, y, atol=EXACT)
+
+
+def triangles(mesh):
+    corners = mesh.vertices_m[mesh.faces]
+    first = np.lexsort(corners.transpose(2, 0, 1)[::-1], axis=1)[:, 0]
+    turned = np.stack([np.roll(c, -k, axis=0) for c, k in zip(corners, first, strict=True)])
+    return turned[np.lexsort(turned.reshape(len(turned), -1).T)]
+
+
+def random_body(seed):
+    rng = np.random.default_rng(seed)
+    lump = trimesh.creation.icosphere(subdivisions=1, radius=0.1)
+    mesh = Mesh(np.asarray(lump.vertices, float) * rng.uniform(0.5, 2, 3), np.asarray(lump.faces, np.int64))
+    shapes = [Box(rng.uniform(0.1, 1, 3)), Ellipsoid(rng.uniform(0.1, 1, 3)), mesh, Ellipsoid(rng.uniform(0.3, 1, 3))]
+    turns = [Rotation.random(rng=rng), Rotation.identity(), Rotation.random(rng=rng)]
+    turns.append(Rotation.from_euler("XYZ", [rng.uniform(-180, 180), rng.choice([-90, 90]), 20], degrees=True))
+    parts = tuple(
+        Part(
+            f'a "{i}" \\ é',
+            shape,
+            RigidTransform.from_components(rng.normal(size=3), turn),
+            None if i == 1 else rng.uniform(0, 255, 3).round(),
+            (-np.inf, float(rng.normal() / 9)) if i == 3 else (-np.inf, np.inf),
+        )
+        for i, (shape, turn) in enumerate(zip(shapes, turns, strict=True))
+    )
+    limits = np.sort(rng.uniform(-3, 3, (3, 2)), axis=1)
+    inertia = Inertia(float(rng.uniform(1, 9)), rng.normal(size=3), np.diag(rng.uniform(0.6, 1, 3)))
+    segments = (
+        Segment("root", None, np.zeros(3), parts[:2], inertia=inertia),
+        Segment("limb", "root", rng.normal(size=3), (), limits),
+        Segment("tip", "limb", rng.normal(size=3), parts[2:]),
+    )
+    landmarks = (Landmark("end", "tip", rng.normal(size=3)), Landmark("root", "limb", np.zeros(3)))
+    return BodyModel("bödy", segments, landmarks if seed % 2 else ())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_any_body_is_read_back_as_it_was_written(tmp_path, seed):
+    model = random_body(seed)
+    write_body(tmp_path / "body.toml", model)
+    same(read_body(tmp_path / "body.toml"), model)
+    (mesh,) = mesh_files(tmp_path / "body.toml")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["body.toml", mesh])
+
+
+@pytest.mark.parametrize("person", [human18(), human18(1.62, 55.0, outfit=SAMPLED)])
+def test_a_person_is_read_back_as_written(tmp_path, person):
+    write_body(tmp_path / "body.toml", person)
+    again = read_body(tmp_path / "body.toml")
+    same(again, person)
+    assert body_toml(again) == body_toml(person), "writing what was read changes nothing"
+    assert "landmark" in body_toml(person)
+
+
+def test_plain_turns_are_written_in_plain_degrees_and_nothing_needless(tmp_path):
+    text = body_toml(read(tmp_path, GOOD))
+    assert "rotation_deg = [10.0, 20.0, 30.0]" in text
+    for needless in ("rotation_deg = [0", "slab_m", "limits_deg", "inertia", "landmark", "-0.0,"):
+        assert needless not in text

@@ -6,14 +6,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from airborne.body.files import read_body
+from airborne.body.files import body_toml, read_body
 from airborne.cameras import calibrate, read_control_points, read_rig
 from airborne.errors import TrialError
 from airborne.evaluation.digitised import digitised_poses, read_digitised
 from airborne.evaluation.truth import read_truth
 from airborne.synthetic import frames, thrown_cross, write_thrown_cross, write_trial
 from airborne.synthetic.measurements import control_points
-from airborne.synthetic.writing import body_toml
 from airborne.trial import read_trial
 from airborne.video import inspect, open_recording
 from airborne.video.decoding import VideoSource

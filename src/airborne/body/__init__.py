@@ -1,6 +1,9 @@
 """Bodies: in come body files, out come `BodyModel`, `Pose` and `PosedBody`; knows no camera and no image."""
 
 from airborne.body.geometry import Geometry, geometry, has_flat_sides
+from airborne.body.human import human18, human18_from_measurements
+from airborne.body.inertia import total_inertia, total_inertias
+from airborne.body.measurements import Measurements, read_measurements, write_measurements
 from airborne.body.model import (
     BodyModel,
     Box,
@@ -14,15 +17,21 @@ from airborne.body.model import (
     Segment,
     Shape,
 )
+from airborne.body.outfits import ATHLETE, SAMPLED, Outfit
+from airborne.body.shaping import with_girths, with_segment_lengths
 
 __all__ = [
+    "ATHLETE",
+    "SAMPLED",
     "BodyModel",
     "Box",
     "Ellipsoid",
     "Geometry",
     "Inertia",
     "Landmark",
+    "Measurements",
     "Mesh",
+    "Outfit",
     "Part",
     "Pose",
     "PosedBody",
@@ -30,4 +39,12 @@ __all__ = [
     "Shape",
     "geometry",
     "has_flat_sides",
+    "human18",
+    "human18_from_measurements",
+    "read_measurements",
+    "total_inertia",
+    "total_inertias",
+    "with_girths",
+    "with_segment_lengths",
+    "write_measurements",
 ]

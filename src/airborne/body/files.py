@@ -1,21 +1,45 @@
-"""Body files: TOML with segments, joints and coloured parts; meshes beside it as OBJ, PLY or STL."""
+"""Body files: TOML with segments, joints, coloured parts, masses and landmarks; meshes beside it, OBJ, PLY or STL."""
 
 from __future__ import annotations
 
+import json
+import re
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 import trimesh
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body.model import LONGEST_M, BodyModel, Box, Ellipsoid, Mesh, Part, Segment, Shape
+from airborne.body.model import (
+    LONGEST_M,
+    UNLIMITED,
+    WHOLE,
+    BodyModel,
+    Box,
+    Ellipsoid,
+    Inertia,
+    Landmark,
+    Mesh,
+    Part,
+    Segment,
+    Shape,
+)
 from airborne.errors import BodyError, one_line
+from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
+Bound = Annotated[float, Field(allow_inf_nan=True)]  # inf: no bound
+Range = Annotated[list[Bound], Field(min_length=2, max_length=2)]
 Channel = Annotated[float, Field(ge=0, le=255)]
+
+
+_SAME_TURN = 1e-15  # rounding of a turn
 
 
 class _Strict(BaseModel):
@@ -33,18 +57,34 @@ class _PartTable(_Strict):
     rotation_deg: Vector = [0.0, 0.0, 0.0]  # about the segment's x, then the new y, then the new z
     colour_srgb: Annotated[list[Channel], Field(min_length=3, max_length=3)] | None = None
     colour: Literal["sample"] | None = None
+    slab_m: Range | None = None  # along the part's own z
+
+
+class _InertiaTable(_Strict):
+    mass_kg: float = Field(gt=0)
+    centre_m: Vector
+    tensor_kg_m2: Matrix
+
+
+class _LandmarkTable(_Strict):
+    name: str
+    segment: str
+    position_m: Vector = [0.0, 0.0, 0.0]
 
 
 class _SegmentTable(_Strict):
     name: str
     parent: str | None = None
     joint_m: Vector = [0.0, 0.0, 0.0]
+    limits_deg: Annotated[list[Range], Field(min_length=3, max_length=3)] | None = None  # about x, y, z
     part: list[_PartTable] = []
+    inertia: _InertiaTable | None = None
 
 
 class _BodyTable(_Strict):
     name: str
     segment: Annotated[list[_SegmentTable], Field(min_length=1)]
+    landmark: list[_LandmarkTable] = []
 
 
 def read_body(path: Path) -> BodyModel:
@@ -58,15 +98,30 @@ def read_body(path: Path) -> BodyModel:
     except ValidationError as error:
         raise BodyError(f"{path.name}: {one_line(error)}") from error
     segments = tuple(_segment(segment, path) for segment in table.segment)
+    landmarks = tuple(Landmark(mark.name, mark.segment, np.array(mark.position_m)) for mark in table.landmark)
     try:
-        return BodyModel(table.name, segments)
+        return BodyModel(table.name, segments, landmarks)
     except BodyError as error:
         raise BodyError(f"{path.name}: {error}") from error
 
 
 def _segment(table: _SegmentTable, path: Path) -> Segment:
     parts = tuple(_part(part, path) for part in table.part)
-    return Segment(table.name, table.parent, np.array(table.joint_m), parts)
+    limits = UNLIMITED if table.limits_deg is None else np.radians(np.array(table.limits_deg))
+    inertia = None if table.inertia is None else _inertia(table.inertia, f"{path.name}: segment '{table.name}'")
+    return Segment(table.name, table.parent, np.array(table.joint_m), parts, limits, inertia)
+
+
+def _inertia(table: _InertiaTable, place: str) -> Inertia:
+    tensor = np.array(table.tensor_kg_m2)
+    moments = np.linalg.eigvalsh((tensor + tensor.T) / 2)
+    slack = 1e-6 * np.abs(tensor).max()
+    if np.abs(tensor - tensor.T).max() > slack or moments[0] < -slack or moments[:2].sum() < moments[2] - slack:
+        raise BodyError(
+            f"{place}: tensor_kg_m2 belongs to no solid; it must be symmetric, about the centre of mass, and no "
+            "principal moment may exceed the sum of the other two"
+        )
+    return Inertia(table.mass_kg, np.array(table.centre_m), tensor)
 
 
 def _part(table: _PartTable, path: Path) -> Part:
@@ -76,7 +131,11 @@ def _part(table: _PartTable, path: Path) -> Part:
         )
     place = RigidTransform.from_components(table.centre_m, Rotation.from_euler("XYZ", table.rotation_deg, degrees=True))
     colour = None if table.colour_srgb is None else np.array(table.colour_srgb)
-    return Part(table.name, _shape(table, path), place, colour)
+    shape, slab = _shape(table, path), WHOLE if table.slab_m is None else (table.slab_m[0], table.slab_m[1])
+    try:
+        return Part(table.name, shape, place, colour, slab)
+    except BodyError as error:
+        raise BodyError(f"{path.name}: {error}") from error
 
 
 def _shape(table: _PartTable, path: Path) -> Shape:
@@ -124,3 +183,89 @@ def mesh_files(path: Path) -> list[str]:
     """Return the mesh files that a readable body file names, relative to it."""
     table = _BodyTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8-sig")))
     return [part.file for segment in table.segment for part in segment.part if part.file is not None]
+
+
+def write_body(path: Path, model: BodyModel) -> None:
+    """Write a body file, and its meshes as OBJ beside it; `read_body` gives the same body back."""
+    path.write_text(body_toml(model), encoding="utf-8")
+    for name, part in zip(_mesh_names(model), model.parts, strict=True):
+        if isinstance(part.shape, Mesh):
+            corners = [f"v {_spaced(corner)}" for corner in part.shape.vertices_m]
+            faces = [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in part.shape.faces.tolist()]
+            (path.parent / name).write_text("\n".join([*corners, *faces]) + "\n", encoding="utf-8")
+
+
+def body_toml(model: BodyModel) -> str:
+    """Return the text of a body's file, numbers to the last digit; it names its meshes as `write_body` writes them."""
+    lines = [f"name = {_text(model.name)}"]
+    meshes = iter(_mesh_names(model))
+    for segment in model.segments:
+        lines += ["", "[[segment]]", f"name = {_text(segment.name)}"]
+        if segment.parent is not None:
+            lines += [f"parent = {_text(segment.parent)}", f"joint_m = {_numbers(segment.joint_m)}"]
+        if np.any(np.isfinite(segment.limits_rad)):
+            lines.append(f"limits_deg = {_rows(np.degrees(segment.limits_rad))}")
+        for part in segment.parts:
+            lines += ["", "[[segment.part]]", f"name = {_text(part.name)}", *_part_lines(part, next(meshes))]
+        if segment.inertia is not None:
+            lines += [
+                "",
+                "[segment.inertia]",
+                f"mass_kg = {float(segment.inertia.mass_kg)!r}",
+                f"centre_m = {_numbers(segment.inertia.centre_m)}",
+                f"tensor_kg_m2 = {_rows(segment.inertia.tensor_kg_m2)}",
+            ]
+    for mark in _own_landmarks(model):
+        lines += ["", "[[landmark]]", f"name = {_text(mark.name)}", f"segment = {_text(mark.segment)}"]
+        lines += [f"position_m = {_numbers(mark.position_m)}"]
+    return "\n".join(lines) + "\n"
+
+
+def _part_lines(part: Part, mesh_name: str) -> list[str]:
+    if isinstance(part.shape, Box):
+        lines = ['shape = "box"', f"size_m = {_numbers(part.shape.size_m)}"]
+    elif isinstance(part.shape, Ellipsoid):
+        lines = ['shape = "ellipsoid"', f"semi_axes_m = {_numbers(part.shape.semi_axes_m)}"]
+    else:
+        lines = ['shape = "mesh"', f"file = {_text(mesh_name)}"]
+    place = part.segment_from_part
+    lines += [f"centre_m = {_numbers(place.translation)}", *_rotation_lines(place.rotation.as_matrix())]
+    lines += ['colour = "sample"' if part.colour is None else f"colour_srgb = {_numbers(part.colour)}"]
+    return lines + ([] if part.slab_m == WHOLE else [f"slab_m = {_numbers(part.slab_m)}"])
+
+
+def _rotation_lines(R: np.ndarray) -> list[str]:
+    if np.array_equal(R, np.eye(3)):
+        return []
+    exact = np.degrees(angles_from_matrix(R))
+    short = exact.round(9) + 0.0  # no -0
+    is_same = np.abs(matrix_from_angles(np.radians(short)) - R).max() < _SAME_TURN
+    return [f"rotation_deg = {_numbers(short if is_same else exact)}"]
+
+
+def _mesh_names(model: BodyModel) -> list[str]:
+    """Name a mesh file for every part, each its own: letters and digits of the part's name, and its place."""
+    return [f"{re.sub(r'[^A-Za-z0-9]+', '_', part.name)[:40]}_{i}.obj" for i, part in enumerate(model.parts)]
+
+
+def _own_landmarks(model: BodyModel) -> tuple[Landmark, ...]:
+    """Return the landmarks, none where they are the segments' origins, as a body without any has them."""
+    origins = [(segment.name, segment.name, False) for segment in model.segments]
+    own = [(mark.name, mark.segment, bool(np.any(mark.position_m))) for mark in model.landmarks]
+    return () if own == origins else model.landmarks
+
+
+def _text(value: str) -> str:
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _numbers(values: ArrayLike) -> str:
+    return "[" + ", ".join(repr(float(value)) for value in np.asarray(values)) + "]"
+
+
+def _rows(values: Iterable[ArrayLike]) -> str:
+    return "[" + ", ".join(map(_numbers, values)) + "]"
+
+
+def _spaced(values: np.ndarray) -> str:
+    return " ".join(repr(float(value)) for value in values)

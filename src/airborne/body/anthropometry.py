@@ -1,0 +1,185 @@
+"""From 95 measurements to the mass, volume and place of 18 segments, with Yeadon's solids and Dempster's densities.
+
+Yeadon (1990-II) builds a person of solids, each between two measured levels. Here they are joined into the segments of
+`human18`, in whose zero pose the palms face the thighs and the soles are level (Yeadon's person stands with the palms
+forward and the toes pointed down).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from airborne.body.inertia import combined, placed
+from airborne.body.measurements import STATURE_SHARES, Measurements, checked
+from airborne.body.model import Inertia
+from airborne.body.stadia import Bulk, Stadium, circle, dome, half_solid, solid, stadium
+from airborne.errors import BodyError
+
+Array = NDArray[np.floating]
+
+FOOT_SLOPE_RAD = np.radians(
+    22.0
+)  # the line from the ankle to the ball of the foot falls by this when the sole is level
+DENSITIES = {  # [kg/m^3], Dempster's, as in Yeadon (1990-II)
+    "head": 1110.0,
+    "shoulders": 1040.0,
+    "thorax": 920.0,
+    "abdomen": 1010.0,
+    "upper_arm": 1070.0,
+    "forearm": 1130.0,
+    "hand": 1160.0,
+    "thigh": 1050.0,
+    "shank": 1090.0,
+    "foot": 1100.0,
+}
+_STATURES_M, _MASSES_KG, _GIRTHS = (0.8, 2.5), (10.0, 300.0), (0.6, 1.7)
+_ACROMION_PER_SHOULDER = 0.57  # depth of the trunk at the acromia over that at the shoulder joints (Yeadon's program)
+_PALM_INWARD = Rotation.from_euler("z", 90, degrees=True).as_matrix()
+_SOLE_LEVEL = Rotation.from_euler("x", FOOT_SLOPE_RAD - np.pi / 2).as_matrix()
+
+
+def measurements_of(stature_m: float, mass_kg: float) -> Measurements:
+    """Make the measurements of a person of our own proportions.
+
+    Lengths are fixed shares of the stature; one factor on all girths, widths and depths gives the mass (it goes with
+    the factor's square). Raises BodyError for a stature or a mass that no athlete has.
+    """
+    for value, (low, high), name, unit in (
+        (stature_m, _STATURES_M, "stature_m", "metres"),
+        (mass_kg, _MASSES_KG, "mass_kg", "kilograms"),
+    ):
+        if not low <= value <= high:
+            raise BodyError(f"{name} is {value:g}; expected {low:g} to {high:g} {unit}")
+    girth = float(np.sqrt(mass_kg / (_mass_per_cubic_stature() * stature_m**3)))
+    if not _GIRTHS[0] <= girth <= _GIRTHS[1]:
+        raise BodyError(
+            f"{mass_kg:g} kg at {stature_m:g} m means girths {girth:.2f} times the usual; expected {_GIRTHS[0]:g} to "
+            f"{_GIRTHS[1]:g}; check both numbers"
+        )
+    values = {key: share * stature_m * (1 if key[-1] == "L" else girth) for key, share in STATURE_SHARES.items()}
+    return Measurements(f"{stature_m:g} m, {mass_kg:g} kg", values, mass_kg)
+
+
+def clavicle_m(values_m: Mapping[str, float], sign: float) -> Array:
+    """Return where the shoulder girdle turns, by the breastbone: (3,) from the middle of the shoulder joints [m].
+
+    sign: +1 left, -1 right. Near the midline, before it, half way up to the acromia: of our own choice.
+    """
+    rise = (values_m["Ls5L"] - values_m["Ls4L"]) / 2
+    return np.array([sign * 0.07 * values_m["Ls4w"], -0.2 * values_m["Ls4d"], rise])
+
+
+def bulks(measurements: Measurements) -> dict[str, Bulk]:
+    """Find what each of the 18 segments is made of, in the segments' own frames; raises BodyError as `checked`.
+
+    With a weighed mass, all densities are scaled by one factor to give it.
+    """
+    v = checked(measurements).values_m
+    found = _trunk(v)
+    for side, arm, leg in (("left", "a", "j"), ("right", "b", "k")):
+        found |= {f"{name}_{side}": bulk for name, bulk in {**_arm(v, arm), **_leg(v, leg)}.items()}
+    if measurements.mass_kg is None:
+        return found
+    share = measurements.mass_kg / sum(bulk.inertia.mass_kg for bulk in found.values())
+    return {name: bulk._replace(inertia=_denser(bulk.inertia, share)) for name, bulk in found.items()}
+
+
+def _trunk(v: Mapping[str, float]) -> dict[str, Bulk]:
+    sections = [stadium(v[f"Ls{i}p"], v[f"Ls{i}w"]) for i in range(4)]
+    radius = v["Ls4d"] / 2
+    shoulders = Stadium(v["Ls4w"] / 2 - radius, radius)
+    acromia = Stadium(v["Ls4w"] / 2 - _ACROMION_PER_SHOULDER * radius, _ACROMION_PER_SHOULDER * radius)
+    neck, nose, ear = (circle(v[f"Ls{i}p"]) for i in (5, 6, 7))
+    heights = np.diff([0.0, *(v[f"Ls{i}L"] for i in range(1, 6))])
+    found = {
+        "pelvis": _moved(_pile(sections[:3], heights[:2], "abdomen"), -v["Ls2L"]),
+        "torso": solid(sections[2], sections[3], heights[2], DENSITIES["thorax"]),
+        "chest": solid(sections[3], shoulders, heights[3], DENSITIES["thorax"]),
+        "head": _joined(
+            [
+                _pile([neck, nose, ear], [v["Ls6L"], v["Ls7L"] - v["Ls6L"]], "head"),
+                _moved(dome(v["Ls7p"], v["Ls8L"] - v["Ls7L"], DENSITIES["head"]), v["Ls7L"]),
+            ]
+        ),
+    }
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        half = half_solid(shoulders, acromia, heights[4], DENSITIES["shoulders"], sign)
+        found[f"shoulder_{side}"] = half._replace(inertia=placed(half.inertia, np.eye(3), -clavicle_m(v, sign)))
+    return found
+
+
+def _arm(v: Mapping[str, float], arm: str) -> dict[str, Bulk]:
+    rounds = [circle(v[f"L{arm}{i}p"]) for i in range(4)]
+    flats = [stadium(v[f"L{arm}{i}p"], v[f"L{arm}{i}w"]) for i in range(4, 8)]
+    elbow, widest, wrist = (v[f"L{arm}{i}L"] for i in (2, 3, 4))
+    hand = np.diff([0.0, *(v[f"L{arm}{i}L"] for i in (5, 6, 7))])
+    return {
+        "upper_arm": _pile(rounds[:3], [-elbow / 2, -elbow / 2], "upper_arm"),
+        "forearm": _turned(_pile([*rounds[2:], flats[0]], [elbow - widest, widest - wrist], "forearm"), _PALM_INWARD),
+        "hand": _turned(_pile(flats, -hand, "hand"), _PALM_INWARD),
+    }
+
+
+def _leg(v: Mapping[str, float], leg: str) -> dict[str, Bulk]:
+    hips = stadium(v["Ls0p"], v["Ls0w"])
+    top = Stadium(0.0, np.sqrt(hips.radius_m * (hips.radius_m + hips.flat_m) / 2))  # as Yeadon's program has it
+    rounds = [top, *(circle(v[f"L{leg}{i}p"]) for i in range(1, 6))]
+    crotch, knee, calf, ankle = (v[f"L{leg}{i}L"] for i in (1, 3, 4, 5))
+    heel, ball, toes = (v[f"L{leg}{i}L"] for i in (6, 8, 9))
+    thigh = [crotch, (knee - crotch) / 2, (knee - crotch) / 2]
+    arch = circle(v[f"L{leg}7p"])
+    front = [stadium(v[f"L{leg}{i}p"], v[f"L{leg}{i}w"]) for i in (8, 9)]
+    back = [rounds[5], stadium(v[f"L{leg}6p"], v[f"L{leg}6d"]), arch]  # the heel is wide from front to back
+    instep = (heel + ball) / 2
+    foot = [
+        _pile(back, [-heel, heel - instep], "foot", is_turned=True),
+        _moved(_pile([arch, *front], [instep - ball, ball - toes], "foot"), -instep),
+    ]
+    return {
+        "thigh": _pile(rounds[:4], -np.array(thigh), "thigh"),
+        "shank": _pile(rounds[3:], [knee - calf, calf - ankle], "shank"),
+        "foot": _turned(_joined(foot), _SOLE_LEVEL),
+    }
+
+
+def _pile(
+    sections: Sequence[Stadium], heights_m: Sequence[float] | Array, kind: str, *, is_turned: bool = False
+) -> Bulk:
+    """Join the solids between successive sections, the first at z = 0; heights below zero [m] go down."""
+    pieces, z = [], 0.0
+    for near, far, height in zip(sections, sections[1:], heights_m, strict=False):
+        low, high = (near, far) if height > 0 else (far, near)
+        piece = solid(low, high, abs(height), DENSITIES[kind], is_turned=is_turned)
+        pieces.append(_moved(piece, min(z, z + height)))
+        z += height
+    return _joined(pieces)
+
+
+def _joined(pieces: Sequence[Bulk]) -> Bulk:
+    return Bulk(combined([piece.inertia for piece in pieces]), sum(piece.volume_m3 for piece in pieces))
+
+
+def _moved(bulk: Bulk, z_m: float) -> Bulk:
+    return bulk._replace(inertia=placed(bulk.inertia, np.eye(3), np.array([0.0, 0.0, z_m])))
+
+
+def _turned(bulk: Bulk, R: Array) -> Bulk:
+    return bulk._replace(inertia=placed(bulk.inertia, R, np.zeros(3)))
+
+
+def _denser(inertia: Inertia, share: float) -> Inertia:
+    return replace(inertia, mass_kg=inertia.mass_kg * share, tensor_kg_m2=inertia.tensor_kg_m2 * share)
+
+
+@lru_cache(maxsize=1)
+def _mass_per_cubic_stature() -> float:
+    """Return the mass of a person of our proportions over the cube of the stature [kg/m^3]."""
+    usual = 1.75  # as tall as people are, so that the check of units says nothing
+    values = {key: share * usual for key, share in STATURE_SHARES.items()}
+    return sum(bulk.inertia.mass_kg for bulk in bulks(Measurements("usual", values)).values()) / usual**3

@@ -1,0 +1,116 @@
+"""Fitting a body to a person: segments made longer or thicker, with all that hangs on them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from airborne.body.model import BodyModel, Box, Ellipsoid, Inertia, Part, Segment, Shape
+from airborne.errors import BodyError
+
+Array = NDArray[np.floating]
+
+_RANGE = (0.1, 10.0)  # a scale beyond these is a mistake
+_ALIGNED = 1e-9
+
+
+def with_segment_lengths(model: BodyModel, scales: Mapping[str, float]) -> BodyModel:
+    """Return the body with segments stretched along their length axes, by factors.
+
+    A name without its side ("thigh") stands for both. The joints and landmarks that a segment carries move with it; its
+    parts, their slabs and its inertia stretch at constant density. Raises BodyError for an unknown segment, a factor
+    that is no length's, or a part that stands askew to its segment.
+    """
+    return _scaled(model, scales, along=True)
+
+
+def with_girths(model: BodyModel, scales: Mapping[str, float]) -> BodyModel:
+    """Return the body with segments made thicker across their length axes, each part about its own centre, by factors.
+
+    Names as in `with_segment_lengths`. Joints, landmarks and centres of mass stay. Raises BodyError likewise.
+    """
+    return _scaled(model, scales, along=False)
+
+
+def length_axis(model: BodyModel, segment: str) -> int:
+    """Return which of a segment's axes (0, 1, 2) it extends along: toward its joints and landmarks, or its parts."""
+    own = model.segments[model.index_of(segment)]
+    ends = [child.joint_m for child in model.segments if child.parent == segment]
+    ends += [landmark.position_m for landmark in model.landmarks if landmark.segment == segment]
+    extent = np.abs(ends).sum(axis=0) if ends else np.zeros(3)
+    if not extent.any():
+        extent = np.sum([np.abs(part.segment_from_part.translation) for part in own.parts], axis=0) + np.zeros(3)
+    return int(np.argmax(extent)) if extent.any() else 2
+
+
+def _scaled(model: BodyModel, scales: Mapping[str, float], *, along: bool) -> BodyModel:
+    factors = _per_segment(model, scales)
+    shape, place = {}, {}
+    for name, scale in factors.items():
+        on_axis = np.arange(3) == length_axis(model, name)
+        shape[name] = np.where(on_axis == along, scale, 1.0)
+        place[name] = shape[name] if along else np.ones(3)
+    segments = []
+    for segment in model.segments:
+        joint = segment.joint_m * place[segment.parent] if segment.parent in place else segment.joint_m
+        changed = replace(segment, joint_m=joint)
+        segments.append(
+            _segment(changed, shape[segment.name], place[segment.name]) if segment.name in shape else changed
+        )
+    landmarks = tuple(
+        replace(mark, position_m=mark.position_m * place[mark.segment]) if mark.segment in place else mark
+        for mark in model.landmarks
+    )
+    return BodyModel(model.name, tuple(segments), landmarks)
+
+
+def _per_segment(model: BodyModel, scales: Mapping[str, float]) -> dict[str, float]:
+    """Resolve names without a side; a name with its side goes before one without."""
+    found: dict[str, float] = {}
+    names = {segment.name for segment in model.segments}
+    for name, scale in sorted(scales.items(), key=lambda item: item[0] in names):
+        if not _RANGE[0] <= scale <= _RANGE[1]:
+            raise BodyError(f"segment '{name}': scale is {scale:g}; expected a factor, {_RANGE[0]:g} to {_RANGE[1]:g}")
+        sides = [side for side in (f"{name}_left", f"{name}_right") if side in names]
+        if name not in names and not sides:
+            model.index_of(name)
+        found |= dict.fromkeys([name] if name in names else sides, float(scale))
+    return found
+
+
+def _segment(segment: Segment, shape: Array, place: Array) -> Segment:
+    parts = tuple(_part(part, shape, place) for part in segment.parts)
+    inertia = segment.inertia
+    if inertia is not None:
+        tensor = inertia.tensor_kg_m2
+        spread = np.trace(tensor) / 2 * np.eye(3) - tensor  # of x x' dm
+        spread = spread * np.outer(shape, shape) * shape.prod()
+        inertia = Inertia(
+            inertia.mass_kg * float(shape.prod()), inertia.centre_m * place, np.trace(spread) * np.eye(3) - spread
+        )
+    return replace(segment, parts=parts, inertia=inertia)
+
+
+def _part(part: Part, shape: Array, place: Array) -> Part:
+    rotation = part.segment_from_part.rotation
+    moved = RigidTransform.from_components(part.segment_from_part.translation * place, rotation)
+    if isinstance(part.shape, Box | Ellipsoid):
+        turn = np.abs(rotation.as_matrix())
+        if np.abs(turn - turn.round()).max() > _ALIGNED:
+            raise BodyError(
+                f"part '{part.name}' stands askew in its segment, so that stretching would bend it; give it axes along "
+                "the segment's, or make it a mesh"
+            )
+        own = turn.round().T @ shape  # along the part's own axes
+        grown: Shape = (
+            Box(part.shape.size_m * own) if isinstance(part.shape, Box) else Ellipsoid(part.shape.semi_axes_m * own)
+        )
+        return replace(
+            part, shape=grown, segment_from_part=moved, slab_m=(part.slab_m[0] * own[2], part.slab_m[1] * own[2])
+        )
+    vertices = rotation.apply(rotation.apply(part.shape.vertices_m) * shape, inverse=True)
+    return replace(part, shape=replace(part.shape, vertices_m=vertices), segment_from_part=moved)
