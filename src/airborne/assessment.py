@@ -1,4 +1,4 @@
-"""A finished run against what is known: the truth, or points clicked by hand; its report then shows both."""
+"""A finished run against what is known: the truth, paths of joints, or points clicked by hand."""
 
 from __future__ import annotations
 
@@ -12,28 +12,36 @@ from airborne.errors import ResultError
 from airborne.evaluation import (
     Comparison,
     DigitisedComparison,
+    JointComparison,
     compare,
     compare_digitised,
+    compare_joints,
     digitised_poses,
     read_digitised,
+    read_joint_paths,
     read_truth,
 )
 from airborne.export import write_figures, write_json, write_report
 from airborne.motion import read_motion
 
+Found = dict[str, Comparison | DigitisedComparison | JointComparison]
 
-def assess(folder: Path, truth: Path | None, digitised: Path | None) -> dict[str, Comparison | DigitisedComparison]:
+
+def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Path | None = None) -> Found:
     """Compare the run in a folder, and put the comparison into its summary, figures and report.
 
-    Raises ResultError where the folder holds no finished run or a file cannot be read.
+    `joints` are paths of joints as `read_joint_paths` reads them. Raises ResultError where the folder holds no finished
+    run or a file cannot be read.
     """
-    if truth is None and digitised is None:
-        raise ResultError("nothing to compare with; give a truth.csv, or --digitised with clicked points")
+    if truth is None and digitised is None and joints is None:
+        raise ResultError(
+            "nothing to compare with; give a truth.csv, --digitised with clicked points, or --joints with their paths"
+        )
     if not (folder / "motion.csv").is_file():
         raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
     motion, model = read_motion(folder / "motion.csv"), read_body(folder / "body.toml")
     alike = symmetries(model)
-    found: dict[str, Comparison | DigitisedComparison] = {}
+    found: Found = {}
     true_poses = clicked = None
     if truth is not None:
         true_poses = read_truth(truth)
@@ -42,6 +50,8 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None) -> dict[str
         rig = read_rig(folder / "calib.toml")
         clicked = digitised_poses(read_digitised(digitised, rig), rig, model)
         found["digitised"] = compare_digitised(motion, clicked, alike)
+    if joints is not None:
+        found["joints"] = compare_joints(motion, model, read_joint_paths(joints))
     summary = folder / "summary.json"
     if summary.is_file():
         values = json.loads(summary.read_text(encoding="utf-8"))

@@ -5,7 +5,9 @@ from fractions import Fraction
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import Pose
+from airborne.body import BodyModel, Ellipsoid, Inertia, Landmark, Part, Pose, Segment
+from airborne.body.chain import moved_pose
+from airborne.motion import Motion
 from airborne.tracking import Estimate, Status
 
 
@@ -14,7 +16,7 @@ def estimate(index, *, seed=0, n_joints=0, covariance=True, status=Status.TRACKE
     rng = np.random.default_rng([seed, index])
     is_lost = status is Status.LOST
     root = RigidTransform.from_components(rng.normal(size=3), Rotation.random(rng=rng))
-    spread = rng.normal(size=(6, 6)) * 1e-2
+    spread = rng.normal(size=(6 + 3 * n_joints,) * 2) * 1e-2
     square = spread @ spread.T
     return Estimate(
         index=index,
@@ -52,3 +54,64 @@ def somersault(n=30, *, turns=1.0, twist_turns=0.5, variance=(1e-6, 1e-4)):
         )
         for i in range(n)
     ], angles
+
+
+def figure(seed=5):
+    """Make a body of five segments, each with a mass, a landmark, and a joint off the axes."""
+    rng = np.random.default_rng(seed)
+    part = (Part("part", Ellipsoid(np.full(3, 0.1)), RigidTransform.identity(), None),)
+    parents = {"trunk": None, "head": "trunk", "arm": "trunk", "hand": "arm", "leg": "trunk"}
+    segments, marks = [], []
+    for name, parent in parents.items():
+        mass, turn = rng.uniform(1, 20), Rotation.random(rng=rng).as_matrix()
+        tensor = turn @ np.diag(mass * np.array([0.03, 0.025, 0.01])) @ turn.T
+        inertia = Inertia(mass, rng.uniform(-0.2, 0.2, 3), (tensor + tensor.T) / 2)
+        segments.append(Segment(name, parent, rng.uniform(-0.4, 0.4, 3), part, inertia=inertia))
+        marks.append(Landmark(f"{name}_mark", name, rng.uniform(-0.3, 0.3, 3)))
+    return BodyModel("figure", tuple(segments), tuple(marks))
+
+
+def motion_of(model, poses, rate_hz=50, covariance=None, lost=()):
+    """Make the motion that finds exactly these poses, those of the frames `lost` apart."""
+    joints = tuple(segment.name for segment in model.segments[1:])
+    estimates = [
+        Estimate(
+            index=k,
+            time_s=Fraction(k, rate_hz),
+            status=Status.LOST if k in lost else Status.TRACKED,
+            score=np.nan if k in lost else 10.0,
+            pose=None if k in lost else pose,
+            covariance=None if k in lost else covariance,
+            n_views=3,
+        )
+        for k, pose in enumerate(poses)
+    ]
+    return Motion.collect(estimates, joints)
+
+
+def small_covariance(model, sd=1e-3, seed=0):
+    """Make a covariance of a body's whole motion vector with all its correlations."""
+    size = 6 + 3 * (len(model.segments) - 1)
+    spread = np.random.default_rng(seed).normal(size=(size, size)) * sd / size**0.5
+    return spread @ spread.T
+
+
+def shaken(rng, pose, covariance):
+    """Draw a pose whose errors have this covariance."""
+    return moved_pose(pose, rng.multivariate_normal(np.zeros(len(covariance)), covariance, method="cholesky"))
+
+
+def swinging(model, time_s, seed=0):
+    """Return poses that turn, travel and swing smoothly at the times."""
+    rng = np.random.default_rng(seed)
+    n = len(model.segments) - 1
+    rate, phase, size = rng.uniform(3, 6, (n, 3)), rng.uniform(0, 6, (n, 3)), rng.uniform(0.1, 0.5, (n, 3))
+    return [
+        Pose(
+            world_from_root=RigidTransform.from_components(
+                [0.5 * t, -t, 1 + 4 * t - 4.905 * t**2], Rotation.from_rotvec([5 * t, 0.3 * np.sin(4 * t), 2 * t])
+            ),
+            joint_angles=size * np.sin(rate * t + phase),
+        )
+        for t in time_s
+    ]

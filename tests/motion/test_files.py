@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from airborne.errors import ResultError
-from airborne.motion import MotionWriter, read_estimates, read_motion
+from airborne.motion import Motion, MotionWriter, read_estimates, read_motion
 from airborne.tracking import Status
 from tests.motion.helpers import estimate, run_with_gap
 from tests.tolerances import ROUNDTRIP
@@ -143,16 +144,17 @@ def test_resuming_with_another_body_is_refused(tmp_path):
     assert path.read_bytes() == before
 
 
-def test_killed_process_leaves_every_finished_frame(tmp_path):
+@pytest.mark.parametrize("joints", [(), ("chest", "head")])
+def test_killed_process_leaves_every_finished_frame(tmp_path, joints):
     path = tmp_path / "motion.csv"
     script = textwrap.dedent(
         f"""
         import itertools, pathlib
         from airborne.motion import MotionWriter
         from tests.motion.helpers import estimate
-        writer = MotionWriter(pathlib.Path({str(path)!r}))
+        writer = MotionWriter(pathlib.Path({str(path)!r}), {joints!r})
         for i in itertools.count():
-            writer.append(estimate(i))
+            writer.append(estimate(i, n_joints={len(joints)}))
             print(i, flush=True)
         """
     )
@@ -164,7 +166,94 @@ def test_killed_process_leaves_every_finished_frame(tmp_path):
         finished = max([20, *map(int, process.stdout.read().split())])
     found = read_estimates(path)
     assert finished <= found[-1].index <= finished + 1
-    assert_same(found, [estimate(i) for i in range(len(found))])
+    assert_same(found, [estimate(i, n_joints=len(joints)) for i in range(len(found))])
+
+
+JOINTS = ("chest", "head")
+
+
+def test_whole_covariance_of_a_body_with_joints_comes_back_bit_for_bit(tmp_path):
+    estimates = run_with_gap(n=20, n_joints=2)
+    estimates[1].covariance[7] = estimates[1].covariance[:, 7] = 0.0
+    estimates[1].covariance[7, 7] = np.inf
+    path = write(tmp_path / "motion.csv", estimates, JOINTS)
+    assert_same(read_estimates(path), estimates)
+    assert read_motion(path).covariance.shape == (20, 12, 12)
+    assert np.isinf(read_motion(path).joint_rotation_sd[1, 0, 1])
+    assert (tmp_path / "covariance.bin").stat().st_size == 20 * 8 * 12 * 13 / 2
+
+
+def test_body_in_one_piece_has_no_second_file(tmp_path):
+    write(tmp_path / "motion.csv", run_with_gap())
+    assert [path.name for path in tmp_path.iterdir()] == ["motion.csv"]
+
+
+def test_without_covariance_bin_only_what_the_joints_add_is_unknown(tmp_path):
+    estimates = run_with_gap(5, lost=[2], n_joints=2)
+    path = write(tmp_path / "motion.csv", estimates, JOINTS)
+    (tmp_path / "covariance.bin").unlink()
+    found = read_motion(path).covariance
+    expected = Motion.collect(estimates, JOINTS).covariance
+    expected[:, 6:] = expected[:, :, 6:] = np.nan
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_covariance_of_the_root_alone_leaves_the_joints_unknown(tmp_path):
+    item = estimate(0, n_joints=2)
+    alone = replace(item, covariance=item.covariance[:6, :6])
+    found = read_motion(write(tmp_path / "motion.csv", [alone], JOINTS))
+    np.testing.assert_array_equal(found.covariance[0, :6, :6], alone.covariance)
+    assert np.isnan(found.covariance[0, 6:]).all()
+
+
+def test_cutting_both_files_of_a_body_with_joints_keeps_every_whole_row(tmp_path):
+    estimates = run_with_gap(4, lost=[1], n_joints=2)
+    path = write(tmp_path / "motion.csv", estimates, JOINTS)
+    rows, covariances = path.read_bytes(), (tmp_path / "covariance.bin").read_bytes()
+    row_bytes = len(covariances) // 4
+    second = [i for i, byte in enumerate(rows) if byte == ord("\n")][2]  # the end of frame 1
+    for left in (2 * row_bytes, 2 * row_bytes + 5, 3 * row_bytes, 3 * row_bytes + 77, 4 * row_bytes):
+        path.write_bytes(rows[: second + 1 + 30])  # frame 2 is torn
+        (tmp_path / "covariance.bin").write_bytes(covariances[:left])
+        assert_same(read_estimates(path), estimates[:2])
+        with MotionWriter(path, JOINTS, resume=True) as writer:
+            for item in estimates[2:]:
+                writer.append(item)
+        assert path.read_bytes() == rows
+        assert (tmp_path / "covariance.bin").read_bytes() == covariances
+
+
+@pytest.mark.parametrize("left", [None, 0, 1])
+def test_resuming_without_whole_covariances_keeps_the_rows_together(tmp_path, left):
+    estimates = run_with_gap(4, lost=[], n_joints=2)
+    path, beside = write(tmp_path / "motion.csv", estimates[:3], JOINTS), tmp_path / "covariance.bin"
+    if left is None:
+        beside.unlink()
+    else:
+        beside.write_bytes(beside.read_bytes()[: left * 8 * 78])
+    with MotionWriter(path, JOINTS, resume=True) as writer:
+        writer.append(estimates[3])
+    found = read_motion(path).covariance
+    is_known = np.array([k < (left or 0) for k in range(3)] + [True])
+    np.testing.assert_array_equal(np.isnan(found).any(axis=(1, 2)), ~is_known)
+    whole = Motion.collect(estimates, JOINTS).covariance
+    np.testing.assert_array_equal(found[is_known], whole[is_known])
+    np.testing.assert_array_equal(found[:, :6, :6], whole[:, :6, :6])
+
+
+def test_covariances_of_another_run_are_refused_in_one_line(tmp_path):
+    path = write(tmp_path / "motion.csv", run_with_gap(3, n_joints=2), JOINTS)
+    (tmp_path / "other").mkdir()
+    other = write(tmp_path / "other" / "motion.csv", run_with_gap(3, n_joints=2, seed=1), JOINTS)
+    path.with_name("covariance.bin").write_bytes(other.with_name("covariance.bin").read_bytes())
+    with pytest.raises(ResultError, match=r"line 2: covariance\.bin holds another covariance.*remove it") as caught:
+        read_motion(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_without_resume_old_covariances_are_replaced(tmp_path):
+    path = write(tmp_path / "motion.csv", run_with_gap(6, n_joints=2), JOINTS)
+    assert_same(read_estimates(write(path, [estimate(9, n_joints=2)], JOINTS)), [estimate(9, n_joints=2)])
 
 
 def test_exact_time_does_not_pass_through_a_float(tmp_path):

@@ -1,7 +1,9 @@
 """The tables of a run."""
 
 import csv
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -10,9 +12,17 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Part, Pose, Segment
 from airborne.geometry.rotations import angles_from_matrix
-from airborne.motion import Motion, angles, write_angles, write_joints, write_motion_parquet
+from airborne.motion import (
+    Motion,
+    angles,
+    write_angles,
+    write_flight,
+    write_joint_angles,
+    write_joints,
+    write_motion_parquet,
+)
 from airborne.tracking import Status
-from tests.motion.helpers import estimate, run_with_gap, somersault
+from tests.motion.helpers import estimate, figure, motion_of, run_with_gap, somersault, swinging
 from tests.tolerances import EXACT, ROUNDTRIP, sampled
 
 
@@ -107,7 +117,7 @@ def test_joints_are_the_segments_origins(tmp_path):
 
 def test_joint_deviation_grows_with_the_distance_from_the_root(tmp_path):
     estimates, _ = somersault(2, variance=(1e-6, 1e-4))
-    write_joints(tmp_path / "joints.csv", Motion.collect(estimates), jointed_body())
+    write_joints(tmp_path / "joints.csv", Motion.collect(estimates, ("head",)), jointed_body())
     trunk, head = rows_of(tmp_path / "joints.csv")[:2]
     assert float(trunk["sd_m"]) == pytest.approx(1e-3, rel=ROUNDTRIP)
     # two of the three axes move with the rotation: per-axis variance 1e-6 + 2/3 * 0.6^2 * 1e-4
@@ -121,11 +131,22 @@ def test_joint_deviation_is_that_of_sampled_poses(tmp_path):
         tmp_path / "joints.csv", Motion.collect([replace(item, covariance=covariance)], ("head",)), jointed_body()
     )
     n = 20000
-    moves = np.random.default_rng(0).multivariate_normal(np.zeros(6), covariance, size=n)
+    moves = np.random.default_rng(0).multivariate_normal(np.zeros(6), covariance[:6, :6], size=n)
     offset = item.pose.world_from_root.rotation.apply([0, 0, 0.6])
-    heads = moves[:, :3] + Rotation.from_rotvec(moves[:, 3:]).apply(offset)
+    heads = moves[:, :3] + Rotation.from_rotvec(moves[:, 3:6]).apply(offset)
     expected = np.sqrt(heads.var(axis=0).mean())
     assert float(rows_of(tmp_path / "joints.csv")[1]["sd_m"]) == pytest.approx(expected, rel=sampled(n))
+
+
+@pytest.mark.parametrize("name", ["joint_angles.csv", "flight.csv"])
+def test_columns_of_a_jointed_body_are_documented(tmp_path, name):
+    model = figure()
+    write = {"joint_angles.csv": write_joint_angles, "flight.csv": write_flight}[name]
+    write(tmp_path / name, motion_of(model, swinging(model, [0.0, 0.02])), model)
+    page = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
+    table = re.search(rf"^## `{re.escape(name)}`\n\n((?:\|.*\n)+)", page, re.MULTILINE)[1]
+    documented = [column for line in table.splitlines()[2:] for column in re.findall(r"`(\w+)`", line.split("|")[1])]
+    assert (tmp_path / name).read_text().splitlines()[0].split(",") == documented
 
 
 def test_unseen_rotation_leaves_the_roots_own_deviation_finite(tmp_path):

@@ -46,6 +46,36 @@ BALL = rigid_body(part("ball", Ellipsoid(np.array([0.2, 0.2, 0.2])), (0, 0, 0), 
 SPINDLE = rigid_body(part("spindle", Ellipsoid(np.array([0.12, 0.12, 0.35])), (0, 0, 0), YELLOW))
 
 
+def _limb(name: str, parent: str | None, joint, semi_axes, centre, colour) -> Segment:
+    limits = np.radians([[-120.0, 120.0]] * 3)
+    return Segment(
+        name, parent, np.array(joint, float), (part(name, Ellipsoid(np.array(semi_axes)), centre, colour),), limits
+    )
+
+
+GREEN, WHITE = (40.0, 150.0, 60.0), (210.0, 210.0, 200.0)
+FIGURE = BodyModel(  # a trunk with two arms of two pieces, and a leg
+    "figure",
+    (
+        _limb("trunk", None, (0, 0, 0), (0.12, 0.08, 0.25), (0, 0, 0), BLUE),
+        _limb("upper_left", "trunk", (0.14, 0, 0.18), (0.045, 0.045, 0.14), (0, 0, -0.12), YELLOW),
+        _limb("lower_left", "upper_left", (0, 0, -0.24), (0.035, 0.05, 0.12), (0, 0, -0.1), RED),
+        _limb("upper_right", "trunk", (-0.14, 0, 0.18), (0.045, 0.045, 0.14), (0, 0, -0.12), YELLOW),
+        _limb("lower_right", "upper_right", (0, 0, -0.24), (0.035, 0.05, 0.12), (0, 0, -0.1), GREEN),
+        _limb("leg", "trunk", (0, 0, -0.22), (0.06, 0.07, 0.2), (0, 0, -0.18), WHITE),
+    ),
+)
+
+
+def standing(time_s: Fraction) -> Pose:
+    """The figure, arms out to the sides and bent, turning slowly."""
+    t = float(time_s)
+    angles = np.array([[0.3, -0.9, 0], [-0.5, -0.2, 0], [-0.2, 0.8, 0], [-0.6, 0.1, 0], [0.3, 0.1, 0]])
+    swing = np.array([[1.0, -2.0, 0], [-1.5, 0, 0], [-1.0, 2.5, 0], [-1.0, 0, 0], [1.5, 0, 0]])
+    root = RigidTransform.from_components([0.3 * t, 0.1 * t, 1.4], Rotation.from_euler("xyz", [0.1, 0.05, 0.3 + t]))
+    return Pose(world_from_root=root, joint_angles=angles + swing * np.sin(4 * t))
+
+
 def camera(name: str, turn: float, focal_px: float = 400.0) -> Camera:
     """A camera 4 m from the place of the throw, `turn` [rad] round the vertical; 100 px a metre by default."""
     centre, target = np.array([4 * np.sin(turn), -4 * np.cos(turn), 1.9]), np.array([0.0, 0.0, 1.4])

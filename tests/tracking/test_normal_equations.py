@@ -1,23 +1,30 @@
 """The Gauss-Newton kernels against blurs by SciPy and against pictures of the moved body."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from scipy.ndimage import correlate1d, gaussian_filter
 
+from airborne.body.chain import moved_pose
 from airborne.rendering.maps import empty_maps
 from airborne.scoring.lighting import TERMS, TO_LIGHT, light_planes
-from airborne.tracking.gauss_newton import Synthesis
+from airborne.tracking.freedom import all_joints, root_only
 from airborne.tracking.normal_equations import (
     RADIUS_PX,
+    REACH_PX,
     Sums,
     blur,
+    find_owners,
     gaussian_taps,
+    new_blocks,
     photometric_equations,
     silhouette_equations,
     window_of,
 )
 from airborne.tracking.regions import regions_round
-from tests.tracking.scenes import CROSS, Scene
+from airborne.tracking.synthesis import Synthesis
+from tests.tracking.scenes import FIGURE, Scene, standing
 
 SINGLE = 1e-5  # float32
 NO_CLIP = 1e6  # every pixel weighs the same
@@ -67,14 +74,13 @@ def test_window_holds_the_mask_and_the_blurs_reach_and_stops_at_the_edge():
 
 
 class Filmed:
-    """One noiseless picture of the cross, from the first camera; the equations of bodies near it."""
+    """One noiseless picture of a body, from the first camera; the equations of poses near it."""
 
-    def __init__(self):
-        scene = Scene(noise_grey=0.0)
+    def __init__(self, scene, freedom=root_only):
         frames = scene.frames(0)
-        self.truth = CROSS.with_pose(scene.start())
-        self._synthesis = Synthesis.of(CROSS)
-        self._region = regions_round([self.truth], self._synthesis.geometry, frames, 32)[0]
+        self.truth, self.freedom = scene.start(), freedom(scene.model)
+        self._synthesis = Synthesis.of(scene.model)
+        self._region = regions_round([self.place(self.truth)], self._synthesis.geometry, frames, 32)[0]
         self._observed = np.empty((3, *self._region.rgb.shape[:2]), np.float32)
         light_planes(self._region.rgb, TO_LIGHT, self._observed)
         background = self._region.crop(scene.backgrounds[0]).transpose(2, 0, 1)
@@ -83,34 +89,62 @@ class Filmed:
         self._light[:, 0] = 1
         self.photometric(self.truth, rounds=5)
 
-    def _body(self, posed):
-        synthesis, region = self._synthesis, self._region
-        return synthesis.shapes, synthesis.geometry, posed.R, posed.t, region.packed, region.camera.K
+    def place(self, pose):
+        return self._synthesis.place(pose)
 
-    def photometric(self, posed, rounds=0, clip=NO_CLIP):
-        """The sums and the squared residual; the light stays as it was fitted at the truth."""
-        synthesis, region = self._synthesis, self._region
-        taps, sums = gaussian_taps(1.2), Sums.zero()
-        certainty = np.ones(region.rgb.shape[:2], np.float32)
-        total, _ = photometric_equations(
-            *self._body(posed), self._observed, self._scene, certainty, synthesis.albedo, synthesis.is_faceted,
-            self._light, rounds, empty_maps(region.camera.size), taps, taps, clip, sums,
+    def moved(self, motion):
+        return moved_pose(self.truth, motion)
+
+    def photometric(self, pose, rounds=0, clip=NO_CLIP):
+        """The equations and the squared residual; the light stays as it was fitted at the truth."""
+        synthesis, seen = (
+            self._synthesis,
+            (self._observed, self._scene, np.ones(self._region.rgb.shape[:2], np.float32)),
+        )
+        body, place, through, maps = self._common(pose, clip)
+        paint = synthesis.albedo, synthesis.is_faceted
+        sums, blocks = Sums.zero(len(synthesis.model.segments)), self._blocks()
+        _, total, _ = photometric_equations(
+            body, place, seen, through, maps, paint, self._light, rounds, sums, blocks
         )  # fmt: skip
-        return sums, total
+        return self._mapped(pose, sums), total
 
-    def silhouette(self, posed):
-        """The sums against the true mask, as probabilities."""
-        region, sums = self._region, Sums.zero()
-        mask = (self._synthesis.parts(self.truth, region) >= 0).astype(np.float32)
-        taps, maps = gaussian_taps(1.2), empty_maps(region.camera.size)
-        black, ones = np.zeros((1, *mask.shape), np.float32), np.ones_like(mask)
-        silhouette_equations(*self._body(posed), mask, black, ones, maps, taps, taps, sums)
-        return sums
+    def silhouette(self, pose):
+        """The equations against the true mask, as probabilities."""
+        mask = (self._synthesis.parts(self.place(self.truth), self._region) >= 0).astype(np.float32)
+        body, place, through, maps = self._common(pose, 0.5)
+        seen = mask[None], np.zeros((1, *mask.shape), np.float32), np.ones_like(mask)
+        sums, blocks = Sums.zero(len(self._synthesis.model.segments)), self._blocks()
+        silhouette_equations(body, place, seen, through, maps, sums, blocks)
+        return self._mapped(pose, sums)
+
+    def _common(self, pose, clip):
+        posed, region, taps = self.place(pose), self._region, gaussian_taps(1.2)
+        place = posed.R, posed.t, region.packed, region.camera.K, posed.t[0]
+        window = (0, 0, *region.camera.size)
+        return self._synthesis.body, place, (window, taps, taps, clip), empty_maps(region.camera.size)
+
+    def _blocks(self):
+        return new_blocks(*self._region.camera.size, len(self._synthesis.model.segments))
+
+    def _mapped(self, pose, sums):
+        J = self._synthesis.jacobian(self.place(pose), self.freedom)
+        return Equations(np.einsum("sia,sij,sjb->ab", J, sums.curvature, J), np.einsum("sia,si->a", J, sums.g))
+
+
+class Equations(NamedTuple):
+    curvature: np.ndarray
+    g: np.ndarray
 
 
 @pytest.fixture(scope="module")
 def filmed():
-    return Filmed()
+    return Filmed(Scene(noise_grey=0.0))
+
+
+@pytest.fixture(scope="module")
+def filmed_figure():
+    return Filmed(Scene(FIGURE, standing, noise_grey=0.0), all_joints)
 
 
 def offsets(n, size, seed=0):
@@ -124,7 +158,7 @@ def test_curvature_predicts_how_the_picture_changes_when_the_body_moves(filmed):
     sums, at_truth = filmed.photometric(filmed.truth)
     ratios = []
     for d in offsets(24, 3.0):
-        both_ways = [filmed.photometric(filmed.truth.moved(sign * d))[1] - at_truth for sign in (1, -1)]
+        both_ways = [filmed.photometric(filmed.moved(sign * d))[1] - at_truth for sign in (1, -1)]
         ratios.append(np.mean(both_ways) / (d @ sums.curvature @ d))
     np.testing.assert_allclose(np.median(ratios), 1, atol=0.06)
     assert 0.7 < min(ratios) < max(ratios) < 1.6
@@ -133,9 +167,11 @@ def test_curvature_predicts_how_the_picture_changes_when_the_body_moves(filmed):
 def test_gradient_is_minus_half_the_slope_of_the_squared_residual(filmed):
     got, expected = [], []
     for d in offsets(12, 4.0, seed=1):
-        posed = filmed.truth.moved(d)
-        got.append(filmed.photometric(posed)[0].g * STEP)
-        ends = [[filmed.photometric(posed.moved(sign * step))[1] for sign in (1, -1)] for step in np.diag(2 * STEP)]
+        pose = filmed.moved(d)
+        got.append(filmed.photometric(pose)[0].g * STEP)
+        ends = [
+            [filmed.photometric(moved_pose(pose, sign * step))[1] for sign in (1, -1)] for step in np.diag(2 * STEP)
+        ]
         expected.append([-(up - down) / 8 for up, down in ends])  # over 4 STEP, halved, times STEP
     got, expected = np.array(got), np.array(expected)
     assert np.corrcoef(got.ravel(), expected.ravel())[0, 1] > 0.99
@@ -146,8 +182,8 @@ def test_gradient_is_minus_half_the_slope_of_the_squared_residual(filmed):
 def test_step_goes_back_to_where_the_body_is(filmed, kind):
     left = []
     for d in offsets(12, 2.0, seed=2):
-        posed = filmed.truth.moved(d)
-        sums = filmed.silhouette(posed) if kind == "silhouette" else filmed.photometric(posed)[0]
+        pose = filmed.moved(d)
+        sums = filmed.silhouette(pose) if kind == "silhouette" else filmed.photometric(pose)[0]
         stiff = sums.curvature + np.diag(1e-3 * np.trace(sums.curvature * np.outer(STEP, STEP)) / STEP**2)
         step = np.linalg.solve(stiff, sums.g)
         after = (d + step) / STEP
@@ -156,13 +192,40 @@ def test_step_goes_back_to_where_the_body_is(filmed, kind):
 
 
 def test_far_residuals_weigh_less(filmed):
-    posed = filmed.truth.moved(offsets(1, 4.0)[0])
-    _, full = filmed.photometric(posed)
-    _, clipped = filmed.photometric(posed, clip=0.1)
+    pose = filmed.moved(offsets(1, 4.0)[0])
+    _, full = filmed.photometric(pose)
+    _, clipped = filmed.photometric(pose, clip=0.1)
     assert clipped < 0.8 * full
 
 
 def test_body_outside_the_picture_adds_nothing(filmed):
-    sums, total = filmed.photometric(filmed.truth.moved(np.array([50.0, 0, 0, 0, 0, 0])))
+    equations, total = filmed.photometric(filmed.moved(np.array([50.0, 0, 0, 0, 0, 0])))
     assert total == 0
-    assert not any(np.any(array) for array in sums)
+    assert not any(np.any(array) for array in equations)
+
+
+@pytest.mark.parametrize("joint", range(1, len(FIGURE.segments)))
+def test_gradient_along_every_joint_is_the_slope_of_the_squared_residual(filmed_figure, joint):
+    """Away from the truth by 4 degrees about each axis in turn; a turn that the picture does not show has no slope."""
+    got, expected = [], []
+    for axis in range(3):
+        for sign in (1, -1):
+            step = np.zeros(6 + 3 * (len(FIGURE.segments) - 1))
+            step[3 + 3 * joint + axis] = np.radians(4.0) * sign
+            pose = filmed_figure.moved(step)
+            got.append(filmed_figure.photometric(pose)[0].g @ step)
+            ends = [filmed_figure.photometric(moved_pose(pose, way * step / 4))[1] for way in (1, -1)]
+            expected.append(-(ends[0] - ends[1]) / (2 * 2 / 4))
+    got, expected = np.array(got), np.array(expected)
+    assert np.corrcoef(got, expected)[0, 1] > 0.95
+    np.testing.assert_allclose(np.vdot(got, expected) / np.vdot(expected, expected), 1, atol=0.3)
+
+
+def test_an_edge_moves_with_what_is_in_front():
+    part = np.full((9, 12), -1, np.int16)
+    part[:, 3:], part[:, 7:] = 0, 1
+    nearness = np.select([part == 0, part == 1], [0.2, 0.25]).astype(np.float32)  # part 1 is nearer
+    owner, found = np.empty((9, 12), np.int16), np.empty((9, 12), np.float32)
+    find_owners(part, nearness, np.array([4, 5], np.int16), 0, 0, owner, found)
+    np.testing.assert_array_equal(owner[4], np.repeat([4, 5], [7 - REACH_PX, 5 + REACH_PX]))
+    np.testing.assert_allclose(found[4], np.where(owner[4] == 5, 0.25, 0.2), atol=SINGLE)

@@ -72,8 +72,13 @@ def test_prediction_for_the_last_time_is_the_last_pose():
         assert_same((predict(past, UNEVEN[-1]), pose(UNEVEN[-1])))
 
 
-def test_joint_angles_stay():
-    bent = [Pose(world_from_root=pose(t).world_from_root, joint_angles=np.full((2, 3), float(t))) for t in EVEN[:3]]
-    past = list(zip(EVEN[:3], bent, strict=True))
-    for predict in (stay, linear, quadratic, ballistic):
-        np.testing.assert_array_equal(predict(past, EVEN[3]).joint_angles, bent[-1].joint_angles)
+def test_joints_turn_on_at_their_last_rate_or_stay():
+    """About one axis the angle of a joint is its turn."""
+
+    def bent(t):
+        return Pose(world_from_root=pose(t).world_from_root, joint_angles=np.array([[0.4 * float(t), 0, 0]] * 2))
+
+    past = [(time, bent(time)) for time in EVEN[:3]]
+    for predict in (linear, quadratic, ballistic):
+        np.testing.assert_allclose(predict(past, EVEN[3]).joint_angles, bent(EVEN[3]).joint_angles, atol=ROUNDTRIP)
+    np.testing.assert_array_equal(stay(past, EVEN[3]).joint_angles, past[-1][1].joint_angles)

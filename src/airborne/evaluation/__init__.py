@@ -1,6 +1,7 @@
 """Evaluation: in come a `Motion` and what is known to be true, out come errors with their units.
 
-Truth is a table of poses, points clicked by hand (paper B), or a known pose that a search has to find again.
+Truth is a table of poses, paths of joints, points clicked by hand (paper B), or a known pose that a search has to find
+again.
 Knows no image and no search.
 """
 
@@ -14,6 +15,8 @@ from airborne.evaluation.digitised import (
     digitised_poses,
     read_digitised,
 )
+from airborne.evaluation.joint_files import JointPaths, landmark_of, read_joint_paths
+from airborne.evaluation.joints import JointComparison, JointErrors, compare_joints
 from airborne.evaluation.truth import Truth, read_truth
 
 __all__ = [
@@ -23,14 +26,20 @@ __all__ = [
     "Digitised",
     "DigitisedComparison",
     "DigitisedPoses",
+    "JointComparison",
+    "JointErrors",
+    "JointPaths",
     "OrientationErrors",
     "PositionErrors",
     "Truth",
     "compare",
     "compare_digitised",
+    "compare_joints",
     "digitised_poses",
     "is_recovered",
+    "landmark_of",
     "perturbed",
     "read_digitised",
+    "read_joint_paths",
     "read_truth",
 ]

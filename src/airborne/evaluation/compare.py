@@ -80,7 +80,7 @@ class Comparison:
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file; what is unknown is None."""
-        return _without_nan(asdict(self))
+        return without_nan(asdict(self))
 
     def describe(self) -> str:
         """Return the numbers as a short plain table."""
@@ -127,14 +127,14 @@ def compare(motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> Compar
     `symmetries` are the body's (see `airborne.body.symmetry`), the identity among them: a body at `R` looks like one
     at `R @ S`. Raises ResultError where no frame with a pose has a true time.
     """
-    frames, rows, offset = _match(motion.time_s, truth.time_s)
+    frames, rows, offset = matched(motion.time_s, truth.time_s)
     status = motion.status[frames]
     has_pose = motion.has_pose[frames]
     frames, rows, offset_seen = frames[has_pose], rows[has_pose], offset[has_pose]
     if not len(frames):
         raise ResultError(
-            f"no pose to compare: motion {_span(motion.time_s)} with {int(motion.has_pose.sum())} poses, "
-            f"truth {_span(truth.time_s)}; give the truth of this recording"
+            f"no pose to compare: motion {span(motion.time_s)} with {int(motion.has_pose.sum())} poses, "
+            f"truth {span(truth.time_s)}; give the truth of this recording"
         )
     R, true_R = motion.R[frames], truth.R[rows]
     alike = R[:, None] @ np.stack(list(symmetries))  # (n, symmetries, 3, 3)
@@ -159,12 +159,12 @@ def compare(motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> Compar
         n_symmetries=len(symmetries),
         n_flips=int(np.sum(np.diff(nearest) != 0)),
         n_singular=int(np.sum(is_near_singular(angles_from_matrix(true_R)))),
-        position_calibration=_calibration(position_error, motion.position_sd[frames]),
-        rotation_calibration=_calibration(rotation_error, motion.rotation_sd[frames]),
+        position_calibration=calibrated(position_error, motion.position_sd[frames]),
+        rotation_calibration=calibrated(rotation_error, motion.rotation_sd[frames]),
     )
 
 
-def _match(time_s: Array, true_time_s: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+def matched(time_s: Array, true_time_s: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Rows of the motion, rows of the truth nearest in time, and the time between them [s]."""
     periods = [float(np.median(np.diff(t))) for t in (time_s, true_time_s) if len(t) > 1]
     reach = _SAME_SHARE * min(periods) if periods else _SAME_TIME_S
@@ -192,7 +192,8 @@ def _orientation_errors(R: Array, true_R: Array) -> OrientationErrors:
     )
 
 
-def _calibration(error: Array, sd: Array) -> Calibration:
+def calibrated(error: Array, sd: Array) -> Calibration:
+    """Count the errors inside one and two of their reported deviations, both of one shape."""
     is_known = np.isfinite(sd)
     ratio, spread = np.abs(error[is_known]), sd[is_known]
     if not len(ratio):
@@ -209,11 +210,13 @@ def _triple(values: Array) -> Triple:
     return x, y, z
 
 
-def _span(time_s: Array) -> str:
+def span(time_s: Array) -> str:
+    """Say from when to when times go."""
     return f"{time_s[0]:.3f} to {time_s[-1]:.3f} s" if len(time_s) else "empty"
 
 
-def _without_nan(value: Any) -> Any:
+def without_nan(value: Any) -> Any:
+    """Turn NaN into None, all the way down."""
     if isinstance(value, dict):
-        return {key: _without_nan(item) for key, item in value.items()}
+        return {key: without_nan(item) for key, item in value.items()}
     return None if isinstance(value, float) and math.isnan(value) else value

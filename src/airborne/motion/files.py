@@ -1,4 +1,7 @@
-"""motion.csv: one row per finished frame, written as a run goes, read back to the last bit."""
+"""motion.csv: one row per finished frame, written as a run goes, read back to the last bit.
+
+A body with joints has its whole covariance in covariance.bin beside it.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,8 @@ from numpy.typing import NDArray
 from airborne.body import Pose
 from airborne.errors import ResultError
 from airborne.motion.motion import Motion, rigid_transform
+from airborne.motion.sidecar import NAME as SIDECAR
+from airborne.motion.sidecar import CovarianceWriter, read_covariances
 from airborne.motion.tables import cell, motion_columns
 from airborne.tracking import Estimate, Status
 
@@ -25,7 +30,8 @@ _ROTATION = [f"r{i}{j}" for i in range(3) for j in range(3)]
 class MotionWriter:
     """Appends estimates to motion.csv; each row is on the disk before the next frame is begun.
 
-    A killed run leaves whole rows and at most one torn last line, which `read_estimates` drops.
+    A killed run leaves whole rows and at most one torn last line, which `read_estimates` drops. For a body with joints
+    the whole covariance goes to covariance.bin in the same folder, before the row does.
     """
 
     def __init__(self, path: Path, joints: tuple[str, ...] = (), *, resume: bool = False) -> None:
@@ -35,10 +41,15 @@ class MotionWriter:
         not a motion of that body.
         """
         kept = _whole_lines(path) if resume and path.exists() else b""
-        if kept and _parse(path)[0] != joints:
+        found, estimates = _parse(path) if kept else (joints, [])
+        if found != joints:
             listed = ", ".join(joints) or "none"
             raise ResultError(f"{path} was written for another body; joints here: {listed}; start in a new folder")
         self._joints = joints
+        self._covariances = None
+        if joints:
+            past = Motion.collect(estimates, joints).covariance
+            self._covariances = CovarianceWriter(path.with_name(SIDECAR), list(past), size=past.shape[-1])
         self._file = path.open("r+b" if kept else "wb")
         self._file.truncate(len(kept))
         self._file.seek(len(kept))
@@ -50,12 +61,16 @@ class MotionWriter:
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
+        if self._covariances is not None:
+            self._covariances.close()
 
     def append(self, estimate: Estimate) -> None:
         """Write one frame and wait until the disk has it."""
         motion = Motion.collect([estimate], self._joints)
         public = [cell(column[0]) for column in motion_columns(motion).values()]
         covariance = map(cell, motion.covariance[0][_UPPER])
+        if self._covariances is not None:
+            self._covariances.append(motion.covariance[0])
         pose = map(cell, [*motion.R[0].ravel(), *motion.joint_angles[0].ravel()])
         self._write_line([*public, *covariance, str(estimate.time_s), *pose])
 
@@ -68,8 +83,9 @@ class MotionWriter:
 def read_estimates(path: Path) -> list[Estimate]:
     """Read the estimates of motion.csv, with exactly the floats and times that were written.
 
-    A torn last line is dropped. A covariance comes back symmetric, from its upper triangle. Raises ResultError in one
-    line for a file that is missing or not a motion.csv.
+    A torn last line is dropped. A covariance comes back symmetric, from its upper triangle; what the joints add to it
+    is NaN where covariance.bin does not lie beside the file. Raises ResultError in one line for a file that is missing
+    or not a motion.csv, and for the covariance.bin of another run.
     """
     return _parse(path)[1]
 
@@ -101,9 +117,11 @@ def _parse(path: Path) -> tuple[tuple[str, ...], list[Estimate]]:
         raise ResultError(f"{path} is not a text table ({error}); expected the motion.csv of a run") from error
     joints = _joints_of(path, rows[0] if rows else [])
     header, estimates = _header(joints), []
+    covariances = read_covariances(path.with_name(SIDECAR), len(rows[1:]) if joints else 0, size=6 + 3 * len(joints))
     for number, cells in enumerate(rows[1:], start=2):
         try:
-            estimate = _estimate(dict(zip(header, cells, strict=True)), len(joints))
+            covariance = covariances[number - 2] if joints else None
+            estimate = _estimate(dict(zip(header, cells, strict=True)), len(joints), covariance)
             if estimates and estimate.index <= estimates[-1].index:
                 raise ValueError(f"frame {estimate.index} after frame {estimates[-1].index}, expected a later one")
             estimates.append(estimate)
@@ -123,13 +141,19 @@ def _joints_of(path: Path, header: list[str]) -> tuple[str, ...]:
     return joints
 
 
-def _estimate(row: dict[str, str], n_joints: int) -> Estimate:
+def _estimate(row: dict[str, str], n_joints: int, whole: NDArray[np.float64] | None) -> Estimate:
+    """Make an estimate from a row of motion.csv and, for a body with joints, its row of covariance.bin."""
     status = Status(row["status"])
     position = _numbers(row, ["x_m", "y_m", "z_m"])
     R = _numbers(row, _ROTATION).reshape(3, 3)
     upper = _numbers(row, _COVARIANCE)
     covariance = np.empty((6, 6))
     covariance[_UPPER] = covariance.T[_UPPER] = upper
+    if whole is not None:
+        if not np.isnan(whole).all() and not np.array_equal(whole[:6, :6], covariance, equal_nan=True):
+            raise ValueError(f"{SIDECAR} holds another covariance, so it belongs to another run; remove it")
+        whole[:6, :6] = covariance
+        covariance = whole
     pose = None
     if status is not Status.LOST:
         if not np.abs(R.T @ R - np.eye(3)).max() < 1e-6:
@@ -144,7 +168,7 @@ def _estimate(row: dict[str, str], n_joints: int) -> Estimate:
         status=status,
         score=_number(row["score"]),
         pose=pose,
-        covariance=None if np.isnan(upper).all() else covariance,
+        covariance=None if np.isnan(covariance).all() else covariance,
         n_views=int(row["n_views"]),
     )
 

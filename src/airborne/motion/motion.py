@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
+from airborne.motion.uncertainty import deviation
 from airborne.tracking import Estimate, Status
 
 Array = NDArray[np.floating]
@@ -20,8 +21,9 @@ Array = NDArray[np.floating]
 class Motion:
     """The root's pose and its uncertainty over time; rows of lost frames are NaN.
 
-    The covariance is that of `Estimate`: position [m], then a rotation vector in world axes [rad]. A variance is
-    infinite where the images do not show that direction, NaN where it is unknown.
+    The covariance is that of `Estimate`: position [m], a rotation vector in world axes [rad], then for each joint a
+    rotation vector in its segment's own axes [rad]. A variance is infinite where the images do not show that direction,
+    NaN where it is unknown.
     """
 
     index: NDArray[np.int64]  # (n,) frame or field numbers
@@ -31,15 +33,18 @@ class Motion:
     n_views: NDArray[np.int64]  # (n,)
     position: Array  # (n, 3) [m]
     R: Array  # (n, 3, 3) world from root
-    covariance: Array  # (n, 6, 6)
+    covariance: Array  # (n, 6 + 3 joints, 6 + 3 joints)
     joints: tuple[str, ...]  # names of the segments after the root; () for a body in one piece
     joint_angles: Array  # (n, joints, 3) x-y-z [rad]
 
     @classmethod
     def collect(cls, estimates: Sequence[Estimate], joints: tuple[str, ...] = ()) -> Motion:
-        """Stack the estimates of a run, in their order; `joints` names the rows of their poses' joint angles."""
-        n = len(estimates)
-        position, R, covariance = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((n, 6, 6), np.nan)
+        """Stack the estimates of a run, in their order; `joints` names the rows of their poses' joint angles.
+
+        A covariance that holds the root alone, (6, 6), leaves that of the joints unknown.
+        """
+        n, size = len(estimates), 6 + 3 * len(joints)
+        position, R, covariance = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((n, size, size), np.nan)
         joint_angles = np.full((n, len(joints), 3), np.nan)
         for row, estimate in enumerate(estimates):
             if estimate.pose is not None:
@@ -47,7 +52,8 @@ class Motion:
                 position[row], R[row] = world_from_root[:3, 3], world_from_root[:3, :3]
                 joint_angles[row] = estimate.pose.joint_angles if estimate.pose.joint_angles.size else 0.0
             if estimate.covariance is not None:
-                covariance[row] = estimate.covariance
+                known = len(estimate.covariance)
+                covariance[row, :known, :known] = estimate.covariance
         return cls(
             index=np.array([e.index for e in estimates], np.int64),
             time_s=np.array([float(e.time_s) for e in estimates], float),
@@ -86,12 +92,21 @@ class Motion:
     @property
     def position_sd(self) -> Array:
         """Standard deviations of the position: (n, 3) [m]."""
-        return _sd(self.covariance)[:, :3]
+        return self._sd[:, :3]
 
     @property
     def rotation_sd(self) -> Array:
         """Standard deviations of the orientation, as a rotation vector in world axes: (n, 3) [rad]."""
-        return _sd(self.covariance)[:, 3:]
+        return self._sd[:, 3:6]
+
+    @property
+    def joint_rotation_sd(self) -> Array:
+        """Standard deviations of the joints, as rotation vectors in the segments' own axes: (n, joints, 3) [rad]."""
+        return self._sd[:, 6:].reshape(len(self), len(self.joints), 3)
+
+    @property
+    def _sd(self) -> Array:
+        return deviation(np.diagonal(self.covariance, axis1=-2, axis2=-1))
 
     def count(self, status: Status) -> int:
         """Count the frames of one status."""
@@ -116,6 +131,7 @@ def dataset(motion: Motion, history: Sequence[str] = ()) -> xr.Dataset:
         "position_sd": (vector, motion.position_sd, {"units": "m", "frame": "world"}),
         "quaternion": (("time", "component"), motion.quaternion, {"units": "1", "map": "world_from_root"}),
         "rotation_sd": (vector, motion.rotation_sd, {"units": "rad", "frame": "world"}),
+        "joint_rotation_sd": (angle, motion.joint_rotation_sd, {"units": "rad", "frame": "segment"}),
         "joint_angle": (angle, motion.joint_angles, {"units": "rad", "order": "x, y, z, body-fixed"}),
     }
     coordinates = {
@@ -126,8 +142,3 @@ def dataset(motion: Motion, history: Sequence[str] = ()) -> xr.Dataset:
         "joint": list(motion.joints),
     }
     return xr.Dataset(variables, coordinates, {"history": list(history)})
-
-
-def _sd(covariance: Array) -> Array:
-    variance = np.diagonal(covariance, axis1=-2, axis2=-1)
-    return np.sqrt(np.where(variance >= 0, variance, np.nan))

@@ -1,4 +1,4 @@
-"""The tables of a run: motion.parquet, angles.csv, joints.csv."""
+"""The tables of a run: motion.parquet, angles.csv, joints.csv, joint_angles.csv, flight.csv."""
 
 from __future__ import annotations
 
@@ -7,21 +7,14 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-import xarray as xr
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel
-from airborne.geometry.rotations import (
-    angles_from_matrix,
-    angles_from_world_rotation,
-    is_near_singular,
-    unwrapped,
-)
+from airborne.motion.angles import ANGLES, angles
+from airborne.motion.flight import flight
+from airborne.motion.joints import joint_angles, landmarks
 from airborne.motion.motion import Motion
 
-Array = NDArray[np.floating]
-
-_ANGLES = ("somersault", "tilt", "twist")
 _UNITS = {"_m": "m", "_s": "s", "_deg": "deg", "_m_sd": "m", "_deg_sd": "deg"}
 
 
@@ -53,53 +46,51 @@ def write_motion_parquet(path: Path, motion: Motion) -> None:
     pq.write_table(pa.table(arrays, schema=pa.schema(fields, metadata=conventions)), path)
 
 
-def angles(motion: Motion) -> xr.Dataset:
-    """Read somersault, tilt and twist [deg] off a motion, unwrapped over time, with standard deviations.
-
-    The deviations follow from the rotation's covariance to first order; NaN where that is unknown or infinite, and
-    near +-90 degrees of tilt, where `is_singular` says that somersault and twist cannot be told apart.
-    """
-    radians = unwrapped(angles_from_matrix(motion.R), motion.time_s)
-    jacobian = angles_from_world_rotation(radians)
-    covariance = motion.covariance[:, 3:, 3:]
-    is_known = np.isfinite(covariance).all(axis=(-2, -1), keepdims=True)
-    variance = np.einsum("nij,njk,nik->ni", jacobian, np.where(is_known, covariance, np.nan), jacobian)
-    sd = np.sqrt(np.where(variance >= 0, variance, np.nan))
-    variables: dict = {name: ("time", np.rad2deg(radians[:, k]), {"units": "deg"}) for k, name in enumerate(_ANGLES)}
-    variables |= {f"{name}_sd": ("time", np.rad2deg(sd[:, k]), {"units": "deg"}) for k, name in enumerate(_ANGLES)}
-    variables["is_singular"] = ("time", is_near_singular(radians))
-    coordinates = {"time": ("time", motion.time_s, {"units": "s"}), "frame": ("time", motion.index)}
-    return xr.Dataset(variables, coordinates, {"history": ["angles: somersault, tilt, twist, unwrapped"]})
-
-
 def write_angles(path: Path, motion: Motion) -> None:
     """Write angles.csv: frame, time_s, the three angles and their deviations in degrees, is_singular (0 or 1)."""
     table = angles(motion)
     columns: dict[str, NDArray] = {"frame": motion.index, "time_s": motion.time_s}
-    columns |= {f"{name}_deg": table[name].to_numpy() for name in _ANGLES}
-    columns |= {f"{name}_deg_sd": table[f"{name}_sd"].to_numpy() for name in _ANGLES}
+    columns |= {f"{name}_deg": table[name].to_numpy() for name in ANGLES}
+    columns |= {f"{name}_deg_sd": table[f"{name}_sd"].to_numpy() for name in ANGLES}
     _write_csv(path, columns | {"is_singular": table["is_singular"].to_numpy().astype(int)})
 
 
 def write_joints(path: Path, motion: Motion, model: BodyModel) -> None:
     """Write joints.csv, long: one row per frame and landmark; empty cells where lost.
 
-    `sd_m` is the root mean square, over the three axes, of the standard deviations that the root's uncertainty gives
-    to that point; joint angles count as exact.
+    `sd_m` is the root mean square, over the three axes, of the standard deviations that the covariance gives to that
+    point through every joint that moves it; infinite where a direction that moves it is unseen.
     """
-    names = [landmark.name for landmark in model.landmarks]
-    points = np.full((len(motion), len(names), 3), np.nan)
-    for row in np.flatnonzero(motion.has_pose):
-        points[row] = model.with_pose(motion.pose(row)).landmarks
-    sd = _point_sd(motion.covariance[:, None], points - motion.position[:, None])
-    per_frame, flat = len(names), points.reshape(-1, 3)
-    columns: dict[str, NDArray] = {
-        "frame": np.repeat(motion.index, per_frame),
-        "time_s": np.repeat(motion.time_s, per_frame),
-        "joint": np.tile(np.array(names), len(motion)),
-    }
-    columns |= {f"{axis}_m": flat[:, k] for k, axis in enumerate("xyz")}
+    points, sd = landmarks(motion, model)
+    names = np.array([landmark.name for landmark in model.landmarks])
+    columns = _long(motion, names) | {f"{axis}_m": points[..., k].ravel() for k, axis in enumerate("xyz")}
     _write_csv(path, columns | {"sd_m": sd.ravel()})
+
+
+def write_joint_angles(path: Path, motion: Motion, model: BodyModel) -> None:
+    """Write joint_angles.csv, long: one row per frame and joint, named by its segment; degrees, and is_singular.
+
+    Raises ResultError where the motion is another body's.
+    """
+    table = joint_angles(motion, model)
+    columns = _long(motion, np.array(motion.joints, np.str_))
+    columns |= {f"{axis}_deg": table["angle"].sel(axis=axis).to_numpy().ravel() for axis in "xyz"}
+    columns |= {f"{axis}_deg_sd": table["angle_sd"].sel(axis=axis).to_numpy().ravel() for axis in "xyz"}
+    _write_csv(path, columns | {"is_singular": table["is_singular"].to_numpy().astype(int).ravel()})
+
+
+def write_flight(path: Path, motion: Motion, model: BodyModel) -> None:
+    """Write flight.csv: the centre of mass, the angular momentum about it, the root's turns, each with its unit.
+
+    Raises BodyError where a segment has no inertia, ResultError where the motion is another body's.
+    """
+    table = flight(motion, model)
+    columns: dict[str, NDArray] = {"frame": motion.index, "time_s": motion.time_s}
+    for name, stem in (("com", "com_{}_m"), ("angular_momentum", "L_{}_kg_m2_s")):
+        columns |= {stem.format(axis): table[name].sel(space=axis).to_numpy() for axis in "xyz"}
+        columns |= {f"{stem.format(axis)}_sd": table[f"{name}_sd"].sel(space=axis).to_numpy() for axis in "xyz"}
+    columns |= {"somersault_rev": table["somersault"].to_numpy(), "twist_rev": table["twist"].to_numpy()}
+    _write_csv(path, columns | {"tilt_deg": table["tilt"].to_numpy()})
 
 
 def cell(value: object) -> str:
@@ -109,16 +100,13 @@ def cell(value: object) -> str:
     return str(value)
 
 
-def _point_sd(covariance: Array, offset: Array) -> Array:
-    """Per-axis standard deviation (...) of points at `offset` (..., 3) from the root, covariance (..., 6, 6)."""
-    x, y, z = np.moveaxis(offset, -1, 0)
-    zero = np.zeros_like(x)
-    turned = np.stack([np.stack(r, -1) for r in ([zero, z, -y], [-z, zero, x], [y, -x, zero])], -2)
-    jacobian = np.concatenate([np.broadcast_to(np.eye(3), turned.shape), turned], axis=-1)
-    moved = jacobian[..., :, :, None] * jacobian[..., :, None, :]
-    with np.errstate(invalid="ignore"):  # an infinite variance counts only where the point moves with it
-        terms = np.where(moved == 0, 0.0, moved * covariance[..., None, :, :])
-        return np.sqrt(terms.sum(axis=(-3, -2, -1)) / 3)
+def _long(motion: Motion, names: NDArray[np.str_]) -> dict[str, NDArray]:
+    """Begin a table of one row per frame and joint."""
+    return {
+        "frame": np.repeat(motion.index, len(names)),
+        "time_s": np.repeat(motion.time_s, len(names)),
+        "joint": np.tile(names, len(motion)),
+    }
 
 
 def _unit(name: str) -> str:

@@ -116,7 +116,7 @@ def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
     """Say which segment moves each pixel's edges: of all surfaces within REACH_PX the one nearest to the camera.
 
     An outline moves with the surface in front of it, never with what it hides. part, inverse_depth (H, W) maps of a
-    region; owner (h, w) segment or -1, nearness (h, w) its inverse depth [1/m], both of the window at (x0, y0).
+    region; owner (h, w) segment or -1, nearness (h, w) its inverse depth near there [1/m], both of the window at (x0, y0).
     """
     h, w = owner.shape
     height, width = part.shape
@@ -137,8 +137,23 @@ def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
             for k in range(2 * REACH_PX + 1):
                 if across[y + k, x] > best:
                     best, front = across[y + k, x], who[y + k, x]
-            nearness[y, x] = best
-            owner[y, x] = segment_of_part[front] if front >= 0 else -1
+            owner[y, x], nearness[y, x] = -1, 0
+            if front < 0:
+                continue
+            own = segment_of_part[front]
+            owner[y, x] = own
+            here = part[y + y0, x + x0]
+            if here >= 0 and segment_of_part[here] == own:
+                nearness[y, x] = inverse_depth[y + y0, x + x0]
+                continue
+            total, count = np.float32(0), 0
+            for v in range(max(y + y0 - REACH_PX, 0), min(y + y0 + REACH_PX + 1, height)):
+                for u in range(max(x + x0 - REACH_PX, 0), min(x + x0 + REACH_PX + 1, width)):
+                    p = part[v, u]
+                    if p >= 0 and segment_of_part[p] == own:
+                        total += inverse_depth[v, u]
+                        count += 1
+            nearness[y, x] = total / count
 
 
 @njit(**KERNEL)

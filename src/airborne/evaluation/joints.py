@@ -1,0 +1,237 @@
+"""How far a body's landmarks are from where another system, or the truth, has them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import BodyModel
+from airborne.errors import ResultError
+from airborne.evaluation.compare import Calibration, calibrated, matched, span, without_nan
+from airborne.evaluation.joint_files import JointPaths, landmark_of
+from airborne.motion import Motion, landmarks
+from airborne.tracking import Status
+
+Array = NDArray[np.floating]
+Triple = tuple[float, float, float]
+
+_FARTHEST_SHIFT = 3  # periods by which the two clocks are tried against each other
+_CLEARLY_BETTER = 0.98  # of the distance as it is
+_MOST_FRAMES = 0.9  # a shift that leaves fewer of the frames is not tried
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointErrors:
+    """Distances of one landmark, or of all, measured minus reference."""
+
+    n: int  # frames, or frames times landmarks
+    mean_mm: float
+    rms_mm: float
+    largest_mm: float
+    mean_without_offset_mm: float  # the mean offset in the landmark's segment taken off: two definitions of one joint
+    mean_without_bias_mm: float  # the mean offset in the world taken off; both NaN for one frame
+    bias_mm: Triple  # mean, world axes
+    offset_mm: Triple | None  # mean, the segment's axes; None for all landmarks together
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointComparison:
+    """A motion's landmarks against a reference, over the frames whose times match and that have a pose."""
+
+    n_frames: int  # of the motion
+    n_reference: int
+    n_matched: int
+    n_tracked: int  # of the matched, likewise the next two
+    n_uncertain: int
+    n_lost: int
+    largest_time_offset_s: float
+    joints: dict[str, JointErrors]  # by landmark
+    whole: JointErrors  # its mean is the mean per-joint position error, MPJPE
+    tracked: JointErrors | None  # the same over the tracked frames alone; None where there are none
+    not_compared: tuple[str, ...]  # markers without a landmark, and landmarks without a marker
+    calibration: Calibration  # errors against the landmarks' reported deviations
+    better_shift_s: float  # added to the reference's times, whole periods, this would agree clearly better; else 0
+    better_mean_without_offset_mm: float  # and leave this
+
+    def to_dict(self) -> dict:
+        """Return the numbers for a JSON file; what is unknown is None."""
+        return without_nan(asdict(self))
+
+    def describe(self) -> str:
+        """Return the numbers as a short plain table."""
+        lines = [
+            f"{self.n_matched} of {self.n_reference} reference times matched, at most "
+            f"{1e3 * self.largest_time_offset_s:.1f} ms off: "
+            f"{self.n_tracked} tracked, {self.n_uncertain} uncertain, {self.n_lost} lost",
+            f"{'joint [mm]':<18}{'mean':>9}{'RMS':>9}{'max':>9}{'no offset':>11}",
+        ]
+        rows = {**self.joints, "all": self.whole} | ({"all, tracked": self.tracked} if self.tracked else {})
+        for name, e in rows.items():
+            cells = f"{e.mean_mm:9.1f}{e.rms_mm:9.1f}{e.largest_mm:9.1f}{e.mean_without_offset_mm:11.1f}"
+            lines.append(f"  {name:<16}{cells}")
+        lines.append("no offset: the mean without a constant offset in the segment, as between two definitions")
+        if self.better_shift_s:
+            lines.append(
+                f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, {'no offset'!r} would be "
+                f"{self.better_mean_without_offset_mm:.1f} mm: do both clocks begin at the same picture?"
+            )
+        share = self.calibration
+        if share.n:
+            lines.append(
+                f"errors within 1 sd {share.within_1sd:.0%} (normal: 68%), "
+                f"within 2 sd {share.within_2sd:.0%} (95%), n = {share.n}"
+            )
+        if self.not_compared:
+            lines.append(f"not compared: {', '.join(self.not_compared)}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pairs:
+    """Landmarks beside their reference, both (n, l, 3) [m], and the rotations of their segments (n, l, 3, 3)."""
+
+    measured: Array
+    reference: Array
+    R: Array
+
+    @property
+    def error(self) -> Array:
+        return self.measured - self.reference
+
+
+def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> JointComparison:
+    """Compare a motion's landmarks with a reference, frame by frame, as `compare` matches them.
+
+    A marker goes with the landmark of its name, or with the one that `landmark_of` says. Raises ResultError where no
+    marker has a landmark, or no frame with a pose has a reference.
+    """
+    of_landmark, not_compared = _markers(model, reference)
+    columns = [k for k, mark in enumerate(model.landmarks) if mark.name in of_landmark]
+    names = [model.landmarks[k].name for k in columns]
+    reference = replace(reference, points=reference.points[:, [of_landmark[name] for name in names]])
+    frames, rows, offset = matched(motion.time_s, reference.time_s)
+    status = motion.status[frames]
+    has_pose = motion.has_pose[frames]
+    if not has_pose.any():
+        raise ResultError(
+            f"no pose to compare: motion {span(motion.time_s)} with {int(motion.has_pose.sum())} poses, "
+            f"reference {span(reference.time_s)}; give the joints of this recording"
+        )
+    measured, sd = (values[:, columns] for values in landmarks(motion, model))
+    R = _rotations(motion, model, columns)
+    at, of = frames[has_pose], rows[has_pose]
+    pairs = _Pairs(measured[at], reference.points[of], R[at])
+    is_known = np.asarray(np.isfinite(pairs.error).all(axis=-1))
+    if not is_known.any():
+        raise ResultError("the reference has no number where the motion has a pose; give the joints of this recording")
+    joints = {name: _errors(pairs, [k]) for k, name in enumerate(names) if is_known[:, k].any()}
+    is_tracked = np.asarray(status[has_pose] == Status.TRACKED.value)
+    tracked = _Pairs(pairs.measured[is_tracked], pairs.reference[is_tracked], pairs.R[is_tracked])
+    everything = list(range(len(names)))
+    whole = _errors(pairs, everything)
+    shift_s, shifted_mm = _better_shift(motion.time_s, reference, measured, R, whole.mean_without_offset_mm)
+    return JointComparison(
+        n_frames=len(motion),
+        n_reference=len(reference.time_s),
+        n_matched=len(status),
+        n_tracked=int(np.sum(status == Status.TRACKED.value)),
+        n_uncertain=int(np.sum(status == Status.UNCERTAIN.value)),
+        n_lost=int(np.sum(status == Status.LOST.value)),
+        largest_time_offset_s=float(offset[has_pose].max()),
+        joints=joints,
+        whole=whole,
+        tracked=_errors(tracked, everything) if np.isfinite(tracked.error).all(axis=-1).any() else None,
+        not_compared=(*not_compared, *(name for name in names if name not in joints)),
+        calibration=calibrated(pairs.error[is_known], np.repeat(sd[at][is_known][:, None], 3, axis=1)),
+        better_shift_s=shift_s,
+        better_mean_without_offset_mm=shifted_mm,
+    )
+
+
+def _markers(model: BodyModel, reference: JointPaths) -> tuple[dict[str, int], list[str]]:
+    """Return the column of the reference for each landmark that has one; and the names that found no partner."""
+    known = [landmark.name for landmark in model.landmarks]
+    found = {name: k for k, name in enumerate(reference.names) if name in known}
+    for k, marker in enumerate(reference.names):
+        name = landmark_of(marker)
+        if name in known:
+            found.setdefault(name, k)
+    if not found:
+        raise ResultError(
+            f"no joint in common: the reference has {', '.join(reference.names[:4])}, ..., "
+            f"body '{model.name}' has {', '.join(known[:4])}, ...; name the columns by the body's landmarks"
+        )
+    used = set(found.values())
+    idle = [marker for k, marker in enumerate(reference.names) if k not in used]
+    return found, idle + [name for name in known if name not in found]
+
+
+def _rotations(motion: Motion, model: BodyModel, columns: list[int]) -> Array:
+    """Return the world rotations of the landmarks' segments: (n, landmarks, 3, 3)."""
+    owners = [model.index_of(model.landmarks[k].segment) for k in columns]
+    R = np.full((len(motion), len(owners), 3, 3), np.nan)
+    for row in np.flatnonzero(motion.has_pose):
+        R[row] = model.with_pose(motion.pose(row)).R[owners]
+    return R
+
+
+def _errors(pairs: _Pairs, columns: list[int]) -> JointErrors:
+    """Reduce the errors of some landmarks; offsets are each landmark's own."""
+    error = pairs.error[:, columns]
+    local = np.einsum("nlji,nlj->nli", pairs.R[:, columns], error)
+    is_known = np.isfinite(error).all(axis=-1)
+    distance = np.linalg.norm(error[is_known], axis=-1)
+    in_mm = 1e3 * distance
+    return JointErrors(
+        n=len(distance),
+        mean_mm=float(in_mm.mean()),
+        rms_mm=float(np.sqrt(np.mean(in_mm**2))),
+        largest_mm=float(in_mm.max()),
+        mean_without_offset_mm=_mean_about(local),
+        mean_without_bias_mm=_mean_about(error),
+        bias_mm=_triple(1e3 * error[is_known].mean(axis=0)),
+        offset_mm=_triple(1e3 * local[is_known].mean(axis=0)) if len(columns) == 1 else None,
+    )
+
+
+def _mean_about(error: Array) -> float:
+    """Return the mean distance [mm] of errors (n, l, 3) from each landmark's own mean; NaN for single frames."""
+    n = np.isfinite(error).all(axis=-1).sum(axis=0)
+    error = error[:, n > 1]
+    if not error.size:
+        return math.nan
+    return float(1e3 * np.nanmean(np.linalg.norm(error - np.nanmean(error, axis=0), axis=-1)))
+
+
+def _better_shift(
+    time_s: Array, reference: JointPaths, measured: Array, R: Array, now_mm: float
+) -> tuple[float, float]:
+    """Try the reference's clock some whole periods earlier and later: the shift [s] and what it leaves [mm]."""
+    if len(reference.time_s) < 2 or math.isnan(now_mm):
+        return 0.0, now_mm
+    period = float(np.median(np.diff(reference.time_s)))
+    best = 0.0, now_mm
+    _, n_now = _at_shift(time_s, reference, measured, R, 0.0)
+    for step in range(-_FARTHEST_SHIFT, _FARTHEST_SHIFT + 1):
+        local, n = _at_shift(time_s, reference, measured, R, step * period)
+        if n < _MOST_FRAMES * n_now:
+            continue
+        found = _mean_about(local)
+        if found < min(best[1], _CLEARLY_BETTER * now_mm):
+            best = step * period, found
+    return best
+
+
+def _at_shift(time_s: Array, reference: JointPaths, measured: Array, R: Array, shift_s: float) -> tuple[Array, int]:
+    """Return the errors in the segments' axes with the reference's clock shifted, and how many there are."""
+    frames, rows, _ = matched(time_s, reference.time_s + shift_s)
+    local = np.einsum("nlji,nlj->nli", R[frames], measured[frames] - reference.points[rows])
+    return local, int(np.isfinite(local).all(axis=-1).sum())
+
+
+def _triple(values: Array) -> Triple:
+    x, y, z = values.tolist()
+    return x, y, z

@@ -1,0 +1,69 @@
+"""covariance.bin: the whole covariance of a body with joints, beside the motion.csv that holds the root's.
+
+Rows of little-endian 64-bit floats, one for each row of motion.csv: the upper triangle, row by row, of the matrix
+(6 + 3 joints, 6 + 3 joints) of `Estimate`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.errors import ResultError
+
+Array = NDArray[np.floating]
+
+NAME = "covariance.bin"
+_FLOAT = np.dtype("<f8")
+
+
+class CovarianceWriter:
+    """Appends covariances; each is on the disk before `append` returns."""
+
+    def __init__(self, path: Path, kept: Sequence[Array], *, size: int) -> None:
+        """Begin a file that holds the covariances `kept` (size, size), leaving those it has as they are."""
+        n_kept = min(len(kept), path.stat().st_size // _row_bytes(size)) if path.is_file() else 0
+        self._upper = np.triu_indices(size)
+        self._file = path.open("r+b" if n_kept else "wb")
+        self._file.truncate(n_kept * _row_bytes(size))
+        self._file.seek(0, os.SEEK_END)
+        for covariance in kept[n_kept:]:
+            self.append(covariance)
+
+    def append(self, covariance: Array) -> None:
+        """Write one covariance (size, size) and wait until the disk has it."""
+        self._file.write(covariance[self._upper].astype(_FLOAT).tobytes())
+        self._file.flush()
+        os.fsync(self._file.fileno())
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def read_covariances(path: Path, n: int, *, size: int) -> Array:
+    """Read the first n covariances (n, size, size); rows that the file does not have, or no file, are NaN.
+
+    Raises ResultError where the file is there and cannot be read.
+    """
+    covariances, upper = np.full((n, size, size), np.nan), np.triu_indices(size)
+    if not path.is_file():
+        return covariances
+    try:
+        with path.open("rb") as file:
+            data = file.read(n * _row_bytes(size))
+    except OSError as error:
+        raise ResultError(f"{path} cannot be read ({error.strerror}); mend it, or remove it to go on without") from None
+    n_whole = len(data) // _row_bytes(size)
+    rows = np.frombuffer(data, _FLOAT, n_whole * len(upper[0])).reshape(n_whole, len(upper[0]))
+    for covariance, row in zip(covariances, rows, strict=False):
+        covariance[upper] = covariance.T[upper] = row
+    return covariances
+
+
+def _row_bytes(size: int) -> int:
+    return _FLOAT.itemsize * (size * (size + 1) // 2)
