@@ -156,7 +156,7 @@ def _compare(
     through = view.window, *taps, _CLIP
     args = synthesis.body, _place(posed, view), view.seen, through, view.maps
     if synthesis.lights is None:
-        paint = synthesis.albedo, synthesis.is_faceted
+        paint = view.albedo, synthesis.is_faceted
         return np.array(photometric_equations(*args, paint, view.light, rounds, sums, blocks))
     size = view.maps[0].shape
     drawn = (

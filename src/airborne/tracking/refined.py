@@ -25,7 +25,7 @@ from airborne.tracking.gauss_newton import CLOSE, FAR, NEAR, Fit, Levels, fit_pi
 from airborne.tracking.loss import Agreement, Usual, agreement, status_of
 from airborne.tracking.regions import regions_round, share_in_pictures
 from airborne.tracking.swaps import is_nearer, swapped
-from airborne.tracking.synthesis import Synthesis
+from airborne.tracking.synthesis import Synthesis, learn_paint
 from airborne.tracking.wide import Reach, search_widely
 from airborne.video import Frames
 
@@ -109,6 +109,8 @@ class Refined:
             mask = self._synthesis.parts(body, region) >= 0
             appearance.learn_colours(region, mask)
             appearance.learn_scene(region, mask)
+            if False and self._is_jointed:
+                learn_paint(self._synthesis, body, region, appearance)
         known = [region for region in regions if appearance.knows(region)]
         agreed = agreement(self._synthesis, body, known, [appearance.posterior(region) for region in known])
         return RefinedState(past, appearance, state.usual.learned(agreed) if known else state.usual)
