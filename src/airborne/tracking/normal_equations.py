@@ -113,47 +113,46 @@ def window_of(part):
 
 @njit(**KERNEL)
 def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
-    """Say which segment moves each pixel's edges: of all surfaces within REACH_PX the one nearest to the camera.
+    """Say which segment moves each pixel's edges: of those with an edge within REACH_PX the one nearest to the camera.
 
     An outline moves with the surface in front of it, never with what it hides. part, inverse_depth (H, W) maps of a
-    region; owner (h, w) segment or -1, nearness (h, w) its inverse depth near there [1/m], both of the window at (x0, y0).
+    region; owner (h, w) segment or -1, nearness (h, w) its inverse depth near there [1/m], both of the window at
+    (x0, y0).
     """
     h, w = owner.shape
     height, width = part.shape
-    across = np.empty((h + 2 * REACH_PX, w), np.float32)
-    who = np.empty((h + 2 * REACH_PX, w), np.int16)
-    for y in range(h + 2 * REACH_PX):
-        v = y + y0 - REACH_PX
-        for x in range(w):
-            best, front = np.float32(0), -1
-            if 0 <= v < height:
-                for u in range(max(x + x0 - REACH_PX, 0), min(x + x0 + REACH_PX + 1, width)):
-                    if inverse_depth[v, u] > best:
-                        best, front = inverse_depth[v, u], part[v, u]
-            across[y, x], who[y, x] = best, front
+    distance = np.zeros((h, w), np.int16)  # squared, to the edge that owns a pixel; 0 inside
     for y in range(h):
         for x in range(w):
-            best, front = np.float32(0), -1
-            for k in range(2 * REACH_PX + 1):
-                if across[y + k, x] > best:
-                    best, front = across[y + k, x], who[y + k, x]
-            owner[y, x], nearness[y, x] = -1, 0
-            if front < 0:
+            p = part[y + y0, x + x0]
+            owner[y, x] = segment_of_part[p] if p >= 0 else -1
+            nearness[y, x] = inverse_depth[y + y0, x + x0]
+    for v in range(max(y0 - REACH_PX, 0), min(y0 + h + REACH_PX, height)):
+        for u in range(max(x0 - REACH_PX, 0), min(x0 + w + REACH_PX, width)):
+            p = part[v, u]
+            if p < 0 or not _is_front_edge(part, inverse_depth, segment_of_part, v, u):
                 continue
-            own = segment_of_part[front]
-            owner[y, x] = own
-            here = part[y + y0, x + x0]
-            if here >= 0 and segment_of_part[here] == own:
-                nearness[y, x] = inverse_depth[y + y0, x + x0]
-                continue
-            total, count = np.float32(0), 0
-            for v in range(max(y + y0 - REACH_PX, 0), min(y + y0 + REACH_PX + 1, height)):
-                for u in range(max(x + x0 - REACH_PX, 0), min(x + x0 + REACH_PX + 1, width)):
-                    p = part[v, u]
-                    if p >= 0 and segment_of_part[p] == own:
-                        total += inverse_depth[v, u]
-                        count += 1
-            nearness[y, x] = total / count
+            own, near = segment_of_part[p], inverse_depth[v, u]
+            for y in range(max(v - y0 - REACH_PX, 0), min(v - y0 + REACH_PX + 1, h)):
+                for x in range(max(u - x0 - REACH_PX, 0), min(u - x0 + REACH_PX + 1, w)):
+                    d = (v - y0 - y) ** 2 + (u - x0 - x) ** 2
+                    is_closer = d < distance[y, x] if owner[y, x] == own else near > nearness[y, x]
+                    if is_closer:
+                        owner[y, x], nearness[y, x], distance[y, x] = own, near, d
+
+
+@njit(**KERNEL)
+def _is_front_edge(part, inverse_depth, segment_of_part, v, u):
+    """Say whether a pixel of the body borders on another segment behind it, or on the background."""
+    height, width = part.shape
+    own, near = segment_of_part[part[v, u]], inverse_depth[v, u]
+    for dv, du in ((0, -1), (0, 1), (-1, 0), (1, 0)):
+        y, x = v + dv, u + du
+        if 0 <= y < height and 0 <= x < width:
+            p = part[y, x]
+            if p < 0 or (segment_of_part[p] != own and inverse_depth[y, x] < near):
+                return True
+    return False
 
 
 @njit(**KERNEL)

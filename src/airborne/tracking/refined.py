@@ -23,16 +23,18 @@ from airborne.tracking.estimate import Estimate, Status, lost
 from airborne.tracking.freedom import Freedom, Prior, all_joints, outward, root_only
 from airborne.tracking.gauss_newton import CLOSE, FAR, NEAR, Fit, Levels, fit_pictures, fit_silhouettes
 from airborne.tracking.loss import Agreement, Usual, agreement, status_of
-from airborne.tracking.regions import regions_round, share_in_pictures
+from airborne.tracking.regions import reduced, regions_round, share_in_pictures
 from airborne.tracking.swaps import is_nearer, swapped
 from airborne.tracking.synthesis import Synthesis, learn_paint
 from airborne.tracking.wide import Reach, search_widely
 from airborne.video import Frames
 
 Array = NDArray[np.floating]
+PAINT = False
 Order = Literal["refined", "joint", "hierarchical"]
 
 _MARGIN_PX, _FIRST_MARGIN_PX = 32, 56  # of a full frame
+_MOST_PX_PER_M = 220.0  # of a body with joints
 _REMEMBERED = 3
 _FITTED_AFTER_SEARCH = 3
 _LEAST_IN_PICTURES = 0.4  # of the body, in the view that holds most of it; less is not enough to be sure
@@ -72,6 +74,7 @@ class Refined:
     ) -> None:
         self._synthesis = Synthesis.of(model, lights)
         self._start = start
+        self._placed_start = self._synthesis.place(start)
         self._predict = PREDICTIONS[prediction]
         self._is_jointed = len(model.segments) > 1 and not fixed_shape
         self._order = order
@@ -84,7 +87,7 @@ class Refined:
 
     def search(self, state: RefinedState, frames: Frames) -> Estimate:
         """Find the body in the frames, without learning from them."""
-        past = state.past
+        frames, past = self._as_tracked(frames), state.past
         poses = [predict(past, frames.time_s) for predict in self._predict] if past else [self._start]
         prior = self._prior(poses[-1], float(frames.time_s - past[-1][0]) if past else None)
         fit, agreed = self._fit(poses, frames, state, prior, is_first=not past)
@@ -100,6 +103,7 @@ class Refined:
         """Return the state after the frames, given where the body was found."""
         if estimate.pose is None:
             return state
+        frames = self._as_tracked(frames)
         past = (*state.past, (frames.time_s, estimate.pose))[-_REMEMBERED:]
         if estimate.status is not Status.TRACKED and state.past:
             return replace(state, past=past)
@@ -109,11 +113,15 @@ class Refined:
             mask = self._synthesis.parts(body, region) >= 0
             appearance.learn_colours(region, mask)
             appearance.learn_scene(region, mask)
-            if False and self._is_jointed:
+            if self._is_jointed and PAINT:
                 learn_paint(self._synthesis, body, region, appearance)
         known = [region for region in regions if appearance.knows(region)]
         agreed = agreement(self._synthesis, body, known, [appearance.posterior(region) for region in known])
         return RefinedState(past, appearance, state.usual.learned(agreed) if known else state.usual)
+
+    def _as_tracked(self, frames: Frames) -> Frames:
+        """Reduce the pictures of a body with joints: its many pixels say more than its shape can follow."""
+        return reduced(frames, self._placed_start, _MOST_PX_PER_M) if self._is_jointed else frames
 
     def _estimate(self, frames: Frames, fit: Fit | None, agreed: Agreement | None, usual: Usual) -> Estimate:
         if fit is None or agreed is None or (status := status_of(fit, agreed, usual)) is Status.LOST:

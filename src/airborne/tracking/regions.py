@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +21,28 @@ def regions_round(bodies: Sequence[PosedBody], geometry: Geometry, frames: Frame
     points = np.concatenate([outermost_points(body, geometry) for body in bodies])
     found = [_region(view, points, margin_px) for view in frames.views if view is not None]
     return [region for region in found if region is not None]
+
+
+def reduced(frames: Frames, body: PosedBody, most_px_per_m: float) -> Frames:
+    """Average the pictures in squares of whole pixels until none shows the body larger than so many pixels a metre.
+
+    `body` says where it is, about; it must be the same for all frames of a recording.
+    """
+    return Frames(frames.index, frames.time_s, tuple(_reduced(view, body, most_px_per_m) for view in frames.views))
+
+
+def _reduced(view: View | None, body: PosedBody, most_px_per_m: float) -> View | None:
+    if view is None:
+        return None
+    depth_m = max(float(view.camera.camera_from_world.apply(body.t[0])[2]), 0.1)
+    n = round(view.camera.K[0, 0] / depth_m / most_px_per_m)
+    if n < 2:
+        return view
+    width, height = view.camera.size[0] // n, view.camera.size[1] // n
+    rgb = cv2.resize(view.rgb[: n * height, : n * width], (width, height), interpolation=cv2.INTER_AREA)
+    middle = (n - 1) / 2
+    camera = view.camera.resampled(scale=(n, n), offset=(middle, middle), size=(width, height))
+    return View(camera, np.asarray(rgb, np.uint8))
 
 
 def share_in_pictures(body: PosedBody, geometry: Geometry, frames: Frames) -> float:

@@ -1,0 +1,145 @@
+"""How the pictures of a body change with its shape and its poses at once, by differences of synthetic pictures.
+
+The same composite as `gauss_newton.fit_pictures`, the lit body over the empty scene, blurred, with the same robust
+cost; here its derivatives come from drawing the body twice for each parameter, so that any parameter will do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import PosedBody
+from airborne.rendering.maps import surface_maps
+from airborne.scoring.lighting import fit_light, light_up
+from airborne.tracking.normal_equations import BLOCK_PX, blur, gaussian_taps
+from airborne.tracking.synthesis import Laid, Synthesis
+
+Array = NDArray[np.floating]
+
+SIGMA_PX = 1.2  # of the blur
+CLIP = 0.1  # linear light, 0..1: a residual this large counts a quarter
+CORRELATED_PX = BLOCK_PX**2  # pixels this near show the same fault of a shape that is only about a person's
+_LIGHT_ROUNDS = 3
+_NEAR_PX = 4  # beyond this from the mask, a small step changes nothing
+
+
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    """How far a body's pictures are from those seen, summed over pixels."""
+
+    cost: float  # robust squared residual of the whole regions
+    weight: float  # of the whole regions
+    total: float  # weighted squared residual where there is body
+    covered: float  # weight where there is body
+
+    def __add__(self, other: Misfit) -> Misfit:
+        """Add up views."""
+        return Misfit(
+            self.cost + other.cost,
+            self.weight + other.weight,
+            self.total + other.total,
+            self.covered + other.covered,
+        )
+
+    @property
+    def noise(self) -> float:
+        """Mean square of the weighted residual, times how many pixels share it."""
+        return CORRELATED_PX * max(self.total / self.covered, 1e-9) if self.covered else 1.0
+
+    @property
+    def rms_light(self) -> float:
+        """Root mean of the robust squared residual over the regions, linear light 0..1."""
+        return (self.cost / self.weight) ** 0.5 if self.weight else float("nan")
+
+
+NOTHING = Misfit(0.0, 0.0, 0.0, 0.0)
+
+
+def misfit(synthesis: Synthesis, posed: PosedBody, view: Laid) -> Misfit:
+    """Compare a body with a view; the view's light is fitted anew, in place."""
+    _fit_light(synthesis, posed, view)
+    return _weighed(view, _residual(view, _shown(synthesis, posed, view)))[0]
+
+
+def equations(
+    synthesis: Synthesis,
+    posed: PosedBody,
+    view: Laid,
+    pairs: Sequence[tuple[Synthesis, PosedBody, Synthesis, PosedBody, float]],
+) -> tuple[Misfit, Array, Array]:
+    """Return a view's misfit and the normal equations H (d, d), g (d,) of d parameters: H step = g.
+
+    pairs: for each parameter the body a step up, the body a step down, and the difference of the parameter between.
+    """
+    _fit_light(synthesis, posed, view)
+    residual = _residual(view, _shown(synthesis, posed, view))
+    found, weights = _weighed(view, residual)
+    near = cv2.dilate((view.maps[0] >= 0).astype(np.uint8), np.ones((2 * _NEAR_PX + 1,) * 2, np.uint8)) > 0
+    y0, x0, y1, x1 = _box(near)
+    within = np.s_[:, y0:y1, x0:x1]
+    columns = np.empty((len(pairs), 3 * (y1 - y0) * (x1 - x0)), np.float32)
+    blurred = np.empty((3, y1 - y0, x1 - x0), np.float32)
+    for column, (above, posed_above, below, posed_below, step) in zip(columns, pairs, strict=True):
+        change = _shown(above, posed_above, view)[within] - _shown(below, posed_below, view)[within]
+        if change.any():
+            blur(np.ascontiguousarray(change), *_taps(view), blurred)
+            column[:] = blurred.ravel() / np.float32(step)
+        else:
+            column[:] = 0
+    weight = np.tile(weights[within[1:]].ravel(), 3)
+    H = (columns * weight) @ columns.T
+    return found, H.astype(float), (columns @ (weight * residual[within].ravel())).astype(float)
+
+
+def _fit_light(synthesis: Synthesis, posed: PosedBody, view: Laid) -> None:
+    part, _, normals = view.maps
+    surface_maps(synthesis.shapes, synthesis.geometry, posed.R, posed.t, view.packed, *view.maps)
+    fit_light(view.seen[0], part, normals, view.albedo, view.light, _LIGHT_ROUNDS, 0, 0, part.shape[1], part.shape[0])
+
+
+def _shown(synthesis: Synthesis, posed: PosedBody, view: Laid) -> NDArray[np.float32]:
+    """Draw the body over the scene under the view's light: (3, h, w) linear light."""
+    part, _, normals = view.maps
+    surface_maps(synthesis.shapes, synthesis.geometry, posed.R, posed.t, view.packed, *view.maps)
+    lit = np.zeros((3, *part.shape), np.float32)
+    light_up(part, normals, view.albedo, view.light, 0, 0, lit)
+    return np.where(part >= 0, lit, view.seen[1])
+
+
+def _residual(view: Laid, shown: NDArray[np.float32]) -> NDArray[np.float32]:
+    out = np.empty_like(shown)
+    blur(view.seen[0] - shown, *_taps(view), out)
+    return out
+
+
+def _weighed(view: Laid, residual: NDArray[np.float32]) -> tuple[Misfit, NDArray[np.float32]]:
+    """Return the misfit and each pixel's weight (h, w), given that the view's maps hold the body."""
+    certainty, covered = view.seen[2], view.maps[0] >= 0
+    e2 = np.einsum("khw,khw->hw", residual, residual)
+    down = 1 / (1 + e2 / CLIP**2)
+    weights = certainty * down**2
+    found = Misfit(
+        float(np.sum(certainty * e2 * down)),
+        float(np.sum(certainty)),
+        float(np.sum((weights * e2)[covered])),
+        float(np.sum(weights[covered])),
+    )
+    return found, weights
+
+
+def _taps(view: Laid) -> tuple[Array, Array]:
+    """Return the blur's taps along rows and columns; a field's rows are farther apart."""
+    aspect = float(view.K[1, 1] / view.K[0, 0])
+    return gaussian_taps(SIGMA_PX), gaussian_taps(max(SIGMA_PX * aspect, 0.5))
+
+
+def _box(near: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    rows, columns = np.flatnonzero(near.any(axis=1)), np.flatnonzero(near.any(axis=0))
+    if not len(rows):
+        return 0, 0, 0, 0
+    return int(rows[0]), int(columns[0]), int(rows[-1]) + 1, int(columns[-1]) + 1
