@@ -46,8 +46,8 @@ class _Sums:
         if len(at) < _FEWEST_PX:
             return
         n = np.bincount(at, minlength=N_BINS).astype(float)
-        colour = np.stack([np.bincount(at, rgb[:, k], N_BINS) for k in range(3)], axis=1)
-        square = np.bincount(at, np.einsum("nk,nk->n", rgb, rgb), N_BINS)
+        colour = np.stack([np.bincount(at, rgb[:, k], N_BINS) for k in range(3)], axis=1).astype(float)
+        square = np.bincount(at, np.einsum("nk,nk->n", rgb, rgb), N_BINS).astype(float)
         self.pictures.append((n, colour, square))
 
     def border(self) -> tuple[float, float] | None:

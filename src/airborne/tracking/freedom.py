@@ -121,13 +121,30 @@ def all_joints(model: BodyModel) -> Freedom:
 
 
 def outward(model: BodyModel) -> list[Freedom]:
-    """Free the trunk first, then what hangs on it, then outward (paper B, "Discussion"): one `Freedom` a stage.
+    """Free the trunk first, then what hangs on it, then outward (paper B, "Discussion"): one `Freedom` a stage."""
+    distance = _distance_from_trunk(model)
+    columns = np.arange(6 + 3 * (len(model.segments) - 1))
+    of_segment = np.concatenate([np.zeros(6, int), np.arange(1, len(model.segments)).repeat(3)])
+    return [Freedom(model, columns[distance[of_segment] <= stage]) for stage in range(distance.max() + 1)]
 
-    The trunk is what several chains hang on, and all between. Every stage keeps the trunk free.
-    """
+
+def limb_of_segment(model: BodyModel) -> NDArray[np.int64]:
+    """Return for each segment the first segment of its limb, -1 for those of the trunk: (segments,)."""
+    distance, limb = _distance_from_trunk(model), np.full(len(model.segments), -1)
+    for segment in np.flatnonzero(distance > 0):
+        limb[segment] = segment if distance[segment] == 1 else limb[model.parents[segment]]
+    return limb
+
+
+def only(model: BodyModel, segments: NDArray[np.integer]) -> Freedom:
+    """Free the joints of some segments."""
+    return Freedom(model, (3 + 3 * np.asarray(segments)[:, None] + np.arange(3)).ravel())
+
+
+def _distance_from_trunk(model: BodyModel) -> NDArray[np.int64]:
+    """Count the joints from each segment to the trunk: what several chains hang on, and all between: (segments,)."""
     parents = model.parents
-    n_children = np.bincount(parents[1:], minlength=len(parents))
-    is_trunk = n_children > 1
+    is_trunk = np.bincount(parents[1:], minlength=len(parents)) > 1
     is_trunk[0] = True
     for segment in range(len(parents) - 1, 0, -1):
         if is_trunk[segment]:
@@ -135,9 +152,7 @@ def outward(model: BodyModel) -> list[Freedom]:
     distance = np.zeros(len(parents), int)
     for segment in range(1, len(parents)):
         distance[segment] = 0 if is_trunk[segment] else distance[parents[segment]] + 1
-    columns = np.arange(6 + 3 * (len(parents) - 1))
-    of_segment = np.concatenate([np.zeros(6, int), np.arange(1, len(parents)).repeat(3)])
-    return [Freedom(model, columns[distance[of_segment] <= stage]) for stage in range(distance.max() + 1)]
+    return distance
 
 
 def _angles_by_own_rotation(angles: Array) -> Array:

@@ -20,13 +20,14 @@ from airborne.scoring.foreground import body_like
 from airborne.tracking import predictors
 from airborne.tracking.appearance import Appearance, Region
 from airborne.tracking.estimate import Estimate, Status, lost
-from airborne.tracking.freedom import Freedom, Prior, all_joints, outward, root_only
+from airborne.tracking.freedom import Freedom, Prior, all_joints, only, outward, root_only
 from airborne.tracking.gauss_newton import CLOSE, FAR, NEAR, Fit, Levels, fit_pictures, fit_silhouettes
+from airborne.tracking.limbs import astray, look_for
 from airborne.tracking.loss import Agreement, Usual, agreement, status_of
 from airborne.tracking.regions import reduced, regions_round, share_in_pictures
 from airborne.tracking.swaps import is_nearer, swapped
 from airborne.tracking.synthesis import Synthesis, learn_paint
-from airborne.tracking.wide import Reach, search_widely
+from airborne.tracking.wide import Reach, evidence_of, search_widely
 from airborne.video import Frames
 
 Array = NDArray[np.floating]
@@ -38,7 +39,7 @@ _MOST_PX_PER_M = 220.0  # of a body with joints
 _REMEMBERED = 3
 _FITTED_AFTER_SEARCH = 3
 _LEAST_IN_PICTURES = 0.4  # of the body, in the view that holds most of it; less is not enough to be sure
-_TRUNK_AT = 4  # pictures reduced so far, or farther, show no more of a body with joints than its trunk
+_TRUNK_AT = 4  # pictures reduced so far show the limbs of a body with joints, those reduced farther its trunk alone
 
 PREDICTIONS: dict[str, tuple[Callable[[predictors.Past, Fraction], Pose], ...]] = {
     "smooth": (predictors.quadratic, predictors.linear),
@@ -191,12 +192,36 @@ class Refined:
             fit = to_pictures([pose, *self._swapped(pose)])
         else:
             best = max(((guess, agreed(guess)) for guess in guesses), key=lambda each: each[1].evidence)
-            fit = to_pictures([to_silhouettes(best[0], NEAR if best[1].is_suspect(state.usual) else CLOSE)])
+            fit = to_pictures(
+                [to_silhouettes(best[0], NEAR if self._is_jointed or best[1].is_suspect(state.usual) else CLOSE)]
+            )
             if swaps := [
                 pose for pose in self._swapped(fit.pose) if is_nearer(self._synthesis.model, pose, fit.pose, best[0])
             ]:
                 fit = to_pictures([fit.pose, *swaps])
+        if self._is_jointed:
+            fit = self._with_limbs_found(fit, guesses, regions, posteriors, to_pictures, prior)
         return fit, agreed(fit.pose)
+
+    def _with_limbs_found(
+        self,
+        fit: Fit,
+        guesses: Sequence[Pose],
+        regions: Sequence[Region],
+        posteriors: Sequence[Array],
+        to_pictures: Callable[[Sequence[Pose]], Fit],
+        prior: Prior | None,
+    ) -> Fit:
+        """Look for each limb that lies on pixels unlike the body; keep what the pictures like better."""
+        maps = None
+        for limb in astray(self._synthesis, fit.pose, regions, posteriors):
+            maps = maps or evidence_of(regions, posteriors)
+            expected = [replace(fit.pose, joint_angles=_with_limb(fit.pose, guess, limb)) for guess in guesses]
+            found = look_for(self._synthesis, [fit.pose, *expected], limb, maps)
+            freedom = only(self._synthesis.model, limb)
+            found = [fit_silhouettes(self._synthesis, pose, regions, posteriors, NEAR, freedom) for pose in found]
+            fit = to_pictures([fit.pose, *found])
+        return fit
 
     def _swapped(self, pose: Pose) -> list[Pose]:
         """Return the poses with the limbs of one side in the places of the other's; none for a body in one piece."""
@@ -205,12 +230,12 @@ class Refined:
     def _to_silhouettes(
         self, pose: Pose, regions: Sequence[Region], posteriors: Sequence[Array], levels: Levels, prior: Prior | None
     ) -> Pose:
-        """Fit the masks level by level; the coarsest shows no more than the trunk."""
+        """Fit the masks level by level: on the coarser ones the trunk goes first."""
         for level in levels:
-            freedom = self._all
-            if self._is_jointed and self._order != "joint":
-                freedom = self._stages[0] if level[0] >= _TRUNK_AT else self._all
-            pose = fit_silhouettes(self._synthesis, pose, regions, posteriors, [level], freedom, prior)
+            if self._is_jointed and self._order != "joint" and level[0] >= _TRUNK_AT:
+                pose = fit_silhouettes(self._synthesis, pose, regions, posteriors, [level], self._stages[0], prior)
+            if not self._is_jointed or self._order == "joint" or level[0] <= _TRUNK_AT:
+                pose = fit_silhouettes(self._synthesis, pose, regions, posteriors, [level], self._all, prior)
         return pose
 
     def _to_pictures(
@@ -252,3 +277,10 @@ class Refined:
         for region in unknown:
             supplemented.learn_scene(region, self._synthesis.parts(posed, region) >= 0)
         return supplemented
+
+
+def _with_limb(pose: Pose, other: Pose, limb: NDArray[np.int64]) -> Array:
+    """Return the joint angles of a pose with one limb's taken from another."""
+    angles = pose.joint_angles.copy()
+    angles[limb - 1] = other.joint_angles[limb - 1]
+    return angles

@@ -48,7 +48,7 @@ def search_widely(
     regions = [r for r in regions_round(bodies, synthesis.geometry, frames, margin_px) if appearance.knows(r)]
     if not regions:
         return list(guesses)
-    maps = _evidence(regions, appearance)
+    maps = evidence_of(regions, [appearance.posterior(region) for region in regions])
     # candidates: which guess each comes from, and how far its root has moved from there
     origin, motions = np.arange(len(guesses)), np.zeros((len(guesses), 6))
     R, t = np.stack([body.R for body in bodies]), np.stack([body.t for body in bodies])
@@ -89,10 +89,11 @@ def _px_per_m(pose: Pose, frames: Frames) -> float:
     return float(max(scales, default=0.0))
 
 
-def _evidence(regions: Sequence[Region], appearance: Appearance) -> EvidenceMaps:
+def evidence_of(regions: Sequence[Region], posteriors: Sequence[Array]) -> EvidenceMaps:
+    """Turn the posteriors (h, w) of the regions into reduced maps of evidence [nats]."""
     cameras, planes = [], []
-    for region in regions:
-        camera, plane = reduced_region(region, appearance.posterior(region), _REDUCTION)
+    for region, posterior in zip(regions, posteriors, strict=True):
+        camera, plane = reduced_region(region, posterior, _REDUCTION)
         cameras.append(camera)
         planes.append(np.empty_like(plane))
         evidence(plane, planes[-1])
