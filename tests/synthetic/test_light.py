@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import BodyModel, Box, Part, Pose, Segment
+from airborne.body import BodyModel, Box, Ellipsoid, Part, Pose, Segment
 from airborne.rendering.srgb import light_from_srgb, srgb_from_light
-from airborne.synthetic.light import Ambient, Spot, boxes_of, is_lit, spot_light
+from airborne.synthetic.light import Ambient, Spot, balls_of, boxes_of, is_lit, spot_light
 from tests.tolerances import EXACT
 
 UP = np.array([[0.0, 0.0, 1.0]])
@@ -82,3 +82,53 @@ def test_light_brighter_than_white_is_clipped():
 def test_srgb_agrees_with_its_standard_at_known_levels(level):
     known = {0: 0.0, 10: 0.003035, 128: 0.215861, 255: 1.0}
     assert light_from_srgb(np.array(level)) == pytest.approx(known[level], abs=1e-6)
+
+
+NO_BOXES = np.zeros((0, 3, 4))
+
+
+def ball(centre, semi_axes, turn=None):
+    place = RigidTransform.from_components(np.array(centre, float), turn or Rotation.identity())
+    parts = (Part("ball", Ellipsoid(np.array(semi_axes, float)), place, None),)
+    model = BodyModel("ball", (Segment("ball", None, np.zeros(3), parts),))
+    return model.with_pose(Pose(world_from_root=RigidTransform.identity()))
+
+
+def test_shadow_of_an_ellipsoid_is_where_the_ray_comes_nearer_to_its_centre_than_its_core():
+    rng = np.random.default_rng(1)
+    points = np.column_stack([rng.uniform(-1.5, 1.5, (4000, 2)), np.zeros(4000)])
+    turn, semi_axes, centre = (
+        Rotation.from_rotvec([0.5, 0.9, -0.4]),
+        np.array([0.2, 0.35, 0.5]),
+        np.array([0.3, 0.1, 2]),
+    )
+    lit = is_lit(points, np.repeat(UP, 4000, axis=0), SPOT, NO_BOXES, balls_of(ball(centre, semi_axes, turn)))
+    start, end = (turn.inv().apply(p - centre) / semi_axes for p in (points, SPOT.position[None]))
+    way = end - start
+    nearest = start - np.sum(start * way, axis=1, keepdims=True) / np.sum(way**2, axis=1, keepdims=True) * way
+    distance = np.linalg.norm(nearest, axis=1)
+    is_sure = np.abs(distance - 0.93) > 5e-3
+    np.testing.assert_array_equal(lit[is_sure], (distance > 0.93)[is_sure])
+    assert 100 < np.count_nonzero(~lit) < 2000
+
+
+def test_ball_darkens_no_point_inside_it_before_it_or_beside_the_way():
+    balls = balls_of(ball((0, 0, 1), (0.5, 0.5, 0.5)))
+    points = np.array([[0, 0, 1.0], [0.1, 0, 1.3], [0, 0, 3.0], [1.5, 0, 1.0], [0, 0, 0.0]])
+    lit = is_lit(points, np.repeat(UP, 5, axis=0), SPOT, NO_BOXES, balls)
+    np.testing.assert_array_equal(lit, [True, True, True, True, False])
+
+
+def test_two_parts_cut_from_one_ellipsoid_block_light_as_one():
+    whole = Part("ball", Ellipsoid(np.ones(3)), RigidTransform.identity(), None)
+    halves = tuple(
+        Part(name, whole.shape, whole.segment_from_part, None, slab)
+        for name, slab in (("below", (-np.inf, 0.1)), ("above", (0.1, np.inf)))
+    )
+    posed = [
+        BodyModel("ball", (Segment("ball", None, np.zeros(3), parts),)).with_pose(
+            Pose(world_from_root=RigidTransform.identity())
+        )
+        for parts in ((whole,), halves)
+    ]
+    np.testing.assert_array_equal(balls_of(posed[0]), balls_of(posed[1]))

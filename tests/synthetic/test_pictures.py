@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
+from scipy.spatial.transform import RigidTransform
 
-from airborne.body import geometry
+from airborne.body import BodyModel, Ellipsoid, Part, Segment, geometry
 from airborne.rendering.srgb import light_from_srgb
 from airborne.synthetic import frames, thrown_cross
 from airborne.synthetic.pictures import background, linear_picture, surface
@@ -147,3 +149,29 @@ def test_background_fills_every_camera_of_a_preset():
     scene = small_scene()
     for camera in scene.rig:
         assert background(scene, camera).ambient.min() > 0
+
+
+def test_surface_points_of_an_ellipsoid_lie_on_it():
+    semi_axes = np.array([0.3, 0.2, 0.12])
+    part = Part("ball", Ellipsoid(semi_axes), RigidTransform.identity(), None)
+    ball = BodyModel("ball", (Segment("ball", None, np.zeros(3), (part,)),))
+    scene = small_scene()
+    posed = ball.with_pose(scene.flight(np.array([0.1])).pose(0))
+    seen = surface(geometry(ball), posed, scene.rig["cam1"])
+    inside = (seen.points - posed.t[0]) @ posed.R[0] / semi_axes
+    np.testing.assert_allclose(np.linalg.norm(inside, axis=1), 1.0, atol=1e-4)
+    facing = np.einsum("ni,ni->n", seen.normals, (inside / semi_axes) @ posed.R[0].T)
+    np.testing.assert_allclose(facing, np.linalg.norm(inside / semi_axes, axis=1), rtol=1e-4)
+
+
+def test_surroundings_that_are_not_there_are_black_and_the_body_is_as_before_others():
+    scene = small_scene(scale=2, blur_px=0.0, spots=())
+    camera, posed = scene.rig["cam1"], posed_at(scene, [0.1])
+    alone = replace(scene, surroundings=None)
+    mask = surface(geometry(scene.body), posed[0], camera).mask
+    light = linear_picture(alone, background(alone, camera), posed)
+    inside, outside = (cv2.erode(m.astype(np.uint8), np.ones((3, 3))) > 0 for m in (mask, ~mask))
+    assert np.all(light[outside] == 0)
+    before = linear_picture(scene, background(scene, camera), posed)
+    np.testing.assert_allclose(light[inside], before[inside], atol=1e-6)
+    assert np.count_nonzero(inside) > 100

@@ -19,7 +19,7 @@ def flown(scene):
 
 def share_along_momentum(scene, axis):
     """Return the cosine between a body axis and the angular momentum at the first and the last field."""
-    mass, flight = mass_of(scene.body, scene.density_kg_m3), flown(scene)
+    mass, flight = mass_of(scene.body, scene.flight.density_kg_m3), flown(scene)
     momentum = flight.R[0] @ mass.inertia @ flight.angular_velocity[0]
     return flight.R[[0, -1], :, axis] @ momentum / np.linalg.norm(momentum)
 
@@ -62,7 +62,7 @@ def test_fields_and_rate_are_those_of_the_paper():
 
 def test_seed_varies_the_throw_and_the_background():
     one, two = thrown_cross(seed=1), thrown_cross(seed=2)
-    assert np.abs(one.launch.angular_velocity - two.launch.angular_velocity).max() > 1e-3
+    assert np.abs(one.flight.launch.angular_velocity - two.flight.launch.angular_velocity).max() > 1e-3
     assert np.abs(geometry(one.surroundings).corners - geometry(two.surroundings).corners).max() > 0.1
 
 

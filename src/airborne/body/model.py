@@ -36,10 +36,11 @@ class Box:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """A closed triangle mesh, faces counter-clockwise from outside."""
+    """A triangle mesh, faces counter-clockwise from outside; closed by itself or with the segment's other parts."""
 
     vertices_m: Array  # (v, 3) [m]
     faces: NDArray[np.integer]  # (f, 3)
+    normals: Array | None = None  # (v, 3) unit, outward, for smooth shading; None: each face has its own
 
 
 Shape = Ellipsoid | Box | Mesh
@@ -65,6 +66,12 @@ class Part:
             raise BodyError(f"part '{self.name}': slab_m is [{low}, {high}]; give the lower height first, in metres")
         if self.slab_m != WHOLE and not isinstance(self.shape, Ellipsoid):
             raise BodyError(f"part '{self.name}': only an ellipsoid can be cut to a slab; leave slab_m out")
+        if isinstance(self.shape, Ellipsoid):
+            top = self.shape.semi_axes_m[2]
+            if low >= top or high <= -top:
+                raise BodyError(
+                    f"part '{self.name}': slab_m [{low}, {high}] misses the ellipsoid, [{-top:g}, {top:g}]; move it"
+                )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -45,11 +45,14 @@ class Flight:
     position: Array  # (n, 3) world [m]
     R: Array  # (n, 3, 3) world from root
     centre: Array  # (n, 3) centre of mass, world [m]
-    angular_velocity: Array  # (n, 3) in the root's frame [rad/s]
+    angular_velocity: Array  # (n, 3) of the root, in its own frame [rad/s]
+    joint_angles: Array  # (n, joints, 3) [rad]; no joints where the body flew stiff and straight
+    angular_momentum: Array  # (n, 3) about the centre of mass, world [kg m^2/s]; NaN where not known
 
     def pose(self, i: int) -> Pose:
-        """Return the i-th sample as a pose, joints straight."""
-        return Pose(world_from_root=RigidTransform.from_components(self.position[i], Rotation.from_matrix(self.R[i])))
+        """Return the i-th sample as a pose."""
+        root = RigidTransform.from_components(self.position[i], Rotation.from_matrix(self.R[i]))
+        return Pose(world_from_root=root, joint_angles=self.joint_angles[i])
 
 
 def mass_of(model: BodyModel, density_kg_m3: float) -> Mass:
@@ -103,4 +106,13 @@ def fly(mass: Mass, launch: Launch, time_s: Array) -> Flight:
     R = Rotation.from_quat(states[:, :4]).as_matrix()
     t = time_s[:, None]
     centre = launch.centre + launch.velocity * t + GRAVITY_M_S2 * t**2 / 2
-    return Flight(time_s=time_s, position=centre - R @ mass.centre, R=R, centre=centre, angular_velocity=states[:, 4:])
+    w = states[:, 4:]
+    return Flight(
+        time_s=time_s,
+        position=centre - R @ mass.centre,
+        R=R,
+        centre=centre,
+        angular_velocity=w,
+        joint_angles=np.zeros((len(time_s), 0, 3)),
+        angular_momentum=np.einsum("nij,nj->ni", R @ mass.inertia, w),
+    )

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airborne.body import Box, PosedBody
+from airborne.body import Box, Ellipsoid, Part, PosedBody
 
 Array = NDArray[np.floating]
 
 _CLEARANCE_M = 1e-3  # a surface is no obstacle to itself
+_CORE = (
+    0.93  # share of an ellipsoid's size that blocks light: a smooth skin lies partly inside the ellipsoid it is over
+)
+_NOTHING = np.zeros((0, 3, 4))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,6 +43,9 @@ class Ambient:
         return upward * self.from_above + (1 - upward) * self.from_below
 
 
+DARK = Ambient(np.zeros(3), np.zeros(3))
+
+
 def spot_light(spot: Spot, points: Array, normals: Array) -> Array:
     """Return the light (n, 3) of a spot that nothing blocks, on matt surfaces at the world points (n, 3) [m]."""
     ray = spot.position - points
@@ -54,21 +62,48 @@ def boxes_of(*bodies: PosedBody) -> Array:
     """Return the boxes of bodies as maps (b, 3, 4) from the world to a cube from -1 to 1; no other shapes."""
     maps = []
     for posed in bodies:
-        for segment, R, t in zip(posed.model.segments, posed.R, posed.t, strict=True):
-            for part in segment.parts:
-                if isinstance(part.shape, Box):
-                    turn = R @ part.segment_from_part.rotation.as_matrix()
-                    place = R @ part.segment_from_part.translation + t
-                    unit_from_world = 2 * turn.T / part.shape.size_m[:, None]
-                    maps.append(np.column_stack([unit_from_world, -unit_from_world @ place]))
+        for part, turn, place in _placed(posed):
+            if isinstance(part.shape, Box):
+                maps.append(_to_unit(2 * turn.T / part.shape.size_m[:, None], place))
     return np.array(maps).reshape(-1, 3, 4)
 
 
-def is_lit(points: Array, normals: Array, spot: Spot, boxes: Array) -> NDArray[np.bool_]:
-    """Say which world points (n, 3) [m] see the spot light past the boxes (b, 3, 4) of `boxes_of`: (n,)."""
+def balls_of(*bodies: PosedBody) -> Array:
+    """Return the cores of bodies' ellipsoids, 0.93 of their size, as maps (e, 3, 4) from the world to the unit ball.
+
+    Ellipsoids that are cut count as whole ones.
+    """
+    maps = []
+    for posed in bodies:
+        for part, turn, place in _placed(posed):
+            if isinstance(part.shape, Ellipsoid):
+                maps.append(_to_unit(turn.T / (_CORE * part.shape.semi_axes_m[:, None]), place))
+    return np.unique(np.array(maps).reshape(-1, 3, 4), axis=0)
+
+
+def is_lit(points: Array, normals: Array, spot: Spot, boxes: Array, balls: Array = _NOTHING) -> NDArray[np.bool_]:
+    """Say which world points (n, 3) [m] see the spot past the boxes of `boxes_of` and balls of `balls_of`: (n,).
+
+    A ball does not darken points inside it.
+    """
     out = np.empty(len(points), np.bool_)
-    _see(points + _CLEARANCE_M * normals, np.asarray(spot.position, float), boxes, out)
+    start, target = points + _CLEARANCE_M * normals, np.asarray(spot.position, float)
+    _see(start, target, boxes, out)
+    if len(balls):
+        _see_past_balls(start, target, balls, out)
     return out
+
+
+def _placed(posed: PosedBody) -> Iterator[tuple[Part, Array, Array]]:
+    """Give every part with its turn (3, 3) and place (3,) [m] in the world."""
+    for segment, R, t in zip(posed.model.segments, posed.R, posed.t, strict=True):
+        for part in segment.parts:
+            place = part.segment_from_part
+            yield part, R @ place.rotation.as_matrix(), R @ place.translation + t
+
+
+def _to_unit(unit_from_world: Array, place: Array) -> Array:
+    return np.column_stack([unit_from_world, -unit_from_world @ place])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -92,5 +127,28 @@ def _see(points, target, boxes, out):
                 if enter >= leave:
                     break
             if enter < leave:
+                out[i] = False
+                break
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _see_past_balls(points, target, balls, out):
+    ends = np.empty((len(balls), 3))  # the target, as each ball sees it
+    for e in range(len(balls)):
+        for k in range(3):
+            ends[e, k] = balls[e, k, 3]
+            for j in range(3):
+                ends[e, k] += balls[e, k, j] * target[j]
+    for i in range(len(points)):
+        if not out[i]:
+            continue
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        for e in range(len(balls)):
+            inside, along, way = -1.0, 0.0, 0.0  # |p|^2 - 1, p.d and |d|^2 of the point p and the way d to the target
+            for k in range(3):
+                p = balls[e, k, 0] * x + balls[e, k, 1] * y + balls[e, k, 2] * z + balls[e, k, 3]
+                d = ends[e, k] - p
+                inside, along, way = inside + p * p, along + p * d, way + d * d
+            if inside > 0 and along < 0 and -along < way and along * along > way * inside:
                 out[i] = False
                 break

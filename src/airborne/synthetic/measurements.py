@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from airborne.body import Box, Pose
+from airborne.body.chain import moved_pose
 from airborne.cameras import ControlPoints, Rig
 from airborne.synthetic.flight import Flight
 from airborne.synthetic.scene import Scene
@@ -57,11 +59,19 @@ def digitised(scene: Scene, flight: Flight) -> dict[str, Array]:
 
 
 def start_pose(scene: Scene) -> Pose:
-    """Return the first pose as set by hand: off by `start_error_m` and `start_error_rad`, in random directions."""
+    """Return the first pose as set by hand: root and joints off by the scene's start errors, in random directions.
+
+    Joint angles stay within the joints' limits.
+    """
     rng = np.random.default_rng([scene.seed, 5])
     offset, axis = (direction / np.linalg.norm(direction) for direction in rng.normal(size=(2, 3)))
     true = scene.flight(np.zeros(1)).pose(0)
-    return true.moved(scene.start_error_m * offset, scene.start_error_rad * axis)
+    turns = rng.normal(size=true.joint_angles.shape)
+    turns = scene.start_joint_error_rad * turns / np.linalg.norm(turns, axis=1, keepdims=True)
+    motion = np.concatenate([scene.start_error_m * offset, scene.start_error_rad * axis, turns.ravel()])
+    pose = moved_pose(true, motion)
+    lowest, highest = np.moveaxis(scene.model.limits_rad, -1, 0)
+    return replace(pose, joint_angles=np.clip(pose.joint_angles, lowest, highest))
 
 
 def lights_table(scene: Scene) -> dict:

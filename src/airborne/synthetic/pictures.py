@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
 from typing import NamedTuple
 
 import cv2
@@ -13,11 +15,13 @@ from scipy.spatial.transform import RigidTransform
 
 from airborne.body import BodyModel, Geometry, Pose, PosedBody, geometry
 from airborne.cameras import Camera
+from airborne.rendering import FLAT, render
 from airborne.rendering.maps import surface_maps
 from airborne.rendering.packing import packed_view
 from airborne.rendering.shapes import new_shapes
 from airborne.rendering.srgb import light_from_srgb, srgb_from_light
-from airborne.synthetic.light import boxes_of, is_lit, spot_light
+from airborne.synthetic.exact import exact_frames
+from airborne.synthetic.light import balls_of, boxes_of, is_lit, spot_light
 from airborne.synthetic.scene import Scene
 from airborne.video import Frames, View
 
@@ -25,6 +29,7 @@ Array = NDArray[np.floating]
 
 _BODY_SAMPLES, _BACKGROUND_SAMPLES = 3, 2  # a pixel's side is cut into so many
 _EXPOSURE_SAMPLES = 3  # moments within an exposure
+_SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))  # (8, 3) of a box's corners
 _SHARED_NOISE = 0.9  # part of the noise's variance that the three channels share
 
 
@@ -53,6 +58,9 @@ def frames(scene: Scene) -> Iterator[Frames]:
 
     The same scene gives the same pixels, whatever is drawn before or beside it.
     """
+    if scene.lights is not None:
+        yield from exact_frames(scene, scene.lights)
+        return
     backgrounds = [background(scene, camera) for camera in scene.rig]
     cameras = [[camera.field(p) for p in (0, 1)] if scene.is_interlaced else [camera] for camera in scene.rig]
     offsets = (np.arange(_EXPOSURE_SAMPLES) - (_EXPOSURE_SAMPLES - 1) / 2) / _EXPOSURE_SAMPLES * scene.exposure_s
@@ -74,8 +82,12 @@ def frames(scene: Scene) -> Iterator[Frames]:
 def background(scene: Scene, camera: Camera) -> Background:
     """Light the surroundings for one camera; what it sees beside them is black."""
     n = _BACKGROUND_SAMPLES
-    still = scene.surroundings.with_pose(Pose(world_from_root=RigidTransform.identity()))
     width, height = camera.size
+    if scene.surroundings is None:
+        black = np.zeros((len(scene.spots), height, width, 3), np.float32)
+        none = np.zeros((height, width, 3))
+        return Background(camera, none, none, none.astype(np.float32), black)
+    still = scene.surroundings.with_pose(Pose(world_from_root=RigidTransform.identity()))
     seen = surface(geometry(scene.surroundings), still, _sampled(camera, n, (0, 0, width, height)))
     boxes = boxes_of(still)
     spots = [
@@ -94,7 +106,7 @@ def linear_picture(scene: Scene, backdrop: Background, exposed: Sequence[PosedBo
     x0, y0, x1, y1 = _region(scene.body, exposed, backdrop.camera)
     if x1 > x0 and y1 > y0:
         camera = _sampled(backdrop.camera, _BODY_SAMPLES, (x0, y0, x1, y1))
-        flat = geometry(scene.body)
+        flat = _flat(scene.body)
         coverage = np.zeros((y1 - y0, x1 - x0, 1))
         colour = np.zeros((y1 - y0, x1 - x0, 3))
         for posed in exposed:
@@ -114,7 +126,9 @@ def surface(flat: Geometry, posed: PosedBody, camera: Camera) -> Surface:
     inverse_depth = np.empty((height, width), np.float32)
     normals = np.empty((3, height, width), np.float32)
     surface_maps(new_shapes(flat), flat, posed.R, posed.t, packed_view(camera), part, inverse_depth, normals)
-    mask = part >= 0
+    if len(flat.ellipsoid_part):  # the maps hold the depth of an ellipsoid's outline, not of its surface
+        inverse_depth = render(flat, posed, camera, FLAT).inverse_depth
+    mask = (part >= 0) & (inverse_depth > 0)
     v, u = np.nonzero(mask)
     rays = np.column_stack([u, v, np.ones(len(u))]) @ np.linalg.inv(camera.K).T
     world_from_camera = camera.camera_from_world.inv()
@@ -128,21 +142,28 @@ def surface(flat: Geometry, posed: PosedBody, camera: Camera) -> Surface:
 
 def _lit(scene: Scene, posed: PosedBody, seen: Surface) -> Array:
     """Return the light (n, 3) that the body's surface sends out; its parts shadow each other."""
-    boxes = boxes_of(posed)
+    blockers = _blockers(scene, posed)
     light = scene.ambient.on(seen.normals)
     for spot in scene.spots:
-        light += spot_light(spot, seen.points, seen.normals) * is_lit(seen.points, seen.normals, spot, boxes)[:, None]
+        is_free = is_lit(seen.points, seen.normals, spot, *blockers)
+        light += spot_light(spot, seen.points, seen.normals) * is_free[:, None]
     return light * seen.albedo
 
 
 def _shadowed(scene: Scene, backdrop: Background, posed: PosedBody) -> NDArray[np.float32]:
     """Return the background (h, w, 3) with the body's shadow on it."""
     light = backdrop.ambient.copy()
-    boxes = boxes_of(posed)
+    blockers = _blockers(scene, posed)
     points, normals = backdrop.points.reshape(-1, 3), backdrop.normals.reshape(-1, 3)
     for spot, part in zip(scene.spots, backdrop.spots, strict=True):
-        light += part * is_lit(points, normals, spot, boxes).reshape(*part.shape[:2], 1)
+        light += part * is_lit(points, normals, spot, *blockers).reshape(*part.shape[:2], 1)
     return light
+
+
+def _blockers(scene: Scene, posed: PosedBody) -> tuple[Array, Array]:
+    """Return the boxes and balls that keep light away, those of the simple body where the one drawn is a mesh."""
+    solid = PosedBody(scene.model, posed.R, posed.t)
+    return boxes_of(solid), balls_of(solid)
 
 
 def _recorded(light: NDArray[np.float32], noise_sd: float, rng: np.random.Generator) -> NDArray[np.uint8]:
@@ -153,16 +174,29 @@ def _recorded(light: NDArray[np.float32], noise_sd: float, rng: np.random.Genera
 
 
 def _region(model: BodyModel, exposed: Sequence[PosedBody], camera: Camera) -> tuple[int, int, int, int]:
-    """Return the part of the image, x0, y0, x1, y1, that holds a body of boxes; the whole, if it reaches behind."""
-    flat = geometry(model)
-    segment = np.repeat(flat.polygon_segment, np.diff(flat.start))
-    corners = [np.einsum("nij,nj->ni", b.R[segment], flat.corners) + b.t[segment] for b in exposed]
-    px = camera.px_from_world(np.concatenate(corners))
+    """Return the part of the image, x0, y0, x1, y1, that holds a body; the whole, if it reaches behind."""
+    segment, corners = _corners(_flat(model))
+    placed = [np.einsum("nij,nj->ni", b.R[segment], corners) + b.t[segment] for b in exposed]
+    px = camera.px_from_world(np.concatenate(placed))
     width, height = camera.size
     if not np.isfinite(px).all():
         return 0, 0, width, height
     (x0, y0), (x1, y1) = np.floor(px.min(axis=0)).astype(int), np.ceil(px.max(axis=0)).astype(int) + 1
     return max(x0, 0), max(y0, 0), min(x1, width), min(y1, height)
+
+
+def _corners(flat: Geometry) -> tuple[NDArray[np.int64], Array]:
+    """Return points (n, 3) round the body, in the segments' frames, and their segments (n,)."""
+    axes = flat.ellipsoid_axes * flat.ellipsoid_semi_axes[:, None, :]
+    round_ellipsoids = flat.ellipsoid_centre[:, None] + np.einsum("eij,cj->eci", axes, _SIGNS)
+    of_ellipsoids = np.repeat(flat.ellipsoid_segment, len(_SIGNS))
+    of_polygons = np.repeat(flat.polygon_segment, np.diff(flat.start))
+    return np.concatenate([of_polygons, of_ellipsoids]), np.concatenate([flat.corners, round_ellipsoids.reshape(-1, 3)])
+
+
+@lru_cache(maxsize=4)
+def _flat(model: BodyModel) -> Geometry:
+    return geometry(model)
 
 
 def _sampled(camera: Camera, n: int, region: tuple[int, int, int, int]) -> Camera:

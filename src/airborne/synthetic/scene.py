@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Literal, get_args
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,9 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import BodyModel, Box, Part, Segment
 from airborne.cameras import Camera, Rig
 from airborne.errors import TrialError
+from airborne.rendering import Lights
 from airborne.synthetic.flight import Flight, Launch, fly, mass_of
-from airborne.synthetic.light import Ambient, Spot
+from airborne.synthetic.light import DARK, Ambient, Spot
 from airborne.synthetic.surroundings import gym
 
 Array = NDArray[np.floating]
@@ -29,24 +31,52 @@ _CAMERAS = {  # position, target [m], focal length [px]
     "above": ((0.03, -0.95, 6.1), (0.0, -0.02, 1.5), 1040.0),
 }
 _FACING = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # world from root: long bar up, broad side to y < 0
+HALL_AMBIENT = Ambient(np.array([0.16, 0.165, 0.18]), np.array([0.10, 0.085, 0.07]))
+
+
+class Course(Protocol):
+    """How a body moves."""
+
+    def __call__(self, time_s: Array) -> Flight:
+        """Return the motion at the times (n,) [s]."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Throw:
+    """The flight of a stiff body of boxes, of one density."""
+
+    body: BodyModel
+    density_kg_m3: float
+    launch: Launch
+
+    def __call__(self, time_s: Array) -> Flight:
+        """Return the motion at the times (n,) [s]."""
+        return fly(mass_of(self.body, self.density_kg_m3), self.launch, time_s)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Scene:
-    """A rigid body of boxes in free flight before a still background, and how it is recorded and measured."""
+    """A body in flight before a still background, and how it is recorded and measured.
+
+    With `lights`, pictures are exact: every pixel's centre in the tracker's own light, without blur or exposure (paper
+    B, "Method"); `spots` and `ambient` then count for nothing. Without, they are what a camera in a hall would record.
+    """
 
     name: str
     seed: int  # of everything random
     rig: Rig  # cameras without distortion
-    body: BodyModel  # made of boxes
-    density_kg_m3: float
-    launch: Launch
-    surroundings: BodyModel  # of boxes, standing still, in world coordinates; the body flies before them
-    spots: tuple[Spot, ...]
-    ambient: Ambient
+    body: BodyModel  # as drawn
+    flight: Course  # the true motion at given times
+    surroundings: BodyModel | None  # standing still, in world coordinates; the body flies before them; None: black
+    spots: tuple[Spot, ...] = ()
+    ambient: Ambient = DARK
+    lights: Lights | None = None
+    tracking_body: BodyModel | None = None  # what the trial tells of the body, and what casts its shadow; None: `body`
     n_pictures: int  # of each camera that the truth covers: fields where interlaced
     rate: Fraction  # pictures of each camera [1/s]
     is_interlaced: bool  # pictures are fields, the top one first
+    is_surveyed: bool = True  # calibrated from control points; else the trial has the exact cameras
     exposure_s: float = 0.002  # centred on the picture's time
     blur_px: float = 0.5  # sd of the lens's blur
     noise_sd: float = 6.0  # of the sensor [grey levels]
@@ -54,6 +84,12 @@ class Scene:
     digitising_sd_px: float = 1.2  # of the body's points
     start_error_m: float = 0.025  # length of the hand-set start's offset
     start_error_rad: float = np.radians(3.0)
+    start_joint_error_rad: float = 0.0  # of every joint
+
+    @property
+    def model(self) -> BodyModel:
+        """The body as the trial tells it."""
+        return self.tracking_body or self.body
 
     @property
     def n_shown(self) -> int:
@@ -67,10 +103,6 @@ class Scene:
     def parity(self, index: int) -> int:
         """Return which rows of the frame a field has: 0 those from the top row on, 1 the others."""
         return index % 2
-
-    def flight(self, time_s: Array) -> Flight:
-        """Return the true motion at the times (n,) [s]."""
-        return fly(mass_of(self.body, self.density_kg_m3), self.launch, time_s)
 
 
 def thrown_cross(preset: Preset = "half-twist", *, seed: int = 0, clutter: int = 14) -> Scene:
@@ -91,16 +123,16 @@ def thrown_cross(preset: Preset = "half-twist", *, seed: int = 0, clutter: int =
         R=turn @ _FACING,
         angular_velocity=np.array([0.5, 0.35, -8.2] if is_side else [10.0, 3.0, 0.3]) + rng.normal(0, 0.1, 3),
     )
+    body = _cross()
     return Scene(
         name=f"thrown cross, {'side' if is_side else 'half-twisting'} somersault",
         seed=seed,
-        rig=Rig(tuple(_aimed(f"cam{i}", *place) for i, place in enumerate(_CAMERAS.values(), start=1))),
-        body=_cross(),
-        density_kg_m3=PINE_KG_M3,
-        launch=launch,
+        rig=Rig(tuple(aimed(f"cam{i}", *place) for i, place in enumerate(_CAMERAS.values(), start=1))),
+        body=body,
+        flight=Throw(body, PINE_KG_M3, launch),
         surroundings=gym(rng, clutter=clutter),
-        spots=_spots(rng),
-        ambient=Ambient(np.array([0.16, 0.165, 0.18]), np.array([0.10, 0.085, 0.07])),
+        spots=hall_spots(rng),
+        ambient=HALL_AMBIENT,
         n_pictures=39 if is_side else 34,
         rate=Fraction(50),
         is_interlaced=True,
@@ -116,7 +148,8 @@ def _cross() -> BodyModel:
     return BodyModel("wooden cross", (Segment("cross", None, np.zeros(3), parts),))
 
 
-def _spots(rng: np.random.Generator) -> tuple[Spot, ...]:
+def hall_spots(rng: np.random.Generator) -> tuple[Spot, ...]:
+    """Return two spot lights, left and right in front of the flight, about where the generator puts them."""
     places = np.array([[-3.0, -3.2, 3.7], [3.2, -2.5, 3.9]]) + rng.normal(0, 0.15, (2, 3))
     targets = np.array([[-0.2, 0.3, 1.3], [0.3, 0.2, 1.5]]) + rng.normal(0, 0.1, (2, 3))
     light = np.array([[1.0, 0.97, 0.9], [0.96, 0.97, 1.0]]) * rng.uniform([[19.5], [16.0]], [[22.5], [19.0]])
@@ -126,9 +159,9 @@ def _spots(rng: np.random.Generator) -> tuple[Spot, ...]:
     )
 
 
-def _aimed(name: str, position, target, focal_px: float) -> Camera:
-    """Return a camera that looks from one world point to another, level."""
-    position, forward = np.array(position), np.subtract(target, position)
+def aimed(name: str, position: Sequence[float], target: Sequence[float], focal_px: float) -> Camera:
+    """Return a camera of 768 x 576 pixels that looks from one world point (3,) to another [m], level."""
+    centre, forward = np.array(position), np.subtract(target, position)
     forward = forward / np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -138,5 +171,5 @@ def _aimed(name: str, position, target, focal_px: float) -> Camera:
         name=name,
         K=np.array([[focal_px, 0, (width - 1) / 2], [0, focal_px, (height - 1) / 2], [0, 0, 1]]),
         size=_SIZE,
-        camera_from_world=RigidTransform.from_components(-R @ position, Rotation.from_matrix(R)),
+        camera_from_world=RigidTransform.from_components(-R @ centre, Rotation.from_matrix(R)),
     )
