@@ -5,7 +5,14 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Ellipsoid, Landmark, Part, Pose, Segment
-from airborne.body.chain import joint_angles_of, moved_pose, nearest_angles, point_jacobian, segment_jacobians
+from airborne.body.chain import (
+    joint_angles_of,
+    motion_between,
+    moved_pose,
+    nearest_angles,
+    point_jacobian,
+    segment_jacobians,
+)
 from airborne.geometry.rotations import matrix_from_angles
 from tests.tolerances import EXACT, ROUNDTRIP
 
@@ -97,6 +104,15 @@ def test_turning_a_joint_back_undoes_the_turn(seed):
     np.testing.assert_allclose(back.world_from_root.as_matrix(), pose.world_from_root.as_matrix(), atol=ROUNDTRIP)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_motion_between_two_poses_takes_the_one_to_the_other(seed):
+    motion = 0.3 * np.random.default_rng(seed).normal(size=n_motion(MODEL))
+    pose = a_pose(MODEL, seed)
+    np.testing.assert_allclose(motion_between(pose, moved_pose(pose, motion)), motion, atol=ROUNDTRIP)
+    rigid = Pose(world_from_root=pose.world_from_root)
+    np.testing.assert_allclose(motion_between(rigid, moved_pose(rigid, motion[:6])), motion[:6], atol=ROUNDTRIP)
+
+
 def test_a_joint_turns_about_its_own_axes_after_its_angles():
     pose, motion = a_pose(MODEL), np.zeros(n_motion(MODEL))
     motion[6 + 3 * 3 : 9 + 3 * 3] = [0.2, -0.4, 0.1]  # the joint of the fourth segment after the root
@@ -116,7 +132,6 @@ def test_missing_joint_angles_are_straight_joints():
 
 
 def test_angles_run_smoothly_through_a_right_angle():
-    model = BodyModel("two", body().segments[:2])
     motion, poses = np.array([0.0] * 7 + [0.02, 0.0]), [Pose(world_from_root=RigidTransform.identity())]
     poses[0] = Pose(world_from_root=RigidTransform.identity(), joint_angles=np.array([[0.3, 1.4, 0.0]]))
     for _ in range(20):
@@ -127,7 +142,6 @@ def test_angles_run_smoothly_through_a_right_angle():
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_x_stays_as_it_was_exactly_at_a_right_angle(sign):
-    model = BodyModel("two", body().segments[:2])
     angles = np.array([[0.7, sign * np.pi / 2, -0.4]])
     pose = Pose(world_from_root=RigidTransform.identity(), joint_angles=angles)
     np.testing.assert_allclose(moved_pose(pose, np.zeros(9)).joint_angles, angles, atol=ROUNDTRIP)

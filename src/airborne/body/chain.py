@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from airborne.body.model import BodyModel, Pose, PosedBody
-from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
+from airborne.geometry.joint_turns import turned, turns_between
+from airborne.geometry.rotations import angles_from_matrix
 
 Array = NDArray[np.floating]
 
@@ -31,9 +31,7 @@ def moved_pose(pose: Pose, motion: Array) -> Pose:
     n_joints = (len(motion) - 6) // 3
     if not n_joints:
         return moved
-    angles = _angles_of(pose, n_joints)
-    turns = Rotation.from_rotvec(np.reshape(motion[6:], (n_joints, 3))).as_matrix()
-    return replace(moved, joint_angles=_angles_near(matrix_from_angles(angles) @ turns, angles))
+    return replace(moved, joint_angles=turned(_angles_of(pose, n_joints), np.reshape(motion[6:], (n_joints, 3))))
 
 
 def motion_between(earlier: Pose, later: Pose) -> Array:
@@ -43,9 +41,8 @@ def motion_between(earlier: Pose, later: Pose) -> Array:
     n_joints = max(len(earlier.joint_angles), len(later.joint_angles))
     if not n_joints:
         return root
-    first, second = (matrix_from_angles(_angles_of(pose, n_joints)) for pose in (earlier, later))
-    turns = Rotation.from_matrix(np.swapaxes(first, -1, -2) @ second)
-    return np.concatenate([root, turns.as_rotvec().ravel()])
+    turns = turns_between(_angles_of(earlier, n_joints), _angles_of(later, n_joints))
+    return np.concatenate([root, turns.ravel()])
 
 
 def joint_angles_of(model: BodyModel, R: Array, near: Array | None = None) -> Array:
@@ -103,7 +100,7 @@ def point_jacobian(posed: PosedBody, segment: int | NDArray[np.integer], points:
 
 def _angles_of(pose: Pose, n_joints: int) -> Array:
     """Return the joint angles (joints, 3) of a pose, which leaves them out where all joints are straight."""
-    return pose.joint_angles if pose.joint_angles.size else np.zeros((n_joints, 3))
+    return np.asarray(pose.joint_angles, float) if pose.joint_angles.size else np.zeros((n_joints, 3))
 
 
 def _is_carried(model: BodyModel) -> NDArray[np.bool_]:

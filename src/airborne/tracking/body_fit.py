@@ -31,13 +31,13 @@ from airborne.video import Frames
 Array = NDArray[np.floating]
 Progress = Callable[[int, int], None]  # steps done, steps expected
 
-LEVELS_PX_PER_M = (60.0, 110.0, 180.0)  # of the pictures that are compared, coarse to fine
+LEVELS_PX_PER_M = (60.0, 100.0, 150.0)  # of the pictures that are compared, coarse to fine
 JOINT_SD_M = 0.025  # of a landmark of weight 1
 _EXPECTED_SD = (0.1, 0.2, 0.25)  # of a pose about the landmarks' own: [m], [rad], [rad]
-_MOST_STEPS = 5  # a level
-_SETTLED = 2e-3  # of the objective
+_MOST_STEPS = 4  # a level
+_SETTLED = 3e-3  # of the objective
 _SHORTER, _MOST_SHORTER = 0.4, 3
-_MARGIN_PX = 24
+_MARGIN_M, _LEAST_MARGIN_PX = 0.1, 8  # round the body, that it may move in
 _LEVER_M = 0.3  # a turn by which this far out a point moves a pixel is a step
 _FATTER = (1.5, 1.25, 1.15)  # the body by which the empty scene is learned, level by level
 
@@ -125,9 +125,10 @@ def fit_body(
     state = _State(np.zeros(len(knobs)), first[: len(sightings)])
     told = progress or (lambda done, expected: None)
     for number, px_per_m in enumerate(LEVELS_PX_PER_M):
+        margin_px = max(_LEAST_MARGIN_PX, round(_MARGIN_M * px_per_m))
         now = shaped(start, knobs, state.shape)
         pictures = [reduced(each.frames, now.with_pose(first[0]), px_per_m) for each in every]
-        plates = _plates(now, pictures, (*state.poses, *first[len(sightings) :]), _FATTER[number])
+        plates = _plates(now, pictures, (*state.poses, *first[len(sightings) :]), _FATTER[number], margin_px)
         seen = pictures[: len(sightings)]
         worn, borders = _dressed(now, state.poses, seen)
         level = _Level(
@@ -136,7 +137,7 @@ def fit_body(
             priors=tuple(Prior(pose, _expected_sd(start)) for pose in first[: len(sightings)]),
             known=known,
             weights=np.array([(weights or {}).get(mark.name, 1.0) for mark in model.landmarks]),
-            views=_laid(worn, state.poses, seen, plates),
+            views=_laid(worn, state.poses, seen, plates, margin_px),
             step_m=1 / px_per_m,
         )
         for step in range(_MOST_STEPS):
@@ -173,13 +174,15 @@ def _stepped(level: _Level, state: _State) -> _State | None:
     freedom, k = all_joints(here.model), len(size)
     found, systems = NOTHING, []
     for index, (pose, views) in enumerate(zip(state.poses, level.views, strict=True)):
-        pairs = [(up, up.place(pose), down, down.place(pose), step) for up, down, step in nudged]
-        pairs += _moved_pairs(here, pose, level.step_m)
-        posed, H, g = here.place(pose), np.zeros((len(pairs),) * 2), np.zeros(len(pairs))
+        posed = here.place(pose)
+        steps: list = [((up, up.place(pose)), (down, down.place(pose)), step) for up, down, step in nudged]
+        steps += _moved(here, pose, level.step_m)
+        H, g = np.zeros((len(steps),) * 2), np.zeros(len(steps))
         for view in views:
-            misfit_here, own_H, own_g = equations(here, posed, view, pairs)
+            misfit_here, own_H, own_g = equations(here, posed, view, steps)
             found, H, g = found + misfit_here, H + own_H, g + own_g
-        rows = np.array([(level.away(p[3], index) - level.away(p[1], index)) / p[4] for p in pairs]).T
+        ends = [(up[1], posed if down is None else down[1], step) for up, down, step in steps]
+        rows = np.array([(level.away(down, index) - level.away(up, index)) / step for up, down, step in ends]).T
         systems.append((H, g, rows.T @ rows, rows.T @ level.away(posed, index)))
     noise = found.noise
     systems = [(H / noise + J, g / noise + j) for H, g, J, j in systems]
@@ -204,14 +207,13 @@ def _stepped(level: _Level, state: _State) -> _State | None:
     return None
 
 
-def _moved_pairs(here: Synthesis, pose: Pose, step_m: float) -> list:
-    """Return the body a step up and down each degree of freedom, see `composites.equations`."""
-    pairs = []
+def _moved(here: Synthesis, pose: Pose, step_m: float) -> list:
+    """Return the body a step up along each degree of freedom, see `composites.equations`."""
+    steps = []
     for i, unit in enumerate(np.eye(6 + 3 * (len(here.model.segments) - 1))):
         h = step_m if i < 3 else step_m / _LEVER_M
-        up, down = (here.place(moved_pose(pose, sign * h * unit)) for sign in (1, -1))
-        pairs.append((here, up, here, down, 2 * h))
-    return pairs
+        steps.append(((here, here.place(moved_pose(pose, h * unit))), None, h))
+    return steps
 
 
 def _objective(level: _Level, state: _State, noise: float) -> float:
@@ -245,13 +247,15 @@ def _landmark_rms_m(model: BodyModel, poses: Sequence[Pose], known: Sequence[Arr
     return float(np.sqrt(np.nanmean(np.sum(np.square(away), axis=-1))))
 
 
-def _plates(model: BodyModel, pictures: Sequence[Frames], poses: Sequence[Pose], fatter: float) -> Appearance:
+def _plates(
+    model: BodyModel, pictures: Sequence[Frames], poses: Sequence[Pose], fatter: float, margin_px: float
+) -> Appearance:
     """Learn the empty scene from what a fatter body leaves free."""
     synthesis = Synthesis.of(_painted(with_girths(model, {s.name: fatter for s in model.segments})))
     appearance = Appearance()
     for frames, pose in zip(pictures, poses, strict=True):
         posed = synthesis.place(pose)
-        for region in regions_round([posed], synthesis.geometry, frames, _MARGIN_PX):
+        for region in regions_round([posed], synthesis.geometry, frames, margin_px):
             appearance.learn_scene(region, synthesis.parts(posed, region) >= 0)
     return appearance
 
@@ -263,25 +267,25 @@ def _painted(model: BodyModel) -> BodyModel:
 
 
 def _dressed(
-    model: BodyModel, poses: Sequence[Pose], pictures: Sequence[Frames]
+    model: BodyModel, poses: Sequence[Pose], pictures: Sequence[Frames], margin_px: float = _LEAST_MARGIN_PX
 ) -> tuple[BodyModel, dict[str, Border | None]]:
     synthesis = Synthesis.of(_painted(model))
     sights = []
     for pose, frames in zip(poses, pictures, strict=True):
         posed = synthesis.place(pose)
-        regions = regions_round([posed], synthesis.geometry, frames, _MARGIN_PX)
+        regions = regions_round([posed], synthesis.geometry, frames, margin_px)
         sights += [(synthesis, posed, region) for region in regions]
     return dressed(model, sights)
 
 
 def _laid(
-    model: BodyModel, poses: Sequence[Pose], pictures: Sequence[Frames], plates: Appearance
+    model: BodyModel, poses: Sequence[Pose], pictures: Sequence[Frames], plates: Appearance, margin_px: float
 ) -> tuple[tuple[Laid, ...], ...]:
     """Lay out the pictures round a body with colours, each time's by themselves."""
     synthesis, found = Synthesis.of(model), []
     for pose, frames in zip(poses, pictures, strict=True):
         posed = synthesis.place(pose)
-        regions = regions_round([posed], synthesis.geometry, frames, _MARGIN_PX)
+        regions = regions_round([posed], synthesis.geometry, frames, margin_px)
         found.append(tuple(pictured(synthesis, [posed], region, plates) for region in regions))
     return tuple(found)
 

@@ -23,6 +23,7 @@ N_BINS = 50  # along a segment
 LEAST_SHARE = 0.1  # of a segment's length on either side of a border: less is the neighbour's colour
 LEAST_CONTRAST = 25.0  # sRGB grey levels, root mean square of the channels, between the sides of a border
 LEAST_EXPLAINED = 0.4  # of the colour's variance along the segment
+STRONG_CONTRAST = 0.4  # of the segment's brightness: no shading of one colour differs as much from end to end
 _CORE_PX = 1  # this near to another segment or the scene, a pixel is mixed
 _FEWEST_PX = 60  # of one picture: fewer say nothing of a border
 _SIDED = ("_left", "_right")
@@ -53,12 +54,14 @@ class _Sums:
     def border(self) -> tuple[float, float] | None:
         """Find the share where the colour steps, and the share of variance that explains; None where it does not.
 
-        Each picture has its own two colours. A step must explain more than an even change along the segment does.
+        Each picture has its own two colours. A step must be strong, or explain more than an even change along the
+        segment does, which shading may be.
         """
         if not self.pictures:
             return None
         cuts = np.arange(round(LEAST_SHARE * N_BINS), N_BINS - round(LEAST_SHARE * N_BINS) + 1)
-        whole, ramp, split, contrast, pixels = 0.0, 0.0, np.zeros(len(cuts)), np.zeros(len(cuts)), 0.0
+        whole, ramp, split, contrast, bright = 0.0, 0.0, np.zeros(len(cuts)), np.zeros(len(cuts)), 0.0
+        pixels = 0.0
         u = (np.arange(N_BINS) + 0.5) / N_BINS
         for n, colour, square in self.pictures:
             total = n.sum()
@@ -75,11 +78,14 @@ class _Sums:
             gain = low_n * high_n / total * gap2
             split += own - gain
             contrast += gap2 / 3 * total
+            bright += mean @ mean / 3 * total
             pixels += total
         best = int(np.argmin(split))
         explained = 1 - split[best] / max(whole, 1e-9)
         is_step = split[best] < ramp and explained > LEAST_EXPLAINED
-        if not is_step or contrast[best] < pixels * LEAST_CONTRAST**2:
+        if not (is_step or contrast[best] > bright * STRONG_CONTRAST**2):
+            return None
+        if contrast[best] < pixels * LEAST_CONTRAST**2:
             return None
         return float(cuts[best] / N_BINS), float(explained)
 

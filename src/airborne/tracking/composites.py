@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from airborne.body import PosedBody
 from airborne.rendering.maps import surface_maps
 from airborne.scoring.lighting import fit_light, light_up
-from airborne.tracking.normal_equations import BLOCK_PX, blur, gaussian_taps
+from airborne.tracking.normal_equations import BLOCK_PX, RADIUS_PX, blur, gaussian_taps
 from airborne.tracking.synthesis import Laid, Synthesis
 
 Array = NDArray[np.floating]
@@ -66,34 +66,35 @@ def misfit(synthesis: Synthesis, posed: PosedBody, view: Laid) -> Misfit:
     return _weighed(view, _residual(view, _shown(synthesis, posed, view)))[0]
 
 
+Placed = tuple[Synthesis, PosedBody]
+
+
 def equations(
-    synthesis: Synthesis,
-    posed: PosedBody,
-    view: Laid,
-    pairs: Sequence[tuple[Synthesis, PosedBody, Synthesis, PosedBody, float]],
+    synthesis: Synthesis, posed: PosedBody, view: Laid, steps: Sequence[tuple[Placed, Placed | None, float]]
 ) -> tuple[Misfit, Array, Array]:
     """Return a view's misfit and the normal equations H (d, d), g (d,) of d parameters: H step = g.
 
-    pairs: for each parameter the body a step up, the body a step down, and the difference of the parameter between.
+    steps: for each parameter the body some way up; the body some way down, or None for the body as it is; and the
+    difference of the parameter between the two.
     """
     _fit_light(synthesis, posed, view)
-    residual = _residual(view, _shown(synthesis, posed, view))
+    here = _shown(synthesis, posed, view)
+    residual = _residual(view, here)
     found, weights = _weighed(view, residual)
     near = cv2.dilate((view.maps[0] >= 0).astype(np.uint8), np.ones((2 * _NEAR_PX + 1,) * 2, np.uint8)) > 0
-    y0, x0, y1, x1 = _box(near)
-    within = np.s_[:, y0:y1, x0:x1]
-    columns = np.empty((len(pairs), 3 * (y1 - y0) * (x1 - x0)), np.float32)
-    blurred = np.empty((3, y1 - y0, x1 - x0), np.float32)
-    for column, (above, posed_above, below, posed_below, step) in zip(columns, pairs, strict=True):
-        change = _shown(above, posed_above, view)[within] - _shown(below, posed_below, view)[within]
-        if change.any():
-            blur(np.ascontiguousarray(change), *_taps(view), blurred)
-            column[:] = blurred.ravel() / np.float32(step)
-        else:
-            column[:] = 0
-    weight = np.tile(weights[within[1:]].ravel(), 3)
-    H = (columns * weight) @ columns.T
-    return found, H.astype(float), (columns @ (weight * residual[within].ravel())).astype(float)
+    rows, across = _box(near)
+    columns = np.zeros((len(steps), 3, rows.stop - rows.start, across.stop - across.start), np.float32)
+    for column, (above, below, step) in zip(columns, steps, strict=True):
+        change = (_shown(*above, view) - (here if below is None else _shown(*below, view)))[:, rows, across]
+        v, u = _box(np.abs(change).max(axis=0, initial=0) > 0, RADIUS_PX)
+        if v.stop > v.start:
+            blurred = np.empty_like(change[:, v, u])
+            blur(np.ascontiguousarray(change[:, v, u]), *_taps(view), blurred)
+            column[:, v, u] = blurred / np.float32(step)
+    weight = np.tile(weights[rows, across].ravel(), 3)
+    flat = columns.reshape(len(steps), -1)
+    weighed = flat * weight
+    return found, (weighed @ flat.T).astype(float), (weighed @ residual[:, rows, across].ravel()).astype(float)
 
 
 def _fit_light(synthesis: Synthesis, posed: PosedBody, view: Laid) -> None:
@@ -138,8 +139,12 @@ def _taps(view: Laid) -> tuple[Array, Array]:
     return gaussian_taps(SIGMA_PX), gaussian_taps(max(SIGMA_PX * aspect, 0.5))
 
 
-def _box(near: NDArray[np.bool_]) -> tuple[int, int, int, int]:
-    rows, columns = np.flatnonzero(near.any(axis=1)), np.flatnonzero(near.any(axis=0))
+def _box(chosen: NDArray[np.bool_], room: int = 0) -> tuple[slice, slice]:
+    """Return the rows and columns that hold what is chosen, and some room round it; empty where nothing is."""
+    rows, columns = np.flatnonzero(chosen.any(axis=1)), np.flatnonzero(chosen.any(axis=0))
     if not len(rows):
-        return 0, 0, 0, 0
-    return int(rows[0]), int(columns[0]), int(rows[-1]) + 1, int(columns[-1]) + 1
+        return slice(0, 0), slice(0, 0)
+    return (
+        slice(max(int(rows[0]) - room, 0), int(rows[-1]) + 1 + room),
+        slice(max(int(columns[0]) - room, 0), int(columns[-1]) + 1 + room),
+    )

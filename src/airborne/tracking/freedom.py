@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose, PosedBody
 from airborne.body.chain import motion_between, moved_pose, segment_jacobians
+from airborne.geometry.joint_turns import turned
 from airborne.geometry.rotations import angles_from_world_rotation, matrix_from_angles
 
 Array = NDArray[np.floating]
@@ -89,7 +90,7 @@ class Freedom:
         nothing = np.zeros((0, len(self.columns))), np.zeros(0)
         if not np.isfinite(limits).any():
             return nothing
-        after = moved_pose(pose, self.whole(motion)).joint_angles
+        after = turned(pose.joint_angles, self.whole(motion)[6:].reshape(-1, 3))
         bound = np.clip(after, limits[..., 0], limits[..., 1])
         joints, axes = np.nonzero(np.abs(after - bound) > 1e-6)
         if not len(joints):

@@ -21,9 +21,11 @@ from airborne.tracking.normal_equations import (
     Sums,
     gaussian_taps,
     lit_equations,
+    mapped,
     new_blocks,
     photometric_equations,
     silhouette_equations,
+    spread_of,
 )
 from airborne.tracking.synthesis import Laid, Synthesis, outlined, pictured, shifts_px
 
@@ -44,29 +46,46 @@ _SLACK = 1e-3  # of the objective: refitted light makes it waver
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
-    """Where a fit ended."""
-
-    pose: Pose
-    covariance: Array  # (6 + 3 joints,) squared, see `body.chain`; infinite where the pictures show nothing
-    rms_light: float  # blurred residual, linear light 0..1
-    steps: int
-
-
-@dataclass(frozen=True, slots=True)
-class _Evaluation:
+class Evaluation:
     """The normal equations at one pose, mapped to the free degrees of freedom."""
 
     pose: Pose
     A: Array  # (d, d)
     g: Array  # (d,)
-    spread: Array  # (d, d)
+    J: Array  # (segments, 6, d)
+    patches: Sequence[Array]  # (n, segments, 6) gradients that vary together: of blocks, of shifted pictures
     cost: float  # robust squared residual
     noise: float  # mean square of the weighted residual, times how many pixels share it
+
+    def covariance(self) -> Array:
+        """Return the covariance (d, d) of the free degrees of freedom."""
+        spread = np.zeros_like(self.A)
+        for each in self.patches:
+            spread_of(np.ascontiguousarray(each), self.J, spread)
+        return covariance_of(self.A, noise=self.noise, spread=spread)
 
     def objective(self, noise: float, prior_cost: float) -> float:
         """Return minus the log-likelihood and the prior's, for a given variance of the noise."""
         return 0.5 * self.cost / noise + prior_cost
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Where a fit ended."""
+
+    pose: Pose
+    freedom: Freedom
+    evaluation: Evaluation  # before the last step
+    rms_light: float  # blurred residual, linear light 0..1
+    steps: int
+
+    @property
+    def covariance(self) -> Array:
+        """Of position [m] and turns [rad], (6 + 3 joints,) squared; infinite where the pictures show nothing."""
+        covariance = self.evaluation.covariance()
+        whole = np.zeros((len(self.freedom.whole(covariance[0])),) * 2)
+        whole[np.ix_(self.freedom.columns, self.freedom.columns)] = covariance
+        return whole
 
 
 def fit_silhouettes(
@@ -86,7 +105,7 @@ def fit_silhouettes(
         views = [outlined(synthesis, posed, *each, reduction) for each in zip(regions, posteriors, strict=True)]
         views = [view for view in views if view.is_seen]
 
-        def evaluate(pose: Pose, _: int, views: list[Laid] = views) -> _Evaluation:
+        def evaluate(pose: Pose, _: int, views: list[Laid] = views) -> Evaluation:
             posed, n = synthesis.place(pose), len(synthesis.model.segments)
             sums, totals, blocks = Sums.zero(n), np.zeros(3), []
             for view in views:
@@ -120,7 +139,7 @@ def fit_pictures(
     correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px or [_FINE_SIGMA_PX]))
     shifts = [shifts_px(region) for _, region in laid_out]
 
-    def evaluate(pose: Pose, step: int) -> _Evaluation:
+    def evaluate(pose: Pose, step: int) -> Evaluation:
         posed, n = synthesis.place(pose), len(synthesis.model.segments)
         sums, totals, blocks, shifted = Sums.zero(n), np.zeros(3), [], []
         for (view, _), (taps_u, taps_v), shift in zip(laid_out, taps, shifts, strict=True):
@@ -136,11 +155,7 @@ def fit_pictures(
     ]
     noise = min(end.evaluation.noise for end in ends)
     last = min(ends, key=lambda end: end.evaluation.objective(noise, freedom.prior_cost(end.evaluation.pose, prior)))
-    found = last.evaluation
-    covariance = covariance_of(found.A, noise=found.noise, spread=found.spread)
-    whole = np.zeros((len(freedom.whole(found.g)),) * 2)
-    whole[np.ix_(freedom.columns, freedom.columns)] = covariance
-    return Fit(last.pose, whole, (found.noise / correlated) ** 0.5, last.steps)
+    return Fit(last.pose, freedom, last.evaluation, (last.evaluation.noise / correlated) ** 0.5, last.steps)
 
 
 def _compare(
@@ -181,12 +196,12 @@ def _blocks(view: Laid, n_segments: int) -> Array:
 @dataclass(frozen=True, slots=True)
 class _Descent:
     pose: Pose  # after the last step
-    evaluation: _Evaluation  # before it
+    evaluation: Evaluation  # before it
     steps: int
 
 
 def _descend(
-    evaluate: Callable[[Pose, int], _Evaluation],
+    evaluate: Callable[[Pose, int], Evaluation],
     freedom: Freedom,
     pose: Pose,
     prior: Prior | None,
@@ -225,15 +240,13 @@ def _mapped(
     shifted: Sequence[Array],
     totals: Array,
     correlated: float,
-) -> _Evaluation:
+) -> Evaluation:
     """Map the segments' equations through the chain of joints."""
-    n = len(synthesis.model.segments)
-    J = synthesis.jacobian(posed, freedom)
-    stacked = J.reshape(6 * n, -1)
-    A = stacked.T @ (sums.curvature @ J).reshape(stacked.shape)
-    g = stacked.T @ sums.g.ravel()
-    rows = [each.reshape(-1, 6 * n) for each in blocks] + [each.reshape(6 * n, 3).T for each in shifted]
-    G = np.concatenate(rows or [np.zeros((0, 6 * n))]) @ stacked
+    J = np.ascontiguousarray(synthesis.jacobian(posed, freedom))
+    d = J.shape[-1]
+    A, g = np.zeros((d, d)), np.zeros(d)
+    mapped(sums.curvature, sums.g, J, A, g)
     cost, total, weight = totals
     noise = correlated * (total / weight if weight > 0 else 1.0)
-    return _Evaluation(pose, A, g, G.T @ G, float(cost), float(noise))
+    rows = [each.reshape(-1, *J.shape[:2]) for each in blocks] + [np.moveaxis(each, 2, 0) for each in shifted]
+    return Evaluation(pose, A, g, J, rows, float(cost), float(noise))

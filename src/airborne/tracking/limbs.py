@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from airborne.body import BodyModel, Pose
-from airborne.body.chain import moved_pose
+from airborne.body import Pose
+from airborne.geometry.joint_turns import turned
 from airborne.rendering import EvidenceMaps, mask_evidence, place_segments
 from airborne.tracking.appearance import Region
-from airborne.tracking.freedom import limb_of_segment, within_limits
+from airborne.tracking.freedom import limb_of_segment
 from airborne.tracking.synthesis import Synthesis
 
 Array = NDArray[np.floating]
@@ -43,24 +44,21 @@ def astray(
 
 
 def look_for(synthesis: Synthesis, poses: Sequence[Pose], limb: NDArray[np.int64], maps: EvidenceMaps) -> list[Pose]:
-    """Return the poses that explain the evidence best when one limb moves from where the given poses have it."""
-    candidates = list(poses)
-    n_dof = 3 * len(limb)
-    columns = (3 + 3 * limb[:, None] + np.arange(3)).ravel()  # of a motion; the root has the first six
+    """Return the poses that explain the evidence best when one limb moves from where the given poses have it.
+
+    The poses differ in that limb only.
+    """
+    model, joints = synthesis.model, limb - 1
+    root = poses[0].world_from_root
+    angles = np.stack([pose.joint_angles for pose in poses])  # (candidates, joints, 3)
     for number, (n_proposals, n_kept) in enumerate(_ROUNDS):
-        steps = ndtri(qmc.Sobol(n_dof, rng=number).random(n_proposals)) * _REACH_RAD / 2**number
-        moved = []
-        for i, step in enumerate(steps):
-            motion = np.zeros(6 + 3 * (len(synthesis.model.segments) - 1))
-            motion[columns] = step
-            moved.append(within_limits(synthesis.model, moved_pose(candidates[i % len(candidates)], motion)))
-        candidates += moved
-        scores = mask_evidence(synthesis.geometry, maps, *_placed(synthesis.model, candidates)).sum(axis=1)
-        candidates = [candidates[i] for i in np.argsort(-scores, kind="stable")[:n_kept]]
-    return candidates
-
-
-def _placed(model: BodyModel, poses: Sequence[Pose]) -> tuple[Array, Array]:
-    roots = [pose.world_from_root for pose in poses]
-    R, t = np.stack([root.rotation.as_matrix() for root in roots]), np.stack([root.translation for root in roots])
-    return place_segments(model, R, t, np.stack([pose.joint_angles for pose in poses]))
+        steps = ndtri(qmc.Sobol(3 * len(limb), rng=number).random(n_proposals)) * _REACH_RAD / 2**number
+        proposed = angles[np.arange(n_proposals) % len(angles)]
+        bent = np.ascontiguousarray(proposed[:, joints]).reshape(-1, 3)
+        proposed[:, joints] = turned(bent, steps.reshape(-1, 3)).reshape(n_proposals, len(limb), 3)
+        angles = np.concatenate([angles, np.clip(proposed, *np.moveaxis(model.limits_rad, -1, 0))])
+        R = np.broadcast_to(root.rotation.as_matrix(), (len(angles), 3, 3))
+        t = np.broadcast_to(root.translation, (len(angles), 3))
+        scores = mask_evidence(synthesis.geometry, maps, *place_segments(model, R, t, angles)).sum(axis=1)
+        angles = angles[np.argsort(-scores, kind="stable")[:n_kept]]
+    return [replace(poses[0], joint_angles=each) for each in angles]

@@ -12,7 +12,6 @@ from airborne.body import PosedBody
 from airborne.scoring.foreground import agreement as view_agreement
 from airborne.tracking.appearance import Region
 from airborne.tracking.estimate import Status
-from airborne.tracking.gauss_newton import Fit
 from airborne.tracking.synthesis import Synthesis
 
 _NEAR_PX = 12  # of a full frame: body-like pixels this close to the mask's box should be in the mask
@@ -74,11 +73,11 @@ def agreement(
     return Agreement(float(inside / max(pixels, 1)), float(inside / max(near, 1e-9)), float(evidence), n_views)
 
 
-def status_of(fit: Fit, agreed: Agreement, usual: Usual) -> Status:
-    """Judge a fit by how far its agreement lies below the usual one, and by its spread."""
+def status_of(covariance: NDArray, agreed: Agreement, usual: Usual) -> Status:
+    """Judge a fit by how far its agreement lies below the usual one, and by its covariance, position [m] first."""
     if agreed.n_views == 0 or agreed.falls_short(usual, _LOST):
         return Status.LOST
-    position_sd = np.sqrt(np.diag(fit.covariance)[:3])
+    position_sd = np.sqrt(np.diag(covariance)[:3])
     shares = _UNCERTAIN if usual.is_learned else _UNCERTAIN_AT_FIRST
     if agreed.falls_short(usual, shares) or np.any(position_sd > _UNCERTAIN_SD_M):
         return Status.UNCERTAIN

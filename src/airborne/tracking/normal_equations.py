@@ -347,3 +347,55 @@ def _of_composite(lit, is_faceted, part, owner, nearness, place, seen, through, 
     shape = sharp
     blur(lit, taps_u, taps_v, shape)
     return accumulate(residual, shape, coverage[0], owner, nearness, place, seen, through, sums, blocks)
+
+
+@njit(**KERNEL)
+def mapped(A, g, jacobians, H, gradient):
+    """Add the segments' equations, A (s, 6, 6) and g (s, 6), mapped by jacobians (s, 6, d), to H (d, d) and (d,).
+
+    Segments that no pixel shows cost nothing, and neither do degrees of freedom that do not move a segment.
+    """
+    d = len(gradient)
+    for e in range(len(A)):
+        J = jacobians[e]
+        if A[e, 0, 0] == 0 and A[e, 1, 1] == 0 and A[e, 2, 2] == 0:
+            continue
+        AJ = np.zeros((6, d))
+        moves = np.zeros(d, np.bool_)
+        for i in range(d):
+            for p in range(6):
+                if J[p, i] != 0:
+                    moves[i] = True
+        for i in range(d):
+            if moves[i]:
+                for p in range(6):
+                    gradient[i] += J[p, i] * g[e, p]
+                    for q in range(6):
+                        AJ[p, i] += A[e, p, q] * J[q, i]
+        for i in range(d):
+            if moves[i]:
+                for j in range(d):
+                    if moves[j]:
+                        for p in range(6):
+                            H[i, j] += J[p, i] * AJ[p, j]
+
+
+@njit(**KERNEL)
+def spread_of(blocks, jacobians, S):
+    """Add to S (d, d) the sum of G G' over the blocks (n, s, 6), G a block's gradient mapped by jacobians (s, 6, d)."""
+    d = len(S)
+    G = np.empty(d)
+    for n in range(len(blocks)):
+        G[:] = 0
+        is_empty = True
+        for e in range(blocks.shape[1]):
+            for p in range(6):
+                value = blocks[n, e, p]
+                if value != 0:
+                    is_empty = False
+                    for i in range(d):
+                        G[i] += value * jacobians[e, p, i]
+        if not is_empty:
+            for i in range(d):
+                for j in range(d):
+                    S[i, j] += G[i] * G[j]

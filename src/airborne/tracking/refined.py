@@ -125,7 +125,11 @@ class Refined:
         return reduced(frames, self._placed_start, _MOST_PX_PER_M) if self._is_jointed else frames
 
     def _estimate(self, frames: Frames, fit: Fit | None, agreed: Agreement | None, usual: Usual) -> Estimate:
-        if fit is None or agreed is None or (status := status_of(fit, agreed, usual)) is Status.LOST:
+        if fit is None or agreed is None:
+            return lost(frames.index, frames.time_s)
+        covariance = fit.covariance
+        status = status_of(covariance, agreed, usual)
+        if status is Status.LOST:
             return lost(frames.index, frames.time_s)
         posed = self._synthesis.place(fit.pose)
         if share_in_pictures(posed, self._synthesis.geometry, frames) < _LEAST_IN_PICTURES:
@@ -136,7 +140,7 @@ class Refined:
             status=status,
             score=fit.rms_light * 255,
             pose=fit.pose,
-            covariance=fit.covariance,
+            covariance=covariance,
             n_views=agreed.n_views,
         )
 

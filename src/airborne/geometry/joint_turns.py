@@ -1,0 +1,113 @@
+"""Kernels that turn joints and tell the turn between two of them: x-y-z angles and rotation vectors, many at once."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+_LOCKED = 1e-8  # cosine of the middle angle below which the other two are one angle
+_SMALL = 1e-8  # of an angle or its sine
+
+
+@njit(cache=True, nogil=True)
+def turned(angles, turns):
+    """Return the angles (n, 3) [rad] of Rx Ry Rz exp(turn), on the branch near the old angles (n, 3).
+
+    turns (n, 3) are rotation vectors [rad] in the turned axes.
+    """
+    out, R, T, product = np.empty_like(angles), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    for j in range(len(angles)):
+        _matrix(angles[j], R)
+        _exponential(turns[j], T)
+        for a in range(3):
+            for b in range(3):
+                product[a, b] = R[a, 0] * T[0, b] + R[a, 1] * T[1, b] + R[a, 2] * T[2, b]
+        _angles_near(product, angles[j], out[j])
+    return out
+
+
+@njit(cache=True, nogil=True)
+def turns_between(earlier, later):
+    """Return the rotation vectors (n, 3) that `turned` takes from angles earlier (n, 3) to later (n, 3) [rad]."""
+    out, A, B, product = np.empty_like(earlier), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    for j in range(len(earlier)):
+        _matrix(earlier[j], A)
+        _matrix(later[j], B)
+        for a in range(3):
+            for b in range(3):
+                product[a, b] = A[0, a] * B[0, b] + A[1, a] * B[1, b] + A[2, a] * B[2, b]
+        _logarithm(product, out[j])
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _matrix(angles, R):
+    cx, sx = math.cos(angles[0]), math.sin(angles[0])
+    cy, sy = math.cos(angles[1]), math.sin(angles[1])
+    cz, sz = math.cos(angles[2]), math.sin(angles[2])
+    R[0, 0], R[0, 1], R[0, 2] = cy * cz, -cy * sz, sy
+    R[1, 0], R[1, 1], R[1, 2] = cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, -sx * cy
+    R[2, 0], R[2, 1], R[2, 2] = sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy
+
+
+@njit(cache=True, nogil=True)
+def _exponential(turn, R):
+    angle2 = turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2
+    angle = math.sqrt(angle2)
+    small = angle < _SMALL
+    s = 1.0 if small else math.sin(angle) / angle
+    c = 0.5 if small else (1 - math.cos(angle)) / angle2
+    x, y, z = turn[0], turn[1], turn[2]
+    R[0, 0], R[1, 1], R[2, 2] = 1 - c * (y * y + z * z), 1 - c * (x * x + z * z), 1 - c * (x * x + y * y)
+    R[0, 1], R[1, 0] = c * x * y - s * z, c * x * y + s * z
+    R[0, 2], R[2, 0] = c * x * z + s * y, c * x * z - s * y
+    R[1, 2], R[2, 1] = c * y * z - s * x, c * y * z + s * x
+
+
+@njit(cache=True, nogil=True)
+def _logarithm(R, turn):
+    """Fill the rotation vector of R through its quaternion, whose largest component is found without cancellation."""
+    w = 1 + R[0, 0] + R[1, 1] + R[2, 2]
+    x = 1 + R[0, 0] - R[1, 1] - R[2, 2]
+    y = 1 - R[0, 0] + R[1, 1] - R[2, 2]
+    z = 1 - R[0, 0] - R[1, 1] + R[2, 2]
+    largest = max(max(w, x), max(y, z))
+    if largest == w:
+        x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    elif largest == x:
+        w, y, z = R[2, 1] - R[1, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]
+    elif largest == y:
+        w, x, z = R[0, 2] - R[2, 0], R[0, 1] + R[1, 0], R[1, 2] + R[2, 1]
+    else:
+        w, x, y = R[1, 0] - R[0, 1], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1]
+    sine = math.sqrt(x * x + y * y + z * z)
+    if w < 0:
+        w, x, y, z = -w, -x, -y, -z
+    scale = 2 / w if sine < _SMALL * w else 2 * math.atan2(sine, w) / sine
+    turn[0], turn[1], turn[2] = scale * x, scale * y, scale * z
+
+
+@njit(cache=True, nogil=True)
+def _angles_near(R, near, out):
+    """Fill the angles of R on the branch nearest to `near` (3,); where y is +-90 degrees, x stays as it was."""
+    cosine = math.hypot(R[1, 2], R[2, 2])
+    x = near[0] if cosine < _LOCKED else math.atan2(-R[1, 2], R[2, 2])
+    y = math.atan2(R[0, 2], math.hypot(R[0, 0], R[0, 1]))
+    c, s = math.cos(x), math.sin(x)
+    z = math.atan2(c * R[1, 0] + s * R[2, 0], c * R[1, 1] + s * R[2, 1])
+    one0, one1, one2 = _wound(x, near[0]), _wound(y, near[1]), _wound(z, near[2])
+    two0, two1, two2 = _wound(x + math.pi, near[0]), _wound(math.pi - y, near[1]), _wound(z + math.pi, near[2])
+    first = (one0 - near[0]) ** 2 + (one1 - near[1]) ** 2 + (one2 - near[2]) ** 2
+    second = (two0 - near[0]) ** 2 + (two1 - near[1]) ** 2 + (two2 - near[2]) ** 2
+    if second < first:
+        out[0], out[1], out[2] = two0, two1, two2
+    else:
+        out[0], out[1], out[2] = one0, one1, one2
+
+
+@njit(cache=True, nogil=True)
+def _wound(angle, near):
+    """Return the angle, whole turns added, nearest to another."""
+    return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))
