@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from airborne import __version__
-from airborne.body import BodyModel, PosedBody, geometry
-from airborne.body.files import mesh_files, read_body
+from airborne.body import BodyModel, Pose, PosedBody, geometry
+from airborne.body.files import body_toml, mesh_files
 from airborne.cameras import Calibration, Camera, Rig, calibrate, read_control_points, read_rig, write_pose2sim
 from airborne.errors import ResultError, TrialError
 from airborne.export import (
@@ -35,13 +35,18 @@ from airborne.export import (
 from airborne.motion import (
     Motion,
     MotionWriter,
+    flight_summary,
+    has_inertias,
     read_estimates,
     read_motion,
     write_angles,
+    write_flight,
+    write_joint_angles,
     write_joints,
     write_motion_parquet,
 )
 from airborne.rendering import FLAT, render
+from airborne.start import first_pose, mended_rig
 from airborne.tracking import Estimate
 from airborne.tracking.methods import FIELDS_AS, sampled, tracker_of
 from airborne.trial import CameraTable, Trial
@@ -76,16 +81,18 @@ def track(
     """
     begun_s = time.monotonic()
     recording, calibration = open_trial(trial)
-    model = read_body(trial.path(trial.body.file))
+    model = trial.model()
+    start = first_pose(trial, model, recording.rig)
+    recording.events.extend(start.notes)
     identity = _identity(trial)
     done = _begin(folder, identity, resume)
-    _keep_inputs(folder, trial, recording.rig)
+    _keep_inputs(folder, trial, model, recording.rig)
     read_s = time.monotonic()
-    model = _track_frames(trial, model, recording, folder, done, pictures, progress)
+    model = _track_frames(trial, model, start.pose, recording, folder, done, pictures, progress)
     tracked_s = time.monotonic()
     motion = read_motion(folder / "motion.csv")
     _write_tables(folder, motion, model)
-    summary = _summary(trial, calibration, recording, motion, identity["inputs"])
+    summary = _summary(trial, calibration, recording, motion, model, identity["inputs"])
     if pictures:
         write_figures(folder, motion)
     summary["timings_s"] = {
@@ -101,7 +108,7 @@ def track(
 
 def open_trial(trial: Trial) -> tuple[Recording, Calibration | None]:
     """Open a trial's videos with its cameras, fields as its method sees them; and the calibration, if one is made."""
-    rig, calibration = cameras_of(trial)
+    rig, calibration, notes = _cameras_of(trial)
     recording = open_recording(
         [_source(trial, camera) for camera in trial.camera],
         rig,
@@ -110,11 +117,23 @@ def open_trial(trial: Trial) -> tuple[Recording, Calibration | None]:
         start=trial.start.frame,
         stop=trial.track.stop,
     )
+    recording.events.extend(notes)
     return recording, calibration
 
 
 def cameras_of(trial: Trial) -> tuple[Rig, Calibration | None]:
     """Return the cameras of the trial's videos in its order, and the calibration if control points gave them."""
+    return _cameras_of(trial)[:2]
+
+
+def _cameras_of(trial: Trial) -> tuple[Rig, Calibration | None, tuple[str, ...]]:
+    """Return also what mending said of them."""
+    rig, calibration = _calibrated(trial)
+    rig, notes = mended_rig(trial, rig)
+    return rig, calibration, notes
+
+
+def _calibrated(trial: Trial) -> tuple[Rig, Calibration | None]:
     sizes = {camera.name: inspect(_source(trial, camera)).size for camera in trial.camera}
     if trial.calibration.control_points is not None:
         points = read_control_points(trial.path(trial.calibration.control_points))
@@ -182,9 +201,12 @@ def _read_record(path: Path) -> dict[str, Any]:
         ) from error
 
 
-def _keep_inputs(folder: Path, trial: Trial, rig: Rig) -> None:
+def _keep_inputs(folder: Path, trial: Trial, model: BodyModel, rig: Rig) -> None:
     """Leave the cameras and the body beside the results, for `airborne evaluate` and for other tools."""
     write_pose2sim(folder / "calib.toml", rig)
+    if trial.body.file is None:
+        (folder / "body.toml").write_text(body_toml(model), encoding="utf-8")
+        return
     body = trial.path(trial.body.file)
     shutil.copyfile(body, folder / "body.toml")
     for name in mesh_files(body):
@@ -196,6 +218,7 @@ def _keep_inputs(folder: Path, trial: Trial, rig: Rig) -> None:
 def _track_frames(
     trial: Trial,
     model: BodyModel,
+    start: Pose,
     recording: Recording,
     folder: Path,
     done: list[Estimate],
@@ -208,13 +231,13 @@ def _track_frames(
         first = next(frames, None)
         if first is None:
             raise TrialError(f"{trial.name}: there is no frame {trial.start.frame}; start.frame lies past the end")
-        model = sampled(model, trial.start.pose, first)
-        tracker = tracker_of(trial.settings, model, trial.start.pose)
+        model = sampled(model, start, first)
+        tracker = tracker_of(trial.settings, model, start)
         joints = tuple(segment.name for segment in model.segments[1:])
         writer = stack.enter_context(MotionWriter(folder / "motion.csv", joints, resume=bool(done)))
         artists = [stack.enter_context(artist) for artist in _artists(folder, recording, pictures)]
         state, finished, missing = tracker.init(), iter(done), Counter[str]()
-        if not np.any([_shows(view, model.with_pose(trial.start.pose)) for view in first.views]):
+        if not np.any([_shows(view, model.with_pose(start)) for view in first.views]):
             recording.events.append("the start pose lies in no camera's picture; check start.position_m, in metres")
         for number, seen in enumerate(chain([first], frames), start=1):
             estimate = next(finished, None)
@@ -223,9 +246,7 @@ def _track_frames(
                 writer.append(estimate)
             state = tracker.learn(state, seen, estimate)
             missing.update(camera.name for camera, view in zip(recording.rig, seen.views, strict=True) if view is None)
-            pose = (
-                trial.start.pose if number == 1 and estimate.pose is None else estimate.pose
-            )  # show a start that failed
+            pose = start if number == 1 and estimate.pose is None else estimate.pose  # show a start that failed
             posed = None if pose is None else model.with_pose(pose)
             for artist in artists:
                 artist.write(seen, posed, estimate.status)
@@ -253,10 +274,19 @@ def _write_tables(folder: Path, motion: Motion, model: BodyModel) -> None:
     write_motion_parquet(folder / "motion.parquet", motion)
     write_angles(folder / "angles.csv", motion)
     write_joints(folder / "joints.csv", motion, model)
+    if motion.joints:
+        write_joint_angles(folder / "joint_angles.csv", motion, model)
+    if motion.joints and has_inertias(model):
+        write_flight(folder / "flight.csv", motion, model)
 
 
 def _summary(
-    trial: Trial, calibration: Calibration | None, recording: Recording, motion: Motion, inputs: dict[str, str]
+    trial: Trial,
+    calibration: Calibration | None,
+    recording: Recording,
+    motion: Motion,
+    model: BodyModel,
+    inputs: dict[str, str],
 ) -> dict[str, Any]:
     fits = {} if calibration is None else {fit.name: fit for fit in calibration.fits}
     cameras = [
@@ -272,6 +302,7 @@ def _summary(
     return {
         "name": trial.name,
         **headline(motion),
+        **({"flight": flight_summary(motion, model).to_dict()} if motion.joints and has_inertias(model) else {}),
         "uncertainty": UNCERTAINTY if calibration is None else UNCERTAINTY + OF_POINTS,
         "warnings": [OF_FILE] if calibration is None else list(calibration.warnings),
         "events": recording.events,
@@ -290,15 +321,20 @@ def versions() -> dict[str, str]:
 
 def inputs_of(trial: Trial) -> dict[str, str]:
     """Return the SHA-256 of each input file, by the name that the trial gives it."""
-    names = [*(camera.video for camera in trial.camera), trial.body.file]
-    names += [name for name in (trial.calibration.file, trial.calibration.control_points) if name]
-    start = json.dumps([trial.start.model_dump(), trial.lights and trial.lights.model_dump()])
+    given = (trial.body.given_file, trial.calibration.file, trial.calibration.control_points, *trial.start.given_files)
+    names = [*(camera.video for camera in trial.camera), *(name for name in given if name)]
+    rest = [trial.start, trial.lights, trial.calibration, trial.body]
+    start = json.dumps([table and table.model_dump() for table in rest])
     hashes = {name: _sha256(trial.path(name)) for name in names}
     return {**hashes, "start and lights": hashlib.sha256(start.encode()).hexdigest()}
 
 
 def _sha256(path: Path) -> str:
     digest = hashlib.sha256()
+    if path.is_dir():
+        for file in sorted(path.rglob("*.json")):
+            digest.update(f"{file.relative_to(path).as_posix()} {_sha256(file)}\n".encode())
+        return digest.hexdigest()
     size = path.stat().st_size
     with path.open("rb") as file:
         if size <= 2 * _HASHED_BYTES:

@@ -11,7 +11,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import Pose
+from airborne.body import SAMPLED, BodyModel, Pose, human18, human18_from_measurements
+from airborne.body.files import read_body
 from airborne.errors import TrialError, one_line
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.rendering import Lamp, Lights
@@ -44,6 +45,7 @@ class CalibrationTable(_Strict):
     file: str | None = None
     control_points: str | None = None
     method: Literal["lm", "annealing"] = "lm"
+    mend: list[str] = []  # cameras to place anew, by the detections of [start]
 
     @model_validator(mode="after")
     def _one_source(self) -> CalibrationTable:
@@ -53,22 +55,59 @@ class CalibrationTable(_Strict):
 
 
 class BodyTable(_Strict):
-    """Which body: a body file."""
+    """Which body: a body file, a person of a stature and a mass, or a measured person."""
 
-    file: str
+    file: str | None = None
+    preset: Literal["human18"] | None = None
+    stature_m: float | None = Field(None, gt=0)
+    mass_kg: float | None = Field(None, gt=0)
+    measurements: str | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> BodyTable:
+        if sum(value is not None for value in (self.file, self.preset, self.measurements)) != 1:
+            raise ValueError('give file = "...", preset = "human18" or measurements = "...", one of them')
+        sizes = (self.stature_m, self.mass_kg)
+        if any(size is None for size in sizes) if self.preset else any(size is not None for size in sizes):
+            raise ValueError("stature_m and mass_kg go with a preset, both of them, and with nothing else")
+        return self
+
+    @property
+    def given_file(self) -> str | None:
+        """The file that the body comes from, if it comes from one."""
+        return self.file or self.measurements
 
 
 class StartTable(_Strict):
-    """The first pose, set by hand."""
+    """The first pose: set by hand, or from places of the body's landmarks."""
 
     frame: Annotated[int, Field(ge=0)] = 0
-    position_m: Vector
+    position_m: Vector | None = None
     rotation_matrix: Annotated[list[Vector], Field(min_length=3, max_length=3)] | None = None
     quaternion_xyzw: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
     somersault_tilt_twist_deg: Vector | None = None
+    joint_angles_deg: dict[str, Vector] = {}  # segment -> x, y, z
+    joints_m: dict[str, Vector] | str | None = None  # landmark -> place, or a table of them
+    points_px: str | None = None  # a table of clicked points
+    detections: str | None = None  # .npz, or a folder of folders of OpenPose JSON
+    detections_cameras: dict[str, str] = {}  # camera -> its array or folder
 
     @model_validator(mode="after")
-    def _a_rotation(self) -> StartTable:
+    def _one_way(self) -> StartTable:
+        by_hand = {"position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg"}
+        ways = [self.joints_m, self.points_px, self.detections]
+        given = sum(value is not None for value in ways) + bool(by_hand & self.model_fields_set)
+        if given != 1:
+            raise ValueError("give a position_m and a rotation, or joints_m, points_px or detections, one of them")
+        if self.detections_cameras and self.detections is None:
+            raise ValueError("detections_cameras goes with detections")
+        if by_hand & self.model_fields_set:
+            self._check_rotation()
+        return self
+
+    def _check_rotation(self) -> None:
+        if self.position_m is None:
+            raise ValueError("position_m is missing: give where the root's origin is")
         given = [self.rotation_matrix, self.quaternion_xyzw, self.somersault_tilt_twist_deg]
         if sum(value is not None for value in given) != 1:
             raise ValueError("give rotation_matrix, quaternion_xyzw or somersault_tilt_twist_deg, one of them")
@@ -78,11 +117,22 @@ class StartTable(_Strict):
             R = np.array(self.rotation_matrix)
             if not np.allclose(R @ R.T, np.eye(3), atol=1e-3) or np.linalg.det(R) < 0:
                 raise ValueError("rotation_matrix is no rotation: rows must be unit, at right angles, right-handed")
-        return self
 
     @property
     def pose(self) -> Pose:
-        """The start as a pose."""
+        """The start as set by hand, joints straight.
+
+        Raises TrialError where it needs the body or the cameras: then `airborne.start.first_pose` finds it.
+        """
+        if self.position_m is None or self.joint_angles_deg:
+            raise TrialError("this start needs the body and the cameras; use airborne.start.first_pose")
+        return Pose(world_from_root=self.world_from_root)
+
+    @property
+    def world_from_root(self) -> RigidTransform:
+        """Where the root is, as set by hand; raises TrialError where it is not."""
+        if self.position_m is None:
+            raise TrialError("the root's place is not set by hand; use airborne.start.first_pose")
         if self.rotation_matrix is not None:
             rotation = Rotation.from_matrix(self.rotation_matrix)
         elif self.quaternion_xyzw is not None:
@@ -90,7 +140,13 @@ class StartTable(_Strict):
         else:
             angles = np.radians(self.somersault_tilt_twist_deg or [0.0, 0.0, 0.0])
             rotation = Rotation.from_matrix(matrix_from_angles(angles))
-        return Pose(world_from_root=RigidTransform.from_components(self.position_m, rotation))
+        return RigidTransform.from_components(self.position_m, rotation)
+
+    @property
+    def given_files(self) -> list[str]:
+        """The files and folders that the start comes from."""
+        joints = self.joints_m if isinstance(self.joints_m, str) else None
+        return [name for name in (joints, self.points_px, self.detections) if name is not None]
 
 
 class LampTable(_Strict):
@@ -109,9 +165,10 @@ class LampTable(_Strict):
 
 
 class LightsTable(_Strict):
-    """Measured lights, for `stepping` and `simplex`; without this table the light is unknown."""
+    """Measured lights; without this table the light is unknown."""
 
     ambient: float = Field(ge=0)
+    is_exact: bool = False  # drawn pictures: their light is exactly this, so that every method looks at it
     lamp: list[LampTable] = []
 
     @property
@@ -127,6 +184,7 @@ class TrackTable(_Strict):
     every: Annotated[int, Field(ge=1)] = 1  # track every n-th frame or field
     stop: Annotated[int, Field(ge=1)] | None = None  # one past the last frame or field
     prediction: Prediction = "smooth"
+    fixed_shape: bool = False  # joints stay as they are at the start; stepping and simplex never move them
     colour: Colour = "normalised"  # stepping and simplex: paper B's score
     v_rule: VRule = "v_sym"  # stepping
     steps_mm: Steps = [50, 30, 20, 10, 10, 5, 5]  # stepping: one loop each
@@ -165,6 +223,16 @@ class Trial(_Strict):
                 )
         return self
 
+    @model_validator(mode="after")
+    def _mending_needs_detections(self) -> Trial:
+        names = [camera.name for camera in self.camera]
+        unknown = [name for name in self.calibration.mend if name not in names]
+        if unknown:
+            raise ValueError(f"calibration.mend: no camera {', '.join(unknown)}; there are: {', '.join(names)}")
+        if self.calibration.mend and self.start.detections is None:
+            raise ValueError("calibration.mend needs [start] with detections: they say where the points are")
+        return self
+
     _folder: Path = PrivateAttr(default=Path())
 
     @property
@@ -175,12 +243,27 @@ class Trial(_Strict):
         return Settings(
             method=track.method,
             prediction=track.prediction,
+            fixed_shape=track.fixed_shape,
             colour=track.colour,
             v_rule=track.v_rule,
             loops=tuple((mm / 1000, float(np.radians(deg))) for mm, deg in steps),
             scale=track.scale,
             lights=None if self.lights is None else self.lights.lights,
+            is_light_exact=self.lights is not None and self.lights.is_exact,
         )
+
+    def model(self) -> BodyModel:
+        """Return the body; a person by preset or measurements takes its colours from the video.
+
+        Raises BodyError for an unusable body.
+        """
+        body = self.body
+        if body.measurements is not None:
+            return human18_from_measurements(self.path(body.measurements), outfit=SAMPLED)
+        if body.file is not None:
+            return read_body(self.path(body.file))
+        assert body.stature_m is not None and body.mass_kg is not None, "checked with the table"
+        return human18(body.stature_m, body.mass_kg, outfit=SAMPLED)
 
     def path(self, name: str) -> Path:
         """Resolve a path of the trial file."""
@@ -212,8 +295,12 @@ def _check(path: Path, trial: Trial) -> None:
     names = [camera.name for camera in trial.camera]
     if len(set(names)) != len(names):
         raise TrialError(f"{path.name}: two cameras share a name: {', '.join(names)}; give each its own")
-    for name in [trial.body.file, trial.calibration.file or trial.calibration.control_points or ""]:
-        if not trial.path(name).is_file():
+    calibration = trial.calibration
+    files = [trial.body.given_file, calibration.file, calibration.control_points, *trial.start.given_files]
+    for name in files:
+        if name is not None and not (
+            trial.path(name).is_file() or (name == trial.start.detections and trial.path(name).is_dir())
+        ):
             raise TrialError(f"{path.name}: {name} not found beside it")
 
 
@@ -222,7 +309,9 @@ def _only(path: Path, trial: Trial, cameras: Sequence[str]) -> Trial:
     unknown = [name for name in cameras if name not in known]
     if unknown:
         raise TrialError(f"{path.name}: no camera {', '.join(unknown)}; it has: {', '.join(known)}")
-    return trial.model_copy(update={"camera": [known[name] for name in cameras]})
+    mend = [name for name in trial.calibration.mend if name in cameras]
+    calibration = trial.calibration.model_copy(update={"mend": mend})
+    return trial.model_copy(update={"camera": [known[name] for name in cameras], "calibration": calibration})
 
 
 def _lamp(table: LampTable) -> Lamp:

@@ -118,7 +118,7 @@ def _lights_lines(scene: Scene) -> list[str]:
     """Tell the lights where the pictures were drawn in the tracker's own."""
     if scene.lights is None:
         return []
-    lines = ["", "[lights]                                  # exact", f"ambient = {scene.lights.ambient}"]
+    lines = ["", "[lights]", "is_exact = true", f"ambient = {scene.lights.ambient}"]
     for lamp in scene.lights.lamps:
         lines += ["", "[[lights.lamp]]", f"position_m = {_numbers(lamp.position_m)}", f"intensity = {lamp.intensity}"]
         if lamp.direction is not None and lamp.half_angle_rad is not None:

@@ -35,7 +35,7 @@ LEVELS_PX_PER_M = (60.0, 100.0, 150.0)  # of the pictures that are compared, coa
 JOINT_SD_M = 0.025  # of a landmark of weight 1
 _EXPECTED_SD = (0.1, 0.2, 0.25)  # of a pose about the landmarks' own: [m], [rad], [rad]
 _MOST_STEPS = 4  # a level
-_SETTLED = 3e-3  # of the objective
+_SETTLED = 1.0  # a step that makes no more likely than this is none [nats]
 _SHORTER, _MOST_SHORTER = 0.4, 3
 _MARGIN_M, _LEAST_MARGIN_PX = 0.1, 8  # round the body, that it may move in
 _LEVER_M = 0.3  # a turn by which this far out a point moves a pixel is a step
@@ -105,13 +105,15 @@ def fit_body(
     scenery: Sequence[Sighting] = (),
     weights: Mapping[str, float] | None = None,
     mass_kg: float | None = None,
+    levels_px_per_m: Sequence[float] = LEVELS_PX_PER_M,
     progress: Progress | None = None,
 ) -> BodyFit:
     """Fit a body with joints to a person seen at a few times.
 
     `scenery` are more times, looked at for what the scene is like without the person; `weights` are what a landmark's
     squared distance counts, 1 where not named. Left and right are alike. Masses and inertias follow the shape at
-    constant density, or add up to `mass_kg`. Raises BodyError where the landmarks settle no pose, and where the
+    constant density, or add up to `mass_kg`. The pictures are compared from coarse to fine, reduced to `levels_px_per_m`
+    where they are larger. Raises BodyError where the landmarks settle no pose, and where the
     pictures do not show a part of the body.
     """
     if not sightings:
@@ -124,11 +126,11 @@ def fit_body(
     knobs = knobs_of(start)
     state = _State(np.zeros(len(knobs)), first[: len(sightings)])
     told = progress or (lambda done, expected: None)
-    for number, px_per_m in enumerate(LEVELS_PX_PER_M):
+    for number, px_per_m in enumerate(levels_px_per_m):
         margin_px = max(_LEAST_MARGIN_PX, round(_MARGIN_M * px_per_m))
         now = shaped(start, knobs, state.shape)
         pictures = [reduced(each.frames, now.with_pose(first[0]), px_per_m) for each in every]
-        plates = _plates(now, pictures, (*state.poses, *first[len(sightings) :]), _FATTER[number], margin_px)
+        plates = _plates(now, pictures, (*state.poses, *first[len(sightings) :]), _FATTER[min(number, len(_FATTER) - 1)], margin_px)
         seen = pictures[: len(sightings)]
         worn, borders = _dressed(now, state.poses, seen)
         level = _Level(
@@ -141,12 +143,12 @@ def fit_body(
             step_m=1 / px_per_m,
         )
         for step in range(_MOST_STEPS):
-            told(number * _MOST_STEPS + step, _MOST_STEPS * len(LEVELS_PX_PER_M))
+            told(number * _MOST_STEPS + step, _MOST_STEPS * len(levels_px_per_m))
             following = _stepped(level, state)
             if following is None:
                 break
             state = following
-    told(_MOST_STEPS * len(LEVELS_PX_PER_M), _MOST_STEPS * len(LEVELS_PX_PER_M))
+    told(_MOST_STEPS * len(levels_px_per_m), _MOST_STEPS * len(levels_px_per_m))
     fitted, borders = _dressed(shaped(start, knobs, state.shape), state.poses, seen)
     before = _dressed(start, first[: len(sightings)], seen)[0], first[: len(sightings)]
     lights = _compared(before, (fitted, state.poses), seen, plates)
@@ -201,7 +203,7 @@ def _stepped(level: _Level, state: _State) -> _State | None:
     for _ in range(_MOST_SHORTER):
         poses = tuple(freedom.moved(pose, share * m) for pose, m in zip(state.poses, motions, strict=True))
         tried = _State(state.shape + share * turn, poses)
-        if _objective(level, tried, noise) < reached * (1 - _SETTLED):
+        if _objective(level, tried, noise) < reached - _SETTLED:
             return tried
         share *= _SHORTER
     return None

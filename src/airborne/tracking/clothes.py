@@ -25,7 +25,8 @@ LEAST_CONTRAST = 25.0  # sRGB grey levels, root mean square of the channels, bet
 LEAST_EXPLAINED = 0.4  # of the colour's variance along the segment
 STRONG_CONTRAST = 0.4  # of the segment's brightness: no shading of one colour differs as much from end to end
 _CORE_PX = 1  # this near to another segment or the scene, a pixel is mixed
-_FEWEST_PX = 60  # of one picture: fewer say nothing of a border
+_FEWEST_PX = 60  # of one picture, and on either side of a border: fewer say nothing
+_LEAST_PIXELS = 0.1  # of a segment's pixels that lie on either side of a border
 _SIDED = ("_left", "_right")
 
 
@@ -61,7 +62,7 @@ class _Sums:
             return None
         cuts = np.arange(round(LEAST_SHARE * N_BINS), N_BINS - round(LEAST_SHARE * N_BINS) + 1)
         whole, ramp, split, contrast, bright = 0.0, 0.0, np.zeros(len(cuts)), np.zeros(len(cuts)), 0.0
-        pixels = 0.0
+        pixels, below = 0.0, np.zeros(len(cuts))
         u = (np.arange(N_BINS) + 0.5) / N_BINS
         for n, colour, square in self.pictures:
             total = n.sum()
@@ -80,7 +81,12 @@ class _Sums:
             contrast += gap2 / 3 * total
             bright += mean @ mean / 3 * total
             pixels += total
+            below += low_n
+        on_fewer_side = np.minimum(below, pixels - below)
+        split[on_fewer_side < max(_FEWEST_PX, _LEAST_PIXELS * pixels)] = np.inf
         best = int(np.argmin(split))
+        if not np.isfinite(split[best]):
+            return None
         explained = 1 - split[best] / max(whole, 1e-9)
         is_step = split[best] < ramp and explained > LEAST_EXPLAINED
         if not (is_step or contrast[best] > bright * STRONG_CONTRAST**2):

@@ -46,6 +46,7 @@ class Settings:
     loops: Sequence[tuple[float, float]] = ()  # stepping: a step in position [m] and in angle [rad] for each loop
     scale: Literal[1, 2, 4] = 1  # stepping, simplex: reduction of the pictures
     lights: Lights | None = None  # None: unknown
+    is_light_exact: bool = False  # else only stepping and simplex look at it; the others fit the light
     fixed_shape: bool = False  # joints stay as they are at the start; stepping and simplex never move them
 
 
@@ -56,7 +57,7 @@ def tracker_of(settings: Settings, model: BodyModel, start: Pose) -> Tracker:
             model,
             start,
             prediction=settings.prediction,
-            lights=settings.lights,
+            lights=settings.lights if settings.is_light_exact else None,
             order=settings.method,
             fixed_shape=settings.fixed_shape,
         )
