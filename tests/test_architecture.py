@@ -24,7 +24,10 @@ PACKAGES = [
 ORDER = [
     *PACKAGES,
     "trial",
+    "start",
     "pipeline",
+    "fitting",
+    "reproduction",
     "examples",
     "assessment",
     "bench",

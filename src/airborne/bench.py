@@ -7,7 +7,6 @@ import time
 import numpy as np
 
 from airborne.body import geometry
-from airborne.body.files import read_body
 from airborne.examples import example_trial
 from airborne.pipeline import open_trial
 from airborne.rendering import FLAT, RULES, score, targets
@@ -28,7 +27,7 @@ def measure_speed() -> dict[str, float]:
 def _tracking_ms(method: str) -> float:
     trial = read_trial(example_trial("thrown_cross"), {"method": method})
     recording, _ = open_trial(trial)
-    tracker = tracker_of(trial.settings, read_body(trial.path(trial.body.file)), trial.start.pose)
+    tracker = tracker_of(trial.settings, trial.model(), trial.start.pose)
     seen = list(recording)
     times: list[float] = []
     for _ in range(2):  # the first round compiles
@@ -42,7 +41,7 @@ def _tracking_ms(method: str) -> float:
 
 def _scoring_us(n: int = 200, rounds: int = 15) -> float:
     trial = read_trial(example_trial("thrown_cross"), {"method": "stepping"})
-    model = read_body(trial.path(trial.body.file))
+    model = trial.model()
     frames = next(iter(open_trial(trial)[0]))
     posed, seen, flat = model.with_pose(trial.start.pose), targets(frames.views, FLAT), geometry(model)
     R, t = np.repeat(posed.R[None], n, axis=0), np.repeat(posed.t[None], n, axis=0)

@@ -1,5 +1,7 @@
 """A body's surface is closed and faces outward."""
 
+from dataclasses import replace
+
 import numpy as np
 import trimesh
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -77,6 +79,14 @@ def test_ellipsoid_keeps_its_place_axes_and_semi_axes():
     np.testing.assert_allclose(flat.ellipsoid_centre, [CENTRE], atol=EXACT)
     np.testing.assert_allclose(flat.ellipsoid_axes, [TURN.as_matrix()], atol=EXACT)
     np.testing.assert_array_equal(flat.ellipsoid_semi_axes, [SIZE])
+
+
+def test_slab_is_kept_and_an_ellipsoid_without_one_is_unlimited():
+    whole = body(Ellipsoid(SIZE), Ellipsoid(SIZE))
+    (segment,) = whole.segments
+    parts = (segment.parts[0], replace(segment.parts[1], slab_m=(-0.1, 0.3)))
+    flat = geometry(replace(whole, segments=(replace(segment, parts=parts),)))
+    np.testing.assert_array_equal(flat.ellipsoid_slab, [[-np.inf, np.inf], [-0.1, 0.3]])
 
 
 def test_sides_are_flat_where_all_edges_are_sharp():

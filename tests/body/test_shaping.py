@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Ellipsoid, Inertia, Landmark, Mesh, Part, Pose, Segment, human18
-from airborne.body.shaping import length_axis, with_girths, with_segment_lengths
+from airborne.body.shaping import length_axis, with_girths, with_mass, with_segment_lengths
 from airborne.errors import BodyError
 from tests.tolerances import EXACT, ROUNDTRIP
 
@@ -148,3 +148,28 @@ def test_unknown_segments_and_factors_that_are_none_are_refused(change):
     for scale in (0.0, -1.0, 110.0, float("nan")):
         with pytest.raises(BodyError, match=r"segment 'thigh': scale is .*; expected a factor"):
             change(human18(), {"thigh": scale})
+
+
+def test_width_and_depth_scale_apart():
+    body = with_girths(human18(), {"torso": (1.2, 0.9), "foot": (1.1, 1.0)})
+    ratio = segment(body, "torso").parts[0].shape.semi_axes_m / segment(human18(), "torso").parts[0].shape.semi_axes_m
+    np.testing.assert_allclose(ratio, (1.2, 0.9, 1.0), rtol=EXACT)
+    feet = [segment(each, "foot_left").parts[0].shape.semi_axes_m for each in (body, human18())]
+    np.testing.assert_allclose(feet[0] / feet[1], (1.1, 1.0, 1.0), rtol=EXACT)
+    same_model(with_girths(human18(), {"torso": (1.2, 1.2)}), with_girths(human18(), {"torso": 1.2}))
+
+
+def test_a_total_mass_is_shared_out_as_before():
+    body = with_mass(human18(), 100.0)
+    assert sum(s.inertia.mass_kg for s in body.segments) == pytest.approx(100.0)
+    same_model(with_mass(body, 75.0), with_mass(human18(), 75.0))
+    ratio = segment(body, "head").inertia.tensor_kg_m2 / segment(human18(), "head").inertia.mass_kg
+    expected = segment(human18(), "head").inertia.tensor_kg_m2 / segment(human18(), "head").inertia.mass_kg
+    scale = segment(body, "head").inertia.mass_kg / segment(human18(), "head").inertia.mass_kg
+    np.testing.assert_allclose(ratio, expected * scale)
+
+
+@pytest.mark.parametrize("mass_kg", [0.0, -3.0, np.inf])
+def test_an_impossible_mass_is_refused(mass_kg):
+    with pytest.raises(BodyError, match="mass_kg"):
+        with_mass(human18(), mass_kg)

@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Segment
+from airborne.body.model import WHOLE
 from airborne.body.symmetry import continuous_axes, symmetries
 from tests.tolerances import ROUNDTRIP
 
@@ -19,9 +20,9 @@ def body(*parts):
     return BodyModel("body", (Segment("root", None, np.zeros(3), parts),))
 
 
-def part(shape, centre=(0, 0, 0), colour=YELLOW, rotation=None):
+def part(shape, centre=(0, 0, 0), colour=YELLOW, rotation=None, slab_m=WHOLE):
     turn = rotation or Rotation.identity()
-    return Part("part", shape, RigidTransform.from_components(np.array(centre, float), turn), colour)
+    return Part("part", shape, RigidTransform.from_components(np.array(centre, float), turn), colour, slab_m)
 
 
 def box(*size):
@@ -114,12 +115,30 @@ def test_parts_of_jointed_segments_count_at_their_places():
         ([part(ellipsoid(1, 1, 1), (0.5, 0, 0)), part(ellipsoid(1, 1, 1), (0, 2, 0))], 0),
         ([part(ellipsoid(1, 1, 2)), part(ellipsoid(2, 1, 1))], 0),
         ([part(ellipsoid(1, 2, 3))], 0),
+        ([part(ellipsoid(1, 1, 1), slab_m=(-np.inf, 0.2))], 1),
+        ([part(ellipsoid(1, 1, 2), slab_m=(-0.3, 0.2))], 1),
+        ([part(ellipsoid(1, 2, 2), slab_m=(-0.3, 0.2))], 0),
+        ([part(ellipsoid(1, 2, 2), slab_m=(-3, 3))], 1),
         ([part(box(1, 1, 2))], 0),
         ([part(ellipsoid(1, 1, 2)), part(box(1, 1, 1))], 0),
     ],
 )
 def test_only_spheroids_and_spheres_on_one_axis_can_turn_unseen(parts, axes):
     assert len(continuous_axes(body(*parts))) == axes
+
+
+def test_a_ball_cut_at_one_end_keeps_the_turns_about_its_axis_and_one_cut_evenly_can_be_upended():
+    ball, up = ellipsoid(1, 1, 1), [0, 0, 1]
+    cap, band = body(part(ball, slab_m=(0.4, np.inf))), body(part(ball, slab_m=(-0.4, 0.4)))
+    assert all(np.allclose(R @ up, up) for R in symmetries(cap)) and len(symmetries(cap)) == 4
+    assert all(np.allclose(np.abs(R @ up), up) for R in symmetries(band)) and len(symmetries(band)) == 8
+
+
+def test_two_halves_of_a_ball_swap_only_when_their_colours_agree():
+    halves = [part(ellipsoid(1, 1, 1), slab_m=slab) for slab in ((-np.inf, 0), (0, np.inf))]
+    repainted = [halves[0], part(ellipsoid(1, 1, 1), slab_m=(0, np.inf), colour=BLUE)]
+    assert len(symmetries(body(*halves))) == 8
+    assert len(symmetries(body(*repainted))) == 4
 
 
 def test_unseen_turn_is_about_the_spheroids_own_axis():

@@ -1,5 +1,7 @@
 """Bodies, poses, cameras and pictures that several tests draw."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -36,17 +38,34 @@ def part(shape, name: str, rng: np.random.Generator, *, spread: float = 0.25) ->
 
 
 def random_shape(kind: str, rng: np.random.Generator):
-    if kind == "ellipsoid":
+    if kind in ("ellipsoid", "slab"):
         return Ellipsoid(rng.uniform(0.1, 0.5, 3))
     if kind == "box":
         return Box(rng.uniform(0.15, 0.8, 3))
     tip = np.array([[0, 0, 0.5], [0.4, 0, -0.2], [-0.2, 0.35, -0.2], [-0.2, -0.35, -0.2]])
-    return Mesh(tip * rng.uniform(0.5, 1.5), np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]))
+    outward = tip / np.linalg.norm(tip, axis=1, keepdims=True) if kind == "smooth" else None
+    return Mesh(tip * rng.uniform(0.5, 1.5), np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]), outward)
+
+
+def cut(whole: Part, rng: np.random.Generator) -> Part:
+    low, high = np.sort(rng.uniform(-1.2, 1.2, 2)) * whole.shape.semi_axes_m[2]
+    return replace(whole, slab_m=(min(low, 0.0), max(high, 0.05)))
+
+
+def in_slabs(whole: Part, heights: list[float]) -> tuple[Part, ...]:
+    """The same ellipsoid cut at heights along its own z axis into parts of other colours, from below to above."""
+    bounds = [-np.inf, *heights, np.inf]
+    colours = np.random.default_rng(len(heights)).uniform(30, 220, (len(bounds) - 1, 3))
+    return tuple(
+        replace(whole, slab_m=(low, high), colour=colour)
+        for low, high, colour in zip(bounds, bounds[1:], colours, strict=False)
+    )
 
 
 def random_body(kinds: list[str], rng: np.random.Generator) -> BodyModel:
-    """Two segments that share the parts; the second hangs on the first."""
+    """Two segments that share the parts; the second hangs on the first. A slab is an ellipsoid cut at both ends."""
     parts = [part(random_shape(kind, rng), f"{kind}{i}", rng) for i, kind in enumerate(kinds)]
+    parts = [cut(each, rng) if kind == "slab" else each for each, kind in zip(parts, kinds, strict=True)]
     half = (len(parts) + 1) // 2
     return BodyModel(
         "random",

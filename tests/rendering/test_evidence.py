@@ -1,10 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from airborne.body import geometry
 from airborne.rendering import FLAT, evidence_maps, mask_evidence, render
 from airborne.rendering.reduction import reduced, reduced_camera
-from tests.rendering.bodies import batch, camera, random_body
+from tests.rendering.bodies import batch, camera, in_slabs, random_body
 
 CAMERAS = [camera("a"), camera("b", turn=2.0, size=(77, 90))]
 MAPS = [np.random.default_rng(i).normal(0, 2, c.size[::-1]).astype(np.float32) for i, c in enumerate(CAMERAS)]
@@ -12,7 +14,7 @@ SUM = 5e-2  # nats, of sums over hundreds of pixels in float32
 
 
 @pytest.mark.parametrize(
-    "kinds", [["ellipsoid"] * 6, ["box"] * 4, ["ellipsoid", "box", "mesh", "box"]], ids=lambda k: k[0]
+    "kinds", [["ellipsoid"] * 6, ["box"] * 4, ["slab"] * 6, ["ellipsoid", "box", "mesh", "slab"]], ids=lambda k: k[0]
 )
 @pytest.mark.parametrize("scale", [1, 2])
 def test_evidence_is_the_sum_over_the_drawn_mask_each_pixel_once(kinds, scale):
@@ -25,6 +27,18 @@ def test_evidence_is_the_sum_over_the_drawn_mask_each_pixel_once(kinds, scale):
             mask = render(shapes, body, reduced_camera(seen_by, scale), FLAT).mask  # type: ignore[arg-type]
             assert mask.sum() > 50
             assert total == pytest.approx(reduced(plane, scale)[mask].sum(dtype=float), abs=SUM)
+
+
+def test_an_ellipsoid_in_two_colours_gathers_as_much_as_in_one():
+    model = random_body(["ellipsoid"] * 4, np.random.default_rng(1))
+    segments = [
+        replace(s, parts=tuple(piece for each in s.parts for piece in in_slabs(each, [-0.07, 0.04])))
+        for s in model.segments
+    ]
+    (R, t), maps = batch(model, 6, 5), evidence_maps(CAMERAS, MAPS)
+    one, two = (mask_evidence(geometry(m), maps, R, t) for m in (model, replace(model, segments=tuple(segments))))
+    assert np.abs(one).max() > 10
+    np.testing.assert_allclose(two, one, atol=SUM)
 
 
 def test_totals_are_the_sums_of_the_whole_maps():

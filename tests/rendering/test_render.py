@@ -1,12 +1,15 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import BodyModel, Box, Ellipsoid, Part, Pose, Segment, geometry
+from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Pose, Segment, geometry
 from airborne.cameras import Camera
 from airborne.errors import CalibrationError
 from airborne.rendering import FLAT, render, render_reference
-from tests.rendering.bodies import LIGHTS, camera, posed_random
+from tests.rendering.bodies import LIGHTS, camera, in_slabs, posed_random
 from tests.tolerances import SOLVED
 
 GREY = 1e-2  # grey levels between float32 kernels and float64 rays
@@ -15,7 +18,9 @@ KINDS = {
     "ellipsoids": ["ellipsoid"] * 5,
     "boxes": ["box"] * 3,
     "meshes": ["mesh"] * 3,
-    "a mixture": ["ellipsoid", "box", "mesh", "ellipsoid", "box"],
+    "slabs": ["slab"] * 5,
+    "smooth meshes": ["smooth"] * 3,
+    "a mixture": ["ellipsoid", "box", "mesh", "slab", "box"],
 }
 
 
@@ -131,6 +136,84 @@ def test_an_ellipsoid_that_is_not_wholly_in_front_is_left_out(centre_z):
 def test_a_body_outside_the_image_draws_nothing():
     shapes, posed = at_origin(one_part(Ellipsoid(np.array([0.5, 0.6, 0.7])), (10.0, 0.0, 5.0)))
     assert not render(shapes, posed, axis_camera(), FLAT).mask.any()
+
+
+def cut_at(whole: BodyModel, heights: list[float]) -> BodyModel:
+    (segment,) = whole.segments
+    return replace(whole, segments=(replace(segment, parts=in_slabs(segment.parts[0], heights)),))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_slabs_of_one_ellipsoid_cover_it_without_a_gap_each_where_its_heights_are_hit(seed):
+    heights = [-0.3, 0.1, 0.35]
+    rng = np.random.default_rng(seed)
+    place = (*rng.normal(0, 0.4, 2), rng.uniform(2, 6)), Rotation.random(rng=rng)
+    model = one_part(Ellipsoid(rng.uniform(0.4, 0.6, 3)), *place)
+    slabs, cut = at_origin(cut_at(model, heights))
+    whole, drawn = render(*at_origin(model), axis_camera(), FLAT), render(slabs, cut, axis_camera(), FLAT)
+    assert whole.mask.sum() > 100
+    assert np.array_equal(drawn.mask, whole.mask)
+    np.testing.assert_allclose(drawn.inverse_depth, whole.inverse_depth, rtol=SOLVED)
+    v, u = np.nonzero(drawn.mask)
+    hits = np.stack([(u - 40) / 100, (v - 30) / 100, np.ones(len(u))], axis=1) / drawn.inverse_depth[v, u][:, None]
+    height = cut.model.parts[0].segment_from_part.inv().apply(hits)[:, 2]
+    found = np.searchsorted(heights, height)
+    is_clear = np.abs(height[:, None] - heights).min(axis=1) > 1e-4  # float32 depths place the rest on either side
+    assert np.array_equal(drawn.part[v, u][is_clear], found[is_clear])
+    assert len(np.unique(found)) >= 2
+
+
+def test_a_slab_seen_along_its_axis_is_a_disc_or_a_ring():
+    upside_down = Rotation.from_euler("X", 180, degrees=True)
+    ball = one_part(Ellipsoid(np.full(3, 0.5)), (0.0, 0.0, 4.0), upside_down)
+    row = render(*at_origin(cut_at(ball, [-0.2, 0.2, 0.4])), axis_camera(focal=300.0), FLAT).part[30]
+    runs = row[np.append(True, np.diff(row) != 0)]
+    assert list(runs[runs >= 0]) == [1, 2, 3, 2, 1]  # the lowest part is hidden by the ellipsoid itself
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 90.0, 31.0])
+def test_a_slab_whose_border_is_seen_edge_on_ends_in_a_straight_line(turn_deg):
+    direction = np.array([-np.sin(np.radians(turn_deg)), np.cos(np.radians(turn_deg)), 0])  # part's z, in the image
+    turn = Rotation.from_matrix(np.stack([np.cross([0, 0, 1], direction), [0, 0, 1.0], direction], axis=1))
+    whole = one_part(Ellipsoid(np.array([0.5, 0.4, 0.6])), (0.0, 0.0, 3.0), turn)
+    drawn = render(*at_origin(cut_at(whole, [0.0])), axis_camera(size=(80, 60)), FLAT)  # the plane holds the camera
+    v, u = np.nonzero(drawn.mask)
+    along = (u - 39.5) * direction[0] + (v - 29.5) * direction[1]
+    assert np.array_equal(drawn.part[v, u], (along > 0).astype(int))
+
+
+def test_a_smooth_mesh_of_a_ball_is_lit_as_a_ball():
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.5)
+    vertices, faces = np.asarray(ball.vertices), np.asarray(ball.faces)
+    meshes = [Mesh(vertices, faces, normals) for normals in (None, vertices / 0.5)]
+    pictures = [
+        render(*at_origin(one_part(shape, (0.2, 0.1, 4.0))), axis_camera(focal=200.0), LIGHTS)
+        for shape in (Ellipsoid(np.full(3, 0.5)), *meshes)
+    ]
+    inside = np.logical_and.reduce([picture.mask for picture in pictures])
+    assert inside.sum() > 1500
+    true, flat, smooth = (picture.colour[inside] for picture in pictures)
+    errors = [np.quantile(np.abs(each - true), 0.99) for each in (flat, smooth)]  # outlines differ a little
+    assert errors[0] > 2
+    assert errors[1] < 0.6
+
+
+def test_no_pixel_falls_between_the_faces_of_a_mesh():
+    grid = np.arange(-20, 21) / 100  # every face meets its neighbours along rows and columns of pixels
+    x, y = np.meshgrid(grid, grid)
+    corner = (np.arange(40)[:, None] * 41 + np.arange(40)).ravel()
+    faces = np.concatenate(
+        [np.stack([corner, corner + 41, corner + 1], 1), np.stack([corner + 1, corner + 41, corner + 42], 1)]
+    )
+    sheet = Mesh(np.stack([x.ravel(), y.ravel(), np.ones(x.size)], 1), faces)
+    K = np.array([[100.0, 0, 40], [0, 100, 30], [0, 0, 1]])
+    for slant in np.linspace(0, 0.3, 7):
+        turned = Rotation.from_rotvec([0.0, slant, 0.0])
+        seen_by = Camera(name="axis", K=K, size=(81, 61), camera_from_world=RigidTransform.from_rotation(turned))
+        mask = render(*at_origin(one_part(sheet)), seen_by, FLAT).mask
+        v, u = np.nonzero(mask)
+        assert all(mask[row, u[v == row].min() : u[v == row].max() + 1].all() for row in np.unique(v))
+        assert mask.sum() > 1000
 
 
 def test_flat_light_shows_each_part_in_its_own_colour():

@@ -3,6 +3,7 @@
 from airborne.body.geometry import Geometry, geometry, has_flat_sides
 from airborne.body.human import human18, human18_from_measurements
 from airborne.body.inertia import total_inertia, total_inertias
+from airborne.body.inverse_kinematics import PoseFit, fit_lengths, fit_pose
 from airborne.body.measurements import Measurements, read_measurements, write_measurements
 from airborne.body.model import (
     BodyModel,
@@ -34,9 +35,12 @@ __all__ = [
     "Outfit",
     "Part",
     "Pose",
+    "PoseFit",
     "PosedBody",
     "Segment",
     "Shape",
+    "fit_lengths",
+    "fit_pose",
     "geometry",
     "has_flat_sides",
     "human18",

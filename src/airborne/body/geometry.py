@@ -23,11 +23,12 @@ _BOX_FACES = [  # corners of each side, counter-clockwise from outside
     (1, 5, 7, 3),
 ]
 _FLAT_RAD, _SHARP_RAD = 0.01, 0.5  # neighbouring faces turned by less are one side; by more, their edge is seen
+_NO_AREA = 1e-12  # twice a triangle's area over its longest side squared
 _UNSAMPLED = np.full(3, 128.0)  # stands in for a colour not yet sampled
 
 
 class Geometry(NamedTuple):
-    """Ellipsoids and plane convex polygons, in the frames of their segments.
+    """Ellipsoids, some cut to a slab, and plane convex polygons, in the frames of their segments.
 
     Polygon p has the corners `corners[start[p]:start[p + 1]]`, counter-clockwise from outside.
     """
@@ -37,40 +38,52 @@ class Geometry(NamedTuple):
     ellipsoid_centre: Array  # (e, 3) [m]
     ellipsoid_axes: Array  # (e, 3, 3) columns: unit axes
     ellipsoid_semi_axes: Array  # (e, 3) [m]
+    ellipsoid_slab: Array  # (e, 2) least and greatest height along the third axis [m], infinite where not cut
     polygon_segment: Indices  # (p,)
     polygon_part: Indices  # (p,)
     start: Indices  # (p + 1,)
     corners: Array  # (c, 3) [m]
     normals: Array  # (p, 3) outward unit normals
+    is_smooth: NDArray[np.bool_]  # (p,) triangles whose shading goes over from corner to corner
+    corner_normals: Array  # (c, 3) outward unit normals there, of smooth triangles; zero elsewhere
     colours: Array  # (parts, 3) sRGB 0..255
 
 
 def geometry(model: BodyModel) -> Geometry:
     """Flatten a body's parts: boxes become six rectangles, meshes their triangles."""
     ellipsoids: list[tuple] = []
-    polygons: list[tuple] = []
+    polygons: list[tuple[int, int, Array, Array | None]] = []  # segment, part, corners and normals (p, k, 3)
     part_index = 0
     for segment_index, segment in enumerate(model.segments):
         for part in segment.parts:
             place = part.segment_from_part
             ids = (segment_index, part_index)
             if isinstance(part.shape, Ellipsoid):
-                ellipsoids.append((*ids, place.translation, place.rotation.as_matrix(), part.shape.semi_axes_m))
+                axes = place.rotation.as_matrix()
+                ellipsoids.append((*ids, place.translation, axes, part.shape.semi_axes_m, part.slab_m))
             else:
-                polygons += [(*ids, place.apply(loop)) for loop in _loops(part.shape)]
+                loops, normals = _loops(part.shape)
+                loops = place.apply(loops.reshape(-1, 3)).reshape(loops.shape)
+                polygons.append((*ids, loops, None if normals is None else normals @ place.rotation.as_matrix().T))
             part_index += 1
-    loops = [p[2] for p in polygons]
+    counts = [len(p[2]) for p in polygons]
+    sizes = np.repeat([p[2].shape[1] for p in polygons], counts).astype(np.int64)
     return Geometry(
         ellipsoid_segment=np.array([e[0] for e in ellipsoids], np.int64),
         ellipsoid_part=np.array([e[1] for e in ellipsoids], np.int64),
         ellipsoid_centre=np.array([e[2] for e in ellipsoids], float).reshape(-1, 3),
         ellipsoid_axes=np.array([e[3] for e in ellipsoids], float).reshape(-1, 3, 3),
         ellipsoid_semi_axes=np.array([e[4] for e in ellipsoids], float).reshape(-1, 3),
-        polygon_segment=np.array([p[0] for p in polygons], np.int64),
-        polygon_part=np.array([p[1] for p in polygons], np.int64),
-        start=np.cumsum([0] + [len(loop) for loop in loops], dtype=np.int64),
-        corners=np.concatenate(loops) if loops else np.zeros((0, 3)),
-        normals=np.array([_normal(loop) for loop in loops], float).reshape(-1, 3),
+        ellipsoid_slab=np.array([e[5] for e in ellipsoids], float).reshape(-1, 2),
+        polygon_segment=np.repeat([p[0] for p in polygons], counts).astype(np.int64),
+        polygon_part=np.repeat([p[1] for p in polygons], counts).astype(np.int64),
+        start=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+        corners=np.concatenate([np.zeros((0, 3)), *(p[2].reshape(-1, 3) for p in polygons)]),
+        normals=np.concatenate([np.zeros((0, 3)), *(_normals(p[2]) for p in polygons)]),
+        is_smooth=np.repeat([p[3] is not None for p in polygons], counts).astype(bool),
+        corner_normals=np.concatenate(
+            [np.zeros((0, 3)), *((np.zeros_like(p[2]) if p[3] is None else p[3]).reshape(-1, 3) for p in polygons)]
+        ),
         colours=np.array([_UNSAMPLED if p.colour is None else p.colour for p in model.parts], float),
     )
 
@@ -84,15 +97,23 @@ def has_flat_sides(shape: Shape) -> bool:
     return bool(len(bends) and np.all(bends > _SHARP_RAD))
 
 
-def _loops(shape: Box | Mesh) -> list[Array]:
+def _loops(shape: Box | Mesh) -> tuple[Array, Array | None]:
+    """Return the polygons of a box or a mesh, (p, corners of each, 3) [m], and normals at their corners, if it has any.
+
+    Triangles without area are left out.
+    """
     if isinstance(shape, Box):
-        corners = _BOX_CORNERS * shape.size_m
-        return [corners[list(face)] for face in _BOX_FACES]
+        return (_BOX_CORNERS * shape.size_m)[np.array(_BOX_FACES)], None
     triangles = shape.vertices_m[shape.faces]
-    area = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
-    return list(triangles[area > 0])
+    longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
+    has_area = np.linalg.norm(_crosses(triangles), axis=1) > _NO_AREA * longest**2
+    return triangles[has_area], None if shape.normals is None else shape.normals[shape.faces[has_area]]
 
 
-def _normal(loop: Array) -> Array:
-    normal = np.cross(loop[1] - loop[0], loop[2] - loop[1])
-    return normal / np.linalg.norm(normal)
+def _crosses(loops: Array) -> Array:
+    return np.cross(loops[:, 1] - loops[:, 0], loops[:, 2] - loops[:, 1])
+
+
+def _normals(loops: Array) -> Array:
+    crosses = _crosses(loops)
+    return crosses / np.linalg.norm(crosses, axis=1, keepdims=True)

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import colorsys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body.model import WHOLE, Ellipsoid, Part
+from airborne.body.model import WHOLE, BodyModel, Ellipsoid, Part, Segment
+from airborne.body.shaping import length_axis
 from airborne.errors import BodyError
 
 Colour = tuple[float, float, float] | None  # sRGB 0..255; None: to be sampled from the video
 
 _BACKWARD = Rotation.from_euler("x", -90, degrees=True)  # a part whose own z points backward
+_TOWARD = (Rotation.from_euler("y", 90, degrees=True), _BACKWARD, Rotation.identity())  # own z points along x, y, z
+_ALIGNED = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +71,96 @@ class Outfit:
         return [Part(segment, ellipsoid, place, _array(colours.get(kind, self.shirt)))]
 
 
+@dataclass(frozen=True, slots=True)
+class Border:
+    """Where a segment's surface changes colour: across one of the segment's axes, as a share of its extent there."""
+
+    share: float  # along the length axis from the segment's joint to its end; along another from its low side
+    axis: int | None = None  # 0, 1, 2: x, y, z; None: the length axis
+
+
+def with_borders(model: BodyModel, borders: Mapping[str, Border | None]) -> BodyModel:
+    """Return the body with the colours of segments changing at other places; None: a segment of one colour.
+
+    A name without its side ("thigh") stands for both. A segment cut the same way before keeps its two parts' names and
+    colours; one cut anew has its colour on both sides. Raises BodyError for an unknown segment, a share outside 0..1,
+    and a segment that is not one ellipsoid.
+    """
+    names = {segment.name for segment in model.segments}
+    wanted: dict[str, Border | None] = {}
+    for name, border in borders.items():
+        sides = [name] if name in names else [f"{name}_{side}" for side in ("left", "right")]
+        if not {*sides} <= names:
+            model.index_of(name)
+        if border is not None and not 0 < border.share < 1:
+            raise BodyError(f"segment '{name}': the border's share is {border.share:g}; expected between 0 and 1")
+        wanted |= dict.fromkeys(sides, border)
+    segments = tuple(
+        replace(segment, parts=_bordered(model, segment, wanted[segment.name])) if segment.name in wanted else segment
+        for segment in model.segments
+    )
+    return replace(model, segments=segments)
+
+
+def extent_m(model: BodyModel, segment: str, axis: int | None = None) -> tuple[float, float]:
+    """Return where a `Border`'s shares 0 and 1 lie along an axis of the segment's frame [m].
+
+    Along the length axis: its joint, and the farthest joint of a segment that hangs on it, or the end of its surface.
+    """
+    ellipsoid, centre = solid_of(model, segment)
+    length = length_axis(model, segment)
+    if axis is None or axis == length:
+        ends = [child.joint_m[length] for child in model.segments if child.parent == segment]
+        far = max(ends, key=abs, default=0.0)
+        if not far:
+            far = centre[length] + np.copysign(ellipsoid.semi_axes_m[length], centre[length])
+        return 0.0, float(far)
+    return float(centre[axis] - ellipsoid.semi_axes_m[axis]), float(centre[axis] + ellipsoid.semi_axes_m[axis])
+
+
+def solid_of(model: BodyModel, segment: str) -> tuple[Ellipsoid, np.ndarray]:
+    """Return the ellipsoid that a segment's parts are cut from, its axes along the segment's, and its centre (3,) [m].
+
+    Raises BodyError for a segment that is not one ellipsoid.
+    """
+    found = []
+    for part in model.segments[model.index_of(segment)].parts:
+        turn = np.abs(part.segment_from_part.rotation.as_matrix())
+        if isinstance(part.shape, Ellipsoid) and np.abs(turn - turn.round()).max() < _ALIGNED:
+            found.append((turn.round() @ part.shape.semi_axes_m, part.segment_from_part.translation))
+        else:
+            found.append((np.full(3, np.nan), np.full(3, np.nan)))
+    if not found or not np.allclose(found, found[0], rtol=0, atol=_ALIGNED):
+        raise BodyError(f"segment '{segment}' is not one ellipsoid along its axes, so it cannot be cut; leave it whole")
+    return Ellipsoid(found[0][0]), found[0][1]
+
+
+def _bordered(model: BodyModel, segment: Segment, border: Border | None) -> tuple[Part, ...]:
+    ellipsoid, centre = solid_of(model, segment.name)
+    old = sorted(segment.parts, key=lambda part: part.slab_m)
+    if border is None:
+        most = max(old, key=lambda part: _height_m(part))
+        return (Part(segment.name, ellipsoid, RigidTransform.from_translation(centre), most.colour),)
+    axis = length_axis(model, segment.name) if border.axis is None else border.axis
+    start, end = extent_m(model, segment.name, axis)
+    height = start + border.share * (end - start) - centre[axis]
+    own = Ellipsoid(np.abs(_TOWARD[axis].as_matrix()).round().T @ ellipsoid.semi_axes_m)
+    place = RigidTransform.from_components(centre, _TOWARD[axis])
+    is_cut_so = len(old) == 2 and np.allclose(old[0].segment_from_part.rotation.apply([0, 0, 1]), np.eye(3)[axis])
+    named = [f"{segment.name}_low", f"{segment.name}_high"]
+    below, above = old if is_cut_so else (replace(old[0], name=name) for name in named)
+    return (
+        Part(below.name, own, place, below.colour, (WHOLE[0], float(height))),
+        Part(above.name, own, place, above.colour, (float(height), WHOLE[1])),
+    )
+
+
+def _height_m(part: Part) -> float:
+    """Return how much of a part's ellipsoid its slab keeps, along its own z [m]."""
+    top = part.shape.semi_axes_m[2] if isinstance(part.shape, Ellipsoid) else 0.0
+    return float(np.diff(np.clip(part.slab_m, -top, top))[0])
+
+
 def _cut(
     segment: str,
     ellipsoid: Ellipsoid,
@@ -111,3 +206,46 @@ SAMPLED = Outfit(
     shorts_share=0.5,
     socks_share=0.0,
 )
+
+# Hue [deg], saturation, value. The hue goes once round the body, so that left and right differ and what lies near looks
+# alike; the trunk is grey. No channel is above 200: light of up to 1.27 leaves every colour below white.
+_HUES = {
+    "pelvis": (0, 0.0, 0.45),
+    "torso": (0, 0.0, 0.57),
+    "chest": (0, 0.0, 0.70),
+    "head": (90, 0.8, 0.78),
+    "shoulder_left": (0, 0.8, 0.78),
+    "upper_arm_left": (15, 0.8, 0.78),
+    "forearm_left": (30, 0.8, 0.78),
+    "hand_left": (45, 0.8, 0.78),
+    "shoulder_right": (210, 0.8, 0.78),
+    "upper_arm_right": (225, 0.8, 0.78),
+    "forearm_right": (240, 0.8, 0.78),
+    "hand_right": (255, 0.8, 0.78),
+    "thigh_left": (320, 0.8, 0.78),
+    "shank_left": (305, 0.8, 0.78),
+    "foot_left": (290, 0.8, 0.78),
+    "thigh_right": (140, 0.8, 0.70),
+    "shank_right": (160, 0.8, 0.70),
+    "foot_right": (180, 0.8, 0.70),
+}
+PALETTE = {
+    name: tuple(round(255 * share) for share in colorsys.hsv_to_rgb(hue / 360, saturation, value))
+    for name, (hue, saturation, value) in _HUES.items()
+}  # sRGB
+
+
+def in_flat_colours(model: BodyModel, colours: Mapping[str, tuple[float, ...]] = PALETTE) -> BodyModel:
+    """Give each segment one colour all over, sRGB 0..255, as paper B's models have; by default those of `PALETTE`.
+
+    Raises BodyError for a segment without a colour, and one that is not one ellipsoid.
+    """
+    missing = [segment.name for segment in model.segments if segment.name not in colours]
+    if missing:
+        raise BodyError(f"no colour for segment '{missing[0]}'; there are colours for {', '.join(colours)}")
+    whole = with_borders(model, {segment.name: None for segment in model.segments})
+    segments = tuple(
+        replace(segment, parts=(replace(segment.parts[0], colour=np.array(colours[segment.name], float)),))
+        for segment in whole.segments
+    )
+    return replace(whole, segments=segments)

@@ -28,12 +28,29 @@ def with_segment_lengths(model: BodyModel, scales: Mapping[str, float]) -> BodyM
     return _scaled(model, scales, along=True)
 
 
-def with_girths(model: BodyModel, scales: Mapping[str, float]) -> BodyModel:
+def with_girths(model: BodyModel, scales: Mapping[str, float | tuple[float, float]]) -> BodyModel:
     """Return the body with segments made thicker across their length axes, each part about its own centre, by factors.
 
-    Names as in `with_segment_lengths`. Joints, landmarks and centres of mass stay. Raises BodyError likewise.
+    A pair scales the two axes across, in the order x, y, z: of the trunk its width and its depth. Names as in
+    `with_segment_lengths`. Joints, landmarks and centres of mass stay. Raises BodyError likewise.
     """
     return _scaled(model, scales, along=False)
+
+
+def with_mass(model: BodyModel, mass_kg: float) -> BodyModel:
+    """Return the body with a total mass [kg], shared out as before; BodyError where a segment's is not known."""
+    if not 0 < mass_kg < np.inf:
+        raise BodyError(f"mass_kg is {mass_kg:g}; expected a mass above zero, in kilograms")
+    unknown = [segment.name for segment in model.segments if segment.inertia is None]
+    if unknown:
+        raise BodyError(f"body '{model.name}' has no inertia of {', '.join(unknown)}; give one, or no mass")
+    scale = mass_kg / sum(segment.inertia.mass_kg for segment in model.segments if segment.inertia is not None)
+    segments = tuple(
+        replace(segment, inertia=Inertia(own.mass_kg * scale, own.centre_m, own.tensor_kg_m2 * scale))
+        for segment in model.segments
+        if (own := segment.inertia) is not None
+    )
+    return BodyModel(model.name, segments, model.landmarks)
 
 
 def length_axis(model: BodyModel, segment: str) -> int:
@@ -47,12 +64,13 @@ def length_axis(model: BodyModel, segment: str) -> int:
     return int(np.argmax(extent)) if extent.any() else 2
 
 
-def _scaled(model: BodyModel, scales: Mapping[str, float], *, along: bool) -> BodyModel:
+def _scaled(model: BodyModel, scales: Mapping[str, float | tuple[float, float]], *, along: bool) -> BodyModel:
     factors = _per_segment(model, scales)
     shape, place = {}, {}
     for name, scale in factors.items():
         on_axis = np.arange(3) == length_axis(model, name)
-        shape[name] = np.where(on_axis == along, scale, 1.0)
+        shape[name] = np.ones(3)
+        shape[name][on_axis == along] = scale
         place[name] = shape[name] if along else np.ones(3)
     segments = []
     for segment in model.segments:
@@ -68,17 +86,19 @@ def _scaled(model: BodyModel, scales: Mapping[str, float], *, along: bool) -> Bo
     return BodyModel(model.name, tuple(segments), landmarks)
 
 
-def _per_segment(model: BodyModel, scales: Mapping[str, float]) -> dict[str, float]:
+def _per_segment(model: BodyModel, scales: Mapping[str, float | tuple[float, float]]) -> dict[str, Array]:
     """Resolve names without a side; a name with its side goes before one without."""
-    found: dict[str, float] = {}
+    found: dict[str, Array] = {}
     names = {segment.name for segment in model.segments}
     for name, scale in sorted(scales.items(), key=lambda item: item[0] in names):
-        if not _RANGE[0] <= scale <= _RANGE[1]:
-            raise BodyError(f"segment '{name}': scale is {scale:g}; expected a factor, {_RANGE[0]:g} to {_RANGE[1]:g}")
+        for factor in np.atleast_1d(scale):
+            if not _RANGE[0] <= factor <= _RANGE[1]:
+                expected = f"expected a factor, {_RANGE[0]:g} to {_RANGE[1]:g}"
+                raise BodyError(f"segment '{name}': scale is {factor:g}; {expected}")
         sides = [side for side in (f"{name}_left", f"{name}_right") if side in names]
         if name not in names and not sides:
             model.index_of(name)
-        found |= dict.fromkeys([name] if name in names else sides, float(scale))
+        found |= dict.fromkeys([name] if name in names else sides, np.asarray(scale, float))
     return found
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body.model import BodyModel, Box, Ellipsoid, Pose, Shape
+from airborne.body.model import BodyModel, Box, Ellipsoid, Part, Pose
 
 Array = NDArray[np.floating]
 
@@ -24,7 +24,7 @@ class _Solid:
     """A part in the root's frame, free of how its axes are named."""
 
     index: int
-    points: Array  # (p, 3) corners, or vertices and face centres, or an ellipsoid's centre [m]
+    points: Array  # (p, 3) corners, or vertices and face centres, or an ellipsoid's centre and ends of its slab [m]
     spread: Array  # (3, 3) an ellipsoid's axes as a sum of squares [m^2]; zero for other shapes
     colour: Array | None
 
@@ -75,6 +75,9 @@ def continuous_axes(model: BodyModel) -> Array:
             return np.zeros((0, 3))
         if steps.any():
             axes.append(directions[:, 0] if steps[0] else directions[:, 2])
+        if len(solid.points) > 1:
+            along = solid.points[2] - solid.points[1]  # a slab is cut square to its own axis
+            axes.append(along / np.linalg.norm(along))
     if not axes:
         return np.eye(3)
     is_one_axis = all(np.linalg.norm(np.cross(axes[0], axis)) < _SAME_PLACE_M for axis in axes)
@@ -91,13 +94,17 @@ def _solids(model: BodyModel) -> list[_Solid]:
             spread = np.zeros((3, 3))
             if isinstance(part.shape, Ellipsoid):
                 spread = turn @ np.diag(np.square(part.shape.semi_axes_m)) @ turn.T
-            solids.append(_Solid(len(solids), _points(part.shape) @ turn.T + place, spread, part.colour))
+            solids.append(_Solid(len(solids), _points(part) @ turn.T + place, spread, part.colour))
     return solids
 
 
-def _points(shape: Shape) -> Array:
+def _points(part: Part) -> Array:
+    shape = part.shape
     if isinstance(shape, Ellipsoid):
-        return np.zeros((1, 3))
+        radius = shape.semi_axes_m[2]
+        low, high = np.clip(part.slab_m, -radius, radius)
+        ends = [low, high] if low > -radius or high < radius else []
+        return np.array([[0.0, 0.0, height] for height in [0.0, *ends]])
     if isinstance(shape, Box):
         return np.array(list(product((-0.5, 0.5), repeat=3))) * shape.size_m
     return np.concatenate([shape.vertices_m, shape.vertices_m[shape.faces].mean(axis=1)])

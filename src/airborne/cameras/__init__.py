@@ -1,24 +1,30 @@
 """Cameras and how they are found.
 
-In come control points or calibration files; out go `Camera` and `Rig`, and a `Calibration` that says how far to trust
-them. Knows no video, no body and no trial.
+In come control points, calibration files or detections; out go `Camera` and `Rig`, and a `Calibration` that says how
+far to trust them. Knows no video, no body and no trial.
 """
 
 from airborne.cameras.calibration import Calibration, CameraFit, calibrate
 from airborne.cameras.camera import Camera, Rig
 from airborne.cameras.control_points import ControlPoints, read_control_points
+from airborne.cameras.detections import Detections, read_detections
 from airborne.cameras.files import read_rig, write_pose2sim
 from airborne.cameras.report import describe, to_dict
+from airborne.cameras.resection import Mending, mend
 
 __all__ = [
     "Calibration",
     "Camera",
     "CameraFit",
     "ControlPoints",
+    "Detections",
+    "Mending",
     "Rig",
     "calibrate",
     "describe",
+    "mend",
     "read_control_points",
+    "read_detections",
     "read_rig",
     "to_dict",
     "write_pose2sim",

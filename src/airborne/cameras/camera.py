@@ -125,11 +125,11 @@ class Rig:
         """The projection matrices without distortion: (cameras, 3, 4)."""
         return np.stack([camera.P for camera in self.cameras])
 
-    def points_from_px(self, px: Array) -> Array:
-        """Triangulate pixels (..., cameras, 2) [px], NaN where not seen: (..., 3) [m].
+    def points_from_px(self, px: Array, weights: Array | None = None) -> Array:
+        """Triangulate pixels (..., cameras, 2) [px], NaN where not seen: (..., 3) [m]; weights (..., cameras).
 
         Lens distortion is taken out first; NaN where fewer than two cameras see the point (see `triangulate`).
         """
         px = np.asarray(px, float)
         straight = [camera.undistorted_px(px[..., i, :]) for i, camera in enumerate(self.cameras)]
-        return triangulate(self.P, np.stack(straight, axis=-2))
+        return triangulate(self.P, np.stack(straight, axis=-2), weights)

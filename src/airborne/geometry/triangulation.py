@@ -20,19 +20,21 @@ def px_from_points(P: Array, points: Array) -> Array:
     return xyw[..., :2] / np.where(xyw[..., 2:] > 0, xyw[..., 2:], np.nan)
 
 
-def triangulate(P: Array, px: Array) -> Array:
+def triangulate(P: Array, px: Array, weights: Array | None = None) -> Array:
     """Return the points (..., 3) [m] whose projections lie nearest to px (..., c, 2) [px], in the least-squares sense.
 
     P (..., c, 3, 4) as in `px_from_points`; px without distortion, NaN where a camera does not see the point. With
-    equal, independent click errors this is the maximum-likelihood point: the linear solution, then Gauss-Newton on the
-    reprojection. NaN where fewer than two cameras see the point, where their rays are parallel, or where the solution
-    lies behind a camera that sees it.
+    independent click errors of variance 1 / weight, weights (..., c) above zero, all alike if not given, this is the
+    maximum-likelihood point: the linear solution, then Gauss-Newton on the reprojection. NaN where fewer than two
+    cameras see the point, where their rays are parallel, or where the solution lies behind a camera that sees it.
     """
     px = np.asarray(px, float)
     points = triangulate_linear(P, px)
+    root = np.ones(px.shape[:-1]) if weights is None else np.sqrt(weights)
     for _ in range(N_STEPS):
         residual, jacobian = _residual_and_jacobian(P, points, px)
-        gradient = np.einsum("...cik,...ci->...k", jacobian, residual)
+        jacobian = root[..., None, None] * jacobian
+        gradient = np.einsum("...cik,...ci->...k", jacobian, root[..., None] * residual)
         points = points + np.einsum("...jk,...k->...j", _inverse(jacobian), gradient)
     residual, jacobian = _residual_and_jacobian(P, points, px)
     is_lost = np.isnan(residual).any(axis=(-2, -1), keepdims=True) | np.isnan(_inverse(jacobian))

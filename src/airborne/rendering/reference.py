@@ -51,7 +51,7 @@ def _ellipsoid_hits(geometry: Geometry, R: Array, t: Array, e: int, rays: Array)
     segment = geometry.ellipsoid_segment[e]
     centre = R[segment] @ geometry.ellipsoid_centre[e] + t[segment]
     axes = R[segment] @ geometry.ellipsoid_axes[e]
-    semi = geometry.ellipsoid_semi_axes[e]
+    semi, slab = geometry.ellipsoid_semi_axes[e], geometry.ellipsoid_slab[e]
     if centre[2] <= np.linalg.norm(axes[2] * semi):  # it reaches the camera's plane
         return np.full(rays.shape[:2], np.inf), np.zeros(3)
     ray_in_sphere, origin_in_sphere = rays @ axes / semi, -centre @ axes / semi
@@ -63,11 +63,16 @@ def _ellipsoid_hits(geometry: Geometry, R: Array, t: Array, e: int, rays: Array)
     on_sphere = np.where(root[..., None] >= 0, origin_in_sphere + ray_in_sphere * ((-b / a)[..., None]), 0)
     on_sphere = on_sphere - ray_in_sphere * (np.sqrt(np.maximum(root, 0)) / a)[..., None]
     normals = (on_sphere / semi) @ axes.T
+    height = on_sphere[..., 2] * semi[2]
+    depth = np.where((slab[0] <= height) & (height <= slab[1]), depth, np.inf)
     return depth, normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
 
 
 def _polygon_hits(geometry: Geometry, R: Array, t: Array, p: int, rays: Array) -> tuple[Array, Array]:
-    """Return each ray's depth [m] at the polygon, infinite where it misses or sees its back, and the normal (3,)."""
+    """Return each ray's depth [m] at the polygon, infinite where it misses or sees its back, and normals to shade with.
+
+    The normals are one, (3,), or of a smooth triangle (h, w, 3).
+    """
     segment = geometry.polygon_segment[p]
     corners = geometry.corners[geometry.start[p] : geometry.start[p + 1]] @ R[segment].T + t[segment]
     normal = R[segment] @ geometry.normals[p]
@@ -80,6 +85,10 @@ def _polygon_hits(geometry: Geometry, R: Array, t: Array, p: int, rays: Array) -
     points = rays * np.where(np.isfinite(depth), depth, 0)[..., None]
     for corner, following in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         depth = np.where(np.cross(following - corner, points - corner) @ normal >= 0, depth, np.inf)
+    if geometry.is_smooth[p]:
+        nearness = points @ np.linalg.inv(corners)
+        normals = nearness @ geometry.corner_normals[geometry.start[p] : geometry.start[p + 1]] @ R[segment].T
+        return depth, normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
     return depth, normal
 
 

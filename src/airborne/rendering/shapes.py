@@ -6,9 +6,13 @@ Every shape, ellipsoid or polygon, becomes one row of numbers for the same pixel
     n(u, v) = N (u, v, 1) - w g                                                outward normal, any positive length
 
 For an ellipsoid (x - c)'M(x - c) = 1 in camera axes with g = M c and k = c'M c - 1: B = K^-T g / k, N = M K^-1, and the
-outline is (u, v, 1) Q (u, v, 1)' >= 0 with Q = B B' - K^-T M K^-1 / k, alpha = -Q00. A polygon of the plane m.x = d has
-B = K^-T m / d, alpha = 0, N = 0 and g = -m; a row cuts it between its edges, each a half-plane of the image that the
-camera's centre and the edge span, so nothing has to be clipped where corners lie behind the camera.
+outline is (u, v, 1) Q (u, v, 1)' >= 0 with Q = B B' - K^-T M K^-1 / k, alpha = -Q00. The near surface's height along
+the ellipsoid's third axis a, as a share of that semi-axis, is a.K^-1 (u, v, 1) / w - a.c: `rows.py` cuts the rows of
+an ellipsoid with a slab where it meets the slab's two heights. A polygon of the plane m.x = d has
+B = K^-T m / d, alpha = 0, N = 0 and g = -m; where its shading is smooth, a triangle of corners X_i and normals n_i has
+g = 0 and N = sum n_i (X_j x X_k)' K^-1 / det(X), the n_i weighted by nearness, times w. A row cuts a polygon between
+its edges, each a half-plane of the image that the camera's centre and the edge span, so nothing has to be clipped where
+corners lie behind the camera.
 
 Numba's cache looks at the file of the calling kernel only: after a change here, delete the folder's `__pycache__`.
 """
@@ -27,10 +31,13 @@ _COMMON: dict[str, Any] = {"nogil": True, "fastmath": True, "error_model": "nump
 KERNEL = {**_COMMON, "cache": True}  # called from Python
 INNER = {**_COMMON, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # called by kernels only
 
+_SEAM_PX = 1e-7  # polygons reach this far beyond their edges, so that no pixel falls between two of a mesh
+
 # columns of a packed view: world to camera (R row by row, t), then the two rows of K^-1
 VIEW_T, VIEW_K, VIEW_COLUMNS = 9, 12, 18
 # columns of an outline (float64)
-B_U, B_V, B_1, MID_V, MID_1, HALF_1, HALF_V, HALF_VV, NORMAL, OUTLINE_COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 8, 17
+B_U, B_V, B_1, MID_V, MID_1, HALF_1, HALF_V, HALF_VV, NORMAL = 0, 1, 2, 3, 4, 5, 6, 7, 8
+HEIGHT, CENTRE_HEIGHT, BEND, OUTLINE_COLUMNS = 17, 20, 21, 22  # a.K^-1, a.c and alpha, for slabs
 # columns of a surface (float32): what the pixel loop holds fixed along a span
 ALPHA, W_STEP, N_STEP, G, COLOUR, ID, SURFACE_COLUMNS = 0, 1, 2, 5, 8, 11, 12
 
@@ -42,9 +49,12 @@ class Shapes(NamedTuple):
     axes: Any  # (e, 3, 3) columns: world axes over semi-axes [1/m]
     corners: Any  # (c, 3) [m] world
     normals: Any  # (p, 3) world
+    corner_normals: Any  # (c, 3) world, of smooth triangles
     outline: Any  # (s, OUTLINE_COLUMNS)
     surface: Any  # (s, SURFACE_COLUMNS) float32
     rows: Any  # (s, 2) first and last row seen, last < first where none is
+    slab: Any  # (e, 2) heights between which an ellipsoid is seen, as shares of its third semi-axis
+    is_cut: Any  # (e,) whether the slab leaves anything out
     edges: Any  # (c, 3) side (+1 lower bound, -1 upper bound, 0 a condition on the row), slope, offset
 
 
@@ -55,14 +65,18 @@ def new_shapes(geometry: Geometry) -> Shapes:
     parts = np.concatenate([geometry.ellipsoid_part, geometry.polygon_part])
     surface[:, COLOUR : COLOUR + 3] = geometry.colours[parts]
     surface[:, ID] = np.arange(e + p)
+    slab = np.clip(geometry.ellipsoid_slab / geometry.ellipsoid_semi_axes[:, 2:], -2, 2)  # kernels know no infinity
     return Shapes(
         np.empty((e, 3)),
         np.empty((e, 3, 3)),
         np.empty((c, 3)),
         np.empty((p, 3)),
+        np.empty((c, 3)),
         np.zeros((e + p, OUTLINE_COLUMNS)),
         surface,
         np.empty((e + p, 2), np.int64),
+        slab,
+        (slab[:, 0] > -1) | (slab[:, 1] < 1),
         np.empty((c, 3)),
     )
 
@@ -79,6 +93,8 @@ def place(shapes, geometry, R, t):
             for j in range(3):
                 length = geometry.ellipsoid_semi_axes[e, j]
                 shapes.axes[e, i, j] = (a * axes[0, j] + b * axes[1, j] + c * axes[2, j]) / length
+    if len(geometry.corner_normals):
+        _place_corner_normals(shapes, geometry, R)
     for p in range(len(geometry.polygon_segment)):
         segment = geometry.polygon_segment[p]
         for i in range(3):
@@ -91,18 +107,34 @@ def place(shapes, geometry, R, t):
 
 
 @njit(**INNER)
+def _place_corner_normals(shapes, geometry, R):
+    """Turn the corner normals of smooth triangles to the world."""
+    for p in range(len(geometry.is_smooth)):
+        if geometry.is_smooth[p]:
+            segment = geometry.polygon_segment[p]
+            for k in range(geometry.start[p], geometry.start[p + 1]):
+                x, y, z = geometry.corner_normals[k, 0], geometry.corner_normals[k, 1], geometry.corner_normals[k, 2]
+                for i in range(3):
+                    shapes.corner_normals[k, i] = R[segment, i, 0] * x + R[segment, i, 1] * y + R[segment, i, 2] * z
+
+
+@njit(**INNER)
 def outline_all(shapes, geometry, view, width, height):
     """Outline every placed shape in a view of `width` pixels a row and `height` rows."""
     n_ellipsoids = len(geometry.ellipsoid_segment)
     for s in range(len(shapes.rows)):
         if s < n_ellipsoids:
-            is_seen = _outline_ellipsoid(shapes, s, view, height)
+            is_seen = _outline_ellipsoid(
+                shapes.centre[s], shapes.axes[s], shapes.outline[s], shapes.surface[s], shapes.rows[s], view, height
+            )
         else:
             p = s - n_ellipsoids
             is_seen = _outline_polygon(shapes, s, p, geometry.start[p], geometry.start[p + 1], view, height)
         if not is_seen:
             shapes.rows[s, 0] = 0
             shapes.rows[s, 1] = -1
+    if len(geometry.corner_normals):
+        _shade_smoothly(shapes, geometry, view)
 
 
 @njit(**INNER)
@@ -115,18 +147,18 @@ def _turned(view, x, y, z):
 
 
 @njit(**INNER)
-def _outline_ellipsoid(shapes, s, view, height):
+def _outline_ellipsoid(centre, axes, outline, surface, rows, view, height):
     """Outline one ellipsoid; False where it reaches the camera's plane, or no row meets it."""
-    m00 = m01 = m02 = m11 = m12 = m22 = 0.0
+    m00 = m01 = m02 = m11 = m12 = m22 = a = b = c = 0.0
     for j in range(3):
-        a, b, c = _turned(view, shapes.axes[s, 0, j], shapes.axes[s, 1, j], shapes.axes[s, 2, j])
+        a, b, c = _turned(view, axes[0, j], axes[1, j], axes[2, j])
         m00 += a * a
         m01 += a * b
         m02 += a * c
         m11 += b * b
         m12 += b * c
         m22 += c * c
-    cx, cy, cz = _turned(view, shapes.centre[s, 0], shapes.centre[s, 1], shapes.centre[s, 2])
+    cx, cy, cz = _turned(view, centre[0], centre[1], centre[2])
     cx, cy, cz = cx + view[VIEW_T], cy + view[VIEW_T + 1], cz + view[VIEW_T + 2]
     g0, g1, g2 = m00 * cx + m01 * cy + m02 * cz, m01 * cx + m11 * cy + m12 * cz, m02 * cx + m12 * cy + m22 * cz
     k = g0 * cx + g1 * cy + g2 * cz - 1
@@ -150,15 +182,17 @@ def _outline_ellipsoid(shapes, s, view, height):
     if half_vv >= 0 or discriminant <= 0:
         return False
     root = math.sqrt(discriminant)
-    shapes.rows[s, 0] = math.ceil(min(max((-half_v + root) / (2 * half_vv), 0.0), float(height)))
-    shapes.rows[s, 1] = math.floor(max(min((-half_v - root) / (2 * half_vv), height - 1.0), -1.0))
-    outline, surface = shapes.outline[s], shapes.surface[s]
+    rows[0] = math.ceil(min(max((-half_v + root) / (2 * half_vv), 0.0), float(height)))
+    rows[1] = math.floor(max(min((-half_v - root) / (2 * half_vv), height - 1.0), -1.0))
     outline[B_U], outline[B_V], outline[B_1] = b0, b1, b2
     outline[MID_V], outline[MID_1] = mid_v, mid_1
     outline[HALF_1], outline[HALF_V], outline[HALF_VV] = half_1, half_v, half_vv
     outline[NORMAL], outline[NORMAL + 1], outline[NORMAL + 2] = n00, n01, n02
     outline[NORMAL + 3], outline[NORMAL + 4], outline[NORMAL + 5] = n10, n11, n12
     outline[NORMAL + 6], outline[NORMAL + 7], outline[NORMAL + 8] = n20, n21, n22
+    outline[HEIGHT], outline[HEIGHT + 1] = k00 * a + k10 * b, k01 * a + k11 * b  # a, b, c: still the third axis
+    outline[HEIGHT + 2], outline[CENTRE_HEIGHT] = k02 * a + k12 * b + c, a * cx + b * cy + c * cz
+    outline[BEND] = -q00
     surface[ALPHA], surface[W_STEP] = -q00, b0
     surface[N_STEP], surface[N_STEP + 1], surface[N_STEP + 2] = n00, n10, n20
     surface[G], surface[G + 1], surface[G + 2] = g0, g1, g2
@@ -182,8 +216,8 @@ def _outline_polygon(shapes, s, p, start, stop, view, height):
         return False
     if not is_in_front:
         low, high = 0.0, height - 1.0
-    shapes.rows[s, 0] = math.ceil(max(low, 0.0))
-    shapes.rows[s, 1] = math.floor(min(high, height - 1.0))
+    shapes.rows[s, 0] = math.ceil(max(low - _SEAM_PX, 0.0))
+    shapes.rows[s, 1] = math.floor(min(high + _SEAM_PX, height - 1.0))
     k00, k01, k02 = view[VIEW_K], view[VIEW_K + 1], view[VIEW_K + 2]
     k10, k11, k12 = view[VIEW_K + 3], view[VIEW_K + 4], view[VIEW_K + 5]
     for i in range(start, stop):
@@ -195,15 +229,44 @@ def _outline_polygon(shapes, s, p, start, stop, view, height):
         a, b, c = side * (k00 * e0 + k10 * e1), side * (k01 * e0 + k11 * e1), side * (k02 * e0 + k12 * e1 + e2)
         edge = shapes.edges[i]
         if a == 0:
-            edge[0], edge[1], edge[2] = 0.0, b, c
+            edge[0], edge[1], edge[2] = 0.0, b, c + _SEAM_PX * abs(b)
         else:
-            edge[0], edge[1], edge[2] = math.copysign(1.0, a), -b / a, -c / a
+            edge[0], edge[1], edge[2] = math.copysign(1.0, a), -b / a, -c / a - math.copysign(_SEAM_PX, a)
     outline, surface = shapes.outline[s], shapes.surface[s]
     outline[B_U], outline[B_V] = (k00 * m0 + k10 * m1) / d, (k01 * m0 + k11 * m1) / d
     outline[B_1] = (k02 * m0 + k12 * m1 + m2) / d
     surface[W_STEP] = outline[B_U]
     surface[G], surface[G + 1], surface[G + 2] = -m0, -m1, -m2
     return True
+
+
+@njit(**INNER)
+def _shade_smoothly(shapes, geometry, view):
+    """Let the normals of smooth triangles go over from corner to corner; one loop, for calls copy all of `shapes`."""
+    n_ellipsoids, normals = len(geometry.ellipsoid_segment), shapes.corner_normals
+    k00, k01, k02 = view[VIEW_K], view[VIEW_K + 1], view[VIEW_K + 2]
+    k10, k11, k12 = view[VIEW_K + 3], view[VIEW_K + 4], view[VIEW_K + 5]
+    for p in range(len(geometry.is_smooth)):
+        s, start = n_ellipsoids + p, geometry.start[p]
+        if not geometry.is_smooth[p] or shapes.rows[s, 1] < shapes.rows[s, 0]:
+            continue
+        outline, surface = shapes.outline[s], shapes.surface[s]
+        for n in range(NORMAL, NORMAL + 9):
+            outline[n] = 0.0
+        for i in range(3):
+            x, y, z = _in_camera(view, shapes.corners[start + (i + 1) % 3])
+            x1, y1, z1 = _in_camera(view, shapes.corners[start + (i + 2) % 3])
+            e0, e1, e2 = y * z1 - z * y1, z * x1 - x * z1, x * y1 - y * x1
+            x, y, z = _in_camera(view, shapes.corners[start + i])
+            det = e0 * x + e1 * y + e2 * z
+            a, b, c = (k00 * e0 + k10 * e1) / det, (k01 * e0 + k11 * e1) / det, (k02 * e0 + k12 * e1 + e2) / det
+            turned = _turned(view, normals[start + i, 0], normals[start + i, 1], normals[start + i, 2])
+            for j in range(3):
+                outline[NORMAL + 3 * j] += turned[j] * a
+                outline[NORMAL + 3 * j + 1] += turned[j] * b
+                outline[NORMAL + 3 * j + 2] += turned[j] * c
+        for j in range(3):
+            surface[N_STEP + j], surface[G + j] = outline[NORMAL + 3 * j], 0.0
 
 
 @njit(**INNER)

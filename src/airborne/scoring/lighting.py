@@ -165,25 +165,3 @@ def paint_evenly(part, is_faceted, x0, y0, lit):
             if p >= 0 and not is_faceted[p]:
                 for k in range(3):
                     lit[k, y, x] = total[p, k] / count[p]
-
-
-@njit(cache=True, nogil=True, fastmath=True)
-def shares_of_light(observed, part, normals, lit, x0, y0, ratio, pixels):
-    """Fill ratio (parts, 3) with how bright each part is seen over how bright it is drawn, pixels (parts,) with how many.
-
-    Only pixels whose neighbours show the same part count; arguments as in `light_up`. 1 where nothing is drawn.
-    """
-    _, h, w = lit.shape
-    seen, drawn = np.zeros(ratio.shape, np.float32), np.zeros(ratio.shape, np.float32)
-    pixels[:] = 0
-    for y in range(h):
-        for x in range(w):
-            p = part[y + y0, x + x0]
-            if p >= 0 and _is_surrounded(part, normals, y + y0, x + x0):
-                pixels[p] += 1
-                for k in range(3):
-                    seen[p, k] += observed[k, y + y0, x + x0]
-                    drawn[p, k] += lit[k, y, x]
-    for p in range(len(ratio)):
-        for k in range(3):
-            ratio[p, k] = seen[p, k] / drawn[p, k] if drawn[p, k] > 0 else np.float32(1)

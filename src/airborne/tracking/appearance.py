@@ -16,8 +16,6 @@ from airborne.scoring.foreground import BINS, count_colours, posterior
 from airborne.scoring.plate import START_SD, Plate, look
 
 COLOUR_RATE = 0.1  # share of the newest frame in the colour histograms
-PAINT_RATE = 0.2  # share of the newest frame in the parts' brightness
-_PAINT_RANGE = 0.2, 5.0
 _SAMPLES = 2000  # pixels of a region that are counted, about
 _FEWEST = 30  # pixels below which a frame teaches nothing
 _CLEAR_PX = 3  # this far outside the mask, a pixel is background [px of a full frame]
@@ -48,12 +46,11 @@ class Region:
 
 @dataclass(frozen=True, slots=True)
 class Appearance:
-    """Colour histograms and paint by camera name, plates by source."""
+    """Colour histograms by camera name, plates by source."""
 
     body: dict[str, NDArray[np.float32]] = field(default_factory=dict)  # (32, 32, 32) probabilities
     background: dict[str, NDArray[np.float32]] = field(default_factory=dict)
     plates: dict[tuple[str, bytes], Plate] = field(default_factory=dict)
-    paint: dict[str, NDArray[np.float32]] = field(default_factory=dict)  # (parts, 3) linear light over the model's
 
     def knows(self, region: Region) -> bool:
         """Whether this camera's colours have been learned."""
@@ -91,13 +88,6 @@ class Appearance:
             look(region.picture, everywhere, plate.mean, plate.sd, plate.looks)
         else:
             look(region.rgb, covered, region.crop(plate.mean), region.crop(plate.sd), region.crop(plate.looks))
-
-    def learn_paint(self, region: Region, ratio: NDArray[np.float32], pixels: NDArray[np.integer]) -> None:
-        """Follow how much brighter each part is than it was drawn: ratio (parts, 3), over so many pixels (parts,)."""
-        name = region.camera.name
-        old = self.paint.get(name, np.ones_like(ratio))
-        rate = np.where(pixels >= _FEWEST, PAINT_RATE, 0.0)[:, None]
-        self.paint[name] = np.asarray(np.clip(old * ratio**rate, *_PAINT_RANGE), np.float32)
 
     def scene(self, region: Region) -> tuple[NDArray, NDArray, NDArray]:
         """Return the empty scene of a region: mean (h, w, 3), sd (h, w), looks (h, w), which are 0 where unknown."""

@@ -20,11 +20,11 @@ from airborne.body.outfits import Border, with_borders
 from airborne.body.shaping import with_girths, with_mass, with_segment_lengths
 from airborne.errors import BodyError
 from airborne.tracking.appearance import Appearance
-from airborne.tracking.clothes import dressed
+from airborne.tracking.clothes import Sight, borders_seen, coloured
 from airborne.tracking.composites import NOTHING, equations, misfit
 from airborne.tracking.freedom import Prior, all_joints
 from airborne.tracking.regions import reduced, regions_round
-from airborne.tracking.shape import Knob, girths_of, knobs_of, lengths_of, shaped
+from airborne.tracking.shape import Knob, border_knobs, borders_of, girths_of, knobs_of, lengths_of, shaped
 from airborne.tracking.synthesis import Laid, Synthesis, pictured
 from airborne.video import Frames
 
@@ -67,7 +67,7 @@ class BodyFit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _State:
-    shape: Array  # (k,) logarithms of factors
+    shape: Array  # (k,) see `shape`
     poses: tuple[Pose, ...]
 
 
@@ -85,7 +85,7 @@ class _Level:
 
     @property
     def shape_precision(self) -> Array:
-        """Inverse variances (k,) of the shape's logarithms about 0."""
+        """Inverse variances (k,) of the shape about 0."""
         return np.array([knob.sd for knob in self.knobs]) ** -2
 
     def synthesis(self, shape: Array) -> Synthesis:
@@ -112,9 +112,9 @@ def fit_body(
 
     `scenery` are more times, looked at for what the scene is like without the person; `weights` are what a landmark's
     squared distance counts, 1 where not named. Left and right are alike. Masses and inertias follow the shape at
-    constant density, or add up to `mass_kg`. The pictures are compared from coarse to fine, reduced to `levels_px_per_m`
-    where they are larger. Raises BodyError where the landmarks settle no pose, and where the
-    pictures do not show a part of the body.
+    constant density, or add up to `mass_kg`. The pictures are compared from coarse to fine, reduced to
+    `levels_px_per_m` where they are larger. Raises BodyError where the landmarks settle no pose, and where the pictures
+    do not show a part of the body.
     """
     if not sightings:
         raise BodyError("no frame to fit the body to; give at least one with known landmarks")
@@ -128,14 +128,20 @@ def fit_body(
     told = progress or (lambda done, expected: None)
     for number, px_per_m in enumerate(levels_px_per_m):
         margin_px = max(_LEAST_MARGIN_PX, round(_MARGIN_M * px_per_m))
-        now = shaped(start, knobs, state.shape)
+        now = shaped(start, knobs, state.shape[: len(knobs)])
         pictures = [reduced(each.frames, now.with_pose(first[0]), px_per_m) for each in every]
-        plates = _plates(now, pictures, (*state.poses, *first[len(sightings) :]), _FATTER[min(number, len(_FATTER) - 1)], margin_px)
+        plates = _plates(
+            now, pictures, (*state.poses, *first[len(sightings) :]), _FATTER[min(number, len(_FATTER) - 1)], margin_px
+        )
         seen = pictures[: len(sightings)]
-        worn, borders = _dressed(now, state.poses, seen)
+        sights = _sights(now, state.poses, seen)
+        borders = borders_seen(now, sights)
+        worn = coloured(with_borders(now, borders), sights)
+        every_knob = (*knobs, *border_knobs(now, borders))
+        state = _State(np.append(state.shape[: len(knobs)], np.zeros(len(every_knob) - len(knobs))), state.poses)
         level = _Level(
             base=with_borders(start, borders).with_colours(np.array([part.colour for part in worn.parts])),
-            knobs=knobs,
+            knobs=every_knob,
             priors=tuple(Prior(pose, _expected_sd(start)) for pose in first[: len(sightings)]),
             known=known,
             weights=np.array([(weights or {}).get(mark.name, 1.0) for mark in model.landmarks]),
@@ -149,17 +155,19 @@ def fit_body(
                 break
             state = following
     told(_MOST_STEPS * len(levels_px_per_m), _MOST_STEPS * len(levels_px_per_m))
-    fitted, borders = _dressed(shaped(start, knobs, state.shape), state.poses, seen)
-    before = _dressed(start, first[: len(sightings)], seen)[0], first[: len(sightings)]
+    fitted = shaped(level.base, level.knobs, state.shape)
+    fitted = coloured(fitted, _sights(fitted, state.poses, seen))
+    before = with_borders(start, borders_of(level.knobs, state.shape)), first[: len(sightings)]
+    before = coloured(before[0], _sights(*before, seen)), before[1]
     lights = _compared(before, (fitted, state.poses), seen, plates)
     return BodyFit(
         model=fitted if mass_kg is None else with_mass(fitted, mass_kg),
         poses=state.poses,
         start=before[0],
         start_poses=before[1],
-        lengths=lengths_of(knobs, state.shape, measured),
-        girths=girths_of(knobs, state.shape),
-        borders={stem: border for stem, border in borders.items() if border is not None},
+        lengths=lengths_of(level.knobs, state.shape, measured),
+        girths=girths_of(level.knobs, state.shape),
+        borders=borders_of(level.knobs, state.shape),
         rms_light=lights,
         landmark_rms_m=(_landmark_rms_m(*before, known), _landmark_rms_m(fitted, state.poses, known)),
     )
@@ -268,16 +276,14 @@ def _painted(model: BodyModel) -> BodyModel:
     return model.with_colours(np.array([grey if part.colour is None else part.colour for part in model.parts]))
 
 
-def _dressed(
-    model: BodyModel, poses: Sequence[Pose], pictures: Sequence[Frames], margin_px: float = _LEAST_MARGIN_PX
-) -> tuple[BodyModel, dict[str, Border | None]]:
-    synthesis = Synthesis.of(_painted(model))
-    sights = []
+def _sights(model: BodyModel, poses: Sequence[Pose], pictures: Sequence[Frames]) -> list[Sight]:
+    """Put a body into every picture."""
+    synthesis, sights = Synthesis.of(_painted(model)), []
     for pose, frames in zip(poses, pictures, strict=True):
         posed = synthesis.place(pose)
-        regions = regions_round([posed], synthesis.geometry, frames, margin_px)
+        regions = regions_round([posed], synthesis.geometry, frames, _LEAST_MARGIN_PX)
         sights += [(synthesis, posed, region) for region in regions]
-    return dressed(model, sights)
+    return sights
 
 
 def _laid(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Part, PosedBody
 from airborne.body.colours import with_sampled_colours
-from airborne.body.outfits import Border, extent_m, solid_of, with_borders
+from airborne.body.outfits import Border, extent_m, solid_of
 from airborne.body.shaping import length_axis
 from airborne.tracking.appearance import Region
 from airborne.tracking.synthesis import Synthesis
@@ -96,33 +96,27 @@ class _Sums:
         return float(cuts[best] / N_BINS), float(explained)
 
 
-def dressed(model: BodyModel, sights: Iterable[tuple[Synthesis, PosedBody, Region]]) -> tuple[BodyModel, dict]:
-    """Cut the body's segments where the pictures show their colours to change, and sample the colours.
+Sight = tuple[Synthesis, PosedBody, Region]  # the body in one picture
 
-    sights: the body in each picture. Left and right share borders and colours. Returns the body and the borders, stem
-    -> Border or None. Raises BodyError for a part that too few pixels show.
+
+def coloured(model: BodyModel, sights: Sequence[Sight]) -> BodyModel:
+    """Sample the colours of a body's parts, left and right alike; BodyError for a part that too few pixels show.
+
+    The bodies of the sights may differ from the model in their surface.
     """
-    sights = list(sights)
-    borders = _borders(model, sights)
-    cut = with_borders(model, borders)
     uncoloured = replace(
-        cut,
-        segments=tuple(replace(s, parts=tuple(replace(p, colour=None) for p in s.parts)) for s in cut.segments),
+        model,
+        segments=tuple(replace(s, parts=tuple(replace(p, colour=None) for p in s.parts)) for s in model.segments),
     )
     synthesis = Synthesis.of(uncoloured)
     seen: dict[str, list[NDArray[np.uint8]]] = defaultdict(list)
-    keys = [_key(part) for part in cut.parts]
+    keys = [_key(part) for part in model.parts]
     for _, posed, region in sights:
-        drawn = synthesis.parts(replace_model(posed, uncoloured), region)
+        drawn = synthesis.parts(PosedBody(uncoloured, posed.R, posed.t), region)
         core = _core(drawn)
         for index, key in enumerate(keys):
             seen[key].append(region.rgb[core & (drawn == index)])
-    return with_sampled_colours(uncoloured, [np.concatenate(seen[key]) for key in keys]), borders
-
-
-def replace_model(posed: PosedBody, model: BodyModel) -> PosedBody:
-    """Return the same places of the segments for a model that differs in its surface only."""
-    return PosedBody(model, posed.R, posed.t)
+    return with_sampled_colours(uncoloured, [np.concatenate(seen[key]) for key in keys])
 
 
 def _key(part: Part) -> str:
@@ -130,7 +124,8 @@ def _key(part: Part) -> str:
     return part.name.replace(_SIDED[0], "").replace(_SIDED[1], "")
 
 
-def _borders(model: BodyModel, sights: list[tuple[Synthesis, PosedBody, Region]]) -> dict[str, Border | None]:
+def borders_seen(model: BodyModel, sights: Sequence[Sight]) -> dict[str, Border | None]:
+    """Find where the colours of a body's segments change, left and right alike: stem -> Border, or None."""
     sums: dict[tuple[str, int], _Sums] = defaultdict(_Sums)
     axes = {s.name: _axes(model, s.name) for s in model.segments if s.parts}
     for synthesis, posed, region in sights:

@@ -23,7 +23,7 @@ Array = NDArray[np.floating]
 
 SIGMA_PX = 1.2  # of the blur
 CLIP = 0.1  # linear light, 0..1: a residual this large counts a quarter
-CORRELATED_PX = BLOCK_PX**2  # pixels this near show the same fault of a shape that is only about a person's
+CORRELATED_PX = BLOCK_PX**2  # pixels this near show the same fault of a shape that is only about right
 _LIGHT_ROUNDS = 3
 _NEAR_PX = 4  # beyond this from the mask, a small step changes nothing
 
@@ -100,7 +100,7 @@ def equations(
 def _fit_light(synthesis: Synthesis, posed: PosedBody, view: Laid) -> None:
     part, _, normals = view.maps
     surface_maps(synthesis.shapes, synthesis.geometry, posed.R, posed.t, view.packed, *view.maps)
-    fit_light(view.seen[0], part, normals, view.albedo, view.light, _LIGHT_ROUNDS, 0, 0, part.shape[1], part.shape[0])
+    fit_light(view.seen[0], part, normals, synthesis.albedo, view.light, _LIGHT_ROUNDS, 0, 0, part.shape[1], part.shape[0])
 
 
 def _shown(synthesis: Synthesis, posed: PosedBody, view: Laid) -> NDArray[np.float32]:
@@ -108,7 +108,7 @@ def _shown(synthesis: Synthesis, posed: PosedBody, view: Laid) -> NDArray[np.flo
     part, _, normals = view.maps
     surface_maps(synthesis.shapes, synthesis.geometry, posed.R, posed.t, view.packed, *view.maps)
     lit = np.zeros((3, *part.shape), np.float32)
-    light_up(part, normals, view.albedo, view.light, 0, 0, lit)
+    light_up(part, normals, synthesis.albedo, view.light, 0, 0, lit)
     return np.where(part >= 0, lit, view.seen[1])
 
 

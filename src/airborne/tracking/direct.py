@@ -47,10 +47,11 @@ _MARGIN_PX = 40
 _V_RULE_SD = 0.2  # of the last step: the RMS error of the V rule as printed
 
 
-def stepping_search(loops: Sequence[Array], v_rule: VRule) -> Search:
-    """Search by paper B's stepping; loops: steps (6,) [m, rad] for each loop."""
+def stepping_search(loops: Sequence[Array], v_rule: VRule, order: Sequence[int] | None = None) -> Search:
+    """Search by paper B's stepping; loops: steps (6,) [m, rad] for each loop; order: of the variables in a loop."""
     return Search(
-        lambda objective, start: stepping(objective, start, loops, v_rule=v_rule)[0], _V_RULE_SD * np.asarray(loops[-1])
+        lambda objective, start: stepping(objective, start, loops, v_rule=v_rule, order=order)[0],
+        _V_RULE_SD * np.asarray(loops[-1]),
     )
 
 
@@ -78,7 +79,10 @@ class DirectState:
 
 
 class Direct:
-    """Track by minimising a colour difference inside the mask, from a prediction, with any search."""
+    """Track by minimising a colour difference inside the mask, from a prediction, with any search.
+
+    With `notices_loss` False, as in paper B, a frame counts as tracked whatever its score, and the next starts from it.
+    """
 
     def __init__(
         self,
@@ -90,10 +94,11 @@ class Direct:
         *,
         scale: int,
         predict: Callable,
+        notices_loss: bool = True,
     ) -> None:
         self._model, self._geometry = model, geometry(model)
         self._start, self._search, self._rule, self._lights = start, search, rule, lights
-        self._scale, self._predict = scale, predict
+        self._scale, self._predict, self._notices_loss = scale, predict, notices_loss
         self._at_origin = model.with_pose(replace(start, world_from_root=RigidTransform.identity()))
 
     def init(self) -> DirectState:
@@ -111,7 +116,7 @@ class Direct:
         value = float(objective(best[None])[0])
         sums = measure(self._geometry, seen, *self._placed(best[None]), with_chroma=False)
         pixels = sums[0, :, PIXELS]
-        status = _status(value, state.scores)
+        status = _status(value, state.scores if self._notices_loss else ())
         if status is Status.LOST:
             return lost(frames.index, frames.time_s)
         pose = _pose(best, self._start)

@@ -19,15 +19,22 @@ from airborne.geometry.rotations import angles_from_world_rotation, matrix_from_
 Array = NDArray[np.floating]
 
 _LIMIT_SD_RAD = np.radians(0.5)  # how firmly a joint that has reached its limit is held there
+_ANYWHERE_SD = 1.5  # [m, rad]
 _DAMPING_SD_M, _DAMPING_SD_RAD = 0.5, 1.0  # keep what the pictures do not show where it is
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
-    """Where a pose is expected to be."""
+    """Where a pose is expected to be; and joints lie about the middle of their limits, as wide as these are."""
 
     expected: Pose
     sd: Array  # (6 + 3 joints,) [m, rad]
+
+    def loosened(self, columns: NDArray[np.integer]) -> Prior:
+        """Return the prior that says little of some degrees of freedom."""
+        sd = self.sd.copy()
+        sd[columns] = _ANYWHERE_SD
+        return replace(self, sd=sd)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +74,8 @@ class Freedom:
             precision = 1 / prior.sd[self.columns] ** 2
             H[np.diag_indices(len(g))] += precision
             g -= precision * motion_between(prior.expected, pose)[self.columns]
+            rows, away = self._from_rest(pose)
+            H, g = H + rows.T @ rows, g - rows.T @ away
         motion = np.linalg.solve(H, g)
         for _ in range(3):
             rows, targets = self._limits_met(pose, motion)
@@ -82,7 +91,22 @@ class Freedom:
         if prior is None:
             return 0.0
         away = motion_between(prior.expected, pose)[self.columns] / prior.sd[self.columns]
-        return 0.5 * float(away @ away)
+        rest = self._from_rest(pose)[1]
+        return 0.5 * float(away @ away + rest @ rest)
+
+    def _from_rest(self, pose: Pose) -> tuple[Array, Array]:
+        """Return how far limited joint angles are from the middle of their limits, in sds: rows (k, d), (k,)."""
+        limits = self.model.limits_rad
+        half = (limits[..., 1] - limits[..., 0]) / 2
+        by_own_rotation = _angles_by_own_rotation(pose.joint_angles)
+        is_regular = np.all(np.isfinite(by_own_rotation), axis=(1, 2))
+        used = np.isfinite(half) & (half > 0) & is_regular[:, None]
+        joints, axes = np.nonzero(used)
+        rows = np.zeros((len(joints), 6 + 3 * len(limits)))
+        columns = 6 + 3 * joints[:, None] + np.arange(3)
+        sd = half[joints, axes]
+        rows[np.arange(len(joints))[:, None], columns] = by_own_rotation[joints, axes] / sd[:, None]
+        return rows[:, self.columns], (pose.joint_angles - limits.mean(axis=-1))[joints, axes] / sd
 
     def _limits_met(self, pose: Pose, motion: Array) -> tuple[Array, Array]:
         """Return rows (k, d) and targets (k,) [rad] of the joint angles that the motion would take past a limit."""

@@ -40,7 +40,9 @@ _CLIP = 0.1  # linear light, 0..1: a residual this large counts a quarter
 _CLIP_MASK = 0.5  # the same of a mask
 _OVERSTEP = 1.6  # robust weights and refitted light make each step about this much too short
 _MOST_STEPS = 12
+_MOST_STEPS_STIFF = 30  # of a body in one piece: its steps are cheap, and a far start may need them
 _SETTLED = 1 / 3  # squared length of the last step, in sds of the pose, for each degree of freedom
+SHAPE_SD_M = 0.007  # a person's segment is not quite where the ellipsoid that fits its picture is
 _SHORTER = 0.4
 _SLACK = 1e-3  # of the objective: refitted light makes it waver
 
@@ -146,11 +148,14 @@ def fit_pictures(
             sums.B[:] = 0
             blocks.append(_blocks(view, n))
             totals += _compare(synthesis, posed, view, (taps_u, taps_v), 3 if step == 1 else 1, sums, blocks[-1])
-            shifted.append(sums.B * shift)
+            shifted.append(np.moveaxis(sums.B * shift, 2, 0))
+            if len(freedom.columns) > 6:
+                shifted.append(_shape_errors(sums.B, posed, view))
         return _mapped(synthesis, freedom, pose, posed, sums, blocks, shifted, totals, correlated)
 
+    most_steps = _MOST_STEPS_STIFF if len(freedom.columns) <= 6 else _MOST_STEPS
     ends = [
-        _descend(evaluate, freedom, pose, prior, most_steps=_MOST_STEPS, overstep=_OVERSTEP, settled=_SETTLED)
+        _descend(evaluate, freedom, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, settled=_SETTLED)
         for pose in poses
     ]
     noise = min(end.evaluation.noise for end in ends)
@@ -171,7 +176,7 @@ def _compare(
     through = view.window, *taps, _CLIP
     args = synthesis.body, _place(posed, view), view.seen, through, view.maps
     if synthesis.lights is None:
-        paint = view.albedo, synthesis.is_faceted
+        paint = synthesis.albedo, synthesis.is_faceted
         return np.array(photometric_equations(*args, paint, view.light, rounds, sums, blocks))
     size = view.maps[0].shape
     drawn = (
@@ -182,6 +187,19 @@ def _compare(
     )
     lamps, ambient = view.light
     return np.array(lit_equations(*args, drawn, synthesis.is_faceted, lamps, ambient, sums, blocks))
+
+
+def _shape_errors(B: Array, posed: PosedBody, view: Laid) -> Array:
+    """Return what it does to the gradient that a person's segments are not ellipsoids: (2 segments, segments, 6).
+
+    Each segment's picture may lie beside the drawn one by SHAPE_SD_M, right or down, in each view by itself.
+    """
+    n = len(B)
+    depth_m = posed.t @ view.packed[6:9] + view.packed[11]
+    sd_px = SHAPE_SD_M * np.array([view.K[0, 0], view.K[1, 1]]) / np.maximum(depth_m, 0.1)[:, None]  # (segments, 2)
+    rows = np.zeros((n, 2, n, 6))
+    rows[np.arange(n), :, np.arange(n)] = np.swapaxes(B[..., :2], 1, 2) * sd_px[..., None]
+    return rows.reshape(2 * n, n, 6)
 
 
 def _place(posed: PosedBody, view: Laid) -> tuple:
@@ -248,5 +266,5 @@ def _mapped(
     mapped(sums.curvature, sums.g, J, A, g)
     cost, total, weight = totals
     noise = correlated * (total / weight if weight > 0 else 1.0)
-    rows = [each.reshape(-1, *J.shape[:2]) for each in blocks] + [np.moveaxis(each, 2, 0) for each in shifted]
+    rows = [each.reshape(-1, *J.shape[:2]) for each in blocks] + list(shifted)
     return Evaluation(pose, A, g, J, rows, float(cost), float(noise))

@@ -21,24 +21,24 @@ Array = NDArray[np.floating]
 
 _ROUNDS = ((512, 16), (256, 3))  # proposals, kept; each round half as wide
 _REACH_RAD = 0.6  # sd of the first proposals, for each joint and axis
-_FEWEST_PX = 15  # a segment that shows fewer pixels is hidden, not astray
-_ASTRAY = 0.55  # share of the body's own agreement, below which a segment is drawn on the wrong pixels
+_FEWEST_PX = 25  # a segment that shows fewer pixels in a view is hidden there, not astray
+_ASTRAY = 0.5  # share of the body's own agreement, below which a segment is drawn on the wrong pixels
 
 
 def astray(
     synthesis: Synthesis, pose: Pose, regions: Sequence[Region], posteriors: Sequence[Array]
 ) -> list[NDArray[np.int64]]:
-    """Return the limbs, as the indices of their segments, of which a segment lies on pixels unlike the body."""
+    """Return the limbs, by their segments' indices, with a segment that lies on pixels unlike the body in a view."""
     n = len(synthesis.model.segments)
-    posed, pixels, inside = synthesis.place(pose), np.zeros(n), np.zeros(n)
-    for region, posterior in zip(regions, posteriors, strict=True):
+    posed, pixels, inside = synthesis.place(pose), np.zeros((len(regions), n)), np.zeros((len(regions), n))
+    for row, (region, posterior) in enumerate(zip(regions, posteriors, strict=True)):
         part = synthesis.parts(posed, region)
         shown = part >= 0
         owner = synthesis.segment_of_part[part[shown]]
-        pixels += np.bincount(owner, minlength=n)
-        inside += np.bincount(owner, posterior[shown], minlength=n)
+        pixels[row] = np.bincount(owner, minlength=n)
+        inside[row] = np.bincount(owner, posterior[shown], minlength=n)
     usual = inside.sum() / max(pixels.sum(), 1)
-    is_astray = (pixels >= _FEWEST_PX) & (inside < _ASTRAY * usual * pixels)
+    is_astray = np.any((pixels >= _FEWEST_PX) & (inside < _ASTRAY * usual * pixels), axis=0)
     limb = limb_of_segment(synthesis.model)
     return [np.flatnonzero(limb == each) for each in np.unique(limb[is_astray & (limb >= 0)])]
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose, PosedBody
+from airborne.body.chain import motion_between, moved_pose
 from airborne.rendering import Lights
 from airborne.scoring.foreground import body_like
 from airborne.tracking import predictors
@@ -26,17 +27,17 @@ from airborne.tracking.limbs import astray, look_for
 from airborne.tracking.loss import Agreement, Usual, agreement, status_of
 from airborne.tracking.regions import reduced, regions_round, share_in_pictures
 from airborne.tracking.swaps import is_nearer, swapped
-from airborne.tracking.synthesis import Synthesis, learn_paint
+from airborne.tracking.synthesis import Synthesis
 from airborne.tracking.wide import Reach, evidence_of, search_widely
 from airborne.video import Frames
 
 Array = NDArray[np.floating]
-PAINT = False
 Order = Literal["refined", "joint", "hierarchical"]
 
 _MARGIN_PX, _FIRST_MARGIN_PX = 32, 56  # of a full frame
 _MOST_PX_PER_M = 220.0  # of a body with joints
 _REMEMBERED = 3
+_SEEN_SD_RAD, _UNSEEN_VARIANCE = 0.1, 1e6  # a turn known less well than this is not extrapolated
 _FITTED_AFTER_SEARCH = 3
 _LEAST_IN_PICTURES = 0.4  # of the body, in the view that holds most of it; less is not enough to be sure
 _TRUNK_AT = 4  # pictures reduced so far show the limbs of a body with joints, those reduced farther its trunk alone
@@ -58,6 +59,7 @@ class RefinedState:
     past: tuple[tuple[Fraction, Pose], ...] = ()  # the last poses found, oldest first
     appearance: Appearance = field(default_factory=Appearance)
     usual: Usual = field(default_factory=Usual)
+    covariance: Array | None = None  # of the last pose found
 
 
 class Refined:
@@ -90,6 +92,8 @@ class Refined:
         """Find the body in the frames, without learning from them."""
         frames, past = self._as_tracked(frames), state.past
         poses = [predict(past, frames.time_s) for predict in self._predict] if past else [self._start]
+        if past and self._is_jointed and state.covariance is not None:
+            poses = [_as_far_as_seen(past[-1][1], pose, state.covariance) for pose in poses]
         prior = self._prior(poses[-1], float(frames.time_s - past[-1][0]) if past else None)
         fit, agreed = self._fit(poses, frames, state, prior, is_first=not past)
         if past and (agreed is None or agreed.is_suspect(state.usual)):
@@ -107,18 +111,17 @@ class Refined:
         frames = self._as_tracked(frames)
         past = (*state.past, (frames.time_s, estimate.pose))[-_REMEMBERED:]
         if estimate.status is not Status.TRACKED and state.past:
-            return replace(state, past=past)
+            return replace(state, past=past, covariance=estimate.covariance)
         body, appearance = self._synthesis.place(estimate.pose), state.appearance
         regions = regions_round([body], self._synthesis.geometry, frames, _MARGIN_PX)
         for region in regions:
             mask = self._synthesis.parts(body, region) >= 0
             appearance.learn_colours(region, mask)
             appearance.learn_scene(region, mask)
-            if self._is_jointed and PAINT:
-                learn_paint(self._synthesis, body, region, appearance)
         known = [region for region in regions if appearance.knows(region)]
         agreed = agreement(self._synthesis, body, known, [appearance.posterior(region) for region in known])
-        return RefinedState(past, appearance, state.usual.learned(agreed) if known else state.usual)
+        usual = state.usual.learned(agreed) if known else state.usual
+        return RefinedState(past, appearance, usual, estimate.covariance)
 
     def _as_tracked(self, frames: Frames) -> Frames:
         """Reduce the pictures of a body with joints: its many pixels say more than its shape can follow."""
@@ -183,7 +186,7 @@ class Refined:
         def to_silhouettes(pose: Pose, levels: Levels) -> Pose:
             return self._to_silhouettes(pose, regions, posteriors, levels, prior)
 
-        def to_pictures(poses: Sequence[Pose]) -> Fit:
+        def to_pictures(poses: Sequence[Pose], prior: Prior | None = prior) -> Fit:
             scenes = self._with_scenes(appearance, self._synthesis.place(poses[0]), regions)
             return self._to_pictures(poses, regions, scenes, prior)
 
@@ -213,7 +216,7 @@ class Refined:
         guesses: Sequence[Pose],
         regions: Sequence[Region],
         posteriors: Sequence[Array],
-        to_pictures: Callable[[Sequence[Pose]], Fit],
+        to_pictures: Callable[[Sequence[Pose], Prior | None], Fit],
         prior: Prior | None,
     ) -> Fit:
         """Look for each limb that lies on pixels unlike the body; keep what the pictures like better."""
@@ -224,7 +227,7 @@ class Refined:
             found = look_for(self._synthesis, [fit.pose, *expected], limb, maps)
             freedom = only(self._synthesis.model, limb)
             found = [fit_silhouettes(self._synthesis, pose, regions, posteriors, NEAR, freedom) for pose in found]
-            fit = to_pictures([fit.pose, *found])
+            fit = to_pictures([fit.pose, *found], None if prior is None else prior.loosened(freedom.columns))
         return fit
 
     def _swapped(self, pose: Pose) -> list[Pose]:
@@ -288,3 +291,17 @@ def _with_limb(pose: Pose, other: Pose, limb: NDArray[np.int64]) -> Array:
     angles = pose.joint_angles.copy()
     angles[limb - 1] = other.joint_angles[limb - 1]
     return angles
+
+
+def _as_far_as_seen(last: Pose, predicted: Pose, covariance: Array) -> Pose:
+    """Turn root and joints on only as far as their turns were seen: what cannot be seen stays put.
+
+    A turn of a joint, with covariance C over its three axes, goes on by S (S + C)^-1 of what it would, S = _SEEN_SD^2.
+    """
+    motion = motion_between(last, predicted)
+    turns = motion[3:].reshape(-1, 3)
+    first = 3 + 3 * np.arange(len(turns))[:, None] + np.arange(3)
+    C = np.nan_to_num(covariance[first[:, :, None], first[:, None, :]], posinf=_UNSEEN_VARIANCE)
+    S = _SEEN_SD_RAD**2 * np.eye(3)
+    motion[3:] = (S @ np.linalg.solve(S + C, turns[..., None]))[..., 0].ravel()
+    return moved_pose(last, motion)

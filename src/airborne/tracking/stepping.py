@@ -18,14 +18,19 @@ VRule = Literal["v_literal", "v_sym"]
 _MOST_STEPS = 40  # in one direction; a score that falls for ever has lost the body
 
 
-def stepping(score: Score, start: Array, loops: Sequence[Array], *, v_rule: VRule) -> tuple[Array, int]:
+def stepping(
+    score: Score, start: Array, loops: Sequence[Array], *, v_rule: VRule, order: Sequence[int] | None = None
+) -> tuple[Array, int]:
     """Minimise from start (d,), one loop over the variables for each row of steps (d,); return (best, evaluations).
 
     Paper B, "Method": a variable is stepped downhill until the score has risen twice in a row, then set by the V rule.
+    Downhill is toward the lower neighbour. `order` is that of the variables in a loop, which the paper does not print;
+    without, as they stand.
     """
     x, evaluations = np.array(start, float), 0
     for steps in loops:
-        for variable, step in enumerate(steps):
+        for variable in range(len(x)) if order is None else order:
+            step = steps[variable]
             if step == 0:
                 continue
             line = _Line(score, x, variable, step)
@@ -63,7 +68,7 @@ class _Line:
 
 def _minimum_on_line(line: _Line, v_rule: VRule) -> float:
     """Return where the score is lowest, in steps from 0."""
-    way = 1 if line(1) < line(0) else -1
+    way = 1 if line(1) < line(-1) else -1
     k = 0
     while k < _MOST_STEPS and (line(way * (k + 1)) < line(way * k) or line(way * (k + 2)) < line(way * (k + 1))):
         k += 1

@@ -18,7 +18,7 @@ from airborne.rendering.maps import empty_maps, surface_maps
 from airborne.rendering.packing import packed_lights, packed_view
 from airborne.rendering.shapes import new_shapes
 from airborne.rendering.srgb import light_from_srgb
-from airborne.scoring.lighting import TERMS, TO_LIGHT, fit_light, light_planes, light_up, shares_of_light
+from airborne.scoring.lighting import TERMS, TO_LIGHT, light_planes
 from airborne.scoring.plate import START_SD, fill
 from airborne.tracking.appearance import Appearance, Region
 from airborne.tracking.covariance import SHIFT_SD_PX
@@ -70,6 +70,8 @@ class Synthesis:
     def jacobian(self, posed: PosedBody, freedom: Freedom) -> Array:
         """Return how the segments move about the root's origin, without turns that change no picture: (s, 6, d)."""
         J = freedom.jacobian(posed, posed.t[0])
+        if not len(self.free_axes):
+            return J
         hidden = np.concatenate([np.zeros_like(self.free_axes), self.free_axes @ posed.R[0].T], axis=1)
         J[..., :6] = J[..., :6] @ (np.eye(6) - hidden.T @ hidden)
         return J
@@ -105,7 +107,6 @@ class Laid(NamedTuple):
     maps: Any
     window: Window
     light: Any = None  # (3, TERMS) to be fitted, or lamps (l, 8) and the ambient light
-    albedo: Any = None  # (parts, 3) linear light, as this camera has seen the parts
 
     @property
     def is_seen(self) -> bool:
@@ -132,9 +133,7 @@ def pictured(synthesis: Synthesis, bodies: Sequence[PosedBody], region: Region, 
         light = packed_lights(synthesis.lights, region.camera), np.float32(synthesis.lights.ambient)
     window = synthesis.window(bodies, region.camera, region.packed)
     maps = empty_maps(region.camera.size)
-    paint = appearance.paint.get(region.camera.name)
-    albedo = synthesis.albedo if paint is None else synthesis.albedo * paint
-    return Laid(region.packed, region.camera.K, (observed, scene, certainty), maps, window, light, albedo)
+    return Laid(region.packed, region.camera.K, (observed, scene, certainty), maps, window, light)
 
 
 def outlined(synthesis: Synthesis, posed: PosedBody, region: Region, posterior: Array, reduction: int) -> Laid:
@@ -160,19 +159,3 @@ def shifts_px(region: Region) -> Array:
     """Return the sds of a picture's shift right and down, in its own pixels, and of its outline's width: (3,) [px]."""
     shift_px = np.hypot(SHIFT_SD_PX, region.camera.shift_sd_px)
     return np.array([shift_px, shift_px * region.aspect, SHIFT_SD_PX])
-
-
-def learn_paint(synthesis: Synthesis, posed: PosedBody, region: Region, appearance: Appearance) -> None:
-    """Learn how bright each part looks in a region, beside the light that is common to all."""
-    view = pictured(synthesis, [posed], region, appearance)
-    if synthesis.lights is not None or not view.is_seen:
-        return
-    part, _, normals = view.maps
-    surface_maps(synthesis.shapes, synthesis.geometry, posed.R, posed.t, region.packed, *view.maps)
-    x0, y0, x1, y1 = view.window
-    fit_light(view.seen[0], part, normals, view.albedo, view.light, 3, x0, y0, x1, y1)
-    lit = np.zeros((3, y1 - y0, x1 - x0), np.float32)
-    light_up(part, normals, view.albedo, view.light, x0, y0, lit)
-    ratio, pixels = np.ones_like(synthesis.albedo), np.zeros(len(synthesis.albedo), np.int64)
-    shares_of_light(view.seen[0], part, normals, lit, x0, y0, ratio, pixels)
-    appearance.learn_paint(region, ratio, pixels)

@@ -1,0 +1,161 @@
+"""Landmarks to targets by damped Gauss-Newton steps over the root and the joint angles, within the joints' limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from airborne.body.chain import point_jacobian
+from airborne.body.model import BodyModel, PosedBody
+from airborne.geometry.rotations import matrix_from_angles
+
+Array = NDArray[np.floating]
+
+ANGLE_SD_RAD = 1.0  # how far from neutral an angle is expected
+FINE, COARSE = 1e-6, 1e-4  # shares of the cost; smaller gains end a search
+_N_STEPS = 100
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is fitted to what."""
+
+    model: BodyModel
+    targets: Array  # (landmarks, 3) world [m]; NaN where unknown
+    root_weights: Array  # (landmarks,) square roots
+    sd_m: float  # of a landmark of weight 1 [m]
+    neutral: Array | None = None  # (joints, 3) [rad]; None: straight, as far as the limits let it
+
+    @cached_property
+    def segments(self) -> NDArray[np.int64]:
+        """The segment that carries each landmark: (landmarks,)."""
+        return np.array([self.model.index_of(landmark.segment) for landmark in self.model.landmarks])
+
+    @cached_property
+    def local(self) -> Array:
+        """The landmarks in their segments' frames: (landmarks, 3) [m]."""
+        return np.array([landmark.position_m for landmark in self.model.landmarks])
+
+    @cached_property
+    def is_given(self) -> NDArray[np.bool_]:
+        """Whether each landmark has a target: (landmarks,)."""
+        return np.asarray(np.isfinite(self.targets).all(axis=1))
+
+    @cached_property
+    def limits(self) -> Array:
+        """The joints' least and greatest angles: (joints, 3, 2) [rad]."""
+        return self.model.limits_rad
+
+    @cached_property
+    def prior(self) -> Array:
+        """The angles that are expected: (joints, 3) [rad]."""
+        wanted = np.zeros(self.limits.shape[:2]) if self.neutral is None else self.neutral
+        return np.clip(wanted, self.limits[..., 0], self.limits[..., 1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    """A pose as arrays."""
+
+    R: Array  # (3, 3) world from root
+    t: Array  # (3,) [m]
+    angles: Array  # (joints, 3) [rad]; where many are tried, (..., joints, 3)
+
+
+def solved(problem: Problem, state: State, free: NDArray[np.bool_], least_gain: float = FINE) -> tuple[State, float]:
+    """Search from a state over the free variables (6 + 3 joints,); return the best state and its cost."""
+    free_m = np.full((6, 2), [-np.inf, np.inf])
+    low, high = np.concatenate([free_m, problem.limits.reshape(-1, 2)]).T
+    cost, gradient, hessian = _equations(problem, state)
+    damping = 1e-4
+    for _ in range(_N_STEPS):
+        now = np.concatenate([np.zeros(6), state.angles.ravel()])
+        step = _step(gradient, hessian, damping, np.where(free, low - now, 0.0), np.where(free, high - now, 0.0))
+        trial = State(
+            Rotation.from_rotvec(step[3:6]).as_matrix() @ state.R,
+            state.t + step[:3],
+            np.clip(now + step, low, high)[6:].reshape(-1, 3),
+        )
+        there = _equations(problem, trial)
+        if there[0] < cost:
+            gain = cost - there[0]
+            state, (cost, gradient, hessian) = trial, there
+            damping = max(damping / 5, 1e-9)
+            if gain < least_gain * cost:
+                break
+        elif damping > 1e8:
+            break
+        else:
+            damping *= 4
+    return state, cost
+
+
+def _step(gradient: Array, hessian: Array, damping: float, low: Array, high: Array) -> Array:
+    """Return the damped Gauss-Newton step (variables,) within bounds on it; what reaches a bound stays there."""
+    step, moving = np.zeros(len(gradient)), (low < 0) & (high > 0)
+    moving |= (low < 0) & (high >= 0) & (gradient > 0) | (low <= 0) & (high > 0) & (gradient < 0)
+    damped = hessian + np.diag(damping * np.diag(hessian) + 1e-9)
+    while moving.any():
+        held = ~moving
+        pull = gradient[moving] + damped[np.ix_(moving, held)] @ step[held]
+        wanted = np.zeros(len(step))
+        wanted[moving] = np.linalg.solve(damped[np.ix_(moving, moving)], -pull)
+        is_out = moving & ((wanted < low) | (wanted > high))
+        step[moving] = np.clip(wanted, low, high)[moving]
+        if not is_out.any():
+            break
+        moving &= ~is_out
+    return step
+
+
+def _equations(problem: Problem, state: State) -> tuple[float, Array, Array]:
+    """Return half the squared residuals, and their gradient and Gauss-Newton Hessian by the variables."""
+    given, scale = problem.is_given, (problem.root_weights / problem.sd_m)[problem.is_given]
+    posed = PosedBody(problem.model, *_placed(problem.model, state))
+    points = posed.landmarks[given]
+    jacobian = point_jacobian(posed, problem.segments[given], points)
+    n_joints = len(state.angles)
+    by_joint = jacobian[..., 6:].reshape(*jacobian.shape[:2], n_joints, 3)
+    by_angle = np.einsum("...ki,kij->...kj", by_joint, _turn_from_angles(state.angles))
+    jacobian = np.concatenate([jacobian[..., :6], by_angle.reshape(*jacobian.shape[:2], -1)], axis=-1)
+    J = (scale[:, None, None] * jacobian).reshape(-1, 6 + 3 * n_joints)
+    r = (scale[:, None] * (points - problem.targets[given])).ravel()
+    off = (state.angles - problem.prior).ravel() / ANGLE_SD_RAD
+    gradient, hessian = J.T @ r, J.T @ J
+    gradient[6:] += off / ANGLE_SD_RAD
+    hessian[range(6, len(hessian)), range(6, len(hessian))] += ANGLE_SD_RAD**-2
+    return float(r @ r + off @ off) / 2, gradient, hessian
+
+
+def _turn_from_angles(angles: Array) -> Array:
+    """Differentiate a joint's rotation vector, segment's own axes, by its x, y, z angles (..., 3): (..., 3, 3)."""
+    cos, sin = np.cos(angles), np.sin(angles)
+    zero, one = np.zeros(angles.shape[:-1]), np.ones(angles.shape[:-1])
+    (_, cy, cz), (_, sy, sz) = np.moveaxis(cos, -1, 0), np.moveaxis(sin, -1, 0)
+    rows = [[cz * cy, sz, zero], [-sz * cy, cz, zero], [sy, zero, one]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _placed(model: BodyModel, state: State) -> tuple[Array, Array]:
+    """Return world from segment, rotations (..., segments, 3, 3) and translations (..., segments, 3) [m]."""
+    turns = matrix_from_angles(state.angles)  # (..., joints, 3, 3)
+    R, t = [np.broadcast_to(state.R, (*turns.shape[:-3], 3, 3))], [np.broadcast_to(state.t, (*turns.shape[:-3], 3))]
+    for index, (segment, parent) in enumerate(zip(model.segments[1:], model.parents[1:], strict=True)):
+        t.append(t[parent] + R[parent] @ segment.joint_m)
+        R.append(R[parent] @ turns[..., index, :, :])
+    return np.stack(R, axis=-3), np.stack(t, axis=-2)
+
+
+def places(problem: Problem, state: State) -> Array:
+    """Return where the landmarks are: (..., landmarks, 3) world [m]."""
+    R, t = _placed(problem.model, state)
+    return np.einsum("...nij,nj->...ni", R[..., problem.segments, :, :], problem.local) + t[..., problem.segments, :]
+
+
+def distances(problem: Problem, state: State) -> Array:
+    """Return how far the landmarks are from their targets: (..., landmarks) [m]; NaN where there is none."""
+    return np.linalg.norm(places(problem, state) - problem.targets, axis=-1)

@@ -1,0 +1,170 @@
+"""A person's skin: each segment a closed rational B-spline surface through stadium sections (Yeadon 1990-II).
+
+Paper B draws its targets with a smooth model of a body scan and tracks them with ellipsoids: the same joints and
+colours, another surface. This is the smooth one. It owes nothing to the ellipsoids: its sections are the measured ones,
+so that limbs taper, calves bulge, hands and feet are flat. What B's subject was beyond his model's measurements, a seed
+adds here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from airborne.body.anthropometry import measurements_of
+from airborne.body.human import human18_from_measurements
+from airborne.body.measurements import STATURE_SHARES, Measurements
+from airborne.body.model import BodyModel, Ellipsoid, Mesh, Part, Segment
+from airborne.body.nurbs import RationalSurface, stadium_loft
+from airborne.body.sections import (
+    Profile,
+    Values,
+    arm_profile,
+    foot_profile,
+    leg_profile,
+    shoulder_profile,
+    trunk_profile,
+)
+from airborne.body.splitting import between, split_at
+from airborne.errors import BodyError
+
+Array = NDArray[np.floating]
+
+_STATIONS = {  # the two ends of a segment's loft; neighbours share the change of girth there
+    "pelvis": ("hip", "waist"),
+    "torso": ("waist", "nipples"),
+    "chest": ("nipples", "neck"),
+    "head": ("neck", "crown"),
+    "shoulder": ("neck", "shoulder"),
+    "upper_arm": ("elbow", "shoulder"),
+    "forearm": ("wrist", "elbow"),
+    "hand": ("fingers", "wrist"),
+    "thigh": ("knee", "hip"),
+    "shank": ("ankle", "knee"),
+    "foot": ("heel", "toes"),
+}
+_PLACES = sorted({name for ends in _STATIONS.values() for name in ends})
+_SAME_JOINT_M, _SAME_MASS = 5e-4, 5e-3
+_FEWEST_ALONG, _MOST_ALONG = 24, 48
+
+
+def skin_of(
+    model: BodyModel,
+    *,
+    measurements: Measurements | None = None,
+    seed: int = 0,
+    radius_change: float = 0.08,
+    border_change_m: float = 0.02,
+    n_around: int = 40,
+) -> BodyModel:
+    """Clothe the skeleton of a `human18` in a smooth skin: the same joints, masses, landmarks and colours.
+
+    The sections are those of the measurements, by default of our own proportions at the model's stature and mass. At
+    each joint, girths differ from them by a share drawn from +-`radius_change`, linear between joints; borders between
+    a segment's colours move by up to `border_change_m` [m]. Left and right change alike; a seed stands for a person.
+    `n_around` facets go round a segment (a multiple of 4). The parts of a segment are open meshes that close each
+    other. Raises BodyError for a body that is not the `human18` of these measurements.
+    """
+    person = _person_of(model, measurements)
+    rng = np.random.default_rng(seed)
+    girths = dict(zip(_PLACES, 1 + radius_change * rng.uniform(-1, 1, len(_PLACES)), strict=True))
+    shifts = dict(zip(_STATIONS, border_change_m * rng.uniform(-1, 1, len(_STATIONS)), strict=True))
+    segments = []
+    for segment in model.segments:
+        kind, side = _kind_and_side(segment.name)
+        profile = _profile(model, segment, (person.swapped() if side == "right" else person).values_m)
+        first, last = _STATIONS[kind]
+        mesh = _mesh(stadium_loft(profile.stations(girths[first], girths[last])), profile.axes, n_around)
+        if side == "right":
+            mesh = _turned(mesh, np.diag([-1.0, 1, 1]))
+        segments.append(replace(segment, parts=_dressed(segment, mesh, shifts[kind])))
+    return replace(model, name=f"{model.name} skin", segments=tuple(segments))
+
+
+def _person_of(model: BodyModel, measurements: Measurements | None) -> Measurements:
+    """Find the measurements whose joints the model has."""
+    names = [segment.name for segment in model.segments]
+    masses = [segment.inertia.mass_kg for segment in model.segments if segment.inertia is not None]
+    if "shank_left" not in names or len(masses) < len(names):
+        raise BodyError(f"body '{model.name}' is no human18 with known masses; make it with human18(stature, mass)")
+    if measurements is None:
+        thigh = -float(model.segments[names.index("shank_left")].joint_m[2])
+        measurements = measurements_of(thigh / STATURE_SHARES["Lj3L"], sum(masses))
+    off_m = np.inf
+    for person in (measurements.evened(), measurements):
+        wanted = human18_from_measurements(person, symmetric=False).segments
+        if [segment.name for segment in wanted] != names:
+            raise BodyError(f"body '{model.name}' has other segments than human18; make it with human18(stature, mass)")
+        off_m = min(
+            off_m, max(np.abs(a.joint_m - b.joint_m).max() for a, b in zip(model.segments, wanted, strict=True))
+        )
+        wanted_masses = [segment.inertia.mass_kg for segment in wanted if segment.inertia is not None]
+        if off_m < _SAME_JOINT_M and np.allclose(masses, wanted_masses, rtol=_SAME_MASS):
+            return person
+    raise BodyError(
+        f"body '{model.name}' is not the one of measurements '{measurements.name}': joints lie up to "
+        f"{1000 * off_m:.0f} mm from theirs, or a segment's mass is another; give the measurements it was made of"
+    )
+
+
+def _kind_and_side(name: str) -> tuple[str, str]:
+    kind, _, side = name.rpartition("_")
+    return (kind, side) if side in ("left", "right") else (name, "")
+
+
+def _profile(model: BodyModel, segment: Segment, values: Values) -> Profile:
+    """Give the sections of a segment, of a left one for a right one."""
+    kind, side = _kind_and_side(segment.name)
+    if kind in ("pelvis", "torso", "chest", "head"):
+        return trunk_profile(kind, values)
+    if kind == "shoulder":
+        to_left = np.array([-1 if side == "right" else 1, 1, 1])
+        arm = model.segments[model.index_of(f"upper_arm_{side}")]
+        return shoulder_profile(values, to_left * segment.joint_m, to_left * arm.joint_m)
+    if kind == "foot":
+        shape, centre = segment.parts[0].shape, segment.parts[0].segment_from_part.translation
+        if not isinstance(shape, Ellipsoid):
+            raise BodyError(f"part '{segment.parts[0].name}' is no ellipsoid; a skin goes over a human18")
+        _, length, height = shape.semi_axes_m
+        return foot_profile(values, -centre[1] - length, -centre[1] + length, centre[2] - height)
+    return arm_profile(kind, values) if kind in ("upper_arm", "forearm", "hand") else leg_profile(kind, values)
+
+
+def _mesh(surface: RationalSurface, axes: Array, n_around: int) -> Mesh:
+    """Tessellate with facets about as long as wide, in the segment's frame."""
+    sections = surface.points(surface.knots[0][:1], np.linspace(0, 1, 9))[0]
+    length = np.linalg.norm(np.diff(sections, axis=0), axis=1).sum()
+    ring = surface.points(np.linspace(0, 1, 25), np.array([0.5]))[:, 0]
+    around = np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()
+    n_along = int(np.clip(round(n_around * length / around), _FEWEST_ALONG, _MOST_ALONG))
+    mesh = surface.mesh(n_around, n_along)
+    return _turned(mesh, axes)
+
+
+def _turned(mesh: Mesh, to: Array) -> Mesh:
+    """Turn or mirror a mesh: rows of `to` (3, 3) are where its axes go."""
+    faces = mesh.faces if np.linalg.det(to) > 0 else mesh.faces[:, ::-1]
+    return Mesh(mesh.vertices_m @ to, faces, None if mesh.normals is None else mesh.normals @ to)
+
+
+def _dressed(segment: Segment, mesh: Mesh, shift_m: float) -> tuple[Part, ...]:
+    """Cut the skin where the segment's colours change, `shift_m` further along the parts' own z."""
+    for part in segment.parts:
+        for border in part.slab_m:
+            if np.isfinite(border):
+                mesh = split_at(mesh, _heights(part, mesh.vertices_m) - border - shift_m)
+    parts = []
+    for part in segment.parts:
+        low, high = part.slab_m
+        kept = between(mesh, _heights(part, mesh.vertices_m), low + shift_m, high + shift_m)
+        if len(kept.faces):
+            parts.append(Part(part.name, kept, RigidTransform.identity(), part.colour))
+    return tuple(parts)
+
+
+def _heights(part: Part, vertices: Array) -> Array:
+    """Return how high points of the segment's frame lie along the part's own z: (v,) [m]."""
+    return part.segment_from_part.inv().apply(vertices)[:, 2]

@@ -1,0 +1,95 @@
+"""Tables of named rows and numbers: points clicked in several pictures, or places typed in."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.errors import CalibrationError
+
+Array = NDArray[np.floating]
+
+
+def read_clicks(path: Path, cameras: Sequence[str]) -> tuple[tuple[str, ...], Array]:
+    """Read a table `point,<camera>_u,<camera>_v,...`: the points' names and their pixels (points, cameras, 2) [px].
+
+    NaN where a point is not seen: blank, NaN or no columns. Raises CalibrationError where fewer than two of the cameras
+    have columns, and for a table that does not say this.
+    """
+    expected = "expected point,<camera>_u,<camera>_v,..."
+    names, columns, values = read_named_numbers(path, "point", expected)
+    strange = [name for name in columns if name[-2:] not in ("_u", "_v")]
+    if strange:
+        raise CalibrationError(f"{path.name}: column '{strange[0]}' is not <camera>_u or <camera>_v; {expected}")
+    known = [name for name in cameras if f"{name}_u" in columns and f"{name}_v" in columns]
+    if len(known) < 2:
+        raise CalibrationError(
+            f"{path.name}: has columns _u and _v of {', '.join(known) or 'none'} of the cameras {', '.join(cameras)}; "
+            "a place needs two of them"
+        )
+    px = np.full((len(names), len(cameras), 2), np.nan)
+    for name in known:
+        px[:, cameras.index(name)] = values[:, [columns.index(f"{name}_u"), columns.index(f"{name}_v")]]
+    for row, column in np.argwhere(np.isnan(px).sum(axis=2) == 1):
+        raise CalibrationError(
+            f"{path.name}: point '{names[row]}' has only one of {cameras[column]}_u and {cameras[column]}_v; "
+            "give both, or leave both blank"
+        )
+    return names, px
+
+
+def read_places(path: Path) -> dict[str, Array]:
+    """Read a table `joint,x_m,y_m,z_m`: joint -> (3,) world [m], NaN where blank; raises CalibrationError."""
+    expected = "expected joint,x_m,y_m,z_m"
+    names, columns, values = read_named_numbers(path, "joint", expected)
+    if sorted(columns) != ["x_m", "y_m", "z_m"]:
+        raise CalibrationError(f"{path.name}: found columns {', '.join(columns) or 'none'} beside joint; {expected}")
+    return dict(zip(names, values[:, [columns.index(axis) for axis in ("x_m", "y_m", "z_m")]], strict=True))
+
+
+def read_named_numbers(path: Path, key: str, expected: str) -> tuple[tuple[str, ...], tuple[str, ...], Array]:
+    """Read the names in column `key`, the other columns' names, and their numbers (rows, columns); NaN where blank.
+
+    `expected` says in errors what the table should be. Raises CalibrationError, naming the row and column.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a table") from None
+    except UnicodeDecodeError:
+        raise CalibrationError(f"{path.name} is not a text file; {expected}") from None
+    lines = [[cell.strip() for cell in row] for row in csv.reader(text.replace("\0", "").splitlines())]
+    header, *rows = [line for line in lines if any(line)] or [[]]
+    if key not in header or len(set(header)) < len(header) or not rows:
+        found = ",".join(header)[:80] or "nothing"
+        raise CalibrationError(f"{path.name}: found the header {found} and {len(rows)} rows; {expected}, each once")
+    place = header.index(key)
+    columns = tuple(header[:place] + header[place + 1 :])
+    names: list[str] = []
+    values = np.full((len(rows), len(columns)), np.nan)
+    for number, row in enumerate(rows):
+        if len(row) != len(header) or not row[place] or row[place] in names:
+            raise CalibrationError(
+                f"{path.name}: row '{','.join(row)[:60]}' needs {len(header)} values and a {key} of its own; {expected}"
+            )
+        names.append(row[place])
+        cells = row[:place] + row[place + 1 :]
+        where = f"{path.name}, {key} '{row[place]}'"
+        values[number] = [_number(cell, f"{where}, {column}") for cell, column in zip(cells, columns, strict=True)]
+    return tuple(names), columns, values
+
+
+def _number(cell: str, where: str) -> float:
+    if not cell or cell.lower() == "nan":
+        return np.nan
+    try:
+        value = float(cell)
+    except ValueError:
+        value = np.inf
+    if not np.isfinite(value):
+        raise CalibrationError(f"{where}: '{cell}' is not a number; leave it blank where nothing is seen")
+    return value

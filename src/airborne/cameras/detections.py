@@ -1,0 +1,235 @@
+"""2D detections: where a pose network, or a hand, saw a person's points in every camera's pictures.
+
+Points go by names of our own (`hip_left`, `toe_right`, ...), whichever list of points the network keeps; the list is
+told by its length: COCO 17, OpenPose's COCO 18, BODY_25, HALPE 26, BlazePose 33, and the first points of COCO-WholeBody
+133 and HALPE 136.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.errors import CalibrationError
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Detections:
+    """Points of one person in the pictures of several cameras, frame by frame."""
+
+    cameras: tuple[str, ...]
+    points: tuple[str, ...]
+    px: Array  # (frames, points, cameras, 2) [px] of the videos themselves; NaN where not seen
+    visibility: Array  # (frames, points, cameras) 0..1: how sure the network is; 0 where not seen
+    notes: tuple[str, ...] = ()  # what the reader should know, one line each
+
+    def select(self, cameras: Sequence[str]) -> Detections:
+        """Return the detections of the named cameras, in that order."""
+        columns = [self.cameras.index(name) for name in cameras]
+        px, visibility = self.px[:, :, columns], self.visibility[:, :, columns]
+        return replace(self, cameras=tuple(cameras), px=px, visibility=visibility)
+
+    def at(self, frames: NDArray[np.integer]) -> Detections:
+        """Return the detections at each camera's own frames (n, cameras); not seen where a frame is not there."""
+        is_there = (frames >= 0) & (frames < len(self.px))
+        row, column = np.where(is_there, frames, 0), np.arange(len(self.cameras))
+        px = np.moveaxis(self.px[row, :, column], 1, 2)  # from (n, cameras, points, 2)
+        visibility = np.moveaxis(self.visibility[row, :, column], 1, 2)
+        px = np.where(is_there[:, None, :, None], px, np.nan)
+        return replace(self, px=px, visibility=np.where(is_there[:, None], visibility, 0.0))
+
+    def surer_than(self, least: float) -> Detections:
+        """Return the detections without those less sure than `least`."""
+        is_sure = self.visibility >= least
+        return replace(
+            self, px=np.where(is_sure[..., None], self.px, np.nan), visibility=np.where(is_sure, self.visibility, 0.0)
+        )
+
+
+def read_detections(path: Path, cameras: Sequence[str], named: Mapping[str, str] | None = None) -> Detections:
+    """Read the detections of the cameras from a `.npz` file or a folder of OpenPose JSON.
+
+    `.npz`: one array (frames, points, 3) a camera, x, y [px] and visibility. Folder: `<camera>_json` or `<camera>`
+    below it, one file a frame, the frame being the last number of the file's name. An array or folder belongs to a
+    camera by `named`, by its name, or by the number that it ends in. Raises CalibrationError where one is missing.
+    """
+    if path.is_dir():
+        found = {folder.name.removesuffix("_json"): folder for folder in sorted(path.iterdir()) if folder.is_dir()}
+        named = {camera: name.removesuffix("_json") for camera, name in (named or {}).items()}
+        chosen = _matched(str(path), cameras, list(found), named)
+        tables, notes = {}, []
+        for camera, name in chosen.items():
+            tables[camera], n_people = _read_folder(found[name])
+            if n_people > 1:
+                notes.append(f"{camera}: up to {n_people} people in a picture; took the one detected most surely")
+        return _detections(str(path), tables, tuple(notes))
+    try:
+        with np.load(path) as arrays:
+            chosen = _matched(path.name, cameras, list(arrays), named or {})
+            return _detections(path.name, {camera: arrays[name] for camera, name in chosen.items()})
+    except OSError as error:
+        raise CalibrationError(f"{path} cannot be read ({error.strerror or error}); give a .npz or a folder") from None
+    except (ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise CalibrationError(
+            f"{path} is not a .npz of numbers ({error}); expected one array (frames, points, 3) a camera"
+        ) from None
+
+
+def _matched(where: str, cameras: Sequence[str], keys: Sequence[str], named: Mapping[str, str]) -> dict[str, str]:
+    """Return the key of every camera: as named, of the same name, or the only one that ends in the same number."""
+    chosen = {}
+    for camera in cameras:
+        wanted = named.get(camera, camera)
+        alike = [key for key in keys if _number(key) == _number(camera) is not None]
+        rivals = [name for name in cameras if _number(name) == _number(camera)]
+        if wanted in keys:
+            chosen[camera] = wanted
+        elif camera not in named and len(alike) == len(rivals) == 1:
+            chosen[camera] = alike[0]
+        else:
+            raise CalibrationError(
+                f"{where} holds no detections of '{wanted}'; it has: {', '.join(keys)[:200] or 'none'}; "
+                f'say which are whose with detections_cameras = {{{camera} = "..."}}'
+            )
+    return chosen
+
+
+def _number(name: str) -> int | None:
+    found = re.search(r"(\d+)$", name)
+    return int(found[1]) if found else None
+
+
+def _detections(where: str, tables: Mapping[str, Array], notes: tuple[str, ...] = ()) -> Detections:
+    """Put the cameras' tables (frames, points, 3) together; shorter ones end unseen."""
+    n_points = {}
+    for camera, table in tables.items():
+        if table.ndim != 3 or table.shape[2] != 3 or not np.issubdtype(table.dtype, np.number) or not table.size:
+            raise CalibrationError(
+                f"{where}: the detections of '{camera}' are {table.dtype} {table.shape}; "
+                "expected numbers (frames, points, 3): x, y, visibility"
+            )
+        n_points[camera] = table.shape[1]
+    count = max(n_points.values())
+    if len(set(n_points.values())) > 1 or count not in NETWORKS:
+        counts = ", ".join(f"{camera} {n}" for camera, n in n_points.items())
+        known = ", ".join(map(str, NETWORKS))
+        raise CalibrationError(f"{where}: points per picture: {counts}; expected the same for all, one of {known}")
+    names = NETWORKS[count]
+    values = np.full((max(map(len, tables.values())), len(names), len(tables), 3), np.nan)
+    for column, table in enumerate(tables.values()):
+        values[: len(table), :, column] = table[:, : len(names)]
+    is_seen = np.isfinite(values).all(axis=-1) & (values[..., 2] > 0)
+    values = np.where(is_seen[..., None], values, np.nan)
+    visibility = np.clip(np.where(is_seen, values[..., 2], 0.0), 0.0, 1.0)
+    return Detections(cameras=tuple(tables), points=names, px=values[..., :2], visibility=visibility, notes=notes)
+
+
+def _read_folder(folder: Path) -> tuple[Array, int]:
+    """Read a camera's JSON files: (frames, points, 3), NaN where nobody is; and the most people in one picture."""
+    files = {_number(path.stem.removesuffix("_keypoints")): path for path in sorted(folder.glob("*.json"))}
+    if not files or None in files:
+        raise CalibrationError(
+            f"{folder} holds no detections; expected JSON files whose names end in the frame's number"
+        )
+    found: dict[int, Array] = {}
+    n_people = 0
+    for frame, path in files.items():
+        people = _people(path)
+        n_people = max(n_people, len(people))
+        if people and frame is not None:
+            found[frame] = max(people, key=lambda person: person[:, 2].sum())
+    if not found:
+        raise CalibrationError(f"{folder}: there is nobody in any picture; give the detections of a person")
+    counts = {len(person) for person in found.values()}
+    if len(counts) > 1:
+        raise CalibrationError(f"{folder}: people of {sorted(counts)} points; expected one list of points throughout")
+    table = np.full((max(n for n in files if n is not None) + 1, counts.pop(), 3), np.nan)
+    for frame, person in found.items():
+        table[frame] = person
+    return table, n_people
+
+
+def _people(path: Path) -> list[Array]:
+    """Read the people (points, 3) of one OpenPose file."""
+    try:
+        document = json.loads(path.read_text(encoding="utf-8-sig"))
+        people = [np.array(person["pose_keypoints_2d"], float).reshape(-1, 3) for person in document["people"]]
+    except OSError as error:
+        raise CalibrationError(f"{path} cannot be read ({error.strerror})") from None
+    except (ValueError, KeyError, TypeError):
+        raise CalibrationError(
+            f"{path} is not OpenPose JSON; expected people[].pose_keypoints_2d = [x, y, confidence, ...]"
+        ) from None
+    return [person for person in people if len(person)]
+
+
+def landmarks_from_points(names: Sequence[str], points: Array) -> dict[str, Array]:
+    """Return points (..., points, 3) [m] by name, and with them the landmarks that lie between them, each (..., 3).
+
+    Where they have no point of their own, the head is midway between the ears, the middle of the hand between the
+    knuckles of the first and the last finger, the ball of the foot three quarters of the way from heel to toes. NaN
+    where a point that it needs is NaN; left out where there is no such point.
+    """
+    found = {name: points[..., i, :] for i, name in enumerate(names)}
+    for landmark, recipes in MADE_OF.items():
+        for recipe in recipes:
+            if landmark not in found and set(recipe) <= set(names):
+                between = points[..., [names.index(name) for name in recipe], :]
+                found[landmark] = np.einsum("...pi,p->...i", between, np.array(list(recipe.values())))
+    return found
+
+
+def _both(*names: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{side}" for name in names for side in ("left", "right"))
+
+
+def _limb(side: str, *names: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{side}" for name in names)
+
+
+_COCO = ("nose", *_both("eye", "ear", "shoulder", "elbow", "wrist", "hip", "knee", "ankle"))
+_HALPE = (*_COCO, "head_top", "mid_shoulder", "mid_hip", *_both("toe", "small_toe", "heel"))
+_ARM, _LEG, _TOES = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"), ("toe", "small_toe", "heel")
+_FACE = ("eye_right", "eye_left", "ear_right", "ear_left")
+_RIGHT_FIRST = ("nose", "mid_shoulder", *_limb("right", *_ARM), *_limb("left", *_ARM))
+_EYES = (*_limb("left", "inner_eye", "eye", "outer_eye"), *_limb("right", "inner_eye", "eye", "outer_eye"))
+
+NETWORKS: dict[int, tuple[str, ...]] = {
+    17: _COCO,
+    18: (*_RIGHT_FIRST, *_limb("right", *_LEG), *_limb("left", *_LEG), *_FACE),
+    25: (
+        *(*_RIGHT_FIRST, "mid_hip", *_limb("right", *_LEG), *_limb("left", *_LEG), *_FACE),
+        *(*_limb("left", *_TOES), *_limb("right", *_TOES)),
+    ),
+    26: _HALPE,
+    33: (
+        *("nose", *_EYES, *_both("ear", "mouth", "shoulder", "elbow", "wrist")),
+        *_both("little_knuckle", "index_knuckle", "thumb", "hip", "knee", "ankle", "heel", "toe"),
+    ),
+    133: (*_COCO, *_limb("left", *_TOES), *_limb("right", *_TOES)),
+    136: _HALPE,
+}  # how many points a network keeps -> their names, in its order
+
+
+def _recipes(side: str) -> dict[str, tuple[dict[str, float], ...]]:
+    toe, small, heel = _limb(side, *_TOES)
+    return {
+        f"hand_{side}": ({f"index_knuckle_{side}": 0.5, f"little_knuckle_{side}": 0.5},),
+        f"foot_{side}": ({heel: 0.25, toe: 0.375, small: 0.375}, {heel: 0.25, toe: 0.75}),
+    }
+
+
+MADE_OF: dict[str, tuple[dict[str, float], ...]] = {
+    "head": ({"ear_left": 0.5, "ear_right": 0.5},),
+    **_recipes("left"),
+    **_recipes("right"),
+}  # landmark -> shares of the points that it lies between, the first recipe that can be followed
