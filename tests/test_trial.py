@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from airborne.body import write_measurements
+from airborne.body.anthropometry import measurements_of
 from airborne.errors import TrialError
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.trial import read_trial
@@ -144,6 +146,27 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
         ('file = "calib.toml"', 'control_points = "none.csv"', "none.csv not found beside it"),
         ('file = "body.toml"', 'file = "none.toml"', "none.toml not found beside it"),
         ('[body]\nfile = "body.toml"', "", "body: is missing"),
+        ('file = "body.toml"', 'file = "body.toml"\npreset = "human18"', "body: give file"),
+        ('file = "body.toml"', "", 'body: give file = "...", preset = "human18" or measurements = "...", one of them'),
+        ('file = "body.toml"', 'preset = "human19"', "body.preset"),
+        ('file = "body.toml"', 'preset = "human18"\nstature_m = 1.8', "stature_m and mass_kg go with a preset, both"),
+        ('file = "body.toml"', 'file = "body.toml"\nmass_kg = 70', "stature_m and mass_kg go with a preset"),
+        ('file = "body.toml"', 'preset = "human18"\nstature_m = -1\nmass_kg = 70', "body.stature_m"),
+        ('file = "body.toml"', 'measurements = "none.txt"', "none.txt not found beside it"),
+        (
+            'file = "calib.toml"',
+            'file = "calib.toml"\nmend = ["left"]',
+            "calibration.mend needs [start] with detections",
+        ),
+        (
+            'file = "calib.toml"',
+            'file = "calib.toml"\nmend = ["top"]',
+            "calibration.mend: no camera top; there are: left",
+        ),
+        ("frame = 3", 'joints_m = "joints.csv"', "or joints_m, points_px or detections, one of them"),
+        ("frame = 3", 'detections_cameras = {left = "c1"}', "detections_cameras goes with detections"),
+        ("position_m = [0.1, 0.2, 1.3]", "", "position_m is missing: give where the root's origin is"),
+        ("frame = 3", "joint_angles_deg = {knee = [1, 2]}", "start.joint_angles_deg.knee"),
         ("frame = 3", "frame = -1", "start.frame"),
         ("frame = 3", "frame = 2.5", "start.frame"),
         ("position_m = [0.1, 0.2, 1.3]", "position_m = [0.1, 0.2]", "start.position_m"),
@@ -178,6 +201,74 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
 def test_malformed_file_is_refused_in_one_line_that_names_it_and_the_fault(folder, old, new, said):
     assert old in GOOD
     assert said in complaint(folder, GOOD.replace(old, new, 1))
+
+
+PLACES = "joints_m = {a = [1, 2, 3], b = [4, 5, 6]}"
+
+
+def by(start):
+    """The good trial with another start."""
+    return GOOD[: GOOD.index("[start]")] + f"[start]\n{start}\n" + GOOD[GOOD.index("[track]") :]
+
+
+def test_start_can_be_given_by_places_clicks_or_detections(folder):
+    for name in ("joints.csv", "clicks.csv", "found.npz"):
+        (folder / name).write_text("")
+    (folder / "json").mkdir()
+    assert read(folder, by(PLACES)).start.joints_m == {"a": [1, 2, 3], "b": [4, 5, 6]}
+    for start, name in (
+        ('joints_m = "joints.csv"', "joints.csv"),
+        ('points_px = "clicks.csv"', "clicks.csv"),
+        ('detections = "found.npz"', "found.npz"),
+        ('detections = "json"\ndetections_cameras = {left = "c1"}', "json"),
+    ):
+        assert read(folder, by(start)).start.given_files == [name]
+
+
+@pytest.mark.parametrize(
+    ("start", "said"),
+    [
+        ("frame = 3", "give a position_m and a rotation, or joints_m, points_px or detections, one of them"),
+        (f'{PLACES}\npoints_px = "clicks.csv"', "one of them"),
+        (f"{PLACES}\nposition_m = [1, 2, 3]", "one of them"),
+        (f"{PLACES}\njoint_angles_deg = {{a = [1, 2, 3]}}", "one of them"),
+        ("joints_m = {a = [1, 2]}", "start.joints_m"),
+        ("joints_m = {a = [1, 2, inf]}", "start.joints_m"),
+        ('joints_m = "none.csv"', "none.csv not found beside it"),
+        ('points_px = "none.csv"', "none.csv not found beside it"),
+        ('detections = "none"', "none not found beside it"),
+        ('points_px = "."', ". not found beside it"),
+    ],
+)
+def test_start_without_one_clear_source_is_refused(folder, start, said):
+    assert said in complaint(folder, by(start))
+
+
+def test_start_that_needs_the_body_gives_no_pose_by_itself(folder):
+    angles = GOOD.replace("frame = 3", "joint_angles_deg = {knee = [1, 2, 3]}")
+    for text in (angles, by(PLACES)):
+        with pytest.raises(TrialError, match=r"use airborne\.start\.first_pose"):
+            _ = read(folder, text).start.pose
+
+
+def test_person_can_be_asked_for_by_stature_and_mass_or_by_measurements(folder):
+    preset = read(
+        folder, GOOD.replace('file = "body.toml"', 'preset = "human18"\nstature_m = 1.7\nmass_kg = 60')
+    ).model()
+    assert len(preset.segments) == 18
+    assert preset.needs_colours
+    write_measurements(folder / "person.txt", measurements_of(1.7, 60.0))
+    measured = read(folder, GOOD.replace('file = "body.toml"', 'measurements = "person.txt"')).model()
+    for one, other in zip(preset.segments, measured.segments, strict=True):
+        np.testing.assert_allclose(one.joint_m, other.joint_m, atol=1e-6)
+    assert measured.needs_colours
+
+
+def test_mending_is_for_cameras_that_are_kept(folder):
+    (folder / "found.npz").write_text("")
+    text = by('detections = "found.npz"').replace('file = "calib.toml"', 'file = "calib.toml"\nmend = ["right"]')
+    assert read(folder, text).calibration.mend == ["right"]
+    assert read(folder, text, cameras=["left"]).calibration.mend == []
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,6 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
         values |= {name: comparison.to_dict() for name, comparison in found.items()}
         write_json(summary, values)
         if (folder / "report.html").is_file():
-            write_figures(folder, motion, truth=true_poses, digitised=clicked, symmetries=alike)
+            write_figures(folder, motion, model, truth=true_poses, digitised=clicked, symmetries=alike)
             write_report(folder, values)
     return found

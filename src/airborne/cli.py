@@ -29,8 +29,15 @@ app = typer.Typer(
 )
 synth = typer.Typer(no_args_is_help=True, help="Write a synthetic trial with its truth.")
 app.add_typer(synth, name="synth")
+reproduce = typer.Typer(no_args_is_help=True, help="Make a paper's experiment anew: its table beside ours.")
+app.add_typer(reproduce, name="reproduce")
 
 _SECONDS_A_LINE = 5.0
+_AGAINST = {
+    "truth": "against the truth",
+    "digitised": "against digitising by hand",
+    "joints": "against the paths of the joints",
+}
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
 
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -104,7 +111,9 @@ def track(
     trial: Annotated[Path, typer.Argument(help="The trial's TOML file.")],
     output: Out,
     resume: Annotated[bool, typer.Option(help="Go on with a run that was stopped.")] = False,
-    method: Annotated[str | None, typer.Option(help="Instead of the trial's: refined, stepping, simplex.")] = None,
+    method: Annotated[
+        str | None, typer.Option(help="Instead of the trial's: refined, joint, hierarchical, stepping, simplex.")
+    ] = None,
     every: Annotated[int | None, typer.Option(min=1, help="Track every n-th frame or field.")] = None,
     cameras: Annotated[str | None, typer.Option(help="Only these cameras, separated by commas.")] = None,
     pictures: Annotated[bool, typer.Option(help="Write overlay videos, figures and the report.")] = True,
@@ -205,6 +214,26 @@ def _sizes(text: str, names: tuple[str, ...]) -> dict[str, tuple[int, int]]:
     return sizes
 
 
+@app.command("fit-body")
+def fit_body(
+    trial: Annotated[Path, typer.Argument(help="The trial's TOML file; its [start] has detections or joints_m.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The body file to write.")],
+    frames: Annotated[int, typer.Option(min=1, help="How many frames to fit the body to.")] = 5,
+) -> None:
+    """Fit the trial's body to the person in its videos: lengths, girths, colours and where these change.
+
+    Example: airborne fit-body trial.toml -o person.toml
+    """
+    from airborne.fitting import described, fit_person
+    from airborne.trial import read_trial
+
+    with _progress("reading and fitting") as report:
+        fitted = fit_person(
+            read_trial(trial), output, n_frames=frames, progress=lambda what, done, total: report(done, total)
+        )
+    print(f"{described(fitted)}\nbody: {output}\npicture: {fitted.picture}")
+
+
 @app.command()
 def evaluate(
     results: Annotated[Path, typer.Argument(help="Folder of a run.")],
@@ -212,20 +241,23 @@ def evaluate(
     digitised: Annotated[
         Path | None, typer.Option(help="Points clicked by hand, to compare with, as the rigid-body paper does.")
     ] = None,
+    joints: Annotated[
+        Path | None, typer.Option(help="Paths of joints: time_s,joint,x_m,y_m,z_m line by line, or a .trc file.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Compare a run with the truth, or with points clicked by hand; the report then shows both.
+    """Compare a run with the truth, with paths of joints, or with points clicked by hand.
 
     Example: airborne evaluate results truth.csv --digitised digitised.csv
     """
     from airborne.assessment import assess
 
-    found = assess(results, truth, digitised)
+    found = assess(results, truth, digitised, joints)
     if as_json:
         print(json.dumps({name: comparison.to_dict() for name, comparison in found.items()}))
         return
     for name, comparison in found.items():
-        print(f"against the {name}" if name == "truth" else "against digitising by hand")
+        print(_AGAINST[name])
         print(comparison.describe())
 
 
@@ -244,6 +276,52 @@ def synth_cross(
     with _progress("rendering") as report:
         write_thrown_cross(output, preset=preset, seed=seed, progress=report)
     print(f"trial: {output / 'trial.toml'}")
+
+
+@synth.command("somersault")
+def synth_somersault(
+    output: Out,
+    preset: Annotated[
+        Literal["paper", "moving-arms", "pike"], typer.Option(help="11 poses of one shape, or 50 frames/s that move.")
+    ] = "paper",
+    target: Annotated[Literal["skin", "ellipsoids"], typer.Option(help="The surface of the person drawn.")] = "skin",
+    style: Annotated[
+        Literal["exact", "gym"], typer.Option(help="Pictures in the tracker's own light, or of cameras in a hall.")
+    ] = "exact",
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+) -> None:
+    """Write a half-twisting somersault: videos from front, side and top, calibration, body, truth.
+
+    Example: airborne synth somersault -o my-somersault --preset moving-arms --style gym
+    """
+    from airborne.synthetic import write_somersault
+
+    with _progress("rendering") as report:
+        write_somersault(output, preset=preset, target=target, style=style, seed=seed, progress=report)
+    print(f"trial: {output / 'trial.toml'}")
+
+
+@reproduce.command("rigid")
+def reproduce_rigid(
+    output: Out = Path("reproduced-rigid"),
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer poses, methods and cases: under a minute.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Track a synthetic somersault as the rigid-body paper does, and better: errors, curves, sensitivity; minutes.
+
+    Example: airborne reproduce rigid -o rigid
+    """
+    from airborne.reproduction import rigid
+
+    try:
+        with _progress("tracking") as report:
+            summary = rigid.reproduce_rigid(output, quick=quick, progress=report)
+    except KeyboardInterrupt:
+        errors.print(f"airborne: stopped; the files finished so far are in {output}", markup=False)
+        raise typer.Exit(130) from None
+    print((output / "summary.json").read_text(encoding="utf-8") if as_json else rigid.describe(summary))
+    if not as_json:
+        print(f"results: {output}")
 
 
 @app.command()

@@ -94,7 +94,7 @@ def track(
     _write_tables(folder, motion, model)
     summary = _summary(trial, calibration, recording, motion, model, identity["inputs"])
     if pictures:
-        write_figures(folder, motion)
+        write_figures(folder, motion, model)
     summary["timings_s"] = {
         "opening": read_s - begun_s,
         "tracking": tracked_s - read_s,

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import BodyModel, Box, Ellipsoid, Part, Pose, Segment
+from airborne.body import BodyModel, Box, Ellipsoid, Part, Pose, Segment, human18
 from airborne.cameras import Camera, Rig
 from airborne.motion import Motion
 from airborne.tracking import Estimate, Status
@@ -23,6 +23,7 @@ def body(shape):
 
 
 BOX = body(Box(np.array([0.5, 0.3, 0.2])))
+PERSON = human18(1.7, 65.0)
 BALL = body(Ellipsoid(np.full(3, 0.25)))
 
 
@@ -71,3 +72,33 @@ def run(n=20, *, lost=(), uncertain=(), unseen=(), turns=1.0):
             estimate = replace(estimate, status=Status.LOST, score=np.nan, pose=None, covariance=None, n_views=0)
         estimates.append(estimate)
     return Motion.collect(estimates)
+
+
+def person_run(n=12, *, lost=(), unseen=(), bent=1.0):
+    """Make a run of a person who falls and bends the left knee and elbow, evenly, at 50 Hz.
+
+    In frames `unseen` the left elbow's turns have an infinite variance.
+    """
+    joints = [segment.name for segment in PERSON.segments[1:]]
+    estimates = []
+    for i in range(n):
+        angles = np.zeros((len(joints), 3))
+        angles[joints.index("shank_left"), 0] = bent * 0.05 * i
+        angles[joints.index("forearm_left"), 0] = -bent * 0.05 * i
+        covariance = np.diag([4e-6] * 3 + [1e-4] * (3 + angles.size))
+        if i in unseen:
+            hidden = 6 + 3 * joints.index("forearm_left") + np.arange(3)
+            covariance[hidden, hidden] = np.inf
+        estimate = Estimate(
+            index=i,
+            time_s=Fraction(i, 50),
+            status=Status.TRACKED,
+            score=10.0,
+            pose=replace(pose((0.0, 0.0, 2.0 - 4.905 * (i / 50) ** 2)), joint_angles=angles),
+            covariance=covariance,
+            n_views=2,
+        )
+        if i in lost:
+            estimate = replace(estimate, status=Status.LOST, score=np.nan, pose=None, covariance=None, n_views=0)
+        estimates.append(estimate)
+    return Motion.collect(estimates, tuple(joints))

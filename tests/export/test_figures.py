@@ -8,8 +8,16 @@ from matplotlib.figure import Figure
 
 from airborne.evaluation import DigitisedPoses, Truth
 from airborne.export import panels, write_errors, write_figures, write_pose
-from airborne.export.figures import _differences, _reference, _same_turn, _turned_alike
-from tests.export.scenes import HALF_TURN, run
+from airborne.export.figures import (
+    _differences,
+    _panes,
+    _reference,
+    _same_turn,
+    _turned_alike,
+    write_flight_figure,
+    write_joints_figure,
+)
+from tests.export.scenes import BOX, HALF_TURN, PERSON, person_run, run
 from tests.tolerances import ROUNDTRIP
 
 NAMES = ["digitised.png", "errors.png", "pose.png", "score.png"]
@@ -36,7 +44,7 @@ def digitised_of(motion):
 def test_every_figure_is_written_at_report_width_whatever_the_run_holds(tmp_path, motion):
     settings = dict(matplotlib.rcParams)
     sound = run()
-    write_figures(tmp_path, motion, truth=truth_of(sound), digitised=digitised_of(sound))
+    write_figures(tmp_path, motion, BOX, truth=truth_of(sound), digitised=digitised_of(sound))
     assert sorted(path.name for path in tmp_path.iterdir()) == NAMES
     for name in NAMES:
         assert cv2.imread(str(tmp_path / name)).shape[1] == panels.WIDTH_IN * panels.DPI
@@ -44,7 +52,7 @@ def test_every_figure_is_written_at_report_width_whatever_the_run_holds(tmp_path
 
 
 def test_no_comparison_is_drawn_where_nothing_is_known_to_compare_with(tmp_path):
-    write_figures(tmp_path, run())
+    write_figures(tmp_path, run(), BOX)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["pose.png", "score.png"]
 
 
@@ -115,3 +123,67 @@ def test_the_band_is_two_standard_deviations_wide_and_absent_where_they_are_infi
     assert corners[:, 1].min() == 2.0
     assert corners[:, 1].max() == 4.0
     assert 2.0 not in corners[:, 0]
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Everything drawn as an estimate: panel label -> values; labels are given after drawing."""
+    panes, found = {}, {}
+    estimate, name = panels.draw_estimate, panels.name_panel
+
+    def draw(axes, motion, values):
+        panes[axes] = values
+        estimate(axes, motion, values)
+
+    def label(axes, text):
+        found[text] = panes[axes]
+        name(axes, text)
+
+    monkeypatch.setattr(panels, "draw_estimate", draw)
+    monkeypatch.setattr(panels, "name_panel", label)
+    return found
+
+
+@pytest.mark.parametrize(
+    "motion", [person_run(lost=(3,), unseen=(5,)), person_run(1), person_run(3, lost=(0, 1, 2))],
+    ids=["mixed", "one frame", "all lost"],
+)  # fmt: skip
+def test_a_body_with_joints_and_masses_gets_two_more_figures(tmp_path, motion):
+    write_figures(tmp_path, motion, PERSON)
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == ["flight.png", "joints.png", "pose.png", "score.png"]
+    for name in names:
+        assert cv2.imread(str(tmp_path / name)).shape[1] == panels.WIDTH_IN * panels.DPI
+
+
+def test_joints_without_masses_get_no_flight(tmp_path):
+    weightless = replace(PERSON, segments=tuple(replace(segment, inertia=None) for segment in PERSON.segments))
+    write_figures(tmp_path, person_run(), weightless)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["joints.png", "pose.png", "score.png"]
+
+
+def test_flexion_is_positive_in_every_joint_drawn(tmp_path, drawn):
+    write_joints_figure(tmp_path / "joints.png", person_run(), PERSON)
+    assert len(drawn) == 8
+    bent = np.degrees(0.05 * np.arange(12))
+    for label, values in drawn.items():
+        expected = bent if label in ("knee left [°]", "elbow left [°]") else 0 * bent
+        np.testing.assert_allclose(values, expected, atol=1e-9, err_msg=label)
+
+
+def test_a_joint_that_cannot_be_seen_shows(tmp_path):
+    write_joints_figure(tmp_path / "seen.png", person_run(), PERSON)
+    write_joints_figure(tmp_path / "unseen.png", person_run(unseen=(5, 6)), PERSON)
+    assert (tmp_path / "seen.png").read_bytes() != (tmp_path / "unseen.png").read_bytes()
+
+
+def test_other_bodies_show_their_first_joints():
+    assert _panes(["flipper", "tail"]) == [("flipper", "flipper, x", 1.0), ("tail", "tail, x", 1.0)]
+    assert len(_panes([f"link {k}" for k in range(30)])) == 8
+
+
+def test_the_height_of_a_falling_stiff_body_is_a_parabola_and_its_momentum_is_none(tmp_path, drawn):
+    write_flight_figure(tmp_path / "flight.png", person_run(bent=0.0), PERSON)
+    height, *momenta = drawn.values()
+    np.testing.assert_allclose(np.diff(height, 2), -9.81 / 50**2, atol=1e-9)
+    np.testing.assert_allclose(momenta, 0, atol=1e-9)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from airborne.errors import ResultError
-from airborne.evaluation import Truth, compare
+from airborne.evaluation import JointPaths, Truth, compare, compare_joints
 from airborne.export import headline, write_figures, write_report
 from airborne.export.page import label, shown
-from airborne.motion import Motion
-from tests.export.scenes import HALF_TURN, run
+from airborne.motion import Motion, flight_summary, landmarks
+from tests.export.scenes import BOX, HALF_TURN, PERSON, person_run, run
 
 
 def html_of(folder, motion, **more):
@@ -16,7 +16,7 @@ def html_of(folder, motion, **more):
 
 
 def test_the_page_needs_nothing_but_itself(tmp_path):
-    write_figures(tmp_path, run())
+    write_figures(tmp_path, run(), BOX)
     html = html_of(tmp_path, run())
     sources = re.findall(r'(?:src|href)\s*=\s*"([^"]{0,30})', html)
     assert len(sources) == 2
@@ -76,6 +76,40 @@ def test_a_comparison_with_the_truth_becomes_a_table(tmp_path):
     assert "Against the truth" in html
     assert "<th>x [mm]</th><td>3.00</td><td>3.00</td>" in html
     assert "20 of 20 reference times matched" in html
+
+
+def test_a_body_with_joints_gets_their_angles_and_its_flight_and_another_does_not(tmp_path):
+    motion = person_run()
+    write_figures(tmp_path, motion, PERSON)
+    html = html_of(tmp_path, motion, flight=flight_summary(motion, PERSON).to_dict())
+    words = (
+        "<h2>Joints</h2>",
+        "<h2>Centre of mass and angular momentum</h2>",
+        "<dt>Joint angles</dt>",
+        "a free fall [mm]",
+    )
+    assert [word for word in words if word not in html] == []
+    assert html.count("<img") == 4
+    (tmp_path / "rigid").mkdir()
+    write_figures(tmp_path / "rigid", run(), BOX)
+    assert [word for word in words if word in html_of(tmp_path / "rigid", run())] == []
+
+
+def test_numbers_of_a_flight_that_are_not_known_are_said_to_be_so(tmp_path):
+    motion = person_run(2)
+    write_figures(tmp_path, motion, PERSON)
+    html = html_of(tmp_path, motion, flight=flight_summary(motion, PERSON).to_dict())
+    assert "fitted, free fall</th><td>not known</td><td>9.81</td>" in html
+
+
+def test_a_comparison_with_paths_of_joints_becomes_a_table(tmp_path):
+    motion = person_run()
+    points, _ = landmarks(motion, PERSON)
+    names = tuple(mark.name for mark in PERSON.landmarks)
+    paths = JointPaths(time_s=motion.time_s, names=names, points=points - [0.004, 0, 0])
+    html = html_of(tmp_path, motion, joints=compare_joints(motion, PERSON, paths).to_dict())
+    assert "Against the paths of the joints" in html
+    assert html.count("<td>4</td><td>4</td><td>4</td>") == len(names) + 2  # all, and all tracked
 
 
 def test_a_number_missing_from_the_summary_is_named(tmp_path):

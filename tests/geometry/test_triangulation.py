@@ -46,6 +46,23 @@ def test_two_of_three_views_are_enough_and_one_is_not():
     assert np.isnan(triangulate(P[:1], px[:, 2:])).all()
 
 
+def test_weights_are_inverse_variances():
+    points, rng = scattered(1)[0], np.random.default_rng(2)
+    sd_px = np.array([0.5, 2.0, 8.0])
+    px = px_from_points(P, points) + rng.normal(0, 1, (4000, 3, 2)) * sd_px[:, None]
+    alike, weighted = triangulate(P, px), triangulate(P, px, np.broadcast_to(sd_px**-2, (4000, 3)))
+    assert np.sum((weighted - points) ** 2) < 0.7 * np.sum((alike - points) ** 2)
+    np.testing.assert_allclose(triangulate(P, px[:9], np.full((9, 3), 7.0)), alike[:9], atol=ROUNDTRIP)
+
+
+def test_best_weighted_point_is_where_the_weighted_squared_distances_are_least():
+    points, weights = scattered(1)[0], np.array([1.0, 4.0, 0.2])
+    px = noisy_px(points, 3.0)
+    cost = lambda x: (np.sqrt(weights)[:, None] * (px - px_from_points(P, x))).ravel()  # noqa: E731
+    best = least_squares(cost, points, xtol=1e-14, ftol=1e-14, gtol=1e-14).x
+    np.testing.assert_allclose(triangulate(P, px, weights), best, atol=SOLVED**2)
+
+
 def test_a_missing_view_does_not_count():
     px = noisy_px(scattered(4), 1.0)
     px[:, 1] = np.nan

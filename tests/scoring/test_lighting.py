@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airborne.rendering.srgb import light_from_srgb
-from airborne.scoring.lighting import TERMS, TO_LIGHT, compose, fit_light, light_planes
+from airborne.scoring.lighting import TERMS, TO_LIGHT, fit_light, light_planes, light_up, paint_evenly
 from tests.tolerances import EXACT
 
 SHAPE = (40, 50)
@@ -104,36 +104,33 @@ def test_black_body_leaves_a_finite_light():
     assert np.isfinite(light).all()
 
 
-@pytest.mark.parametrize("is_faceted", [True, False])
-def test_composite_of_the_right_body_and_light_leaves_no_residual(is_faceted):
-    part, normals, observed = body()
-    scene = np.full((3, *SHAPE), 0.05, np.float32)
-    residual, shape = np.empty((2, 3, *SHAPE), np.float32)
-    facets = np.full(2, is_faceted)
-    compose(observed, scene, part, normals, ALBEDO, facets, LIGHT.astype(np.float32), 0, 0, residual, shape)
-    np.testing.assert_allclose(residual, 0, atol=1e-6)
-    assert np.all(shape[:, part < 0] == 0)
+def lit_by(light, part, normals, x0=0, y0=0, size=SHAPE):
+    """The body's light (3, h, w) in the window at (x0, y0)."""
+    lit = np.zeros((3, *size), np.float32)
+    light_up(part, normals, ALBEDO, light.astype(np.float32), x0, y0, lit)
+    return lit
 
 
-def test_shape_of_a_faceted_part_is_its_light_and_of_a_smooth_one_its_mean_light():
+def test_body_lit_by_the_right_light_is_what_was_seen():
     part, normals, observed = body()
-    scene = np.zeros((3, *SHAPE), np.float32)
-    residual, shape = np.empty((2, 3, *SHAPE), np.float32)
-    facets = np.array([True, False])
-    compose(observed, scene, part, normals, ALBEDO, facets, LIGHT.astype(np.float32), 0, 0, residual, shape)
-    np.testing.assert_allclose(shape[:, part == 0], observed[:, part == 0], atol=1e-6)
+    lit = lit_by(LIGHT, part, normals)
+    np.testing.assert_allclose(lit[:, part >= 0], observed[:, part >= 0], atol=1e-6)
+    assert np.all(lit[:, part < 0] == 0)
+
+
+def test_a_faceted_part_keeps_its_light_and_a_smooth_one_gets_its_mean_light():
+    part, normals, observed = body()
+    lit = lit_by(LIGHT, part, normals)
+    paint_evenly(part, np.array([True, False]), 0, 0, lit)
+    np.testing.assert_allclose(lit[:, part == 0], observed[:, part == 0], atol=1e-6)
     mean = observed[:, part == 1].mean(axis=1, keepdims=True)
-    np.testing.assert_allclose(shape[:, part == 1], np.broadcast_to(mean, (3, (part == 1).sum())), rtol=1e-4)
+    np.testing.assert_allclose(lit[:, part == 1], np.broadcast_to(mean, (3, (part == 1).sum())), rtol=1e-4)
 
 
-def test_composite_covers_the_window_it_is_asked_for():
-    part, normals, observed = body()
-    scene = np.random.default_rng(2).uniform(0, 1, (3, *SHAPE)).astype(np.float32)
-    arrays = observed, scene, part, normals, ALBEDO, np.array([True, True]), even_light()
-    whole, window = np.empty((2, 3, *SHAPE), np.float32), np.empty((2, 3, 20, 25), np.float32)
-    compose(*arrays, 0, 0, *whole)
-    compose(*arrays, 12, 7, *window)
-    np.testing.assert_array_equal(window, whole[:, :, 7:27, 12:37])
+def test_light_covers_the_window_it_is_asked_for():
+    part, normals, _ = body()
+    whole, window = lit_by(LIGHT, part, normals), lit_by(LIGHT, part, normals, 12, 7, (20, 25))
+    np.testing.assert_array_equal(window, whole[:, 7:27, 12:37])
 
 
 def test_light_of_srgb_has_its_known_values():

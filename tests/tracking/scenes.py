@@ -121,6 +121,7 @@ class Scene:
     brightness: Callable[[int], float] = lambda index: 1.0
     noise_grey: float = 2.0
     is_dark: Callable[[int, str], bool] = lambda index, name: False  # a camera without an image at a frame
+    reach: float = REACH
 
     def frames(self, index: int) -> Frames:
         time_s = Fraction(index, FPS)
@@ -134,7 +135,7 @@ class Scene:
     def _picture(self, index: int, i: int, seen_by: Camera, pose: Pose | None) -> np.ndarray:
         light = self.backgrounds[i]
         if pose is not None:
-            share, shown = _drawn(self.model, pose, seen_by)
+            share, shown = _drawn(self.model, pose, seen_by, self.reach)
             light = (1 - share) * light + shown
         rng = np.random.default_rng([index, i])
         noise = self.noise_grey * rng.standard_normal(light.shape, np.float32)
@@ -153,14 +154,14 @@ def srgb_from_light(light: np.ndarray) -> np.ndarray:
     return SRGB[np.rint(np.clip(light, 0, 1) * (len(SRGB) - 1)).astype(int)]
 
 
-def _drawn(model: BodyModel, pose: Pose, seen_by: Camera) -> tuple[np.ndarray, np.ndarray]:
+def _drawn(model: BodyModel, pose: Pose, seen_by: Camera, reach: float) -> tuple[np.ndarray, np.ndarray]:
     """The body's share of each pixel (h, w, 1), and its linear light in it (h, w, 3): averaged over finer pixels."""
     width, height = SIZE
     fine_size = (FINER * width, FINER * height)
     offset = -(FINER - 1) / (2 * FINER)
     fine = seen_by.resampled(scale=(1 / FINER, 1 / FINER), offset=(offset, offset), size=fine_size)
     share, shown = np.zeros((height, width, 1), np.float32), np.zeros((height, width, 3), np.float32)
-    reach_px = round(REACH * seen_by.K[0, 0])
+    reach_px = round(reach * seen_by.K[0, 0])
     u, v = np.rint(seen_by.px_from_world(pose.world_from_root.translation)).astype(int)
     x0, x1 = np.clip([u - reach_px, u + reach_px], 0, width)
     y0, y1 = np.clip([v - reach_px, v + reach_px], 0, height)

@@ -11,7 +11,6 @@ from airborne.body.outfits import Border, solid_of, with_borders
 from airborne.errors import BodyError
 from airborne.tracking.body_fit import Sighting, fit_body
 from airborne.tracking.shape import border_knobs, borders_of, girths_of, knobs_of, lengths_of, shaped
-from tests.tracking import scenes
 from tests.tracking.scenes import CAMERAS, FPS, Scene
 
 STATURE_M, MASS_KG = 1.72, 68.0
@@ -52,15 +51,13 @@ def moving(time_s: Fraction) -> Pose:
 def filmed():
     """Sightings of the person, with joints that are a little off."""
     rng = np.random.default_rng(7)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scenes, "REACH", 0.3)
-        scene = Scene(model=person(), motion=moving, cameras=CAMERAS[:3])
-        found = []
-        for index in TIMES:
-            posed = scene.model.with_pose(moving(Fraction(index, FPS)))
-            seen = posed.landmarks + JOINT_SD_M * rng.standard_normal(posed.landmarks.shape)
-            names = [landmark.name for landmark in scene.model.landmarks]
-            found.append(Sighting(scene.frames(index), dict(zip(names, seen, strict=True))))
+    scene = Scene(model=person(), motion=moving, cameras=CAMERAS[:3], reach=0.3)
+    found = []
+    for index in TIMES:
+        posed = scene.model.with_pose(moving(Fraction(index, FPS)))
+        seen = posed.landmarks + JOINT_SD_M * rng.standard_normal(posed.landmarks.shape)
+        names = [landmark.name for landmark in scene.model.landmarks]
+        found.append(Sighting(scene.frames(index), dict(zip(names, seen, strict=True))))
     return found
 
 

@@ -4,22 +4,29 @@ import numpy as np
 import pytest
 
 from airborne.tracking.methods import Settings, tracker_of
-from tests.tracking.scenes import FPS, Scene, clutter, thrown, track
+from tests.tracking.scenes import FIGURE, FPS, Scene, clutter, standing, thrown, track
 
 FRAMES, ABSENT = 8, 2
 SCENE = Scene(
     motion=lambda time_s: None if time_s * FPS == ABSENT else thrown(time_s),
     backgrounds=tuple(clutter(seed, (220.0, 190.0, 40.0)) for seed in range(4)),
 )
+JOINTED = Scene(FIGURE, lambda time_s: None if time_s * FPS == ABSENT else standing(time_s))
 METHODS = {
     "refined": Settings(),
     "union": Settings(method="stepping", colour="union", loops=((0.01, 0.02), (0.005, 0.01))),
     "simplex": Settings(method="simplex"),
+    "joints": Settings(),
+    "joints, outward": Settings(method="hierarchical"),
 }
 
 
+def scene(name):
+    return JOINTED if name.startswith("joints") else SCENE
+
+
 def tracker(name):
-    return tracker_of(METHODS[name], SCENE.model, SCENE.start())
+    return tracker_of(METHODS[name], scene(name).model, scene(name).start())
 
 
 def assert_same(a, b):
@@ -28,18 +35,19 @@ def assert_same(a, b):
     assert (a.pose is None) == (b.pose is None)
     if a.pose is not None:
         np.testing.assert_array_equal(a.pose.world_from_root.as_matrix(), b.pose.world_from_root.as_matrix())
+        np.testing.assert_array_equal(a.pose.joint_angles, b.pose.joint_angles)
         np.testing.assert_array_equal(a.covariance, b.covariance)
 
 
 @pytest.mark.parametrize("name", METHODS)
 def test_learning_the_first_frames_and_searching_on_is_searching_all(name):
-    searched = track(SCENE, range(FRAMES), tracker(name))
+    searched = track(scene(name), range(FRAMES), tracker(name))
     resumed = tracker(name)
     state = resumed.init()
     for estimate in searched[:5]:
-        state = resumed.learn(state, SCENE.frames(estimate.index), estimate)
+        state = resumed.learn(state, scene(name).frames(estimate.index), estimate)
     for before in searched[5:]:
-        frames = SCENE.frames(before.index)
+        frames = scene(name).frames(before.index)
         estimate = resumed.search(state, frames)
         assert_same(estimate, before)
         state = resumed.learn(state, frames, estimate)
@@ -50,7 +58,7 @@ def test_searching_teaches_nothing(name):
     seeker = tracker(name)
     state = seeker.init()
     for index in range(2):
-        frames = SCENE.frames(index)
+        frames = scene(name).frames(index)
         first = seeker.search(state, frames)
         assert_same(seeker.search(state, frames), first)
         state = seeker.learn(state, frames, first)

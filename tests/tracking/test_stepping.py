@@ -122,3 +122,35 @@ def test_start_is_left_as_it_was():
     start = np.zeros(1)
     stepping(vee(5.0), start, [np.ones(1)], v_rule="v_sym")
     assert start[0] == 0
+
+
+@pytest.mark.parametrize("v_rule", RULES)
+def test_search_sets_out_toward_the_lower_neighbour_and_past_one_rise(v_rule):
+    heights = {-1: 9.5, 0: 9.0, 1: 9.2, 2: 6.0, 3: 5.0, 4: 6.0, 5: 7.0}
+    best, _ = stepping(
+        lambda x: np.array([heights.get(round(k), 20.0) for k in x[:, 0]]), np.zeros(1), [np.ones(1)], v_rule=v_rule
+    )
+    assert best[0] == pytest.approx(3, abs=1)
+
+
+def test_minimum_beside_the_start_is_found_exactly_by_the_papers_rule_on_either_side():
+    for minimum in np.linspace(-0.49, 0.49, 11):
+        np.testing.assert_allclose(on_a_line(minimum, "v_literal")[0], minimum, atol=ROUNDTRIP)
+
+
+def test_variables_are_set_in_the_order_asked_for():
+    asked = []
+
+    def score(x):
+        asked.append(int(np.flatnonzero(x[0] != start)[0]) if (x[0] != start).any() else None)
+        return np.zeros(1)
+
+    start = np.zeros(3)
+    stepping(score, start, [np.ones(3)], v_rule="v_sym", order=(2, 0, 1))
+    named = [variable for variable in asked if variable is not None]
+    assert list(dict.fromkeys(named)) == [2, 0, 1]
+
+
+def test_order_without_a_variable_leaves_it():
+    best, _ = stepping(vee(np.array([1.0, 1.0])), np.zeros(2), [np.ones(2)], v_rule="v_sym", order=(1,))
+    np.testing.assert_allclose(best, [0, 1], atol=ROUNDTRIP)

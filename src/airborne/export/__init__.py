@@ -1,11 +1,13 @@
 """Export: in come `Motion`, `Frames` with posed bodies, and a summary; out come what people open.
 
-Overlay videos, a sheet of what the cameras saw through the mask, figures, summary.json and a self-contained report.
+Overlay videos, a sheet of what the cameras saw through the mask, figures, 3D model files, summary.json and a
+self-contained report.
 Knows no search and decides nothing.
 """
 
 from airborne.export.figures import write_digitised, write_errors, write_figures, write_pose, write_score
 from airborne.export.matching import MatchingPicture
+from airborne.export.models import write_model
 from airborne.export.overlays import OverlayVideos
 from airborne.export.report import write_report
 from airborne.export.sheet import ContactSheet
@@ -21,6 +23,7 @@ __all__ = [
     "write_errors",
     "write_figures",
     "write_json",
+    "write_model",
     "write_pose",
     "write_report",
     "write_score",

@@ -1,4 +1,7 @@
-"""The figures of a run over time: pose.png, score.png, and against a reference digitised.png and errors.png."""
+"""The figures of a run over time: pose.png, score.png, and against a reference digitised.png and errors.png.
+
+For a body with joints also joints.png, and flight.png where every segment has a mass.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +15,12 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from airborne.body import BodyModel
 from airborne.evaluation import DigitisedPoses, Truth
 from airborne.export import panels
 from airborne.export.palette import REFERENCE_RGB, web
 from airborne.geometry.rotations import angles_from_matrix, geodesic, unwrapped, wrapped
-from airborne.motion import Motion, angles
+from airborne.motion import Motion, angles, flight, has_inertias, joint_angles
 
 Array = NDArray[np.floating]
 Rows = NDArray[np.intp]
@@ -24,22 +28,36 @@ Mask = NDArray[np.bool_]
 
 _AXIS_LOOKS = (("x", "-", "#0072b2"), ("y", "--", "#cc79a7"), ("z", ":", "#333333"))
 _CLICKED = {"linestyle": "", "marker": "o", "markersize": 4.5, "markerfacecolor": "none", "color": web(REFERENCE_RGB)}
+_FLEXION = {  # of a person: the segment that a joint turns, the joint, and the sign of its x angle in flexion
+    "upper_arm": ("shoulder", -1.0),
+    "forearm": ("elbow", -1.0),
+    "thigh": ("hip", -1.0),
+    "shank": ("knee", 1.0),
+}
+_MOST_JOINTS = 8  # of a body that is no person
 
 
 def write_figures(
     folder: Path,
     motion: Motion,
+    model: BodyModel,
     *,
     truth: Truth | None = None,
     digitised: DigitisedPoses | None = None,
     symmetries: Sequence[Array] = (np.eye(3),),
 ) -> None:
-    """Write every figure that the data allow into a run's folder: pose.png, score.png, errors.png, digitised.png.
+    """Write every figure that the data allow into a run's folder.
 
-    `symmetries` (3, 3) are the body's, the identity among them, as in `evaluation.compare`.
+    Always pose.png and score.png; joints.png and flight.png where the body has joints and masses; errors.png and
+    digitised.png where there is something to compare with. `symmetries` (3, 3) are the body's, the identity among them,
+    as in `evaluation.compare`. Raises ResultError where the motion is another body's.
     """
     write_pose(folder / "pose.png", motion)
     write_score(folder / "score.png", motion)
+    if motion.joints:
+        write_joints_figure(folder / "joints.png", motion, model)
+    if motion.joints and has_inertias(model):
+        write_flight_figure(folder / "flight.png", motion, model)
     if truth is not None:
         write_errors(folder / "errors.png", motion, truth, symmetries)
     if digitised is not None:
@@ -89,6 +107,69 @@ def write_score(path: Path, motion: Motion) -> None:
         panels.begin_at_zero(axes)
     position.legend(fontsize=panels.FONT_PT - 1, frameon=False, ncols=3, labelcolor=panels.TEXT)
     panels.finish(figure, path, motion, panels.unseen_handles(np.logical_or(*_unseen(motion))))
+
+
+def write_joints_figure(path: Path, motion: Motion, model: BodyModel) -> None:
+    """Draw how the main joints are bent over time [deg], left beside right, with bands of two standard deviations.
+
+    Of a person shoulders, elbows, hips and knees: the x angle, with its sign such that flexion is positive. Of another
+    body the x angles of its first joints. Raises ResultError where the motion is another body's.
+    """
+    table, panes = joint_angles(motion, model), _panes(motion.joints)
+    hidden, singular = np.zeros((2, len(motion)), bool)
+    figure, grid = panels.panel_figure(-(-len(panes) // 2), 2, row_in=1.6)
+    cells = [axes for row in grid for axes in row]
+    for axes, (segment, label, sign) in zip(cells, panes, strict=False):
+        of_joint = table.sel(joint=segment)
+        values, sd = (of_joint[name].sel(axis="x").to_numpy() for name in ("angle", "angle_sd"))
+        is_hidden, is_singular = np.isinf(sd), of_joint["is_singular"].to_numpy() & motion.has_pose
+        panels.draw_band(axes, motion.time_s, sign * values, sd)
+        panels.draw_estimate(axes, motion, sign * values)
+        panels.shade(axes, motion.time_s, is_hidden, panels.UNSEEN)
+        panels.shade(axes, motion.time_s, is_singular, panels.SINGULAR)
+        panels.name_panel(axes, f"{label} [°]")
+        hidden, singular = hidden | is_hidden, singular | is_singular
+    for axes in cells[len(panes) :]:
+        axes.set_axis_off()
+    handles = [*panels.unseen_handles(hidden), *panels.singular_handles(singular, "y near ±90°: x and z mix")]
+    panels.finish(figure, path, motion, [panels.band_handle("± 2 standard deviations"), *handles])
+
+
+def _panes(joints: Sequence[str]) -> list[tuple[str, str, float]]:
+    """Choose the joints to draw: segment, label and sign of the x angle."""
+    person = [
+        (f"{segment}_{side}", f"{joint} {side}", sign)
+        for segment, (joint, sign) in _FLEXION.items()
+        for side in ("left", "right")
+    ]
+    found = [pane for pane in person if pane[0] in joints]
+    return found or [(segment, f"{segment}, x", 1.0) for segment in joints[:_MOST_JOINTS]]
+
+
+def write_flight_figure(path: Path, motion: Motion, model: BodyModel) -> None:
+    """Draw the height of the centre of mass [m] and the angular momentum [kg m^2/s] over time, with bands of two sd.
+
+    Raises BodyError where a segment has no inertia, ResultError where the motion is another body's.
+    """
+    table = flight(motion, model)
+    com, momentum = (
+        [table[name].sel(space=axis).to_numpy() for name in (quantity, f"{quantity}_sd")]
+        for quantity, axis in (("com", "z"), ("angular_momentum", list("xyz")))
+    )
+    drawn = [("height of centre of mass [m]", *com)]
+    drawn += [(f"L about {axis} [kg m²/s]", momentum[0][:, k], momentum[1][:, k]) for k, axis in enumerate("xyz")]
+    figure, grid = panels.panel_figure(2, 2, row_in=2.1)
+    cells = [axes for row in grid for axes in row]
+    for axes, (label, values, sd) in zip(cells, drawn, strict=True):
+        panels.draw_band(axes, motion.time_s, values, sd)
+        panels.draw_estimate(axes, motion, values)
+        panels.shade(axes, motion.time_s, np.isinf(sd), panels.UNSEEN)
+        panels.name_panel(axes, label)
+    momenta = cells[1:]
+    low, high = zip(*(axes.get_ylim() for axes in momenta), strict=True)
+    for axes in momenta:  # one scale, so that the components can be compared
+        axes.set_ylim(min(low), max(high))
+    panels.finish(figure, path, motion, [panels.band_handle("± 2 standard deviations")])
 
 
 def write_errors(path: Path, motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> None:

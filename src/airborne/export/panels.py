@@ -115,9 +115,9 @@ def unseen_handles(unseen: Mask) -> list[Patch]:
     return [Patch(**UNSEEN, label="a direction cannot be seen (infinite deviation)")] if unseen.any() else []
 
 
-def singular_handles(singular: Mask) -> list[Patch]:
+def singular_handles(singular: Mask, label: str = "tilt near ±90°: somersault and twist mix") -> list[Patch]:
     """Return the legend entry of the stretches shaded as `SINGULAR`, if any."""
-    return [Patch(**SINGULAR, label="tilt near ±90°: somersault and twist mix")] if singular.any() else []
+    return [Patch(**SINGULAR, label=label)] if singular.any() else []
 
 
 def _stretches(time_s: Array, mask: Mask) -> Iterator[tuple[float, float]]:

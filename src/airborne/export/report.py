@@ -11,12 +11,23 @@ from airborne.export import page
 from airborne.export.palette import STATUS_RGB, web
 from airborne.export.summary import headline, plain, warnings
 from airborne.motion import Motion
+from airborne.motion.flight import GRAVITY_M_S2
 from airborne.tracking import Status
 
 PICTURES = {  # titles and captions, in the order of the page
     "pose.png": (
         "The motion",
         "Position of the body's root in the world, and its somersault, tilt and twist, over time.",
+    ),
+    "joints.png": (
+        "Joints",
+        "How the main joints are bent over time. Of a person: flexion is positive, and zero is standing upright with "
+        "hanging arms. Of another body: the x angles. Turns about the other axes are in joint_angles.csv.",
+    ),
+    "flight.png": (
+        "Centre of mass and angular momentum",
+        "Height of the centre of mass, and the angular momentum about it in world axes. In free flight the height is a "
+        "parabola and the momentum constant: how far they are from that checks the measurement.",
     ),
     "through_mask.png": (
         "Through the mask",
@@ -63,6 +74,12 @@ DEFINITIONS = {
     ),
 }
 
+JOINT_ANGLES = (
+    "Successive turns about the moving x, y and z axes, parent from segment; a joint bears the name of the segment it "
+    "turns. All are zero in a person standing upright, arms hanging, feet forward. What no picture shows, such as a "
+    "round limb's turn about its own axis, stays as it was and has an infinite standard deviation."
+)
+
 UNCERTAINTY = (
     "Given as one standard deviation for each axis; bands in the figures are two. If errors are normal, 68% of them "
     "lie within one and 95% within two. Infinite means that the pictures do not show that direction."
@@ -79,7 +96,9 @@ def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
     - `events`: sentences on what happened to the recording
     - `method`, `timings_s` [s], `versions`, `inputs` (SHA-256 by file name): dictionaries of names and values
     - `cameras`: one dictionary for each camera, with `name` first
-    - `truth`: `Comparison.to_dict()`; `digitised`: `DigitisedComparison.to_dict()`
+    - `truth`: `Comparison.to_dict()`; `digitised`: `DigitisedComparison.to_dict()`; `joints`:
+      `JointComparison.to_dict()`
+    - `flight`: `FlightSummary.to_dict()`
 
     Units stand at the ends of keys (`_s`, `_px`, ...) and are shown as such. All text is escaped. Of the figures and
     the contact sheet, those in the folder are shown. Raises ResultError where a number of the headline is missing.
@@ -107,16 +126,22 @@ def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
     for key, title in (("truth", "Against the truth"), ("digitised", "Against digitising by hand")):
         if summary.get(key):
             yield page.heading(title) + _comparison(summary[key])
+    if summary.get("joints"):
+        yield page.heading("Against the paths of the joints") + _joint_comparison(summary["joints"])
     for name, (title, caption) in PICTURES.items():
         if (folder / name).is_file():
             yield page.heading(title) + page.picture(folder / name, caption)
+        if name == "flight.png" and summary.get("flight"):
+            yield _flight(summary["flight"])
     if summary.get("method"):
         yield page.heading("Method")
         yield page.table((page.label(key), value) for key, value in summary["method"].items())
     if summary.get("cameras"):
         yield page.heading("Cameras") + _records(summary["cameras"])
     yield page.heading("What the numbers mean")
-    yield page.definitions({**DEFINITIONS, "Uncertainty": f"{UNCERTAINTY} {summary.get('uncertainty', '')}"})
+    of_joints = {"Joint angles": JOINT_ANGLES} if (folder / "joints.png").is_file() else {}
+    uncertainty = {"Uncertainty": f"{UNCERTAINTY} {summary.get('uncertainty', '')}"}
+    yield page.definitions({**DEFINITIONS, **of_joints, **uncertainty})
     for key, title in (("timings_s", "Time taken [s]"), ("versions", "Versions"), ("inputs", "Inputs (SHA-256)")):
         if summary.get(key):
             yield page.heading(title) + page.table(summary[key].items())
@@ -183,6 +208,39 @@ def _comparison(comparison: Mapping[str, Any]) -> str:
             )
     table = page.table(((name, f"{rms:.2f}", f"{most:.2f}") for name, rms, most in rows), ("", "RMS", "largest"))
     return table + page.bullets(lines)
+
+
+def _joint_comparison(comparison: Mapping[str, Any]) -> str:
+    rows = {**comparison["joints"], "all": comparison["whole"]}
+    if comparison["tracked"]:
+        rows["all, tracked frames"] = comparison["tracked"]
+    keys = ("mean_mm", "rms_mm", "largest_mm", "mean_without_offset_mm")
+    table = page.table(
+        ((name, *(each[key] for key in keys)) for name, each in rows.items()),
+        ("", "mean [mm]", "RMS [mm]", "largest [mm]", "mean without offset [mm]"),
+    )
+    lines = [
+        f"{comparison['n_matched']} of {comparison['n_reference']} reference times matched.",
+        "Without offset: less a constant offset in the segment, as two definitions of a joint have.",
+    ]
+    return table + page.bullets(lines)
+
+
+def _flight(flight: Mapping[str, Any]) -> str:
+    mean, spread = flight["angular_momentum_kg_m2_s"], flight["angular_momentum_spread_kg_m2_s"]
+    rows = [
+        (f"angular momentum about {axis} [kg m²/s]: mean, standard deviation over the frames", mean[k], spread[k])
+        for k, axis in enumerate("xyz")
+    ]
+    rows.append(
+        (
+            "downward acceleration of the centre of mass [m/s²]: fitted, free fall",
+            flight["fitted_gravity_m_s2"],
+            GRAVITY_M_S2,
+        )
+    )
+    rows.append(("distance of the centre of mass from a free fall [mm], RMS", flight["ballistic_rms_mm"], ""))
+    return page.table(rows)
 
 
 def _records(records: list[Mapping[str, Any]]) -> str:

@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Pose, human18
+from airborne.body.outfits import in_flat_colours
 from airborne.body.skin import skin_of
 from airborne.cameras import Rig
 from airborne.errors import BodyError, TrialError
@@ -128,10 +129,11 @@ def somersault(
 ) -> Scene:
     """Return a half-twisting somersault seen by three cameras, front, side and top, 768 x 576.
 
-    "paper": 11 poses of one shape, as paper B has it; "moving-arms": 50 frames/s, and the arms that make the twist
-    move; "pike": hips, knees and trunk too. The body drawn is a smooth skin or the tracker's own ellipsoids. "exact"
-    pictures are drawn in the tracker's light, on black; those of the "gym" are what cameras in a hall would record. The
-    seed varies the start, the noise, the lamps and the background, where `clutter` boxes stand along either wall.
+    "paper": 11 poses of one shape, one colour a segment, as paper B has it; "moving-arms": 50 frames/s, and the arms
+    that make the twist move; "pike": hips, knees and trunk too. The body drawn is a smooth skin or the tracker's own
+    ellipsoids. "exact" pictures are drawn in the tracker's light, on black; those of the "gym" are what cameras in a
+    hall would record. The seed varies the start, the noise, the lamps and the background, where `clutter` boxes stand
+    along either wall.
     Raises TrialError for an unknown choice. Source: paper B, "Method".
     """
     for value, known, name in ((preset, Preset, "preset"), (target, Target, "target"), (style, Style, "style")):
@@ -139,6 +141,8 @@ def somersault(
             raise TrialError(f"{name} '{value}' is not known; choose {' or '.join(get_args(known))}")
     model = human18(STATURE_M, MASS_KG)
     skill = replace(half_twist(model, has_pike=preset == "pike"), is_held=preset == "paper")
+    if preset == "paper":
+        model = _in_flat_colours(model)
     duration = Fraction(round(1000 * skill.duration_s), 1000)
     rate = (N_POSES - 1) / duration if preset == "paper" else Fraction(50)
     scene = Scene(
@@ -170,6 +174,11 @@ def somersault(
         noise_sd=4.0,
         exposure_s=0.001,
     )
+
+
+@lru_cache(maxsize=8)
+def _in_flat_colours(model: BodyModel) -> BodyModel:
+    return in_flat_colours(model)
 
 
 def _solved(model: BodyModel, start: Array, *, has_pike: bool) -> Array:

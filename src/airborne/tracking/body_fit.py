@@ -198,8 +198,9 @@ def _stepped(level: _Level, state: _State) -> _State | None:
     systems = [(H / noise + J, g / noise + j) for H, g, J, j in systems]
     S, s = np.diag(level.shape_precision), -level.shape_precision * state.shape
     for (H, g), pose, prior in zip(systems, state.poses, level.priors, strict=True):
-        own = H[k:, k:] + np.diag(1 / prior.sd**2)
-        pull = g[k:] - motion_between(prior.expected, pose) / prior.sd**2
+        rows, away = freedom.from_rest(pose)
+        own = H[k:, k:] + np.diag(1 / prior.sd**2) + rows.T @ rows
+        pull = g[k:] - motion_between(prior.expected, pose) / prior.sd**2 - rows.T @ away
         through = np.linalg.solve(own, H[k:, :k]).T
         S, s = S + H[:k, :k] - through @ H[k:, :k], s + g[:k] - through @ pull
     turn = np.linalg.solve(S, s)

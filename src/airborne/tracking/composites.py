@@ -100,7 +100,8 @@ def equations(
 def _fit_light(synthesis: Synthesis, posed: PosedBody, view: Laid) -> None:
     part, _, normals = view.maps
     surface_maps(synthesis.shapes, synthesis.geometry, posed.R, posed.t, view.packed, *view.maps)
-    fit_light(view.seen[0], part, normals, synthesis.albedo, view.light, _LIGHT_ROUNDS, 0, 0, part.shape[1], part.shape[0])
+    height, width = part.shape
+    fit_light(view.seen[0], part, normals, synthesis.albedo, view.light, _LIGHT_ROUNDS, 0, 0, width, height)
 
 
 def _shown(synthesis: Synthesis, posed: PosedBody, view: Laid) -> NDArray[np.float32]:

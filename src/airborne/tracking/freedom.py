@@ -25,7 +25,7 @@ _DAMPING_SD_M, _DAMPING_SD_RAD = 0.5, 1.0  # keep what the pictures do not show 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
-    """Where a pose is expected to be; and joints lie about the middle of their limits, as wide as these are."""
+    """Where a pose is expected to be; and limited joints are near the zero pose, within half their range."""
 
     expected: Pose
     sd: Array  # (6 + 3 joints,) [m, rad]
@@ -74,7 +74,7 @@ class Freedom:
             precision = 1 / prior.sd[self.columns] ** 2
             H[np.diag_indices(len(g))] += precision
             g -= precision * motion_between(prior.expected, pose)[self.columns]
-            rows, away = self._from_rest(pose)
+            rows, away = self.from_rest(pose)
             H, g = H + rows.T @ rows, g - rows.T @ away
         motion = np.linalg.solve(H, g)
         for _ in range(3):
@@ -91,11 +91,11 @@ class Freedom:
         if prior is None:
             return 0.0
         away = motion_between(prior.expected, pose)[self.columns] / prior.sd[self.columns]
-        rest = self._from_rest(pose)[1]
+        rest = self.from_rest(pose)[1]
         return 0.5 * float(away @ away + rest @ rest)
 
-    def _from_rest(self, pose: Pose) -> tuple[Array, Array]:
-        """Return how far limited joint angles are from the middle of their limits, in sds: rows (k, d), (k,)."""
+    def from_rest(self, pose: Pose) -> tuple[Array, Array]:
+        """Return how far limited joint angles are from the zero pose, in sds: rows (k, d), values (k,)."""
         limits = self.model.limits_rad
         half = (limits[..., 1] - limits[..., 0]) / 2
         by_own_rotation = _angles_by_own_rotation(pose.joint_angles)
@@ -106,7 +106,8 @@ class Freedom:
         columns = 6 + 3 * joints[:, None] + np.arange(3)
         sd = half[joints, axes]
         rows[np.arange(len(joints))[:, None], columns] = by_own_rotation[joints, axes] / sd[:, None]
-        return rows[:, self.columns], (pose.joint_angles - limits.mean(axis=-1))[joints, axes] / sd
+        away = pose.joint_angles - np.clip(0.0, limits[..., 0], limits[..., 1])
+        return rows[:, self.columns], away[joints, axes] / sd
 
     def _limits_met(self, pose: Pose, motion: Array) -> tuple[Array, Array]:
         """Return rows (k, d) and targets (k,) [rad] of the joint angles that the motion would take past a limit."""

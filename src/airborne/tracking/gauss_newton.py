@@ -37,6 +37,7 @@ FAR, NEAR, CLOSE = ((8, 5), (4, 4), (2, 3)), ((4, 2), (2, 2)), ((2, 2),)
 _COARSE_SIGMA_PX = 1.2  # of the reduced picture
 _FINE_SIGMA_PX = 1.2  # of a full frame
 _CLIP = 0.1  # linear light, 0..1: a residual this large counts a quarter
+_CLIP_LIT = 0.5  # the same in exact light, where no shadow or highlight has to be left out
 _CLIP_MASK = 0.5  # the same of a mask
 _OVERSTEP = 1.6  # robust weights and refitted light make each step about this much too short
 _MOST_STEPS = 12
@@ -173,7 +174,7 @@ def _compare(
     blocks: Array,
 ) -> Array:
     """Add one view's equations; return the cost, the weighted squared residual and the weight."""
-    through = view.window, *taps, _CLIP
+    through = view.window, *taps, _CLIP if synthesis.lights is None else _CLIP_LIT
     args = synthesis.body, _place(posed, view), view.seen, through, view.maps
     if synthesis.lights is None:
         paint = synthesis.albedo, synthesis.is_faceted

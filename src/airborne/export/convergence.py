@@ -1,0 +1,80 @@
+"""Figures of an experiment made anew: how a score rises about the truth, and sequences of pictures side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from airborne.export import panels
+from airborne.export.palette import ESTIMATE_RGB, web
+
+Array = NDArray[np.floating]
+Picture = NDArray[np.uint8]
+
+_LOOKS = (("-", web(ESTIMATE_RGB)), ("--", "#d55e00"))
+_TITLE_PX, _GAP_PX, _FONT_SCALE = 18, 2, 0.42
+_GREY = (210, 210, 210)
+
+
+class Rise(NamedTuple):
+    """A score over a variable's offset from its true value."""
+
+    offset: Array  # (k,)
+    scores: Array  # (poses, k) [grey levels]
+    half_width: float  # how far the curve rises on both sides
+
+
+def write_convergence(path: Path, variables: Sequence[tuple[str, str]], rises: Mapping[str, Sequence[Rise]]) -> None:
+    """Draw the mean score over the poses, and its range, for each variable (name, unit); one line for each name.
+
+    The bars at the bottom reach as far as the curves rise on both sides.
+    Source: paper B, figs 5 and 6.
+    """
+    figure = Figure((panels.WIDTH_IN, 4.6), dpi=panels.DPI, layout="constrained")
+    grid = figure.subplots(2, (len(variables) + 1) // 2, squeeze=False, sharey=True)
+    top = max(float(rise.scores.max()) for curves in rises.values() for rise in curves)
+    for k, (axes, (name, unit)) in enumerate(zip(grid.ravel(), variables, strict=False)):
+        for row, ((style, colour), (label, curves)) in enumerate(zip(_LOOKS, rises.items(), strict=False)):
+            offset, scores, half = curves[k]
+            axes.fill_between(offset, scores.min(axis=0), scores.max(axis=0), color=colour, alpha=0.15, linewidth=0)
+            axes.plot(offset, scores.mean(axis=0), style, color=colour, linewidth=1.2, label=label)
+            axes.axvspan(-half, half, 0.02 * row, 0.02 * row + 0.015, color=colour, alpha=0.6, linewidth=0)
+        axes.set_xlabel(f"{name} [{unit}]", fontsize=panels.FONT_PT, color=panels.TEXT)
+        axes.tick_params(labelsize=panels.FONT_PT - 1, color=panels.TEXT, labelcolor=panels.TEXT)
+        axes.grid(True, color=panels.FAINT, linewidth=0.6)
+        axes.set_ylim(0, 1.05 * top)
+        for side in ("top", "right"):
+            axes.spines[side].set_visible(False)
+    for row in grid:
+        row[0].set_ylabel("score [grey levels]", fontsize=panels.FONT_PT, color=panels.TEXT)
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=2, fontsize=panels.FONT_PT, frameon=False,
+        labelcolor=panels.TEXT,
+    )  # fmt: skip
+    figure.savefig(path)
+
+
+def write_sequences(path: Path, rows: Sequence[tuple[str, Sequence[Picture]]]) -> None:
+    """Lay rows of pictures (h, w, 3) RGB, all of one size, below each other, each row under its title; write a PNG.
+
+    Source: paper B, fig. 4.
+    """
+    height, width, _ = rows[0][1][0].shape
+    n = max(len(pictures) for _, pictures in rows)
+    sheet = np.zeros((len(rows) * (height + _TITLE_PX), n * (width + _GAP_PX) - _GAP_PX, 3), np.uint8)
+    for k, (title, pictures) in enumerate(rows):
+        top = k * (height + _TITLE_PX)
+        cv2.putText(
+            sheet, title, (4, top + _TITLE_PX - 5), cv2.FONT_HERSHEY_SIMPLEX, _FONT_SCALE, _GREY, 1, cv2.LINE_AA
+        )
+        for j, picture in enumerate(pictures):
+            left = j * (width + _GAP_PX)
+            sheet[top + _TITLE_PX : top + _TITLE_PX + height, left : left + width] = picture
+    path.write_bytes(cv2.imencode(".png", sheet[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes())
