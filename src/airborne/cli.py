@@ -290,14 +290,16 @@ def synth_somersault(
     ] = "exact",
     seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
 ) -> None:
-    """Write a half-twisting somersault: videos from front, side and top, calibration, body, truth.
+    """Write a half-twisting somersault: videos from front, side and top, calibration, body, truth, the person as glTF.
 
     Example: airborne synth somersault -o my-somersault --preset moving-arms --style gym
     """
-    from airborne.synthetic import write_somersault
+    from airborne.export import write_model
+    from airborne.synthetic import somersault, write_somersault
 
     with _progress("rendering") as report:
         write_somersault(output, preset=preset, target=target, style=style, seed=seed, progress=report)
+    write_model(output / "person.glb", somersault(preset, target=target, style=style, seed=seed).body)
     print(f"trial: {output / 'trial.toml'}")
 
 

@@ -74,10 +74,10 @@ def run(n=20, *, lost=(), uncertain=(), unseen=(), turns=1.0):
     return Motion.collect(estimates)
 
 
-def person_run(n=12, *, lost=(), unseen=(), bent=1.0):
+def person_run(n=12, *, lost=(), unseen=(), bent=1.0, raised=0.0):
     """Make a run of a person who falls and bends the left knee and elbow, evenly, at 50 Hz.
 
-    In frames `unseen` the left elbow's turns have an infinite variance.
+    The left arm is `raised` sideways [rad]. In frames `unseen` the left elbow's turns have an infinite variance.
     """
     joints = [segment.name for segment in PERSON.segments[1:]]
     estimates = []
@@ -85,6 +85,7 @@ def person_run(n=12, *, lost=(), unseen=(), bent=1.0):
         angles = np.zeros((len(joints), 3))
         angles[joints.index("shank_left"), 0] = bent * 0.05 * i
         angles[joints.index("forearm_left"), 0] = -bent * 0.05 * i
+        angles[joints.index("upper_arm_left"), 1] = -raised
         covariance = np.diag([4e-6] * 3 + [1e-4] * (3 + angles.size))
         if i in unseen:
             hidden = 6 + 3 * joints.index("forearm_left") + np.arange(3)

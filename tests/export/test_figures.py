@@ -177,6 +177,23 @@ def test_a_joint_that_cannot_be_seen_shows(tmp_path):
     assert (tmp_path / "seen.png").read_bytes() != (tmp_path / "unseen.png").read_bytes()
 
 
+def test_the_legend_lies_within_the_figure_however_much_it_has_to_say(tmp_path, monkeypatch):
+    widths = []
+    save = Figure.savefig
+
+    def measured(figure, path, **options):
+        save(figure, path, **options)
+        legend = figure.legends[0].get_window_extent()
+        widths.append((legend.x0 / figure.bbox.width, legend.x1 / figure.bbox.width))
+
+    monkeypatch.setattr(Figure, "savefig", measured)
+    motion = person_run(lost=(3,), unseen=(5,), raised=np.pi / 2)
+    write_joints_figure(tmp_path / "joints.png", motion, PERSON)
+    write_pose(tmp_path / "pose.png", run(lost=(4, 5), uncertain=(6,), unseen=(9,)))
+    assert min(left for left, _ in widths) > 0
+    assert max(right for _, right in widths) < 1
+
+
 def test_other_bodies_show_their_first_joints():
     assert _panes(["flipper", "tail"]) == [("flipper", "flipper, x", 1.0), ("tail", "tail, x", 1.0)]
     assert len(_panes([f"link {k}" for k in range(30)])) == 8

@@ -1,7 +1,6 @@
 """Unknown light is found from the surface's own normals."""
 
 import numpy as np
-import pytest
 
 from airborne.rendering.srgb import light_from_srgb
 from airborne.scoring.lighting import TERMS, TO_LIGHT, fit_light, light_planes, light_up, paint_evenly

@@ -64,9 +64,9 @@ def test_hidden_arm_stays_near_where_it_went_and_is_found_when_it_comes_out(esti
     assert statuses(estimates) == ["tracked"] * FRAMES
     for estimate in estimates:
         hidden = 5 <= estimate.index < OUT_AGAIN
-        assert off_mm(estimate, "hand_right") < (200 if hidden else 20)
-        assert off_mm(estimate, "elbow_right") < (90 if hidden else 20)
-        assert off_mm(estimate, "hand_left") < 20
+        assert off_mm(estimate, "hand_right") < (50 if hidden else 16)
+        assert off_mm(estimate, "elbow_right") < (32 if hidden else 16)
+        assert off_mm(estimate, "hand_left") < 12
 
 
 def test_hidden_arm_is_not_claimed_to_be_known(estimates):

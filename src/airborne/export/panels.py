@@ -23,6 +23,7 @@ Mask = NDArray[np.bool_]
 WIDTH_IN = 7.6
 DPI = 150
 FONT_PT = 9
+_LEGEND_CHARACTERS = 85  # that fit into one row
 ANGLES = ("somersault", "tilt", "twist")
 TEXT, LINE, FAINT = web(TEXT_RGB), web(ESTIMATE_RGB), "#dddddd"
 MARKERS = {Status.TRACKED: "o", Status.UNCERTAIN: "D"}
@@ -91,8 +92,10 @@ def finish(figure: Figure, path: Path, motion: Motion, extra: Sequence[Artist] =
     ]  # fmt: skip
     if counts[Status.LOST]:
         handles.append(Patch(**LOST, label=f"lost ({counts[Status.LOST]})"))
+    handles += extra
+    fits = sum(len(str(handle.get_label())) for handle in handles) <= _LEGEND_CHARACTERS
     figure.legend(
-        handles=[*handles, *extra], loc="outside upper center", ncols=4, fontsize=FONT_PT - 1, frameon=False,
+        handles=handles, loc="outside upper center", ncols=4 if fits else 2, fontsize=FONT_PT - 1, frameon=False,
         labelcolor=TEXT,
     )  # fmt: skip
     figure.align_ylabels()

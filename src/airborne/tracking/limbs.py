@@ -20,7 +20,7 @@ from airborne.tracking.synthesis import Synthesis
 Array = NDArray[np.floating]
 
 _ROUNDS = ((512, 16), (256, 3))  # proposals, kept; each round half as wide
-_REACH_RAD = 0.6  # sd of the first proposals, for each joint and axis
+_REACH_RAD = 0.7  # sd of the first proposals, for each joint and axis
 _FEWEST_PX = 25  # a segment that shows fewer pixels in a view is hidden there, not astray
 _ASTRAY = 0.5  # share of the body's own agreement, below which a segment is drawn on the wrong pixels
 
@@ -51,8 +51,10 @@ def look_for(synthesis: Synthesis, poses: Sequence[Pose], limb: NDArray[np.int64
     model, joints = synthesis.model, limb - 1
     root = poses[0].world_from_root
     angles = np.stack([pose.joint_angles for pose in poses])  # (candidates, joints, 3)
+    half = np.diff(model.limits_rad[joints], axis=-1).ravel() / 2  # a hinge is looked for along its one turn
+    reach = np.minimum(half / 2, _REACH_RAD)
     for number, (n_proposals, n_kept) in enumerate(_ROUNDS):
-        steps = ndtri(qmc.Sobol(3 * len(limb), rng=number).random(n_proposals)) * _REACH_RAD / 2**number
+        steps = ndtri(qmc.Sobol(3 * len(limb), rng=number).random(n_proposals)) * reach / 2**number
         proposed = angles[np.arange(n_proposals) % len(angles)]
         bent = np.ascontiguousarray(proposed[:, joints]).reshape(-1, 3)
         proposed[:, joints] = turned(bent, steps.reshape(-1, 3)).reshape(n_proposals, len(limb), 3)

@@ -48,6 +48,7 @@ class Agreement:
     found: float  # share of the body-like pixels near the mask that it covers
     evidence: float  # sum over the mask [nats]
     n_views: int  # views in which the body is seen
+    astray: tuple[int, ...] = ()  # segments of limbs that lie on pixels unlike the body
 
     def is_suspect(self, usual: Usual) -> bool:
         """Whether it is worth looking elsewhere."""

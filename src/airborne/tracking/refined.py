@@ -134,6 +134,9 @@ class Refined:
         status = status_of(covariance, agreed, usual)
         if status is Status.LOST:
             return lost(frames.index, frames.time_s)
+        if agreed.astray:
+            covariance = _unknown(covariance, only(self._synthesis.model, np.array(agreed.astray)).columns)
+            status = status if usual.is_learned else Status.UNCERTAIN
         posed = self._synthesis.place(fit.pose)
         if share_in_pictures(posed, self._synthesis.geometry, frames) < _LEAST_IN_PICTURES:
             status = Status.UNCERTAIN
@@ -195,8 +198,8 @@ class Refined:
             poses = sorted(poses, key=lambda pose: agreed(pose).evidence, reverse=True)[:n_fitted]
             fit = max((to_pictures([pose]) for pose in poses), key=lambda each: agreed(each.pose).evidence)
         elif is_first:
-            pose = to_silhouettes(guesses[0], FAR)
-            fit = to_pictures([pose, *self._swapped(pose)])
+            poses = [to_silhouettes(pose, FAR) for pose in (guesses[0], *self._swapped(guesses[0]))]
+            fit = to_pictures([*poses, *self._swapped(poses[0])])
         else:
             best = max(((guess, agreed(guess)) for guess in guesses), key=lambda each: each[1].evidence)
             fit = to_pictures(
@@ -206,9 +209,11 @@ class Refined:
                 pose for pose in self._swapped(fit.pose) if is_nearer(self._synthesis.model, pose, fit.pose, best[0])
             ]:
                 fit = to_pictures([fit.pose, *swaps])
+        strays: list[NDArray[np.int64]] = []
         if self._is_jointed:
             fit = self._with_limbs_found(fit, guesses, regions, posteriors, to_pictures, prior)
-        return fit, agreed(fit.pose)
+            strays = astray(self._synthesis, fit.pose, regions, posteriors)
+        return fit, replace(agreed(fit.pose), astray=tuple(int(i) for limb in strays for i in limb))
 
     def _with_limbs_found(
         self,
@@ -305,3 +310,11 @@ def _as_far_as_seen(last: Pose, predicted: Pose, covariance: Array) -> Pose:
     S = _SEEN_SD_RAD**2 * np.eye(3)
     motion[3:] = (S @ np.linalg.solve(S + C, turns[..., None]))[..., 0].ravel()
     return moved_pose(last, motion)
+
+
+def _unknown(covariance: Array, columns: NDArray[np.integer]) -> Array:
+    """Return a covariance in which some degrees of freedom are not known."""
+    covariance = covariance.copy()
+    covariance[columns] = covariance[:, columns] = 0
+    covariance[columns, columns] = np.inf
+    return covariance

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import cv2
@@ -42,7 +42,7 @@ class Synthesis:
     segment_of_part: NDArray[np.int16]  # (parts,)
     albedo: NDArray[np.float32]  # (parts, 3) linear light
     is_faceted: NDArray[np.bool_]  # (parts,) the edges between their sides can be seen
-    free_axes: Array  # (k, 3) in the root's frame: turns about them change nothing
+    free_axes: dict[int, Array]  # segment -> (k, 3) in its frame: its turns about them change nothing
     lights: Lights | None  # None: unknown, fitted in each view
 
     @classmethod
@@ -52,8 +52,8 @@ class Synthesis:
         albedo = light_from_srgb(flat.colours).astype(np.float32)
         owners = [index for index, segment in enumerate(model.segments) for _ in segment.parts]
         is_faceted = np.array([has_flat_sides(part.shape) for part in model.parts])
-        axes = continuous_axes(model) if len(model.segments) == 1 else np.zeros((0, 3))
-        return cls(model, flat, new_shapes(flat), np.array(owners, np.int16), albedo, is_faceted, axes, lights)
+        shapes, axes = new_shapes(flat), _free_axes(model)
+        return cls(model, flat, shapes, np.array(owners, np.int16), albedo, is_faceted, axes, lights)
 
     @property
     def body(self) -> tuple:
@@ -70,10 +70,11 @@ class Synthesis:
     def jacobian(self, posed: PosedBody, freedom: Freedom) -> Array:
         """Return how the segments move about the root's origin, without turns that change no picture: (s, 6, d)."""
         J = freedom.jacobian(posed, posed.t[0])
-        if not len(self.free_axes):
-            return J
-        hidden = np.concatenate([np.zeros_like(self.free_axes), self.free_axes @ posed.R[0].T], axis=1)
-        J[..., :6] = J[..., :6] @ (np.eye(6) - hidden.T @ hidden)
+        for segment, axes in self.free_axes.items():
+            hidden = axes @ posed.R[0].T if segment == 0 else axes  # the root turns about the world's axes
+            columns = np.flatnonzero((freedom.columns >= 3 + 3 * segment) & (freedom.columns < 6 + 3 * segment))
+            if len(columns):
+                J[..., columns] = J[..., columns] @ (np.eye(3) - hidden.T @ hidden)
         return J
 
     def parts(self, posed: PosedBody, region: Region) -> NDArray[np.int16]:
@@ -96,6 +97,17 @@ class Synthesis:
         width, height = camera.size
         room_v = round(_ROOM_PX * camera.K[1, 1] / camera.K[0, 0])
         return max(x0 - _ROOM_PX, 0), max(y0 - room_v, 0), min(x1 + _ROOM_PX, width), min(y1 + room_v, height)
+
+
+def _free_axes(model: BodyModel) -> dict[int, Array]:
+    """Find the segments at the ends of the body that are round about an axis through their joint."""
+    found = {}
+    for index in set(range(len(model.segments))) - set(model.parents.tolist()):
+        segment = model.segments[index]
+        if segment.parts:
+            alone = BodyModel(segment.name, (replace(segment, parent=None),))
+            found[index] = continuous_axes(alone)
+    return {index: axes for index, axes in found.items() if len(axes)}
 
 
 class Laid(NamedTuple):
