@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.tracking.covariance import covariance_of
+from airborne.tracking.covariance import covariance_of, principal
 from tests.tolerances import ROUNDTRIP
 
 ROUND = np.diag([1e6, 1e6, 1e6, 0, 0, 0])  # a ball: turning it changes nothing
@@ -69,3 +69,14 @@ def test_the_larger_of_noise_and_spread_over_patches_holds():
     loud = covariance_of(curvature, noise=1.0, spread=9 * curvature)
     np.testing.assert_allclose(quiet, covariance_of(curvature, noise=1.0), rtol=ROUNDTRIP)
     np.testing.assert_allclose(loud, covariance_of(curvature, noise=9.0), rtol=ROUNDTRIP)
+
+
+@pytest.mark.parametrize("size", [1, 6, 57])
+def test_principal_axes_are_lapacks(size):
+    rng = np.random.default_rng(size)
+    root = rng.normal(size=(size, size)) * 10.0 ** rng.uniform(-3, 3, size)
+    matrix = root.T @ root
+    values, directions = principal(matrix)
+    np.testing.assert_allclose(np.sort(values), np.linalg.eigvalsh(matrix), rtol=1e-9, atol=1e-9 * values.max())
+    np.testing.assert_allclose(directions.T @ directions, np.eye(size), atol=1e-12)
+    np.testing.assert_allclose(directions * values @ directions.T, matrix, atol=1e-10 * values.max())

@@ -78,9 +78,9 @@ def read_detections(path: Path, cameras: Sequence[str], named: Mapping[str, str]
             return _detections(path.name, {camera: arrays[name] for camera, name in chosen.items()})
     except OSError as error:
         raise CalibrationError(f"{path} cannot be read ({error.strerror or error}); give a .npz or a folder") from None
-    except (ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except (ValueError, TypeError, EOFError, zipfile.BadZipFile):
         raise CalibrationError(
-            f"{path} is not a .npz of numbers ({error}); expected one array (frames, points, 3) a camera"
+            f"{path} is not a .npz of numbers; expected one array (frames, points, 3) a camera"
         ) from None
 
 

@@ -19,7 +19,7 @@ from airborne.synthetic.measurements import control_points, digitised, lights_ta
 from airborne.synthetic.pictures import frames
 from airborne.synthetic.scene import Preset, Scene, thrown_cross
 from airborne.synthetic.somersault import Preset as SomersaultPreset
-from airborne.synthetic.somersault import Style, Target, somersault
+from airborne.synthetic.somersault import Skill, Style, Target, somersault
 from airborne.video import VideoWriter, weave
 
 Progress = Callable[[int, int], None]  # pictures done, pictures in all
@@ -110,6 +110,7 @@ def trial_toml(scene: Scene) -> str:
         "[track]",
         'method = "refined"',
         f"stop = {scene.n_pictures}",
+        *(["fixed_shape = true"] if isinstance(scene.flight, Skill) and scene.flight.is_held else []),
     ]
     return "\n".join(lines) + "\n"
 
