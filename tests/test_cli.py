@@ -176,7 +176,9 @@ def test_demo_runs_again_in_its_own_folder_and_spares_any_other(trial, short_run
 
 def test_a_killed_run_is_readable_and_resumes_to_the_same_bytes(trial, tmp_path):
     long = trial.with_name("long.toml")
-    assert in_process("track", long, "-o", tmp_path / "whole", "--no-pictures") == 0
+    whole = started("track", long, "-o", tmp_path / "whole", "--no-pictures")
+    whole.communicate()
+    assert whole.returncode == 0
     process = started("track", long, "-o", tmp_path / "killed", "--no-pictures")
     wait_for_rows(process, tmp_path / "killed" / "motion.csv", KILLED_AFTER)
     process.kill()
@@ -184,7 +186,9 @@ def test_a_killed_run_is_readable_and_resumes_to_the_same_bytes(trial, tmp_path)
     n_kept = len(read_motion(tmp_path / "killed" / "motion.csv"))
     assert KILLED_AFTER <= n_kept < LONG
     assert not (tmp_path / "killed" / "summary.json").exists()
-    assert in_process("track", long, "-o", tmp_path / "killed", "--no-pictures", "--resume") == 0
+    resumed = started("track", long, "-o", tmp_path / "killed", "--no-pictures", "--resume")
+    resumed.communicate()
+    assert resumed.returncode == 0
     for name in ("motion.csv", "angles.csv", "joints.csv"):
         assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 

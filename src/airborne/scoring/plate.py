@@ -21,7 +21,8 @@ class Plate:
         self.looks: NDArray[np.uint8] = np.zeros((height, width), np.uint8)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+# one signature for whole pictures and for regions of them: whichever a process looks at first, rounding is the same
+@njit("(u1[:,:,:], b1[:,:], f4[:,:,:], f4[:,:], u1[:,:])", cache=True, nogil=True, fastmath=True)
 def look(rgb, covered, mean, sd, looks):
     """Learn from one picture: rgb (h, w, 3) uint8, covered (h, w) bool where the body may be; the rest in place."""
     h, w, _ = rgb.shape
