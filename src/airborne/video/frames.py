@@ -18,6 +18,11 @@ class View:
     camera: Camera  # without distortion: the image has been straightened where the lens bends
     rgb: NDArray[np.uint8]  # (h, w, 3) sRGB
 
+    def crop(self, box: tuple[int, int, int, int]) -> NDArray[np.uint8]:
+        """Return the part (y1 - y0, x1 - x0, 3) of the picture in a box (x0, y0, x1, y1) [px] that lies in it."""
+        x0, y0, x1, y1 = box
+        return self.rgb[y0:y1, x0:x1]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frames:

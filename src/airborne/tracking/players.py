@@ -1,0 +1,54 @@
+"""What tracking says of several players at one time, and what every tracker of players is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.tracking.estimate import Status
+from airborne.video import Frames
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlayerStart:
+    """Where a player is at the first frame, set by hand: joint -> (3,) [m]. A bystander has a torso only."""
+
+    name: str
+    joints_m: dict[str, Array]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlayerEstimate:
+    """One player's joints at one time, in the order of the tracker's `joints`; NaN where unknown."""
+
+    player: str
+    index: int
+    time_s: Fraction
+    status: Status
+    points: Array  # (joints, 3) [m], world
+    covariance: Array  # (joints, 3, 3) [m²], of each joint for itself
+    score: float  # mean log-likelihood of the estimate [nat]; NaN when lost
+    n_views: int  # cameras that were looked at and not hidden
+
+
+class PlayersTracker(Protocol):
+    """Tracks all its players together. Everything random comes from a seed, so that a run can be made again."""
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The names of the joints of every estimate."""
+        ...
+
+    def init(self) -> Any:
+        """Return the state before the first frame."""
+        ...
+
+    def step(self, state: Any, frames: Frames) -> tuple[Any, tuple[PlayerEstimate, ...]]:
+        """Track one time; one estimate for each player with legs, in the order of the start."""
+        ...
