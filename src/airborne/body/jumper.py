@@ -1,0 +1,123 @@
+"""The body of the `blocker` method: trunk and legs as a chain with constant lengths, drawn as tapered capsules.
+
+Eighteen numbers are a pose: the middle of the hips (3) [m]; the pelvis' heading, side lean and forward lean [rad],
+R = Rz(heading) Ry(side) Rx(lean); the trunk's bend forward and sideways; for the left leg, then the right, the hip's
+x, y, z, the knee's and the ankle's flexion. Axes and signs are those of `human`: x to the subject's left, y backward.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airborne.body.legs import LEG_POINTS
+
+Array = NDArray[np.floating]
+
+N_DOF = 18
+JOINTS = (*LEG_POINTS, "foot_left", "foot_right", "torso")
+SHIRT, SHORTS, SKIN, SOCK, SHOE = range(5)
+KINDS = ("shirt", "shorts", "skin", "socks", "shoes")
+# columns of the lengths
+WAIST, SHORTS_END, SOCK_END, TRUNK, PELVIS, THIGH, SHANK, FOOT, SOLE = range(9)
+# columns of the radii
+R_CHEST, R_WAIST, R_HIP, R_KNEE, R_ANKLE, R_FOOT, CHEST_OUT, HIP_OUT = range(8)
+_HEEL = 0.35  # how far the heel reaches behind the ankle, over how far the ball lies before it
+SOLE_M = 0.03  # the ball of the foot lies this far above the ground in standing
+_TOE = 1.25  # how far the toes reach, likewise
+_ANYWHERE = (-np.inf, np.inf)
+_LEG_LIMITS_DEG = ((-125, 35), (-45, 25), (-40, 60), (0, 145), (-35, 50))  # hip x, y, z, knee, ankle, of the left leg
+LIMITS_RAD = np.radians(  # (18, 2) least and greatest; the right leg mirrors y and z
+    [_ANYWHERE] * 4
+    + [(-35, 35), (-35, 75), (-25, 70), (-25, 25)]
+    + list(_LEG_LIMITS_DEG)
+    + [tuple(-x for x in limits[::-1]) if i in (1, 2) else limits for i, limits in enumerate(_LEG_LIMITS_DEG)]
+)
+_KERNEL: dict[str, Any] = {"nogil": True, "fastmath": True, "error_model": "numpy", "cache": True}
+
+
+# the two kinds and the leg (0 trunk, 1 left, 2 right) of each capsule
+CAPSULES = np.array(
+    [(SHIRT, SHIRT, 0), (SHIRT, SHIRT, 0), (SHORTS, SHORTS, 0), (SHORTS, SHORTS, 0)]
+    + [(a, b, leg) for leg in (1, 2) for a, b in ((SHORTS, SKIN), (SKIN, SOCK), (SHOE, SHOE))],
+    np.int64,
+)
+
+
+@njit(**_KERNEL)
+def _turn(R, axis, angle, out):
+    """Fill out (3, 3) with R times a turn about one of its axes."""
+    c, s = np.cos(angle), np.sin(angle)
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    for i in range(3):
+        a, b = R[i, j], R[i, k]
+        out[i, axis] = R[i, axis]
+        out[i, j], out[i, k] = c * a + s * b, c * b - s * a
+
+
+@njit(**_KERNEL)
+def place(pose, lengths, radii, points, ends, balls):
+    """Place a jumper: pose (18,), lengths (9,), radii (8,) [m].
+
+    Fills points (9, 3), the JOINTS, and the capsules' ends (10, 2, 3) and radii (10, 2), all world [m].
+    """
+    R, Q = np.zeros((3, 3)), np.empty((3, 3))
+    R[0, 0] = R[1, 1] = R[2, 2] = 1
+    _turn(R, 2, pose[3], Q)
+    _turn(Q, 1, pose[4], R)
+    pelvis, trunk = np.empty((3, 3)), np.empty((3, 3))
+    _turn(R, 0, pose[5], pelvis)
+    _turn(pelvis, 0, pose[6], R)
+    _turn(R, 1, pose[7], trunk)
+    for i in range(3):
+        middle = pose[i]
+        waist = middle + lengths[WAIST] * pelvis[i, 2]
+        chest = waist + lengths[TRUNK] * trunk[i, 2]
+        points[8, i] = 0.5 * (middle + chest)
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            points[side, i] = middle + sign * lengths[PELVIS] * pelvis[i, 0]
+            ends[side, 0, i] = waist + sign * radii[HIP_OUT] * trunk[i, 0]
+            ends[side, 1, i] = chest + sign * radii[CHEST_OUT] * trunk[i, 0]
+            ends[2 + side, 0, i] = middle + sign * radii[HIP_OUT] * pelvis[i, 0]
+            ends[2 + side, 1, i] = waist + sign * radii[HIP_OUT] * pelvis[i, 0]
+    for side in range(2):
+        balls[side, 0], balls[side, 1] = radii[R_WAIST], radii[R_CHEST]
+        balls[2 + side, 0], balls[2 + side, 1] = radii[R_HIP], radii[R_WAIST]
+        _place_leg(pose, lengths, radii, side, pelvis, points, ends, balls)
+
+
+@njit(**_KERNEL)
+def _place_leg(pose, lengths, radii, side, pelvis, points, ends, balls):
+    first, c = 8 + 5 * side, 4 + 3 * side
+    R, thigh, shank = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    _turn(pelvis, 0, pose[first], thigh)
+    _turn(thigh, 1, pose[first + 1], R)
+    _turn(R, 2, pose[first + 2], thigh)
+    _turn(thigh, 0, pose[first + 3], shank)
+    _turn(shank, 0, pose[first + 4], R)
+    for i in range(3):
+        hip = points[side, i]
+        knee = hip - lengths[THIGH] * thigh[i, 2]
+        ankle = knee - lengths[SHANK] * shank[i, 2]
+        sole = ankle - lengths[SOLE] * R[i, 2]
+        points[2 + side, i], points[4 + side, i], points[6 + side, i] = knee, ankle, sole - lengths[FOOT] * R[i, 1]
+        ends[c, 0, i], ends[c, 1, i] = hip, knee
+        ends[c + 1, 0, i], ends[c + 1, 1, i] = knee, ankle
+        lift = (radii[R_FOOT] - SOLE_M) * R[i, 2]
+        ends[c + 2, 0, i] = sole + _HEEL * lengths[FOOT] * R[i, 1] + lift
+        ends[c + 2, 1, i] = sole - _TOE * lengths[FOOT] * R[i, 1] + lift
+    balls[c, 0], balls[c, 1] = radii[R_HIP], radii[R_KNEE]
+    balls[c + 1, 0], balls[c + 1, 1] = radii[R_KNEE], radii[R_ANKLE]
+    balls[c + 2, 0] = balls[c + 2, 1] = radii[R_FOOT]
+
+
+@njit(**_KERNEL)
+def shares(lengths, out):
+    """Fill out (10,) with how far along its axis the first kind of each capsule reaches."""
+    out[:] = 1
+    for side in range(2):
+        out[4 + 3 * side], out[5 + 3 * side] = lengths[SHORTS_END], 1 - lengths[SOCK_END]

@@ -1,0 +1,61 @@
+"""How like skin, shorts, shoes a pixel is: evidence maps of several kinds of surface, by one look-up a pixel.
+
+The evidence of a pixel for a kind, in nats, is log((1 - o) p(colour | kind) + o p(colour | anyone)) less the same of the
+background: o is the chance that somebody else is there, in front of the player or beside him, dressed like him or not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airborne.scoring.foreground import BINS
+
+COLUMNS = 8  # of a table: room for the kinds, a whole number of cache lines
+_UNSEEN = 1e-6  # probability of a colour never seen, a bin
+_LIKE_THEM = 0.8  # share of what anyone wears that has the player's own colours
+
+
+def ratio_table(kinds: NDArray, background: NDArray, hidden: NDArray) -> NDArray[np.float32]:
+    """Return the table (32768, COLUMNS) of evidence [nats] for kinds (k, 32, 32, 32) of colour probabilities.
+
+    background (32, 32, 32) likewise, hidden (k,) the chance that somebody else is where a pixel of that kind would be.
+    """
+    table = np.zeros((BINS**3, COLUMNS), np.float32)
+    own, empty = kinds.reshape(len(kinds), -1), background.reshape(-1)
+    anyone = _LIKE_THEM * own.mean(axis=0) + (1 - _LIKE_THEM) / BINS**3
+    o = hidden[:, None]
+    table[:, : len(kinds)] = np.log(((1 - o) * own + o * anyone + _UNSEEN) / ((1 - o) * empty + o * anyone + _UNSEEN)).T
+    return table
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def evidence_maps(rgb, table, reduction, out):
+    """Fill out (k, h // r, w // r) with the mean evidence over blocks of r x r pixels of rgb (h, w, 3) uint8."""
+    k, h, w = out.shape
+    share = np.float32(1.0 / (reduction * reduction))
+    for y in range(h):
+        for x in range(w):
+            for c in range(k):
+                out[c, y, x] = 0
+            for j in range(y * reduction, (y + 1) * reduction):
+                for i in range(x * reduction, (x + 1) * reduction):
+                    cell = (int(rgb[j, i, 0]) >> 3 << 10) | (int(rgb[j, i, 1]) >> 3 << 5) | (int(rgb[j, i, 2]) >> 3)
+                    for c in range(k):
+                        out[c, y, x] += share * table[cell, c]
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def smooth(maps, out):
+    """Blur maps (k, h, w) with [1 2 1] / 4 along rows and columns into out; the border stays."""
+    k, h, w = maps.shape
+    quarter = np.float32(0.25)
+    row = np.empty(w, np.float32)
+    for c in range(k):
+        for y in range(h):
+            above, below = max(y - 1, 0), min(y + 1, h - 1)
+            for x in range(w):
+                row[x] = quarter * (maps[c, above, x] + 2 * maps[c, y, x] + maps[c, below, x])
+            for x in range(w):
+                out[c, y, x] = quarter * (row[max(x - 1, 0)] + 2 * row[x] + row[min(x + 1, w - 1)])

@@ -1,0 +1,116 @@
+"""What a player's shirt, shorts, skin, socks and shoes look like, learned from a posed jumper and its background."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body.jumper import CAPSULES, KINDS, N_DOF
+from airborne.cameras import Camera
+from airborne.rendering.capsules import labels, project
+from airborne.scoring.foreground import BINS, count_colours
+from airborne.scoring.kinds import ratio_table
+from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, placed
+from airborne.tracking.blocker.views import Region, packed
+
+Array = NDArray[np.floating]
+
+CORE, AROUND = 0.6, 1.25  # pixels under thinner capsules are the player's; outside thicker ones they are not
+LEAST_HIDDEN, MOST_HIDDEN = 0.05, 0.9
+_AT_EVEN, _PER_NAT = 0.5, 0.25  # hidden where the kind's evidence is nothing, and less by this for each nat
+_LEAST_PX = 20  # of a kind in a view to judge it by
+_ROUNDS = 3
+_THICKNESSES = slice(N_DOF + N_LENGTHS, N_DOF + N_LENGTHS + 6)  # the radii among a state
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Colours:
+    """Colour probabilities, 32 bins a channel, and how likely each camera's view of each kind is covered."""
+
+    kinds: NDArray[np.float32]  # (5, 32, 32, 32)
+    background: NDArray[np.float32]  # (cameras, 32, 32, 32)
+    hidden: Array  # (cameras, 5)
+
+    def tables(self, regions: Sequence[Region]) -> list[NDArray[np.float32]]:
+        """Return each region's table of evidence (32768, 8)."""
+        return [ratio_table(self.kinds, self.background[each.view], self.hidden[each.view]) for each in regions]
+
+
+def drawn(state: Array, camera: Camera, thickness: float = 1.0) -> NDArray[np.int8]:
+    """Draw which kind each pixel of a camera's picture shows: (h, w), -1 where none."""
+    state = state.copy()
+    state[_THICKNESSES] *= thickness
+    points, ends, balls = np.empty((N_POINTS, 3)), np.empty((N_CAPSULES, 2, 3)), np.empty((N_CAPSULES, 2))
+    discs, depth, share = np.empty((N_CAPSULES, 2, 3)), np.empty(N_CAPSULES), np.empty(N_CAPSULES)
+    placed(state, points, ends, balls, share)
+    project(ends, balls, packed(camera), discs, depth)
+    out = np.empty(camera.size[::-1], np.int8)
+    labels(discs, depth, CAPSULES[:, :2], share, out)
+    return out
+
+
+def learned(state: Array, regions: Sequence[Region], n_cameras: int, used: NDArray[np.bool_]) -> Colours:
+    """Learn from one posed player: used (cameras, 5) says which camera's view of which kind to learn from.
+
+    What a kind's pixels share with the background or with another kind goes to the one that has more of it.
+    """
+    counts = np.zeros((len(KINDS), BINS, BINS, BINS), np.float32)
+    background = np.zeros((n_cameras, BINS, BINS, BINS), np.float32)
+    for region in regions:
+        core, around = drawn(state, region.full, CORE), drawn(state, region.full, AROUND)
+        count_colours(region.rgb, around < 0, 1, background[region.view])
+        for kind in range(len(KINDS)):
+            if used[region.view, kind]:
+                count_colours(region.rgb, core == kind, 1, counts[kind])
+    background /= np.maximum(background.sum(axis=(1, 2, 3), keepdims=True), 1)
+    raw = _normalised(counts.reshape(len(KINDS), -1))
+    around_all = background.sum(axis=0).ravel() / max(len(regions), 1)
+    kinds = raw
+    for _ in range(_ROUNDS):
+        kinds = _normalised(raw * kinds / (kinds.sum(axis=0) + around_all + 1e-9))
+    return Colours(kinds.reshape(counts.shape).astype(np.float32), background, np.zeros((n_cameras, len(KINDS))))
+
+
+def seen_through(state: Array, regions: Sequence[Region], n_cameras: int) -> Colours:
+    """Learn as `learned` does, from the views in which nothing stands before the player; say which these are.
+
+    A view's kind is judged by the colours that the other views give it.
+    """
+    used = np.zeros((n_cameras, len(KINDS)), bool)
+    used[[region.view for region in regions]] = True
+    hidden = np.full(used.shape, LEAST_HIDDEN)
+    if len(regions) > 2:
+        for region in regions:
+            others = used.copy()
+            others[region.view] = False
+            colours = learned(state, regions, n_cameras, others)
+            hidden[region.view] = hidden_by(_mean_evidence(state, region, colours))
+        agreeing = used & (hidden < _AT_EVEN)
+        used = np.where(agreeing.any(axis=0), agreeing, used)
+    return replace(learned(state, regions, n_cameras, used), hidden=hidden)
+
+
+def hidden_by(evidence: Array) -> Array:
+    """Return the chance to be covered, of kinds whose pixels have this mean evidence [nat]; NaN: as if it were 0."""
+    return np.clip(_AT_EVEN - _PER_NAT * np.nan_to_num(evidence), LEAST_HIDDEN, MOST_HIDDEN)
+
+
+def _mean_evidence(state: Array, region: Region, colours: Colours) -> Array:
+    """Return the mean evidence of each kind's pixels in a region (5,) [nat]; NaN where too few are drawn."""
+    part = drawn(state, region.full)
+    table = ratio_table(colours.kinds, colours.background[region.view], np.full(len(KINDS), 0.02))
+    cells = region.rgb.astype(np.int64) >> 3
+    cells = (cells[..., 0] << 10) | (cells[..., 1] << 5) | cells[..., 2]
+    found = np.full(len(KINDS), np.nan)
+    for kind in range(len(KINDS)):
+        chosen = part == kind
+        if np.count_nonzero(chosen) > _LEAST_PX:
+            found[kind] = table[cells[chosen], kind].mean()
+    return found
+
+
+def _normalised(counts: Array) -> Array:
+    return counts / np.maximum(counts.sum(axis=1, keepdims=True), 1e-9)

@@ -1,0 +1,130 @@
+"""Gauss-Newton on evidence maps: a jumper moves until nothing more is gained at its outlines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body.jumper import CAPSULES, KINDS, LIMITS_RAD, N_DOF
+from airborne.tracking.blocker.equations import N_CAPSULES, N_POINTS, gathered
+from airborne.tracking.blocker.views import Seen, workspace
+
+Array = NDArray[np.floating]
+
+NATS_PER_PX = 0.02  # neighbouring pixels err together: what one of them is worth
+SHAPE_SD_M = 0.010  # how far a capsule's outline may lie beside the player's
+SLOPE = 0.7  # how evidence falls across an outline [nat / px]
+_LIMIT_SD_RAD = 0.05  # how firmly joints keep within their limits
+_FLOOR_SD_M = 0.01  # and feet above the floor
+BALL_HEIGHT_M = 0.03  # of the ball of the foot in standing
+_SETTLED_NATS = 0.02
+_MOST_DAMPING = 20.0  # steps that short change nothing
+_ROBUST = 4.0  # squared sds at which an anchor's pull is halved
+_BALLS = np.array([6, 7])  # rows of the points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prior:
+    """What is known before looking: a Gaussian over the first numbers of the state, and anchors of points."""
+
+    mean: Array  # (n_free,)
+    information: Array  # (n_free, n_free), the inverse of its covariance
+    anchors: Array | None = None  # (9, 3) [m]; NaN where there is none
+    anchor_sd_m: Array | None = None  # (9,) [m]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """Where a jumper was found."""
+
+    state: Array  # (35,)
+    information: Array  # (n_free, n_free) of pictures and prior together
+    by_shape: Array  # (n_free, n_free) covariance from outlines that are not the player's
+    points: Array  # (9, 3) [m]
+    by_state: Array  # (27, n_free) how the points move with the state
+    nats: float  # evidence, worth of a pixel taken in
+    total: float  # nats and the prior's
+    owned: Array  # (v, 10, 2, 2) evidence and area [px of the maps] of each capsule's two kinds
+
+
+def fit(state: Array, prior: Prior, found: Seen, others: tuple[Array, Array], *, most_steps: int = 10) -> Fit:
+    """Move the first len(prior.mean) numbers of a state to the nearest maximum of evidence and prior."""
+    best = _evaluated(state, prior, found, others)
+    damping = 1.0
+    for _ in range(most_steps):
+        A, b = best[1], best[2]
+        step = np.linalg.solve(A + damping * np.diag(np.diag(A)), b)
+        moved = best[0].state.copy()
+        moved[: len(step)] += step
+        tried = _evaluated(moved, prior, found, others)
+        gain = tried[0].total - best[0].total
+        if gain > 0:
+            best, damping = tried, max(damping / 4, 0.03)
+        else:
+            damping = max(damping * 4, 0.25)
+        if 0 < gain < _SETTLED_NATS or damping > _MOST_DAMPING:
+            break
+    inverse = np.linalg.inv(best[0].information)
+    return replace(best[0], by_shape=inverse @ best[0].by_shape @ inverse)
+
+
+def scored(state: Array, found: Seen, others: tuple[Array, Array]) -> float:
+    """Return the evidence of a state [nat], without any prior."""
+    work, owned = workspace(found, len(others[0]))
+    nothing = np.empty((N_POINTS, 3)), np.empty((27, 0)), np.empty(0), np.empty((0, 0)), np.empty((0, 0))
+    total = gathered(state, 0, found.cameras, _kinds(others), found.sums, others, work, owned, nothing)
+    return NATS_PER_PX * found.reduction**2 * total
+
+
+def _kinds(others: tuple[Array, Array]) -> NDArray[np.int64]:
+    return np.concatenate([CAPSULES[:, :2], np.full((len(others[0]), 2), len(KINDS))])
+
+
+def _evaluated(state: Array, prior: Prior, found: Seen, others: tuple[Array, Array]) -> tuple[Fit, Array, Array]:
+    n = len(prior.mean)
+    work, owned = workspace(found, len(others[0]))
+    points, by_state, gradient = np.empty((N_POINTS, 3)), np.empty((27, n)), np.empty(n)
+    curvature, spread = np.empty((2, n, n))
+    equations = points, by_state, gradient, curvature, spread
+    worth = NATS_PER_PX * found.reduction**2
+    total = gathered(state, n, found.cameras, _kinds(others), found.sums, others, work, owned, equations)
+    away = state[:n] - prior.mean
+    cost = 0.5 * float(away @ prior.information @ away)
+    steepness = worth * SLOPE * found.reduction
+    A = steepness * curvature + prior.information
+    b = worth * gradient - prior.information @ away
+    for rows, targets, weights, each in _rules(state, points, by_state, prior):
+        A += rows.T @ (weights[:, None] * rows)
+        b += rows.T @ (weights * targets)
+        cost += each
+    nats = worth * total
+    fitted = Fit(state, A, (SHAPE_SD_M * steepness) ** 2 * spread, points, by_state, nats, nats - cost, owned[:, :N_CAPSULES])
+    return fitted, A, b
+
+
+def _rules(state: Array, points: Array, by_state: Array, prior: Prior) -> Sequence[tuple[Array, Array, Array, float]]:
+    """Return rows (k, n), how far to go (k,), weights (k,) and cost of: joint limits, the floor, anchors."""
+    n = by_state.shape[1]
+    rules = []
+    beyond = np.clip(state[:N_DOF], *LIMITS_RAD.T) - state[:N_DOF]
+    if (out := np.flatnonzero(beyond)).size:
+        rules.append(_rule(np.eye(N_DOF, n)[out], beyond[out], np.full(len(out), _LIMIT_SD_RAD)))
+    sunk = BALL_HEIGHT_M - points[_BALLS, 2]
+    if (low := np.flatnonzero(sunk > 0)).size:
+        rules.append(_rule(by_state[3 * _BALLS[low] + 2], sunk[low], np.full(len(low), _FLOOR_SD_M)))
+    if prior.anchors is not None and prior.anchor_sd_m is not None:
+        known = np.flatnonzero(np.isfinite(prior.anchors).all(axis=1))
+        away = (prior.anchors - points)[known]
+        squared = np.sum(away**2, axis=1) / prior.anchor_sd_m[known] ** 2 / 3
+        weights = 1 / (prior.anchor_sd_m[known] ** 2 * (1 + squared / _ROBUST))
+        rows = by_state.reshape(N_POINTS, 3, n)[known].reshape(-1, n)
+        cost = float(np.sum(1.5 * _ROBUST * np.log1p(squared / _ROBUST)))
+        rules.append((rows, away.ravel(), np.repeat(weights, 3), cost))
+    return rules
+
+
+def _rule(rows: Array, targets: Array, sd: Array) -> tuple[Array, Array, Array, float]:
+    return rows, targets, 1 / sd**2, 0.5 * float(np.sum((targets / sd) ** 2))

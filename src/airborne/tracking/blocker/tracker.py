@@ -1,0 +1,199 @@
+"""Tracking of one or several jumpers, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body.jumper import CAPSULES, JOINTS, KINDS, N_DOF, PELVIS
+from airborne.tracking.blocker.colours import Colours, hidden_by
+from airborne.tracking.blocker.dynamics import N_FREE, N_SLIDING, Filtered, begun, predicted, updated
+from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, placed
+from airborne.tracking.blocker.first import first_look, points_of
+from airborne.tracking.blocker.fit import BALL_HEIGHT_M, Fit, Prior, fit
+from airborne.tracking.blocker.views import regions_round, seen
+from airborne.tracking.estimate import Status
+from airborne.tracking.players import PlayerEstimate, PlayerStart
+from airborne.video import Frames
+
+Array = NDArray[np.floating]
+
+_NEAR_M = 3.0  # players further apart hide nothing of each other
+_FLYING_M = 0.06  # both balls of the feet this far above their height in standing: in the air
+_LEAST_SHARE, _LOST_SHARE = 0.5, 0.25  # of the usual evidence per pixel: suspect, lost
+_USUAL_RATE = 0.05
+_UNCERTAIN_SD_M = 0.06
+_LEAST_AREA_PX = 8.0  # of a kind in a map, to judge whether it is hidden
+_HIDDEN_RATE, _HIDDEN_STEP = 0.3, 0.08
+_SHAPE = np.arange(N_DOF + PELVIS, N_DOF + N_LENGTHS)  # lengths that stay the same, in a state
+_STEP_M = 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """What the next frame needs of one player."""
+
+    time_s: Fraction
+    filtered: Filtered
+    state: Array  # (35,) as last found; its shape stays
+    sliding: Array  # (4,) in the first frame
+    shape_covariance: Array  # (5, 5) of the lengths that stay [m2]
+    colours: Colours
+    reduction: int
+    usual: float  # evidence per pixel [nat]
+
+
+class Blocker:
+    """Track jumpers by Gauss-Newton on evidence maps; the state is one `Track` a player, {} before the first frame."""
+
+    joints = JOINTS
+
+    def __init__(self, starts: Sequence[PlayerStart]) -> None:
+        self._starts = [start for start in starts if "hip_left" in start.joints_m]
+
+    def init(self) -> Mapping[str, Track]:
+        """Return the state before the first frame."""
+        return {}
+
+    def step(
+        self, state: Mapping[str, Track], frames: Frames
+    ) -> tuple[Mapping[str, Track], tuple[PlayerEstimate, ...]]:
+        """Track one time; raises TrialError where a player is in no picture of the first frame."""
+        if not state:
+            return self._first(frames)
+        expected = {name: _expected(track, frames.time_s) for name, track in state.items()}
+        tracks, estimates = {}, []
+        for name, track in state.items():
+            others = [each for other, (_, each) in expected.items() if other != name]
+            tracks[name], estimate = _followed(name, track, expected[name][0], others, frames)
+            estimates.append(estimate)
+        return tracks, tuple(estimates)
+
+    def _first(self, frames: Frames) -> tuple[dict[str, Track], tuple[PlayerEstimate, ...]]:
+        tracks, estimates = {}, []
+        for start in self._starts:
+            first = first_look(start.name, start.joints_m, frames, capsules([]))
+            state, covariance = first.fit.state, np.linalg.inv(first.fit.information)
+            tracks[start.name] = Track(
+                frames.time_s,
+                begun(state[:N_FREE], covariance[:N_FREE, :N_FREE]),
+                state,
+                state[N_DOF : N_DOF + N_SLIDING],
+                covariance[np.ix_(_SHAPE, _SHAPE)],
+                first.colours,
+                first.reduction,
+                _per_px(first.fit.owned),
+            )
+            n_views = int(np.sum(first.colours.hidden.mean(axis=1) < 0.5))
+            free = replace(
+                first.fit,
+                by_state=first.fit.by_state[:, :N_FREE],
+                by_shape=first.fit.by_shape[:N_FREE, :N_FREE],
+            )
+            estimates.append(_estimate(start.name, frames, tracks[start.name], free, n_views))
+        return tracks, tuple(estimates)
+
+
+def capsules(states: Sequence[Array]) -> tuple[Array, Array]:
+    """Return the capsules of whole jumpers: ends (10 n, 2, 3) and radii (10 n, 2) [m]."""
+    ends, balls = np.empty((len(states), N_CAPSULES, 2, 3)), np.empty((len(states), N_CAPSULES, 2))
+    for state, each_ends, each_balls in zip(states, ends, balls, strict=True):
+        placed(state, np.empty((N_POINTS, 3)), each_ends, each_balls, np.empty(N_CAPSULES))
+    return ends.reshape(-1, 2, 3), balls.reshape(-1, 2)
+
+
+def _expected(track: Track, time_s: Fraction) -> tuple[Filtered, Array]:
+    """Predict a player: the Gaussian, and the whole state (35,)."""
+    is_flying = bool(np.all(points_of(track.state)[6:8, 2] > BALL_HEIGHT_M + _FLYING_M))
+    filtered = predicted(track.filtered, float(time_s - track.time_s), track.sliding, is_flying=is_flying)
+    return filtered, np.concatenate([filtered.free, track.state[N_FREE:]])
+
+
+def _followed(
+    name: str, track: Track, expected: Filtered, others: Sequence[Array], frames: Frames
+) -> tuple[Track, PlayerEstimate]:
+    state = np.concatenate([expected.free, track.state[N_FREE:]])
+    regions = regions_round(frames, state[:3])
+    near = capsules([other for other in others if np.linalg.norm(other[:3] - state[:3]) < _NEAR_M])
+    if not regions:
+        return replace(track, filtered=expected, time_s=frames.time_s), _lost(name, frames)
+    found = seen(regions, track.colours.tables(regions), track.reduction)
+    information = np.linalg.inv(expected.covariance[:N_FREE, :N_FREE])
+    fitted = fit(state, Prior(expected.free, information), found, near)
+    evidence = _per_px(fitted.owned)
+    filtered = updated(expected, fitted.state[:N_FREE], np.linalg.inv(fitted.information))
+    views = [region.view for region in regions]
+    track = replace(track, time_s=frames.time_s, filtered=filtered, state=fitted.state)
+    if evidence < _LOST_SHARE * track.usual:
+        return track, _lost(name, frames)
+    if evidence > _LEAST_SHARE * track.usual:
+        track = replace(track, usual=track.usual + _USUAL_RATE * (evidence - track.usual))
+    hidden = _hidden(track.colours.hidden, fitted.owned, views)
+    n_views = int(np.sum(hidden[views].mean(axis=1) < 0.5))
+    estimate = _estimate(name, frames, track, fitted, n_views)
+    if evidence < _LEAST_SHARE * track.usual:
+        estimate = replace(estimate, status=Status.UNCERTAIN)
+    return replace(track, colours=replace(track.colours, hidden=hidden)), estimate
+
+
+def _hidden(hidden: Array, owned: Array, views: Sequence[int]) -> Array:
+    """Say anew which kinds of surface are hidden in which view, by the evidence of what was fitted there."""
+    after = hidden.copy()
+    for view, each in zip(views, owned, strict=True):
+        for kind in range(len(KINDS)):
+            evidence, area = each[CAPSULES[:, :2] == kind].sum(axis=0)
+            target = hidden_by(evidence / area) if area > _LEAST_AREA_PX else hidden[view, kind]
+            changed = hidden[view, kind] + _HIDDEN_RATE * (target - hidden[view, kind])
+            after[view, kind] = changed
+    return after
+
+
+def _estimate(name: str, frames: Frames, track: Track, fitted: Fit, n_views: int) -> PlayerEstimate:
+    by_state = fitted.by_state.reshape(N_POINTS, 3, -1)
+    of_state = track.filtered.covariance[:N_FREE, :N_FREE] + fitted.by_shape
+    covariance = by_state @ of_state @ by_state.swapaxes(1, 2)
+    by_shape = _by_shape(fitted.state)
+    covariance += by_shape @ track.shape_covariance @ by_shape.swapaxes(1, 2)
+    sd = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 3)
+    is_sure = n_views >= 2 and sd[: len(JOINTS) - 3].max() < _UNCERTAIN_SD_M
+    return PlayerEstimate(
+        player=name,
+        index=frames.index,
+        time_s=frames.time_s,
+        status=Status.TRACKED if is_sure else Status.UNCERTAIN,
+        points=fitted.points,
+        covariance=covariance,
+        score=_per_px(fitted.owned),
+        n_views=n_views,
+    )
+
+
+def _by_shape(state: Array) -> Array:
+    """Return how the points move with the lengths that stay: (9, 3, 5)."""
+    points = points_of(state)
+    moved = np.tile(state, (len(_SHAPE), 1))
+    moved[np.arange(len(_SHAPE)), _SHAPE] += _STEP_M
+    return np.stack([(points_of(each) - points) / _STEP_M for each in moved], axis=-1)
+
+
+def _per_px(owned: Array) -> float:
+    evidence, area = owned.sum(axis=(0, 1, 2))
+    return float(evidence / area) if area > 0 else 0.0
+
+
+def _lost(name: str, frames: Frames) -> PlayerEstimate:
+    n = len(JOINTS)
+    return PlayerEstimate(
+        player=name,
+        index=frames.index,
+        time_s=frames.time_s,
+        status=Status.LOST,
+        points=np.full((n, 3), np.nan),
+        covariance=np.full((n, 3, 3), np.nan),
+        score=float("nan"),
+        n_views=0,
+    )
