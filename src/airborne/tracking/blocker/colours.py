@@ -22,7 +22,7 @@ CORE, AROUND = 0.6, 1.25  # pixels under thinner capsules are the player's; outs
 LEAST_HIDDEN, MOST_HIDDEN = 0.05, 0.9
 _AT_EVEN, _PER_NAT = 0.5, 0.25  # hidden where the kind's evidence is nothing, and less by this for each nat
 _LEAST_PX = 20  # of a kind in a view to judge it by
-_ROUNDS = 3
+_ROUNDS = 6
 _THICKNESSES = slice(N_DOF + N_LENGTHS, N_DOF + N_LENGTHS + 6)  # the radii among a state
 
 
@@ -55,7 +55,8 @@ def drawn(state: Array, camera: Camera, thickness: float = 1.0) -> NDArray[np.in
 def learned(state: Array, regions: Sequence[Region], n_cameras: int, used: NDArray[np.bool_]) -> Colours:
     """Learn from one posed player: used (cameras, 5) says which camera's view of which kind to learn from.
 
-    What a kind's pixels share with the background or with another kind goes to the one that has more of it.
+    What a kind's pixels share with the background, or with the kind above or below it on the body, goes to the one that
+    has more of it.
     """
     counts = np.zeros((len(KINDS), BINS, BINS, BINS), np.float32)
     background = np.zeros((n_cameras, BINS, BINS, BINS), np.float32)
@@ -70,7 +71,10 @@ def learned(state: Array, regions: Sequence[Region], n_cameras: int, used: NDArr
     around_all = background.sum(axis=0).ravel() / max(len(regions), 1)
     kinds = raw
     for _ in range(_ROUNDS):
-        kinds = _normalised(raw * kinds / (kinds.sum(axis=0) + around_all + 1e-9))
+        beside = kinds + around_all + 1e-9
+        beside[1:] += kinds[:-1]
+        beside[:-1] += kinds[1:]
+        kinds = _normalised(raw * kinds / beside)
     return Colours(kinds.reshape(counts.shape).astype(np.float32), background, np.zeros((n_cameras, len(KINDS))))
 
 

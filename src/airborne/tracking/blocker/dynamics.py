@@ -26,7 +26,7 @@ _ACCELERATION_SD = np.array(  # [m/s2], [rad/s2]
 )
 _FLYING_SD = 8.0  # of the hips' acceleration in the air, about free fall: legs and arms move about the centre of mass
 _FIRST_SPEED_SD = np.array([1.0] * 3 + [2.0] * 15)  # [m/s], [rad/s]
-_SLIDING_SD = np.array([0.08, 0.16, 0.08, 0.08])  # in a square root of a second: [m], shares, shares, [m]
+_SLIDING_SD = np.array([0.05, 0.10, 0.03, 0.05])  # in a square root of a second: [m], shares, shares, [m]
 _SLIDING_BACK = 1.2  # share of the way back to the first frame's values in a second
 
 
