@@ -23,27 +23,43 @@ def ratio_table(kinds: NDArray, background: NDArray, hidden: NDArray) -> NDArray
     background (32, 32, 32) likewise, hidden (k,) the chance that somebody else is where a pixel of that kind would be.
     """
     table = np.zeros((BINS**3, COLUMNS), np.float32)
-    own, empty = kinds.reshape(len(kinds), -1), background.reshape(-1)
-    anyone = _LIKE_THEM * own.mean(axis=0) + (1 - _LIKE_THEM) / BINS**3
-    o = hidden[:, None]
-    table[:, : len(kinds)] = np.log(((1 - o) * own + o * anyone + _UNSEEN) / ((1 - o) * empty + o * anyone + _UNSEEN)).T
+    flat = np.ascontiguousarray(kinds.reshape(len(kinds), -1), np.float32)
+    _fill_table(flat, np.ascontiguousarray(background.reshape(-1), np.float32), hidden.astype(np.float32), table)
     return table
 
 
 @njit(cache=True, nogil=True, fastmath=True)
+def _fill_table(kinds, background, hidden, table):
+    n, cells = kinds.shape
+    one = np.float32(1)
+    for cell in range(cells):
+        anyone = np.float32((1 - _LIKE_THEM) / cells)
+        for c in range(n):
+            anyone += np.float32(_LIKE_THEM / n) * kinds[c, cell]
+        for c in range(n):
+            o = hidden[c]
+            other = o * anyone + np.float32(_UNSEEN)
+            table[cell, c] = np.log(((one - o) * kinds[c, cell] + other) / ((one - o) * background[cell] + other))
+
+
+@njit(cache=True, nogil=True, fastmath=True)
 def evidence_maps(rgb, table, reduction, out):
-    """Fill out (k, h // r, w // r) with the mean evidence over blocks of r x r pixels of rgb (h, w, 3) uint8."""
-    k, h, w = out.shape
+    """Fill out (5, h // r, w // r) with the mean evidence over blocks of r x r pixels of rgb (h, w, 3) uint8."""
+    _, h, w = out.shape
     share = np.float32(1.0 / (reduction * reduction))
     for y in range(h):
         for x in range(w):
-            for c in range(k):
-                out[c, y, x] = 0
+            a, b, c, d, e = np.float32(0), np.float32(0), np.float32(0), np.float32(0), np.float32(0)
             for j in range(y * reduction, (y + 1) * reduction):
                 for i in range(x * reduction, (x + 1) * reduction):
                     cell = (int(rgb[j, i, 0]) >> 3 << 10) | (int(rgb[j, i, 1]) >> 3 << 5) | (int(rgb[j, i, 2]) >> 3)
-                    for c in range(k):
-                        out[c, y, x] += share * table[cell, c]
+                    a += table[cell, 0]
+                    b += table[cell, 1]
+                    c += table[cell, 2]
+                    d += table[cell, 3]
+                    e += table[cell, 4]
+            out[0, y, x], out[1, y, x], out[2, y, x] = share * a, share * b, share * c
+            out[3, y, x], out[4, y, x] = share * d, share * e
 
 
 @njit(cache=True, nogil=True, fastmath=True)

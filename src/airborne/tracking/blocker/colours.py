@@ -34,9 +34,9 @@ class Colours:
     background: NDArray[np.float32]  # (cameras, 32, 32, 32)
     hidden: Array  # (cameras, 5)
 
-    def tables(self, regions: Sequence[Region]) -> list[NDArray[np.float32]]:
-        """Return each region's table of evidence (32768, 8)."""
-        return [ratio_table(self.kinds, self.background[each.view], self.hidden[each.view]) for each in regions]
+    def table(self, view: int) -> NDArray[np.float32]:
+        """Return a camera's table of evidence (32768, 8)."""
+        return ratio_table(self.kinds, self.background[view], self.hidden[view])
 
 
 def drawn(state: Array, camera: Camera, thickness: float = 1.0) -> NDArray[np.int8]:

@@ -95,7 +95,7 @@ def first_look(name: str, joints_m: Mapping[str, Array], frames: Frames, others:
             raise TrialError(f"player '{name}' is in no camera's picture at the start; check its joints_m, in metres")
         colours = seen_through(state, regions, len(frames.views))
         reduction = reduction_of(regions, state[:3])
-        found = seen(regions, colours.tables(regions), reduction)
+        found = seen(regions, [colours.table(region.view) for region in regions], reduction)
         if number < 2:
             state = _with_borders(state, found, others)
             prior.mean[N_DOF : N_DOF + N_LENGTHS][SHORTS_END : SOCK_END + 1] = state[N_DOF:][SHORTS_END : SOCK_END + 1]

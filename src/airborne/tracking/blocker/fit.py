@@ -15,7 +15,7 @@ from airborne.tracking.blocker.views import Seen, workspace
 Array = NDArray[np.floating]
 
 NATS_PER_PX = 0.02  # neighbouring pixels err together: what one of them is worth
-SHAPE_SD_M = 0.010  # how far a capsule's outline may lie beside the player's
+SHAPE_SD_M = 0.040  # how far a capsule's outline may lie beside the player's
 SLOPE = 0.7  # how evidence falls across an outline [nat / px]
 _LIMIT_SD_RAD = 0.05  # how firmly joints keep within their limits
 _FLOOR_SD_M = 0.01  # and feet above the floor
@@ -101,7 +101,9 @@ def _evaluated(state: Array, prior: Prior, found: Seen, others: tuple[Array, Arr
         b += rows.T @ (weights * targets)
         cost += each
     nats = worth * total
-    fitted = Fit(state, A, (SHAPE_SD_M * steepness) ** 2 * spread, points, by_state, nats, nats - cost, owned[:, :N_CAPSULES])
+    fitted = Fit(
+        state, A, (SHAPE_SD_M * steepness) ** 2 * spread, points, by_state, nats, nats - cost, owned[:, :N_CAPSULES]
+    )
     return fitted, A, b
 
 

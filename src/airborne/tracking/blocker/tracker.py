@@ -13,7 +13,7 @@ from airborne.body.jumper import CAPSULES, JOINTS, KINDS, N_DOF, PELVIS
 from airborne.tracking.blocker.colours import Colours, hidden_by
 from airborne.tracking.blocker.dynamics import N_FREE, N_SLIDING, Filtered, begun, predicted, updated
 from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, placed
-from airborne.tracking.blocker.first import first_look, points_of
+from airborne.tracking.blocker.first import first_look, points_of, start_state
 from airborne.tracking.blocker.fit import BALL_HEIGHT_M, Fit, Prior, fit
 from airborne.tracking.blocker.views import regions_round, seen
 from airborne.tracking.estimate import Status
@@ -22,7 +22,7 @@ from airborne.video import Frames
 
 Array = NDArray[np.floating]
 
-_NEAR_M = 3.0  # players further apart hide nothing of each other
+_NEAR_M = 3.0  # other jumpers further away hide nothing
 _FLYING_M = 0.06  # both balls of the feet this far above their height in standing: in the air
 _LEAST_SHARE, _LOST_SHARE = 0.5, 0.25  # of the usual evidence per pixel: suspect, lost
 _USUAL_RATE = 0.05
@@ -43,20 +43,22 @@ class Track:
     sliding: Array  # (4,) in the first frame
     shape_covariance: Array  # (5, 5) of the lengths that stay [m2]
     colours: Colours
+    tables: tuple[tuple[Array, NDArray[np.float32]], ...]  # each camera's: for which hidden (5,), and itself
     reduction: int
     usual: float  # evidence per pixel [nat]
 
 
 class Blocker:
-    """Track jumpers by Gauss-Newton on evidence maps; the state is one `Track` a player, {} before the first frame."""
+    """Track jumpers by Gauss-Newton on evidence maps."""
 
     joints = JOINTS
 
     def __init__(self, starts: Sequence[PlayerStart]) -> None:
+        """Take the players as they start; those with a torso only are left out."""
         self._starts = [start for start in starts if "hip_left" in start.joints_m]
 
     def init(self) -> Mapping[str, Track]:
-        """Return the state before the first frame."""
+        """Return the state before the first frame: nobody."""
         return {}
 
     def step(
@@ -68,15 +70,18 @@ class Blocker:
         expected = {name: _expected(track, frames.time_s) for name, track in state.items()}
         tracks, estimates = {}, []
         for name, track in state.items():
-            others = [each for other, (_, each) in expected.items() if other != name]
-            tracks[name], estimate = _followed(name, track, expected[name][0], others, frames)
+            hiding = capsules(expected[name][1], [each for other, (_, each) in expected.items() if other != name])
+            tracks[name], estimate = _followed(name, track, expected[name][0], hiding, frames)
             estimates.append(estimate)
         return tracks, tuple(estimates)
 
     def _first(self, frames: Frames) -> tuple[dict[str, Track], tuple[PlayerEstimate, ...]]:
         tracks, estimates = {}, []
+        placed_by_hand = {start.name: start_state(start.name, start.joints_m) for start in self._starts}
         for start in self._starts:
-            first = first_look(start.name, start.joints_m, frames, capsules([]))
+            own = placed_by_hand[start.name]
+            hiding = capsules(own, [each for name, each in placed_by_hand.items() if name != start.name])
+            first = first_look(start.name, start.joints_m, frames, hiding)
             state, covariance = first.fit.state, np.linalg.inv(first.fit.information)
             tracks[start.name] = Track(
                 frames.time_s,
@@ -85,6 +90,7 @@ class Blocker:
                 state[N_DOF : N_DOF + N_SLIDING],
                 covariance[np.ix_(_SHAPE, _SHAPE)],
                 first.colours,
+                tuple((hidden, first.colours.table(v)) for v, hidden in enumerate(first.colours.hidden)),
                 first.reduction,
                 _per_px(first.fit.owned),
             )
@@ -98,11 +104,15 @@ class Blocker:
         return tracks, tuple(estimates)
 
 
-def capsules(states: Sequence[Array]) -> tuple[Array, Array]:
-    """Return the capsules of whole jumpers: ends (10 n, 2, 3) and radii (10 n, 2) [m]."""
-    ends, balls = np.empty((len(states), N_CAPSULES, 2, 3)), np.empty((len(states), N_CAPSULES, 2))
-    for state, each_ends, each_balls in zip(states, ends, balls, strict=True):
-        placed(state, np.empty((N_POINTS, 3)), each_ends, each_balls, np.empty(N_CAPSULES))
+def capsules(state: Array, others: Sequence[Array]) -> tuple[Array, Array]:
+    """Return what may hide a jumper: the capsules of other ones near by, ends (m, 2, 3) and radii (m, 2) [m].
+
+    state (35,) is his own, others theirs.
+    """
+    others = [other for other in others if np.linalg.norm(other[:3] - state[:3]) < _NEAR_M]
+    ends, balls = np.empty((len(others), N_CAPSULES, 2, 3)), np.empty((len(others), N_CAPSULES, 2))
+    for other, each_ends, each_balls in zip(others, ends, balls, strict=True):
+        placed(other, np.empty((N_POINTS, 3)), each_ends, each_balls, np.empty(N_CAPSULES))
     return ends.reshape(-1, 2, 3), balls.reshape(-1, 2)
 
 
@@ -114,16 +124,15 @@ def _expected(track: Track, time_s: Fraction) -> tuple[Filtered, Array]:
 
 
 def _followed(
-    name: str, track: Track, expected: Filtered, others: Sequence[Array], frames: Frames
+    name: str, track: Track, expected: Filtered, hiding: tuple[Array, Array], frames: Frames
 ) -> tuple[Track, PlayerEstimate]:
     state = np.concatenate([expected.free, track.state[N_FREE:]])
     regions = regions_round(frames, state[:3])
-    near = capsules([other for other in others if np.linalg.norm(other[:3] - state[:3]) < _NEAR_M])
     if not regions:
         return replace(track, filtered=expected, time_s=frames.time_s), _lost(name, frames)
-    found = seen(regions, track.colours.tables(regions), track.reduction)
+    found = seen(regions, [track.tables[region.view][1] for region in regions], track.reduction)
     information = np.linalg.inv(expected.covariance[:N_FREE, :N_FREE])
-    fitted = fit(state, Prior(expected.free, information), found, near)
+    fitted = fit(state, Prior(expected.free, information), found, hiding)
     evidence = _per_px(fitted.owned)
     filtered = updated(expected, fitted.state[:N_FREE], np.linalg.inv(fitted.information))
     views = [region.view for region in regions]
@@ -137,7 +146,17 @@ def _followed(
     estimate = _estimate(name, frames, track, fitted, n_views)
     if evidence < _LEAST_SHARE * track.usual:
         estimate = replace(estimate, status=Status.UNCERTAIN)
-    return replace(track, colours=replace(track.colours, hidden=hidden)), estimate
+    return _with_hidden(track, hidden), estimate
+
+
+def _with_hidden(track: Track, hidden: Array) -> Track:
+    """Take in what is hidden; a camera's table is made anew only when that changes it."""
+    colours = replace(track.colours, hidden=hidden)
+    tables = tuple(
+        (now, colours.table(view)) if np.abs(now - made_for).max() > _HIDDEN_STEP else (made_for, table)
+        for view, (now, (made_for, table)) in enumerate(zip(hidden, track.tables, strict=True))
+    )
+    return replace(track, colours=colours, tables=tables)
 
 
 def _hidden(hidden: Array, owned: Array, views: Sequence[int]) -> Array:
