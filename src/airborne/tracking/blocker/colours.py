@@ -20,7 +20,8 @@ Array = NDArray[np.floating]
 
 CORE, AROUND = 0.6, 1.25  # pixels under thinner capsules are the player's; outside thicker ones they are not
 LEAST_HIDDEN, MOST_HIDDEN = 0.05, 0.9
-_AT_EVEN, _PER_NAT = 0.5, 0.25  # hidden where the kind's evidence is nothing, and less by this for each nat
+_AT_EVEN = 0.5  # hidden where a kind's evidence is nothing; not at all where it is as usual
+_LEAST_USUAL = 0.3  # [nat]
 _LEAST_PX = 20  # of a kind in a view to judge it by
 _ROUNDS = 6
 _THICKNESSES = slice(N_DOF + N_LENGTHS, N_DOF + N_LENGTHS + 6)  # the radii among a state
@@ -37,6 +38,11 @@ class Colours:
     def table(self, view: int) -> NDArray[np.float32]:
         """Return a camera's table of evidence (32768, 8)."""
         return ratio_table(self.kinds, self.background[view], self.hidden[view])
+
+    def usual(self, table: NDArray[np.float32]) -> Array:
+        """Return the mean evidence by a table of pixels of each kind that nothing covers: (5,) [nat]."""
+        n = len(KINDS)
+        return np.einsum("kc,ck->k", self.kinds.reshape(n, -1), table[:, :n])
 
 
 def drawn(state: Array, camera: Camera, thickness: float = 1.0) -> NDArray[np.int8]:
@@ -91,21 +97,25 @@ def seen_through(state: Array, regions: Sequence[Region], n_cameras: int) -> Col
             others = used.copy()
             others[region.view] = False
             colours = learned(state, regions, n_cameras, others)
-            hidden[region.view] = hidden_by(_mean_evidence(state, region, colours))
+            hidden[region.view] = hidden_by(*_mean_evidence(state, region, colours))
         agreeing = used & (hidden < _AT_EVEN)
         used = np.where(agreeing.any(axis=0), agreeing, used)
     return replace(learned(state, regions, n_cameras, used), hidden=hidden)
 
 
-def hidden_by(evidence: Array) -> Array:
-    """Return the chance to be covered, of kinds whose pixels have this mean evidence [nat]; NaN: as if it were 0."""
-    return np.clip(_AT_EVEN - _PER_NAT * np.nan_to_num(evidence), LEAST_HIDDEN, MOST_HIDDEN)
+def hidden_by(evidence: Array, usual: Array) -> Array:
+    """Return the chance to be covered, of kinds whose pixels have this mean evidence; NaN: as if it were 0 [nat].
+
+    `usual` is what they have when nothing covers them.
+    """
+    share = np.nan_to_num(evidence) / np.maximum(usual, _LEAST_USUAL)
+    return np.clip(_AT_EVEN * (1 - share), LEAST_HIDDEN, MOST_HIDDEN)
 
 
-def _mean_evidence(state: Array, region: Region, colours: Colours) -> Array:
-    """Return the mean evidence of each kind's pixels in a region (5,) [nat]; NaN where too few are drawn."""
+def _mean_evidence(state: Array, region: Region, colours: Colours) -> tuple[Array, Array]:
+    """Return the mean evidence of each kind's pixels in a region (5,) [nat], NaN where too few are drawn; and usual."""
     part = drawn(state, region.full)
-    table = ratio_table(colours.kinds, colours.background[region.view], np.full(len(KINDS), 0.02))
+    table = ratio_table(colours.kinds, colours.background[region.view], np.full(len(KINDS), LEAST_HIDDEN))
     cells = region.rgb.astype(np.int64) >> 3
     cells = (cells[..., 0] << 10) | (cells[..., 1] << 5) | cells[..., 2]
     found = np.full(len(KINDS), np.nan)
@@ -113,7 +123,7 @@ def _mean_evidence(state: Array, region: Region, colours: Colours) -> Array:
         chosen = part == kind
         if np.count_nonzero(chosen) > _LEAST_PX:
             found[kind] = table[cells[chosen], kind].mean()
-    return found
+    return found, colours.usual(table)
 
 
 def _normalised(counts: Array) -> Array:

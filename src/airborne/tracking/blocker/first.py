@@ -15,7 +15,7 @@ from airborne.errors import TrialError
 from airborne.tracking.blocker.colours import Colours, seen_through
 from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, N_STATE, placed
 from airborne.tracking.blocker.fit import Fit, Prior, fit, scored
-from airborne.tracking.blocker.views import Seen, reduction_of, regions_round, seen
+from airborne.tracking.blocker.views import Scale, Seen, scale_of, regions_round, seen
 from airborne.video import Frames
 
 Array = NDArray[np.floating]
@@ -41,7 +41,7 @@ class First:
 
     fit: Fit
     colours: Colours
-    reduction: int
+    scale: Scale
 
 
 def points_of(state: Array) -> Array:
@@ -94,15 +94,15 @@ def first_look(name: str, joints_m: Mapping[str, Array], frames: Frames, others:
         if not regions:
             raise TrialError(f"player '{name}' is in no camera's picture at the start; check its joints_m, in metres")
         colours = seen_through(state, regions, len(frames.views))
-        reduction = reduction_of(regions, state[:3])
-        found = seen(regions, [colours.table(region.view) for region in regions], reduction)
+        scale = scale_of(regions, state[:3])
+        found = seen(regions, [colours.table(region.view) for region in regions], scale)
         if number < 2:
             state = _with_borders(state, found, others)
             prior.mean[N_DOF : N_DOF + N_LENGTHS][SHORTS_END : SOCK_END + 1] = state[N_DOF:][SHORTS_END : SOCK_END + 1]
         fitted = fit(state, prior, found, others, most_steps=_MOST_STEPS)
         state = fitted.state
     assert len(state) == N_STATE
-    return First(fitted, colours, reduction)
+    return First(fitted, colours, scale)
 
 
 def _with_borders(state: Array, found: Seen, others: tuple[Array, Array]) -> Array:

@@ -14,9 +14,9 @@ from airborne.tracking.blocker.views import Seen, workspace
 
 Array = NDArray[np.floating]
 
-NATS_PER_PX = 0.02  # neighbouring pixels err together: what one of them is worth
+NATS_PER_M2 = 240.0  # neighbouring pixels err together: what an area on the body is worth for each nat of theirs
 SHAPE_SD_M = 0.040  # how far a capsule's outline may lie beside the player's
-SLOPE = 0.7  # how evidence falls across an outline [nat / px]
+SLOPE = 1.4  # how evidence falls across an outline [nat / px of the maps]
 _LIMIT_SD_RAD = 0.05  # how firmly joints keep within their limits
 _FLOOR_SD_M = 0.01  # and feet above the floor
 BALL_HEIGHT_M = 0.03  # of the ball of the foot in standing
@@ -76,7 +76,7 @@ def scored(state: Array, found: Seen, others: tuple[Array, Array]) -> float:
     work, owned = workspace(found, len(others[0]))
     nothing = np.empty((N_POINTS, 3)), np.empty((27, 0)), np.empty(0), np.empty((0, 0)), np.empty((0, 0))
     total = gathered(state, 0, found.cameras, _kinds(others), found.sums, others, work, owned, nothing)
-    return NATS_PER_PX * found.reduction**2 * total
+    return NATS_PER_M2 / found.scale.px_per_m**2 * total
 
 
 def _kinds(others: tuple[Array, Array]) -> NDArray[np.int64]:
@@ -89,11 +89,11 @@ def _evaluated(state: Array, prior: Prior, found: Seen, others: tuple[Array, Arr
     points, by_state, gradient = np.empty((N_POINTS, 3)), np.empty((27, n)), np.empty(n)
     curvature, spread = np.empty((2, n, n))
     equations = points, by_state, gradient, curvature, spread
-    worth = NATS_PER_PX * found.reduction**2
+    worth = NATS_PER_M2 / found.scale.px_per_m**2
     total = gathered(state, n, found.cameras, _kinds(others), found.sums, others, work, owned, equations)
     away = state[:n] - prior.mean
     cost = 0.5 * float(away @ prior.information @ away)
-    steepness = worth * SLOPE * found.reduction
+    steepness = worth * SLOPE
     A = steepness * curvature + prior.information
     b = worth * gradient - prior.information @ away
     for rows, targets, weights, each in _rules(state, points, by_state, prior):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from airborne.tracking.blocker.dynamics import N_FREE, N_SLIDING, Filtered, begu
 from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, placed
 from airborne.tracking.blocker.first import first_look, points_of, start_state
 from airborne.tracking.blocker.fit import BALL_HEIGHT_M, Fit, Prior, fit
-from airborne.tracking.blocker.views import regions_round, seen
+from airborne.tracking.blocker.views import Scale, regions_round, seen
 from airborne.tracking.estimate import Status
 from airborne.tracking.players import PlayerEstimate, PlayerStart
 from airborne.video import Frames
@@ -33,6 +34,14 @@ _SHAPE = np.arange(N_DOF + PELVIS, N_DOF + N_LENGTHS)  # lengths that stay the s
 _STEP_M = 1e-4
 
 
+class Table(NamedTuple):
+    """One camera's evidence by colour."""
+
+    hidden: Array  # (5,) what it was made for
+    evidence: NDArray[np.float32]  # (32768, 8) [nat]
+    usual: Array  # (5,) of pixels that nothing covers [nat]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
     """What the next frame needs of one player."""
@@ -43,8 +52,8 @@ class Track:
     sliding: Array  # (4,) in the first frame
     shape_covariance: Array  # (5, 5) of the lengths that stay [m2]
     colours: Colours
-    tables: tuple[tuple[Array, NDArray[np.float32]], ...]  # each camera's: for which hidden (5,), and itself
-    reduction: int
+    tables: tuple[Table, ...]  # each camera's
+    scale: Scale
     usual: float  # evidence per pixel [nat]
 
 
@@ -90,8 +99,8 @@ class Blocker:
                 state[N_DOF : N_DOF + N_SLIDING],
                 covariance[np.ix_(_SHAPE, _SHAPE)],
                 first.colours,
-                tuple((hidden, first.colours.table(v)) for v, hidden in enumerate(first.colours.hidden)),
-                first.reduction,
+                tuple(_table(first.colours, view) for view in range(len(frames.views))),
+                first.scale,
                 _per_px(first.fit.owned),
             )
             n_views = int(np.sum(first.colours.hidden.mean(axis=1) < 0.5))
@@ -130,7 +139,7 @@ def _followed(
     regions = regions_round(frames, state[:3])
     if not regions:
         return replace(track, filtered=expected, time_s=frames.time_s), _lost(name, frames)
-    found = seen(regions, [track.tables[region.view][1] for region in regions], track.reduction)
+    found = seen(regions, [track.tables[region.view].evidence for region in regions], track.scale)
     information = np.linalg.inv(expected.covariance[:N_FREE, :N_FREE])
     fitted = fit(state, Prior(expected.free, information), found, hiding)
     evidence = _per_px(fitted.owned)
@@ -141,7 +150,7 @@ def _followed(
         return track, _lost(name, frames)
     if evidence > _LEAST_SHARE * track.usual:
         track = replace(track, usual=track.usual + _USUAL_RATE * (evidence - track.usual))
-    hidden = _hidden(track.colours.hidden, fitted.owned, views)
+    hidden = _hidden(track, fitted.owned, views)
     n_views = int(np.sum(hidden[views].mean(axis=1) < 0.5))
     estimate = _estimate(name, frames, track, fitted, n_views)
     if evidence < _LEAST_SHARE * track.usual:
@@ -149,26 +158,29 @@ def _followed(
     return _with_hidden(track, hidden), estimate
 
 
+def _table(colours: Colours, view: int) -> Table:
+    evidence = colours.table(view)
+    return Table(colours.hidden[view], evidence, colours.usual(evidence))
+
+
 def _with_hidden(track: Track, hidden: Array) -> Track:
     """Take in what is hidden; a camera's table is made anew only when that changes it."""
     colours = replace(track.colours, hidden=hidden)
     tables = tuple(
-        (now, colours.table(view)) if np.abs(now - made_for).max() > _HIDDEN_STEP else (made_for, table)
-        for view, (now, (made_for, table)) in enumerate(zip(hidden, track.tables, strict=True))
+        _table(colours, view) if np.abs(hidden[view] - table.hidden).max() > _HIDDEN_STEP else table
+        for view, table in enumerate(track.tables)
     )
     return replace(track, colours=colours, tables=tables)
 
 
-def _hidden(hidden: Array, owned: Array, views: Sequence[int]) -> Array:
+def _hidden(track: Track, owned: Array, views: Sequence[int]) -> Array:
     """Say anew which kinds of surface are hidden in which view, by the evidence of what was fitted there."""
-    after = hidden.copy()
+    hidden = track.colours.hidden.copy()
     for view, each in zip(views, owned, strict=True):
-        for kind in range(len(KINDS)):
-            evidence, area = each[CAPSULES[:, :2] == kind].sum(axis=0)
-            target = hidden_by(evidence / area) if area > _LEAST_AREA_PX else hidden[view, kind]
-            changed = hidden[view, kind] + _HIDDEN_RATE * (target - hidden[view, kind])
-            after[view, kind] = changed
-    return after
+        evidence, area = np.array([each[CAPSULES[:, :2] == kind].sum(axis=0) for kind in range(len(KINDS))]).T
+        target = hidden_by(evidence / np.maximum(area, 1e-9), track.tables[view].usual)
+        hidden[view] += _HIDDEN_RATE * np.where(area > _LEAST_AREA_PX, target - hidden[view], 0)
+    return hidden
 
 
 def _estimate(name: str, frames: Frames, track: Track, fitted: Fit, n_views: int) -> PlayerEstimate:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,12 +39,19 @@ class Region:
         return self.camera.resampled(scale=(1, 1), offset=(x0, y0), size=(x1 - x0, y1 - y0))
 
 
+class Scale(NamedTuple):
+    """How the evidence maps of one player are made."""
+
+    reduction: int  # of the pictures
+    px_per_m: float  # of the maps, about
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
     """What the kernels take of all regions: maps of one size, reduced to about 60 pixels a metre."""
 
     regions: tuple[Region, ...]
-    reduction: int
+    scale: Scale
     cameras: Array  # (v, 4, 4): K [R t] of the reduced region, then the focal length
     sums: NDArray[np.float32]  # (v, kinds + 1, h, w + 1); the last map is empty
 
@@ -74,14 +82,16 @@ def px_per_m(camera: Camera, point: Array) -> float:
     return float(camera.K[0, 0]) / depth_m if depth_m > 0 else 0.0
 
 
-def reduction_of(regions: Sequence[Region], hips: Array) -> int:
-    """Return by how much to reduce the maps of these regions."""
-    return max(1, round(float(np.median([px_per_m(region.camera, hips) for region in regions])) / _PX_PER_M))
+def scale_of(regions: Sequence[Region], hips: Array) -> Scale:
+    """Return how to reduce the pictures of these regions."""
+    whole = float(np.median([px_per_m(region.camera, hips) for region in regions]))
+    reduction = max(1, round(whole / _PX_PER_M))
+    return Scale(reduction, whole / reduction)
 
 
-def seen(regions: Sequence[Region], tables: Sequence[NDArray[np.float32]], reduction: int) -> Seen:
+def seen(regions: Sequence[Region], tables: Sequence[NDArray[np.float32]], scale: Scale) -> Seen:
     """Look every pixel's evidence up; tables are those of the regions, (32768, 8) each."""
-    r, k = reduction, len(KINDS)
+    r, k = scale.reduction, len(KINDS)
     sizes = [((y1 - y0) // r, (x1 - x0) // r) for x0, y0, x1, y1 in (region.box for region in regions)]
     h, w = max(size[0] for size in sizes), max(size[1] for size in sizes)
     sums = np.zeros((len(regions), k + 1, h, w + 1), np.float32)
@@ -96,7 +106,7 @@ def seen(regions: Sequence[Region], tables: Sequence[NDArray[np.float32]], reduc
         sums[i, :k, :rows, columns + 1 :] = filled[:, :, -1:]
         camera = region.full.resampled(scale=(r, r), offset=((r - 1) / 2, (r - 1) / 2), size=(columns, rows))
         cameras[i] = packed(camera)
-    return Seen(tuple(regions), r, cameras, sums)
+    return Seen(tuple(regions), scale, cameras, sums)
 
 
 def packed(camera: Camera) -> Array:
