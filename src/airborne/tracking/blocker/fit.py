@@ -24,6 +24,13 @@ _SETTLED_NATS = 0.02
 _MOST_DAMPING = 20.0  # steps that short change nothing
 _ROBUST = 4.0  # squared sds at which an anchor's pull is halved
 _BALLS = np.array([6, 7])  # rows of the points
+# how people hold themselves, weakly: upright, legs under the hips, both bent alike
+_HABIT_SD = np.array([0.2, 0.5, 0.3, 0.15] + [0.25, 0.3, 0.4] * 2 + [0.5, 0.6])
+_HABITS = np.zeros((len(_HABIT_SD), N_DOF))
+_HABITS[np.arange(10), [4, 5, 6, 7, 9, 10, 12, 14, 15, 17]] = 1  # side and forward lean, bends, hip y and z, ankle
+_HABITS[10, [8, 13]] = _HABITS[11, [11, 16]] = 1, -1  # hip and knee flexion, left less right
+_REST = np.zeros(N_DOF)
+_REST[5] = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,9 +115,11 @@ def _evaluated(state: Array, prior: Prior, found: Seen, others: tuple[Array, Arr
 
 
 def _rules(state: Array, points: Array, by_state: Array, prior: Prior) -> Sequence[tuple[Array, Array, Array, float]]:
-    """Return rows (k, n), how far to go (k,), weights (k,) and cost of: joint limits, the floor, anchors."""
+    """Return rows (k, n), how far to go (k,), weights (k,) and cost of: habits, joint limits, the floor, anchors."""
     n = by_state.shape[1]
-    rules = []
+    away = _REST - state[:N_DOF]
+    rows = np.pad(_HABITS, ((0, 0), (0, n - N_DOF)))
+    rules = [_rule(rows, _HABITS @ away, _HABIT_SD)]
     beyond = np.clip(state[:N_DOF], *LIMITS_RAD.T) - state[:N_DOF]
     if (out := np.flatnonzero(beyond)).size:
         rules.append(_rule(np.eye(N_DOF, n)[out], beyond[out], np.full(len(out), _LIMIT_SD_RAD)))

@@ -24,6 +24,7 @@ from airborne.video import Frames
 Array = NDArray[np.floating]
 
 _NEAR_M = 3.0  # other jumpers further away hide nothing
+_STANDING_M, _SLIP_SD_M = 0.02, 0.02  # a ball of the foot this low stands; how far it moves in a frame
 _FLYING_M = 0.06  # both balls of the feet this far above their height in standing: in the air
 _LEAST_SHARE, _LOST_SHARE = 0.5, 0.25  # of the usual evidence per pixel: suspect, lost
 _USUAL_RATE = 0.05
@@ -141,7 +142,8 @@ def _followed(
         return replace(track, filtered=expected, time_s=frames.time_s), _lost(name, frames)
     found = seen(regions, [track.tables[region.view].evidence for region in regions], track.scale)
     information = np.linalg.inv(expected.covariance[:N_FREE, :N_FREE])
-    fitted = fit(state, Prior(expected.free, information), found, hiding)
+    prior = Prior(expected.free, information, _standing(track.state), np.full(N_POINTS, _SLIP_SD_M))
+    fitted = fit(state, prior, found, hiding)
     evidence = _per_px(fitted.owned)
     filtered = updated(expected, fitted.state[:N_FREE], np.linalg.inv(fitted.information))
     views = [region.view for region in regions]
@@ -161,6 +163,16 @@ def _followed(
 def _table(colours: Colours, view: int) -> Table:
     evidence = colours.table(view)
     return Table(colours.hidden[view], evidence, colours.usual(evidence))
+
+
+def _standing(state: Array) -> Array:
+    """Return where the balls of feet on the floor are, (9, 3) [m]; NaN elsewhere: a foot stays until it is lifted."""
+    points = points_of(state)
+    anchors = np.full(points.shape, np.nan)
+    for ball in (6, 7):
+        if points[ball, 2] < BALL_HEIGHT_M + _STANDING_M:
+            anchors[ball] = points[ball]
+    return anchors
 
 
 def _with_hidden(track: Track, hidden: Array) -> Track:
