@@ -1,6 +1,10 @@
 """Synthetic recordings with truth: in comes a `Scene`, out come its frames or a whole trial; knows no tracker."""
 
 from airborne.synthetic.aerial import Takeoff, fly_articulated
+from airborne.synthetic.block_pictures import frames_of
+from airborne.synthetic.block_scene import DIFFICULTIES, BlockScene, Difficulty, block_scene, paper_sequences
+from airborne.synthetic.block_truth import joints_of, jump_facts, starts_of, torso_input
+from airborne.synthetic.block_writing import write_block
 from airborne.synthetic.flight import Flight, Launch, Mass, fly, mass_of
 from airborne.synthetic.light import Ambient, Spot
 from airborne.synthetic.pictures import frames
@@ -10,7 +14,10 @@ from airborne.synthetic.surroundings import gym
 from airborne.synthetic.writing import write_somersault, write_thrown_cross, write_trial
 
 __all__ = [
+    "DIFFICULTIES",
     "Ambient",
+    "BlockScene",
+    "Difficulty",
     "Flight",
     "Launch",
     "Mass",
@@ -18,15 +25,23 @@ __all__ = [
     "Scene",
     "Spot",
     "Takeoff",
+    "block_scene",
     "fly",
     "fly_articulated",
     "frames",
+    "frames_of",
     "gym",
     "half_twist",
+    "joints_of",
+    "jump_facts",
     "mass_of",
+    "paper_sequences",
     "ranges",
     "somersault",
+    "starts_of",
     "thrown_cross",
+    "torso_input",
+    "write_block",
     "write_somersault",
     "write_thrown_cross",
     "write_trial",
