@@ -1,0 +1,111 @@
+"""How far measured jumps are from the true ones: each definition of height, take-off and landing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from airborne.motion.jump import Jump
+from airborne.motion.jumps import jumps
+from airborne.motion.players import PlayersMotion
+
+HEIGHTS = ("foot_height_m", "hip_height_m", "flight_time_height_m", "takeoff_speed_height_m", "hip_rise_m")
+EVENTS = ("takeoff_frame", "landing_frame")
+_TITLES = ("feet", "hips", "flight time", "take-off speed", "hips from take-off")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JumpErrors:
+    """One true jump against the measured one, measured minus true; NaN where either is unknown.
+
+    Two truths: what the same functions make of the true paths, and what the truth's own file says of the jump.
+    """
+
+    player: str
+    number: int  # of the true jump
+    is_found: bool
+    height_error_m: dict[str, float]  # by definition, as `Jump` names them; against the true paths
+    event_error_frames: dict[str, float]
+    stated_height_error_m: dict[str, float]  # against the file, where it says something
+    stated_event_error_frames: dict[str, float]
+    within_95: dict[str, bool]  # whether the interval holds what the true paths give
+
+    def describe(self) -> str:
+        """Return the errors as two lines at most."""
+        if not self.is_found:
+            return f"{self.player}: jump {self.number} not found"
+        heights = self._line(self.height_error_m, self.event_error_frames)
+        lines = [f"{self.player}: jump {self.number}, minus that of the true paths: {heights}"]
+        if self.stated_height_error_m or self.stated_event_error_frames:
+            stated = self._line(self.stated_height_error_m, self.stated_event_error_frames)
+            lines.append(f"{self.player}: jump {self.number}, minus the stated: {stated}")
+        return "\n".join(lines)
+
+    def _line(self, heights: dict[str, float], events: dict[str, float]) -> str:
+        parts = [
+            f"{title} {100 * heights[name]:+.1f} cm"
+            for name, title in zip(HEIGHTS, _TITLES, strict=True)
+            if name in heights
+        ]
+        parts += [f"{name.removesuffix('_frame')} {error:+.2f} frames" for name, error in events.items()]
+        return ", ".join(parts)
+
+
+def compare_jumps(
+    motion: PlayersMotion, truth: PlayersMotion, players: Sequence[str], known: dict[str, dict[str, float]]
+) -> tuple[JumpErrors, ...]:
+    """Compare the jumps of the named players; `known` is what a file says of a player's only jump.
+
+    A measured jump goes with the true one whose flight it overlaps. Empty where legs are not among the joints.
+    """
+    if not all(_has_legs(each) for each in (motion, truth)):
+        return ()
+    found = jumps(_only(motion, players))
+    true = jumps(_only(truth, players))
+    errors = []
+    for jump in true:
+        partner = next((j for j in found if j.player == jump.player and _overlap(j, jump)), None)
+        is_only = sum(j.player == jump.player for j in true) == 1
+        errors.append(_errors(jump, partner, known.get(jump.player, {}) if is_only else {}))
+    return tuple(errors)
+
+
+def _errors(true: Jump, found: Jump | None, known: dict[str, float]) -> JumpErrors:
+    names = (*HEIGHTS, *EVENTS)
+    got = {name: getattr(found, name).value if found else math.nan for name in names}
+    error = {name: got[name] - getattr(true, name).value for name in names}
+    stated = {name: got[name] - known[name] for name in names if name in known}
+    inside = {}
+    for name in names:
+        value = getattr(true, name).value
+        if found is not None and math.isfinite(error[name]):
+            measured = getattr(found, name)
+            inside[name] = bool(measured.low <= value <= measured.high)
+    return JumpErrors(
+        player=true.player,
+        number=true.number,
+        is_found=found is not None,
+        height_error_m={name: error[name] for name in HEIGHTS},
+        event_error_frames={name: error[name] for name in EVENTS},
+        stated_height_error_m={name: stated[name] for name in HEIGHTS if name in stated},
+        stated_event_error_frames={name: stated[name] for name in EVENTS if name in stated},
+        within_95=inside,
+    )
+
+
+def _has_legs(motion: PlayersMotion) -> bool:
+    return all(f"{part}_{side}" in motion.joints for part in ("hip", "knee", "ankle") for side in ("left", "right"))
+
+
+def _only(motion: PlayersMotion, players: Sequence[str]) -> PlayersMotion:
+    at = [motion.players.index(name) for name in players]
+    chosen = {name: getattr(motion, name)[:, at] for name in ("points", "covariance", "status", "score", "n_views")}
+    return replace(motion, players=tuple(players), **chosen)
+
+
+def _overlap(one: Jump, other: Jump) -> bool:
+    spans = [(float(np.min(jump.path_s)), float(np.max(jump.path_s))) for jump in (one, other)]
+    return max(spans[0][0], spans[1][0]) <= min(spans[0][1], spans[1][1])

@@ -1,0 +1,111 @@
+"""One player's legs as a jump needs them: hips to balls of the feet, and the centre of mass that they stand for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body.legs import LEG_POINTS
+from airborne.errors import ResultError
+from airborne.motion.players import PlayersMotion
+
+Array = NDArray[np.floating]
+
+UNKNOWN_SD_M = 0.02  # of a joint whose covariance is not given
+_LEAP_M = 0.05  # beyond noise
+_MASS = {"hip": 0.6782 + 0.2832 * 0.5905, "knee": 0.2832 * 0.4095 + 0.0866 * 0.5605, "ankle": 0.0866 * 0.4395 + 0.0274}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LegTrack:
+    """Paths of one player [m], left side first, with the variances of their errors [m²]; NaN where unknown."""
+
+    player: str
+    index: NDArray[np.int64]  # (n,) frame numbers
+    time_s: Array  # (n,)
+    hips: Array  # (n, 2, 3)
+    knees: Array  # (n, 2, 3)
+    ankles: Array  # (n, 2, 3)
+    balls: Array | None  # (n, 2, 3), of the feet
+    wrists: Array | None  # (n, 2, 3)
+    variances: dict[str, Array]  # "hips", ... -> (n, 2, 3)
+
+    @property
+    def period_s(self) -> float:
+        """Time between two frames."""
+        return float(np.median(np.diff(self.time_s)))
+
+    @property
+    def mid_hips(self) -> tuple[Array, Array]:
+        """The middle of the hips (n, 3), and its variance."""
+        return self.hips.mean(axis=1), self.variances["hips"].mean(axis=1) / 2
+
+    @property
+    def mid_ankles(self) -> tuple[Array, Array]:
+        """The middle of the ankles (n, 3), and its variance."""
+        return self.ankles.mean(axis=1), self.variances["ankles"].mean(axis=1) / 2
+
+    @property
+    def centre_of_mass_height(self) -> tuple[Array, Array]:
+        """Height of the centre of mass up to a constant (n,) [m], and its variance.
+
+        The trunk, arms and head ride on the hips; the legs have their own masses (de Leva's for men).
+        """
+        parts = {"hip": (self.hips, "hips"), "knee": (self.knees, "knees"), "ankle": (self.ankles, "ankles")}
+        height = sum(_MASS[name] * points[:, :, 2].mean(axis=1) for name, (points, _) in parts.items())
+        variance = sum(
+            _MASS[name] ** 2 * self.variances[key][:, :, 2].mean(axis=1) / 2 for name, (_, key) in parts.items()
+        )
+        return np.asarray(height), np.asarray(variance)
+
+    def scaled(self, factor: float) -> LegTrack:
+        """Return the same paths with all variances times a factor."""
+        return replace(self, variances={name: factor * variance for name, variance in self.variances.items()})
+
+
+def leg_track(motion: PlayersMotion, player: str) -> LegTrack:
+    """Take one player's legs out of a motion. A covariance that is not given counts as 20 mm an axis.
+
+    A place that lies 5 sd and 0.05 m from the median of the five frames about it counts as unknown: a joint does not
+    leap away and back.
+    Raises ResultError where the motion has no such player, or lacks hips, knees or ankles.
+    """
+    if player not in motion.players:
+        raise ResultError(f"no player '{player}'; the motion has: {', '.join(motion.players)}")
+    missing = [name for name in LEG_POINTS if name not in motion.joints]
+    if missing:
+        raise ResultError(f"jumps need {', '.join(LEG_POINTS)}; the motion lacks {', '.join(missing)}")
+    who = motion.players.index(player)
+    parts = {}
+    for part in ("hip", "knee", "ankle", "foot", "wrist"):
+        names = [f"{part}_left", f"{part}_right"]
+        if all(name in motion.joints for name in names):
+            at = [motion.joints.index(name) for name in names]
+            variance = np.diagonal(motion.covariance[:, who][:, at], axis1=-2, axis2=-1)
+            sound = np.isfinite(variance) & (variance > 0)
+            variance = np.where(sound, variance, UNKNOWN_SD_M**2)
+            parts[part] = _without_spikes(motion.points[:, who][:, at], variance), variance
+    keys = {"hip": "hips", "knee": "knees", "ankle": "ankles", "foot": "balls", "wrist": "wrists"}
+    return LegTrack(
+        player=player,
+        index=motion.index,
+        time_s=motion.time_s,
+        hips=parts["hip"][0],
+        knees=parts["knee"][0],
+        ankles=parts["ankle"][0],
+        balls=parts["foot"][0] if "foot" in parts else None,
+        wrists=parts["wrist"][0] if "wrist" in parts else None,
+        variances={keys[part]: variance for part, (_, variance) in parts.items()},
+    )
+
+
+def _without_spikes(points: Array, variance: Array) -> Array:
+    """Return paths (n, sides, 3) with NaN for the places that leap away from their neighbours and back."""
+    if len(points) < 5:
+        return points
+    windows = np.lib.stride_tricks.sliding_window_view(points, 5, axis=0)  # only whole, wholly known windows judge
+    middle = np.pad(np.median(windows, axis=-1), ((2, 2), (0, 0), (0, 0)), constant_values=np.nan)
+    leaps = np.any(np.abs(points - middle) > 5 * np.sqrt(variance) + _LEAP_M, axis=-1, keepdims=True)
+    return np.where(leaps, np.nan, points)
