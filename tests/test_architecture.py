@@ -23,9 +23,13 @@ PACKAGES = [
 ]
 ORDER = [
     *PACKAGES,
+    "player_table",
     "trial",
     "start",
+    "runs",
     "pipeline",
+    "players_tracker",
+    "players_pipeline",
     "fitting",
     "reproduction",
     "examples",

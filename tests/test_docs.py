@@ -147,6 +147,7 @@ MODELS = {
     "`[calibration]`": trials.CalibrationTable,
     "`[body]`": trials.BodyTable,
     "`[start]`": trials.StartTable,
+    "`[[start.player]]`": trials.PlayerTable,
     "`[lights]`": trials.LightsTable,
     "`[[lights.lamp]]`": trials.LampTable,
     "`[track]`": trials.TrackTable,

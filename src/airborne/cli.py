@@ -20,6 +20,7 @@ from airborne.errors import AirborneError
 
 if TYPE_CHECKING:
     from airborne.pipeline import Run
+    from airborne.players_pipeline import PlayersRun
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -112,19 +113,28 @@ def track(
     output: Out,
     resume: Annotated[bool, typer.Option(help="Go on with a run that was stopped.")] = False,
     method: Annotated[
-        str | None, typer.Option(help="Instead of the trial's: refined, joint, hierarchical, stepping, simplex.")
+        str | None,
+        typer.Option(
+            help="Instead of the trial's: refined, joint, hierarchical, stepping, simplex; "
+            "of players blocker, block-jump, mixture, framework."
+        ),
     ] = None,
     every: Annotated[int | None, typer.Option(min=1, help="Track every n-th frame or field.")] = None,
     cameras: Annotated[str | None, typer.Option(help="Only these cameras, separated by commas.")] = None,
     pictures: Annotated[bool, typer.Option(help="Write overlay videos, figures and the report.")] = True,
+    overlay: Annotated[str | None, typer.Option(help="What overlay videos of players show: paper, broadcast.")] = None,
+    live: Annotated[
+        bool, typer.Option(help="Players: read pipes, capture devices, or files at their own speed; late frames drop.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Track a trial; results appear in the output folder as they are found.
 
     Example: airborne track trial.toml -o results
     """
-    changes = {key: value for key, value in (("method", method), ("every", every)) if value is not None}
-    run = _track(trial, output, resume=resume, pictures=pictures, changes=changes, cameras=cameras)
+    given = {"method": method, "every": every, "overlay": overlay}
+    changes = {key: value for key, value in given.items() if value is not None}
+    run = _track(trial, output, resume=resume, pictures=pictures, changes=changes, cameras=cameras, live=live)
     if as_json:
         print((output / "summary.json").read_text(encoding="utf-8"), end="")
     else:
@@ -141,14 +151,20 @@ def _track(
     pictures: bool,
     changes: dict | None = None,
     cameras: str | None = None,
-) -> Run:
+    live: bool = False,
+) -> Run | PlayersRun:
     from airborne import pipeline
+    from airborne.players_pipeline import track_players
     from airborne.trial import read_trial
 
     names = None if cameras is None else [name.strip() for name in cameras.split(",")]
     trial = read_trial(path, changes or {}, names)
+    if live and not trial.has_players:
+        raise AirborneError('--live is for players; this trial has no body preset = "legs"')
     try:
         with _progress(f"tracking {trial.name}") as report:
+            if trial.has_players:
+                return track_players(trial, output, resume=resume, live=live, pictures=pictures, progress=report)
             return pipeline.track(trial, output, resume=resume, pictures=pictures, progress=report)
     except KeyboardInterrupt:
         errors.print(f"airborne: stopped; the frames found so far are in {output}; --resume goes on", markup=False)
@@ -156,9 +172,13 @@ def _track(
 
 
 def _in_short(summary: dict) -> str:
+    from airborne.export.players_report import players_in_short
+
     counts = ", ".join(f"{summary[f'n_{status}']} {status}" for status in ("tracked", "uncertain", "lost"))
     lines = [f"{summary['n_frames']} frames at {summary['rate_hz']:.5g} Hz: {counts}"]
-    if summary["n_frames"] == summary["n_lost"]:
+    if "players" in summary:
+        lines += players_in_short(summary)
+    elif summary["n_frames"] == summary["n_lost"]:
         lines.append("the body was found in no frame: look at the first picture of the overlay videos, mend [start]")
     else:
         position, rotation = summary["median_position_sd_mm"], summary["median_rotation_sd_deg"]
@@ -300,6 +320,32 @@ def synth_somersault(
     with _progress("rendering") as report:
         write_somersault(output, preset=preset, target=target, style=style, seed=seed, progress=report)
     write_model(output / "person.glb", somersault(preset, target=target, style=style, seed=seed).body)
+    print(f"trial: {output / 'trial.toml'}")
+
+
+@synth.command("block")
+def synth_block(
+    output: Out,
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    blockers: Annotated[int, typer.Option(min=1, max=3, help="How many players jump to block.")] = 1,
+    difficulty: Annotated[
+        Literal["easy", "default", "hard"], typer.Option(help="Clothes, players in the way, noise, calibration.")
+    ] = "default",
+    frame_rate: Annotated[int | None, typer.Option(help="Frames per second: 30, 60 or 120.")] = None,
+    cameras: Annotated[int | None, typer.Option(min=2, max=6, help="How many cameras.")] = None,
+) -> None:
+    """Write a volleyball block: videos from behind the blockers, calibration, hand-set start, truth.
+
+    Example: airborne synth block -o my-block --seed 3 --blockers 2
+    """
+    from dataclasses import replace
+
+    from airborne.synthetic import DIFFICULTIES, block_scene, write_block
+
+    given = {"frame_rate": frame_rate, "n_cameras": cameras}
+    hardness = replace(DIFFICULTIES[difficulty], **{key: value for key, value in given.items() if value is not None})
+    with _progress("rendering") as report:
+        write_block(output, block_scene(seed, n_blockers=blockers, difficulty=hardness), progress=report)
     print(f"trial: {output / 'trial.toml'}")
 
 

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-import platform
 import shutil
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, replace
-from importlib.metadata import version
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from airborne import __version__
 from airborne.body import BodyModel, Pose, PosedBody, geometry
 from airborne.body.files import body_toml, mesh_files
-from airborne.cameras import Calibration, Camera, Rig, calibrate, read_control_points, read_rig, write_pose2sim
-from airborne.errors import ResultError, TrialError
+from airborne.cameras import Calibration, Rig, write_pose2sim
 from airborne.export import (
     ContactSheet,
     MatchingPicture,
@@ -46,21 +40,30 @@ from airborne.motion import (
     write_motion_parquet,
 )
 from airborne.rendering import FLAT, render
-from airborne.start import first_pose, mended_rig
+from airborne.runs import (
+    Progress,
+    begin,
+    cameras_of,
+    circumstances,
+    holds_run_of,
+    identity_of,
+    inputs_of,
+    open_trial,
+    past_the_end,
+)
+from airborne.start import first_pose
 from airborne.tracking import Estimate
-from airborne.tracking.methods import FIELDS_AS, sampled, tracker_of
-from airborne.trial import CameraTable, Trial
-from airborne.video import Recording, VideoSource, View, inspect, open_recording
+from airborne.tracking.methods import sampled, tracker_of
+from airborne.trial import Trial
+from airborne.video import Recording, View
 
-Progress = Callable[[int, int | None], None]  # frames done, frames expected
+__all__ = ["Run", "cameras_of", "holds_run_of", "inputs_of", "open_trial", "track"]
 
 UNCERTAINTY = (
     "Standard deviations hold what the pictures leave open: noise, light, and edges that are not where the drawn body "
     "has them. They do not hold a body measured wrongly all over, or wrong times of the cameras."
 )
 OF_POINTS = " They hold how far the control points leave each camera's picture open."
-OF_FILE = "the calibration comes from a file that does not say how good it is; the standard deviations take it as exact"
-_HASHED_BYTES = 8 << 20  # larger files are told apart by their first and last so many bytes and their length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,8 +87,8 @@ def track(
     model = trial.model()
     start = first_pose(trial, model, recording.rig)
     recording.events.extend(start.notes)
-    identity = _identity(trial)
-    done = _begin(folder, identity, resume)
+    identity = identity_of(trial)
+    done = read_estimates(folder / "motion.csv") if begin(folder, identity, "motion.csv", resume=resume) else []
     _keep_inputs(folder, trial, model, recording.rig)
     read_s = time.monotonic()
     model = _track_frames(trial, model, start.pose, recording, folder, done, pictures, progress)
@@ -104,101 +107,6 @@ def track(
     if pictures:
         write_report(folder, summary)
     return Run(motion, summary)
-
-
-def open_trial(trial: Trial) -> tuple[Recording, Calibration | None]:
-    """Open a trial's videos with its cameras, fields as its method sees them; and the calibration, if one is made."""
-    rig, calibration, notes = _cameras_of(trial)
-    recording = open_recording(
-        [_source(trial, camera) for camera in trial.camera],
-        rig,
-        fields_as=FIELDS_AS[trial.track.method],
-        every=trial.track.every,
-        start=trial.start.frame,
-        stop=trial.track.stop,
-    )
-    recording.events.extend(notes)
-    return recording, calibration
-
-
-def cameras_of(trial: Trial) -> tuple[Rig, Calibration | None]:
-    """Return the cameras of the trial's videos in its order, and the calibration if control points gave them."""
-    return _cameras_of(trial)[:2]
-
-
-def _cameras_of(trial: Trial) -> tuple[Rig, Calibration | None, tuple[str, ...]]:
-    """Return also what mending said of them."""
-    rig, calibration = _calibrated(trial)
-    rig, notes = mended_rig(trial, rig)
-    return rig, calibration, notes
-
-
-def _calibrated(trial: Trial) -> tuple[Rig, Calibration | None]:
-    sizes = {camera.name: inspect(_source(trial, camera)).size for camera in trial.camera}
-    if trial.calibration.control_points is not None:
-        points = read_control_points(trial.path(trial.calibration.control_points))
-        missing = [name for name in sizes if name not in points.cameras]
-        if missing:
-            raise TrialError(
-                f"{trial.calibration.control_points} has no points clicked in {', '.join(missing)}; "
-                f"it has: {', '.join(points.cameras)}"
-            )
-        calibration = calibrate(points.select(list(sizes)), sizes, method=trial.calibration.method)
-        return calibration.rig, calibration
-    rig = read_rig(trial.path(trial.calibration.file or ""))
-    return Rig(tuple(_as_saved(rig, camera, sizes[camera.name]) for camera in trial.camera)), None
-
-
-def _as_saved(rig: Rig, table: CameraTable, size: tuple[int, int]) -> Camera:
-    """Return a calibrated camera as the camera of its video's own pixels."""
-    camera = replace(rig[table.calibrated_as or table.name], name=table.name)
-    du, dv = table.saved_offset_px
-    if table.saved_scale == 1 and (du, dv) == (0, 0):
-        return camera
-    return camera.resampled(scale=(table.saved_scale, table.saved_scale), offset=(du, dv), size=size)
-
-
-def _source(trial: Trial, camera: CameraTable) -> VideoSource:
-    return VideoSource(camera.name, trial.path(camera.video), camera.fields, camera.offset_s)
-
-
-def _begin(folder: Path, identity: dict[str, Any], resume: bool) -> list[Estimate]:
-    """Make the folder ready and return the frames that are finished already."""
-    motion, record = folder / "motion.csv", folder / "run.json"
-    folder.mkdir(parents=True, exist_ok=True)
-    if not record.exists() and not motion.exists() and any(folder.iterdir()):
-        raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
-    if motion.exists() and not resume:
-        raise ResultError(f"{folder} already holds a run; give --resume to go on with it, or another folder")
-    if not motion.exists():
-        write_json(record, identity)
-        return []
-    known = _read_record(record)
-    changed = [name for name in identity if known.get(name) != identity[name]]
-    if changed:
-        raise ResultError(f"{folder} holds another run (other {', other '.join(changed)}); track into another folder")
-    return read_estimates(motion)
-
-
-def holds_run_of(trial: Trial, folder: Path) -> bool:
-    """Say whether a folder holds a run of exactly this trial, finished or not."""
-    record = folder / "run.json"
-    return record.is_file() and _read_record(record) == _identity(trial)
-
-
-def _identity(trial: Trial) -> dict[str, Any]:
-    settings = {"inputs": inputs_of(trial), "settings": trial.track.model_dump(), "version": __version__}
-    return json.loads(json.dumps(settings))
-
-
-def _read_record(path: Path) -> dict[str, Any]:
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        return record if isinstance(record, dict) else {}
-    except (OSError, ValueError) as error:
-        raise ResultError(
-            f"{path} is missing or damaged, so it cannot be told whose run this is; use another folder"
-        ) from error
 
 
 def _keep_inputs(folder: Path, trial: Trial, model: BodyModel, rig: Rig) -> None:
@@ -230,7 +138,7 @@ def _track_frames(
         frames = stack.enter_context(closing(iter(recording)))
         first = next(frames, None)
         if first is None:
-            raise TrialError(f"{trial.name}: there is no frame {trial.start.frame}; start.frame lies past the end")
+            raise past_the_end(trial)
         model = sampled(model, start, first)
         tracker = tracker_of(trial.settings, model, start)
         joints = tuple(segment.name for segment in model.segments[1:])
@@ -288,60 +196,10 @@ def _summary(
     model: BodyModel,
     inputs: dict[str, str],
 ) -> dict[str, Any]:
-    fits = {} if calibration is None else {fit.name: fit for fit in calibration.fits}
-    cameras = [
-        {
-            "name": camera.name,
-            "position_m": [round(float(x), 4) for x in camera.centre],
-            "focal_px": round(float(camera.K[0, 0]), 2),
-            "calibration_rms_px": fits[camera.name].rms_px if camera.name in fits else None,
-            "held_out_rms_mm": fits[camera.name].held_out_m * 1e3 if camera.name in fits else None,
-        }
-        for camera in recording.rig
-    ]
     return {
         "name": trial.name,
         **headline(motion),
         **({"flight": flight_summary(motion, model).to_dict()} if motion.joints and has_inertias(model) else {}),
         "uncertainty": UNCERTAINTY if calibration is None else UNCERTAINTY + OF_POINTS,
-        "warnings": [OF_FILE] if calibration is None else list(calibration.warnings),
-        "events": recording.events,
-        "method": trial.track.model_dump(),
-        "cameras": cameras,
-        "versions": versions(),
-        "inputs": inputs,
+        **circumstances(trial, calibration, recording, inputs),
     }
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of everything that a result may depend on."""
-    packages = ("numpy", "scipy", "numba", "av", "opencv-python-headless")
-    return {"airborne": __version__, "python": platform.python_version(), **{name: version(name) for name in packages}}
-
-
-def inputs_of(trial: Trial) -> dict[str, str]:
-    """Return the SHA-256 of each input file, by the name that the trial gives it."""
-    given = (trial.body.given_file, trial.calibration.file, trial.calibration.control_points, *trial.start.given_files)
-    names = [*(camera.video for camera in trial.camera), *(name for name in given if name)]
-    rest = [trial.start, trial.lights, trial.calibration, trial.body]
-    start = json.dumps([table and table.model_dump() for table in rest])
-    hashes = {name: _sha256(trial.path(name)) for name in names}
-    return {**hashes, "start and lights": hashlib.sha256(start.encode()).hexdigest()}
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    if path.is_dir():
-        for file in sorted(path.rglob("*.json")):
-            digest.update(f"{file.relative_to(path).as_posix()} {_sha256(file)}\n".encode())
-        return digest.hexdigest()
-    size = path.stat().st_size
-    with path.open("rb") as file:
-        if size <= 2 * _HASHED_BYTES:
-            digest.update(file.read())
-        else:
-            digest.update(file.read(_HASHED_BYTES))
-            file.seek(-_HASHED_BYTES, 2)
-            digest.update(file.read())
-            digest.update(str(size).encode())
-    return digest.hexdigest()

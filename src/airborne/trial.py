@@ -5,26 +5,30 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast, get_args
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+from pydantic import BaseModel, Field, PrivateAttr, ValidationError, model_validator
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import SAMPLED, BodyModel, Pose, human18, human18_from_measurements
 from airborne.body.files import read_body
 from airborne.errors import TrialError, one_line
 from airborne.geometry.rotations import matrix_from_angles
+from airborne.player_table import STRICT, PlayerTable, Vector
 from airborne.rendering import Lamp, Lights
 from airborne.tracking.methods import Colour, Method, Prediction, Settings
+from airborne.tracking.players import PlayerStart
 from airborne.tracking.stepping import VRule
 
-Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Steps = list[Annotated[float, Field(gt=0)]]
+PlayersMethod = Literal["blocker", "block-jump", "mixture", "framework"]
+
+PLAYERS_METHODS: tuple[str, ...] = get_args(PlayersMethod)
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = STRICT
 
 
 class CameraTable(_Strict):
@@ -55,10 +59,10 @@ class CalibrationTable(_Strict):
 
 
 class BodyTable(_Strict):
-    """Which body: a body file, a person of a stature and a mass, or a measured person."""
+    """Which body: a body file, a person of a stature and a mass, a measured person, or players' legs."""
 
     file: str | None = None
-    preset: Literal["human18"] | None = None
+    preset: Literal["human18", "legs"] | None = None
     stature_m: float | None = Field(None, gt=0)
     mass_kg: float | None = Field(None, gt=0)
     measurements: str | None = None
@@ -66,9 +70,14 @@ class BodyTable(_Strict):
     @model_validator(mode="after")
     def _one_way(self) -> BodyTable:
         if sum(value is not None for value in (self.file, self.preset, self.measurements)) != 1:
-            raise ValueError('give file = "...", preset = "human18" or measurements = "...", one of them')
+            raise ValueError(
+                'give file = "...", preset = "human18" or measurements = "...", one of them; '
+                'of several players preset = "legs"'
+            )
         sizes = (self.stature_m, self.mass_kg)
-        if any(size is None for size in sizes) if self.preset else any(size is not None for size in sizes):
+        if self.preset == "legs" and any(size is not None for size in sizes):
+            raise ValueError('preset = "legs" takes no stature_m and no mass_kg; remove them')
+        if any(size is None for size in sizes) if self.preset == "human18" else any(size is not None for size in sizes):
             raise ValueError("stature_m and mass_kg go with a preset, both of them, and with nothing else")
         return self
 
@@ -79,7 +88,7 @@ class BodyTable(_Strict):
 
 
 class StartTable(_Strict):
-    """The first pose: set by hand, or from places of the body's landmarks."""
+    """The first pose: set by hand, or from places of the body's landmarks; or of several players."""
 
     frame: Annotated[int, Field(ge=0)] = 0
     position_m: Vector | None = None
@@ -91,14 +100,23 @@ class StartTable(_Strict):
     points_px: str | None = None  # a table of clicked points
     detections: str | None = None  # .npz, or a folder of folders of OpenPose JSON
     detections_cameras: dict[str, str] = {}  # camera -> its array or folder
+    player: list[PlayerTable] = []
 
     @model_validator(mode="after")
     def _one_way(self) -> StartTable:
         by_hand = {"position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg"}
         ways = [self.joints_m, self.points_px, self.detections]
-        given = sum(value is not None for value in ways) + bool(by_hand & self.model_fields_set)
+        given = sum(value is not None for value in ways) + bool(by_hand & self.model_fields_set) + bool(self.player)
         if given != 1:
-            raise ValueError("give a position_m and a rotation, or joints_m, points_px or detections, one of them")
+            raise ValueError(
+                "give a position_m and a rotation, or joints_m, points_px or detections, one of them; "
+                "of several players [[start.player]] tables"
+            )
+        names = [player.name for player in self.player]
+        if len(set(names)) != len(names):
+            raise ValueError(f"two players share a name: {', '.join(names)}; give each its own")
+        if names and not any(player.has_legs for player in self.player):
+            raise ValueError("every player is a bystander; give one of them the points of the legs too")
         if self.detections_cameras and self.detections is None:
             raise ValueError("detections_cameras goes with detections")
         if by_hand & self.model_fields_set:
@@ -180,7 +198,7 @@ class LightsTable(_Strict):
 class TrackTable(_Strict):
     """How to track; each method reads its own settings."""
 
-    method: Method = "refined"
+    method: Method | PlayersMethod = "refined"
     every: Annotated[int, Field(ge=1)] = 1  # track every n-th frame or field
     stop: Annotated[int, Field(ge=1)] | None = None  # one past the last frame or field
     prediction: Prediction = "smooth"
@@ -190,12 +208,33 @@ class TrackTable(_Strict):
     steps_mm: Steps = [50, 30, 20, 10, 10, 5, 5]  # stepping: one loop each
     steps_deg: Steps = [5, 3, 2, 1, 1, 0.5, 0.5]
     scale: Literal[1, 2, 4] = 1  # stepping and simplex: reduction of the pictures
+    n_particles: Annotated[int, Field(ge=50, le=100_000)] | None = None  # particle filters; None: the method's own
+    seed: Annotated[int, Field(ge=0)] = 0  # particle filters: of everything random
+    swing: Literal["consistent", "literal"] = "consistent"  # block-jump: how rods swing
+    estimate: Literal["max", "mean", "top10_mean"] | None = None  # particle filters; None: the method's own
+    torso: str | None = None  # particle filters: a table of torsos; None: they are tracked
+    overlay: Literal["paper", "broadcast"] = "paper"  # legs: what the overlay videos show
 
     @model_validator(mode="after")
     def _equal_loops(self) -> TrackTable:
         if len(self.steps_mm) != len(self.steps_deg) or not self.steps_mm:
             raise ValueError("steps_mm and steps_deg need one number a loop each, equally many")
         return self
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """The settings that the method may read."""
+        settings = self.model_dump()
+        if self.method not in PLAYERS_METHODS:
+            others = _OF_LEGS
+        else:
+            others = (*_OF_BODIES, *(_OF_FILTERS if self.method == "blocker" else ()))
+        return {name: value for name, value in settings.items() if name not in others}
+
+
+_OF_FILTERS = ("n_particles", "seed", "swing", "estimate", "torso")
+_OF_LEGS = (*_OF_FILTERS, "overlay")
+_OF_BODIES = ("prediction", "fixed_shape", "colour", "v_rule", "steps_mm", "steps_deg", "scale")
 
 
 class Trial(_Strict):
@@ -208,6 +247,33 @@ class Trial(_Strict):
     start: StartTable
     lights: LightsTable | None = None
     track: TrackTable = TrackTable()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _legs_have_their_method(cls, table: Any) -> Any:
+        match table:
+            case {"body": {"preset": "legs"}, **rest}:
+                track = rest.get("track", {})
+                return {**table, "track": {"method": PLAYERS_METHODS[0], **track}} if isinstance(track, dict) else table
+        return table
+
+    @model_validator(mode="after")
+    def _players_go_together(self) -> Trial:
+        is_legs, method = self.body.preset == "legs", self.track.method
+        if is_legs and not self.start.player:
+            raise ValueError('body preset "legs" needs [[start.player]] tables: where every player is at the start')
+        if self.start.player and not is_legs:
+            raise ValueError('[[start.player]] goes with body preset = "legs"')
+        if is_legs != (method in PLAYERS_METHODS):
+            known = PLAYERS_METHODS if is_legs else get_args(Method)
+            body = 'preset "legs"' if is_legs else "this body"
+            raise ValueError(f"track.method = '{method}' does not go with {body}; use one of: {', '.join(known)}")
+        strange = sorted(self.track.model_fields_set & {*(_OF_BODIES if is_legs else _OF_LEGS)})
+        if is_legs and self.lights is not None:
+            strange.append("[lights]")
+        if strange:
+            raise ValueError(f"{', '.join(strange)} under [track]: not read by method '{method}'; remove it")
+        return self
 
     @model_validator(mode="after")
     def _saved_needs_a_file(self) -> Trial:
@@ -236,12 +302,25 @@ class Trial(_Strict):
     _folder: Path = PrivateAttr(default=Path())
 
     @property
+    def has_players(self) -> bool:
+        """Whether this is a trial of players' legs, and not of one body."""
+        return bool(self.start.player)
+
+    @property
+    def players(self) -> tuple[PlayerStart, ...]:
+        """Where every player and bystander starts."""
+        return tuple(
+            PlayerStart(name=player.name, joints_m={name: np.array(place) for name, place in player.joints_m.items()})
+            for player in self.start.player
+        )
+
+    @property
     def settings(self) -> Settings:
-        """What the tracking method is told."""
+        """What the tracking method of one body is told."""
         track = self.track
         steps = zip(track.steps_mm, track.steps_deg, strict=True)
         return Settings(
-            method=track.method,
+            method=cast(Method, track.method),
             prediction=track.prediction,
             fixed_shape=track.fixed_shape,
             colour=track.colour,
@@ -255,9 +334,11 @@ class Trial(_Strict):
     def model(self) -> BodyModel:
         """Return the body; a person by preset or measurements takes its colours from the video.
 
-        Raises BodyError for an unusable body.
+        Raises BodyError for an unusable body, TrialError for players, who have none.
         """
         body = self.body
+        if body.preset == "legs":
+            raise TrialError(f'{self.name}: preset = "legs" is points of several players; this needs one whole body')
         if body.measurements is not None:
             return human18_from_measurements(self.path(body.measurements), outfit=SAMPLED)
         if body.file is not None:
@@ -295,8 +376,8 @@ def _check(path: Path, trial: Trial) -> None:
     names = [camera.name for camera in trial.camera]
     if len(set(names)) != len(names):
         raise TrialError(f"{path.name}: two cameras share a name: {', '.join(names)}; give each its own")
-    calibration = trial.calibration
-    files = [trial.body.given_file, calibration.file, calibration.control_points, *trial.start.given_files]
+    calibration, body = trial.calibration, trial.body
+    files = [body.given_file, calibration.file, calibration.control_points, trial.track.torso, *trial.start.given_files]
     for name in files:
         if name is not None and not (
             trial.path(name).is_file() or (name == trial.start.detections and trial.path(name).is_dir())

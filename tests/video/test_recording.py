@@ -167,7 +167,7 @@ def test_each_frame_is_decoded_once(tmp_path, monkeypatch):
     import airborne.video.decoding as decoding
 
     decoded = []
-    sound_frames = decoding._sound_frames
+    sound_frames = decoding.sound_frames
 
     def counting(*args, **options):
         for stamp, frame in sound_frames(*args, **options):
@@ -175,7 +175,7 @@ def test_each_frame_is_decoded_once(tmp_path, monkeypatch):
             yield stamp, frame
 
     trial = recording(clip(tmp_path / "a.mkv", 25))
-    monkeypatch.setattr(decoding, "_sound_frames", counting)
+    monkeypatch.setattr(decoding, "sound_frames", counting)
     assert len(list(trial)) == 25
     assert decoded == sorted(set(decoded))
     assert len(decoded) == 25

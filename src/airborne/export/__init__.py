@@ -1,7 +1,7 @@
 """Export: in come `Motion`, `Frames` with posed bodies, and a summary; out come what people open.
 
-Overlay videos, a sheet of what the cameras saw through the mask, figures, 3D model files, summary.json and a
-self-contained report.
+Overlay videos of a body or of players, a sheet of what the cameras saw through the mask, figures, 3D model files,
+summary.json and a self-contained report.
 Knows no search and decides nothing.
 """
 
@@ -9,6 +9,8 @@ from airborne.export.figures import write_digitised, write_errors, write_figures
 from airborne.export.matching import MatchingPicture
 from airborne.export.models import write_model
 from airborne.export.overlays import OverlayVideos
+from airborne.export.players_overlay import PlayersOverlayVideos
+from airborne.export.players_report import players_warnings, write_players_report
 from airborne.export.report import write_report
 from airborne.export.sheet import ContactSheet
 from airborne.export.summary import headline, warnings, write_json
@@ -17,13 +19,16 @@ __all__ = [
     "ContactSheet",
     "MatchingPicture",
     "OverlayVideos",
+    "PlayersOverlayVideos",
     "headline",
+    "players_warnings",
     "warnings",
     "write_digitised",
     "write_errors",
     "write_figures",
     "write_json",
     "write_model",
+    "write_players_report",
     "write_pose",
     "write_report",
     "write_score",

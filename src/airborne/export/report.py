@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +114,7 @@ def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
 
 def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
     yield page.heading(summary["name"], 1)
-    yield _status_bar(summary)
+    yield status_bar(summary)
     yield page.box("tiles", "".join(page.tile(value, name) for value, name in _tiles(summary)))
     alarms = [*warnings(summary), *summary.get("warnings", [])]
     if alarms:
@@ -137,7 +137,7 @@ def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
         yield page.heading("Method")
         yield page.table((page.label(key), value) for key, value in summary["method"].items())
     if summary.get("cameras"):
-        yield page.heading("Cameras") + _records(summary["cameras"])
+        yield page.heading("Cameras") + records(summary["cameras"])
     yield page.heading("What the numbers mean")
     of_joints = {"Joint angles": JOINT_ANGLES} if (folder / "joints.png").is_file() else {}
     uncertainty = {"Uncertainty": f"{UNCERTAINTY} {summary.get('uncertainty', '')}"}
@@ -147,7 +147,8 @@ def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
             yield page.heading(title) + page.table(summary[key].items())
 
 
-def _status_bar(head: Mapping[str, Any]) -> str:
+def status_bar(head: Mapping[str, Any]) -> str:
+    """Show how many frames have which status."""
     shares = [(head[f"n_{status}"], web(STATUS_RGB[status])) for status in Status]
     bar = "".join(f'<div style="flex: {n} 0 0; background: {colour}"></div>' for n, colour in shares)
     counts = ", ".join(f"{head[f'n_{status}']} {status}" for status in Status)
@@ -243,7 +244,8 @@ def _flight(flight: Mapping[str, Any]) -> str:
     return page.table(rows)
 
 
-def _records(records: list[Mapping[str, Any]]) -> str:
+def records(records: Sequence[Mapping[str, Any]]) -> str:
+    """Show dictionaries as the rows of a table."""
     keys = list(dict.fromkeys(key for record in records for key in record))
     rows = [[record.get(key, "") for key in keys] for record in records]
     return page.table(rows, [page.label(key) for key in keys])

@@ -1,7 +1,8 @@
 """Motion: in come `Estimate`s, out come `Motion` and its tables.
 
 Writes and reads motion.csv as a run goes; at its end motion.parquet, angles.csv and joints.csv, and of bodies with
-joints and masses joint_angles.csv and flight.csv. Knows no camera, no image and no truth.
+joints and masses joint_angles.csv and flight.csv. Of several players it writes and reads joints.csv as a run goes.
+Knows no camera, no image and no truth.
 """
 
 from airborne.motion.angles import angles
@@ -9,6 +10,7 @@ from airborne.motion.files import MotionWriter, read_estimates, read_motion
 from airborne.motion.flight import FlightSummary, flight, flight_summary, has_inertias
 from airborne.motion.joints import joint_angles, landmarks
 from airborne.motion.motion import Motion, dataset
+from airborne.motion.players import PlayersMotion, PlayersWriter, read_players, write_players_parquet
 from airborne.motion.tables import (
     write_angles,
     write_flight,
@@ -21,6 +23,8 @@ __all__ = [
     "FlightSummary",
     "Motion",
     "MotionWriter",
+    "PlayersMotion",
+    "PlayersWriter",
     "angles",
     "dataset",
     "flight",
@@ -30,9 +34,11 @@ __all__ = [
     "landmarks",
     "read_estimates",
     "read_motion",
+    "read_players",
     "write_angles",
     "write_flight",
     "write_joint_angles",
     "write_joints",
     "write_motion_parquet",
+    "write_players_parquet",
 ]

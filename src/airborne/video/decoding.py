@@ -80,27 +80,35 @@ def inspect(source: VideoSource) -> VideoFacts:
     Raises VideoError, in one line, where there is no readable video, or fields are asked of a rotated one.
     """
     with _opened(source) as (container, stream):
-        frame = next((picture for _, picture in _sound_frames(container, stream, size=None)), None)
+        frame = next((picture for _, picture in sound_frames(container, stream, size=None)), None)
         if frame is None:
             raise VideoError(f"{source.name}: no picture of {source.path} can be decoded; copy or convert it again")
-        rate = stream.average_rate or stream.guessed_rate
-        if not rate:
-            raise VideoError(f"{source.name}: {source.path} states no frame rate; convert it to a constant rate")
-        if frame.rotation % 90:
-            raise VideoError(f"{source.name}: {source.path} asks to be turned by {frame.rotation}°; only quarter turns")
-        flagged = _flagged_fields(stream, frame)
-        fields = flagged if source.fields == "auto" else source.fields
-        if fields != "progressive" and frame.rotation:
-            raise VideoError(f"{source.name}: {source.path} is both interlaced and rotated; remove its rotation tag")
-        width, height = frame.width, frame.height
-        return VideoFacts(
-            size=(height, width) if frame.rotation % 180 else (width, height),
-            frame_rate=_exact_rate(rate),
-            duration_s=_duration_s(container, stream),
-            flagged=flagged,
-            fields=fields,
-            rotation_deg=frame.rotation % 360,
-        )
+        return facts_of(source, container, stream, frame)
+
+
+def facts_of(source: VideoSource, container: InputContainer, stream: VideoStream, frame: av.VideoFrame) -> VideoFacts:
+    """Return what an opened video says of itself, given its first picture.
+
+    Raises VideoError where it states no frame rate, or fields are asked of a rotated one.
+    """
+    rate = stream.average_rate or stream.guessed_rate
+    if not rate:
+        raise VideoError(f"{source.name}: {source.path} states no frame rate; convert it to a constant rate")
+    if frame.rotation % 90:
+        raise VideoError(f"{source.name}: {source.path} asks to be turned by {frame.rotation}°; only quarter turns")
+    flagged = _flagged_fields(stream, frame)
+    fields = flagged if source.fields == "auto" else source.fields
+    if fields != "progressive" and frame.rotation:
+        raise VideoError(f"{source.name}: {source.path} is both interlaced and rotated; remove its rotation tag")
+    width, height = frame.width, frame.height
+    return VideoFacts(
+        size=(height, width) if frame.rotation % 180 else (width, height),
+        frame_rate=_exact_rate(rate),
+        duration_s=_duration_s(container, stream),
+        flagged=flagged,
+        fields=fields,
+        rotation_deg=frame.rotation % 360,
+    )
 
 
 def pictures(source: VideoSource, facts: VideoFacts) -> Generator[Picture]:
@@ -112,8 +120,8 @@ def pictures(source: VideoSource, facts: VideoFacts) -> Generator[Picture]:
     """
     with _opened(source) as (container, stream):
         tick = stream.time_base or Fraction(1, 1_000_000)
-        for n_ticks, frame in _sound_frames(container, stream, size=facts.stored_size):
-            time_s = _on_grid(n_ticks * tick, facts.frame_rate, tick)
+        for n_ticks, frame in sound_frames(container, stream, size=facts.stored_size):
+            time_s = on_grid(n_ticks * tick, facts.frame_rate, tick)
             for j, parity in enumerate(facts.parities):
                 yield Picture(time_s + j / facts.image_rate, frame, parity)
 
@@ -148,7 +156,7 @@ def _opened(source: VideoSource) -> Iterator[tuple[InputContainer, VideoStream]]
         yield container, stream
 
 
-def _sound_frames(
+def sound_frames(
     container: InputContainer, stream: VideoStream, *, size: tuple[int, int] | None
 ) -> Iterator[tuple[int, av.VideoFrame]]:
     """Yield (ticks since the first picture, frame) for every frame that is whole, and of `size` if given."""
@@ -197,7 +205,8 @@ def _exact_rate(rate: Fraction) -> Fraction:
     return broadcast if abs(broadcast - rate) < rate / 1_000_000 else rate
 
 
-def _on_grid(time_s: Fraction, rate: Fraction, tick: Fraction) -> Fraction:
+def on_grid(time_s: Fraction, rate: Fraction, tick: Fraction) -> Fraction:
+    """Put a stamp on the multiples of the frame's duration where it lies within its own resolution of one."""
     nearest = round(time_s * rate) / rate
     return nearest if abs(nearest - time_s) <= tick else time_s
 

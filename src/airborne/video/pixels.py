@@ -58,7 +58,7 @@ def field_frame(frame: av.VideoFrame, parity: int) -> av.VideoFrame:
     field = av.VideoFrame(frame.width, (frame.height - parity + 1) // 2, frame.format.name)
     field.colorspace, field.color_range = frame.colorspace, frame.color_range
     for source, target in zip(frame.planes, field.planes, strict=True):
-        _copy_rows(_rows(target), _rows(source)[parity::2])
+        _copy_rows(stored_rows(target), stored_rows(source)[parity::2])
     return field
 
 
@@ -68,11 +68,11 @@ def woven_frame(top: av.VideoFrame, bottom: av.VideoFrame) -> av.VideoFrame:
     frame.colorspace, frame.color_range = top.colorspace, top.color_range
     for parity, field in enumerate((top, bottom)):
         for source, target in zip(field.planes, frame.planes, strict=True):
-            _copy_rows(_rows(target)[parity::2], _rows(source))
+            _copy_rows(stored_rows(target)[parity::2], stored_rows(source))
     return frame
 
 
-def _rows(plane: VideoPlane) -> Image:
+def stored_rows(plane: VideoPlane) -> Image:
     """Return a plane's bytes, one stored line per row, top line first; writable."""
     rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, abs(plane.line_size))
     return rows[::-1] if plane.line_size < 0 else rows

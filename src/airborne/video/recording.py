@@ -15,6 +15,7 @@ from airborne.video.ahead import ahead
 from airborne.video.decoding import Picture, VideoFacts, VideoSource, inspect, pictures, rgb_from_picture
 from airborne.video.fields import fill_rows
 from airborne.video.frames import Frames, View
+from airborne.video.kept import KnownColours, kept_view
 from airborne.video.lens import Lens, lens_of
 
 FieldsAs = Literal["rows", "interpolated"]
@@ -36,6 +37,7 @@ class Recording:
     every: int
     start: int
     stop: int | None
+    is_lazy: bool = False
     events: list[str] = field(default_factory=list)  # what the user should know, one line each; grows while reading
 
     @property
@@ -46,10 +48,10 @@ class Recording:
     @property
     def n_frames(self) -> int | None:
         """How many `Frames` to expect by what the files promise; None where the clock's file does not say."""
-        ends = [_offset_s(s) + f.duration_s for s, f in zip(self.sources, self.facts, strict=True) if f.duration_s]
+        ends = [offset_of(s) + f.duration_s for s, f in zip(self.sources, self.facts, strict=True) if f.duration_s]
         if self.facts[0].duration_s is None:
             return None
-        n = round((max(ends) - _offset_s(self.sources[0])) * self.facts[0].image_rate)
+        n = round((max(ends) - offset_of(self.sources[0])) * self.facts[0].image_rate)
         return len(range(self.start, n if self.stop is None else min(n, self.stop), self.every))
 
     def __iter__(self) -> Generator[Frames]:
@@ -61,22 +63,27 @@ class Recording:
                 for source, facts in zip(self.sources, self.facts, strict=True)
             ]
             pool = open_files.enter_context(ThreadPoolExecutor(len(cursors)))
-            times = _clock(cursors, start_s=_offset_s(self.sources[0]), period_s=period_s)
+            known = [KnownColours(min(facts.size)) for facts in self.facts]
+            times = _clock(cursors, start_s=offset_of(self.sources[0]), period_s=period_s)
             for index, time_s in enumerate(times):
                 if self.stop is not None and index >= self.stop:
                     return
                 seen = [cursor.picture_at(time_s) for cursor in cursors]
                 if index >= self.start and (index - self.start) % self.every == 0:
-                    yield Frames(index, time_s, tuple(pool.map(self._view, seen, self.facts, lenses)))
+                    yield Frames(index, time_s, tuple(pool.map(self._view, seen, self.facts, lenses, known)))
 
     def _lenses(self, camera: Camera, facts: VideoFacts) -> dict[int | None, Lens]:
         """Return the lens of each kind of image that the file gives: whole (None), top field (0), bottom field (1)."""
         is_whole = facts.fields == "progressive" or self.fields_as == "interpolated"
         return {parity: lens_of(camera if is_whole else camera.field(parity or 0)) for parity in facts.parities}
 
-    def _view(self, picture: Picture | None, facts: VideoFacts, lenses: dict[int | None, Lens]) -> View | None:
+    def _view(
+        self, picture: Picture | None, facts: VideoFacts, lenses: dict[int | None, Lens], known: KnownColours
+    ) -> View | None:
         if picture is None:
             return None
+        if self.is_lazy:
+            return kept_view(picture, facts, lenses[picture.parity], known)
         rgb = rgb_from_picture(picture, facts)
         if picture.parity is not None and self.fields_as == "interpolated":
             rgb = fill_rows(rgb, picture.parity, facts.size[1])
@@ -84,7 +91,7 @@ class Recording:
 
     def _timed(self, source: VideoSource, facts: VideoFacts) -> Generator[Picture]:
         """Yield a camera's pictures on the trial's clock, and note every gap and an early end."""
-        period_s, offset_s = 1 / facts.image_rate, _offset_s(source)
+        period_s, offset_s = 1 / facts.image_rate, offset_of(source)
         expected_s = offset_s
         with closing(ahead(pictures(source, facts))) as stream:
             for picture in stream:
@@ -115,13 +122,15 @@ def open_recording(
     every: int = 1,
     start: int = 0,
     stop: int | None = None,
+    lazy: bool = False,
 ) -> Recording:
     """Check the cameras' videos against the calibration and return their `Recording`; only first pictures are decoded.
 
     Each camera of the rig has one source of the same name; the rig's first camera is the clock. `fields_as` says what
     becomes of the fields of interlaced files: "rows" keeps the field's own rows with a camera of that half-height
     image; "interpolated" keeps the full height and fills the missing rows from their neighbours (rigid-body tracking
-    paper), with the camera unchanged. Of the clock's images `start, start + every, ...` below `stop` are read.
+    paper), with the camera unchanged. Of the clock's images `start, start + every, ...` below `stop` are read. With
+    `lazy` a picture is converted only where somebody looks: `View.crop`; it goes with "rows".
 
     Raises VideoError where a file cannot be read, a size differs from the calibration's, or names do not match.
     """
@@ -129,6 +138,8 @@ def open_recording(
         raise VideoError(f"fields_as = '{fields_as}' is not known; use one of: {', '.join(get_args(FieldsAs))}")
     if every < 1 or start < 0 or (stop is not None and stop <= start):
         raise VideoError(f"every = {every}, start = {start}, stop = {stop}; expected every >= 1 and 0 <= start < stop")
+    if lazy and fields_as != "rows":
+        raise VideoError('a lazy recording reads fields as their own rows; use fields_as = "rows"')
     by_name = {source.name: source for source in sources}
     if len(by_name) != len(sources) or set(by_name) != set(rig.names):
         given = ", ".join(source.name for source in sources) or "none"
@@ -137,16 +148,21 @@ def open_recording(
         )
     ordered = tuple(by_name[name] for name in rig.names)
     facts = tuple(inspect(source) for source in ordered)
-    for source, camera, fact in zip(ordered, rig, facts, strict=True):
+    check_sizes(ordered, rig, facts)
+    recording = Recording(ordered, facts, rig, fields_as, every, start, stop, lazy)
+    recording.events.extend(_notes(ordered, facts))
+    return recording
+
+
+def check_sizes(sources: Sequence[VideoSource], rig: Rig, facts: Sequence[VideoFacts]) -> None:
+    """Raise VideoError where a video's pictures have another size than its camera's in the calibration."""
+    for source, camera, fact in zip(sources, rig, facts, strict=True):
         if fact.size != tuple(camera.size):
             found, expected = ("×".join(map(str, size)) for size in (fact.size, camera.size))
             raise VideoError(
                 f"{source.name}: {source.path} is {found} px, but the calibration's camera is {expected} px; "
                 "give the video that was calibrated, or the calibration of this size"
             )
-    recording = Recording(ordered, facts, rig, fields_as, every, start, stop)
-    recording.events.extend(_notes(ordered, facts))
-    return recording
 
 
 def _notes(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> Iterator[str]:
@@ -157,7 +173,7 @@ def _notes(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> Itera
             yield f"{source.name}: read as {fact.fields}, though the file's flags say {fact.flagged}"
 
 
-def _offset_s(source: VideoSource) -> Fraction:
+def offset_of(source: VideoSource) -> Fraction:
     """Return the offset as the decimal number that was written, not as its nearest binary one."""
     return Fraction(str(source.offset_s))
 

@@ -1,0 +1,153 @@
+"""Parts of decoded frames to sRGB, without converting the rest: colours as `airborne.video.pixels` has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import av
+import numpy as np
+from av.video.reformatter import ColorRange, Colorspace
+from numba import njit
+from numpy.typing import NDArray
+
+from airborne.video.frames import Box
+from airborne.video.pixels import UNSPECIFIED, Image, matrix_for, rgb_from_frame, stored_rows
+
+ROWS_A_CHROMA = {"yuv420p": 2, "yuvj420p": 2, "yuv422p": 1, "yuvj422p": 1}  # planar, 8 bits, half as wide in colour
+LUMA_WEIGHTS = {  # red's and blue's share of the luma: BT.709, and BT.601 under its two tags
+    Colorspace.ITU709: (0.2126, 0.0722),
+    Colorspace.ITU601: (0.299, 0.114),
+    6: (0.299, 0.114),
+}
+SITINGS = ((0, 2), (1, 1))  # quarters of the neighbour's chroma: at even and at odd places
+PROBE_PX = 32
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Colours:
+    """How one kind of frame turns into sRGB."""
+
+    scale: NDArray[np.float32]  # (6,) black; factors of luma, red by V, green by U and by V, blue by U
+    siting_x: tuple[int, int]  # of SITINGS
+    siting_y: tuple[int, int]
+    rows_a_chroma: int  # rows of luma to one of chroma
+
+
+def colours_of(frame: av.VideoFrame, *, short_side: int) -> Colours | None:
+    """Find how the parts of frames like this one turn into sRGB; None where only a whole frame can be converted.
+
+    A frame does not say where its chroma lies, so a small frame of its kind is converted whole, as `rgb_from_frame`
+    does it; parts come out equal within one grey level. short_side [px]: that of the recording.
+    """
+    rows_a_chroma = ROWS_A_CHROMA.get(frame.format.name)
+    matrix = matrix_for(short_side) if frame.colorspace == UNSPECIFIED else frame.colorspace
+    if rows_a_chroma is None or matrix not in LUMA_WEIGHTS:
+        return None
+    is_full = frame.color_range == ColorRange.JPEG or frame.format.name.startswith("yuvj")
+    scale = _scale(*LUMA_WEIGHTS[matrix], is_full=is_full)
+    probe = frame.reformat(width=PROBE_PX, height=PROBE_PX, threads=1)  # with all that the frame says of itself
+    rng = np.random.default_rng(0)
+    for plane in probe.planes:
+        rows = stored_rows(plane)
+        rows[:] = rng.integers(64, 192, rows.shape)
+    expected = rgb_from_frame(probe, short_side=short_side).astype(int)
+    for siting_x, siting_y in product(SITINGS, SITINGS):
+        colours = Colours(scale, siting_x, siting_y, rows_a_chroma)
+        found = rgb_from_part(probe, colours, (0, 0, PROBE_PX, PROBE_PX))
+        if np.abs(found - expected).max() <= 1:
+            return colours
+    return None
+
+
+def rgb_from_part(frame: av.VideoFrame, colours: Colours, box: Box) -> Image:
+    """Convert the part of a frame in a box that lies in it to sRGB: (y1 - y0, x1 - x0, 3)."""
+    x0, y0, x1, y1 = box
+    rgb = np.empty((y1 - y0, x1 - x0, 3), np.uint8)
+    y, u, v = (np.ascontiguousarray(stored_rows(plane)) for plane in frame.planes)
+    sitings = (colours.siting_x, colours.siting_y)
+    _convert(y, u, v, frame.planes[1].width, colours.scale, sitings, colours.rows_a_chroma, x0, y0, rgb)
+    return rgb
+
+
+def _scale(red: float, blue: float, *, is_full: bool) -> NDArray[np.float32]:
+    black, luma, chroma = (0, 1.0, 1.0) if is_full else (16, 255 / 219, 255 / 224)
+    green = 1 - red - blue
+    of_v, of_u = 2 * (1 - red) * chroma, 2 * (1 - blue) * chroma
+    return np.array([black, luma, of_v, of_u * blue / green, of_v * red / green, of_u], np.float32)
+
+
+@njit(nogil=True, cache=True)
+def _convert(
+    y: NDArray[np.uint8],
+    u: NDArray[np.uint8],
+    v: NDArray[np.uint8],
+    chroma_width: int,
+    scale: NDArray[np.float32],
+    sitings: tuple[tuple[int, int], tuple[int, int]],
+    rows_a_chroma: int,
+    x0: int,
+    y0: int,
+    rgb: NDArray[np.uint8],
+) -> None:
+    """Fill rgb (h, w, 3) with the part that begins at x0, y0 of planes whose rows may be padded."""
+    black, k_y, k_rv, k_gu, k_gv, k_bu = scale
+    height, width = rgb.shape[:2]
+    half, low, high = np.float32(0.5), np.float32(0), np.float32(255)
+    first = x0 // 2
+    n = (x0 + width - 1) // 2 - first + 1
+    mixed = np.empty(n + 2, np.float32)
+    chroma_u, chroma_v = np.empty(2 * n, np.float32), np.empty(2 * n, np.float32)
+    red, green, blue = np.empty(width, np.uint8), np.empty(width, np.uint8), np.empty(width, np.uint8)
+    for row in range(height):
+        a, b, share = _rows_around(y0 + row, u.shape[0], sitings[1], rows_a_chroma)
+        _spread(u[a], u[b], share, sitings[0], first, chroma_width, mixed, chroma_u)
+        _spread(v[a], v[b], share, sitings[0], first, chroma_width, mixed, chroma_v)
+        of_u, of_v = chroma_u[x0 % 2 : x0 % 2 + width], chroma_v[x0 % 2 : x0 % 2 + width]
+        luma = y[y0 + row, x0 : x0 + width]
+        for i in range(width):
+            light = k_y * (np.float32(luma[i]) - black) + half
+            red[i] = np.uint8(min(max(light + k_rv * of_v[i], low), high))
+            green[i] = np.uint8(min(max(light - k_gu * of_u[i] - k_gv * of_v[i], low), high))
+            blue[i] = np.uint8(min(max(light + k_bu * of_u[i], low), high))
+        for i in range(width):
+            rgb[row, i, 0], rgb[row, i, 1], rgb[row, i, 2] = red[i], green[i], blue[i]
+
+
+@njit(nogil=True, cache=True)
+def _rows_around(row: int, n: int, siting: tuple[int, int], rows_a_chroma: int) -> tuple[int, int, np.float32]:
+    """Return the two rows of chroma around a row of luma, and the second one's share."""
+    if rows_a_chroma == 1:
+        return row, row, np.float32(0)
+    j, is_odd = row // 2, row % 2
+    return j, min(max(j + 2 * is_odd - 1, 0), n - 1), np.float32(siting[is_odd] / 4)
+
+
+@njit(nogil=True, cache=True)
+def _spread(
+    near: NDArray[np.uint8],
+    far: NDArray[np.uint8],
+    share: np.float32,
+    siting: tuple[int, int],
+    first: int,
+    width: int,
+    mixed: NDArray[np.float32],
+    chroma: NDArray[np.float32],
+) -> None:
+    """Interpolate the chroma of two rows, zero for grey, to every pixel from column 2 first on: chroma (2 n,).
+
+    mixed (n + 2,) is room to work in.
+    """
+    rest, grey = np.float32(1) - share, np.float32(128)
+    n = len(mixed) - 2
+    a, b, middle = near[first : first + n], far[first : first + n], mixed[1 : n + 1]
+    for j in range(n):
+        middle[j] = rest * np.float32(a[j]) + share * np.float32(b[j]) - grey
+    before, after = max(first - 1, 0), min(first + n, width - 1)
+    mixed[0] = rest * np.float32(near[before]) + share * np.float32(far[before]) - grey
+    mixed[n + 1] = rest * np.float32(near[after]) + share * np.float32(far[after]) - grey
+    left, right = mixed[:n], mixed[2 : n + 2]
+    even, odd = np.float32(siting[0] / 4), np.float32(siting[1] / 4)
+    for j in range(n):
+        chroma[2 * j] = middle[j] + even * (left[j] - middle[j])
+        chroma[2 * j + 1] = middle[j] + odd * (right[j] - middle[j])

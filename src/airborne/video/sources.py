@@ -1,0 +1,98 @@
+"""Opening live pictures: pipes, capture devices, and files played at their own speed."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event
+from typing import Literal
+
+import av
+from av.container import InputContainer
+from av.error import FFmpegError
+from av.video.stream import VideoStream
+
+from airborne.errors import VideoError
+from airborne.video.decoding import VideoSource
+
+Kind = Literal["file", "pipe", "device"]
+
+STDIN = "-"
+LOOK_S = 0.1  # how often a waiting reader looks whether it should stop
+_PROBE = {"probesize": "1000000", "analyzeduration": "500000"}  # begin soon
+
+
+def kind_of(source: VideoSource) -> Kind:
+    """Say what a live source is; raises VideoError where there is nothing."""
+    path = Path(source.path)
+    if path.name == STDIN or path.is_fifo():
+        return "pipe"
+    if path.is_char_device():
+        return "device"
+    if path.is_file():
+        return "file"
+    raise VideoError(f"{source.name}: {path} is no file, pipe or capture device; check its path")
+
+
+@contextmanager
+def opened_live(source: VideoSource, stop: Event) -> Iterator[tuple[InputContainer, VideoStream]]:
+    """Open a live source and yield its container and video stream; reading ends early once `stop` is set.
+
+    Raises VideoError where there are no pictures.
+    """
+    kind = kind_of(source)
+    pipe = None
+    try:
+        if kind == "pipe":
+            pipe = _Pipe(source, stop)
+            container = av.open(pipe, "r", container_options=_PROBE)
+        elif kind == "device":
+            container = av.open(str(source.path), "r", format="v4l2")
+        else:
+            container = av.open(source.path, "r")
+    except (FFmpegError, OSError, ValueError) as error:
+        if pipe is not None:
+            pipe.close()
+        said = getattr(error, "strerror", None) or error
+        raise VideoError(
+            f"{source.name}: no pictures come from {source.path} ({said}); check what sends them"
+        ) from error
+    try:
+        with container:
+            if not container.streams.video:
+                raise VideoError(f"{source.name}: what comes from {source.path} holds no video; send a video stream")
+            stream = container.streams.video[0]
+            stream.thread_type = "NONE"
+            yield container, stream
+    finally:
+        if pipe is not None:
+            pipe.close()
+
+
+class _Pipe:
+    """A pipe, or the standard input, that FFmpeg reads from and that can be left at any time."""
+
+    def __init__(self, source: VideoSource, stop: Event) -> None:
+        is_stdin = Path(source.path).name == STDIN
+        self._stop = stop
+        self._file = sys.stdin.fileno() if is_stdin else os.open(source.path, os.O_RDONLY | os.O_NONBLOCK)
+        self._is_own = not is_stdin
+        self._poll = select.poll()
+        self._poll.register(self._file, select.POLLIN | select.POLLHUP)
+
+    def read(self, n: int) -> bytes:
+        """Wait for up to n bytes; none at the end, and once told to stop."""
+        while not self._stop.is_set():
+            if self._poll.poll(LOOK_S * 1000):
+                return os.read(self._file, n)
+        return b""
+
+    def close(self) -> None:
+        """Let the writer know that nobody reads any more."""
+        if self._is_own:
+            os.close(self._file)
+            self._is_own = False

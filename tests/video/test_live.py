@@ -1,0 +1,228 @@
+"""Live pictures: the newest of each camera, matched in time; late ones are dropped and counted, never queued."""
+
+import os
+import threading
+import time
+from contextlib import contextmanager, suppress
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+
+from airborne.cameras import Rig
+from airborne.errors import VideoError
+from airborne.video import VideoSource, connected, live_recording
+from airborne.video.live import PATIENCE_S
+from airborne.video.pixels import frame_from_rgb
+from airborne.video.regions import colours_of
+from tests.video.clips import numbered, plain_camera, plain_rig, write_clip
+
+SIZE = (64, 48)
+RATE = 50
+NAMES = ("cam1", "cam2", "cam3")
+OPTIONS = {"mpegts": {"flush_packets": "1"}, "matroska": {"cluster_time_limit": "10", "flush_packets": "1"}}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled():
+    """Load what converts pictures, which takes longer than any picture waits."""
+    colours_of(frame_from_rgb(np.zeros((48, 64, 3), np.uint8), short_side=48), short_side=48)
+
+
+def level_of(k):
+    """The grey level of a picture, coarse enough to come through a codec, for up to 55 pictures."""
+    return 20 + 4 * (k % 56)
+
+
+class Sender(threading.Thread):
+    """Writes numbered pictures into a pipe at their own speed."""
+
+    def __init__(self, path, n, *, container="mpegts", silent=(), gone_after=None):
+        super().__init__(daemon=True)
+        self.path, self.n, self.container = path, n, container
+        self.silent, self.gone_after = silent, gone_after  # numbers that are not sent; last one sent
+
+    def run(self):
+        with suppress(OSError), open(self.path, "wb", buffering=0) as pipe:
+            container = av.open(pipe, "w", format=self.container, options=OPTIONS[self.container])
+            stream = container.add_stream("mpeg2video", rate=RATE, options={"qmin": "1", "qmax": "2", "g": "1"})
+            stream.width, stream.height = SIZE
+            stream.pix_fmt = "yuv420p"
+            begun_s = time.monotonic()
+            for k in range(self.n):
+                time.sleep(max(begun_s + k / RATE - time.monotonic(), 0))
+                if self.gone_after is not None and k > self.gone_after:
+                    break
+                if k in self.silent:
+                    continue
+                frame = av.VideoFrame.from_ndarray(np.full((SIZE[1], SIZE[0], 3), level_of(k), np.uint8))
+                frame.pts, frame.time_base = k, Fraction(1, RATE)
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode(None))
+            with suppress(OSError):
+                container.close()
+
+
+@contextmanager
+def piped(folder, n, names=NAMES, rig=None, **of_camera):
+    """Recordings from a pipe a camera; `of_camera` holds what is special about one's sender."""
+    for name in names:
+        os.mkfifo(folder / name)
+    senders = [Sender(folder / name, n, **of_camera.get(name, {})) for name in names]
+    for sender in senders:
+        sender.start()
+    with connected([VideoSource(name, folder / name) for name in names]) as cameras:
+        yield live_recording(cameras, rig or plain_rig(*names))
+    for sender in senders:
+        sender.join(5)
+        assert not sender.is_alive()
+
+
+def shown(frames):
+    """The numbers of the pictures of one time."""
+    levels = [None if view is None else int(view.crop((5, 5, 6, 6))[0, 0, 0]) for view in frames.views]
+    return [None if level is None else round((level - level_of(0)) / 4) for level in levels]
+
+
+def counted(recording):
+    return {each["name"]: (each["n_received"], each["n_used"], each["n_dropped"]) for each in recording.dropped()}
+
+
+@pytest.mark.parametrize("container", ["mpegts", "matroska"])
+def test_pictures_of_one_time_come_together_and_in_order(tmp_path, container):
+    with piped(tmp_path, 40, **{name: {"container": container} for name in NAMES}) as recording:
+        assert recording.rate == RATE
+        seen = [(frames.index, frames.time_s, shown(frames)) for frames in recording]
+        counts = counted(recording)
+    indices = [index for index, *_ in seen]
+    assert indices == sorted(set(indices)) and indices[0] == 0 and indices[-1] == 39
+    whole = [numbers for _, _, numbers in seen if None not in numbers]
+    assert len(whole) >= 0.9 * len(seen)
+    for index, time_s, numbers in seen:
+        assert abs(time_s - Fraction(index, RATE)) < Fraction(1, 2 * RATE)
+        assert {number for number in numbers if number is not None} <= {index - 1, index, index + 1}
+        assert sum(number == index for number in numbers) >= 1
+    for k, name in enumerate(NAMES):
+        n_used = sum(numbers[k] is not None for *_, numbers in seen)
+        assert counts[name] == (40, n_used, 40 - n_used)
+
+
+def test_a_slow_tracker_drops_pictures_and_falls_behind_by_no_more_than_its_own_time(tmp_path):
+    step_s, delays_s = 0.09, []
+    with piped(tmp_path, 60) as recording:
+        for frames in recording:
+            delays_s.append(time.monotonic() - recording.arrived_s)
+            last = frames.index
+            time.sleep(step_s)
+        counts = counted(recording)
+    assert last >= 58
+    for n_received, n_used, n_dropped in counts.values():
+        assert n_received == 60 == n_used + n_dropped
+        assert n_dropped > 60 / 2
+        assert 4 <= n_used <= 60 / RATE / step_s + 3
+    assert max(delays_s) < 2 * PATIENCE_S
+    assert np.median(delays_s) < 2 / RATE
+
+
+def test_a_camera_that_goes_quiet_is_waited_for_once_and_then_missed(tmp_path):
+    with piped(tmp_path, 100, cam2={"silent": range(40, 100)}) as recording:
+        seen, gaps_s, before_s = [], [], time.monotonic()
+        for frames in recording:
+            gaps_s.append(time.monotonic() - before_s)
+            before_s = time.monotonic()
+            seen.append((frames.index, shown(frames)))
+    late = [numbers for index, numbers in seen if index >= 58]
+    assert len(late) > 15
+    assert all(numbers[1] is None and numbers[0] is not None and numbers[2] is not None for numbers in late)
+    assert max(gaps_s[1:]) < 2 * PATIENCE_S
+
+
+def test_cameras_that_end_early_leave_the_others_even_if_one_was_the_clock(tmp_path):
+    with piped(tmp_path, 40, cam1={"gone_after": 12}) as recording:
+        seen = {frames.index: shown(frames) for frames in recording}
+    assert max(seen) == 39
+    assert all(numbers[0] is None for index, numbers in seen.items() if index > 14)
+    assert all(numbers[1] is not None for index, numbers in seen.items() if index > 14)
+
+
+def test_files_play_at_their_own_speed_and_nothing_is_missed_while_the_first_pictures_are_looked_at(tmp_path):
+    sources = [VideoSource(name, write_clip(tmp_path / f"{name}.mkv", numbered(20))) for name in NAMES[:2]]
+    with connected(sources) as cameras:
+        recording = live_recording(cameras, plain_rig(*NAMES[:2]))
+        frames = iter(recording)
+        assert next(frames).index == 0
+        time.sleep(0.3)  # as a tracker does that compiles at its first step
+        begun_s = time.monotonic()
+        rest = [each.index for each in frames]
+        taken_s = time.monotonic() - begun_s
+    assert 0.9 * 19 / 50 <= taken_s < 3
+    assert rest[0] <= 3 and rest[-1] == 19
+
+
+def test_offsets_move_a_cameras_times(tmp_path):
+    clip = write_clip(tmp_path / "clip.mkv", numbered(30))
+    sources = [VideoSource("cam1", clip), VideoSource("cam2", clip, offset_s=0.1)]
+    with connected(sources) as cameras:
+        pairs = [
+            [round(int(view.rgb[5, 5, 0]) / 2) for view in frames.views]
+            for frames in live_recording(cameras, plain_rig("cam1", "cam2"))
+            if None not in frames.views
+        ]
+    assert len(pairs) >= 5 and all(first - second == 5 for first, second in pairs)
+
+
+def test_start_every_and_stop_choose_frames(tmp_path):
+    sources = [VideoSource("cam1", write_clip(tmp_path / "cam1.mkv", numbered(30)))]
+    with connected(sources) as cameras:
+        recording = live_recording(cameras, plain_rig("cam1"), start=4, every=3, stop=20)
+        indices = [frames.index for frames in recording]
+    assert set(indices) <= set(range(4, 20, 3)) and len(indices) >= 3
+    assert recording.rate == Fraction(50, 3)
+
+
+def test_leaving_early_lets_the_senders_go(tmp_path):
+    n_threads = threading.active_count()
+    with piped(tmp_path, 500) as recording:
+        for frames in recording:
+            if frames.index > 3:
+                break
+    assert threading.active_count() == n_threads
+
+
+def test_waiting_for_pictures_is_told_and_can_be_interrupted(tmp_path):
+    os.mkfifo(tmp_path / "cam1")
+    told = []
+
+    def waiting():
+        told.append(1)
+        if len(told) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), connected([VideoSource("cam1", tmp_path / "cam1")], waiting):
+        pass
+    assert len(told) == 3
+
+
+@pytest.mark.parametrize(
+    ("sources", "said"),
+    [
+        ([("cam1", "nowhere", "progressive")], "is no file, pipe or capture device"),
+        ([("cam1", "clip.mkv", "top-first")], "live pictures are read as whole frames"),
+        ([("cam1", "pipe", "progressive"), ("cam2", "pipe", "progressive")], "two cameras read from"),
+        ([("cam1", "text", "progressive")], "no pictures come from"),
+    ],
+)
+def test_what_gives_no_pictures_is_refused_in_one_line(tmp_path, sources, said):
+    write_clip(tmp_path / "clip.mkv", numbered(3))
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "text").write_text("no video")
+    with pytest.raises(VideoError) as caught, connected([VideoSource(n, tmp_path / p, f) for n, p, f in sources]):
+        pass
+    assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_camera_of_another_size_is_refused(tmp_path):
+    sources = [VideoSource("cam1", write_clip(tmp_path / "cam1.mkv", numbered(3)))]
+    with connected(sources) as cameras, pytest.raises(VideoError, match="64×48 px, but the calibration's"):
+        live_recording(cameras, Rig((plain_camera(size=(80, 60)),)))

@@ -1,0 +1,53 @@
+"""Cameras that show nothing are told with their frames."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from airborne.video import Frames, Outages, View
+from airborne.video.outages import DARK_GREY, LISTED, is_dark
+from tests.video.clips import plain_camera
+
+
+def view(level):
+    camera = plain_camera()
+    return View(camera, np.full((camera.size[1], camera.size[0], 3), level, np.uint8))
+
+
+def told(levels, step=1):
+    """What is said of a first camera that shows these levels (None: no picture), beside a sound one."""
+    outages = Outages(("left", "right"))
+    for k, level in enumerate(levels):
+        views = (None if level is None else view(level), view(90))
+        outages.add(Frames(step * k, Fraction(k, 50), views))
+    return list(outages.described())
+
+
+def test_nothing_is_said_of_cameras_that_show_something():
+    assert told([90, 200, DARK_GREY]) == []
+
+
+def test_missing_and_dark_pictures_are_told_by_camera_and_frames():
+    assert told([90, None, None, 90, 3, 90, None]) == [
+        "left: no picture at 3 of 7 frames: frames 1 to 2, 6",
+        "left: dark at 1 of 7 frames: frame 4",
+    ]
+
+
+def test_frames_that_are_left_out_on_purpose_make_no_new_stretch():
+    assert told([90, None, None, None], step=3) == ["left: no picture at 3 of 4 frames: frames 3 to 9"]
+
+
+@pytest.mark.parametrize("n", [40, 4000])
+def test_what_is_said_and_kept_does_not_grow_with_the_run(n):
+    (said,) = told([None if k % 2 else 90 for k in range(n)])
+    assert said.startswith(f"left: no picture at {n // 2} of {n} frames: frames 1, 3, 5, 7, 9 and")
+    assert said.endswith(f"{n // 2 - LISTED} more times")
+
+
+def test_a_dark_picture_with_a_bright_corner_is_not_dark():
+    shown = view(0)
+    assert is_dark(shown)
+    shown.rgb[-4:, -4:] = 200
+    assert not is_dark(shown)
