@@ -36,7 +36,7 @@ LIMITS_RAD = np.radians(  # (18, 2) least and greatest; the right leg mirrors y 
     + list(_LEG_LIMITS_DEG)
     + [tuple(-x for x in limits[::-1]) if i in (1, 2) else limits for i, limits in enumerate(_LEG_LIMITS_DEG)]
 )
-_KERNEL: dict[str, Any] = {"nogil": True, "fastmath": True, "error_model": "numpy", "cache": True}
+_KERNEL: dict[str, Any] = {"nogil": True, "error_model": "numpy", "cache": True}
 
 
 # the two kinds and the leg (0 trunk, 1 left, 2 right) of each capsule

@@ -1,17 +1,20 @@
 """Evidence under the outline of tapered capsules: one pose of a person in one picture, without visiting its pixels.
 
 A capsule is the hull of two balls; in the picture, of two discs. Its outline in a row is a span; the sum of a map over
-a span is the difference of two running sums along that row. Where capsules overlap, the nearer one owns the pixels. Along
-its axis a capsule may change from one map to another (shorts to skin). How the sum changes as the discs move is read
-off at the ends of the spans: only there, and at the border between its two maps, pixels change hands.
+a span is the difference of two running sums along that row. Where capsules overlap, the nearer one owns the pixels.
+Along its axis a capsule may change from one map to another (shorts to skin). How the sum changes as the discs move is
+read off at the ends of the spans: only there, and at the border between its two maps, pixels change hands.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
-from airborne.rendering.shapes import KERNEL
+# no fast maths: sums keep their order, so that a run is the same to the last bit however the code was compiled
+EXACT: dict[str, Any] = {"nogil": True, "error_model": "numpy", "cache": True}
 
 MOST_SPANS = 64  # capsules in one row
 BEHIND = 1e9  # depth of what is not in front of the camera [m]
@@ -19,7 +22,7 @@ _MOST_SLOPE = 4.0  # of an edge that a row cuts: flatter ones are seen at their 
 _BORDER_SAMPLES = 5
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def running_sums(maps, out):
     """Fill out (k, h, w + 1) with the sums of maps (k, h, w) over all pixels to the left of each pixel's left side."""
     k, h, w = maps.shape
@@ -32,7 +35,7 @@ def running_sums(maps, out):
                 out[c, y, x + 1] = total
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def project(ends, radii, camera, discs, depth):
     """Project capsules: ends (n, 2, 3) world [m], radii (n, 2) [m], camera (4, 4): K [R t], then the focal length [px].
 
@@ -54,12 +57,12 @@ def project(ends, radii, camera, discs, depth):
         depth[i] = mean if nearest > 0.1 else BEHIND
 
 
-@njit(**KERNEL)
-def outline(disc_a, disc_b, y_first, x, dx):
+@njit(**EXACT)
+def outline(disc_a, disc_b, y_first, x, tangents):
     """Outline the hull of two discs (x, y, radius) [px] in rows at y_first, y_first + 1, ...
 
-    Fills x (2, rows), where it begins and ends in each row, and dx (2, rows, 6), how these move with (x, y, radius) of
-    disc a, then of disc b. Returns the first and one past the last row that is met.
+    Fills x (2, rows), where it begins and ends in each row, and tangents (2, 8), what `_motion` takes of either side.
+    Returns the first and one past the last row that is met.
     """
     n = x.shape[1]
     top = min(disc_a[1] - disc_a[2], disc_b[1] - disc_b[2])
@@ -75,7 +78,8 @@ def outline(disc_a, disc_b, y_first, x, dx):
     for side in range(2):
         outward = 2.0 * side - 1.0
         high, low, ax, ay, slope, nx, ny, length = BEHIND, BEHIND, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0
-        a_is_upper = dr > 0
+        upper = 0.0 if dr > 0 else 1.0
+        lower = upper
         if not is_one:  # the common tangent on this side
             sign = 1.0 if (side == 0) == (uy > 0) else -1.0
             nx, ny = ux * cosine - sign * uy * sine, uy * cosine + sign * ux * sine
@@ -83,37 +87,53 @@ def outline(disc_a, disc_b, y_first, x, dx):
             bx, by = disc_b[0] + disc_b[2] * nx, disc_b[1] + disc_b[2] * ny
             length = by - ay
             slope = (bx - ax) / length if abs(length) > 1e-9 else 0.0
-            a_is_upper = ay < by
+            upper, lower = (0.0, 1.0) if ay < by else (1.0, 0.0)
             high, low = min(ay, by), max(ay, by)
-        for i in range(first, last):
-            y = y_first + i
-            if high <= y <= low:
-                t = (y - ay) / length if abs(length) > 1e-9 else 0.5
-                x[side, i] = ax + slope * (y - ay)
-                steep = min(max(slope, -_MOST_SLOPE), _MOST_SLOPE)
-                along = nx - steep * ny  # what a larger radius does
-                dx[side, i, 0], dx[side, i, 1], dx[side, i, 2] = 1 - t, -steep * (1 - t), along * (1 - t)
-                dx[side, i, 3], dx[side, i, 4], dx[side, i, 5] = t, -steep * t, along * t
-                continue
-            at_a = a_is_upper == (y < high) if not is_one else a_is_upper
-            disc, k = (disc_a, 0) if at_a else (disc_b, 3)
-            dy = y - disc[1]
-            h = np.sqrt(max(disc[2] * disc[2] - dy * dy, 0.0))
-            x[side, i] = disc[0] + outward * h
-            h = max(h, disc[2] / _MOST_SLOPE, 1e-6)
-            dx[side, i, :] = 0
-            dx[side, i, k], dx[side, i, k + 1], dx[side, i, k + 2] = 1, outward * dy / h, outward * disc[2] / h
+        for k, value in enumerate((high, low, ay, slope, nx, ny, length, upper)):
+            tangents[side, k] = value
+        in_tangent = int(min(max(np.ceil(high - y_first), first), last))
+        after_tangent = int(min(max(np.floor(low - y_first) + 1, in_tangent), last))
+        _cap(disc_a if upper == 0 else disc_b, y_first, outward, first, in_tangent, x[side])
+        for i in range(in_tangent, after_tangent):
+            x[side, i] = ax + slope * (y_first + i - ay)
+        _cap(disc_a if lower == 0 else disc_b, y_first, outward, after_tangent, last, x[side])
     return first, last
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
+def _cap(disc, y_first, outward, start, stop, x):
+    for i in range(start, stop):
+        dy = y_first + i - disc[1]
+        x[i] = disc[0] + outward * np.sqrt(max(disc[2] * disc[2] - dy * dy, 0.0))
+
+
+@njit(**EXACT)
+def _motion(disc_a, disc_b, tangent, y, outward, dx):
+    """Fill dx (6,) with how a side of an outline moves in a row, by (x, y, radius) of disc a, then of disc b."""
+    high, low, ay, slope, nx, ny, length, upper = tangent
+    if high <= y <= low:
+        t = (y - ay) / length if abs(length) > 1e-9 else 0.5
+        steep = min(max(slope, -_MOST_SLOPE), _MOST_SLOPE)
+        along = nx - steep * ny  # what a larger radius does
+        dx[0], dx[1], dx[2] = 1 - t, -steep * (1 - t), along * (1 - t)
+        dx[3], dx[4], dx[5] = t, -steep * t, along * t
+        return
+    at_a = (upper == 0) == (y < high) or (high == BEHIND and upper == 0)
+    disc, k = (disc_a, 0) if at_a else (disc_b, 3)
+    dy = y - disc[1]
+    h = max(np.sqrt(max(disc[2] * disc[2] - dy * dy, 0.0)), disc[2] / _MOST_SLOPE, 1e-6)
+    dx[:] = 0
+    dx[k], dx[k + 1], dx[k + 2] = 1, outward * dy / h, outward * disc[2] / h
+
+
+@njit(**EXACT)
 def _read(row, x):
     """Read running sums between pixels: pixel i reaches from i - 0.5 to i + 0.5."""
     i = int(x + np.float32(0.5))
     return row[i] + (x + np.float32(0.5) - i) * (row[i + 1] - row[i])
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def _value(row, x):
     """Read the map itself from its running sums: linear between the pixels' middles."""
     i = int(x)
@@ -121,16 +141,16 @@ def _value(row, x):
     return (1 - f) * (row[i + 1] - row[i]) + f * (row[i + 2] - row[i + 1])
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def evidence(discs, depth, kinds, share, sums, origin, work, out, gradient, curvature):
     """Add up maps under the capsules, and how the sum changes as their discs move.
 
     discs (n, 2, 3) and depth (n,) as `project` gives them, in the pixels of the maps; kinds (n, 2) the map at either
     end of each capsule and share (n,) how far along its axis the first one reaches; sums (k, h, w + 1) running sums of
     the maps over a region whose first pixel is origin (x, y). What lies outside the region counts nothing. work is
-    x (n, 2, h) and dx (n, 2, h, 6). Fills out (n, 2, 2), the sum and the area [px] that each capsule owns of its first
-    and its second map; and if gradient (n, 7) is not empty, that and curvature (n, 7, 7), which is what a map that
-    falls by one per pixel across every edge would have, by (x, y, radius) of both discs and the share.
+    x (n, 2, h) and tangents (n, 2, 8). Fills out (n, 2, 2), the sum and the area [px] that each capsule owns of its
+    first and its second map; and if gradient (n, 7) is not empty, that and curvature (n, 7, 7), which is what a map
+    that falls by one per pixel across every edge would have, by (x, y, radius) of both discs and the share.
     """
     n, (_, h, w) = len(discs), sums.shape
     with_gradient = len(gradient) > 0
@@ -138,10 +158,11 @@ def evidence(discs, depth, kinds, share, sums, origin, work, out, gradient, curv
     out[:], gradient[:], curvature[:] = 0, 0, 0
     first, last = np.zeros(n, np.int64), np.zeros(n, np.int64)
     top, bottom = h, 0
-    x, dx = work
+    x, tangents = work
+    dx = np.empty(6)
     for i in range(n):
         if depth[i] < BEHIND:
-            first[i], last[i] = outline(discs[i, 0], discs[i, 1], origin[1], x[i], dx[i])
+            first[i], last[i] = outline(discs[i, 0], discs[i, 1], origin[1], x[i], tangents[i])
             if last[i] > first[i]:
                 top, bottom = min(top, first[i]), max(bottom, last[i])
     taken_x, taken_by = np.empty((MOST_SPANS, 2), np.float32), np.empty((MOST_SPANS, 2), np.int64)
@@ -171,23 +192,28 @@ def evidence(discs, depth, kinds, share, sums, origin, work, out, gradient, curv
                         who, side = (i, 0) if from_k < 0 else (taken_by[from_k, 1], 1)
                         if at > least:
                             value = _at_edge(map_0, map_1, at, cut, weight, split)
-                            _pull(dx[who, side, row], -value, gradient[who], curvature[who])
+                            _motion(discs[who, 0], discs[who, 1], tangents[who, side], y, 2.0 * side - 1.0, dx)
+                            _pull(dx, -value, gradient[who], curvature[who])
                         who, side = (i, 1) if is_open else (taken_by[k, 0], 0)
                         if end < most:
                             value = _at_edge(map_0, map_1, end, cut, weight, split)
-                            _pull(dx[who, side, row], value, gradient[who], curvature[who])
+                            _motion(discs[who, 0], discs[who, 1], tangents[who, side], y, 2.0 * side - 1.0, dx)
+                            _pull(dx, value, gradient[who], curvature[who])
                 if is_open:
                     break
                 at, from_k = max(at, taken_x[k, 1]), k
             taken = _claim(taken_x, taken_by, taken, a, b, i)
     if with_gradient:
         for i in range(n):
+            for p in range(6):
+                for q in range(p):
+                    curvature[i, q, p] = curvature[i, p, q]
             if last[i] > first[i] and kinds[i, 0] != kinds[i, 1]:
                 maps = sums[kinds[i, 0]], sums[kinds[i, 1]]
                 _pull_border(discs[i], share[i], maps, origin, gradient[i], curvature[i])
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def _border(disc, share, y, x_middle):
     """Say where a row meets the border across a capsule, at a share of its axis: (x, weight, split).
 
@@ -205,7 +231,7 @@ def _border(disc, share, y, x_middle):
     return cx, min(max(0.5 - beyond, 0.0), 1.0), 0
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def _own(map_0, map_1, at, end, cut, weight, split, out):
     """Add the sums and the areas from `at` to `end` of a row of running sums to out (2, 2)."""
     if split == 0:
@@ -225,7 +251,7 @@ def _own(map_0, map_1, at, end, cut, weight, split, out):
     out[j, 1] += end - middle
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def _at_edge(map_0, map_1, edge, cut, weight, split):
     """Read the map that holds at an edge of a span."""
     if split == 0:
@@ -233,19 +259,18 @@ def _at_edge(map_0, map_1, edge, cut, weight, split):
     return _value(map_0, edge) if (edge < cut) == (split > 0) else _value(map_1, edge)
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def _pull(dx, value, gradient, curvature):
     """Add an edge that gains `value` per pixel of motion dx (6,) to the right."""
     slope = dx[1] + dx[4]
     facing = 1 / np.sqrt(1 + slope * slope)
     for p in range(6):
-        if dx[p] != 0:
-            gradient[p] += value * dx[p]
-            for q in range(6):
-                curvature[p, q] += facing * dx[p] * dx[q]
+        gradient[p] += value * dx[p]
+        for q in range(p + 1):
+            curvature[p, q] += facing * dx[p] * dx[q]
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def _pull_border(disc, share, maps, origin, gradient, curvature):
     """Add what a border across a capsule gains when it moves along the axis."""
     ux, uy = disc[1, 0] - disc[0, 0], disc[1, 1] - disc[0, 1]
@@ -271,7 +296,7 @@ def _pull_border(disc, share, maps, origin, gradient, curvature):
                 curvature[p, q] += step * along[p] * along[q]
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def _claim(taken_x, taken_by, taken, a, b, owner):
     """Join a span to the ordered, separate ones taken so far, each end with its owner; return how many there are."""
     left_by, right_by, kept = owner, owner, 0
@@ -294,17 +319,17 @@ def _claim(taken_x, taken_by, taken, a, b, owner):
     return kept + 1
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def labels(discs, depth, kinds, share, out):
     """Fill out (h, w) with the kind of the nearest capsule at each pixel, -1 where there is none; see `evidence`."""
     h, w = out.shape
     out[:] = -1
-    x, dx = np.empty((2, h)), np.empty((2, h, 6))
+    x, tangents = np.empty((2, h)), np.empty((2, 8))
     order = np.argsort(-depth)
     for i in order:
         if depth[i] >= BEHIND:
             continue
-        first, last = outline(discs[i, 0], discs[i, 1], 0.0, x, dx)
+        first, last = outline(discs[i, 0], discs[i, 1], 0.0, x, tangents)
         ux, uy = discs[i, 1, 0] - discs[i, 0, 0], discs[i, 1, 1] - discs[i, 0, 1]
         cx, cy = discs[i, 0, 0] + share[i] * ux, discs[i, 0, 1] + share[i] * uy
         for y in range(first, last):

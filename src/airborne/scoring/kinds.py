@@ -1,7 +1,8 @@
 """How like skin, shorts, shoes a pixel is: evidence maps of several kinds of surface, by one look-up a pixel.
 
-The evidence of a pixel for a kind, in nats, is log((1 - o) p(colour | kind) + o p(colour | anyone)) less the same of the
-background: o is the chance that somebody else is there, in front of the player or beside him, dressed like him or not.
+The evidence of a pixel for a kind, in nats, is log((1 - o) p(colour | kind) + o p(colour | anyone)) less the same of
+the background: o is the chance that somebody else is there, in front of the player or beside him, dressed like him or
+not. No kernel uses fast maths, so that maps are the same to the last bit however it was compiled.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ def ratio_table(kinds: NDArray, background: NDArray, hidden: NDArray) -> NDArray
     return table
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def _fill_table(kinds, background, hidden, table):
     n, cells = kinds.shape
     one = np.float32(1)
@@ -42,7 +43,7 @@ def _fill_table(kinds, background, hidden, table):
             table[cell, c] = np.log(((one - o) * kinds[c, cell] + other) / ((one - o) * background[cell] + other))
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def evidence_maps(rgb, table, reduction, out):
     """Fill out (5, h // r, w // r) with the mean evidence over blocks of r x r pixels of rgb (h, w, 3) uint8."""
     _, h, w = out.shape
@@ -62,7 +63,7 @@ def evidence_maps(rgb, table, reduction, out):
             out[3, y, x], out[4, y, x] = share * d, share * e
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def smooth(maps, out):
     """Blur maps (k, h, w) with [1 2 1] / 4 along rows and columns into out; the border stays."""
     k, h, w = maps.shape

@@ -9,15 +9,14 @@ import numpy as np
 from numba import njit
 
 from airborne.body.jumper import N_DOF, place, shares
-from airborne.rendering.capsules import evidence, project
-from airborne.rendering.shapes import KERNEL
+from airborne.rendering.capsules import EXACT, evidence, project
 
 N_LENGTHS, N_RADII, N_CAPSULES, N_POINTS = 9, 8, 10, 9
 N_STATE = N_DOF + N_LENGTHS + N_RADII
 _STEP = 1e-4  # [m, rad] of the differences that say how points and discs move
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def placed(state, points, ends, balls, share):
     """Place a state: fill points (9, 3) [m], the capsules' ends (10, 2, 3) and radii (10, 2) [m], and shares (10,)."""
     lengths = state[N_DOF : N_DOF + N_LENGTHS]
@@ -25,14 +24,14 @@ def placed(state, points, ends, balls, share):
     shares(lengths, share)
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def _add_square(b, out):
     for i in range(len(b)):
         for j in range(len(b)):
             out[i, j] += b[i] * b[j]
 
 
-@njit(**KERNEL)
+@njit(**EXACT)
 def gathered(state, n_free, cameras, kinds, sums, others, work, owned, equations):
     """Add up a jumper's evidence over the views and return it [nats times pixels].
 

@@ -15,7 +15,7 @@ from airborne.errors import TrialError
 from airborne.tracking.blocker.colours import Colours, seen_through
 from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, N_STATE, placed
 from airborne.tracking.blocker.fit import Fit, Prior, fit, scored
-from airborne.tracking.blocker.views import Scale, Seen, scale_of, regions_round, seen
+from airborne.tracking.blocker.views import Scale, Seen, regions_round, scale_of, seen
 from airborne.video import Frames
 
 Array = NDArray[np.floating]

@@ -29,6 +29,7 @@ _HABIT_SD = np.array([0.2, 0.5, 0.3, 0.15] + [0.25, 0.3, 0.4] * 2 + [0.5, 0.6])
 _HABITS = np.zeros((len(_HABIT_SD), N_DOF))
 _HABITS[np.arange(10), [4, 5, 6, 7, 9, 10, 12, 14, 15, 17]] = 1  # side and forward lean, bends, hip y and z, ankle
 _HABITS[10, [8, 13]] = _HABITS[11, [11, 16]] = 1, -1  # hip and knee flexion, left less right
+_HABIT_INFORMATION = _HABITS.T @ (_HABITS / _HABIT_SD[:, None] ** 2)
 _REST = np.zeros(N_DOF)
 _REST[5] = 0.25
 
@@ -99,10 +100,13 @@ def _evaluated(state: Array, prior: Prior, found: Seen, others: tuple[Array, Arr
     worth = NATS_PER_M2 / found.scale.px_per_m**2
     total = gathered(state, n, found.cameras, _kinds(others), found.sums, others, work, owned, equations)
     away = state[:n] - prior.mean
-    cost = 0.5 * float(away @ prior.information @ away)
+    from_rest = _REST - state[:N_DOF]
+    cost = 0.5 * float(away @ prior.information @ away + from_rest @ _HABIT_INFORMATION @ from_rest)
     steepness = worth * SLOPE
     A = steepness * curvature + prior.information
     b = worth * gradient - prior.information @ away
+    A[:N_DOF, :N_DOF] += _HABIT_INFORMATION
+    b[:N_DOF] += _HABIT_INFORMATION @ from_rest
     for rows, targets, weights, each in _rules(state, points, by_state, prior):
         A += rows.T @ (weights[:, None] * rows)
         b += rows.T @ (weights * targets)
@@ -115,11 +119,9 @@ def _evaluated(state: Array, prior: Prior, found: Seen, others: tuple[Array, Arr
 
 
 def _rules(state: Array, points: Array, by_state: Array, prior: Prior) -> Sequence[tuple[Array, Array, Array, float]]:
-    """Return rows (k, n), how far to go (k,), weights (k,) and cost of: habits, joint limits, the floor, anchors."""
+    """Return rows (k, n), how far to go (k,), weights (k,) and cost of: joint limits, the floor, anchors."""
     n = by_state.shape[1]
-    away = _REST - state[:N_DOF]
-    rows = np.pad(_HABITS, ((0, 0), (0, n - N_DOF)))
-    rules = [_rule(rows, _HABITS @ away, _HABIT_SD)]
+    rules = []
     beyond = np.clip(state[:N_DOF], *LIMITS_RAD.T) - state[:N_DOF]
     if (out := np.flatnonzero(beyond)).size:
         rules.append(_rule(np.eye(N_DOF, n)[out], beyond[out], np.full(len(out), _LIMIT_SD_RAD)))

@@ -117,6 +117,6 @@ def packed(camera: Camera) -> Array:
 
 
 def workspace(found: Seen, n_others: int) -> tuple[tuple[Array, Array], Array]:
-    """Allocate what `gathered` works in: (x, dx) and owned."""
+    """Allocate what `gathered` works in: (x, tangents) and owned."""
     n, (v, _, h, _) = N_CAPSULES + n_others, found.sums.shape
-    return (np.empty((n, 2, h)), np.empty((n, 2, h, 6))), np.zeros((v, n, 2, 2))
+    return (np.empty((n, 2, h)), np.empty((n, 2, 8))), np.zeros((v, n, 2, 2))
