@@ -142,15 +142,16 @@ def _value(row, x):
 
 
 @njit(**EXACT)
-def evidence(discs, depth, kinds, share, sums, origin, work, out, gradient, curvature):
+def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, gradient, curvature):
     """Add up maps under the capsules, and how the sum changes as their discs move.
 
     discs (n, 2, 3) and depth (n,) as `project` gives them, in the pixels of the maps; kinds (n, 2) the map at either
     end of each capsule and share (n,) how far along its axis the first one reaches; sums (k, h, w + 1) running sums of
-    the maps over a region whose first pixel is origin (x, y). What lies outside the region counts nothing. work is
+    the maps over a region whose first pixel is origin (x, y); contrast (k,) by how much each map falls across an edge
+    of what it shows. What lies outside the region counts nothing. work is
     x (n, 2, h) and tangents (n, 2, 8). Fills out (n, 2, 2), the sum and the area [px] that each capsule owns of its
-    first and its second map; and if gradient (n, 7) is not empty, that and curvature (n, 7, 7), which is what a map
-    that falls by one per pixel across every edge would have, by (x, y, radius) of both discs and the share.
+    first and its second map; and if gradient (n, 7) is not empty, that and curvature (n, 7, 7), which is what maps
+    have that fall by their contrast within a pixel of every edge, by (x, y, radius) of both discs and the share.
     """
     n, (_, h, w) = len(discs), sums.shape
     with_gradient = len(gradient) > 0
@@ -193,12 +194,24 @@ def evidence(discs, depth, kinds, share, sums, origin, work, out, gradient, curv
                         if at > least:
                             value = _at_edge(map_0, map_1, at, cut, weight, split)
                             _motion(discs[who, 0], discs[who, 1], tangents[who, side], y, 2.0 * side - 1.0, dx)
-                            _pull(dx, -value, gradient[who], curvature[who])
+                            _pull(
+                                dx,
+                                -value,
+                                _at_edge_of(contrast, kinds[i], at, cut, weight, split),
+                                gradient[who],
+                                curvature[who],
+                            )
                         who, side = (i, 1) if is_open else (taken_by[k, 0], 0)
                         if end < most:
                             value = _at_edge(map_0, map_1, end, cut, weight, split)
                             _motion(discs[who, 0], discs[who, 1], tangents[who, side], y, 2.0 * side - 1.0, dx)
-                            _pull(dx, value, gradient[who], curvature[who])
+                            _pull(
+                                dx,
+                                value,
+                                _at_edge_of(contrast, kinds[i], end, cut, weight, split),
+                                gradient[who],
+                                curvature[who],
+                            )
                 if is_open:
                     break
                 at, from_k = max(at, taken_x[k, 1]), k
@@ -210,7 +223,8 @@ def evidence(discs, depth, kinds, share, sums, origin, work, out, gradient, curv
                     curvature[i, q, p] = curvature[i, p, q]
             if last[i] > first[i] and kinds[i, 0] != kinds[i, 1]:
                 maps = sums[kinds[i, 0]], sums[kinds[i, 1]]
-                _pull_border(discs[i], share[i], maps, origin, gradient[i], curvature[i])
+                between = 0.5 * (contrast[kinds[i, 0]] + contrast[kinds[i, 1]])
+                _pull_border(discs[i], share[i], maps, between, origin, gradient[i], curvature[i])
 
 
 @njit(**EXACT)
@@ -260,10 +274,18 @@ def _at_edge(map_0, map_1, edge, cut, weight, split):
 
 
 @njit(**EXACT)
-def _pull(dx, value, gradient, curvature):
+def _at_edge_of(contrast, kinds, edge, cut, weight, split):
+    """Read the contrast of the map that holds at an edge of a span."""
+    if split == 0:
+        return weight * contrast[kinds[0]] + (1 - weight) * contrast[kinds[1]]
+    return contrast[kinds[0]] if (edge < cut) == (split > 0) else contrast[kinds[1]]
+
+
+@njit(**EXACT)
+def _pull(dx, value, contrast, gradient, curvature):
     """Add an edge that gains `value` per pixel of motion dx (6,) to the right."""
     slope = dx[1] + dx[4]
-    facing = 1 / np.sqrt(1 + slope * slope)
+    facing = contrast / np.sqrt(1 + slope * slope)
     for p in range(6):
         gradient[p] += value * dx[p]
         for q in range(p + 1):
@@ -271,7 +293,7 @@ def _pull(dx, value, gradient, curvature):
 
 
 @njit(**EXACT)
-def _pull_border(disc, share, maps, origin, gradient, curvature):
+def _pull_border(disc, share, maps, contrast, origin, gradient, curvature):
     """Add what a border across a capsule gains when it moves along the axis."""
     ux, uy = disc[1, 0] - disc[0, 0], disc[1, 1] - disc[0, 1]
     length = np.sqrt(ux * ux + uy * uy)
@@ -293,7 +315,7 @@ def _pull_border(disc, share, maps, origin, gradient, curvature):
         for p in range(7):
             gradient[p] += value * along[p]
             for q in range(7):
-                curvature[p, q] += step * along[p] * along[q]
+                curvature[p, q] += contrast * step * along[p] * along[q]
 
 
 @njit(**EXACT)

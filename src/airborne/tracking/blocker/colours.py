@@ -14,7 +14,7 @@ from airborne.rendering.capsules import labels, project
 from airborne.scoring.foreground import BINS, count_colours
 from airborne.scoring.kinds import ratio_table
 from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, placed
-from airborne.tracking.blocker.views import Region, packed
+from airborne.tracking.blocker.views import Region, Table, packed
 
 Array = NDArray[np.floating]
 
@@ -35,14 +35,13 @@ class Colours:
     background: NDArray[np.float32]  # (cameras, 32, 32, 32)
     hidden: Array  # (cameras, 5)
 
-    def table(self, view: int) -> NDArray[np.float32]:
-        """Return a camera's table of evidence (32768, 8)."""
-        return ratio_table(self.kinds, self.background[view], self.hidden[view])
-
-    def usual(self, table: NDArray[np.float32]) -> Array:
-        """Return the mean evidence by a table of pixels of each kind that nothing covers: (5,) [nat]."""
+    def table(self, view: int, hidden: Array | None = None) -> Table:
+        """Return a camera's table of evidence, as it is or for another hidden (5,)."""
         n = len(KINDS)
-        return np.einsum("kc,ck->k", self.kinds.reshape(n, -1), table[:, :n])
+        chosen: Array = self.hidden[view] if hidden is None else hidden
+        evidence = ratio_table(self.kinds, self.background[view], chosen)
+        usual = np.einsum("kc,ck->k", self.kinds.reshape(n, -1), evidence[:, :n])
+        return Table(chosen, evidence, usual, usual - self.background[view].ravel() @ evidence[:, :n])
 
 
 def drawn(state: Array, camera: Camera, thickness: float = 1.0) -> NDArray[np.int8]:
@@ -115,15 +114,15 @@ def hidden_by(evidence: Array, usual: Array) -> Array:
 def _mean_evidence(state: Array, region: Region, colours: Colours) -> tuple[Array, Array]:
     """Return the mean evidence of each kind's pixels in a region (5,) [nat], NaN where too few are drawn; and usual."""
     part = drawn(state, region.full)
-    table = ratio_table(colours.kinds, colours.background[region.view], np.full(len(KINDS), LEAST_HIDDEN))
+    table = colours.table(region.view, np.full(len(KINDS), LEAST_HIDDEN))
     cells = region.rgb.astype(np.int64) >> 3
     cells = (cells[..., 0] << 10) | (cells[..., 1] << 5) | cells[..., 2]
     found = np.full(len(KINDS), np.nan)
     for kind in range(len(KINDS)):
         chosen = part == kind
         if np.count_nonzero(chosen) > _LEAST_PX:
-            found[kind] = table[cells[chosen], kind].mean()
-    return found, colours.usual(table)
+            found[kind] = table.evidence[cells[chosen], kind].mean()
+    return found, table.usual
 
 
 def _normalised(counts: Array) -> Array:

@@ -32,10 +32,11 @@ def _add_square(b, out):
 
 
 @njit(**EXACT)
-def gathered(state, n_free, cameras, kinds, sums, others, work, owned, equations):
+def gathered(state, n_free, cameras, kinds, maps, others, work, owned, equations):
     """Add up a jumper's evidence over the views and return it [nats times pixels].
 
-    cameras (v, 4, 4) see the regions of sums (v, k + 1, h, w + 1), whose last map is empty: it belongs to `others`,
+    cameras (v, 4, 4) see the regions of maps: sums (v, k + 1, h, w + 1), the last empty, and contrast (v, k + 1), see
+    `capsules.evidence`. The empty map belongs to `others`,
     capsules ends (m, 2, 3) and balls (m, 2) [m] of other players, who hide what lies behind them. kinds (10 + m, 2).
     Fills owned (v, 10 + m, 2, 2), see `capsules.evidence`, and equations: points (9, 3) [m], and with n_free > 0 their
     Jacobian (27, n_free), and for the first numbers of the state the gradient (n_free,), the curvature (n_free, n_free)
@@ -43,6 +44,7 @@ def gathered(state, n_free, cameras, kinds, sums, others, work, owned, equations
     one metre's sd, right or down, in each view by itself.
     """
     points, by_state, gradient, curvature, spread = equations
+    sums, contrast = maps
     other_ends, other_balls = others
     n, all_n = N_CAPSULES, N_CAPSULES + len(other_ends)
     ends, balls, share = np.empty((all_n, 2, 3)), np.empty((all_n, 2)), np.ones(all_n)
@@ -67,7 +69,7 @@ def gathered(state, n_free, cameras, kinds, sums, others, work, owned, equations
     total, origin = 0.0, np.zeros(2)
     for v in range(len(cameras)):
         project(ends, balls, cameras[v], discs, depth)
-        evidence(discs, depth, kinds, share, sums[v], origin, work, owned[v], g, H)
+        evidence(discs, depth, kinds, share, sums[v], contrast[v], origin, work, owned[v], g, H)
         for i in range(n):
             total += owned[v, i, 0, 0] + owned[v, i, 1, 0]
         for k in range(n_free):

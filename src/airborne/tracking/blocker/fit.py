@@ -15,8 +15,8 @@ from airborne.tracking.blocker.views import Seen, workspace
 Array = NDArray[np.floating]
 
 NATS_PER_M2 = 240.0  # neighbouring pixels err together: what an area on the body is worth for each nat of theirs
-SHAPE_SD_M = 0.040  # how far a capsule's outline may lie beside the player's
-SLOPE = 1.4  # how evidence falls across an outline [nat / px of the maps]
+SHAPE_SD_M = 0.050  # how far a capsule's outline may lie beside the player's
+SLOPE = 0.25  # share of its contrast by which evidence falls across an outline in a pixel of the maps
 _LIMIT_SD_RAD = 0.05  # how firmly joints keep within their limits
 _FLOOR_SD_M = 0.01  # and feet above the floor
 BALL_HEIGHT_M = 0.03  # of the ball of the foot in standing
@@ -83,7 +83,7 @@ def scored(state: Array, found: Seen, others: tuple[Array, Array]) -> float:
     """Return the evidence of a state [nat], without any prior."""
     work, owned = workspace(found, len(others[0]))
     nothing = np.empty((N_POINTS, 3)), np.empty((27, 0)), np.empty(0), np.empty((0, 0)), np.empty((0, 0))
-    total = gathered(state, 0, found.cameras, _kinds(others), found.sums, others, work, owned, nothing)
+    total = gathered(state, 0, found.cameras, _kinds(others), found.maps, others, work, owned, nothing)
     return NATS_PER_M2 / found.scale.px_per_m**2 * total
 
 
@@ -98,7 +98,7 @@ def _evaluated(state: Array, prior: Prior, found: Seen, others: tuple[Array, Arr
     curvature, spread = np.empty((2, n, n))
     equations = points, by_state, gradient, curvature, spread
     worth = NATS_PER_M2 / found.scale.px_per_m**2
-    total = gathered(state, n, found.cameras, _kinds(others), found.sums, others, work, owned, equations)
+    total = gathered(state, n, found.cameras, _kinds(others), found.maps, others, work, owned, equations)
     away = state[:n] - prior.mean
     from_rest = _REST - state[:N_DOF]
     cost = 0.5 * float(away @ prior.information @ away + from_rest @ _HABIT_INFORMATION @ from_rest)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from airborne.tracking.blocker.dynamics import N_FREE, N_SLIDING, Filtered, begu
 from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, placed
 from airborne.tracking.blocker.first import first_look, points_of, start_state
 from airborne.tracking.blocker.fit import BALL_HEIGHT_M, Fit, Prior, fit
-from airborne.tracking.blocker.views import Scale, regions_round, seen
+from airborne.tracking.blocker.views import Scale, Table, regions_round, seen
 from airborne.tracking.estimate import Status
 from airborne.tracking.players import PlayerEstimate, PlayerStart
 from airborne.video import Frames
@@ -33,14 +32,6 @@ _LEAST_AREA_PX = 8.0  # of a kind in a map, to judge whether it is hidden
 _HIDDEN_RATE, _HIDDEN_STEP = 0.3, 0.08
 _SHAPE = np.arange(N_DOF + PELVIS, N_DOF + N_LENGTHS)  # lengths that stay the same, in a state
 _STEP_M = 1e-4
-
-
-class Table(NamedTuple):
-    """One camera's evidence by colour."""
-
-    hidden: Array  # (5,) what it was made for
-    evidence: NDArray[np.float32]  # (32768, 8) [nat]
-    usual: Array  # (5,) of pixels that nothing covers [nat]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +91,7 @@ class Blocker:
                 state[N_DOF : N_DOF + N_SLIDING],
                 covariance[np.ix_(_SHAPE, _SHAPE)],
                 first.colours,
-                tuple(_table(first.colours, view) for view in range(len(frames.views))),
+                tuple(first.colours.table(view) for view in range(len(frames.views))),
                 first.scale,
                 _per_px(first.fit.owned),
             )
@@ -140,7 +131,7 @@ def _followed(
     regions = regions_round(frames, state[:3])
     if not regions:
         return replace(track, filtered=expected, time_s=frames.time_s), _lost(name, frames)
-    found = seen(regions, [track.tables[region.view].evidence for region in regions], track.scale)
+    found = seen(regions, [track.tables[region.view] for region in regions], track.scale)
     information = np.linalg.inv(expected.covariance[:N_FREE, :N_FREE])
     prior = Prior(expected.free, information, _standing(track.state), np.full(N_POINTS, _SLIP_SD_M))
     fitted = fit(state, prior, found, hiding)
@@ -160,11 +151,6 @@ def _followed(
     return _with_hidden(track, hidden), estimate
 
 
-def _table(colours: Colours, view: int) -> Table:
-    evidence = colours.table(view)
-    return Table(colours.hidden[view], evidence, colours.usual(evidence))
-
-
 def _standing(state: Array) -> Array:
     """Return where the balls of feet on the floor are, (9, 3) [m]; NaN elsewhere: a foot stays until it is lifted."""
     points = points_of(state)
@@ -179,7 +165,7 @@ def _with_hidden(track: Track, hidden: Array) -> Track:
     """Take in what is hidden; a camera's table is made anew only when that changes it."""
     colours = replace(track.colours, hidden=hidden)
     tables = tuple(
-        _table(colours, view) if np.abs(hidden[view] - table.hidden).max() > _HIDDEN_STEP else table
+        colours.table(view) if np.abs(hidden[view] - table.hidden).max() > _HIDDEN_STEP else table
         for view, table in enumerate(track.tables)
     )
     return replace(track, colours=colours, tables=tables)

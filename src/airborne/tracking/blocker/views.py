@@ -39,6 +39,15 @@ class Region:
         return self.camera.resampled(scale=(1, 1), offset=(x0, y0), size=(x1 - x0, y1 - y0))
 
 
+class Table(NamedTuple):
+    """One camera's evidence by colour."""
+
+    hidden: Array  # (5,) what it was made for
+    evidence: NDArray[np.float32]  # (32768, 8) [nat]
+    usual: Array  # (5,) mean over pixels of a kind that nothing covers [nat]
+    contrast: Array  # (5,) the same less the mean over the background's pixels [nat]
+
+
 class Scale(NamedTuple):
     """How the evidence maps of one player are made."""
 
@@ -54,6 +63,12 @@ class Seen:
     scale: Scale
     cameras: Array  # (v, 4, 4): K [R t] of the reduced region, then the focal length
     sums: NDArray[np.float32]  # (v, kinds + 1, h, w + 1); the last map is empty
+    contrast: Array  # (v, kinds + 1) how much evidence falls from inside to outside [nat]
+
+    @property
+    def maps(self) -> tuple[NDArray[np.float32], Array]:
+        """What `gathered` takes of the maps."""
+        return self.sums, self.contrast
 
 
 def regions_round(frames: Frames, hips: Array, extra_m: float = 0.0) -> tuple[Region, ...]:
@@ -89,8 +104,8 @@ def scale_of(regions: Sequence[Region], hips: Array) -> Scale:
     return Scale(reduction, whole / reduction)
 
 
-def seen(regions: Sequence[Region], tables: Sequence[NDArray[np.float32]], scale: Scale) -> Seen:
-    """Look every pixel's evidence up; tables are those of the regions, (32768, 8) each."""
+def seen(regions: Sequence[Region], tables: Sequence[Table], scale: Scale) -> Seen:
+    """Look every pixel's evidence up; tables are those of the regions."""
     r, k = scale.reduction, len(KINDS)
     sizes = [((y1 - y0) // r, (x1 - x0) // r) for x0, y0, x1, y1 in (region.box for region in regions)]
     h, w = max(size[0] for size in sizes), max(size[1] for size in sizes)
@@ -98,7 +113,7 @@ def seen(regions: Sequence[Region], tables: Sequence[NDArray[np.float32]], scale
     cameras = np.zeros((len(regions), 4, 4))
     for i, (region, table, (rows, columns)) in enumerate(zip(regions, tables, sizes, strict=True)):
         raw, smoothed = np.empty((2, k, rows, columns), np.float32)
-        evidence_maps(region.rgb, table, r, raw)
+        evidence_maps(region.rgb, table.evidence, r, raw)
         smooth(raw, smoothed)
         filled = np.empty((k, rows, columns + 1), np.float32)
         running_sums(smoothed, filled)
@@ -106,7 +121,8 @@ def seen(regions: Sequence[Region], tables: Sequence[NDArray[np.float32]], scale
         sums[i, :k, :rows, columns + 1 :] = filled[:, :, -1:]
         camera = region.full.resampled(scale=(r, r), offset=((r - 1) / 2, (r - 1) / 2), size=(columns, rows))
         cameras[i] = packed(camera)
-    return Seen(tuple(regions), scale, cameras, sums)
+    contrast = np.array([[*table.contrast, 0.0] for table in tables])
+    return Seen(tuple(regions), scale, cameras, sums, contrast)
 
 
 def packed(camera: Camera) -> Array:
