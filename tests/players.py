@@ -1,13 +1,16 @@
 """A small trial of two players and a bystander, and a tracker that needs no pictures."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body.legs import LEG_POINTS
 from airborne.cameras import Camera, Rig, write_pose2sim
+from airborne.motion import PlayersWriter
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate
 from tests.video.clips import write_clip
@@ -108,3 +111,28 @@ class StandIn:
             )
             for name, x in PLAYERS.items()
         )
+
+
+def write_run(folder: Path, n=12) -> Path:
+    """Leave what a run with the stand-in leaves that `evaluate` reads, without pictures, and return the folder."""
+    folder.mkdir(parents=True)
+    tracker = StandIn()
+    with PlayersWriter(folder / "joints.csv", tracker.joints) as writer:
+        for index in range(n):
+            seen = SimpleNamespace(index=index, time_s=Fraction(index, RATE), views=(True, True))
+            writer.append(tracker.step(0, seen)[1])
+    write_pose2sim(folder / "calib.toml", rig())
+    (folder / "summary.json").write_text('{"name": "a block"}\n', encoding="utf-8")
+    return folder
+
+
+def write_truth(path: Path, n=12, off_m=0.0) -> Path:
+    """Write the true table of such a run, in which everybody is lower by `off_m`, and return its path."""
+    stems = [f"{name.split('_')[1][0]}_{name.split('_')[0]}" for name in LEG_POINTS]
+    lines = [",".join(["frame", "time_s", "player", *(f"{stem}_{axis}" for stem in stems for axis in "xyz")])]
+    for index in range(n):
+        for name, x in PLAYERS.items():
+            points = points_of(x, (height_at(index) if name == "Anna" else 0.0) - off_m)
+            lines.append(",".join([str(index), repr(index / RATE), name, *map(repr, points.ravel().tolist())]))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path

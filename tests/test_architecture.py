@@ -42,10 +42,11 @@ NOUNS = ("cameras", "video", "body")  # packages whose public names are values w
 KERNELS = [
     "cameras/distortion.py",
     *sorted(f"geometry/{path.name}" for path in (SOURCE / "geometry").glob("[a-z]*.py")),
+    "rendering/capsules.py",
+    *(f"scoring/{name}.py" for name in ("distances", "foreground", "hsv", "kinds", "lighting")),
+    *(f"scoring/{name}.py" for name in ("over_views", "plate", "recognition", "rods")),
+    *(f"tracking/filters/{name}.py" for name in ("hidden", "jump_state", "resampling", "sir", "swing")),
     "tracking/stepping.py",
-    "scoring/foreground.py",
-    "scoring/lighting.py",
-    "scoring/plate.py",
 ]
 MOST_LINES_A_FILE, MOST_LINES_A_FUNCTION = 450, 90
 HEAVY = ("matplotlib", "nicegui", "tkinter", "PyQt5", "PySide6", "typer", "ezc3d", "yeadon")

@@ -12,6 +12,7 @@ from airborne.body.files import read_body
 from airborne.errors import ResultError
 from airborne.motion import Motion, MotionWriter, write_joints
 from tests.motion.helpers import estimate
+from tests.players import PLAYERS, write_run, write_truth
 
 
 @pytest.fixture
@@ -47,3 +48,41 @@ def test_nothing_to_compare_with_is_refused(run):
 def test_a_truth_given_as_joints_is_refused_in_one_line(run, thrown_cross):
     with pytest.raises(ResultError, match="no column joint"):
         assess(run, None, None, thrown_cross / "truth.csv")
+
+
+def test_players_are_compared_with_their_truth_and_the_summary_keeps_it(tmp_path):
+    run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv", off_m=0.03)
+    found = assess(run, truth, None)
+    assert list(found) == ["truth"]
+    assert [errors.parts["all"].mean_mm for errors in found["truth"].players.values()] == pytest.approx([30, 30])
+    kept = json.loads((run / "summary.json").read_text())
+    assert list(kept["truth"]["players"]) == list(PLAYERS)
+    assert kept["name"] == "a block"
+
+
+def test_a_broken_list_of_jumps_beside_the_truth_is_refused(tmp_path):
+    run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv")
+    (tmp_path / "players.json").write_text("[")
+    with pytest.raises(ResultError, match=r"players\.json"):
+        assess(run, truth, None)
+
+
+def test_players_without_a_summary_are_compared_and_none_is_made(tmp_path):
+    run = write_run(tmp_path / "run")
+    (run / "summary.json").unlink()
+    assert assess(run, write_truth(tmp_path / "truth.csv"), None)["truth"].n_matched == 12
+    assert not (run / "summary.json").exists()
+
+
+def test_players_have_a_truth_only(tmp_path):
+    run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv")
+    for given in ((None, None, None), (truth, truth, None), (truth, None, truth), (None, None, truth)):
+        with pytest.raises(ResultError, match=r"a run of players.*give a truth\.csv"):
+            assess(run, *given)
+
+
+def test_truths_of_players_and_of_a_body_are_told_apart(run, thrown_cross, tmp_path):
+    with pytest.raises(ResultError, match="expected a truth table of players"):
+        assess(write_run(tmp_path / "players"), thrown_cross / "truth.csv", None)
+    with pytest.raises(ResultError, match="no column x_m"):
+        assess(run, write_truth(tmp_path / "truth.csv"), None)

@@ -14,6 +14,7 @@ import pytest
 
 from airborne import cli
 from airborne.motion import read_motion
+from tests.players import write_run, write_truth
 
 SHORT = 3  # fields that are tracked where the length does not matter
 LONG = 12
@@ -152,6 +153,43 @@ def test_synth_cross_writes_a_trial_once(tmp_path, capsys, monkeypatch):
     assert in_process("synth", "cross", "-o", tmp_path / "new", "--seed", "3", "--preset", "side-somersault") == 0
     assert (asked[0]["seed"], asked[0]["preset"]) == (3, "side-somersault")
     assert capsys.readouterr().out == f"trial: {tmp_path / 'new' / 'trial.toml'}\n"
+
+
+def test_synth_block_writes_the_scene_that_was_asked_for(tmp_path, capsys, monkeypatch):
+    asked = []
+    monkeypatch.setattr("airborne.synthetic.write_block", lambda folder, scene, progress: asked.append((folder, scene)))
+    options = ("--seed", "4", "--blockers", "2", "--difficulty", "hard", "--frame-rate", "30", "--cameras", "2")
+    assert in_process("synth", "block", "-o", tmp_path / "new", *options) == 0
+    ((folder, scene),) = asked
+    assert (folder, scene.seed, len(scene.blockers), len(scene.rig)) == (tmp_path / "new", 4, 2, 2)
+    assert (scene.rate, scene.difficulty.occlusion, scene.difficulty.colour_similarity) == (30, 0.8, 1.0)
+    assert capsys.readouterr().out == f"trial: {tmp_path / 'new' / 'trial.toml'}\n"
+
+
+def test_synth_block_refuses_what_it_cannot_draw(tmp_path, capsys):
+    new = tmp_path / "new"
+    assert "choose 30, 60 or 120" in refusal(capsys, "synth", "block", "-o", new, "--frame-rate", "50")
+    assert "--blockers" in refusal(capsys, "synth", "block", "-o", new, "--blockers", "4")
+    assert "--cameras" in refusal(capsys, "synth", "block", "-o", new, "--cameras", "1")
+    assert "--difficulty" in refusal(capsys, "synth", "block", "-o", new, "--difficulty", "unfair")
+    assert not new.exists()
+    (tmp_path / "mine.txt").write_text("mine")
+    assert "not empty" in refusal(capsys, "synth", "block", "-o", tmp_path)
+
+
+def test_evaluate_compares_players_with_their_truth(tmp_path, capsys):
+    run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv", off_m=0.02)
+    assert in_process("evaluate", run, truth) == 0
+    out, _ = capsys.readouterr()
+    assert out.startswith("against the truth\n12 of 12 true times matched")
+    assert "number 7: 9 tracked, 3 uncertain, 0 lost" in out
+    assert "nan" not in out
+    assert in_process("evaluate", run, truth, "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["truth"]["players"]["Anna"]["parts"]["knees"]["mean_mm"] == pytest.approx(20)
+    assert "leave --digitised" in refusal(capsys, "evaluate", run, truth, "--digitised", truth)
+    assert "give a truth.csv" in refusal(capsys, "evaluate", run)
+    assert "cannot be read" in refusal(capsys, "evaluate", run, tmp_path / "none.csv")
 
 
 def test_bench_prints_what_it_measured(capsys, monkeypatch):

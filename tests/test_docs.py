@@ -8,7 +8,9 @@ import re
 import shlex
 import subprocess
 import tomllib
+from dataclasses import fields
 from pathlib import Path
+from typing import get_args
 
 import pytest
 import typer
@@ -21,17 +23,20 @@ from airborne.body import files as bodies
 from airborne.body.files import read_body
 from airborne.body.human import LIMITS_DEG, PARENTS
 from airborne.cli import app
+from airborne.evaluation import PlayerErrors, PlayersComparison
+from airborne.evaluation.jump_errors import JumpErrors
+from airborne.evaluation.players import PartErrors
 from airborne.export import write_figures
 from airborne.motion import flight_summary, sidecar
 from airborne.motion.files import _header
-from airborne.trial import Trial, read_trial
+from airborne.trial import PlayersMethod, Trial, read_trial
 from tests.export.scenes import PERSON, person_run
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(DOCS.glob("*.md"))]
 TREE = typer.main.get_command(app)
-LARGEST_IMAGES_BYTES = 400_000
+LARGEST_IMAGES_BYTES = 700_000
 
 
 def commands_below(command, name="airborne"):
@@ -182,10 +187,11 @@ def test_every_table_of_the_trial_file_has_a_section():
 
 def test_examples_of_trial_files_are_valid():
     trial, body = fences((DOCS / "trial.md").read_text(encoding="utf-8"), "toml")
-    short, person = fences((ROOT / "README.md").read_text(encoding="utf-8"), "toml")
+    short, person, players = fences((ROOT / "README.md").read_text(encoding="utf-8"), "toml")
     assert len(Trial.model_validate(tomllib.loads(trial)).camera) == 3
     assert len(Trial.model_validate(tomllib.loads(short)).camera) == 2
     assert len(Trial.model_validate(tomllib.loads(person)).model().segments) == 18
+    assert Trial.model_validate(tomllib.loads(players)).has_players
     assert len(bodies._BodyTable.model_validate(tomllib.loads(body)).segment) == 2
 
 
@@ -278,7 +284,27 @@ def test_the_landmarks_of_a_person_are_documented():
     assert sentence and stems == set(named(sentence[1])) - {"_left", "_right"}
 
 
-@pytest.mark.parametrize(("page", "least"), [("methods.md", 8), ("human.md", 9)])
+@pytest.mark.parametrize(
+    ("heading", "values"),
+    [
+        ("Comparing players", (PlayersComparison,)),
+        ("A player's errors", (PlayerErrors, PartErrors)),
+        ("A jump's errors", (JumpErrors,)),
+    ],
+)
+def test_every_number_of_a_comparison_of_players_is_documented(heading, values):
+    rows = table_of(DOCS / "results.md", heading)
+    assert {name for row in rows for name in named(row[0])} == {each.name for value in values for each in fields(value)}
+
+
+def test_every_method_of_players_stands_in_the_page_on_legs():
+    header = next(
+        line for line in (DOCS / "legs.md").read_text(encoding="utf-8").splitlines() if line.startswith("| |")
+    )
+    assert set(named(header)) == set(get_args(PlayersMethod))
+
+
+@pytest.mark.parametrize(("page", "least"), [("methods.md", 8), ("human.md", 9), ("legs.md", 7)])
 def test_constants_in_the_pages_on_methods_are_those_of_the_code(page, least):
     text = (DOCS / page).read_text(encoding="utf-8")
     checked = 0

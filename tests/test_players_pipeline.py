@@ -74,6 +74,14 @@ def test_the_summary_counts_each_player_and_tells_what_was_used(path, tmp_path):
     assert "live" not in summary
 
 
+@pytest.mark.parametrize(("method", "n"), [("blocker", 1), ("block-jump", 2), ("mixture", 2), ("framework", 2)])
+def test_particle_filters_warn_that_their_deviations_are_too_small(path, tmp_path, method, n):
+    run = track_players(read_trial(path, {"method": method, "stop": 2}), tmp_path / "run", pictures=False)
+    warnings = run.summary["warnings"]
+    assert len(warnings) == n
+    assert n == 1 or (method in warnings[1] and "far too small" in warnings[1])
+
+
 def test_pictures_and_report_are_written_where_wanted(path, tmp_path):
     track_players(read_trial(path, {"overlay": "broadcast"}), tmp_path / "run")
     assert {file.name for file in (tmp_path / "run").iterdir()} == TABLES | PICTURES

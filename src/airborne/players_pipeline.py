@@ -29,6 +29,10 @@ UNCERTAINTY = (
     "Standard deviations hold what the method itself leaves open, joint by joint. They do not hold joints that were "
     "set wrongly at the start, nor errors of the cameras' calibration or times."
 )
+TOO_SURE = (
+    "the standard deviations are only the spread of the particles of {method} and far too small: in trials with a "
+    "known truth, their 95 % regions held a quarter to a half of it"
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,6 +153,9 @@ def _summary(
     inputs: dict[str, str],
 ) -> dict[str, Any]:
     is_tracked, is_lost = (motion.status == status.value for status in (Status.TRACKED, Status.LOST))
+    shared = circumstances(trial, calibration, recording, inputs)
+    if trial.track.method != "blocker":
+        shared["warnings"].append(TOO_SURE.format(method=trial.track.method))
     n_tracked, n_lost = int(is_tracked.all(axis=1).sum()), int(is_lost.all(axis=1).sum())
     return {
         "name": trial.name,
@@ -162,7 +169,7 @@ def _summary(
         "players": {name: _player(motion, k, len(recording.rig)) for k, name in enumerate(motion.players)},
         "bystanders": [start.name for start in trial.players if len(start.joints_m) == 1],
         "uncertainty": UNCERTAINTY,
-        **circumstances(trial, calibration, recording, inputs),
+        **shared,
     }
 
 

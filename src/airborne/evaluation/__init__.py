@@ -1,7 +1,7 @@
 """Evaluation: in come a `Motion` and what is known to be true, out come errors with their units.
 
-Truth is a table of poses, paths of joints, points clicked by hand (paper B), or a known pose that a search has to find
-again.
+Truth is a table of poses, paths of joints, points clicked by hand (paper B), joints and jumps of several players, or
+a known pose that a search has to find again.
 Knows no image and no search.
 """
 
@@ -17,6 +17,8 @@ from airborne.evaluation.digitised import (
 )
 from airborne.evaluation.joint_files import JointPaths, landmark_of, read_joint_paths
 from airborne.evaluation.joints import JointComparison, JointErrors, compare_joints
+from airborne.evaluation.players import PlayerErrors, PlayersComparison, assess_players, compare_players
+from airborne.evaluation.players_truth import read_players_truth
 from airborne.evaluation.truth import Truth, read_truth
 
 __all__ = [
@@ -30,16 +32,21 @@ __all__ = [
     "JointErrors",
     "JointPaths",
     "OrientationErrors",
+    "PlayerErrors",
+    "PlayersComparison",
     "PositionErrors",
     "Truth",
+    "assess_players",
     "compare",
     "compare_digitised",
     "compare_joints",
+    "compare_players",
     "digitised_poses",
     "is_recovered",
     "landmark_of",
     "perturbed",
     "read_digitised",
     "read_joint_paths",
+    "read_players_truth",
     "read_truth",
 ]

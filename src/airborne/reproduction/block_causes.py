@@ -7,22 +7,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from airborne.body.legs import RODS
+
 Array = NDArray[np.floating]
 
 OFF_M = 0.10  # from here on a part is off
-TORSO_OFF_M = 0.25
+TORSO_OFF_M = 0.10
 _AT_ANOTHER_M = 0.15
 _HALF_HIDDEN = 0.5
+_LATE_FRAMES = 9
+_ALONG_COS = np.cos(np.radians(20))
 _OTHER_SIDE = (1, 0, 3, 2, 5, 4)  # of PARTS
 CAUSES = (
     "no estimate",
-    "torso off by 0.25 m",
+    "torso off by 0.10 m",
     "left and right swapped",
     "on another player's leg",
     "hidden in two cameras",
-    "in flight",
-    "on the floor",
-)  # the last two: none of the others
+    "behind the motion",
+    "along the limb",
+    "none of these",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,13 +37,15 @@ class Situation:
     truth: Array  # (n, 6, 3) [m], as PARTS
     others: Array  # (n, m, 6, 3) of all other players
     hidden: Array  # (n, views, 6) share that other players hide
-    is_flying: NDArray[np.bool_]  # (n,)
 
 
 def causes_of(estimate: Array, what: Situation, torso_error_m: Array | None) -> NDArray[np.int64]:
     """Return the cause (n, 6) for each part of an estimate (n, 6, 3), as an index of CAUSES; -1 where it is not off.
 
-    torso_error_m (n,) is that of the torso that the tracker was told; None for a tracker that needs none.
+    torso_error_m (n,) is that of the torso that the tracker was told; None for a tracker that needs none. Swapped: the
+    other side's joint is less than half as far. On another's leg: a joint of that within 0.15 m, and nearer. Hidden:
+    half of the part or more, by other players. Behind: less than half as far from where the part was in the last nine
+    frames. Along: the error within 20 degrees of a limb that ends there.
     """
     error = np.linalg.norm(estimate - what.truth, axis=-1)
     to_other_side = np.linalg.norm(estimate - what.truth[:, _OTHER_SIDE], axis=-1)
@@ -51,7 +58,28 @@ def causes_of(estimate: Array, what: Situation, torso_error_m: Array | None) -> 
         2 * to_other_side < error,
         (to_another < _AT_ANOTHER_M) & (to_another < error),
         (what.hidden >= _HALF_HIDDEN).sum(axis=1) >= 2,
-        np.broadcast_to(what.is_flying[:, None], error.shape),
+        2 * _to_the_past(estimate, what.truth) < error,
+        _along_limbs(estimate - what.truth, what.truth) > _ALONG_COS,
         np.ones(error.shape, bool),
     ]
     return np.where(error <= OFF_M, -1, np.argmax(holds, axis=0))
+
+
+def _to_the_past(estimate: Array, truth: Array) -> Array:
+    """Return the distance (n, 6) from where each part was in the frames just before."""
+    least = np.full(estimate.shape[:2], np.inf)
+    for k in range(1, min(_LATE_FRAMES, len(truth) - 1) + 1):
+        least[k:] = np.fmin(least[k:], np.linalg.norm(estimate[k:] - truth[:-k], axis=-1))
+    return least
+
+
+def _along_limbs(error: Array, truth: Array) -> Array:
+    """Return how much of an error (n, 6, 3) is along a thigh or shank that ends there: the cosine (n, 6), 0 to 1."""
+    found = np.zeros(error.shape[:2])
+    size = np.maximum(np.linalg.norm(error, axis=-1), 1e-9)
+    for a, b in RODS:
+        rod = truth[:, b] - truth[:, a]
+        rod /= np.linalg.norm(rod, axis=-1, keepdims=True)
+        for k in (a, b):
+            found[:, k] = np.fmax(found[:, k], np.abs(np.sum(error[:, k] * rod, axis=-1)) / size[:, k])
+    return found

@@ -40,7 +40,10 @@ def hidden_shares(scene: BlockScene) -> Array:
 
 
 def is_hidden(points: Array, centre: Array, start: Array, end: Array, radius: Array) -> NDArray[np.bool_]:
-    """Say which points (n, k, 3) a camera at `centre` (3,) cannot see for capsules start, end (n, c, 3), radius (c,)."""
+    """Say which points (n, k, 3) a camera at `centre` (3,) cannot see: (n, k).
+
+    What may hide them are capsules: start, end (n, c, 3), radius (c,) [m].
+    """
     ray, axis = (points - centre)[:, :, None], (end - start)[:, None]
     to_start = (start - centre)[:, None]
     rr, ra, aa = (np.sum(a * b, axis=-1) for a, b in ((ray, ray), (ray, axis), (axis, axis)))

@@ -1,4 +1,4 @@
-"""One tracked sequence against its truth: a record of plain numbers for each run and player, written as it is finished."""
+"""One tracked sequence against its truth: a record of plain numbers for each run and player."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ _WARM_UP = 3  # frames whose times are left out: kernels are compiled, colours l
 _LEGS = len(PARTS)
 
 
-def records_of(take: Take, scene: BlockScene, tracked: Tracked) -> list[dict[str, Any]]:
-    """Measure every run: one record for each of its players."""
-    truth, hidden = true_motion(scene), hidden_shares(scene)
+def records_of(take: Take, scene: BlockScene, tracked: Tracked, truth: PlayersMotion) -> list[dict[str, Any]]:
+    """Measure every run against the truth of all players: one record for each of its players."""
+    hidden = hidden_shares(scene)
     visible = np.zeros((scene.n_frames, len(truth.players), len(scene.rig), len(truth.joints)), bool)
     visible[:, : len(scene.blockers), :, :_LEGS] = hidden < FULLY_HIDDEN
     known = {player.name: _stated(player, float(scene.rate)) for player in scene.blockers}
-    situations = [_situation(i, scene, truth, hidden) for i in range(len(scene.blockers))]
+    situations = [_situation(i, truth, hidden) for i in range(len(scene.blockers))]
     records = []
     for run, motion in tracked.motions.items():
         compared = compare_players(motion, truth, rig=scene.calibrated, visible=visible, known_jumps=known)
@@ -67,9 +67,8 @@ def records_of(take: Take, scene: BlockScene, tracked: Tracked) -> list[dict[str
     return records
 
 
-def torso_record(take: Take, scene: BlockScene, tracked: Tracked) -> dict[str, Any]:
+def torso_record(take: Take, tracked: Tracked, truth: PlayersMotion) -> dict[str, Any]:
     """Say how good and how dear the torso tracker is: errors of the blockers' torsos."""
-    truth = true_motion(scene)
     errors = np.stack([_torso_errors_m(seed, tracked, truth) for seed in tracked.torsos])
     return {
         "mean_mm": 1e3 * errors.mean(),
@@ -86,17 +85,17 @@ def write_take(path: Path, take: Take, scene: BlockScene, tracked: Tracked) -> N
     Places (n, 6, 3) [m] and covariances (n, 6, 3, 3) [m2] of each run and player by the record's "places"; the truth of
     player k as `truth/k`.
     """
-    arrays: dict[str, Array] = {"time_s": scene.times_s}
-    truth = _legs(true_motion(scene))
-    arrays |= {f"truth/{i}": truth[:, i] for i in range(len(scene.blockers))}
+    arrays: dict[str, Any] = {"time_s": scene.times_s}
+    truth = true_motion(scene)
+    arrays |= {f"truth/{i}": _legs(truth)[:, i] for i in range(len(scene.blockers))}
     for run, motion in tracked.motions.items():
         columns = [motion.joints.index(name) for name in PARTS]
         for i in range(len(motion.players)):
             arrays[f"{run.key}/{i}"] = motion.points[:, i, columns]
             arrays[f"{run.key}/{i}/covariance"] = motion.covariance[:, i, columns]
     np.savez_compressed(path.with_suffix(".npz"), **arrays)
-    records = records_of(take, scene, tracked)
-    write_json(path, {"records": records, "torso": torso_record(take, scene, tracked)})
+    records = records_of(take, scene, tracked, truth)
+    write_json(path, {"records": records, "torso": torso_record(take, tracked, truth)})
 
 
 def read_take(path: Path) -> dict[str, Any]:
@@ -143,15 +142,9 @@ def _stated(player: Player, rate_hz: float) -> dict[str, float]:
     }
 
 
-def _situation(i: int, scene: BlockScene, truth: PlayersMotion, hidden: Array) -> Situation:
-    player, legs = scene.blockers[i], _legs(truth)
-    assert player.takeoff_s is not None and player.touch_s is not None, "a blocker jumps"
-    return Situation(
-        truth=legs[:, i],
-        others=np.delete(legs, i, axis=1),
-        hidden=hidden[:, i],
-        is_flying=(scene.times_s >= player.takeoff_s) & (scene.times_s <= player.touch_s),
-    )
+def _situation(i: int, truth: PlayersMotion, hidden: Array) -> Situation:
+    legs = _legs(truth)
+    return Situation(truth=legs[:, i], others=np.delete(legs, i, axis=1), hidden=hidden[:, i])
 
 
 def _torso_error_m(run: Run, i: int, tracked: Tracked, truth: PlayersMotion) -> Array | None:

@@ -1,4 +1,4 @@
-"""All sequences together: success by the paper's protocol and strict errors, over seeds; which sequences fail and why."""
+"""All sequences together: success as the paper has it, strict errors, over seeds; which sequences fail and why."""
 
 from __future__ import annotations
 

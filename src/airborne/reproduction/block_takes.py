@@ -1,4 +1,4 @@
-"""Sequences over processes: each is finished and written for itself, so a run that was stopped goes on with the rest."""
+"""Sequences over processes: each is written as soon as it is finished; a run goes on with those that are missing."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import wait as until_ready
-from multiprocessing.managers import SyncManager
 from pathlib import Path
-from queue import Empty
 from threading import Thread
 from typing import Any
 
@@ -73,11 +71,9 @@ def _do_take(path: Path, take: Take, progress: Callable[[], None]) -> None:
 
 def _in_processes(missing: Sequence[tuple[Path, Take]], n: int, done: _Counter) -> None:
     context = get_context("spawn")
-    manager = SyncManager(ctx=context)
-    manager.start(_end_with_parent)
-    with manager, ProcessPoolExecutor(n, context, _prepare) as pool:
-        frames, stop = manager.Queue(), manager.Event()
-        futures = [pool.submit(_do_take_apart, path, take, frames, stop) for path, take in missing]
+    frames, stop = context.Value("q", 0), context.Event()
+    with ProcessPoolExecutor(n, context, _prepare, (frames, stop)) as pool:
+        futures = [pool.submit(_do_take_apart, path, take) for path, take in missing]
         try:
             _listen(futures, frames, done)
         finally:
@@ -87,44 +83,38 @@ def _in_processes(missing: Sequence[tuple[Path, Take]], n: int, done: _Counter) 
 
 def _listen(futures: Sequence[Future[None]], frames: Any, done: _Counter) -> None:
     """Count frames until all is finished; what goes wrong in a process is raised here at once."""
-    left = set(futures)
+    left, told = set(futures), 0
     while left:
         finished, left = wait(left, timeout=_LOOK_S)
-        while (count := _waiting(frames)) > 0:
-            for _ in range(count):
-                done()
+        while told < frames.value:
+            told += 1
+            done()
         for future in finished:
             future.result()
 
 
-def _waiting(frames: Any) -> int:
-    """Take all that waits in the queue."""
-    count = 0
-    try:
-        while True:
-            count += frames.get_nowait()
-    except Empty:
-        return count
+class _Shared:
+    """What a process has from the one that started it, as long as it lives; only `_prepare` sets it."""
+
+    frames: Any  # how many are done, by all processes
+    stop: Any  # an event
 
 
-def _prepare() -> None:
-    """Make a process leave stopping to the one that started it, and use one core."""
+def _prepare(frames: Any, stop: Any) -> None:
+    """Make a process leave stopping to the one that started it, end with that one, and use one core."""
+    _Shared.frames, _Shared.stop = frames, stop
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     cv2.setNumThreads(1)
-    _end_with_parent()
-
-
-def _end_with_parent() -> None:
-    """End this process when the one that started it is gone, whatever ended that."""
     parent = parent_process()
     assert parent is not None, "a process that was started by another"
     Thread(target=lambda: (until_ready([parent.sentinel]), os._exit(1)), daemon=True).start()
 
 
-def _do_take_apart(path: Path, take: Take, frames: Any, stop: Any) -> None:
+def _do_take_apart(path: Path, take: Take) -> None:
     def tell() -> None:
-        frames.put(1)
-        if stop.is_set():
+        with _Shared.frames.get_lock():
+            _Shared.frames.value += 1
+        if _Shared.stop.is_set():
             raise _Stopped
 
     try:

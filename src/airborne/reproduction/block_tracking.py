@@ -54,7 +54,7 @@ class _Stepped:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Told:
-    """A `TorsoInput` of torsos that are tracked once for several filters: one (players, 3) [m] for each frame so far."""
+    """A `TorsoInput` of torsos that are tracked once for several filters: (players, 3) [m] of each frame so far."""
 
     places: list[Array]
 
@@ -102,7 +102,7 @@ def track_scene(scene: BlockScene, runs: Sequence[Run], progress: Callable[[], N
 
 
 def hand_set(scene: BlockScene, seed: int) -> list[PlayerStart]:
-    """Return the players as set by hand in the first frame; seed 0 is the scene's own, others are off by other errors."""
+    """Return the players as set by hand in the first frame; seed 0 is the scene's own, others have other errors."""
     return [PlayerStart(name=name, joints_m=joints) for name, joints in starts_of(_reseeded(scene, seed)).items()]
 
 
