@@ -18,7 +18,7 @@ from airborne.export import PlayersOverlayVideos, write_json, write_players_repo
 from airborne.motion import PlayersMotion, PlayersWriter, read_players, write_players_parquet
 from airborne.motion.jump_table import columns_of, write_jumps
 from airborne.motion.jumps import jumps
-from airborne.players_tracker import players_tracker_of
+from airborne.players_tracker import compile_for, players_tracker_of
 from airborne.runs import Progress, begin, circumstances, identity_of, open_live, open_trial, past_the_end
 from airborne.tracking import Status
 from airborne.trial import Trial
@@ -64,6 +64,7 @@ def track_players(
     begun_s = time.monotonic()
     with ExitStack() as stack:
         if live:
+            compile_for(trial)
             waiting = (lambda: None) if progress is None else (lambda: progress(0, None))
             recording, calibration = stack.enter_context(open_live(trial, waiting))
         else:

@@ -5,21 +5,25 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 from pathlib import Path
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.cameras import Rig
+from airborne.cameras import Camera, Rig
 from airborne.errors import TrialError
 from airborne.tracking.blocker import Blocker
 from airborne.tracking.filters import GivenTorsos, LegsMethod, LegsSettings, legs_tracker
 from airborne.tracking.players import PlayerStart, PlayersTracker
 from airborne.trial import Trial
+from airborne.video import Frames, View
 
 Array = NDArray[np.floating]
 
+_AWAY_M = 4.0  # of the made-up cameras
 _TORSO_COLUMNS = ("player", "frame", "x_m", "y_m", "z_m")
 
 
@@ -43,6 +47,30 @@ def players_tracker_of(trial: Trial, rig: Rig) -> PlayersTracker:
         **{name: value for name, value in chosen.items() if value is not None},
     )
     return legs_tracker(settings, rig, starts, torso)
+
+
+def compile_for(trial: Trial) -> None:
+    """Take two steps on empty pictures, so that the tracker's kernels are compiled before live pictures come."""
+    at = np.mean([place for start in trial.players for place in start.joints_m.values()], axis=0)
+    size, focal_px = (640, 480), 400.0
+    K = np.array([[focal_px, 0, size[0] / 2], [0, focal_px, size[1] / 2], [0, 0, 1]])
+    level = Rotation.from_matrix([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # looks along +y
+    cameras = []
+    for camera, aside_m in zip(trial.camera, np.linspace(-1, 1, len(trial.camera)), strict=True):
+        place = at + [aside_m, -_AWAY_M, 0]
+        cameras.append(
+            Camera(
+                name=camera.name,
+                K=K,
+                size=size,
+                camera_from_world=RigidTransform.from_components(-level.apply(place), level),
+            )
+        )
+    tracker, grey = players_tracker_of(trial, Rig(tuple(cameras))), np.full((size[1], size[0], 3), 128, np.uint8)
+    state = tracker.init()
+    for index in range(2):
+        views = tuple(View(camera, grey) for camera in cameras)
+        state, _ = tracker.step(state, Frames(index, Fraction(index, 60), views))
 
 
 def read_torsos(path: Path, starts: Sequence[PlayerStart], *, first: int) -> GivenTorsos:

@@ -53,5 +53,7 @@ class Legs:
         )
         for name, length_m in (("thigh", legs.thigh_m), ("shank", legs.shank_m), ("pelvis", 2 * legs.half_pelvis_m)):
             if not 0.05 < length_m < 0.8:
-                raise BodyError(f"a {name} of {length_m:.2f} m is no person's; give the points in metres, 0.05 to 0.8 m")
+                raise BodyError(
+                    f"a {name} of {length_m:.2f} m is no person's; give the points in metres, 0.05 to 0.8 m"
+                )
         return legs

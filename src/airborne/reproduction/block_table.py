@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from airborne.evaluation.jump_errors import EVENTS, HEIGHTS
+from airborne.reproduction.block_causes import TORSO_OFF_M
 from airborne.reproduction.block_plan import PAPER, PARTS
 
 Summary = Mapping[str, Any]
@@ -99,13 +100,13 @@ def _shares(summary: Summary) -> str:
     for name, found in summary["rows"].items():
         means = [sum(found[key]) / len(PARTS) for key in ("within_100mm", "within_50mm", "within_95")]
         shares = [*means, *(found[key] for key in ("swaps_knees", "swaps_feet", "limbs_correct", "lost", "uncertain"))]
-        needs_torso = name in PAPER
-        ms = found["ms_per_frame"] + (summary["torso"]["ms_per_frame"] if needs_torso else 0.0)
+        ms = found["ms_per_frame"] + (summary["torso"]["ms_per_frame"] if name in PAPER else 0.0)
         lines.append([_code(name), *(_number(100 * share, 1) for share in shares), _number(ms, 1)])
     torso = summary["torso"]
     note = (
-        f"The tracked torsos are off by {torso['mean_mm']:.0f} mm on the mean ({torso['median_mm']:.0f} median, over "
-        f"0.25 m in {100 * torso['off']:.1f} %) and cost {torso['ms_per_frame']:.1f} ms of the three filters' time."
+        f"The tracked torsos are off by {torso['mean_mm']:.0f} mm on the mean ({torso['median_mm']:.0f} median; over "
+        f"{TORSO_OFF_M:.2f} m in {100 * torso['off']:.1f} % of the frames). Following them is "
+        f"{torso['ms_per_frame']:.1f} ms of the three filters' time."
     )
     return f"{_table(titles, lines)}\n\n{note}"
 
