@@ -57,7 +57,7 @@ def compile_for(trial: Trial) -> None:
     level = Rotation.from_matrix([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # looks along +y
     cameras = []
     for camera, aside_m in zip(trial.camera, np.linspace(-1, 1, len(trial.camera)), strict=True):
-        place = at + [aside_m, -_AWAY_M, 0]
+        place = at + np.array([aside_m, -_AWAY_M, 0])
         cameras.append(
             Camera(
                 name=camera.name,

@@ -1,4 +1,4 @@
-"""The legs of a jumper: six points joined by rods, with the lengths that stay the same (block-jump paper, section 2.1)."""
+"""The legs of a jumper: six points joined by rods of fixed lengths (block-jump paper, section 2.1)."""
 
 from __future__ import annotations
 
