@@ -152,7 +152,7 @@ class Hall:
         for number, name in enumerate(self.motions):
             off = np.random.default_rng([11, number]).normal(size=(len(JOINTS), 3))
             off *= wrong_m / np.linalg.norm(off, axis=1, keepdims=True)
-            points = dict(zip(JOINTS, self.truth(name, index) + off, strict=True))
+            points: dict[str, np.ndarray] = dict(zip(JOINTS, self.truth(name, index) + off, strict=True))
             found.append(PlayerStart(name=name, joints_m=points))
         return found
 
