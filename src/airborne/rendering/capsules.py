@@ -18,7 +18,6 @@ EXACT: dict[str, Any] = {"nogil": True, "error_model": "numpy", "cache": True}
 
 MOST_SPANS = 64  # capsules in one row
 BEHIND = 1e9  # depth of what is not in front of the camera [m]
-_MOST_SLOPE = 4.0  # of an edge that a row cuts: flatter ones are seen at their ends
 _BORDER_SAMPLES = 5
 
 
@@ -58,72 +57,78 @@ def project(ends, radii, camera, discs, depth):
 
 
 @njit(**EXACT)
-def outline(disc_a, disc_b, y_first, x, tangents):
+def outline(disc_a, disc_b, y_first, x, pieces, tangents):
     """Outline the hull of two discs (x, y, radius) [px] in rows at y_first, y_first + 1, ...
 
-    Fills x (2, rows), where it begins and ends in each row, and tangents (2, 8), what `_motion` takes of either side.
-    Returns the first and one past the last row that is met.
+    Fills x (2, rows), where it begins and ends in each row; pieces (2, rows), of what that end is: disc a (0), disc b
+    (1), or one of the common tangents (2, 3); and tangents (2, 6), what `_motion` takes of these. Returns the first and
+    one past the last row that is met.
     """
     n = x.shape[1]
     top = min(disc_a[1] - disc_a[2], disc_b[1] - disc_b[2])
     bottom = max(disc_a[1] + disc_a[2], disc_b[1] + disc_b[2])
     first = int(min(max(np.ceil(top - y_first), 0.0), n))
     last = int(min(max(np.floor(bottom - y_first) + 1, first), n))
+    x[0, first:last], x[1, first:last] = BEHIND, -BEHIND
+    for k in range(2):
+        disc = disc_a if k == 0 else disc_b
+        start = int(min(max(np.ceil(disc[1] - disc[2] - y_first), first), last))
+        stop = int(min(max(np.floor(disc[1] + disc[2] - y_first) + 1, start), last))
+        for i in range(start, stop):
+            dy = y_first + i - disc[1]
+            h = np.sqrt(max(disc[2] * disc[2] - dy * dy, 0.0))
+            if disc[0] - h < x[0, i]:
+                x[0, i], pieces[0, i] = disc[0] - h, k
+            if disc[0] + h > x[1, i]:
+                x[1, i], pieces[1, i] = disc[0] + h, k
     ux, uy, dr = disc_b[0] - disc_a[0], disc_b[1] - disc_a[1], disc_a[2] - disc_b[2]
     d2 = ux * ux + uy * uy
-    is_one = d2 <= dr * dr * 1.0001  # one disc lies in the other
-    cosine, sine = 0.0, 0.0
-    if not is_one:
-        cosine, sine = dr / d2, np.sqrt(d2 - dr * dr) / d2
-    for side in range(2):
-        outward = 2.0 * side - 1.0
-        high, low, ax, ay, slope, nx, ny, length = BEHIND, BEHIND, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0
-        upper = 0.0 if dr > 0 else 1.0
-        lower = upper
-        if not is_one:  # the common tangent on this side
-            sign = 1.0 if (side == 0) == (uy > 0) else -1.0
-            nx, ny = ux * cosine - sign * uy * sine, uy * cosine + sign * ux * sine
-            ax, ay = disc_a[0] + disc_a[2] * nx, disc_a[1] + disc_a[2] * ny
-            bx, by = disc_b[0] + disc_b[2] * nx, disc_b[1] + disc_b[2] * ny
-            length = by - ay
-            slope = (bx - ax) / length if abs(length) > 1e-9 else 0.0
-            upper, lower = (0.0, 1.0) if ay < by else (1.0, 0.0)
-            high, low = min(ay, by), max(ay, by)
-        for k, value in enumerate((high, low, ay, slope, nx, ny, length, upper)):
-            tangents[side, k] = value
-        in_tangent = int(min(max(np.ceil(high - y_first), first), last))
-        after_tangent = int(min(max(np.floor(low - y_first) + 1, in_tangent), last))
-        _cap(disc_a if upper == 0 else disc_b, y_first, outward, first, in_tangent, x[side])
-        for i in range(in_tangent, after_tangent):
-            x[side, i] = ax + slope * (y_first + i - ay)
-        _cap(disc_a if lower == 0 else disc_b, y_first, outward, after_tangent, last, x[side])
+    if d2 <= dr * dr * 1.0001:  # one disc lies in the other
+        return first, last
+    cosine, sine = dr / d2, np.sqrt(d2 - dr * dr) / d2
+    for k in range(2):
+        sign = 1.0 - 2.0 * k
+        nx, ny = ux * cosine - sign * uy * sine, uy * cosine + sign * ux * sine
+        ax, ay = disc_a[0] + disc_a[2] * nx, disc_a[1] + disc_a[2] * ny
+        bx, by = disc_b[0] + disc_b[2] * nx, disc_b[1] + disc_b[2] * ny
+        slope = (bx - ax) / (by - ay) if abs(by - ay) > 1e-9 else 0.0
+        for p, value in enumerate((ax, ay, by, slope, nx, ny)):
+            tangents[k, p] = value
+        start = int(min(max(np.ceil(min(ay, by) - y_first), first), last))
+        stop = int(min(max(np.floor(max(ay, by) - y_first) + 1, start), last))
+        for i in range(start, stop):
+            edge = ax + slope * (y_first + i - ay)
+            if edge < x[0, i]:
+                x[0, i], pieces[0, i] = edge, 2 + k
+            if edge > x[1, i]:
+                x[1, i], pieces[1, i] = edge, 2 + k
     return first, last
 
 
 @njit(**EXACT)
-def _cap(disc, y_first, outward, start, stop, x):
-    for i in range(start, stop):
-        dy = y_first + i - disc[1]
-        x[i] = disc[0] + outward * np.sqrt(max(disc[2] * disc[2] - dy * dy, 0.0))
+def _motion(disc_a, disc_b, tangents, piece, y, outward, dx):
+    """Say how an end of a span moves: dx (6,), by (x, y, radius) of disc a, then of disc b.
 
-
-@njit(**EXACT)
-def _motion(disc_a, disc_b, tangent, y, outward, dx):
-    """Fill dx (6,) with how a side of an outline moves in a row, by (x, y, radius) of disc a, then of disc b."""
-    high, low, ay, slope, nx, ny, length, upper = tangent
-    if high <= y <= low:
-        t = (y - ay) / length if abs(length) > 1e-9 else 0.5
-        steep = min(max(slope, -_MOST_SLOPE), _MOST_SLOPE)
-        along = nx - steep * ny  # what a larger radius does
-        dx[0], dx[1], dx[2] = 1 - t, -steep * (1 - t), along * (1 - t)
-        dx[3], dx[4], dx[5] = t, -steep * t, along * t
-        return
-    at_a = (upper == 0) == (y < high) or (high == BEHIND and upper == 0)
-    disc, k = (disc_a, 0) if at_a else (disc_b, 3)
-    dy = y - disc[1]
-    h = max(np.sqrt(max(disc[2] * disc[2] - dy * dy, 0.0)), disc[2] / _MOST_SLOPE, 1e-6)
+    Over the row's own height, from y - 0.5 to y + 0.5, the outline runs over a stretch (x0, x1) that is returned: a
+    level edge gains and loses pixels all along it.
+    """
+    if piece >= 2:
+        ax, ay, by, slope, nx, ny = tangents[piece - 2]
+        top, bottom = max(y - 0.5, min(ay, by)), min(y + 0.5, max(ay, by))
+        run = slope * (bottom - top)
+        t = min(max((0.5 * (top + bottom) - ay) / (by - ay), 0.0), 1.0) if abs(by - ay) > 1e-9 else 0.5
+        along = nx - run * ny  # what a larger radius does
+        dx[0], dx[1], dx[2] = 1 - t, -run * (1 - t), along * (1 - t)
+        dx[3], dx[4], dx[5] = t, -run * t, along * t
+        return ax + slope * (top - ay), ax + slope * (bottom - ay)
+    disc, k = (disc_a, 0) if piece == 0 else (disc_b, 3)
+    r = disc[2]
+    top, bottom = min(max(y - 0.5 - disc[1], -r), r), min(max(y + 0.5 - disc[1], -r), r)
+    h_top, h_bottom = np.sqrt(max(r * r - top * top, 0.0)), np.sqrt(max(r * r - bottom * bottom, 0.0))
     dx[:] = 0
-    dx[k], dx[k + 1], dx[k + 2] = 1, outward * dy / h, outward * disc[2] / h
+    dx[k], dx[k + 1] = 1, -outward * (h_bottom - h_top)
+    dx[k + 2] = outward * r * (np.arcsin(bottom / r) - np.arcsin(top / r))
+    return disc[0] + outward * h_top, disc[0] + outward * h_bottom
 
 
 @njit(**EXACT)
@@ -148,10 +153,10 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
     discs (n, 2, 3) and depth (n,) as `project` gives them, in the pixels of the maps; kinds (n, 2) the map at either
     end of each capsule and share (n,) how far along its axis the first one reaches; sums (k, h, w + 1) running sums of
     the maps over a region whose first pixel is origin (x, y); contrast (k,) by how much each map falls across an edge
-    of what it shows. What lies outside the region counts nothing. work is
-    x (n, 2, h) and tangents (n, 2, 8). Fills out (n, 2, 2), the sum and the area [px] that each capsule owns of its
-    first and its second map; and if gradient (n, 7) is not empty, that and curvature (n, 7, 7), which is what maps
-    have that fall by their contrast within a pixel of every edge, by (x, y, radius) of both discs and the share.
+    of what it shows. What lies outside the region counts nothing. work is x (n, 2, h), pieces (n, 2, h) and tangents
+    (n, 2, 6). Fills out (n, 2, 2), the sum and the area [px] that each capsule owns of its first and its second map;
+    and if gradient (n, 7) is not empty, that and curvature (n, 7, 7), which is what maps have that fall by their
+    contrast within a pixel of every edge, by (x, y, radius) of both discs and the share.
     """
     n, (_, h, w) = len(discs), sums.shape
     with_gradient = len(gradient) > 0
@@ -159,11 +164,11 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
     out[:], gradient[:], curvature[:] = 0, 0, 0
     first, last = np.zeros(n, np.int64), np.zeros(n, np.int64)
     top, bottom = h, 0
-    x, tangents = work
+    x, pieces, tangents = work
     dx = np.empty(6)
     for i in range(n):
         if depth[i] < BEHIND:
-            first[i], last[i] = outline(discs[i, 0], discs[i, 1], origin[1], x[i], tangents[i])
+            first[i], last[i] = outline(discs[i, 0], discs[i, 1], origin[1], x[i], pieces[i], tangents[i])
             if last[i] > first[i]:
                 top, bottom = min(top, first[i]), max(bottom, last[i])
     taken_x, taken_by = np.empty((MOST_SPANS, 2), np.float32), np.empty((MOST_SPANS, 2), np.int64)
@@ -192,26 +197,16 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
                     if with_gradient:
                         who, side = (i, 0) if from_k < 0 else (taken_by[from_k, 1], 1)
                         if at > least:
-                            value = _at_edge(map_0, map_1, at, cut, weight, split)
-                            _motion(discs[who, 0], discs[who, 1], tangents[who, side], y, 2.0 * side - 1.0, dx)
-                            _pull(
-                                dx,
-                                -value,
-                                _at_edge_of(contrast, kinds[i], at, cut, weight, split),
-                                gradient[who],
-                                curvature[who],
-                            )
+                            edge = pieces[who, side, row], y, side, at, ox
+                            pull = -1.0, _at_edge_of(contrast, kinds[i], at, cut, weight, split)
+                            maps = map_0, map_1, cut, weight, split
+                            _pull(discs[who], tangents[who], edge, maps, pull, dx, gradient[who], curvature[who])
                         who, side = (i, 1) if is_open else (taken_by[k, 0], 0)
                         if end < most:
-                            value = _at_edge(map_0, map_1, end, cut, weight, split)
-                            _motion(discs[who, 0], discs[who, 1], tangents[who, side], y, 2.0 * side - 1.0, dx)
-                            _pull(
-                                dx,
-                                value,
-                                _at_edge_of(contrast, kinds[i], end, cut, weight, split),
-                                gradient[who],
-                                curvature[who],
-                            )
+                            edge = pieces[who, side, row], y, side, end, ox
+                            pull = 1.0, _at_edge_of(contrast, kinds[i], end, cut, weight, split)
+                            maps = map_0, map_1, cut, weight, split
+                            _pull(discs[who], tangents[who], edge, maps, pull, dx, gradient[who], curvature[who])
                 if is_open:
                     break
                 at, from_k = max(at, taken_x[k, 1]), k
@@ -222,9 +217,10 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
                 for q in range(p):
                     curvature[i, q, p] = curvature[i, p, q]
             if last[i] > first[i] and kinds[i, 0] != kinds[i, 1]:
-                maps = sums[kinds[i, 0]], sums[kinds[i, 1]]
+                sums_of = sums[kinds[i, 0]], sums[kinds[i, 1]]
                 between = 0.5 * (contrast[kinds[i, 0]] + contrast[kinds[i, 1]])
-                _pull_border(discs[i], share[i], maps, between, origin, gradient[i], curvature[i])
+                nearer = order, i, first, last, x
+                _pull_border(discs[i], share[i], sums_of, between, nearer, origin, gradient[i], curvature[i])
 
 
 @njit(**EXACT)
@@ -282,10 +278,27 @@ def _at_edge_of(contrast, kinds, edge, cut, weight, split):
 
 
 @njit(**EXACT)
-def _pull(dx, value, contrast, gradient, curvature):
-    """Add an edge that gains `value` per pixel of motion dx (6,) to the right."""
-    slope = dx[1] + dx[4]
-    facing = contrast / np.sqrt(1 + slope * slope)
+def _pull(disc, tangents, edge, maps, pull, dx, gradient, curvature):
+    """Add what the end of a span gains when its discs move: `pull` is its sign and the contrast there.
+
+    A level edge gains all along the stretch that it runs over within the row.
+    """
+    piece, y, side, at, ox = edge
+    map_0, map_1, cut, weight, split = maps
+    sign, contrast = pull
+    x0, x1 = _motion(disc[0], disc[1], tangents, piece, y, 2.0 * side - 1.0, dx)
+    last = np.float32(len(map_0) - 2.0)
+    left = min(max(np.float32(min(x0, x1)) - ox, np.float32(0)), last)
+    right = min(max(np.float32(max(x0, x1)) - ox, np.float32(0)), last)
+    if right - left > 1:
+        inside = _read_mixed(map_0, map_1, right, cut, weight, split) - _read_mixed(
+            map_0, map_1, left, cut, weight, split
+        )
+        value = sign * inside / (right - left)
+    else:
+        value = sign * _at_edge(map_0, map_1, at, cut, weight, split)
+    length = np.sqrt((dx[0] + dx[3]) ** 2 + (dx[1] + dx[4]) ** 2)
+    facing = contrast / max(length, 1e-6)
     for p in range(6):
         gradient[p] += value * dx[p]
         for q in range(p + 1):
@@ -293,7 +306,31 @@ def _pull(dx, value, contrast, gradient, curvature):
 
 
 @njit(**EXACT)
-def _pull_border(disc, share, maps, contrast, origin, gradient, curvature):
+def _read_mixed(map_0, map_1, x, cut, weight, split):
+    """Read the running sums of the maps that hold left of x, up to a constant."""
+    if split == 0:
+        return weight * _read(map_0, x) + (1 - weight) * _read(map_1, x)
+    on_left, on_right = (map_0, map_1) if split > 0 else (map_1, map_0)
+    middle = min(max(np.float32(cut), np.float32(0)), np.float32(len(map_0) - 2.0))
+    if x <= middle:
+        return _read(on_left, x)
+    return _read(on_left, middle) + _read(on_right, x) - _read(on_right, middle)
+
+
+@njit(**EXACT)
+def _is_hidden(nearer, u, row):
+    """Say whether a nearer capsule lies over a place of a row."""
+    order, i, first, last, x = nearer
+    for j in order:
+        if j == i:
+            return False
+        if first[j] <= row < last[j] and x[j, 0, row] <= u <= x[j, 1, row]:
+            return True
+    return False
+
+
+@njit(**EXACT)
+def _pull_border(disc, share, maps, contrast, nearer, origin, gradient, curvature):
     """Add what a border across a capsule gains when it moves along the axis."""
     ux, uy = disc[1, 0] - disc[0, 0], disc[1, 1] - disc[0, 1]
     length = np.sqrt(ux * ux + uy * uy)
@@ -306,9 +343,9 @@ def _pull_border(disc, share, maps, contrast, origin, gradient, curvature):
     h, w = maps[0].shape
     step = 2 * radius / _BORDER_SAMPLES
     for i in range(_BORDER_SAMPLES):
-        offset = (i + 0.5) * step - radius
+        offset = radius * ((2 * i + 1) / _BORDER_SAMPLES - 1)
         x, row = cx - offset * uy, int(np.floor(cy + offset * ux + 0.5))
-        if not (0 <= row < h and 0 <= x < w - 2):
+        if not (0 <= row < h and 0 <= x < w - 2) or _is_hidden(nearer, x + origin[0], row):
             continue
         value = (_value(maps[0][row], x) - _value(maps[1][row], x)) * step
         along = (ux * (1 - share), uy * (1 - share), 0.0, ux * share, uy * share, 0.0, length)
@@ -346,12 +383,12 @@ def labels(discs, depth, kinds, share, out):
     """Fill out (h, w) with the kind of the nearest capsule at each pixel, -1 where there is none; see `evidence`."""
     h, w = out.shape
     out[:] = -1
-    x, tangents = np.empty((2, h)), np.empty((2, 8))
+    x, pieces, tangents = np.empty((2, h)), np.empty((2, h), np.int64), np.empty((2, 6))
     order = np.argsort(-depth)
     for i in order:
         if depth[i] >= BEHIND:
             continue
-        first, last = outline(discs[i, 0], discs[i, 1], 0.0, x, tangents)
+        first, last = outline(discs[i, 0], discs[i, 1], 0.0, x, pieces, tangents)
         ux, uy = discs[i, 1, 0] - discs[i, 0, 0], discs[i, 1, 1] - discs[i, 0, 1]
         cx, cy = discs[i, 0, 0] + share[i] * ux, discs[i, 0, 1] + share[i] * uy
         for y in range(first, last):

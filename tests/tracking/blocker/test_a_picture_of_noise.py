@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from airborne.tracking import Status
 from tests.tracking.blocker.hops import errors_mm, statuses, tracked
@@ -30,9 +29,6 @@ def test_a_start_in_noise_is_never_certain(hall):
     assert found[0].n_views < 2
 
 
-@pytest.mark.xfail(
-    strict=True, reason="colours learned from a bare floor make a player of it, whatever little they say"
-)
 def test_a_start_on_an_empty_floor_is_never_certain(hall):
     [found] = tracked(replace(hall, is_there=lambda index: False), range(8))
     assert Status.TRACKED not in statuses(found)

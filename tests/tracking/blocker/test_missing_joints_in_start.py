@@ -22,11 +22,6 @@ def test_a_missing_joint_is_named(hall, missing):
     assert "\n" not in str(error.value) and "anna" in str(error.value)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    raises=pytest.fail.Exception,
-    reason="a player with every joint but hip_left is silently taken for a bystander",
-)
 def test_a_missing_left_hip_is_named(hall):
     joints = {name: point for name, point in hall.starts()[0].joints_m.items() if name != "hip_left"}
     with pytest.raises(TrialError, match="hip_left"):

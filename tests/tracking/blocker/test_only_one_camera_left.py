@@ -34,9 +34,6 @@ def test_a_player_is_followed_again_when_the_others_are_back(hall, found):
     assert np.median(errors_mm(hall, found)[18:]) < 25
 
 
-@pytest.mark.xfail(
-    strict=True, raises=AssertionError, reason="the first frame counts cameras without a picture among its views"
-)
 def test_one_camera_from_the_start_is_never_certain(hall):
     [found] = tracked(replace(hall, is_without=lambda index, number: number != 1), range(4))
     assert set(statuses(found)) == {Status.UNCERTAIN}

@@ -22,6 +22,7 @@ CORE, AROUND = 0.6, 1.25  # pixels under thinner capsules are the player's; outs
 LEAST_HIDDEN, MOST_HIDDEN = 0.05, 0.9
 _AT_EVEN = 0.5  # hidden where a kind's evidence is nothing; not at all where it is as usual
 _LEAST_USUAL = 0.3  # [nat]
+_IN_SIGHT = (0.1, 0.4)  # the most that a kind is hidden in the view that sees it best, and in the next
 _LEAST_PX = 20  # of a kind in a view to judge it by
 _ROUNDS = 6
 _THICKNESSES = slice(N_DOF + N_LENGTHS, N_DOF + N_LENGTHS + 6)  # the radii among a state
@@ -109,6 +110,16 @@ def hidden_by(evidence: Array, usual: Array) -> Array:
     """
     share = np.nan_to_num(evidence) / np.maximum(usual, _LEAST_USUAL)
     return np.clip(_AT_EVEN * (1 - share), LEAST_HIDDEN, MOST_HIDDEN)
+
+
+def not_everywhere(hidden: Array, views: Sequence[int]) -> Array:
+    """Return hidden (cameras, 5) with each kind in sight of two views: where all disagree, the pose is wrong."""
+    hidden = hidden.copy()
+    for kind in range(hidden.shape[1]):
+        best = np.argsort(hidden[views, kind], kind="stable")[: len(_IN_SIGHT)]
+        for view, most in zip(np.array(views)[best], _IN_SIGHT, strict=False):
+            hidden[view, kind] = min(hidden[view, kind], most)
+    return hidden
 
 
 def _mean_evidence(state: Array, region: Region, colours: Colours) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from airborne.body.jumper import JOINTS, N_DOF, SHORTS_END, SOCK_END, THIGH, WAIST
+from airborne.body.jumper import JOINTS, N_DOF, PELVIS, SHANK, SHORTS_END, SOCK_END, THIGH, TRUNK, WAIST
 from airborne.body.legs import LEG_POINTS, Legs
 from airborne.errors import TrialError
 from airborne.tracking.blocker.colours import Colours, seen_through
@@ -61,8 +61,8 @@ def start_state(name: str, joints_m: Mapping[str, Array]) -> Array:
     state = np.concatenate([np.zeros(N_DOF), _LENGTHS * stature_m, _RADII * stature_m])
     lengths = state[N_DOF : N_DOF + N_LENGTHS]
     lengths[SHORTS_END : SOCK_END + 1] = _LENGTHS[SHORTS_END : SOCK_END + 1]
-    lengths[THIGH - 1 : THIGH + 2] = legs.half_pelvis_m, legs.thigh_m, legs.shank_m
-    lengths[3] = 2 * legs.torso_to_hips_m - lengths[WAIST]
+    lengths[[PELVIS, THIGH, SHANK]] = legs.half_pelvis_m, legs.thigh_m, legs.shank_m
+    lengths[TRUNK] = 2 * legs.torso_to_hips_m - lengths[WAIST]
     hips = (np.asarray(joints_m["hip_left"]) + joints_m["hip_right"]) / 2
     across = np.asarray(joints_m["hip_left"]) - joints_m["hip_right"]
     state[:N_DOF] = _REST

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body.jumper import CAPSULES, JOINTS, KINDS, N_DOF, PELVIS
-from airborne.tracking.blocker.colours import Colours, hidden_by
+from airborne.body.legs import LEG_POINTS
+from airborne.tracking.blocker.colours import Colours, hidden_by, not_everywhere
 from airborne.tracking.blocker.dynamics import N_FREE, N_SLIDING, Filtered, begun, predicted, updated
 from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, placed
 from airborne.tracking.blocker.first import first_look, points_of, start_state
@@ -26,6 +27,8 @@ _NEAR_M = 3.0  # other jumpers further away hide nothing
 _STANDING_M, _SLIP_SD_M = 0.02, 0.02  # a ball of the foot this low stands; how far it moves in a frame
 _FLYING_M = 0.06  # both balls of the feet this far above their height in standing: in the air
 _LEAST_SHARE, _LOST_SHARE = 0.5, 0.25  # of the usual evidence per pixel: suspect, lost
+_LEAST_EVIDENCE = 0.3  # per pixel [nat]; less is as good as nothing
+_HIDDEN = 0.45  # mean chance to be hidden, over the kinds, from which a view does not count
 _USUAL_RATE = 0.05
 _UNCERTAIN_SD_M = 0.06
 _LEAST_AREA_PX = 8.0  # of a kind in a map, to judge whether it is hidden
@@ -56,7 +59,7 @@ class Blocker:
 
     def __init__(self, starts: Sequence[PlayerStart]) -> None:
         """Take the players as they start; those with a torso only are left out."""
-        self._starts = [start for start in starts if "hip_left" in start.joints_m]
+        self._starts = [start for start in starts if any(joint in start.joints_m for joint in LEG_POINTS)]
 
     def init(self) -> Mapping[str, Track]:
         """Return the state before the first frame: nobody."""
@@ -95,13 +98,17 @@ class Blocker:
                 first.scale,
                 _per_px(first.fit.owned),
             )
-            n_views = int(np.sum(first.colours.hidden.mean(axis=1) < 0.5))
+            n_views = sum(
+                view is not None and hidden.mean() < _HIDDEN
+                for view, hidden in zip(frames.views, first.colours.hidden, strict=True)
+            )
             free = replace(
                 first.fit,
                 by_state=first.fit.by_state[:, :N_FREE],
                 by_shape=first.fit.by_shape[:N_FREE, :N_FREE],
             )
-            estimates.append(_estimate(start.name, frames, tracks[start.name], free, n_views))
+            found = _estimate(start.name, frames, tracks[start.name], free, n_views)
+            estimates.append(found if found.score > _LEAST_EVIDENCE else _lost(start.name, frames))
         return tracks, tuple(estimates)
 
 
@@ -136,18 +143,18 @@ def _followed(
     prior = Prior(expected.free, information, _standing(track.state), np.full(N_POINTS, _SLIP_SD_M))
     fitted = fit(state, prior, found, hiding)
     evidence = _per_px(fitted.owned)
+    if evidence < max(_LOST_SHARE * track.usual, _LEAST_EVIDENCE):
+        return replace(track, filtered=expected, time_s=frames.time_s), _lost(name, frames)
     filtered = updated(expected, fitted.state[:N_FREE], np.linalg.inv(fitted.information))
     views = [region.view for region in regions]
     track = replace(track, time_s=frames.time_s, filtered=filtered, state=fitted.state)
-    if evidence < _LOST_SHARE * track.usual:
-        return track, _lost(name, frames)
-    if evidence > _LEAST_SHARE * track.usual:
-        track = replace(track, usual=track.usual + _USUAL_RATE * (evidence - track.usual))
     hidden = _hidden(track, fitted.owned, views)
-    n_views = int(np.sum(hidden[views].mean(axis=1) < 0.5))
+    n_views = int(np.sum(hidden[views].mean(axis=1) < _HIDDEN))
     estimate = _estimate(name, frames, track, fitted, n_views)
     if evidence < _LEAST_SHARE * track.usual:
         estimate = replace(estimate, status=Status.UNCERTAIN)
+    elif estimate.status is Status.TRACKED:
+        track = replace(track, usual=track.usual + _USUAL_RATE * (evidence - track.usual))
     return _with_hidden(track, hidden), estimate
 
 
@@ -178,7 +185,7 @@ def _hidden(track: Track, owned: Array, views: Sequence[int]) -> Array:
         evidence, area = np.array([each[CAPSULES[:, :2] == kind].sum(axis=0) for kind in range(len(KINDS))]).T
         target = hidden_by(evidence / np.maximum(area, 1e-9), track.tables[view].usual)
         hidden[view] += _HIDDEN_RATE * np.where(area > _LEAST_AREA_PX, target - hidden[view], 0)
-    return hidden
+    return not_everywhere(hidden, views)
 
 
 def _estimate(name: str, frames: Frames, track: Track, fitted: Fit, n_views: int) -> PlayerEstimate:

@@ -71,18 +71,18 @@ class Seen:
         return self.sums, self.contrast
 
 
-def regions_round(frames: Frames, hips: Array, extra_m: float = 0.0) -> tuple[Region, ...]:
+def regions_round(frames: Frames, hips: Array) -> tuple[Region, ...]:
     """Cut out what the cameras show within reach of hips (3,) [m]; views without it are left out."""
-    found = (_region(v, view, hips, extra_m) for v, view in enumerate(frames.views) if view is not None)
+    found = (_region(v, view, hips) for v, view in enumerate(frames.views) if view is not None)
     return tuple(region for region in found if region is not None)
 
 
-def _region(number: int, view: View, hips: Array, extra_m: float) -> Region | None:
+def _region(number: int, view: View, hips: Array) -> Region | None:
     centre = hips - [0, 0, BELOW_HIPS_M]
     px, scale = view.camera.px_from_world(centre), px_per_m(view.camera, centre)
     if not np.isfinite(px).all():
         return None
-    half = scale * (np.array([HALF_WIDTH_M, HALF_HEIGHT_M]) + extra_m)
+    half = scale * np.array([HALF_WIDTH_M, HALF_HEIGHT_M])
     low = np.maximum(np.floor(px - half), 0).astype(int)
     high = np.minimum(np.ceil(px + half), view.camera.size).astype(int)
     if (high - low).min() < LEAST_SIDE_PX:
@@ -132,7 +132,7 @@ def packed(camera: Camera) -> Array:
     return found
 
 
-def workspace(found: Seen, n_others: int) -> tuple[tuple[Array, Array], Array]:
-    """Allocate what `gathered` works in: (x, tangents) and owned."""
+def workspace(found: Seen, n_others: int) -> tuple[tuple, Array]:
+    """Allocate what `gathered` works in: (x, pieces, tangents) and owned."""
     n, (v, _, h, _) = N_CAPSULES + n_others, found.sums.shape
-    return (np.empty((n, 2, h)), np.empty((n, 2, 8))), np.zeros((v, n, 2, 2))
+    return (np.empty((n, 2, h)), np.empty((n, 2, h), np.int64), np.empty((n, 2, 6))), np.zeros((v, n, 2, 2))
