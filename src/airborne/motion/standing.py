@@ -91,7 +91,8 @@ def _is_quiet_straight(time_s: Array, points: Array, lengths: Array, variance: A
     from_noise = 3 * float(slope @ noise_covariance(time_s, variance) @ slope)
     is_slow = squared.mean() < _QUIET_M_S**2 + from_noise and squared.max() < (_QUIET_M_S + 2 * from_noise**0.5) ** 2
     place = points.mean(axis=0)
-    share = float(np.mean(np.linalg.norm(place[:2] - place[2:], axis=-1) / lengths))
+    known = np.where(lengths > 0, lengths, np.nan)  # a length that noise hides is none
+    share = float(np.mean(np.linalg.norm(place[:2] - place[2:], axis=-1) / known))
     return bool(is_slow and share >= _STRAIGHT)
 
 
