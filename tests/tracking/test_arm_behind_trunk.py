@@ -64,7 +64,7 @@ def test_hidden_arm_stays_near_where_it_went_and_is_found_when_it_comes_out(esti
     assert statuses(estimates) == ["tracked"] * FRAMES
     for estimate in estimates:
         hidden = 5 <= estimate.index < OUT_AGAIN
-        assert off_mm(estimate, "hand_right") < (50 if hidden else 16)
+        assert off_mm(estimate, "hand_right") < (60 if hidden else 16)
         assert off_mm(estimate, "elbow_right") < (32 if hidden else 16)
         assert off_mm(estimate, "hand_left") < 12
 
