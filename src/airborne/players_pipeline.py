@@ -168,7 +168,7 @@ def _summary(
         "duration_s": float(motion.time_s[-1] - motion.time_s[0]),
         "rate_hz": round(float(recording.rate), 6),
         "players": {name: _player(motion, k, len(recording.rig)) for k, name in enumerate(motion.players)},
-        "bystanders": [start.name for start in trial.players if len(start.joints_m) == 1],
+        "bystanders": [start.name for start in trial.players if not start.has_legs],
         "uncertainty": UNCERTAINTY,
         **shared,
     }

@@ -26,7 +26,7 @@ WAIST, SHORTS_END, SOCK_END, TRUNK, PELVIS, THIGH, SHANK, FOOT, SOLE = range(9)
 # columns of the radii
 R_CHEST, R_WAIST, R_HIP, R_KNEE, R_ANKLE, R_FOOT, CHEST_OUT, HIP_OUT = range(8)
 _HEEL = 0.35  # how far the heel reaches behind the ankle, over how far the ball lies before it
-SOLE_M = 0.03  # the ball of the foot lies this far above the ground in standing
+BALL_HEIGHT_M = 0.03  # of the ball of the foot over the floor in standing
 _TOE = 1.25  # how far the toes reach, likewise
 _ANYWHERE = (-np.inf, np.inf)
 _LEG_LIMITS_DEG = ((-125, 35), (-45, 25), (-40, 60), (0, 145), (-35, 50))  # hip x, y, z, knee, ankle, of the left leg
@@ -107,7 +107,7 @@ def _place_leg(pose, lengths, radii, side, pelvis, points, ends, balls):
         points[2 + side, i], points[4 + side, i], points[6 + side, i] = knee, ankle, sole - lengths[FOOT] * R[i, 1]
         ends[c, 0, i], ends[c, 1, i] = hip, knee
         ends[c + 1, 0, i], ends[c + 1, 1, i] = knee, ankle
-        lift = (radii[R_FOOT] - SOLE_M) * R[i, 2]
+        lift = (radii[R_FOOT] - BALL_HEIGHT_M) * R[i, 2]
         ends[c + 2, 0, i] = sole + _HEEL * lengths[FOOT] * R[i, 1] + lift
         ends[c + 2, 1, i] = sole - _TOE * lengths[FOOT] * R[i, 1] + lift
     balls[c, 0], balls[c, 1] = radii[R_HIP], radii[R_KNEE]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -74,12 +75,13 @@ def read_known_jumps(path: Path) -> dict[str, dict[str, float]]:
     try:
         players = json.loads(path.read_text(encoding="utf-8"))
         found = {str(player["name"]): player["jump"] for player in players if player.get("jump")}
-        return {name: _known(jump) for name, jump in found.items()}
+        return {name: known_jump(jump) for name, jump in found.items()}
     except (ValueError, TypeError, KeyError, AttributeError):
         raise ResultError(f"{path} is no list of players with name and jump; write it so, or take it away") from None
 
 
-def _known(jump: dict) -> dict[str, float]:
+def known_jump(jump: Mapping[str, float]) -> dict[str, float]:
+    """Return the numbers of our table of jumps that facts of a jump, as a generator states them, say."""
     known = {name: float(jump[key]) for name, key in (_EVENTS | _HEIGHTS).items() if key in jump}
     if "flight_s" in jump:
         known["flight_time_height_m"] = 9.81 * float(jump["flight_s"]) ** 2 / 8

@@ -49,7 +49,7 @@ class Heights:
 
     def __init__(self, starts: Sequence[PlayerStart]) -> None:
         """Take the standing heights from the starts that have legs."""
-        with_legs = [start for start in starts if len(start.joints_m) > 1]
+        with_legs = [start for start in starts if start.has_legs]
         self._standing_m = {s.name: np.mean([s.joints_m[LEG_POINTS[i]][2] for i in _ANKLES]) for s in with_legs}
         self._shown = {name: Height(0.0) for name in self._standing_m}
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from airborne.evaluation.jump_errors import JumpErrors
 from airborne.evaluation.players import PlayerErrors, compare_players
+from airborne.evaluation.players_truth import known_jump
 from airborne.export import write_json
 from airborne.motion.players import PlayersMotion
 from airborne.reproduction.block_causes import CAUSES, TORSO_OFF_M, Situation, causes_of
@@ -18,18 +19,9 @@ from airborne.reproduction.block_hidden import FULLY_HIDDEN, hidden_shares
 from airborne.reproduction.block_plan import PARTS, Run, Take
 from airborne.reproduction.block_tracking import Tracked, true_motion
 from airborne.synthetic import BlockScene, jump_facts
-from airborne.synthetic.block_players import Player
 
 Array = NDArray[np.floating]
 
-_STATED = {  # names of `Jump`, names of `jump_facts`
-    "takeoff_frame": "last_contact_frame",
-    "landing_frame": "first_contact_frame",
-    "foot_height_m": "foot_rise_m",
-    "hip_height_m": "hip_rise_over_standing_m",
-    "takeoff_speed_height_m": "com_rise_from_takeoff_m",
-    "hip_rise_m": "hip_rise_from_takeoff_m",
-}
 _WARM_UP = 3  # frames whose times are left out: kernels are compiled, colours learned
 _LEGS = len(PARTS)
 
@@ -39,7 +31,7 @@ def records_of(take: Take, scene: BlockScene, tracked: Tracked, truth: PlayersMo
     hidden = hidden_shares(scene)
     visible = np.zeros((scene.n_frames, len(truth.players), len(scene.rig), len(truth.joints)), bool)
     visible[:, : len(scene.blockers), :, :_LEGS] = hidden < FULLY_HIDDEN
-    known = {player.name: _stated(player, float(scene.rate)) for player in scene.blockers}
+    known = {player.name: known_jump(jump_facts(player, float(scene.rate))) for player in scene.blockers}
     situations = [_situation(i, truth, hidden) for i in range(len(scene.blockers))]
     records = []
     for run, motion in tracked.motions.items():
@@ -132,13 +124,6 @@ def _jump(jump: JumpErrors) -> dict[str, Any]:
         **jump.stated_height_error_m,
         **jump.stated_event_error_frames,
         "within_95": jump.within_95,
-    }
-
-
-def _stated(player: Player, rate_hz: float) -> dict[str, float]:
-    facts = jump_facts(player, rate_hz)
-    return {name: facts[fact] for name, fact in _STATED.items()} | {
-        "flight_time_height_m": 9.81 * facts["flight_s"] ** 2 / 8
     }
 
 

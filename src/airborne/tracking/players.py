@@ -22,6 +22,11 @@ class PlayerStart:
     name: str
     joints_m: dict[str, Array]
 
+    @property
+    def has_legs(self) -> bool:
+        """Whether the player is tracked, and no bystander."""
+        return set(self.joints_m) != {"torso"}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlayerEstimate:
@@ -35,6 +40,20 @@ class PlayerEstimate:
     covariance: Array  # (joints, 3, 3) [m²], of each joint for itself
     score: float  # mean log-likelihood of the estimate [nat]; NaN when lost
     n_views: int  # cameras that were looked at and not hidden
+
+
+def lost_player(player: str, frames: Frames, n_joints: int) -> PlayerEstimate:
+    """Say that a player was not found."""
+    return PlayerEstimate(
+        player=player,
+        index=frames.index,
+        time_s=frames.time_s,
+        status=Status.LOST,
+        points=np.full((n_joints, 3), np.nan),
+        covariance=np.full((n_joints, 3, 3), np.nan),
+        score=np.nan,
+        n_views=0,
+    )
 
 
 class PlayersTracker(Protocol):

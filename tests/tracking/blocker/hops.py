@@ -132,7 +132,7 @@ class Hall:
             return View(seen_by, rng.integers(0, 256, (height, width, 3), np.uint8))
         picture = _floor(number)[:height, :width].copy()
         for state in self._far_to_near(index, seen_by) if self.is_there(index) else ():
-            kind = drawn(state, seen_by)
+            kind = drawn(state, seen_by, 1.0)
             picture[kind >= 0] = COLOURS[kind[kind >= 0]]
         x, y = rng.integers(0, 97, 2)
         picture += _grain()[y : y + height, x : x + width]

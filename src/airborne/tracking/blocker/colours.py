@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,14 @@ _ROUNDS = 6
 _THICKNESSES = slice(N_DOF + N_LENGTHS, N_DOF + N_LENGTHS + 6)  # the radii among a state
 
 
+class Drawings(NamedTuple):
+    """Which kind each pixel of a region shows, -1 where none: (h, w), of thin, true and thick capsules."""
+
+    core: NDArray[np.int8]
+    whole: NDArray[np.int8]
+    around: NDArray[np.int8]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Colours:
     """Colour probabilities, 32 bins a channel, and how likely each camera's view of each kind is covered."""
@@ -45,7 +54,7 @@ class Colours:
         return Table(chosen, evidence, usual, usual - self.background[view].ravel() @ evidence[:, :n])
 
 
-def drawn(state: Array, camera: Camera, thickness: float = 1.0) -> NDArray[np.int8]:
+def drawn(state: Array, camera: Camera, thickness: float) -> NDArray[np.int8]:
     """Draw which kind each pixel of a camera's picture shows: (h, w), -1 where none."""
     state = state.copy()
     state[_THICKNESSES] *= thickness
@@ -58,16 +67,17 @@ def drawn(state: Array, camera: Camera, thickness: float = 1.0) -> NDArray[np.in
     return out
 
 
-def learned(state: Array, regions: Sequence[Region], n_cameras: int, used: NDArray[np.bool_]) -> Colours:
-    """Learn from one posed player: used (cameras, 5) says which camera's view of which kind to learn from.
+def learned(
+    regions: Sequence[Region], drawings: Sequence[Drawings], n_cameras: int, used: NDArray[np.bool_]
+) -> Colours:
+    """Learn from one player, drawn in each region: used (cameras, 5) says which camera's view of which kind counts.
 
     What a kind's pixels share with the background, or with the kind above or below it on the body, goes to the one that
     has more of it.
     """
     counts = np.zeros((len(KINDS), BINS, BINS, BINS), np.float32)
     background = np.zeros((n_cameras, BINS, BINS, BINS), np.float32)
-    for region in regions:
-        core, around = drawn(state, region.full, CORE), drawn(state, region.full, AROUND)
+    for region, (core, _, around) in zip(regions, drawings, strict=True):
         count_colours(region.rgb, around < 0, 1, background[region.view])
         for kind in range(len(KINDS)):
             if used[region.view, kind]:
@@ -92,15 +102,16 @@ def seen_through(state: Array, regions: Sequence[Region], n_cameras: int) -> Col
     used = np.zeros((n_cameras, len(KINDS)), bool)
     used[[region.view for region in regions]] = True
     hidden = np.full(used.shape, LEAST_HIDDEN)
+    drawings = [Drawings(*(drawn(state, region.full, thick) for thick in (CORE, 1.0, AROUND))) for region in regions]
     if len(regions) > 2:
-        for region in regions:
+        for region, drawing in zip(regions, drawings, strict=True):
             others = used.copy()
             others[region.view] = False
-            colours = learned(state, regions, n_cameras, others)
-            hidden[region.view] = hidden_by(*_mean_evidence(state, region, colours))
+            colours = learned(regions, drawings, n_cameras, others)
+            hidden[region.view] = hidden_by(*_mean_evidence(drawing.whole, region, colours))
         agreeing = used & (hidden < _AT_EVEN)
         used = np.where(agreeing.any(axis=0), agreeing, used)
-    return replace(learned(state, regions, n_cameras, used), hidden=hidden)
+    return replace(learned(regions, drawings, n_cameras, used), hidden=hidden)
 
 
 def hidden_by(evidence: Array, usual: Array) -> Array:
@@ -122,9 +133,8 @@ def not_everywhere(hidden: Array, views: Sequence[int]) -> Array:
     return hidden
 
 
-def _mean_evidence(state: Array, region: Region, colours: Colours) -> tuple[Array, Array]:
+def _mean_evidence(part: NDArray[np.int8], region: Region, colours: Colours) -> tuple[Array, Array]:
     """Return the mean evidence of each kind's pixels in a region (5,) [nat], NaN where too few are drawn; and usual."""
-    part = drawn(state, region.full)
     table = colours.table(region.view, np.full(len(KINDS), LEAST_HIDDEN))
     cells = region.rgb.astype(np.int64) >> 3
     cells = (cells[..., 0] << 10) | (cells[..., 1] << 5) | cells[..., 2]

@@ -11,8 +11,7 @@ from numba import njit
 from airborne.body.jumper import N_DOF, place, shares
 from airborne.rendering.capsules import EXACT, evidence, project
 
-N_LENGTHS, N_RADII, N_CAPSULES, N_POINTS = 9, 8, 10, 9
-N_STATE = N_DOF + N_LENGTHS + N_RADII
+N_LENGTHS, N_CAPSULES, N_POINTS = 9, 10, 9
 _STEP = 1e-4  # [m, rad] of the differences that say how points and discs move
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from airborne.body.jumper import JOINTS, N_DOF, PELVIS, SHANK, SHORTS_END, SOCK_
 from airborne.body.legs import LEG_POINTS, Legs
 from airborne.errors import TrialError
 from airborne.tracking.blocker.colours import Colours, seen_through
-from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, N_STATE, placed
+from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, placed
 from airborne.tracking.blocker.fit import Fit, Prior, fit, scored
 from airborne.tracking.blocker.views import Scale, Seen, regions_round, scale_of, seen
 from airborne.video import Frames
@@ -29,8 +29,8 @@ _RADIUS_SD = 0.10  # of the radius
 _POSE_SD = np.array([0.1] * 3 + [0.5] * 5 + [0.5, 0.5, 0.6, 0.5, 0.5] * 2)  # beside the anchors [m, rad]
 ANCHOR_SD_M = np.array([0.02] * 6 + [0.03] * 2 + [0.04])  # of joints set by hand
 _IK_WEIGHT = 0.3  # of the feet and the torso, which the rods do not reach
-_REST = np.array([0, 0, 0, 0, 0, 0.2, 0, 0] + [-0.3, 0, 0, 0.5, 0] * 2)  # a slight crouch [rad]
-_REST_PULL_M = np.array([0] * 4 + [0.003] * 2 + [0.01] * 2 + [0.003, 0.003, 0.01, 0, 0.01] * 2)  # per rad
+_CROUCH = np.array([0, 0, 0, 0, 0, 0.2, 0, 0] + [-0.3, 0, 0, 0.5, 0] * 2)  # a slight crouch [rad]
+_CROUCH_PULL_M = np.array([0] * 4 + [0.003] * 2 + [0.01] * 2 + [0.003, 0.003, 0.01, 0, 0.01] * 2)  # per rad
 _ROUNDS, _MOST_STEPS = 4, 12
 _SHARES = np.linspace(0.05, 0.95, 19)
 
@@ -65,7 +65,7 @@ def start_state(name: str, joints_m: Mapping[str, Array]) -> Array:
     lengths[TRUNK] = 2 * legs.torso_to_hips_m - lengths[WAIST]
     hips = (np.asarray(joints_m["hip_left"]) + joints_m["hip_right"]) / 2
     across = np.asarray(joints_m["hip_left"]) - joints_m["hip_right"]
-    state[:N_DOF] = _REST
+    state[:N_DOF] = _CROUCH
     state[:3], state[3] = hips, np.arctan2(across[1], across[0])
     used = [i for i, joint in enumerate(JOINTS) if joint in joints_m]
     targets = np.array([joints_m[JOINTS[i]] for i in used])
@@ -74,7 +74,7 @@ def start_state(name: str, joints_m: Mapping[str, Array]) -> Array:
 
     def misfit(pose: Array) -> Array:
         found = points_of(np.concatenate([pose, state[N_DOF:]]))[used]
-        return np.concatenate([((found - targets) * weights[:, None]).ravel(), _REST_PULL_M * (pose - rest)])
+        return np.concatenate([((found - targets) * weights[:, None]).ravel(), _CROUCH_PULL_M * (pose - rest)])
 
     state[:N_DOF] = least_squares(misfit, rest).x
     return state
@@ -89,6 +89,7 @@ def first_look(name: str, joints_m: Mapping[str, Array], frames: Frames, others:
     anchors = np.array([joints_m.get(joint, np.full(3, np.nan)) for joint in JOINTS], float)
     sd = np.concatenate([_POSE_SD, _LENGTH_SD, _RADIUS_SD * state[N_DOF + N_LENGTHS :]])
     prior = Prior(state.copy(), np.diag(1 / sd**2), anchors, ANCHOR_SD_M)
+    borders = [N_DOF + SHORTS_END, N_DOF + SOCK_END]
     for number in range(_ROUNDS):
         regions = regions_round(frames, state[:3])
         if not regions:
@@ -98,10 +99,11 @@ def first_look(name: str, joints_m: Mapping[str, Array], frames: Frames, others:
         found = seen(regions, [colours.table(region.view) for region in regions], scale)
         if number < 2:
             state = _with_borders(state, found, others)
-            prior.mean[N_DOF : N_DOF + N_LENGTHS][SHORTS_END : SOCK_END + 1] = state[N_DOF:][SHORTS_END : SOCK_END + 1]
+            mean = prior.mean.copy()
+            mean[borders] = state[borders]
+            prior = replace(prior, mean=mean)
         fitted = fit(state, prior, found, others, most_steps=_MOST_STEPS)
         state = fitted.state
-    assert len(state) == N_STATE
     return First(fitted, colours, scale)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body.jumper import CAPSULES, KINDS, LIMITS_RAD, N_DOF
+from airborne.body.jumper import BALL_HEIGHT_M, CAPSULES, KINDS, LIMITS_RAD, N_DOF
 from airborne.tracking.blocker.equations import N_CAPSULES, N_POINTS, gathered
 from airborne.tracking.blocker.views import Seen, workspace
 
@@ -19,7 +19,6 @@ SHAPE_SD_M = 0.050  # how far a capsule's outline may lie beside the player's
 SLOPE = 0.25  # share of its contrast by which evidence falls across an outline in a pixel of the maps
 _LIMIT_SD_RAD = 0.05  # how firmly joints keep within their limits
 _FLOOR_SD_M = 0.01  # and feet above the floor
-BALL_HEIGHT_M = 0.03  # of the ball of the foot in standing
 _SETTLED_NATS = 0.02
 _MOST_DAMPING = 20.0  # steps that short change nothing
 _ROBUST = 4.0  # squared sds at which an anchor's pull is halved

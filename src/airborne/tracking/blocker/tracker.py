@@ -9,16 +9,15 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body.jumper import CAPSULES, JOINTS, KINDS, N_DOF, PELVIS
-from airborne.body.legs import LEG_POINTS
+from airborne.body.jumper import BALL_HEIGHT_M, CAPSULES, JOINTS, KINDS, N_DOF, PELVIS
 from airborne.tracking.blocker.colours import Colours, hidden_by, not_everywhere
 from airborne.tracking.blocker.dynamics import N_FREE, N_SLIDING, Filtered, begun, predicted, updated
 from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, placed
 from airborne.tracking.blocker.first import first_look, points_of, start_state
-from airborne.tracking.blocker.fit import BALL_HEIGHT_M, Fit, Prior, fit
+from airborne.tracking.blocker.fit import Fit, Prior, fit
 from airborne.tracking.blocker.views import Scale, Table, regions_round, seen
 from airborne.tracking.estimate import Status
-from airborne.tracking.players import PlayerEstimate, PlayerStart
+from airborne.tracking.players import PlayerEstimate, PlayerStart, lost_player
 from airborne.video import Frames
 
 Array = NDArray[np.floating]
@@ -59,7 +58,7 @@ class Blocker:
 
     def __init__(self, starts: Sequence[PlayerStart]) -> None:
         """Take the players as they start; those with a torso only are left out."""
-        self._starts = [start for start in starts if any(joint in start.joints_m for joint in LEG_POINTS)]
+        self._starts = [start for start in starts if start.has_legs]
 
     def init(self) -> Mapping[str, Track]:
         """Return the state before the first frame: nobody."""
@@ -75,7 +74,7 @@ class Blocker:
         tracks, estimates = {}, []
         for name, track in state.items():
             hiding = capsules(expected[name][1], [each for other, (_, each) in expected.items() if other != name])
-            tracks[name], estimate = _followed(name, track, expected[name][0], hiding, frames)
+            tracks[name], estimate = _followed(name, track, expected[name], hiding, frames)
             estimates.append(estimate)
         return tracks, tuple(estimates)
 
@@ -108,7 +107,7 @@ class Blocker:
                 by_shape=first.fit.by_shape[:N_FREE, :N_FREE],
             )
             found = _estimate(start.name, frames, tracks[start.name], free, n_views)
-            estimates.append(found if found.score > _LEAST_EVIDENCE else _lost(start.name, frames))
+            estimates.append(found if found.score > _LEAST_EVIDENCE else lost_player(start.name, frames, len(JOINTS)))
         return tracks, tuple(estimates)
 
 
@@ -132,19 +131,20 @@ def _expected(track: Track, time_s: Fraction) -> tuple[Filtered, Array]:
 
 
 def _followed(
-    name: str, track: Track, expected: Filtered, hiding: tuple[Array, Array], frames: Frames
+    name: str, track: Track, predicted: tuple[Filtered, Array], hiding: tuple[Array, Array], frames: Frames
 ) -> tuple[Track, PlayerEstimate]:
-    state = np.concatenate([expected.free, track.state[N_FREE:]])
+    """Look for a player where `_expected` has him."""
+    expected, state = predicted
     regions = regions_round(frames, state[:3])
     if not regions:
-        return replace(track, filtered=expected, time_s=frames.time_s), _lost(name, frames)
+        return replace(track, filtered=expected, time_s=frames.time_s), lost_player(name, frames, len(JOINTS))
     found = seen(regions, [track.tables[region.view] for region in regions], track.scale)
     information = np.linalg.inv(expected.covariance[:N_FREE, :N_FREE])
     prior = Prior(expected.free, information, _standing(track.state), np.full(N_POINTS, _SLIP_SD_M))
     fitted = fit(state, prior, found, hiding)
     evidence = _per_px(fitted.owned)
     if evidence < max(_LOST_SHARE * track.usual, _LEAST_EVIDENCE):
-        return replace(track, filtered=expected, time_s=frames.time_s), _lost(name, frames)
+        return replace(track, filtered=expected, time_s=frames.time_s), lost_player(name, frames, len(JOINTS))
     filtered = updated(expected, fitted.state[:N_FREE], np.linalg.inv(fitted.information))
     views = [region.view for region in regions]
     track = replace(track, time_s=frames.time_s, filtered=filtered, state=fitted.state)
@@ -219,17 +219,3 @@ def _by_shape(state: Array) -> Array:
 def _per_px(owned: Array) -> float:
     evidence, area = owned.sum(axis=(0, 1, 2))
     return float(evidence / area) if area > 0 else 0.0
-
-
-def _lost(name: str, frames: Frames) -> PlayerEstimate:
-    n = len(JOINTS)
-    return PlayerEstimate(
-        player=name,
-        index=frames.index,
-        time_s=frames.time_s,
-        status=Status.LOST,
-        points=np.full((n, 3), np.nan),
-        covariance=np.full((n, 3, 3), np.nan),
-        score=float("nan"),
-        n_views=0,
-    )

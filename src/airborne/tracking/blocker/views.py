@@ -59,7 +59,6 @@ class Scale(NamedTuple):
 class Seen:
     """What the kernels take of all regions: maps of one size, reduced to about 60 pixels a metre."""
 
-    regions: tuple[Region, ...]
     scale: Scale
     cameras: Array  # (v, 4, 4): K [R t] of the reduced region, then the focal length
     sums: NDArray[np.float32]  # (v, kinds + 1, h, w + 1); the last map is empty
@@ -122,7 +121,7 @@ def seen(regions: Sequence[Region], tables: Sequence[Table], scale: Scale) -> Se
         camera = region.full.resampled(scale=(r, r), offset=((r - 1) / 2, (r - 1) / 2), size=(columns, rows))
         cameras[i] = packed(camera)
     contrast = np.array([[*table.contrast, 0.0] for table in tables])
-    return Seen(tuple(regions), scale, cameras, sums, contrast)
+    return Seen(scale, cameras, sums, contrast)
 
 
 def packed(camera: Camera) -> Array:

@@ -45,7 +45,7 @@ def legs_tracker(
     torsos = [start_torso(start) for start in starts]
     players = []
     for i, start in enumerate(starts):
-        if any(name in start.joints_m for name in LEG_POINTS):
+        if start.has_legs:
             points = np.array([np.asarray(start.joints_m.get(name, np.full(3, np.nan)), float) for name in LEG_POINTS])
             players.append(LegsPlayer(start.name, i, Legs.from_points(torsos[i], points), points))
     if not players:

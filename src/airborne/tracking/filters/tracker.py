@@ -20,7 +20,7 @@ from airborne.tracking.filters.regions import LEARNING_MARGIN_M, centre_of, in_p
 from airborne.tracking.filters.settings import LegsSettings
 from airborne.tracking.filters.situation import Filter, Found, Situation
 from airborne.tracking.filters.torso import TorsoInput
-from airborne.tracking.players import PlayerEstimate
+from airborne.tracking.players import PlayerEstimate, lost_player
 from airborne.video import Frames
 
 Array = NDArray[np.floating]
@@ -115,7 +115,7 @@ class LegsTracker:
             may_be_hidden=settings.views == "robust",
         )
         if not look.n_views:
-            return state._replace(belief=belief), _lost(player.name, frames)
+            return state._replace(belief=belief), lost_player(player.name, frames, len(LEG_POINTS))
         belief, found = self.filter.weigh(belief, look, now)
         estimate = _estimate(player.name, frames, found, look)
         return PlayerState(state.references, belief, found.points), estimate
@@ -155,7 +155,7 @@ class LegsTracker:
             region if in_view[v] else None for v, region in enumerate(regions_of(frames, points, LEARNING_MARGIN_M))
         ]
         if all(region is None for region in regions):
-            return state, _lost(player.name, frames)
+            return state, lost_player(player.name, frames, len(LEG_POINTS))
         references = learn(regions, ends, PARTS, used=used)
         found = Found(points, np.tile(SET_BY_HAND_SD_M**2 * np.eye(3), (len(points), 1, 1)))
         look = look_at(references, regions, used if used.any() else np.broadcast_to(in_view, used.shape))
@@ -177,18 +177,4 @@ def _estimate(name: str, frames: Frames, found: Found, look: Look) -> PlayerEsti
         covariance=found.covariance,
         score=score,
         n_views=look.n_views,
-    )
-
-
-def _lost(name: str, frames: Frames) -> PlayerEstimate:
-    n = len(LEG_POINTS)
-    return PlayerEstimate(
-        player=name,
-        index=frames.index,
-        time_s=frames.time_s,
-        status=Status.LOST,
-        points=np.full((n, 3), np.nan),
-        covariance=np.full((n, 3, 3), np.nan),
-        score=np.nan,
-        n_views=0,
     )
