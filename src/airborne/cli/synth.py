@@ -1,0 +1,74 @@
+"""Commands that write synthetic trials."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+
+from airborne.cli.console import Out, progress
+
+
+def synth_cross(
+    output: Out,
+    preset: Annotated[Literal["half-twist", "side-somersault"], typer.Option(help="The throw.")] = "half-twist",
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+) -> None:
+    """Write a thrown wooden cross: interlaced videos of three cameras, calibration, clicks, truth.
+
+    Example: airborne synth cross -o my-trial --seed 3
+    """
+    from airborne.synthetic import write_thrown_cross
+
+    with progress("rendering") as report:
+        write_thrown_cross(output, preset=preset, seed=seed, progress=report)
+    print(f"trial: {output / 'trial.toml'}")
+
+
+def synth_somersault(
+    output: Out,
+    preset: Annotated[
+        Literal["paper", "moving-arms", "pike"], typer.Option(help="11 poses of one shape, or 50 frames/s that move.")
+    ] = "paper",
+    target: Annotated[Literal["skin", "ellipsoids"], typer.Option(help="The surface of the person drawn.")] = "skin",
+    style: Annotated[
+        Literal["exact", "gym"], typer.Option(help="Pictures in the tracker's own light, or of cameras in a hall.")
+    ] = "exact",
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+) -> None:
+    """Write a half-twisting somersault: videos from front, side and top, calibration, body, truth, the person as glTF.
+
+    Example: airborne synth somersault -o my-somersault --preset moving-arms --style gym
+    """
+    from airborne.export import write_model
+    from airborne.synthetic import somersault, write_somersault
+
+    with progress("rendering") as report:
+        write_somersault(output, preset=preset, target=target, style=style, seed=seed, progress=report)
+    write_model(output / "person.glb", somersault(preset, target=target, style=style, seed=seed).body)
+    print(f"trial: {output / 'trial.toml'}")
+
+
+def synth_block(
+    output: Out,
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    blockers: Annotated[int, typer.Option(min=1, max=3, help="How many players jump to block.")] = 1,
+    difficulty: Annotated[
+        Literal["easy", "default", "hard"], typer.Option(help="Clothes, players in the way, noise, calibration.")
+    ] = "default",
+    frame_rate: Annotated[int | None, typer.Option(help="Frames per second: 30, 60 or 120.")] = None,
+    cameras: Annotated[int | None, typer.Option(min=2, max=6, help="How many cameras.")] = None,
+) -> None:
+    """Write a volleyball block: videos from behind the blockers, calibration, hand-set start, truth.
+
+    Example: airborne synth block -o my-block --seed 3 --blockers 2
+    """
+    from dataclasses import replace
+
+    from airborne.synthetic import DIFFICULTIES, block_scene, write_block
+
+    given = {"frame_rate": frame_rate, "n_cameras": cameras}
+    hardness = replace(DIFFICULTIES[difficulty], **{key: value for key, value in given.items() if value is not None})
+    with progress("rendering") as report:
+        write_block(output, block_scene(seed, n_blockers=blockers, difficulty=hardness), progress=report)
+    print(f"trial: {output / 'trial.toml'}")

@@ -1,0 +1,163 @@
+"""Commands that track: the demo, a trial, a body fitted to a person, the machine's speed."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from airborne.cli.console import Json, Out, errors, progress
+from airborne.cli.results import evaluate
+from airborne.errors import AirborneError
+
+if TYPE_CHECKING:
+    from airborne.pipeline import Run
+    from airborne.players_pipeline import PlayersRun
+
+
+def demo(
+    output: Out = Path("airborne-demo"),
+    as_json: Json = False,
+) -> None:
+    """Track the bundled example, a thrown cross, and compare it with its truth.
+
+    Example: airborne demo
+    """
+    from airborne.examples import example_trial
+
+    trial = example_trial("thrown_cross")
+    _forget_demo(trial, output)
+    run = _track(trial, output, resume=False, pictures=True)
+    if not as_json:
+        print(_in_short(run.summary))
+    evaluate(output, trial.parent / "truth.csv", trial.parent / "digitised.csv", as_json=as_json)
+    if not as_json:
+        print(f"report: {output / 'report.html'}")
+
+
+def _forget_demo(path: Path, output: Path) -> None:
+    """Let the demo be run again in its own folder; a folder with any other run is left alone."""
+    from airborne.pipeline import holds_run_of
+    from airborne.trial import read_trial
+
+    if holds_run_of(read_trial(path), output):
+        (output / "motion.csv").unlink(missing_ok=True)
+
+
+def track(
+    trial: Annotated[Path, typer.Argument(help="The trial's TOML file.")],
+    output: Out,
+    resume: Annotated[bool, typer.Option(help="Go on with a run that was stopped.")] = False,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            help="Instead of the trial's: refined, joint, hierarchical, stepping, simplex; "
+            "of players blocker, block-jump, mixture, framework."
+        ),
+    ] = None,
+    every: Annotated[int | None, typer.Option(min=1, help="Track every n-th frame or field.")] = None,
+    cameras: Annotated[str | None, typer.Option(help="Only these cameras, separated by commas.")] = None,
+    pictures: Annotated[bool, typer.Option(help="Write overlay videos, figures and the report.")] = True,
+    overlay: Annotated[str | None, typer.Option(help="What overlay videos of players show: paper, broadcast.")] = None,
+    live: Annotated[
+        bool, typer.Option(help="Players: read pipes, capture devices, or files at their own speed; late frames drop.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Track a trial; results appear in the output folder as they are found.
+
+    Example: airborne track trial.toml -o results
+    """
+    given = {"method": method, "every": every, "overlay": overlay}
+    changes = {key: value for key, value in given.items() if value is not None}
+    run = _track(trial, output, resume=resume, pictures=pictures, changes=changes, cameras=cameras, live=live)
+    if as_json:
+        print((output / "summary.json").read_text(encoding="utf-8"), end="")
+    else:
+        print(f"{_in_short(run.summary)}\nresults: {output}")
+    if run.summary["n_frames"] == run.summary["n_lost"]:
+        raise typer.Exit(1)
+
+
+def _track(
+    path: Path,
+    output: Path,
+    *,
+    resume: bool,
+    pictures: bool,
+    changes: dict | None = None,
+    cameras: str | None = None,
+    live: bool = False,
+) -> Run | PlayersRun:
+    from airborne import pipeline
+    from airborne.players_pipeline import track_players
+    from airborne.trial import read_trial
+
+    names = None if cameras is None else [name.strip() for name in cameras.split(",")]
+    trial = read_trial(path, changes or {}, names)
+    if live and not trial.has_players:
+        raise AirborneError('--live is for players; this trial has no body preset = "legs"')
+    try:
+        with progress(f"tracking {trial.name}") as report:
+            if trial.has_players:
+                return track_players(trial, output, resume=resume, live=live, pictures=pictures, progress=report)
+            return pipeline.track(trial, output, resume=resume, pictures=pictures, progress=report)
+    except KeyboardInterrupt:
+        errors.print(f"airborne: stopped; the frames found so far are in {output}; --resume goes on", markup=False)
+        raise typer.Exit(130) from None
+
+
+def _in_short(summary: dict) -> str:
+    from airborne.export.players_report import players_in_short
+
+    counts = ", ".join(f"{summary[f'n_{status}']} {status}" for status in ("tracked", "uncertain", "lost"))
+    lines = [f"{summary['n_frames']} frames at {summary['rate_hz']:.5g} Hz: {counts}"]
+    if "players" in summary:
+        lines += players_in_short(summary)
+    elif summary["n_frames"] == summary["n_lost"]:
+        lines.append("the body was found in no frame: look at the first picture of the overlay videos, mend [start]")
+    else:
+        position, rotation = summary["median_position_sd_mm"], summary["median_rotation_sd_deg"]
+        lines.append(
+            f"median sd: position {_or_unseen(position, 'mm')}, rotation {_or_unseen(rotation, 'degrees')}; "
+            "summary.json says which errors it holds"
+        )
+    lines += [f"note: {text}" for text in [*summary["warnings"], *summary["events"]]]
+    return "\n".join(lines)
+
+
+def _or_unseen(sd: float, unit: str) -> str:
+    return f"{sd:.2g} {unit}" if math.isfinite(sd) else "not seen in the pictures"
+
+
+def fit_body(
+    trial: Annotated[Path, typer.Argument(help="The trial's TOML file; its [start] has detections or joints_m.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The body file to write.")],
+    frames: Annotated[int, typer.Option(min=1, help="How many frames to fit the body to.")] = 5,
+) -> None:
+    """Fit the trial's body to the person in its videos: lengths, girths, colours and where these change.
+
+    Example: airborne fit-body trial.toml -o person.toml
+    """
+    from airborne.fitting import described, fit_person
+    from airborne.trial import read_trial
+
+    with progress("reading and fitting") as report:
+        fitted = fit_person(
+            read_trial(trial), output, n_frames=frames, progress=lambda what, done, total: report(done, total)
+        )
+    print(f"{described(fitted)}\nbody: {output}\npicture: {fitted.picture}")
+
+
+def bench(as_json: Json = False) -> None:
+    """Measure the speed of this machine on the bundled example: CPU time per field, and per hypothesis.
+
+    Example: airborne bench
+    """
+    from airborne.bench import measure_speed
+
+    found = measure_speed()
+    print(json.dumps(found) if as_json else "\n".join(f"{name}: {value:.3g}" for name, value in found.items()))
