@@ -11,9 +11,8 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.cameras import Camera, Rig
+from airborne.cameras import Rig, aimed
 from airborne.errors import TrialError
 from airborne.tracking.blocker import Blocker
 from airborne.tracking.filters import GivenTorsos, LegsMethod, LegsSettings, legs_tracker
@@ -23,7 +22,7 @@ from airborne.video import Frames, View
 
 Array = NDArray[np.floating]
 
-_AWAY_M = 4.0  # of the made-up cameras
+_AWAY = np.array([0, -4.0, 0])  # of the made-up cameras [m]
 _TORSO_COLUMNS = ("player", "frame", "x_m", "y_m", "z_m")
 
 
@@ -52,20 +51,9 @@ def players_tracker_of(trial: Trial, rig: Rig) -> PlayersTracker:
 def compile_for(trial: Trial) -> None:
     """Take two steps on empty pictures, so that the tracker's kernels are compiled before live pictures come."""
     at = np.mean([place for start in trial.players for place in start.joints_m.values()], axis=0)
-    size, focal_px = (640, 480), 400.0
-    K = np.array([[focal_px, 0, size[0] / 2], [0, focal_px, size[1] / 2], [0, 0, 1]])
-    level = Rotation.from_matrix([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # looks along +y
-    cameras = []
-    for camera, aside_m in zip(trial.camera, np.linspace(-1, 1, len(trial.camera)), strict=True):
-        place = at + np.array([aside_m, -_AWAY_M, 0])
-        cameras.append(
-            Camera(
-                name=camera.name,
-                K=K,
-                size=size,
-                camera_from_world=RigidTransform.from_components(-level.apply(place), level),
-            )
-        )
+    size = (640, 480)
+    asides = zip(trial.camera, np.linspace([-1, 0, 0], [1, 0, 0], len(trial.camera)), strict=True)
+    cameras = [aimed(camera.name, at + aside + _AWAY, at + aside, 400.0, size) for camera, aside in asides]
     tracker, grey = players_tracker_of(trial, Rig(tuple(cameras))), np.full((size[1], size[0], 3), 128, np.uint8)
     state = tracker.init()
     for index in range(2):
@@ -105,7 +93,7 @@ def read_torsos(path: Path, starts: Sequence[PlayerStart], *, first: int) -> Giv
 
 def _check_seen(trial: Trial, start: PlayerStart, rig: Rig) -> None:
     """Raise TrialError where no camera can see any point of a player; a bystander may be out of sight."""
-    if len(start.joints_m) == 1:
+    if not start.has_legs:
         return
     points = np.array(list(start.joints_m.values()))
     for camera in rig:

@@ -1,9 +1,10 @@
 import cv2
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airborne.cameras.distortion import distort, undistort
+from airborne.cameras.distortion import distort, distort_fisheye, undistort, undistort_fisheye
 from tests.cameras.examples import LENS
 from tests.tolerances import ROUNDTRIP
 
@@ -40,3 +41,23 @@ def test_where_the_lens_folds_back_there_is_no_inverse():
 
 def test_a_missing_point_stays_missing():
     assert np.isnan(undistort(np.array([np.nan, np.nan]), LENS)).all()
+
+
+FISHEYE = np.array([0.03, -0.01, 0.004, -0.001])
+
+
+def test_a_fisheye_lens_is_that_of_opencv():
+    rays = np.column_stack([3 * XY, np.ones(len(XY))])
+    oracle, _ = cv2.fisheye.projectPoints(rays[:, None], np.zeros(3), np.zeros(3), np.eye(3), FISHEYE)
+    assert np.allclose(distort_fisheye(3 * XY, FISHEYE), oracle[:, 0], atol=ROUNDTRIP)
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (3, 1, 2)])
+def test_straightening_a_fisheye_takes_back_its_bending(batch):
+    xy = np.random.default_rng(1).uniform(-3, 3, (*batch, 2))
+    assert np.allclose(undistort_fisheye(distort_fisheye(xy, FISHEYE), FISHEYE), xy, atol=ROUNDTRIP)
+    assert np.allclose(undistort_fisheye(np.zeros(2), FISHEYE), 0)
+
+
+def test_what_a_fisheye_sees_beside_and_behind_itself_has_no_place_in_a_pinhole_picture():
+    assert np.isnan(undistort_fisheye(np.array([1.6, 0.0]), np.zeros(4))).all()

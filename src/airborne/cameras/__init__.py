@@ -5,7 +5,7 @@ far to trust them. Knows no video, no body and no trial.
 """
 
 from airborne.cameras.calibration import Calibration, CameraFit, calibrate
-from airborne.cameras.camera import Camera, Rig
+from airborne.cameras.camera import Camera, Rig, aimed
 from airborne.cameras.control_points import ControlPoints, read_control_points
 from airborne.cameras.detections import Detections, read_detections
 from airborne.cameras.files import read_rig, write_pose2sim
@@ -20,6 +20,7 @@ __all__ = [
     "Detections",
     "Mending",
     "Rig",
+    "aimed",
     "calibrate",
     "describe",
     "mend",

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.cameras.distortion import distort, undistort
+from airborne.cameras.distortion import distort, distort_fisheye, undistort, undistort_fisheye
 from airborne.errors import CalibrationError
 from airborne.geometry.triangulation import triangulate
 
 Array = NDArray[np.floating]
+Lens = Literal["brown", "fisheye"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Camera:
-    """A pinhole camera with Brown distortion: x right, y down, z forward; pixel centres at whole numbers.
+    """A pinhole camera with Brown or fisheye distortion: x right, y down, z forward; pixel centres at whole numbers.
 
     World points are in metres. `camera_from_world` is the rigid map from world to camera axes.
     """
@@ -27,7 +29,8 @@ class Camera:
     K: Array  # (3, 3) [px]
     size: tuple[int, int]  # (width, height) [px]
     camera_from_world: RigidTransform
-    distortion: Array = field(default_factory=lambda: np.zeros(5))  # k1, k2, p1, p2, k3
+    distortion: Array = field(default_factory=lambda: np.zeros(5))  # k1, k2, p1, p2, k3; of a fisheye k1, k2, k3, k4
+    lens: Lens = "brown"
     shift_sd_px: float = 0.0  # how far the calibration may displace a picture as a whole, right or down [px]
 
     @property
@@ -37,8 +40,8 @@ class Camera:
 
     @property
     def is_distorted(self) -> bool:
-        """Whether any distortion coefficient differs from zero."""
-        return bool(np.any(self.distortion))
+        """Whether the lens is anything but a pinhole."""
+        return self.lens == "fisheye" or bool(np.any(self.distortion))
 
     @property
     def P(self) -> Array:
@@ -50,10 +53,12 @@ class Camera:
         points = np.asarray(points, float)
         xyz = points @ self.camera_from_world.rotation.as_matrix().T + self.camera_from_world.translation
         z = np.where(xyz[..., 2:] > 0, xyz[..., 2:], np.nan)
-        xy = xyz[..., :2] / z
-        if self.is_distorted:
-            xy = distort(xy, self.distortion)
-        return xy @ self.K[:2, :2].T + self.K[:2, 2]
+        return self._bent(xyz[..., :2] / z) @ self.K[:2, :2].T + self.K[:2, 2]
+
+    def distorted_px(self, px: Array) -> Array:
+        """Move pixels (..., 2) of the same camera without distortion to where this one sees them: (..., 2) [px]."""
+        xy = (np.asarray(px, float) - self.K[:2, 2]) @ np.linalg.inv(self.K[:2, :2]).T
+        return self._bent(xy) @ self.K[:2, :2].T + self.K[:2, 2]
 
     def undistorted_px(self, px: Array) -> Array:
         """Move pixels (..., 2) [px] to where the same camera without distortion would see them: (..., 2) [px].
@@ -64,7 +69,13 @@ class Camera:
         if not self.is_distorted:
             return px
         xy = (px - self.K[:2, 2]) @ np.linalg.inv(self.K[:2, :2]).T
-        return undistort(xy, self.distortion) @ self.K[:2, :2].T + self.K[:2, 2]
+        straighten = undistort_fisheye if self.lens == "fisheye" else undistort
+        return straighten(xy, self.distortion) @ self.K[:2, :2].T + self.K[:2, 2]
+
+    def _bent(self, xy: Array) -> Array:
+        if not self.is_distorted:
+            return xy
+        return (distort_fisheye if self.lens == "fisheye" else distort)(xy, self.distortion)
 
     def resampled(
         self, *, scale: tuple[float, float], offset: tuple[float, float] = (0.0, 0.0), size: tuple[int, int]
@@ -85,7 +96,29 @@ class Camera:
 
     def undistorted(self) -> Camera:
         """Return the same camera without distortion."""
-        return replace(self, distortion=np.zeros(5))
+        return replace(self, distortion=np.zeros(5), lens="brown")
+
+
+def aimed(
+    name: str,
+    position: ArrayLike,
+    target: ArrayLike,
+    focal_px: float,
+    size: tuple[int, int],
+) -> Camera:
+    """Return a camera of size (width, height) [px] that looks from one world point (3,) to another [m], held level."""
+    centre, forward = np.asarray(position, float), np.subtract(target, position)
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    R = np.stack([right, np.cross(forward, right), forward])
+    width, height = size
+    return Camera(
+        name=name,
+        K=np.array([[focal_px, 0, (width - 1) / 2], [0, focal_px, (height - 1) / 2], [0, 0, 1]]),
+        size=size,
+        camera_from_world=RigidTransform.from_components(-R @ centre, Rotation.from_matrix(R)),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

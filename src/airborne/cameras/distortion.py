@@ -1,4 +1,4 @@
-"""Brown lens distortion on normalised image coordinates (OpenCV's k1, k2, p1, p2, k3)."""
+"""Lens distortion on normalised image coordinates: Brown (OpenCV's k1, k2, p1, p2, k3) and fisheye (its k1 to k4)."""
 
 from __future__ import annotations
 
@@ -55,3 +55,45 @@ def _inverse_slope(xy: Array, coefficients: Array) -> Array:
     xy_ = x * y * radial_slope + 2 * p1 * x + 2 * p2 * y  # the derivative is symmetric
     determinant = xx * yy - xy_ * xy_
     return np.stack([np.stack([yy, -xy_], -1), np.stack([-xy_, xx], -1)], -2) / determinant[..., None, None]
+
+
+def distort_fisheye(xy: Array, coefficients: Array) -> Array:
+    """Move pinhole points (..., 2) to where a fisheye lens puts them: (..., 2).
+
+    A ray at the angle a from the axis is seen at the radius `a + k1 a^3 + k2 a^5 + k3 a^7 + k4 a^9` (Kannala and
+    Brandt 2006, as in OpenCV); coefficients (4,).
+    """
+    xy = np.asarray(xy, float)
+    r = np.hypot(xy[..., 0], xy[..., 1])
+    radius = _fisheye_radius(np.arctan(r), coefficients)
+    return xy * np.where(r > 0, radius / np.where(r > 0, r, 1), 1)[..., None]
+
+
+def undistort_fisheye(xy: Array, coefficients: Array) -> Array:
+    """Move points (..., 2) from where a fisheye lens puts them to the pinhole ones: (..., 2).
+
+    The inverse of `distort_fisheye`; NaN for rays 90 degrees and more from the axis, and where the lens folds back.
+    """
+    xy = np.asarray(xy, float)
+    radius = np.hypot(xy[..., 0], xy[..., 1])
+    angle = np.minimum(radius, 1.5)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a diverging point ends as NaN below
+        for _ in range(N_STEPS):
+            angle = angle - (_fisheye_radius(angle, coefficients) - radius) / _fisheye_slope(angle, coefficients)
+        miss = np.abs(_fisheye_radius(angle, coefficients) - radius)
+        is_solved = (miss <= UNSOLVED * (1 + radius)) & (_fisheye_slope(angle, coefficients) > 0)
+        is_solved &= (angle >= 0) & (angle < np.pi / 2)
+        scale = np.where(radius > 0, np.tan(angle) / radius, 1)
+    return np.where(is_solved[..., None], xy * scale[..., None], np.nan)
+
+
+def _fisheye_radius(angle: Array, coefficients: Array) -> Array:
+    k1, k2, k3, k4 = coefficients[:4]
+    a2 = angle * angle
+    return angle * (1 + a2 * (k1 + a2 * (k2 + a2 * (k3 + a2 * k4))))
+
+
+def _fisheye_slope(angle: Array, coefficients: Array) -> Array:
+    k1, k2, k3, k4 = coefficients[:4]
+    a2 = angle * angle
+    return 1 + a2 * (3 * k1 + a2 * (5 * k2 + a2 * (7 * k3 + a2 * 9 * k4)))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.cameras import Camera, Rig
+from airborne.cameras import Camera, Rig, aimed
 from airborne.errors import TrialError
 
 Array = NDArray[np.floating]
@@ -28,11 +28,12 @@ def hall_rig(rng: np.random.Generator, n_cameras: int) -> Rig:
         raise TrialError(f"{n_cameras} cameras were asked for; give 2 to {len(_PLACES)}")
     return Rig(
         tuple(
-            _aimed(
+            aimed(
                 f"cam{k + 1}",
                 place + rng.normal(0, _PLACED_SD_M, 3),
                 _AIM + rng.normal(0, _AIMED_SD_M, 3),
                 rng.uniform(*_FOCAL_PX),
+                SIZE,
             )
             for k, place in enumerate(_PLACES[:n_cameras])
         )
@@ -53,17 +54,3 @@ def _turned(rng: np.random.Generator, camera: Camera, error_px: float) -> Camera
     off = Rotation.from_rotvec(rng.normal(0, 1, 3) * error_px / np.array([focal, focal, corner]))
     turn = RigidTransform.from_components(np.zeros(3), off)
     return replace(camera, camera_from_world=turn * camera.camera_from_world)
-
-
-def _aimed(name: str, centre: Array, target: Array, focal_px: float) -> Camera:
-    forward = (target - centre) / np.linalg.norm(target - centre)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    R = np.stack([right, np.cross(forward, right), forward])
-    width, height = SIZE
-    return Camera(
-        name=name,
-        K=np.array([[focal_px, 0, (width - 1) / 2], [0, focal_px, (height - 1) / 2], [0, 0, 1]]),
-        size=SIZE,
-        camera_from_world=RigidTransform.from_components(-R @ centre, Rotation.from_matrix(R)),
-    )

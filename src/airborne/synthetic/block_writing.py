@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.cameras import write_pose2sim
-from airborne.errors import TrialError
 from airborne.synthetic.block_pictures import frames_of
 from airborne.synthetic.block_players import Player
 from airborne.synthetic.block_scene import BlockScene
 from airborne.synthetic.block_truth import TRUTH_JOINTS, joints_of, jump_facts, starts_of
+from airborne.synthetic.writing import require_room
 from airborne.video import VideoWriter
 
 Array = NDArray[np.floating]
@@ -35,10 +35,7 @@ def write_block(folder: Path, scene: BlockScene, *, overwrite: bool = False, pro
     truth of the jumps). `progress` is told after every frame. Raises TrialError for a folder that holds anything,
     unless `overwrite`: then files of these names are replaced.
     """
-    if folder.exists() and not folder.is_dir():
-        raise TrialError(f"{folder} is a file; give a folder for the trial")
-    if not overwrite and folder.is_dir() and any(folder.iterdir()):
-        raise TrialError(f"{folder} is not empty; give another folder, or overwrite it")
+    require_room(folder, overwrite)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "trial.toml").unlink(missing_ok=True)
     starts = starts_of(scene)

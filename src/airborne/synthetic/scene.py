@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal, Protocol, get_args
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Part, Segment
-from airborne.cameras import Camera, Rig
+from airborne.cameras import Rig, aimed
 from airborne.errors import TrialError
 from airborne.rendering import Lights
 from airborne.synthetic.flight import Flight, Launch, fly, mass_of
@@ -24,7 +23,7 @@ Preset = Literal["side-somersault", "half-twist"]
 
 PINE_KG_M3 = 500.0
 YELLOW = np.array([231.0, 200.0, 48.0])  # sRGB
-_SIZE = (768, 576)  # [px]
+PICTURE_SIZE = (768, 576)  # [px]
 _CAMERAS = {  # position, target [m], focal length [px]
     "left": ((-2.35, -5.0, 1.52), (0.02, 0.0, 1.55), 1060.0),
     "right": ((2.30, -4.95, 1.47), (-0.03, 0.02, 1.57), 1095.0),
@@ -127,7 +126,7 @@ def thrown_cross(preset: Preset = "half-twist", *, seed: int = 0, clutter: int =
     return Scene(
         name=f"thrown cross, {'side' if is_side else 'half-twisting'} somersault",
         seed=seed,
-        rig=Rig(tuple(aimed(f"cam{i}", *place) for i, place in enumerate(_CAMERAS.values(), start=1))),
+        rig=Rig(tuple(aimed(f"cam{i}", *place, PICTURE_SIZE) for i, place in enumerate(_CAMERAS.values(), start=1))),
         body=body,
         flight=Throw(body, PINE_KG_M3, launch),
         surroundings=gym(rng, clutter=clutter),
@@ -156,20 +155,4 @@ def hall_spots(rng: np.random.Generator) -> tuple[Spot, ...]:
     return tuple(
         Spot(position=place, target=target, light_at_1m=power, cone_rad=np.radians(32.0))
         for place, target, power in zip(places, targets, light, strict=True)
-    )
-
-
-def aimed(name: str, position: Sequence[float], target: Sequence[float], focal_px: float) -> Camera:
-    """Return a camera of 768 x 576 pixels that looks from one world point (3,) to another [m], level."""
-    centre, forward = np.array(position), np.subtract(target, position)
-    forward = forward / np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    R = np.stack([right, np.cross(forward, right), forward])
-    width, height = _SIZE
-    return Camera(
-        name=name,
-        K=np.array([[focal_px, 0, (width - 1) / 2], [0, focal_px, (height - 1) / 2], [0, 0, 1]]),
-        size=_SIZE,
-        camera_from_world=RigidTransform.from_components(-R @ centre, Rotation.from_matrix(R)),
     )

@@ -16,13 +16,13 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import BodyModel, Pose, human18
 from airborne.body.outfits import in_flat_colours
 from airborne.body.skin import skin_of
-from airborne.cameras import Rig
+from airborne.cameras import Rig, aimed
 from airborne.errors import BodyError, TrialError
 from airborne.geometry.rotations import angles_from_matrix, unwrapped
 from airborne.rendering import Lamp, Lights
 from airborne.synthetic.aerial import Takeoff, fly_articulated, mass_as_bent, moves, slowed, together, with_shape_held
 from airborne.synthetic.flight import GRAVITY_M_S2, Flight
-from airborne.synthetic.scene import HALL_AMBIENT, Scene, aimed, hall_spots
+from airborne.synthetic.scene import HALL_AMBIENT, PICTURE_SIZE, Scene, hall_spots
 from airborne.synthetic.surroundings import gym
 
 Array = NDArray[np.floating]
@@ -148,7 +148,7 @@ def somersault(
     scene = Scene(
         name=f"half-twisting somersault, {preset}, {target}, {style}",
         seed=seed,
-        rig=Rig(tuple(aimed(name, *place) for name, place in _CAMERAS.items())),
+        rig=Rig(tuple(aimed(name, *place, PICTURE_SIZE) for name, place in _CAMERAS.items())),
         body=skin_of(model) if target == "skin" else model,
         flight=skill,
         surroundings=None,

@@ -50,7 +50,7 @@ def write_somersault(
     progress: Progress | None = None,
 ) -> None:
     """Write a trial of a `somersault` preset; see `write_trial`."""
-    _require_room(folder, overwrite)
+    require_room(folder, overwrite)
     scene = somersault(preset, target=target, style=style, seed=seed)
     write_trial(scene, folder, overwrite=overwrite, progress=progress)
 
@@ -64,7 +64,7 @@ def write_trial(scene: Scene, folder: Path, *, overwrite: bool = False, progress
     landmarks) and `truth_angles.csv`. `progress` is told after every picture how many of how many are done. Raises
     TrialError for a folder that holds anything, unless `overwrite`: then files of these names are replaced.
     """
-    _require_room(folder, overwrite)
+    require_room(folder, overwrite)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "trial.toml").unlink(missing_ok=True)
     flight = scene.flight(np.array([float(scene.time_s(i)) for i in range(scene.n_pictures)]))
@@ -82,7 +82,7 @@ def write_trial(scene: Scene, folder: Path, *, overwrite: bool = False, progress
     (folder / "trial.toml").write_text(trial_toml(scene), encoding="utf-8")
 
 
-def _require_room(folder: Path, overwrite: bool) -> None:
+def require_room(folder: Path, overwrite: bool) -> None:
     """Raise TrialError for a file, and for a folder that holds anything, unless it may be overwritten."""
     if folder.exists() and not folder.is_dir():
         raise TrialError(f"{folder} is a file; give a folder for the trial")

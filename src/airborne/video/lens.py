@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.cameras import Camera
-from airborne.cameras.distortion import distort
 from airborne.video.frames import Box, Image, View
 
 NEGLIGIBLE_PX = 0.05  # a lens that moves no pixel by more is left alone
@@ -53,9 +52,7 @@ def lens_of(camera: Camera) -> Lens:
     if camera.is_distorted:
         width, height = camera.size
         straight = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1).astype(float)
-        K_inv = np.linalg.inv(camera.K)
-        xy = straight @ K_inv[:2, :2].T + K_inv[:2, 2]
-        bent = distort(xy, camera.distortion) @ camera.K[:2, :2].T + camera.K[:2, 2]
+        bent = camera.distorted_px(straight)
         if np.max(np.linalg.norm(bent - straight, axis=-1)) > NEGLIGIBLE_PX:
             maps = cv2.convertMaps(bent[..., 0].astype(np.float32), bent[..., 1].astype(np.float32), cv2.CV_16SC2)
     return Lens(camera.undistorted(), maps)
