@@ -110,7 +110,7 @@ def _as_saved(rig: Rig, table: CameraTable, size: tuple[int, int]) -> Camera:
 
 def source_of(trial: Trial, camera: CameraTable) -> VideoSource:
     """Return a camera's video."""
-    return VideoSource(camera.name, trial.path(camera.video), camera.fields, camera.offset_s)
+    return VideoSource(camera.name, trial.path(camera.video), camera.fields, camera.offset_s, camera.drift_ppm)
 
 
 def begin(folder: Path, identity: dict[str, Any], table: str, *, resume: bool) -> bool:
@@ -202,7 +202,7 @@ def inputs_of(trial: Trial, *, live: bool = False) -> dict[str, str]:
         *trial.start.given_files,
     )
     names = [*(camera.video for camera in trial.camera if not live), *(name for name in given if name)]
-    rest = [trial.start, trial.lights, trial.calibration, trial.body]
+    rest = [trial.start, trial.lights, trial.calibration, trial.body, *trial.camera]
     start = json.dumps([table and table.model_dump() for table in rest])
     hashes = {name: _sha256(trial.path(name)) for name in names}
     return {**hashes, "start and lights": hashlib.sha256(start.encode()).hexdigest()}

@@ -171,10 +171,12 @@ def _all_at_once(trial: Trial, rig: Rig) -> Detections:
 
 def _frames_at(trial: Trial, index: NDArray[np.integer], *, fields: bool) -> NDArray[np.int64]:
     """Return every camera's frame nearest in time (n, cameras) to the first camera's frames, or images, (n,)."""
-    facts = [inspect(VideoSource(c.name, trial.path(c.video), c.fields, c.offset_s)) for c in trial.camera]
+    facts = [inspect(VideoSource(c.name, trial.path(c.video), c.fields)) for c in trial.camera]
     rate = facts[0].image_rate if fields else facts[0].frame_rate
-    time_s = trial.camera[0].offset_s + index / float(rate)
+    first = trial.camera[0]
+    time_s = first.offset_s + index / float(rate) * (1 + first.drift_ppm / 1e6)
     columns = [
-        (time_s - camera.offset_s) * float(fact.frame_rate) for camera, fact in zip(trial.camera, facts, strict=True)
+        (time_s - camera.offset_s) / (1 + camera.drift_ppm / 1e6) * float(fact.frame_rate)
+        for camera, fact in zip(trial.camera, facts, strict=True)
     ]
     return np.floor(np.stack(columns, axis=1) + 0.5 - 1e-6).astype(np.int64)  # a field at a half belongs to its frame

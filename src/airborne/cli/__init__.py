@@ -11,6 +11,7 @@ from airborne import __version__
 from airborne.cli import reproduce, results, synth, track
 from airborne.cli.calibrate import calibrate
 from airborne.cli.console import refuse
+from airborne.cli.sync import sync
 from airborne.errors import AirborneError
 
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
@@ -18,6 +19,7 @@ _COMMANDS = {
     "demo": track.demo,
     "track": track.track,
     "calibrate": calibrate,
+    "sync": sync,
     "fit-body": track.fit_body,
     "evaluate": results.evaluate,
     "bench": track.bench,

@@ -65,15 +65,17 @@ def frames(scene: Scene) -> Iterator[Frames]:
     cameras = [[camera.field(p) for p in (0, 1)] if scene.is_interlaced else [camera] for camera in scene.rig]
     offsets = (np.arange(_EXPOSURE_SAMPLES) - (_EXPOSURE_SAMPLES - 1) / 2) / _EXPOSURE_SAMPLES * scene.exposure_s
     times = np.array([float(scene.time_s(i)) for i in range(scene.n_shown)])
-    flight = scene.flight((times[:, None] + offsets).ravel())
+    late_s = scene.late_s or (0.0,) * len(scene.rig)
+    flights = {late: scene.flight((times[:, None] + offsets + late).ravel()) for late in sorted(set(late_s))}
     for index in range(scene.n_shown):
         first = index * _EXPOSURE_SAMPLES
-        exposed = [scene.body.with_pose(flight.pose(first + k)) for k in range(_EXPOSURE_SAMPLES)]
+        moments = range(first, first + _EXPOSURE_SAMPLES)
+        exposed = {late: [scene.body.with_pose(flight.pose(k)) for k in moments] for late, flight in flights.items()}
         parity = scene.parity(index) if scene.is_interlaced else 0
         rows = slice(parity, None, 2) if scene.is_interlaced else slice(None)
         views = []
         for number, (backdrop, own) in enumerate(zip(backgrounds, cameras, strict=True)):
-            light = linear_picture(scene, backdrop, exposed)[rows]
+            light = linear_picture(scene, backdrop, exposed[late_s[number]])[rows]
             rng = np.random.default_rng([scene.seed, 2, number, index])
             views.append(View(own[parity], _recorded(light, scene.noise_sd, rng)))
         yield Frames(index, scene.time_s(index), tuple(views))

@@ -76,6 +76,7 @@ class Scene:
     rate: Fraction  # pictures of each camera [1/s]
     is_interlaced: bool  # pictures are fields, the top one first
     is_surveyed: bool = True  # calibrated from control points; else the trial has the exact cameras
+    late_s: tuple[float, ...] = ()  # how much later than it says each camera takes its pictures; (): none does
     exposure_s: float = 0.002  # centred on the picture's time
     blur_px: float = 0.5  # sd of the lens's blur
     noise_sd: float = 6.0  # of the sensor [grey levels]

@@ -134,6 +134,29 @@ def fit_pictures(
 
     From several poses, the one is kept that ends in the best agreement with pictures and prior.
     """
+    evaluate, correlated = _comparison(synthesis, poses, regions, appearance, freedom)
+    most_steps = _MOST_STEPS_STIFF if len(freedom.columns) <= 6 else _MOST_STEPS
+    ends = [
+        _descend(evaluate, freedom, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, settled=_SETTLED)
+        for pose in poses
+    ]
+    noise = min(end.evaluation.noise for end in ends)
+    last = min(ends, key=lambda end: end.evaluation.objective(noise, freedom.prior_cost(end.evaluation.pose, prior)))
+    return Fit(last.pose, freedom, last.evaluation, (last.evaluation.noise / correlated) ** 0.5, last.steps)
+
+
+def evaluate_pictures(
+    synthesis: Synthesis, pose: Pose, regions: Sequence[Region], appearance: Appearance, freedom: Freedom
+) -> Evaluation:
+    """Return what the pictures say of one pose, without moving it."""
+    evaluate, _ = _comparison(synthesis, [pose], regions, appearance, freedom)
+    return evaluate(pose, 1)
+
+
+def _comparison(
+    synthesis: Synthesis, poses: Sequence[Pose], regions: Sequence[Region], appearance: Appearance, freedom: Freedom
+) -> tuple[Callable[[Pose, int], Evaluation], float]:
+    """Return what compares poses near the given ones with the pictures, and how many pixels share their noise."""
     bodies = [synthesis.place(pose) for pose in poses]
     laid_out = [(pictured(synthesis, bodies, region, appearance), region) for region in regions]
     laid_out = [(view, region) for view, region in laid_out if view.is_seen]
@@ -154,14 +177,7 @@ def fit_pictures(
                 shifted.append(_shape_errors(sums.B, posed, view))
         return _mapped(synthesis, freedom, pose, posed, sums, blocks, shifted, totals, correlated)
 
-    most_steps = _MOST_STEPS_STIFF if len(freedom.columns) <= 6 else _MOST_STEPS
-    ends = [
-        _descend(evaluate, freedom, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, settled=_SETTLED)
-        for pose in poses
-    ]
-    noise = min(end.evaluation.noise for end in ends)
-    last = min(ends, key=lambda end: end.evaluation.objective(noise, freedom.prior_cost(end.evaluation.pose, prior)))
-    return Fit(last.pose, freedom, last.evaluation, (last.evaluation.noise / correlated) ** 0.5, last.steps)
+    return evaluate, correlated
 
 
 def _compare(

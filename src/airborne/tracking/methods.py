@@ -14,6 +14,7 @@ from airborne.body.colours import with_sampled_colours
 from airborne.rendering import FLAT, RULES, Lights, render
 from airborne.tracking import predictors
 from airborne.tracking.direct import Direct, Search, simplex_search, stepping_search
+from airborne.tracking.lateness import InTime
 from airborne.tracking.refined import Refined
 from airborne.tracking.stepping import VRule
 from airborne.tracking.tracker import Tracker
@@ -51,7 +52,11 @@ class Settings:
 
 
 def tracker_of(settings: Settings, model: BodyModel, start: Pose) -> Tracker:
-    """Make the tracker of a method."""
+    """Make the tracker of a method; it takes views that are late to be so."""
+    return InTime(_tracker_of(settings, model, start))
+
+
+def _tracker_of(settings: Settings, model: BodyModel, start: Pose) -> Tracker:
     if settings.method in ("refined", "joint", "hierarchical"):
         return Refined(
             model,

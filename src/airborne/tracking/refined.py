@@ -22,7 +22,16 @@ from airborne.tracking import predictors
 from airborne.tracking.appearance import Appearance, Region
 from airborne.tracking.estimate import Estimate, Status, lost
 from airborne.tracking.freedom import Freedom, Prior, all_joints, only, outward, root_only
-from airborne.tracking.gauss_newton import CLOSE, FAR, NEAR, Fit, Levels, fit_pictures, fit_silhouettes
+from airborne.tracking.gauss_newton import (
+    CLOSE,
+    FAR,
+    NEAR,
+    Fit,
+    Levels,
+    evaluate_pictures,
+    fit_pictures,
+    fit_silhouettes,
+)
 from airborne.tracking.limbs import astray, look_for
 from airborne.tracking.loss import Agreement, Usual, agreement, status_of
 from airborne.tracking.regions import reduced, regions_round, share_in_pictures
@@ -122,6 +131,21 @@ class Refined:
         agreed = agreement(self._synthesis, body, known, [appearance.posterior(region) for region in known])
         usual = state.usual.learned(agreed) if known else state.usual
         return RefinedState(past, appearance, usual, estimate.covariance)
+
+    def by_view(self, state: RefinedState, frames: Frames, pose: Pose) -> dict[str, tuple[Array, Array]]:
+        """Say which way each camera alone would move the root: camera -> curvature (6, 6), slope (6,) [nat].
+
+        The motion x (6,) of `airborne.body.chain` changes the log-likelihood by `slope x - x curvature x / 2`.
+        """
+        frames, posed = self._as_tracked(frames), self._synthesis.place(pose)
+        regions = regions_round([posed], self._synthesis.geometry, frames, _MARGIN_PX)
+        regions = [region for region in regions if state.appearance.knows(region)]
+        scenes = self._with_scenes(state.appearance, posed, regions)
+        found = {}
+        for region in regions:
+            each = evaluate_pictures(self._synthesis, pose, [region], scenes, self._root)
+            found[region.camera.name] = each.A / each.noise, each.g / each.noise
+        return found
 
     def _as_tracked(self, frames: Frames) -> Frames:
         """Reduce the pictures of a body with joints: its many pixels say more than its shape can follow."""

@@ -42,7 +42,7 @@ def _reduced(view: View | None, body: PosedBody, most_px_per_m: float) -> View |
     rgb = cv2.resize(view.rgb[: n * height, : n * width], (width, height), interpolation=cv2.INTER_AREA)
     middle = (n - 1) / 2
     camera = view.camera.resampled(scale=(n, n), offset=(middle, middle), size=(width, height))
-    return View(camera, np.asarray(rgb, np.uint8))
+    return View(camera, np.asarray(rgb, np.uint8), view.late_s)
 
 
 def share_in_pictures(body: PosedBody, geometry: Geometry, frames: Frames) -> float:

@@ -31,11 +31,19 @@ class VideoSource:
     path: Path
     fields: FieldsWanted = "progressive"
     offset_s: Fraction | float = 0  # added to this camera's times [s]
+    drift_ppm: Fraction | float = 0  # by how much its clock is slow, in millionths
 
     def __post_init__(self) -> None:
         if self.fields not in get_args(FieldsWanted):
             known = ", ".join(get_args(FieldsWanted))
             raise VideoError(f"{self.name}: fields = '{self.fields}' is not known; use one of: {known}")
+
+    def on_clock(self, time_s: Fraction) -> Fraction:
+        """Return a time since the file's first picture on the trial's clock [s].
+
+        Offset and drift are taken as the decimal numbers that were written, not as their nearest binary ones.
+        """
+        return Fraction(str(self.offset_s)) + time_s * (1 + Fraction(str(self.drift_ppm)) / 1_000_000)
 
 
 @dataclass(frozen=True, slots=True)

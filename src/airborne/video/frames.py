@@ -33,6 +33,7 @@ class View:
 
     camera: Camera  # without distortion: the image has been straightened where the lens bends
     picture: Image | Pixels  # (h, w, 3) sRGB, or what gives it
+    late_s: float = 0.0  # how much later it was taken than the time of its `Frames` [s]
 
     @property
     def rgb(self) -> Image:

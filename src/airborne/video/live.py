@@ -16,7 +16,7 @@ from airborne.video.decoding import Picture, VideoFacts, VideoSource, facts_of, 
 from airborne.video.frames import Frames, View
 from airborne.video.kept import KnownColours, kept_view
 from airborne.video.lens import Lens, lens_of
-from airborne.video.recording import check_sizes, offset_of
+from airborne.video.recording import check_sizes
 from airborne.video.sources import LOOK_S, Kind, kind_of, opened_live
 
 N_KEPT = 16  # newest pictures of a camera that wait to be matched
@@ -77,7 +77,7 @@ class LiveCamera:
                 now_s = time.monotonic()
                 if self.kind == "device" and self.n_received:
                     stamp_s = Fraction(round((now_s - begun_s) * _MICRO), _MICRO) + 1 / facts.frame_rate
-                self._keep(Picture(stamp_s + offset_of(self.source), frame, None), facts, now_s)
+                self._keep(Picture(self.source.on_clock(stamp_s), frame, None), facts, now_s)
         if self.facts is None and not self.stop.is_set():
             raise VideoError(f"{self.source.name}: no picture came from {self.source.path}; check what sends them")
 
@@ -147,7 +147,7 @@ class LiveRecording:
         lenses = [lens_of(camera) for camera in self.rig]
         known = [KnownColours(min(self._facts(k).size)) for k in range(len(self.cameras))]
         period_s = 1 / self._facts(0).image_rate
-        first_s, last_s, last_index = offset_of(self.cameras[0].source), None, -1
+        first_s, last_s, last_index = self.cameras[0].source.on_clock(Fraction(0)), None, -1
         while (found := self._next(last_s, period_s)) is not None:
             last_s, arrived = found
             index = max(round((last_s - first_s) / period_s), last_index + 1)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import repeat
 from typing import Literal, get_args
 
 from airborne.cameras import Camera, Rig
@@ -27,7 +28,7 @@ class Recording:
 
     The first camera is the clock: index and time are those of its frames (or fields), continued at its rate over
     pictures that it lost and past its end, until every camera has ended. Another camera gives the picture nearest in
-    time, if within half of the clock's period, else None.
+    time, if within half of the clock's period, else None; its `View` says how late it was taken.
     """
 
     sources: tuple[VideoSource, ...]  # in the rig's order
@@ -48,10 +49,10 @@ class Recording:
     @property
     def n_frames(self) -> int | None:
         """How many `Frames` to expect by what the files promise; None where the clock's file does not say."""
-        ends = [offset_of(s) + f.duration_s for s, f in zip(self.sources, self.facts, strict=True) if f.duration_s]
+        ends = [s.on_clock(f.duration_s) for s, f in zip(self.sources, self.facts, strict=True) if f.duration_s]
         if self.facts[0].duration_s is None:
             return None
-        n = round((max(ends) - offset_of(self.sources[0])) * self.facts[0].image_rate)
+        n = round((max(ends) - self.sources[0].on_clock(Fraction(0))) * self.facts[0].image_rate)
         return len(range(self.start, n if self.stop is None else min(n, self.stop), self.every))
 
     def __iter__(self) -> Generator[Frames]:
@@ -64,13 +65,14 @@ class Recording:
             ]
             pool = open_files.enter_context(ThreadPoolExecutor(len(cursors)))
             known = [KnownColours(min(facts.size)) for facts in self.facts]
-            times = _clock(cursors, start_s=offset_of(self.sources[0]), period_s=period_s)
+            times = _clock(cursors, start_s=self.sources[0].on_clock(Fraction(0)), period_s=period_s)
             for index, time_s in enumerate(times):
                 if self.stop is not None and index >= self.stop:
                     return
                 seen = [cursor.picture_at(time_s) for cursor in cursors]
                 if index >= self.start and (index - self.start) % self.every == 0:
-                    yield Frames(index, time_s, tuple(pool.map(self._view, seen, self.facts, lenses, known)))
+                    views = pool.map(self._view, seen, repeat(time_s), self.facts, lenses, known)
+                    yield Frames(index, time_s, tuple(views))
 
     def _lenses(self, camera: Camera, facts: VideoFacts) -> dict[int | None, Lens]:
         """Return the lens of each kind of image that the file gives: whole (None), top field (0), bottom field (1)."""
@@ -78,24 +80,30 @@ class Recording:
         return {parity: lens_of(camera if is_whole else camera.field(parity or 0)) for parity in facts.parities}
 
     def _view(
-        self, picture: Picture | None, facts: VideoFacts, lenses: dict[int | None, Lens], known: KnownColours
+        self,
+        picture: Picture | None,
+        time_s: Fraction,
+        facts: VideoFacts,
+        lenses: dict[int | None, Lens],
+        known: KnownColours,
     ) -> View | None:
         if picture is None:
             return None
+        late_s = float(picture.time_s - time_s)
         if self.is_lazy:
-            return kept_view(picture, facts, lenses[picture.parity], known)
+            return replace(kept_view(picture, facts, lenses[picture.parity], known), late_s=late_s)
         rgb = rgb_from_picture(picture, facts)
         if picture.parity is not None and self.fields_as == "interpolated":
             rgb = fill_rows(rgb, picture.parity, facts.size[1])
-        return lenses[picture.parity].view(rgb)
+        return replace(lenses[picture.parity].view(rgb), late_s=late_s)
 
     def _timed(self, source: VideoSource, facts: VideoFacts) -> Generator[Picture]:
         """Yield a camera's pictures on the trial's clock, and note every gap and an early end."""
-        period_s, offset_s = 1 / facts.image_rate, offset_of(source)
-        expected_s = offset_s
+        period_s = 1 / facts.image_rate
+        expected_s = source.on_clock(Fraction(0))
         with closing(ahead(pictures(source, facts))) as stream:
             for picture in stream:
-                time_s = picture.time_s + offset_s
+                time_s = source.on_clock(picture.time_s)
                 if time_s > expected_s + period_s / 2:
                     self._note(
                         f"{source.name}: no picture from {float(expected_s):.3f} s to {float(time_s):.3f} s (damaged "
@@ -103,8 +111,8 @@ class Recording:
                     )
                 yield picture._replace(time_s=time_s)
                 expected_s = time_s + period_s
-        if facts.duration_s and expected_s < offset_s + facts.duration_s - period_s / 2:
-            end_s = offset_s + facts.duration_s
+        end_s = source.on_clock(facts.duration_s or Fraction(0))
+        if facts.duration_s and expected_s < end_s - period_s / 2:
             self._note(
                 f"{source.name}: the pictures end at {float(expected_s):.3f} s; the file promises {float(end_s):.3f} s"
             )
@@ -171,11 +179,6 @@ def _notes(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> Itera
             yield f"{source.name}: the file's flags say {fact.flagged}"
         elif fact.flagged != fact.fields:
             yield f"{source.name}: read as {fact.fields}, though the file's flags say {fact.flagged}"
-
-
-def offset_of(source: VideoSource) -> Fraction:
-    """Return the offset as the decimal number that was written, not as its nearest binary one."""
-    return Fraction(str(source.offset_s))
 
 
 class _Cursor:

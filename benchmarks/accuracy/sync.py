@@ -1,0 +1,129 @@
+"""Offsets of the third camera, found from motion and from tracking: `python benchmarks/accuracy/sync.py`.
+
+`generated`: crosses thrown by our generator, the third camera 0 to 20 ms late. `thrown_cross`: the example as it is;
+the third camera's fields resampled to a later time, by mixing the two fields beside each moment; and two cameras
+started whole fields late.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from rows import ROOT, append
+
+from airborne.runs import cameras_of, source_of
+from airborne.synchronising import synchronise
+from airborne.synthetic.scene import thrown_cross
+from airborne.synthetic.writing import write_trial
+from airborne.trial import read_trial
+from airborne.video import VideoWriter, fill_rows, weave
+from airborne.video.decoding import inspect, pictures, rgb_from_picture
+from airborne.video.sync import offsets_by_motion
+
+LATE_MS = ((0, 3), (1, 7), (2, 10), (3, 13), (4, 17), (5, 20))  # seed, third camera's delay
+RESAMPLED_MS = (3, 7, 10, 13, 17)
+WHOLE_FIELDS = ((0, 2, 4), (0, 6, 2), (0, 4, 8))
+FIELD_S = Fraction(1, 50)
+EXAMPLE = ROOT / "examples" / "thrown_cross"
+
+
+def errors_ms(folder: Path, late_s: float) -> dict[str, float]:
+    """Return the errors of the third camera's offset, and the sd that tracking states."""
+    trial = read_trial(folder / "trial.toml")
+    rig, _ = cameras_of(trial)
+    motion = offsets_by_motion([source_of(trial, camera) for camera in trial.camera], rig, within_s=0.3)
+    tracking = synchronise(trial, within_s=0.3)
+    print(folder.name, late_s, motion.describe(), tracking.describe(), sep="\n", flush=True)
+    return {
+        "motion": 1e3 * abs(float(motion.offset_s[2]) - late_s),
+        "tracking": 1e3 * abs(float(tracking.offset_s[2]) - late_s),
+        "tracking, other camera": 1e3 * abs(float(tracking.offset_s[1])),
+        "sd": 1e3 * float(tracking.offset_sd_s[2]),
+    }
+
+
+def copied(folder: Path) -> Path:
+    """Copy the example."""
+    shutil.copytree(EXAMPLE, folder)
+    return folder
+
+
+def fields_of(folder: Path, name: str) -> list[np.ndarray]:
+    """Read a camera's fields as whole pictures, missing rows filled in."""
+    trial = read_trial(folder / "trial.toml")
+    source = source_of(trial, next(camera for camera in trial.camera if camera.name == name))
+    facts = inspect(source)
+    return [fill_rows(rgb_from_picture(p, facts), p.parity or 0, facts.size[1]) for p in pictures(source, facts)]
+
+
+def write_fields(path: Path, fields: list[np.ndarray]) -> None:
+    """Write whole pictures as the fields of an interlaced video, top field first."""
+    height, width = fields[0].shape[:2]
+    with VideoWriter(path, size=(width, height), rate=Fraction(25), fields="top-first", crf=10) as video:
+        for top, bottom in zip(fields[::2], fields[1::2], strict=False):
+            video.write(weave(top[0::2], bottom[1::2]))
+
+
+def resampled(folder: Path, late_s: float) -> Path:
+    """Give the third camera the pictures that it would have taken later, mixed from those beside."""
+    fields = fields_of(copied(folder), "cam3")
+    whole, share = divmod(late_s / float(FIELD_S), 1)
+    first = int(whole)
+    pairs = zip(fields[first:], fields[first + 1 :], strict=False)
+    mixed = [np.rint((1 - share) * a + share * b).astype(np.uint8) for a, b in pairs]
+    (folder / "cam3.mp4").unlink()
+    write_fields(folder / "cam3.mp4", mixed)
+    return folder
+
+
+def started_late(folder: Path, whole_fields: tuple[int, int, int]) -> Path:
+    """Cut whole frames off the cameras' beginnings."""
+    copied(folder)
+    for name, n in zip(("cam1", "cam2", "cam3"), whole_fields, strict=True):
+        if n:
+            fields = fields_of(folder, name)
+            (folder / f"{name}.mp4").unlink()
+            write_fields(folder / f"{name}.mp4", fields[n:])
+    return folder
+
+
+def row(data: str, method: str, errors: list[float], floor: str = "") -> dict:
+    worst = {"metric": "offset error, largest", "unit": "ms", "value": max(errors), "n": len(errors), "floor": floor}
+    return {"data": data, "method": method, **worst}
+
+
+def main() -> None:
+    """Measure, and append the rows."""
+    with tempfile.TemporaryDirectory() as scratch:
+        at = Path(scratch)
+        generated = []
+        for seed, late_ms in LATE_MS:
+            scene = replace(thrown_cross(seed=seed), late_s=(0.0, 0.0, late_ms / 1000))
+            write_trial(scene, at / f"g{seed}")
+            generated.append(errors_ms(at / f"g{seed}", late_ms / 1000))
+        mixed = [errors_ms(resampled(at / f"r{ms}", ms / 1000), ms / 1000) for ms in RESAMPLED_MS]
+        still = [errors_ms(EXAMPLE, 0.0)]
+        rows = []
+        for data, found in (("generated", generated), ("thrown_cross", still), ("thrown_cross, resampled", mixed)):
+            rows.append(row(data, "motion", [each["motion"] for each in found]))
+            rows.append(row(data, "tracking", [each["tracking"] for each in found], "<= 1"))
+        wrong = 0
+        for fields in WHOLE_FIELDS:
+            trial = read_trial(started_late(at / "-".join(map(str, fields)), fields) / "trial.toml")
+            found = synchronise(trial, by="motion", within_s=0.3, whole_pictures=True)
+            wrong += int(np.any(np.round(found.offset_s / float(FIELD_S)) != fields))
+        counted = {"metric": "wrong by a field", "unit": "of 3", "value": wrong, "n": 3, "floor": "0"}
+        append("sync", [*rows, {"data": "thrown_cross, whole fields", "method": "motion", **counted}])
+
+
+if __name__ == "__main__":
+    main()

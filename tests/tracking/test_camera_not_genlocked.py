@@ -1,0 +1,50 @@
+"""One camera takes its pictures 7 ms after the others, and says so."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+
+from airborne.tracking.lateness import InTime
+from airborne.tracking.refined import Refined
+from airborne.video import Frames
+from tests.tracking.scenes import CAMERAS, CROSS, FPS, Scene, statuses, thrown, track, worst
+
+LATE_S = Fraction(7, 1000)
+THREE = Scene(cameras=CAMERAS[:3])
+LATER = Scene(cameras=CAMERAS[:3], motion=lambda time_s: thrown(time_s + LATE_S))
+
+
+class NotGenlocked(Scene):
+    """The third camera's pictures come from a scene 7 ms on."""
+
+    told = True
+
+    def frames(self, index: int) -> Frames:
+        late = replace(LATER.frames(index).views[2], late_s=float(LATE_S) if self.told else 0.0)
+        return Frames(index, Fraction(index, FPS), (*THREE.frames(index).views[:2], late))
+
+
+class Untold(NotGenlocked):
+    told = False
+
+
+@pytest.fixture(scope="module")
+def errors():
+    """Worst errors (mm, deg) of each scene, and its statuses."""
+    found = {}
+    for name, scene in (("in time", THREE), ("late", NotGenlocked()), ("untold", Untold())):
+        estimates = track(scene, range(12), InTime(Refined(CROSS, scene.start())))
+        found[name] = worst(THREE, estimates), statuses(estimates)
+    return found
+
+
+def test_it_is_tracked_about_as_well_as_cameras_in_time(errors):
+    (position_mm, rotation_deg), seen = errors["late"]
+    assert "lost" not in seen
+    assert position_mm < 2 * errors["in time"][0][0] + 1
+    assert rotation_deg < 2 * errors["in time"][0][1] + 0.5
+
+
+def test_not_knowing_it_costs_much_more(errors):
+    assert errors["untold"][0][0] > 1.5 * errors["late"][0][0]
