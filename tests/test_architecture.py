@@ -34,6 +34,7 @@ ORDER = [
     "reproduction",
     "examples",
     "assessment",
+    "exporting",
     "bench",
     "cli",
 ]  # a module may import what stands before it, and its own package

@@ -11,6 +11,7 @@ from airborne import __version__
 from airborne.cli import reproduce, results, synth, track
 from airborne.cli.calibrate import calibrate
 from airborne.cli.console import refuse
+from airborne.cli.export import export
 from airborne.errors import AirborneError
 
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
@@ -20,6 +21,7 @@ _COMMANDS = {
     "calibrate": calibrate,
     "fit-body": track.fit_body,
     "evaluate": results.evaluate,
+    "export": export,
     "bench": track.bench,
 }
 _SYNTH = {"cross": synth.synth_cross, "somersault": synth.synth_somersault, "block": synth.synth_block}
