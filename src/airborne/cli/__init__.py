@@ -11,7 +11,9 @@ from airborne import __version__
 from airborne.cli import reproduce, results, synth, track
 from airborne.cli.calibrate import calibrate
 from airborne.cli.console import refuse
+from airborne.cli.convert import convert
 from airborne.cli.export import export
+from airborne.cli.smooth import smooth
 from airborne.errors import AirborneError
 
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
@@ -19,7 +21,9 @@ _COMMANDS = {
     "demo": track.demo,
     "track": track.track,
     "calibrate": calibrate,
+    "convert": convert,
     "fit-body": track.fit_body,
+    "smooth": smooth,
     "evaluate": results.evaluate,
     "export": export,
     "bench": track.bench,
