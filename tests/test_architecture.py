@@ -22,6 +22,7 @@ PACKAGES = [
     "export",
 ]
 ORDER = [
+    "reading",
     *PACKAGES,
     "player_table",
     "trial",
@@ -35,7 +36,11 @@ ORDER = [
     "examples",
     "assessment",
     "synchronising",
+    "conversion",
+    "smoothing",
+    "exporting",
     "bench",
+    "calibrating",
     "cli",
 ]  # a module may import what stands before it, and its own package
 FOR_ALL = {"", "errors"}  # the package's own name holds its version
@@ -44,6 +49,7 @@ KERNELS = [
     "cameras/distortion.py",
     *sorted(f"geometry/{path.name}" for path in (SOURCE / "geometry").glob("[a-z]*.py")),
     "rendering/capsules.py",
+    *sorted(f"motion/signals/{path.name}" for path in (SOURCE / "motion" / "signals").glob("[a-z]*.py")),
     *(f"scoring/{name}.py" for name in ("distances", "foreground", "hsv", "kinds", "lighting")),
     *(f"scoring/{name}.py" for name in ("over_views", "plate", "recognition", "rods")),
     *(f"tracking/filters/{name}.py" for name in ("hidden", "jump_state", "resampling", "sir", "swing")),

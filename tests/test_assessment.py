@@ -1,5 +1,6 @@
 """A finished run is compared with what is known, and its summary keeps the comparison."""
 
+import csv
 import json
 import shutil
 from dataclasses import replace
@@ -7,12 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airborne.assessment import assess
+from airborne.assessment import agree, assess
 from airborne.body.files import read_body
+from airborne.cameras import read_rig, write_pose2sim
 from airborne.errors import ResultError
 from airborne.motion import Motion, MotionWriter, write_joints
 from tests.motion.helpers import estimate
 from tests.players import PLAYERS, write_run, write_truth
+from tests.test_docs import DOCS
 
 
 @pytest.fixture
@@ -86,3 +89,74 @@ def test_truths_of_players_and_of_a_body_are_told_apart(run, thrown_cross, tmp_p
         assess(write_run(tmp_path / "players"), thrown_cross / "truth.csv", None)
     with pytest.raises(ResultError, match="no column x_m"):
         assess(run, write_truth(tmp_path / "truth.csv"), None)
+
+
+def agreements(found, against):
+    return {row.name: row for row in found.agreements[against]}
+
+
+def test_agreement_of_joints_is_told_with_tables_figures_and_a_paragraph(run, tmp_path):
+    before = {path.name: path.read_bytes() for path in run.iterdir()}
+    found = agree(run, joints=run.parent / "higher.csv", out=tmp_path / "agreement")
+    rows = agreements(found, "the joints")
+    assert rows["all joints z"].bias.value == pytest.approx(-10)
+    assert rows["all joints x"].rmse.value == pytest.approx(0, abs=1e-9)
+    assert {path.name for path in (tmp_path / "agreement").iterdir()} == set(found.files)
+    assert set(found.files) == {"agreement.csv", "agreement_joints.png", "identity_joints.png", "agreement_methods.txt"}
+    text = (tmp_path / "agreement" / "agreement_methods.txt").read_text()
+    assert "Bland" in text and "McGraw" in text and "bias -10.00" in text and "airborne" in text
+    assert {path.name: path.read_bytes() for path in run.iterdir()} == before
+
+
+def test_each_number_of_the_table_has_its_interval(run, tmp_path):
+    agree(run, joints=run.parent / "higher.csv", out=tmp_path)
+    with (tmp_path / "agreement.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert rows[0]["against"] == "the joints"
+    for name in ("bias", "lower_limit", "upper_limit", "rmse", "nrmse_percent", "icc_a1", "icc_c1", "sem", "mdc"):
+        assert {f"{name}_low", f"{name}_high"} <= set(rows[0])
+
+
+def test_runs_of_one_trial_are_compared_with_one_another(run, tmp_path):
+    other = shutil.copytree(run, tmp_path / "other")
+    found = agree(run, repeats=[other, other], out=tmp_path)
+    rows = {row.name: row for row in found.repeats["runs"]}
+    assert rows["x"].n_ways == 3 and rows["x"].within_sd.value == pytest.approx(0, abs=1e-9)
+    assert {"somersault", "tilt", "twist", "all joints x"} <= set(rows)
+    assert "between runs" in found.describe()
+    assert not found.agreements
+    with pytest.raises(ResultError, match="holds no run"):
+        agree(run, repeats=[tmp_path])
+
+
+def test_people_who_click_the_same_pictures_are_compared(run, thrown_cross, tmp_path):
+    write_pose2sim(run / "calib.toml", read_rig(thrown_cross / "calib_true.toml"))
+    clicks = thrown_cross / "digitised.csv"
+    found = agree(run, digitised=clicks, operators=[clicks], out=tmp_path)
+    assert {row.name for row in found.repeats["operators"]} == {"x", "y", "z", "somersault", "tilt", "twist"}
+    assert list(found.agreements) == ["points digitised"]
+    with pytest.raises(ResultError, match="give those as --digitised"):
+        agree(run, operators=[clicks])
+
+
+def test_players_and_their_jumps_agree_with_their_truth(tmp_path):
+    run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv", off_m=0.03)
+    found = agree(run, truth, repeats=[run])
+    rows = agreements(found, "the truth")
+    assert rows["ankle_left z"].bias.value == pytest.approx(30)
+    assert rows["ankle_left z"].n_individuals == 2
+    assert rows["all joints z"].n_individuals == 12
+    assert [row.name for row in found.repeats["runs"]][:3] == ["hip_left x", "all joints x", "hip_left y"]
+    with pytest.raises(ResultError, match="a run of players"):
+        agree(run, joints=truth)
+    plain = json.dumps(found.to_dict(), allow_nan=False)
+    assert "NaN" not in plain
+
+
+def test_every_number_is_documented(run, tmp_path):
+    agree(run, joints=run.parent / "higher.csv", repeats=[run], out=tmp_path)
+    text = (DOCS / "agreement.md").read_text(encoding="utf-8")
+    for name in ("agreement.csv", "repeatability.csv"):
+        header = (tmp_path / name).read_text().splitlines()[0].split(",")
+        stems = {column.removesuffix("_low").removesuffix("_high") for column in header}
+        assert {stem for stem in stems if f"`{stem}`" not in text} <= {"against", "between", "variable", "unit"}

@@ -1,20 +1,31 @@
-"""A finished run against what is known: the truth, paths of joints, or points clicked by hand."""
+"""A finished run against what is known: the truth, paths of joints, points clicked by hand; other runs, other people.
+
+`assess` gives errors, `agree` says how well they agree: bias, limits of agreement, reliability, repeatability.
+"""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from airborne.body import BodyModel
 from airborne.body.files import read_body
 from airborne.body.symmetry import symmetries
-from airborne.cameras import read_rig
+from airborne.cameras import Rig, read_rig
 from airborne.errors import ResultError
 from airborne.evaluation import (
+    Agreement,
     Comparison,
     DigitisedComparison,
     JointComparison,
     PlayersComparison,
+    Repeatability,
+    Series,
+    agreement,
     assess_players,
     compare,
     compare_digitised,
@@ -22,10 +33,30 @@ from airborne.evaluation import (
     digitised_poses,
     read_digitised,
     read_joint_paths,
+    read_players_truth,
     read_truth,
+    repeatability,
+)
+from airborne.evaluation.agreement_tables import write_agreements, write_repeats
+from airborne.evaluation.agreement_text import agreement_table, methods_text, repeatability_table
+from airborne.evaluation.jump_errors import paired_jumps
+from airborne.evaluation.variables import (
+    Variables,
+    headline,
+    of_joint_paths,
+    of_jumps,
+    of_motion,
+    of_players,
+    of_root,
+    read_joint_angles,
+    side_by_side,
+    turned_alike,
 )
 from airborne.export import write_figures, write_json, write_report
-from airborne.motion import read_motion
+from airborne.export.analysis_figures import write_bland_altman, write_identity
+from airborne.motion import Motion, read_motion, read_players
+from airborne.reading import read_json
+from airborne.runs import versions
 
 Found = Mapping[str, Comparison | DigitisedComparison | JointComparison | PlayersComparison]
 
@@ -85,7 +116,169 @@ def _kept(folder: Path, found: Found) -> dict:
     path = folder / "summary.json"
     if not path.is_file():
         return {}
-    summary = json.loads(path.read_text(encoding="utf-8"))
+    try:
+        summary = read_json(path)
+    except (OSError, ValueError) as error:
+        raise ResultError(f"{path} cannot be read ({str(error)[:120]}); mend it, or remove it") from None
+    if not isinstance(summary, dict):
+        raise ResultError(f"{path} holds no summary of a run; mend it, or remove it")
     summary |= {name: comparison.to_dict() for name, comparison in found.items()}
     write_json(path, summary)
     return summary
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Concord:
+    """How well things agree, by what the run was compared with; and repeatability, by what was repeated."""
+
+    agreements: dict[str, list[Agreement]]
+    repeats: dict[str, list[Repeatability]]
+    headlines: frozenset[str]  # names of the variables that stand first
+    files: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the numbers for a JSON file."""
+        return {
+            "agreement": {name: [row.to_dict() for row in rows] for name, rows in self.agreements.items()},
+            "repeatability": {name: [row.to_dict() for row in rows] for name, rows in self.repeats.items()},
+        }
+
+    def describe(self) -> str:
+        """Return the variables that stand first as short plain tables."""
+        lines = []
+        for name, rows in self.agreements.items():
+            lines += [f"agreement with {name}", agreement_table([row for row in rows if row.name in self.headlines])]
+        for name, rows in self.repeats.items():
+            lines += [f"between {name}", repeatability_table([row for row in rows if row.name in self.headlines])]
+        return "\n".join([*lines, f"wrote {', '.join(self.files)}"])
+
+
+def agree(
+    folder: Path,
+    truth: Path | None = None,
+    digitised: Path | None = None,
+    joints: Path | None = None,
+    *,
+    joint_angles: Path | None = None,
+    repeats: Sequence[Path] = (),
+    operators: Sequence[Path] = (),
+    out: Path | None = None,
+) -> Concord:
+    """Say how well the run in a folder agrees with references, and how well repetitions agree with one another.
+
+    `repeats` are folders of other runs of the same trial; `operators` files of points that other people clicked in the
+    pictures of `digitised`. Writes agreement.csv, repeatability.csv, figures and a methods paragraph into the run's
+    folder, or into `out`. Raises ResultError where something is no run, cannot be read, or is of another recording.
+    """
+    if operators and digitised is None:
+        raise ResultError("clicks of other people are compared with the first person's; give those as --digitised")
+    if holds_players(folder):
+        if digitised or joints or joint_angles:
+            raise ResultError(f"{folder} holds a run of players; give a truth.csv of players, or other runs of it")
+        references, repeated = _players_series(folder, truth, repeats)
+    else:
+        references, repeated = _body_series(folder, truth, digitised, joints, joint_angles, repeats, operators)
+    agreements = {name: [agreement(one) for one in series] for name, series in references.items()}
+    repeatable = {name: [repeatability(one) for one in series] for name, series in repeated.items()}
+    out = folder if out is None else out
+    out.mkdir(parents=True, exist_ok=True)
+    first = frozenset(one.name for series in (*references.values(), *repeated.values()) for one in headline(series))
+    files = []
+    if agreements:
+        write_agreements(out / "agreement.csv", agreements)
+        files.append("agreement.csv")
+    if repeatable:
+        write_repeats(out / "repeatability.csv", repeatable)
+        files.append("repeatability.csv")
+    for name, series in references.items():
+        word = name.split()[-1]
+        drawn = [
+            (one, row) for one, row in zip(series, agreements[name], strict=True) if one.name in first and row.n > 1
+        ]
+        if drawn:
+            write_bland_altman(out / f"agreement_{word}.png", drawn)
+            write_identity(out / f"identity_{word}.png", drawn)
+            files += [f"agreement_{word}.png", f"identity_{word}.png"]
+    text = methods_text(
+        {name: [row for row in rows if row.name in first] for name, rows in agreements.items()},
+        {name: [row for row in rows if row.name in first] for name, rows in repeatable.items()},
+        versions(),
+    )
+    (out / "agreement_methods.txt").write_text(text, encoding="utf-8", newline="\n")
+    return Concord(agreements, repeatable, first, (*files, "agreement_methods.txt"))
+
+
+Compared = dict[str, list[Series]]
+
+
+def _players_series(folder: Path, truth: Path | None, repeats: Sequence[Path]) -> tuple[Compared, Compared]:
+    motion = read_players(folder / "joints.csv")
+    own, references, repeated = of_players(motion), Compared(), Compared()
+    if truth is not None:
+        true = read_players_truth(truth)
+        players = [name for name in motion.players if name in true.players]
+        series = side_by_side([own, of_players(true)], "the run and its truth")
+        pairs = paired_jumps(motion, true, players)
+        references["the truth"] = series + (of_jumps(pairs) if pairs else [])
+    if repeats:
+        others = [of_players(read_players(other / "joints.csv")) for other in repeats]
+        repeated["runs"] = side_by_side([own, *others], "the runs")
+    return references, repeated
+
+
+def _body_series(
+    folder: Path,
+    truth: Path | None,
+    digitised: Path | None,
+    joints: Path | None,
+    joint_angles: Path | None,
+    repeats: Sequence[Path],
+    operators: Sequence[Path],
+) -> tuple[Compared, Compared]:
+    motion, model = _body_run(folder)
+    alike, references, repeated = symmetries(model), Compared(), Compared()
+    if truth is not None:
+        true = read_truth(truth)
+        turned = turned_alike(motion, true.R, true.time_s, alike)
+        reference = of_root(true.time_s, true.position, true.R)
+        references["the truth"] = side_by_side(
+            [of_root(motion.time_s, motion.position, turned), reference], "the run and its truth"
+        )
+    if joints is not None:
+        paths = of_joint_paths(read_joint_paths(joints), model)
+        references["the joints"] = side_by_side([of_motion(motion, model), paths], "the run and the joints")
+    if joint_angles is not None:
+        true_angles = read_joint_angles(joint_angles)
+        references["the joint angles"] = side_by_side(
+            [of_motion(motion, model), true_angles], "the run and the joint angles"
+        )
+    if digitised is not None:
+        rig = read_rig(folder / "calib.toml")
+        clicked = [_clicked(path, rig, model, motion, alike) for path in (digitised, *operators)]
+        turned = of_root(motion.time_s, motion.position, clicked[0][1])
+        references["points digitised"] = side_by_side([turned, clicked[0][0]], "the run and the clicked points")
+        if operators:
+            repeated["operators"] = side_by_side([each for each, _ in clicked], "the people's clicks")
+    if repeats:
+        others = [_body_run(other)[0] for other in repeats]
+        same = [replace(each, R=turned_alike(each, motion.R, motion.time_s, alike)) for each in others]
+        repeated["runs"] = side_by_side([of_motion(each, model) for each in (motion, *same)], "the runs")
+    return references, repeated
+
+
+def _body_run(folder: Path) -> tuple[Motion, BodyModel]:
+    if not (folder / "motion.csv").is_file():
+        raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
+    return read_motion(folder / "motion.csv"), read_body(folder / "body.toml")
+
+
+def _clicked(
+    path: Path, rig: Rig, model: BodyModel, motion: Motion, alike: Sequence[np.ndarray]
+) -> tuple[Variables, np.ndarray]:
+    """Return one person's clicked poses at the motion's times, and the motion turned to look like them."""
+    poses = digitised_poses(read_digitised(path, rig), rig, model)
+    _, frames, rows = np.intersect1d(motion.index, poses.index, return_indices=True)
+    if not len(frames):
+        raise ResultError(f"{path} has no frame of this run; give the clicks of this recording")
+    time_s, R = motion.time_s[frames], poses.R[rows]
+    return of_root(time_s, poses.position[rows], R), turned_alike(motion, R, time_s, alike)

@@ -24,6 +24,7 @@ Array = NDArray[np.floating]
 
 _AWAY = np.array([0, -4.0, 0])  # of the made-up cameras [m]
 _TORSO_COLUMNS = ("player", "frame", "x_m", "y_m", "z_m")
+_MOST_FRAMES = 1_000_000  # from the first to the last torso
 
 
 def players_tracker_of(trial: Trial, rig: Rig) -> PlayersTracker:
@@ -78,7 +79,10 @@ def read_torsos(path: Path, starts: Sequence[PlayerStart], *, first: int) -> Giv
             for row in rows:
                 if row.get("joint", "torso") == "torso" and row["player"] in names:
                     x, y, z = (float(row[axis] or math.nan) for axis in _TORSO_COLUMNS[2:])
-                    places[int(row["frame"]), row["player"]] = (x, y, z)
+                    frame = int(row["frame"])
+                    if not abs(frame - first) <= _MOST_FRAMES:
+                        raise ValueError(f"frame {str(frame)[:20]} lies far beyond the recording")
+                    places[frame, row["player"]] = (x, y, z)
     except (OSError, UnicodeDecodeError, ValueError, TypeError, csv.Error) as error:
         raise TrialError(f"{path.name}: not a table of torsos ({error}); mend it or leave `torso` out") from error
     positions = np.full((max((frame for frame, _ in places), default=first) - first + 1, len(names), 3), np.nan)

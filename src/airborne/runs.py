@@ -16,6 +16,7 @@ from airborne import __version__
 from airborne.cameras import Calibration, Camera, Rig, calibrate, read_control_points, read_rig
 from airborne.errors import ResultError, TrialError
 from airborne.export import write_json
+from airborne.reading import read_json
 from airborne.start import mended_rig
 from airborne.tracking.methods import FIELDS_AS
 from airborne.trial import CameraTable, Trial
@@ -148,7 +149,7 @@ def identity_of(trial: Trial, *, live: bool = False) -> dict[str, Any]:
 
 def _read_record(path: Path) -> dict[str, Any]:
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
+        record = read_json(path)
         return record if isinstance(record, dict) else {}
     except (OSError, ValueError) as error:
         raise ResultError(

@@ -16,6 +16,7 @@ from airborne.body.files import read_body
 from airborne.errors import TrialError, one_line
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.player_table import STRICT, PlayerTable, Vector
+from airborne.reading import read_toml
 from airborne.rendering import Lamp, Lights
 from airborne.tracking.methods import Colour, Method, Prediction, Settings
 from airborne.tracking.players import PlayerStart
@@ -359,7 +360,7 @@ def read_trial(path: Path, track: dict[str, Any] | None = None, cameras: Sequenc
     `track` replaces entries of its [track] table; `cameras` keeps only the named cameras.
     """
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        table = read_toml(path)
         if isinstance(settings := table.setdefault("track", {}), dict):
             settings.update(track or {})
         trial = Trial.model_validate(table)

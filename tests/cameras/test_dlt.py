@@ -1,7 +1,7 @@
 import cv2
 import numpy as np
 
-from airborne.cameras.dlt import coefficients, compose, decompose, fit_dlt
+from airborne.cameras.dlt import coefficients, compose, decompose, decompose_with_skew, fit_dlt
 from tests.cameras.examples import camera_at, scattered
 from tests.tolerances import ROUNDTRIP
 
@@ -64,3 +64,14 @@ def test_a_mirrored_world_or_picture_is_seen_as_such():
     for world, px in ((WORLD * [-1, 1, 1], PX), (WORLD[:, [1, 0, 2]], PX), (WORLD, PX[:, ::-1])):
         assert decompose(fit_dlt(world, px)).is_mirrored
     assert not decompose(fit_dlt(WORLD[:, [1, 2, 0]], PX)).is_mirrored
+
+
+def test_all_eleven_numbers_come_back_with_skew_from_either_sign_as_in_opencv():
+    K = CAMERA.K + np.array([[0, 7, 0], [0, 30, 0], [0, 0, 0]])
+    P = compose(K, CAMERA.camera_from_world.rotation.as_matrix(), CAMERA.centre)
+    oracle = cv2.decomposeProjectionMatrix(P)[0]
+    for scaled in (P, -P, 1e-3 * P):
+        found = decompose_with_skew(scaled)
+        assert np.allclose(compose(found.K, found.R, found.centre), P, rtol=ROUNDTRIP)
+        assert np.allclose(found.K, oracle / oracle[2, 2], rtol=ROUNDTRIP, atol=1e3 * ROUNDTRIP)
+        assert not found.is_mirrored

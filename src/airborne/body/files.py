@@ -31,6 +31,7 @@ from airborne.body.model import (
 )
 from airborne.errors import BodyError, one_line
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
+from airborne.reading import read_toml
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
@@ -40,6 +41,7 @@ Channel = Annotated[float, Field(ge=0, le=255)]
 
 
 _SAME_TURN = 1e-15  # rounding of a turn
+_LARGEST_KG_M2 = 1e6
 
 
 class _Strict(BaseModel):
@@ -90,7 +92,7 @@ class _BodyTable(_Strict):
 def read_body(path: Path) -> BodyModel:
     """Read a body file; raises BodyError, naming the file and what is wrong, for anything unusable."""
     try:
-        table = _BodyTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8-sig")))
+        table = _BodyTable.model_validate(read_toml(path))
     except OSError as error:
         raise BodyError(f"{path.name}: cannot be read ({error.strerror})") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -114,6 +116,8 @@ def _segment(table: _SegmentTable, path: Path) -> Segment:
 
 def _inertia(table: _InertiaTable, place: str) -> Inertia:
     tensor = np.array(table.tensor_kg_m2)
+    if np.abs(tensor).max() > _LARGEST_KG_M2:
+        raise BodyError(f"{place}: tensor_kg_m2 belongs to no body; expected kilograms times square metres")
     moments = np.linalg.eigvalsh((tensor + tensor.T) / 2)
     slack = 1e-6 * np.abs(tensor).max()
     if np.abs(tensor - tensor.T).max() > slack or moments[0] < -slack or moments[:2].sum() < moments[2] - slack:
@@ -164,24 +168,26 @@ def _mesh(path: Path, scale: float) -> Mesh:
     if not path.is_file():
         raise BodyError(f"mesh file {path.name} not found beside the body file")
     try:
-        mesh = trimesh.load_mesh(path)
-        vertices, faces = np.asarray(mesh.vertices, float) * scale, np.asarray(mesh.faces, np.int64)
+        with np.errstate(all="ignore"):
+            mesh = trimesh.load_mesh(path)
+            is_closed, volume = mesh.is_watertight, mesh.volume
+            vertices, faces = np.asarray(mesh.vertices, float) * scale, np.asarray(mesh.faces, np.int64)
     except Exception as error:  # trimesh raises whatever its parsers raise
         raise BodyError(f"{path.name}: not a readable OBJ, PLY or STL mesh ({error})") from error
     if not len(faces) or not np.all(np.isfinite(vertices)):
         raise BodyError(f"{path.name}: the mesh has no faces, or corners that are not numbers")
-    if not mesh.is_watertight:
+    if not is_closed:
         raise BodyError(f"{path.name}: the mesh is not closed; fill its holes, so that inside and outside can be told")
     if np.ptp(vertices, axis=0).max() > LONGEST_M:
         raise BodyError(
             f"{path.name}: the mesh is over {LONGEST_M:.0f} m long; give scale = 0.001 if it is in millimetres"
         )
-    return Mesh(vertices, faces if mesh.volume >= 0 else faces[:, ::-1])
+    return Mesh(vertices, faces if volume >= 0 else faces[:, ::-1])
 
 
 def mesh_files(path: Path) -> list[str]:
     """Return the mesh files that a readable body file names, relative to it."""
-    table = _BodyTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8-sig")))
+    table = _BodyTable.model_validate(read_toml(path))
     return [part.file for segment in table.segment for part in segment.part if part.file is not None]
 
 

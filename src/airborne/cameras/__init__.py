@@ -8,7 +8,8 @@ from airborne.cameras.calibration import Calibration, CameraFit, calibrate
 from airborne.cameras.camera import Camera, Rig, aimed
 from airborne.cameras.control_points import ControlPoints, read_control_points
 from airborne.cameras.detections import Detections, read_detections
-from airborne.cameras.files import read_rig, write_pose2sim
+from airborne.cameras.files import read_rig, write_pose2sim, write_rig
+from airborne.cameras.formats.given import PixelCount
 from airborne.cameras.report import describe, to_dict
 from airborne.cameras.resection import Mending, mend
 
@@ -19,6 +20,7 @@ __all__ = [
     "ControlPoints",
     "Detections",
     "Mending",
+    "PixelCount",
     "Rig",
     "aimed",
     "calibrate",
@@ -29,4 +31,5 @@ __all__ = [
     "read_rig",
     "to_dict",
     "write_pose2sim",
+    "write_rig",
 ]

@@ -62,7 +62,10 @@ def read_named_numbers(path: Path, key: str, expected: str) -> tuple[tuple[str, 
         raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a table") from None
     except UnicodeDecodeError:
         raise CalibrationError(f"{path.name} is not a text file; {expected}") from None
-    lines = [[cell.strip() for cell in row] for row in csv.reader(text.replace("\0", "").splitlines())]
+    try:
+        lines = [[cell.strip() for cell in row] for row in csv.reader(text.replace("\0", "").splitlines())]
+    except csv.Error as error:
+        raise CalibrationError(f"{path.name} is not a table ({error}); {expected}") from None
     header, *rows = [line for line in lines if any(line)] or [[]]
     if key not in header or len(set(header)) < len(header) or not rows:
         found = ",".join(header)[:80] or "nothing"

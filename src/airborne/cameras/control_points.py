@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airborne.cameras.court import ScenePoint, nearest_names
 from airborne.errors import CalibrationError
 
 Array = NDArray[np.floating]
@@ -26,6 +27,7 @@ class ControlPoints:
     world: Array  # (n, 3) [m]
     cameras: tuple[str, ...]
     px: Array  # (n, cameras, 2) [px]
+    sd_m: Array | None = None  # (n, 3) how exactly each coordinate is known [m]; None: exactly
 
     def seen_by(self, camera: str) -> NDArray[np.bool_]:
         """Say which points the named camera sees: (n,)."""
@@ -36,16 +38,17 @@ class ControlPoints:
         return replace(self, cameras=tuple(cameras), px=self.px[:, [self.cameras.index(name) for name in cameras]])
 
 
-def read_control_points(path: str | Path) -> ControlPoints:
+def read_control_points(path: str | Path, known: dict[str, ScenePoint] | None = None) -> ControlPoints:
     """Read a table `point,x_m,y_m,z_m,<camera>_u,<camera>_v,...`; blank (or NaN) pixels where a point is not seen.
 
     World coordinates in metres, pixels with (0, 0) at the centre of the top-left pixel. Columns may stand in any
-    order. Raises CalibrationError, with the row and column, for a file that does not say this.
+    order. Points that are `known` by name (a court's) need no coordinates: blank, or no such columns at all. Raises
+    CalibrationError, with the row and column, for a file that does not say this.
     """
     path = Path(path)
     header, *rows = _read_rows(path)
     column = {name: i for i, name in enumerate(header)}
-    cameras = _check_header(path, header)
+    cameras = _check_header(path, header, needs_world=not known)
     n = len(header)
     names: dict[str, int] = {}
     for line, row in rows:
@@ -57,14 +60,33 @@ def read_control_points(path: str | Path) -> ControlPoints:
         if name in names:
             raise CalibrationError(f"{path}: point '{name}' stands in rows {names[name]} and {line}; remove one")
         names[name] = line
-    world = np.array([[_number(path, line, c, row[column[c]]) for c in WORLD_COLUMNS] for line, row in rows])
+    places = [_place(path, line, {c: row[column[c]] for c in column}, known or {}) for line, row in rows]
     px = np.array(
         [
             [_pixel(path, line, camera, [row[column[f"{camera}_{a}"]] for a in "uv"]) for camera in cameras]
             for line, row in rows
         ]
     )
-    return ControlPoints(names=tuple(names), world=world, cameras=cameras, px=px)
+    return ControlPoints(
+        names=tuple(names),
+        world=np.array([place.place_m for place in places]),
+        cameras=cameras,
+        px=px,
+        sd_m=np.array([place.sd_m for place in places]) if known else None,
+    )
+
+
+def _place(path: Path, line: int, row: Mapping[str, str], known: dict[str, ScenePoint]) -> ScenePoint:
+    """Return a row's own coordinates; where it has none, those of the known point of its name."""
+    if not known or any(row.get(c, "").lower() not in ("", "nan") for c in WORLD_COLUMNS):
+        place = np.array([_number(path, line, c, row.get(c, "")) for c in WORLD_COLUMNS])
+        return ScenePoint(place, np.zeros(3))
+    if row["point"] not in known:
+        raise CalibrationError(
+            f"{path}, row {line}: point '{row['point']}' has no x_m, y_m, z_m and is none of the court's; "
+            f"nearest names: {nearest_names(row['point'], known)}"
+        )
+    return known[row["point"]]
 
 
 def _read_rows(path: Path) -> list:
@@ -92,12 +114,12 @@ def _read_rows(path: Path) -> list:
     return [rows[0][1], *rows[1:]]
 
 
-def _check_header(path: Path, header: Sequence[str]) -> tuple[str, ...]:
+def _check_header(path: Path, header: Sequence[str], *, needs_world: bool) -> tuple[str, ...]:
     """Return the cameras' names in the order of their columns."""
     twice = sorted({name for name in header if header.count(name) > 1})
     if twice:
         raise CalibrationError(f"{path}: column '{twice[0]}' stands twice in the header; name each column once")
-    missing = [name for name in ("point", *WORLD_COLUMNS) if name not in header]
+    missing = [name for name in ("point", *WORLD_COLUMNS) if name not in header and (needs_world or name == "point")]
     if missing:
         raise CalibrationError(f"{path}: no column {', '.join(missing)}; found {','.join(header)[:80]}; {EXPECTED}")
     others = [name for name in header if name not in ("point", *WORLD_COLUMNS)]

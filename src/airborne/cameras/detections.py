@@ -7,9 +7,6 @@ told by its length: COCO 17, OpenPose's COCO 18, BODY_25, HALPE 26, BlazePose 33
 
 from __future__ import annotations
 
-import json
-import re
-import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from airborne.cameras.formats.openpose import camera_folders, number_at_end, read_folder, write_folders
+from airborne.cameras.npz import read_arrays, write_arrays
 from airborne.errors import CalibrationError
 
 Array = NDArray[np.floating]
@@ -31,6 +30,13 @@ class Detections:
     px: Array  # (frames, points, cameras, 2) [px] of the videos themselves; NaN where not seen
     visibility: Array  # (frames, points, cameras) 0..1: how sure the network is; 0 where not seen
     notes: tuple[str, ...] = ()  # what the reader should know, one line each
+
+    @classmethod
+    def of_clicks(cls, cameras: Sequence[str], points: Sequence[str], px: Array) -> Detections:
+        """Return points clicked by hand, px (frames, points, cameras, 2) [px]; seen where both numbers are known."""
+        is_seen = np.asarray(np.isfinite(px).all(axis=-1))
+        px = np.where(is_seen[..., None], px, np.nan)
+        return cls(cameras=tuple(cameras), points=tuple(points), px=px, visibility=is_seen.astype(float))
 
     def select(self, cameras: Sequence[str]) -> Detections:
         """Return the detections of the named cameras, in that order."""
@@ -55,33 +61,69 @@ class Detections:
         )
 
 
-def read_detections(path: Path, cameras: Sequence[str], named: Mapping[str, str] | None = None) -> Detections:
+def read_detections(
+    path: Path, cameras: Sequence[str], named: Mapping[str, str] | None = None, *, person: int | None = None
+) -> Detections:
     """Read the detections of the cameras from a `.npz` file or a folder of OpenPose JSON.
 
     `.npz`: one array (frames, points, 3) a camera, x, y [px] and visibility. Folder: `<camera>_json` or `<camera>`
     below it, one file a frame, the frame being the last number of the file's name. An array or folder belongs to a
-    camera by `named`, by its name, or by the number that it ends in. Raises CalibrationError where one is missing.
+    camera by `named`, by its name, or by the number that it ends in. Of several people in a folder's pictures the one
+    detected most surely is taken, or the one at the place `person` of each file's list. Raises CalibrationError where a
+    camera is missing, or two people are detected about equally surely and `person` does not say which.
     """
     if path.is_dir():
-        found = {folder.name.removesuffix("_json"): folder for folder in sorted(path.iterdir()) if folder.is_dir()}
+        found = camera_folders(path)
         named = {camera: name.removesuffix("_json") for camera, name in (named or {}).items()}
         chosen = _matched(str(path), cameras, list(found), named)
         tables, notes = {}, []
         for camera, name in chosen.items():
-            tables[camera], n_people = _read_folder(found[name])
+            tables[camera], n_people = read_folder(found[name], person)
             if n_people > 1:
-                notes.append(f"{camera}: up to {n_people} people in a picture; took the one detected most surely")
+                which = "the one detected most surely" if person is None else f"number {person} of each"
+                notes.append(f"{camera}: up to {n_people} people in a picture; took {which}")
         return _detections(str(path), tables, tuple(notes))
     try:
-        with np.load(path) as arrays:
-            chosen = _matched(path.name, cameras, list(arrays), named or {})
-            return _detections(path.name, {camera: arrays[name] for camera, name in chosen.items()})
+        arrays = read_arrays(path)
     except OSError as error:
         raise CalibrationError(f"{path} cannot be read ({error.strerror or error}); give a .npz or a folder") from None
-    except (ValueError, TypeError, EOFError, zipfile.BadZipFile):
+    except ValueError:
         raise CalibrationError(
             f"{path} is not a .npz of numbers; expected one array (frames, points, 3) a camera"
         ) from None
+    chosen = _matched(path.name, cameras, list(arrays), named or {})
+    return _detections(path.name, {camera: arrays[name] for camera, name in chosen.items()})
+
+
+def cameras_in(path: Path) -> tuple[str, ...]:
+    """Return the names of all cameras in a file or folder of detections. Raises CalibrationError."""
+    if path.is_dir():
+        return tuple(camera_folders(path))
+    try:
+        return tuple(read_arrays(path))
+    except (OSError, ValueError) as error:
+        raise CalibrationError(f"{path} is not a .npz of numbers ({error}); give a .npz or a folder") from None
+
+
+def write_detections(path: Path, detections: Detections, *, as_folder: bool = False) -> None:
+    """Write detections as `.npz`, or as a folder of OpenPose JSON.
+
+    Raises CalibrationError where the points are no network's: a reader tells them by the length of their list.
+    """
+    names = NETWORKS.get(len(detections.points))
+    if names != detections.points:
+        raise CalibrationError(
+            f"{len(detections.points)} points ({', '.join(detections.points[:3])}, ...) are not a pose network's, "
+            "which are told by their number; write a table (.csv)"
+        )
+    tables = {
+        camera: np.concatenate([detections.px[:, :, k], detections.visibility[:, :, k, None]], axis=-1)
+        for k, camera in enumerate(detections.cameras)
+    }
+    if as_folder:
+        write_folders(path, tables)
+    else:
+        write_arrays(path, tables)
 
 
 def _matched(where: str, cameras: Sequence[str], keys: Sequence[str], named: Mapping[str, str]) -> dict[str, str]:
@@ -89,8 +131,8 @@ def _matched(where: str, cameras: Sequence[str], keys: Sequence[str], named: Map
     chosen = {}
     for camera in cameras:
         wanted = named.get(camera, camera)
-        alike = [key for key in keys if _number(key) == _number(camera) is not None]
-        rivals = [name for name in cameras if _number(name) == _number(camera)]
+        alike = [key for key in keys if number_at_end(key) == number_at_end(camera) is not None]
+        rivals = [name for name in cameras if number_at_end(name) == number_at_end(camera)]
         if wanted in keys:
             chosen[camera] = wanted
         elif camera not in named and len(alike) == len(rivals) == 1:
@@ -101,11 +143,6 @@ def _matched(where: str, cameras: Sequence[str], keys: Sequence[str], named: Map
                 f'say which are whose with detections_cameras = {{{camera} = "..."}}'
             )
     return chosen
-
-
-def _number(name: str) -> int | None:
-    found = re.search(r"(\d+)$", name)
-    return int(found[1]) if found else None
 
 
 def _detections(where: str, tables: Mapping[str, Array], notes: tuple[str, ...] = ()) -> Detections:
@@ -131,45 +168,6 @@ def _detections(where: str, tables: Mapping[str, Array], notes: tuple[str, ...] 
     values = np.where(is_seen[..., None], values, np.nan)
     visibility = np.clip(np.where(is_seen, values[..., 2], 0.0), 0.0, 1.0)
     return Detections(cameras=tuple(tables), points=names, px=values[..., :2], visibility=visibility, notes=notes)
-
-
-def _read_folder(folder: Path) -> tuple[Array, int]:
-    """Read a camera's JSON files: (frames, points, 3), NaN where nobody is; and the most people in one picture."""
-    files = {_number(path.stem.removesuffix("_keypoints")): path for path in sorted(folder.glob("*.json"))}
-    if not files or None in files:
-        raise CalibrationError(
-            f"{folder} holds no detections; expected JSON files whose names end in the frame's number"
-        )
-    found: dict[int, Array] = {}
-    n_people = 0
-    for frame, path in files.items():
-        people = _people(path)
-        n_people = max(n_people, len(people))
-        if people and frame is not None:
-            found[frame] = max(people, key=lambda person: person[:, 2].sum())
-    if not found:
-        raise CalibrationError(f"{folder}: there is nobody in any picture; give the detections of a person")
-    counts = {len(person) for person in found.values()}
-    if len(counts) > 1:
-        raise CalibrationError(f"{folder}: people of {sorted(counts)} points; expected one list of points throughout")
-    table = np.full((max(n for n in files if n is not None) + 1, counts.pop(), 3), np.nan)
-    for frame, person in found.items():
-        table[frame] = person
-    return table, n_people
-
-
-def _people(path: Path) -> list[Array]:
-    """Read the people (points, 3) of one OpenPose file."""
-    try:
-        document = json.loads(path.read_text(encoding="utf-8-sig"))
-        people = [np.array(person["pose_keypoints_2d"], float).reshape(-1, 3) for person in document["people"]]
-    except OSError as error:
-        raise CalibrationError(f"{path} cannot be read ({error.strerror})") from None
-    except (ValueError, KeyError, TypeError):
-        raise CalibrationError(
-            f"{path} is not OpenPose JSON; expected people[].pose_keypoints_2d = [x, y, confidence, ...]"
-        ) from None
-    return [person for person in people if len(person)]
 
 
 def landmarks_from_points(names: Sequence[str], points: Array) -> dict[str, Array]:

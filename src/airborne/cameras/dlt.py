@@ -78,6 +78,23 @@ def decompose(P: Array) -> Decomposition:
     return Decomposition(K, left @ right, -np.linalg.solve(P[:, :3], P[:, 3]))
 
 
+def decompose_with_skew(P: Array) -> Decomposition:
+    """Split P (3, 4), of either sign, into K with skew, R and centre: all eleven numbers are kept.
+
+    The axes by Gram and Schmidt from the line of sight upwards, which is the RQ decomposition. P's sign is chosen so
+    that R is a rotation.
+    """
+    P = P / np.linalg.norm(P[2, :3]) * np.sign(np.linalg.det(P[:, :3]))
+    right, down, r3 = P[:, :3]
+    u0, v0 = right @ r3, down @ r3
+    down = down - v0 * r3
+    r2 = down / np.linalg.norm(down)
+    skew = right @ r2
+    r1 = np.cross(r2, r3)
+    K = np.array([[right @ r1, skew, u0], [0, np.linalg.norm(down), v0], [0, 0, 1]])
+    return Decomposition(K, np.stack([r1, r2, r3]), -np.linalg.solve(P[:, :3], P[:, 3]))
+
+
 def compose(K: Array, R: Array, centre: Array) -> Array:
     """Return `P = K R [I | -centre]` (3, 4), the inverse of `decompose`."""
     return K @ R @ np.column_stack([np.eye(3), -centre])

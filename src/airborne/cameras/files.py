@@ -1,52 +1,138 @@
-"""Calibration files: told apart by what is in them, not by their names."""
+"""Calibration files: told apart by what is in them, not by their names; each format has its file in `formats/`."""
 
 from __future__ import annotations
 
-import json
-import math
-import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.cameras.camera import Camera, Rig
-from airborne.cameras.qualisys import rig_from_qualisys
+from airborne.cameras.camera import Rig
+from airborne.cameras.formats.aniposelib import aniposelib_text
+from airborne.cameras.formats.caliscope import caliscope_loses, caliscope_text, rig_from_caliscope
+from airborne.cameras.formats.dlt import dlt_loses, dlt_text, is_dlt, rig_from_dlt
+from airborne.cameras.formats.given import Given, PixelCount, Size, Unit
+from airborne.cameras.formats.opencv import document_of, easymocap_texts, halves_of, opencv_text, rig_from_opencv
+from airborne.cameras.formats.pose2sim import pose2sim_text, rig_from_tables
+from airborne.cameras.formats.qualisys import qualisys_text, rig_from_qualisys
+from airborne.cameras.formats.vicon import rig_from_vicon, vicon_loses, vicon_text
+from airborne.cameras.formats.xml import root_of
 from airborne.errors import CalibrationError
+from airborne.reading import parsed_toml
 
-Array = NDArray[np.floating]
+LARGEST_FILE_BYTES = 2_000_000  # a hundred cameras take a tenth of it
+FARTHEST_M, NEAREST_M = 200.0, 0.05  # where the largest distance between two cameras is in metres
 
-NOT_CAMERAS = ("metadata", "capture_volume", "charuco", "checkerboard")
+EXPECTED = (
+    "expected Pose2Sim, aniposelib or Caliscope TOML, Qualisys .qca.txt, Vicon .xcp, OpenCV YAML or DLT coefficients"
+)
+SUFFIXES = {
+    **{".toml": "pose2sim", ".qca.txt": "qualisys", ".xcp": "vicon"},
+    **{".yml": "opencv", ".yaml": "opencv", ".csv": "dlt"},
+}
+UNITS: dict[str, tuple[Unit, ...]] = {
+    **{"pose2sim": ("m",), "aniposelib": ("m", "mm"), "caliscope": ("m",), "qualisys": ("mm",)},
+    **{"vicon": ("mm",), "opencv": ("m", "mm"), "easymocap": ("m", "mm"), "dlt": ("m", "mm")},
+}  # of lengths as a format is written, the usual one first
+ROOTS = {"calibration": ("qualisys", rig_from_qualisys), "Cameras": ("vicon", rig_from_vicon)}
 
 
-def read_rig(path: str | Path) -> Rig:
-    """Read a Pose2Sim `Calib.toml` or a Qualisys `.qca.txt`, in the file's order of cameras.
+@dataclass(frozen=True, slots=True)
+class CalibrationFile:
+    """A calibration file that was told from others, and not yet built."""
 
-    Pose2Sim: metres, camera from world, Rodrigues rotation, 4 or 5 distortion terms; a camera is named by its `name`,
-    else by its key. Raises CalibrationError for a fisheye lens and for any file that is neither.
+    format: str  # one of UNITS; pose2sim also for aniposelib, which has the same layout
+    where: str
+    rig_of: Callable[[Given], Rig]
+
+
+def read_rig(
+    path: str | Path,
+    *,
+    unit: Unit | None = None,
+    size: Size | Mapping[str, Size] | None = None,
+    pixels: PixelCount | None = None,
+) -> Rig:
+    """Read a calibration of any known format, in the file's order of cameras; a folder of OpenCV YAML counts as one.
+
+    unit: of the file's lengths; None takes what the format defines (Pose2Sim's layout: metres). size: of the pictures,
+    (width, height) [px], for formats that do not hold it: DLT coefficients, some OpenCV files. pixels: where DLT
+    coefficients count pixels from; None takes DLTdv 8's way. Raises CalibrationError for a file that is of no known
+    format, and where no unit was given and the cameras lie more than 200 m or all within 5 cm of each other.
+    """
+    return rig_of(open_calibration(path), Given(unit=unit, size=size, pixels=pixels or PixelCount()))
+
+
+def rig_of(file: CalibrationFile, given: Given) -> Rig:
+    """Return the rig of a calibration file, checked against what was given (see `read_rig`)."""
+    rig = file.rig_of(given)
+    for camera in rig:
+        size = given.size.get(camera.name) if isinstance(given.size, Mapping) else given.size
+        if size not in (None, camera.size):
+            said = f"{camera.size[0]}x{camera.size[1]}"
+            raise CalibrationError(f"{file.where} says that '{camera.name}' has pictures of {said}; leave --size out")
+    if given.unit is None and len(rig) > 1:
+        _check_distances(rig, file.where)
+    return rig
+
+
+def open_calibration(path: str | Path) -> CalibrationFile:
+    """Tell of which format a calibration is. Raises CalibrationError for a file of no known one."""
+    path = Path(path)
+    where = str(path)
+    if path.is_dir():
+        return _opencv(path, where, _opencv_folder(path))
+    text = _read_text(path)
+    if text.lstrip().startswith("<"):
+        root = root_of(text, where)
+        if root.tag not in ROOTS:
+            raise CalibrationError(f"{where} is XML with the root <{root.tag[:60]}>; {EXPECTED}")
+        name, build = ROOTS[root.tag]
+        return CalibrationFile(name, where, partial(build, root, where))
+    if text.startswith("%YAML"):
+        return _opencv(path, where, document_of(text, where))
+    if is_dlt(text):
+        return CalibrationFile("dlt", where, partial(rig_from_dlt, text, where))
+    try:
+        document = parsed_toml(text)
+    except tomllib.TOMLDecodeError as error:
+        raise CalibrationError(f"{where} is no calibration: {EXPECTED}; as TOML, {_short(error)}") from None
+    if isinstance(document.get("cameras"), dict):
+        return CalibrationFile("caliscope", where, partial(rig_from_caliscope, document, where))
+    return CalibrationFile("pose2sim", where, partial(rig_from_tables, document, where))
+
+
+def write_rig(
+    path: str | Path,
+    rig: Rig,
+    *,
+    format: str | None = None,
+    unit: Unit | None = None,
+    pixels: PixelCount | None = None,
+    errors_px: Mapping[str, float] | None = None,
+) -> tuple[str, ...]:
+    """Write a calibration and return what the format cannot hold, a phrase each; `read_rig` gives the rest back.
+
+    format: a key of `UNITS`; None goes by the file's name. easymocap makes a folder with two files. unit: of lengths,
+    where the format leaves a choice. pixels: where DLT coefficients count pixels from; None is DLTdv 8's way.
+    errors_px: reprojection RMS by camera, kept by pose2sim and caliscope. Raises CalibrationError.
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a calibration file") from None
-    except UnicodeDecodeError:
-        raise CalibrationError(f"{path} is not a text file; expected a Pose2Sim .toml or a Qualisys .qca.txt") from None
-    if text.lstrip().startswith("<"):
-        return rig_from_qualisys(text, str(path))
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise CalibrationError(
-            f"{path} is neither a Pose2Sim .toml nor a Qualisys .qca.txt: as TOML, {str(error).lower()}"
-        ) from None
-    tables = {key: table for key, table in document.items() if key not in NOT_CAMERAS and isinstance(table, dict)}
-    if not tables:
-        raise CalibrationError(f"{path} has no cameras; expected a table such as [cam1] with matrix, rotation, ...")
-    return Rig(tuple(_camera_from_table(f"{path}, [{key}]", key, table) for key, table in tables.items()))
+    kind = format or format_of_name(path)
+    chosen = _unit(kind, unit)
+    for name in rig.names:
+        if not name.isprintable() or not name.strip():
+            raise CalibrationError(f"camera {name!r} has a name that files cannot hold; rename it")
+    texts, notes = _texts(kind, rig, chosen, pixels or PixelCount(), errors_px)
+    if kind == "easymocap":
+        path.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        (path / name).write_text(text, encoding="utf-8")  # path / "" is path itself
+    return notes
 
 
 def write_pose2sim(path: str | Path, rig: Rig, *, errors_px: Mapping[str, float] | None = None) -> None:
@@ -55,65 +141,91 @@ def write_pose2sim(path: str | Path, rig: Rig, *, errors_px: Mapping[str, float]
     A fifth distortion term is written where there is one. errors_px: reprojection RMS by camera; each stands in its
     camera's table as `error`, their RMS in `[metadata]`.
     """
-    lines = []
-    for camera in rig:
-        n_terms = 5 if camera.distortion[4:].any() else 4
-        transform = camera.camera_from_world
-        lines += [
-            f"[{_toml_key(camera.name)}]",
-            f"name = {json.dumps(camera.name, ensure_ascii=False)}",
-            f"size = {_toml([float(length) for length in camera.size])}",
-            f"matrix = {_toml(camera.K.tolist())}",
-            f"distortions = {_toml(np.pad(camera.distortion, (0, 5 - len(camera.distortion)))[:n_terms].tolist())}",
-            f"rotation = {_toml(transform.rotation.as_rotvec().tolist())}",
-            f"translation = {_toml(transform.translation.tolist())}",
-            "fisheye = false",
-            *([f"error = {float(errors_px[camera.name])!r}"] if errors_px else []),
-            "",
-        ]
-    lines += ["[metadata]", "adjusted = false"]
-    if errors_px:
-        lines.append(f"error = {math.sqrt(sum(errors_px[name] ** 2 for name in rig.names) / len(rig))!r}")
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_rig(path, rig, format="pose2sim", errors_px=errors_px)
 
 
-def _camera_from_table(where: str, key: str, table: dict) -> Camera:
-    if table.get("fisheye", False):
-        raise CalibrationError(f"{where}: fisheye = true; fisheye lenses are not supported, straighten the video first")
-    K = _numbers(where, table, "matrix", (3, 3))
-    if not (K[0, 0] > 0 and K[1, 1] > 0 and K[1, 0] == 0 and np.array_equal(K[2], [0, 0, 1])):
-        raise CalibrationError(f"{where}: matrix is not [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with positive fx and fy")
-    size = _numbers(where, table, "size", (2,))
-    if not (np.all(size >= 1) and np.array_equal(size, np.round(size))):
-        raise CalibrationError(f"{where}: size = {size.tolist()}, expected width and height in whole pixels")
-    distortion = _numbers(where, table, "distortions", (4,), (5,))
-    rotation = Rotation.from_rotvec(_numbers(where, table, "rotation", (3,)))
-    return Camera(
-        name=str(table.get("name", key)),
-        K=K,
-        size=(int(size[0]), int(size[1])),
-        camera_from_world=RigidTransform.from_components(_numbers(where, table, "translation", (3,)), rotation),
-        distortion=np.pad(distortion, (0, 5 - len(distortion))),
-    )
+def format_of_name(path: Path) -> str:
+    """Return the format that a file's name asks for. Raises CalibrationError."""
+    for suffix, kind in SUFFIXES.items():
+        if path.name.lower().endswith(suffix):
+            return kind
+    raise CalibrationError(f"{path}: the name asks for no format; end it in {', '.join(SUFFIXES)}, or name the format")
 
 
-def _numbers(where: str, table: dict, key: str, *shapes: tuple[int, ...]) -> Array:
-    """Return table[key] as an array of finite numbers with one of the shapes."""
-    expected = " or ".join("×".join(map(str, shape)) for shape in shapes)
-    if key not in table:
-        raise CalibrationError(f"{where}: no {key}; expected {expected} numbers")
+def _texts(
+    kind: str, rig: Rig, unit: Unit, pixels: PixelCount, errors_px: Mapping[str, float] | None
+) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Return the texts by the name of their file, and what they do not hold."""
+    if kind == "easymocap":
+        return easymocap_texts(rig, unit), ()
+    write = {
+        "pose2sim": lambda: (pose2sim_text(rig, errors_px), ()),
+        "aniposelib": lambda: (aniposelib_text(rig, unit), ()),
+        "caliscope": lambda: (caliscope_text(rig, errors_px), caliscope_loses(rig)),
+        "qualisys": lambda: (qualisys_text(rig), ()),
+        "vicon": lambda: (vicon_text(rig), vicon_loses(rig)),
+        "opencv": lambda: (opencv_text(rig, unit), ()),
+        "dlt": lambda: (dlt_text(rig, pixels, unit), dlt_loses(rig)),
+    }
+    text, notes = write[kind]()
+    return {"": text}, notes
+
+
+def _unit(kind: str, unit: Unit | None) -> Unit:
+    if kind not in UNITS:
+        raise CalibrationError(f"no calibration format '{kind}'; choose from {', '.join(UNITS)}")
+    if unit not in (None, *UNITS[kind]):
+        raise CalibrationError(f"{kind} files are always in {UNITS[kind][0]}; leave the unit out")
+    return unit or UNITS[kind][0]
+
+
+def _check_distances(rig: Rig, where: str) -> None:
+    centres = np.stack([camera.centre for camera in rig])
+    widest = float(np.linalg.norm(centres[:, None] - centres, axis=-1).max())
+    if not NEAREST_M <= widest <= FARTHEST_M:
+        asked = "millimetres? Then say --unit mm" if widest > FARTHEST_M else "metres? Then say --unit m"
+        raise CalibrationError(
+            f"{where}: the cameras lie up to {widest:.3g} m from each other; are its lengths in {asked}; "
+            "`airborne convert` writes such a file anew, in metres"
+        )
+
+
+def _read_text(path: Path) -> str:
     try:
-        values = np.array(table[key], float)
-    except (TypeError, ValueError):
-        values = np.array(np.nan)
-    if values.shape not in shapes or not np.all(np.isfinite(values)):
-        raise CalibrationError(f"{where}: {key} = {str(table[key])[:60]}, expected {expected} numbers")
-    return values
+        if path.stat().st_size > LARGEST_FILE_BYTES:
+            raise CalibrationError(f"{path} is larger than any calibration ({path.stat().st_size} bytes); {EXPECTED}")
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a calibration file") from None
+    except UnicodeDecodeError:
+        raise CalibrationError(f"{path} is not a text file; {EXPECTED}") from None
 
 
-def _toml(values: list) -> str:
-    return "[" + ", ".join(_toml(value) if isinstance(value, list) else repr(value) for value in values) + "]"
+def _opencv(path: Path, where: str, document: dict[str, Any]) -> CalibrationFile:
+    """Return an OpenCV calibration; where it has only one half, the other is looked for beside it."""
+    if path.is_file() and len(halves_of(document)) == 1:
+        beside = [_opencv_file(other) for other in _yaml_files(path.parent) if other != path]
+        others = [other for other in beside if len(halves_of(other) | halves_of(document)) == 2]
+        if len(others) == 1:
+            document = others[0] | document
+    return CalibrationFile("opencv", where, partial(rig_from_opencv, document, where))
 
 
-def _toml_key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
+def _opencv_folder(folder: Path) -> dict[str, Any]:
+    documents = [_opencv_file(path) for path in _yaml_files(folder)]
+    if not documents:
+        raise CalibrationError(f"{folder} is a folder without OpenCV YAML (intri.yml, extri.yml); {EXPECTED}")
+    return {key: node for document in documents for key, node in document.items()}
+
+
+def _opencv_file(path: Path) -> dict[str, Any]:
+    return document_of(_read_text(path), str(path))
+
+
+def _yaml_files(folder: Path) -> list[Path]:
+    found = sorted(path for path in folder.iterdir() if path.suffix.lower() in (".yml", ".yaml") and path.is_file())
+    return [path for path in found if path.read_bytes()[:5] == b"%YAML"]
+
+
+def _short(error: Exception) -> str:
+    return " ".join(str(error).lower().split())[:120]

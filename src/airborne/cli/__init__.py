@@ -11,6 +11,9 @@ from airborne import __version__
 from airborne.cli import reproduce, results, synth, track
 from airborne.cli.calibrate import calibrate
 from airborne.cli.console import refuse
+from airborne.cli.convert import convert
+from airborne.cli.export import export
+from airborne.cli.smooth import smooth
 from airborne.cli.sync import sync
 from airborne.errors import AirborneError
 
@@ -20,8 +23,11 @@ _COMMANDS = {
     "track": track.track,
     "calibrate": calibrate,
     "sync": sync,
+    "convert": convert,
     "fit-body": track.fit_body,
+    "smooth": smooth,
     "evaluate": results.evaluate,
+    "export": export,
     "bench": track.bench,
 }
 _SYNTH = {"cross": synth.synth_cross, "somersault": synth.synth_somersault, "block": synth.synth_block}

@@ -31,18 +31,44 @@ def evaluate(
     joints: Annotated[
         Path | None, typer.Option(help="Paths of joints: time_s,joint,x_m,y_m,z_m line by line, or a .trc file.")
     ] = None,
+    joint_angles: Annotated[
+        Path | None, typer.Option(help="How joints are turned: time_s,<joint>_x_rad,<joint>_y_rad,<joint>_z_rad,...")
+    ] = None,
+    repeat: Annotated[
+        list[Path] | None, typer.Option(help="Another run of the same trial, for the repeatability; may be repeated.")
+    ] = None,
+    operator: Annotated[
+        list[Path] | None, typer.Option(help="Another person's clicks beside --digitised; may be repeated.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for the agreement's files; else the run's.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Compare a run with the truth, with paths of joints, or with points clicked by hand; of players with their truth.
 
-    Example: airborne evaluate results truth.csv --digitised digitised.csv
-    """
-    from airborne.assessment import assess
+    Also says how well they agree (bias, limits of agreement, ICC, SEM), and how well several runs or people do.
 
-    found = assess(results, truth, digitised, joints)
+    Example: airborne evaluate results truth.csv --digitised digitised.csv --repeat results2
+    """
+    from airborne.assessment import agree, assess
+
+    others = repeat or joint_angles
+    found = {} if others and not (truth or digitised or joints) else assess(results, truth, digitised, joints)
+    concord = agree(
+        results,
+        truth,
+        digitised,
+        joints,
+        joint_angles=joint_angles,
+        repeats=repeat or (),
+        operators=operator or (),
+        out=output,
+    )
     if as_json:
-        print(json.dumps({name: comparison.to_dict() for name, comparison in found.items()}))
+        print(json.dumps({name: comparison.to_dict() for name, comparison in found.items()} | concord.to_dict()))
         return
     for name, comparison in found.items():
         print(_AGAINST[name])
         print(comparison.describe())
+    print(concord.describe())

@@ -70,18 +70,35 @@ def read_digitised(path: Path, rig: Rig) -> Digitised:
 
     Pixels are those of the full image, (0, 0) the centre of its top-left pixel, with the lens's distortion.
     """
+    return read_clicked_frames(path, rig.names)
+
+
+def read_clicked_frames(path: Path, cameras: Sequence[str]) -> Digitised:
+    """Read clicked points of cameras of these names, as `read_digitised` does."""
     table = read_table(path, _EXPECTED)
     if table.names[0] not in ("field", "frame"):
         raise ResultError(f"{path} begins with column {table.names[0]}; expected {_EXPECTED}")
-    columns = {name: _point_and_camera(path, name, rig) for name in table.names[1:]}
+    columns = {name: _point_and_camera(path, name, cameras) for name in table.names[1:]}
     points = tuple(dict.fromkeys(point for point, _, _ in columns.values()))
     if not points:
         raise ResultError(f"{path} has no clicked points; expected {_EXPECTED}")
     values = table.numbers(list(columns))
-    px = np.full((len(values), len(points), len(rig), 2), np.nan)
+    px = np.full((len(values), len(points), len(cameras), 2), np.nan)
     for k, (point, camera, axis) in enumerate(columns.values()):
         px[:, points.index(point), camera, axis] = values[:, k]
     return Digitised(index=table.whole_numbers(table.names[0]), points=points, px=px)
+
+
+def write_clicked_frames(path: Path, digitised: Digitised, cameras: Sequence[str]) -> None:
+    """Write clicked points as `read_clicked_frames` reads them, blank where a point was not clicked."""
+    header = [
+        "frame",
+        *(f"{point}_{camera}_{axis}" for point in digitised.points for camera in cameras for axis in "uv"),
+    ]
+    rows = [header]
+    for frame, values in zip(digitised.index, digitised.px.reshape(len(digitised.px), -1), strict=True):
+        rows.append([str(frame), *("" if np.isnan(value) else repr(float(value)) for value in values)])
+    path.write_text("".join(",".join(row) + "\n" for row in rows), encoding="utf-8")
 
 
 def body_points(model: BodyModel, points: Sequence[str]) -> Array:
@@ -155,13 +172,13 @@ def fit_rigid(source: Array, target: Array, weights: Array) -> tuple[Array, Arra
     return np.full((3, 3), np.nan), np.full(3, np.nan)
 
 
-def _point_and_camera(path: Path, name: str, rig: Rig) -> tuple[str, int, int]:
+def _point_and_camera(path: Path, name: str, cameras: Sequence[str]) -> tuple[str, int, int]:
     stem, _, axis = name.rpartition("_")
-    for camera in sorted(rig.names, key=len, reverse=True):  # the longest first: "far_left" also ends with "_left"
+    for camera in sorted(cameras, key=len, reverse=True):  # the longest first: "far_left" also ends with "_left"
         point = stem.removesuffix(f"_{camera}")
         if point and point != stem and axis in ("u", "v"):
-            return point, rig.names.index(camera), "uv".index(axis)
-    raise ResultError(f"{path}: column {name} is no <point>_<camera>_u or _v; cameras: {', '.join(rig.names)}")
+            return point, cameras.index(camera), "uv".index(axis)
+    raise ResultError(f"{path}: column {name} is no <point>_<camera>_u or _v; cameras: {', '.join(cameras)}")
 
 
 def _end(point: str, boxes: dict[str, tuple[Array, Array]]) -> Array:

@@ -61,16 +61,27 @@ def compare_jumps(
 
     A measured jump goes with the true one whose flight it overlaps. Empty where legs are not among the joints.
     """
+    errors, pairs = [], paired_jumps(motion, truth, players)
+    for jump, partner in pairs:
+        is_only = sum(j.player == jump.player for j, _ in pairs) == 1
+        errors.append(_errors(jump, partner, known.get(jump.player, {}) if is_only else {}))
+    return tuple(errors)
+
+
+def paired_jumps(
+    motion: PlayersMotion, truth: PlayersMotion, players: Sequence[str]
+) -> tuple[tuple[Jump, Jump | None], ...]:
+    """Return every true jump of the named players with the measured one whose flight it overlaps, if any.
+
+    Empty where legs are not among the joints.
+    """
     if not all(_has_legs(each) for each in (motion, truth)):
         return ()
     found = jumps(_only(motion, players))
-    true = jumps(_only(truth, players))
-    errors = []
-    for jump in true:
-        partner = next((j for j in found if j.player == jump.player and _overlap(j, jump)), None)
-        is_only = sum(j.player == jump.player for j in true) == 1
-        errors.append(_errors(jump, partner, known.get(jump.player, {}) if is_only else {}))
-    return tuple(errors)
+    return tuple(
+        (jump, next((j for j in found if j.player == jump.player and _overlap(j, jump)), None))
+        for jump in jumps(_only(truth, players))
+    )
 
 
 def _errors(true: Jump, found: Jump | None, known: dict[str, float]) -> JumpErrors:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 from airborne.errors import ResultError
 from airborne.evaluation.table import read_table
 from airborne.motion.players import PlayersMotion
+from airborne.reading import read_json
 from airborne.tracking import Status
 
 _EXPECTED = "a truth table of players: frame, time_s, player, then x, y, z of every joint, as l_hip_x, l_hip_y, l_hip_z"
@@ -73,10 +73,10 @@ def read_known_jumps(path: Path) -> dict[str, dict[str, float]]:
     if not path.is_file():
         return {}
     try:
-        players = json.loads(path.read_text(encoding="utf-8"))
+        players = read_json(path)
         found = {str(player["name"]): player["jump"] for player in players if player.get("jump")}
         return {name: known_jump(jump) for name, jump in found.items()}
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError):
         raise ResultError(f"{path} is no list of players with name and jump; write it so, or take it away") from None
 
 

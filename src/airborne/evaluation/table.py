@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from airborne.errors import ResultError
 
+_LARGEST = 1e15  # of any number in a table: a whole number is exact up to here
+
 
 @dataclass(frozen=True, slots=True)
 class Table:
@@ -34,9 +36,11 @@ class Table:
                 try:
                     values[row, k] = float(text) if text else np.nan
                 except ValueError:
+                    values[row, k] = np.inf
+                if not abs(values[row, k]) <= _LARGEST and not np.isnan(values[row, k]):
                     raise ResultError(
-                        f"{self.path} line {row + 2}: {name} is '{text}', expected a number; mend it"
-                    ) from None
+                        f"{self.path} line {row + 2}: {name[:60]} is '{text[:60]}', expected a number; mend it"
+                    )
         return values
 
     def whole_numbers(self, name: str) -> NDArray[np.int64]:

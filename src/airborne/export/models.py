@@ -7,24 +7,18 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
-from trimesh.exchange.gltf import export_glb, export_gltf
+from scipy.spatial.transform import RigidTransform
 from trimesh.exchange.ply import export_ply
-from trimesh.visual import ColorVisuals, TextureVisuals
-from trimesh.visual.material import PBRMaterial
+from trimesh.visual import ColorVisuals
 
-from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Pose, PosedBody
-from airborne.body.splitting import between, split_at
+from airborne.body import BodyModel, Part, Pose, PosedBody
 from airborne.errors import ResultError
-from airborne.rendering.srgb import light_from_srgb
+from airborne.export.gltf import still
+from airborne.export.part_meshes import part_colour, segment_mesh
 
 Array = NDArray[np.floating]
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
-_AROUND, _ALONG = 48, 32  # facets of an ellipsoid
-_UNSAMPLED = np.full(3, 128.0)  # sRGB, stands in for a colour not yet sampled
-_Y_UP = Rotation.from_euler("x", -90, degrees=True).as_matrix()  # glTF from world: z up becomes y up
-_MATT = 0.9  # roughness of a material
 
 
 def write_model(path: Path, body: PosedBody | BodyModel) -> None:
@@ -45,75 +39,15 @@ def write_model(path: Path, body: PosedBody | BodyModel) -> None:
         raise ResultError(f"{path.name}: cannot be written ({error.strerror})") from error
 
 
-def part_mesh(part: Part) -> Mesh:
-    """Tessellate a part, cut to its slab, in the part's own frame; smooth shapes come with normals."""
-    if isinstance(part.shape, Mesh):
-        return part.shape
-    if isinstance(part.shape, Box):
-        box = trimesh.creation.box(extents=part.shape.size_m)
-        return Mesh(np.asarray(box.vertices), np.asarray(box.faces))
-    mesh = _ellipsoid_mesh(part.shape)
-    for border in part.slab_m:
-        if np.isfinite(border):
-            mesh = split_at(mesh, mesh.vertices_m[:, 2] - border)
-    return between(mesh, mesh.vertices_m[:, 2], *part.slab_m)
-
-
-def _ellipsoid_mesh(shape: Ellipsoid) -> Mesh:
-    ball = trimesh.creation.uv_sphere(count=(_ALONG, _AROUND))
-    unit, faces = np.asarray(ball.vertices), np.asarray(ball.faces)
-    normals = unit / shape.semi_axes_m
-    return Mesh(unit * shape.semi_axes_m, faces, normals / np.linalg.norm(normals, axis=1, keepdims=True))
-
-
-def _in_segment(part: Part) -> trimesh.Trimesh:
-    """Return a part's mesh in its segment's frame; each face of a flat one has its own corners, so that edges show."""
-    mesh, place = part_mesh(part), part.segment_from_part
-    if mesh.normals is None:
-        vertices, faces = mesh.vertices_m[mesh.faces].reshape(-1, 3), np.arange(mesh.faces.size).reshape(-1, 3)
-        return trimesh.Trimesh(place.apply(vertices), faces, process=False)
-    normals = place.rotation.apply(mesh.normals)
-    return trimesh.Trimesh(place.apply(mesh.vertices_m), mesh.faces, vertex_normals=normals, process=False)
-
-
-def _colour(part: Part) -> Array:
-    return _UNSAMPLED if part.colour is None else part.colour
-
-
 def _gltf_files(posed: PosedBody, path: Path) -> dict[str, bytes]:
-    scene, model = trimesh.Scene(base_frame="world"), posed.model
-    colours: dict[str, list[float]] = {}
-    index = 0
-    for segment, R, t, parent in zip(model.segments, posed.R, posed.t, model.parents, strict=True):
-        placed = _matrix(R, t)
-        above = np.linalg.inv(_matrix(posed.R[parent], posed.t[parent])) if parent >= 0 else _matrix(_Y_UP, np.zeros(3))
-        scene.graph.update(
-            frame_to=segment.name, frame_from=segment.parent or scene.graph.base_frame, matrix=above @ placed
-        )
-        for part in segment.parts:
-            mesh = _in_segment(part)
-            material = f"{index} {part.name}"
-            mesh.visual = TextureVisuals(material=PBRMaterial(name=material, metallicFactor=0.0, roughnessFactor=_MATT))
-            colours[material] = [*light_from_srgb(_colour(part)).tolist(), 1.0]
-            scene.add_geometry(mesh, node_name=material, geom_name=material, parent_node_name=segment.name)
-            index += 1
-
-    def paint(tree: dict) -> None:
-        for material in tree["materials"]:
-            material["pbrMetallicRoughness"]["baseColorFactor"] = colours[material["name"]]
-
-    if path.suffix.lower() == ".glb":
-        data = export_glb(scene, include_normals=True, tree_postprocessor=paint)
-        return {path.name: data}
-    files = export_gltf(scene, include_normals=True, tree_postprocessor=paint, embed_buffers=True)
-    return {path.name: files["model.gltf"]}
+    return {path.name: still(posed, is_binary=path.suffix.lower() == ".glb")}
 
 
 def _obj_files(posed: PosedBody, path: Path) -> dict[str, bytes]:
     lines, materials, first = [f"mtllib {path.stem}.mtl"], [], 1
     for index, (part, mesh) in enumerate(_in_world(posed)):
         name = "_".join(f"{index} {part.name}".split())
-        red, green, blue = _colour(part) / 255
+        red, green, blue = part_colour(part) / 255
         materials += [f"newmtl {name}", f"Kd {red:.6f} {green:.6f} {blue:.6f}", "illum 1", ""]
         lines += [f"o {name}", f"usemtl {name}"]
         lines += [f"v {x:.7f} {y:.7f} {z:.7f}" for x, y, z in mesh.vertices]
@@ -129,7 +63,7 @@ def _obj_files(posed: PosedBody, path: Path) -> dict[str, bytes]:
 def _ply_files(posed: PosedBody, path: Path) -> dict[str, bytes]:
     meshes = []
     for part, mesh in _in_world(posed):
-        colours = np.tile([*np.rint(np.clip(_colour(part), 0, 255)), 255], (len(mesh.vertices), 1)).astype(np.uint8)
+        colours = np.tile([*np.rint(np.clip(part_colour(part), 0, 255)), 255], (len(mesh.vertices), 1)).astype(np.uint8)
         mesh.visual = ColorVisuals(mesh, vertex_colors=colours)
         meshes.append(mesh)
     whole = trimesh.util.concatenate(meshes)
@@ -140,7 +74,7 @@ def _in_world(posed: PosedBody) -> list[tuple[Part, trimesh.Trimesh]]:
     found = []
     for segment, R, t in zip(posed.model.segments, posed.R, posed.t, strict=True):
         for part in segment.parts:
-            found.append((part, _in_segment(part).apply_transform(_matrix(R, t))))
+            found.append((part, segment_mesh(part).apply_transform(_matrix(R, t))))
     return found
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import math
 import os
+import re
 from fractions import Fraction
 from pathlib import Path
 
@@ -163,14 +164,26 @@ def _estimate(row: dict[str, str], n_joints: int, whole: NDArray[np.float64] | N
         angles = _numbers(row, list(row)[-3 * n_joints :] if n_joints else []).reshape(n_joints, 3)
         pose = Pose(world_from_root=rigid_transform(R, position), joint_angles=angles)
     return Estimate(
-        index=int(row["frame"]),
-        time_s=Fraction(row["time_exact"]),
+        index=_whole(row["frame"]),
+        time_s=_exact(row["time_exact"]),
         status=status,
         score=_number(row["score"]),
         pose=pose,
         covariance=None if np.isnan(covariance).all() else covariance,
-        n_views=int(row["n_views"]),
+        n_views=_whole(row["n_views"]),
     )
+
+
+def _whole(text: str) -> int:
+    if not re.fullmatch(r"-?[0-9]{1,15}", text):
+        raise ValueError(f"'{text[:40]}' is no whole number")
+    return int(text)
+
+
+def _exact(text: str) -> Fraction:
+    if not re.fullmatch(r"-?[0-9]{1,40}(/[0-9]{1,40})?", text):  # no exponents: 1e999999999 would take all memory
+        raise ValueError(f"time_exact is '{text[:40]}', expected a fraction such as 1001/60000")
+    return Fraction(text)
 
 
 def _numbers(row: dict[str, str], names: list[str]) -> NDArray[np.float64]:

@@ -216,7 +216,7 @@ def _table(path: Path, n_bytes: int) -> pa.Table:
         with pa.memory_map(str(path)) as file:
             return csv.read_csv(pa.BufferReader(file.read_buffer(n_bytes)), convert_options=options)
     except pa.ArrowInvalid as error:
-        raise ResultError(f"{path}: {str(error).splitlines()[0]}; mend the line or track again") from None
+        raise ResultError(f"{path}: {str(error).splitlines()[0][:200]}; mend the line or track again") from None
 
 
 def _check_order(path: Path, table: pa.Table, frame: NDArray[np.int64], n_joints: int) -> None:

@@ -1,0 +1,22 @@
+"""aniposelib's and FreeMoCap's TOML: Pose2Sim's layout under the keys cam_0, cam_1, ...; read by `rig_from_tables`."""
+
+from __future__ import annotations
+
+from airborne.cameras.camera import Rig
+from airborne.cameras.formats.given import METRES, Unit
+from airborne.cameras.formats.toml import table_lines, toml
+
+
+def aniposelib_text(rig: Rig, unit: Unit = "m") -> str:
+    """Return an aniposelib file, lengths in the unit; the keys have as many digits as keep them in order as text."""
+    digits = len(str(len(rig) - 1))
+    lines = []
+    for number, camera in enumerate(rig):
+        lines += [
+            f"[cam_{number:0{digits}}]",
+            f"name = {toml(camera.name)}",
+            f"size = {toml(list(camera.size))}",
+            *table_lines(camera, n_terms=4 if camera.lens == "fisheye" else 5, metres=METRES[unit]),
+            "",
+        ]
+    return "\n".join([*lines, "[metadata]", "adjusted = false"]) + "\n"

@@ -1,0 +1,63 @@
+"""Caliscope's `camera_array.toml`: tables [cameras.0], [cameras.1], ... in metres.
+
+`rotation_count` turns pictures only for its pose networks; the calibration is that of the pictures as recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from airborne.cameras.camera import Rig
+from airborne.cameras.formats.given import Given
+from airborne.cameras.formats.toml import camera_from_table, table_lines, toml
+from airborne.errors import CalibrationError
+
+ABSENT = (None, "null")
+
+
+def rig_from_caliscope(document: dict, where: str, given: Given) -> Rig:
+    """Return the cameras that have a place, named cam_<number> as Caliscope names their videos."""
+    tables = {key: table for key, table in document["cameras"].items() if isinstance(table, dict)}
+    placed = {key: table for key, table in tables.items() if table.get("rotation") not in ABSENT}
+    if not placed:
+        raise CalibrationError(f"{where}: none of its {len(tables)} cameras has a place; calibrate their extrinsics")
+    metres = given.metres("m")
+    return Rig(
+        tuple(
+            camera_from_table(f"{where}, [cameras.{key[:60]}]", f"cam_{key}", table, metres)
+            for key, table in placed.items()
+        )
+    )
+
+
+def caliscope_text(rig: Rig, errors_px: Mapping[str, float] | None = None) -> str:
+    """Return a Caliscope file."""
+    lines = []
+    for number, camera in zip(caliscope_numbers(rig), rig, strict=True):
+        lines += [
+            f"[cameras.{number}]",
+            f"cam_id = {number}",
+            f"size = {toml(list(camera.size))}",
+            "rotation_count = 0",
+            *([f"error = {float(errors_px[camera.name])!r}"] if errors_px else []),
+            *table_lines(camera, n_terms=4 if camera.lens == "fisheye" else 5),
+            "",
+        ]
+    return "\n".join(lines)
+
+
+def caliscope_numbers(rig: Rig) -> list[int]:
+    """Return the cameras' numbers: those of their names where all are cam_<number>, else 0, 1, 2, ..."""
+    found = [name.removeprefix("cam_") for name in rig.names]
+    if all(text.isascii() and text.isdigit() and text == str(int(text)) for text in found if len(text) < 10):
+        own = [f"cam_{text}" for text in found]
+        if own == list(rig.names) and max(map(len, found)) < 10:
+            return [int(text) for text in found]
+    return list(range(len(rig)))
+
+
+def caliscope_loses(rig: Rig) -> tuple[str, ...]:
+    """Say what a Caliscope file cannot hold."""
+    pairs = zip(rig.names, caliscope_numbers(rig), strict=True)
+    renamed = [f"{name} is {number}" for name, number in pairs if name != f"cam_{number}"]
+    return (f"names: Caliscope numbers its cameras: {', '.join(renamed)}",) if renamed else ()

@@ -1,0 +1,184 @@
+"""Digitised points as DLTdv keeps them: `<prefix>xypts.csv` and its siblings xyzpts, xyzres, offsets and xyzCI.
+
+One row a frame, no frame column, NaN where a point was not digitised; points outer, cameras inner.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.cameras.camera import Rig
+from airborne.cameras.detections import Detections
+from airborne.cameras.formats.given import Given
+from airborne.errors import CalibrationError
+
+Array = NDArray[np.floating]
+
+LARGEST_FILE_BYTES = 50_000_000
+COLUMN = re.compile(r"(.+)_cam_?(\d{1,4})_([uvxyUVXY])")  # DLTdv pt1_cam1_X, Argus track_cam_1_x
+EXPECTED = "expected DLTdv's table pt1_cam1_U,pt1_cam1_V,pt1_cam2_U,..."
+DEGREES_OF_FREEDOM = 3  # that a place in space takes from the 2 numbers of each camera
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Digitisation:
+    """What DLTdv knows of a recording: pixels, and where it has them places, residuals, offsets and intervals."""
+
+    points: Detections  # visibility 1 where digitised
+    world: Array | None = None  # (frames, points, 3) [m]; NaN where not known
+    residual_px: Array | None = None  # (frames, points)
+    offset_frames: Array | None = None  # (frames, cameras)
+    interval: Array | None = None  # (frames, points, 3) half of the 95 % interval [m]
+
+
+def is_xypts(header: str) -> bool:
+    """Whether a table's first line is that of DLTdv's pixels."""
+    names = [name.strip().strip('"') for name in header.split(",")]
+    return len(names) > 1 and all(COLUMN.fullmatch(name) for name in names)
+
+
+def read_digitisation(path: Path, given: Given, cameras: Sequence[str] | None = None) -> Digitisation:
+    """Read `<prefix>xypts.csv` and its siblings that are there; lengths are metres unless given otherwise.
+
+    Cameras are named cam1, cam2, ... unless named here. Raises CalibrationError.
+    """
+    points = read_xypts(path, given, cameras)
+    n, n_points, n_cameras = points.visibility.shape
+    stem, found = path.name.removesuffix("xypts.csv"), {}
+    shapes = {"xyzpts": (n_points, 3), "xyzres": (n_points,), "offsets": (n_cameras,), "xyzCI": (n_points, 3)}
+    for sibling, shape in shapes.items():
+        other = path.with_name(f"{stem}{sibling}.csv")
+        if stem != path.name and other.is_file():
+            _, values = _read_table(other)
+            if len(values) != n or values.shape[1] != np.prod(shape):
+                raise CalibrationError(
+                    f"{other} has {len(values)} rows of {values.shape[1]}; expected {n} of {np.prod(shape)}, "
+                    f"as {path.name} has"
+                )
+            found[sibling] = values.reshape(n, *shape)
+    metres = given.metres("m")
+    return Digitisation(
+        points=points,
+        world=_scaled(found.get("xyzpts"), metres),
+        residual_px=found.get("xyzres"),
+        offset_frames=found.get("offsets"),
+        interval=_scaled(found.get("xyzCI"), metres),
+    )
+
+
+def read_xypts(path: Path, given: Given, cameras: Sequence[str] | None = None) -> Detections:
+    """Read `xypts.csv`, pixels as `given.pixels` counts them; from below sizes are needed. Raises CalibrationError."""
+    header, values = _read_table(path)
+    keys = [key for name in header if (key := _key(name)) is not None]
+    if not header or len(keys) < len(header):
+        raise CalibrationError(f"{path}: found the columns {','.join(header)[:80] or 'none'}; {EXPECTED}")
+    names, numbers = list(dict.fromkeys(key[0] for key in keys)), sorted({key[1] for key in keys})
+    if len(set(keys)) < len(keys) or len(keys) != 2 * len(names) * len(numbers):
+        raise CalibrationError(f"{path}: not every point has one U and one V in every camera; {EXPECTED}")
+    called = list(cameras or [f"cam{number}" for number in numbers])
+    if len(called) != len(numbers) or len(set(called)) != len(called):
+        raise CalibrationError(f"{path} has {len(numbers)} cameras; name as many, each once: found {', '.join(called)}")
+    px = np.full((len(values), len(names), len(numbers), 2), np.nan)
+    for column, (name, number, axis) in enumerate(keys):
+        px[:, names.index(name), numbers.index(number), "uv".index(axis)] = values[:, column]
+    for k, camera in enumerate(called):
+        px[:, :, k] = given.pixels.ours(px[:, :, k], _height(given, camera, str(path)))
+    return Detections.of_clicks(called, names, px)
+
+
+def write_digitisation(path: Path, digitisation: Digitisation, given: Given) -> tuple[Path, ...]:
+    """Write `<prefix>xypts.csv` and the siblings that are known; returns what was written. 17 digits; NaN is NaN.
+
+    Points are named pt1, pt2, ... as DLTdv does. Raises CalibrationError for a name that does not end in xypts.csv, and
+    where pixels are to count from below and a camera's size was not given.
+    """
+    if not path.name.endswith("xypts.csv"):
+        raise CalibrationError(f"{path}: DLTdv wants a name that ends in xypts.csv, such as throw_xypts.csv")
+    points = digitisation.points
+    heights = [_height(given, name, str(path)) for name in points.cameras]
+    px = [given.pixels.theirs(points.px[:, :, k], height) for k, height in enumerate(heights)]
+    numbers, cameras = range(1, len(points.points) + 1), range(1, len(points.cameras) + 1)
+    header = [f"pt{p}_cam{c}_{axis}" for p in numbers for c in cameras for axis in "UV"]
+    written = [_write_table(path, header, np.stack(px, axis=2))]
+    places, scale = [f"pt{p}_{axis}" for p in numbers for axis in "XYZ"], 1 / given.metres("m")
+    siblings = {
+        "xyzpts": (places, _scaled(digitisation.world, scale)),
+        "xyzres": ([f"pt{p}_dltres" for p in numbers], digitisation.residual_px),
+        "offsets": ([f"cam{c}_offset" for c in cameras], digitisation.offset_frames),
+        "xyzCI": ([f"{place}+-CI" for place in places], _scaled(digitisation.interval, scale)),
+    }
+    stem = path.name.removesuffix("xypts.csv")
+    for sibling, (names, values) in siblings.items():
+        if values is not None:
+            written.append(_write_table(path.with_name(f"{stem}{sibling}.csv"), names, values))
+    return tuple(written)
+
+
+def placed(points: Detections, rig: Rig) -> Digitisation:
+    """Triangulate digitised points with the cameras of the same names; as DLTdv does, with residuals and no offsets.
+
+    The residual is `sqrt(sum e² / (2 n - 3))` over the n cameras that see a point, e their pixel errors.
+    """
+    rig = rig.select(points.cameras)
+    world = rig.points_from_px(points.px)
+    error = np.stack([camera.px_from_world(world) for camera in rig], axis=2) - points.px
+    n = np.isfinite(error).all(axis=-1).sum(axis=-1)
+    freedom = np.where(n > 1, 2 * n - DEGREES_OF_FREEDOM, 1)
+    residual = np.where(n > 1, np.sqrt(np.nansum(error**2, axis=(2, 3)) / freedom), np.nan)
+    return Digitisation(
+        points=points, world=world, residual_px=residual, offset_frames=np.zeros((len(points.px), len(rig)))
+    )
+
+
+def _key(column: str) -> tuple[str, int, str] | None:
+    """Return a column's point, number of the camera and axis."""
+    found = COLUMN.fullmatch(column)
+    return (found[1], int(found[2]), "u" if found[3] in "uUxX" else "v") if found else None
+
+
+def _height(given: Given, camera: str, where: str) -> int:
+    """Return a picture's height [px]; any will do where pixels count from above."""
+    return 0 if given.pixels.corner == "upper-left" else given.size_of(camera, where)[1]
+
+
+def _scaled(values: Array | None, scale: float) -> Array | None:
+    return None if values is None else scale * values
+
+
+def _read_table(path: Path) -> tuple[list[str], Array]:
+    """Return the header and the numbers (rows, columns); blank cells are NaN."""
+    try:
+        if path.stat().st_size > LARGEST_FILE_BYTES:
+            raise CalibrationError(f"{path} has {path.stat().st_size} bytes, more than any table of clicks; {EXPECTED}")
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise CalibrationError(f"{path} cannot be read ({error.strerror}); {EXPECTED}") from None
+    except UnicodeDecodeError:
+        raise CalibrationError(f"{path} is not a text file; {EXPECTED}") from None
+    try:
+        rows = [row for row in csv.reader(text.replace("\0", "").splitlines()) if any(map(str.strip, row))]
+    except csv.Error as error:
+        raise CalibrationError(f"{path} is not a table ({error}); {EXPECTED}") from None
+    header = [name.strip() for name in rows[0]] if rows else []
+    values = np.full((max(len(rows) - 1, 0), len(header)), np.nan)
+    for number, row in enumerate(rows[1:]):
+        cells = row[:-1] if len(row) == len(header) + 1 and not row[-1].strip() else row
+        try:
+            values[number] = np.reshape([float(cell) if cell.strip() else np.nan for cell in cells], len(header))
+        except ValueError:
+            raise CalibrationError(f"{path}, row {number + 2}: expected {len(header)} numbers") from None
+    return header, np.where(np.abs(values) < 1e12, values, np.nan)
+
+
+def _write_table(path: Path, header: Sequence[str], values: Array) -> Path:
+    rows = np.reshape(values, (len(values), -1))
+    lines = (",".join("NaN" if np.isnan(value) else f"{value:.17g}" for value in row) for row in rows)
+    path.write_text("\n".join([",".join(header), *lines]) + "\n", encoding="utf-8")
+    return path

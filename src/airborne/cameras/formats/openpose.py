@@ -1,0 +1,106 @@
+"""OpenPose's detections as Pose2Sim keeps them: a folder a camera, a JSON file a frame."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.errors import CalibrationError
+
+Array = NDArray[np.floating]
+
+LARGEST_FILE_BYTES = 5_000_000  # a picture of a thousand people
+MOST_NUMBERS = 10_000_000  # frames times points
+ALIKE = 0.8  # of the surest person's confidence: a second one this sure makes the choice a guess
+
+
+def camera_folders(path: Path) -> dict[str, Path]:
+    """Return the folders below, by camera: `<camera>_json` or `<camera>`."""
+    return {folder.name.removesuffix("_json"): folder for folder in sorted(path.iterdir()) if folder.is_dir()}
+
+
+def read_folder(folder: Path, person: int | None = None) -> tuple[Array, int]:
+    """Read a camera's JSON files: (frames, points, 3), NaN where nobody is; and the most people in one picture.
+
+    person: the place of the person in every file's list, from 0; None takes the one detected most surely. Raises
+    CalibrationError where two are about equally sure.
+    """
+    files = {number_at_end(path.stem.removesuffix("_keypoints")): path for path in sorted(folder.glob("*.json"))}
+    if not files or None in files:
+        raise CalibrationError(
+            f"{folder} holds no detections; expected JSON files whose names end in the frame's number"
+        )
+    last = max(number for number in files if number is not None)
+    found: dict[int, Array] = {}
+    n_people = 0
+    for frame, path in files.items():
+        people = _people(path)
+        n_people = max(n_people, len(people))
+        chosen = _chosen(people, person, path)
+        if chosen is not None and frame is not None:
+            found[frame] = chosen
+    if not found:
+        raise CalibrationError(f"{folder}: there is nobody in any picture; give the detections of a person")
+    counts = {len(one) for one in found.values()}
+    if len(counts) > 1:
+        raise CalibrationError(f"{folder}: people of {sorted(counts)} points; expected one list of points throughout")
+    n_points = counts.pop()
+    if last * n_points > MOST_NUMBERS:
+        raise CalibrationError(f"{folder}: a file is of frame {last}; expected the frame's number at the names' end")
+    table = np.full((last + 1, n_points, 3), np.nan)
+    for frame, one in found.items():
+        table[frame] = one
+    return table, n_people
+
+
+def write_folders(path: Path, tables: dict[str, Array]) -> None:
+    """Write tables (frames, points, 3) of x, y [px] and visibility by camera; points not seen are 0, 0, 0."""
+    for camera, table in tables.items():
+        folder = path / f"{camera}_json"
+        folder.mkdir(parents=True, exist_ok=True)
+        for frame, points in enumerate(table):
+            is_seen = np.isfinite(points).all(axis=-1) & (points[:, 2] > 0)
+            values = np.where(is_seen[:, None], points, 0.0).ravel().tolist()
+            people = [{"person_id": [-1], "pose_keypoints_2d": values}] if is_seen.any() else []
+            text = json.dumps({"version": 1.3, "people": people})
+            (folder / f"{camera}_{frame:06d}.json").write_text(text, encoding="utf-8")
+
+
+def number_at_end(name: str) -> int | None:
+    """Return the number that a name ends in; None where there is none."""
+    found = re.search(r"([0-9]{1,18})$", name)
+    return int(found[1]) if found else None
+
+
+def _chosen(people: list[Array], person: int | None, path: Path) -> Array | None:
+    if person is not None:
+        return people[person] if 0 <= person < len(people) else None
+    if not people:
+        return None
+    *_, second, first = sorted([0.0, *(float(one[:, 2].sum()) for one in people)])
+    if second > ALIKE * first:
+        raise CalibrationError(
+            f"{path}: two of {len(people)} people are detected about equally surely; say which one: "
+            "airborne convert FOLDER detections.npz --person 0 (0 is the first of each file)"
+        )
+    return max(people, key=lambda one: float(one[:, 2].sum()))
+
+
+def _people(path: Path) -> list[Array]:
+    """Read the people (points, 3) of one OpenPose file."""
+    try:
+        if path.stat().st_size > LARGEST_FILE_BYTES:
+            raise CalibrationError(f"{path} is larger than any picture's detections ({path.stat().st_size} bytes)")
+        document = json.loads(path.read_text(encoding="utf-8-sig"))
+        people = [np.array(person["pose_keypoints_2d"], float).reshape(-1, 3) for person in document["people"]]
+    except OSError as error:
+        raise CalibrationError(f"{path} cannot be read ({error.strerror})") from None
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
+        raise CalibrationError(
+            f"{path} is not OpenPose JSON; expected people[].pose_keypoints_2d = [x, y, confidence, ...]"
+        ) from None
+    return [np.where(np.abs(one) < 1e9, one, 0.0) for one in people if len(one)]

@@ -1,0 +1,48 @@
+"""Pose2Sim's `Calib.toml`, whose layout aniposelib and FreeMoCap share: one table a camera at the top level."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from airborne.cameras.camera import Rig
+from airborne.cameras.formats.given import Given
+from airborne.cameras.formats.toml import camera_from_table, has_fifth_term, table_lines, toml, toml_key
+from airborne.errors import CalibrationError
+
+NOT_CAMERAS = ("metadata", "capture_volume", "charuco", "checkerboard")
+
+
+def rig_from_tables(document: dict, where: str, given: Given) -> Rig:
+    """Return the rig of the tables at the top level, in their order; a camera is named by its `name`, else by its key.
+
+    Metres unless given otherwise: the file does not say, and a board in millimetres makes it millimetres.
+    """
+    tables = {key: table for key, table in document.items() if key not in NOT_CAMERAS and isinstance(table, dict)}
+    if not tables:
+        raise CalibrationError(f"{where} has no cameras; expected a table such as [cam1] with matrix, rotation, ...")
+    metres = given.metres("m")
+    return Rig(
+        tuple(
+            camera_from_table(f"{where}, [{key[:60]}]", str(table.get("name", key)), table, metres)
+            for key, table in tables.items()
+        )
+    )
+
+
+def pose2sim_text(rig: Rig, errors_px: Mapping[str, float] | None = None) -> str:
+    """Return a Pose2Sim file: a fifth distortion term only where there is one, real errors or none."""
+    lines = []
+    for camera in rig:
+        lines += [
+            f"[{toml_key(camera.name)}]",
+            f"name = {toml(camera.name)}",
+            f"size = {toml([float(length) for length in camera.size])}",
+            *table_lines(camera, n_terms=5 if has_fifth_term(camera) else 4),
+            *([f"error = {float(errors_px[camera.name])!r}"] if errors_px else []),
+            "",
+        ]
+    lines += ["[metadata]", "adjusted = false"]
+    if errors_px:
+        lines.append(f"error = {math.sqrt(sum(errors_px[name] ** 2 for name in rig.names) / len(rig))!r}")
+    return "\n".join(lines) + "\n"

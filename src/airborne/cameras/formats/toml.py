@@ -1,0 +1,61 @@
+"""TOML as calibration files use it: one table a camera, with matrix, distortions, rotation, translation and size."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+
+from airborne.cameras.camera import Camera
+from airborne.cameras.formats.building import build, numbers, terms, whole_size
+
+ROTATIONS = ((3,), (3, 3))
+TERMS = {False: ((4,), (5,)), True: ((4,),)}  # by whether the lens is a fisheye
+
+
+def camera_from_table(where: str, name: str, table: dict, metres: float) -> Camera:
+    """Return the camera of a table; lengths are multiplied by metres. Raises CalibrationError."""
+    is_fisheye = table.get("fisheye") is True
+    terms_given = table.get("distortions")
+    if isinstance(terms_given, list) and len(terms_given) == 1:  # OpenCV returns them as a row
+        terms_given = terms_given[0]
+    return build(
+        where,
+        name,
+        K=numbers(where, "matrix", table.get("matrix"), (3, 3)),
+        size=whole_size(where, numbers(where, "size", table.get("size"), (2,))),
+        rotation=numbers(where, "rotation", table.get("rotation"), *ROTATIONS),
+        translation=metres * numbers(where, "translation", table.get("translation"), (3,)),
+        distortion=numbers(where, "distortions", terms_given, *TERMS[is_fisheye]),
+        is_fisheye=is_fisheye,
+    )
+
+
+def table_lines(camera: Camera, *, n_terms: int, metres: float = 1.0) -> list[str]:
+    """Return a camera's lines of a table: matrix to fisheye; lengths are divided by metres."""
+    place = camera.camera_from_world
+    return [
+        f"matrix = {toml(camera.K.tolist())}",
+        f"distortions = {toml(terms(camera, n_terms))}",
+        f"rotation = {toml(place.rotation.as_rotvec().tolist())}",
+        f"translation = {toml((place.translation / metres).tolist())}",
+        f"fisheye = {'true' if camera.lens == 'fisheye' else 'false'}",
+    ]
+
+
+def toml(value: object) -> str:
+    """Return a list, number or string as TOML."""
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+
+
+def toml_key(name: str) -> str:
+    """Return a name as the key of a table, quoted where it must be."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml(name)
+
+
+def has_fifth_term(camera: Camera) -> bool:
+    """Whether a Brown lens needs more than k1, k2, p1, p2."""
+    return camera.lens == "brown" and bool(np.any(camera.distortion[4:]))

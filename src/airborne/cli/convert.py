@@ -1,0 +1,78 @@
+"""The command that turns one format into another."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from airborne.errors import AirborneError
+
+Unit = Literal["m", "mm"]
+Corner = Literal["upper-left", "lower-left"]
+
+
+def convert(
+    source: Annotated[Path, typer.Argument(metavar="IN", help="Cameras, clicked points or detections; any format.")],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="File to write; its name says the format.")],
+    to: Annotated[str | None, typer.Option(help="Format of OUT, where its name does not say it.")] = None,
+    size: Annotated[
+        str | None, typer.Option(help="Picture size WIDTHxHEIGHT, or name=WIDTHxHEIGHT,..., where IN does not say it.")
+    ] = None,
+    unit: Annotated[Unit | None, typer.Option(help="Unit of the lengths in IN.")] = None,
+    origin: Annotated[Corner | None, typer.Option(help="Where IN counts pixels from.")] = None,
+    pixel_base: Annotated[int | None, typer.Option(min=0, max=1, help="Number of IN's first pixel.")] = None,
+    to_unit: Annotated[Unit | None, typer.Option(help="Unit of the lengths in OUT.")] = None,
+    to_origin: Annotated[Corner | None, typer.Option(help="Where OUT counts pixels from.")] = None,
+    to_pixel_base: Annotated[int | None, typer.Option(min=0, max=1, help="Number of OUT's first pixel.")] = None,
+    cameras: Annotated[str | None, typer.Option(help="Names of the cameras of points, in order: left,right.")] = None,
+    calibration: Annotated[
+        Path | None, typer.Option(help="Cameras of points: their names, sizes, and places for DLTdv's xyzpts.")
+    ] = None,
+    person: Annotated[int | None, typer.Option(min=0, help="Which of several people in OpenPose's files.")] = None,
+) -> None:
+    """Convert cameras, clicked points or detections; IN is told by what is in it. DLT defaults are DLTdv 8's.
+
+    Example: airborne convert dltCoefs.csv calib.toml --size 1920x1080 --origin lower-left
+    """
+    from airborne.cameras.formats import Given, PixelCount
+    from airborne.conversion import FORMATS, Wishes
+    from airborne.conversion import convert as convert_file
+
+    if to is not None and to not in FORMATS:
+        raise AirborneError(f"--to {to}: no such format; choose from {', '.join(FORMATS)}")
+    options = {
+        **{"--size": size, "--unit": unit, "--origin": origin, "--pixel-base": pixel_base, "--to-unit": to_unit},
+        **{"--to-origin": to_origin, "--to-pixel-base": to_pixel_base, "--cameras": cameras},
+        **{"--calibration": calibration, "--person": person},
+    }
+    wishes = Wishes(
+        to=to,
+        source=Given(unit=unit, size=_size(size), pixels=PixelCount(origin or "upper-left", _base(pixel_base))),
+        target=Given(unit=to_unit, pixels=PixelCount(to_origin or "upper-left", _base(to_pixel_base))),
+        cameras=tuple(name.strip() for name in (cameras or "").split(",") if name.strip()),
+        calibration=calibration,
+        person=person,
+        said=frozenset(name for name, value in options.items() if value is not None),
+    )
+    print(convert_file(source, target, wishes).describe())
+
+
+def _base(given: int | None) -> int:
+    return 1 if given is None else given
+
+
+def _size(text: str | None) -> tuple[int, int] | dict[str, tuple[int, int]] | None:
+    """Parse 768x576 for all cameras, or cam1=768x576,cam2=1920x1080."""
+    if text is None:
+        return None
+    sizes = {}
+    try:
+        for item in text.split(","):
+            name, _, numbers = item.rpartition("=")
+            width, height = (int(number) for number in numbers.lower().split("x"))
+            sizes[name.strip()] = (width, height)
+    except ValueError:
+        raise AirborneError(f"--size {text}: expected WIDTHxHEIGHT such as 768x576, or cam1=768x576,cam2=...") from None
+    return sizes[""] if set(sizes) == {""} else sizes

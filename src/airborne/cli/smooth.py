@@ -1,0 +1,70 @@
+"""The command that smooths a run."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from airborne.cli.console import Json, progress
+from airborne.errors import ResultError
+
+if TYPE_CHECKING:
+    from airborne.motion.smoothing import Smoothing
+
+
+def smooth(
+    results: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    butterworth: Annotated[
+        str | None,
+        typer.Option(help="Cut-off in Hz of a zero-lag Butterworth filter, or auto: the residual analysis'."),
+    ] = None,
+    spline: Annotated[bool, typer.Option("--spline", help="Smoothing splines by cross-validation.")] = False,
+    kalman: Annotated[bool, typer.Option("--kalman", help="Kalman smoother with the run's own covariances.")] = False,
+    fill: Annotated[float, typer.Option(help="Fill gaps up to so many seconds.")] = 0.0,
+    events: Annotated[
+        str, typer.Option(help="Times in s that no filter may cross, as 0.31,0.92; or auto: those found; or none.")
+    ] = "auto",
+    resample: Annotated[float | None, typer.Option(help="Rate in Hz of the filter where frames are not even.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for the results; else the run's.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Smooth a run and find its velocities and accelerations: new tables beside the raw ones.
+
+    Example: airborne smooth results --butterworth 6 --fill 0.1
+    """
+    from airborne.export.summary import plain
+    from airborne.smoothing import smooth_run
+
+    how = _how(butterworth, spline=spline, kalman=kalman, fill_s=fill, resample_hz=resample)
+    with progress("smoothing") as report:
+        done = smooth_run(results, how, events_s=_times(events), out=output, progress=report)
+    print(json.dumps(plain(done.to_dict())) if as_json else done.describe())
+
+
+def _how(butterworth: str | None, *, spline: bool, kalman: bool, fill_s: float, resample_hz: float | None) -> Smoothing:
+    from airborne.motion.smoothing import Smoothing
+
+    if (butterworth is not None) + spline + kalman != 1:
+        raise ResultError("say how to smooth, one way: --butterworth 6, --butterworth auto, --spline or --kalman")
+    if butterworth is not None:
+        cutoff_hz = None if butterworth == "auto" else _number(butterworth, "--butterworth", "a cut-off in Hz, or auto")
+        return Smoothing(method="butterworth", cutoff_hz=cutoff_hz, resample_hz=resample_hz, fill_s=fill_s)
+    return Smoothing(method="spline" if spline else "kalman", resample_hz=resample_hz, fill_s=fill_s)
+
+
+def _times(text: str) -> list[float] | None:
+    if text in ("auto", "none"):
+        return None if text == "auto" else []
+    return [_number(word, "--events", "times in seconds as 0.31,0.92, or auto, or none") for word in text.split(",")]
+
+
+def _number(text: str, option: str, expected: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ResultError(f"{option} is '{text}'; give {expected}") from None

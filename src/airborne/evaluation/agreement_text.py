@@ -1,0 +1,129 @@
+"""Agreement in words: a short table, and a methods paragraph that can be cited, its numbers filled in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from airborne.evaluation.agreement import Agreement
+from airborne.evaluation.repeatability import Repeatability
+from airborne.motion.jump import Measured
+
+_REFERENCES = (
+    "Bland JM, Altman DG (1999) Measuring agreement in method comparison studies. Stat Methods Med Res 8:135-160.",
+    "Bland JM, Altman DG (2007) Agreement between methods of measurement with multiple observations per individual. "
+    "J Biopharm Stat 17:571-582.",
+    "McGraw KO, Wong SP (1996) Forming inferences about some intraclass correlation coefficients. "
+    "Psychol Methods 1:30-46.",
+    "Zou GY (2013) Confidence interval estimation for the Bland-Altman limits of agreement with multiple observations "
+    "per individual. Stat Methods Med Res 22:630-642.",
+)
+
+
+def agreement_table(rows: Sequence[Agreement]) -> str:
+    """Return agreement as a short plain table."""
+    width = max(16, *(len(f"{row.name} [{row.unit}]") + 2 for row in rows))
+    lines = [f"{'agreement':<{width}}{'bias':>9}{'95 % limits':>19}{'RMSE':>9}{'nRMSE':>8}{'ICC(A,1)':>10}{'SEM':>9}"]
+    for row in rows:
+        limits = f"{_short(row.lower_limit.value)} to {_short(row.upper_limit.value)}"
+        share = "-" if math.isnan(row.nrmse_percent.value) else f"{row.nrmse_percent.value:.2f}%"
+        icc = "-" if math.isnan(row.icc.agreement.value) else f"{row.icc.agreement.value:.4f}"
+        lines.append(
+            f"{f'  {row.name} [{row.unit}]':<{width}}{_short(row.bias.value):>9}{limits:>19}"
+            f"{_short(row.rmse.value):>9}{share:>8}{icc:>10}{_short(row.sem.value):>9}"
+        )
+    return "\n".join(lines)
+
+
+def repeatability_table(rows: Sequence[Repeatability]) -> str:
+    """Return repeatability as a short plain table."""
+    width = max(16, *(len(f"{row.name} [{row.unit}]") + 2 for row in rows))
+    lines = [f"{'repeatability':<{width}}{'within sd':>10}{'coefficient':>12}{'ICC(A,1)':>10}{'SEM':>9}{'MDC':>9}"]
+    for row in rows:
+        icc = "-" if math.isnan(row.icc.agreement.value) else f"{row.icc.agreement.value:.4f}"
+        numbers = f"{_short(row.within_sd.value):>10}{_short(row.coefficient.value):>12}{icc:>10}"
+        lines.append(
+            f"{f'  {row.name} [{row.unit}]':<{width}}{numbers}{_short(row.sem.value):>9}{_short(row.mdc.value):>9}"
+        )
+    return "\n".join(lines)
+
+
+def methods_text(
+    agreements: Mapping[str, Sequence[Agreement]],
+    repeats: Mapping[str, Sequence[Repeatability]],
+    versions: Mapping[str, str],
+) -> str:
+    """Return a paragraph for a methods section, its results, and its references; numbers with 95 % intervals.
+
+    `agreements` and `repeats` are headline variables by what they were compared with.
+    """
+    software = ", ".join(f"{name} {version}" for name, version in versions.items())
+    text = [
+        "Agreement was computed with Airborne ("
+        + software
+        + "). Coordinates are in a world frame with z up, angles in "
+        "degrees; differences of angles were taken on the circle, to the nearest half turn, and somersault and twist "
+        "left out within 5 degrees of 90 degrees of tilt. Frames were matched in time to within a tenth of a period; "
+        "frames without a measurement were left out."
+    ]
+    if agreements:
+        text.append(
+            "Bias is the mean of measured minus reference. The 95 % limits of agreement are bias +- 1.96 standard "
+            "deviations of a single difference, the variance being the sum of that between and that within individuals "
+            "for a true value that varies (Bland and Altman 2007), with intervals by variance estimates recovery (Zou "
+            "2013). nRMSE is the root mean square error over the range of the reference. ICC(A,1) and ICC(C,1) are "
+            "two-way intraclass correlations of a single measurement for absolute agreement and for consistency "
+            "(McGraw and Wong 1996). SEM is the square root of the two-way residual mean square, and the minimal "
+            "detectable change 1.96 sqrt(2) SEM."
+        )
+    if repeats:
+        text.append(
+            "Repeatability is the standard deviation within moments, over all measurements of a moment, and its "
+            "coefficient 1.96 sqrt(2) times that (Bland and Altman 1999)."
+        )
+    text.append(
+        "As neighbouring frames err alike, intervals rest on the effective number of frames, n / (1 + 2 sum of the "
+        "autocorrelations of the differences)."
+    )
+    lines = [" ".join(text), ""]
+    for against, rows in agreements.items():
+        lines += [f"Against {against}:", *(_agreement_sentence(row) for row in rows), ""]
+    for what, some in repeats.items():
+        lines += [f"Between {what}:", *(_repeat_sentence(row) for row in some), ""]
+    return "\n".join([*lines, "References", *_REFERENCES]) + "\n"
+
+
+def _agreement_sentence(row: Agreement) -> str:
+    if row.n < 2:
+        found = "one value" if row.n else "no value"
+        return f"{row.name}: {found}, measured minus reference {_whole(row.bias)} {row.unit}."
+    who = f"{row.n_individuals} individuals, " if row.n_individuals > 1 else ""
+    return (
+        f"{row.name} ({who}n = {row.n}, effectively {row.n_effective:.0f}): bias {_whole(row.bias)} {row.unit}, limits "
+        f"{_whole(row.lower_limit)} to {_whole(row.upper_limit)} {row.unit}, RMSE {_whole(row.rmse)} {row.unit}, nRMSE "
+        f"{_whole(row.nrmse_percent)} % of {row.range:.4g} {row.unit}, ICC(A,1) {_whole(row.icc.agreement, 4)}, "
+        f"ICC(C,1) {_whole(row.icc.consistency, 4)}, SEM {_whole(row.sem)} {row.unit}, minimal detectable change "
+        f"{_whole(row.mdc)} {row.unit}."
+    )
+
+
+def _repeat_sentence(row: Repeatability) -> str:
+    return (
+        f"{row.name} ({row.n_ways} measurements, n = {row.n}, effectively {row.n_effective:.0f}): standard deviation "
+        f"within moments {_whole(row.within_sd)} {row.unit}, coefficient of repeatability {_whole(row.coefficient)} "
+        f"{row.unit}, ICC(A,1) {_whole(row.icc.agreement, 4)}, SEM {_whole(row.sem)} {row.unit}, minimal detectable "
+        f"change {_whole(row.mdc)} {row.unit}."
+    )
+
+
+def _whole(measured: Measured, digits: int = 2) -> str:
+    """Write a number with its interval in brackets."""
+    if math.isnan(measured.value):
+        return "unknown"
+    if math.isnan(measured.low):
+        return f"{measured.value:.{digits}f}"
+    return f"{measured.value:.{digits}f} [{measured.low:.{digits}f}, {measured.high:.{digits}f}]"
+
+
+def _short(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.2f}"

@@ -1,0 +1,119 @@
+"""Figures of an analysis: residuals over cut-offs, agreement with another measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from airborne.evaluation import Agreement, Series
+from airborne.export import panels
+from airborne.motion.signals import ResidualAnalysis
+
+Array = NDArray[np.floating]
+
+_CHOSEN, _OTHER = "#d55e00", "#333333"
+_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#333333")
+
+
+def write_residuals(path: Path, analysis: ResidualAnalysis, used_hz: float | None = None) -> None:
+    """Draw what a Butterworth filter takes off, over its cut-off, with the line of noise and the cut-offs chosen.
+
+    `used_hz` is the cut-off that was used, where there was one.
+    """
+    figure = Figure((panels.WIDTH_IN, 3.6), dpi=panels.DPI, layout="constrained")
+    axes = figure.subplots()
+    _look(axes)
+    start, slope = (1e3 * each for each in analysis.line)
+    f, residual = analysis.cutoff_hz, 1e3 * analysis.residual
+    axes.plot(f, residual, color=panels.LINE, label="residual, all joints and axes")
+    if np.isfinite(start):
+        axes.plot(f, np.maximum(start + slope * f, 0), "--", color=_OTHER, linewidth=1, label="line of noise alone")
+        axes.axhline(start, color=_OTHER, linewidth=0.6)
+        axes.set_ylim(0, max(4 * start, 1.2 * float(np.interp(f[-1] / 6, f, residual))))
+    for hz, colour, style, label in (
+        (analysis.chosen_hz, _CHOSEN, "-", "Winter"),
+        (analysis.whitest_hz, "#cc79a7", ":", "whitest residuals (Challis)"),
+        (used_hz, "#009e73", "-.", "used"),
+    ):
+        if hz is not None and np.isfinite(hz):
+            axes.axvline(hz, color=colour, linestyle=style, linewidth=1.2, label=f"{label}: {hz:.1f} Hz")
+    axes.set_xlim(0, f[-1])
+    axes.set_xlabel("cut-off [Hz]", fontsize=panels.FONT_PT, color=panels.TEXT)
+    panels.name_panel(axes, "RMS residual [mm]")
+    axes.legend(fontsize=panels.FONT_PT - 1, frameon=False, labelcolor=panels.TEXT)
+    figure.savefig(path)
+
+
+def write_bland_altman(path: Path, drawn: Sequence[tuple[Series, Agreement]]) -> None:
+    """Draw differences over means, one panel a variable, with bias, limits of agreement and their 95 % intervals.
+
+    Individuals differ in colour. Source: Bland and Altman 1986, 1999.
+    """
+    figure, grid = _panels(drawn)
+    for axes, (series, row) in zip(grid, drawn, strict=False):
+        measured, reference = series.known().values.T
+        _points(axes, series.known(), (measured + reference) / 2, measured - reference)
+        for found, style in ((row.bias, "-"), (row.lower_limit, "--"), (row.upper_limit, "--")):
+            if np.isfinite(found.value):
+                axes.axhline(found.value, color=_OTHER, linestyle=style, linewidth=1.0)
+            if np.isfinite(found.low):
+                axes.axhspan(found.low, found.high, color=_OTHER, alpha=0.12, linewidth=0)
+        reach = [row.lower_limit.value, row.upper_limit.value, float(np.min(measured - reference))]
+        span = np.nanmax([*reach, float(np.max(measured - reference))]) - np.nanmin(reach)
+        middle = row.bias.value
+        axes.set_ylim(middle - 0.75 * span, middle + 0.75 * span) if span > 0 else None
+        said = f"{row.bias.value:.3g} [{row.lower_limit.value:.3g}, {row.upper_limit.value:.3g}] {row.unit}"
+        axes.set_title(f"{row.name}\n{said}", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
+        axes.set_xlabel(f"mean [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
+        axes.set_ylabel(f"difference [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
+    figure.savefig(path)
+
+
+def write_identity(path: Path, drawn: Sequence[tuple[Series, Agreement]]) -> None:
+    """Draw measured over reference with the line of identity, one panel a variable."""
+    figure, grid = _panels(drawn)
+    for axes, (series, row) in zip(grid, drawn, strict=False):
+        measured, reference = series.known().values.T
+        ends = [float(min(measured.min(), reference.min())), float(max(measured.max(), reference.max()))]
+        axes.plot(ends, ends, color=_OTHER, linewidth=0.8)
+        _points(axes, series.known(), reference, measured)
+        said = f"{row.name}\nICC(A,1) {row.icc.agreement.value:.4f}"
+        axes.set_title(said, fontsize=panels.FONT_PT - 1, color=panels.TEXT)
+        axes.set_xlabel(f"reference [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
+        axes.set_ylabel(f"measured [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
+    figure.savefig(path)
+
+
+def _panels(drawn: Sequence[tuple[Series, Agreement]]) -> tuple[Figure, list[Axes]]:
+    n_columns = min(3, len(drawn))
+    n_rows = ceil(len(drawn) / n_columns)
+    size = panels.WIDTH_IN * n_columns / 3, 2.5 * n_rows
+    figure = Figure(size, dpi=panels.DPI, layout="constrained")
+    grid = figure.subplots(n_rows, n_columns, squeeze=False).ravel().tolist()
+    for axes in grid[: len(drawn)]:
+        _look(axes)
+    for axes in grid[len(drawn) :]:
+        axes.set_axis_off()
+    return figure, grid
+
+
+def _points(axes: Axes, series: Series, x: Array, y: Array) -> None:
+    names = list(dict.fromkeys(series.individual.tolist()))
+    for k, name in enumerate(names):
+        own = series.individual == name
+        colour = panels.LINE if len(names) == 1 else _COLOURS[k % len(_COLOURS)]
+        axes.plot(x[own], y[own], "o", markersize=2.2, markeredgewidth=0, alpha=0.7, color=colour)
+
+
+def _look(axes: Axes) -> None:
+    axes.tick_params(labelsize=panels.FONT_PT - 1, color=panels.TEXT, labelcolor=panels.TEXT)
+    axes.grid(True, color=panels.FAINT, linewidth=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)

@@ -1,0 +1,51 @@
+"""Figures of an analysis are written for whatever there is to draw."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from airborne.evaluation import Series, agreement
+from airborne.export.analysis_figures import write_bland_altman, write_identity, write_residuals
+from airborne.motion.signals import residual_analysis
+
+BIAS_GREY = (51, 51, 51)
+
+
+def drawn(n_variables, n=40, sd=1.0):
+    rng, found = np.random.default_rng(0), []
+    for k in range(n_variables):
+        reference = np.linspace(0, 100, n)
+        values = np.stack([reference + sd * rng.normal(size=n), reference], axis=1)
+        series = Series(f"variable {k}", "mm", values, np.where(np.arange(n) % 2, "one", "two"))
+        found.append((series, agreement(series)))
+    return found
+
+
+@pytest.mark.parametrize("n_variables", [1, 3, 7])
+@pytest.mark.parametrize("write", [write_bland_altman, write_identity])
+def test_there_is_a_panel_for_each_variable(tmp_path, write, n_variables):
+    write(tmp_path / "few.png", drawn(n_variables))
+    with Image.open(tmp_path / "few.png") as picture:
+        pixels = np.asarray(picture.convert("L"))
+    columns = min(3, n_variables)
+    rows = -(-n_variables // columns)
+    assert pixels.shape[0] == rows * 375
+    panels = [block for row in np.split(pixels, rows) for block in np.array_split(row, columns, axis=1)]
+    assert [bool((block < 200).mean() > 0.01) for block in panels] == [k < n_variables for k in range(columns * rows)]
+
+
+@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("sd", [0.0, 1.0])
+def test_hardly_anything_is_drawn_too(tmp_path, n, sd):
+    write_bland_altman(tmp_path / "a.png", drawn(1, n, sd))
+    write_identity(tmp_path / "b.png", drawn(1, n, sd))
+    assert (tmp_path / "a.png").stat().st_size > 5000
+
+
+def test_residuals_are_drawn_with_and_without_a_cutoff_used(tmp_path):
+    t = np.arange(200) / 60
+    noise = 0.01 * np.random.default_rng(1).normal(size=(200, 1, 1))
+    found = residual_analysis(t, np.sin(6 * t)[:, None, None] + noise)
+    write_residuals(tmp_path / "a.png", found)
+    write_residuals(tmp_path / "b.png", found, 3.0)
+    assert (tmp_path / "a.png").read_bytes() != (tmp_path / "b.png").read_bytes()

@@ -1,0 +1,46 @@
+"""Two thousand random and mutated files: every reader of the package says what is wrong in one line, or reads them."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.any_input import CPU_LIMIT_S, MEMORY_LIMIT_BYTES
+
+ROOT = Path(__file__).resolve().parents[1]
+N_FILES = 2000
+CPU_LIMIT_ALL_S = 120.0  # it takes 20 s on two cores of 2020
+
+
+@pytest.fixture(scope="module")
+def found():
+    """What came of feeding the files, in a process of its own, whose memory is limited."""
+    threads = {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.any_input", str(N_FILES)],
+        **{"cwd": ROOT, "env": os.environ | threads, "capture_output": True, "text": True, "timeout": 1800},
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    return json.loads(done.stdout)
+
+
+def test_no_file_brings_anything_but_one_clear_line(found):
+    assert found["failures"] == {}
+
+
+def test_every_reader_saw_its_share(found):
+    assert sum(found["files"].values()) >= N_FILES
+    assert min(found["files"].values()) >= 8
+    assert len(found["files"]) >= 40
+
+
+def test_no_file_takes_long(found):
+    assert max(cpu_s for cpu_s, _ in found["slowest"].values()) < CPU_LIMIT_S
+    assert found["cpu_s"] < CPU_LIMIT_ALL_S
+
+
+def test_no_file_takes_much_memory(found):
+    assert found["grown_mb"] < MEMORY_LIMIT_BYTES / 1e6
