@@ -20,8 +20,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from airborne.cameras.boards import read_board
-from airborne.cameras.wand import read_wand
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
@@ -31,10 +29,12 @@ from airborne.body import human18
 from airborne.body.files import read_body, write_body
 from airborne.body.measurements import read_measurements, write_measurements
 from airborne.cameras import PixelCount, read_control_points, read_detections, read_rig, write_rig
+from airborne.cameras.boards import read_board
 from airborne.cameras.clicks import read_clicks, read_places
 from airborne.cameras.detections import NETWORKS, Detections, write_detections
 from airborne.cameras.formats.dltdv import placed, read_digitisation, write_digitisation
 from airborne.cameras.formats.given import Given
+from airborne.cameras.wand import read_wand
 from airborne.conversion import Wishes, convert
 from airborne.errors import AirborneError
 from airborne.evaluation import read_clicked_frames, read_joint_paths, read_players_truth, read_truth

@@ -70,7 +70,7 @@ def mend(rig: Rig, detections: Detections, names: Sequence[str]) -> tuple[Rig, t
             f"mend = [{', '.join(names)}] leaves {len(others)} of {len(rig)} cameras; "
             "two others at least must say where the points are"
         )
-    sure = _sample(detections).surer_than(LEAST_VISIBILITY)
+    sure = sampled(detections).surer_than(LEAST_VISIBILITY)
     seen = sure.select(others.names)
     points = agreed_points(others, seen.px, seen.visibility).points
     done = tuple(resected(rig[name], points, sure.select([name]).px[:, :, 0]) for name in names)
@@ -120,7 +120,7 @@ def disagreeing(rig: Rig, detections: Detections) -> tuple[Mending, ...]:
     over WRONG_PX from the others' points and where another place would leave less than the share MENDABLE of that:
     scattered detections cannot be mended so. Two cameras alone cannot say which of them is wrong.
     """
-    sure = _sample(detections).surer_than(LEAST_VISIBILITY).select(rig.names)
+    sure = sampled(detections).surer_than(LEAST_VISIBILITY).select(rig.names)
     weights, trusted, found = sure.visibility, list(rig.names), []
     while len(trusted) > 2:
         rest_px, points = {}, {}
@@ -140,7 +140,7 @@ def disagreeing(rig: Rig, detections: Detections) -> tuple[Mending, ...]:
     return tuple(found)
 
 
-def _sample(detections: Detections) -> Detections:
+def sampled(detections: Detections) -> Detections:
     """Return at most MOST_FRAMES moments, evenly spread, without the face."""
     n = len(detections.px)
     rows = np.unique(np.linspace(0, n - 1, min(n, MOST_FRAMES)).astype(int))

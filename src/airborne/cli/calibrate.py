@@ -3,36 +3,120 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
-from airborne.cli.console import Json
+from airborne.cli.console import Json, progress
 from airborne.errors import AirborneError
 
 
 def calibrate(
-    points: Annotated[Path, typer.Argument(help="Control points: point,x_m,y_m,z_m,<camera>_u,<camera>_v,...")],
-    size: Annotated[str, typer.Option(help="Image size in pixels, WIDTHxHEIGHT, or name=WIDTHxHEIGHT,...")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            help="A file of sources (.toml); or a table of control points (.csv); or with --board each camera's video."
+        ),
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Calibration file to write (Pose2Sim TOML).")],
+    size: Annotated[
+        str | None,
+        typer.Option(help="Control points: image size in pixels, WIDTHxHEIGHT, or name=WIDTHxHEIGHT,..."),
+    ] = None,
     method: Annotated[
-        Literal["lm", "annealing"], typer.Option(help="Fit: least squares, or simulated annealing.")
+        Literal["lm", "annealing"], typer.Option(help="Control points: least squares, or simulated annealing.")
     ] = "lm",
+    board: Annotated[Path | None, typer.Option(help="The board's file: columns, rows, square_m, dictionary.")] = None,
+    timestamps: Annotated[
+        Path | None, typer.Option(help="Which frames belong together: sync_index,cam_id,frame_time.")
+    ] = None,
+    fisheye: Annotated[bool, typer.Option("--fisheye", help="With --board: the lenses are fisheyes.")] = False,
+    report: Annotated[
+        Path | None, typer.Option(help="Folder for report.json and a picture a camera; <output>_report by default.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Find the cameras from surveyed control points.
+    """Find the cameras from control points, boards, wands, courts, detections, alone or together.
 
-    Example: airborne calibrate control_points.csv --size 768x576 -o calib.toml
+    Example: airborne calibrate --board charuco.toml cam_0.mp4 cam_1.mp4 -o calib.toml
     """
+    if board is None and len(files) == 1 and files[0].suffix.lower() != ".toml":
+        _from_control_points(files[0], size, output, method, as_json)
+        return
+    if size is not None:
+        raise AirborneError("--size goes with a table of control points; a file of sources has size = [width, height]")
+    if board is not None:
+        sources = _short_form(files, board, timestamps, fisheye)
+    elif len(files) == 1:
+        sources = _read(files[0])
+    else:
+        raise AirborneError(f"{len(files)} files are given without --board; give one file of sources, or the board's")
+    _from_sources(sources, output, report or output.with_name(f"{output.stem}_report"), as_json)
+
+
+def _from_control_points(
+    points: Path, size: str | None, output: Path, method: Literal["lm", "annealing"], as_json: bool
+) -> None:
     from airborne import cameras
 
+    if size is None:
+        raise AirborneError("--size is missing: give the image size in pixels, such as 768x576")
     table = cameras.read_control_points(points)
     calibration = cameras.calibrate(table, _sizes(size, table.cameras), method=method)
     cameras.write_pose2sim(output, calibration.rig, errors_px={fit.name: fit.rms_px for fit in calibration.fits})
     print(json.dumps(cameras.to_dict(calibration)) if as_json else cameras.describe(calibration))
     if not as_json:
         print(f"written: {output}")
+
+
+def _read(path: Path) -> Any:
+    from airborne.calibrating import read_sources
+
+    return read_sources(path)
+
+
+def _short_form(videos: list[Path], board: Path, timestamps: Path | None, fisheye: bool) -> Any:
+    """Return the sources of a board seen by videos, or by folders of pictures; cameras are named like these."""
+    from airborne.calibrating import sources_from
+
+    kinds = [{"pictures" if path.is_dir() else "video": str(path.resolve())} for path in videos]
+    lens = "fisheye" if fisheye else "brown"
+    table = {"file": str(board.resolve()), **({"timestamps": str(timestamps.resolve())} if timestamps else {})}
+    cameras = [{"name": path.stem, "lens": lens, **kind} for path, kind in zip(videos, kinds, strict=True)]
+    return sources_from({"camera": cameras, "board": table}, Path(), "the videos")
+
+
+def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> None:
+    from airborne import calibrating
+    from airborne.cameras import write_pose2sim
+
+    with _Phases() as phases:
+        found = calibrating.calibrate_from(sources, phases)
+    told = calibrating.to_dict(found)
+    write_pose2sim(
+        output, found.rig, errors_px={name: told["cameras"][name]["rms_px"] or 0.0 for name in found.rig.names}
+    )
+    pictures = calibrating.write_pictures(folder, found)
+    (folder / "report.json").write_text(json.dumps(told, indent=1), encoding="utf-8")
+    print(json.dumps(told) if as_json else calibrating.describe(found))
+    if not as_json:
+        print(f"written: {output}\nreport: {folder / 'report.json'} and {len(pictures)} pictures beside it")
+
+
+class _Phases(ExitStack):
+    """A bar of progress for each thing that is done, one after the other."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._what, self._report = "", lambda done, total: None
+
+    def __call__(self, what: str, done: int, total: int | None) -> None:
+        if what != self._what:
+            self.close()
+            self._what, self._report = what, self.enter_context(progress(what))
+        self._report(done, total)
 
 
 def _sizes(text: str, names: tuple[str, ...]) -> dict[str, tuple[int, int]]:

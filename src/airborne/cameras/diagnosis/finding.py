@@ -1,0 +1,26 @@
+"""What is wrong with a calibration, in one plain sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One thing found: what, with the number that shows it, and what to do."""
+
+    kind: str  # one word for programs: "board", "coverage", "bridge", "mirrored", "turned", "moved", "swapped", ...
+    what: str
+    advice: str
+    cameras: tuple[str, ...] = ()  # whom it is about; empty: all
+
+    @property
+    def sentence(self) -> str:
+        """The whole, in one line."""
+        return f"{self.what}: {self.advice}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as people write them: a, b and c."""
+    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]])) if names else "none"

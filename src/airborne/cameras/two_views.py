@@ -1,0 +1,78 @@
+"""How two cameras stand to each other, from the same points seen by both: epipolar geometry. Arrays only.
+
+`x_b^T F x_a = 0` for pixels of the same point; with the cameras' matrices `E = K_b^T F K_a = [t]x R`. The four places
+that one E allows are told apart by the points, which lie in front of both cameras. (Hartley and Zisserman 2004, 9.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating]
+
+N_POINTS = 8  # the fewest that a fundamental matrix is looked for in
+CONFIDENCE, MOST_TRIES = 0.9999, 5000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Epipolar:
+    """The fundamental matrix of two pictures and the points that keep to it."""
+
+    F: Array  # (3, 3)
+    is_inlier: NDArray[np.bool_]  # (n,)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RelativePlace:
+    """Where camera b stands in camera a's axes, as long as the distance between them is 1."""
+
+    R: Array  # (3, 3), b from a
+    t: Array  # (3,), of length 1
+    points: Array  # (n, 3) in a's axes
+    front_share: float  # how many of the points lie in front of both cameras, 0 to 1
+    parallax_rad: float  # median angle between the two rays to a point [rad]
+
+
+def epipolar(px_a: Array, px_b: Array, *, limit_px: float) -> Epipolar | None:
+    """Return what most of the pixels (n, 2) of two pictures agree on to limit_px [px]; None where nothing is found.
+
+    Both without distortion and without NaN. Points in one plane, or all on one line, have no single answer.
+    """
+    if len(px_a) < N_POINTS:
+        return None
+    F, mask = cv2.findFundamentalMat(px_a, px_b, cv2.USAC_MAGSAC, limit_px, CONFIDENCE, MOST_TRIES)
+    if F is None or F.shape != (3, 3) or not np.all(np.isfinite(F)):
+        return None
+    return Epipolar(F.astype(float), mask.ravel().astype(bool))
+
+
+def relative_place(F: Array, K_a: Array, K_b: Array, px_a: Array, px_b: Array) -> RelativePlace:
+    """Return the place of camera b that puts most of the points (n, 2) [px] in front of both cameras."""
+    R_1, R_2, t = (np.asarray(part, float) for part in cv2.decomposeEssentialMat(K_b.T @ F @ K_a))
+    rays_a, rays_b = _rays(px_a, K_a), _rays(px_b, K_b)
+    candidates = [_place(R, sign * t.ravel(), rays_a, rays_b) for R in (R_1, R_2) for sign in (1.0, -1.0)]
+    return max(candidates, key=lambda place: place.front_share)
+
+
+def _place(R: Array, t: Array, rays_a: Array, rays_b: Array) -> RelativePlace:
+    """Put every point in the middle of where its two rays pass each other."""
+    along = rays_b @ R  # b's rays in a's axes
+    centre = -t @ R
+    cosine = np.sum(rays_a * along, axis=1)
+    apart = np.maximum(1 - cosine**2, 1e-12)
+    depth_a = (rays_a @ centre - cosine * (along @ centre)) / apart
+    depth_b = (cosine * (rays_a @ centre) - along @ centre) / apart
+    points = (depth_a[:, None] * rays_a + centre + depth_b[:, None] * along) / 2
+    is_front = (depth_a > 0) & (depth_b > 0)
+    parallax = np.arccos(np.clip(cosine[is_front], -1, 1)) if is_front.any() else np.zeros(1)
+    return RelativePlace(R, t, points, float(np.mean(is_front)), float(np.median(parallax)))
+
+
+def _rays(px: Array, K: Array) -> Array:
+    """Return the unit directions (n, 3) in the camera's axes in which pixels (n, 2) are seen."""
+    rays = np.column_stack([(px - K[:2, 2]) @ np.linalg.inv(K[:2, :2]).T, np.ones(len(px))])
+    return rays / np.linalg.norm(rays, axis=1)[:, None]
