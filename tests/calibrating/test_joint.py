@@ -150,16 +150,20 @@ def test_a_start_keeps_its_lenses_and_its_world(recordings):
         np.testing.assert_allclose(camera.centre, RIG[camera.name].centre, atol=0.02)
 
 
-def test_the_command_writes_the_rig_a_report_and_a_picture_a_camera(recordings, tmp_path, capsys, monkeypatch):
+def test_the_command_writes_the_rig_a_report_and_a_picture_a_camera(tmp_path, capsys, monkeypatch):
+    folder = tmp_path / "short"
+    folder.mkdir()
+    two = Rig(RIG.cameras[:2])
+    write_videos(folder, board_pictures(two, waved(8)))
     output = tmp_path / "calib.toml"
-    words = ["calibrate", "--board", "board.toml", *(f"{name}.mp4" for name in RIG.names[:2]), "-o", str(output)]
-    monkeypatch.chdir(recordings)
+    words = ["calibrate", "--board", "board.toml", *(f"{name}.mp4" for name in two.names), "-o", str(output)]
+    monkeypatch.chdir(folder)
     monkeypatch.setattr("sys.argv", ["airborne", *words])
     with pytest.raises(SystemExit) as left:
         cli.main()
     assert not left.value.code
     rig = read_rig(output)
-    assert isinstance(rig, Rig) and rig.names == RIG.names[:2]
+    assert isinstance(rig, Rig) and rig.names == two.names
     names = {path.name for path in (tmp_path / "calib_report").iterdir()}
     assert names == {"report.json", "residuals_cam0.png", "residuals_cam1.png"}
     assert "world: the board" in capsys.readouterr().out

@@ -1,6 +1,7 @@
 """Wand, court and throw as files, through `airborne calibrate`, against the true cameras."""
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -129,17 +130,46 @@ def test_a_throw_tells_which_way_is_up(hall):
 
 def test_the_command_writes_the_rig_and_says_how_good_it_is(hall):
     sources = written(hall, COURT + WAND, "command.toml")
-    done = subprocess.run(
-        [sys.executable, "-c", MAIN, "calibrate", str(sources), "-o", str(hall / "calib.toml")],
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
+    done = run(sources, "-o", hall / "calib.toml")
     assert done.returncode == 0, done.stderr
     assert off_m(read_rig(hall / "calib.toml")) < 0.012
     report = json.loads((hall / "calib_report" / "report.json").read_text())
     assert report["findings"] == []
     assert "wand" in done.stdout and "court" in done.stdout
+
+
+def run(*arguments):
+    command = [sys.executable, "-c", MAIN, "calibrate", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300)
+
+
+def test_one_table_needs_no_file_of_sources(hall):
+    named = ",".join(f"{name}=1920x1080" for name in RIG.names)
+    for table, options in (("court.csv", ("--court", "men", "--size", "1920x1080")), ("pair.csv", ("--wand", 0.6))):
+        if options[0] == "--wand":
+            px = waving.tracks(np.random.default_rng(6), RIG, 60, lengths_m=(0.6,)).px
+            (hall / table).write_text(xypts(px))
+            options = (*options, "--size", named)
+        done = run(hall / table, *options, "-o", hall / "short.toml")
+        assert done.returncode == 0, done.stderr
+        assert waving.misplaced_m(RIG, read_rig(hall / "short.toml")).max() < 0.15
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--court", "men"), "--size is missing"),
+        (("--court", "boys", "--size", "9x9"), "--court boys: expected men, women"),
+        (("--court", "men", "--wand", "1", "--size", "9x9"), "go with one table each"),
+        (("--wand", "1000", "--size", "1920x1080"), "metres, not millimetres"),
+    ],
+)
+def test_wrong_options_are_answered_in_one_line(hall, options, said):
+    table = "court.csv" if "--court" in options else "wand_xypts.csv"
+    done = run(hall / table, *options, "-o", hall / "no.toml")
+    assert done.returncode == 2
+    assert re.search(said, done.stderr)
+    assert len(done.stderr.strip().splitlines()) == 1
 
 
 def test_a_wand_in_millimetres_is_refused(hall):

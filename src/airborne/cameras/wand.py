@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from airborne.cameras.agreement import agreed_points
 from airborne.cameras.bundle.source import Lengths, Source
 from airborne.cameras.camera import Rig
-from airborne.cameras.formats.dltdv import is_xypts, read_xypts
+from airborne.cameras.formats.dltdv import LARGEST_FILE_BYTES, is_xypts, read_xypts
 from airborne.cameras.formats.given import Given
 from airborne.errors import CalibrationError
 
@@ -66,6 +66,8 @@ def read_wand(path: Path, cameras: Sequence[str], given: Given, lengths_m: Seque
     CalibrationError.
     """
     try:
+        if path.stat().st_size > LARGEST_FILE_BYTES:
+            raise CalibrationError(f"{path} has {path.stat().st_size} bytes, more than any wand's tracks; {EXPECTED}")
         with path.open(encoding="utf-8-sig") as file:
             header = file.readline(MOST_CHARACTERS).strip()
     except OSError as error:

@@ -23,7 +23,7 @@ def calibrate(
     output: Annotated[Path, typer.Option("-o", "--output", help="Calibration file to write (Pose2Sim TOML).")],
     size: Annotated[
         str | None,
-        typer.Option(help="Control points: image size in pixels, WIDTHxHEIGHT, or name=WIDTHxHEIGHT,..."),
+        typer.Option(help="Tables: image size in pixels, WIDTHxHEIGHT, or name=WIDTHxHEIGHT,..."),
     ] = None,
     method: Annotated[
         Literal["lm", "annealing"], typer.Option(help="Control points: least squares, or simulated annealing.")
@@ -31,6 +31,12 @@ def calibrate(
     board: Annotated[Path | None, typer.Option(help="The board's file: columns, rows, square_m, dictionary.")] = None,
     timestamps: Annotated[
         Path | None, typer.Option(help="Which frames belong together: sync_index,cam_id,frame_time.")
+    ] = None,
+    court: Annotated[
+        str | None, typer.Option(help="The file holds clicked points of a court; its net: men, women, or metres.")
+    ] = None,
+    wand: Annotated[
+        float | None, typer.Option(help="The file holds the tracks of a wand with two markers, so many metres apart.")
     ] = None,
     fisheye: Annotated[bool, typer.Option("--fisheye", help="With --board: the lenses are fisheyes.")] = False,
     report: Annotated[
@@ -42,6 +48,10 @@ def calibrate(
 
     Example: airborne calibrate --board charuco.toml cam_0.mp4 cam_1.mp4 -o calib.toml
     """
+    if court is not None or wand is not None:
+        sources = _scene(files, court, wand, size)
+        _from_sources(sources, output, report or output.with_name(f"{output.stem}_report"), as_json)
+        return
     if board is None and len(files) == 1 and files[0].suffix.lower() != ".toml":
         _from_control_points(files[0], size, output, method, as_json)
         return
@@ -86,6 +96,36 @@ def _short_form(videos: list[Path], board: Path, timestamps: Path | None, fishey
     table = {"file": str(board.resolve()), **({"timestamps": str(timestamps.resolve())} if timestamps else {})}
     cameras = [{"name": path.stem, "lens": lens, **kind} for path, kind in zip(videos, kinds, strict=True)]
     return sources_from({"camera": cameras, "board": table}, Path(), "the videos")
+
+
+def _scene(files: list[Path], court: str | None, wand_m: float | None, size: str | None) -> Any:
+    """Return the sources of one table: clicked points of a court, or a wand's tracks (cameras as --size names them)."""
+    from airborne.calibrating import sources_from
+    from airborne.cameras import read_control_points
+    from airborne.cameras.court import court_points
+    from airborne.cameras.formats.dltdv import read_xypts
+    from airborne.cameras.formats.given import Given
+
+    if len(files) != 1 or (court is None) == (wand_m is None):
+        raise AirborneError("--court and --wand go with one table each; for several sources write a file of sources")
+    if size is None:
+        raise AirborneError("--size is missing: give the image size in pixels, such as 1920x1080")
+    path = files[0].resolve()
+    if court is not None:
+        net = court if court in ("men", "women") else _metres(court)
+        names, table = read_control_points(path, court_points(net)).cameras, {"court": {"file": str(path), "net": net}}
+    else:
+        named = tuple(item.partition("=")[0] for item in size.split(",") if "=" in item)
+        names, table = named or read_xypts(path, Given()).cameras, {"wand": {"file": str(path), "length_m": wand_m}}
+    cameras = [{"name": name, "size": list(own)} for name, own in _sizes(size, names).items()]
+    return sources_from({"camera": cameras, **table}, Path(), str(path))
+
+
+def _metres(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise AirborneError(f"--court {text}: expected men, women, or the net's height in metres") from None
 
 
 def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> None:
