@@ -47,7 +47,6 @@ FOR_ALL = {"", "errors"}  # the package's own name holds its version
 NOUNS = ("cameras", "video", "body")  # packages whose public names are values with a meaning, not arrays
 KERNELS = [
     "cameras/distortion.py",
-    "cameras/bundle/lenses.py",
     "cameras/bundle/loss.py",
     *sorted(f"geometry/{path.name}" for path in (SOURCE / "geometry").glob("[a-z]*.py")),
     "rendering/capsules.py",

@@ -204,7 +204,7 @@ def test_demo_runs_again_in_its_own_folder_and_spares_any_other(trial, short_run
     monkeypatch.setattr("airborne.examples.example_trial", lambda name: trial)
     shutil.copytree(short_run, tmp_path / "demo")
     assert in_process("demo", "-o", tmp_path / "demo", "--json") == 0
-    assert set(json.loads(capsys.readouterr().out)) == {"truth", "digitised"}
+    assert set(json.loads(capsys.readouterr().out)) == {"truth", "digitised", "agreement", "repeatability"}
     assert (tmp_path / "demo" / "report.html").stat().st_size > 10_000
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "motion.csv").write_text("mine")

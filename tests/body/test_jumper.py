@@ -15,6 +15,7 @@ from airborne.body.jumper import (
     PELVIS,
     R_HIP,
     R_KNEE,
+    R_WAIST,
     SHANK,
     SHORTS_END,
     SOCK_END,
@@ -138,11 +139,13 @@ def test_radii_stand_where_they_belong():
 
 def test_kinds_change_where_shorts_and_socks_end():
     out = np.empty(10)
-    shares(LENGTHS, out)
-    thighs, shanks = [4, 7], [5, 8]
+    shares(LENGTHS, RADII, out)
+    hips, thighs, shanks = [2, 3], [4, 7], [5, 8]
+    np.testing.assert_allclose((1 - out[hips]) * LENGTHS[WAIST], np.pi / 4 * RADII[R_WAIST])
     np.testing.assert_array_equal(out[thighs], LENGTHS[SHORTS_END])
     np.testing.assert_allclose(out[shanks], 1 - LENGTHS[SOCK_END])
-    np.testing.assert_array_equal(np.delete(out, thighs + shanks), 1)
+    np.testing.assert_array_equal(np.delete(out, hips + thighs + shanks), 1)
+    assert [(KINDS[a], KINDS[b]) for a, b, _ in CAPSULES[[0, 2]]] == [("shirt", "shirt"), ("shorts", "shirt")]
     assert [(KINDS[a], KINDS[b]) for a, b, _ in CAPSULES[4:7]] == [
         ("shorts", "skin"),
         ("skin", "socks"),

@@ -261,6 +261,12 @@ def test_lengths_of_legs_are_not_made_longer_by_noise():
     assert leg_lengths(leg_track(motion)) == pytest.approx([LEG_M, LEG_M], abs=0.025)
 
 
+def test_errors_that_a_whole_leg_shares_leave_its_length():
+    motion = motion_of(CLEAN, sd_m=0.03, rng=np.random.default_rng(11))
+    stiff = replace(motion_of(CLEAN), covariance=motion.covariance)
+    assert leg_lengths(leg_track(stiff)) == pytest.approx([LEG_M, LEG_M], abs=1e-3)
+
+
 def test_peak_speeds_and_drift_are_those_of_the_motion():
     jumper = CLEAN
     motion = motion_of(jumper)

@@ -27,6 +27,7 @@ WAIST, SHORTS_END, SOCK_END, TRUNK, PELVIS, THIGH, SHANK, FOOT, SOLE = range(9)
 R_CHEST, R_WAIST, R_HIP, R_KNEE, R_ANKLE, R_FOOT, CHEST_OUT, HIP_OUT = range(8)
 _HEEL = 0.35  # how far the heel reaches behind the ankle, over how far the ball lies before it
 BALL_HEIGHT_M = 0.03  # of the ball of the foot over the floor in standing
+_MEAN_REACH = np.pi / 4  # of a half disc below its middle, over its radius
 _TOE = 1.25  # how far the toes reach, likewise
 _ANYWHERE = (-np.inf, np.inf)
 _LEG_LIMITS_DEG = ((-125, 35), (-45, 25), (-40, 60), (0, 145), (-35, 50))  # hip x, y, z, knee, ankle, of the left leg
@@ -41,7 +42,7 @@ _KERNEL: dict[str, Any] = {"nogil": True, "error_model": "numpy", "cache": True}
 
 # the two kinds and the leg (0 trunk, 1 left, 2 right) of each capsule
 CAPSULES = np.array(
-    [(SHIRT, SHIRT, 0), (SHIRT, SHIRT, 0), (SHORTS, SHORTS, 0), (SHORTS, SHORTS, 0)]
+    [(SHIRT, SHIRT, 0), (SHIRT, SHIRT, 0), (SHORTS, SHIRT, 0), (SHORTS, SHIRT, 0)]
     + [(a, b, leg) for leg in (1, 2) for a, b in ((SHORTS, SKIN), (SKIN, SOCK), (SHOE, SHOE))],
     np.int64,
 )
@@ -116,8 +117,13 @@ def _place_leg(pose, lengths, radii, side, pelvis, points, ends, balls):
 
 
 @njit(**_KERNEL)
-def shares(lengths, out):
-    """Fill out (10,) with how far along its axis the first kind of each capsule reaches."""
+def shares(lengths, radii, out):
+    """Fill out (10,) with how far along its axis the first kind of each capsule reaches.
+
+    Shorts reach up to where the round end of the trunk hangs down to on the mean: which of pelvis and trunk is nearer
+    to a camera, as it turns out in leaning over, then moves no border.
+    """
     out[:] = 1
     for side in range(2):
+        out[2 + side] = 1 - _MEAN_REACH * radii[R_WAIST] / max(lengths[WAIST], 0.01)
         out[4 + 3 * side], out[5 + 3 * side] = lengths[SHORTS_END], 1 - lengths[SOCK_END]

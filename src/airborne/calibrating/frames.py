@@ -52,7 +52,7 @@ def framed(inputs: Inputs, adjusted: Adjusted, wrong: Sequence[str]) -> Framed:
     if table.frame == "start" or (table.frame == "auto" and inputs.given is not None and not inputs.points):
         return _by_start(inputs, adjusted, wrong)
     if table.frame == "auto" and inputs.points:
-        return Framed(said=f"as the {' and the '.join(inputs.points)} have it", stays=True)
+        return Framed(said=f"that of the {' and the '.join(inputs.points)}", stays=True)
     first = adjusted.rig.cameras[0]
     said = f"the origin is camera {first.name}, z is where it looks: give [world] for z up"
     return Framed(new_from_old=first.camera_from_world, said=said, held_camera=first.name)

@@ -17,6 +17,7 @@ _WINDOW_S = 0.25
 _QUIET_M_S = 0.15  # how fast hips and ankles may be
 _STRAIGHT = 0.98  # distance of hip and ankle, in lengths of the leg: a knee bent by no more than 20 degrees
 _LEG_SHARE, _LEG_SHARE_SD = 0.985, 0.01  # height of the hips over the ankles of one who stands, in lengths of the leg
+_SD_OF_MEDIAN_DEVIATION = 1.4826  # of normal noise
 _FLAT_SD_M = 0.005  # of the lowest place of an ankle, beyond its noise
 
 
@@ -43,15 +44,21 @@ def standing(rng: np.random.Generator, track: LegTrack, floor: NDArray[np.bool_]
 
 
 def leg_lengths(track: LegTrack) -> Array:
-    """Return thigh plus shank, left and right: (2,) [m], the noise of their ends taken out; NaN where never known."""
-    lengths = []
-    for a, b in (("hips", "knees"), ("knees", "ankles")):
-        ends = {"hips": track.hips, "knees": track.knees, "ankles": track.ankles}
-        squares = ((ends[a] - ends[b]) ** 2 - track.variances[a] - track.variances[b]).sum(axis=-1)
-        known = np.isfinite(squares).any(axis=0)
-        middle = np.array([np.nanmedian(squares[:, k]) if known[k] else np.nan for k in range(2)])
-        lengths.append(np.sqrt(np.maximum(middle, 0.0)))
-    return np.asarray(lengths[0] + lengths[1])
+    """Return thigh plus shank, left and right: (2,) [m], the noise of their ends taken out; NaN where never known.
+
+    Noise of variance s² an axis that a thigh's ends do not share makes a length l longer by s²/l on the mean, and
+    shows in it as that much variance. What it varies by is taken out, and not what the joints' covariances say: errors
+    that both ends share, as in a chain of constant lengths, leave it as it is.
+    """
+    lengths = np.zeros(2)
+    for a, b in ((track.hips, track.knees), (track.knees, track.ankles)):
+        found = np.linalg.norm(a - b, axis=-1)
+        for k in range(2):
+            known = found[np.isfinite(found[:, k]), k]
+            middle = float(np.median(known)) if len(known) else np.nan
+            deviation = _SD_OF_MEDIAN_DEVIATION * float(np.median(np.abs(known - middle))) if len(known) else np.nan
+            lengths[k] += max(middle - deviation**2 / middle, 0.0) if middle else 0.0
+    return lengths
 
 
 def _window(track: LegTrack) -> int:

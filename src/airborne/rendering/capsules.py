@@ -106,14 +106,16 @@ def outline(disc_a, disc_b, y_first, x, pieces, tangents):
 
 
 @njit(**EXACT)
-def _motion(disc_a, disc_b, tangents, piece, y, outward, dx):
-    """Say how an end of a span moves: dx (6,), by (x, y, radius) of disc a, then of disc b.
+def _motion(discs, tangents, who, piece, y, outward, dx):
+    """Say how an end of a span of capsule `who` moves: dx (6,), by (x, y, radius) of disc a, then of disc b.
 
     Over the row's own height, from y - 0.5 to y + 0.5, the outline runs over a stretch (x0, x1) that is returned: a
     level edge gains and loses pixels all along it.
     """
     if piece >= 2:
-        ax, ay, by, slope, nx, ny = tangents[piece - 2]
+        k = piece - 2
+        ax, ay, by = tangents[who, k, 0], tangents[who, k, 1], tangents[who, k, 2]
+        slope, nx, ny = tangents[who, k, 3], tangents[who, k, 4], tangents[who, k, 5]
         top, bottom = max(y - 0.5, min(ay, by)), min(y + 0.5, max(ay, by))
         run = slope * (bottom - top)
         t = min(max((0.5 * (top + bottom) - ay) / (by - ay), 0.0), 1.0) if abs(by - ay) > 1e-9 else 0.5
@@ -121,14 +123,14 @@ def _motion(disc_a, disc_b, tangents, piece, y, outward, dx):
         dx[0], dx[1], dx[2] = 1 - t, -run * (1 - t), along * (1 - t)
         dx[3], dx[4], dx[5] = t, -run * t, along * t
         return ax + slope * (top - ay), ax + slope * (bottom - ay)
-    disc, k = (disc_a, 0) if piece == 0 else (disc_b, 3)
-    r = disc[2]
-    top, bottom = min(max(y - 0.5 - disc[1], -r), r), min(max(y + 0.5 - disc[1], -r), r)
+    k = 3 * piece
+    cx, cy, r = discs[who, piece, 0], discs[who, piece, 1], discs[who, piece, 2]
+    top, bottom = min(max(y - 0.5 - cy, -r), r), min(max(y + 0.5 - cy, -r), r)
     h_top, h_bottom = np.sqrt(max(r * r - top * top, 0.0)), np.sqrt(max(r * r - bottom * bottom, 0.0))
     dx[:] = 0
     dx[k], dx[k + 1] = 1, -outward * (h_bottom - h_top)
     dx[k + 2] = outward * r * (np.arcsin(bottom / r) - np.arcsin(top / r))
-    return disc[0] + outward * h_top, disc[0] + outward * h_bottom
+    return cx + outward * h_top, cx + outward * h_bottom
 
 
 @njit(**EXACT)
@@ -185,6 +187,7 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
                 continue
             cut, weight, split = _border(discs[i], share[i], y, 0.5 * (a + b) + ox)
             cut -= ox
+            border = cut, weight, split
             map_0, map_1 = sums[kinds[i, 0], row], sums[kinds[i, 1], row]
             at, from_k = a, -1  # walk through what nearer capsules have left free
             for k in range(taken + 1):
@@ -197,16 +200,14 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
                     if with_gradient:
                         who, side = (i, 0) if from_k < 0 else (taken_by[from_k, 1], 1)
                         if at > least:
-                            edge = pieces[who, side, row], y, side, at, ox
-                            pull = -1.0, _at_edge_of(contrast, kinds[i], at, cut, weight, split)
-                            maps = map_0, map_1, cut, weight, split
-                            _pull(discs[who], tangents[who], edge, maps, pull, dx, gradient[who], curvature[who])
+                            edge = who, pieces[who, side, row], y, side, at, ox
+                            pull = -1.0, _at_edge_of(contrast, kinds[i, 0], kinds[i, 1], at, border)
+                            _pull(discs, tangents, edge, map_0, map_1, border, pull, dx, gradient, curvature)
                         who, side = (i, 1) if is_open else (taken_by[k, 0], 0)
                         if end < most:
-                            edge = pieces[who, side, row], y, side, end, ox
-                            pull = 1.0, _at_edge_of(contrast, kinds[i], end, cut, weight, split)
-                            maps = map_0, map_1, cut, weight, split
-                            _pull(discs[who], tangents[who], edge, maps, pull, dx, gradient[who], curvature[who])
+                            edge = who, pieces[who, side, row], y, side, end, ox
+                            pull = 1.0, _at_edge_of(contrast, kinds[i, 0], kinds[i, 1], end, border)
+                            _pull(discs, tangents, edge, map_0, map_1, border, pull, dx, gradient, curvature)
                 if is_open:
                     break
                 at, from_k = max(at, taken_x[k, 1]), k
@@ -270,23 +271,24 @@ def _at_edge(map_0, map_1, edge, cut, weight, split):
 
 
 @njit(**EXACT)
-def _at_edge_of(contrast, kinds, edge, cut, weight, split):
+def _at_edge_of(contrast, kind_0, kind_1, edge, border):
     """Read the contrast of the map that holds at an edge of a span."""
+    cut, weight, split = border
     if split == 0:
-        return weight * contrast[kinds[0]] + (1 - weight) * contrast[kinds[1]]
-    return contrast[kinds[0]] if (edge < cut) == (split > 0) else contrast[kinds[1]]
+        return weight * contrast[kind_0] + (1 - weight) * contrast[kind_1]
+    return contrast[kind_0] if (edge < cut) == (split > 0) else contrast[kind_1]
 
 
 @njit(**EXACT)
-def _pull(disc, tangents, edge, maps, pull, dx, gradient, curvature):
-    """Add what the end of a span gains when its discs move: `pull` is its sign and the contrast there.
+def _pull(discs, tangents, edge, map_0, map_1, border, pull, dx, gradient, curvature):
+    """Add what the end of a span gains when its capsule's discs move: `pull` is its sign and the contrast there.
 
     A level edge gains all along the stretch that it runs over within the row.
     """
-    piece, y, side, at, ox = edge
-    map_0, map_1, cut, weight, split = maps
+    who, piece, y, side, at, ox = edge
+    cut, weight, split = border
     sign, contrast = pull
-    x0, x1 = _motion(disc[0], disc[1], tangents, piece, y, 2.0 * side - 1.0, dx)
+    x0, x1 = _motion(discs, tangents, who, piece, y, 2.0 * side - 1.0, dx)
     last = np.float32(len(map_0) - 2.0)
     left = min(max(np.float32(min(x0, x1)) - ox, np.float32(0)), last)
     right = min(max(np.float32(max(x0, x1)) - ox, np.float32(0)), last)
@@ -299,10 +301,11 @@ def _pull(disc, tangents, edge, maps, pull, dx, gradient, curvature):
         value = sign * _at_edge(map_0, map_1, at, cut, weight, split)
     length = np.sqrt((dx[0] + dx[3]) ** 2 + (dx[1] + dx[4]) ** 2)
     facing = contrast / max(length, 1e-6)
-    for p in range(6):
-        gradient[p] += value * dx[p]
-        for q in range(p + 1):
-            curvature[p, q] += facing * dx[p] * dx[q]
+    first, last_p = (0, 6) if piece >= 2 else (3 * piece, 3 * piece + 3)
+    for p in range(first, last_p):
+        gradient[who, p] += value * dx[p]
+        for q in range(first, p + 1):
+            curvature[who, p, q] += facing * dx[p] * dx[q]
 
 
 @njit(**EXACT)

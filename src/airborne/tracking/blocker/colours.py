@@ -26,6 +26,9 @@ _LEAST_USUAL = 0.3  # [nat]
 _IN_SIGHT = (0.1, 0.4)  # the most that a kind is hidden in the view that sees it best, and in the next
 _LEAST_PX = 20  # of a kind in a view to judge it by
 _ROUNDS = 6
+_BRIGHTNESS_SD = 0.10  # of the logarithm of sRGB values: about a fifth more or less light, as a surface turns
+_LIGHTNESS = np.linspace(-1.5, 1.5, 15)  # in these; so many that no bin between is left out
+_LIGHTS, _LIGHT_WEIGHTS = np.exp(_BRIGHTNESS_SD * _LIGHTNESS), np.exp(-(_LIGHTNESS**2) / 2)
 _THICKNESSES = slice(N_DOF + N_LENGTHS, N_DOF + N_LENGTHS + 6)  # the radii among a state
 
 
@@ -72,8 +75,9 @@ def learned(
 ) -> Colours:
     """Learn from one player, drawn in each region: used (cameras, 5) says which camera's view of which kind counts.
 
-    What a kind's pixels share with the background, or with the kind above or below it on the body, goes to the one that
-    has more of it.
+    A colour counts as it was seen and, less, brighter and darker: a surface turns in the light, and one frame shows
+    few of its pixels. What a kind's pixels share with the background, or with the kind above or below it on the body,
+    goes to the one that has more of it.
     """
     counts = np.zeros((len(KINDS), BINS, BINS, BINS), np.float32)
     background = np.zeros((n_cameras, BINS, BINS, BINS), np.float32)
@@ -83,7 +87,7 @@ def learned(
             if used[region.view, kind]:
                 count_colours(region.rgb, core == kind, 1, counts[kind])
     background /= np.maximum(background.sum(axis=(1, 2, 3), keepdims=True), 1)
-    raw = _normalised(counts.reshape(len(KINDS), -1))
+    raw = _normalised(_in_all_lights(counts).reshape(len(KINDS), -1))
     around_all = background.sum(axis=0).ravel() / max(len(regions), 1)
     kinds = raw
     for _ in range(_ROUNDS):
@@ -144,6 +148,16 @@ def _mean_evidence(part: NDArray[np.int8], region: Region, colours: Colours) -> 
         if np.count_nonzero(chosen) > _LEAST_PX:
             found[kind] = table.evidence[cells[chosen], kind].mean()
     return found, table.usual
+
+
+def _in_all_lights(counts: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Spread counts (k, 32, 32, 32) of colours over what they are in more and in less light."""
+    lit = np.zeros_like(counts)
+    kind, *cell = np.nonzero(counts)
+    middle, seen = np.array(cell) + 0.5, counts[kind, *cell]
+    for light, weight in zip(_LIGHTS, _LIGHT_WEIGHTS, strict=True):
+        np.add.at(lit, (kind, *np.minimum(light * middle, BINS - 1).astype(int)), weight * seen)
+    return lit
 
 
 def _normalised(counts: Array) -> Array:

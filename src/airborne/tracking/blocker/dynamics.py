@@ -21,12 +21,14 @@ N_FILTERED = N_FREE + N_DOF
 assert {WAIST, SHORTS_END, SOCK_END, TRUNK} == set(range(N_SLIDING)), "what slides comes first among the lengths"
 
 GRAVITY_M_S2 = 9.81
-_ACCELERATION_SD = np.array(  # [m/s2], [rad/s2]
+_LASTING = 2.0  # accelerations last some frames: white noise moves as far with the root of how many times their size
+_ACCELERATION_SD = _LASTING * np.array(  # [m/s2], [rad/s2]
     [30.0] * 3 + [150.0] * 3 + [80.0, 60.0] + [150.0, 80.0, 80.0, 200.0, 200.0] * 2
 )
-_FLYING_SD = 8.0  # of the hips' acceleration in the air, about free fall: legs and arms move about the centre of mass
+# of the hips in the air, about free fall: legs and arms move about the centre of mass
+_FLYING_SD = _LASTING * 8.0
 _FIRST_SPEED_SD = np.array([1.0] * 3 + [2.0] * 15)  # [m/s], [rad/s]
-_SLIDING_SD = np.array([0.05, 0.10, 0.03, 0.05])  # in a square root of a second: [m], shares, shares, [m]
+_SLIDING_SD = np.array([0.02, 0.20, 0.03, 0.05])  # in a square root of a second: [m], shares, shares, [m]
 _SLIDING_BACK = 1.2  # share of the way back to the first frame's values in a second
 
 

@@ -18,16 +18,9 @@ _STEP = 1e-4  # [m, rad] of the differences that say how points and discs move
 @njit(**EXACT)
 def placed(state, points, ends, balls, share):
     """Place a state: fill points (9, 3) [m], the capsules' ends (10, 2, 3) and radii (10, 2) [m], and shares (10,)."""
-    lengths = state[N_DOF : N_DOF + N_LENGTHS]
-    place(state[:N_DOF], lengths, state[N_DOF + N_LENGTHS :], points, ends, balls)
-    shares(lengths, share)
-
-
-@njit(**EXACT)
-def _add_square(b, out):
-    for i in range(len(b)):
-        for j in range(len(b)):
-            out[i, j] += b[i] * b[j]
+    lengths, radii = state[N_DOF : N_DOF + N_LENGTHS], state[N_DOF + N_LENGTHS :]
+    place(state[:N_DOF], lengths, radii, points, ends, balls)
+    shares(lengths, radii, share)
 
 
 @njit(**EXACT)
@@ -52,6 +45,7 @@ def gathered(state, n_free, cameras, kinds, maps, others, work, owned, equations
     depth, moved_depth = np.empty(all_n), np.empty(n)
     m = all_n if n_free > 0 else 0
     g, H, J = np.empty((m, 7)), np.empty((m, 7, 7)), np.empty((n, 7, n_free))
+    HJ, beside = np.empty((n, 7, n_free)), np.empty((2 * n, n_free))
     moved_points = np.empty((N_POINTS, 3))
     moved_ends, moved_balls = np.empty((n_free, n, 2, 3)), np.empty((n_free, n, 2))
     moved_share = np.empty((n_free, n))
@@ -79,9 +73,15 @@ def gathered(state, n_free, cameras, kinds, maps, others, work, owned, equations
                 J[i, 6, k] = (moved_share[k, i] - share[i]) / _STEP
         if n_free > 0:
             for i in range(n):
-                gradient += J[i].T @ g[i]
-                curvature += J[i].T @ (H[i] @ J[i])
                 px = cameras[v, 3, 0] / max(depth[i], 0.1)
+                for p in range(7):
+                    HJ[i, p] = 0
+                    for q in range(7):
+                        HJ[i, p] += H[i, p, q] * J[i, q]
                 for p in range(2):
-                    _add_square(J[i].T @ (px * (H[i, :, p] + H[i, :, p + 3])), spread)
+                    beside[2 * i + p] = px * (HJ[i, p] + HJ[i, p + 3])
+            flat = J.reshape(7 * n, n_free)
+            gradient += g[:n].reshape(7 * n) @ flat
+            curvature += flat.T @ HJ.reshape(7 * n, n_free)
+            spread += beside.T @ beside
     return total

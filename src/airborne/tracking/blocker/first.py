@@ -22,9 +22,9 @@ Array = NDArray[np.floating]
 
 STATURE_PER_LEG = 1 / 0.491  # thigh and shank are this share of the stature: 0.245 and 0.246 (Drillis and Contini)
 # of a stature of 1 m: waist, (shorts, socks: shares), trunk, pelvis, thigh, shank, foot, sole
-_LENGTHS = np.array([0.054, 0.5, 0.35, 0.24, 0.065, 0.245, 0.246, 0.075, 0.035])
+_LENGTHS = np.array([0.094, 0.5, 0.35, 0.24, 0.065, 0.245, 0.246, 0.075, 0.035])
 _RADII = np.array([0.054, 0.051, 0.048, 0.031, 0.0226, 0.0242, 0.043, 0.027])
-_LENGTH_SD = np.array([0.03, 0.15, 0.10, 0.05, 0.004, 0.015, 0.015, 0.01, 0.01])  # [m], shares
+_LENGTH_SD = np.array([0.06, 0.15, 0.10, 0.05, 0.004, 0.015, 0.015, 0.01, 0.01])  # [m], shares
 _RADIUS_SD = 0.10  # of the radius
 _POSE_SD = np.array([0.1] * 3 + [0.5] * 5 + [0.5, 0.5, 0.6, 0.5, 0.5] * 2)  # beside the anchors [m, rad]
 ANCHOR_SD_M = np.array([0.02] * 6 + [0.03] * 2 + [0.04])  # of joints set by hand

@@ -19,8 +19,8 @@ SHAPE_SD_M = 0.050  # how far a capsule's outline may lie beside the player's
 SLOPE = 0.25  # share of its contrast by which evidence falls across an outline in a pixel of the maps
 _LIMIT_SD_RAD = 0.05  # how firmly joints keep within their limits
 _FLOOR_SD_M = 0.01  # and feet above the floor
-_SETTLED_NATS = 0.02
-_MOST_DAMPING = 20.0  # steps that short change nothing
+_SETTLED_NATS = 0.1
+_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 0.1, 0.03, 2.0  # of a first step; steps shorter than the last change nothing
 _ROBUST = 4.0  # squared sds at which an anchor's pull is halved
 _BALLS = np.array([6, 7])  # rows of the points
 # how people hold themselves, weakly: upright, legs under the hips, both bent alike
@@ -60,7 +60,7 @@ class Fit:
 def fit(state: Array, prior: Prior, found: Seen, others: tuple[Array, Array], *, most_steps: int = 10) -> Fit:
     """Move the first len(prior.mean) numbers of a state to the nearest maximum of evidence and prior."""
     best = _evaluated(state, prior, found, others)
-    damping = 1.0
+    damping = _DAMPING
     for _ in range(most_steps):
         A, b = best[1], best[2]
         step = np.linalg.solve(A + damping * np.diag(np.diag(A)), b)
@@ -69,7 +69,7 @@ def fit(state: Array, prior: Prior, found: Seen, others: tuple[Array, Array], *,
         tried = _evaluated(moved, prior, found, others)
         gain = tried[0].total - best[0].total
         if gain > 0:
-            best, damping = tried, max(damping / 4, 0.03)
+            best, damping = tried, max(damping / 4, _LEAST_DAMPING)
         else:
             damping = max(damping * 4, 0.25)
         if 0 < gain < _SETTLED_NATS or damping > _MOST_DAMPING:

@@ -77,11 +77,11 @@ def regions_round(frames: Frames, hips: Array) -> tuple[Region, ...]:
 
 
 def _region(number: int, view: View, hips: Array) -> Region | None:
-    centre = hips - [0, 0, BELOW_HIPS_M]
-    px, scale = view.camera.px_from_world(centre), px_per_m(view.camera, centre)
-    if not np.isfinite(px).all():
+    x, y, depth_m = view.camera.P @ [*(hips - [0, 0, BELOW_HIPS_M]), 1]
+    if not depth_m > 0:
         return None
-    half = scale * np.array([HALF_WIDTH_M, HALF_HEIGHT_M])
+    px = np.array([x, y]) / depth_m
+    half = view.camera.K[0, 0] / depth_m * np.array([HALF_WIDTH_M, HALF_HEIGHT_M])
     low = np.maximum(np.floor(px - half), 0).astype(int)
     high = np.minimum(np.ceil(px + half), view.camera.size).astype(int)
     if (high - low).min() < LEAST_SIDE_PX:
@@ -118,16 +118,19 @@ def seen(regions: Sequence[Region], tables: Sequence[Table], scale: Scale) -> Se
         running_sums(smoothed, filled)
         sums[i, :k, :rows, : columns + 1] = filled
         sums[i, :k, :rows, columns + 1 :] = filled[:, :, -1:]
-        camera = region.full.resampled(scale=(r, r), offset=((r - 1) / 2, (r - 1) / 2), size=(columns, rows))
-        cameras[i] = packed(camera)
+        x0, y0, _, _ = region.box
+        cameras[i] = packed(region.camera, r, (x0 + (r - 1) / 2, y0 + (r - 1) / 2))
     contrast = np.array([[*table.contrast, 0.0] for table in tables])
     return Seen(scale, cameras, sums, contrast)
 
 
-def packed(camera: Camera) -> Array:
-    """Pack a camera for the capsule kernels: (4, 4)."""
+def packed(camera: Camera, reduction: int = 1, offset: tuple[float, float] = (0.0, 0.0)) -> Array:
+    """Pack a camera for the capsule kernels: (4, 4); pixel (i, j) is the picture's at reduction (i, j) + offset."""
     found = np.zeros((4, 4))
-    found[:3], found[3, 0] = camera.P, (camera.K[0, 0] + camera.K[1, 1]) / 2
+    found[:3] = camera.P / reduction
+    found[:2] -= np.outer(offset, found[2])
+    found[2] *= reduction
+    found[3, 0] = (camera.K[0, 0] + camera.K[1, 1]) / (2 * reduction)
     return found
 
 
