@@ -84,7 +84,7 @@ def off_m(rig):
 def test_the_court_alone_gives_cameras_in_its_world(hall):
     found = calibrated(hall, COURT)
     assert off_m(found.rig) < 0.025
-    assert found.world == "as the court have it"
+    assert found.world == "that of the court"
     assert to_dict(found)["findings"] == []
 
 
