@@ -79,11 +79,34 @@ def test_drift_is_kept_in_millionths(trial):
     assert abs(float(source.on_clock(100)) - (100 * (1 + 25e-6) + 0.012346)) < EXACT
 
 
-def test_cameras_in_an_inline_list_are_left_to_the_user(trial):
-    text = trial.read_text()
-    trial.write_text(text.replace("[[camera]]", "[[ 'camera' ]]"))
+LISTED = """name = "my throw"
+camera = [
+    { name = "cam1", video = "cam1.mp4" },  # the clock
+    { name = "cam2", video = "cam2.mp4", offset_s = 0.5, fields = "top-first" },
+    { name = "cam3", video = "cam3.mp4" },
+]
+calibration = { file = "calib.toml" }
+"""
+
+
+def test_cameras_in_a_list_get_their_offsets_in_their_entries(tmp_path):
+    path = tmp_path / "trial.toml"
+    path.write_text(LISTED)
+    write_offsets(path, offsets((0, -0.004, 0.007)))
+    found = tomllib.loads(path.read_text())
+    assert [camera.get("offset_s") for camera in found["camera"]] == [None, -0.004, 0.007]
+    assert [camera.get("offset_sd_s") for camera in found["camera"]] == [None, 0.001, 0.002]
+    assert found["camera"][1]["fields"] == "top-first"
+    assert "# the clock" in path.read_text()
+    write_offsets(path, offsets((0, 0.001, 0.002)))
+    assert [camera.get("offset_s") for camera in tomllib.loads(path.read_text())["camera"]] == [None, 0.001, 0.002]
+
+
+def test_cameras_written_in_another_way_are_left_to_the_user(tmp_path):
+    path = tmp_path / "trial.toml"
+    path.write_text(LISTED.replace("camera = [", "'camera' = ["))
     with pytest.raises(TrialError, match="write the offsets by hand"):
-        write_offsets(trial, offsets((0, 0, 0)))
+        write_offsets(path, offsets((0, 0, 0)))
 
 
 def test_whole_pictures_are_rounded_to_and_doubts_told():

@@ -32,6 +32,7 @@ Progress = Callable[[int, int | None], None]
 
 _FEWEST = 8  # moments at which the body must be tracked to tell lags
 _DECIMALS = 6  # of seconds, as written
+_KEYS = "offset_s|offset_sd_s|drift_ppm"
 
 
 def synchronise(
@@ -129,28 +130,54 @@ def write_offsets(path: Path, found: Offsets) -> None:
 
     Raises TrialError where the cameras' tables are not found in the file.
     """
-    lines = path.read_text(encoding="utf-8-sig").splitlines()
-    heads = [k for k, line in enumerate(lines) if re.match(r"\s*\[\[\s*camera\s*\]\]", line)]
-    if len(heads) != len(found.names):
+    text = path.read_text(encoding="utf-8-sig")
+    written = _in_tables(text, found) or _in_list(text, found)
+    if written is None:
         raise TrialError(f"{path.name}: its cameras are not written as [[camera]] tables; write the offsets by hand")
-    for number in reversed(range(len(heads))):
-        end = next((k for k in range(heads[number] + 1, len(lines)) if lines[k].lstrip().startswith("[")), len(lines))
-        lines[heads[number] : end] = _with_clock(lines[heads[number] : end], found, number)
     beside = path.with_name(path.name + ".part")
-    beside.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    beside.write_text(written, encoding="utf-8")
     beside.replace(path)
 
 
-def _with_clock(table: Sequence[str], found: Offsets, number: int) -> list[str]:
-    """Set the lines of one camera's table that say when it took its pictures."""
-    wanted = {"offset_s": round(float(found.offset_s[number]), _DECIMALS) + 0.0}
-    wanted["offset_sd_s"] = round(float(found.offset_sd_s[number]), _DECIMALS)
-    wanted["drift_ppm"] = round(1e6 * float(found.drift[number]), 3)
-    kept = [line for line in table if not re.match(r"\s*(offset_s|offset_sd_s|drift_ppm)\s*=", line)]
-    last = max(k for k, line in enumerate(kept) if line.strip())
+def _in_tables(text: str, found: Offsets) -> str | None:
+    """Set the lines of [[camera]] tables; None where there are not as many as cameras."""
+    lines = text.splitlines()
+    heads = [k for k, line in enumerate(lines) if re.match(r"\s*\[\[\s*camera\s*\]\]", line)]
+    if len(heads) != len(found.names):
+        return None
+    for number in reversed(range(len(heads))):
+        end = next((k for k in range(heads[number] + 1, len(lines)) if lines[k].lstrip().startswith("[")), len(lines))
+        kept = [line for line in lines[heads[number] : end] if not re.match(rf"\s*({_KEYS})\s*=", line)]
+        last = max(k for k, line in enumerate(kept) if line.strip())
+        lines[heads[number] : end] = [*kept[: last + 1], *_clock(found, number), *kept[last + 1 :]]
+    return "\n".join(lines) + "\n"
+
+
+def _in_list(text: str, found: Offsets) -> str | None:
+    """Set the entries of `camera = [{ ... }, ...]`; None where there are not as many as cameras."""
+    begun = re.search(r"^\s*camera\s*=\s*\[", text, re.MULTILINE)
+    entries = [] if begun is None else list(re.finditer(r"\{[^{}]*\}", text[begun.end() :]))[: len(found.names)]
+    if begun is None or len(entries) != len(found.names):
+        return None
+    names = [re.search(r"\bname\s*=\s*[\"']([^\"']*)", entry.group()) for entry in entries]
+    if [name and name.group(1) for name in names] != list(found.names):
+        return None
+    for number, entry in reversed(list(enumerate(entries))):
+        kept = re.sub(rf",\s*({_KEYS})\s*=\s*[^,}}]*", "", entry.group()[:-1]).rstrip()
+        start, end = (begun.end() + each for each in entry.span())
+        text = text[:start] + ", ".join([kept, *_clock(found, number)]) + " }" + text[end:]
+    return text
+
+
+def _clock(found: Offsets, number: int) -> list[str]:
+    """Return the entries that say when one camera took its pictures; none for a first camera in time."""
+    wanted = {
+        "offset_s": round(float(found.offset_s[number]), _DECIMALS) + 0.0,
+        "offset_sd_s": round(float(found.offset_sd_s[number]), _DECIMALS),
+        "drift_ppm": round(1e6 * float(found.drift[number]), 3),
+    }
     is_needed = number > 0 or any(wanted.values())
-    new = [f"{key} = {value!r}" for key, value in wanted.items() if is_needed and (value or key == "offset_s")]
-    return [*kept[: last + 1], *new, *kept[last + 1 :]]
+    return [f"{key} = {value!r}" for key, value in wanted.items() if is_needed and (value or key == "offset_s")]
 
 
 def _refined(trial: Trial, found: Offsets, progress: Progress | None) -> Offsets:

@@ -26,9 +26,9 @@ _LEAST_USUAL = 0.3  # [nat]
 _IN_SIGHT = (0.1, 0.4)  # the most that a kind is hidden in the view that sees it best, and in the next
 _LEAST_PX = 20  # of a kind in a view to judge it by
 _ROUNDS = 6
-_BRIGHTNESS_SD = 0.10  # of the logarithm of sRGB values: about a fifth more or less light, as a surface turns
+BRIGHTNESS_SD = 0.10  # of the logarithm of sRGB values: about a fifth more or less light, as a surface turns
 _LIGHTNESS = np.linspace(-1.5, 1.5, 15)  # in these; so many that no bin between is left out
-_LIGHTS, _LIGHT_WEIGHTS = np.exp(_BRIGHTNESS_SD * _LIGHTNESS), np.exp(-(_LIGHTNESS**2) / 2)
+_LIGHTS, _LIGHT_WEIGHTS = np.exp(BRIGHTNESS_SD * _LIGHTNESS), np.exp(-(_LIGHTNESS**2) / 2)
 _THICKNESSES = slice(N_DOF + N_LENGTHS, N_DOF + N_LENGTHS + 6)  # the radii among a state
 
 
