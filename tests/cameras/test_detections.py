@@ -223,3 +223,8 @@ def test_less_sure_detections_are_not_seen():
     np.testing.assert_array_equal(np.isfinite(sure.px).all(axis=-1), is_kept)
     np.testing.assert_array_equal(sure.visibility[is_kept], given.visibility[is_kept])
     assert not sure.visibility[~is_kept].any()
+
+
+def test_an_empty_folder_holds_no_detections(tmp_path):
+    with pytest.raises(CalibrationError, match="holds no detections"):
+        read_detections(tmp_path, ())

@@ -147,6 +147,10 @@ def _matched(where: str, cameras: Sequence[str], keys: Sequence[str], named: Map
 
 def _detections(where: str, tables: Mapping[str, Array], notes: tuple[str, ...] = ()) -> Detections:
     """Put the cameras' tables (frames, points, 3) together; shorter ones end unseen."""
+    if not tables:
+        raise CalibrationError(
+            f"{where} holds no detections; expected a folder of OpenPose JSON for each camera, or .npz"
+        )
     n_points = {}
     for camera, table in tables.items():
         if table.ndim != 3 or table.shape[2] != 3 or not np.issubdtype(table.dtype, np.number) or not table.size:
