@@ -23,8 +23,8 @@ from airborne.tracking.lateness import InTime, in_time
 from airborne.tracking.methods import sampled
 from airborne.tracking.refined import Refined
 from airborne.trial import Trial
-from airborne.video import VideoSource, inspect
-from airborne.video.sync import Offsets, offsets_by_flash, offsets_by_motion, offsets_by_sound
+from airborne.video import Recording, VideoSource, inspect
+from airborne.video.sync import Offsets, counting, offsets_by_flash, offsets_by_motion, offsets_by_sound
 
 Array = NDArray[np.floating]
 By = Literal["auto", "flash", "sound", "motion", "tracking"]
@@ -80,13 +80,13 @@ def offsets_by_tracking(
     """
     if trial.has_players:
         raise TrialError("tracking tells the lags of one body's cameras; of players use motion, flash or sound")
-    trial = trial.model_copy(update={"track": trial.track.model_copy(update={"method": "refined"})})
-    done = 0
+    method = {"track": trial.track.model_copy(update={"method": "refined"})}
+    trial = _with_offsets(trial.model_copy(update=method), start_s)
+    recording, _ = open_trial(trial)
+    start, told = first_pose(trial, trial.model(), recording.rig).pose, counting(progress)
 
     def look(lag_s: Array, drift: Array) -> Sightings:
-        nonlocal done
-        seen, done = _sightings(with_offsets(trial, start_s[0] + lag_s, drift), progress, done)
-        return seen
+        return _sightings(trial, _at(recording, start_s[0] + lag_s, drift), start, told)
 
     lags = find_lags(look, start_s - start_s[0], with_drift=with_drift)
     names = tuple(camera.name for camera in trial.camera)
@@ -95,15 +95,6 @@ def offsets_by_tracking(
         raise TrialError(f"{', '.join(unknown)}: never sees the tracked body move; synchronise by flash or sound")
     how = "by tracking: every camera's pictures against the body as all of them see it"
     return Offsets(names, start_s[0] + lags.lag_s, lags.sd_s, lags.drift, lags.drift_sd, how)
-
-
-def with_offsets(trial: Trial, offset_s: Array, drift: Array) -> Trial:
-    """Return a trial whose cameras have these offsets (c,) [s] and drifts (c,)."""
-    changed = [
-        camera.model_copy(update={"offset_s": round(float(offset), 9), "drift_ppm": round(1e6 * float(rate), 6)})
-        for camera, offset, rate in zip(trial.camera, offset_s, drift, strict=True)
-    ]
-    return trial.model_copy(update={"camera": changed})
 
 
 def in_whole_pictures(found: Offsets, sources: Sequence[VideoSource]) -> Offsets:
@@ -192,12 +183,26 @@ def _refined(trial: Trial, found: Offsets, progress: Progress | None) -> Offsets
     return better
 
 
-def _sightings(trial: Trial, progress: Progress | None, done: int) -> tuple[Sightings, int]:
-    """Track a trial and gather what every camera alone says; frames count on from `done`."""
-    recording, _ = open_trial(trial)
-    model = trial.model()
-    start = first_pose(trial, model, recording.rig).pose
-    names = recording.rig.names
+def _with_offsets(trial: Trial, offset_s: Array) -> Trial:
+    """Return a trial whose cameras have these offsets (c,) [s] and no drift."""
+    pairs = zip(trial.camera, offset_s, strict=True)
+    cameras = [camera.model_copy(update={"offset_s": float(s), "drift_ppm": 0.0}) for camera, s in pairs]
+    return trial.model_copy(update={"camera": cameras})
+
+
+def _at(recording: Recording, offset_s: Array, drift: Array) -> Recording:
+    """Return a recording whose cameras have these offsets (c,) [s] and drifts (c,)."""
+    rows = zip(recording.sources, offset_s, drift, strict=True)
+    timed = [
+        replace(source, offset_s=round(float(offset), 9), drift_ppm=round(1e6 * float(rate), 6))
+        for source, offset, rate in rows
+    ]
+    return replace(recording, sources=tuple(timed))
+
+
+def _sightings(trial: Trial, recording: Recording, start: Pose, told: Callable[[], None]) -> Sightings:
+    """Track a recording and gather what every camera alone says; `told` is called after every frame."""
+    model, names = trial.model(), recording.rig.names
     times: list[float] = []
     poses: list[Pose] = []
     equations: list[dict[str, tuple[Array, Array]]] = []
@@ -214,9 +219,7 @@ def _sightings(trial: Trial, progress: Progress | None, done: int) -> tuple[Sigh
             times.append(float(frames.time_s))
             poses.append(estimate.pose)
             equations.append(refined.by_view(state.inner, in_time(frames, state.past), estimate.pose))
-        done += 1
-        if progress is not None:
-            progress(done, None)
+        told()
     if refined is None:
         raise past_the_end(trial)
     if len(times) < _FEWEST:
@@ -224,7 +227,7 @@ def _sightings(trial: Trial, progress: Progress | None, done: int) -> tuple[Sigh
             f"{trial.name}: the body was tracked at {len(times)} moments, {_FEWEST} at least tell the lags; "
             "check [start], or synchronise by motion, flash or sound first"
         )
-    return _laid_out(np.array(times), poses, equations, names), done
+    return _laid_out(np.array(times), poses, equations, names)
 
 
 def _laid_out(

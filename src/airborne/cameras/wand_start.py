@@ -21,6 +21,7 @@ from airborne.cameras.diagnosis.pictures import mirrored_picture
 from airborne.cameras.two_views import Epipolar, RelativePlace, epipolar, relative_place
 from airborne.cameras.wand import WandTracks
 from airborne.errors import CalibrationError
+from airborne.geometry.scatter import robust_sd
 
 Array = NDArray[np.floating]
 
@@ -191,7 +192,7 @@ def _scale(points: Array, seen: NDArray[np.bool_], tracks: WandTracks) -> tuple[
     logs = logs[np.isfinite(logs)]
     if not len(logs):
         return 1.0, np.inf
-    return float(np.exp(np.median(logs))), float(1.4826 * np.median(np.abs(logs - np.median(logs))))
+    return float(np.exp(np.median(logs))), robust_sd(logs)
 
 
 def _without_strays(px: Array, pairs: Sequence[_Pair]) -> Array:

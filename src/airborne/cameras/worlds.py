@@ -15,6 +15,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras.camera import Rig
 from airborne.errors import CalibrationError
+from airborne.geometry.scatter import SD_OF_MEDIAN_DEVIATION
 
 Array = NDArray[np.floating]
 
@@ -23,7 +24,6 @@ NEAREST_M = 0.05  # points that are to fix an axis stand further apart than this
 LEAST_ANGLE = np.radians(5)  # between the axis and the third point
 FEWEST_TIMES = 6  # of a throw
 SHORTEST_FALL_M = 0.1  # a throw whose path is bent less says little about down
-MAD = 1.4826  # median of absolute deviations -> standard deviation
 
 
 def frame_of_three_points(origin: Array, along_x: Array, in_xy: Array) -> RigidTransform:
@@ -162,7 +162,7 @@ def _common_acceleration(flights: Sequence[tuple[Array, Array]]) -> tuple[Array,
     A, b = np.concatenate(rows), np.concatenate(sides)
     start = np.linalg.lstsq(A, b, rcond=None)[0]
     off = np.linalg.norm(b - A @ start, axis=1)
-    scale = max(MAD * float(np.median(off)), 1e-9)
+    scale = max(SD_OF_MEDIAN_DEVIATION * float(np.median(off)), 1e-9)
     fit = least_squares(
         lambda p: ((b - A @ p.reshape(start.shape)) / scale).ravel(), start.ravel(), loss="cauchy", x_scale="jac"
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from airborne.geometry.scatter import robust_sd
 from airborne.motion.contact import noise_covariance
 from airborne.motion.jump import Measured, Standing
 from airborne.motion.jump_events import standing_height
@@ -17,7 +18,6 @@ _WINDOW_S = 0.25
 _QUIET_M_S = 0.15  # how fast hips and ankles may be
 _STRAIGHT = 0.98  # distance of hip and ankle, in lengths of the leg: a knee bent by no more than 20 degrees
 _LEG_SHARE, _LEG_SHARE_SD = 0.985, 0.01  # height of the hips over the ankles of one who stands, in lengths of the leg
-_SD_OF_MEDIAN_DEVIATION = 1.4826  # of normal noise
 _FLAT_SD_M = 0.005  # of the lowest place of an ankle, beyond its noise
 
 
@@ -56,7 +56,7 @@ def leg_lengths(track: LegTrack) -> Array:
         for k in range(2):
             known = found[np.isfinite(found[:, k]), k]
             middle = float(np.median(known)) if len(known) else np.nan
-            deviation = _SD_OF_MEDIAN_DEVIATION * float(np.median(np.abs(known - middle))) if len(known) else np.nan
+            deviation = robust_sd(known) if len(known) else np.nan
             lengths[k] += max(middle - deviation**2 / middle, 0.0) if middle else 0.0
     return lengths
 

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from airborne.geometry.scatter import covariance_of_sum
+
 Array = NDArray[np.floating]
 
 _TOGETHER = 2  # frames so near share their errors
@@ -91,14 +93,6 @@ def solve_lags(seen: Sightings, *, with_drift: bool = False) -> tuple[Array, Arr
     step, sd = np.zeros(2 * c), np.zeros(2 * c)
     unseen = np.flatnonzero(is_free & ~is_seen)
     step[unseen] = sd[unseen] = np.nan
-    step[index], sd[index] = found, np.sqrt(np.maximum(np.diag(inverse @ _shared(left) @ inverse), 0))
+    covariance = inverse @ covariance_of_sum(left, _TOGETHER) @ inverse
+    step[index], sd[index] = found, np.sqrt(np.maximum(np.diag(covariance), 0))
     return step, sd
-
-
-def _shared(left: Array) -> Array:
-    """Return the covariance of a sum of what single frames leave over (n, d); neighbours are alike."""
-    total = left.T @ left
-    for apart in range(1, min(_TOGETHER, len(left) - 1) + 1):
-        both = left[apart:].T @ left[:-apart]
-        total += (1 - apart / (_TOGETHER + 1)) * (both + both.T)
-    return total

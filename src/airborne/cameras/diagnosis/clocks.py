@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.cameras.diagnosis.finding import Finding, listed
+from airborne.geometry.scatter import SD_OF_MEDIAN_DEVIATION
 
 Array = NDArray[np.floating]
 
@@ -117,7 +118,7 @@ def rolling_shutter(
         root = np.sqrt(weights)
         x = np.linalg.lstsq(A * root[:, None], b * root, rcond=None)[0]
         off = b - A @ x
-        scale = max(1.4826 * float(np.median(np.abs(off))), 1e-9)
+        scale = max(SD_OF_MEDIAN_DEVIATION * float(np.median(np.abs(off))), 1e-9)
         weights = 1 / (1 + (off / (2 * scale)) ** 2)
     information = A.T @ (weights[:, None] * A)
     if np.linalg.cond(information) > 1e10:

@@ -6,7 +6,7 @@ are right by definition.
 
 from airborne.video.sync.flash import offsets_by_flash
 from airborne.video.sync.movers import offsets_by_motion
-from airborne.video.sync.offsets import Offsets
+from airborne.video.sync.offsets import Offsets, counting
 from airborne.video.sync.sound import offsets_by_sound
 
-__all__ = ["Offsets", "offsets_by_flash", "offsets_by_motion", "offsets_by_sound"]
+__all__ = ["Offsets", "counting", "offsets_by_flash", "offsets_by_motion", "offsets_by_sound"]

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.errors import VideoError
+from airborne.geometry.scatter import robust_sd
 from airborne.video.decoding import VideoSource, inspect, pictures
-from airborne.video.sync.offsets import Offsets, line_through
+from airborne.video.sync.offsets import Offsets, counting, line_through
 
 Array = NDArray[np.floating]
 
@@ -39,7 +40,7 @@ def offsets_by_flash(
     A flash is known to the time between two pictures: uniform, so that one flash leaves an sd of a period over
     sqrt(12) for each camera. Raises VideoError where a camera shows no flash, or none that fits the first camera's.
     """
-    told = _counting(progress)
+    told = counting(progress)
     flashes = [flashes_of(brightness_of(source, told)) for source in sources]
     missing = [source.name for source, found in zip(sources, flashes, strict=True) if not len(found[0])]
     if missing:
@@ -75,7 +76,7 @@ def brightness_of(source: VideoSource, told: Callable[[], None] = lambda: None) 
 def flashes_of(brightness: Brightness) -> tuple[Array, float]:
     """Return when the picture suddenly brightens (n,) [s], the middle between dark and bright picture, and the sd."""
     step = np.diff(brightness.level)
-    spread = 1.4826 * float(np.median(np.abs(step - np.median(step)))) if len(step) else 0.0
+    spread = robust_sd(step) if len(step) else 0.0
     found: list[float] = []
     for k in np.flatnonzero(step > max(_CLEAR * spread, _LEAST_STEP)):
         time_s = float(brightness.time_s[k : k + 2].mean())
@@ -95,15 +96,3 @@ def paired(reference: Array, times: Array, tolerance_s: float) -> NDArray[np.int
         if reached > quality:
             best, quality = np.stack([i, j], axis=1), reached
     return best
-
-
-def _counting(progress: Callable[[int, int | None], None] | None) -> Callable[[], None]:
-    done = 0
-
-    def told() -> None:
-        nonlocal done
-        done += 1
-        if progress is not None:
-            progress(done, None)
-
-    return told

@@ -19,8 +19,9 @@ from scipy.optimize import least_squares
 
 from airborne.cameras import Camera, Rig
 from airborne.errors import VideoError
+from airborne.geometry.scatter import SD_OF_MEDIAN_DEVIATION, covariance_of_sum
 from airborne.video.decoding import Picture, VideoFacts, VideoSource, inspect, pictures, rgb_from_picture
-from airborne.video.sync.offsets import Offsets
+from airborne.video.sync.offsets import Offsets, counting
 
 Array = NDArray[np.floating]
 Told = Callable[[], None]
@@ -60,14 +61,7 @@ def offsets_by_motion(
     Shifts up to `within_s` either way are tried, by half pictures, then between them. The sds come from the scatter and
     take neighbouring pictures to err alike. Raises VideoError where nothing moves in a camera, or where no shift fits.
     """
-    done = 0
-
-    def told() -> None:
-        nonlocal done
-        done += 1
-        if progress is not None:
-            progress(done, None)
-
+    told = counting(progress)
     seen = [silhouettes_of(source, camera, told) for source, camera in zip(sources, rig, strict=True)]
     still = [each.camera.name for each in seen if sum(len(hull) > 0 for hull in each.hulls) < _FEWEST]
     if still:
@@ -100,8 +94,9 @@ def silhouettes_of(source: VideoSource, camera: Camera, told: Told = lambda: Non
     for parity in set(parities):
         rows = [k for k, each in enumerate(parities) if each == parity]
         stack = np.stack([small[k] for k in rows])
+        seen_by = _camera_of(stack.shape[1:3], camera, parity)
         for k, hull in zip(rows, _hulls(stack), strict=True):
-            hulls[k] = _rays(camera, _full_px(hull, facts, parity, stack.shape[1:3]))
+            hulls[k] = _rays(seen_by, hull)
     return Silhouettes(camera, np.array(times), tuple(hulls), float(1 / facts.image_rate))
 
 
@@ -173,7 +168,7 @@ def smoothed(time_s: Array, values: Array, wanted_s: Array, period_s: float) -> 
     b = np.einsum("mn,mni,nk->mik", weight, powers, np.nan_to_num(values))
     is_known = ((weight * (away <= 0)).sum(axis=1) > 1) & ((weight * (away >= 0)).sum(axis=1) > 1)
     A[~is_known] = np.eye(3)
-    found: Array = np.linalg.solve(A, b).real[:, 0]
+    found = np.asarray(np.linalg.solve(A, b), float)[:, 0]
     return np.where(is_known[:, None], found, np.nan)
 
 
@@ -181,7 +176,7 @@ def _across(baseline: Array, a: Silhouettes, b: Silhouettes) -> Array:
     """Return two axes (2, 3) across the baseline, the first toward what moves."""
     along = baseline / np.linalg.norm(baseline)
     toward = np.concatenate([*a.hulls, *b.hulls]).mean(axis=0)
-    u = toward - (toward @ along) * along
+    u: Array = toward - (toward @ along) * along
     u /= np.linalg.norm(u)
     return np.stack([u, np.cross(along, u)])
 
@@ -210,10 +205,7 @@ def _sd(residual: Callable[[Array], Array], x: Array, step: float) -> Array:
     if np.any(np.diag(H) <= 0) or np.linalg.cond(H) > 1e12:
         return np.full(len(x), np.inf)
     left, inverse = (weight * at)[:, None] * J, np.linalg.inv(H)
-    together, reach = left.T @ left, 2 * 2 * _SMOOTHED  # two planes a moment
-    for apart in range(1, min(reach, len(left) - 1) + 1):
-        shared = left[apart:].T @ left[:-apart]
-        together += (1 - apart / (reach + 1)) * (shared + shared.T)
+    together = covariance_of_sum(left, 2 * 2 * _SMOOTHED)  # two planes a moment
     return np.sqrt(np.maximum(np.diag(inverse @ together @ inverse), 0))
 
 
@@ -240,7 +232,7 @@ def _hulls(stack: NDArray[np.uint8]) -> list[Array]:
     hulls = []
     for picture in stack:
         away = cv2.GaussianBlur(_difference(picture.astype(np.float32), background), (0, 0), 0.8)
-        is_new = away > max(_CLEAR * 1.4826 * float(np.median(away)), _LEAST_GREY)
+        is_new = away > max(_CLEAR * SD_OF_MEDIAN_DEVIATION * float(np.median(away)), _LEAST_GREY)
         _, labels, boxes, _ = cv2.connectedComponentsWithStats(is_new.astype(np.uint8))
         areas = boxes[1:, cv2.CC_STAT_AREA]
         hulls.append(np.zeros((0, 2)))
@@ -260,13 +252,11 @@ def _difference(picture: Array, background: Array) -> Array:
     return np.abs(picture - shown).max(axis=2)
 
 
-def _full_px(small_px: Array, facts: VideoFacts, parity: int | None, small: tuple[int, ...]) -> Array:
-    """Turn pixels of small pictures (k, 2) into pixels of the whole frame."""
-    width, height = facts.size
-    lines = height if parity is None else (height - parity + 1) // 2
-    x = (small_px[:, 0] + 0.5) * width / small[1] - 0.5
-    y = (small_px[:, 1] + 0.5) * lines / small[0] - 0.5
-    return np.stack([x, y if parity is None else 2 * y + parity], axis=1)
+def _camera_of(small: tuple[int, ...], camera: Camera, parity: int | None) -> Camera:
+    """Return the camera of the small pictures (height, width) of frames or fields."""
+    image = camera if parity is None else camera.field(parity)
+    x, y = image.size[0] / small[1], image.size[1] / small[0]
+    return image.resampled(scale=(x, y), offset=((x - 1) / 2, (y - 1) / 2), size=(small[1], small[0]))
 
 
 def _rays(camera: Camera, px: Array) -> Array:

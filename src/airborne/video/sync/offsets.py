@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,3 +59,16 @@ def line_through(time_s: Array, offset_s: Array, sd_s: Array, *, with_drift: boo
     chi2 = float(np.sum(((offset_s - design @ solution) / sd_s) ** 2))
     sd = np.sqrt(np.diag(inverse) * max(1.0, chi2 / spare if spare else 1.0))
     return float(solution[0]), float(sd[0]), *((float(solution[1]), float(sd[1])) if len(solution) > 1 else (0.0, 0.0))
+
+
+def counting(progress: Callable[[int, int | None], None] | None) -> Callable[[], None]:
+    """Return what is called after every picture: it tells how many these are."""
+    done = 0
+
+    def told() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done, None)
+
+    return told

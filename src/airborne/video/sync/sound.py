@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, correlate, correlation_lags, sosfilt
 
 from airborne.errors import VideoError
+from airborne.geometry.scatter import robust_sd
 from airborne.video.decoding import VideoSource
 from airborne.video.sync.offsets import Offsets, line_through
 
@@ -138,7 +139,7 @@ def _mended(reference: Array, sound: Array, start: int, coarse_s: float) -> tupl
     match = np.fft.irfft(cross / (np.abs(cross) + 1e-9 * np.abs(cross).max() + 1e-30), size)
     match = np.concatenate([match[-near:], match[: near + 1]])
     k = int(match.argmax())
-    if not 0 < k < len(match) - 1 or match[k] < _CLEAR * 1.4826 * np.median(np.abs(match - np.median(match))):
+    if not 0 < k < len(match) - 1 or match[k] < _CLEAR * robust_sd(match):
         return None
     before, top, after = match[k - 1 : k + 2]
     between = 0.5 * (before - after) / (before - 2 * top + after)
