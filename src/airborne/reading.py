@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import tomllib
@@ -10,6 +11,7 @@ from typing import Any
 
 LARGEST_TOML_BYTES = 5_000_000
 LARGEST_JSON_BYTES = 50_000_000
+LARGEST_CSV_BYTES = 50_000_000
 
 _DEEP_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){64}""")  # a.a.a...: takes time in squares
 
@@ -26,9 +28,32 @@ def read_json(path: Path) -> Any:
     if path.stat().st_size > LARGEST_JSON_BYTES:
         raise ValueError(f"larger than {LARGEST_JSON_BYTES // 1_000_000} MB")
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(path.read_text(encoding="utf-8-sig"))
     except RecursionError:
         raise ValueError("nested too deep") from None
+
+
+def read_csv(path: Path, expected: str, error: type[Exception]) -> list[tuple[int, list[str]]]:
+    """Read the rows of a table with commas that are not empty: the line's number, from 1, and its cells, stripped.
+
+    Raises `error`, saying in one line what was found and what is `expected`.
+    """
+    try:
+        if path.stat().st_size > LARGEST_CSV_BYTES:
+            raise error(f"{path} is larger than {LARGEST_CSV_BYTES // 1_000_000} MB; {expected}")
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as failure:
+        raise error(f"{path} cannot be read ({failure.strerror}); {expected}") from None
+    except UnicodeDecodeError:
+        raise error(f"{path} is not a text file; {expected}") from None
+    if "\0" in text:
+        raise error(f"{path} is not a text file; {expected}")
+    reader = csv.reader(text.splitlines())
+    try:
+        rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
+    except csv.Error as failure:
+        raise error(f"{path}, row {reader.line_num}: not a table with commas ({failure}); {expected}") from None
+    return [(line, row) for line, row in rows if any(row)]
 
 
 def parsed_toml(text: str) -> dict[str, Any]:

@@ -71,7 +71,7 @@ def test_missing_and_unreadable_files_are_refused_in_one_line(tmp_path):
     with pytest.raises(ResultError, match="cannot be read"):
         read_truth(tmp_path / "none.csv")
     (tmp_path / "picture.csv").write_bytes(b"\x89PNG\xff\xd8")
-    with pytest.raises(ResultError, match="not a text table"):
+    with pytest.raises(ResultError, match="is not a text file"):
         read_truth(tmp_path / "picture.csv")
 
 

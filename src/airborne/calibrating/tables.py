@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
 from airborne.errors import CalibrationError, one_line
+from airborne.reading import read_toml
 
 Positive = Annotated[float, Field(gt=0)]
 Pixels = Literal["upper-left-1", "upper-left-0", "lower-left-1", "lower-left-0"]
@@ -168,7 +169,7 @@ class Sources(_Strict):
 def read_sources(path: Path) -> Sources:
     """Read the TOML file; raises CalibrationError in one line for what cannot be used."""
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        document = read_toml(path)
     except OSError as error:
         raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a file of sources") from None
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.errors import CalibrationError
+from airborne.reading import read_csv
 
 Array = NDArray[np.floating]
 
@@ -56,17 +56,8 @@ def read_named_numbers(path: Path, key: str, expected: str) -> tuple[tuple[str, 
 
     `expected` says in errors what the table should be. Raises CalibrationError, naming the row and column.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a table") from None
-    except UnicodeDecodeError:
-        raise CalibrationError(f"{path.name} is not a text file; {expected}") from None
-    try:
-        lines = [[cell.strip() for cell in row] for row in csv.reader(text.replace("\0", "").splitlines())]
-    except csv.Error as error:
-        raise CalibrationError(f"{path.name} is not a table ({error}); {expected}") from None
-    header, *rows = [line for line in lines if any(line)] or [[]]
+    lines = [row for _, row in read_csv(path, expected, CalibrationError)]
+    header, *rows = lines or [[]]
     if key not in header or len(set(header)) < len(header) or not rows:
         found = ",".join(header)[:80] or "nothing"
         raise CalibrationError(f"{path.name}: found the header {found} and {len(rows)} rows; {expected}, each once")

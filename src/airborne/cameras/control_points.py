@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from airborne.cameras.court import ScenePoint, nearest_names
 from airborne.errors import CalibrationError
+from airborne.reading import read_csv
 
 Array = NDArray[np.floating]
 
@@ -91,22 +91,7 @@ def _place(path: Path, line: int, row: Mapping[str, str], known: dict[str, Scene
 
 def _read_rows(path: Path) -> list:
     """Return the header and (line number, row) for every row that is not empty."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a control point table") from None
-    except UnicodeDecodeError:
-        raise CalibrationError(f"{path} is not a text file; {EXPECTED}") from None
-    if "\0" in text:
-        raise CalibrationError(f"{path} is not a text file; {EXPECTED}")
-    reader = csv.reader(text.splitlines())
-    try:
-        rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
-    except csv.Error as error:
-        raise CalibrationError(
-            f"{path}, row {reader.line_num}: not a table with commas ({error}); {EXPECTED}"
-        ) from None
-    rows = [(line, row) for line, row in rows if any(row)]
+    rows = read_csv(path, EXPECTED, CalibrationError)
     if not rows:
         raise CalibrationError(f"{path} is empty; {EXPECTED}")
     if len(rows) == 1:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,9 +12,10 @@ from numpy.typing import NDArray
 from airborne.cameras.agreement import agreed_points
 from airborne.cameras.bundle.source import Lengths, Source
 from airborne.cameras.camera import Rig
-from airborne.cameras.formats.dltdv import LARGEST_FILE_BYTES, is_xypts, read_xypts
+from airborne.cameras.formats.dltdv import is_xypts, read_xypts
 from airborne.cameras.formats.given import Given
 from airborne.errors import CalibrationError
+from airborne.reading import read_csv
 
 Array = NDArray[np.floating]
 
@@ -23,7 +23,6 @@ LENGTH_SD_M = 5e-4  # how well a wand's length is usually measured
 LENGTH_RANGE_M = (0.02, 20.0)  # no wand is shorter or longer
 LENGTH_SHARE = 0.15  # a wand that comes out further off its length is not the wand
 MOST_MARKERS = 20
-MOST_CHARACTERS = 100_000  # of a header
 COLUMNS = {"frame", "marker", "camera", "u_px", "v_px"}
 EXPECTED = "expected frame,marker,camera,u_px,v_px or DLTdv's pt1_cam1_U,pt1_cam1_V,pt1_cam2_U,..."
 
@@ -65,32 +64,23 @@ def read_wand(path: Path, cameras: Sequence[str], given: Given, lengths_m: Seque
     from 1 and our own pixels. lengths_m are those between marker 1 and 2, 2 and 3, and so on [m]. Raises
     CalibrationError.
     """
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise CalibrationError(f"{path} has {path.stat().st_size} bytes, more than any wand's tracks; {EXPECTED}")
-        with path.open(encoding="utf-8-sig") as file:
-            header = file.readline(MOST_CHARACTERS).strip()
-    except OSError as error:
-        raise CalibrationError(f"{path} cannot be read ({error.strerror}); give the wand's tracks") from None
-    except UnicodeDecodeError:
-        raise CalibrationError(f"{path} is not a text file; {EXPECTED}") from None
-    px = read_xypts(path, given, cameras).px if is_xypts(header) else _read_table(path, cameras)
+    rows = read_csv(path, EXPECTED, CalibrationError)
+    header = ",".join(rows[0][1]) if rows else ""
+    px = read_xypts(path, given, cameras).px if is_xypts(header) else _tracks(path, rows, cameras)
     lengths = {(i, i + 1): float(length) for i, length in enumerate(lengths_m)}
     return WandTracks(cameras=tuple(cameras), px=px, lengths_m=lengths)
 
 
-def _read_table(path: Path, cameras: Sequence[str]) -> Array:
-    """Read rows of one frame, marker and camera, in any order: (frames, markers, cameras, 2) [px], NaN elsewhere."""
-    try:
-        rows = list(csv.DictReader(path.read_text(encoding="utf-8-sig").replace("\0", "").splitlines(), strict=True))
-    except (UnicodeDecodeError, csv.Error):
-        raise CalibrationError(f"{path} is not a table; {EXPECTED}") from None
-    if not rows or not set(rows[0]) >= COLUMNS:
-        found = ",".join(map(str, rows[0])) if rows else "nothing"
-        raise CalibrationError(f"{path}: found {found[:80]}; {EXPECTED}")
+def _tracks(path: Path, rows: Sequence[tuple[int, list[str]]], cameras: Sequence[str]) -> Array:
+    """Sort rows of one frame, marker and camera, in any order: (frames, markers, cameras, 2) [px], NaN elsewhere."""
+    (_, header), *rows = rows or [(1, [])]
+    if not rows or not set(header) >= COLUMNS:
+        raise CalibrationError(f"{path}: found {','.join(header)[:80] or 'nothing'}; {EXPECTED}")
     places: dict[tuple[int, int, int], tuple[float, float]] = {}
-    for line, row in enumerate(rows, start=2):
-        place, px = _row(f"{path}, row {line}", row, cameras)
+    for line, cells in rows:
+        if len(cells) != len(header):
+            raise CalibrationError(f"{path}, row {line}: {len(cells)} values, expected {len(header)} as in the header")
+        place, px = _row(f"{path}, row {line}", dict(zip(header, cells, strict=True)), cameras)
         if place in places:
             raise CalibrationError(f"{path}, row {line}: this frame, marker and camera stand twice; remove one")
         places[place] = px
@@ -102,16 +92,16 @@ def _read_table(path: Path, cameras: Sequence[str]) -> Array:
 
 
 def _row(
-    where: str, row: Mapping[str, str | None], cameras: Sequence[str]
+    where: str, row: Mapping[str, str], cameras: Sequence[str]
 ) -> tuple[tuple[int, int, int], tuple[float, float]]:
     try:
-        frame, marker = int(row["frame"] or ""), int(row["marker"] or "")
+        frame, marker = int(row["frame"]), int(row["marker"])
         u, v = (float(row[key] or "nan") for key in ("u_px", "v_px"))
     except ValueError:
         raise CalibrationError(f"{where}: expected whole numbers for frame and marker, pixels or blanks else") from None
     if not 1 <= marker <= MOST_MARKERS:
         raise CalibrationError(f"{where}: marker {marker}; count the wand's markers from 1 to {MOST_MARKERS} at most")
-    camera = (row["camera"] or "").strip()
+    camera = row["camera"]
     if camera not in cameras:
         raise CalibrationError(f"{where}: camera '{camera}' is not one of {', '.join(cameras)}")
     if np.isinf([u, v]).any() or np.isnan(u) != np.isnan(v):

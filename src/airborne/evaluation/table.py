@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.errors import ResultError
+from airborne.reading import read_csv
 
 _LARGEST = 1e15  # of any number in a table: a whole number is exact up to here
 
@@ -54,13 +54,7 @@ class Table:
 
 def read_table(path: Path, expected: str) -> Table:
     """Read a table; `expected` says in the error what the file should have been. Raises ResultError."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        rows = [cells for cells in csv.reader(text.splitlines()) if any(cells)]
-    except OSError as error:
-        raise ResultError(f"{path} cannot be read ({error.strerror}); expected {expected}") from None
-    except (UnicodeDecodeError, csv.Error):
-        raise ResultError(f"{path} is not a text table; expected {expected}") from None
+    rows = [row for _, row in read_csv(path, f"expected {expected}", ResultError)]
     if len(rows) < 2:
         raise ResultError(f"{path} has no lines of numbers; expected {expected}")
-    return Table(path, [name.strip() for name in rows[0]], rows[1:])
+    return Table(path, rows[0], rows[1:])

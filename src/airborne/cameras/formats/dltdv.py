@@ -5,7 +5,6 @@ One row a frame, no frame column, NaN where a point was not digitised; points ou
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,10 +17,10 @@ from airborne.cameras.camera import Rig
 from airborne.cameras.detections import Detections
 from airborne.cameras.formats.given import Given
 from airborne.errors import CalibrationError
+from airborne.reading import read_csv
 
 Array = NDArray[np.floating]
 
-LARGEST_FILE_BYTES = 50_000_000
 COLUMN = re.compile(r"(.+)_cam_?(\d{1,4})_([uvxyUVXY])")  # DLTdv pt1_cam1_X, Argus track_cam_1_x
 EXPECTED = "expected DLTdv's table pt1_cam1_U,pt1_cam1_V,pt1_cam2_U,..."
 DEGREES_OF_FREEDOM = 3  # that a place in space takes from the 2 numbers of each camera
@@ -154,26 +153,15 @@ def _scaled(values: Array | None, scale: float) -> Array | None:
 
 def _read_table(path: Path) -> tuple[list[str], Array]:
     """Return the header and the numbers (rows, columns); blank cells are NaN."""
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise CalibrationError(f"{path} has {path.stat().st_size} bytes, more than any table of clicks; {EXPECTED}")
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise CalibrationError(f"{path} cannot be read ({error.strerror}); {EXPECTED}") from None
-    except UnicodeDecodeError:
-        raise CalibrationError(f"{path} is not a text file; {EXPECTED}") from None
-    try:
-        rows = [row for row in csv.reader(text.replace("\0", "").splitlines()) if any(map(str.strip, row))]
-    except csv.Error as error:
-        raise CalibrationError(f"{path} is not a table ({error}); {EXPECTED}") from None
-    header = [name.strip() for name in rows[0]] if rows else []
+    rows = read_csv(path, EXPECTED, CalibrationError)
+    header = rows[0][1] if rows else []
     values = np.full((max(len(rows) - 1, 0), len(header)), np.nan)
-    for number, row in enumerate(rows[1:]):
-        cells = row[:-1] if len(row) == len(header) + 1 and not row[-1].strip() else row
+    for number, (line, row) in enumerate(rows[1:]):
+        cells = row[:-1] if len(row) == len(header) + 1 and not row[-1] else row
         try:
-            values[number] = np.reshape([float(cell) if cell.strip() else np.nan for cell in cells], len(header))
+            values[number] = np.reshape([float(cell) if cell else np.nan for cell in cells], len(header))
         except ValueError:
-            raise CalibrationError(f"{path}, row {number + 2}: expected {len(header)} numbers") from None
+            raise CalibrationError(f"{path}, row {line}: expected {len(header)} numbers") from None
     return header, np.where(np.abs(values) < 1e12, values, np.nan)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.errors import CalibrationError
+from airborne.reading import read_json
 
 Array = NDArray[np.floating]
 
@@ -95,7 +96,7 @@ def _people(path: Path) -> list[Array]:
     try:
         if path.stat().st_size > LARGEST_FILE_BYTES:
             raise CalibrationError(f"{path} is larger than any picture's detections ({path.stat().st_size} bytes)")
-        document = json.loads(path.read_text(encoding="utf-8-sig"))
+        document = read_json(path)
         people = [np.array(person["pose_keypoints_2d"], float).reshape(-1, 3) for person in document["people"]]
     except OSError as error:
         raise CalibrationError(f"{path} cannot be read ({error.strerror})") from None
