@@ -35,6 +35,7 @@ ORDER = [
     "reproduction",
     "examples",
     "assessment",
+    "sync_by_tracking",
     "synchronising",
     "conversion",
     "smoothing",

@@ -11,26 +11,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body import Pose
-from airborne.body.chain import motion_between
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, TrialError
-from airborne.runs import cameras_of, open_trial, past_the_end, source_of
-from airborne.start import first_pose
-from airborne.tracking import Status
-from airborne.tracking.lags import Sightings, find_lags
-from airborne.tracking.lateness import InTime, in_time
-from airborne.tracking.methods import sampled
-from airborne.tracking.refined import Refined
+from airborne.runs import cameras_of, source_of
+from airborne.sync_by_tracking import offsets_by_tracking
 from airborne.trial import Trial
-from airborne.video import Recording, VideoSource, inspect
-from airborne.video.sync import Offsets, counting, offsets_by_flash, offsets_by_motion, offsets_by_sound
+from airborne.video import VideoSource, inspect
+from airborne.video.sync import Offsets, offsets_by_flash, offsets_by_motion, offsets_by_sound
 
 Array = NDArray[np.floating]
 By = Literal["auto", "flash", "sound", "motion", "tracking"]
 Progress = Callable[[int, int | None], None]
 
-_FEWEST = 8  # moments at which the body must be tracked to tell lags
 _DECIMALS = 6  # of seconds, as written
 _KEYS = "offset_s|offset_sd_s|drift_ppm"
 
@@ -68,33 +60,6 @@ def synchronise(
         if by == "auto" and not trial.has_players:
             found = _refined(trial, found, progress)
     return in_whole_pictures(found, sources) if whole_pictures else found
-
-
-def offsets_by_tracking(
-    trial: Trial, start_s: Array, *, with_drift: bool = False, progress: Progress | None = None
-) -> Offsets:
-    """Find the offsets at which every camera's pictures agree with the body as all cameras together track it.
-
-    The recording is tracked some times over, from offsets start_s (c,) [s]. Raises TrialError for players, and where
-    the body is not tracked often enough.
-    """
-    if trial.has_players:
-        raise TrialError("tracking tells the lags of one body's cameras; of players use motion, flash or sound")
-    method = {"track": trial.track.model_copy(update={"method": "refined"})}
-    trial = _with_offsets(trial.model_copy(update=method), start_s)
-    recording, _ = open_trial(trial)
-    start, told = first_pose(trial, trial.model(), recording.rig).pose, counting(progress)
-
-    def look(lag_s: Array, drift: Array) -> Sightings:
-        return _sightings(trial, _at(recording, start_s[0] + lag_s, drift), start, told)
-
-    lags = find_lags(look, start_s - start_s[0], with_drift=with_drift)
-    names = tuple(camera.name for camera in trial.camera)
-    unknown = [name for name, lag_s in zip(names, lags.lag_s, strict=True) if not np.isfinite(lag_s)]
-    if unknown:
-        raise TrialError(f"{', '.join(unknown)}: never sees the tracked body move; synchronise by flash or sound")
-    how = "by tracking: every camera's pictures against the body as all of them see it"
-    return Offsets(names, start_s[0] + lags.lag_s, lags.sd_s, lags.drift, lags.drift_sd, how)
 
 
 def in_whole_pictures(found: Offsets, sources: Sequence[VideoSource]) -> Offsets:
@@ -181,68 +146,6 @@ def _refined(trial: Trial, found: Offsets, progress: Progress | None) -> Offsets
             found, notes=(*found.notes, "tracking led elsewhere, so motion's offsets are kept; look at both")
         )
     return better
-
-
-def _with_offsets(trial: Trial, offset_s: Array) -> Trial:
-    """Return a trial whose cameras have these offsets (c,) [s] and no drift."""
-    pairs = zip(trial.camera, offset_s, strict=True)
-    cameras = [camera.model_copy(update={"offset_s": float(s), "drift_ppm": 0.0}) for camera, s in pairs]
-    return trial.model_copy(update={"camera": cameras})
-
-
-def _at(recording: Recording, offset_s: Array, drift: Array) -> Recording:
-    """Return a recording whose cameras have these offsets (c,) [s] and drifts (c,)."""
-    rows = zip(recording.sources, offset_s, drift, strict=True)
-    timed = [
-        replace(source, offset_s=round(float(offset), 9), drift_ppm=round(1e6 * float(rate), 6))
-        for source, offset, rate in rows
-    ]
-    return replace(recording, sources=tuple(timed))
-
-
-def _sightings(trial: Trial, recording: Recording, start: Pose, told: Callable[[], None]) -> Sightings:
-    """Track a recording and gather what every camera alone says; `told` is called after every frame."""
-    model, names = trial.model(), recording.rig.names
-    times: list[float] = []
-    poses: list[Pose] = []
-    equations: list[dict[str, tuple[Array, Array]]] = []
-    settings, refined = trial.settings, None
-    for frames in recording:
-        if refined is None:
-            model = sampled(model, start, frames)
-            refined = Refined(model, start, prediction=settings.prediction, fixed_shape=settings.fixed_shape)
-            tracker = InTime(refined)
-            state = tracker.init()
-        estimate = tracker.search(state, frames)
-        state = tracker.learn(state, frames, estimate)
-        if estimate.status is Status.TRACKED and estimate.pose is not None:
-            times.append(float(frames.time_s))
-            poses.append(estimate.pose)
-            equations.append(refined.by_view(state.inner, in_time(frames, state.past), estimate.pose))
-        told()
-    if refined is None:
-        raise past_the_end(trial)
-    if len(times) < _FEWEST:
-        raise TrialError(
-            f"{trial.name}: the body was tracked at {len(times)} moments, {_FEWEST} at least tell the lags; "
-            "check [start], or synchronise by motion, flash or sound first"
-        )
-    return _laid_out(np.array(times), poses, equations, names)
-
-
-def _laid_out(
-    time_s: Array, poses: Sequence[Pose], equations: Sequence[dict[str, tuple[Array, Array]]], names: Sequence[str]
-) -> Sightings:
-    """Lay the equations out as arrays; the first and last moment only tell the velocity of their neighbours."""
-    n, c = len(time_s) - 2, len(names)
-    curvature, slope = np.zeros((n, c, 6, 6)), np.zeros((n, c, 6))
-    for k, found in enumerate(equations[1:-1]):
-        for i, name in enumerate(names):
-            if name in found:
-                curvature[k, i], slope[k, i] = found[name]
-    motion = [motion_between(before, after)[:6] for before, after in zip(poses[:-2], poses[2:], strict=True)]
-    velocity = np.stack(motion) / (time_s[2:] - time_s[:-2])[:, None]
-    return Sightings(time_s[1:-1], velocity, curvature, slope)
 
 
 def _largest_distance_m(rig: Rig) -> float:

@@ -55,6 +55,28 @@ def test_a_camera_that_saw_nothing_has_no_lag():
     assert abs(step[1] - 0.004) < 1e-9
 
 
+def test_without_the_first_camera_the_next_one_is_the_clock():
+    seen = sightings((0, 0.004, -0.002))
+    seen.curvature[:, 0] = seen.slope[:, 0] = 0
+    step, sd = solve_lags(seen)
+    assert np.isnan([step[0], sd[0]]).all()
+    assert step[1] == sd[1] == 0
+    assert abs(step[2] + 0.006) < 1e-9
+
+
+def test_a_camera_that_never_sees_the_body_keeps_no_other_from_its_lag():
+    truth = np.array([0, 0.007, -0.003])
+
+    def look(lag_s, drift):
+        seen = sightings(truth - lag_s)
+        seen.curvature[:, 2] = seen.slope[:, 2] = 0
+        return seen
+
+    found = find_lags(look, np.zeros(C))
+    assert np.allclose(found.lag_s[:2], truth[:2], atol=SOLVED)
+    assert np.isnan([found.lag_s[2], found.sd_s[2]]).all()
+
+
 def test_steps_that_are_too_short_still_lead_there_and_widen_the_sds():
     truth, looks = np.array([0, 0.007, -0.003]), []
 

@@ -36,7 +36,7 @@ class Sightings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lags:
-    """By how much each camera is later than its times say; the first is in time by definition. NaN where unknown."""
+    """By how much each camera is later than its times say; the first one seen keeps its lag. NaN where unknown."""
 
     lag_s: Array  # (c,)
     sd_s: Array  # (c,)
@@ -55,6 +55,7 @@ def find_lags(look: Callable[[Array, Array], Sightings], lag_s: Array, *, with_d
     last: tuple[Array, Array] | None = None
     for _ in range(_MOST_PASSES):
         step, sd = solve_lags(look(x[:n], x[n:]), with_drift=with_drift)
+        step = np.nan_to_num(step)
         if last is not None:
             moved, change = x - last[0], last[1] - step
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -62,9 +63,10 @@ def find_lags(look: Callable[[Array, Array], Sightings], lag_s: Array, *, with_d
             gain = np.clip(np.where(np.isfinite(seen) & (seen > 0), seen, gain), 1.0, _MOST_GAIN)
         last = x, step
         x = x + gain * step
-        if np.all(np.abs(step[:n]) < np.maximum(_SETTLED_S, _SETTLED_SDS * sd[:n])) or np.isnan(step).any():
+        if np.all(np.abs(step[:n]) < np.maximum(_SETTLED_S, _SETTLED_SDS * np.nan_to_num(sd[:n]))):
             break
-    return Lags(x[:n], gain[:n] * sd[:n], x[n:], gain[n:] * sd[n:])
+    x, sd = np.where(np.isnan(sd), np.nan, x), gain * sd
+    return Lags(x[:n], sd[:n], x[n:], sd[n:])
 
 
 def solve_lags(seen: Sightings, *, with_drift: bool = False) -> tuple[Array, Array]:
@@ -84,8 +86,8 @@ def solve_lags(seen: Sightings, *, with_drift: bool = False) -> tuple[Array, Arr
     m = basis.shape[1]
     H = np.einsum("kcd,ka,kb->kacbd", H, basis, basis).reshape(n, m * c, m * c)
     r = np.einsum("kc,ka->kac", r, basis).reshape(n, m * c)
-    is_free = np.tile(np.arange(c) > 0, m)
     is_seen = np.diag(H.sum(axis=0)) > 0
+    is_free = np.tile(np.arange(c) != np.argmax(is_seen[:c]), m)
     index = np.flatnonzero(is_free & is_seen)
     inverse = np.linalg.inv(H.sum(axis=0)[np.ix_(index, index)])
     found = inverse @ r.sum(axis=0)[index]

@@ -20,6 +20,7 @@ from airborne.rendering import Lights
 from airborne.scoring.foreground import body_like
 from airborne.tracking import predictors
 from airborne.tracking.appearance import Appearance, Region
+from airborne.tracking.blending import moment_equations
 from airborne.tracking.estimate import Estimate, Status, lost
 from airborne.tracking.freedom import Freedom, Prior, all_joints, only, outward, root_only
 from airborne.tracking.gauss_newton import (
@@ -38,7 +39,7 @@ from airborne.tracking.regions import reduced, regions_round, share_in_pictures
 from airborne.tracking.swaps import is_nearer, swapped
 from airborne.tracking.synthesis import Synthesis
 from airborne.tracking.wide import Reach, evidence_of, search_widely
-from airborne.video import Frames
+from airborne.video import Frames, View
 
 Array = NDArray[np.floating]
 Order = Literal["refined", "joint", "hierarchical"]
@@ -146,6 +147,13 @@ class Refined:
             each = evaluate_pictures(self._synthesis, pose, [region], scenes, self._root)
             found[region.camera.name] = each.A / each.noise, each.g / each.noise
         return found
+
+    def by_moment(self, state: RefinedState, view: View, poses: Sequence[Pose]) -> tuple[Array, Array] | None:
+        """Say how much of the body in m poses each a view shows: normal equations (m, m), (m,); None: not in view."""
+        frames = self._as_tracked(Frames(0, Fraction(0), (view,)))
+        bodies = [self._synthesis.place(pose) for pose in poses]
+        regions = regions_round(bodies, self._synthesis.geometry, frames, _MARGIN_PX)
+        return moment_equations(self._synthesis, state.appearance, regions[0], bodies) if regions else None
 
     def _as_tracked(self, frames: Frames) -> Frames:
         """Reduce the pictures of a body with joints: its many pixels say more than its shape can follow."""
