@@ -50,7 +50,8 @@ def test_a_method_is_told_only_what_it_may_read(folder):
     of_filter = read(folder, trial_text(track='method = "block-jump"\nseed = 3\nn_particles = 200')).track.told
     assert set(of_filter) == {
         *("method", "every", "stop", "overlay"),
-        *("n_particles", "seed", "swing", "estimate", "torso"),
+        *("n_particles", "seed", "swing", "estimate", "views", "tempered"),
+        *("torso_shift", "resample", "resample_when", "torso"),
     }
     assert (of_filter["seed"], of_filter["n_particles"], of_filter["estimate"]) == (3, 200, None)
     assert set(read(folder, trial_text()).track.told) == {"method", "every", "stop", "overlay"}
@@ -131,6 +132,10 @@ def test_settings_reach_the_filter(folder):
     settings = players_tracker_of(read(folder, trial_text(track=track)), rig()).settings
     assert (settings.method, settings.seed, settings.n_particles) == ("block-jump", 3, 200)
     assert (settings.swing, settings.estimate) == ("literal", "mean")
+    track = 'method = "mixture"\nviews = "robust"\ntempered = true\ntorso_shift = true\nresample = "residual"'
+    settings = players_tracker_of(read(folder, trial_text(track=track + '\nresample_when = "ess"')), rig()).settings
+    assert (settings.views, settings.tempered, settings.torso_shift) == ("robust", True, True)
+    assert (settings.resample, settings.resample_when) == ("residual", "ess")
 
 
 def test_a_player_whom_no_camera_sees_is_refused_and_a_bystander_is_not(folder):

@@ -44,6 +44,11 @@ def players_tracker_of(trial: Trial, rig: Rig) -> PlayersTracker:
         method=cast(LegsMethod, track.method),
         seed=track.seed,
         swing=track.swing,
+        views=track.views,
+        tempered=track.tempered,
+        torso_shift=track.torso_shift,
+        resample=track.resample,
+        resample_when=track.resample_when,
         **{name: value for name, value in chosen.items() if value is not None},
     )
     return legs_tracker(settings, rig, starts, torso)

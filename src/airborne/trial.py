@@ -215,6 +215,11 @@ class TrackTable(_Strict):
     seed: Annotated[int, Field(ge=0)] = 0  # particle filters: of everything random
     swing: Literal["consistent", "literal"] = "consistent"  # block-jump: how rods swing
     estimate: Literal["max", "mean", "top10_mean"] | None = None  # particle filters; None: the method's own
+    views: Literal["all", "visible", "robust"] = "all"  # particle filters: which cameras count
+    tempered: bool = False  # particle filters: a softer comparison of histograms, the more cameras
+    torso_shift: bool = False  # particle filters: everything moves along with the torso
+    resample: Literal["systematic", "stratified", "residual", "multinomial"] = "systematic"  # particle filters
+    resample_when: Literal["always", "ess"] = "always"  # particle filters
     torso: str | None = None  # particle filters: a table of torsos; None: they are tracked
     overlay: Literal["paper", "broadcast"] = "paper"  # legs: what the overlay videos show
 
@@ -235,7 +240,10 @@ class TrackTable(_Strict):
         return {name: value for name, value in settings.items() if name not in others}
 
 
-_OF_FILTERS = ("n_particles", "seed", "swing", "estimate", "torso")
+_OF_FILTERS = (
+    *("n_particles", "seed", "swing", "estimate", "views", "tempered"),
+    *("torso_shift", "resample", "resample_when", "torso"),
+)
 _OF_LEGS = (*_OF_FILTERS, "overlay")
 _OF_BODIES = ("prediction", "fixed_shape", "colour", "v_rule", "steps_mm", "steps_deg", "scale")
 
