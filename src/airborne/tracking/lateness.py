@@ -79,6 +79,18 @@ def in_time(frames: Frames, past: Past, degree: int = 2) -> Frames:
     return replace(frames, views=tuple(prompt)) if any(prompt) else frames
 
 
+def carried(frames: Frames, velocity_m_s: Array) -> Frames:
+    """Move the cameras of late views as a body moves that goes at a velocity (3,) [m/s] and does not turn."""
+    if all(view is None or abs(view.late_s) < IN_TIME_S for view in frames.views):
+        return frames
+
+    def moved(view: View) -> View:
+        ahead = RigidTransform.from_translation(view.late_s * velocity_m_s)
+        return replace(view, camera=replace(view.camera, camera_from_world=view.camera.camera_from_world * ahead))
+
+    return replace(frames, views=tuple(view and moved(view) for view in frames.views))
+
+
 def _longer(past: Past, frames: Frames, pose: Pose) -> Past:
     return (*past, (frames.time_s, pose))[-_REMEMBERED:]
 

@@ -44,6 +44,11 @@ class Filtered:
         """Pose and sliding lengths: (22,)."""
         return self.mean[:N_FREE]
 
+    @property
+    def hips_m_s(self) -> Array:
+        """The hips' velocity: (3,) [m/s]."""
+        return self.mean[N_FREE : N_FREE + 3]
+
 
 def begun(free: Array, covariance: Array) -> Filtered:
     """Start at rest: free (22,), covariance (22, 22)."""

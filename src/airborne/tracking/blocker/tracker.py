@@ -17,6 +17,7 @@ from airborne.tracking.blocker.first import first_look, points_of, start_state
 from airborne.tracking.blocker.fit import Fit, Prior, fit
 from airborne.tracking.blocker.views import Scale, Table, regions_round, seen
 from airborne.tracking.estimate import Status
+from airborne.tracking.lateness import carried
 from airborne.tracking.players import PlayerEstimate, PlayerStart, lost_player
 from airborne.video import Frames
 
@@ -135,7 +136,7 @@ def _followed(
 ) -> tuple[Track, PlayerEstimate]:
     """Look for a player where `_expected` has him."""
     expected, state = predicted
-    regions = regions_round(frames, state[:3])
+    regions = regions_round(carried(frames, expected.hips_m_s), state[:3])
     if not regions:
         return replace(track, filtered=expected, time_s=frames.time_s), lost_player(name, frames, len(JOINTS))
     found = seen(regions, [track.tables[region.view] for region in regions], track.scale)
