@@ -118,8 +118,8 @@ def test_each_number_of_the_table_has_its_interval(run, tmp_path):
 
 
 def test_runs_of_one_trial_are_compared_with_one_another(run, tmp_path):
-    other = shutil.copytree(run, tmp_path / "other")
-    found = agree(run, repeats=[other, other], out=tmp_path)
+    others = [shutil.copytree(run, tmp_path / name) for name in ("other", "third")]
+    found = agree(run, repeats=others, out=tmp_path)
     rows = {row.name: row for row in found.repeats["runs"]}
     assert rows["x"].n_ways == 3 and rows["x"].within_sd.value == pytest.approx(0, abs=1e-9)
     assert {"somersault", "tilt", "twist", "all joints x"} <= set(rows)
@@ -129,10 +129,37 @@ def test_runs_of_one_trial_are_compared_with_one_another(run, tmp_path):
         agree(run, repeats=[tmp_path])
 
 
+def test_nothing_is_compared_with_itself(run, thrown_cross, tmp_path):
+    other, clicks = shutil.copytree(run, tmp_path / "other"), thrown_cross / "digitised.csv"
+    for repeats in ([run], [other, tmp_path / "run" / ".." / "other"]):
+        with pytest.raises(ResultError, match=r"--repeat .* compared with itself"):
+            agree(run, repeats=repeats)
+    with pytest.raises(ResultError, match=r"--operator .* compared with itself"):
+        agree(run, digitised=clicks, operators=[clicks])
+
+
+@pytest.mark.parametrize("text", ["{", "[]", ""])
+def test_a_run_with_a_damaged_record_is_refused(run, text):
+    (run / "run.json").write_text(text)
+    with pytest.raises(ResultError, match=r"run\.json is missing or damaged"):
+        assess(run, None, None, run.parent / "higher.csv")
+    players = write_run(run.parent / "players")
+    (players / "run.json").write_text(text)
+    with pytest.raises(ResultError, match=r"run\.json is missing or damaged"):
+        assess(players, write_truth(run.parent / "truth.csv"), None)
+
+
+def test_a_run_without_its_body_is_refused(run):
+    (run / "body.toml").unlink()
+    with pytest.raises(ResultError, match=r"body\.toml is missing, .* track again"):
+        assess(run, None, None, run.parent / "higher.csv")
+
+
 def test_people_who_click_the_same_pictures_are_compared(run, thrown_cross, tmp_path):
     write_pose2sim(run / "calib.toml", read_rig(thrown_cross / "calib_true.toml"))
     clicks = thrown_cross / "digitised.csv"
-    found = agree(run, digitised=clicks, operators=[clicks], out=tmp_path)
+    others = shutil.copyfile(clicks, tmp_path / "others.csv")
+    found = agree(run, digitised=clicks, operators=[others], out=tmp_path)
     assert {row.name for row in found.repeats["operators"]} == {"x", "y", "z", "somersault", "tilt", "twist"}
     assert list(found.agreements) == ["points digitised"]
     with pytest.raises(ResultError, match="give those as --digitised"):
@@ -141,7 +168,7 @@ def test_people_who_click_the_same_pictures_are_compared(run, thrown_cross, tmp_
 
 def test_players_and_their_jumps_agree_with_their_truth(tmp_path):
     run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv", off_m=0.03)
-    found = agree(run, truth, repeats=[run])
+    found = agree(run, truth, repeats=[shutil.copytree(run, tmp_path / "again")])
     rows = agreements(found, "the truth")
     assert rows["ankle_left z"].bias.value == pytest.approx(30)
     assert rows["ankle_left z"].n_individuals == 2
@@ -154,7 +181,7 @@ def test_players_and_their_jumps_agree_with_their_truth(tmp_path):
 
 
 def test_every_number_is_documented(run, tmp_path):
-    agree(run, joints=run.parent / "higher.csv", repeats=[run], out=tmp_path)
+    agree(run, joints=run.parent / "higher.csv", repeats=[shutil.copytree(run, tmp_path / "again")], out=tmp_path)
     text = (DOCS / "agreement.md").read_text(encoding="utf-8")
     for name in ("agreement.csv", "repeatability.csv"):
         header = (tmp_path / name).read_text().splitlines()[0].split(",")

@@ -103,6 +103,8 @@ def test_method_and_every_replace_those_of_the_trial(trial, tmp_path, capsys):
     summary = json.loads(capsys.readouterr().out)
     assert summary["method"]["method"] == "stepping"
     assert summary["rate_hz"] == 25
+    assert in_process("track", trial, "-o", tmp_path / "one", "--every", "100", "--no-pictures") == 0
+    assert capsys.readouterr().out.startswith("1 frame: 1 tracked, ")
     assert read_motion(tmp_path / "run" / "motion.csv").index.tolist() == [0, 2]
 
 
@@ -291,7 +293,7 @@ def test_arguments_that_name_nothing_get_one_line(trial, tmp_path, capsys):
     run = tmp_path / "run"
     assert "none.toml" in refusal(capsys, "track", trial.with_name("none.toml"), "-o", run)
     assert "cam7" in refusal(capsys, "track", trial, "-o", run, "--cameras", "cam1,cam7")
-    assert "'magic'" in refusal(capsys, "track", trial, "-o", run, "--method", "magic")
+    assert "--method magic: " in refusal(capsys, "track", trial, "-o", run, "--method", "magic")
     assert not run.exists()
 
 
@@ -315,10 +317,21 @@ def test_a_damaged_record_of_a_run_is_not_guessed(trial, short_run, tmp_path, ca
 @pytest.mark.skipif(os.name != "posix", reason="a path below a file fails in another way there")
 def test_outputs_that_cannot_be_written_get_one_line(trial, tmp_path, capsys):
     (tmp_path / "file").write_text("not a folder")
-    assert "file" in refusal(capsys, "track", trial, "-o", tmp_path / "file")
-    assert "file/run" in refusal(capsys, "track", trial, "-o", tmp_path / "file" / "run")
-    points = trial.parent / "control_points.csv"
-    assert "no/c.toml" in refusal(capsys, "calibrate", points, "--size", "768x576", "-o", tmp_path / "no" / "c.toml")
+    for out in (tmp_path / "file", tmp_path / "file" / "run"):
+        assert f"{tmp_path / 'file'} is a file; give a folder\n" in refusal(capsys, "track", trial, "-o", out)
+    calib, out = trial.parent / "calib_true.toml", tmp_path / "no" / "c.toml"
+    assert f"there is no folder {out.parent}; make it" in refusal(capsys, "convert", calib, out)
+    (tmp_path / "c.toml").mkdir()
+    assert "c.toml is a folder; give a file's name" in refusal(capsys, "convert", calib, tmp_path / "c.toml")
+
+
+def test_ctrl_c_is_answered_in_one_line_whatever_runs(monkeypatch, capsys):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("airborne.bench.measure_speed", interrupted)
+    assert in_process("bench") == 130
+    assert capsys.readouterr() == ("", "airborne: stopped\n")
 
 
 def test_evaluate_says_what_it_lacks(trial, short_run, tmp_path, capsys):
@@ -335,6 +348,12 @@ def test_calibrate_says_what_it_lacks(trial, tmp_path, capsys):
     assert "768x576" in refusal(capsys, "calibrate", points, "--size", "768", "-o", out)
     assert "cam2" in refusal(capsys, "calibrate", points, "--size", "cam1=768x576", "-o", out)
     assert "no column point" in refusal(capsys, "calibrate", trial.parent / "truth.csv", "--size", "768x576", "-o", out)
+    assert "no.toml does not exist" in refusal(capsys, "calibrate", tmp_path / "no.toml", "--size", "10x10", "-o", out)
+    assert "sides of 16" in refusal(capsys, "calibrate", points, "--size", "10x10", "-o", out)
+    for length in ("-1", "0", "nan", "1000"):
+        said = refusal(capsys, "calibrate", points, "--wand", length, "--size", "768x576", "-o", out)
+        assert f"--wand {length}: expected" in said
+    assert "not one point" in refusal(capsys, "calibrate", points, "--court", "men", "--size", "768x576", "-o", out)
     assert not out.exists()
 
 

@@ -1,10 +1,12 @@
 """`airborne convert`: what goes in comes out in the other format, and what got lost is said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from airborne import cli
-from airborne.cameras import read_detections, read_rig, write_rig
+from airborne.cameras import Rig, read_detections, read_rig, write_rig
 from airborne.conversion import FORMATS
 from tests.cameras.examples import LENS, three_cameras
 from tests.cameras.formats.rigs import assert_same
@@ -77,12 +79,62 @@ def test_a_calibration_places_clicked_points(tmp_path, thrown_cross, airborne):
     code, said, _ = airborne("convert", thrown_cross / "digitised.csv", tmp_path / "a_xypts.csv", *calib)
     assert code == 0
     assert "a_xyzres.csv" in said
-    residual = float(said.split("median residual ")[1].split(" px")[0])
+    residual = float(said.split("median residual of ")[1].split(" px")[0])
     assert 0.5 < residual < 3  # clicks of 1.2 px
     assert "names: pt1 to pt4 for long_minus, long_plus, short_minus, short_plus" in said
     places = np.genfromtxt(tmp_path / "a_xyzpts.csv", delimiter=",", skip_header=1).reshape(-1, 4, 3)
     lengths = np.linalg.norm(places[:, 0] - places[:, 1], axis=-1)
     assert np.nanstd(lengths) < 0.05 * np.nanmean(lengths)  # a bar stays as long as it is
+
+
+def test_a_wrong_origin_shows_as_a_large_residual(tmp_path, thrown_cross, airborne):
+    calib = ("--calibration", thrown_cross / "calib_true.toml")
+    airborne("convert", thrown_cross / "digitised.csv", tmp_path / "a_xypts.csv", *calib)
+    _, said, _ = airborne("convert", tmp_path / "a_xypts.csv", tmp_path / "b.csv", *calib)
+    assert "median residual" in said and "this is large" not in said
+    _, said, _ = airborne("convert", tmp_path / "a_xypts.csv", tmp_path / "b.csv", *calib, "--origin", "lower-left")
+    assert "this is large: are --origin" in said
+
+
+def test_a_unit_that_cannot_be_is_doubted(tmp_path, airborne):
+    write_rig(tmp_path / "calib.toml", three_cameras())
+    write_rig(tmp_path / "mm.csv", three_cameras(), unit="mm")
+    to = tmp_path / "out.toml"
+    assert "is --unit mm right?" in airborne("convert", tmp_path / "calib.toml", to, "--unit", "mm")[1]
+    assert "is --unit m right?" in airborne("convert", tmp_path / "mm.csv", to, "--unit", "m", "--size", "768x576")[1]
+    assert "right?" not in airborne("convert", tmp_path / "mm.csv", to, "--unit", "mm", "--size", "768x576")[1]
+
+
+OTHERS = {  # what is in a file that is not converted, and what the line says
+    "control.csv": ("point,x_m,y_m,z_m,a_u,a_v\nP,1,2,3,4,5\n", "control points or a court's points"),
+    "truth.csv": ("field,time_s,x_m\n0,0,1\n", "a table of motion"),
+    "trial.toml": ('name = "x"\n[[camera]]\nname = "a"\n[body]\nfile = "b"\n', "a trial file"),
+    "sources.toml": ('[[camera]]\nname = "a"\n', "a file of sources"),
+    "body.toml": ('[[segment]]\nname = "a"\n', "a body file"),
+    "words": ("some words\n", "(it begins with 'some words'); expected Pose2Sim"),
+    "empty.toml": ("", "is empty; expected Pose2Sim"),
+    "junk.npz": ("\0\1\2\xff", "expected Pose2Sim"),
+    "board.toml": ("columns = 4\nrows = 5\n", "has no cameras (found columns, rows)"),
+    "run/run.json": ("{}", "a run's folder, which `airborne export` hands on"),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_another_file_is_answered_with_what_it_looks_like(tmp_path, airborne, name):
+    text, complaint = OTHERS[name]
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(text.encode("latin-1"))
+    code, said, told = airborne("convert", path.parent if name == "run/run.json" else path, tmp_path / "out.toml")
+    assert (code, said) == (2, "")
+    assert complaint in told
+    assert not (tmp_path / "out.toml").exists()
+
+
+def test_a_camera_may_be_called_camera(tmp_path, airborne):
+    rig = three_cameras()
+    write_rig(tmp_path / "calib.toml", Rig((replace(rig.cameras[0], name="camera"), *rig.cameras[1:])))
+    assert airborne("convert", tmp_path / "calib.toml", tmp_path / "out.xcp")[0] == 0
 
 
 def test_detections_go_to_openpose_and_back(tmp_path, shared_data, airborne):
@@ -104,7 +156,7 @@ def test_detections_go_to_openpose_and_back(tmp_path, shared_data, airborne):
         (("calib.toml", "x.npz", "--to", "npz"), "holds cameras, which cannot be written as npz"),
         (("calib.toml", "x.toml", "--to", "bvh"), "--to bvh: no such format"),
         (("clicks.csv", "x_xypts.csv"), "say which cameras its columns are of: --cameras"),
-        (("clicks.csv", "x.toml", "--cameras", "a"), "points are written to a name ending in xypts.csv"),
+        (("clicks.csv", "x.toml", "--cameras", "a"), "give a name ending in xypts.csv, .csv or .npz"),
         (("clicks.csv", "x.toml", "--cameras", "a", "--to", "vicon"), "holds points in pictures, not cameras"),
         (("none.toml", "x.toml"), "none.toml cannot be read"),
         (("coefficients.csv", "x.toml"), "does not say how large the pictures of 'cam1' are; give --size"),

@@ -175,7 +175,7 @@ def test_what_is_no_run_is_refused_in_one_line(files, said, tmp_path, monkeypatc
 def test_a_missing_body_and_a_missing_folder_are_refused_in_one_line(person_run, tmp_path, monkeypatch, capsys):
     (tmp_path / "motion.csv").write_bytes((person_run / "motion.csv").read_bytes())
     assert run_command(monkeypatch, "export", tmp_path) == 2
-    assert "body.toml: cannot be read" in capsys.readouterr().err
+    assert "body.toml is missing, the body that was tracked" in capsys.readouterr().err
     assert run_command(monkeypatch, "export", tmp_path / "nowhere") == 2
     assert "holds no run" in capsys.readouterr().err
     (tmp_path / "file").touch()

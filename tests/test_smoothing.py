@@ -63,7 +63,7 @@ def test_gaps_are_filled_on_request_into_another_folder(run, tmp_path):
 
 
 def test_auto_takes_the_cutoff_of_the_residual_analysis_and_json_says_all(run, capsys):
-    assert in_process("smooth", run, "--butterworth", "auto", "--events", "0.2", "--json") == 0
+    assert in_process("smooth", run, "--butterworth", "auto", "--events", "0.2,0.20", "--json") == 0
     found = json.loads(capsys.readouterr().out)
     assert found == json.loads((run / "smooth.json").read_text())
     assert found["cutoff_hz"] == found["residual_analysis"]["chosen_hz"]

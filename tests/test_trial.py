@@ -114,7 +114,24 @@ def test_entries_of_the_track_table_can_be_replaced(folder):
     trial = read(folder, track={"method": "simplex", "stop": 9})
     assert (trial.track.method, trial.track.stop, trial.track.every) == ("simplex", 9, 2)
     assert read(folder, GOOD[: GOOD.index("[track]")], track={"every": 5}).track.every == 5
-    assert "track.every" in complaint(folder, GOOD, track={"every": 0})
+    assert "track.every" in complaint(folder, GOOD.replace("every = 2", "every = 0"), track={"stop": 9})
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"every": 0}, "--every 0: track.every: expected greater than or equal to 1"),
+        ({"method": "magic"}, "--method magic: track.method: expected 'refined', 'joint'"),
+        ({"method": "blocker"}, "--method blocker: track.method = 'blocker' does not go with this body"),
+        ({"overlay": "magic"}, "--overlay magic: track.overlay: expected 'paper' or 'broadcast'"),
+        ({"overlay": "paper"}, "--overlay paper: overlay under"),
+    ],
+)
+def test_a_change_that_cannot_be_is_named_instead_of_the_file(folder, changes, said):
+    with pytest.raises(TrialError) as caught:
+        read(folder, track=changes)
+    assert str(caught.value).startswith(said)
+    assert "literal" not in str(caught.value)
 
 
 def test_cameras_can_be_chosen_by_name(folder):
@@ -137,7 +154,7 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
         ('video = "left.mp4"', 'vidoe = "left.mp4"', "and 1 more"),
         ('name = "right"', 'name = "left"', "two cameras share a name: left, left; give each its own"),
         ('"top-first"', '"odd-first"', "camera.0.fields"),
-        ("offset_s = 0.004", "offset_s = nan", "camera.0.offset_s: Input should be a finite number"),
+        ("offset_s = 0.004", "offset_s = nan", "camera.0.offset_s: expected a finite number"),
         ("offset_s = 0.004", "saved_scale = 0", "camera.0.saved_scale"),
         ("offset_s = 0.004", "saved_offset_px = [1]", "camera.0.saved_offset_px"),
         ('file = "calib.toml"', "", 'calibration: give file = "..." or control_points = "..."'),
@@ -190,7 +207,7 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
         ("every = 2", 'prediction = "psychic"', "track.prediction"),
         ("steps_mm = [50, 5]", "steps_mm = [50]", "steps_mm and steps_deg need one number a loop each"),
         ("steps_mm = [50, 5]\nsteps_deg = [10, 1]", "steps_mm = []\nsteps_deg = []", "one number a loop each"),
-        ("steps_mm = [50, 5]", "steps_mm = [50, 0]", "track.steps_mm.1: Input should be greater than 0"),
+        ("steps_mm = [50, 5]", "steps_mm = [50, 0]", "track.steps_mm.1: expected greater than 0"),
         ("steps_mm = [50, 5]", "steps_mm = [50, inf]", "track.steps_mm.1"),
         ("[track]", "[lights]\nambient = -1\n[track]", "lights.ambient"),
         ("[track]", "[lights]\nambient = inf\n[track]", "lights.ambient"),
@@ -297,13 +314,14 @@ def test_value_where_a_table_belongs_is_refused(folder, wrong):
 
 
 def test_empty_missing_or_binary_file_is_refused(folder):
-    assert "is missing" in complaint(folder, "")
+    assert "no trial file, as [[camera]], [calibration], [body], [start] are missing" in complaint(folder, "")
+    assert "(found segment)" in complaint(folder, "[[segment]]")
     with pytest.raises(TrialError, match=r"none\.toml: cannot be read \(No such file or directory\)"):
         read_trial(folder / "none.toml")
     with pytest.raises(TrialError, match="cannot be read"):
         read_trial(folder)
     (folder / "binary.toml").write_bytes(bytes(range(256)))
-    with pytest.raises(TrialError, match=r"binary\.toml: not a TOML file"):
+    with pytest.raises(TrialError, match=r"binary\.toml: not a TOML file: it is not a text file; expected a trial's"):
         read_trial(folder / "binary.toml")
 
 

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from airborne.body import BodyModel
-from airborne.body.files import read_body
 from airborne.body.symmetry import symmetries
 from airborne.cameras import Rig, read_rig
 from airborne.errors import ResultError
@@ -54,9 +53,9 @@ from airborne.evaluation.variables import (
 )
 from airborne.export import write_figures, write_json, write_report
 from airborne.export.analysis_figures import write_bland_altman, write_identity
-from airborne.motion import Motion, read_motion, read_players
+from airborne.motion import Motion
 from airborne.reading import read_json
-from airborne.runs import versions
+from airborne.runs import body_run, check_record, holds_players, players_run, versions
 
 Found = Mapping[str, Comparison | DigitisedComparison | JointComparison | PlayersComparison]
 
@@ -73,9 +72,7 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
         raise ResultError(
             "nothing to compare with; give a truth.csv, --digitised with clicked points, or --joints with their paths"
         )
-    if not (folder / "motion.csv").is_file():
-        raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
-    motion, model = read_motion(folder / "motion.csv"), read_body(folder / "body.toml")
+    motion, model = body_run(folder)
     alike = symmetries(model)
     found: dict[str, Comparison | DigitisedComparison | JointComparison] = {}
     true_poses = clicked = None
@@ -95,17 +92,13 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
     return found
 
 
-def holds_players(folder: Path) -> bool:
-    """Say whether a folder holds a run of several players, finished or not."""
-    return (folder / "joints.csv").is_file() and not (folder / "motion.csv").is_file()
-
-
 def _assess_players(folder: Path, truth: Path | None, *, is_alone: bool) -> Found:
     if truth is None or not is_alone:
         raise ResultError(
             f"{folder} holds a run of players, which is compared with a truth of players only; "
             "leave --digitised and --joints out and give a truth.csv"
         )
+    check_record(folder)
     found = {"truth": assess_players(folder, truth)}
     _kept(folder, found)
     return found
@@ -172,6 +165,8 @@ def agree(
     """
     if operators and digitised is None:
         raise ResultError("clicks of other people are compared with the first person's; give those as --digitised")
+    _check_different("--repeat", (folder, *repeats), "another run")
+    _check_different("--operator", (digitised or Path(), *operators), "another person's clicks")
     if holds_players(folder):
         if digitised or joints or joint_angles:
             raise ResultError(f"{folder} holds a run of players; give a truth.csv of players, or other runs of it")
@@ -208,11 +203,19 @@ def agree(
     return Concord(agreements, repeatable, first, (*files, "agreement_methods.txt"))
 
 
+def _check_different(option: str, paths: Sequence[Path], wanted: str) -> None:
+    """Raise ResultError where one file or folder is given twice."""
+    places = [path.resolve() for path in paths]
+    for i, path in enumerate(paths):
+        if places[i] in places[:i]:
+            raise ResultError(f"{option} {path} would be compared with itself and agree perfectly; give {wanted}")
+
+
 Compared = dict[str, list[Series]]
 
 
 def _players_series(folder: Path, truth: Path | None, repeats: Sequence[Path]) -> tuple[Compared, Compared]:
-    motion = read_players(folder / "joints.csv")
+    motion = players_run(folder)
     own, references, repeated = of_players(motion), Compared(), Compared()
     if truth is not None:
         true = read_players_truth(truth)
@@ -221,7 +224,7 @@ def _players_series(folder: Path, truth: Path | None, repeats: Sequence[Path]) -
         pairs = paired_jumps(motion, true, players)
         references["the truth"] = series + (of_jumps(pairs) if pairs else [])
     if repeats:
-        others = [of_players(read_players(other / "joints.csv")) for other in repeats]
+        others = [of_players(players_run(other)) for other in repeats]
         repeated["runs"] = side_by_side([own, *others], "the runs")
     return references, repeated
 
@@ -235,7 +238,7 @@ def _body_series(
     repeats: Sequence[Path],
     operators: Sequence[Path],
 ) -> tuple[Compared, Compared]:
-    motion, model = _body_run(folder)
+    motion, model = body_run(folder)
     alike, references, repeated = symmetries(model), Compared(), Compared()
     if truth is not None:
         true = read_truth(truth)
@@ -260,16 +263,10 @@ def _body_series(
         if operators:
             repeated["operators"] = side_by_side([each for each, _ in clicked], "the people's clicks")
     if repeats:
-        others = [_body_run(other)[0] for other in repeats]
+        others = [body_run(other)[0] for other in repeats]
         same = [replace(each, R=turned_alike(each, motion.R, motion.time_s, alike)) for each in others]
         repeated["runs"] = side_by_side([of_motion(each, model) for each in (motion, *same)], "the runs")
     return references, repeated
-
-
-def _body_run(folder: Path) -> tuple[Motion, BodyModel]:
-    if not (folder / "motion.csv").is_file():
-        raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
-    return read_motion(folder / "motion.csv"), read_body(folder / "body.toml")
 
 
 def _clicked(

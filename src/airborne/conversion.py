@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,17 +11,30 @@ import numpy as np
 
 from airborne.cameras import Detections, Rig, read_detections, read_rig
 from airborne.cameras.detections import cameras_in, write_detections
+from airborne.cameras.diagnosis.units import odd_distances
 from airborne.cameras.files import UNITS, CalibrationFile, format_of_name, open_calibration, rig_of, write_rig
 from airborne.cameras.formats.dltdv import Digitisation, is_xypts, placed, read_digitisation, write_digitisation
 from airborne.cameras.formats.given import Given
-from airborne.errors import AirborneError
+from airborne.errors import AirborneError, CalibrationError
 from airborne.evaluation import Digitised, read_clicked_frames, write_clicked_frames
+from airborne.reading import read_toml
 
 POINT_FORMATS = ("digitised", "dltdv", "npz", "openpose")
 FORMATS = (*UNITS, *POINT_FORMATS)
+LARGE = 0.01  # of a picture's longer side: a median residual beyond it comes from more than inexact clicks
 _MOST_NUMBERS = 20_000_000  # of a table of clicked points
 _PIXELS = frozenset({"--origin", "--pixel-base"})
 _NAMES = frozenset({"--cameras", "--calibration"})
+_EXPECTED_POINTS = "points in pictures: tables frame,<point>_<camera>_u,..., DLTdv's xypts, .npz, OpenPose's folders"
+_EXPECTED = f"calibrations, or {_EXPECTED_POINTS}"
+_OTHERS = (
+    ({"run.json"}, "a run's folder, which `airborne export` hands on"),
+    ({"point"}, "control points or a court's points, by which `airborne calibrate` finds cameras"),
+    ({"time_s"}, "a table of motion"),
+    ({"segment"}, "a body file"),
+    ({"camera", "body"}, "a trial file, which names its calibration"),
+    ({"camera"}, "a file of sources, by which `airborne calibrate` finds cameras"),
+)  # what stands in files and folders that hold neither cameras nor points in pictures
 _FROM: Mapping[str, frozenset[str]] = {
     **dict.fromkeys(UNITS, frozenset({"--unit"})),
     "opencv": frozenset({"--unit", "--size"}),
@@ -53,25 +67,50 @@ class Wishes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conversion:
-    """What was done: a line each about what was read, what was written, and what the new file does not hold."""
+    """What was done: a line each about what was read, what was written, what the new file does not hold, and doubts."""
 
     read: str
     written: str
     lost: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     def describe(self) -> str:
         """Return the lines."""
         lost = [f"not in the new file: {'; '.join(self.lost)}"] if self.lost else []
-        return "\n".join([f"read: {self.read}", f"written: {self.written}", *lost])
+        notes = [f"note: {note}" for note in self.notes]
+        return "\n".join([f"read: {self.read}", f"written: {self.written}", *lost, *notes])
 
 
 def convert(source: Path, target: Path, wishes: Wishes) -> Conversion:
     """Read one file and write the other. Raises AirborneError where one cannot be, or an option says nothing."""
     kind = _points_kind(source)
     if kind is None:
-        file = open_calibration(source)
-        return _convert_rig(file, target, wishes)
+        return _convert_rig(_opened(source), target, wishes)
     return _convert_points(source, kind, target, wishes)
+
+
+def _opened(source: Path) -> CalibrationFile:
+    """Open a calibration. Raises AirborneError, saying what a file looks like that is none."""
+    found = _names_in(source)
+    for names, what in _OTHERS:
+        if names <= found:
+            raise AirborneError(f"{source} looks like {what}; convert takes {_EXPECTED}")
+    try:
+        return open_calibration(source)
+    except CalibrationError as error:
+        raise AirborneError(f"{error}; or {_EXPECTED_POINTS}") from None
+
+
+def _names_in(source: Path) -> set[str]:
+    """Return a folder's files, a table's columns, or what stands at the top of a TOML file, but for cameras."""
+    if source.is_dir():
+        return {path.name for path in source.iterdir()}
+    try:
+        return {key for key, value in read_toml(source).items() if not (isinstance(value, dict) and "matrix" in value)}
+    except OSError:
+        return set()
+    except tomllib.TOMLDecodeError:
+        return set(_first_line(source).split(","))
 
 
 def _convert_rig(file: CalibrationFile, target: Path, wishes: Wishes) -> Conversion:
@@ -87,18 +126,20 @@ def _convert_rig(file: CalibrationFile, target: Path, wishes: Wishes) -> Convers
         read=f"{file.where}, {file.format}, {len(rig)} cameras: {', '.join(rig.names)}",
         written=f"{target}, {to}{_convention(to, wishes.target)}",
         lost=lost,
+        notes=tuple(f"{finding.what}; is --unit {wishes.source.unit} right?" for finding in odd_distances(rig)),
     )
 
 
 def _convert_points(source: Path, kind: str, target: Path, wishes: Wishes) -> Conversion:
-    to = wishes.to or _points_format_of_name(target)
+    to = wishes.to or _points_format_of_name(target, source)
     if to not in POINT_FORMATS:
         raise AirborneError(f"{source} holds points in pictures, not cameras; write one of {', '.join(POINT_FORMATS)}")
     _check_options(wishes, kind, to)
     rig = read_rig(wishes.calibration) if wishes.calibration else None
     read = _read_points(source, kind, wishes, rig)
+    spot = placed(read.points, rig) if rig else read
     if to == "dltdv":
-        written, lost = _write_dltdv(target, read, wishes, rig)
+        written, lost = _write_dltdv(target, spot, wishes, rig)
     elif to == "digitised":
         written, lost = _write_digitised(target, read.points), ()
     else:
@@ -115,33 +156,52 @@ def _convert_points(source: Path, kind: str, target: Path, wishes: Wishes) -> Co
         read=f"{source}, {kind}, {counts}{notes}",
         written=f"{written}, {to}{_convention(to, wishes.target)}",
         lost=lost,
+        notes=_residual(spot, rig) if rig else (),
     )
+
+
+def _residual(digitisation: Digitisation, rig: Rig) -> tuple[str, ...]:
+    """Say how well the places that cameras give to points explain their pixels, where two cameras or more see any."""
+    if digitisation.residual_px is None or not np.isfinite(digitisation.residual_px).any():
+        return ()
+    median_px = float(np.nanmedian(digitisation.residual_px))
+    is_large = median_px > LARGE * max(max(camera.size) for camera in rig)
+    doubt = "; this is large: are --origin, the order of --cameras and the frames right?" if is_large else ""
+    return (f"the points' places leave a median residual of {median_px:.2f} px{doubt}",)
 
 
 def _points_kind(source: Path) -> str | None:
     """Tell which kind of points a file holds; None for anything else."""
     if source.is_dir():
-        return None if any(source.glob("*.y*ml")) else "openpose"
+        return "openpose" if any(source.glob("*/*.json")) and not any(source.glob("*.y*ml")) else None
+    first = _first_line(source)
+    if first.startswith("PK"):
+        return "npz"
+    if is_xypts(first):
+        return "dltdv"
+    names = first.split(",")
+    return "digitised" if names[0] in ("frame", "field") and any(name.endswith("_u") for name in names) else None
+
+
+def _first_line(source: Path) -> str:
     try:
         with source.open("rb") as file:
             head = file.read(100_000)
     except OSError as error:
         raise AirborneError(f"{source} cannot be read ({error.strerror}); give a file to convert") from None
-    if head.startswith(b"PK"):
-        return "npz"
-    first = head.decode("utf-8-sig", errors="replace").split("\n", 1)[0].strip()
-    if is_xypts(first):
-        return "dltdv"
-    return "digitised" if first.split(",")[0] in ("frame", "field") else None
+    return head.decode("utf-8-sig", errors="replace").split("\n", 1)[0].strip()
 
 
-def _points_format_of_name(target: Path) -> str:
+def _points_format_of_name(target: Path, source: Path) -> str:
     for ending, kind in {"xypts.csv": "dltdv", ".csv": "digitised", ".npz": "npz"}.items():
         if target.name.endswith(ending):
             return kind
     if not target.suffix:
         return "openpose"
-    raise AirborneError(f"{target}: points are written to a name ending in xypts.csv, .csv or .npz, or to a folder")
+    raise AirborneError(
+        f"{source} holds points in pictures, not cameras; for {target} give a name ending in xypts.csv, .csv or .npz, "
+        "or a folder"
+    )
 
 
 def _check_options(wishes: Wishes, kind: str, to: str) -> None:
@@ -180,13 +240,9 @@ def _write_digitised(target: Path, points: Detections) -> str:
 
 
 def _write_dltdv(target: Path, read: Digitisation, wishes: Wishes, rig: Rig | None) -> tuple[str, tuple[str, ...]]:
-    digitisation = placed(read.points, rig) if rig else read
     given = _with_sizes(replace(wishes.target, size=wishes.source.size), rig)
-    files = write_digitisation(target, digitisation, given)
-    written = ", ".join(map(str, files))
-    if rig and digitisation.residual_px is not None and np.isfinite(digitisation.residual_px).any():
-        written += f", median residual {np.nanmedian(digitisation.residual_px):.2f} px"
-    return written, (*_renamed("pt", read.points.points), *_renamed("cam", read.points.cameras))
+    files = write_digitisation(target, read, given)
+    return ", ".join(map(str, files)), (*_renamed("pt", read.points.points), *_renamed("cam", read.points.cameras))
 
 
 def _renamed(stem: str, names: tuple[str, ...]) -> tuple[str, ...]:

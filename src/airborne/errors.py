@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
+    from pydantic_core import ErrorDetails
 
 
 _LONGEST = 1200  # characters of a message
@@ -43,12 +45,24 @@ class ResultError(AirborneError):
 _PLAIN = {"missing": "is missing", "extra_forbidden": "unknown key"}
 
 
+_KIND = re.compile(r"(literal|dict|list|constrained|function)\W.*|str|int|float|bool")  # a step to one of several kinds
+
+
 def one_line(error: ValidationError) -> str:
     """Say a pydantic error's first complaint in one line: where, what, what was given."""
-    first = error.errors(include_url=False)[0]
-    place = ".".join(str(step)[:60] for step in first["loc"]) or "the file"
-    said = _PLAIN.get(first["type"], first["msg"].removeprefix("Value error, "))
+    by_place: dict[str, list[ErrorDetails]] = {}
+    for one in error.errors(include_url=False):
+        steps = [str(step)[:60] for step in one["loc"]]
+        by_place.setdefault(".".join(step for step in steps if not _KIND.fullmatch(step)), []).append(one)
+    places = [place for place in by_place if not any(other.startswith(f"{place}.") for other in by_place)]
+    place, more = places[0], len(places) - 1
+    first, said = by_place[place][0], ", or ".join(dict.fromkeys(map(_said, by_place[place])))
     is_whole_table = isinstance(first["input"], dict) or first["type"] == "missing"
     given = "" if is_whole_table else f" (found {str(first['input'])[:60]!r})"
-    more = f"; and {error.error_count() - 1} more mistakes" if error.error_count() > 1 else ""
-    return f"{place}: {said}{given}{more}"
+    others = f"; and {more} more mistake{'s' * (more > 1)}" if more else ""
+    return f"{place}{': ' if place else ''}{said}{given}{others}"
+
+
+def _said(one: ErrorDetails) -> str:
+    said = one["msg"].removeprefix("Value error, ").replace("Input should be", "expected")
+    return _PLAIN.get(one["type"], said)

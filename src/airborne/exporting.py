@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel
-from airborne.body.files import read_body
 from airborne.errors import ResultError
 from airborne.export.bvh import write_bvh
 from airborne.export.c3d import write_c3d
@@ -20,7 +19,8 @@ from airborne.export.opensim_motion import write_mot
 from airborne.export.tables import Columns, body_columns, players_columns, write_csv, write_parquet
 from airborne.export.takes import Take, body_take, plain_names, player_takes, with_axis_markers
 from airborne.export.trc import write_trc
-from airborne.motion import Motion, flight, has_inertias, landmarks, read_motion, read_players
+from airborne.motion import Motion, flight, has_inertias, landmarks
+from airborne.runs import body_run, holds_players, players_run
 
 Array = NDArray[np.floating]
 Progress = Callable[[int, int | None], None]
@@ -86,15 +86,12 @@ def _gaps(takes: Sequence[Take], has_parts: bool) -> Iterator[str]:
 
 
 def _read(folder: Path, has_tables: bool, progress: Progress) -> _Read:
-    if (folder / "motion.csv").is_file():
-        return _read_body(folder, has_tables, progress)
-    if (folder / "joints.csv").is_file():
-        return _read_players(folder)
-    raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
+    return _read_players(folder) if holds_players(folder) else _read_body(folder, has_tables, progress)
 
 
 def _read_body(folder: Path, has_tables: bool, progress: Progress) -> _Read:
-    motion, model = read_motion(folder / "motion.csv"), with_axis_markers(read_body(folder / "body.toml"))
+    motion, body = body_run(folder)
+    model = with_axis_markers(body)
     if not motion.has_pose.any():
         raise ResultError(f"{folder}: the body was found in no frame, so there is nothing to export; track again")
     has_com = has_tables and has_inertias(model)
@@ -106,7 +103,7 @@ def _read_body(folder: Path, has_tables: bool, progress: Progress) -> _Read:
 
 
 def _read_players(folder: Path) -> _Read:
-    motion = read_players(folder / "joints.csv")
+    motion = players_run(folder)
     takes = player_takes(motion)
     if not takes:
         raise ResultError(f"{folder}: no player was found in any frame, so there is nothing to export; track again")

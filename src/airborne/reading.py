@@ -17,10 +17,18 @@ _DEEP_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){64}""")  # 
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file. Raises OSError, UnicodeDecodeError, or TOMLDecodeError, also where it is large or nested."""
+    """Read a TOML file. Raises OSError, or TOMLDecodeError for anything else, also where it is large or nested."""
     if path.stat().st_size > LARGEST_TOML_BYTES:
         raise tomllib.TOMLDecodeError(f"larger than {LARGEST_TOML_BYTES // 1_000_000} MB")
-    return parsed_toml(path.read_text(encoding="utf-8-sig"))
+    try:
+        return parsed_toml(path.read_text(encoding="utf-8-sig"))
+    except UnicodeDecodeError:
+        raise tomllib.TOMLDecodeError("it is not a text file") from None
+
+
+def listed_keys(document: dict[str, Any]) -> str:
+    """Return what stands at the top of a document, for an error."""
+    return ", ".join(key[:60] for key in [*document][:6]) or "nothing"
 
 
 def read_json(path: Path) -> Any:

@@ -13,9 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from airborne import __version__
+from airborne.body import BodyModel
+from airborne.body.files import read_body
 from airborne.cameras import Calibration, Camera, Rig, calibrate, read_control_points, read_rig
 from airborne.errors import ResultError, TrialError
 from airborne.export import write_json
+from airborne.motion import Motion, PlayersMotion, read_motion, read_players
 from airborne.reading import read_json
 from airborne.start import mended_rig
 from airborne.tracking.methods import FIELDS_AS
@@ -141,6 +144,40 @@ def holds_run_of(trial: Trial, folder: Path) -> bool:
     return record.is_file() and _read_record(record) == identity_of(trial)
 
 
+def holds_players(folder: Path) -> bool:
+    """Say whether a folder holds a run of several players, finished or not."""
+    return (folder / "joints.csv").is_file() and not (folder / "motion.csv").is_file()
+
+
+def body_run(folder: Path) -> tuple[Motion, BodyModel]:
+    """Return the motion and the body of the run in a folder, finished or not.
+
+    Raises ResultError where the folder holds none, the body is missing, or its record is damaged.
+    """
+    if not (folder / "motion.csv").is_file():
+        raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
+    check_record(folder)
+    motion = read_motion(folder / "motion.csv")
+    if not (folder / "body.toml").is_file():
+        raise ResultError(
+            f"{folder / 'body.toml'} is missing, the body that was tracked; put the trial's body file there, "
+            "or track again"
+        )
+    return motion, read_body(folder / "body.toml")
+
+
+def players_run(folder: Path) -> PlayersMotion:
+    """Return the motion of the run of players in a folder. Raises ResultError as `body_run` does."""
+    check_record(folder)
+    return read_players(folder / "joints.csv")
+
+
+def check_record(folder: Path) -> None:
+    """Raise ResultError where a folder's run.json is damaged; a run without one is known by its tables."""
+    if (folder / RECORD).exists():
+        _read_record(folder / RECORD)
+
+
 def identity_of(trial: Trial, *, live: bool = False) -> dict[str, Any]:
     """Return what two runs share if one can go on where the other was stopped."""
     settings = {"inputs": inputs_of(trial, live=live), "settings": trial.track.told, "version": __version__}
@@ -150,11 +187,13 @@ def identity_of(trial: Trial, *, live: bool = False) -> dict[str, Any]:
 def _read_record(path: Path) -> dict[str, Any]:
     try:
         record = read_json(path)
-        return record if isinstance(record, dict) else {}
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError):
+        record = None
+    if not isinstance(record, dict):
         raise ResultError(
-            f"{path} is missing or damaged, so it cannot be told whose run this is; use another folder"
-        ) from error
+            f"{path} is missing or damaged, so it cannot be told whose run this is; track into another folder"
+        )
+    return record
 
 
 def past_the_end(trial: Trial) -> TrialError:

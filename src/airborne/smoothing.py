@@ -11,12 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne import __version__
-from airborne.assessment import holds_players
-from airborne.body.files import read_body
 from airborne.errors import ResultError
 from airborne.export import write_json
 from airborne.export.analysis_figures import write_residuals
-from airborne.motion import landmarks, read_motion, read_players
+from airborne.motion import landmarks
 from airborne.motion.flights import Event, body_events, player_events
 from airborne.motion.signals import ResidualAnalysis, is_even, residual_analysis
 from airborne.motion.smooth_tables import (
@@ -32,6 +30,7 @@ from airborne.motion.smoothing import (
     smooth_players,
     smooth_root,
 )
+from airborne.runs import body_run, holds_players, players_run
 
 Array = NDArray[np.floating]
 Progress = Callable[[int, int | None], None]
@@ -133,7 +132,7 @@ class _Run:
 
 
 def _players_run(folder: Path) -> _Run:
-    motion = read_players(folder / "joints.csv")
+    motion = players_run(folder)
 
     def write(
         out: Path, how: Smoothing, events: Events, progress: Progress | None
@@ -150,9 +149,7 @@ def _players_run(folder: Path) -> _Run:
 
 
 def _body_run(folder: Path) -> _Run:
-    if not (folder / "motion.csv").is_file():
-        raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
-    motion, model = read_motion(folder / "motion.csv"), read_body(folder / "body.toml")
+    motion, model = body_run(folder)
 
     def write(
         out: Path, how: Smoothing, events: Events, progress: Progress | None
@@ -179,7 +176,8 @@ def _events(run: _Run, given_s: Sequence[float] | None) -> Events:
             raise ResultError(
                 f"no event can be at {outside[0]:g} s: the run goes from {run.time_s[0]:.3f} to {run.time_s[-1]:.3f} s"
             )
-        return {name: tuple(Event("given", time) for time in sorted(given_s)) for name in dict.fromkeys(run.owners)}
+        given = tuple(Event("given", time) for time in sorted(set(given_s)))
+        return dict.fromkeys(run.owners, given)
     try:
         return run.find()
     except ResultError as error:

@@ -16,7 +16,7 @@ from airborne.body.files import read_body
 from airborne.errors import TrialError, one_line
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.player_table import STRICT, PlayerTable, Vector
-from airborne.reading import read_toml
+from airborne.reading import listed_keys, read_toml
 from airborne.rendering import Lamp, Lights
 from airborne.tracking.methods import Colour, Method, Prediction, Settings
 from airborne.tracking.players import PlayerStart
@@ -201,7 +201,7 @@ class LightsTable(_Strict):
 class TrackTable(_Strict):
     """How to track; each method reads its own settings."""
 
-    method: Method | PlayersMethod = "refined"
+    method: Literal[Method, PlayersMethod] = "refined"
     every: Annotated[int, Field(ge=1)] = 1  # track every n-th frame or field
     stop: Annotated[int, Field(ge=1)] | None = None  # one past the last frame or field
     prediction: Prediction = "smooth"
@@ -365,22 +365,39 @@ class Trial(_Strict):
 def read_trial(path: Path, track: dict[str, Any] | None = None, cameras: Sequence[str] | None = None) -> Trial:
     """Read a trial file; raises TrialError, naming the file and what is wrong, for anything unusable.
 
-    `track` replaces entries of its [track] table; `cameras` keeps only the named cameras.
+    `track` replaces entries of its [track] table, as options of `airborne track` do; `cameras` keeps only the named
+    cameras.
     """
     try:
-        table = read_toml(path)
-        if isinstance(settings := table.setdefault("track", {}), dict):
-            settings.update(track or {})
-        trial = Trial.model_validate(table)
+        trial = _validated(read_toml(path), track or {}, path.name)
     except OSError as error:
         raise TrialError(f"{path}: cannot be read ({error.strerror}); give the path of a trial's TOML file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise TrialError(f"{path.name}: not a TOML file: {error}") from error
-    except ValidationError as error:
-        raise TrialError(f"{path.name}: {one_line(error)}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise TrialError(f"{path.name}: not a TOML file: {error}; expected a trial's TOML") from error
     trial._folder = path.parent
     _check(path, trial)
     return trial if cameras is None else _only(path, trial, cameras)
+
+
+def _validated(table: dict[str, Any], changes: dict[str, Any], where: str) -> Trial:
+    """Return the trial of a table with changes to its settings; errors name these where they are what is wrong."""
+    heads = ("[[camera]]", "[calibration]", "[body]", "[start]")
+    missing = [head for head in heads if head.strip("[]") not in table]
+    if len(missing) > 1:
+        raise TrialError(f"{where}: no trial file, as {', '.join(missing)} are missing (found {listed_keys(table)})")
+    settings = table.get("track", {})
+    changed = {**table, "track": {**settings, **changes} if isinstance(settings, dict) else settings}
+    try:
+        return Trial.model_validate(changed)
+    except ValidationError as error:
+        said = one_line(error)
+    if changes:
+        try:
+            Trial.model_validate(table)
+            where = " ".join(f"--{name} {value}" for name, value in changes.items())
+        except ValidationError:
+            pass
+    raise TrialError(f"{where}: {said}")
 
 
 def _check(path: Path, trial: Trial) -> None:

@@ -114,7 +114,7 @@ def test_file_says_segments_parts_places_and_colours(tmp_path):
         ('name = "leg"', "", "name: is missing"),
         ("centre_m", "center_m", "segment.0.part.0.center_m: unknown key"),
         ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, -0.2, 0.4]", "part 'upper': size_m is [0.1, -0.2, 0.4]"),
-        ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2, nan]", "segment.0.part.0.size_m.2: Input should be a finite"),
+        ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2, nan]", "segment.0.part.0.size_m.2: expected a finite"),
         ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2]", "segment.0.part.0.size_m"),
         ("size_m = [0.1, 0.2, 0.4]", "", "part 'upper' is a box and needs size_m"),
         ("size_m = [0.1, 0.2, 0.4]", "semi_axes_m = [1, 1, 1]", "part 'upper' is a box and needs size_m"),
@@ -144,7 +144,7 @@ def test_malformed_file_is_refused_in_one_line_that_names_it_and_the_fault(tmp_p
 
 def test_file_without_segments_is_refused(tmp_path):
     assert "segment" in complaint(tmp_path, 'name = "a"\nsegment = []')
-    assert "is missing" in complaint(tmp_path, "")
+    assert "is no body file: it has no [[segment]] (found nothing)" in complaint(tmp_path, "")
 
 
 def test_body_without_parts_is_refused(tmp_path):

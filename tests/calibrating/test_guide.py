@@ -7,7 +7,9 @@ import tomllib
 from itertools import product
 from pathlib import Path
 
-from airborne.calibrating import sources_from
+import numpy as np
+
+from airborne.calibrating import calibrate_from, sources_from
 from airborne.cameras.court import court_points
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -36,6 +38,22 @@ def test_every_point_of_the_court_is_named():
 def test_points_of_the_example_are_points_of_the_court():
     rows = fences("text")[0].splitlines()[1:]
     assert {row.split(",")[0] for row in rows} <= set(court_points("men"))
+
+
+def test_the_example_of_the_court_gives_its_cameras(tmp_path):
+    (tmp_path / "court_clicks.csv").write_text(fences("text")[0])
+    sources = sources_from(tomllib.loads(fences("toml")[0]), tmp_path, "the page")
+    found = calibrate_from(sources, lambda what, done, total: None)
+    assert found.adjusted.rms_px() < 1
+    assert np.allclose(found.rig["left"].centre, (-6.2, -13.5, 3.6), atol=0.1)
+    assert np.allclose(found.rig["right"].centre, (7.1, -12.8, 4.1), atol=0.1)
+
+
+def test_four_points_a_camera_do_not_claim_more_than_clicks_can_say(tmp_path):
+    (tmp_path / "court_clicks.csv").write_text("\n".join(fences("text")[0].splitlines()[:5]))
+    sources = sources_from(tomllib.loads(fences("toml")[0]), tmp_path, "the page")
+    sd_m = calibrate_from(sources, lambda what, done, total: None).adjusted.camera_sd[:, 3:6]
+    assert (np.linalg.norm(sd_m, axis=1) > 0.05).all()
 
 
 def test_every_kind_of_finding_is_explained():

@@ -61,3 +61,20 @@ def test_a_file_that_is_none_is_refused_in_one_line(tmp_path, text):
     assert "\n" not in str(caught.value)
     with pytest.raises(CalibrationError, match="cannot be read"):
         read_sources(tmp_path / "none.toml")
+
+
+def test_another_kind_of_file_is_told(tmp_path):
+    path = tmp_path / "sources.toml"
+    for text, found in (("[cam1]\nmatrix = 1", "cam1"), ('name = "x"\n[[camera]]\n[body]', "name, camera, body")):
+        path.write_text(text)
+        with pytest.raises(CalibrationError, match=rf"is no file of sources: expected .* \(found {found}\)"):
+            read_sources(path)
+
+
+@pytest.mark.parametrize(("net", "said"), [('"boys"', "expected 'men' or 'women'"), ("-1", "expected greater than 0")])
+def test_a_choice_that_is_none_names_its_place_and_no_inner_kind(tmp_path, net, said):
+    path = tmp_path / "sources.toml"
+    path.write_text(f'[[camera]]\nname = "a"\nsize = [100, 100]\n[court]\nfile = "x"\nnet = {net}\n')
+    with pytest.raises(CalibrationError, match=rf"sources\.toml: court\.net: .*{said}") as caught:
+        read_sources(path)
+    assert "more mistake" not in str(caught.value)

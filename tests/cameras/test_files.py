@@ -148,11 +148,11 @@ def test_a_qualisys_camera_looks_down_its_own_negative_z(tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("", "has no cameras"),
+        ("", "is empty; expected Pose2Sim"),
         ("[metadata]\nerror = 0\n", "has no cameras"),
         ("title = 'x'\n", "has no cameras"),
         (b"\xff\xfe\x00", "is not a text file"),
-        ("just words", "is no calibration: expected Pose2Sim"),
+        ("just words", "(it begins with 'just words'); expected Pose2Sim"),
         (TOML.replace("false", "true").replace(", 0.4]", "]"), "distortions = [0.1, 0.2, 0.3], expected 4 numbers"),
         (TOML.replace("matrix", "matrx"), "[left]: no matrix; expected 3×3 numbers"),
         (TOML.replace("[ 0.0, 0.0, 1.0]]", "]"), "expected 3×3 numbers"),

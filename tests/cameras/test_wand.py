@@ -81,6 +81,12 @@ def test_a_file_that_is_no_text_or_not_there_is_refused(tmp_path):
         read_wand(tmp_path / "no.csv", NAMES, Given(), [0.5])
 
 
+def test_other_points_beside_the_wand_are_refused(tmp_path):
+    px = np.full((1, 4, 1, 2), 5.0)
+    with pytest.raises(CalibrationError, match="holds 4 markers; expected 2, one more than lengths"):
+        read_wand(written(tmp_path, xypts(px)), ("cam1",), Given(), [1.0])
+
+
 @pytest.mark.parametrize(
     ("lengths", "said"),
     [({}, "has no length"), ({(0, 2): 1.0}, "between markers 1 and 3"), ({(0, 1): 1000.0}, "not millimetres")],

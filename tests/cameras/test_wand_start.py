@@ -64,8 +64,18 @@ def test_a_camera_that_shares_nothing_with_the_others_is_named():
     px = tracks.px.copy()
     px[:100, :, 3] = np.nan
     px[100:, :, :3] = np.nan
-    with pytest.raises(CalibrationError, match="does not tie cam4 to cam1, cam2, cam3: fewer than 15"):
+    with pytest.raises(
+        CalibrationError, match=r"does not tie cam4 to cam1, cam2, cam3: .* in 0 frames at most; at least 10"
+    ):
         wand_start(replace(tracks, px=px), waving.SIZES)
+
+
+def test_a_wand_seen_in_a_few_frames_is_refused():
+    tracks = waving.tracks(np.random.default_rng(11), waving.hall(), 9)
+    with pytest.raises(CalibrationError, match="in 9 frames at most; at least 10 are needed"):
+        wand_start(tracks, waving.SIZES)
+    with pytest.raises(CalibrationError, match="only cam1 saw the wand"):
+        wand_start(tracks.select(["cam1"]), waving.SIZES)
 
 
 def test_cameras_are_chained_where_only_neighbours_share_views():

@@ -31,7 +31,7 @@ from airborne.body.model import (
 )
 from airborne.errors import BodyError, one_line
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
-from airborne.reading import read_toml
+from airborne.reading import listed_keys, read_toml
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
@@ -92,11 +92,14 @@ class _BodyTable(_Strict):
 def read_body(path: Path) -> BodyModel:
     """Read a body file; raises BodyError, naming the file and what is wrong, for anything unusable."""
     try:
-        table = _BodyTable.model_validate(read_toml(path))
+        document = read_toml(path)
+        if "segment" not in document:
+            raise BodyError(f"{path.name} is no body file: it has no [[segment]] (found {listed_keys(document)})")
+        table = _BodyTable.model_validate(document)
     except OSError as error:
         raise BodyError(f"{path.name}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BodyError(f"{path.name}: not a TOML file: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise BodyError(f"{path.name}: not a TOML file: {error}; expected a body's [[segment]] tables") from error
     except ValidationError as error:
         raise BodyError(f"{path.name}: {one_line(error)}") from error
     segments = tuple(_segment(segment, path) for segment in table.segment)

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
 from airborne.errors import CalibrationError, one_line
-from airborne.reading import read_toml
+from airborne.reading import listed_keys, read_toml
 
 Positive = Annotated[float, Field(gt=0)]
 Pixels = Literal["upper-left-1", "upper-left-0", "lower-left-1", "lower-left-0"]
@@ -172,7 +172,7 @@ def read_sources(path: Path) -> Sources:
         document = read_toml(path)
     except OSError as error:
         raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a file of sources") from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
         raise CalibrationError(
             f"{path} is no TOML file ({str(error).lower()}); expected [[camera]], [board], ..."
         ) from None
@@ -181,6 +181,11 @@ def read_sources(path: Path) -> Sources:
 
 def sources_from(document: dict, folder: Path, where: str) -> Sources:
     """Check the tables; relative paths count from the folder. Raises CalibrationError, naming `where`."""
+    if "camera" not in document or "body" in document:
+        raise CalibrationError(
+            f"{where} is no file of sources: expected [[camera]] and [board], [control_points], [court], [wand] or "
+            f"[detections] (found {listed_keys(document)})"
+        )
     try:
         sources = Sources.model_validate(document)
     except ValidationError as error:

@@ -92,7 +92,7 @@ def read_board(path: str | Path) -> Board:
         document = read_toml(path)
     except OSError as error:
         raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a board's file") from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
         raise CalibrationError(f"{path} is no TOML file ({str(error).lower()}); expected columns, rows, ...") from None
     return board_from_table(document, str(path))
 

@@ -61,6 +61,11 @@ def read_control_points(path: str | Path, known: dict[str, ScenePoint] | None = 
             raise CalibrationError(f"{path}: point '{name}' stands in rows {names[name]} and {line}; remove one")
         names[name] = line
     places = [_place(path, line, {c: row[column[c]] for c in column}, known or {}) for line, row in rows]
+    if known and not any(place is known.get(name) for name, place in zip(names, places, strict=True)):
+        raise CalibrationError(
+            f"{path}: not one point has its place from the court, as all have coordinates of their own; "
+            "give such a table as control points, without a court"
+        )
     px = np.array(
         [
             [_pixel(path, line, camera, [row[column[f"{camera}_{a}"]] for a in "uv"]) for camera in cameras]

@@ -9,9 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from airborne.cameras.camera import Rig
+from airborne.cameras.diagnosis.units import FARTHEST_M, odd_distances, widest
 from airborne.cameras.formats.aniposelib import aniposelib_text
 from airborne.cameras.formats.caliscope import caliscope_loses, caliscope_text, rig_from_caliscope
 from airborne.cameras.formats.dlt import dlt_loses, dlt_text, is_dlt, rig_from_dlt
@@ -25,7 +24,6 @@ from airborne.errors import CalibrationError
 from airborne.reading import parsed_toml
 
 LARGEST_FILE_BYTES = 2_000_000  # a hundred cameras take a tenth of it
-FARTHEST_M, NEAREST_M = 200.0, 0.05  # where the largest distance between two cameras is in metres
 
 EXPECTED = (
     "expected Pose2Sim, aniposelib or Caliscope TOML, Qualisys .qca.txt, Vicon .xcp, OpenCV YAML or DLT coefficients"
@@ -75,8 +73,12 @@ def rig_of(file: CalibrationFile, given: Given) -> Rig:
         if size not in (None, camera.size):
             said = f"{camera.size[0]}x{camera.size[1]}"
             raise CalibrationError(f"{file.where} says that '{camera.name}' has pictures of {said}; leave --size out")
-    if given.unit is None and len(rig) > 1:
-        _check_distances(rig, file.where)
+    if given.unit is None and odd_distances(rig):
+        asked = "millimetres? Then say --unit mm" if widest(rig) > FARTHEST_M else "metres? Then say --unit m"
+        raise CalibrationError(
+            f"{file.where}: the cameras lie up to {widest(rig):.3g} m from each other; are its lengths in {asked}; "
+            "`airborne convert` writes such a file anew, in metres"
+        )
     return rig
 
 
@@ -87,6 +89,8 @@ def open_calibration(path: str | Path) -> CalibrationFile:
     if path.is_dir():
         return _opencv(path, where, _opencv_folder(path))
     text = _read_text(path)
+    if not text.strip():
+        raise CalibrationError(f"{where} is empty; {EXPECTED}")
     if text.lstrip().startswith("<"):
         root = root_of(text, where)
         if root.tag not in ROOTS:
@@ -100,7 +104,9 @@ def open_calibration(path: str | Path) -> CalibrationFile:
     try:
         document = parsed_toml(text)
     except tomllib.TOMLDecodeError as error:
-        raise CalibrationError(f"{where} is no calibration: {EXPECTED}; as TOML, {_short(error)}") from None
+        first = text.strip().splitlines()[0][:40]
+        found = f"as TOML, {_short(error)}" if path.suffix.lower() == ".toml" else f"it begins with {first!r}"
+        raise CalibrationError(f"{where} is no calibration ({found}); {EXPECTED}") from None
     if isinstance(document.get("cameras"), dict):
         return CalibrationFile("caliscope", where, partial(rig_from_caliscope, document, where))
     return CalibrationFile("pose2sim", where, partial(rig_from_tables, document, where))
@@ -149,7 +155,7 @@ def format_of_name(path: Path) -> str:
     for suffix, kind in SUFFIXES.items():
         if path.name.lower().endswith(suffix):
             return kind
-    raise CalibrationError(f"{path}: the name asks for no format; end it in {', '.join(SUFFIXES)}, or name the format")
+    raise CalibrationError(f"{path}: the name asks for no format; end it in {', '.join(SUFFIXES)}, or give --to")
 
 
 def _texts(
@@ -177,17 +183,6 @@ def _unit(kind: str, unit: Unit | None) -> Unit:
     if unit not in (None, *UNITS[kind]):
         raise CalibrationError(f"{kind} files are always in {UNITS[kind][0]}; leave the unit out")
     return unit or UNITS[kind][0]
-
-
-def _check_distances(rig: Rig, where: str) -> None:
-    centres = np.stack([camera.centre for camera in rig])
-    widest = float(np.linalg.norm(centres[:, None] - centres, axis=-1).max())
-    if not NEAREST_M <= widest <= FARTHEST_M:
-        asked = "millimetres? Then say --unit mm" if widest > FARTHEST_M else "metres? Then say --unit m"
-        raise CalibrationError(
-            f"{where}: the cameras lie up to {widest:.3g} m from each other; are its lengths in {asked}; "
-            "`airborne convert` writes such a file anew, in metres"
-        )
 
 
 def _read_text(path: Path) -> str:

@@ -26,7 +26,7 @@ FOCAL_RATIOS = np.geomspace(0.4, 5.0, 14)  # focal length over the picture's lon
 SCALE_PX = 3.0  # residuals much beyond this count ever less
 FAR_M = 1000.0  # an anchor stands so far off that its distance changes with one coordinate only
 EXACT_SD_M = 1e-6
-LEAST_FOCAL_PX = 1.0
+FAR_OFF = 5.0  # by which a logarithm of the focal length never changes
 
 
 def scene_start(
@@ -137,7 +137,7 @@ def _polished(camera: Camera, world: Array, px: Array, *, is_focal_free: bool) -
     def moved(step: Array) -> Camera:
         turn = RigidTransform.from_components(step[3:6], Rotation.from_rotvec(step[:3]))
         K = camera.K.copy()
-        K[[0, 1], [0, 1]] *= np.exp(step[6]) if is_focal_free else 1.0
+        K[[0, 1], [0, 1]] *= np.exp(np.clip(step[6], -FAR_OFF, FAR_OFF)) if is_focal_free else 1.0
         return replace(camera, K=K, camera_from_world=turn * camera.camera_from_world)
 
     free = 7 if is_focal_free and 2 * len(world) >= 7 else 6

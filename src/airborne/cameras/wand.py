@@ -67,6 +67,11 @@ def read_wand(path: Path, cameras: Sequence[str], given: Given, lengths_m: Seque
     rows = read_csv(path, EXPECTED, CalibrationError)
     header = ",".join(rows[0][1]) if rows else ""
     px = read_xypts(path, given, cameras).px if is_xypts(header) else _tracks(path, rows, cameras)
+    if px.shape[1] != len(lengths_m) + 1:
+        raise CalibrationError(
+            f"{path} holds {px.shape[1]} markers; expected {len(lengths_m) + 1}, one more than lengths are given: keep "
+            "the wand's own markers, and give a length from each to the next"
+        )
     lengths = {(i, i + 1): float(length) for i, length in enumerate(lengths_m)}
     return WandTracks(cameras=tuple(cameras), px=px, lengths_m=lengths)
 

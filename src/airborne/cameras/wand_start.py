@@ -26,7 +26,7 @@ from airborne.geometry.scatter import robust_sd
 Array = NDArray[np.floating]
 
 LIMIT_SHARE = 0.003  # of a picture's longer side: how far a marker may lie from its epipolar line
-LEAST_SHARED = 15  # markers that two cameras must both see
+LEAST_SHARED, LEAST_FRAMES = 15, 10  # markers that two cameras must both see, and in how many frames
 FOCAL_RATIOS = np.geomspace(0.45, 3.6, 10)  # focal length over the picture's longer side: 96 to 16 degrees across
 SAMPLE = 120  # frames that judge a focal length
 PLACING_SHARE = 0.02  # of the longer side: how far a marker may lie off when a camera is chained on
@@ -88,21 +88,29 @@ def _pairs(px: Array, cameras: Sequence[Camera]) -> list[_Pair]:
             continue
         seen = np.zeros_like(both)
         seen[both] = agreement.is_inlier
-        found.append(_Pair(a, b, seen, agreement))
+        if seen.any(axis=1).sum() >= LEAST_FRAMES:
+            found.append(_Pair(a, b, seen, agreement))
     return found
 
 
 def _check_linked(tracks: WandTracks, pairs: Sequence[_Pair]) -> None:
     """Raise CalibrationError where not every camera is tied to every other, at least through others."""
+    if len(tracks.cameras) < 2:
+        raise CalibrationError(
+            f"only {', '.join(tracks.cameras)} saw the wand; it calibrates two cameras or more together"
+        )
     linked = {0}
     for _ in tracks.cameras:
         linked |= {i for pair in pairs if {pair.a, pair.b} & linked for i in (pair.a, pair.b)}
-    apart = [name for i, name in enumerate(tracks.cameras) if i not in linked]
+    apart = [i for i in range(len(tracks.cameras)) if i not in linked]
     if apart:
-        rest = [name for i, name in enumerate(tracks.cameras) if i in linked]
+        is_seen = np.isfinite(tracks.px[..., 0])
+        shared = max(int((is_seen[..., i] & is_seen[..., j]).any(axis=1).sum()) for i in apart for j in linked)
+        names, rest = (", ".join(tracks.cameras[i] for i in each) for each in (apart, sorted(linked)))
         raise CalibrationError(
-            f"the wand does not tie {', '.join(apart)} to {', '.join(rest)}: fewer than {LEAST_SHARED} of its places "
-            "are seen by one of each at the same time; wave it where both see it, and bring the cameras into step"
+            f"the wand does not tie {names} to {rest}: one of each sees it at the same time in {shared} frames at "
+            f"most; at least {LEAST_FRAMES} are needed in which {LEAST_SHARED} of its places agree, 200 are good: "
+            "wave it where both see it, and bring the cameras into step"
         )
 
 

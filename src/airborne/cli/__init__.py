@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -10,7 +11,7 @@ import typer
 from airborne import __version__
 from airborne.cli import reproduce, results, synth, track
 from airborne.cli.calibrate import calibrate
-from airborne.cli.console import refuse
+from airborne.cli.console import STOPPED, refuse, stopped
 from airborne.cli.convert import convert
 from airborne.cli.export import export
 from airborne.cli.smooth import smooth
@@ -54,19 +55,36 @@ app.add_typer(_group(_REPRODUCE, "Make a paper's experiment anew: its table besi
 def main() -> None:
     """Run the command line; a user's error is one line on stderr and exit code 2."""
     try:
-        sys.exit(app(standalone_mode=False))
+        code = app(standalone_mode=False)
+        if code == STOPPED:  # typer's answer to Ctrl-C
+            stopped()
+        sys.exit(code)
     except _UsageError as error:
         said, context = error.format_message(), getattr(error, "ctx", None)
         if "Usage:" in said or not said:  # a command without arguments: its help
             print(said, end="")
             sys.exit(2)
-        refuse(f"{' '.join(said.split())} See: {context.command_path if context else 'airborne'} --help")
+        refuse(f"{' '.join(said.split()).rstrip('.')}; see {context.command_path if context else 'airborne'} --help")
     except (KeyboardInterrupt, typer.Abort):
-        sys.exit(130)
+        stopped()
     except AirborneError as error:
         refuse(str(error))
     except OSError as error:
-        refuse(f"{error.filename or 'a file'}: {error.strerror or error}; give a path that can be read or written")
+        refuse(_said_of_path(error))
+
+
+def _said_of_path(error: OSError) -> str:
+    """Say what stands in the way at the path that an error is about."""
+    path = Path(str(error.filename or "a file"))
+    file = next((place for place in (path, *path.parents) if place.is_file()), path)
+    match error:
+        case FileExistsError() | NotADirectoryError():
+            return f"{file} is a file; give a folder"
+        case IsADirectoryError():
+            return f"{path} is a folder; give a file's name"
+        case FileNotFoundError() if not path.parent.exists():
+            return f"{path}: there is no folder {path.parent}; make it, or give another path"
+    return f"{path}: {error.strerror or error}; give a path that can be read or written"
 
 
 @app.callback(invoke_without_command=True)

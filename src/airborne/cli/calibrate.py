@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from airborne.cli.console import Json, progress
+from airborne.cli.console import Json, progress, sizes_px
 from airborne.errors import AirborneError
 
 
@@ -48,6 +48,11 @@ def calibrate(
 
     Example: airborne calibrate --board charuco.toml cam_0.mp4 cam_1.mp4 -o calib.toml
     """
+    for path in (*files, board, timestamps):
+        if path is not None and not path.exists():
+            raise AirborneError(f"{path} does not exist; check the path")
+    if board is None and files[0].is_dir():
+        raise AirborneError(f"{files[0]} is a folder; give a table or a file of sources, or --board for its pictures")
     if court is not None or wand is not None:
         sources = _scene(files, court, wand, size)
         _from_sources(sources, output, report or output.with_name(f"{output.stem}_report"), as_json)
@@ -105,11 +110,17 @@ def _scene(files: list[Path], court: str | None, wand_m: float | None, size: str
     from airborne.cameras.court import court_points
     from airborne.cameras.formats.dltdv import read_xypts
     from airborne.cameras.formats.given import Given
+    from airborne.cameras.wand import LENGTH_RANGE_M
 
     if len(files) != 1 or (court is None) == (wand_m is None):
         raise AirborneError("--court and --wand go with one table each; for several sources write a file of sources")
     if size is None:
         raise AirborneError("--size is missing: give the image size in pixels, such as 1920x1080")
+    if wand_m is not None and not LENGTH_RANGE_M[0] <= wand_m <= LENGTH_RANGE_M[1]:
+        raise AirborneError(
+            f"--wand {wand_m:g}: expected the distance between the two markers, {LENGTH_RANGE_M[0]:g} to "
+            f"{LENGTH_RANGE_M[1]:g} metres, not millimetres"
+        )
     path = files[0].resolve()
     if court is not None:
         net = court if court in ("men", "women") else _metres(court)
@@ -160,15 +171,9 @@ class _Phases(ExitStack):
 
 
 def _sizes(text: str, names: tuple[str, ...]) -> dict[str, tuple[int, int]]:
-    """Parse 768x576 for all cameras, or cam1=768x576,cam2=1920x1080."""
-    sizes = {}
-    try:
-        for item in text.split(","):
-            name, _, numbers = item.rpartition("=")
-            width, height = (int(number) for number in numbers.lower().split("x"))
-            sizes |= {n: (width, height) for n in ([name] if name else names)}
-    except ValueError:
-        raise AirborneError(f"--size {text}: expected WIDTHxHEIGHT such as 768x576, or cam1=768x576,cam2=...") from None
+    """Return the size of every camera's pictures."""
+    sizes = sizes_px(text)
+    sizes = (dict.fromkeys(names, sizes.pop("")) if "" in sizes else {}) | sizes
     missing = [name for name in names if name not in sizes]
     if missing:
         raise AirborneError(f"--size gives no size for {', '.join(missing)}; add {missing[0]}=WIDTHxHEIGHT")

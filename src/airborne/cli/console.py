@@ -13,7 +13,11 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from airborne.errors import AirborneError
+
+STOPPED = 130  # the exit code
 _SECONDS_A_LINE = 5.0
+_SIDES_PX = range(16, 20_001)  # of a picture
 
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -25,6 +29,27 @@ def refuse(reason: str) -> NoReturn:
     """Say why in one line and leave with code 2."""
     errors.print(f"airborne: {reason}", style="red", markup=False)
     sys.exit(2)
+
+
+def stopped(left: str = "") -> NoReturn:
+    """Say that the user stopped the command, and what of it is left; leave with code 130."""
+    errors.print(f"airborne: stopped{'; ' if left else ''}{left}", markup=False)
+    sys.exit(STOPPED)
+
+
+def sizes_px(text: str) -> dict[str, tuple[int, int]]:
+    """Parse the option --size: 768x576 for all cameras (under ""), or cam1=768x576,cam2=1920x1080."""
+    sizes = {}
+    try:
+        for item in text.split(","):
+            name, _, numbers = item.rpartition("=")
+            width, height = (int(number) for number in numbers.lower().split("x"))
+            sizes[name.strip()] = (width, height)
+    except ValueError:
+        raise AirborneError(f"--size {text}: expected WIDTHxHEIGHT such as 768x576, or cam1=768x576,cam2=...") from None
+    if any(side not in _SIDES_PX for size in sizes.values() for side in size):
+        raise AirborneError(f"--size {text}: expected sides of {_SIDES_PX[0]} to {_SIDES_PX[-1]} pixels")
+    return sizes
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from airborne.cli.console import sizes_px
 from airborne.errors import AirborneError
 
 Unit = Literal["m", "mm"]
@@ -64,15 +65,6 @@ def _base(given: int | None) -> int:
 
 
 def _size(text: str | None) -> tuple[int, int] | dict[str, tuple[int, int]] | None:
-    """Parse 768x576 for all cameras, or cam1=768x576,cam2=1920x1080."""
-    if text is None:
-        return None
-    sizes = {}
-    try:
-        for item in text.split(","):
-            name, _, numbers = item.rpartition("=")
-            width, height = (int(number) for number in numbers.lower().split("x"))
-            sizes[name.strip()] = (width, height)
-    except ValueError:
-        raise AirborneError(f"--size {text}: expected WIDTHxHEIGHT such as 768x576, or cam1=768x576,cam2=...") from None
-    return sizes[""] if set(sizes) == {""} else sizes
+    """Return the size of all cameras' pictures, or those by camera."""
+    sizes = {} if text is None else sizes_px(text)
+    return sizes[""] if set(sizes) == {""} else sizes or None

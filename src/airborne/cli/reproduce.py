@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from airborne.cli.console import Json, Out, errors, progress
+from airborne.cli.console import Json, Out, progress, stopped
 
 
 def reproduce_rigid(
@@ -25,8 +25,7 @@ def reproduce_rigid(
         with progress("tracking") as report:
             summary = rigid.reproduce_rigid(output, quick=quick, progress=report)
     except KeyboardInterrupt:
-        errors.print(f"airborne: stopped; the files finished so far are in {output}", markup=False)
-        raise typer.Exit(130) from None
+        stopped(f"the files finished so far are in {output}")
     print((output / "summary.json").read_text(encoding="utf-8") if as_json else rigid.describe(summary))
     if not as_json:
         print(f"results: {output}")
@@ -51,8 +50,7 @@ def reproduce_blockjump(
                 output, quick=quick, progress=report, n_processes=processes, n_seeds=seeds
             )
     except KeyboardInterrupt:
-        errors.print(f"airborne: stopped; give the same command again to go on; sequences in {output}", markup=False)
-        raise typer.Exit(130) from None
+        stopped(f"give the same command again to go on; sequences in {output}")
     print((output / "summary.json").read_text(encoding="utf-8") if as_json else block_jump.describe(summary))
     if not as_json:
         print(f"results: {output}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from airborne.cli.console import Json, Out, errors, progress
+from airborne.cli.console import Json, Out, progress, stopped
 from airborne.cli.results import evaluate
 from airborne.errors import AirborneError
 
@@ -106,15 +106,15 @@ def _track(
                 return track_players(trial, output, resume=resume, live=live, pictures=pictures, progress=report)
             return pipeline.track(trial, output, resume=resume, pictures=pictures, progress=report)
     except KeyboardInterrupt:
-        errors.print(f"airborne: stopped; the frames found so far are in {output}; --resume goes on", markup=False)
-        raise typer.Exit(130) from None
+        stopped(f"the frames found so far are in {output}; --resume goes on")
 
 
 def _in_short(summary: dict) -> str:
     from airborne.export.players_report import players_in_short
 
     counts = ", ".join(f"{summary[f'n_{status}']} {status}" for status in ("tracked", "uncertain", "lost"))
-    lines = [f"{summary['n_frames']} frames at {summary['rate_hz']:.5g} Hz: {counts}"]
+    n, rate_hz = summary["n_frames"], summary["rate_hz"]
+    lines = [f"{n} frames at {rate_hz:.5g} Hz: {counts}" if n > 1 else f"{n} frame: {counts}"]
     if "players" in summary:
         lines += players_in_short(summary)
     elif summary["n_frames"] == summary["n_lost"]:

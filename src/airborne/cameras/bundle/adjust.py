@@ -38,6 +38,7 @@ SETTLED = 1e-5  # of the cost, or this much alone: a step that promises less is 
 SAME_NOISE = 0.01
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-12, 1e8
 LEAST_SCALE = 1e-6
+FEWEST_LEFT = 8  # numbers more than were fitted; fewer do not show that the noise is smaller than was said
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -232,7 +233,8 @@ class _Search:
             rows = (self.task.source == i) & self.task.is_used
             if rows.any() and not known[i]:
                 shrunk = 1.0 if redundancy is None else redundancy[i] / (2 * rows.sum())  # by what was fitted
-                scale[i] = max(scale_of(self.loss, s[rows] / shrunk), LEAST_SCALE)
+                least = 1.0 if redundancy is not None and redundancy[i] < FEWEST_LEFT else LEAST_SCALE
+                scale[i] = max(scale_of(self.loss, s[rows] / shrunk), least)
             if rows.any() and redundancy is not None:
                 weight = weight_of(self.loss, s[rows] / scale[i] ** 2) / self.task.sd_px[rows] ** 2
                 effect[i] = _design_effect(weight[:, None] * np.nan_to_num(residual[rows]), self.task.cluster[rows])

@@ -13,7 +13,7 @@ from airborne.cameras.diagnosis.finding import Finding
 
 Array = NDArray[np.floating]
 
-FARTHEST_M, NEAREST_M = 200.0, 0.02  # between two cameras
+FARTHEST_M, NEAREST_M = 200.0, 0.05  # where the largest distance between two cameras is in metres
 UNITS = {1000.0: "mm", 100.0: "cm", 10.0: "dm", 1 / 0.0254: "inches", 1 / 0.3048: "feet"}  # in a metre
 LIKE = 0.08  # relative distance of a ratio from a unit's
 DIFFERENT = 0.15  # relative difference of two scales that is told
@@ -21,16 +21,21 @@ DIFFERENT = 0.15  # relative difference of two scales that is told
 
 def odd_distances(rig: Rig) -> list[Finding]:
     """Say whether cameras stand implausibly far apart or near to each other."""
-    distances = [float(np.linalg.norm(a.centre - b.centre)) for a, b in combinations(rig, 2)]
-    if not distances or NEAREST_M <= max(distances) <= FARTHEST_M:
+    widest_m = widest(rig)
+    if len(rig) < 2 or NEAREST_M <= widest_m <= FARTHEST_M:
         return []
     return [
         Finding(
             kind="units",
-            what=f"the cameras come out {max(distances):.3g} m apart at most",
+            what=f"the cameras come out {widest_m:.3g} m apart at most",
             advice="a length is not in metres: check square_m, the wand's length and the coordinates (mm / 1000 = m)",
         )
     ]
+
+
+def widest(rig: Rig) -> float:
+    """Return the largest distance between two cameras [m]; 0 for a single one."""
+    return max((float(np.linalg.norm(a.centre - b.centre)) for a, b in combinations(rig, 2)), default=0.0)
 
 
 def scales_apart(starts: Mapping[str, Rig]) -> list[Finding]:

@@ -9,7 +9,9 @@ from airborne.cameras.camera import Rig
 from airborne.cameras.formats.given import Given
 from airborne.cameras.formats.toml import camera_from_table, has_fifth_term, table_lines, toml, toml_key
 from airborne.errors import CalibrationError
+from airborne.reading import listed_keys
 
+OF_A_CAMERA = {"matrix", "rotation", "translation"}
 NOT_CAMERAS = ("metadata", "capture_volume", "charuco", "checkerboard")
 
 
@@ -19,8 +21,11 @@ def rig_from_tables(document: dict, where: str, given: Given) -> Rig:
     Metres unless given otherwise: the file does not say, and a board in millimetres makes it millimetres.
     """
     tables = {key: table for key, table in document.items() if key not in NOT_CAMERAS and isinstance(table, dict)}
-    if not tables:
-        raise CalibrationError(f"{where} has no cameras; expected a table such as [cam1] with matrix, rotation, ...")
+    if not any(OF_A_CAMERA & table.keys() for table in tables.values()):
+        raise CalibrationError(
+            f"{where} has no cameras (found {listed_keys(document)}); "
+            "expected a table such as [cam1] with matrix, rotation, ..."
+        )
     metres = given.metres("m")
     return Rig(
         tuple(
