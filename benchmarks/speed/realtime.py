@@ -2,8 +2,8 @@
 
 FOLDER holds the recording `block_jump`; by default it is looked for beside the project. Its files are written with a
 high bit rate, which makes decoding dear, and last hardly longer than a start takes; so they are also measured written
-anew at an ordinary rate, played forth and back until they last ten seconds. A first run, which compiles, is not counted.
-Decoding alone is measured too, as nothing can be faster.
+anew at an ordinary rate, played forth and back until they last ten seconds. A first run, which compiles, does not
+count. Decoding alone is measured too, as nothing can be faster.
 """
 
 from __future__ import annotations
