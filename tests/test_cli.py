@@ -308,9 +308,9 @@ def test_a_damaged_record_of_a_run_is_not_guessed(trial, short_run, tmp_path, ca
     run = tmp_path / "run"
     shutil.copytree(short_run, run)
     (run / "run.json").write_text("{")
-    assert "missing or damaged" in refusal(capsys, "track", trial, "-o", run, "--resume")
+    assert "run.json is damaged" in refusal(capsys, "track", trial, "-o", run, "--resume")
     (run / "run.json").unlink()
-    assert "missing or damaged" in refusal(capsys, "track", trial, "-o", run, "--resume")
+    assert "run.json is missing" in refusal(capsys, "track", trial, "-o", run, "--resume")
     assert (run / "motion.csv").read_bytes() == (short_run / "motion.csv").read_bytes()
 
 

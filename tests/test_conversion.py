@@ -1,5 +1,6 @@
 """`airborne convert`: what goes in comes out in the other format, and what got lost is said."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,8 @@ import pytest
 
 from airborne import cli
 from airborne.cameras import Rig, read_detections, read_rig, write_rig
-from airborne.conversion import FORMATS
+from airborne.conversion import FORMATS, Wishes, convert
+from airborne.errors import AirborneError
 from tests.cameras.examples import LENS, three_cameras
 from tests.cameras.formats.rigs import assert_same
 
@@ -172,3 +174,10 @@ def test_what_cannot_be_is_told(tmp_path, monkeypatch, airborne, words, complain
     assert code == 2
     assert complaint in said
     assert not list(tmp_path.glob("x*"))
+
+
+def test_a_file_is_not_written_over_itself(tmp_path, thrown_cross):
+    path = shutil.copy(thrown_cross / "calib_true.toml", tmp_path / "calib.toml")
+    with pytest.raises(AirborneError, match="is the file that is read"):
+        convert(path, tmp_path / "." / "calib.toml", Wishes())
+    assert path.read_bytes() == (thrown_cross / "calib_true.toml").read_bytes()

@@ -70,7 +70,7 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
         return _assess_players(folder, truth, is_alone=digitised is None and joints is None)
     if truth is None and digitised is None and joints is None:
         raise ResultError(
-            "nothing to compare with; give a truth.csv, --digitised with clicked points, or --joints with their paths"
+            "nothing to compare with; give a truth.csv, --digitised, --joints, --joint-angles, or --repeat with a run"
         )
     motion, model = body_run(folder)
     alike = symmetries(model)

@@ -83,6 +83,8 @@ class Conversion:
 
 def convert(source: Path, target: Path, wishes: Wishes) -> Conversion:
     """Read one file and write the other. Raises AirborneError where one cannot be, or an option says nothing."""
+    if source.exists() and target.exists() and source.samefile(target):
+        raise AirborneError(f"{target} is the file that is read; give another name for what is written")
     kind = _points_kind(source)
     if kind is None:
         return _convert_rig(_opened(source), target, wishes)

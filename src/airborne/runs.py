@@ -190,9 +190,8 @@ def _read_record(path: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         record = None
     if not isinstance(record, dict):
-        raise ResultError(
-            f"{path} is missing or damaged, so it cannot be told whose run this is; track into another folder"
-        )
+        state = "damaged" if path.exists() else "missing"
+        raise ResultError(f"{path} is {state}, so it cannot be told whose run this is; track into another folder")
     return record
 
 

@@ -223,3 +223,9 @@ def test_exchanged_columns_are_named_by_the_calibration_before(hall, tmp_path):
     except CalibrationError as error:
         sentences = [str(error)]
     assert any("the files of cam2 and cam4 are swapped" in sentence for sentence in sentences)
+
+
+def test_a_court_with_another_net_fits_badly_and_this_is_said(hall):
+    assert not [each for each in to_dict(calibrated(hall, COURT))["findings"] if each["kind"] == "misfit"]
+    wrong = to_dict(calibrated(hall, COURT.replace("men", "women")))["findings"]
+    assert any("court: the points fit to" in each["sentence"] and "another net" in each["sentence"] for each in wrong)

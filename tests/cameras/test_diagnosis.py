@@ -55,7 +55,7 @@ def test_points_near_one_plane_are_doubted(points, sizes):
 def test_exchanged_u_and_v_are_seen_from_the_picture_border(points, sizes):
     message = error_of(clicked(points, "cam1", exchanged), sizes)
     assert "camera 'cam1'" in message
-    assert "with u and v exchanged they would fit" in message
+    assert "with width and height exchanged they would fit" in message
 
 
 def test_exchanged_u_and_v_are_seen_from_the_mirrored_camera(points):

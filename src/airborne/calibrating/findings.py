@@ -20,6 +20,7 @@ from airborne.cameras.diagnosis.views import clustered_views, few_views, missing
 Array = NDArray[np.floating]
 
 UP = np.array([0.0, 0.0, 1.0])
+MISFIT_PX, MISFIT_SHARE = 4.0, 0.002  # RMS of clicked points; share of the pictures' longer sides
 
 
 def findings(found: Calibrated) -> tuple[Finding, ...]:
@@ -31,6 +32,7 @@ def findings(found: Calibrated) -> tuple[Finding, ...]:
         _swapped(found),
         below_floor(rig) if "court" in inputs.points else (),
         odd_distances(rig),
+        _misfits(found),
         turned_pictures(rig, UP if is_level else None),
         _moved(found),
         _bridges(found),
@@ -41,6 +43,19 @@ def findings(found: Calibrated) -> tuple[Finding, ...]:
         _rolling(found),
     ]
     return tuple(chain.from_iterable(told))
+
+
+def _misfits(found: Calibrated) -> Iterator[Finding]:
+    """Doubt clicked points that fit much less well than clicks are made."""
+    adjusted, sides = found.adjusted, [max(camera.size) for camera in found.rig]
+    for i, source in enumerate(adjusted.sources):
+        rms_px = adjusted.rms_px(source=i)
+        if source.name in found.inputs.points and rms_px > max(MISFIT_PX, MISFIT_SHARE * float(np.mean(sides))):
+            yield Finding(
+                kind="misfit",
+                what=f"{source.name}: the points fit to {rms_px:.1f} px only, and clicks are good to 1 or 2 px",
+                advice="look for points that are mixed up, a court with another net, or a wrong survey",
+            )
 
 
 def _tracks(found: Calibrated) -> Iterator[tuple[Array, Array | None]]:

@@ -64,6 +64,7 @@ def main() -> None:
         if "Usage:" in said or not said:  # a command without arguments: its help
             print(said, end="")
             sys.exit(2)
+        said = said.replace("Value error, ", "").replace("Input should be", "expected a number")
         refuse(f"{' '.join(said.split()).rstrip('.')}; see {context.command_path if context else 'airborne'} --help")
     except (KeyboardInterrupt, typer.Abort):
         stopped()

@@ -58,6 +58,8 @@ def calibrate(
         _from_sources(sources, output, report or output.with_name(f"{output.stem}_report"), as_json)
         return
     if board is None and len(files) == 1 and files[0].suffix.lower() != ".toml":
+        if report is not None:
+            raise AirborneError("--report goes with sources; a table of control points alone is told on the screen")
         _from_control_points(files[0], size, output, method, as_json)
         return
     if size is not None:

@@ -108,7 +108,7 @@ def with_axis_markers(model: BodyModel) -> BodyModel:
     if len(spread) and np.linalg.matrix_rank(spread - spread[0], tol=1e-3) >= 2:
         return model
     taken = {landmark.name for landmark in model.landmarks}
-    names = [f"{root}_{axis}" for axis in "xyz"]
+    names = [f"{root}_axis_{axis}" for axis in "xyz"]
     added = [Landmark(n, root, AXIS_MARKER_M * e) for n, e in zip(names, np.eye(3), strict=True) if n not in taken]
     return replace(model, landmarks=(*model.landmarks, *added))
 

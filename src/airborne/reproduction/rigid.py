@@ -125,11 +125,11 @@ def describe(summary: Mapping[str, Any]) -> str:
     columns |= {f"{method}, NURBS": found for method, found in summary["skin"].items()}
     columns |= {f"{method}, ellipsoids": found for method, found in summary["ellipsoids"].items()}
     lines = [f"RMS (largest) of {summary['n_poses']} poses, mean over {len(summary['persons'])} NURBS bodies"]
-    lines.append(" " * 22 + "".join(f"{f'{name} [{unit}]':>19}" for name, unit in zip(VARIABLES, UNITS, strict=True)))
+    lines.append(" " * 22 + "".join(f"{f'{name} [{unit}]':>22}" for name, unit in zip(VARIABLES, UNITS, strict=True)))
     for name, found in columns.items():
         cells = [f"{rms:.3g} ({largest:.3g})" for rms, largest in zip(found["rms"], found["largest"], strict=True)]
         lost = f"  {found['n_lost']} lost" if found.get("n_lost") else ""
-        lines.append(f"{name:<22}" + "".join(f"{cell:>19}" for cell in cells) + lost)
+        lines.append(f"{name:<22}" + "".join(f"{cell:>22}" for cell in cells) + lost)
     return "\n".join(lines)
 
 

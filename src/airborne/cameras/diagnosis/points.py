@@ -63,7 +63,9 @@ def _check_inside(points: ControlPoints, camera: str, size: tuple[int, int]) -> 
         f"(first '{points.names[first]}' at u={px[first, 0]:g}, v={px[first, 1]:g})"
     )
     if not ((px < -0.5) | (px > upper[::-1])).any():
-        raise CalibrationError(f"{what}; with u and v exchanged they would fit: exchange the two columns")
+        raise CalibrationError(
+            f"{what}; with width and height exchanged they would fit: exchange those, or the columns u and v"
+        )
     raise CalibrationError(f"{what}: correct them, or the picture size")
 
 
