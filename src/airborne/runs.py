@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib.metadata import version
@@ -26,6 +26,7 @@ from airborne.trial import CameraTable, Trial
 from airborne.video import (
     LiveRecording,
     Recording,
+    VideoFacts,
     VideoSource,
     connected,
     inspect,
@@ -45,10 +46,13 @@ def open_trial(trial: Trial) -> tuple[Recording, Calibration | None]:
 
     The pictures of players are converted only where somebody looks.
     """
-    rig, calibration, notes = _cameras_of(trial)
+    sources = [source_of(trial, camera) for camera in trial.camera]
+    facts = [inspect(source) for source in sources]
+    rig, calibration, notes = _cameras_of(trial, facts)
     recording = open_recording(
-        [source_of(trial, camera) for camera in trial.camera],
+        sources,
         rig,
+        facts=facts,
         fields_as="rows" if trial.has_players else FIELDS_AS[trial.settings.method],
         every=trial.track.every,
         start=trial.start.frame,
@@ -75,14 +79,13 @@ def open_live(
 
 def cameras_of(trial: Trial) -> tuple[Rig, Calibration | None]:
     """Return the cameras of the trial's videos in its order, and the calibration if control points gave them."""
-    return _cameras_of(trial)[:2]
+    return _cameras_of(trial, [inspect(source_of(trial, camera)) for camera in trial.camera])[:2]
 
 
-def _cameras_of(trial: Trial) -> tuple[Rig, Calibration | None, tuple[str, ...]]:
+def _cameras_of(trial: Trial, facts: Sequence[VideoFacts]) -> tuple[Rig, Calibration | None, tuple[str, ...]]:
     """Return also what mending said of them."""
-    rig, calibration = _calibrated(
-        trial, {camera.name: inspect(source_of(trial, camera)).size for camera in trial.camera}
-    )
+    sizes = {camera.name: each.size for camera, each in zip(trial.camera, facts, strict=True)}
+    rig, calibration = _calibrated(trial, sizes)
     rig, notes = mended_rig(trial, rig)
     return rig, calibration, notes
 

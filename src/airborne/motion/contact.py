@@ -37,14 +37,15 @@ class Side:
 
 
 def noise_covariance(time_s: Array, variance: Array, sway_m: float = 0.0) -> Array:
-    """Return the covariance (n, n) of tracked values, half of each variance white and half fading over 0.1 s.
+    """Return covariances (..., n, n) of tracked values, half of each variance (..., n) white, half fading over 0.1 s.
 
     `sway_m` adds an error common to neighbouring times, of what the values stand for.
     """
     apart = np.abs(time_s[:, None] - time_s)
     sd = np.sqrt(variance)
-    fading = (1 - WHITE_SHARE) * sd[:, None] * sd * np.exp(-apart / CORRELATION_S)
-    return fading + np.diag(WHITE_SHARE * variance) + sway_m**2 * np.exp(-apart / SWAY_S)
+    fading = (1 - WHITE_SHARE) * np.exp(-apart / CORRELATION_S)
+    found = sd[..., :, None] * sd[..., None, :] * (fading + WHITE_SHARE * np.eye(len(time_s)))
+    return found + sway_m**2 * np.exp(-apart / SWAY_S) if sway_m else found
 
 
 def fallen(time_s: Array) -> Array:

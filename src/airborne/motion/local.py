@@ -30,9 +30,9 @@ def local_fit(time_s: Array, values: Array, variance: Array, at_s: float) -> tup
     if u[0] > step or u[-1] < -step:
         return unknown
     scale = float(np.abs(u).max())
-    hat = np.linalg.pinv(np.vander(u / scale, 3, increasing=True))[:2] / np.array([[1.0], [scale]])
-    noise = np.stack([noise_covariance(u, variance[rows, i]) for i in range(k)], axis=-1)
-    return hat @ values[rows], np.einsum("ai,ijk,bj->abk", hat, noise, hat)
+    powers = np.vander(u / scale, 3, increasing=True)
+    hat = np.linalg.solve(powers.T @ powers, powers.T)[:2] / np.array([[1.0], [scale]])
+    return hat @ values[rows], np.moveaxis(hat @ noise_covariance(u, variance[rows].T) @ hat.T, 0, -1)
 
 
 def peak_draws(

@@ -92,15 +92,15 @@ def _stance(track: LegTrack, floor: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 def _is_quiet_straight(time_s: Array, points: Array, lengths: Array, variance: Array) -> bool:
     """Say whether hips and ankles (n, 4, 3) are slow, beyond what their noise makes of it, and the legs straight."""
+    place = points.mean(axis=0)
+    known = np.where(lengths > 0, lengths, np.nan)  # a length that noise hides is none
+    if not np.mean(np.linalg.norm(place[:2] - place[2:], axis=-1) / known) >= _STRAIGHT:
+        return False
     u = time_s - time_s.mean()
     slope = u / (u @ u)
     squared = (np.tensordot(slope, points, 1) ** 2).sum(axis=-1)  # (4,)
     from_noise = 3 * float(slope @ noise_covariance(time_s, variance) @ slope)
-    is_slow = squared.mean() < _QUIET_M_S**2 + from_noise and squared.max() < (_QUIET_M_S + 2 * from_noise**0.5) ** 2
-    place = points.mean(axis=0)
-    known = np.where(lengths > 0, lengths, np.nan)  # a length that noise hides is none
-    share = float(np.mean(np.linalg.norm(place[:2] - place[2:], axis=-1) / known))
-    return bool(is_slow and share >= _STRAIGHT)
+    return bool(squared.mean() < _QUIET_M_S**2 + from_noise and squared.max() < (_QUIET_M_S + 2 * from_noise**0.5) ** 2)
 
 
 def _heights(path: tuple[Array, Array]) -> tuple[Array, Array]:

@@ -15,6 +15,7 @@ from numba import njit
 
 # no fast maths: sums keep their order, so that a run is the same to the last bit however the code was compiled
 EXACT: dict[str, Any] = {"nogil": True, "error_model": "numpy", "cache": True}
+INLINE: dict[str, Any] = {**EXACT, "inline": "always"}  # what is called for every span: handing arrays over costs more
 
 MOST_SPANS = 64  # capsules in one row
 BEHIND = 1e9  # depth of what is not in front of the camera [m]
@@ -105,12 +106,13 @@ def outline(disc_a, disc_b, y_first, x, pieces, tangents):
     return first, last
 
 
-@njit(**EXACT)
-def _motion(discs, tangents, who, piece, y, outward, dx):
-    """Say how an end of a span of capsule `who` moves: dx (6,), by (x, y, radius) of disc a, then of disc b.
+@njit(**INLINE)
+def _motion(discs, tangents, who, piece, y, outward):
+    """Say how an end of a span of capsule `who` moves: (x0, x1, t, by_y, by_r).
 
-    Over the row's own height, from y - 0.5 to y + 0.5, the outline runs over a stretch (x0, x1) that is returned: a
-    level edge gains and loses pixels all along it.
+    It moves along with x of the discs, by_y times y and by_r times their radius: 1 - t of disc a and t of disc b. Over
+    the row's own height, from y - 0.5 to y + 0.5, the outline runs over a stretch (x0, x1): a level edge gains and
+    loses pixels all along it.
     """
     if piece >= 2:
         k = piece - 2
@@ -120,27 +122,22 @@ def _motion(discs, tangents, who, piece, y, outward, dx):
         run = slope * (bottom - top)
         t = min(max((0.5 * (top + bottom) - ay) / (by - ay), 0.0), 1.0) if abs(by - ay) > 1e-9 else 0.5
         along = nx - run * ny  # what a larger radius does
-        dx[0], dx[1], dx[2] = 1 - t, -run * (1 - t), along * (1 - t)
-        dx[3], dx[4], dx[5] = t, -run * t, along * t
-        return ax + slope * (top - ay), ax + slope * (bottom - ay)
-    k = 3 * piece
+        return ax + slope * (top - ay), ax + slope * (bottom - ay), t, -run, along
     cx, cy, r = discs[who, piece, 0], discs[who, piece, 1], discs[who, piece, 2]
     top, bottom = min(max(y - 0.5 - cy, -r), r), min(max(y + 0.5 - cy, -r), r)
     h_top, h_bottom = np.sqrt(max(r * r - top * top, 0.0)), np.sqrt(max(r * r - bottom * bottom, 0.0))
-    dx[:] = 0
-    dx[k], dx[k + 1] = 1, -outward * (h_bottom - h_top)
-    dx[k + 2] = outward * r * (np.arcsin(bottom / r) - np.arcsin(top / r))
-    return cx + outward * h_top, cx + outward * h_bottom
+    turn = outward * r * (np.arcsin(bottom / r) - np.arcsin(top / r))
+    return cx + outward * h_top, cx + outward * h_bottom, float(piece), -outward * (h_bottom - h_top), turn
 
 
-@njit(**EXACT)
+@njit(**INLINE)
 def _read(row, x):
     """Read running sums between pixels: pixel i reaches from i - 0.5 to i + 0.5."""
     i = int(x + np.float32(0.5))
     return row[i] + (x + np.float32(0.5) - i) * (row[i + 1] - row[i])
 
 
-@njit(**EXACT)
+@njit(**INLINE)
 def _value(row, x):
     """Read the map itself from its running sums: linear between the pixels' middles."""
     i = int(x)
@@ -157,17 +154,16 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
     the maps over a region whose first pixel is origin (x, y); contrast (k,) by how much each map falls across an edge
     of what it shows. What lies outside the region counts nothing. work is x (n, 2, h), pieces (n, 2, h) and tangents
     (n, 2, 6). Fills out (n, 2, 2), the sum and the area [px] that each capsule owns of its first and its second map;
-    and if gradient (n, 7) is not empty, that and curvature (n, 7, 7), which is what maps have that fall by their
-    contrast within a pixel of every edge, by (x, y, radius) of both discs and the share.
+    and of the first m capsules the gradient (m, 7) and the curvature (m, 7, 7), which is what maps have that fall by
+    their contrast within a pixel of every edge, by (x, y, radius) of both discs and the share.
     """
     n, (_, h, w) = len(discs), sums.shape
-    with_gradient = len(gradient) > 0
+    n_moving = len(gradient)
     order = np.argsort(depth)
     out[:], gradient[:], curvature[:] = 0, 0, 0
     first, last = np.zeros(n, np.int64), np.zeros(n, np.int64)
     top, bottom = h, 0
     x, pieces, tangents = work
-    dx = np.empty(6)
     for i in range(n):
         if depth[i] < BEHIND:
             first[i], last[i] = outline(discs[i, 0], discs[i, 1], origin[1], x[i], pieces[i], tangents[i])
@@ -197,34 +193,33 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
                 end = b if is_open else taken_x[k, 0]
                 if end > at:
                     _own(map_0, map_1, at, end, cut, weight, split, out[i])
-                    if with_gradient:
+                    if n_moving > 0:
                         who, side = (i, 0) if from_k < 0 else (taken_by[from_k, 1], 1)
-                        if at > least:
+                        if at > least and who < n_moving:
                             edge = who, pieces[who, side, row], y, side, at, ox
                             pull = -1.0, _at_edge_of(contrast, kinds[i, 0], kinds[i, 1], at, border)
-                            _pull(discs, tangents, edge, map_0, map_1, border, pull, dx, gradient, curvature)
+                            _pull(discs, tangents, edge, map_0, map_1, border, pull, gradient, curvature)
                         who, side = (i, 1) if is_open else (taken_by[k, 0], 0)
-                        if end < most:
+                        if end < most and who < n_moving:
                             edge = who, pieces[who, side, row], y, side, end, ox
                             pull = 1.0, _at_edge_of(contrast, kinds[i, 0], kinds[i, 1], end, border)
-                            _pull(discs, tangents, edge, map_0, map_1, border, pull, dx, gradient, curvature)
+                            _pull(discs, tangents, edge, map_0, map_1, border, pull, gradient, curvature)
                 if is_open:
                     break
                 at, from_k = max(at, taken_x[k, 1]), k
             taken = _claim(taken_x, taken_by, taken, a, b, i)
-    if with_gradient:
-        for i in range(n):
-            for p in range(6):
-                for q in range(p):
-                    curvature[i, q, p] = curvature[i, p, q]
-            if last[i] > first[i] and kinds[i, 0] != kinds[i, 1]:
-                sums_of = sums[kinds[i, 0]], sums[kinds[i, 1]]
-                between = 0.5 * (contrast[kinds[i, 0]] + contrast[kinds[i, 1]])
-                nearer = order, i, first, last, x
-                _pull_border(discs[i], share[i], sums_of, between, nearer, origin, gradient[i], curvature[i])
+    for i in range(n_moving):
+        for p in range(6):
+            for q in range(p):
+                curvature[i, q, p] = curvature[i, p, q]
+        if last[i] > first[i] and kinds[i, 0] != kinds[i, 1]:
+            sums_of = sums[kinds[i, 0]], sums[kinds[i, 1]]
+            between = 0.5 * (contrast[kinds[i, 0]] + contrast[kinds[i, 1]])
+            nearer = order, i, first, last, x
+            _pull_border(discs[i], share[i], sums_of, between, nearer, origin, gradient[i], curvature[i])
 
 
-@njit(**EXACT)
+@njit(**INLINE)
 def _border(disc, share, y, x_middle):
     """Say where a row meets the border across a capsule, at a share of its axis: (x, weight, split).
 
@@ -242,7 +237,7 @@ def _border(disc, share, y, x_middle):
     return cx, min(max(0.5 - beyond, 0.0), 1.0), 0
 
 
-@njit(**EXACT)
+@njit(**INLINE)
 def _own(map_0, map_1, at, end, cut, weight, split, out):
     """Add the sums and the areas from `at` to `end` of a row of running sums to out (2, 2)."""
     if split == 0:
@@ -262,7 +257,7 @@ def _own(map_0, map_1, at, end, cut, weight, split, out):
     out[j, 1] += end - middle
 
 
-@njit(**EXACT)
+@njit(**INLINE)
 def _at_edge(map_0, map_1, edge, cut, weight, split):
     """Read the map that holds at an edge of a span."""
     if split == 0:
@@ -270,7 +265,7 @@ def _at_edge(map_0, map_1, edge, cut, weight, split):
     return _value(map_0, edge) if (edge < cut) == (split > 0) else _value(map_1, edge)
 
 
-@njit(**EXACT)
+@njit(**INLINE)
 def _at_edge_of(contrast, kind_0, kind_1, edge, border):
     """Read the contrast of the map that holds at an edge of a span."""
     cut, weight, split = border
@@ -279,8 +274,8 @@ def _at_edge_of(contrast, kind_0, kind_1, edge, border):
     return contrast[kind_0] if (edge < cut) == (split > 0) else contrast[kind_1]
 
 
-@njit(**EXACT)
-def _pull(discs, tangents, edge, map_0, map_1, border, pull, dx, gradient, curvature):
+@njit(**INLINE)
+def _pull(discs, tangents, edge, map_0, map_1, border, pull, gradient, curvature):
     """Add what the end of a span gains when its capsule's discs move: `pull` is its sign and the contrast there.
 
     A level edge gains all along the stretch that it runs over within the row.
@@ -288,7 +283,7 @@ def _pull(discs, tangents, edge, map_0, map_1, border, pull, dx, gradient, curva
     who, piece, y, side, at, ox = edge
     cut, weight, split = border
     sign, contrast = pull
-    x0, x1 = _motion(discs, tangents, who, piece, y, 2.0 * side - 1.0, dx)
+    x0, x1, t, by_y, by_r = _motion(discs, tangents, who, piece, y, 2.0 * side - 1.0)
     last = np.float32(len(map_0) - 2.0)
     left = min(max(np.float32(min(x0, x1)) - ox, np.float32(0)), last)
     right = min(max(np.float32(max(x0, x1)) - ox, np.float32(0)), last)
@@ -299,16 +294,26 @@ def _pull(discs, tangents, edge, map_0, map_1, border, pull, dx, gradient, curva
         value = sign * inside / (right - left)
     else:
         value = sign * _at_edge(map_0, map_1, at, cut, weight, split)
-    length = np.sqrt((dx[0] + dx[3]) ** 2 + (dx[1] + dx[4]) ** 2)
-    facing = contrast / max(length, 1e-6)
-    first, last_p = (0, 6) if piece >= 2 else (3 * piece, 3 * piece + 3)
-    for p in range(first, last_p):
-        gradient[who, p] += value * dx[p]
-        for q in range(first, p + 1):
-            curvature[who, p, q] += facing * dx[p] * dx[q]
+    facing = contrast / np.sqrt(1 + by_y * by_y)
+    of_a, of_b, by = 1 - t, t, (1.0, by_y, by_r)
+    slopes, K = gradient[who], curvature[who]
+    if of_a > 0:
+        for p in range(3):
+            slopes[p] += value * of_a * by[p]
+            for q in range(p + 1):
+                K[p, q] += facing * of_a * of_a * by[p] * by[q]
+    if of_b > 0:
+        for p in range(3):
+            slopes[3 + p] += value * of_b * by[p]
+            for q in range(p + 1):
+                K[3 + p, 3 + q] += facing * of_b * of_b * by[p] * by[q]
+        if of_a > 0:
+            for p in range(3):
+                for q in range(3):
+                    K[3 + p, q] += facing * of_a * of_b * by[p] * by[q]
 
 
-@njit(**EXACT)
+@njit(**INLINE)
 def _read_mixed(map_0, map_1, x, cut, weight, split):
     """Read the running sums of the maps that hold left of x, up to a constant."""
     if split == 0:
@@ -358,7 +363,7 @@ def _pull_border(disc, share, maps, contrast, nearer, origin, gradient, curvatur
                 curvature[p, q] += contrast * step * along[p] * along[q]
 
 
-@njit(**EXACT)
+@njit(**INLINE)
 def _claim(taken_x, taken_by, taken, a, b, owner):
     """Join a span to the ordered, separate ones taken so far, each end with its owner; return how many there are."""
     left_by, right_by, kept = owner, owner, 0

@@ -34,6 +34,11 @@ def _fill_table(kinds, background, hidden, table):
     n, cells = kinds.shape
     one = np.float32(1)
     for cell in range(cells):
+        seen = background[cell]
+        for c in range(n):
+            seen = max(seen, kinds[c, cell])
+        if seen == 0:  # a colour that nothing has says nothing
+            continue
         anyone = np.float32((1 - _LIKE_THEM) / cells)
         for c in range(n):
             anyone += np.float32(_LIKE_THEM / n) * kinds[c, cell]
@@ -67,12 +72,14 @@ def evidence_maps(rgb, table, reduction, out):
 def smooth(maps, out):
     """Blur maps (k, h, w) with [1 2 1] / 4 along rows and columns into out; the border stays."""
     k, h, w = maps.shape
-    quarter = np.float32(0.25)
+    quarter, two = np.float32(0.25), np.float32(2)
     row = np.empty(w, np.float32)
     for c in range(k):
         for y in range(h):
-            above, below = max(y - 1, 0), min(y + 1, h - 1)
+            above, here, below, to = maps[c, max(y - 1, 0)], maps[c, y], maps[c, min(y + 1, h - 1)], out[c, y]
             for x in range(w):
-                row[x] = quarter * (maps[c, above, x] + 2 * maps[c, y, x] + maps[c, below, x])
-            for x in range(w):
-                out[c, y, x] = quarter * (row[max(x - 1, 0)] + 2 * row[x] + row[min(x + 1, w - 1)])
+                row[x] = quarter * (above[x] + two * here[x] + below[x])
+            for x in range(1, w - 1):
+                to[x] = quarter * (row[x - 1] + two * row[x] + row[x + 1])
+            for x in (0, w - 1):
+                to[x] = quarter * (row[max(x - 1, 0)] + two * row[x] + row[min(x + 1, w - 1)])

@@ -63,7 +63,8 @@ class Recording:
                 _Cursor(open_files.enter_context(closing(self._timed(source, facts))), half_s=period_s / 2)
                 for source, facts in zip(self.sources, self.facts, strict=True)
             ]
-            pool = open_files.enter_context(ThreadPoolExecutor(len(cursors)))
+            # nothing is converted yet in a lazy recording: threads would only wait for a core
+            parallel = map if self.is_lazy else open_files.enter_context(ThreadPoolExecutor(len(cursors))).map
             known = [KnownColours(min(facts.size)) for facts in self.facts]
             times = _clock(cursors, start_s=self.sources[0].on_clock(Fraction(0)), period_s=period_s)
             for index, time_s in enumerate(times):
@@ -71,7 +72,7 @@ class Recording:
                     return
                 seen = [cursor.picture_at(time_s) for cursor in cursors]
                 if index >= self.start and (index - self.start) % self.every == 0:
-                    views = pool.map(self._view, seen, repeat(time_s), self.facts, lenses, known)
+                    views = parallel(self._view, seen, repeat(time_s), self.facts, lenses, known)
                     yield Frames(index, time_s, tuple(views))
 
     def _lenses(self, camera: Camera, facts: VideoFacts) -> dict[int | None, Lens]:
@@ -131,6 +132,7 @@ def open_recording(
     start: int = 0,
     stop: int | None = None,
     lazy: bool = False,
+    facts: Sequence[VideoFacts] | None = None,
 ) -> Recording:
     """Check the cameras' videos against the calibration and return their `Recording`; only first pictures are decoded.
 
@@ -138,7 +140,8 @@ def open_recording(
     becomes of the fields of interlaced files: "rows" keeps the field's own rows with a camera of that half-height
     image; "interpolated" keeps the full height and fills the missing rows from their neighbours (rigid-body tracking
     paper), with the camera unchanged. Of the clock's images `start, start + every, ...` below `stop` are read. With
-    `lazy` a picture is converted only where somebody looks: `View.crop`; it goes with "rows".
+    `lazy` a picture is converted only where somebody looks: `View.crop`; it goes with "rows". `facts` are what
+    `inspect` found in the sources, where it has been asked before.
 
     Raises VideoError where a file cannot be read, a size differs from the calibration's, or names do not match.
     """
@@ -148,17 +151,17 @@ def open_recording(
         raise VideoError(f"every = {every}, start = {start}, stop = {stop}; expected every >= 1 and 0 <= start < stop")
     if lazy and fields_as != "rows":
         raise VideoError('a lazy recording reads fields as their own rows; use fields_as = "rows"')
-    by_name = {source.name: source for source in sources}
+    by_name = {source.name: k for k, source in enumerate(sources)}
     if len(by_name) != len(sources) or set(by_name) != set(rig.names):
         given = ", ".join(source.name for source in sources) or "none"
         raise VideoError(
             f"videos are given for {given}; the calibration has {', '.join(rig.names)}; give each one video"
         )
-    ordered = tuple(by_name[name] for name in rig.names)
-    facts = tuple(inspect(source) for source in ordered)
-    check_sizes(ordered, rig, facts)
-    recording = Recording(ordered, facts, rig, fields_as, every, start, stop, lazy)
-    recording.events.extend(_notes(ordered, facts))
+    ordered = tuple(sources[by_name[name]] for name in rig.names)
+    found = tuple(facts[by_name[name]] if facts else inspect(sources[by_name[name]]) for name in rig.names)
+    check_sizes(ordered, rig, found)
+    recording = Recording(ordered, found, rig, fields_as, every, start, stop, lazy)
+    recording.events.extend(_notes(ordered, found))
     return recording
 
 

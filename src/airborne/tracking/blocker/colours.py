@@ -150,14 +150,13 @@ def _mean_evidence(part: NDArray[np.int8], region: Region, colours: Colours) -> 
     return found, table.usual
 
 
-def _in_all_lights(counts: NDArray[np.float32]) -> NDArray[np.float32]:
+def _in_all_lights(counts: NDArray[np.float32]) -> Array:
     """Spread counts (k, 32, 32, 32) of colours over what they are in more and in less light."""
-    lit = np.zeros_like(counts)
     kind, *cell = np.nonzero(counts)
-    middle, seen = np.array(cell) + 0.5, counts[kind, *cell]
-    for light, weight in zip(_LIGHTS, _LIGHT_WEIGHTS, strict=True):
-        np.add.at(lit, (kind, *np.minimum(light * middle, BINS - 1).astype(int)), weight * seen)
-    return lit
+    lit = np.minimum(_LIGHTS[:, None, None] * (np.array(cell) + 0.5), BINS - 1).astype(int)  # (lights, 3, n)
+    to = np.ravel_multi_index((np.broadcast_to(kind, lit[:, 0].shape), *np.moveaxis(lit, 1, 0)), counts.shape)
+    weights = _LIGHT_WEIGHTS[:, None] * counts[kind, *cell]
+    return np.bincount(to.ravel(), weights.ravel(), counts.size).reshape(counts.shape)
 
 
 def _normalised(counts: Array) -> Array:

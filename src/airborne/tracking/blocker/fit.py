@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from airborne.body.jumper import BALL_HEIGHT_M, CAPSULES, KINDS, LIMITS_RAD, N_DOF
+from airborne.rendering.capsules import EXACT
 from airborne.tracking.blocker.equations import N_CAPSULES, N_POINTS, gathered
 from airborne.tracking.blocker.views import Seen, workspace
 
@@ -22,7 +24,7 @@ _FLOOR_SD_M = 0.01  # and feet above the floor
 _SETTLED_NATS = 0.1
 _DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 0.1, 0.03, 2.0  # of a first step; steps shorter than the last change nothing
 _ROBUST = 4.0  # squared sds at which an anchor's pull is halved
-_BALLS = np.array([6, 7])  # rows of the points
+_BALLS = (6, 7)  # rows of the points
 # how people hold themselves, weakly: upright, legs under the hips, both bent alike
 _HABIT_SD = np.array([0.2, 0.5, 0.3, 0.15] + [0.25, 0.3, 0.4] * 2 + [0.5, 0.6])
 _HABITS = np.zeros((len(_HABIT_SD), N_DOF))
@@ -57,86 +59,127 @@ class Fit:
     owned: Array  # (v, 10, 2, 2) evidence and area [px of the maps] of each capsule's two kinds
 
 
+class _Place(NamedTuple):
+    """One state, and all that is known of it there."""
+
+    state: Array  # (35,)
+    totals: Array  # (2,) nats of the pictures, and with the prior
+    pull: Array  # (n_free,) the gradient of the second
+    information: Array  # (n_free, n_free) its curvature
+    owned: Array  # (v, 10 + others, 2, 2)
+    equations: tuple[Array, Array, Array, Array, Array]  # see `gathered`
+
+
 def fit(state: Array, prior: Prior, found: Seen, others: tuple[Array, Array], *, most_steps: int = 10) -> Fit:
     """Move the first len(prior.mean) numbers of a state to the nearest maximum of evidence and prior."""
-    best = _evaluated(state, prior, found, others)
-    damping = _DAMPING
-    for _ in range(most_steps):
-        A, b = best[1], best[2]
-        step = np.linalg.solve(A + damping * np.diag(np.diag(A)), b)
-        moved = best[0].state.copy()
-        moved[: len(step)] += step
-        tried = _evaluated(moved, prior, found, others)
-        gain = tried[0].total - best[0].total
-        if gain > 0:
-            best, damping = tried, max(damping / 4, _LEAST_DAMPING)
-        else:
-            damping = max(damping * 4, 0.25)
-        if 0 < gain < _SETTLED_NATS or damping > _MOST_DAMPING:
-            break
-    inverse = np.linalg.inv(best[0].information)
-    return replace(best[0], by_shape=inverse @ best[0].by_shape @ inverse)
+    n = len(prior.mean)
+    work, owned = workspace(found, len(others[0]))
+    pictures = found.cameras, _kinds(others), found.maps, others, work
+    anchors = np.full((N_POINTS, 3), np.nan) if prior.anchors is None else prior.anchors
+    sd_m = np.ones(N_POINTS) if prior.anchor_sd_m is None else prior.anchor_sd_m
+    known = prior.mean, np.ascontiguousarray(prior.information), anchors, sd_m
+    worth = _worth(found)
+    best = _climbed(_place(state, n, owned), _place(state, n, owned), known, pictures, worth, most_steps)
+    points, by_state, _, _, spread = best.equations
+    inverse = np.linalg.inv(best.information)
+    return Fit(
+        state=best.state,
+        information=best.information,
+        by_shape=(SHAPE_SD_M * worth * SLOPE) ** 2 * inverse @ spread @ inverse,
+        points=points,
+        by_state=by_state,
+        nats=float(best.totals[0]),
+        total=float(best.totals[1]),
+        owned=best.owned[:, :N_CAPSULES],
+    )
 
 
 def scored(state: Array, found: Seen, others: tuple[Array, Array]) -> float:
     """Return the evidence of a state [nat], without any prior."""
     work, owned = workspace(found, len(others[0]))
     nothing = np.empty((N_POINTS, 3)), np.empty((27, 0)), np.empty(0), np.empty((0, 0)), np.empty((0, 0))
-    total = gathered(state, 0, found.cameras, _kinds(others), found.maps, others, work, owned, nothing)
-    return NATS_PER_M2 / found.scale.px_per_m**2 * total
+    return _worth(found) * gathered(state, 0, found.cameras, _kinds(others), found.maps, others, work, owned, nothing)
+
+
+def _worth(found: Seen) -> float:
+    return NATS_PER_M2 / found.scale.px_per_m**2
 
 
 def _kinds(others: tuple[Array, Array]) -> NDArray[np.int64]:
     return np.concatenate([CAPSULES[:, :2], np.full((len(others[0]), 2), len(KINDS))])
 
 
-def _evaluated(state: Array, prior: Prior, found: Seen, others: tuple[Array, Array]) -> tuple[Fit, Array, Array]:
-    n = len(prior.mean)
-    work, owned = workspace(found, len(others[0]))
-    points, by_state, gradient = np.empty((N_POINTS, 3)), np.empty((27, n)), np.empty(n)
-    curvature, spread = np.empty((2, n, n))
-    equations = points, by_state, gradient, curvature, spread
-    worth = NATS_PER_M2 / found.scale.px_per_m**2
-    total = gathered(state, n, found.cameras, _kinds(others), found.maps, others, work, owned, equations)
-    away = state[:n] - prior.mean
+def _place(state: Array, n: int, owned: Array) -> _Place:
+    equations = np.empty((N_POINTS, 3)), np.empty((3 * N_POINTS, n)), np.empty(n), np.empty((n, n)), np.empty((n, n))
+    return _Place(state.copy(), np.empty(2), np.empty(n), np.empty((n, n)), owned.copy(), equations)
+
+
+@njit(**EXACT)
+def _climbed(best, tried, known, pictures, worth, most_steps):
+    """Go from the place `best` up to the nearest maximum and return that one of the two places where it is known."""
+    n, damping = len(best.pull), _DAMPING
+    _evaluate(best, known, pictures, worth)
+    for _ in range(most_steps):
+        damped = best.information.copy()
+        for k in range(n):
+            damped[k, k] += damping * damped[k, k]
+        step = np.linalg.solve(damped, best.pull)
+        tried.state[:] = best.state
+        tried.state[:n] += step
+        _evaluate(tried, known, pictures, worth)
+        gain = tried.totals[1] - best.totals[1]
+        if gain > 0:
+            best, tried = tried, best
+            damping = max(damping / 4, _LEAST_DAMPING)
+        else:
+            damping = max(damping * 4, 0.25)
+        if 0 < gain < _SETTLED_NATS or damping > _MOST_DAMPING:
+            break
+    return best
+
+
+@njit(**EXACT)
+def _evaluate(at, known, pictures, worth):
+    """Look at the pictures from a place's state, weigh in what is `known`, and fill the rest of the place."""
+    mean, information, anchors, anchor_sd_m = known
+    cameras, kinds, maps, others, work = pictures
+    points, by_state, gradient, curvature, _ = at.equations
+    state, n, A, b = at.state, len(mean), at.information, at.pull
+    nats = worth * gathered(state, n, cameras, kinds, maps, others, work, at.owned, at.equations)
+    away = state[:n] - mean
+    held = information @ away
     from_rest = _REST - state[:N_DOF]
-    cost = 0.5 * float(away @ prior.information @ away + from_rest @ _HABIT_INFORMATION @ from_rest)
-    steepness = worth * SLOPE
-    A = steepness * curvature + prior.information
-    b = worth * gradient - prior.information @ away
+    habit = _HABIT_INFORMATION @ from_rest
+    A[:] = worth * SLOPE * curvature + information
+    b[:] = worth * gradient - held
     A[:N_DOF, :N_DOF] += _HABIT_INFORMATION
-    b[:N_DOF] += _HABIT_INFORMATION @ from_rest
-    for rows, targets, weights, each in _rules(state, points, by_state, prior):
-        A += rows.T @ (weights[:, None] * rows)
-        b += rows.T @ (weights * targets)
-        cost += each
-    nats = worth * total
-    fitted = Fit(
-        state, A, (SHAPE_SD_M * steepness) ** 2 * spread, points, by_state, nats, nats - cost, owned[:, :N_CAPSULES]
-    )
-    return fitted, A, b
+    b[:N_DOF] += habit
+    cost = 0.5 * (away @ held + from_rest @ habit)
+    for k in range(N_DOF):
+        beyond = min(max(state[k], LIMITS_RAD[k, 0]), LIMITS_RAD[k, 1]) - state[k]
+        if beyond != 0:
+            A[k, k] += 1 / _LIMIT_SD_RAD**2
+            b[k] += beyond / _LIMIT_SD_RAD**2
+            cost += 0.5 * (beyond / _LIMIT_SD_RAD) ** 2
+    for ball in _BALLS:
+        sunk = BALL_HEIGHT_M - points[ball, 2]
+        if sunk > 0:
+            _add(by_state[3 * ball + 2], sunk, 1 / _FLOOR_SD_M**2, A, b)
+            cost += 0.5 * (sunk / _FLOOR_SD_M) ** 2
+    for i in range(N_POINTS):
+        if np.isfinite(anchors[i]).all():
+            off = anchors[i] - points[i]
+            squared = off @ off / anchor_sd_m[i] ** 2 / 3
+            for p in range(3):
+                _add(by_state[3 * i + p], off[p], 1 / (anchor_sd_m[i] ** 2 * (1 + squared / _ROBUST)), A, b)
+            cost += 1.5 * _ROBUST * np.log1p(squared / _ROBUST)
+    at.totals[0], at.totals[1] = nats, nats - cost
 
 
-def _rules(state: Array, points: Array, by_state: Array, prior: Prior) -> Sequence[tuple[Array, Array, Array, float]]:
-    """Return rows (k, n), how far to go (k,), weights (k,) and cost of: joint limits, the floor, anchors."""
-    n = by_state.shape[1]
-    rules = []
-    beyond = np.clip(state[:N_DOF], *LIMITS_RAD.T) - state[:N_DOF]
-    if (out := np.flatnonzero(beyond)).size:
-        rules.append(_rule(np.eye(N_DOF, n)[out], beyond[out], np.full(len(out), _LIMIT_SD_RAD)))
-    sunk = BALL_HEIGHT_M - points[_BALLS, 2]
-    if (low := np.flatnonzero(sunk > 0)).size:
-        rules.append(_rule(by_state[3 * _BALLS[low] + 2], sunk[low], np.full(len(low), _FLOOR_SD_M)))
-    if prior.anchors is not None and prior.anchor_sd_m is not None:
-        known = np.flatnonzero(np.isfinite(prior.anchors).all(axis=1))
-        away = (prior.anchors - points)[known]
-        squared = np.sum(away**2, axis=1) / prior.anchor_sd_m[known] ** 2 / 3
-        weights = 1 / (prior.anchor_sd_m[known] ** 2 * (1 + squared / _ROBUST))
-        rows = by_state.reshape(N_POINTS, 3, n)[known].reshape(-1, n)
-        cost = float(np.sum(1.5 * _ROBUST * np.log1p(squared / _ROBUST)))
-        rules.append((rows, away.ravel(), np.repeat(weights, 3), cost))
-    return rules
-
-
-def _rule(rows: Array, targets: Array, sd: Array) -> tuple[Array, Array, Array, float]:
-    return rows, targets, 1 / sd**2, 0.5 * float(np.sum((targets / sd) ** 2))
+@njit(**EXACT)
+def _add(row, target, weight, A, b):
+    """Add to the normal equations that row (n,) times the step should be `target`."""
+    for i in range(len(row)):
+        b[i] += weight * target * row[i]
+        for j in range(len(row)):
+            A[i, j] += weight * row[i] * row[j]

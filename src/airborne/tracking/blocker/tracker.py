@@ -35,6 +35,7 @@ _LEAST_AREA_PX = 8.0  # of a kind in a map, to judge whether it is hidden
 _HIDDEN_RATE, _HIDDEN_STEP = 0.3, 0.08
 _SHAPE = np.arange(N_DOF + PELVIS, N_DOF + N_LENGTHS)  # lengths that stay the same, in a state
 _STEP_M = 1e-4
+_OF_KIND = (CAPSULES[:, :2].ravel() == np.arange(len(KINDS))[:, None]).astype(float)  # (kinds, halves of capsules)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,8 +183,8 @@ def _with_hidden(track: Track, hidden: Array) -> Track:
 def _hidden(track: Track, owned: Array, views: Sequence[int]) -> Array:
     """Say anew which kinds of surface are hidden in which view, by the evidence of what was fitted there."""
     hidden = track.colours.hidden.copy()
-    for view, each in zip(views, owned, strict=True):
-        evidence, area = np.array([each[CAPSULES[:, :2] == kind].sum(axis=0) for kind in range(len(KINDS))]).T
+    by_kind = _OF_KIND @ owned.reshape(len(owned), -1, 2)  # (views, kinds, 2)
+    for view, (evidence, area) in zip(views, by_kind.swapaxes(1, 2), strict=True):
         target = hidden_by(evidence / np.maximum(area, 1e-9), track.tables[view].usual)
         hidden[view] += _HIDDEN_RATE * np.where(area > _LEAST_AREA_PX, target - hidden[view], 0)
     return not_everywhere(hidden, views)
