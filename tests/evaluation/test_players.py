@@ -245,7 +245,15 @@ def test_cover_counts_what_lies_within_the_part_and_its_margin_in_two_views(rig)
     assert set(far.rate.values()) == {0.0}
     assert near.tolerance_m["hip_left"] == pytest.approx(0.12, abs=0.01)
     assert near.tolerance_m["ankle_left"] == pytest.approx(0.10, abs=0.01)
-    assert "m" in near.describe().splitlines()[1]
+
+
+def test_rectangles_touch_within_a_whole_width(rig):
+    truth = STILL.points[:, 0]
+    above = success_cover(rig, truth + np.array([0, 0, 0.175]), truth, LEG_POINTS)
+    assert set(above.rate.values()) == {0.0}
+    assert {name: above.touching_rate[name] for name in ("hip_left", "ankle_left")} == {"hip_left": 1, "ankle_left": 0}
+    assert above.touching_tolerance_m["hip_left"] == pytest.approx(above.tolerance_m["hip_left"] + 0.075, abs=0.001)
+    assert above.touching_tolerance_m["ankle_left"] == pytest.approx(0.155, abs=0.01)
 
 
 def test_cover_leaves_frames_out_that_fewer_than_two_cameras_show(rig):

@@ -20,6 +20,7 @@ INLINE: dict[str, Any] = {**EXACT, "inline": "always"}  # what is called for eve
 MOST_SPANS = 64  # capsules in one row
 BEHIND = 1e9  # depth of what is not in front of the camera [m]
 _BORDER_SAMPLES = 5
+_LEVEL = 2.0  # tangents that run this much further across than down are gone along column by column, not row by row
 
 
 @njit(**EXACT)
@@ -62,10 +63,11 @@ def outline(disc_a, disc_b, y_first, x, pieces, tangents):
     """Outline the hull of two discs (x, y, radius) [px] in rows at y_first, y_first + 1, ...
 
     Fills x (2, rows), where it begins and ends in each row; pieces (2, rows), of what that end is: disc a (0), disc b
-    (1), or one of the common tangents (2, 3); and tangents (2, 6), what `_motion` takes of these. Returns the first and
-    one past the last row that is met.
+    (1), or one of the common tangents (2, 3); and tangents (2, 7), NaN where there are none: where each touches disc a
+    (x, y), y of disc b, its slope, its normal (x, y), x of disc b. Returns the first and one past the last row met.
     """
     n = x.shape[1]
+    tangents[:] = np.nan
     top = min(disc_a[1] - disc_a[2], disc_b[1] - disc_b[2])
     bottom = max(disc_a[1] + disc_a[2], disc_b[1] + disc_b[2])
     first = int(min(max(np.ceil(top - y_first), 0.0), n))
@@ -93,7 +95,7 @@ def outline(disc_a, disc_b, y_first, x, pieces, tangents):
         ax, ay = disc_a[0] + disc_a[2] * nx, disc_a[1] + disc_a[2] * ny
         bx, by = disc_b[0] + disc_b[2] * nx, disc_b[1] + disc_b[2] * ny
         slope = (bx - ax) / (by - ay) if abs(by - ay) > 1e-9 else 0.0
-        for p, value in enumerate((ax, ay, by, slope, nx, ny)):
+        for p, value in enumerate((ax, ay, by, slope, nx, ny, bx)):
             tangents[k, p] = value
         start = int(min(max(np.ceil(min(ay, by) - y_first), first), last))
         stop = int(min(max(np.floor(max(ay, by) - y_first) + 1, start), last))
@@ -107,24 +109,31 @@ def outline(disc_a, disc_b, y_first, x, pieces, tangents):
 
 
 @njit(**INLINE)
+def _stretch(top, bottom, y):
+    """Return what of a stretch of heights counts for the row at y: half way to its neighbours, or to the end."""
+    return top if y - 1 < top else y - 0.5, bottom if y + 1 > bottom else y + 0.5
+
+
+@njit(**INLINE)
 def _motion(discs, tangents, who, piece, y, outward):
     """Say how an end of a span of capsule `who` moves: (x0, x1, t, by_y, by_r).
 
     It moves along with x of the discs, by_y times y and by_r times their radius: 1 - t of disc a and t of disc b. Over
-    the row's own height, from y - 0.5 to y + 0.5, the outline runs over a stretch (x0, x1): a level edge gains and
-    loses pixels all along it.
+    the height that counts for the row the outline runs over a stretch (x0, x1): a flat edge gains and loses pixels all
+    along it.
     """
     if piece >= 2:
         k = piece - 2
         ax, ay, by = tangents[who, k, 0], tangents[who, k, 1], tangents[who, k, 2]
         slope, nx, ny = tangents[who, k, 3], tangents[who, k, 4], tangents[who, k, 5]
-        top, bottom = max(y - 0.5, min(ay, by)), min(y + 0.5, max(ay, by))
+        top, bottom = _stretch(min(ay, by), max(ay, by), y)
         run = slope * (bottom - top)
         t = min(max((0.5 * (top + bottom) - ay) / (by - ay), 0.0), 1.0) if abs(by - ay) > 1e-9 else 0.5
         along = nx - run * ny  # what a larger radius does
         return ax + slope * (top - ay), ax + slope * (bottom - ay), t, -run, along
     cx, cy, r = discs[who, piece, 0], discs[who, piece, 1], discs[who, piece, 2]
-    top, bottom = min(max(y - 0.5 - cy, -r), r), min(max(y + 0.5 - cy, -r), r)
+    top, bottom = _stretch(cy - r, cy + r, y)
+    top, bottom = min(max(top - cy, -r), r), min(max(bottom - cy, -r), r)
     h_top, h_bottom = np.sqrt(max(r * r - top * top, 0.0)), np.sqrt(max(r * r - bottom * bottom, 0.0))
     turn = outward * r * (np.arcsin(bottom / r) - np.arcsin(top / r))
     return cx + outward * h_top, cx + outward * h_bottom, float(piece), -outward * (h_bottom - h_top), turn
@@ -153,7 +162,7 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
     end of each capsule and share (n,) how far along its axis the first one reaches; sums (k, h, w + 1) running sums of
     the maps over a region whose first pixel is origin (x, y); contrast (k,) by how much each map falls across an edge
     of what it shows. What lies outside the region counts nothing. work is x (n, 2, h), pieces (n, 2, h) and tangents
-    (n, 2, 6). Fills out (n, 2, 2), the sum and the area [px] that each capsule owns of its first and its second map;
+    (n, 2, 7). Fills out (n, 2, 2), the sum and the area [px] that each capsule owns of its first and its second map;
     and of the first m capsules the gradient (m, 7) and the curvature (m, 7, 7), which is what maps have that fall by
     their contrast within a pixel of every edge, by (x, y, radius) of both discs and the share.
     """
@@ -208,15 +217,19 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
                     break
                 at, from_k = max(at, taken_x[k, 1]), k
             taken = _claim(taken_x, taken_by, taken, a, b, i)
+    for i in range(n):
+        if last[i] <= first[i]:
+            continue
+        nearer = order, i, first, last, x
+        _go_along_level(discs, share, tangents[i], kinds, sums, contrast, nearer, origin, out, gradient, curvature)
+        if i < n_moving and kinds[i, 0] != kinds[i, 1]:
+            sums_of = sums[kinds[i, 0]], sums[kinds[i, 1]]
+            between = 0.5 * (contrast[kinds[i, 0]] + contrast[kinds[i, 1]])
+            _pull_border(discs[i], share[i], sums_of, between, nearer, origin, gradient[i], curvature[i])
     for i in range(n_moving):
         for p in range(6):
             for q in range(p):
                 curvature[i, q, p] = curvature[i, p, q]
-        if last[i] > first[i] and kinds[i, 0] != kinds[i, 1]:
-            sums_of = sums[kinds[i, 0]], sums[kinds[i, 1]]
-            between = 0.5 * (contrast[kinds[i, 0]] + contrast[kinds[i, 1]])
-            nearer = order, i, first, last, x
-            _pull_border(discs[i], share[i], sums_of, between, nearer, origin, gradient[i], curvature[i])
 
 
 @njit(**INLINE)
@@ -278,9 +291,11 @@ def _at_edge_of(contrast, kind_0, kind_1, edge, border):
 def _pull(discs, tangents, edge, map_0, map_1, border, pull, gradient, curvature):
     """Add what the end of a span gains when its capsule's discs move: `pull` is its sign and the contrast there.
 
-    A level edge gains all along the stretch that it runs over within the row.
+    A flat edge gains all along the stretch that it runs over within the row. Level ones are left to `_go_along_level`.
     """
     who, piece, y, side, at, ox = edge
+    if piece >= 2 and _is_level(tangents[who, piece - 2]):
+        return
     cut, weight, split = border
     sign, contrast = pull
     x0, x1, t, by_y, by_r = _motion(discs, tangents, who, piece, y, 2.0 * side - 1.0)
@@ -294,23 +309,94 @@ def _pull(discs, tangents, edge, map_0, map_1, border, pull, gradient, curvature
         value = sign * inside / (right - left)
     else:
         value = sign * _at_edge(map_0, map_1, at, cut, weight, split)
-    facing = contrast / np.sqrt(1 + by_y * by_y)
-    of_a, of_b, by = 1 - t, t, (1.0, by_y, by_r)
-    slopes, K = gradient[who], curvature[who]
+    _add(1.0, by_y, by_r, t, value, contrast / np.sqrt(1 + by_y * by_y), gradient[who], curvature[who])
+
+
+@njit(**INLINE)
+def _add(by_x, by_y, by_r, t, value, facing, gradient, curvature):
+    """Add an edge that moves by_x, by_y, by_r times as x, y, radius: 1 - t of disc a, t of b; `value` is its gain."""
+    of_a, of_b, by = 1 - t, t, (by_x, by_y, by_r)
     if of_a > 0:
         for p in range(3):
-            slopes[p] += value * of_a * by[p]
+            gradient[p] += value * of_a * by[p]
             for q in range(p + 1):
-                K[p, q] += facing * of_a * of_a * by[p] * by[q]
+                curvature[p, q] += facing * of_a * of_a * by[p] * by[q]
     if of_b > 0:
         for p in range(3):
-            slopes[3 + p] += value * of_b * by[p]
+            gradient[3 + p] += value * of_b * by[p]
             for q in range(p + 1):
-                K[3 + p, 3 + q] += facing * of_b * of_b * by[p] * by[q]
+                curvature[3 + p, 3 + q] += facing * of_b * of_b * by[p] * by[q]
         if of_a > 0:
             for p in range(3):
                 for q in range(3):
-                    K[3 + p, q] += facing * of_a * of_b * by[p] * by[q]
+                    curvature[3 + p, q] += facing * of_a * of_b * by[p] * by[q]
+
+
+@njit(**INLINE)
+def _is_level(tangent):
+    """Say whether a tangent runs across rather than down; False where there is none."""
+    return abs(tangent[6] - tangent[0]) > _LEVEL * abs(tangent[2] - tangent[1])
+
+
+@njit(**EXACT)
+def _go_along_level(discs, share, tangents, kinds, sums, contrast, nearer, origin, out, gradient, curvature):
+    """Make the sums along the level tangents of a capsule exact, column by column, and add what these gain in moving.
+
+    Rows meet such an edge once or not at all, and count whole: its sum would be a staircase. What it gains in moving
+    out is the map there, less that of what lies behind; where a nearer capsule lies over it, it gains nothing.
+    """
+    order, i, first, last, x = nearer
+    _, h, w = sums.shape
+    for k in range(2):
+        tangent = tangents[k]
+        if not _is_level(tangent):
+            continue
+        ax, ay, by, ny, bx = tangent[0], tangent[1] - origin[1], tangent[2] - origin[1], tangent[5], tangent[6]
+        low, high, m, outward = min(ay, by), max(ay, by), (by - ay) / (bx - ax), 1.0 if ny > 0 else -1.0
+        for above in range(max(int(np.floor(low)), 0), min(int(np.floor(high)), h - 2) + 1):  # between two rows each
+            t_0, t_1 = 0.0, 1.0
+            if high - low > 1e-9:
+                t_0, t_1 = (max(low, above) - ay) / (by - ay), (min(high, above + 1) - ay) / (by - ay)
+            n = int(np.ceil(abs((t_1 - t_0) * (bx - ax))))
+            for s in range(n):
+                t, step = t_0 + (s + 0.5) / n * (t_1 - t_0), abs((t_1 - t_0) * (bx - ax)) / n
+                u, height = ax + t * (bx - ax), ay + t * (by - ay)
+                column, y, row = u - origin[0], height + origin[1], int(np.floor(height + 0.5))
+                if not 0 <= column < w - 2 or _is_hidden(nearer, u, row):
+                    continue
+                rows_end = np.floor(height) + 0.5 if ny > 0 else np.ceil(height) - 0.5
+                missed = step * outward * (height - rows_end)  # of the area
+                half = _half(discs[i], share[i], u, y)
+                value, facing = _value_between(sums[kinds[i, half]], column, height, above), contrast[kinds[i, half]]
+                out[i, half, 0] += missed * value
+                out[i, half, 1] += missed
+                is_behind = False
+                for j in order:
+                    if is_behind and first[j] <= row < last[j] and x[j, 0, row] <= u <= x[j, 1, row]:
+                        half = _half(discs[j], share[j], u, y)
+                        lost = _value_between(sums[kinds[j, half]], column, height, above)
+                        out[j, half, 0] -= missed * lost
+                        out[j, half, 1] -= missed
+                        value, facing = value - lost, facing + contrast[kinds[j, half]]
+                        break
+                    is_behind = is_behind or j == i
+                if i < len(gradient):
+                    facing *= step / np.sqrt(1 + m * m)
+                    _add(-m, 1.0, 1 / ny, t, outward * step * value, facing, gradient[i], curvature[i])
+
+
+@njit(**INLINE)
+def _half(disc, share, u, y):
+    """Say which of a capsule's two kinds lies at a place."""
+    ux, uy = disc[1, 0] - disc[0, 0], disc[1, 1] - disc[0, 1]
+    cx, cy = disc[0, 0] + share * ux, disc[0, 1] + share * uy
+    return 0 if share >= 1 or (u - cx) * ux + (y - cy) * uy < 0 else 1
+
+
+@njit(**INLINE)
+def _value_between(sums, x, y, above):
+    """Read a map between its rows, of which `above` is the upper one."""
+    return (above + 1 - y) * _value(sums[above], x) + (y - above) * _value(sums[above + 1], x)
 
 
 @njit(**INLINE)
@@ -391,15 +477,12 @@ def labels(discs, depth, kinds, share, out):
     """Fill out (h, w) with the kind of the nearest capsule at each pixel, -1 where there is none; see `evidence`."""
     h, w = out.shape
     out[:] = -1
-    x, pieces, tangents = np.empty((2, h)), np.empty((2, h), np.int64), np.empty((2, 6))
+    x, pieces, tangents = np.empty((2, h)), np.empty((2, h), np.int64), np.empty((2, 7))
     order = np.argsort(-depth)
     for i in order:
         if depth[i] >= BEHIND:
             continue
         first, last = outline(discs[i, 0], discs[i, 1], 0.0, x, pieces, tangents)
-        ux, uy = discs[i, 1, 0] - discs[i, 0, 0], discs[i, 1, 1] - discs[i, 0, 1]
-        cx, cy = discs[i, 0, 0] + share[i] * ux, discs[i, 0, 1] + share[i] * uy
         for y in range(first, last):
             for u in range(max(int(np.ceil(x[0, y])), 0), min(int(np.floor(x[1, y])), w - 1) + 1):
-                is_first = share[i] >= 1 or (u - cx) * ux + (y - cy) * uy < 0
-                out[y, u] = kinds[i, 0] if is_first else kinds[i, 1]
+                out[y, u] = kinds[i, _half(discs[i], share[i], u, y)]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from airborne.evaluation.jump_errors import JumpErrors
 from airborne.evaluation.players import PlayerErrors, compare_players
 from airborne.evaluation.players_truth import known_jump
+from airborne.evaluation.success import Cover
 from airborne.export import write_json
 from airborne.motion.players import PlayersMotion
 from airborne.reproduction.block_causes import CAUSES, TORSO_OFF_M, Situation, causes_of
@@ -101,14 +102,23 @@ def read_take(path: Path) -> dict[str, Any]:
     return found
 
 
+def _success(cover: Cover) -> dict[str, Any]:
+    """Return in how many frames each part is covered, touched and judged, and what that lets it be off by."""
+    return {
+        "covered": [cover.rate[name] * cover.n[name] if cover.n[name] else 0.0 for name in PARTS],
+        "touched": [cover.touching_rate[name] * cover.n[name] if cover.n[name] else 0.0 for name in PARTS],
+        "judged": [cover.n[name] for name in PARTS],
+        "tolerance_m": [cover.tolerance_m[name] for name in PARTS],
+        "touching_tolerance_m": [cover.touching_tolerance_m[name] for name in PARTS],
+    }
+
+
 def _in_short(errors: PlayerErrors) -> dict[str, Any]:
     cover = errors.cover
     assert cover is not None, "cameras were given"
     parts = {name: errors.parts[name] for name in PARTS}
     return {
-        "covered": [cover.rate[name] * cover.n[name] if cover.n[name] else 0.0 for name in PARTS],
-        "judged": [cover.n[name] for name in PARTS],
-        "tolerance_m": [cover.tolerance_m[name] for name in PARTS],
+        **_success(cover),
         "within_95": [part.within_95 for part in parts.values()],
         "n_lost": errors.n_lost,
         "n_uncertain": errors.n_uncertain,

@@ -37,6 +37,7 @@ def summarise(plan: Plan, takes: Sequence[Mapping[str, Any]], *, is_quick: bool)
         "parts": list(PARTS),
         "paper": {name: list(values) for name, values in PAPER.items()},
         "tolerance_m": np.mean([r["tolerance_m"] for r in table], axis=0),
+        "touching_tolerance_m": np.mean([r["touching_tolerance_m"] for r in table], axis=0),
         "rows": {name: _row(each) for name, each in rows.items()},
         "failed": {name: _failed(each) for name, each in rows.items()},
         "jumps": {name: _jumps(rows[name]) for name in _WITH_JUMPS},
@@ -45,10 +46,10 @@ def summarise(plan: Plan, takes: Sequence[Mapping[str, Any]], *, is_quick: bool)
     }
 
 
-def success(records: Iterable[Record]) -> Array:
-    """Return the share of judged frames in which each part is covered, pooled over the records: (6,)."""
+def success(records: Iterable[Record], key: str = "covered") -> Array:
+    """Return the share of judged frames in which each part is covered, or "touched", pooled over the records: (6,)."""
     found = list(records)
-    covered = np.sum([r["covered"] for r in found], axis=0)
+    covered = np.sum([r[key] for r in found], axis=0)
     return covered / np.maximum(np.sum([r["judged"] for r in found], axis=0), 1)
 
 
@@ -71,6 +72,7 @@ def _row(records: Sequence[Record]) -> dict[str, Any]:
     median = np.median(known, axis=0)
     return {
         "success": _over_seeds(records, success),
+        "touching": _over_seeds(records, lambda each: success(each, "touched")),
         "success_one_blocker": _over_seeds([r for r in records if r["n_blockers"] == 1], success),
         "success_several": _over_seeds([r for r in records if r["n_blockers"] > 1], success),
         "mean_mm": _over_seeds(records, _mean_mm),

@@ -137,4 +137,4 @@ def packed(camera: Camera, reduction: int = 1, offset: tuple[float, float] = (0.
 def workspace(found: Seen, n_others: int) -> tuple[tuple, Array]:
     """Allocate what `gathered` works in: (x, pieces, tangents) and owned."""
     n, (v, _, h, _) = N_CAPSULES + n_others, found.sums.shape
-    return (np.empty((n, 2, h)), np.empty((n, 2, h), np.int64), np.empty((n, 2, 6))), np.zeros((v, n, 2, 2))
+    return (np.empty((n, 2, h)), np.empty((n, 2, h), np.int64), np.empty((n, 2, 7))), np.zeros((v, n, 2, 2))
