@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airborne.body.legs import LEG_POINTS
+from airborne.motion.contact import OF_PLAYERS
 from airborne.motion.leg_track import LegTrack
 from airborne.motion.leg_track import leg_track as track_of
 from airborne.motion.players import PlayersMotion
@@ -106,7 +107,7 @@ def leg_track(motion) -> LegTrack:
 
 
 def motion_of(jumper, *, sd_m=1e-3, rng=None, feet=False):
-    """Return a jumper's motion, with noise of sd_m that is half white and half fades over 0.1 s where rng is given."""
+    """Return a jumper's motion, with noise of sd_m that is shared out as the players' trackers' where rng is given."""
     joints = (*LEG_POINTS, "foot_left", "foot_right") if feet else LEG_POINTS
     points = jumper.points()[:, None, : len(joints)]
     if rng is not None:
@@ -115,11 +116,12 @@ def motion_of(jumper, *, sd_m=1e-3, rng=None, feet=False):
 
 
 def noise(rng, shape, rate=60.0):
-    """Unit noise, half of its variance white, half correlated over 0.1 s."""
-    keep = np.exp(-1 / rate / 0.1)
+    """Unit noise (n, ...), in part white, else fading, as `OF_PLAYERS` has it."""
+    keep = np.exp(-1 / rate / OF_PLAYERS.fading_s)
     steps = rng.standard_normal(shape)
     slow = np.empty(shape)
     slow[0] = steps[0]
     for k in range(1, shape[0]):
         slow[k] = keep * slow[k - 1] + np.sqrt(1 - keep**2) * steps[k]
-    return np.sqrt(0.5) * (rng.standard_normal(shape) + slow)
+    white = OF_PLAYERS.white_share
+    return np.sqrt(white) * rng.standard_normal(shape) + np.sqrt(1 - white) * slow

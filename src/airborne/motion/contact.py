@@ -8,6 +8,7 @@ away at the event, integrated twice, is a Gaussian process that is zero in fligh
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +16,24 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating]
 
 GRAVITY_M_S2 = 9.81
-WHITE_SHARE = 0.5  # of a joint's variance; the rest fades over CORRELATION_S: trackers err alike in frames near by
-CORRELATION_S = 0.1
 SWAY_M, SWAY_S = 0.005, 0.15  # of a centre of mass that is made of the tracked joints alone, and how long it lasts
 _PUSH_M_S2, _PUSH_SD_M_S2 = 20.0, 10.0  # mean force of a push-off about three body weights, as force plates show
 _PUSH_CHANGE_S, _PUSH_FADE_S = 0.04, 0.02
 _LONGEST_CONTACT_S = 0.6
 _STEP_S = 1 / 1200
+
+
+class Noise(NamedTuple):
+    """How a tracker errs: trackers err alike in frames near by."""
+
+    white_share: float  # of the variance
+    fading_s: float  # time over which the rest fades
+
+
+OF_ANYTHING = Noise(0.5, 0.1)  # joints, bodies, detections from anywhere
+# `blocker` errs by 1 % white in synthetic blocks, 0.3 to 1 % in recorded ones, and else fading over 0.5 to 0.7 s; the
+# particle filters by 3 %, fading over 0.2 to 0.3 s
+OF_PLAYERS = Noise(0.1, 0.3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,15 +48,15 @@ class Side:
     precision: Array  # (times, 2, 2)
 
 
-def noise_covariance(time_s: Array, variance: Array, sway_m: float = 0.0) -> Array:
-    """Return covariances (..., n, n) of tracked values, half of each variance (..., n) white, half fading over 0.1 s.
+def noise_covariance(time_s: Array, variance: Array, *, noise: Noise = OF_PLAYERS, sway_m: float = 0.0) -> Array:
+    """Return covariances (..., n, n) of tracked values of variances (..., n), as `noise` shares them out.
 
     `sway_m` adds an error common to neighbouring times, of what the values stand for.
     """
     apart = np.abs(time_s[:, None] - time_s)
     sd = np.sqrt(variance)
-    fading = (1 - WHITE_SHARE) * np.exp(-apart / CORRELATION_S)
-    found = sd[..., :, None] * sd[..., None, :] * (fading + WHITE_SHARE * np.eye(len(time_s)))
+    alike = (1 - noise.white_share) * np.exp(-apart / noise.fading_s) + noise.white_share * np.eye(len(time_s))
+    found = sd[..., :, None] * sd[..., None, :] * alike
     return found + sway_m**2 * np.exp(-apart / SWAY_S) if sway_m else found
 
 

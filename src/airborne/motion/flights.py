@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel
-from airborne.motion.contact import GRAVITY_M_S2, joined, noise_covariance, side
+from airborne.motion.contact import GRAVITY_M_S2, OF_ANYTHING, joined, noise_covariance, side
 from airborne.motion.flight import flight, has_inertias
 from airborne.motion.jumps import jumps
 from airborne.motion.motion import Motion
@@ -127,7 +127,7 @@ def _accelerations(time_s: Array, height_m: Array, variance: Array) -> tuple[Arr
             continue
         hat = np.linalg.pinv(np.vander(u, 3))[0]
         bend[k] = 2 * hat @ height_m[rows]
-        sd[k] = 2 * np.sqrt(hat @ noise_covariance(u, variance[rows]) @ hat)
+        sd[k] = 2 * np.sqrt(hat @ noise_covariance(u, variance[rows], noise=OF_ANYTHING) @ hat)
     return bend, sd
 
 
@@ -158,7 +158,7 @@ def _ends(time_s: Array, height_m: Array, variance: Array, start_s: float, stop_
         if not is_seen:
             grid = np.array([at - 1.0 if is_takeoff else at + 1.0])
         span = (time_s >= at - reach) & (time_s < origin) if is_takeoff else (time_s >= origin) & (time_s <= at + reach)
-        noise = noise_covariance(time_s[span], variance[span])
+        noise = noise_covariance(time_s[span], variance[span], noise=OF_ANYTHING)
         sides.append(side(time_s[span] - origin, height_m[span], noise, grid - origin, is_takeoff=is_takeoff))
     i, j = np.unravel_index(int(np.argmax(joined(*sides)[0])), (len(sides[0].constant), len(sides[1].constant)))
     named = (("take-off", grids[0], i), ("landing", grids[1], j))

@@ -140,7 +140,7 @@ def _falls(track: LegTrack, rows: tuple[int, int]) -> bool:
     time_s, height, variance = _known_mass(track, rows[0], rows[1] + 1)
     if len(time_s) < 5:
         return False
-    weight = np.linalg.inv(noise_covariance(time_s, variance, SWAY_M))
+    weight = np.linalg.inv(noise_covariance(time_s, variance, sway_m=SWAY_M))
     terms = np.vander(time_s - time_s.mean(), 3)
     covariance = np.linalg.inv(terms.T @ weight @ terms)
     bend = 2 * (covariance @ terms.T @ weight @ height)[0]
@@ -159,7 +159,7 @@ def _noise_scale(track: LegTrack, rows: tuple[int, int]) -> float:
     """Return by how much the distances from the best parabola exceed the stated variances; 1 where they may not."""
     time_s, height, variance = _known_mass(track, rows[0], rows[1] + 1)
     u = time_s - time_s.mean()
-    L = np.linalg.cholesky(noise_covariance(time_s, variance, SWAY_M))
+    L = np.linalg.cholesky(noise_covariance(time_s, variance, sway_m=SWAY_M))
     line = np.linalg.solve(L, np.vander(u, 2))
     rest = np.linalg.solve(L, height - fallen(u))
     rest = rest - line @ np.linalg.lstsq(line, rest, rcond=None)[0]
@@ -195,7 +195,7 @@ def _one_side(track: LegTrack, rows: tuple[int, int], grid: Array | None, origin
     time_s, height, variance = _known_mass(track, start, stop)
     if grid is None:
         grid = np.array([from_s - 1 if is_takeoff else to_s + 1])
-    covariance = noise_covariance(time_s, variance, SWAY_M)
+    covariance = noise_covariance(time_s, variance, sway_m=SWAY_M)
     return side(time_s - origin, height, covariance, grid - origin, is_takeoff=is_takeoff)
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import butter, filtfilt
 
 from airborne.errors import ResultError
-from airborne.motion.contact import noise_covariance
+from airborne.motion.contact import OF_ANYTHING, noise_covariance
 from airborne.motion.signals import butterworth, correction, in_stretches, is_even, low_pass, pass_cutoff_hz
 from tests.tolerances import EXACT, ROUNDTRIP, SOLVED, sampled
 
@@ -108,7 +108,7 @@ def test_stated_deviations_are_those_of_many_draws():
     rng, t, runs = np.random.default_rng(2), times(40), 800
     sd = np.linspace(1.0, 3.0, 40)
     covariance = (sd**2)[:, None, None] * np.ones((1, 1, 1))
-    noise = np.linalg.cholesky(noise_covariance(t, sd**2)) @ rng.standard_normal((40, runs))
+    noise = np.linalg.cholesky(noise_covariance(t, sd**2, noise=OF_ANYTHING)) @ rng.standard_normal((40, runs))
     stated = butterworth(t, noise[:, :1], covariance, cutoff_hz=6)
     many = butterworth(t, noise, np.full((40, runs, runs), np.nan), cutoff_hz=6)
     for name in ("value", "velocity", "acceleration"):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from airborne.motion.contact import noise_covariance
+from airborne.motion.contact import OF_ANYTHING, noise_covariance
 from airborne.motion.signals import kalman
 from airborne.motion.signals.kalman import PRIOR_SD, filtered, likeliest_density, noise_of, rts, steps_of
 from tests.tolerances import ROUNDTRIP
@@ -28,7 +28,7 @@ def dense(t, z, variance, density):
         means.append(F @ means[-1])
     seen = np.flatnonzero(np.isfinite(z))
     mean, at = np.concatenate(means), 3 * seen
-    S = K[np.ix_(at, at)] + noise_covariance(t[seen], variance[seen])
+    S = K[np.ix_(at, at)] + noise_covariance(t[seen], variance[seen], noise=OF_ANYTHING)
     gain = np.linalg.solve(S, K[at]).T
     evidence = multivariate_normal(mean[at], S).logpdf(z[seen])
     return mean + gain @ (z[seen] - mean[at]), K - gain @ K[at], evidence
@@ -78,7 +78,7 @@ def test_the_strength_of_the_jerk_is_the_likeliest():
 def test_free_fall_is_recovered_inside_a_flight():
     rng, t = np.random.default_rng(3), np.arange(36) / RATE
     sd = 0.005
-    noise = np.linalg.cholesky(noise_covariance(t, np.full(36, sd**2))) @ rng.normal(size=(36, 3))
+    noise = np.linalg.cholesky(noise_covariance(t, np.full(36, sd**2), noise=OF_ANYTHING)) @ rng.normal(size=(36, 3))
     fall = np.stack([0.5 * t, 0 * t, 1 + 3 * t - 9.81 / 2 * t**2], axis=1)
     found = kalman(t, fall + noise, np.broadcast_to(sd**2 * np.eye(3), (36, 3, 3)))
     assert found.acceleration[:, 2].mean() == pytest.approx(-9.81, abs=3 * found.acceleration_sd[:, 2].mean())
@@ -91,7 +91,7 @@ def test_deviations_are_honest_for_paths_as_the_model_has_them():
     t, T, sd = np.arange(n) / RATE, 1 / RATE, 0.01
     F = np.array([[1, T, T * T / 2], [0, 1, T], [0, 0, 1]])
     Q = 2e3 * np.array([[T**5 / 20, T**4 / 8, T**3 / 6], [T**4 / 8, T**3 / 3, T**2 / 2], [T**3 / 6, T**2 / 2, T]])
-    root, noise = np.linalg.cholesky(Q), np.linalg.cholesky(noise_covariance(t, np.full(n, sd**2)))
+    root, noise = np.linalg.cholesky(Q), np.linalg.cholesky(noise_covariance(t, np.full(n, sd**2), noise=OF_ANYTHING))
     for _ in range(40):
         states = [np.array([0.0, 1.0, -5.0])]
         for _ in range(n - 1):

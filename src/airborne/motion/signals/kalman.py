@@ -1,7 +1,7 @@
 """The Kalman smoother with the tracker's own covariances: a path of white jerk, its strength by maximum likelihood.
 
 Each path obeys d3x/dt3 = white noise of density q, alike on its axes. A measurement is the path plus the tracker's
-error; half of its covariance is white and half fades over 0.1 s, as `motion.contact.noise_covariance` has it, the
+error; half of its covariance is white and half fades over 0.1 s, as `motion.contact.OF_ANYTHING` has it, the
 latter as a state of its own. Source: Rauch, Tung and Striebel 1965, "Maximum likelihood estimates of linear dynamic
 systems"; Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to Tracking and Navigation", section 6.2 (the
 discrete noise of a continuous white jerk). With white noise alone the result is the fifth-order smoothing spline.
@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from airborne.motion.contact import CORRELATION_S, WHITE_SHARE
+from airborne.motion.contact import OF_ANYTHING
 from airborne.motion.signals.stretches import Smoothed, known_rows
 
 Array = NDArray[np.floating]
@@ -99,7 +99,7 @@ def steps_of(time_s: Array, values: Array, noise: Noise, density: float) -> Step
     step = np.diff(time_s)
     one = np.eye(k)
     T = step / period
-    fade = np.exp(-step / CORRELATION_S)
+    fade = np.exp(-step / OF_ANYTHING.fading_s)
     zero, unit = np.zeros_like(T), np.ones_like(T)
     move = np.array(
         [[unit, T, T**2 / 2, zero], [zero, unit, T, zero], [zero, zero, unit, zero], [zero, zero, zero, fade]]
@@ -114,9 +114,9 @@ def steps_of(time_s: Array, values: Array, noise: Noise, density: float) -> Step
         ]
     )
     nothing = np.zeros((len(values), k, 2 * k))
-    fading = np.sqrt(1 - WHITE_SHARE) * noise.root
+    fading = np.sqrt(1 - OF_ANYTHING.white_share) * noise.root
     seen = np.concatenate([np.broadcast_to(one, fading.shape), nothing, fading], axis=2)
-    white = WHITE_SHARE * noise.root @ noise.root + noise.unseen[:, :, None] * one
+    white = OF_ANYTHING.white_share * noise.root @ noise.root + noise.unseen[:, :, None] * one
     first = values[np.flatnonzero(np.isfinite(values).all(axis=1))[0]]
     spread = np.square([PRIOR_SD[0], PRIOR_SD[1] * period, PRIOR_SD[2] * period**2, 1.0])
     return Steps(

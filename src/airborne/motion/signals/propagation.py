@@ -1,6 +1,6 @@
 """Noise through a linear smoother: the standard deviations that the stated noise leaves, to the last coefficient.
 
-Half of each variance is white and half fades over 0.1 s, as `motion.contact.noise_covariance` has it: trackers err
+Half of each variance is white and half fades over 0.1 s, as `motion.contact.OF_ANYTHING` has it: trackers err
 alike in neighbouring frames, so that smoothing gains less than it would with white noise.
 """
 
@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.motion.contact import CORRELATION_S, WHITE_SHARE
+from airborne.motion.contact import OF_ANYTHING
 from airborne.motion.signals.stretches import FEWEST, Smoothed, known_rows
 
 Array = NDArray[np.floating]
@@ -66,8 +66,8 @@ def _block(operator: Operator, time_s: Array, is_known: NDArray[np.bool_], varia
     is_sound = np.isfinite(variance) & (variance >= 0)
     weight = operator(known_s, np.eye(len(known_s)), time_s)  # (3, n, known)
     scaled = weight * np.sqrt(np.where(is_sound, variance, 0.0))
-    white = WHITE_SHARE * (scaled**2).sum(axis=-1)
-    fading = (1 - WHITE_SHARE) * ((scaled @ _fading_root(known_s)) ** 2).sum(axis=-1)
+    white = OF_ANYTHING.white_share * (scaled**2).sum(axis=-1)
+    fading = (1 - OF_ANYTHING.white_share) * ((scaled @ _fading_root(known_s)) ** 2).sum(axis=-1)
     unsound = (weight[..., ~is_sound] ** 2).sum(axis=-1) > _NO_WEIGHT * (weight**2).sum(axis=-1)
     return np.where(unsound, np.nan, np.sqrt(white + fading))
 
@@ -75,6 +75,6 @@ def _block(operator: Operator, time_s: Array, is_known: NDArray[np.bool_], varia
 def _fading_root(time_s: Array) -> Array:
     """Return L with L L' = exp(-|t - t'| / 0.1 s): the Cholesky root of a process of first order, in closed form."""
     apart = time_s[:, None] - time_s
-    step = np.exp(-np.diff(time_s) / CORRELATION_S)
+    step = np.exp(-np.diff(time_s) / OF_ANYTHING.fading_s)
     fresh = np.concatenate([[1.0], np.sqrt(1 - step**2)])
-    return np.where(apart >= 0, np.exp(-np.maximum(apart, 0.0) / CORRELATION_S), 0.0) * fresh
+    return np.where(apart >= 0, np.exp(-np.maximum(apart, 0.0) / OF_ANYTHING.fading_s), 0.0) * fresh
