@@ -213,7 +213,7 @@ class TrackTable(_Strict):
     scale: Literal[1, 2, 4] = 1  # stepping and simplex: reduction of the pictures
     n_particles: Annotated[int, Field(ge=50, le=100_000)] | None = None  # particle filters; None: the method's own
     seed: Annotated[int, Field(ge=0)] = 0  # particle filters: of everything random
-    swing: Literal["consistent", "literal"] = "consistent"  # block-jump: how rods swing
+    swing: Literal["literal", "consistent"] = "literal"  # block-jump: how rods swing
     estimate: Literal["max", "mean", "top10_mean"] | None = None  # particle filters; None: the method's own
     views: Literal["all", "visible", "robust"] = "all"  # particle filters: which cameras count
     tempered: bool = False  # particle filters: a softer comparison of histograms, the more cameras

@@ -24,7 +24,7 @@ TINY = Plan(
     numbers=(11, 21),
     n_seeds=1,
     n_particles=50,
-    has_given_torsos=True,
+    has_variants=True,
     sweep=(50, 60),
     sweep_numbers=(21,),
     n_sweep_seeds=1,
@@ -135,7 +135,7 @@ def test_run_leaves_its_files_and_says_the_same_in_each(done):
     assert {path.name for path in (folder / "sequences").iterdir()} == {"11.json", "11.npz", "21.json", "21.npz"}
     kept = json.loads((folder / "summary.json").read_text())
     rows = list(csv.DictReader((folder / "table1.csv").read_text().splitlines()))
-    assert len(rows) == 5 * len(PARTS)
+    assert len(rows) == 6 * len(PARTS)
     told = [float(row["success_percent"]) for row in rows if row["row"] == "blocker"]
     np.testing.assert_allclose(told, 100 * np.array(kept["rows"]["blocker"]["success"]["mean"]), rtol=1e-4)
     assert kept["n_frames"] == 2 * SHORT

@@ -9,6 +9,7 @@ import numpy as np
 
 from airborne.synthetic import BlockScene, block_scene
 from airborne.synthetic.block_scene import paper_lengths
+from airborne.tracking.filters.swing import Swing
 
 MethodName = Literal["framework", "mixture", "block-jump", "blocker"]
 FILTERS: tuple[MethodName, ...] = ("framework", "mixture", "block-jump")
@@ -31,16 +32,20 @@ class Run:
     seed: int
     n_particles: int = 0  # 0: the method has none
     torsos: Literal["tracked", "given"] = "tracked"  # given: the truth with noise
+    swing: Swing = "literal"
 
     @property
     def row(self) -> str:
         """The row of the table that this run belongs to."""
+        if self.swing == "consistent":
+            return f"{self.method}, rods keep their lengths"
         return f"{self.method}, torsos given" if self.torsos == "given" else self.method
 
     @property
     def key(self) -> str:
         """A name that no other run has."""
-        return f"{self.method}-{self.torsos}-{self.n_particles}-{self.seed}"
+        mended = "-consistent" if self.swing == "consistent" else ""
+        return f"{self.method}{mended}-{self.torsos}-{self.n_particles}-{self.seed}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +70,7 @@ class Plan:
     numbers: tuple[int, ...]  # which of the 22 sequences
     n_seeds: int
     n_particles: int
-    has_given_torsos: bool
+    has_variants: bool  # "block-jump" with torsos given, and with rods that keep their lengths
     sweep: tuple[int, ...]  # particles of "block-jump"
     sweep_numbers: tuple[int, ...]  # sequences
     n_sweep_seeds: int
@@ -93,8 +98,9 @@ class Plan:
         seeds, count = range(self.n_seeds), self.n_particles
         runs = [Run(method=method, seed=seed, n_particles=count) for method in FILTERS for seed in seeds]
         runs += [Run(method="blocker", seed=seed) for seed in seeds]
-        if self.has_given_torsos:
+        if self.has_variants:
             runs += [Run(method="block-jump", seed=seed, n_particles=count, torsos="given") for seed in seeds]
+            runs += [Run(method="block-jump", seed=seed, n_particles=count, swing="consistent") for seed in seeds]
         return runs
 
     def _sweep_runs(self) -> list[Run]:
@@ -110,7 +116,7 @@ FULL = Plan(
     numbers=tuple(range(22)),
     n_seeds=5,
     n_particles=1500,
-    has_given_torsos=True,
+    has_variants=True,
     sweep=(100, 300, 1000, 1500, 5000),
     sweep_numbers=(0, 11, 20),
     n_sweep_seeds=3,
@@ -119,7 +125,7 @@ QUICK = Plan(
     numbers=(11, 21),
     n_seeds=2,
     n_particles=300,
-    has_given_torsos=False,
+    has_variants=False,
     sweep=(100, 300),
     sweep_numbers=(21,),
     n_sweep_seeds=2,

@@ -130,7 +130,7 @@ def _tracker(run: Run, scene: BlockScene, starts: list[PlayerStart], told: Told)
         return Blocker(starts)
     given = run.torsos == "given"
     torso = GivenTorsos(torso_input(_reseeded(scene, run.seed))) if given else told
-    settings = LegsSettings(method=run.method, seed=run.seed, n_particles=run.n_particles)
+    settings = LegsSettings(method=run.method, seed=run.seed, n_particles=run.n_particles, swing=run.swing)
     return legs_tracker(settings, scene.calibrated, starts, torso)
 
 

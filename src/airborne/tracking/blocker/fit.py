@@ -77,7 +77,7 @@ def fit(state: Array, prior: Prior, found: Seen, others: tuple[Array, Array], *,
     pictures = found.cameras, _kinds(others), found.maps, others, work
     anchors = np.full((N_POINTS, 3), np.nan) if prior.anchors is None else prior.anchors
     sd_m = np.ones(N_POINTS) if prior.anchor_sd_m is None else prior.anchor_sd_m
-    known = prior.mean, np.ascontiguousarray(prior.information), anchors, sd_m
+    known = prior.mean, np.ascontiguousarray(prior.information), anchors, sd_m, _HABIT_INFORMATION
     worth = _worth(found)
     best = _climbed(_place(state, n, owned), _place(state, n, owned), known, pictures, worth, most_steps)
     points, by_state, _, _, spread = best.equations
@@ -141,7 +141,7 @@ def _climbed(best, tried, known, pictures, worth, most_steps):
 @njit(**EXACT)
 def _evaluate(at, known, pictures, worth):
     """Look at the pictures from a place's state, weigh in what is `known`, and fill the rest of the place."""
-    mean, information, anchors, anchor_sd_m = known
+    mean, information, anchors, anchor_sd_m, habits = known
     cameras, kinds, maps, others, work = pictures
     points, by_state, gradient, curvature, _ = at.equations
     state, n, A, b = at.state, len(mean), at.information, at.pull
@@ -149,12 +149,12 @@ def _evaluate(at, known, pictures, worth):
     away = state[:n] - mean
     held = information @ away
     from_rest = _REST - state[:N_DOF]
-    habit = _HABIT_INFORMATION @ from_rest
+    to_rest = habits @ from_rest
     A[:] = worth * SLOPE * curvature + information
     b[:] = worth * gradient - held
-    A[:N_DOF, :N_DOF] += _HABIT_INFORMATION
-    b[:N_DOF] += habit
-    cost = 0.5 * (away @ held + from_rest @ habit)
+    A[:N_DOF, :N_DOF] += habits
+    b[:N_DOF] += to_rest
+    cost = 0.5 * (away @ held + from_rest @ to_rest)
     for k in range(N_DOF):
         beyond = min(max(state[k], LIMITS_RAD[k, 0]), LIMITS_RAD[k, 1]) - state[k]
         if beyond != 0:

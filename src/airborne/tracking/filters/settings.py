@@ -34,7 +34,7 @@ class LegsSettings:
     method: LegsMethod = "block-jump"
     seed: int = 0
     n_particles: int = 1500
-    swing: Swing = "consistent"
+    swing: Swing = "literal"
     estimate: EstimateAs = "max"
     views: ViewsAs = "all"
     tempered: bool = False

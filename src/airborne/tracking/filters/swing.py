@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
-Swing = Literal["consistent", "literal"]
+Swing = Literal["literal", "consistent"]
 
 SECTORS = 16
 _LEAST_REACH_M, _CLEARANCE_M = 0.01, 0.04  # of a step towards the other leg
