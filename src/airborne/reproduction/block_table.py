@@ -103,7 +103,7 @@ def _shares(summary: Summary) -> str:
     for name, found in summary["rows"].items():
         means = [sum(found[key]) / len(PARTS) for key in ("within_100mm", "within_50mm", "within_95")]
         shares = [*means, *(found[key] for key in ("swaps_knees", "swaps_feet", "limbs_correct", "lost", "uncertain"))]
-        ms = found["ms_per_frame"] + (summary["torso"]["ms_per_frame"] if name in PAPER else 0.0)
+        ms = found["ms_per_frame"] + (summary["torso"]["ms_per_frame"] if _tracks_torsos(name) else 0.0)
         lines.append([_code(name), *(_number(100 * share, 1) for share in shares), _number(ms, 1)])
     torso = summary["torso"]
     note = (
@@ -112,6 +112,10 @@ def _shares(summary: Summary) -> str:
         f"{torso['ms_per_frame']:.1f} ms of the three filters' time."
     )
     return f"{_table(titles, lines)}\n\n{note}"
+
+
+def _tracks_torsos(row: str) -> bool:
+    return row != "blocker" and not row.endswith("torsos given")
 
 
 def _jumps(summary: Summary) -> str:

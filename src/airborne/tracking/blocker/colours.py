@@ -156,8 +156,7 @@ def _in_all_lights(counts: NDArray[np.float32]) -> Array:
     lit = np.minimum(_LIGHTS[:, None, None] * (np.array(cell) + 0.5), BINS - 1).astype(int)  # (lights, 3, n)
     to = np.ravel_multi_index((np.broadcast_to(kind, lit[:, 0].shape), *np.moveaxis(lit, 1, 0)), counts.shape)
     weights = _LIGHT_WEIGHTS[:, None] * counts[kind, *cell]
-    lit_counts: Array = np.bincount(to.ravel(), weights.ravel(), counts.size)
-    return lit_counts.reshape(counts.shape)
+    return np.asarray(np.bincount(to.ravel(), weights.ravel(), counts.size), float).reshape(counts.shape)
 
 
 def _normalised(counts: Array) -> Array:
