@@ -50,7 +50,7 @@ KERNELS = [
     "cameras/distortion.py",
     "cameras/bundle/loss.py",
     *sorted(f"geometry/{path.name}" for path in (SOURCE / "geometry").glob("[a-z]*.py")),
-    "rendering/capsules.py",
+    *(f"rendering/{name}.py" for name in ("capsule_evidence", "capsules", "spans")),
     *sorted(f"motion/signals/{path.name}" for path in (SOURCE / "motion" / "signals").glob("[a-z]*.py")),
     *(f"scoring/{name}.py" for name in ("distances", "foreground", "hsv", "kinds", "lighting")),
     *(f"scoring/{name}.py" for name in ("over_views", "plate", "recognition", "rods")),

@@ -6,7 +6,9 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras import Camera
-from airborne.rendering.capsules import BEHIND, evidence, labels, outline, project, running_sums
+from airborne.rendering.capsule_evidence import evidence
+from airborne.rendering.capsules import BEHIND, labels, outline, project
+from airborne.rendering.spans import running_sums
 from tests.tolerances import SOLVED
 
 W, H, FINE = 64, 56, 32  # of the maps [px], and points a pixel along a row

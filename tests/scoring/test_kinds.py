@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.rendering.capsules import running_sums
+from airborne.rendering.spans import running_sums
 from airborne.scoring.kinds import COLUMNS, evidence_maps, ratio_table, smooth
 
 UNSEEN, LIKE_THEM, CELLS = 1e-6, 0.8, 32**3

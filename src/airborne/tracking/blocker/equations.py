@@ -9,7 +9,9 @@ import numpy as np
 from numba import njit
 
 from airborne.body.jumper import N_DOF, place, shares
-from airborne.rendering.capsules import BEHIND, EXACT, evidence, project
+from airborne.rendering.capsule_evidence import evidence
+from airborne.rendering.capsules import BEHIND, project
+from airborne.rendering.spans import EXACT
 
 N_LENGTHS, N_CAPSULES, N_POINTS = 9, 10, 9
 _STEP = 1e-4  # [m, rad] of the differences that say how points and capsules move

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airborne.body.jumper import BALL_HEIGHT_M, CAPSULES, KINDS, LIMITS_RAD, N_DOF
-from airborne.rendering.capsules import EXACT
+from airborne.rendering.spans import EXACT
 from airborne.tracking.blocker.equations import N_CAPSULES, N_POINTS, gathered
 from airborne.tracking.blocker.views import Seen, workspace
 

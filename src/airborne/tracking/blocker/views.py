@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airborne.body.jumper import KINDS
 from airborne.cameras import Camera
-from airborne.rendering.capsules import running_sums
+from airborne.rendering.spans import running_sums
 from airborne.scoring.kinds import evidence_maps, smooth
 from airborne.tracking.blocker.equations import N_CAPSULES
 from airborne.video import Frames, View
