@@ -29,8 +29,8 @@ def jumps(motion: PlayersMotion, *, block_level_m: float = BLOCK_LEVEL_M) -> tup
     """Measure every flight of every player, in the players' order and then in time; empty where nobody jumps.
 
     A flight needs both ankles 0.12 m over where they stand for 0.1 s and a body in free fall. Intervals hold the noise
-    that the covariances state, half of each variance white and half fading over 0.1 s (see `noise_covariance`), and are
-    widened where a flight shows more. The same motion always gives the same numbers.
+    that the covariances state, a tenth of each variance white and the rest fading over 0.3 s (see
+    `contact.OF_PLAYERS`), and are widened where a flight shows more. The same motion always gives the same numbers.
     Raises ResultError where hips, knees or ankles are not among the joints.
     """
     found: list[Jump] = []

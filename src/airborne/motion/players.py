@@ -182,13 +182,14 @@ def write_players_parquet(path: Path, table_csv: Path) -> None:
 
 def _lines(motion: PlayersMotion) -> list[str]:
     """Lay out the rows of one time."""
-    lines, sd = [], motion.sd
+    lines = []
+    upper = motion.covariance[0][..., *_UPPER]
+    numbers = np.concatenate([motion.points[0], motion.sd[0, ..., None], upper], axis=-1).tolist()
     for p, player in enumerate(motion.players):
         shared = [player, str(motion.index[0]), cell(float(motion.time_s[0])), str(motion.status[0, p])]
         ends = [cell(float(motion.score[0, p])), str(motion.n_views[0, p])]
         for j, joint in enumerate(motion.joints):
-            numbers = [*motion.points[0, p, j], sd[0, p, j], *motion.covariance[0, p, j][_UPPER]]
-            lines.append(",".join([*shared, joint, *(cell(float(number)) for number in numbers), *ends]) + "\n")
+            lines.append(",".join([*shared, joint, *map(cell, numbers[p][j]), *ends]) + "\n")
     return lines
 
 

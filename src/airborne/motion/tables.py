@@ -96,7 +96,7 @@ def write_flight(path: Path, motion: Motion, model: BodyModel) -> None:
 def cell(value: object) -> str:
     """Write one value so that a float is read back to the last bit; NaN, the unknown, is an empty cell."""
     if isinstance(value, float):
-        return "" if np.isnan(value) else repr(float(value))
+        return "" if value != value else float.__repr__(value)  # faster than isnan, and np.float64 has another repr
     return str(value)
 
 

@@ -30,13 +30,13 @@ def placed(state, points, ends, balls, share):
 def gathered(state, n_free, cameras, kinds, maps, others, work, owned, equations):
     """Add up a jumper's evidence over the views and return it [nats times pixels].
 
-    cameras (v, 4, 4) see the regions of maps: sums (v, k + 1, h, w + 1), the last empty, and contrast (v, k + 1), see
-    `capsules.evidence`. The empty map belongs to `others`,
-    capsules ends (m, 2, 3) and balls (m, 2) [m] of other players, who hide what lies behind them. kinds (10 + m, 2).
-    Fills owned (v, 10 + m, 2, 2), see `capsules.evidence`, and equations: points (9, 3) [m], and with n_free > 0 their
-    Jacobian (27, n_free), and for the first numbers of the state the gradient (n_free,), the curvature (n_free, n_free)
-    and spread (n_free, n_free): the covariance of the gradient when every capsule's outline lies beside the player's by
-    one metre's sd, right or down, in each view by itself.
+    cameras (v, 4, 4) see the regions of maps: sums (v, k + 1, h, w + 1), the last empty, and contrast (v, k + 1), as
+    `capsule_evidence.evidence` takes them. The empty map belongs to `others`, capsules ends (m, 2, 3) and balls (m, 2)
+    [m] of other players, who hide what lies behind them. kinds (10 + m, 2).
+    Fills owned (v, 10 + m, 2, 2), see there, and equations: points (9, 3) [m], and with n_free > 0 their Jacobian
+    (27, n_free), and for the first numbers of the state the gradient (n_free,), the curvature (n_free, n_free) and
+    spread (n_free, n_free): the covariance of the gradient when every capsule's outline lies beside the player's by one
+    metre's sd, right or down, in each view by itself.
 
     Views add up capsule by capsule in the world, 9 numbers each; only the sums are mapped to the state.
     """
