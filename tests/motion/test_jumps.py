@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from airborne.errors import ResultError
-from airborne.motion.contact import fallen
+from airborne.motion.contact import fallen, noise_covariance
 from airborne.motion.jumps import jumps
-from airborne.motion.local import local_fit
+from airborne.motion.local import local_fits
 from airborne.motion.standing import leg_lengths
 from tests.motion.jumping import (
     FLAT_M,
@@ -323,11 +323,36 @@ def test_a_motion_of_one_frame_or_none_known_has_no_jump():
     assert jumps(players_motion(CLEAN.time_s[:1], CLEAN.points()[:1, None, :6])) == ()
 
 
-def test_local_fit_is_exact_on_parabolas_and_unknown_outside_the_data():
+def test_local_fits_are_exact_on_parabolas_and_unknown_outside_the_data():
     time_s = np.arange(12) / 60
     values = np.column_stack([1.0 + 2 * time_s + fallen(time_s), 3 - time_s])
-    fit, covariance = local_fit(time_s, values, np.full_like(values, 1e-4), 0.0871)
-    assert fit[0] == pytest.approx([1 + 2 * 0.0871 - G / 2 * 0.0871**2, 3 - 0.0871], abs=ROUNDTRIP)
-    assert fit[1] == pytest.approx([2 - G * 0.0871, -1], abs=ROUNDTRIP)
-    assert (np.linalg.eigvalsh(covariance[..., 0]) > 0).all()
-    assert np.isnan(local_fit(time_s, values, values, 0.3)[0]).all()
+    at_s = np.array([0.0871, 0.3, 0.1])
+    fit, covariance = local_fits(time_s, values, np.full_like(values, 1e-4), at_s)
+    for k in (0, 2):
+        at = at_s[k]
+        assert fit[k, 0] == pytest.approx([1 + 2 * at - G / 2 * at**2, 3 - at], abs=ROUNDTRIP)
+        assert fit[k, 1] == pytest.approx([2 - G * at, -1], abs=ROUNDTRIP)
+        assert (np.linalg.eigvalsh(covariance[k]) > 0).all()
+    assert np.isnan(fit[1]).all() and np.isnan(covariance[1]).all()
+
+
+@pytest.mark.parametrize("rate_hz", [25, 60, 240])
+def test_local_fits_take_the_nine_known_values_nearest_to_the_time(rate_hz):
+    rng = np.random.default_rng(rate_hz)
+    time_s = np.arange(60) / rate_hz
+    values, variance = rng.normal(size=(60, 2)), rng.uniform(1, 2, (60, 2))
+    values[rng.random(60) < 0.15, 1] = np.nan
+    known = np.flatnonzero(np.isfinite(values[:, 1]))
+    at_s = rng.uniform(time_s[known[0]], time_s[known[-1]], 50)
+    fit, covariance = local_fits(time_s, values, variance, at_s)
+    for at, found, spread in zip(at_s, fit, covariance, strict=True):
+        rows = np.sort(known[np.argsort(np.abs(time_s[known] - at))[:9]])
+        rows = rows[np.abs(time_s[rows] - at) <= 0.12]
+        if len(rows) < 5:
+            assert np.isnan(found).all() and np.isnan(spread).all()
+            continue
+        hat = np.linalg.pinv(np.vander(time_s[rows] - at, 3, increasing=True))[:2]
+        np.testing.assert_allclose(found, hat @ values[rows], rtol=1e-6, atol=1e-8)
+        noise_of = noise_covariance(time_s[rows], variance[rows, 1])
+        np.testing.assert_allclose(spread[1], hat @ noise_of @ hat.T, rtol=1e-6, atol=1e-8)
+    assert np.isfinite(fit).all(axis=(1, 2)).mean() > 0.5

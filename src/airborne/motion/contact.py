@@ -49,13 +49,13 @@ class Side:
 
 
 def noise_covariance(time_s: Array, variance: Array, *, noise: Noise = OF_PLAYERS, sway_m: float = 0.0) -> Array:
-    """Return covariances (..., n, n) of tracked values of variances (..., n), as `noise` shares them out.
+    """Return covariances (..., n, n) of values tracked at times (..., n), of variances (..., n), as `noise` says.
 
     `sway_m` adds an error common to neighbouring times, of what the values stand for.
     """
-    apart = np.abs(time_s[:, None] - time_s)
+    apart = np.abs(time_s[..., :, None] - time_s[..., None, :])
     sd = np.sqrt(variance)
-    alike = (1 - noise.white_share) * np.exp(-apart / noise.fading_s) + noise.white_share * np.eye(len(time_s))
+    alike = (1 - noise.white_share) * np.exp(-apart / noise.fading_s) + noise.white_share * np.eye(time_s.shape[-1])
     found = sd[..., :, None] * sd[..., None, :] * alike
     return found + sway_m**2 * np.exp(-apart / SWAY_S) if sway_m else found
 

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from airborne.motion.contact import GRAVITY_M_S2, SWAY_M, Side, fallen, joined, noise_covariance, side
 from airborne.motion.leg_track import LegTrack
-from airborne.motion.local import N_DRAWS, local_fit
+from airborne.motion.local import N_DRAWS, local_fits
 
 Array = NDArray[np.floating]
 
@@ -219,17 +219,12 @@ def _lower_rise(track: LegTrack, name: str, points: Array, flat: Array, times: A
 
     The lower of two noisy heights is too low on the mean, so they count as one until they clearly differ.
     """
-    rise, variance = np.full((2, len(times)), np.nan)
-    for k, at in enumerate(times):
-        fit, covariance = local_fit(track.time_s, points[:, :, 2], track.variances[name][:, :, 2], float(at))
-        each = fit[0] - flat
-        spread = covariance[0, 0]
-        if abs(each[0] - each[1]) > 2 * np.sqrt(spread.sum()):
-            lower = int(np.argmin(each))
-            rise[k], variance[k] = each[lower], spread[lower]
-        else:
-            rise[k], variance[k] = each.mean(), spread.sum() / 4
-    return rise, variance
+    fit, covariance = local_fits(track.time_s, points[:, :, 2], track.variances[name][:, :, 2], times)
+    each, spread = fit[:, 0] - flat, covariance[..., 0, 0]
+    lower = each.argmin(axis=1)[:, None]
+    differs = np.abs(each[:, 0] - each[:, 1]) > 2 * np.sqrt(spread.sum(axis=1))
+    rise = np.where(differs, np.take_along_axis(each, lower, axis=1)[:, 0], each.mean(axis=1))
+    return rise, np.where(differs, np.take_along_axis(spread, lower, axis=1)[:, 0], spread.sum(axis=1) / 4)
 
 
 def _normalised(log_p: Array) -> Array:

@@ -9,7 +9,7 @@ from airborne.motion.contact import GRAVITY_M_S2
 from airborne.motion.jump import UNKNOWN, Jump, Measured
 from airborne.motion.jump_events import Flight, find_flights, flight_of
 from airborne.motion.leg_track import LegTrack, leg_track
-from airborne.motion.local import N_DRAWS, local_fit, peak_draws
+from airborne.motion.local import N_DRAWS, local_fits, peak_draws
 from airborne.motion.players import PlayersMotion
 from airborne.motion.standing import standing
 
@@ -166,10 +166,10 @@ def _drawn(
     if at_s is None:
         return None
     middle = float(np.median(at_s))
-    fit, covariance = local_fit(track.time_s, values, variance, middle)
+    (fit,), (covariance,) = local_fits(track.time_s, values, variance, np.array([middle]))
     if not np.isfinite(fit).all():
         return None
-    sd = np.sqrt(covariance[0, 0])
+    sd = np.sqrt(covariance[:, 0, 0])
     return fit[0] + fit[1] * (at_s - middle)[:, None] + sd * rng.standard_normal((N_DRAWS, len(sd)))
 
 
@@ -181,14 +181,19 @@ def _peak_speed(track: LegTrack, flight: Flight, points: Array, variance: Array)
     """Return the greatest speed of any of the points (n, k, 3) [m/s], slopes of parabolas over nine frames."""
     start = float(track.time_s[flight.rows[0]] if flight.takeoff_s is None else np.median(flight.takeoff_s)) - _BEFORE_S
     end = float(track.time_s[flight.rows[1]] if flight.landing_s is None else np.median(flight.landing_s))
+    at_s = track.time_s[(track.time_s >= start) & (track.time_s <= end)]
     best = UNKNOWN
-    for row in np.flatnonzero((track.time_s >= start) & (track.time_s <= end)):
-        for k in range(points.shape[1]):
-            fit, covariance = local_fit(track.time_s, points[:, k], variance[:, k], float(track.time_s[row]))
-            speed = float(np.linalg.norm(fit[1]))
-            if np.isfinite(speed) and not speed <= best.value:
-                sd = float(np.sqrt((fit[1] / speed) ** 2 @ covariance[1, 1])) if speed else 0.0
-                best = Measured(speed, max(speed - 1.96 * sd, 0.0), speed + 1.96 * sd)
+    for k in range(points.shape[1]):
+        fit, covariance = local_fits(track.time_s, points[:, k], variance[:, k], at_s)
+        speed = np.linalg.norm(fit[:, 1], axis=1)
+        if not np.isfinite(speed).any():
+            continue
+        row = int(np.nanargmax(speed))
+        fastest = float(speed[row])
+        if not fastest <= best.value:
+            along = fit[row, 1] / fastest if fastest else fit[row, 1]
+            sd = float(np.sqrt(along**2 @ covariance[row, :, 1, 1]))
+            best = Measured(fastest, max(fastest - 1.96 * sd, 0.0), fastest + 1.96 * sd)
     return best
 
 

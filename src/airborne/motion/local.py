@@ -9,30 +9,41 @@ from airborne.motion.contact import noise_covariance
 
 Array = NDArray[np.floating]
 
-_NEAREST, _FARTHEST_S = 9, 0.12
+_NEAREST, _LEAST, _FARTHEST_S = 9, 5, 0.12
 
 
-def local_fit(time_s: Array, values: Array, variance: Array, at_s: float) -> tuple[Array, Array]:
-    """Fit a parabola to the nine known values nearest to a time: value and slope there (2, k), covariance (2, 2, k).
+def local_fits(time_s: Array, values: Array, variance: Array, at_s: Array) -> tuple[Array, Array]:
+    """Fit parabolas to the nine known values nearest to each of some times.
 
-    `values` and `variance` are (n, k), NaN where unknown; only values within 0.12 s count. NaN where fewer than five
-    are known, or all lie on one side and the nearest is not the time's neighbour.
+    `time_s` (n,) in order; `values` and `variance` (n, k), NaN where unknown; `at_s` (m,). Returns value and slope
+    there (m, 2, k) and their covariance (m, k, 2, 2). Only values within 0.12 s count. NaN where fewer than five are
+    known, or all lie on one side and the nearest is not the time's neighbour.
     """
-    k = values.shape[1]
-    unknown = np.full((2, k), np.nan), np.full((2, 2, k), np.nan)
-    is_known = np.isfinite(values).all(axis=1) & (np.abs(time_s - at_s) <= _FARTHEST_S)
-    rows = np.flatnonzero(is_known)
-    rows = np.sort(rows[np.argsort(np.abs(time_s[rows] - at_s), kind="stable")[:_NEAREST]])
-    if len(rows) < 5:
-        return unknown
-    u = time_s[rows] - at_s
-    step = float(np.min(np.diff(time_s[rows])))
-    if u[0] > step or u[-1] < -step:
-        return unknown
-    scale = float(np.abs(u).max())
-    powers = np.vander(u / scale, 3, increasing=True)
-    hat = np.linalg.solve(powers.T @ powers, powers.T)[:2] / np.array([[1.0], [scale]])
-    return hat @ values[rows], np.moveaxis(hat @ noise_covariance(u, variance[rows].T) @ hat.T, 0, -1)
+    m, k = len(at_s), values.shape[1]
+    fit, covariance = np.full((m, 2, k), np.nan), np.full((m, k, 2, 2), np.nan)
+    known = np.flatnonzero(np.isfinite(values).all(axis=1))
+    n = min(_NEAREST, len(known))
+    if n < _LEAST:
+        return fit, covariance
+    known_s = time_s[known]
+    starts = np.searchsorted(known_s, at_s)[:, None] + np.arange(-n, 1)
+    starts = np.clip(starts, 0, len(known) - n)
+    reach = np.maximum(at_s[:, None] - known_s[starts], known_s[starts + n - 1] - at_s[:, None])
+    start = np.take_along_axis(starts, reach.argmin(axis=1)[:, None], axis=1)
+    rows = known[start + np.arange(n)]
+    u = time_s[rows] - at_s[:, None]
+    counts = np.abs(u) <= _FARTHEST_S
+    step = np.where(counts[:, 1:] & counts[:, :-1], np.diff(u), np.inf).min(axis=1)
+    first, last = np.where(counts, u, np.inf).min(axis=1), np.where(counts, u, -np.inf).max(axis=1)
+    is_known = (counts.sum(axis=1) >= _LEAST) & (first <= step) & (last >= -step)
+    rows, u, counts = rows[is_known], u[is_known], counts[is_known]
+    powers = (u / _FARTHEST_S)[..., None] ** np.arange(3) * counts[..., None]
+    turned = np.swapaxes(powers, 1, 2)
+    hat = np.linalg.solve(turned @ powers, turned)[:, :2] / np.array([[1.0], [_FARTHEST_S]])
+    fit[is_known] = hat @ values[rows]
+    noise = noise_covariance(u[:, None], np.swapaxes(variance[rows], 1, 2))
+    covariance[is_known] = hat[:, None] @ noise @ np.swapaxes(hat, 1, 2)[:, None]
+    return fit, covariance
 
 
 def peak_draws(
