@@ -51,6 +51,8 @@ def test_bundled_truth_is_read(thrown_cross):
         ([LINE.format(0, "inf")], "line 2: time_s is 'inf', expected a number"),
         ([LINE.format(0.5, 0)], "line 2: frame must be a whole number"),
         ([LINE.format(0, 1), LINE.format(1, 1)], "line 3: time_s 1 is not after"),
+        (["", LINE.format(0, 1), "", LINE.format(1, 1)], "line 5: time_s 1 is not after"),
+        (["", "", LINE.format(0, "soon")], "line 4: time_s is .soon., expected a number"),
         ([LINE.format(0, 1).replace("-1", "1")], "line 2: .* not a rotation"),
         ([LINE.format(0, 1).replace("-1", "-2")], "line 2: .* not a rotation"),
     ],

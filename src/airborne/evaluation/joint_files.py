@@ -63,7 +63,7 @@ def _read_long(path: Path) -> JointPaths:
             raise ResultError(f"{path} holds {len(players)} players ({', '.join(players[:3])}...); leave one in")
     labels = [cells[table.names.index("joint")].strip() for cells in table.lines]
     for row in np.flatnonzero(np.isnan(values[:, 0])):
-        raise ResultError(f"{path} line {row + 2} has no time_s; every line needs one, in seconds")
+        raise ResultError(f"{path} line {table.line_numbers[row]} has no time_s; every line needs one, in seconds")
     names = tuple(dict.fromkeys(labels))
     time_s, at = np.unique(values[:, 0], return_inverse=True)
     joint = np.array([names.index(label) for label in labels])

@@ -16,21 +16,21 @@ _LARGEST = 1e15  # of any number in a table: a whole number is exact up to here
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A comma-separated file: its column names, and its lines as text."""
+    """A comma-separated file: its column names, and its lines as text, with their numbers in the file."""
 
     path: Path
     names: list[str]
     lines: list[list[str]]
+    line_numbers: list[int]
 
     def numbers(self, names: list[str]) -> NDArray[np.float64]:
         """Return the named columns as numbers (lines, names), blank cells as NaN; ResultError for anything else."""
         columns = [self.names.index(name) for name in names]
         values = np.full((len(self.lines), len(names)), np.nan)
         for row, cells in enumerate(self.lines):
+            where = f"{self.path} line {self.line_numbers[row]}"
             if len(cells) != len(self.names):
-                raise ResultError(
-                    f"{self.path} line {row + 2} has {len(cells)} cells, expected {len(self.names)}; mend it"
-                )
+                raise ResultError(f"{where} has {len(cells)} cells, expected {len(self.names)}; mend it")
             for k, (name, column) in enumerate(zip(names, columns, strict=True)):
                 text = cells[column].strip()
                 try:
@@ -38,23 +38,22 @@ class Table:
                 except ValueError:
                     values[row, k] = np.inf
                 if not abs(values[row, k]) <= _LARGEST and not np.isnan(values[row, k]):
-                    raise ResultError(
-                        f"{self.path} line {row + 2}: {name[:60]} is '{text[:60]}', expected a number; mend it"
-                    )
+                    raise ResultError(f"{where}: {name[:60]} is '{text[:60]}', expected a number; mend it")
         return values
 
     def whole_numbers(self, name: str) -> NDArray[np.int64]:
         """Return one column as whole numbers (lines,); ResultError for anything else."""
         values = self.numbers([name])[:, 0]
-        for row, value in enumerate(values):
+        for line, value in zip(self.line_numbers, values, strict=True):
             if value != np.round(value):
-                raise ResultError(f"{self.path} line {row + 2}: {name} must be a whole number, as in 0, 1, 2; mend it")
+                raise ResultError(f"{self.path} line {line}: {name} must be a whole number, as in 0, 1, 2; mend it")
         return values.astype(np.int64)
 
 
 def read_table(path: Path, expected: str) -> Table:
     """Read a table; `expected` says in the error what the file should have been. Raises ResultError."""
-    rows = [row for _, row in read_csv(path, f"expected {expected}", ResultError)]
+    rows = read_csv(path, f"expected {expected}", ResultError)
     if len(rows) < 2:
         raise ResultError(f"{path} has no lines of numbers; expected {expected}")
-    return Table(path, rows[0], rows[1:])
+    (_, names), *others = rows
+    return Table(path, names, [cells for _, cells in others], [line for line, _ in others])

@@ -43,7 +43,7 @@ def read_truth(path: Path) -> Truth:
         raise ResultError(f"{path} has no column {absent}; expected {_EXPECTED}")
     values = table.numbers(["time_s", *_POSITION, *_ROTATION])
     time_s, position, R = values[:, 0], values[:, 1:4], values[:, 4:].reshape(-1, 3, 3)
-    for row, line in enumerate(range(2, len(values) + 2)):
+    for row, line in enumerate(table.line_numbers):
         if not np.isfinite(values[row]).all():
             raise ResultError(
                 f"{path} line {line} has an empty cell; a truth needs every number, or leave the line out"
