@@ -21,7 +21,7 @@ SHAPE_SD_M = 0.050  # how far a capsule's outline may lie beside the player's
 SLOPE = 0.25  # share of its contrast by which evidence falls across an outline in a pixel of the maps
 _LIMIT_SD_RAD = 0.05  # how firmly joints keep within their limits
 _FLOOR_SD_M = 0.01  # and feet above the floor
-_SETTLED_NATS = 0.1  # a step that gains less, or may gain less, is the last
+_SETTLED_NATS = 0.1
 _DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 0.1, 0.03, 2.0  # of a first step; steps shorter than the last change nothing
 _ROBUST = 4.0  # squared sds at which an anchor's pull is halved
 _BALLS = (6, 7)  # rows of the points
@@ -124,8 +124,6 @@ def _climbed(best, tried, known, pictures, worth, most_steps):
         for k in range(n):
             damped[k, k] += damping * damped[k, k]
         step = np.linalg.solve(damped, best.pull)
-        if 0.5 * (step @ best.pull) < _SETTLED_NATS:  # what it may gain
-            break
         tried.state[:] = best.state
         tried.state[:n] += step
         _evaluate(tried, known, pictures, worth)
