@@ -35,6 +35,7 @@ VARIANTS: dict[str, list[Switch]] = {
     "without hidden views": [(tracker, "_HIDDEN_RATE", 0.0)],
     "clothes that stay": [(dynamics, "_SLIDING_SD", dynamics._SLIDING_SD * 0.01)],
     "colours as lit at first": [(colours, "_LIGHTS", np.ones_like(colours._LIGHTS))],
+    "socks and shoes as at first": [(tracker, "RENEWED_S", np.inf)],
     "without other players": [(tracker, "_NEAR_M", 0.0)],
 }
 

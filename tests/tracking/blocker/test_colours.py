@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body.jumper import KINDS, N_DOF, SHIRT, SHORTS, SKIN
+from airborne.body.jumper import KINDS, N_DOF, SHIRT, SHOE, SHORTS, SKIN
 from airborne.cameras import Camera
-from airborne.tracking.blocker.colours import Drawings, drawn, learned
+from airborne.tracking.blocker.colours import Drawings, drawn, learned, renewed
+from airborne.tracking.blocker.equations import NOBODY
 from airborne.tracking.blocker.views import Region
 from tests.tracking.blocker.hops import LENGTHS, RADII
 
@@ -51,9 +52,9 @@ def coloured(colour, n=40):
     return learned([region], [Drawings(part, part, part)], 1, np.ones((1, len(KINDS)), bool))
 
 
-def evidence_of(colours, colour):
-    r, g, b = np.asarray(colour) >> 3
-    return colours.table(0).evidence[r << 10 | g << 5 | b, SKIN]
+def evidence_of(colours, colour, kind=SKIN):
+    r, g, b = np.asarray(colour, int) >> 3
+    return colours.table(0).evidence[r << 10 | g << 5 | b, kind]
 
 
 def test_a_surface_is_known_again_in_more_and_in_less_light():
@@ -62,3 +63,51 @@ def test_a_surface_is_known_again_in_more_and_in_less_light():
         assert evidence_of(colours, (np.array([180, 140, 110]) * light).astype(int)) > 3
     assert evidence_of(colours, (110, 140, 180)) < 1
     assert evidence_of(colours, (90, 70, 55)) < 1
+
+
+STANDING = leaning(0.0)
+WORN = np.array([(160, 30, 40), (30, 30, 30), (180, 140, 110), (20, 40, 20), (230, 230, 220), (40, 60, 160)], np.uint8)
+SOLE, GREEN = (90, 200, 190), np.array([(60, 200, 60)], np.uint8)
+
+
+def dressed(shoe, others=NOBODY):
+    """A picture of one who stands before a blue wall, in shoes of a colour; others are green."""
+    worn = np.concatenate([WORN, GREEN])
+    worn[SHOE] = shoe
+    shown = drawn(STANDING, looking(1), 1.0, others)
+    return Region(0, looking(1), (0, 0, SIDE_PX, SIDE_PX), worn[np.choose(shown + 1, [5, 0, 1, 2, 3, 4, 6])])
+
+
+def at_first():
+    region = dressed(WORN[SHOE])
+    part, around = drawn(STANDING, looking(1), 0.6), drawn(STANDING, looking(1), 1.25)
+    return learned([region], [Drawings(part, part, around)], 1, np.ones((1, len(KINDS)), bool))
+
+
+def test_shoes_are_known_by_their_soles_once_these_were_seen():
+    colours = at_first()
+    assert evidence_of(colours, SOLE, SHOE) < 1
+    later = renewed(colours, STANDING, [dressed(SOLE)], NOBODY)
+    assert evidence_of(later, SOLE, SHOE) > 3
+    assert evidence_of(later, WORN[SHOE], SHOE) > 3
+    np.testing.assert_array_equal(later.kinds[: SKIN + 1], colours.kinds[: SKIN + 1])
+    for _ in range(50):
+        later = renewed(later, STANDING, [dressed(SOLE)], NOBODY)
+    assert evidence_of(later, WORN[SHOE], SHOE) > 3  # what they were at first is never forgotten
+
+
+def test_nothing_is_learned_of_shoes_that_are_hidden():
+    colours = at_first()
+    colours.hidden[0, SHOE] = 0.9
+    later = renewed(colours, STANDING, [dressed(SOLE)], NOBODY)
+    np.testing.assert_array_equal(later.kinds[SHOE], colours.kinds[SHOE])
+
+
+def test_nothing_is_learned_of_another_players_leg_in_front():
+    feet = np.array([[[0.3, 0.5, 0.08], [-0.3, 0.5, 0.08]]])
+    others = feet, np.full((1, 2), 0.3)
+    assert np.count_nonzero(dressed(WORN[SHOE], others).rgb == GREEN) > 1000
+    later = renewed(at_first(), STANDING, [dressed(WORN[SHOE], others)], others)
+    assert evidence_of(later, GREEN[0], SHOE) < 1
+    unaware = renewed(at_first(), STANDING, [dressed(WORN[SHOE], others)], NOBODY)
+    assert evidence_of(unaware, GREEN[0], SHOE) > 3

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body.jumper import CAPSULES, KINDS, N_DOF
+from airborne.body.jumper import KINDS, N_DOF, SHOE, SKIN, SOCK
 from airborne.cameras import Camera
 from airborne.rendering.capsules import labels, project
 from airborne.scoring.foreground import BINS, count_colours
 from airborne.scoring.kinds import ratio_table
-from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, placed
+from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, NOBODY, kinds_with, placed
 from airborne.tracking.blocker.views import Region, Table, packed
 
 Array = NDArray[np.floating]
@@ -30,6 +30,9 @@ BRIGHTNESS_SD = 0.10  # of the logarithm of sRGB values: about a fifth more or l
 _LIGHTNESS = np.linspace(-1.5, 1.5, 15)  # in these; so many that no bin between is left out
 _LIGHTS, _LIGHT_WEIGHTS = np.exp(BRIGHTNESS_SD * _LIGHTNESS), np.exp(-(_LIGHTNESS**2) / 2)
 _THICKNESSES = slice(N_DOF + N_LENGTHS, N_DOF + N_LENGTHS + 6)  # the radii among a state
+RENEWED_S = 0.2  # how often socks and shoes are looked at anew: in the air they show other sides than on the floor
+_RENEWING, _AS_FIRST = 0.35, 0.5  # share that is new each time; of it, what they looked like at first
+_FREE = 0.3  # views in which they are hidden less teach
 
 
 class Drawings(NamedTuple):
@@ -45,6 +48,7 @@ class Colours:
     """Colour probabilities, 32 bins a channel, and how likely each camera's view of each kind is covered."""
 
     kinds: NDArray[np.float32]  # (5, 32, 32, 32)
+    first: NDArray[np.float32]  # (5, 32, 32, 32) as the first frame shows them
     background: NDArray[np.float32]  # (cameras, 32, 32, 32)
     hidden: Array  # (cameras, 5)
 
@@ -57,16 +61,19 @@ class Colours:
         return Table(chosen, evidence, usual, usual - self.background[view].ravel() @ evidence[:, :n])
 
 
-def drawn(state: Array, camera: Camera, thickness: float) -> NDArray[np.int8]:
-    """Draw which kind each pixel of a camera's picture shows: (h, w), -1 where none."""
+def drawn(state: Array, camera: Camera, thickness: float, others: tuple[Array, Array] = NOBODY) -> NDArray[np.int8]:
+    """Draw which kind each pixel of a camera's picture shows: (h, w), -1 where none, 5 where one of the others is."""
     state = state.copy()
     state[_THICKNESSES] *= thickness
-    points, ends, balls = np.empty((N_POINTS, 3)), np.empty((N_CAPSULES, 2, 3)), np.empty((N_CAPSULES, 2))
-    discs, depth, share = np.empty((N_CAPSULES, 2, 3)), np.empty(N_CAPSULES), np.empty(N_CAPSULES)
-    placed(state, points, ends, balls, share)
+    other_ends, other_balls = others
+    n = N_CAPSULES + len(other_ends)
+    ends, balls, share = np.empty((n, 2, 3)), np.empty((n, 2)), np.ones(n)
+    ends[N_CAPSULES:], balls[N_CAPSULES:] = other_ends, other_balls
+    discs, depth = np.empty((n, 2, 3)), np.empty(n)
+    placed(state, np.empty((N_POINTS, 3)), ends, balls, share)
     project(ends, balls, packed(camera), discs, depth)
     out = np.empty(camera.size[::-1], np.int8)
-    labels(discs, depth, CAPSULES[:, :2], share, out)
+    labels(discs, depth, kinds_with(others), share, out)
     return out
 
 
@@ -89,29 +96,65 @@ def learned(
     background /= np.maximum(background.sum(axis=(1, 2, 3), keepdims=True), 1)
     raw = _normalised(_in_all_lights(counts).reshape(len(KINDS), -1))
     around_all = background.sum(axis=0).ravel() / max(len(regions), 1)
+    kinds = _shared_out(raw, around_all).reshape(counts.shape).astype(np.float32)
+    return Colours(kinds, kinds, background, np.zeros((n_cameras, len(KINDS))))
+
+
+def renewed(colours: Colours, state: Array, regions: Sequence[Region], others: tuple[Array, Array]) -> Colours:
+    """Take in what socks and shoes look like now, in the views in which they are in sight.
+
+    state (35,) is where the player was found, others as `fit` takes them.
+    """
+    counts = np.zeros((1 + SHOE - SKIN, BINS, BINS, BINS), np.float32)
+    for region in regions:
+        core = drawn(state, region.full, CORE, others)
+        for kind, count in enumerate(counts, SKIN):
+            if colours.hidden[region.view, kind] < _FREE:
+                count_colours(region.rgb, core == kind, 1, count)
+    raw = _normalised(_in_all_lights(counts).reshape(len(counts), -1))
+    cells = np.flatnonzero(raw.any(axis=0))
+    new = _shared_out(raw[:, cells], colours.background.reshape(-1, raw.shape[1])[:, cells].mean(axis=0))
+    kinds = colours.kinds.copy()
+    for kind in (SOCK, SHOE):
+        if counts[kind - SKIN].sum() > _LEAST_PX:
+            target = _AS_FIRST * colours.first[kind].ravel()
+            target[cells] += (1 - _AS_FIRST) * new[kind - SKIN]
+            kinds[kind] += _RENEWING * (target.reshape(kinds[kind].shape) - kinds[kind])
+    return replace(colours, kinds=kinds)
+
+
+def _shared_out(raw: Array, around: Array) -> Array:
+    """Give what kinds (k, n) share with the background (n,), or with the kind beside them, to the one with more."""
     kinds = raw
     for _ in range(_ROUNDS):
-        beside = kinds + around_all + 1e-9
+        beside = kinds + around + 1e-9
         beside[1:] += kinds[:-1]
         beside[:-1] += kinds[1:]
         kinds = _normalised(raw * kinds / beside)
-    return Colours(kinds.reshape(counts.shape).astype(np.float32), background, np.zeros((n_cameras, len(KINDS))))
+    return kinds
 
 
-def seen_through(state: Array, regions: Sequence[Region], n_cameras: int) -> Colours:
+def seen_through(state: Array, regions: Sequence[Region], n_cameras: int, others: tuple[Array, Array]) -> Colours:
     """Learn as `learned` does, from the views in which nothing stands before the player; say which these are.
 
-    A view's kind is judged by the colours that the other views give it.
+    A view's kind is judged by the colours that the other views give it. others as `fit` takes them.
     """
     used = np.zeros((n_cameras, len(KINDS)), bool)
     used[[region.view for region in regions]] = True
     hidden = np.full(used.shape, LEAST_HIDDEN)
-    drawings = [Drawings(*(drawn(state, region.full, thick) for thick in (CORE, 1.0, AROUND))) for region in regions]
+    drawings = [
+        Drawings(
+            core=drawn(state, region.full, CORE, others),
+            whole=drawn(state, region.full, 1.0, others),
+            around=drawn(state, region.full, AROUND),
+        )
+        for region in regions
+    ]
     if len(regions) > 2:
         for region, drawing in zip(regions, drawings, strict=True):
-            others = used.copy()
-            others[region.view] = False
-            colours = learned(regions, drawings, n_cameras, others)
+            elsewhere = used.copy()
+            elsewhere[region.view] = False
+            colours = learned(regions, drawings, n_cameras, elsewhere)
             hidden[region.view] = hidden_by(*_mean_evidence(drawing.whole, region, colours))
         agreeing = used & (hidden < _AT_EVEN)
         used = np.where(agreeing.any(axis=0), agreeing, used)

@@ -7,15 +7,22 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from airborne.body.jumper import N_DOF, place, shares
+from airborne.body.jumper import CAPSULES, KINDS, N_DOF, place, shares
 from airborne.rendering.capsule_evidence import evidence
 from airborne.rendering.capsules import BEHIND, project
 from airborne.rendering.spans import EXACT
 
 N_LENGTHS, N_CAPSULES, N_POINTS = 9, 10, 9
+NOBODY = np.empty((0, 2, 3)), np.empty((0, 2))  # the capsules of no other players
 _STEP = 1e-4  # [m, rad] of the differences that say how points and capsules move
 _OF_CAPSULE = 9  # what says where a capsule is: both ends (6), both radii [m], the share
+
+
+def kinds_with(others: tuple[NDArray, NDArray]) -> NDArray[np.int64]:
+    """Return the kinds of a jumper's capsules and of others' (10 + m, 2); these have one of their own."""
+    return np.concatenate([CAPSULES[:, :2], np.full((len(others[0]), 2), len(KINDS))])
 
 
 @njit(**EXACT)

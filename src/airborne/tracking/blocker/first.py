@@ -94,7 +94,7 @@ def first_look(name: str, joints_m: Mapping[str, Array], frames: Frames, others:
         regions = regions_round(frames, state[:3])
         if not regions:
             raise TrialError(f"player '{name}' is in no camera's picture at the start; check its joints_m, in metres")
-        colours = seen_through(state, regions, len(frames.views))
+        colours = seen_through(state, regions, len(frames.views), others)
         scale = scale_of(regions, state[:3])
         found = seen(regions, [colours.table(region.view) for region in regions], scale)
         if number < 2:

@@ -9,9 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airborne.body.jumper import BALL_HEIGHT_M, CAPSULES, KINDS, LIMITS_RAD, N_DOF
+from airborne.body.jumper import BALL_HEIGHT_M, LIMITS_RAD, N_DOF
 from airborne.rendering.spans import EXACT
-from airborne.tracking.blocker.equations import N_CAPSULES, N_POINTS, gathered
+from airborne.tracking.blocker.equations import N_CAPSULES, N_POINTS, gathered, kinds_with
 from airborne.tracking.blocker.views import Seen, workspace
 
 Array = NDArray[np.floating]
@@ -74,7 +74,7 @@ def fit(state: Array, prior: Prior, found: Seen, others: tuple[Array, Array], *,
     """Move the first len(prior.mean) numbers of a state to the nearest maximum of evidence and prior."""
     n = len(prior.mean)
     work, owned = workspace(found, len(others[0]))
-    pictures = found.cameras, _kinds(others), found.maps, others, work
+    pictures = found.cameras, kinds_with(others), found.maps, others, work
     anchors = np.full((N_POINTS, 3), np.nan) if prior.anchors is None else prior.anchors
     sd_m = np.ones(N_POINTS) if prior.anchor_sd_m is None else prior.anchor_sd_m
     known = prior.mean, np.ascontiguousarray(prior.information), anchors, sd_m, _HABIT_INFORMATION
@@ -98,15 +98,13 @@ def scored(state: Array, found: Seen, others: tuple[Array, Array]) -> float:
     """Return the evidence of a state [nat], without any prior."""
     work, owned = workspace(found, len(others[0]))
     nothing = np.empty((N_POINTS, 3)), np.empty((27, 0)), np.empty(0), np.empty((0, 0)), np.empty((0, 0))
-    return _worth(found) * gathered(state, 0, found.cameras, _kinds(others), found.maps, others, work, owned, nothing)
+    return _worth(found) * gathered(
+        state, 0, found.cameras, kinds_with(others), found.maps, others, work, owned, nothing
+    )
 
 
 def _worth(found: Seen) -> float:
     return NATS_PER_M2 / found.scale.px_per_m**2
-
-
-def _kinds(others: tuple[Array, Array]) -> NDArray[np.int64]:
-    return np.concatenate([CAPSULES[:, :2], np.full((len(others[0]), 2), len(KINDS))])
 
 
 def _place(state: Array, n: int, owned: Array) -> _Place:

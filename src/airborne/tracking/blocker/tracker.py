@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body.jumper import BALL_HEIGHT_M, CAPSULES, JOINTS, KINDS, N_DOF, PELVIS
-from airborne.tracking.blocker.colours import Colours, hidden_by, not_everywhere
+from airborne.tracking.blocker.colours import RENEWED_S, Colours, hidden_by, not_everywhere, renewed
 from airborne.tracking.blocker.dynamics import N_FREE, N_SLIDING, Filtered, begun, predicted, updated
 from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, placed
 from airborne.tracking.blocker.first import first_look, points_of, start_state
@@ -48,6 +48,7 @@ class Track:
     sliding: Array  # (4,) in the first frame
     shape_covariance: Array  # (5, 5) of the lengths that stay [m2]
     colours: Colours
+    renewed_s: Fraction  # when its colours were looked at last
     tables: tuple[Table, ...]  # each camera's
     scale: Scale
     usual: float  # evidence per pixel [nat]
@@ -95,7 +96,8 @@ class Blocker:
                 state[N_DOF : N_DOF + N_SLIDING],
                 covariance[np.ix_(_SHAPE, _SHAPE)],
                 first.colours,
-                tuple(first.colours.table(view) for view in range(len(frames.views))),
+                frames.time_s,
+                _tables(first.colours),
                 first.scale,
                 _per_px(first.fit.owned),
             )
@@ -157,6 +159,9 @@ def _followed(
         estimate = replace(estimate, status=Status.UNCERTAIN)
     elif estimate.status is Status.TRACKED:
         track = replace(track, usual=track.usual + _USUAL_RATE * (evidence - track.usual))
+        if frames.time_s - track.renewed_s >= RENEWED_S:
+            colours = renewed(replace(track.colours, hidden=hidden), track.state, regions, hiding)
+            return replace(track, colours=colours, renewed_s=frames.time_s, tables=_tables(colours)), estimate
     return _with_hidden(track, hidden), estimate
 
 
@@ -168,6 +173,10 @@ def _standing(state: Array) -> Array:
         if points[ball, 2] < BALL_HEIGHT_M + _STANDING_M:
             anchors[ball] = points[ball]
     return anchors
+
+
+def _tables(colours: Colours) -> tuple[Table, ...]:
+    return tuple(colours.table(view) for view in range(len(colours.hidden)))
 
 
 def _with_hidden(track: Track, hidden: Array) -> Track:
