@@ -252,7 +252,11 @@ BROKEN_TRIALS = {  # what is replaced in trial.toml, and what the line says
     "text as video": (("cam2.mp4", "text.mp4"), "text.mp4 cannot be opened as a video"),
     "truncated video": (("cam2.mp4", "cut.mp4"), "cut.mp4 cannot be opened as a video"),
     "calibration of another size": ((CALIBRATED, 'file = "large.toml"'), "1920×1080"),
-    "calibration lacks a camera": ((CALIBRATED, 'file = "two.toml"'), "cam3"),
+    "calibration lacks a camera": (
+        (CALIBRATED, 'file = "two.toml"'),
+        "no camera 'cam3'; it has: cam1, cam2; say",
+    ),
+    "folder as video": (("cam2.mp4", "."), "is no file; give a video, or read pipes and devices with --live"),
     "no such calibration": ((CALIBRATED, 'file = "no.toml"'), "no.toml not found"),
     "start past the end": ((f"stop = {SHORT}", ""), "no frame 500"),
 }
@@ -293,6 +297,9 @@ def test_arguments_that_name_nothing_get_one_line(trial, tmp_path, capsys):
     run = tmp_path / "run"
     assert "none.toml" in refusal(capsys, "track", trial.with_name("none.toml"), "-o", run)
     assert "cam7" in refusal(capsys, "track", trial, "-o", run, "--cameras", "cam1,cam7")
+    assert "--cameras names no camera" in refusal(capsys, "track", trial, "-o", run, "--cameras", " , ")
+    for kind in ("cross", "somersault", "block"):
+        assert "--seed" in refusal(capsys, "synth", kind, "-o", run, "--seed", "-1")
     assert "--method magic: " in refusal(capsys, "track", trial, "-o", run, "--method", "magic")
     assert not run.exists()
 

@@ -15,6 +15,7 @@ Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)  # of every table
 FEET = ("foot_left", "foot_right")
 FARTHEST_M = 100.0  # no court is larger
+MOST_UNDER_FLOOR_M = 0.3  # what a calibration's floor may be off
 
 
 class PlayerTable(BaseModel):
@@ -46,6 +47,11 @@ class PlayerTable(BaseModel):
 
     def _measure(self) -> None:
         points = np.array([self.joints_m[name] for name in LEG_POINTS])
+        if points[:2, 2].min() < points[4:, 2].max():
+            raise ValueError(f"player '{self.name}': a hip lies lower than an ankle; were they exchanged?")
+        under_m = -float(points[:, 2].min())
+        if under_m > MOST_UNDER_FLOOR_M:
+            raise ValueError(f"player '{self.name}': a joint lies {under_m:.2f} m under the floor, which must be z = 0")
         try:
             Legs.from_points(np.array(self.joints_m["torso"]), points)
         except BodyError as error:

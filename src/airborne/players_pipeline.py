@@ -31,7 +31,7 @@ UNCERTAINTY = (
 )
 TOO_SURE = (
     "the standard deviations are only the spread of the particles of {method} and far too small: in trials with a "
-    "known truth, their 95 % regions held a quarter to a half of it"
+    "known truth, their 95 % regions held 30 to 70 % of it"
 )
 
 

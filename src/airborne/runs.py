@@ -108,7 +108,13 @@ def _calibrated(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[Rig, C
 
 def _as_saved(rig: Rig, table: CameraTable, size: tuple[int, int]) -> Camera:
     """Return a calibrated camera as the camera of its video's own pixels."""
-    camera = replace(rig[table.calibrated_as or table.name], name=table.name)
+    wanted = table.calibrated_as or table.name
+    if wanted not in rig.names:
+        raise TrialError(
+            f"the calibration file has no camera '{wanted}'; it has: {', '.join(rig.names)}; say which of them the "
+            f"video is of: calibrated_as under [[camera]]"
+        )
+    camera = replace(rig[wanted], name=table.name)
     du, dv = table.saved_offset_px
     if table.saved_scale == 1 and (du, dv) == (0, 0):
         return camera

@@ -199,6 +199,8 @@ def test_truth_is_read_by_player_and_frame_in_any_order(tmp_path):
     [
         (["0,0,a,1,2,3", "1,0.1,b,1,2,3"], "not one row for each of 2 players"),
         (["0,0,a,1,2,3", "0,0.1,b,1,2,3"], "time_s must be one number in each frame"),
+        (["0,0,a,1,2,3", "1,,a,1,2,3"], "line 3 has no time_s"),
+        (["0,0,a,,nan,", "1,0.1,a,,,"], "holds no place of any point"),
     ],
 )
 def test_broken_truth_is_refused_in_one_line(tmp_path, lines, said):

@@ -8,11 +8,13 @@ import typer
 
 from airborne.cli.console import Out, progress
 
+Seed = Annotated[int, typer.Option(min=0, help="Seed of everything random.")]
+
 
 def synth_cross(
     output: Out,
     preset: Annotated[Literal["half-twist", "side-somersault"], typer.Option(help="The throw.")] = "half-twist",
-    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    seed: Seed = 0,
 ) -> None:
     """Write a thrown wooden cross: interlaced videos of three cameras, calibration, clicks, truth.
 
@@ -34,7 +36,7 @@ def synth_somersault(
     style: Annotated[
         Literal["exact", "gym"], typer.Option(help="Pictures in the tracker's own light, or of cameras in a hall.")
     ] = "exact",
-    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    seed: Seed = 0,
 ) -> None:
     """Write a half-twisting somersault: videos from front, side and top, calibration, body, truth, the person as glTF.
 
@@ -51,7 +53,7 @@ def synth_somersault(
 
 def synth_block(
     output: Out,
-    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    seed: Seed = 0,
     blockers: Annotated[int, typer.Option(min=1, max=3, help="How many players jump to block.")] = 1,
     difficulty: Annotated[
         Literal["easy", "default", "hard"], typer.Option(help="Clothes, players in the way, noise, calibration.")

@@ -96,7 +96,9 @@ def _track(
     from airborne.players_pipeline import track_players
     from airborne.trial import read_trial
 
-    names = None if cameras is None else [name.strip() for name in cameras.split(",")]
+    names = None if cameras is None else [name.strip() for name in cameras.split(",") if name.strip()]
+    if names == []:
+        raise AirborneError("--cameras names no camera; give their names, separated by commas")
     trial = read_trial(path, changes or {}, names)
     if live and not trial.has_players:
         raise AirborneError('--live is for players; this trial has no body preset = "legs"')
@@ -106,6 +108,8 @@ def _track(
                 return track_players(trial, output, resume=resume, live=live, pictures=pictures, progress=report)
             return pipeline.track(trial, output, resume=resume, pictures=pictures, progress=report)
     except KeyboardInterrupt:
+        if live:
+            stopped("not every camera had shown a picture yet, so nothing is written")
         stopped(f"the frames found so far are in {output}; --resume goes on")
 
 
@@ -117,6 +121,8 @@ def _in_short(summary: dict) -> str:
     lines = [f"{n} frames at {rate_hz:.5g} Hz: {counts}" if n > 1 else f"{n} frame: {counts}"]
     if "players" in summary:
         lines += players_in_short(summary)
+        if n == summary["n_lost"]:
+            lines.append("no player was found in any frame: look at the overlay videos, mend [[start.player]]")
     elif summary["n_frames"] == summary["n_lost"]:
         lines.append("the body was found in no frame: look at the first picture of the overlay videos, mend [start]")
     else:

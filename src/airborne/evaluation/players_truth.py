@@ -37,6 +37,10 @@ def read_players_truth(path: Path) -> PlayersMotion:
     if missing or not stems:
         raise ResultError(f"{path} has no column {missing[0] if missing else 'l_hip_x'}; expected {_EXPECTED}")
     values = table.numbers(["time_s", *(f"{stem}_{axis}" for stem in stems for axis in "xyz")])
+    for line in np.array(table.line_numbers)[np.isnan(values[:, 0])]:
+        raise ResultError(f"{path} line {line} has no time_s; every line needs one, in seconds")
+    if np.isnan(values[:, 1:]).all():
+        raise ResultError(f"{path} holds no place of any point; expected {_EXPECTED}")
     frames, row = np.unique(table.whole_numbers("frame"), return_inverse=True)
     names = [cells[table.names.index("player")].strip() for cells in table.lines]
     players = tuple(dict.fromkeys(names))

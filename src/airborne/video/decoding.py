@@ -144,6 +144,8 @@ def rgb_from_picture(picture: Picture, facts: VideoFacts) -> Image:
 def _opened(source: VideoSource) -> Iterator[tuple[InputContainer, VideoStream]]:
     path = Path(source.path)
     if not path.is_file():
+        if path.exists():
+            raise VideoError(f"{source.name}: {path} is no file; give a video, or read pipes and devices with --live")
         raise VideoError(f"{source.name}: video {path} not found; check its path")
     if path.stat().st_size == 0:
         raise VideoError(f"{source.name}: video {path} is empty (0 bytes); copy it again")
