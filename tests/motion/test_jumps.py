@@ -7,6 +7,7 @@ import pytest
 
 from airborne.errors import ResultError
 from airborne.motion.contact import fallen, noise_covariance
+from airborne.motion.jump_table import describe
 from airborne.motion.jumps import jumps
 from airborne.motion.local import local_fits
 from airborne.motion.standing import leg_lengths
@@ -291,6 +292,16 @@ def test_reach_is_the_higher_wrist_at_its_peak(clean):
     joints = (*motion_of(CLEAN).joints, "wrist_left", "wrist_right")
     jump = only(players_motion(CLEAN.time_s, np.concatenate([legs, wrists], axis=2), joints=joints))
     assert jump.reach_m.value == pytest.approx(legs[:, 0, 0, 2].max() + 1.3, abs=2e-3)
+
+
+def test_uncertain_frames_of_the_flight_are_counted_and_those_of_the_floor_are_not():
+    motion = motion_of(CLEAN)
+    status = motion.status.astype("U9")
+    at = round(60 * (CLEAN.takeoff_s + CLEAN.speed_m_s / G))
+    status[at : at + 4] = status[0] = "uncertain"
+    jump = only(replace(motion, status=status))
+    assert (only(motion).n_uncertain, jump.n_uncertain) == (0, 4)
+    assert "4 frames of the flight are uncertain" in describe([jump])
 
 
 def test_a_covariance_that_is_not_given_counts_as_20_mm():

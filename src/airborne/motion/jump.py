@@ -51,6 +51,7 @@ class Jump:
     number: int  # of this player's jumps, from 1
     status: str  # "whole", "no take-off", "no landing" or "neither": which events the recording shows
     n_lost: int  # frames of the flight in which a hip or an ankle is not known
+    n_uncertain: int  # frames of the flight that the tracker calls uncertain
     takeoff_s: Measured
     landing_s: Measured
     takeoff_frame: Measured  # the same in frames, with their fractions

@@ -43,7 +43,7 @@ def _names() -> tuple[str, ...]:
     measured += ["standing_hips_m", "standing_ankles_m"]
     numbers = [column for name in measured for column in (name, f"{name}_low", f"{name}_high")]
     stand = ["standing_source", "standing_first_frame", "standing_last_frame"]
-    return ("player", "jump", "status", *numbers, *stand, "block_level_m", "noise_scale", "n_lost")
+    return ("player", "jump", "status", *numbers, *stand, "block_level_m", "noise_scale", "n_lost", "n_uncertain")
 
 
 COLUMNS = _names()
@@ -62,7 +62,8 @@ def columns_of(jump: Jump) -> dict[str, str | int | float]:
     row |= _three("standing_hips_m", stand.hips_m) | _three("standing_ankles_m", stand.ankles_m)
     first, last = stand.frames or (np.nan, np.nan)
     row |= {"standing_source": stand.source, "standing_first_frame": first, "standing_last_frame": last}
-    return row | {"block_level_m": jump.block_level_m, "noise_scale": jump.noise_scale, "n_lost": jump.n_lost}
+    row |= {"block_level_m": jump.block_level_m, "noise_scale": jump.noise_scale}
+    return row | {"n_lost": jump.n_lost, "n_uncertain": jump.n_uncertain}
 
 
 def write_jumps(path: Path, jumps: Sequence[Jump]) -> None:
@@ -93,6 +94,8 @@ def describe(jumps: Sequence[Jump]) -> str:
             lines.append(f"{name}: {_WHY[jump.status]}; numbers that need it are left out")
         if jump.n_lost:
             lines.append(f"{name}: hips or ankles unknown in {jump.n_lost} frames of the flight")
+        if jump.n_uncertain:
+            lines.append(f"{name}: {jump.n_uncertain} frames of the flight are uncertain; look at them before use")
     lines.append("after +-: half of the 95 % interval")
     return "\n".join(lines)
 

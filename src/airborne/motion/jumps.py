@@ -75,6 +75,7 @@ def _jump(
         number=number,
         status=_STATUS[takeoff is not None, landing is not None],
         n_lost=int((~known).sum()),
+        n_uncertain=int(track.is_uncertain[rows].sum()),
         takeoff_s=Measured.of(takeoff),
         landing_s=Measured.of(landing),
         takeoff_frame=Measured.of(_frames(track, takeoff)),

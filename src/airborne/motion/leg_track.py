@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from airborne.body.legs import LEG_POINTS
 from airborne.errors import ResultError
 from airborne.motion.players import PlayersMotion
+from airborne.tracking import Status
 
 Array = NDArray[np.floating]
 
@@ -25,6 +26,7 @@ class LegTrack:
     player: str
     index: NDArray[np.int64]  # (n,) frame numbers
     time_s: Array  # (n,)
+    is_uncertain: NDArray[np.bool_]  # (n,) the tracker's own word
     hips: Array  # (n, 2, 3)
     knees: Array  # (n, 2, 3)
     ankles: Array  # (n, 2, 3)
@@ -92,6 +94,7 @@ def leg_track(motion: PlayersMotion, player: str) -> LegTrack:
         player=player,
         index=motion.index,
         time_s=motion.time_s,
+        is_uncertain=motion.status[:, who] == Status.UNCERTAIN.value,
         hips=parts["hip"][0],
         knees=parts["knee"][0],
         ankles=parts["ankle"][0],

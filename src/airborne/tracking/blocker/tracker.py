@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body.jumper import BALL_HEIGHT_M, CAPSULES, JOINTS, KINDS, N_DOF, PELVIS
+from airborne.body.jumper import BALL_HEIGHT_M, CAPSULES, JOINTS, KINDS, N_DOF, PELVIS, SKIN
 from airborne.tracking.blocker.colours import RENEWED_S, Colours, hidden_by, not_everywhere, renewed
 from airborne.tracking.blocker.dynamics import N_FREE, N_SLIDING, Filtered, begun, predicted, updated
 from airborne.tracking.blocker.equations import N_CAPSULES, N_LENGTHS, N_POINTS, placed
@@ -28,7 +28,7 @@ _STANDING_M, _SLIP_SD_M = 0.02, 0.02  # a ball of the foot this low stands; how 
 _FLYING_M = 0.06  # both balls of the feet this far above their height in standing: in the air
 _LEAST_SHARE, _LOST_SHARE = 0.5, 0.25  # of the usual evidence per pixel: suspect, lost
 _LEAST_EVIDENCE = 0.3  # per pixel [nat]; less is as good as nothing
-_HIDDEN = 0.45  # mean chance to be hidden, over the kinds, from which a view does not count
+_HIDDEN = 0.45  # mean chance to be hidden, of all kinds or of those on the legs, from which a view does not count
 _USUAL_RATE = 0.05
 _UNCERTAIN_SD_M = 0.06
 _LEAST_AREA_PX = 8.0  # of a kind in a map, to judge whether it is hidden
@@ -101,10 +101,7 @@ class Blocker:
                 first.scale,
                 _per_px(first.fit.owned),
             )
-            n_views = sum(
-                view is not None and hidden.mean() < _HIDDEN
-                for view, hidden in zip(frames.views, first.colours.hidden, strict=True)
-            )
+            n_views = _n_free(first.colours.hidden, [v for v, view in enumerate(frames.views) if view is not None])
             free = replace(
                 first.fit,
                 by_state=first.fit.by_state[:, :N_FREE],
@@ -153,7 +150,8 @@ def _followed(
     views = [region.view for region in regions]
     track = replace(track, time_s=frames.time_s, filtered=filtered, state=fitted.state)
     hidden = _hidden(track, fitted.owned, views)
-    n_views = int(np.sum(hidden[views].mean(axis=1) < _HIDDEN))
+    n_views = _n_free(hidden, views)
+    hidden = not_everywhere(hidden, views)
     estimate = _estimate(name, frames, track, fitted, n_views)
     if evidence < _LEAST_SHARE * track.usual:
         estimate = replace(estimate, status=Status.UNCERTAIN)
@@ -196,7 +194,13 @@ def _hidden(track: Track, owned: Array, views: Sequence[int]) -> Array:
     for view, (evidence, area) in zip(views, by_kind.swapaxes(1, 2), strict=True):
         target = hidden_by(evidence / np.maximum(area, 1e-9), track.tables[view].usual)
         hidden[view] += _HIDDEN_RATE * np.where(area > _LEAST_AREA_PX, target - hidden[view], 0)
-    return not_everywhere(hidden, views)
+    return hidden
+
+
+def _n_free(hidden: Array, views: Sequence[int]) -> int:
+    """Count the views in which neither the player nor the legs alone are hidden."""
+    most = np.maximum(hidden[views].mean(axis=1), hidden[views, SKIN:].mean(axis=1))
+    return int(np.sum(most < _HIDDEN))
 
 
 def _estimate(name: str, frames: Frames, track: Track, fitted: Fit, n_views: int) -> PlayerEstimate:
