@@ -135,6 +135,11 @@ def test_text_holds_no_nan_and_names_what_has_no_partner():
     text = compare_players(estimate, STILL).describe()
     assert "nan" not in text.lower()
     assert "not compared: tail" in text
+    hips = replace(STILL, joints=LEG_POINTS[:2], points=STILL.points[:2, :, :2] + 1.0, time_s=STILL.time_s[:2])
+    hips = replace(hips, **{name: getattr(STILL, name)[:2] for name in ("index", "status", "score", "n_views")})
+    text = compare_players(replace(hips, covariance=STILL.covariance[:2, :, :2]), STILL).describe()
+    assert "nan" not in text.lower()
+    assert "times; not recovered" in text
 
 
 def test_other_recordings_are_refused_in_one_line():

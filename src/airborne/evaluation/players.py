@@ -283,18 +283,26 @@ def _table(player: str, errors: PlayerErrors) -> list[str]:
     ]
     for name, e in errors.parts.items():
         cover = errors.cover.rate.get(name, math.nan) if errors.cover else math.nan
-        last = "".join(f"{'-':>8}" if math.isnan(share) else f"{share:8.1%}" for share in (e.within_95, cover))
-        numbers = f"{e.mean_mm:8.1f}{e.median_mm:8.1f}{e.largest_mm:8.1f}"
-        shares = f"{e.within_100mm:8.1%}{e.within_50mm:8.1%}{e.auc_200mm:8.1%}"
-        lines.append(f"  {name:<14}{numbers}{shares}{e.jitter_mm:8.1f}{last}")
+        numbers = [_or_dash(number, ".1f") for number in (e.mean_mm, e.median_mm, e.largest_mm)]
+        numbers += [_or_dash(share, ".1%") for share in (e.within_100mm, e.within_50mm, e.auc_200mm)]
+        numbers += [_or_dash(e.jitter_mm, ".1f"), _or_dash(e.within_95, ".1%"), _or_dash(cover, ".1%")]
+        lines.append(f"  {name:<14}" + "".join(f"{number:>8}" for number in numbers))
     swaps = ", ".join(f"{name} {rate:.1%}" for name, rate in errors.swap_rate.items())
-    lines.append(f"  limbs correct (PCP 0.5) {errors.pcp:.1%}; left and right swapped: {swaps or 'not judged'}")
+    lines.append(
+        f"  limbs correct (PCP 0.5) {_or_dash(errors.pcp, '.1%')}; left and right swapped: {swaps or 'not judged'}"
+    )
     if errors.cover:
         reach = ", ".join(f"{name} {metres:.3f}" for name, metres in errors.cover.tolerance_m.items())
         lines.append(f"  cover lets a part be off by [m]: {reach}")
     if errors.n_losses:
-        lines.append(
-            f"  off by more than 100 mm {errors.n_losses} times; recovered after {errors.mean_recovery_s:.2f} s "
-            f"on the mean, {errors.longest_recovery_s:.2f} s at most"
-        )
+        recovery = "not recovered"
+        if not math.isnan(errors.mean_recovery_s):
+            recovery = (
+                f"recovered after {errors.mean_recovery_s:.2f} s on the mean, {errors.longest_recovery_s:.2f} s at most"
+            )
+        lines.append(f"  off by more than 100 mm {errors.n_losses} times; {recovery}")
     return lines
+
+
+def _or_dash(number: float, form: str) -> str:
+    return "-" if math.isnan(number) else format(number, form)

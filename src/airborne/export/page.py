@@ -102,6 +102,11 @@ def label(key: str) -> str:
     return key.removesuffix(suffix).replace("_", " ") + unit
 
 
+def settings(values: Mapping[str, Any]) -> str:
+    """Show the settings of a method; those that are not set are left out."""
+    return table((label(key), value) for key, value in values.items() if value is not None)
+
+
 def shown(value: Any) -> str:
     """Show a value of the summary as text: four digits for a fraction, None as "not known"."""
     if value is None:

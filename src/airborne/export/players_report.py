@@ -141,7 +141,7 @@ def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
         yield page.heading("Jumps") + _jumps(summary["jumps"])
     yield page.heading("Heights")
     yield page.picture(folder / FIGURE, FIGURE_SAYS)
-    yield page.heading("Method") + page.table((page.label(key), value) for key, value in summary["method"].items())
+    yield page.heading("Method") + page.settings(summary["method"])
     yield page.heading("Cameras") + records(summary["cameras"])
     yield page.heading("What the numbers mean")
     uncertainty = f"{MEANINGS['Uncertainty']} {summary['uncertainty']}"

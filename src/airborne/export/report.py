@@ -135,7 +135,7 @@ def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
             yield _flight(summary["flight"])
     if summary.get("method"):
         yield page.heading("Method")
-        yield page.table((page.label(key), value) for key, value in summary["method"].items())
+        yield page.settings(summary["method"])
     if summary.get("cameras"):
         yield page.heading("Cameras") + records(summary["cameras"])
     yield page.heading("What the numbers mean")
