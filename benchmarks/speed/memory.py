@@ -91,8 +91,8 @@ def write_trial(folder: Path, size: tuple[int, int], seconds: int) -> Path:
     """Write a trial of two players before three cameras that show the same."""
     turn = Rotation.from_matrix([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
     K = np.array([[size[0], 0, size[0] / 2], [0, size[0], size[1] / 2], [0, 0, 1.0]])
-    away = RigidTransform.from_components([0, 0.8, 6.0], turn)
-    rig = Rig(tuple(Camera(name=name, K=K, size=size, camera_from_world=away) for name in NAMES))
+    places = {name: RigidTransform.from_components([k - 1.0, 0.8, 6.0], turn) for k, name in enumerate(NAMES)}
+    rig = Rig(tuple(Camera(name=name, K=K, size=size, camera_from_world=place) for name, place in places.items()))
     write_pose2sim(folder / "calib.toml", rig)
     write_clip(folder / "clip.mp4", size, seconds)
     cameras = "".join(f'[[camera]]\nname = "{name}"\nvideo = "clip.mp4"\n' for name in NAMES)

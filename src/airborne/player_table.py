@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from airborne.body.legs import LEG_POINTS, Legs
 from airborne.errors import BodyError
@@ -18,12 +18,20 @@ FARTHEST_M = 100.0  # no court is larger
 MOST_UNDER_FLOOR_M = 0.3  # what a calibration's floor may be off
 
 
+def _fit_for_tables(name: str) -> str:
+    if not name:
+        raise ValueError("must not be empty")
+    if set(name) & set(',"\r\n'):
+        raise ValueError("must not hold a comma, a quote or a line's end")
+    return name
+
+
 class PlayerTable(BaseModel):
     """Where a player is at the first frame; one with a torso only is a bystander."""
 
     model_config = STRICT
 
-    name: str = Field(min_length=1, pattern=r'^[^,"\r\n]+$')
+    name: Annotated[str, AfterValidator(_fit_for_tables)]
     joints_m: dict[str, Vector]
 
     @model_validator(mode="after")

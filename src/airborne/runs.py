@@ -112,7 +112,7 @@ def _as_saved(rig: Rig, table: CameraTable, size: tuple[int, int]) -> Camera:
     if wanted not in rig.names:
         raise TrialError(
             f"the calibration file has no camera '{wanted}'; it has: {', '.join(rig.names)}; say which of them the "
-            f"video is of: calibrated_as under [[camera]]"
+            "video is of: calibrated_as under [[camera]]"
         )
     camera = replace(rig[wanted], name=table.name)
     du, dv = table.saved_offset_px

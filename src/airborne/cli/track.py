@@ -108,9 +108,9 @@ def _track(
                 return track_players(trial, output, resume=resume, live=live, pictures=pictures, progress=report)
             return pipeline.track(trial, output, resume=resume, pictures=pictures, progress=report)
     except KeyboardInterrupt:
-        if live:
+        if live and not output.exists():
             stopped("not every camera had shown a picture yet, so nothing is written")
-        stopped(f"the frames found so far are in {output}; --resume goes on")
+        stopped(f"the frames found so far are in {output}{'' if live else '; --resume goes on'}")
 
 
 def _in_short(summary: dict) -> str:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from airborne.evaluation.agreement import Agreement
+from airborne.evaluation.compare import or_dash
 from airborne.evaluation.repeatability import Repeatability
 from airborne.motion.jump import Measured
 
@@ -26,8 +27,8 @@ def agreement_table(rows: Sequence[Agreement]) -> str:
     lines = [f"{'agreement':<{width}}{'bias':>9}{'95 % limits':>19}{'RMSE':>9}{'nRMSE':>8}{'ICC(A,1)':>10}{'SEM':>9}"]
     for row in rows:
         limits = f"{_short(row.lower_limit.value)} to {_short(row.upper_limit.value)}"
-        share = "-" if math.isnan(row.nrmse_percent.value) else f"{row.nrmse_percent.value:.2f}%"
-        icc = "-" if math.isnan(row.icc.agreement.value) else f"{row.icc.agreement.value:.4f}"
+        share = or_dash(row.nrmse_percent.value / 100, ".2%")
+        icc = or_dash(row.icc.agreement.value, ".4f")
         lines.append(
             f"{f'  {row.name} [{row.unit}]':<{width}}{_short(row.bias.value):>9}{limits:>19}"
             f"{_short(row.rmse.value):>9}{share:>8}{icc:>10}{_short(row.sem.value):>9}"
@@ -40,7 +41,7 @@ def repeatability_table(rows: Sequence[Repeatability]) -> str:
     width = max(16, *(len(f"{row.name} [{row.unit}]") + 2 for row in rows))
     lines = [f"{'repeatability':<{width}}{'within sd':>10}{'coefficient':>12}{'ICC(A,1)':>10}{'SEM':>9}{'MDC':>9}"]
     for row in rows:
-        icc = "-" if math.isnan(row.icc.agreement.value) else f"{row.icc.agreement.value:.4f}"
+        icc = or_dash(row.icc.agreement.value, ".4f")
         numbers = f"{_short(row.within_sd.value):>10}{_short(row.coefficient.value):>12}{icc:>10}"
         lines.append(
             f"{f'  {row.name} [{row.unit}]':<{width}}{numbers}{_short(row.sem.value):>9}{_short(row.mdc.value):>9}"
@@ -126,4 +127,4 @@ def _whole(measured: Measured, digits: int = 2) -> str:
 
 
 def _short(value: float) -> str:
-    return "-" if math.isnan(value) else f"{value:.2f}"
+    return or_dash(value, ".2f")

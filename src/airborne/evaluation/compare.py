@@ -215,6 +215,11 @@ def span(time_s: Array) -> str:
     return f"{time_s[0]:.3f} to {time_s[-1]:.3f} s" if len(time_s) else "empty"
 
 
+def or_dash(number: float, form: str) -> str:
+    """Write a number in a format such as ".1f"; NaN as a dash."""
+    return "-" if math.isnan(number) else format(number, form)
+
+
 def without_nan(value: Any) -> Any:
     """Turn NaN into None, all the way down."""
     if isinstance(value, dict):

@@ -56,23 +56,21 @@ def _read_long(path: Path) -> JointPaths:
     missing = [name for name in ("time_s", "joint", "x_m", "y_m", "z_m") if name not in table.names]
     if missing:
         raise ResultError(f"{path} has no column {', '.join(missing)}; expected {_LONG}, or a .trc file")
-    values = table.numbers(["time_s", "x_m", "y_m", "z_m"])
+    places, times_s = table.numbers(["x_m", "y_m", "z_m"]), table.times_s()
     if "player" in table.names:
         players = sorted({cells[table.names.index("player")] for cells in table.lines})
         if len(players) > 1:
             raise ResultError(f"{path} holds {len(players)} players ({', '.join(players[:3])}...); leave one in")
     labels = [cells[table.names.index("joint")].strip() for cells in table.lines]
-    for row in np.flatnonzero(np.isnan(values[:, 0])):
-        raise ResultError(f"{path} line {table.line_numbers[row]} has no time_s; every line needs one, in seconds")
     names = tuple(dict.fromkeys(labels))
-    time_s, at = np.unique(values[:, 0], return_inverse=True)
+    time_s, at = np.unique(times_s, return_inverse=True)
     joint = np.array([names.index(label) for label in labels])
     cell, count = np.unique(at * len(names) + joint, return_counts=True)
     if (count > 1).any():
         when, who = divmod(int(cell[np.argmax(count)]), len(names))
         raise ResultError(f"{path} has {names[who]} {count.max()} times at {time_s[when]:g} s; give each joint once")
     points = np.full((len(time_s), len(names), 3), np.nan)
-    points[at, joint] = values[:, 1:]
+    points[at, joint] = places
     return JointPaths(names=names, time_s=time_s, points=points)
 
 

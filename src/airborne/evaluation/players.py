@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from airborne.cameras import Rig, read_rig
 from airborne.errors import ResultError
-from airborne.evaluation.compare import matched, span, without_nan
+from airborne.evaluation.compare import matched, or_dash, span, without_nan
 from airborne.evaluation.jump_errors import JumpErrors, compare_jumps
 from airborne.evaluation.players_truth import read_known_jumps, read_players_truth
 from airborne.evaluation.success import Cover, success_cover
@@ -283,13 +283,13 @@ def _table(player: str, errors: PlayerErrors) -> list[str]:
     ]
     for name, e in errors.parts.items():
         cover = errors.cover.rate.get(name, math.nan) if errors.cover else math.nan
-        numbers = [_or_dash(number, ".1f") for number in (e.mean_mm, e.median_mm, e.largest_mm)]
-        numbers += [_or_dash(share, ".1%") for share in (e.within_100mm, e.within_50mm, e.auc_200mm)]
-        numbers += [_or_dash(e.jitter_mm, ".1f"), _or_dash(e.within_95, ".1%"), _or_dash(cover, ".1%")]
+        numbers = [or_dash(number, ".1f") for number in (e.mean_mm, e.median_mm, e.largest_mm)]
+        numbers += [or_dash(share, ".1%") for share in (e.within_100mm, e.within_50mm, e.auc_200mm)]
+        numbers += [or_dash(e.jitter_mm, ".1f"), or_dash(e.within_95, ".1%"), or_dash(cover, ".1%")]
         lines.append(f"  {name:<14}" + "".join(f"{number:>8}" for number in numbers))
     swaps = ", ".join(f"{name} {rate:.1%}" for name, rate in errors.swap_rate.items())
     lines.append(
-        f"  limbs correct (PCP 0.5) {_or_dash(errors.pcp, '.1%')}; left and right swapped: {swaps or 'not judged'}"
+        f"  limbs correct (PCP 0.5) {or_dash(errors.pcp, '.1%')}; left and right swapped: {swaps or 'not judged'}"
     )
     if errors.cover:
         reach = ", ".join(f"{name} {metres:.3f}" for name, metres in errors.cover.tolerance_m.items())
@@ -302,7 +302,3 @@ def _table(player: str, errors: PlayerErrors) -> list[str]:
             )
         lines.append(f"  off by more than 100 mm {errors.n_losses} times; {recovery}")
     return lines
-
-
-def _or_dash(number: float, form: str) -> str:
-    return "-" if math.isnan(number) else format(number, form)

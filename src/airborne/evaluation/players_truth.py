@@ -36,10 +36,8 @@ def read_players_truth(path: Path) -> PlayersMotion:
     missing = [name for name in wanted if name not in table.names]
     if missing or not stems:
         raise ResultError(f"{path} has no column {missing[0] if missing else 'l_hip_x'}; expected {_EXPECTED}")
-    values = table.numbers(["time_s", *(f"{stem}_{axis}" for stem in stems for axis in "xyz")])
-    for line in np.array(table.line_numbers)[np.isnan(values[:, 0])]:
-        raise ResultError(f"{path} line {line} has no time_s; every line needs one, in seconds")
-    if np.isnan(values[:, 1:]).all():
+    places, times_s = table.numbers([f"{stem}_{axis}" for stem in stems for axis in "xyz"]), table.times_s()
+    if np.isnan(places).all():
         raise ResultError(f"{path} holds no place of any point; expected {_EXPECTED}")
     frames, row = np.unique(table.whole_numbers("frame"), return_inverse=True)
     names = [cells[table.names.index("player")].strip() for cells in table.lines]
@@ -51,8 +49,8 @@ def read_players_truth(path: Path) -> PlayersMotion:
         raise ResultError(f"{path} has not one row for each of {len(players)} players in every frame; mend it")
     time_s = np.empty(shape)
     points = np.empty((*shape, len(stems), 3))
-    time_s[row, column] = values[:, 0]
-    points[row, column] = values[:, 1:].reshape(-1, len(stems), 3)
+    time_s[row, column] = times_s
+    points[row, column] = places.reshape(-1, len(stems), 3)
     if np.ptp(time_s, axis=1).max() > 0 or (np.diff(time_s[:, 0]) <= 0).any():
         raise ResultError(f"{path}: time_s must be one number in each frame, and grow with the frames; mend it")
     return PlayersMotion(

@@ -41,6 +41,14 @@ class Table:
                     raise ResultError(f"{where}: {name[:60]} is '{text[:60]}', expected a number; mend it")
         return values
 
+    def times_s(self) -> NDArray[np.float64]:
+        """Return the column time_s (lines,); ResultError where a cell is blank."""
+        values = self.numbers(["time_s"])[:, 0]
+        for line, value in zip(self.line_numbers, values, strict=True):
+            if np.isnan(value):
+                raise ResultError(f"{self.path} line {line} has no time_s; every line needs one, in seconds")
+        return values
+
     def whole_numbers(self, name: str) -> NDArray[np.int64]:
         """Return one column as whole numbers (lines,); ResultError for anything else."""
         values = self.numbers([name])[:, 0]

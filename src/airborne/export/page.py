@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+UNKNOWN = "not known"
 _UNITS = {"_m": "m", "_mm": "mm", "_s": "s", "_hz": "1/s", "_px": "px", "_deg": "°", "_rev": "turns"}
 
 _STYLE = """
@@ -110,7 +111,7 @@ def settings(values: Mapping[str, Any]) -> str:
 def shown(value: Any) -> str:
     """Show a value of the summary as text: four digits for a fraction, None as "not known"."""
     if value is None:
-        return "not known"
+        return UNKNOWN
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):

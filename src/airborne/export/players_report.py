@@ -28,7 +28,6 @@ SHOWN = {  # columns of jumps.csv that the report shows: name, factor, digits
     "landing [frame]": ("landing_frame", 1.0, 1),
     "flight [ms]": ("flight_s", 1000.0, 0),
 }
-UNKNOWN = "not known"
 JUMPS_SAY = (
     "Heights are in cm, each with its 95 % interval: of feet and hips over standing, and what flight time and take-off "
     "speed come to. jumps.csv has more."
@@ -84,7 +83,7 @@ def players_in_short(summary: Mapping[str, Any]) -> Iterator[str]:
     for name, player in summary["players"].items():
         counts = ", ".join(f"{player[f'n_{status}']} {status}" for status in Status)
         sd_mm = player["median_sd_mm"]
-        yield f"{name}: {counts}; median sd of a joint {'not known' if sd_mm is None else f'{sd_mm:.0f} mm'}"
+        yield f"{name}: {counts}; median sd of a joint {page.UNKNOWN if sd_mm is None else f'{sd_mm:.0f} mm'}"
     for jump in summary["jumps"]:
         feet, flight = (_in_cm(jump, what) for what in ("feet", "flight time"))
         doubt = f"; {jump['n_uncertain']} of its frames are uncertain" if jump["n_uncertain"] else ""
@@ -110,14 +109,14 @@ def _jumps(rows: list[Mapping[str, Any]]) -> str:
 def _with_interval(row: Mapping[str, Any], name: str, scale: float, digits: int) -> str:
     numbers = [row[name + end] for end in ("", "_low", "_high")]
     if any(number is None or not np.isfinite(number) for number in numbers):
-        return UNKNOWN
+        return page.UNKNOWN
     middle, low, high = (f"{scale * number:.{digits}f}" for number in numbers)
     return f"{middle} ({low} to {high})"
 
 
 def _in_cm(row: Mapping[str, Any], what: str) -> str:
     text = _with_interval(row, *SHOWN[what])
-    return text if text == UNKNOWN else f"{text} cm"
+    return text if text == page.UNKNOWN else f"{text} cm"
 
 
 def _dropped(summary: Mapping[str, Any]) -> Iterator[str]:

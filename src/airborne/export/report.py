@@ -165,10 +165,10 @@ def _tiles(head: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield _with_unit(head["somersault_rev"], "{:.2f} turns"), "somersault, first to last pose"
         yield _with_unit(head["twist_rev"], "{:.2f} turns"), "twist, first to last pose"
         low, high = head["tilt_range_deg"]
-        yield "not known" if low is None else f"{low:.0f}° to {high:.0f}°".replace("-", "−"), "tilt"
+        yield page.UNKNOWN if low is None else f"{low:.0f}° to {high:.0f}°".replace("-", "−"), "tilt"
     ranges = head["range_m"]
     yield (
-        "not known" if ranges[0] is None else " · ".join(f"{r:.2f}" for r in ranges) + " m",
+        page.UNKNOWN if ranges[0] is None else " · ".join(f"{r:.2f}" for r in ranges) + " m",
         "range of motion in x, y, z",
     )
     yield _with_unit(head["median_score"], "{:.1f}"), "median score in grey levels"
@@ -177,12 +177,12 @@ def _tiles(head: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 def _spread(head: Mapping[str, Any], what: str, unit: str) -> str:
     value = head[f"median_{what}_sd_{unit}"]
     if value is None:
-        return "cannot be seen" if head[f"n_{what}_unobservable"] else "not known"
+        return "cannot be seen" if head[f"n_{what}_unobservable"] else page.UNKNOWN
     return f"± {value:.2g} mm" if unit == "mm" else f"± {value:.2g}°"
 
 
 def _with_unit(value: float | None, form: str) -> str:
-    return "not known" if value is None else form.format(value).replace("-", "−")
+    return page.UNKNOWN if value is None else form.format(value).replace("-", "−")
 
 
 def _comparison(comparison: Mapping[str, Any]) -> str:

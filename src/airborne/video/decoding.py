@@ -143,10 +143,10 @@ def rgb_from_picture(picture: Picture, facts: VideoFacts) -> Image:
 @contextmanager
 def _opened(source: VideoSource) -> Iterator[tuple[InputContainer, VideoStream]]:
     path = Path(source.path)
-    if not path.is_file():
-        if path.exists():
-            raise VideoError(f"{source.name}: {path} is no file; give a video, or read pipes and devices with --live")
+    if not path.exists():
         raise VideoError(f"{source.name}: video {path} not found; check its path")
+    if not path.is_file():
+        raise VideoError(f"{source.name}: {path} is no file; give a video, or read pipes and devices with --live")
     if path.stat().st_size == 0:
         raise VideoError(f"{source.name}: video {path} is empty (0 bytes); copy it again")
     try:
