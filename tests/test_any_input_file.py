@@ -4,13 +4,12 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-from tests.any_input import CPU_LIMIT_S, MEMORY_LIMIT_BYTES
+from tests.support.any_input import CPU_LIMIT_S, MEMORY_LIMIT_BYTES
+from tests.support.places import ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
 N_FILES = 2000
 CPU_LIMIT_ALL_S = 120.0  # it takes 20 s on two cores of 2020
 
@@ -20,7 +19,7 @@ def found():
     """What came of feeding the files, in a process of its own, whose memory is limited."""
     threads = {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(
-        [sys.executable, "-m", "tests.any_input", str(N_FILES)],
+        [sys.executable, "-m", "tests.support.any_input", str(N_FILES)],
         **{"cwd": ROOT, "env": os.environ | threads, "capture_output": True, "text": True, "timeout": 1800},
     )
     assert done.returncode == 0, done.stderr[-2000:]

@@ -9,16 +9,12 @@ import shlex
 import subprocess
 import tomllib
 from dataclasses import fields
-from pathlib import Path
 from typing import get_args
 
 import pytest
 import typer
 from pydantic import BaseModel
 
-from airborne import pipeline
-from airborne import trial as trials
-from airborne.assessment import assess
 from airborne.body import files as bodies
 from airborne.body.files import read_body
 from airborne.body.human import LIMITS_DEG, PARENTS
@@ -27,12 +23,15 @@ from airborne.evaluation import PlayerErrors, PlayersComparison
 from airborne.evaluation.jump_errors import JumpErrors
 from airborne.evaluation.players import PartErrors
 from airborne.export import write_figures
-from airborne.motion import flight_summary, sidecar
+from airborne.motion import covariance_file, flight_summary
 from airborne.motion.files import _header
-from airborne.trial import PlayersMethod, Trial, read_trial
-from tests.export.scenes import PERSON, person_run
+from airborne.run import body_tracking
+from airborne.run.evaluate import assess
+from airborne.trial import file as trials
+from airborne.trial.file import PlayersMethod, Trial, read_trial
+from tests.support.export_scenes import PERSON, person_run
+from tests.support.places import ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(DOCS.glob("*.md"))]
 TREE = typer.main.get_command(app)
@@ -209,7 +208,7 @@ def run(tmp_path_factory):
     """The folder of a short run with everything that a run can leave."""
     example = ROOT / "examples" / "thrown_cross"
     folder = tmp_path_factory.mktemp("docs") / "run"
-    pipeline.track(read_trial(example / "trial.toml", {"stop": 2}), folder)
+    body_tracking.track(read_trial(example / "trial.toml", {"stop": 2}), folder)
     assess(folder, example / "truth.csv", example / "digitised.csv")
     return folder
 
@@ -246,7 +245,7 @@ def person(tmp_path_factory):
     """The folder of the tables and figures of a body with joints and masses, and its motion."""
     folder, motion = tmp_path_factory.mktemp("docs") / "person", person_run(4)
     folder.mkdir()
-    pipeline._write_tables(folder, motion, PERSON)
+    body_tracking._write_tables(folder, motion, PERSON)
     write_figures(folder, motion, PERSON)
     return folder, motion
 
@@ -254,7 +253,7 @@ def person(tmp_path_factory):
 def test_every_file_of_a_body_with_joints_is_documented(person, run):
     left = {path.name for path in person[0].iterdir()} - {path.name for path in run.iterdir()}
     rows = table_of(DOCS / "results.md", "Files of a body with joints")
-    assert left | {sidecar.NAME} == {name for row in rows for name in named(row[0])}
+    assert left | {covariance_file.NAME} == {name for row in rows for name in named(row[0])}
 
 
 @pytest.mark.parametrize("name", ["joint_angles.csv", "flight.csv"])

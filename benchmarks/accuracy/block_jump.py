@@ -16,8 +16,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from rows import ROOT, append
 
 from airborne.evaluation.players import assess_players
-from airborne.players_pipeline import track_players
-from airborne.trial import read_trial
+from airborne.run.players_tracking import track_players
+from airborne.trial.file import read_trial
 
 
 def main(data: Path, method: str) -> None:

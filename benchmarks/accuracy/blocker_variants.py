@@ -21,7 +21,7 @@ from rows import append
 
 from airborne.body.legs import LEG_POINTS
 from airborne.synthetic import block_scene, frames_of, joints_of, starts_of
-from airborne.tracking.blocker import Blocker, colours, dynamics, fit, tracker
+from airborne.tracking.capsules import Blocker, dynamics, fit, surface_colours, tracker
 from airborne.tracking.players import PlayerStart
 
 SEEDS, WITH_TWO = (31, 32, 33, 34), (34,)
@@ -34,7 +34,7 @@ VARIANTS: dict[str, list[Switch]] = {
     "without flight": [(tracker, "_FLYING_M", np.inf)],
     "without hidden views": [(tracker, "_HIDDEN_RATE", 0.0)],
     "clothes that stay": [(dynamics, "_SLIDING_SD", dynamics._SLIDING_SD * 0.01)],
-    "colours as lit at first": [(colours, "_LIGHTS", np.ones_like(colours._LIGHTS))],
+    "colours as lit at first": [(surface_colours, "_LIGHTS", np.ones_like(surface_colours._LIGHTS))],
     "socks and shoes as at first": [(tracker, "RENEWED_S", np.inf)],
     "without other players": [(tracker, "_NEAR_M", 0.0)],
 }

@@ -19,9 +19,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rows import ROOT, append
 
-from airborne.calibrating import Calibrated, calibrate_from, sources_from, to_dict
+from airborne.calibration import Calibrated, calibrate_from, sources_from
+from airborne.calibration.report import to_dict
+from airborne.calibration.sources.person import median_reprojection_px
 from airborne.cameras.detections import read_detections
-from airborne.cameras.refinement import median_reprojection_px
 
 DATA = ROOT.parent / "shared" / "data"
 SAVED = {"saved_scale": 1.00741, "saved_offset_px": [0.0, -7.11]}

@@ -17,11 +17,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from rows import append
 
 from airborne.evaluation.success import success_cover
-from airborne.reproduction.block_hidden import FULLY_HIDDEN, hidden_shares
-from airborne.reproduction.block_plan import FULL, PARTS
-from airborne.reproduction.block_tracking import Told, hand_set, true_motion
+from airborne.reproduction.block.occlusion import FULLY_HIDDEN, hidden_shares
+from airborne.reproduction.block.plan import FULL, PARTS
+from airborne.reproduction.block.tracking import Told, hand_set, true_motion
 from airborne.synthetic import frames_of
-from airborne.tracking.filters import LegsSettings, legs_tracker, torso_tracker
+from airborne.tracking.particle import LegsSettings, legs_tracker, torso_tracker
 
 SEQUENCES, SEEDS = (3, 6, 9, 15, 18, 20), range(2)
 VARIANTS: dict[str, dict[str, Any]] = {

@@ -20,8 +20,8 @@ from airborne.body.legs import LEG_POINTS
 from airborne.evaluation.jump_errors import EVENTS, HEIGHTS
 from airborne.evaluation.players import compare_players
 from airborne.evaluation.players_truth import known_jump
-from airborne.motion.contact import noise_covariance
-from airborne.reproduction.block_tracking import true_motion
+from airborne.motion.free_fall import noise_covariance
+from airborne.reproduction.block.tracking import true_motion
 from airborne.synthetic import block_scene, jump_facts
 
 SCENES, SEEDS = range(8), range(4)

@@ -20,7 +20,7 @@ from rows import append
 
 from airborne.body.chain import moved_pose
 from airborne.synthetic import frames
-from airborne.synthetic.somersault import somersault
+from airborne.synthetic.flight.somersault import somersault
 from airborne.tracking.methods import Settings, tracker_of
 from airborne.tracking.tracker import step
 

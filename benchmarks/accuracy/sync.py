@@ -20,14 +20,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rows import ROOT, append
 
-from airborne.runs import cameras_of, source_of
-from airborne.synchronising import synchronise
-from airborne.synthetic.scene import thrown_cross
-from airborne.synthetic.writing import write_trial
-from airborne.trial import read_trial
+from airborne.run.opening import cameras_of, source_of
+from airborne.sync import offsets_by_motion
+from airborne.sync.from_trial import synchronise
+from airborne.synthetic.throw.scene import thrown_cross
+from airborne.synthetic.throw.writing import write_trial
+from airborne.trial.file import read_trial
 from airborne.video import VideoWriter, fill_rows, weave
 from airborne.video.decoding import inspect, pictures, rgb_from_picture
-from airborne.video.sync import offsets_by_motion
 
 LATE_MS = ((0, 3), (1, 10), (2, 17))  # seed, third camera's delay
 RESAMPLED_MS = (2, 5, 8, 10, 13, 16, 19)

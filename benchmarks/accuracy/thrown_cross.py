@@ -25,13 +25,13 @@ from airborne.evaluation import (
     read_truth,
 )
 from airborne.evaluation.basin import Basin
-from airborne.examples import example_trial
 from airborne.motion import Motion
-from airborne.pipeline import open_trial
+from airborne.run.body_tracking import open_trial
 from airborne.tracking.methods import tracker_of
-from airborne.tracking.refined import Refined, RefinedState
+from airborne.tracking.model_based.refined import Refined, RefinedState
 from airborne.tracking.tracker import step
-from airborne.trial import CalibrationTable, Trial, read_trial
+from airborne.trial.examples import example_trial
+from airborne.trial.file import CalibrationTable, Trial, read_trial
 
 FOLDER = example_trial("thrown_cross").parent
 MODEL = read_body(FOLDER / "cross.toml")

@@ -20,12 +20,12 @@ import av
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne import players_pipeline
 from airborne.body.legs import LEG_POINTS
 from airborne.cameras import Camera, Rig, write_pose2sim
+from airborne.run import players_tracking
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate
-from airborne.trial import read_trial
+from airborne.trial.file import read_trial
 from airborne.video import VideoWriter
 
 NAMES, RATE = ("left", "right", "middle"), 60
@@ -114,11 +114,11 @@ def main() -> None:
     given = parser.parse_args()
     width, height = map(int, given.size.split("x"))
     tracker = Still()
-    players_pipeline.players_tracker_of = lambda trial, rig: tracker
+    players_tracking.players_tracker_of = lambda trial, rig: tracker
     with tempfile.TemporaryDirectory() as name:
         trial = read_trial(write_trial(Path(name), (width, height), round(60 * given.minutes)))
         begun_s = time.monotonic()
-        run = players_pipeline.track_players(trial, Path(name) / "run", pictures=False)
+        run = players_tracking.track_players(trial, Path(name) / "run", pictures=False)
         taken_s = time.monotonic() - begun_s
     settled = [mb for index, mb in tracker.resident_mb if index >= 10 * RATE]
     found = {

@@ -22,9 +22,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rows import ROOT, append
 
-from airborne.players_pipeline import track_players
-from airborne.runs import open_trial
-from airborne.trial import read_trial
+from airborne.run.opening import open_trial
+from airborne.run.players_tracking import track_players
+from airborne.trial.file import read_trial
 from airborne.video import VideoWriter
 
 CRF, REPEATS = 23, 3

@@ -23,10 +23,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rows import append
 
-from airborne.bench import measure_speed
 from airborne.body import BodyModel, Ellipsoid, Part, Segment, geometry
 from airborne.cameras import Camera
 from airborne.rendering import RULES, Lamp, Lights, place_segments, score, targets
+from airborne.run.bench import measure_speed
 from airborne.video import View
 
 HERE = Path(__file__).resolve()

@@ -14,7 +14,7 @@ from airborne.body.chain import (
     segment_jacobians,
 )
 from airborne.geometry.rotations import matrix_from_angles
-from tests.tolerances import EXACT, ROUNDTRIP
+from tests.support.tolerances import EXACT, ROUNDTRIP
 
 STEP = 1e-6
 SECOND_ORDER = 1e-8  # what central differences of that step leave of lengths of a metre

@@ -5,22 +5,10 @@ import pytest
 import trimesh
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import (
-    SAMPLED,
-    BodyModel,
-    Box,
-    Ellipsoid,
-    Inertia,
-    Landmark,
-    Mesh,
-    Part,
-    Segment,
-    geometry,
-    human18,
-)
+from airborne.body import SAMPLED, BodyModel, Box, Ellipsoid, Inertia, Landmark, Mesh, Part, Segment, geometry, human18
 from airborne.body.files import body_toml, mesh_files, read_body, write_body
 from airborne.errors import BodyError
-from tests.tolerances import EXACT
+from tests.support.tolerances import EXACT
 
 GOOD = """
 name = "leg"

@@ -8,8 +8,8 @@ from airborne.body import SAMPLED, Ellipsoid, Pose, human18, human18_from_measur
 from airborne.body.anthropometry import bulks, measurements_of
 from airborne.body.human import PARENTS
 from airborne.errors import BodyError
-from tests.body.yeadon_oracle import ANGLES, SEGMENTS, random_configuration, same_pose, yeadon_person
-from tests.tolerances import EXACT, ROUNDTRIP
+from tests.support.tolerances import EXACT, ROUNDTRIP
+from tests.support.yeadon_oracle import ANGLES, SEGMENTS, random_configuration, same_pose, yeadon_person
 
 PEOPLE = [(1.80, 75.0), (1.55, 44.0), (2.05, 102.0)]
 LIMB = ["hip", "knee", "ankle", "foot", "shoulder", "elbow", "wrist", "hand"]

@@ -21,8 +21,8 @@ from airborne.body import (
 from airborne.body.anthropometry import bulks, measurements_of
 from airborne.body.inertia import combined, placed
 from airborne.errors import BodyError
-from tests.body.yeadon_oracle import random_configuration, same_pose, whole_by_slices, yeadon_person
-from tests.tolerances import EXACT, ROUNDTRIP
+from tests.support.tolerances import EXACT, ROUNDTRIP
+from tests.support.yeadon_oracle import random_configuration, same_pose, whole_by_slices, yeadon_person
 
 SLICED = 3e-5  # relative, of an integral by slices
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from airborne.body.legs import LEG_POINTS, RODS, Legs
 from airborne.errors import BodyError
-from tests.tolerances import EXACT
+from tests.support.tolerances import EXACT
 
 TORSO = np.array([0.1, 0.2, 1.25])
 POINTS = np.array(

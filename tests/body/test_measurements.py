@@ -10,7 +10,7 @@ from airborne.body import human18, human18_from_measurements, read_measurements,
 from airborne.body.anthropometry import bulks, measurements_of
 from airborne.body.measurements import STATURE_SHARES, checked
 from airborne.errors import BodyError
-from tests.tolerances import EXACT, ROUNDTRIP
+from tests.support.tolerances import EXACT, ROUNDTRIP
 
 PERSON = measurements_of(1.72, 66.0)
 

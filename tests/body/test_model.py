@@ -6,7 +6,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Ellipsoid, Part, Pose, Segment
 from airborne.errors import BodyError
-from tests.tolerances import EXACT
+from tests.support.tolerances import EXACT
 
 BALL = Ellipsoid(np.array([0.1, 0.1, 0.1]))
 

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from airborne.body.nurbs import RationalSurface, stadium_loft
 from airborne.errors import BodyError
-from tests.tolerances import EXACT, ROUNDTRIP, SOLVED
+from tests.support.tolerances import EXACT, ROUNDTRIP, SOLVED
 
 U = np.linspace(0, 1, 4001)
 

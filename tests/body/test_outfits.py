@@ -8,7 +8,7 @@ import pytest
 from airborne.body import ATHLETE, SAMPLED, human18
 from airborne.body.outfits import Border, extent_m, solid_of, with_borders
 from airborne.errors import BodyError
-from tests.tolerances import EXACT
+from tests.support.tolerances import EXACT
 
 
 def parts_of(model, segment):

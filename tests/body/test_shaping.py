@@ -8,7 +8,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import BodyModel, Box, Ellipsoid, Inertia, Landmark, Mesh, Part, Pose, Segment, human18
 from airborne.body.shaping import length_axis, with_girths, with_mass, with_segment_lengths
 from airborne.errors import BodyError
-from tests.tolerances import EXACT, ROUNDTRIP
+from tests.support.tolerances import EXACT, ROUNDTRIP
 
 UPRIGHT = Pose(world_from_root=RigidTransform.identity())
 

@@ -14,7 +14,7 @@ from airborne.body.stadia import stadium
 from airborne.cameras import Camera
 from airborne.errors import BodyError
 from airborne.rendering import FLAT, render
-from tests.tolerances import EXACT, ROUNDTRIP
+from tests.support.tolerances import EXACT, ROUNDTRIP
 
 PERSON = human18(1.80, 75.0)
 PLAIN = skin_of(PERSON, radius_change=0, border_change_m=0)

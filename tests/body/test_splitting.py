@@ -6,7 +6,7 @@ import trimesh
 
 from airborne.body import Mesh
 from airborne.body.splitting import between, split_at
-from tests.tolerances import EXACT, ROUNDTRIP
+from tests.support.tolerances import EXACT, ROUNDTRIP
 
 BALL = trimesh.creation.icosphere(subdivisions=2, radius=0.3)
 

@@ -5,7 +5,7 @@ import pytest
 
 from airborne.body.inertia import combined, placed
 from airborne.body.stadia import Stadium, circle, dome, half_solid, solid, stadium
-from tests.tolerances import EXACT, ROUNDTRIP
+from tests.support.tolerances import EXACT, ROUNDTRIP
 
 WIDE, NARROW, ROUND = Stadium(0.09, 0.06), Stadium(0.05, 0.08), Stadium(0.0, 0.07)
 CUBES = 4e-3  # relative, of a sum over millimetre cubes

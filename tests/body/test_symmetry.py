@@ -7,7 +7,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Segment
 from airborne.body.model import WHOLE
 from airborne.body.symmetry import continuous_axes, symmetries
-from tests.tolerances import ROUNDTRIP
+from tests.support.tolerances import ROUNDTRIP
 
 YELLOW, BLUE = np.array([231.0, 200.0, 48.0]), np.array([0.0, 0.0, 200.0])
 HALF_TURN_Y = np.diag([-1.0, 1.0, -1.0])

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from airborne.errors import CalibrationError
-from tests.cameras.examples import LENS, camera_at, scattered, three_cameras
-from tests.tolerances import ROUNDTRIP
+from tests.support.cameras import LENS, camera_at, scattered, three_cameras
+from tests.support.tolerances import ROUNDTRIP
 
 
 def test_an_undistorted_pixel_is_the_pixel_of_the_undistorted_camera():

@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airborne.cameras.distortion import distort, distort_fisheye, undistort, undistort_fisheye
-from tests.cameras.examples import LENS
-from tests.tolerances import ROUNDTRIP
+from tests.support.cameras import LENS
+from tests.support.tolerances import ROUNDTRIP
 
 XY = np.random.default_rng(0).uniform(-0.6, 0.6, (50, 2))
 

@@ -2,8 +2,8 @@ import cv2
 import numpy as np
 
 from airborne.cameras.dlt import coefficients, compose, decompose, decompose_with_skew, fit_dlt
-from tests.cameras.examples import camera_at, scattered
-from tests.tolerances import ROUNDTRIP
+from tests.support.cameras import camera_at, scattered
+from tests.support.tolerances import ROUNDTRIP
 
 CAMERA = camera_at((-4, -5, 1.5))
 WORLD = scattered(12)

@@ -6,8 +6,8 @@ import pytest
 
 from airborne.cameras import Rig, read_rig, write_pose2sim
 from airborne.errors import CalibrationError
-from tests.cameras.examples import LENS, scattered, three_cameras
-from tests.tolerances import EXACT, ROUNDTRIP
+from tests.support.cameras import LENS, scattered, three_cameras
+from tests.support.tolerances import EXACT, ROUNDTRIP
 
 TOML = """
 [left]

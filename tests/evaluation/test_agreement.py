@@ -5,7 +5,7 @@ import pytest
 
 from airborne.evaluation import Series, agreement
 from airborne.evaluation.agreement import Z, limits, n_effective, spread_of
-from tests.tolerances import ROUNDTRIP, sampled
+from tests.support.tolerances import ROUNDTRIP, sampled
 
 
 def series(difference, individual=None, reference=None):

@@ -7,8 +7,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import Pose
 from airborne.evaluation import Basin, is_recovered, perturbed
 from airborne.geometry.rotations import geodesic
-from tests.evaluation.helpers import HALF_TURN, IDENTITY
-from tests.tolerances import ROUNDTRIP, sampled
+from tests.support.evaluation import HALF_TURN, IDENTITY
+from tests.support.tolerances import ROUNDTRIP, sampled
 
 START = Pose(
     world_from_root=RigidTransform.from_components([0.1, 0.2, 1.3], Rotation.from_euler("XYZ", [0.3, 0.4, 0.5]))

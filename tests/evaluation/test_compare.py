@@ -8,8 +8,8 @@ import pytest
 
 from airborne.errors import ResultError
 from airborne.evaluation import compare
-from tests.evaluation.helpers import HALF_TURN, IDENTITY, flight, motion_of, shifted, turned
-from tests.tolerances import ROUNDTRIP, sampled
+from tests.support.evaluation import HALF_TURN, IDENTITY, flight, motion_of, shifted, turned
+from tests.support.tolerances import ROUNDTRIP, sampled
 
 
 def rows(truth, keep):

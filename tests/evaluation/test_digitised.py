@@ -14,8 +14,8 @@ from airborne.cameras import read_rig
 from airborne.errors import ResultError
 from airborne.evaluation import compare_digitised, digitised_poses, read_digitised, read_truth
 from airborne.evaluation.digitised import Digitised, body_points, fit_rigid
-from tests.evaluation.helpers import HALF_TURN, IDENTITY, cross, motion_of, shifted
-from tests.tolerances import ROUNDTRIP, SOLVED
+from tests.support.evaluation import HALF_TURN, IDENTITY, cross, motion_of, shifted
+from tests.support.tolerances import ROUNDTRIP, SOLVED
 
 ENDS = ("long_minus", "long_plus", "short_minus", "short_plus")
 

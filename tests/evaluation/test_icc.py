@@ -5,7 +5,7 @@ import pytest
 
 from airborne.evaluation import reliability
 from airborne.evaluation.icc import mean_squares
-from tests.tolerances import ROUNDTRIP
+from tests.support.tolerances import ROUNDTRIP
 
 # Shrout and Fleiss 1979, table 2: six targets, four judges
 JUDGES = np.array([[9, 2, 5, 8], [6, 1, 3, 2], [8, 4, 6, 8], [7, 1, 2, 6], [10, 5, 6, 9], [6, 2, 4, 7]], float)

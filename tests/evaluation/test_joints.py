@@ -10,8 +10,8 @@ from airborne.errors import ResultError
 from airborne.evaluation import JointPaths, compare_joints, landmark_of, read_joint_paths
 from airborne.motion import Motion, landmarks, write_joints
 from airborne.tracking import Status
-from tests.motion.helpers import figure, motion_of, small_covariance, swinging
-from tests.tolerances import ROUNDTRIP, sampled
+from tests.support.motions import figure, motion_of, small_covariance, swinging
+from tests.support.tolerances import ROUNDTRIP, sampled
 
 MARKS = ("pelvis", "head", "elbow_left", "wrist_left", "knee_right")
 PLAIN = figure()

@@ -16,8 +16,8 @@ from airborne.evaluation.success import success_cover
 from airborne.motion.players import PlayersWriter
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate
-from tests.motion.jumping import Jumper, motion_of, noise, players_motion
-from tests.tolerances import ROUNDTRIP, sampled
+from tests.support.jumping import Jumper, motion_of, noise, players_motion
+from tests.support.tolerances import ROUNDTRIP, sampled
 
 JUMPER = Jumper()
 TRUTH = motion_of(JUMPER)

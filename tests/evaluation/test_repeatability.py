@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airborne.evaluation import Series, repeatability
-from tests.tolerances import ROUNDTRIP
+from tests.support.tolerances import ROUNDTRIP
 
 
 def series(values):

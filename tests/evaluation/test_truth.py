@@ -5,7 +5,7 @@ import pytest
 
 from airborne.errors import ResultError
 from airborne.evaluation import read_truth
-from tests.tolerances import ROUNDTRIP
+from tests.support.tolerances import ROUNDTRIP
 
 HEADER = "frame,time_s,x_m,y_m,z_m,r00,r01,r02,r10,r11,r12,r20,r21,r22"
 LINE = "{},{},1,2,3,0,-1,0,1,0,0,0,0,1"

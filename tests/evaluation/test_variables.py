@@ -14,7 +14,7 @@ from airborne.evaluation.variables import (
     side_by_side,
     turned_alike,
 )
-from tests.evaluation.helpers import HALF_TURN, flight, motion_of
+from tests.support.evaluation import HALF_TURN, flight, motion_of
 
 T = np.arange(40) / 50
 

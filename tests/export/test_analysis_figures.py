@@ -6,7 +6,7 @@ from PIL import Image
 
 from airborne.evaluation import Series, agreement
 from airborne.export.analysis_figures import write_bland_altman, write_identity, write_residuals
-from airborne.motion.signals import residual_analysis
+from airborne.motion.smoothing import residual_analysis
 
 BIAS_GREY = (51, 51, 51)
 

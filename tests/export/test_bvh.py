@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from airborne.body import BodyModel
 from airborne.export.bvh import write_bvh
 from airborne.export.takes import player_takes
-from tests.export.scenes import BOX, PERSON
-from tests.export.takes import jumping, take_of, tumbling
+from tests.support.export_scenes import BOX, PERSON
+from tests.support.takes import jumping, take_of, tumbling
 
 TO_WORLD = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 WRITTEN_M = 1e-6

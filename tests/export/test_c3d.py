@@ -10,8 +10,8 @@ import pytest
 from airborne.errors import ResultError
 from airborne.export.c3d import LARGEST_RESIDUAL_MM, write_c3d
 from airborne.export.takes import player_takes
-from tests.export.scenes import PERSON
-from tests.export.takes import NTSC, hidden, jumping, take_of, tumbling
+from tests.support.export_scenes import PERSON
+from tests.support.takes import NTSC, hidden, jumping, take_of, tumbling
 
 TOLERANCE_MM = 1e-3  # of 32-bit floats some metres from the origin
 

@@ -17,8 +17,8 @@ from airborne.export.figures import (
     write_flight_figure,
     write_joints_figure,
 )
-from tests.export.scenes import BOX, HALF_TURN, PERSON, person_run, run
-from tests.tolerances import ROUNDTRIP
+from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run
+from tests.support.tolerances import ROUNDTRIP
 
 NAMES = ["digitised.png", "errors.png", "pose.png", "score.png"]
 

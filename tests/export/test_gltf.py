@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from airborne.export.gltf import write_animation
 from airborne.export.part_meshes import segment_mesh
 from airborne.export.takes import player_takes
-from tests.export.scenes import BOX, PERSON
-from tests.export.takes import jumping, take_of, tumbling
+from tests.support.export_scenes import BOX, PERSON
+from tests.support.takes import jumping, take_of, tumbling
 
 WORLD_FROM_GLTF = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 SINGLE = 1e-6  # of 32-bit floats, some joints away

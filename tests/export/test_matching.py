@@ -3,7 +3,7 @@ import cv2
 from airborne.export import MatchingPicture
 from airborne.export.matching import TITLES, _row
 from airborne.tracking import Status
-from tests.export.scenes import RIG, SCENE_GREY, frames, posed
+from tests.support.export_scenes import RIG, SCENE_GREY, frames, posed
 
 
 def test_the_first_tracked_frame_is_drawn_and_no_other(tmp_path):

@@ -14,7 +14,7 @@ from airborne.errors import ResultError
 from airborne.export.models import write_model
 from airborne.export.part_meshes import part_mesh
 from airborne.rendering.srgb import srgb_from_light
-from tests.tolerances import ROUNDTRIP, SOLVED
+from tests.support.tolerances import ROUNDTRIP, SOLVED
 
 KINDS = ("glb", "gltf", "obj", "ply")
 TO_WORLD = {"glb": np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]), "gltf": np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])}

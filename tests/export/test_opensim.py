@@ -13,9 +13,9 @@ from airborne.export.opensim_model import coordinates_of, write_osim
 from airborne.export.opensim_motion import write_mot
 from airborne.export.takes import player_takes
 from airborne.export.trc import write_trc
-from tests.export.scenes import BOX, PERSON
-from tests.export.takes import jumping, take_of, tumbling
-from tests.tolerances import ROUNDTRIP
+from tests.support.export_scenes import BOX, PERSON
+from tests.support.takes import jumping, take_of, tumbling
+from tests.support.tolerances import ROUNDTRIP
 
 Y_UP = [1, 2, 0]
 PLAYED_M = 1e-7  # nine digits of degrees, some joints away

@@ -14,7 +14,7 @@ from airborne.export.views import seen_by
 from airborne.rendering import FLAT, render
 from airborne.tracking import Status
 from airborne.video import View
-from tests.export.scenes import BOX, RIG, SCENE_GREY, camera, frames, posed
+from tests.support.export_scenes import BOX, RIG, SCENE_GREY, camera, frames, posed
 
 CODED = 30  # grey levels that 4:2:0 coding may move a thin coloured line
 

@@ -18,7 +18,7 @@ from airborne.export.players_overlay import GREEN_RGB, rectangle_px
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerStart
 from airborne.video import Frames, View
-from tests.players import LEG_POINTS, PLAYERS, StandIn, camera, points_of
+from tests.support.players_trial import LEG_POINTS, PLAYERS, StandIn, camera, points_of
 
 GREY = 120
 BIG = camera("left").resampled(scale=(0.25, 0.25), offset=(-0.375, -0.375), size=(640, 480))

@@ -8,7 +8,7 @@ from airborne.evaluation import JointPaths, Truth, compare, compare_joints
 from airborne.export import headline, write_figures, write_report
 from airborne.export.page import label, shown
 from airborne.motion import Motion, flight_summary, landmarks
-from tests.export.scenes import BOX, HALF_TURN, PERSON, person_run, run
+from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run
 
 
 def html_of(folder, motion, **more):

@@ -6,7 +6,7 @@ from airborne.export import ContactSheet
 from airborne.export.sheet import BACKGROUND_GREY, N_HELD, _cell
 from airborne.export.views import CELL_PX, ROOM, close_up
 from airborne.tracking import Status
-from tests.export.scenes import BALL, BOX, RIG, SCENE_GREY, camera, frames, posed
+from tests.support.export_scenes import BALL, BOX, RIG, SCENE_GREY, camera, frames, posed
 
 
 def shown_px(camera, position):

@@ -7,8 +7,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import Pose
 from airborne.errors import ResultError
 from airborne.export.stick_figure import stick_figure
-from tests.export.takes import LEGS, jumping
-from tests.tolerances import ROUNDTRIP
+from tests.support.takes import LEGS, jumping
+from tests.support.tolerances import ROUNDTRIP
 
 
 def placed(figure, row):

@@ -8,8 +8,8 @@ import pytest
 from airborne.export import headline, warnings, write_json
 from airborne.export.summary import plain
 from airborne.motion import Motion
-from tests.export.scenes import run
-from tests.tolerances import ROUNDTRIP
+from tests.support.export_scenes import run
+from tests.support.tolerances import ROUNDTRIP
 
 
 def test_headline_counts_frames_turns_and_time():

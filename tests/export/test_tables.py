@@ -8,8 +8,8 @@ from pyarrow import csv
 
 from airborne.export.tables import body_columns, players_columns, write_csv, write_parquet
 from airborne.motion import flight, joint_angles, landmarks
-from tests.export.scenes import BOX, PERSON
-from tests.export.takes import jumping, tumbling
+from tests.support.export_scenes import BOX, PERSON
+from tests.support.takes import jumping, tumbling
 
 
 def person_columns(motion):

@@ -7,9 +7,9 @@ import pytest
 
 from airborne.errors import ResultError
 from airborne.export.takes import part_paths, plain_names, player_takes, rate_of, with_axis_markers
-from tests.export.scenes import BOX, PERSON
-from tests.export.takes import NTSC, jumping, take_of, tumbling
-from tests.tolerances import EXACT, ROUNDTRIP
+from tests.support.export_scenes import BOX, PERSON
+from tests.support.takes import NTSC, jumping, take_of, tumbling
+from tests.support.tolerances import EXACT, ROUNDTRIP
 
 
 @pytest.mark.parametrize("rate", [NTSC, Fraction(50), Fraction(24000, 1001), Fraction(25, 2), Fraction(240)])

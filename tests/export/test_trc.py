@@ -6,8 +6,8 @@ import pytest
 from airborne.evaluation import read_joint_paths
 from airborne.export.takes import player_takes
 from airborne.export.trc import write_trc
-from tests.export.scenes import PERSON
-from tests.export.takes import hidden, jumping, take_of, tumbling
+from tests.support.export_scenes import PERSON
+from tests.support.takes import hidden, jumping, take_of, tumbling
 
 TOLERANCE_M = 1e-6
 

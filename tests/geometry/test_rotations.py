@@ -15,7 +15,7 @@ from airborne.geometry.rotations import (
     unwrapped,
     wrapped,
 )
-from tests.tolerances import EXACT, ROUNDTRIP, SOLVED
+from tests.support.tolerances import EXACT, ROUNDTRIP, SOLVED
 
 ANGLE = st.floats(-np.pi, np.pi)
 TILT = st.floats(-np.pi / 2, np.pi / 2)

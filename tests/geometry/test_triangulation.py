@@ -10,8 +10,8 @@ from airborne.geometry.triangulation import (
     triangulate,
     triangulate_linear,
 )
-from tests.cameras.examples import scattered, three_cameras
-from tests.tolerances import EXACT, ROUNDTRIP, SOLVED, sampled
+from tests.support.cameras import scattered, three_cameras
+from tests.support.tolerances import EXACT, ROUNDTRIP, SOLVED, sampled
 
 P = three_cameras().P
 

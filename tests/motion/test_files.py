@@ -7,7 +7,6 @@ import sys
 import textwrap
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +14,10 @@ import pytest
 from airborne.errors import ResultError
 from airborne.motion import Motion, MotionWriter, read_estimates, read_motion
 from airborne.tracking import Status
-from tests.motion.helpers import estimate, run_with_gap
-from tests.tolerances import ROUNDTRIP
+from tests.support.motions import estimate, run_with_gap
+from tests.support.places import ROOT
+from tests.support.tolerances import ROUNDTRIP
 
-ROOT = Path(__file__).resolve().parents[2]
 COLUMNS = "frame,time_s,status,score,x_m,y_m,z_m,qx,qy,qz,qw,x_m_sd,y_m_sd,z_m_sd,rx_deg_sd,ry_deg_sd,rz_deg_sd,n_views"
 
 
@@ -151,7 +150,7 @@ def test_killed_process_leaves_every_finished_frame(tmp_path, joints):
         f"""
         import itertools, pathlib
         from airborne.motion import MotionWriter
-        from tests.motion.helpers import estimate
+        from tests.support.motions import estimate
         writer = MotionWriter(pathlib.Path({str(path)!r}), {joints!r})
         for i in itertools.count():
             writer.append(estimate(i, n_joints={len(joints)}))

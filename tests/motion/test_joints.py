@@ -10,8 +10,8 @@ from airborne.body import Pose
 from airborne.errors import ResultError
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.motion import joint_angles, landmarks, write_joint_angles
-from tests.motion.helpers import figure, motion_of, shaken, small_covariance, swinging
-from tests.tolerances import EXACT, ROUNDTRIP, sampled
+from tests.support.motions import figure, motion_of, shaken, small_covariance, swinging
+from tests.support.tolerances import EXACT, ROUNDTRIP, sampled
 
 MODEL = figure()
 TIMES = np.arange(12) / 50

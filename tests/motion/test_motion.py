@@ -9,8 +9,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import Pose
 from airborne.motion import Motion, dataset
 from airborne.tracking import Status
-from tests.motion.helpers import estimate, run_with_gap
-from tests.tolerances import EXACT
+from tests.support.motions import estimate, run_with_gap
+from tests.support.tolerances import EXACT
 
 
 def test_lost_frames_are_unknown_and_the_others_are_not():

@@ -3,7 +3,6 @@
 import csv
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -22,8 +21,9 @@ from airborne.motion import (
     write_motion_parquet,
 )
 from airborne.tracking import Status
-from tests.motion.helpers import estimate, figure, motion_of, run_with_gap, somersault, swinging
-from tests.tolerances import EXACT, ROUNDTRIP, sampled
+from tests.support.motions import estimate, figure, motion_of, run_with_gap, somersault, swinging
+from tests.support.places import ROOT
+from tests.support.tolerances import EXACT, ROUNDTRIP, sampled
 
 
 def rows_of(path):
@@ -143,7 +143,7 @@ def test_columns_of_a_jointed_body_are_documented(tmp_path, name):
     model = figure()
     write = {"joint_angles.csv": write_joint_angles, "flight.csv": write_flight}[name]
     write(tmp_path / name, motion_of(model, swinging(model, [0.0, 0.02])), model)
-    page = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
     table = re.search(rf"^## `{re.escape(name)}`\n\n((?:\|.*\n)+)", page, re.MULTILINE)[1]
     documented = [column for line in table.splitlines()[2:] for column in re.findall(r"`(\w+)`", line.split("|")[1])]
     assert (tmp_path / name).read_text().splitlines()[0].split(",") == documented

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airborne.motion.uncertainty import deviation, variances
-from tests.tolerances import EXACT
+from tests.support.tolerances import EXACT
 
 RNG = np.random.default_rng(0)
 JACOBIAN, ROOT = RNG.normal(size=(3, 4, 6)), RNG.normal(size=(6, 6))

@@ -6,7 +6,7 @@ import pytest
 from airborne.body import geometry
 from airborne.rendering import FLAT, evidence_maps, mask_evidence, render
 from airborne.rendering.reduction import reduced, reduced_camera
-from tests.rendering.bodies import batch, camera, in_slabs, random_body
+from tests.support.bodies import batch, camera, in_slabs, random_body
 
 CAMERAS = [camera("a"), camera("b", turn=2.0, size=(77, 90))]
 MAPS = [np.random.default_rng(i).normal(0, 2, c.size[::-1]).astype(np.float32) for i, c in enumerate(CAMERAS)]

@@ -1,8 +1,8 @@
 import numpy as np
 
 from airborne.rendering import place_segments
-from tests.rendering.bodies import random_body, random_pose
-from tests.tolerances import EXACT
+from tests.support.bodies import random_body, random_pose
+from tests.support.tolerances import EXACT
 
 
 def test_a_batch_of_poses_is_placed_as_one_by_one():

@@ -4,8 +4,8 @@ from airborne.rendering import FLAT, render
 from airborne.rendering.maps import empty_maps, surface_maps
 from airborne.rendering.packing import packed_view
 from airborne.rendering.shapes import new_shapes
-from tests.rendering.bodies import camera, posed_random
-from tests.tolerances import SOLVED
+from tests.support.bodies import camera, posed_random
+from tests.support.tolerances import SOLVED
 
 
 def test_surface_maps_are_the_rendering_with_normals_that_point_at_the_camera():

@@ -1,14 +1,7 @@
 import numpy as np
 
-from airborne.rendering import (
-    FLAT,
-    mask_picture,
-    match_picture,
-    model_picture,
-    render,
-    through_mask,
-)
-from tests.rendering.bodies import camera, noise_view, posed_random
+from airborne.rendering import FLAT, mask_picture, match_picture, model_picture, render, through_mask
+from tests.support.bodies import camera, noise_view, posed_random
 
 SHAPES, POSED = posed_random(["ellipsoid", "box", "mesh"], 1)
 VIEW = noise_view(camera(), 0)

@@ -17,8 +17,8 @@ from airborne.rendering import (
 from airborne.rendering.reduction import reduced, reduced_camera
 from airborne.rendering.scores import GAINS, MISSED_GREY
 from airborne.video import View
-from tests.rendering.bodies import LIGHTS, batch, camera, noise_view, posed_random, random_body
-from tests.tolerances import SOLVED
+from tests.support.bodies import LIGHTS, batch, camera, noise_view, posed_random, random_body
+from tests.support.tolerances import SOLVED
 
 GREY = 1e-2  # grey levels between float32 kernels and float64 rays
 CAMERAS = [camera("a"), camera("b", turn=2.0, size=(77, 90), skew=2.0)]

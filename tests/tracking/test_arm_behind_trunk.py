@@ -8,8 +8,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose, geometry
 from airborne.rendering import FLAT, render
-from tests.tracking.people import FOCAL_PX, HELD, HUMAN, PLACE, SWING, landmark_errors_mm, person, sd_rad, tracker
-from tests.tracking.scenes import FPS, camera, statuses, track
+from tests.support.people import FOCAL_PX, HELD, HUMAN, PLACE, SWING, landmark_errors_mm, person, sd_rad, tracker
+from tests.support.scenes import FPS, camera, statuses, track
 
 SIDE = tuple(camera(f"side{i}", np.pi / 2 + turn, FOCAL_PX) for i, turn in enumerate((-0.25, 0.0, 0.25)))
 FRAMES, HIDDEN, OUT_AGAIN = 17, (8, 9, 10), 14

@@ -1,6 +1,6 @@
 """Things behind the body that have its colours are told from it, because they stay."""
 
-from tests.tracking.scenes import BLUE, RED, YELLOW, Scene, clutter, statuses, track, worst
+from tests.support.scenes import BLUE, RED, YELLOW, Scene, clutter, statuses, track, worst
 
 CLUTTERED = Scene(backgrounds=tuple(clutter(seed, YELLOW, BLUE, YELLOW, RED) for seed in range(4)))
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from airborne.body import human18
-from tests.tracking.people import HUMAN, mean_errors_mm, person, tracker
-from tests.tracking.scenes import statuses, track
+from tests.support.people import HUMAN, mean_errors_mm, person, tracker
+from tests.support.scenes import statuses, track
 
 SCENE = person()
 

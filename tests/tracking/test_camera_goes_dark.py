@@ -1,6 +1,6 @@
 """A camera may have no picture for a while."""
 
-from tests.tracking.scenes import Scene, statuses, track, worst
+from tests.support.scenes import Scene, statuses, track, worst
 
 DARK = (2, 3, 4)
 

@@ -5,10 +5,10 @@ from fractions import Fraction
 
 import pytest
 
-from airborne.tracking.lateness import InTime
-from airborne.tracking.refined import Refined
+from airborne.tracking.model_based.refined import Refined
+from airborne.tracking.time_offsets import InTime
 from airborne.video import Frames
-from tests.tracking.scenes import CAMERAS, CROSS, FPS, Scene, statuses, thrown, track, worst
+from tests.support.scenes import CAMERAS, CROSS, FPS, Scene, statuses, thrown, track, worst
 
 LATE_S = Fraction(7, 1000)
 THREE = Scene(cameras=CAMERAS[:3])

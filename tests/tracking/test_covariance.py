@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airborne.tracking.covariance import covariance_of, principal
-from tests.tolerances import ROUNDTRIP
+from tests.support.tolerances import ROUNDTRIP
 
 ROUND = np.diag([1e6, 1e6, 1e6, 0, 0, 0])  # a ball: turning it changes nothing
 

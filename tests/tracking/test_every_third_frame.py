@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tests.tracking.scenes import FPS, Scene, statuses, thrown, track, worst
+from tests.support.scenes import FPS, Scene, statuses, thrown, track, worst
 
 
 def test_every_third_frame_is_enough():

@@ -5,9 +5,9 @@ import pytest
 
 from airborne.body.chain import motion_between
 from airborne.tracking.methods import Settings, tracker_of
-from tests.tolerances import EXACT
-from tests.tracking.people import HUMAN, person, tracker, wrong
-from tests.tracking.scenes import FIGURE, LIGHTS, Scene, standing, statuses, track
+from tests.support.people import HUMAN, person, tracker, wrong
+from tests.support.scenes import FIGURE, LIGHTS, Scene, standing, statuses, track
+from tests.support.tolerances import EXACT
 
 STILL = Scene(FIGURE, lambda time_s: standing(0))
 LOOPS = ((0.02, 0.035), (0.01, 0.017))

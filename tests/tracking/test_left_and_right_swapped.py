@@ -5,10 +5,10 @@ import pytest
 
 from airborne.body import Pose
 from airborne.body.chain import moved_pose
-from airborne.tracking.swaps import is_nearer, swapped
-from tests.tolerances import EXACT, ROUNDTRIP
-from tests.tracking.people import HUMAN, mean_errors_mm, person, swinging, tracker, wrong
-from tests.tracking.scenes import CROSS, FIGURE, standing, statuses, thrown, track
+from airborne.tracking.model_based.left_right_swap import is_nearer, swapped
+from tests.support.people import HUMAN, mean_errors_mm, person, swinging, tracker, wrong
+from tests.support.scenes import CROSS, FIGURE, standing, statuses, thrown, track
+from tests.support.tolerances import EXACT, ROUNDTRIP
 
 SCENE = person()
 TRUTH = SCENE.start()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.tracking.scenes import Scene, statuses, track, worst
+from tests.support.scenes import Scene, statuses, track, worst
 
 FRAMES = 12
 

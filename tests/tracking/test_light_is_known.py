@@ -7,8 +7,8 @@ import pytest
 
 from airborne.body import geometry
 from airborne.rendering import render
-from tests.tracking.people import CAMERAS, HUMAN, REACH, mean_errors_mm, swinging, tracker, wrong
-from tests.tracking.scenes import CROSS, LIGHTS, Scene, srgb_from_light, statuses, thrown, track, worst
+from tests.support.people import CAMERAS, HUMAN, REACH, mean_errors_mm, swinging, tracker, wrong
+from tests.support.scenes import CROSS, LIGHTS, Scene, srgb_from_light, statuses, thrown, track, worst
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from airborne.appearance.model import Appearance
 from airborne.body import Pose
-from airborne.tracking.appearance import Appearance
-from airborne.tracking.freedom import limb_of_segment, within_limits
-from airborne.tracking.limbs import astray, look_for
-from airborne.tracking.regions import regions_round
-from airborne.tracking.synthesis import Synthesis
-from airborne.tracking.wide import evidence_of
-from tests.tracking.people import HUMAN, mean_errors_mm, person, tracker
-from tests.tracking.scenes import statuses, track
+from airborne.tracking.image_regions import regions_round
+from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment, within_limits
+from airborne.tracking.model_based.global_search import evidence_of
+from airborne.tracking.model_based.misplaced_limbs import astray, look_for
+from airborne.tracking.model_based.render_model import Synthesis
+from tests.support.people import HUMAN, mean_errors_mm, person, tracker
+from tests.support.scenes import statuses, track
 
 SCENE = person()
 FOLDS = {

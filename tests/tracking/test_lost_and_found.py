@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.tracking.scenes import FPS, Scene, statuses, thrown, track, worst
+from tests.support.scenes import FPS, Scene, statuses, thrown, track, worst
 
 ABSENT = (3, 4, 5)
 GONE = Scene(motion=lambda time_s: None if time_s * FPS in ABSENT else thrown(time_s))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airborne.tracking.methods import Settings, tracker_of
-from tests.tracking.scenes import CROSS, FPS, Scene, statuses, thrown, track, worst
+from tests.support.scenes import CROSS, FPS, Scene, statuses, thrown, track, worst
 
 EMPTY = Scene(motion=lambda time_s: None)
 METHODS = {

@@ -6,7 +6,7 @@ import pytest
 from airborne.body import geometry
 from airborne.rendering import FLAT, render
 from airborne.tracking.methods import Settings, tracker_of
-from tests.tracking.scenes import CAMERAS, CROSS, Scene, errors, statuses, thrown, track
+from tests.support.scenes import CAMERAS, CROSS, Scene, errors, statuses, thrown, track
 
 FRAMES = 14
 

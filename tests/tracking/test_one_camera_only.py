@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.tracking.scenes import CAMERAS, Scene, statuses, track
+from tests.support.scenes import CAMERAS, Scene, statuses, track
 
 ONE = Scene(cameras=CAMERAS[:1])
 DEPTH = CAMERAS[0].camera_from_world.rotation.as_matrix()[2]  # the optical axis in the world

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.tracking.people import HUMAN, mean_errors_mm, person, tracker, wrong
-from tests.tracking.scenes import statuses, track
+from tests.support.people import HUMAN, mean_errors_mm, person, tracker, wrong
+from tests.support.scenes import statuses, track
 
 SCENE = person()
 

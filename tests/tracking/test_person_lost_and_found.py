@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.tracking.people import mean_errors_mm, person, swinging, tracker
-from tests.tracking.scenes import FPS, statuses, track
+from tests.support.people import mean_errors_mm, person, swinging, tracker
+from tests.support.scenes import FPS, statuses, track
 
 ABSENT = (3, 4, 5)
 SCENES = {

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.tracking.people import CAMERAS, HUMAN, PLACE, mean_errors_mm, person, tracker, turned_to
-from tests.tracking.scenes import statuses, track
+from tests.support.people import CAMERAS, HUMAN, PLACE, mean_errors_mm, person, tracker, turned_to
+from tests.support.scenes import statuses, track
 
 
 def axis_toward_first_camera() -> Rotation:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tests.tracking.people import CAMERAS, mean_errors_mm, person, tracker
-from tests.tracking.scenes import statuses, track
+from tests.support.people import CAMERAS, mean_errors_mm, person, tracker
+from tests.support.scenes import statuses, track
 
 TWO, THREE = person(cameras=CAMERAS[:2]), person()
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
 from airborne.tracking.predictors import ballistic, linear, quadratic, stay
-from tests.tolerances import ROUNDTRIP
+from tests.support.tolerances import ROUNDTRIP
 
 EVEN = [Fraction(k, 50) for k in range(4)]
 UNEVEN = [Fraction(0), Fraction(1, 50), Fraction(1, 20), Fraction(7, 50)]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airborne.tracking.methods import Settings, tracker_of
-from tests.tracking.scenes import FIGURE, FPS, Scene, clutter, standing, thrown, track
+from tests.support.scenes import FIGURE, FPS, Scene, clutter, standing, thrown, track
 
 FRAMES, ABSENT = 8, 2
 SCENE = Scene(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.tracking.scenes import BALL, SPINDLE, Scene, errors, statuses, track
+from tests.support.scenes import BALL, SPINDLE, Scene, errors, statuses, track
 
 
 def test_ball_has_a_position_and_no_rotation():

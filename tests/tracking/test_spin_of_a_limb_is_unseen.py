@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airborne.body import BodyModel, Ellipsoid, Part
-from tests.tracking.scenes import FIGURE, Scene, standing, statuses, track
+from tests.support.scenes import FIGURE, Scene, standing, statuses, track
 
 ROUND = ("lower_left", "lower_right", "leg")  # limbs that carry nothing
 

@@ -5,7 +5,7 @@ import pytest
 
 from airborne.body import geometry
 from airborne.rendering import RULES, score, targets
-from tests.tracking.scenes import CROSS, LIGHTS, Scene
+from tests.support.scenes import CROSS, LIGHTS, Scene
 
 
 @pytest.mark.parametrize("rule", RULES)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.tracking.scenes import CAMERAS, Scene, statuses, track, worst
+from tests.support.scenes import CAMERAS, Scene, statuses, track, worst
 
 TWO = Scene(cameras=CAMERAS[:2])
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from airborne.tracking.refined import Refined
-from tests.tracking.scenes import CROSS, TURNS, Scene, camera, clutter, errors, track
+from airborne.tracking.model_based.refined import Refined
+from tests.support.scenes import CROSS, TURNS, Scene, camera, clutter, errors, track
 
 
 def grey(light):

@@ -7,7 +7,7 @@ import pytest
 
 from airborne.errors import VideoError
 from airborne.video import VideoSource, open_recording
-from tests.video.clips import numbered, plain_rig, write_clip
+from tests.support.clips import numbered, plain_rig, write_clip
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 
 from airborne.video import VideoSource, VideoWriter, inspect
 from airborne.video.decoding import pictures, rgb_from_picture
-from tests.video.clips import SIZE, numbered, packets_of, textured, with_noise, write_clip
+from tests.support.clips import SIZE, numbered, packets_of, textured, with_noise, write_clip
 
 NTSC = Fraction(60000, 1001)
 

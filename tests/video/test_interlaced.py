@@ -12,7 +12,7 @@ from av.filter import Graph
 from airborne.video import VideoSource, VideoWriter, inspect, open_recording, weave
 from airborne.video.decoding import pictures
 from airborne.video.pixels import field_frame, frame_from_rgb, rgb_from_frame, woven_frame
-from tests.video.clips import SIZE, plain_rig, write_clip
+from tests.support.clips import SIZE, plain_rig, write_clip
 
 PARITIES = {"top-first": (0, 1), "bottom-first": (1, 0)}
 

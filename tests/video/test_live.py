@@ -13,10 +13,10 @@ import pytest
 from airborne.cameras import Rig
 from airborne.errors import VideoError
 from airborne.video import VideoSource, connected, live_recording
+from airborne.video.crops import colours_of
 from airborne.video.live import PATIENCE_S
 from airborne.video.pixels import frame_from_rgb
-from airborne.video.regions import colours_of
-from tests.video.clips import numbered, plain_camera, plain_rig, write_clip
+from tests.support.clips import numbered, plain_camera, plain_rig, write_clip
 
 SIZE = (64, 48)
 RATE = 50

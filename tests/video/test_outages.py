@@ -7,7 +7,7 @@ import pytest
 
 from airborne.video import Frames, Outages, View
 from airborne.video.outages import DARK_GREY, LISTED, is_dark
-from tests.video.clips import plain_camera
+from tests.support.clips import plain_camera
 
 
 def view(level):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.video import Recording, VideoSource, open_recording
-from tests.video.clips import SIZE, numbered, numbers_of, packets_of, plain_rig, textured, with_noise, write_clip
+from tests.support.clips import SIZE, numbered, numbers_of, packets_of, plain_rig, textured, with_noise, write_clip
 
 
 def clip(path: Path, n: int, rate: int = 50) -> Path:

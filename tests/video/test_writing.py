@@ -11,7 +11,7 @@ import pytest
 
 from airborne.errors import VideoError
 from airborne.video import VideoSource, VideoWriter, inspect, open_recording
-from tests.video.clips import plain_rig
+from tests.support.clips import plain_rig
 
 
 def ramp(width, height):

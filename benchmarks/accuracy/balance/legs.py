@@ -17,13 +17,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from run import ROOT, append, trial_text
 
-from airborne import pipeline
 from airborne.body.legs import LEG_POINTS
-from airborne.start import landmarks_over_time
+from airborne.run.first_pose import landmarks_over_time
+from airborne.run.opening import open_trial
 from airborne.tracking import Status
-from airborne.tracking.blocker import Blocker
+from airborne.tracking.capsules import Blocker
 from airborne.tracking.players import PlayerStart
-from airborne.trial import read_trial
+from airborne.trial.file import read_trial
 
 TRUNK = ("hip_left", "hip_right", "shoulder_left", "shoulder_right")
 
@@ -34,7 +34,7 @@ def main(data: Path) -> None:
         path = Path(name) / "trial.toml"
         path.write_text(trial_text(data, 'preset = "human18"\nstature_m = 1.72\nmass_kg = 66.0'))
         trial = read_trial(path)
-        recording, _ = pipeline.open_trial(trial)
+        recording, _ = open_trial(trial)
         seen = landmarks_over_time(trial, recording.rig)
     first = {joint: seen[joint][0] for joint in (*LEG_POINTS, "foot_left", "foot_right")}
     first["torso"] = np.mean([seen[joint][0] for joint in TRUNK], axis=0)

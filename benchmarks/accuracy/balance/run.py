@@ -20,12 +20,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from rows import ROOT, append
 
-from airborne import pipeline
 from airborne.body.files import read_body
+from airborne.body_fitting.from_trial import fit_person
 from airborne.evaluation import compare_joints, landmark_of, read_joint_paths
-from airborne.fitting import fit_person
-from airborne.start import landmarks_over_time
-from airborne.trial import read_trial
+from airborne.run.body_tracking import track
+from airborne.run.first_pose import landmarks_over_time
+from airborne.run.opening import open_trial
+from airborne.trial.file import read_trial
 
 SIDES = ("left", "right")
 LIMBS = [f"{joint}_{side}" for joint in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist") for side in SIDES]
@@ -61,9 +62,9 @@ def main(data: Path, body: Path | None) -> None:
             fit_person(read_trial(folder / "fit.toml"), body)
         (folder / "trial.toml").write_text(trial_text(data, f'file = "{body.resolve().as_posix()}"'))
         trial = read_trial(folder / "trial.toml")
-        recording, _ = pipeline.open_trial(trial)
+        recording, _ = open_trial(trial)
         seen = landmarks_over_time(trial, recording.rig)
-        run = pipeline.track(trial, folder / "run", pictures=False)
+        run = track(trial, folder / "run", pictures=False)
         model = read_body(folder / "run" / "body.toml")
     motion, base = run.motion, {"data": "balance, whole body", "method": trial.track.method, "n": len(run.motion)}
     trc = read_joint_paths(data / "Pose2Sim_markers.trc")

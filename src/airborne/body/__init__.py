@@ -1,6 +1,5 @@
 """Bodies: in come body files, out come `BodyModel`, `Pose` and `PosedBody`; knows no camera and no image."""
 
-from airborne.body.geometry import Geometry, geometry, has_flat_sides
 from airborne.body.human import human18, human18_from_measurements
 from airborne.body.inertia import total_inertia, total_inertias
 from airborne.body.inverse_kinematics import PoseFit, fit_lengths, fit_pose
@@ -20,6 +19,7 @@ from airborne.body.model import (
 )
 from airborne.body.outfits import ATHLETE, SAMPLED, Outfit
 from airborne.body.shaping import with_girths, with_segment_lengths
+from airborne.body.surface import Geometry, geometry, has_flat_sides
 
 __all__ = [
     "ATHLETE",

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body.model import BodyModel, Pose, PosedBody
-from airborne.geometry.joint_turns import turned, turns_between
+from airborne.geometry.joint_rotations import turned, turns_between
 from airborne.geometry.rotations import angles_from_matrix
 
 Array = NDArray[np.floating]

@@ -31,7 +31,7 @@ from airborne.body.model import (
 )
 from airborne.errors import BodyError, one_line
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
-from airborne.reading import listed_keys, read_toml
+from airborne.io.text import listed_keys, read_toml
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]

@@ -1,35 +1,22 @@
-"""Cameras and how they are found.
+"""Cameras: what a camera is, and its files.
 
-In come control points, calibration files or detections; out go `Camera` and `Rig`, and a `Calibration` that says how
-far to trust them. Knows no video, no body and no trial.
+In come calibration files of any known format, detections and clicks; out go `Camera`, `Rig` and points in pictures.
+Knows no video, no body and no trial, and finds no camera: that is `calibration`.
 """
 
-from airborne.cameras.calibration import Calibration, CameraFit, calibrate
 from airborne.cameras.camera import Camera, Rig, aimed
-from airborne.cameras.control_points import ControlPoints, read_control_points
 from airborne.cameras.detections import Detections, read_detections
 from airborne.cameras.files import read_rig, write_pose2sim, write_rig
-from airborne.cameras.formats.given import PixelCount
-from airborne.cameras.report import describe, to_dict
-from airborne.cameras.resection import Mending, mend
+from airborne.cameras.formats.options import PixelCount
 
 __all__ = [
-    "Calibration",
     "Camera",
-    "CameraFit",
-    "ControlPoints",
     "Detections",
-    "Mending",
     "PixelCount",
     "Rig",
     "aimed",
-    "calibrate",
-    "describe",
-    "mend",
-    "read_control_points",
     "read_detections",
     "read_rig",
-    "to_dict",
     "write_pose2sim",
     "write_rig",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.errors import CalibrationError
-from airborne.reading import read_csv
+from airborne.io.text import read_csv
 
 Array = NDArray[np.floating]
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.cameras.formats.openpose import camera_folders, number_at_end, read_folder, write_folders
-from airborne.cameras.npz import read_arrays, write_arrays
 from airborne.errors import CalibrationError
+from airborne.io.npz import read_arrays, write_arrays
 
 Array = NDArray[np.floating]
 

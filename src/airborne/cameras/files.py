@@ -10,18 +10,18 @@ from pathlib import Path
 from typing import Any
 
 from airborne.cameras.camera import Rig
-from airborne.cameras.diagnosis.units import FARTHEST_M, odd_distances, widest
 from airborne.cameras.formats.aniposelib import aniposelib_text
 from airborne.cameras.formats.caliscope import caliscope_loses, caliscope_text, rig_from_caliscope
 from airborne.cameras.formats.dlt import dlt_loses, dlt_text, is_dlt, rig_from_dlt
-from airborne.cameras.formats.given import Given, PixelCount, Size, Unit
 from airborne.cameras.formats.opencv import document_of, easymocap_texts, halves_of, opencv_text, rig_from_opencv
+from airborne.cameras.formats.options import Given, PixelCount, Size, Unit
 from airborne.cameras.formats.pose2sim import pose2sim_text, rig_from_tables
 from airborne.cameras.formats.qualisys import qualisys_text, rig_from_qualisys
 from airborne.cameras.formats.vicon import rig_from_vicon, vicon_loses, vicon_text
 from airborne.cameras.formats.xml import root_of
+from airborne.cameras.units import FARTHEST_M, odd_distances, widest
 from airborne.errors import CalibrationError
-from airborne.reading import parsed_toml
+from airborne.io.text import parsed_toml
 
 LARGEST_FILE_BYTES = 2_000_000  # a hundred cameras take a tenth of it
 

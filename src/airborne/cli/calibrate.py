@@ -76,27 +76,30 @@ def calibrate(
 def _from_control_points(
     points: Path, size: str | None, output: Path, method: Literal["lm", "annealing"], as_json: bool
 ) -> None:
-    from airborne import cameras
+    from airborne.calibration import calibrate as calibrate_cameras
+    from airborne.calibration import read_control_points
+    from airborne.calibration.points_report import describe, to_dict
+    from airborne.cameras import write_pose2sim
 
     if size is None:
         raise AirborneError("--size is missing: give the image size in pixels, such as 768x576")
-    table = cameras.read_control_points(points)
-    calibration = cameras.calibrate(table, _sizes(size, table.cameras), method=method)
-    cameras.write_pose2sim(output, calibration.rig, errors_px={fit.name: fit.rms_px for fit in calibration.fits})
-    print(json.dumps(cameras.to_dict(calibration)) if as_json else cameras.describe(calibration))
+    table = read_control_points(points)
+    calibration = calibrate_cameras(table, _sizes(size, table.cameras), method=method)
+    write_pose2sim(output, calibration.rig, errors_px={fit.name: fit.rms_px for fit in calibration.fits})
+    print(json.dumps(to_dict(calibration)) if as_json else describe(calibration))
     if not as_json:
         print(f"written: {output}")
 
 
 def _read(path: Path) -> Any:
-    from airborne.calibrating import read_sources
+    from airborne.calibration import read_sources
 
     return read_sources(path)
 
 
 def _short_form(videos: list[Path], board: Path, timestamps: Path | None, fisheye: bool) -> Any:
     """Return the sources of a board seen by videos, or by folders of pictures; cameras are named like these."""
-    from airborne.calibrating import sources_from
+    from airborne.calibration import sources_from
 
     kinds = [{"pictures" if path.is_dir() else "video": str(path.resolve())} for path in videos]
     lens = "fisheye" if fisheye else "brown"
@@ -107,12 +110,12 @@ def _short_form(videos: list[Path], board: Path, timestamps: Path | None, fishey
 
 def _scene(files: list[Path], court: str | None, wand_m: float | None, size: str | None) -> Any:
     """Return the sources of one table: clicked points of a court, or a wand's tracks (cameras as --size names them)."""
-    from airborne.calibrating import sources_from
-    from airborne.cameras import read_control_points
-    from airborne.cameras.court import court_points
+    from airborne.calibration import sources_from
+    from airborne.calibration.sources.control_points import read_control_points
+    from airborne.calibration.sources.court import court_points
+    from airborne.calibration.sources.wand import LENGTH_RANGE_M
     from airborne.cameras.formats.dltdv import read_xypts
-    from airborne.cameras.formats.given import Given
-    from airborne.cameras.wand import LENGTH_RANGE_M
+    from airborne.cameras.formats.options import Given
 
     if len(files) != 1 or (court is None) == (wand_m is None):
         raise AirborneError("--court and --wand go with one table each; for several sources write a file of sources")
@@ -142,18 +145,20 @@ def _metres(text: str) -> float:
 
 
 def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> None:
-    from airborne import calibrating
+    from airborne.calibration import calibrate_from
+    from airborne.calibration.report import describe, to_dict
+    from airborne.calibration.residual_figures import write_pictures
     from airborne.cameras import write_pose2sim
 
     with _Phases() as phases:
-        found = calibrating.calibrate_from(sources, phases)
-    told = calibrating.to_dict(found)
+        found = calibrate_from(sources, phases)
+    told = to_dict(found)
     write_pose2sim(
         output, found.rig, errors_px={name: told["cameras"][name]["rms_px"] or 0.0 for name in found.rig.names}
     )
-    pictures = calibrating.write_pictures(folder, found)
+    pictures = write_pictures(folder, found)
     (folder / "report.json").write_text(json.dumps(told, indent=1), encoding="utf-8")
-    print(json.dumps(told) if as_json else calibrating.describe(found))
+    print(json.dumps(told) if as_json else describe(found))
     if not as_json:
         print(f"written: {output}\nreport: {folder / 'report.json'} and {len(pictures)} pictures beside it")
 

@@ -38,8 +38,8 @@ def convert(
     Example: airborne convert dltCoefs.csv calib.toml --size 1920x1080 --origin lower-left
     """
     from airborne.cameras.formats import Given, PixelCount
-    from airborne.conversion import FORMATS, Wishes
-    from airborne.conversion import convert as convert_file
+    from airborne.export.conversion import FORMATS, Wishes
+    from airborne.export.conversion import convert as convert_file
 
     if to is not None and to not in FORMATS:
         raise AirborneError(f"--to {to}: no such format; choose from {', '.join(FORMATS)}")

@@ -30,7 +30,7 @@ def export(
 
     Example: airborne export results --c3d --trc
     """
-    from airborne.exporting import export_run
+    from airborne.run.export import export_run
 
     given = {"c3d": c3d, "trc": trc, "mot": mot, "osim": osim, "gltf": gltf, "bvh": bvh, "csv": csv, "parquet": parquet}
     with progress("exporting") as report:

@@ -19,14 +19,15 @@ def reproduce_rigid(
 
     Example: airborne reproduce rigid -o rigid
     """
-    from airborne.reproduction import rigid
+    from airborne.reproduction.rigid.experiment import describe
+    from airborne.reproduction.rigid.experiment import reproduce_rigid as reproduce
 
     try:
         with progress("tracking") as report:
-            summary = rigid.reproduce_rigid(output, quick=quick, progress=report)
+            summary = reproduce(output, quick=quick, progress=report)
     except KeyboardInterrupt:
         stopped(f"the files finished so far are in {output}")
-    print((output / "summary.json").read_text(encoding="utf-8") if as_json else rigid.describe(summary))
+    print((output / "summary.json").read_text(encoding="utf-8") if as_json else describe(summary))
     if not as_json:
         print(f"results: {output}")
 
@@ -42,15 +43,14 @@ def reproduce_blockjump(
 
     A command that was stopped goes on where it was. Example: airborne reproduce blockjump -o blockjump
     """
-    from airborne.reproduction import block_jump
+    from airborne.reproduction.block.experiment import describe
+    from airborne.reproduction.block.experiment import reproduce_blockjump as reproduce
 
     try:
         with progress("tracking") as report:
-            summary = block_jump.reproduce_blockjump(
-                output, quick=quick, progress=report, n_processes=processes, n_seeds=seeds
-            )
+            summary = reproduce(output, quick=quick, progress=report, n_processes=processes, n_seeds=seeds)
     except KeyboardInterrupt:
         stopped(f"give the same command again to go on; sequences in {output}")
-    print((output / "summary.json").read_text(encoding="utf-8") if as_json else block_jump.describe(summary))
+    print((output / "summary.json").read_text(encoding="utf-8") if as_json else describe(summary))
     if not as_json:
         print(f"results: {output}")

@@ -51,7 +51,7 @@ def evaluate(
 
     Example: airborne evaluate results truth.csv --digitised digitised.csv --repeat results2
     """
-    from airborne.assessment import agree, assess
+    from airborne.run.evaluate import agree, assess
 
     others = repeat or joint_angles
     found = {} if others and not (truth or digitised or joints) else assess(results, truth, digitised, joints)

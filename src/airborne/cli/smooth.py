@@ -12,7 +12,7 @@ from airborne.cli.console import Json, progress
 from airborne.errors import ResultError
 
 if TYPE_CHECKING:
-    from airborne.motion.smoothing import Smoothing
+    from airborne.motion.smoothing.smoother import Smoothing
 
 
 def smooth(
@@ -38,7 +38,7 @@ def smooth(
     Example: airborne smooth results --butterworth 6 --fill 0.1
     """
     from airborne.export.summary import plain
-    from airborne.smoothing import smooth_run
+    from airborne.run.smooth import smooth_run
 
     how = _how(butterworth, spline=spline, kalman=kalman, fill_s=fill, resample_hz=resample)
     with progress("smoothing") as report:
@@ -47,7 +47,7 @@ def smooth(
 
 
 def _how(butterworth: str | None, *, spline: bool, kalman: bool, fill_s: float, resample_hz: float | None) -> Smoothing:
-    from airborne.motion.smoothing import Smoothing
+    from airborne.motion.smoothing.smoother import Smoothing
 
     if (butterworth is not None) + spline + kalman != 1:
         raise ResultError("say how to smooth, one way: --butterworth 6, --butterworth auto, --spline or --kalman")

@@ -29,8 +29,8 @@ def sync(
 
     Example: airborne sync trial.toml --by flash
     """
-    from airborne.synchronising import synchronise, write_offsets
-    from airborne.trial import read_trial
+    from airborne.sync.from_trial import synchronise, write_offsets
+    from airborne.trial.file import read_trial
 
     with progress("synchronising: pictures read") as report:
         found = synchronise(

@@ -14,8 +14,8 @@ from airborne.cli.results import evaluate
 from airborne.errors import AirborneError
 
 if TYPE_CHECKING:
-    from airborne.pipeline import Run
-    from airborne.players_pipeline import PlayersRun
+    from airborne.run.body_tracking import Run
+    from airborne.run.players_tracking import PlayersRun
 
 
 def demo(
@@ -26,7 +26,7 @@ def demo(
 
     Example: airborne demo
     """
-    from airborne.examples import example_trial
+    from airborne.trial.examples import example_trial
 
     trial = example_trial("thrown_cross")
     _forget_demo(trial, output)
@@ -40,8 +40,8 @@ def demo(
 
 def _forget_demo(path: Path, output: Path) -> None:
     """Let the demo be run again in its own folder; a folder with any other run is left alone."""
-    from airborne.pipeline import holds_run_of
-    from airborne.trial import read_trial
+    from airborne.run.body_tracking import holds_run_of
+    from airborne.trial.file import read_trial
 
     if holds_run_of(read_trial(path), output):
         (output / "motion.csv").unlink(missing_ok=True)
@@ -92,9 +92,9 @@ def _track(
     cameras: str | None = None,
     live: bool = False,
 ) -> Run | PlayersRun:
-    from airborne import pipeline
-    from airborne.players_pipeline import track_players
-    from airborne.trial import read_trial
+    from airborne.run.body_tracking import track as track_body
+    from airborne.run.players_tracking import track_players
+    from airborne.trial.file import read_trial
 
     names = None if cameras is None else [name.strip() for name in cameras.split(",") if name.strip()]
     if names == []:
@@ -106,7 +106,7 @@ def _track(
         with progress(f"tracking {trial.name}") as report:
             if trial.has_players:
                 return track_players(trial, output, resume=resume, live=live, pictures=pictures, progress=report)
-            return pipeline.track(trial, output, resume=resume, pictures=pictures, progress=report)
+            return track_body(trial, output, resume=resume, pictures=pictures, progress=report)
     except KeyboardInterrupt:
         if live and not output.exists():
             stopped("not every camera had shown a picture yet, so nothing is written")
@@ -148,8 +148,8 @@ def fit_body(
 
     Example: airborne fit-body trial.toml -o person.toml
     """
-    from airborne.fitting import described, fit_person
-    from airborne.trial import read_trial
+    from airborne.body_fitting.from_trial import described, fit_person
+    from airborne.trial.file import read_trial
 
     with progress("reading and fitting") as report:
         fitted = fit_person(
@@ -163,7 +163,7 @@ def bench(as_json: Json = False) -> None:
 
     Example: airborne bench
     """
-    from airborne.bench import measure_speed
+    from airborne.run.bench import measure_speed
 
     found = measure_speed()
     print(json.dumps(found) if as_json else "\n".join(f"{name}: {value:.3g}" for name, value in found.items()))

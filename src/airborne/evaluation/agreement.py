@@ -22,7 +22,7 @@ from scipy.stats import chi2, norm, t
 
 from airborne.evaluation.compare import without_nan
 from airborne.evaluation.icc import Reliability, reliability
-from airborne.motion.jump import UNKNOWN, Measured
+from airborne.motion.jumps.jump import UNKNOWN, Measured
 
 Array = NDArray[np.floating]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from airborne.evaluation.agreement import Agreement
 from airborne.evaluation.icc import Reliability
 from airborne.evaluation.repeatability import Repeatability
-from airborne.motion.jump import Measured
+from airborne.motion.jumps.jump import Measured
 from airborne.motion.tables import cell
 
 Row = dict[str, object]

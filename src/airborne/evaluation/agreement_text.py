@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from airborne.evaluation.agreement import Agreement
 from airborne.evaluation.compare import or_dash
 from airborne.evaluation.repeatability import Repeatability
-from airborne.motion.jump import Measured
+from airborne.motion.jumps.jump import Measured
 
 _REFERENCES = (
     "Bland JM, Altman DG (1999) Measuring agreement in method comparison studies. Stat Methods Med Res 8:135-160.",

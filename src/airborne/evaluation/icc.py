@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, f
 
-from airborne.motion.jump import UNKNOWN, Measured
+from airborne.motion.jumps.jump import UNKNOWN, Measured
 
 Array = NDArray[np.floating]
 

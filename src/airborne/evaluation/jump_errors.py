@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from airborne.motion.jump import Jump
-from airborne.motion.jumps import jumps
+from airborne.motion.jumps.heights import jumps
+from airborne.motion.jumps.jump import Jump
 from airborne.motion.players import PlayersMotion
 
 HEIGHTS = ("foot_height_m", "hip_height_m", "flight_time_height_m", "takeoff_speed_height_m", "hip_rise_m")

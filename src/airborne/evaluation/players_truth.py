@@ -9,8 +9,8 @@ import numpy as np
 
 from airborne.errors import ResultError
 from airborne.evaluation.table import read_table
+from airborne.io.text import read_json
 from airborne.motion.players import PlayersMotion
-from airborne.reading import read_json
 from airborne.tracking import Status
 
 _EXPECTED = "a truth table of players: frame, time_s, player, then x, y, z of every joint, as l_hip_x, l_hip_y, l_hip_z"

@@ -14,7 +14,7 @@ import numpy as np
 
 from airborne.evaluation.agreement import Series, Z, n_effective, plain_numbers, scaled
 from airborne.evaluation.icc import Reliability, mean_squares, reliability, standard_deviation
-from airborne.motion.jump import UNKNOWN, Measured
+from airborne.motion.jumps.jump import UNKNOWN, Measured
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

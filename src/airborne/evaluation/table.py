@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.errors import ResultError
-from airborne.reading import read_csv
+from airborne.io.text import read_csv
 
 _LARGEST = 1e15  # of any number in a table: a whole number is exact up to here
 

@@ -20,7 +20,7 @@ from airborne.evaluation.table import read_table
 from airborne.geometry.rotations import angles_from_matrix, geodesic, is_near_singular, matrix_from_angles, wrapped
 from airborne.motion import Motion, PlayersMotion, landmarks
 from airborne.motion.angles import ANGLES
-from airborne.motion.jump import Jump
+from airborne.motion.jumps.jump import Jump
 
 Array = NDArray[np.floating]
 Key = tuple[str, str]  # name of the variable, and the individual

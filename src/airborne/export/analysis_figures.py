@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from airborne.evaluation import Agreement, Series
 from airborne.export import panels
-from airborne.motion.signals import ResidualAnalysis
+from airborne.motion.smoothing import ResidualAnalysis
 
 Array = NDArray[np.floating]
 

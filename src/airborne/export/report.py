@@ -11,7 +11,7 @@ from airborne.export import page
 from airborne.export.palette import STATUS_RGB, web
 from airborne.export.summary import headline, plain, warnings
 from airborne.motion import Motion
-from airborne.motion.flight import GRAVITY_M_S2
+from airborne.motion.flight.momentum_table import GRAVITY_M_S2
 from airborne.tracking import Status
 
 PICTURES = {  # titles and captions, in the order of the page

@@ -8,20 +8,14 @@ Knows no camera, no image and no truth.
 
 from airborne.motion.angles import angles
 from airborne.motion.files import MotionWriter, read_estimates, read_motion
-from airborne.motion.flight import FlightSummary, flight, flight_summary, has_inertias
+from airborne.motion.flight.momentum_table import FlightSummary, flight, flight_summary, has_inertias
 from airborne.motion.joints import joint_angles, landmarks
-from airborne.motion.jump import Jump
-from airborne.motion.jump_table import write_jumps
-from airborne.motion.jumps import jumps
+from airborne.motion.jumps.heights import jumps
+from airborne.motion.jumps.jump import Jump
+from airborne.motion.jumps.table import write_jumps
 from airborne.motion.motion import Motion, dataset
 from airborne.motion.players import PlayersMotion, PlayersWriter, read_players, write_players_parquet
-from airborne.motion.tables import (
-    write_angles,
-    write_flight,
-    write_joint_angles,
-    write_joints,
-    write_motion_parquet,
-)
+from airborne.motion.tables import write_angles, write_flight, write_joint_angles, write_joints, write_motion_parquet
 
 __all__ = [
     "FlightSummary",

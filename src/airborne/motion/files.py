@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from airborne.body import Pose
 from airborne.errors import ResultError
+from airborne.motion.covariance_file import NAME as SIDECAR
+from airborne.motion.covariance_file import CovarianceWriter, read_covariances
 from airborne.motion.motion import Motion, rigid_transform
-from airborne.motion.sidecar import NAME as SIDECAR
-from airborne.motion.sidecar import CovarianceWriter, read_covariances
 from airborne.motion.tables import cell, motion_columns
 from airborne.tracking import Estimate, Status
 

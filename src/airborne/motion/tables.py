@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.motion.angles import ANGLES, angles
-from airborne.motion.flight import flight
+from airborne.motion.flight.momentum_table import flight
 from airborne.motion.joints import joint_angles, landmarks
 from airborne.motion.motion import Motion
 

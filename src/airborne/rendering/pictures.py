@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.rendering.render import Rendering
+from airborne.rendering.drawing import Rendering
 
 Picture = NDArray[np.uint8]
 

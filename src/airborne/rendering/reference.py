@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from airborne.body import Geometry, PosedBody
 from airborne.cameras import Camera
+from airborne.rendering.drawing import Rendering
 from airborne.rendering.lights import Lamp, Lights
-from airborne.rendering.render import Rendering
 
 Array = NDArray[np.floating]
 

@@ -1,10 +1,10 @@
 """A paper's experiment made anew: in comes nothing but choices, out comes its table beside ours; reads no recording."""
 
-from airborne.reproduction.block_jump import reproduce_blockjump
-from airborne.reproduction.curves import Curve, convergence, half_width
-from airborne.reproduction.rigid import reproduce_rigid
-from airborne.reproduction.sensitivity import CASES, Case
-from airborne.reproduction.somersaults import METHODS, Errors, Experiment, experiment, tracked
+from airborne.reproduction.block.experiment import reproduce_blockjump
+from airborne.reproduction.rigid.curves import Curve, convergence, half_width
+from airborne.reproduction.rigid.experiment import reproduce_rigid
+from airborne.reproduction.rigid.sensitivity import CASES, Case
+from airborne.reproduction.rigid.somersaults import METHODS, Errors, Experiment, experiment, tracked
 
 __all__ = [
     "CASES",

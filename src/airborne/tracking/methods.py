@@ -13,10 +13,10 @@ from airborne.body import BodyModel, Pose, geometry
 from airborne.body.colours import with_sampled_colours
 from airborne.rendering import FLAT, RULES, Lights, render
 from airborne.tracking import predictors
-from airborne.tracking.direct import Direct, Search, simplex_search, stepping_search
-from airborne.tracking.lateness import InTime
-from airborne.tracking.refined import Refined
-from airborne.tracking.stepping import VRule
+from airborne.tracking.direct_search.stepping import VRule
+from airborne.tracking.direct_search.trackers import Direct, Search, simplex_search, stepping_search
+from airborne.tracking.model_based.refined import Refined
+from airborne.tracking.time_offsets import InTime
 from airborne.tracking.tracker import Tracker
 from airborne.video import Frames
 

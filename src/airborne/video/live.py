@@ -14,10 +14,10 @@ from airborne.cameras import Rig
 from airborne.errors import VideoError
 from airborne.video.decoding import Picture, VideoFacts, VideoSource, facts_of, on_grid, sound_frames
 from airborne.video.frames import Frames, View
-from airborne.video.kept import KnownColours, kept_view
-from airborne.video.lens import Lens, lens_of
+from airborne.video.lazy import KnownColours, kept_view
 from airborne.video.recording import check_sizes
 from airborne.video.sources import LOOK_S, Kind, kind_of, opened_live
+from airborne.video.undistortion import Lens, lens_of
 
 N_KEPT = 16  # newest pictures of a camera that wait to be matched
 PATIENCE_S, PATIENCE_PERIODS = 0.25, N_KEPT - 4  # how long a picture waits for those of the other cameras, at most

@@ -12,12 +12,12 @@ from typing import Literal, get_args
 
 from airborne.cameras import Camera, Rig
 from airborne.errors import VideoError
-from airborne.video.ahead import ahead
 from airborne.video.decoding import Picture, VideoFacts, VideoSource, inspect, pictures, rgb_from_picture
 from airborne.video.fields import fill_rows
 from airborne.video.frames import Frames, View
-from airborne.video.kept import KnownColours, kept_view
-from airborne.video.lens import Lens, lens_of
+from airborne.video.lazy import KnownColours, kept_view
+from airborne.video.prefetch import ahead
+from airborne.video.undistortion import Lens, lens_of
 
 FieldsAs = Literal["rows", "interpolated"]
 

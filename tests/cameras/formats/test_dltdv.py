@@ -8,10 +8,10 @@ from hypothesis.extra.numpy import arrays
 
 from airborne.cameras import Detections, PixelCount
 from airborne.cameras.formats.dltdv import Digitisation, is_xypts, placed, read_digitisation, write_digitisation
-from airborne.cameras.formats.given import Given
+from airborne.cameras.formats.options import Given
 from airborne.errors import CalibrationError
-from tests.cameras.examples import LENS, scattered, three_cameras
-from tests.tolerances import EXACT, ROUNDTRIP
+from tests.support.cameras import LENS, scattered, three_cameras
+from tests.support.tolerances import EXACT, ROUNDTRIP
 
 RIG = three_cameras(LENS)
 SIZES = {f"cam{k}": (768, 576) for k in (1, 2, 3)}

@@ -15,10 +15,10 @@ from scipy.spatial.transform import Rotation
 
 from airborne.cameras import PixelCount, Rig, read_rig, write_rig
 from airborne.errors import CalibrationError
-from tests.cameras.examples import LENS, three_cameras
-from tests.cameras.formats.rigs import assert_same, seen_points
 from tests.cameras.formats.test_round_trips import FISHEYE_LENS, fisheye_rig
-from tests.tolerances import ROUNDTRIP
+from tests.support.cameras import LENS, three_cameras
+from tests.support.format_rigs import assert_same, seen_points
+from tests.support.tolerances import ROUNDTRIP
 
 PX = 1e3 * ROUNDTRIP  # of pixels that count in hundreds
 RIG = three_cameras(LENS)

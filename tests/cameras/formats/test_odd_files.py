@@ -7,8 +7,8 @@ import pytest
 
 from airborne.cameras import read_rig, write_rig
 from airborne.errors import CalibrationError
-from tests.cameras.examples import LENS, three_cameras
-from tests.cameras.formats.rigs import assert_same
+from tests.support.cameras import LENS, three_cameras
+from tests.support.format_rigs import assert_same
 
 RIG = three_cameras(LENS * [1, 1, 0, 0, 1])
 XML_BOMB = '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "b">]><calibration><cameras/></calibration>'

@@ -8,7 +8,7 @@ import pytest
 from airborne.cameras import Detections, read_detections
 from airborne.cameras.detections import cameras_in, write_detections
 from airborne.errors import CalibrationError
-from tests.cameras.people import four_cameras, seen, walking
+from tests.support.people_seen import four_cameras, seen, walking
 
 
 def some():

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from airborne.cameras import PixelCount, Rig, read_rig, write_rig
 from airborne.errors import CalibrationError
-from tests.cameras.examples import LENS, three_cameras
-from tests.cameras.formats.rigs import PLAIN_NAMES, assert_same, rigs
+from tests.support.cameras import LENS, three_cameras
+from tests.support.format_rigs import PLAIN_NAMES, assert_same, rigs
 
 FEW = settings(
     max_examples=25, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from airborne.cameras.camera import Rig
-from airborne.cameras.formats.given import METRES, Unit
+from airborne.cameras.formats.options import METRES, Unit
 from airborne.cameras.formats.toml import table_lines, toml
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from airborne.cameras.camera import Rig
-from airborne.cameras.formats.given import Given
+from airborne.cameras.formats.options import Given
 from airborne.cameras.formats.toml import camera_from_table, table_lines, toml
 from airborne.errors import CalibrationError
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from airborne.cameras.camera import Camera, Rig
 from airborne.cameras.dlt import coefficients, decompose_with_skew
-from airborne.cameras.formats.building import LARGEST, build, whole_size
-from airborne.cameras.formats.given import METRES, Given, PixelCount, Unit
+from airborne.cameras.formats.options import METRES, Given, PixelCount, Unit
+from airborne.cameras.formats.parsing import LARGEST, build, whole_size
 from airborne.cameras.formats.xml import number
 from airborne.errors import CalibrationError
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from airborne.cameras.camera import Rig
 from airborne.cameras.detections import Detections
-from airborne.cameras.formats.given import Given
+from airborne.cameras.formats.options import Given
 from airborne.errors import CalibrationError
-from airborne.reading import read_csv
+from airborne.io.text import read_csv
 
 Array = NDArray[np.floating]
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.cameras.camera import Camera, Rig
-from airborne.cameras.formats.building import build, numbers, refuse_fisheye, terms
-from airborne.cameras.formats.given import METRES, Given, Size, Unit
+from airborne.cameras.formats.options import METRES, Given, Size, Unit
+from airborne.cameras.formats.parsing import build, numbers, refuse_fisheye, terms
 from airborne.errors import CalibrationError
 
 Array = NDArray[np.floating]

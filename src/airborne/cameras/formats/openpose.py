@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.errors import CalibrationError
-from airborne.reading import read_json
+from airborne.io.text import read_json
 
 Array = NDArray[np.floating]
 

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping
 
 from airborne.cameras.camera import Rig
-from airborne.cameras.formats.given import Given
+from airborne.cameras.formats.options import Given
 from airborne.cameras.formats.toml import camera_from_table, has_fifth_term, table_lines, toml, toml_key
 from airborne.errors import CalibrationError
-from airborne.reading import listed_keys
+from airborne.io.text import listed_keys
 
 OF_A_CAMERA = {"matrix", "rotation", "translation"}
 NOT_CAMERAS = ("metadata", "capture_volume", "charuco", "checkerboard")

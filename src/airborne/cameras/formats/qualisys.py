@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from airborne.cameras.camera import Camera, Rig
-from airborne.cameras.formats.building import build, refuse_fisheye, whole_size
-from airborne.cameras.formats.given import Given
+from airborne.cameras.formats.options import Given
+from airborne.cameras.formats.parsing import build, refuse_fisheye, whole_size
 from airborne.cameras.formats.xml import attribute_numbers, xml_text
 from airborne.errors import CalibrationError
 

@@ -8,7 +8,7 @@ import re
 import numpy as np
 
 from airborne.cameras.camera import Camera
-from airborne.cameras.formats.building import build, numbers, terms, whole_size
+from airborne.cameras.formats.parsing import build, numbers, terms, whole_size
 
 ROTATIONS = ((3,), (3, 3))
 TERMS = {False: ((4,), (5,)), True: ((4,),)}  # by whether the lens is a fisheye

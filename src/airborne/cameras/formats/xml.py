@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from airborne.cameras.formats.building import LARGEST
+from airborne.cameras.formats.parsing import LARGEST
 from airborne.errors import CalibrationError
 
 

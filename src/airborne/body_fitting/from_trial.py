@@ -1,0 +1,172 @@
+"""A person's own body from a trial: detections -> a few frames -> `tracking.body_fit` -> a body file and a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import BodyModel, Pose, geometry
+from airborne.body.files import write_body
+from airborne.body.inverse_kinematics import CORE
+from airborne.body_fitting.fit import BodyFit, Sighting, fit_body
+from airborne.cameras.clicks import read_places
+from airborne.errors import TrialError
+from airborne.export.views import close_up, seen_by
+from airborne.rendering import FLAT, render
+from airborne.run.body_tracking import open_trial
+from airborne.run.first_pose import WEIGHTS, landmarks_over_time
+from airborne.trial.file import Trial
+from airborne.video import Frames, Recording
+
+Array = NDArray[np.floating]
+Progress = Callable[[str, int, int], None]  # what is being done, how far, of how many
+
+N_SCENERY = 10  # further frames that show the scene without the person
+PICTURE = "fit_body.png"
+_CELL_PX, _CELL_SCALE = 400, 0.4  # a cell of the picture, and its pixels in those of `close_up`
+_LINE_RGB, _EMPTY_GREY = (255, 230, 0), 60
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """What fitting a trial's person leaves."""
+
+    fit: BodyFit
+    frames: tuple[int, ...]  # that it was fitted to
+    picture: Path
+
+
+def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: Progress | None = None) -> Fitted:
+    """Fit a trial's body to the person that its pictures show; write the body file, and beside it `fit_body.png`.
+
+    Where the trial's joints are known comes from the detections of its [start], or for one frame from its joints_m.
+    Raises an AirborneError for input that cannot be used.
+    """
+    if n_frames < 1:
+        raise TrialError(f"frames is {n_frames}; expected at least 1 frame to fit the body to")
+    told = progress or (lambda what, done, total: None)
+    model = trial.model()
+    recording, _ = open_trial(trial)
+    known = _known(trial, recording)
+    chosen, around = _chosen(trial, known, n_frames)
+    sightings = _read(recording, known, sorted({*chosen, *around}), told)
+    missing = [index for index in chosen if index not in sightings]
+    if missing:
+        raise TrialError(f"{trial.name}: the videos end before frame {missing[0]}, which has detections")
+    fit = fit_body(
+        model,
+        [sightings[index] for index in chosen],
+        scenery=[sightings[index] for index in around if index in sightings],
+        weights=WEIGHTS,
+        mass_kg=trial.body.mass_kg,
+        progress=lambda done, total: told("fitting", done, total),
+    )
+    picture = output.with_name(PICTURE)
+    write_body(output, fit.model)
+    picture.write_bytes(_contact_sheet(fit, [sightings[index].frames for index in chosen]))
+    return Fitted(fit, tuple(chosen), picture)
+
+
+def described(fitted: Fitted) -> str:
+    """Say in a few lines what was found."""
+    fit = fitted.fit
+    lines = [f"fitted to frames {', '.join(map(str, fitted.frames))}", "segment     length  girth (two across)"]
+    for stem, length in fit.lengths.items():
+        wide, deep = fit.girths[stem]
+        girth = f"{wide:.2f}" if wide == deep else f"{wide:.2f} {deep:.2f}"
+        lines.append(f"{stem:<12}{length:5.2f}   {girth}")
+    borders = [f"{stem} at {border.share:.2f}" for stem, border in fit.borders.items()]
+    lines.append(f"colours change along: {', '.join(borders) or 'no segment'}")
+    seen: dict[str, str] = {}
+    for part in fit.model.parts:
+        if part.colour is not None:
+            name = part.name.replace("_left", "").replace("_right", "")
+            seen[name] = " ".join(f"{value:.0f}" for value in part.colour)
+    lines.append("sRGB: " + "; ".join(f"{name} {colour}" for name, colour in seen.items()))
+    before, after = fit.rms_light
+    lines.append(f"residual: {before * 255:.2f} to {after * 255:.2f} (linear light, 0 to 255)")
+    before, after = fit.landmark_rms_m
+    lines.append(f"joints: {before * 1e3:.0f} to {after * 1e3:.0f} mm off (RMS)")
+    return "\n".join(lines)
+
+
+def _known(trial: Trial, recording: Recording) -> dict[int, dict[str, Array]]:
+    """Return the landmarks known at each frame of the recording: frame -> landmark -> (3,) [m]."""
+    if trial.start.detections is not None:
+        over_time = landmarks_over_time(trial, recording.rig)
+        facts, n = recording.facts[0], len(next(iter(over_time.values())))
+        per_frame = round(facts.image_rate / facts.frame_rate)
+        stop = n * per_frame if trial.track.stop is None else min(n * per_frame, trial.track.stop)
+        indices = range(trial.start.frame, stop, trial.track.every * per_frame)
+        at = {index: {name: places[index // per_frame] for name, places in over_time.items()} for index in indices}
+        return {
+            index: {name: place for name, place in places.items() if np.isfinite(place).all()}
+            for index, places in at.items()
+        }
+    if isinstance(trial.start.joints_m, dict):
+        return {trial.start.frame: {name: np.array(place) for name, place in trial.start.joints_m.items()}}
+    if trial.start.joints_m is not None:
+        return {trial.start.frame: read_places(trial.path(trial.start.joints_m))}
+    raise TrialError(f"{trial.name}: fitting the body needs known joints; give detections or joints_m under [start]")
+
+
+def _chosen(trial: Trial, known: dict[int, dict[str, Array]], n: int) -> tuple[list[int], list[int]]:
+    """Choose frames spread over the recording, the fullest of each stretch; and more to see the scene by."""
+    usable = [index for index, places in known.items() if set(CORE) <= set(places)]
+    if not usable:
+        raise TrialError(f"{trial.name}: no frame has both hips and both shoulders seen by two cameras that agree")
+    stretches = [stretch for stretch in np.array_split(np.array(usable), min(n, len(usable))) if len(stretch)]
+    chosen = []
+    for stretch in stretches:
+        middle = stretch[len(stretch) // 2]
+        chosen.append(int(max(stretch, key=lambda index: (len(known[int(index)]), -abs(int(index) - int(middle))))))
+    rest = [index for index in usable if index not in chosen]
+    around = [rest[i] for i in np.unique(np.linspace(0, len(rest) - 1, N_SCENERY).round().astype(int))] if rest else []
+    return chosen, around
+
+
+def _read(
+    recording: Recording, known: dict[int, dict[str, Array]], wanted: Sequence[int], told: Progress
+) -> dict[int, Sighting]:
+    found = {}
+    with closing(iter(recording)) as stream:
+        for frames in stream:
+            if frames.index in wanted:
+                found[frames.index] = Sighting(frames, known[frames.index])
+                told("reading", len(found), len(wanted))
+            if frames.index >= wanted[-1]:
+                break
+    return found
+
+
+def _contact_sheet(fit: BodyFit, frames: Sequence[Frames]) -> bytes:
+    """Draw the fitted body over every picture it was fitted to, as a PNG: rows are times, columns cameras."""
+    rows = []
+    for seen, pose in zip(frames, fit.poses, strict=True):
+        rows.append(np.concatenate([_cell(seen, i, fit.model, pose) for i in range(len(seen.views))], axis=1))
+    done, png = cv2.imencode(".png", np.concatenate(rows)[..., ::-1])
+    assert done, "a picture in memory can be written as PNG"
+    return png.tobytes()
+
+
+def _cell(frames: Frames, camera: int, model: BodyModel, pose: Pose) -> NDArray[np.uint8]:
+    """Show one camera's picture round the body, with lines where one part's colour meets another's or the scene."""
+    view, posed = frames.views[camera], model.with_pose(pose)
+    crop = None if view is None else close_up(view.camera, posed)
+    if view is None or crop is None:
+        return np.full((_CELL_PX, _CELL_PX, 3), _EMPTY_GREY, np.uint8)
+    middle = (_CELL_SCALE - 1) / 2
+    larger = crop.resampled(scale=(_CELL_SCALE, _CELL_SCALE), offset=(middle, middle), size=(_CELL_PX, _CELL_PX))
+    picture = seen_by(view, larger)
+    part = render(geometry(model), posed, larger, FLAT).part
+    edge = np.zeros(part.shape, bool)
+    edge[1:] |= part[1:] != part[:-1]
+    edge[:, 1:] |= part[:, 1:] != part[:, :-1]
+    picture[edge] = _LINE_RGB
+    return picture

@@ -1,0 +1,26 @@
+"""Calibration: how cameras are found, from control points or from any sources, alone or together.
+
+In come control points, or a file that names videos, pictures, tables of points and detections; out go a `Calibration`
+or a `Calibrated` rig that say how far to trust them, and their report. Knows no body and no trial.
+"""
+
+from airborne.calibration.from_points import Calibration, CameraFit, calibrate
+from airborne.calibration.from_sources import Calibrated, calibrate_from
+from airborne.calibration.initial.resection import Mending, mend
+from airborne.calibration.sources.control_points import ControlPoints, read_control_points
+from airborne.calibration.sources.files import Sources, read_sources, sources_from
+
+__all__ = [
+    "Calibrated",
+    "Calibration",
+    "CameraFit",
+    "ControlPoints",
+    "Mending",
+    "Sources",
+    "calibrate",
+    "calibrate_from",
+    "mend",
+    "read_control_points",
+    "read_sources",
+    "sources_from",
+]

@@ -1,0 +1,314 @@
+"""Robust bundle adjustment by Levenberg and Marquardt's method, and how well each number is known after it.
+
+Reduced camera equations as in Triggs et al. 2000 (Bundle adjustment - a modern synthesis); weights anew at every step;
+each source's noise scaled to its own residuals (variance components).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from airborne.calibration.bundle.equations import (
+    Normal,
+    Slopes,
+    free_frame,
+    length_residual_m,
+    normal_equations,
+    residual_px,
+    slopes_of,
+    turned_from,
+)
+from airborne.calibration.bundle.loss import BEHIND, Loss, cost_of, scale_of, weight_of
+from airborne.calibration.bundle.problem import State, Task, rig_of, sources_of, state_of, stepped, task_of, with_paths
+from airborne.calibration.bundle.source import Freedom, Prior, Source
+from airborne.calibration.bundle.uncertainty import frame_kept, redundancies, uncertainty
+from airborne.cameras.camera import Rig
+from airborne.errors import CalibrationError
+
+Array = NDArray[np.floating]
+Ints = NDArray[np.integer]
+
+MOST_STEPS, MOST_SCALINGS = 200, 12
+SETTLED = 1e-5  # of the cost, or this much alone: a step that promises less is the last
+SAME_NOISE = 0.01
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-12, 1e8
+LEAST_SCALE = 1e-6
+FEWEST_LEFT = 8  # numbers more than were fitted; fewer do not show that the noise is smaller than was said
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Adjusted:
+    """Cameras, points and targets that fit all sources best, and how far to trust them."""
+
+    rig: Rig
+    sources: tuple[Source, ...]  # as given, points and targets where they were found
+    freedom: Mapping[str, Freedom]
+    prior: Prior | None
+    residual_px: tuple[Array, ...]  # by source (n, 2), measured minus projected [px]; NaN: the point was left out
+    weight: tuple[Array, ...]  # by source (n,), 1 for what fits, near 0 for what does not
+    noise_px: tuple[float, ...]  # by source: the standard deviation found of a coordinate with sd_px 1 [px]
+    camera_sd: Array  # (cameras, 15), in the units of `lenses.NUMBERS`; 0 where held
+    covariance: Array  # of the free numbers of the cameras
+    lag_s: tuple[Array, ...]  # by source: each observation's lag (n,) [s]
+    columns: Ints  # (cameras, 15): where each number stands in the covariance; -1 where held
+    is_frame_free: bool  # nothing fixes the world: standard deviations are those within the rig
+    is_settled: bool  # False: stopped after the most steps
+
+    def rms_px(self, *, source: int | None = None, camera: int | None = None) -> float:
+        """Return the RMS distance of a source's, a camera's or all observations [px], each with its robust weight 1."""
+        rows = [
+            np.sum(r**2, axis=1)[(camera is None) | (s.camera == camera)]
+            for i, (r, s) in enumerate(zip(self.residual_px, self.sources, strict=True))
+            if source in (None, i)
+        ]
+        squares = np.concatenate([np.zeros(0), *rows])
+        return float(np.sqrt(np.nanmean(squares))) if np.isfinite(squares).any() else float("nan")
+
+    def with_noise_known(self) -> tuple[Source, ...]:
+        """Return the sources with the noise that was found as known, so that a part of them is fitted alike."""
+        return tuple(
+            replace(source, sd_px=np.asarray(source.sd_px) * noise, sd_is_known=True)
+            for source, noise in zip(self.sources, self.noise_px, strict=True)
+        )
+
+    def moved(self, new_from_old: RigidTransform, scale: float = 1.0) -> tuple[Rig, tuple[Source, ...]]:
+        """Return the rig and the sources in another world, first grown by a scale, then moved."""
+        rig = Rig(tuple(_moved_camera(camera, new_from_old, scale) for camera in self.rig))
+        return rig, tuple(_moved_source(source, new_from_old, scale) for source in self.sources)
+
+
+def adjust(
+    rig: Rig,
+    sources: Sequence[Source],
+    freedom: Mapping[str, Freedom] | Freedom | None = None,
+    *,
+    prior: Prior | None = None,
+    loss: Loss = "cauchy",
+    progress: Callable[[int, float], None] | None = None,
+) -> Adjusted:
+    """Find cameras, free points and targets from all sources at once, beginning from `rig` and the sources' starts.
+
+    freedom: what may change, for all cameras or by name (default `Freedom()`). prior: what is known of the cameras
+    beforehand. progress is told the step's number and the cost. Raises CalibrationError where nothing is measured.
+    """
+    freedoms = _by_camera(rig, freedom if freedom is not None else Freedom())
+    task = task_of(rig, sources, freedoms)
+    state = state_of(rig, sources, task)
+    if not task.is_used.any():
+        raise CalibrationError("nothing to adjust: no point is seen by enough cameras")
+    search = _Search(task, state, prior, loss, progress)
+    state, noise, is_settled = search.run(_known(sources))
+    fit = search.fit_at(state, noise)
+    found = uncertainty(task, state, fit.normal, fit.slopes, weights=fit.row_weights, residuals=fit.rows, loss=loss)
+    residuals = np.where(task.is_used[:, None], fit.residual, np.nan)
+    rows = [task.source == i for i in range(len(sources))]
+    adjusted = rig_of(rig, state)
+    cameras = tuple(
+        replace(c, shift_sd_px=float(s)) for c, s in zip(adjusted, found.shift_sd_px(task, fit.slopes), strict=True)
+    )
+    return Adjusted(
+        rig=Rig(cameras),
+        sources=sources_of(sources, state),
+        freedom=freedoms,
+        prior=prior,
+        residual_px=tuple(residuals[r] for r in rows),
+        weight=tuple(fit.weight[r] for r in rows),
+        noise_px=tuple(float(scale) for scale in noise.scale),
+        camera_sd=np.where(task.camera_columns >= 0, np.append(found.sd, 0.0)[task.camera_columns], 0.0),
+        covariance=found.covariance,
+        lag_s=tuple(np.append(state.lags, 0.0)[task.lag[r]] for r in rows),
+        columns=task.camera_columns,
+        is_frame_free=found.is_frame_free,
+        is_settled=is_settled,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fit:
+    """The equations at one state."""
+
+    residual: Array  # (n, 2) [px]
+    weight: Array  # (n,)
+    row_weights: Array
+    rows: Array  # residuals by row
+    slopes: Slopes
+    normal: Normal
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Noise:
+    """What is known of the sources' noise: (sources,)."""
+
+    scale: Array  # of the standard deviations that were given
+    effect: Array  # how many observations are worth one, because clusters err together (Kish's design effect)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Search:
+    """The descent of one task."""
+
+    task: Task
+    start: State
+    prior: Prior | None
+    loss: Loss
+    progress: Callable[[int, float], None] | None
+
+    def run(self, known: NDArray[np.bool_]) -> tuple[State, _Noise, bool]:
+        """Return the best state, the sources' noise, and whether the search came to rest."""
+        state, n_steps = self.start, 0
+        noise = self._noise(state, _Noise(np.ones(len(known)), np.ones(len(known))), known, None)
+        for _ in range(MOST_SCALINGS):
+            state, n_steps = self._descend(with_paths(self.task, state), noise, n_steps)
+            fit = self.fit_at(state, noise)
+            redundancy = redundancies(self.task, state, fit.normal, fit.slopes, weights=fit.row_weights)
+            new = self._noise(state, noise, known, redundancy)
+            change = (
+                np.abs(new.scale / noise.scale - 1).max(initial=0),
+                np.abs(new.effect / noise.effect - 1).max(initial=0),
+            )
+            noise = new
+            if max(change) < SAME_NOISE or n_steps >= MOST_STEPS:
+                return state, noise, n_steps < MOST_STEPS
+        return state, noise, n_steps < MOST_STEPS
+
+    def fit_at(self, state: State, noise: _Noise) -> _Fit:
+        """Return the weighted equations at a state."""
+        task = self.task
+        residual, s = self._squares(state, noise.scale)
+        variance = (task.sd_px * noise.scale[task.source]) ** 2 * noise.effect[task.source]
+        weight = np.where(task.is_used & np.isfinite(residual[:, 0]), weight_of(self.loss, s), 0.0)
+        row_weights = np.concatenate([np.repeat(weight / variance, 2), 1 / task.length_sd_m**2, 1 / task.lag_sd_s**2])
+        rows = np.concatenate([np.nan_to_num(residual).ravel(), length_residual_m(task, state), -state.lags])
+        slopes = slopes_of(task, state)
+        normal = normal_equations(slopes, row_weights, rows)
+        return _Fit(residual, weight, row_weights, rows, slopes, self._with_prior(normal, state))
+
+    def _descend(self, state: State, noise: _Noise, n_steps: int) -> tuple[State, int]:
+        damping, growth, cost = FIRST_DAMPING, 2.0, self._cost(state, noise)
+        while n_steps < MOST_STEPS:
+            normal = self.fit_at(state, noise).normal
+            while damping < MOST_DAMPING:
+                step, other_step, promised = _step(self.task, state, normal, damping)
+                if promised <= SETTLED * (1 + SETTLED * cost):
+                    return state, n_steps
+                tried = stepped(self.task, state, step, other_step)
+                new = self._cost(tried, noise)
+                n_steps += 1
+                if np.isfinite(new) and new < cost:
+                    break
+                damping, growth = damping * growth, growth * 2
+            else:
+                return state, n_steps
+            gain = (cost - new) / promised
+            state, cost, growth = tried, new, 2.0
+            damping = max(damping * max(1 / 10, 1 - (2 * min(gain, 1.0) - 1) ** 3), LEAST_DAMPING)
+            if self.progress is not None:
+                self.progress(n_steps, cost)
+        return state, n_steps
+
+    def _squares(self, state: State, scales: Array) -> tuple[Array, Array]:
+        """Return the residuals (n, 2) [px] and their squared distances in standard deviations (n,)."""
+        task = self.task
+        residual = residual_px(task, state)
+        s = np.sum(residual**2, axis=1) / (task.sd_px * scales[task.source]) ** 2
+        return residual, np.where(task.is_used, np.where(np.isfinite(s), s, BEHIND), 0.0)
+
+    def _cost(self, state: State, noise: _Noise) -> float:
+        _, s = self._squares(state, noise.scale)
+        lengths = np.sum((length_residual_m(self.task, state) / self.task.length_sd_m) ** 2)
+        lags = np.sum((state.lags / self.task.lag_sd_s) ** 2)
+        pixels = np.sum(cost_of(self.loss, s) / noise.effect[self.task.source])
+        return float(pixels + lengths + lags + self._prior_cost(state)) / 2
+
+    def _noise(self, state: State, noise: _Noise, known: NDArray[np.bool_], redundancy: Array | None) -> _Noise:
+        """Find the sources' noise from the residuals, as far as it is not known."""
+        residual, s = self._squares(state, np.ones(len(known)))
+        scale, effect = noise.scale.copy(), noise.effect.copy()
+        for i in range(len(known)):
+            rows = (self.task.source == i) & self.task.is_used
+            if rows.any() and not known[i]:
+                shrunk = 1.0 if redundancy is None else redundancy[i] / (2 * rows.sum())  # by what was fitted
+                least = 1.0 if redundancy is not None and redundancy[i] < FEWEST_LEFT else LEAST_SCALE
+                scale[i] = max(scale_of(self.loss, s[rows] / shrunk), least)
+            if rows.any() and redundancy is not None:
+                weight = weight_of(self.loss, s[rows] / scale[i] ** 2) / self.task.sd_px[rows] ** 2
+                effect[i] = _design_effect(weight[:, None] * np.nan_to_num(residual[rows]), self.task.cluster[rows])
+        return _Noise(scale, effect)
+
+    def _prior_residual(self, state: State) -> Array:
+        turn = turned_from(self.start.R, state.R)
+        change = [turn, state.centre - self.start.centre, state.inner - self.start.inner]
+        return np.concatenate(change, axis=1)
+
+    def _prior_cost(self, state: State) -> float:
+        if self.prior is None:
+            return 0.0
+        is_free = self.task.camera_columns >= 0
+        return float(np.sum((self._prior_residual(state) / self.prior.sd)[is_free] ** 2))
+
+    def _with_prior(self, normal: Normal, state: State) -> Normal:
+        if self.prior is None:
+            return normal
+        columns, weight = self.task.camera_columns, 1 / self.prior.sd**2
+        is_free = columns >= 0
+        cameras, side = normal.cameras.copy(), normal.camera_side.copy()
+        np.add.at(cameras, (columns[is_free], columns[is_free]), weight[is_free])
+        np.add.at(side, columns[is_free], -(weight * self._prior_residual(state))[is_free])
+        return replace(normal, cameras=cameras, camera_side=side)
+
+
+def _step(task: Task, state: State, normal: Normal, damping: float) -> tuple[Array, Array, float]:
+    """Return the step of the cameras, of the others, and by how much the cost should fall."""
+    reduced, side, factors, back = normal.reduced(damping)
+    step = np.zeros(0)
+    if len(reduced):
+        step = frame_kept(reduced, free_frame(task, state, normal, reduced)) @ side
+    other = np.zeros(0)
+    if factors is not None:
+        other = factors.solve(normal.other_side) - back @ step
+    promised = normal.camera_side @ step + normal.other_side @ other
+    promised -= (step @ normal.cameras @ step + other @ (normal.others @ other)) / 2 + step @ normal.coupling @ other
+    return step, other, float(promised)
+
+
+def _design_effect(scores: Array, cluster: Ints) -> float:
+    """Return how many observations are worth one: squared sums over clusters against sums of squares; 1 at least."""
+    own = cluster >= 0
+    total = float(np.sum(scores[own] ** 2))
+    if total == 0:
+        return 1.0
+    sums = np.zeros((int(cluster.max()) + 1, 2))
+    np.add.at(sums, cluster[own], scores[own])
+    return max(float(np.sum(sums**2)) / total, 1.0)
+
+
+def _by_camera(rig: Rig, freedom: Mapping[str, Freedom] | Freedom) -> dict[str, Freedom]:
+    if isinstance(freedom, Freedom):
+        return dict.fromkeys(rig.names, freedom)
+    missing = [name for name in rig.names if name not in freedom]
+    if missing:
+        raise CalibrationError(f"no freedom is given for camera '{missing[0]}'; given: {', '.join(freedom) or 'none'}")
+    return {name: freedom[name] for name in rig.names}
+
+
+def _known(sources: Sequence[Source]) -> NDArray[np.bool_]:
+    return np.array([source.sd_is_known for source in sources], bool)
+
+
+def _moved_camera(camera, new_from_old: RigidTransform, scale: float):
+    place = camera.camera_from_world
+    grown = RigidTransform.from_components(place.translation * scale, place.rotation)
+    return replace(camera, camera_from_world=grown * new_from_old.inv())
+
+
+def _moved_source(source: Source, new_from_old: RigidTransform, scale: float) -> Source:
+    targets = source.world_from_target
+    if targets is not None:
+        grown = RigidTransform.from_components(targets.translation * scale, targets.rotation)
+        return replace(source, world_from_target=new_from_old * grown)
+    return replace(source, points=new_from_old.apply(source.points * scale))

@@ -1,0 +1,285 @@
+"""Is this the board that was printed? The pictures are asked for another dictionary, layout, or marker size."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.calibration.sources.boards import DICTIONARIES, Board, detector_of
+from airborne.cameras.finding import Finding, listed
+
+Array = NDArray[np.floating]
+Picture = NDArray[np.uint8]
+
+MOST_PICTURES, MOST_SEARCHED = 12, 6  # spread over those given; the latter are searched for every kind of marker
+SEEN_WELL = 0.3  # share of the pictures, and of the corners in them, at which the board is as described
+FEWEST_MARKERS = 4  # in a picture that tells a layout
+FEWEST_PICTURES = 2
+CLEARLY = 2.0  # times as many markers make another dictionary the right one
+WIDEST, MOST_COMPARED = 15, 3  # columns or rows that are tried, pictures that they are tried on
+STRAIGHT_PX = 5.0  # how far a marker's middle may lie off its place on the board
+FITTING = 0.8  # share of the markers that must lie there
+RATIO_OFF = 0.12  # relative difference of the markers' size; blur makes them seem smaller
+CHESS_SIZE = (3, 3)  # inner corners of the least board looked for
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Markers:
+    """The markers of one picture."""
+
+    ids: NDArray[np.integer]  # (n,)
+    px: Array  # (n, 4, 2) [px], clockwise from the top left
+
+
+def wrong_board(board: Board, pictures: Sequence[Picture], camera: str = "") -> list[Finding]:
+    """Say what of a board's description does not match its print, by grey pictures (h, w); nothing where it is found.
+
+    Of a charuco board: the dictionary, printed in reverse, mirrored pictures, columns and rows, the markers' size. Of a
+    chessboard: its inner corners. A square's size in metres cannot be seen; the measured print must give it.
+    """
+    if not len(pictures):
+        return []
+    chosen = [pictures[i] for i in np.unique(np.linspace(0, len(pictures) - 1, MOST_PICTURES).astype(int))]
+    where = f"{camera}: " if camera else ""
+    counts = _corner_counts(board, chosen)
+    n_corners = board.inner[0] * board.inner[1]
+    shown = [count for count in counts if count]
+    if board.kind == "chessboard":
+        return [] if len(shown) >= max(SEEN_WELL * len(chosen), 1) else _wrong_chessboard(board, chosen, where, camera)
+    is_found = len(shown) >= SEEN_WELL * len(chosen) and bool(np.median(shown) >= SEEN_WELL * n_corners)
+    found = list(_wrong_charuco(board, chosen, where, camera, is_found=is_found))
+    if found or is_found:
+        return found
+    return [_unseen(board, chosen, counts, where, camera)]
+
+
+def _corner_counts(board: Board, pictures: Sequence[Picture]) -> list[int]:
+    detect = detector_of(board)
+    return [len(detect(picture).corner) for picture in pictures]
+
+
+def _unseen(board: Board, pictures: Sequence[Picture], counts: Sequence[int], where: str, camera: str) -> Finding:
+    n_shown, n_corners = sum(count > 0 for count in counts), board.inner[0] * board.inner[1]
+    return Finding(
+        kind="board",
+        what=(
+            f"{where}the board is found in {n_shown} of {len(pictures)} pictures, with {max(counts)} of its "
+            f"{n_corners} corners at most, and no other board is either"
+        ),
+        advice="show it larger, flat, sharp and without glare, with its white border free",
+        cameras=(camera,) if camera else (),
+    )
+
+
+def _wrong_charuco(
+    board: Board, pictures: Sequence[Picture], where: str, camera: str, *, is_found: bool
+) -> Iterator[Finding]:
+    about = (camera,) if camera else ()
+    if not is_found:
+        few = pictures[:: max(len(pictures) // MOST_SEARCHED, 1)]
+        n_here = _count(_all_markers(few, board.dictionary, board.is_inverted))
+        mirrored = [np.ascontiguousarray(picture[:, ::-1]) for picture in few]
+        n_mirrored = _count(_all_markers(mirrored, board.dictionary, board.is_inverted))
+        if n_mirrored >= CLEARLY * max(n_here, FEWEST_MARKERS):
+            yield Finding(
+                kind="mirrored",
+                what=f"{where}{n_here} of the board's markers are seen, {n_mirrored} once the pictures are mirrored",
+                advice="the pictures are mirrored; switch off the camera's mirror image and record or convert anew",
+                cameras=about,
+            )
+            return
+        is_own_seen = n_here >= FEWEST_MARKERS * len(few)
+        dictionary, is_inverted, n_there = ("", False, 0) if is_own_seen else _likeliest_print(board, few)
+        if n_there >= CLEARLY * max(n_here, FEWEST_MARKERS):
+            yield _other_print(board, dictionary, is_inverted, where, about, (n_here, n_there))
+            board = replace(board, dictionary=dictionary, is_inverted=is_inverted)
+    yield from _wrong_layout(board, _all_markers(pictures, board.dictionary, board.is_inverted), where, about)
+
+
+def _other_print(
+    board: Board, dictionary: str, is_inverted: bool, where: str, about: tuple[str, ...], counts: tuple[int, int]
+) -> Finding:
+    settings = [f'dictionary = "{dictionary}"'] * (dictionary != board.dictionary)
+    settings += [f"inverted = {str(is_inverted).lower()}"] * (is_inverted != board.is_inverted)
+    return Finding(
+        kind="board",
+        what=f"{where}{counts[0]} markers are seen as the board is described, {counts[1]} with {listed(settings)}",
+        advice=f"the print is another one; set {listed(settings)}",
+        cameras=about,
+    )
+
+
+def _wrong_layout(board: Board, seen: Sequence[_Markers], where: str, about: tuple[str, ...]) -> Iterator[Finding]:
+    told = [markers for markers in seen if len(markers.ids) >= FEWEST_MARKERS]
+    if len(told) < FEWEST_PICTURES:
+        return
+    fit = _fit(board, told)
+    if fit < FITTING:
+        clearest = sorted(told, key=lambda markers: -len(markers.ids))[:MOST_COMPARED]
+        best = max(_layouts(board, told), key=lambda other: _fit(other, clearest), default=board)
+        if _fit(best, told) >= FITTING:
+            said = f"{board.columns} columns and {board.rows} rows"
+            print_ = f"columns = {best.columns} and rows = {best.rows}"
+            legacy = f", legacy = {str(best.is_legacy).lower()}" if best.is_legacy != board.is_legacy else ""
+            swapped = (best.columns, best.rows) == (board.rows, board.columns)
+            yield Finding(
+                kind="board",
+                what=(
+                    f"{where}{fit:.0%} of the markers lie where a board of {said} has them, "
+                    f"{_fit(best, told):.0%} with {print_}{legacy}"
+                ),
+                advice=(
+                    f"{'columns and rows are exchanged; ' if swapped else ''}count the squares of the print and set "
+                    f"{print_}{legacy}"
+                ),
+                cameras=about,
+            )
+            board = best
+    ratio = _marker_ratio(board, told)
+    stated = board.marker_m / board.square_m
+    if np.isfinite(ratio) and abs(ratio / stated - 1) > RATIO_OFF:
+        yield Finding(
+            kind="board",
+            what=f"{where}markers are {ratio:.2f} of a square in the pictures, {stated:.2f} as described",
+            advice=f"measure the print; with these squares marker_m = {ratio * board.square_m:.4f}",
+            cameras=about,
+        )
+
+
+def _markers(picture: Picture, dictionary: str) -> _Markers:
+    finder = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary)))
+    corners, ids, _ = finder.detectMarkers(picture)
+    if ids is None:
+        return _Markers(np.zeros(0, int), np.zeros((0, 4, 2)))
+    return _Markers(np.asarray(ids, int).ravel(), np.asarray(corners, float).reshape(-1, 4, 2))
+
+
+def _count(seen: Sequence[_Markers]) -> int:
+    return sum(len(markers.ids) for markers in seen)
+
+
+def _all_markers(pictures: Sequence[Picture], dictionary: str, is_inverted: bool) -> list[_Markers]:
+    """Return every picture's markers without those of numbers that only one picture shows: chance finds."""
+    seen = [_markers(255 - picture if is_inverted else picture, dictionary) for picture in pictures]
+    ids, counts = np.unique(np.concatenate([markers.ids for markers in seen]), return_counts=True)
+    often = ids[counts >= FEWEST_PICTURES]
+    kept = [np.isin(markers.ids, often) for markers in seen]
+    return [_Markers(markers.ids[keep], markers.px[keep]) for markers, keep in zip(seen, kept, strict=True)]
+
+
+def _likeliest_print(board: Board, pictures: Sequence[Picture]) -> tuple[str, bool, int]:
+    """Return the dictionary of which most markers are seen, whether in reverse, and how many.
+
+    Of a family that only differs in its number of markers the largest is searched, the least that holds all named.
+    """
+    families = {name.rsplit("_", 1)[0]: name for name in sorted(DICTIONARIES, key=_size_of)}
+    kinds = [(name, inverted) for name in families.values() for inverted in (board.is_inverted, not board.is_inverted)]
+    found = {kind: _all_markers(pictures, *kind) for kind in kinds}
+    best, is_inverted = max(kinds, key=lambda kind: _count(found[kind]))
+    seen = found[best, is_inverted]
+    if sum(len(markers.ids) >= FEWEST_MARKERS for markers in seen) < FEWEST_PICTURES:
+        return board.dictionary, board.is_inverted, 0
+    last = max(int(markers.ids.max(initial=0)) for markers in seen)
+    if best.rsplit("_", 1)[0] == board.dictionary.rsplit("_", 1)[0] and _size_of(board.dictionary) > last:
+        return board.dictionary, is_inverted, _count(seen)
+    family = [name for name in DICTIONARIES if name.rsplit("_", 1)[0] == best.rsplit("_", 1)[0]]
+    return next(name for name in sorted(family, key=_size_of) if _size_of(name) > last), is_inverted, _count(seen)
+
+
+def _size_of(dictionary: str) -> int:
+    return len(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary)).bytesList)
+
+
+def _layouts(board: Board, told: Sequence[_Markers]) -> Iterator[Board]:
+    """Yield boards of other columns and rows that have all markers seen; a row more or less changes nothing else."""
+    last = max(int(markers.ids.max()) for markers in told)
+    for columns in range(2, WIDEST + 1):
+        fewest_rows = max(2, int(np.ceil(2 * (last + 1) / columns)))
+        for rows in {fewest_rows, fewest_rows + 1, board.rows, board.columns}:
+            for is_legacy in {board.is_legacy, not board.is_legacy}:
+                if 2 <= rows <= WIDEST and columns * rows // 2 > last:
+                    yield replace(board, columns=columns, rows=rows, is_legacy=is_legacy)
+
+
+def _plane_corners(board: Board) -> Array:
+    """Return the markers' corners in the board's plane: (markers, 4, 2) in squares, by marker."""
+    places = [
+        (column, row)
+        for row in range(board.rows)
+        for column in range(board.columns)
+        if (column + row) % 2 == (0 if board.is_legacy and board.rows % 2 == 0 else 1)
+    ]
+    half = board.marker_m / board.square_m / 2
+    corners = np.array([[-half, -half], [half, -half], [half, half], [-half, half]])
+    return np.array(places, float)[:, None] + 0.5 + corners
+
+
+def _plane_fits(board: Board, told: Sequence[_Markers]) -> Iterator[tuple[Array, Array, Array]]:
+    """Yield of every picture the homography plane -> px, and the markers' corners (n, 4, 2) in both."""
+    plane = _plane_corners(board)
+    for markers in told:
+        known = markers.ids < len(plane)
+        if known.sum() >= FEWEST_MARKERS:
+            there, px = plane[markers.ids[known]], markers.px[known]
+            H, _ = cv2.findHomography(there.reshape(-1, 2), px.reshape(-1, 2), cv2.RANSAC, STRAIGHT_PX, maxIters=200)
+            if H is not None and abs(np.linalg.det(H)) > 1e-12:
+                yield np.asarray(H, float), there, px
+
+
+def _fit(board: Board, told: Sequence[_Markers]) -> float:
+    """Return the share of the markers that lie where the board's layout has them."""
+    near = 0
+    for H, there, px in _plane_fits(board, told):
+        middles = cv2.perspectiveTransform(there.mean(axis=1)[:, None], H)[:, 0]
+        near += int((np.linalg.norm(middles - px.mean(axis=1), axis=1) < STRAIGHT_PX).sum())
+    return near / _count(told)
+
+
+def _marker_ratio(board: Board, told: Sequence[_Markers]) -> float:
+    """Return the side of a marker in squares, by the pictures; NaN where too few markers are seen."""
+    sides = []
+    for _, there, px in _plane_fits(board, told):
+        H, _ = cv2.findHomography(px.mean(axis=1), there.mean(axis=1), cv2.LMEDS)
+        if H is None:
+            continue
+        corners = cv2.perspectiveTransform(px.reshape(-1, 1, 2), H).reshape(-1, 4, 2)
+        sides.append(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=-1).ravel())
+    return float(np.median(np.concatenate(sides))) if sides else float("nan")
+
+
+def _wrong_chessboard(board: Board, pictures: Sequence[Picture], where: str, camera: str) -> list[Finding]:
+    """Look for chessboards of any size, parts of boards among them, and take the size that most pictures show whole."""
+    flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_LARGER
+    sizes = set()
+    for picture in pictures[:: max(len(pictures) // MOST_SEARCHED, 1)]:
+        is_found, _, meta = cv2.findChessboardCornersSBWithMeta(picture, CHESS_SIZE, flags)
+        if is_found and meta is not None:
+            sizes.add((min(meta.shape[:2]), max(meta.shape[:2])))
+    counts = {
+        size: sum(bool(count) for count in _corner_counts(replace(board, columns=size[0], rows=size[1]), pictures))
+        for size in sizes - {(min(board.inner), max(board.inner))}
+    }
+    short, long = max(counts, key=lambda size: (counts[size], size), default=(0, 0))
+    n_seen = counts.get((short, long), 0)
+    if n_seen < FEWEST_PICTURES:
+        return [_unseen(board, pictures, _corner_counts(board, pictures), where, camera)]
+    columns, rows = (long, short) if board.columns >= board.rows else (short, long)
+    squares = (columns + 1, rows + 1) == (board.columns, board.rows)
+    return [
+        Finding(
+            kind="board",
+            what=(
+                f"{where}no chessboard of {board.columns} by {board.rows} inner corners is seen, but one of {columns} "
+                f"by {rows} in {n_seen} of {len(pictures)} pictures"
+            ),
+            advice=(
+                f"{'squares were counted, not the inner corners; ' if squares else ''}set columns = {columns} and "
+                f"rows = {rows}"
+            ),
+            cameras=(camera,) if camera else (),
+        )
+    ]

@@ -1,0 +1,140 @@
+"""Clocks and counters that do not run on: restarts, repeats, lost pictures; and rows that are read one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.cameras.finding import Finding, listed
+from airborne.geometry.robust import SD_OF_MEDIAN_DEVIATION
+
+Array = NDArray[np.floating]
+
+SAME = 0.1  # of a period: two times closer than this are one
+GAP = 1.5  # periods: further apart, a picture is missing
+NAMED = 3  # pictures told by their number; of more only how many
+FEWEST = 5  # times that tell a period
+READOUT_S, READOUT_SDS, READOUT_PX = 0.002, 5.0, 0.3  # a readout is told that is longer, surer, shifts more
+MOST_READOUT_S = 0.1
+
+
+def odd_times(camera: str, times_s: Array) -> list[Finding]:
+    """Say where a camera's time stamps (n,) [s], in the order of its pictures, go back, repeat or leave one out."""
+    times_s = np.asarray(times_s, float)
+    if len(times_s) < FEWEST:
+        return []
+    return list(_odd_steps(camera, times_s, "time stamps", period=None))
+
+
+def odd_counter(camera: str, counts: NDArray[np.integer]) -> list[Finding]:
+    """Say where a camera's own picture counter (n,), in the order of its pictures, rolls over, repeats or jumps."""
+    if len(counts) < FEWEST:
+        return []
+    return list(_odd_steps(camera, counts.astype(float), "picture numbers", period=1.0))
+
+
+def unequal_counts(n_pictures: Mapping[str, int], n_least: int = 1) -> list[Finding]:
+    """Say which videos have another number of pictures than most; n_least: a difference that counts."""
+    values, how_often = np.unique(list(n_pictures.values()), return_counts=True)
+    if len(values) < 2:
+        return []
+    usual = int(values[np.argmax(how_often)])
+    odd = {name: n for name, n in n_pictures.items() if abs(n - usual) >= n_least}
+    if not odd:
+        return []
+    told = listed([f"{name} has {n}" for name, n in odd.items()])
+    others = listed([name for name in n_pictures if name not in odd])
+    return [
+        Finding(
+            kind="clock",
+            what=f"{told} pictures, {others} {usual}",
+            advice=(
+                "started late, ended early or lost some; without time stamps that is not known, so compare an event "
+                "that all cameras see near the end (airborne sync)"
+            ),
+            cameras=tuple(odd),
+        )
+    ]
+
+
+def _odd_steps(camera: str, values: Array, what: str, *, period: float | None) -> Iterator[Finding]:
+    steps = np.diff(values)
+    period = period or (float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0)
+    if period <= 0:
+        yield _finding(camera, f"its {what} never go forward", "they are no times; leave them out and give the rate")
+        return
+    back, same = np.flatnonzero(steps < -SAME * period), np.flatnonzero(np.abs(steps) <= SAME * period)
+    gaps = np.flatnonzero(steps > GAP * period)
+    if len(back):
+        yield _finding(
+            camera,
+            f"its {what} fall from {values[back[0]]:g} to {values[back[0] + 1]:g} {_at(back)}",
+            "a counter rolled over or the camera started anew; let it run on from there, or cut the recording there",
+        )
+    if len(same):
+        yield _finding(
+            camera,
+            f"its {what} stand still {_at(same)}",
+            "pictures were stored twice; leave the repeats out",
+        )
+    if len(gaps):
+        lost = int(np.sum(np.round(steps[gaps] / period) - 1))
+        yield _finding(
+            camera,
+            f"{lost} picture{'s are' if lost != 1 else ' is'} missing by its {what}, {_at(gaps)}",
+            "the camera lost them; go by the time stamps, do not count pictures",
+        )
+
+
+def _at(rows: NDArray[np.integer]) -> str:
+    """Say after which pictures, counted from 0."""
+    shown = ", ".join(str(row) for row in rows[:NAMED])
+    more = f" and {len(rows) - NAMED} more" if len(rows) > NAMED else ""
+    return f"after picture{'s' * (len(rows) > 1)} {shown}{more}"
+
+
+def _finding(camera: str, what: str, advice: str) -> Finding:
+    return Finding(kind="clock", what=f"{camera}: {what}", advice=advice, cameras=(camera,))
+
+
+def rolling_shutter(
+    camera: str, residual_px: Array, velocity_px_per_s: Array, row_px: Array, height_px: int
+) -> list[Finding]:
+    """Say whether a camera reads its rows one after another: moving points are then seen late, the lower the later.
+
+    residual_px (n, 2), measured minus projected; velocity (n, 2) of the points in the picture [px/s]; row_px (n,). Fits
+    `residual = velocity (offset + readout (row / height - 1/2))`.
+    """
+    known = np.isfinite(np.column_stack([residual_px, velocity_px_per_s, row_px])).all(axis=1)
+    r, v = residual_px[known], velocity_px_per_s[known]
+    if known.sum() < 10 * FEWEST or not v.any():
+        return []
+    depth = row_px[known] / height_px - 0.5
+    A, b = np.column_stack([v.ravel(), (v * depth[:, None]).ravel()]), r.ravel()
+    weights = np.ones(len(b))
+    for _ in range(10):
+        root = np.sqrt(weights)
+        x = np.linalg.lstsq(A * root[:, None], b * root, rcond=None)[0]
+        off = b - A @ x
+        scale = max(SD_OF_MEDIAN_DEVIATION * float(np.median(np.abs(off))), 1e-9)
+        weights = 1 / (1 + (off / (2 * scale)) ** 2)
+    information = A.T @ (weights[:, None] * A)
+    if np.linalg.cond(information) > 1e10:
+        return []
+    sd = scale * float(np.sqrt(np.linalg.inv(information)[1, 1]))
+    shift_px = x[1] / 2 * float(np.median(np.linalg.norm(v, axis=1)))
+    if not (READOUT_S < x[1] < MOST_READOUT_S and x[1] > READOUT_SDS * sd and shift_px > READOUT_PX):
+        return []
+    return [
+        Finding(
+            kind="rolling shutter",
+            what=(
+                f"{camera} reads its rows over {x[1] * 1e3:.0f} ms (sd {sd * 1e3:.0f}): moving points are displaced by "
+                f"{shift_px:.1f} px at the picture's upper and lower edge"
+            ),
+            advice="calibrate with slow movements; fast ones are measured late in the lower half of the picture",
+            cameras=(camera,),
+        )
+    ]

@@ -1,0 +1,187 @@
+"""What is wrong with control points: errors where no camera can be found, plain warnings where one can."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc
+
+from airborne.calibration.intrinsics.model_selection import Solution, leave_one_out
+from airborne.calibration.intrinsics.physical import fit_pinhole
+from airborne.calibration.sources.control_points import ControlPoints
+from airborne.cameras.dlt import N_POINTS, Decomposition, decompose, fit_dlt
+from airborne.errors import CalibrationError
+
+Array = NDArray[np.floating]
+
+FLAT_ERROR, FLAT_WARNING = 0.01, 0.1  # thickness over extent of the points that one camera sees
+LARGEST_EXTENT_M, LARGE_EXTENT_M = 500.0, 100.0
+ROUGH_FIT_PX = 3.0  # careful clicks give about one pixel
+OFF_CENTRE = 0.15  # of the picture's diagonal
+NOT_SQUARE = 0.03
+ROLLED = np.radians(60)
+CHANCE = 1e-4  # of calling a good set of points wrong
+MAX_WRONG_POINTS = 3
+
+
+def check_points(points: ControlPoints, sizes: Mapping[str, tuple[int, int]]) -> None:
+    """Raise CalibrationError where a camera cannot be found: sizes, number, unit, picture borders, flatness."""
+    missing = [camera for camera in points.cameras if camera not in sizes]
+    if missing:
+        raise CalibrationError(f"no picture size for camera '{missing[0]}'; sizes are given for: {', '.join(sizes)}")
+    extent = np.linalg.norm(np.ptp(points.world, axis=0))
+    if extent > LARGEST_EXTENT_M:
+        raise CalibrationError(
+            f"the control points span {extent:.0f} m, expected a scene in metres: divide by 1000 if they are in mm"
+        )
+    for camera in points.cameras:
+        seen = points.seen_by(camera)
+        if seen.sum() < N_POINTS:
+            raise CalibrationError(
+                f"camera '{camera}' sees {seen.sum()} control points, at least {N_POINTS} are needed: click more"
+            )
+        _check_inside(points, camera, sizes[camera])
+        ratio = flatness(points.world[seen])
+        if ratio < FLAT_ERROR:
+            raise CalibrationError(
+                f"the control points of camera '{camera}' lie in one plane (thickness / extent {ratio:.4f}, "
+                f"at least {FLAT_ERROR} is needed): add points off that plane"
+            )
+
+
+def _check_inside(points: ControlPoints, camera: str, size: tuple[int, int]) -> None:
+    px = points.px[:, points.cameras.index(camera)]
+    upper = np.array(size) - 0.5
+    outside = (px < -0.5) | (px > upper)  # NaN compares as inside
+    if not outside.any():
+        return
+    first = int(np.flatnonzero(outside.any(axis=1))[0])
+    what = (
+        f"camera '{camera}': {outside.any(axis=1).sum()} control points lie outside its {size[0]}×{size[1]} picture "
+        f"(first '{points.names[first]}' at u={px[first, 0]:g}, v={px[first, 1]:g})"
+    )
+    if not ((px < -0.5) | (px > upper[::-1])).any():
+        raise CalibrationError(
+            f"{what}; with width and height exchanged they would fit: exchange those, or the columns u and v"
+        )
+    raise CalibrationError(f"{what}: correct them, or the picture size")
+
+
+def flatness(world: Array) -> float:
+    """Return thickness over extent of points (n, 3): the ratio of the smallest to the largest singular spread."""
+    spread = np.linalg.svd(world - world.mean(axis=0), compute_uv=False)
+    return float(spread[2] / spread[0]) if spread[0] > 0 else 0.0
+
+
+def decompose_cameras(points: ControlPoints) -> dict[str, Decomposition]:
+    """Return every camera's DLT decomposition; raise CalibrationError where one is mirrored."""
+    found = {}
+    for i, camera in enumerate(points.cameras):
+        seen = points.seen_by(camera)
+        found[camera] = decompose(fit_dlt(points.world[seen], points.px[seen, i]))
+    mirrored = [camera for camera, decomposition in found.items() if decomposition.is_mirrored]
+    if mirrored and len(mirrored) == len(found):
+        raise CalibrationError(
+            "every camera comes out left-handed, so the world is mirrored: two of x_m, y_m, z_m are exchanged, one has "
+            "the wrong sign, or every v counts up from the bottom instead of down from the top"
+        )
+    if mirrored:
+        raise CalibrationError(
+            f"camera '{mirrored[0]}' comes out left-handed while others do not: its u and v are exchanged, "
+            "or one of them counts from the wrong side"
+        )
+    return found
+
+
+def warnings_about(
+    points: ControlPoints,
+    sizes: Mapping[str, tuple[int, int]],
+    decompositions: Mapping[str, Decomposition],
+    solutions: Mapping[str, Solution],
+) -> tuple[str, ...]:
+    """Return plain sentences about what makes the calibration doubtful; empty when nothing does."""
+    warnings = []
+    extent = np.linalg.norm(np.ptp(points.world, axis=0))
+    if extent > LARGE_EXTENT_M:
+        warnings.append(f"the control points span {extent:.0f} m: are they in metres?")
+    wrong = {camera: wrong_points(solutions[camera]) for camera in points.cameras}
+    warnings += _about_wrong_points(points, wrong)
+    for camera in points.cameras:
+        warnings += _about_picture(camera, sizes[camera], decompositions[camera])
+        ratio = flatness(solutions[camera].world)
+        if ratio < FLAT_WARNING:
+            warnings.append(
+                f"the control points of camera '{camera}' are nearly flat (thickness / extent {ratio:.3f}): "
+                "depth and focal length are poorly told apart; spread them more"
+            )
+        rms = np.sqrt(np.mean(np.sum(solutions[camera].residual_px ** 2, axis=1)))
+        if rms > ROUGH_FIT_PX and len(wrong[camera]) in (0, MAX_WRONG_POINTS):  # else the named points explain it
+            warnings.append(
+                f"camera '{camera}' fits its control points only to {rms:.1f} px (careful clicks give about 1): "
+                "check its points, their coordinates and the picture size"
+            )
+    return tuple(warnings)
+
+
+def _about_picture(camera: str, size: tuple[int, int], decomposition: Decomposition) -> list[str]:
+    warnings = []
+    K, R = decomposition.K, decomposition.R
+    middle = (np.array(size) - 1) / 2
+    if np.linalg.norm(K[:2, 2] - middle) > OFF_CENTRE * np.hypot(*size):
+        warnings.append(
+            f"camera '{camera}' looks through pixel ({K[0, 2]:.0f}, {K[1, 2]:.0f}), expected near the middle "
+            f"({middle[0]:.0f}, {middle[1]:.0f}): is {size[0]}×{size[1]} its size, or is the picture cropped?"
+        )
+    if abs(K[0, 0] / K[1, 1] - 1) > NOT_SQUARE:
+        warnings.append(
+            f"camera '{camera}' seems to have pixels that are not square (focal lengths {K[0, 0]:.0f} and "
+            f"{K[1, 1]:.0f} px): resample its picture to square pixels"
+        )
+    level = np.hypot(R[2, 0], R[2, 1])
+    if level > 0.5 and -R[1, 2] / level < np.cos(ROLLED):
+        warnings.append(f"camera '{camera}' comes out on its side or upside down: is world z up?")
+    return warnings
+
+
+def wrong_points(solution: Solution) -> dict[int, float]:
+    """Return the points that do not belong: index among the camera's points -> held-out error [px], worst first.
+
+    A point is called wrong when leaving it out lowers the sum of squares by more than chance allows: an F test with 2
+    and `2 (n - 1) - k` degrees of freedom, at `CHANCE` over all points; then again without it.
+    """
+    found: dict[int, float] = {}
+    index = np.arange(len(solution.world))
+    while len(found) < MAX_WRONG_POINTS:
+        dof = 2 * (len(index) - 1) - solution.model.n_parameters
+        if dof < 2:
+            return found
+        total = np.sum(solution.residual_px**2)
+        others = solution.px - np.array([pinhole.px_from_world(solution.world) for pinhole in solution.held_out])
+        without = np.sum(others**2, axis=(1, 2)) - np.sum(solution.held_out_px**2, axis=1)
+        worst = int(np.argmin(without))
+        statistic = (total - without[worst]) / 2 / max(without[worst] / dof, 1e-12)
+        if fdtrc(2, dof, statistic) * len(index) > CHANCE:
+            return found
+        found[int(index[worst])] = float(np.linalg.norm(solution.held_out_px[worst]))
+        keep = np.arange(len(index)) != worst
+        index = index[keep]
+        world, px = solution.world[keep], solution.px[keep]
+        pinhole = fit_pinhole(solution.held_out[worst], solution.model, world, px)
+        solution = leave_one_out(pinhole, solution.model, world, px)
+    return found
+
+
+def _about_wrong_points(points: ControlPoints, wrong: Mapping[str, Mapping[int, float]]) -> list[str]:
+    errors: dict[str, dict[str, float]] = {}
+    for camera, found in wrong.items():
+        names = np.array(points.names)[points.seen_by(camera)]
+        for i, error in found.items():
+            errors.setdefault(str(names[i]), {})[camera] = error
+    warnings = []
+    for name, by_camera in errors.items():
+        misses = " and ".join(f"{error:.1f} px in camera '{camera}'" for camera, error in by_camera.items())
+        suspect = "its x_m, y_m, z_m" if len(by_camera) > 1 else "its clicked pixels"
+        warnings.append(f"control point '{name}' misses by {misses} when left out: check {suspect}, or leave it out")
+    return warnings

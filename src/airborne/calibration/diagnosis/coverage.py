@@ -1,0 +1,100 @@
+"""Are there enough views, and where they are needed? Counts, places in the picture, tilts, shared moments."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from airborne.cameras.finding import Finding, listed
+
+Array = NDArray[np.floating]
+
+FEWEST_VIEWS = 8  # of a board, for a lens
+CELLS = (6, 4)  # of the picture, across and down
+COVERED = 0.25  # share of them that should show something
+EMPTY = 0.15  # of the cells of a third or a quarter of the picture: below it that part is named
+TILTED = np.radians(20)  # a board should be turned this far away from facing the camera now and then
+TILTED_SHARE = 0.9  # quantile of the tilts that must reach it
+FEWEST_POINTS = 60  # that could fill a picture
+FEWEST_SHARED = 5  # moments that tie two cameras
+
+
+def few_views(camera: str, n_views: int) -> list[Finding]:
+    """Say where too few pictures show the board."""
+    if n_views >= FEWEST_VIEWS:
+        return []
+    return [
+        Finding(
+            kind="coverage",
+            what=f"{camera} shows the board in {n_views} picture{'s' * (n_views != 1)}, expected {FEWEST_VIEWS}",
+            advice="film it longer, in all parts of the picture, near and far",
+            cameras=(camera,),
+        )
+    ]
+
+
+def clustered_views(camera: str, px: Array, size: tuple[int, int]) -> list[Finding]:
+    """Say where points (n, 2) [px] leave much of a picture (width, height) empty; a few clicks cannot fill one."""
+    px = px[np.isfinite(px).all(axis=1)]
+    if len(px) < FEWEST_POINTS:
+        return []
+    cell = np.clip((px / size * CELLS).astype(int), 0, np.array(CELLS) - 1)
+    filled = np.zeros(CELLS, bool)
+    filled[cell[:, 0], cell[:, 1]] = True
+    if filled.mean() >= COVERED:
+        return []
+    parts = {"left": filled[:2], "right": filled[-2:], "upper": filled[:, :1], "lower": filled[:, -1:]}
+    empty = [name for name, part in parts.items() if part.mean() < EMPTY]
+    borders = "near its borders" if len(empty) == len(parts) else f"in its {listed(empty)} part{'s' * (len(empty) > 1)}"
+    where = f", hardly any {borders}" if empty else ""
+    return [
+        Finding(
+            kind="coverage",
+            what=f"{camera} has points in {filled.mean():.0%} of its picture{where}",
+            advice="the lens and the place are guessed where there is nothing; cover the whole picture",
+            cameras=(camera,),
+        )
+    ]
+
+
+def untilted_views(camera: str, tilts_rad: Array) -> list[Finding]:
+    """Say where a board nearly always faces the camera; tilts (n,) from facing it [rad]."""
+    if len(tilts_rad) < FEWEST_VIEWS or np.quantile(tilts_rad, TILTED_SHARE) >= TILTED:
+        return []
+    return [
+        Finding(
+            kind="coverage",
+            what=f"{camera} sees the board turned away by {np.degrees(np.max(tilts_rad)):.0f} degrees at most",
+            advice="focal length and distance are poorly told apart; tilt it by 30 to 45 degrees, to all sides",
+            cameras=(camera,),
+        )
+    ]
+
+
+def missing_bridges(names: Sequence[str], n_shared: Array, what: str = "moments") -> list[Finding]:
+    """Say which cameras are not tied to the others; n_shared (cameras, cameras) counts what two see at once."""
+    n_groups, group = connected_components(np.asarray(n_shared) >= FEWEST_SHARED, directed=False)
+    return list(_bridges(names, np.asarray(n_shared), group, n_groups, what)) if n_groups > 1 else []
+
+
+def _bridges(names: Sequence[str], n_shared: Array, group: Array, n_groups: int, what: str) -> Iterator[Finding]:
+    main = int(np.argmax(np.bincount(group)))
+    for other in (g for g in range(n_groups) if g != main):
+        here, there = np.flatnonzero(group == main), np.flatnonzero(group == other)
+        between = n_shared[np.ix_(here, there)]
+        i, j = divmod(int(np.argmax(between)), len(there))
+        a, b, most = names[int(here[i])], names[int(there[j])], int(between[i, j])
+        apart = tuple(names[int(k)] for k in there)
+        nearest = f"; {a} and {b} come nearest" if most else ""
+        yield Finding(
+            kind="bridge",
+            what=(
+                f"{listed(apart)} and {listed([names[int(k)] for k in here])} share {most} {what}, "
+                f"expected {FEWEST_SHARED} or more between two of them{nearest}"
+            ),
+            advice=f"film board or wand where {a if most else 'one'} and {b if most else 'another'} both see it",
+            cameras=apart,
+        )

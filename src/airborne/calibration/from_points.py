@@ -1,0 +1,187 @@
+"""Calibration: from control points to a rig, with what is known about its errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.calibration.diagnosis import check_points, decompose_cameras, warnings_about
+from airborne.calibration.intrinsics.model_selection import Solution, choose, leave_one_out, supported
+from airborne.calibration.intrinsics.physical import (
+    MODELS,
+    SEVEN_PARAMETERS,
+    Pinhole,
+    anneal_pinhole,
+    fit_pinhole,
+    parameter_names,
+    parameter_sd,
+)
+from airborne.calibration.sources.control_points import ControlPoints
+from airborne.cameras.camera import Camera, Rig
+from airborne.cameras.dlt import Decomposition, coefficients, fit_dlt
+from airborne.errors import CalibrationError
+from airborne.geometry.triangulation import px_from_points, triangulate
+
+Array = NDArray[np.floating]
+Method = Literal["lm", "annealing"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CameraFit:
+    """How well one camera fits its control points. RMS values are of distances, over the points it sees."""
+
+    name: str
+    model: str  # the one chosen
+    n_points: int
+    residual_px: Array  # (n, 2) [px], measured minus projected; NaN where not seen
+    held_out_px: Array  # (n, 2) [px], the same for the camera fitted without the point
+    m_per_px: Array  # (n,) [m/px], at the point's depth
+    held_out_rms_px: dict[str, float]  # [px] for every model tried
+    sd: dict[str, float]  # standard deviations of the fitted numbers, units in the names
+    dlt_rms_px: float  # the 11-parameter DLT's own residual [px]
+    dlt: Array  # (11,), L1..L11
+
+    @property
+    def rms_px(self) -> float:
+        """RMS distance between measured and projected points [px]."""
+        return _rms(self.residual_px)
+
+    @property
+    def rms_m(self) -> float:
+        """The same across the line of sight at the points' depths [m]."""
+        return _rms(self.residual_px * self.m_per_px[:, None])
+
+    @property
+    def held_out_m(self) -> float:
+        """RMS distance of points from the camera fitted without them, at their depths [m]."""
+        return _rms(self.held_out_px * self.m_per_px[:, None])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Calibration:
+    """A rig and how far it can be trusted."""
+
+    rig: Rig
+    method: Method
+    fits: tuple[CameraFit, ...]  # in the rig's order
+    held_out_points_m: (
+        Array  # (n, 3) [m], triangulated minus surveyed, by cameras fitted without the point; NaN: < 2 views
+    )
+    warnings: tuple[str, ...]
+
+    @property
+    def held_out_3d_m(self) -> float:
+        """RMS distance of triangulated held-out points from the surveyed ones [m]; NaN with one camera."""
+        return _rms(self.held_out_points_m)
+
+
+def calibrate(
+    points: ControlPoints, sizes: Mapping[str, tuple[int, int]], *, method: Method = "lm", seed: int = 0
+) -> Calibration:
+    """Find every camera that the control points were clicked in.
+
+    sizes: (width, height) [px] by camera name. Each camera starts from the decomposition of its DLT. Method "lm": least
+    squares on the pixels for a ladder of physical cameras, of which the simplest is taken that predicts held-out points
+    as well as the best. Method "annealing": paper B's seven-parameter camera by simulated annealing, `seed` fixed.
+    Raises CalibrationError where no camera can be found; what is only doubtful stands in `warnings`.
+    """
+    if method not in ("lm", "annealing"):
+        raise CalibrationError(f"unknown calibration method '{method}'; expected 'lm' or 'annealing'")
+    check_points(points, sizes)
+    decompositions = decompose_cameras(points)
+    cameras, fits, solutions = [], [], {}
+    for name in points.cameras:
+        candidates = _solve(points, name, sizes[name], decompositions[name], method, seed)
+        solutions[name] = choose(candidates)
+        cameras.append(_camera(name, sizes[name], solutions[name]))
+        fits.append(_describe_fit(points, name, solutions[name], candidates))
+    return Calibration(
+        rig=Rig(tuple(cameras)),
+        method=method,
+        fits=tuple(fits),
+        held_out_points_m=_held_out_points(points, solutions),
+        warnings=warnings_about(points, sizes, decompositions, solutions),
+    )
+
+
+def _solve(
+    points: ControlPoints, name: str, size: tuple[int, int], decomposition: Decomposition, method: Method, seed: int
+) -> list[Solution]:
+    seen = points.seen_by(name)
+    world, px = points.world[seen], points.px[seen, points.cameras.index(name)]
+    start = Pinhole(
+        decomposition.R,
+        decomposition.centre,
+        (decomposition.K[0, 0] + decomposition.K[1, 1]) / 2,
+        (np.array(size) - 1) / 2,
+    )
+    if method == "annealing":
+        pinhole = anneal_pinhole(start, world, px, seed=seed)
+        return [leave_one_out(pinhole, SEVEN_PARAMETERS, world, px)]
+    return [
+        leave_one_out(fit_pinhole(start, model, world, px), model, world, px) for model in supported(MODELS, len(world))
+    ]
+
+
+def _camera(name: str, size: tuple[int, int], solution: Solution) -> Camera:
+    pinhole = solution.pinhole
+    f, (u0, v0) = pinhole.focal_px, pinhole.principal_point
+    return Camera(
+        name=name,
+        K=np.array([[f, 0, u0], [0, f, v0], [0, 0, 1]]),
+        size=size,
+        camera_from_world=RigidTransform.from_components(-pinhole.R @ pinhole.centre, Rotation.from_matrix(pinhole.R)),
+        distortion=np.array([pinhole.k1, 0, 0, 0, 0]),
+        shift_sd_px=solution.shift_sd_px,
+    )
+
+
+def _describe_fit(points: ControlPoints, name: str, chosen: Solution, candidates: list[Solution]) -> CameraFit:
+    seen = points.seen_by(name)
+    P_dlt = fit_dlt(chosen.world, chosen.px)
+    sd = parameter_sd(chosen.pinhole, chosen.model, chosen.world, chosen.px)
+    return CameraFit(
+        name=name,
+        model=chosen.model.name,
+        n_points=int(seen.sum()),
+        residual_px=_at(seen, chosen.residual_px),
+        held_out_px=_at(seen, chosen.held_out_px),
+        m_per_px=_at(seen, chosen.pinhole.depth(chosen.world) / chosen.pinhole.focal_px),
+        held_out_rms_px={solution.model.name: _rms(solution.held_out_px) for solution in candidates},
+        sd=dict(zip(parameter_names(chosen.model), sd.tolist(), strict=True)),
+        dlt_rms_px=_rms(chosen.px - px_from_points(P_dlt[None], chosen.world)[:, 0]),
+        dlt=coefficients(P_dlt),
+    )
+
+
+def _held_out_points(points: ControlPoints, solutions: Mapping[str, Solution]) -> Array:
+    """Triangulate each point with cameras fitted without it: (n, 3) [m] minus the surveyed points."""
+    n, c = points.px.shape[:2]
+    P, px = np.zeros((n, c, 3, 4)), np.full((n, c, 2), np.nan)
+    for i, name in enumerate(points.cameras):
+        solution = solutions[name]
+        for row, pinhole, seen_px in zip(
+            np.flatnonzero(points.seen_by(name)), solution.held_out, solution.px, strict=True
+        ):
+            P[row, i] = pinhole.P
+            px[row, i] = pinhole.undistorted_px(seen_px)
+    return triangulate(P, px) - points.world
+
+
+def _at(seen: NDArray[np.bool_], values: Array) -> Array:
+    """Spread the values of seen points over all points, NaN elsewhere."""
+    full = np.full((len(seen), *values.shape[1:]), np.nan)
+    full[seen] = values
+    return full
+
+
+def _rms(vectors: Array) -> float:
+    """Root mean square length of vectors (n, d), without NaN rows; NaN for none."""
+    squares = np.sum(vectors**2, axis=-1)
+    squares = squares[~np.isnan(squares)]
+    return float(np.sqrt(np.mean(squares))) if len(squares) else float("nan")

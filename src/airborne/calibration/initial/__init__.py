@@ -1,0 +1,1 @@
+"""Initial values: where each camera begins, before anything is adjusted."""

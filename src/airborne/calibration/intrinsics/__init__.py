@@ -1,0 +1,1 @@
+"""Lenses: how many numbers of them the evidence supports."""

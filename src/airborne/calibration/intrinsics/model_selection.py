@@ -1,0 +1,66 @@
+"""Which camera model do the control points support? Leave-one-out errors decide. Arrays only."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.calibration.intrinsics.physical import Model, Pinhole, fit_pinhole
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """One camera fitted to all its points, and once more without each of them."""
+
+    model: Model
+    pinhole: Pinhole
+    held_out: tuple[Pinhole, ...]  # (n,), fitted without point i
+    world: Array  # (n, 3) [m]
+    px: Array  # (n, 2) [px]
+
+    @property
+    def residual_px(self) -> Array:
+        """Measured minus projected pixels (n, 2) [px]."""
+        return self.px - self.pinhole.px_from_world(self.world)
+
+    @property
+    def shift_sd_px(self) -> float:
+        """How far the fit leaves a projected point open, in one direction, on average over the points [px]."""
+        n, p = 2 * len(self.world), self.model.n_parameters
+        return float(np.sqrt(np.sum(self.residual_px**2) / max(n - p, 1) * p / n))
+
+    @property
+    def held_out_px(self) -> Array:
+        """The same for the camera that has not seen the point (n, 2) [px]."""
+        return self.px - np.array([p.px_from_world(x) for p, x in zip(self.held_out, self.world, strict=True)])
+
+
+def leave_one_out(pinhole: Pinhole, model: Model, world: Array, px: Array) -> Solution:
+    """Return the solution of a fitted pinhole: refits by least squares without each point, starting from it."""
+    keep = ~np.eye(len(world), dtype=bool)
+    refits = tuple(fit_pinhole(pinhole, model, world[k], px[k]) for k in keep)
+    return Solution(model, pinhole, refits, world, px)
+
+
+def supported(models: Sequence[Model], n_points: int) -> list[Model]:
+    """Return the models whose free numbers are fewer than the coordinates that remain without one point."""
+    return [model for model in models if model.n_parameters < 2 * (n_points - 1)]
+
+
+def choose(solutions: Sequence[Solution]) -> Solution:
+    """Return the first (simplest) solution that is not clearly worse than the best on held-out points.
+
+    Clearly: the mean difference of squared held-out errors, point by point, exceeds its own standard error.
+    """
+    squares = [np.sum(solution.held_out_px**2, axis=1) for solution in solutions]
+    best = min(squares, key=np.mean)
+    for solution, square in zip(solutions, squares, strict=True):
+        excess = square - best
+        if np.mean(excess) <= np.std(excess, ddof=1) / np.sqrt(len(excess)):
+            return solution
+    raise AssertionError("the best solution is never worse than itself")

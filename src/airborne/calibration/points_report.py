@@ -1,0 +1,68 @@
+"""A calibration in words and numbers, for people and for programs."""
+
+from __future__ import annotations
+
+import math
+
+from airborne.calibration.from_points import Calibration, CameraFit
+
+
+def describe(calibration: Calibration) -> str:
+    """Return a short plain table: RMS per camera in px and mm, held-out errors, chosen models, warnings.
+
+    RMS of 2D distances; mm across the line of sight at each point's depth. "held out": each point measured by a camera
+    fitted without it. "DLT": the 11-parameter transformation's own residual.
+    """
+    header = ("camera", "points", "RMS px", "RMS mm", "held-out px", "held-out mm", "DLT px", "model")
+    rows = [header, *(_row(fit) for fit in calibration.fits)]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(header))]
+    lines = [
+        "  ".join([row[0].ljust(widths[0]), *(row[i].rjust(widths[i]) for i in range(1, 7)), row[7]]) for row in rows
+    ]
+    if not math.isnan(calibration.held_out_3d_m):
+        lines.append(f"held-out control points in 3D: {calibration.held_out_3d_m * 1e3:.1f} mm RMS")
+    lines += [_reason(fit) for fit in calibration.fits if len(fit.held_out_rms_px) > 1]
+    lines += [f"warning: {warning}" for warning in calibration.warnings]
+    return "\n".join(lines)
+
+
+def to_dict(calibration: Calibration) -> dict:
+    """Return the same, and the cameras' numbers, as plain values for JSON; None where a value does not exist."""
+    cameras = {}
+    for camera, fit in zip(calibration.rig, calibration.fits, strict=True):
+        height_angle = 2 * math.atan(camera.size[1] / (2 * camera.K[1, 1]))
+        cameras[fit.name] = {
+            "model": fit.model,
+            "n_points": fit.n_points,
+            "rms_px": fit.rms_px,
+            "rms_mm": fit.rms_m * 1e3,
+            "held_out_rms_px": fit.held_out_rms_px[fit.model],
+            "held_out_rms_mm": fit.held_out_m * 1e3,
+            "held_out_rms_px_of_model": fit.held_out_rms_px,
+            "dlt_rms_px": fit.dlt_rms_px,
+            "dlt_coefficients": fit.dlt.tolist(),
+            "position_m": camera.centre.tolist(),
+            "focal_px": float(camera.K[0, 0]),
+            "height_angle_deg": math.degrees(height_angle),
+            "principal_point_px": camera.K[:2, 2].tolist(),
+            "distortion": camera.distortion.tolist(),
+            "sd": fit.sd,
+        }
+    held_out = calibration.held_out_3d_m
+    return {
+        "method": calibration.method,
+        "cameras": cameras,
+        "held_out_3d_rms_mm": None if math.isnan(held_out) else held_out * 1e3,
+        "warnings": list(calibration.warnings),
+    }
+
+
+def _row(fit: CameraFit) -> tuple[str, ...]:
+    held_out_px = fit.held_out_rms_px[fit.model]
+    numbers = (fit.rms_px, fit.rms_m * 1e3, held_out_px, fit.held_out_m * 1e3, fit.dlt_rms_px)
+    return (fit.name, str(fit.n_points), *(f"{number:.2f}" for number in numbers), fit.model)
+
+
+def _reason(fit: CameraFit) -> str:
+    tried = ", ".join(f"{name} {rms:.2f}" for name, rms in fit.held_out_rms_px.items())
+    return f"{fit.name}: '{fit.model}' is the simplest model not clearly worse on held-out points (px: {tried})"

@@ -1,0 +1,235 @@
+"""The board in videos and pictures: which frames belong together, and what each shows."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Callable, Container, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.calibration.diagnosis.clocks import unequal_counts
+from airborne.calibration.diagnosis.inputs import check_board, check_stamps
+from airborne.calibration.initial.chaining import Views
+from airborne.calibration.sources.boards import NOTHING, Board, Sighting, as_printed, detector_of
+from airborne.calibration.sources.files import CameraSource, Sources
+from airborne.cameras.finding import Finding
+from airborne.errors import CalibrationError
+from airborne.video import VideoSource, inspect
+from airborne.video.decoding import pictures, rgb_from_picture
+
+Grey = NDArray[np.uint8]
+Array = NDArray[np.floating]
+Told = Callable[[int, int | None], None]
+
+MOST_MOMENTS = 240  # that the board is looked for at, spread over a recording
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+LARGEST_PICTURE_BYTES = 200_000_000
+SAMPLES = 12  # pictures of a camera that tell how the board was printed
+ODD_PICTURES = 2  # more or fewer than the other cameras' are told
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """What the cameras saw of the board together."""
+
+    views: Views
+    time_s: Array | None  # (moments,) [s]; None for pictures, which have no times
+    sizes: dict[str, tuple[int, int]]
+    examples: dict[str, Grey]  # by camera, the picture with most corners
+    notes: tuple[str, ...]
+    findings: tuple[Finding, ...]
+
+
+def look(sources: Sources, board: Board, told: Told) -> Seen:
+    """Find the board in all cameras' recordings; raises VideoError or CalibrationError for what cannot be read."""
+    cameras = [camera for camera in sources.camera if camera.video or camera.pictures]
+    if not cameras:
+        raise CalibrationError("[board] needs a video or pictures of the cameras; add video = ... to each [[camera]]")
+    if all(camera.video for camera in cameras):
+        moments, time_s, odd = _moments(sources, cameras)
+    elif all(camera.pictures for camera in cameras):
+        counts = [len(_picture_paths(sources, camera.pictures or "")) for camera in cameras]
+        if len(cameras) > 1 and len(set(counts)) > 1:
+            said = ", ".join(f"{camera.name} {n}" for camera, n in zip(cameras, counts, strict=True))
+            raise CalibrationError(
+                f"pictures that belong together stand at the same place of every folder, but there are: {said}; "
+                "use lens_pictures for pictures of one camera alone"
+            )
+        moments, time_s, odd = [{i: i for i in range(n)} for n in counts], None, ()
+    else:
+        raise CalibrationError("some cameras have a video and some pictures; give the same kind for all")
+    samples = {camera.name: _samples(sources, camera) for camera in cameras}
+    board, notes = as_printed(board, [grey for own in samples.values() for grey in own])
+    total = sum(len(own) for own in moments)
+    n_moments = max(max(own.values(), default=-1) for own in moments) + 1
+    rows, sizes, examples, done = [], {}, {}, 0
+    for camera, own in zip(cameras, moments, strict=True):
+        row, best = [NOTHING] * n_moments, -1
+        detect = detector_of(board)
+        for index, grey in _greys(sources, camera, own):
+            sizes.setdefault(camera.name, (grey.shape[1], grey.shape[0]))
+            row[own[index]] = sighting = detect(grey)
+            if len(sighting.corner) > best:
+                examples[camera.name], best = grey, len(sighting.corner)
+            done += 1
+            told(done, total)
+        rows.append(tuple(row))
+    views = Views(board, tuple(camera.name for camera in cameras), tuple(rows))
+    return Seen(views, time_s, sizes, examples, notes, (*odd, *check_board(views, samples)))
+
+
+def look_alone(sources: Sources, camera: CameraSource, board: Board, told: Told) -> Views | None:
+    """Find the board in the recording for one camera's lens, if there is one."""
+    name = camera.lens_video or camera.lens_pictures
+    if name is None:
+        return None
+    alone = camera.model_copy(update={"video": camera.lens_video, "pictures": camera.lens_pictures})
+    detect = detector_of(board)
+    found: list[Sighting] = []
+    n = _count(sources, alone) or MOST_MOMENTS
+    wanted = range(0, n, math.ceil(n / MOST_MOMENTS))
+    for _, grey in _greys(sources, alone, wanted):
+        found.append(detect(grey))
+        told(len(found), len(wanted))
+    views = Views(board, (camera.name,), (tuple(found),))
+    if not any(len(sighting.corner) for sighting in found):
+        check_board(views, {camera.name: _samples(sources, alone)})
+    return views.of(0)
+
+
+def first_picture(sources: Sources, camera: CameraSource) -> Grey | None:
+    """Return the first picture of a camera's recording, if it has one."""
+    if not (camera.video or camera.pictures):
+        return None
+    return next((grey for _, grey in _greys(sources, camera, range(1))), None)
+
+
+def size_of(sources: Sources, camera: CameraSource) -> tuple[int, int] | None:
+    """Return a camera's picture size (width, height) [px], where anything tells it."""
+    if camera.size is not None:
+        return camera.size[0], camera.size[1]
+    if camera.video is not None:
+        return inspect(VideoSource(camera.name, sources.path(camera.video))).size
+    if camera.pictures is not None or camera.lens_pictures is not None:
+        path = _picture_paths(sources, camera.pictures or camera.lens_pictures or "")[0]
+        grey = _read_grey(path)
+        return grey.shape[1], grey.shape[0]
+    if camera.lens_video is not None:
+        return inspect(VideoSource(camera.name, sources.path(camera.lens_video))).size
+    return None
+
+
+def _moments(
+    sources: Sources, cameras: Sequence[CameraSource]
+) -> tuple[list[dict[int, int]], Array, tuple[Finding, ...]]:
+    """Return by camera which of its frames belongs to which moment, the moments' times, and what is odd about them."""
+    if sources.board is not None and sources.board.timestamps is not None:
+        return _stamped(sources.path(sources.board.timestamps), cameras)
+    facts = [inspect(VideoSource(c.name, sources.path(c.video or ""))) for c in cameras]
+    rate = float(facts[0].frame_rate)
+    ends = [float(f.duration_s) + c.offset_s for f, c in zip(facts, cameras, strict=True) if f.duration_s]
+    n = max(1, round((max(ends, default=MOST_MOMENTS / rate) - cameras[0].offset_s) * rate))
+    stride = max(1, math.ceil(n / MOST_MOMENTS))
+    index = np.arange(0, n, stride)
+    time_s = index / rate + cameras[0].offset_s
+    found = []
+    for camera, fact in zip(cameras, facts, strict=True):
+        frames = np.rint((time_s - camera.offset_s) * float(fact.frame_rate)).astype(int)
+        off = np.abs(frames / float(fact.frame_rate) + camera.offset_s - time_s)
+        is_there = (frames >= 0) & (off <= 0.5 / rate + 1e-9)
+        found.append({int(f): m for m, f in enumerate(frames) if is_there[m]})
+    if len({fact.frame_rate for fact in facts}) > 1 or any(camera.offset_s for camera in cameras):
+        return found, time_s, ()
+    counts = {c.name: _count(sources, c) or 0 for c in cameras}
+    return found, time_s, tuple(unequal_counts(counts, ODD_PICTURES))
+
+
+def _stamped(path: Path, cameras: Sequence[CameraSource]) -> tuple[list[dict[int, int]], Array, tuple[Finding, ...]]:
+    """Read a table sync_index,cam_id,frame_time: the n-th row of a camera, by time, is its video's n-th frame."""
+    expected = "expected the columns sync_index,cam_id,frame_time"
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            table = list(csv.DictReader(file))
+        rows = [(int(r["sync_index"]), r["cam_id"].strip(), float(r["frame_time"])) for r in table]
+    except OSError as error:
+        raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a table of time stamps") from None
+    except (KeyError, ValueError, TypeError, AttributeError, UnicodeDecodeError, csv.Error):
+        raise CalibrationError(f"{path} is no table of time stamps; {expected}") from None
+    if not rows or not np.isfinite([row[2] for row in rows]).all():
+        raise CalibrationError(f"{path} holds no time stamps, or one that is no number; {expected}")
+    ids = {row[1] for row in rows}
+    moment = {sync: m for m, sync in enumerate(sorted({row[0] for row in rows}))}
+    time_s = np.array([np.mean([row[2] for row in rows if moment[row[0]] == m]) for m in range(len(moment))])
+    found, odd = [], []
+    for camera in cameras:
+        key = _stamp_id(camera.name, ids)
+        if key is None:
+            raise CalibrationError(f"{path} has no rows of camera '{camera.name}'; its cam_id are: {', '.join(ids)}")
+        told = sorted((r for r in table if r["cam_id"].strip() == key), key=lambda r: int(r["sync_index"]))
+        odd += check_stamps(camera.name, told)
+        own = sorted((row for row in rows if row[1] == key), key=lambda row: row[2])
+        found.append({n: moment[row[0]] for n, row in enumerate(own)})
+    return found, time_s - time_s[0], tuple(odd)
+
+
+def _stamp_id(name: str, ids: set[str]) -> str | None:
+    number = re.search(r"(\d+)$", name)
+    return name if name in ids else number[1] if number and number[1] in ids else None
+
+
+def _samples(sources: Sources, camera: CameraSource) -> list[Grey]:
+    n = _count(sources, camera) or SAMPLES
+    wanted = set(np.linspace(0, max(n - 1, 0), SAMPLES).astype(int).tolist())
+    return [grey for _, grey in _greys(sources, camera, wanted)]
+
+
+def _count(sources: Sources, camera: CameraSource) -> int | None:
+    if camera.pictures is not None:
+        return len(_picture_paths(sources, camera.pictures))
+    facts = inspect(VideoSource(camera.name, sources.path(camera.video or "")))
+    return None if facts.duration_s is None else round(facts.duration_s * facts.frame_rate)
+
+
+def _greys(sources: Sources, camera: CameraSource, wanted: Container[int]) -> Iterator[tuple[int, Grey]]:
+    """Yield the wanted pictures of a recording in grey, with their numbers."""
+    if camera.pictures is not None:
+        for index, path in enumerate(_picture_paths(sources, camera.pictures)):
+            if index in wanted:
+                yield index, _read_grey(path)
+        return
+    source = VideoSource(camera.name, sources.path(camera.video or ""))
+    facts = inspect(source)
+    for picture in pictures(source, facts):
+        index = round(picture.time_s * facts.frame_rate)
+        if index in wanted:
+            grey = cv2.cvtColor(rgb_from_picture(picture, facts), cv2.COLOR_RGB2GRAY)
+            yield index, np.asarray(grey, np.uint8)
+
+
+def _picture_paths(sources: Sources, pattern: str) -> list[Path]:
+    given = sources.path(pattern)
+    if given.is_dir():
+        found = sorted(path for path in given.iterdir() if path.suffix.lower() in PICTURES)
+    else:
+        found = sorted(path for path in given.parent.glob(given.name) if path.suffix.lower() in PICTURES)
+    if not found:
+        raise CalibrationError(f"no pictures at {given}; give a folder or a pattern such as left/*.png")
+    return found
+
+
+def _read_grey(path: Path) -> Grey:
+    if path.stat().st_size > LARGEST_PICTURE_BYTES:
+        raise CalibrationError(f"{path} is larger than {LARGEST_PICTURE_BYTES // 10**6} MB; is it a picture?")
+    try:
+        grey = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_GRAYSCALE)
+    except cv2.error:
+        grey = None
+    if grey is None:
+        raise CalibrationError(f"{path} cannot be read as a picture; convert it to PNG or JPEG")
+    return np.asarray(grey, np.uint8)

@@ -1,0 +1,239 @@
+"""Calibration boards: what they look like, and their corners in pictures."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from airborne.errors import CalibrationError, one_line
+from airborne.io.text import read_toml
+
+Array = NDArray[np.floating]
+Ints = NDArray[np.integer]
+
+FEWEST_CORNERS = 6  # of a view that says where the board is
+THINNEST = 0.05  # width over length of the corners seen: on one line they leave the board free to turn
+ENOUGH = 2  # corners a picture, on average: the board is printed as described
+DICTIONARIES = tuple(sorted(name for name in dir(cv2.aruco) if re.match(r"DICT_[0-9A]", name)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Board:
+    """A flat printed board; its corners lie in the plane z = 0, x along a row, y down the rows, z into the paper."""
+
+    kind: Literal["charuco", "chessboard"]
+    columns: int  # squares in a row; of a chessboard inner corners in a row
+    rows: int  # the same in a column
+    square_m: float  # side of a square [m]
+    marker_m: float = 0.0  # side of a marker [m]; charuco
+    dictionary: str = "DICT_4X4_50"  # charuco
+    is_inverted: bool = False  # printed white on black
+    is_legacy: bool = False  # even rows begin with a marker, as OpenCV printed them before 4.6
+
+    @property
+    def corners(self) -> Array:
+        """The inner corners (n, 3) [m], row by row."""
+        nx, ny = self.inner
+        grid = np.stack(np.meshgrid(np.arange(nx), np.arange(ny)), axis=-1).reshape(-1, 2) * self.square_m
+        return np.column_stack([grid, np.zeros(len(grid))])
+
+    @property
+    def inner(self) -> tuple[int, int]:
+        """How many inner corners a row and a column have."""
+        return (self.columns - 1, self.rows - 1) if self.kind == "charuco" else (self.columns, self.rows)
+
+    @property
+    def is_ambiguous(self) -> bool:
+        """Whether the board looks the same when turned by half."""
+        return self.kind == "chessboard" and (self.columns + self.rows) % 2 == 0
+
+    def neighbours(self) -> Ints:
+        """Return the pairs of corners one square apart: (k, 2)."""
+        nx, ny = self.inner
+        index = np.arange(nx * ny).reshape(ny, nx)
+        across = np.stack([index[:, :-1].ravel(), index[:, 1:].ravel()], axis=1)
+        down = np.stack([index[:-1].ravel(), index[1:].ravel()], axis=1)
+        return np.concatenate([across, down])
+
+
+class _BoardTable(BaseModel):
+    """A board's file: ours, or Caliscope's `charuco.toml` with its own words for the sizes."""
+
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+    kind: Literal["charuco", "chessboard"] = "charuco"
+    columns: Annotated[int, Field(ge=1, le=100)]
+    rows: Annotated[int, Field(ge=1, le=100)]
+    square_m: float | None = Field(None, gt=0, le=10)
+    square_size_override_cm: float | None = Field(None, gt=0, le=1000)
+    marker_m: float | None = Field(None, gt=0, le=10)
+    aruco_scale: float = Field(0.75, gt=0, lt=1)
+    dictionary: str = "DICT_4X4_50"
+    inverted: bool = False
+    legacy: bool = False
+
+
+def read_board(path: str | Path) -> Board:
+    """Read a board's TOML file: kind, columns, rows, square_m, and of a charuco marker_m and dictionary.
+
+    Caliscope's `charuco.toml` is read too. Raises CalibrationError for a file that does not say this.
+    """
+    path = Path(path)
+    try:
+        document = read_toml(path)
+    except OSError as error:
+        raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a board's file") from None
+    except tomllib.TOMLDecodeError as error:
+        raise CalibrationError(f"{path} is no TOML file ({str(error).lower()}); expected columns, rows, ...") from None
+    return board_from_table(document, str(path))
+
+
+def board_from_table(table: dict, where: str) -> Board:
+    """Return the board that a table describes; raises CalibrationError, naming `where`."""
+    try:
+        given = _BoardTable.model_validate(table)
+    except ValidationError as error:
+        raise CalibrationError(f"{where}: {one_line(error)}") from None
+    square_m = given.square_m or (given.square_size_override_cm or 0.0) / 100
+    if not square_m:
+        raise CalibrationError(f"{where}: the size of a square is missing; measure the print and give square_m")
+    if given.dictionary not in DICTIONARIES:
+        known = ", ".join(name for name in DICTIONARIES if name.startswith(given.dictionary[:8])) or "DICT_4X4_50, ..."
+        raise CalibrationError(f"{where}: dictionary '{given.dictionary}' is not known; expected one of: {known}")
+    marker_m = given.marker_m or given.aruco_scale * square_m
+    if marker_m >= square_m:
+        raise CalibrationError(f"{where}: marker_m {marker_m} is not below square_m {square_m}; exchange them?")
+    if min(given.columns, given.rows) < 3:
+        raise CalibrationError(
+            f"{where}: {given.columns}×{given.rows} is too small; a board has 3 columns and rows at least"
+        )
+    return Board(
+        kind=given.kind,
+        columns=given.columns,
+        rows=given.rows,
+        square_m=square_m,
+        marker_m=marker_m,
+        dictionary=given.dictionary,
+        is_inverted=given.inverted,
+        is_legacy=given.legacy,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """The corners that one picture shows."""
+
+    corner: Ints  # (n,) rows of the board's corners
+    px: Array  # (n, 2) [px]
+
+
+NOTHING = Sighting(np.zeros(0, int), np.zeros((0, 2)))
+Detector = Callable[[NDArray[np.uint8]], Sighting]
+
+
+def detector_of(board: Board) -> Detector:
+    """Return what finds the board in a grey picture (h, w): too few corners, or all on a line, count as none."""
+    find = _charuco_finder(board) if board.kind == "charuco" else _chessboard_finder(board)
+    corners = board.corners[:, :2]
+
+    def detect(grey: NDArray[np.uint8]) -> Sighting:
+        sighting = find(255 - grey if board.is_inverted else grey)
+        if len(sighting.corner) < FEWEST_CORNERS:
+            return NOTHING
+        spread = np.linalg.svd(corners[sighting.corner] - corners[sighting.corner].mean(axis=0), compute_uv=False)
+        return sighting if spread[1] > THINNEST * spread[0] else NOTHING
+
+    return detect
+
+
+def as_printed(board: Board, pictures: Sequence[NDArray[np.uint8]]) -> tuple[Board, tuple[str, ...]]:
+    """Return the board with the pattern (legacy or not, inverted or not) that shows most corners in some pictures.
+
+    The notes tell what differs from what was said; where nothing is found at all the board stays as it is.
+    """
+    if board.kind != "charuco" or not pictures:
+        return board, ()
+    said = (board.is_inverted, board.is_legacy)
+    counts = {said: _n_corners(board, pictures)}
+    kinds = [(inverted, legacy) for inverted in (False, True) for legacy in {False, board.rows % 2 == 0}]
+    for inverted, legacy in kinds if counts[said] < ENOUGH * len(pictures) else ():
+        if (inverted, legacy) not in counts:
+            counts[inverted, legacy] = _n_corners(replace(board, is_inverted=inverted, is_legacy=legacy), pictures)
+    best = max(counts, key=counts.__getitem__)
+    if counts[best] <= 1.5 * counts[said]:
+        return board, ()
+    names = zip(("inverted", "legacy"), best, said, strict=True)
+    told = " and ".join(f"{name} = {str(new).lower()}" for name, new, old in names if new != old)
+    return replace(board, is_inverted=best[0], is_legacy=best[1]), (
+        f"the board shows {counts[best]} corners with {told}, {counts[said]} as described; went on with {told}",
+    )
+
+
+def _n_corners(board: Board, pictures: Sequence[NDArray[np.uint8]]) -> int:
+    detect = detector_of(board)
+    return sum(len(detect(picture).corner) for picture in pictures)
+
+
+def _charuco_finder(board: Board) -> Detector:
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
+    n_markers = board.columns * board.rows // 2
+    if n_markers > len(dictionary.bytesList):
+        raise CalibrationError(
+            f"the board of {board.columns}×{board.rows} squares has {n_markers} markers, {board.dictionary} only "
+            f"{len(dictionary.bytesList)}; give the dictionary that it was printed with"
+        )
+    pattern = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square_m, board.marker_m, dictionary)
+    pattern.setLegacyPattern(board.is_legacy)
+    finder = cv2.aruco.CharucoDetector(pattern)
+
+    def find(grey: NDArray[np.uint8]) -> Sighting:
+        px, ids, _, _ = finder.detectBoard(grey)
+        if ids is None:
+            return NOTHING
+        return Sighting(np.asarray(ids, int).ravel(), np.asarray(px, float).reshape(-1, 2))
+
+    return find
+
+
+def _chessboard_finder(board: Board) -> Detector:
+    nx, ny = board.columns, board.rows
+    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 30, 1e-3)
+
+    def find(grey: NDArray[np.uint8]) -> Sighting:
+        is_found, px = cv2.findChessboardCornersSB(grey, (nx, ny), flags=cv2.CALIB_CB_NORMALIZE_IMAGE)
+        if not is_found:
+            quick = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
+            is_found, px = cv2.findChessboardCorners(grey, (nx, ny), flags=quick)
+            if not is_found:
+                return NOTHING
+            half = _half_a_square(np.asarray(px, float).reshape(ny, nx, 2))
+            px = cv2.cornerSubPix(grey, px, (half, half), (-1, -1), criteria)
+        grid = np.asarray(px, float).reshape(ny, nx, 2)
+        if np.linalg.det(np.stack([grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]])) < 0:
+            grid = grid[:, ::-1]  # seen from the front, rows go down where columns go right
+        if not board.is_ambiguous and _brightness(grey, grid[:2, :2]) > _brightness(grey, grid[-2:, -2:]):
+            grid = grid[::-1, ::-1]  # the first square is the dark one
+        return Sighting(np.arange(nx * ny), grid.reshape(-1, 2))
+
+    return find
+
+
+def _half_a_square(grid: Array) -> int:
+    """Return a window for refining corners that reaches no other corner: half of the shortest gap [px]."""
+    gaps = [np.linalg.norm(np.diff(grid, axis=axis), axis=-1).min() for axis in (0, 1)]
+    return int(np.clip(min(gaps) / 2.5, 2, 11))
+
+
+def _brightness(grey: NDArray[np.uint8], square: Array) -> float:
+    """Return the grey level in the middle of a square with corners (2, 2, 2) [px]."""
+    u, v = np.clip(np.rint(square.mean(axis=(0, 1))).astype(int), 0, np.array(grey.shape[::-1]) - 1)
+    return float(grey[max(v - 1, 0) : v + 2, max(u - 1, 0) : u + 2].mean())

@@ -1,0 +1,194 @@
+"""What is there to calibrate from: one TOML file that names cameras and sources; paths are relative to it."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+
+from airborne.errors import CalibrationError, one_line
+from airborne.io.text import listed_keys, read_toml
+
+Positive = Annotated[float, Field(gt=0)]
+Pixels = Literal["upper-left-1", "upper-left-0", "lower-left-1", "lower-left-0"]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class CameraSource(_Strict):
+    """One camera: its recording, or only its picture size."""
+
+    name: str
+    video: str | None = None  # shows the board together with the other cameras
+    pictures: str | None = None  # the same as pictures: a folder or a pattern such as "left/*.png"
+    lens_video: str | None = None  # shows the board to this camera alone, for its lens
+    lens_pictures: str | None = None
+    size: Annotated[list[Annotated[int, Field(ge=16, le=20000)]], Field(min_length=2, max_length=2)] | None = None
+    lens: Literal["brown", "fisheye"] = "brown"
+    focal: Literal["auto", "free", "fixed", "shared"] = "auto"  # shared: one focal length for all cameras that say so
+    offset_s: float = 0.0  # added to this camera's times
+    calibrated_as: str | None = None  # its name in [start] file, where it differs
+    saved_scale: Positive = 1.0  # pixels of the [start] file = saved_scale * this camera's pixels + saved_offset_px
+    saved_offset_px: Annotated[list[float], Field(min_length=2, max_length=2)] = [0.0, 0.0]
+
+
+class StartSource(_Strict):
+    """A calibration that exists: where the search begins."""
+
+    file: str
+
+
+class BoardSource(_Strict):
+    """A printed board that is moved about."""
+
+    file: str | None = None
+    kind: Literal["charuco", "chessboard"] | None = None  # these, or a file that says them
+    columns: int | None = None
+    rows: int | None = None
+    square_m: Positive | None = None
+    marker_m: Positive | None = None
+    dictionary: str | None = None
+    inverted: bool | None = None
+    legacy: bool | None = None
+    timestamps: str | None = None  # which frames belong together: sync_index,cam_id,frame_time
+    sync: Literal["auto", "exact", "loose"] = "auto"  # loose: every picture may lag behind the others
+
+    @model_validator(mode="after")
+    def _one_way(self) -> BoardSource:
+        if (self.file is None) == (self.columns is None):
+            raise ValueError('give file = "..." or kind, columns, rows and square_m')
+        return self
+
+
+class PointsSource(_Strict):
+    """Points whose places were surveyed."""
+
+    file: str
+
+
+class CourtSource(_Strict):
+    """Clicked points of a volleyball court and net."""
+
+    file: str
+    net: Literal["men", "women"] | Positive = "men"
+
+
+class WandSource(_Strict):
+    """A stick of known length that is waved about."""
+
+    file: str
+    length_m: Positive | None = None
+    lengths_m: list[Positive] | None = None
+    pixels: Pixels = "upper-left-1"
+    cameras: list[str] | None = None  # whose columns the file has, in order; all cameras where it does not say
+
+    @model_validator(mode="after")
+    def _one_length(self) -> WandSource:
+        if (self.length_m is None) == (self.lengths_m is None):
+            raise ValueError("give length_m, or lengths_m between the markers in a row")
+        return self
+
+
+class DetectionsSource(_Strict):
+    """Points of a moving person, as a pose network saw them."""
+
+    file: str
+    cameras: dict[str, str] = {}
+
+
+class WorldTable(_Strict):
+    """Where the world's origin and axes are; without this table the sources decide."""
+
+    frame: Literal["auto", "board", "camera", "start"] = "auto"
+    moment: Annotated[int, Field(ge=0)] | None = None  # board: at which frame it lies in the origin
+    points: str | None = None  # clicked points: point,<camera>_u,<camera>_v,...
+    origin: str | None = None
+    along_x: str | None = None
+    in_xy: str | None = None
+    throw: str | None = None  # tracks of a thrown thing: DLTdv's xypts
+    rate_hz: Positive | None = None  # of the throw
+    pixels: Pixels = "upper-left-1"
+
+    @model_validator(mode="after")
+    def _whole(self) -> WorldTable:
+        if self.points is not None and (self.origin is None or self.along_x is None):
+            raise ValueError("points needs origin and along_x, and in_xy or a throw")
+        if self.points is not None and self.in_xy is None and self.throw is None:
+            raise ValueError("points needs in_xy = the third point's name, or a throw that tells which way is up")
+        if self.throw is not None and self.rate_hz is None:
+            raise ValueError("throw needs rate_hz, the frames in a second")
+        return self
+
+
+class Sources(_Strict):
+    """All that a calibration is made from."""
+
+    camera: Annotated[list[CameraSource], Field(min_length=1)]
+    start: StartSource | None = None
+    board: BoardSource | None = None
+    control_points: PointsSource | None = None
+    court: CourtSource | None = None
+    wand: WandSource | None = None
+    detections: DetectionsSource | None = None
+    world: WorldTable = WorldTable()
+    _folder: Path = PrivateAttr(Path())
+
+    @model_validator(mode="after")
+    def _usable(self) -> Sources:
+        names = self.names
+        if len(set(names)) < len(names):
+            raise ValueError(f"two cameras share a name: {', '.join(names)}; give each its own")
+        if self.detections is not None and self.start is None and len(self.given) < 2:
+            raise ValueError('detections refine cameras that are known: give [start] file = "..." or another source')
+        if not self.given:
+            raise ValueError("no source: add [board], [control_points], [court], [wand] or [detections]")
+        return self
+
+    @property
+    def names(self) -> list[str]:
+        """The cameras' names, in order."""
+        return [camera.name for camera in self.camera]
+
+    @property
+    def given(self) -> list[str]:
+        """The kinds of evidence that are given."""
+        kinds = ("board", "control_points", "court", "wand", "detections")
+        return [kind for kind in kinds if getattr(self, kind) is not None]
+
+    def path(self, name: str) -> Path:
+        """Return the path of a file named here; raises CalibrationError for what can be no name."""
+        if not name or "\0" in name:
+            raise CalibrationError("a file's name is empty or holds a zero byte; give the file's path")
+        return self._folder / name
+
+
+def read_sources(path: Path) -> Sources:
+    """Read the TOML file; raises CalibrationError in one line for what cannot be used."""
+    try:
+        document = read_toml(path)
+    except OSError as error:
+        raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a file of sources") from None
+    except tomllib.TOMLDecodeError as error:
+        raise CalibrationError(
+            f"{path} is no TOML file ({str(error).lower()}); expected [[camera]], [board], ..."
+        ) from None
+    return sources_from(document, path.parent, str(path))
+
+
+def sources_from(document: dict, folder: Path, where: str) -> Sources:
+    """Check the tables; relative paths count from the folder. Raises CalibrationError, naming `where`."""
+    if "camera" not in document or "body" in document:
+        raise CalibrationError(
+            f"{where} is no file of sources: expected [[camera]] and [board], [control_points], [court], [wand] or "
+            f"[detections] (found {listed_keys(document)})"
+        )
+    try:
+        sources = Sources.model_validate(document)
+    except ValidationError as error:
+        raise CalibrationError(f"{where}: {one_line(error)}") from None
+    sources._folder = folder
+    return sources

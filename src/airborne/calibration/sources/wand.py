@@ -1,0 +1,162 @@
+"""A moving wand: two or more markers at known distances, seen by several cameras frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.calibration.bundle.source import Lengths, Source
+from airborne.cameras.camera import Rig
+from airborne.cameras.consensus import agreed_points
+from airborne.cameras.formats.dltdv import is_xypts, read_xypts
+from airborne.cameras.formats.options import Given
+from airborne.errors import CalibrationError
+from airborne.io.text import read_csv
+
+Array = NDArray[np.floating]
+
+LENGTH_SD_M = 5e-4  # how well a wand's length is usually measured
+LENGTH_RANGE_M = (0.02, 20.0)  # no wand is shorter or longer
+LENGTH_SHARE = 0.15  # a wand that comes out further off its length is not the wand
+MOST_MARKERS = 20
+COLUMNS = {"frame", "marker", "camera", "u_px", "v_px"}
+EXPECTED = "expected frame,marker,camera,u_px,v_px or DLTdv's pt1_cam1_U,pt1_cam1_V,pt1_cam2_U,..."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WandTracks:
+    """The markers of a wand in the pictures of several cameras; NaN where not seen."""
+
+    cameras: tuple[str, ...]
+    px: Array  # (frames, markers, cameras, 2) [px]
+    lengths_m: Mapping[tuple[int, int], float]  # between two markers, counted from 0 [m]
+    sd_m: float = LENGTH_SD_M  # of each length [m]
+
+    def __post_init__(self) -> None:
+        n = self.px.shape[1]
+        if not self.lengths_m:
+            raise CalibrationError("the wand has no length; give length_m = the distance between its markers in metres")
+        for pair, length in self.lengths_m.items():
+            if not (0 <= min(pair) < max(pair) < n):
+                raise CalibrationError(
+                    f"a length of the wand is between markers {pair[0] + 1} and {pair[1] + 1}; the tracks have {n}"
+                )
+            if not LENGTH_RANGE_M[0] <= length <= LENGTH_RANGE_M[1]:
+                raise CalibrationError(
+                    f"the wand is {length:g} m long; expected {LENGTH_RANGE_M[0]:g} to {LENGTH_RANGE_M[1]:g} m: "
+                    "give metres, not millimetres"
+                )
+
+    def select(self, cameras: Sequence[str]) -> WandTracks:
+        """Return the tracks of the named cameras, in that order."""
+        columns = [self.cameras.index(name) for name in cameras]
+        return replace(self, cameras=tuple(cameras), px=self.px[:, :, columns])
+
+
+def read_wand(path: Path, cameras: Sequence[str], given: Given, lengths_m: Sequence[float]) -> WandTracks:
+    """Read a wand's tracks: DLTdv's or easyWand's `xypts.csv`, or a table `frame,marker,camera,u_px,v_px`.
+
+    cameras name the first's columns, in their order; `given` says where its pixels count from. The other has markers
+    from 1 and our own pixels. lengths_m are those between marker 1 and 2, 2 and 3, and so on [m]. Raises
+    CalibrationError.
+    """
+    rows = read_csv(path, EXPECTED, CalibrationError)
+    header = ",".join(rows[0][1]) if rows else ""
+    px = read_xypts(path, given, cameras).px if is_xypts(header) else _tracks(path, rows, cameras)
+    if px.shape[1] != len(lengths_m) + 1:
+        raise CalibrationError(
+            f"{path} holds {px.shape[1]} markers; expected {len(lengths_m) + 1}, one more than lengths are given: keep "
+            "the wand's own markers, and give a length from each to the next"
+        )
+    lengths = {(i, i + 1): float(length) for i, length in enumerate(lengths_m)}
+    return WandTracks(cameras=tuple(cameras), px=px, lengths_m=lengths)
+
+
+def _tracks(path: Path, rows: Sequence[tuple[int, list[str]]], cameras: Sequence[str]) -> Array:
+    """Sort rows of one frame, marker and camera, in any order: (frames, markers, cameras, 2) [px], NaN elsewhere."""
+    (_, header), *rows = rows or [(1, [])]
+    if not rows or not set(header) >= COLUMNS:
+        raise CalibrationError(f"{path}: found {','.join(header)[:80] or 'nothing'}; {EXPECTED}")
+    places: dict[tuple[int, int, int], tuple[float, float]] = {}
+    for line, cells in rows:
+        if len(cells) != len(header):
+            raise CalibrationError(f"{path}, row {line}: {len(cells)} values, expected {len(header)} as in the header")
+        place, px = _row(f"{path}, row {line}", dict(zip(header, cells, strict=True)), cameras)
+        if place in places:
+            raise CalibrationError(f"{path}, row {line}: this frame, marker and camera stand twice; remove one")
+        places[place] = px
+    frames = {frame: i for i, frame in enumerate(sorted({frame for frame, _, _ in places}))}
+    px = np.full((len(frames), 1 + max(marker for _, marker, _ in places), len(cameras), 2), np.nan)
+    for (frame, marker, camera), uv in places.items():
+        px[frames[frame], marker, camera] = uv
+    return px
+
+
+def _row(
+    where: str, row: Mapping[str, str], cameras: Sequence[str]
+) -> tuple[tuple[int, int, int], tuple[float, float]]:
+    try:
+        frame, marker = int(row["frame"]), int(row["marker"])
+        u, v = (float(row[key] or "nan") for key in ("u_px", "v_px"))
+    except ValueError:
+        raise CalibrationError(f"{where}: expected whole numbers for frame and marker, pixels or blanks else") from None
+    if not 1 <= marker <= MOST_MARKERS:
+        raise CalibrationError(f"{where}: marker {marker}; count the wand's markers from 1 to {MOST_MARKERS} at most")
+    camera = row["camera"]
+    if camera not in cameras:
+        raise CalibrationError(f"{where}: camera '{camera}' is not one of {', '.join(cameras)}")
+    if np.isinf([u, v]).any() or np.isnan(u) != np.isnan(v):
+        raise CalibrationError(f"{where}: u_px and v_px must both be pixels, or both blank")
+    return (frame, marker - 1, cameras.index(camera)), (u, v)
+
+
+def wand_source(rig: Rig, tracks: WandTracks) -> Source:
+    """Return the wand as evidence: its markers as free points, triangulated with the rig, tied by the known lengths.
+
+    Places that do not fit the other cameras' are left out (see `agreed_points`), and so are two markers whose distance
+    comes out far from what is known.
+    """
+    tracks = tracks.select([name for name in rig.names if name in tracks.cameras])
+    rows = np.array([rig.names.index(name) for name in tracks.cameras])
+    agreed = agreed_points(rig.select(tracks.cameras), tracks.px, np.ones(tracks.px.shape[:-1]))
+    is_known = np.isfinite(agreed.points[..., 0]) & ~_is_astray(tracks, agreed.points)
+    number = np.full(is_known.shape, -1)
+    number[is_known] = np.arange(is_known.sum())
+    frame, marker, column = np.nonzero(agreed.is_used & is_known[..., None])
+    return Source(
+        name="wand",
+        camera=rows[column],
+        point=number[frame, marker],
+        px=tracks.px[frame, marker, column],
+        points=agreed.points[is_known],
+        is_free=np.ones(is_known.sum(), bool),
+        sd_px=0.5,
+        lengths=_lengths(tracks, number),
+    )
+
+
+def _is_astray(tracks: WandTracks, points: Array) -> NDArray[np.bool_]:
+    """Say which markers (frames, markers) are at a wrong distance from another; points (frames, markers, 3) [m]."""
+    astray = np.zeros(points.shape[:2], bool)
+    for (a, b), length_m in tracks.lengths_m.items():
+        found = np.linalg.norm(points[:, a] - points[:, b], axis=-1)
+        is_off = np.abs(found / length_m - 1) > LENGTH_SHARE  # NaN compares as right
+        astray[:, a] |= is_off
+        astray[:, b] |= is_off
+    return astray
+
+
+def _lengths(tracks: WandTracks, number: NDArray[np.integer]) -> Lengths:
+    first, second, length = [], [], []
+    for (a, b), length_m in tracks.lengths_m.items():
+        both = (number[:, a] >= 0) & (number[:, b] >= 0)
+        first.append(number[both, a])
+        second.append(number[both, b])
+        length.append(np.full(both.sum(), length_m))
+    return Lengths(
+        first=np.concatenate(first), second=np.concatenate(second), length_m=np.concatenate(length), sd_m=tracks.sd_m
+    )

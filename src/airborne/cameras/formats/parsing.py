@@ -1,0 +1,100 @@
+"""What all formats share: numbers checked, and cameras built from them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.cameras.camera import Camera
+from airborne.cameras.formats.options import Size
+from airborne.errors import CalibrationError
+
+Array = NDArray[np.floating]
+
+LARGEST = 1e9  # of any number in a calibration: metres, millimetres or pixels
+LARGEST_SIZE_PX = 65_535
+ROTATION_TOLERANCE = 1e-3  # how far nine numbers may be from a rotation
+N_TERMS = {"brown": 5, "fisheye": 4}
+
+
+def numbers(where: str, name: str, given: object, *shapes: tuple[int, ...]) -> Array:
+    """Return what a file gives as an array of finite numbers with one of the shapes; raises CalibrationError."""
+    expected = " or ".join("×".join(map(str, shape)) for shape in shapes)
+    if given is None:
+        raise CalibrationError(f"{where}: no {name}; expected {expected} numbers")
+    try:
+        values = np.array(given, float)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        values = np.array(np.nan)
+    if values.shape not in shapes or not np.all(np.abs(values) <= LARGEST):
+        raise CalibrationError(f"{where}: {name} = {_short(given)}, expected {expected} numbers")
+    return values
+
+
+def build(
+    where: str,
+    name: str,
+    *,
+    K: Array,
+    size: ArrayLike,
+    rotation: Array,
+    translation: Array,
+    distortion: Array,
+    is_fisheye: bool = False,
+) -> Camera:
+    """Build a camera from checked numbers; raises CalibrationError where they are no camera's.
+
+    size (width, height) [px]; rotation (3,) Rodrigues or (3, 3), camera from world; translation (3,) [m]; distortion up
+    to five Brown terms k1, k2, p1, p2, k3, or the four of a fisheye.
+    """
+    if not (K[0, 0] > 0 and K[1, 1] > 0 and K[1, 0] == 0 and np.array_equal(K[2], [0, 0, 1])):
+        raise CalibrationError(f"{where}: matrix is not [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with positive fx and fy")
+    lens = "fisheye" if is_fisheye else "brown"
+    if len(distortion) > N_TERMS[lens]:
+        raise CalibrationError(f"{where}: {len(distortion)} distortion terms; a {lens} lens has {N_TERMS[lens]}")
+    return Camera(
+        name=name,
+        K=K,
+        size=whole_size(where, size),
+        camera_from_world=RigidTransform.from_components(translation, _rotation(where, rotation)),
+        distortion=np.pad(distortion, (0, N_TERMS[lens] - len(distortion))),
+        lens=lens,
+    )
+
+
+def whole_size(where: str, size: ArrayLike) -> Size:
+    """Return (width, height) [px]; raises CalibrationError where they are no whole numbers of pixels."""
+    values = np.asarray(size, float)
+    if not (np.all(values >= 1) and np.all(values <= LARGEST_SIZE_PX) and np.array_equal(values, np.round(values))):
+        raise CalibrationError(f"{where}: size = {values.tolist()}, expected width and height in whole pixels")
+    return int(values[0]), int(values[1])
+
+
+def terms(camera: Camera, n: int) -> list[float]:
+    """Return the camera's distortion in n terms, zeros where it has fewer."""
+    return np.pad(camera.distortion, (0, max(n - len(camera.distortion), 0)))[:n].tolist()
+
+
+def refuse_fisheye(camera: Camera, name_of_format: str) -> None:
+    """Raise CalibrationError for a fisheye lens in a format that has no place for one."""
+    if camera.lens == "fisheye":
+        raise CalibrationError(
+            f"camera '{camera.name}' has a fisheye lens, which {name_of_format} cannot hold; "
+            "write pose2sim, aniposelib or caliscope"
+        )
+
+
+def _rotation(where: str, given: Array) -> Rotation:
+    if given.shape == (3,):
+        return Rotation.from_rotvec(given)
+    if np.abs(given @ given.T - np.eye(3)).max() > ROTATION_TOLERANCE or np.linalg.det(given) < 0:
+        raise CalibrationError(f"{where}: the rotation is not one: its rows are not at right angles, or it mirrors")
+    return Rotation.from_matrix(given)
+
+
+def _short(given: object) -> str:
+    try:
+        return str(given)[:60]
+    except (RecursionError, ValueError):  # nested too deeply, or a number of too many digits
+        return "something unreadable"

@@ -1,0 +1,62 @@
+"""The folder of a run, read back: which run lies there, and its motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from airborne.body import BodyModel
+from airborne.body.files import read_body
+from airborne.errors import ResultError
+from airborne.io.text import read_json
+from airborne.motion.files import read_motion
+from airborne.motion.motion import Motion
+from airborne.motion.players import PlayersMotion, read_players
+
+RECORD = "run.json"
+
+
+def holds_players(folder: Path) -> bool:
+    """Say whether a folder holds a run of several players, finished or not."""
+    return (folder / "joints.csv").is_file() and not (folder / "motion.csv").is_file()
+
+
+def body_run(folder: Path) -> tuple[Motion, BodyModel]:
+    """Return the motion and the body of the run in a folder, finished or not.
+
+    Raises ResultError where the folder holds none, the body is missing, or its record is damaged.
+    """
+    if not (folder / "motion.csv").is_file():
+        raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
+    check_record(folder)
+    motion = read_motion(folder / "motion.csv")
+    if not (folder / "body.toml").is_file():
+        raise ResultError(
+            f"{folder / 'body.toml'} is missing, the body that was tracked; put the trial's body file there, "
+            "or track again"
+        )
+    return motion, read_body(folder / "body.toml")
+
+
+def players_run(folder: Path) -> PlayersMotion:
+    """Return the motion of the run of players in a folder. Raises ResultError as `body_run` does."""
+    check_record(folder)
+    return read_players(folder / "joints.csv")
+
+
+def check_record(folder: Path) -> None:
+    """Raise ResultError where a folder's run.json is damaged; a run without one is known by its tables."""
+    if (folder / RECORD).exists():
+        read_record(folder / RECORD)
+
+
+def read_record(path: Path) -> dict[str, Any]:
+    """Read a run's record. Raises ResultError where it is damaged or missing."""
+    try:
+        record = read_json(path)
+    except (OSError, ValueError):
+        record = None
+    if not isinstance(record, dict):
+        state = "damaged" if path.exists() else "missing"
+        raise ResultError(f"{path} is {state}, so it cannot be told whose run this is; track into another folder")
+    return record

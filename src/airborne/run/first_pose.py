@@ -1,0 +1,182 @@
+"""The first pose, and the cameras it is seen with: set by hand, or from places, clicked points or 2D detections."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import BodyModel, Pose
+from airborne.body.inverse_kinematics import fit_pose
+from airborne.calibration.initial.resection import disagreeing, mend
+from airborne.cameras import Rig
+from airborne.cameras.clicks import read_clicks, read_places
+from airborne.cameras.consensus import agreed_points
+from airborne.cameras.detections import MADE_OF, NETWORKS, Detections, landmarks_from_points, read_detections
+from airborne.errors import BodyError, TrialError
+from airborne.trial.file import Trial
+from airborne.video import VideoSource, inspect
+
+Array = NDArray[np.floating]
+
+LEAST_VISIBILITY = 0.3  # detections less sure are not looked at
+WEIGHTS = {  # of points that lie only near the landmark they stand for
+    "head": 0.1,
+    **dict.fromkeys(("hand_left", "hand_right", "foot_left", "foot_right"), 0.3),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FirstPose:
+    """Where the body is at the first frame."""
+
+    pose: Pose
+    notes: tuple[str, ...] = ()  # what the user should know, one line each
+
+
+def first_pose(trial: Trial, model: BodyModel, rig: Rig) -> FirstPose:
+    """Find the first pose of a trial; `rig` holds the cameras of its videos, mended where it asks for that.
+
+    Raises TrialError where the places given do not settle a pose of this body, CalibrationError for unusable tables.
+    """
+    start = trial.start
+    if start.position_m is not None:
+        return _by_hand(trial, model)
+    if isinstance(start.joints_m, dict):
+        found = {name: np.array(place) for name, place in start.joints_m.items()}
+        return _fitted(model, "start.joints_m", list(found), np.stack(list(found.values())))
+    if start.joints_m is not None:
+        found = read_places(trial.path(start.joints_m))
+        return _fitted(model, start.joints_m, list(found), np.stack(list(found.values())))
+    if start.points_px is not None:
+        names, px = read_clicks(trial.path(start.points_px), rig.names)
+        return _triangulated(model, rig, start.points_px, names, px, np.ones(px.shape[:-1]))
+    detections = _detections(trial, rig).at(_frames_at(trial, np.array([start.frame]), fields=True))
+    sure = detections.surer_than(LEAST_VISIBILITY)
+    where = f"{start.detections}, frame {start.frame}"
+    first = _triangulated(model, rig, where, sure.points, sure.px[0], sure.visibility[0])
+    return FirstPose(first.pose, (*detections.notes, *first.notes))
+
+
+def mended_rig(trial: Trial, rig: Rig) -> tuple[Rig, tuple[str, ...]]:
+    """Place the cameras anew that the trial says to mend; the notes say what that did, and which others disagree.
+
+    Without detections the rig stays as it is. Raises CalibrationError where a camera cannot be placed.
+    """
+    if trial.start.detections is None:
+        return rig, ()
+    detections = _all_at_once(trial, rig)
+    notes = []
+    if trial.calibration.mend:
+        rig, done = mend(rig, detections, trial.calibration.mend)
+        notes += [mending.describe() for mending in done]
+    notes += [
+        f"{found.camera.name} disagrees with the other cameras: half of its detections lie over "
+        f"{found.before_px:.0f} px from where the others see the points; if it moved after the calibration, give "
+        f'mend = ["{found.camera.name}"] under [calibration]'
+        for found in disagreeing(rig, detections)
+    ]
+    return rig, tuple(notes)
+
+
+def landmarks_over_time(trial: Trial, rig: Rig) -> dict[str, Array]:
+    """Triangulate a trial's detections at every frame of the first camera: point or landmark -> (frames, 3) [m].
+
+    NaN where fewer than two cameras agree. Raises CalibrationError.
+    """
+    sure = _all_at_once(trial, rig).surer_than(LEAST_VISIBILITY)
+    return landmarks_from_points(sure.points, agreed_points(rig, sure.px, sure.visibility).points)
+
+
+def _by_hand(trial: Trial, model: BodyModel) -> FirstPose:
+    joints = [segment.name for segment in model.segments[1:]]
+    angles = np.zeros((len(joints), 3))
+    for name, xyz in trial.start.joint_angles_deg.items():
+        if name not in joints:
+            raise TrialError(
+                f"start.joint_angles_deg: body '{model.name}' has no joint '{name}'; "
+                f"it has: {', '.join(joints) or 'none'}"
+            )
+        angles[joints.index(name)] = np.radians(xyz)
+    is_out = np.any((angles < model.limits_rad[..., 0]) | (angles > model.limits_rad[..., 1]), axis=1)
+    beyond = [name for name, out in zip(joints, is_out, strict=True) if out and name in trial.start.joint_angles_deg]
+    notes = (f"start.joint_angles_deg: {', '.join(beyond)} beyond the body's joint limits",) if beyond else ()
+    return FirstPose(Pose(world_from_root=trial.start.world_from_root, joint_angles=angles), notes)
+
+
+def _triangulated(model: BodyModel, rig: Rig, where: str, names: Sequence[str], px: Array, weights: Array) -> FirstPose:
+    """Fit to points seen in pictures: px (points, cameras, 2) [px], NaN where not seen; weights (points, cameras)."""
+    needed = _needed(model, where, names)
+    names = [names[i] for i in needed]
+    agreed = agreed_points(rig, px[needed], weights[needed])
+    is_left_out = np.isfinite(agreed.distance_px) & ~agreed.is_used & (weights[needed] > 0)
+    left_out = [
+        f"{where}: {camera} left out at {', '.join(name for name, is_out in zip(names, out, strict=True) if is_out)}, "
+        f"up to {distance_px[out].max():.0f} px from where the other cameras see them"
+        for camera, out, distance_px in zip(rig.names, is_left_out.T, agreed.distance_px.T, strict=True)
+        if out.any()
+    ]
+    first = _fitted(model, where, names, agreed.points)
+    return FirstPose(first.pose, (*left_out, *first.notes))
+
+
+def _needed(model: BodyModel, where: str, names: Sequence[str]) -> list[int]:
+    """Return which points make landmarks of the body; raises TrialError for a name that nobody knows."""
+    landmarks = [landmark.name for landmark in model.landmarks]
+    of_networks = {*chain.from_iterable(NETWORKS.values())}
+    strange = [name for name in names if name not in landmarks and name not in of_networks]
+    if strange:
+        raise TrialError(
+            f"{where}: body '{model.name}' has no landmark {', '.join(strange)}; it has: {', '.join(landmarks)}"
+        )
+    recipes = chain.from_iterable(MADE_OF[landmark] for landmark in landmarks if landmark in MADE_OF)
+    parts = {*landmarks, *chain.from_iterable(recipes)}
+    return [i for i, name in enumerate(names) if name in parts]
+
+
+def _fitted(model: BodyModel, where: str, names: Sequence[str], points: Array) -> FirstPose:
+    """Fit to points (points, 3) [m] that go by these names."""
+    needed = _needed(model, where, names)
+    found = landmarks_from_points([names[i] for i in needed], points[needed])
+    targets = {landmark.name: found[landmark.name] for landmark in model.landmarks if landmark.name in found}
+    try:
+        fit = fit_pose(model, targets, weights=WEIGHTS)
+    except BodyError as error:
+        raise TrialError(f"{where}: {error}") from error
+    off_m = {name: distance for name, distance in fit.residual_m.items() if np.isfinite(distance)}
+    worst = max(off_m, key=off_m.__getitem__)
+    unseen = ", ".join(name for name, place in targets.items() if np.isnan(place).any())
+    notes = [
+        f"{where}: first pose found, landmarks {fit.rms_m * 1e3:.0f} mm off (RMS), "
+        f"most {worst}, {off_m[worst] * 1e3:.0f} mm",
+        f"{where}: no place of {unseen}; there the first pose is as near to straight as it can be" if unseen else None,
+        f"{where}: {fit.note}" if fit.note else None,
+    ]
+    return FirstPose(fit.pose, tuple(note for note in notes if note is not None))
+
+
+def _detections(trial: Trial, rig: Rig) -> Detections:
+    start = trial.start
+    return read_detections(trial.path(start.detections or ""), rig.names, start.detections_cameras)
+
+
+def _all_at_once(trial: Trial, rig: Rig) -> Detections:
+    """Return the detections with one moment a row: the frames of the first camera."""
+    detections = _detections(trial, rig)
+    return detections.at(_frames_at(trial, np.arange(len(detections.px)), fields=False))
+
+
+def _frames_at(trial: Trial, index: NDArray[np.integer], *, fields: bool) -> NDArray[np.int64]:
+    """Return every camera's frame nearest in time (n, cameras) to the first camera's frames, or images, (n,)."""
+    facts = [inspect(VideoSource(c.name, trial.path(c.video), c.fields)) for c in trial.camera]
+    rate = facts[0].image_rate if fields else facts[0].frame_rate
+    first = trial.camera[0]
+    time_s = first.offset_s + index / float(rate) * (1 + first.drift_ppm / 1e6)
+    columns = [
+        (time_s - camera.offset_s) / (1 + camera.drift_ppm / 1e6) * float(fact.frame_rate)
+        for camera, fact in zip(trial.camera, facts, strict=True)
+    ]
+    return np.floor(np.stack(columns, axis=1) + 0.5 - 1e-6).astype(np.int64)  # a field at a half belongs to its frame

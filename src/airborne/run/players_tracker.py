@@ -1,0 +1,115 @@
+"""The tracker of a trial's players: their starts checked against the cameras, torsos given or tracked, by method."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.cameras import Rig, aimed
+from airborne.errors import TrialError
+from airborne.tracking.capsules import Blocker
+from airborne.tracking.particle import GivenTorsos, LegsMethod, LegsSettings, legs_tracker
+from airborne.tracking.players import PlayerStart, PlayersTracker
+from airborne.trial.file import Trial
+from airborne.video import Frames, View
+
+Array = NDArray[np.floating]
+
+_AWAY = np.array([0, -4.0, 0])  # of the made-up cameras [m]
+_TORSO_COLUMNS = ("player", "frame", "x_m", "y_m", "z_m")
+_MOST_FRAMES = 1_000_000  # from the first to the last torso
+
+
+def players_tracker_of(trial: Trial, rig: Rig) -> PlayersTracker:
+    """Make the tracker of a trial's players, who are seen by `rig`.
+
+    Raises TrialError for a player whom no camera can see at the start, and for an unusable table of torsos.
+    """
+    starts = trial.players
+    for start in starts:
+        _check_seen(trial, start, rig)
+    track = trial.track
+    if track.method == "blocker":
+        return Blocker(starts)
+    torso = None if track.torso is None else read_torsos(trial.path(track.torso), starts, first=trial.start.frame)
+    chosen = {"n_particles": track.n_particles, "estimate": track.estimate}
+    settings = LegsSettings(
+        method=cast(LegsMethod, track.method),
+        seed=track.seed,
+        swing=track.swing,
+        views=track.views,
+        tempered=track.tempered,
+        torso_shift=track.torso_shift,
+        resample=track.resample,
+        resample_when=track.resample_when,
+        **{name: value for name, value in chosen.items() if value is not None},
+    )
+    return legs_tracker(settings, rig, starts, torso)
+
+
+def compile_for(trial: Trial) -> None:
+    """Take two steps on empty pictures, so that the tracker's kernels are compiled before live pictures come."""
+    at = np.mean([place for start in trial.players for place in start.joints_m.values()], axis=0)
+    size = (640, 480)
+    asides = zip(trial.camera, np.linspace([-1, 0, 0], [1, 0, 0], len(trial.camera)), strict=True)
+    cameras = [aimed(camera.name, at + aside + _AWAY, at + aside, 400.0, size) for camera, aside in asides]
+    tracker, grey = players_tracker_of(trial, Rig(tuple(cameras))), np.full((size[1], size[0], 3), 128, np.uint8)
+    state = tracker.init()
+    for index in range(2):
+        views = tuple(View(camera, grey) for camera in cameras)
+        state, _ = tracker.step(state, Frames(index, Fraction(index, 60), views))
+
+
+def read_torsos(path: Path, starts: Sequence[PlayerStart], *, first: int) -> GivenTorsos:
+    """Read the torsos of all players and bystanders: a table `player,frame,x_m,y_m,z_m`, in any order of its rows.
+
+    Of a joints.csv, which has a column `joint` too, the rows of the torso are read. A frame without a row keeps the
+    torso of the one before. Raises TrialError where the table cannot be read or a player has no place at frame `first`.
+    """
+    names = [start.name for start in starts]
+    places: dict[tuple[int, str], tuple[float, float, float]] = {}
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = csv.DictReader(file)
+            missing = [name for name in _TORSO_COLUMNS if name not in (rows.fieldnames or ())]
+            if missing:
+                raise TrialError(f"{path.name}: no column {', '.join(missing)}; expected {', '.join(_TORSO_COLUMNS)}")
+            for row in rows:
+                if row.get("joint", "torso") == "torso" and row["player"] in names:
+                    x, y, z = (float(row[axis] or math.nan) for axis in _TORSO_COLUMNS[2:])
+                    frame = int(row["frame"])
+                    if not abs(frame - first) <= _MOST_FRAMES:
+                        raise ValueError(f"frame {str(frame)[:20]} lies far beyond the recording")
+                    places[frame, row["player"]] = (x, y, z)
+    except (OSError, UnicodeDecodeError, ValueError, TypeError, csv.Error) as error:
+        raise TrialError(f"{path.name}: not a table of torsos ({error}); mend it or leave `torso` out") from error
+    positions = np.full((max((frame for frame, _ in places), default=first) - first + 1, len(names), 3), np.nan)
+    for (frame, name), place in places.items():
+        if frame >= first:
+            positions[frame - first, names.index(name)] = place
+    unknown = [name for name, place in zip(names, positions[0], strict=True) if not np.isfinite(place).all()]
+    if unknown:
+        raise TrialError(f"{path.name}: no torso of {', '.join(unknown)} at frame {first}, where tracking starts")
+    return GivenTorsos(positions, first)
+
+
+def _check_seen(trial: Trial, start: PlayerStart, rig: Rig) -> None:
+    """Raise TrialError where no camera can see any point of a player; a bystander may be out of sight."""
+    if not start.has_legs:
+        return
+    points = np.array(list(start.joints_m.values()))
+    for camera in rig:
+        px = camera.undistorted().px_from_world(points)
+        if np.any(np.all((px >= -0.5) & (px <= np.array(camera.size) - 0.5), axis=-1)):
+            return
+    raise TrialError(
+        f"{trial.name}: player '{start.name}' lies in no camera's picture; joints_m are metres in the world of the "
+        "calibration"
+    )

@@ -1,0 +1,1 @@
+"""Scenes of a volleyball block: players, footwork, jumps, the hall, its cameras and pictures."""

@@ -1,0 +1,172 @@
+"""How a person moves on the floor and in the air: a course of poses in time, with acceleration continuous."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BPoly, PchipInterpolator, PPoly
+
+from airborne.synthetic.block.legs import rolled_foot, turn
+from airborne.synthetic.block.posture import Feet, Person, Poses, standing
+from airborne.synthetic.flight.rigid import GRAVITY_M_S2
+
+Array = NDArray[np.floating]
+Knot = tuple[float, Any, Any, Any]  # time [s], value, its rate and the rate's rate
+
+_STEP_S, _STEPS = 0.002, 6  # of the look back over the legs at take-off, and ahead at landing
+
+
+def quintic(knots: Sequence[Knot]) -> PPoly:
+    """Join knots by quintics: value, rate and acceleration are continuous. Values are numbers or arrays of a shape."""
+    values = [np.stack([np.broadcast_to(np.asarray(v, float), np.shape(k[1])) for v in k[1:]]) for k in knots]
+    return PPoly.from_bernstein_basis(BPoly.from_derivatives([k[0] for k in knots], np.stack(values)))
+
+
+def resting(time_s: Sequence[float], values: Sequence[object]) -> PPoly:
+    """Join values at rest by the quintics of least jerk."""
+    return quintic([(t, value, 0.0, 0.0) for t, value in zip(time_s, values, strict=True)])
+
+
+def flowing(time_s: Sequence[float], values: Sequence[object]) -> PPoly:
+    """Join values by quintics that pass without a stop where the values go on the same way, and rest at the ends."""
+    stacked = np.stack([np.asarray(value, float) for value in values])
+    rates = PchipInterpolator(time_s, stacked)(time_s, 1)
+    rates[[0, -1]] = 0
+    return quintic([(t, value, rate, 0.0) for t, value, rate in zip(time_s, stacked, rates, strict=True)])
+
+
+def at(curve: PPoly, time_s: Array) -> Array:
+    """Return a curve's values (n, ...) at times (n,) [s]; before and after its knots it keeps its ends."""
+    return curve(np.clip(time_s, curve.x[0], curve.x[-1]))
+
+
+class Foot(NamedTuple):
+    """One foot's way over the floor; see `rolled_foot`."""
+
+    place: PPoly  # (3,) x, y [m] and the turn about z [rad]
+    lift: PPoly  # [m]
+    pitch: PPoly  # [rad]
+
+
+class Stand(NamedTuple):
+    """A time on the floor; the centre of mass goes its way whatever the feet do."""
+
+    over: PPoly  # (2,) x, y of the centre of mass [m]
+    height: PPoly  # z of the centre of mass [m]
+    feet: tuple[Foot, ...]  # left, right
+
+
+class Manner(NamedTuple):
+    """How root, trunk, head and arms are held; the legs follow."""
+
+    yaw: PPoly  # of the root about z [rad]
+    pitch: PPoly  # of the root, then forward about its own x [rad]
+    trunk: PPoly  # (17, 3) joint angles; summed with the arms'
+    arms: PPoly  # (17, 3)
+
+
+class Flight(NamedTuple):
+    """A time in the air: a parabola of the centre of mass, from take-off at time 0."""
+
+    centre: Array  # (3,) of mass at take-off, world [m]
+    velocity: Array  # (3,) [m/s]
+    duration_s: float
+    legs: PPoly  # (6, 3) angles of hip, knee, ankle, left first [rad]
+
+    def centre_at(self, time_s: Array) -> Array:
+        """Return where the centre of mass is at the times (n,) [s] after take-off: (n, 3) world [m]."""
+        t = np.asarray(time_s, float)[:, None]
+        return self.centre + self.velocity * t + GRAVITY_M_S2 * t**2 / 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """A person's motion; a jumper leaves the floor at time 0."""
+
+    person: Person
+    manner: Manner
+    before: Stand
+    flight: Flight | None = None
+    after: Stand | None = None
+
+    def __call__(self, time_s: Array) -> Poses:
+        """Return the poses at the times (n,) [s]; before its first and after its last knot the person stands still."""
+        time_s = np.asarray(time_s, float)
+        flight, after = self.flight, self.after
+        if flight is None or after is None:
+            return stand_poses(self.person, self.manner, self.before, time_s)
+        is_up = (time_s > 0) & (time_s < flight.duration_s)
+        phases = [
+            (time_s <= 0, lambda t: stand_poses(self.person, self.manner, self.before, t)),
+            (is_up, self._flying),
+            (time_s >= flight.duration_s, lambda t: stand_poses(self.person, self.manner, after, t)),
+        ]
+        n, joints = len(time_s), len(self.person.model.segments) - 1
+        found = Poses(np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, joints, 3)))
+        for chosen, poses_at in phases:
+            if chosen.any():
+                for whole, part in zip(found, poses_at(time_s[chosen]), strict=True):
+                    whole[chosen] = part
+        return found
+
+    def _flying(self, time_s: Array) -> Poses:
+        assert self.flight is not None
+        R, angles = manner_at(self.manner, time_s)
+        angles[:, self.person.joints.ravel()] = self.flight.legs(time_s)
+        own = self.person.centre_of_mass(Poses(R, np.zeros((len(time_s), 3)), angles))
+        return Poses(R, self.flight.centre_at(time_s) - own, angles)
+
+
+def moved(course: Course, way: Array) -> Course:
+    """Return the same motion at another place on the floor, `way` (2,) [m] from the old one."""
+
+    def shifted(curve: PPoly) -> PPoly:
+        c = curve.c.copy()
+        c[-1, :, :2] += way
+        return PPoly(c, curve.x)
+
+    def stood(stand: Stand) -> Stand:
+        feet = tuple(foot._replace(place=shifted(foot.place)) for foot in stand.feet)
+        return stand._replace(over=shifted(stand.over), feet=feet)
+
+    flight, after = course.flight, course.after
+    return replace(
+        course,
+        before=stood(course.before),
+        flight=None if flight is None else flight._replace(centre=flight.centre + np.append(way, 0.0)),
+        after=None if after is None else stood(after),
+    )
+
+
+def manner_at(manner: Manner, time_s: Array) -> tuple[Array, Array]:
+    """Return the root's R (n, 3, 3) and the joint angles (n, 17, 3), legs straight, at the times (n,) [s]."""
+    yaw, pitch = at(manner.yaw, time_s), at(manner.pitch, time_s)
+    return turn(2, yaw) @ turn(0, pitch), at(manner.trunk, time_s) + at(manner.arms, time_s)
+
+
+def stand_poses(person: Person, manner: Manner, stand: Stand, time_s: Array) -> Poses:
+    """Return the poses of a time on the floor at the times (n,) [s]."""
+    R, angles = manner_at(manner, time_s)
+    feet = [
+        rolled_foot(person.leg, at(foot.place, time_s), at(foot.pitch, time_s), at(foot.lift, time_s))
+        for foot in stand.feet
+    ]
+    both = Feet(np.stack([ankle for ankle, _ in feet]), np.stack([turned for _, turned in feet]))
+    return standing(person, R, angles, both, np.column_stack([at(stand.over, time_s), at(stand.height, time_s)]))
+
+
+def legs_at_edge(person: Person, manner: Manner, stand: Stand, time_s: float, *, toward: int) -> tuple[Array, ...]:
+    """Return the legs' angles, rates and accelerations, (6, 3) each, at a stand's first or last moment.
+
+    `toward` is -1 to look back from its last moment, +1 to look ahead from its first.
+    """
+    steps = toward * np.arange(_STEPS)
+    angles = stand_poses(person, manner, stand, time_s + _STEP_S * steps).joint_angles[:, person.joints.ravel()]
+    coefficients = np.linalg.solve(np.vander(steps.astype(float), increasing=True), angles.reshape(_STEPS, -1))
+    shape = angles.shape[1:]
+    value, rate, double = (coefficients[k].reshape(shape) / _STEP_S**k for k in range(3))
+    return value, rate, 2 * double

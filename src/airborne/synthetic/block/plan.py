@@ -1,0 +1,159 @@
+"""What a jump is made of: its plan, how the body is held at the key moments, how high the centre of mass is then."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.synthetic.block.legs import rolled_foot, turn
+from airborne.synthetic.block.posture import Feet, Person, posture, standing
+from airborne.synthetic.block.steps import Approach, stance
+
+Array = NDArray[np.floating]
+Arms = Literal["block", "attack", "low"]
+
+TAKEOFF_PITCH = (np.radians(35.0), 13.0, -60.0)  # of the feet [rad, rad/s, rad/s^2]
+TOUCH_PITCH = (np.radians(26.0), -11.0, 0.0)
+AHEAD_M, AHEAD_LOW_M = 0.02, -0.01  # of the centre of mass before the feet's middle: standing, at its lowest
+AHEAD_TAKEOFF_M, AHEAD_TOUCH_M = 0.085, 0.05
+_HEIGHTS_PER_REACH, _N_HEIGHTS = (0.75, 1.5), 48  # of the centre of mass, tried, over a leg's length
+_MET_S = 0.1  # feet land ahead of a drifting body by what it goes in this time
+
+
+class Hold(NamedTuple):
+    """How pelvis, trunk, head and arms are held, in degrees; see `posture`."""
+
+    pitch: float  # of the pelvis, forward
+    trunk: float
+    head: float
+    arms: tuple[float, float]
+    elbows: tuple[float, float]
+    apart: float = 8.0
+
+    def angles(self, person: Person) -> Array:
+        """Return the joint angles (17, 3) [rad], legs straight."""
+        return posture(person, trunk=self.trunk, head=self.head, arms=self.arms, elbows=self.elbows, apart=self.apart)
+
+
+READY = Hold(15, 14, -16, (35, 35), (120, 120))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JumpPlan:
+    """What a jump is made of; angles in degrees, of knees how far they are bent."""
+
+    rise_m: float  # of the centre of mass after take-off
+    place: Array  # (2,) x, y of the feet's middle at take-off [m]
+    yaw: float  # turn about z: 0 faces -y, pi faces +y [rad]
+    drift_m_s: Array  # (2,) horizontal velocity in flight
+    approach: Approach = "static"
+    way_m: float = 0.0  # of the approach, along x
+    crouch_s: float = 0.32
+    width_m: float = 0.36  # between the feet
+    knee_ready: float = 38.0
+    knee_crouch: float = 92.0
+    knee_takeoff: float = 32.0
+    knee_touch: float = 34.0
+    knee_landing: float = 87.0
+    knee_peak: float = 14.0
+    hip_peak: float = 16.0
+    ankle_peak: float = 24.0
+    arms: Arms = "block"
+    tilt: float = 20.0  # of the arms at the peak, from upright forward
+
+    @property
+    def forward(self) -> Array:
+        """The way that the player faces: (2,), unit."""
+        return np.array([np.sin(self.yaw), -np.cos(self.yaw)])
+
+    @property
+    def touch_offset_m(self) -> Array:
+        """Where the centre of mass is at touch-down, seen from the middle of the feet: (2,) [m]."""
+        return AHEAD_TOUCH_M * self.forward - _MET_S * self.drift_m_s
+
+    @property
+    def holds(self) -> dict[str, Hold]:
+        """How the body is held at the key moments."""
+        up = 178.0 - self.tilt
+        swing = {
+            "block": (
+                Hold(36, 24, -32, (35, 35), (125, 125)),
+                Hold(6, 4, -18, (115, 115), (85, 85)),
+                Hold(9, 8, -8, (up, up), (6, 6), 6),
+            ),
+            "attack": (
+                Hold(38, 24, -30, (-45, -45), (15, 15)),
+                Hold(4, 0, -20, (125, 120), (20, 70)),
+                Hold(8, 6, -12, (110, up), (25, 15), 14),
+            ),
+            "low": (
+                Hold(34, 22, -28, (10, 10), (60, 60), 14),
+                Hold(6, 4, -12, (45, 45), (60, 60), 14),
+                Hold(8, 6, -10, (60, 60), (50, 50), 18),
+            ),
+        }[self.arms]
+        return {
+            "ready": READY,
+            **dict(zip(("bottom", "takeoff", "peak"), swing, strict=True)),
+            "fold": Hold(12, 9, -10, (100, 100), (120, 120), 12),
+            "touch": Hold(14, 10, -10, (35, 35), (125, 125), 14),
+            "low": Hold(30, 20, -24, (10, 10), (110, 110), 18),
+            "end": Hold(13, 12, -14, (25, 25), (105, 105), 12),
+        }
+
+
+class Levels(NamedTuple):
+    """Heights of the centre of mass [m]."""
+
+    ready: float
+    bottom: float
+    takeoff: float
+    touch: float
+    low: float
+    end: float
+
+
+def levels_of(person: Person, plan: JumpPlan) -> Levels:
+    """Find how high the centre of mass is at the key moments, from how far the knees are bent."""
+    near, holds = AHEAD_M * plan.forward, plan.holds
+
+    def height(hold: str, knee: float, offset: Array = near, pitch: float = 0.0) -> float:
+        places = stance(plan.place, plan.yaw, plan.width_m)
+        return height_where(
+            person, holds[hold], places, over=plan.place + offset, yaw=plan.yaw, knee=np.radians(knee), pitch=pitch
+        )
+
+    return Levels(
+        ready=height("ready", plan.knee_ready),
+        bottom=height("bottom", plan.knee_crouch, AHEAD_LOW_M * plan.forward),
+        takeoff=height("takeoff", plan.knee_takeoff, AHEAD_TAKEOFF_M * plan.forward, TAKEOFF_PITCH[0]),
+        touch=height("touch", plan.knee_touch, plan.touch_offset_m, TOUCH_PITCH[0]),
+        low=height("low", plan.knee_landing, AHEAD_LOW_M * plan.forward),
+        end=height("end", plan.knee_ready),
+    )
+
+
+def height_where(
+    person: Person, hold: Hold, places: Array, *, over: Array, yaw: float, knee: float, pitch: float = 0.0
+) -> float:
+    """Return the height of the centre of mass [m] at which the knees are bent by `knee` [rad] on the mean.
+
+    Feet stand at `places` (2, 3) with their heels raised by `pitch`; the centre of mass is over `over` (2,) [m].
+    """
+    reach = person.leg.thigh_m + person.leg.shank_m
+    heights = np.linspace(*_HEIGHTS_PER_REACH, _N_HEIGHTS) * reach
+    alike = np.ones(_N_HEIGHTS)
+    R = turn(2, yaw * alike) @ turn(0, np.radians(hold.pitch) * alike)
+    ankles, turns = zip(
+        *(rolled_foot(person.leg, np.tile(place, (_N_HEIGHTS, 1)), pitch * alike, 0 * alike) for place in places),
+        strict=True,
+    )
+    centres = np.column_stack([np.tile(over, (_N_HEIGHTS, 1)), heights])
+    angles = np.tile(hold.angles(person), (_N_HEIGHTS, 1, 1))
+    poses = standing(person, R, angles, Feet(np.stack(ankles), np.stack(turns)), centres)
+    bent = poses.joint_angles[:, person.knees, 0].mean(axis=1)
+    can_stand = np.isfinite(bent)
+    return float(np.interp(-knee, -bent[can_stand], heights[can_stand]))

@@ -1,0 +1,148 @@
+"""A person of the preset `human18` who stands: the root is where feet and centre of mass want it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.body import BodyModel, Ellipsoid, Pose
+from airborne.body.inertia import segment_inertias
+from airborne.rendering import place_segments
+from airborne.synthetic.block.legs import LegSizes, leg_angles
+
+Array = NDArray[np.floating]
+
+SIDES = ("left", "right")
+_MOST_ROUNDS, _SOLVED_M, _TOO_SHORT_M = 60, 1e-13, 1e-6
+_BOLDNESS = 1.2  # the centre of mass follows the root by a part of its way
+
+
+class Poses(NamedTuple):
+    """n poses of one body."""
+
+    root_R: Array  # (n, 3, 3) world from root
+    root_t: Array  # (n, 3) world [m]
+    joint_angles: Array  # (n, 17, 3) [rad]
+
+    def pose(self, i: int) -> Pose:
+        """Return the i-th one."""
+        root = RigidTransform.from_components(self.root_t[i], Rotation.from_matrix(self.root_R[i]))
+        return Pose(world_from_root=root, joint_angles=self.joint_angles[i])
+
+
+class Feet(NamedTuple):
+    """Where n pairs of feet are, left first."""
+
+    ankle: Array  # (2, n, 3) world [m]
+    R: Array  # (2, n, 3, 3) world from foot
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """A body and what of it standing needs."""
+
+    model: BodyModel
+    mass_kg: Array  # (segments,)
+    centre_m: Array  # (segments, 3) of mass, segments' frames [m]
+    leg: LegSizes  # both legs are alike
+    hips_m: Array  # (2, 3) root's frame [m]
+    joints: NDArray[np.intp]  # (2, 3) rows of hip, knee and ankle among the joints
+
+    @property
+    def knees(self) -> NDArray[np.intp]:
+        """The rows of both knees among the joints: (2,)."""
+        return self.joints[:, 1]
+
+    def placed(self, poses: Poses) -> tuple[Array, Array]:
+        """Return R (n, s, 3, 3) and t (n, s, 3) of the segments, world from segment."""
+        return place_segments(self.model, poses.root_R, poses.root_t, poses.joint_angles)
+
+    def centre_of_mass(self, poses: Poses) -> Array:
+        """Return where the centre of mass is: (n, 3) world [m]."""
+        R, t = self.placed(poses)
+        return np.einsum(
+            "s,nsi->ni", self.mass_kg / self.mass_kg.sum(), np.einsum("nsij,sj->nsi", R, self.centre_m) + t
+        )
+
+    def landmarks(self, poses: Poses) -> dict[str, Array]:
+        """Return the body's landmarks and the tips of the toes, `toe_left` and `toe_right`: (n, 3) world [m] each."""
+        R, t = self.placed(poses)
+        local = {mark.name: (mark.segment, mark.position_m) for mark in self.model.landmarks}
+        tip = self.leg.foot_centre_m - [0, self.leg.foot_half_length_m, 0]
+        local |= {f"toe_{side}": (f"foot_{side}", tip) for side in SIDES}
+        found = {}
+        for name, (segment, place) in local.items():
+            k = self.model.index_of(segment)
+            found[name] = R[:, k] @ place + t[:, k]
+        return found
+
+
+@lru_cache(maxsize=64)
+def person_of(model: BodyModel) -> Person:
+    """Measure a `human18`."""
+    mass, centres, _ = segment_inertias(model)
+    segment = {each.name: each for each in model.segments}
+    foot = segment["foot_left"].parts[0]
+    assert isinstance(foot.shape, Ellipsoid)
+    leg = LegSizes(
+        thigh_m=float(-segment["shank_left"].joint_m[2]),
+        shank_m=float(-segment["foot_left"].joint_m[2]),
+        foot_centre_m=foot.segment_from_part.translation,
+        foot_half_length_m=float(foot.shape.semi_axes_m[1]),
+        foot_half_height_m=float(foot.shape.semi_axes_m[2]),
+    )
+    hips = np.array([segment[f"thigh_{side}"].joint_m for side in SIDES])
+    joints = np.array([[model.index_of(f"{k}_{side}") - 1 for k in ("thigh", "shank", "foot")] for side in SIDES])
+    return Person(model, mass, centres, leg, hips, joints)
+
+
+def standing(person: Person, root_R: Array, joint_angles: Array, feet: Feet, centre: Array) -> Poses:
+    """Put the root where legs from the hips to the feet bring the centre of mass to `centre` (n, 3) [m].
+
+    `joint_angles` (n, 17, 3) are those of all other joints; the legs' are found. NaN where a leg is too short.
+    """
+    angles, root, n = np.array(joint_angles, float), np.array(centre, float), len(centre)
+    R_pelvis, hips = np.concatenate([root_R, root_R]), np.concatenate([root_R @ hip for hip in person.hips_m])
+    ankles, R_feet = feet.ankle.reshape(2 * n, 3), feet.R.reshape(2 * n, 3, 3)
+    short = np.zeros(2 * n)
+    for _ in range(_MOST_ROUNDS):
+        legs, short = leg_angles(person.leg, R_pelvis, hips + np.concatenate([root, root]), ankles, R_feet)
+        angles[:, person.joints[0]], angles[:, person.joints[1]] = legs[:n], legs[n:]
+        off = centre - person.centre_of_mass(Poses(root_R, root, angles))
+        if np.abs(off).max(initial=0.0) < _SOLVED_M:
+            break
+        root = root + _BOLDNESS * off
+    angles[np.any(short.reshape(2, n) > _TOO_SHORT_M, axis=0)] = np.nan
+    return Poses(root_R, root, angles)
+
+
+def posture(
+    person: Person,
+    *,
+    trunk: float = 0.0,
+    head: float = 0.0,
+    arms: tuple[float, float] = (0.0, 0.0),
+    elbows: tuple[float, float] = (10.0, 10.0),
+    apart: float = 8.0,
+) -> Array:
+    """Return joint angles (17, 3) [rad] of a bent trunk and of arms raised forward, the left first; all in degrees.
+
+    `apart` is how far the arms go outward. The legs stay straight.
+    """
+    angles = np.zeros((len(person.model.segments) - 1, 3))
+
+    def put(segment: str, x: float, y: float = 0.0) -> None:
+        angles[person.model.index_of(segment) - 1, :2] = x, y
+
+    put("torso", 0.6 * trunk)
+    put("chest", 0.4 * trunk)
+    put("head", head)
+    for side, sign, arm, elbow in zip(SIDES, (-1, 1), arms, elbows, strict=True):
+        put(f"upper_arm_{side}", -arm, sign * apart)
+        put(f"forearm_{side}", -elbow)
+    return np.radians(angles)

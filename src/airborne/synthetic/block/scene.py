@@ -1,0 +1,249 @@
+"""Scenes of block jumps: everything that such a recording depends on, as one value."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.cameras import Rig
+from airborne.errors import TrialError
+from airborne.synthetic.block.margins import Capsules, gap_m
+from airborne.synthetic.block.players import CLEARANCE_M, Player, attacker, blocker, bystander, taken_room
+from airborne.synthetic.block.rig import hall_rig, miscalibrated
+from airborne.synthetic.block.steps import Approach
+
+Array = NDArray[np.floating]
+
+FRAME_RATES = (30, 60, 120)
+_PAPER_FRAMES, _PAPER_SCENES = 1798, 22
+_PAPER_TEAMS = (2, 2, 2, 3, 3)  # blockers, where there are several
+_MEAN_FRAMES, _FEWEST_FRAMES = 82, 70
+_SPREAD_S = 0.08  # between the take-offs of neighbouring blockers
+_SPACING_M, _WIDER_M = (0.62, 0.80), 0.04
+_NEAR_M = 2.5  # players further apart at the start cannot touch
+_TRIES = 200
+_FLIGHT_S = 0.66  # about
+_PLACE_M = (-2.6, 2.6)  # of the block along the net
+_OUT_OF_WAY_M = 0.7
+_APPROACHES: tuple[Approach, ...] = ("static", "shuffle", "crossover")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difficulty:
+    """How hard a recording is."""
+
+    colour_similarity: float = 0.8  # of the opponents' legs to the blockers': 0 all their own, 1 the same clothes
+    occlusion: float = 0.35  # chance that another player stands in the way of a camera, or behind a blocker's legs
+    frame_rate: int = 60  # [1/s]: 30, 60 or 120
+    n_cameras: int = 3  # 2 to 6
+    calibration_error_px: float = 0.5  # sd to the right, and down
+    torso_noise_m: float = 0.025  # sd of the torso's given path, each axis
+    start_noise_m: float = 0.015  # sd of the joints set by hand, each axis
+    noise_sd: float = 3.0  # of the sensor [grey levels]
+    gain_spread: float = 0.08  # greatest change of a camera's brightness, and of its red and blue
+    jpeg_quality: int = 85  # 0: no compression
+    shadow: float = 0.35  # of the light that is missing where a body shades the floor most
+
+    def __post_init__(self) -> None:
+        for name in ("colour_similarity", "occlusion", "shadow"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise TrialError(f"{name} is {getattr(self, name):g}; expected 0 to 1")
+        if self.frame_rate not in FRAME_RATES:
+            raise TrialError(f"frame_rate is {self.frame_rate}; choose 30, 60 or 120")
+        for name in ("calibration_error_px", "torso_noise_m", "start_noise_m", "noise_sd", "gain_spread"):
+            if getattr(self, name) < 0:
+                raise TrialError(f"{name} is {getattr(self, name):g}; expected zero or more")
+        if not 0 <= self.jpeg_quality <= 100:
+            raise TrialError(f"jpeg_quality is {self.jpeg_quality}; expected 1 to 100, or 0 for none")
+
+
+EASY = Difficulty(colour_similarity=0.0, occlusion=0.0, calibration_error_px=0.0, noise_sd=2.0, gain_spread=0.03)
+HARD = Difficulty(colour_similarity=1.0, occlusion=0.8, calibration_error_px=1.5, noise_sd=4.0, shadow=0.5)
+DIFFICULTIES = {"easy": EASY, "default": Difficulty(), "hard": HARD}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BlockScene:
+    """Players at the net and how they are recorded."""
+
+    name: str
+    seed: int  # of everything random
+    rig: Rig  # the true cameras
+    calibrated: Rig  # the cameras as they are told
+    players: tuple[Player, ...]  # blockers first
+    n_frames: int
+    difficulty: Difficulty = field(default_factory=Difficulty)
+
+    @property
+    def rate(self) -> Fraction:
+        """Pictures of each camera [1/s]."""
+        return Fraction(self.difficulty.frame_rate)
+
+    @property
+    def times_s(self) -> Array:
+        """The frames' times (n,) [s]."""
+        return np.arange(self.n_frames) / self.difficulty.frame_rate
+
+    @property
+    def blockers(self) -> tuple[Player, ...]:
+        """The players whose legs are looked for."""
+        return tuple(player for player in self.players if player.role == "blocker")
+
+
+def block_scene(
+    seed: int,
+    *,
+    n_blockers: int = 1,
+    difficulty: Difficulty | None = None,
+    n_frames: int | None = None,
+) -> BlockScene:
+    """Draw a block of one to three players against a spiker, with decoys and three team mates in defence.
+
+    `n_frames` is 82 at 60 frames/s and as long at others, unless given. Raises TrialError for an unusable number.
+    """
+    difficulty = difficulty or Difficulty()
+    if not 1 <= n_blockers <= 3:
+        raise TrialError(f"{n_blockers} blockers were asked for; give 1 to 3")
+    n_frames = n_frames or round(_MEAN_FRAMES * difficulty.frame_rate / 60)
+    if n_frames * 60 < _FEWEST_FRAMES * difficulty.frame_rate:
+        raise TrialError(f"{n_frames} frames are too few for a jump; give at least {_FEWEST_FRAMES / 60:.2f} s")
+    rng = np.random.default_rng([seed, 21])
+    rig = hall_rig(rng, difficulty.n_cameras)
+    calibrated = miscalibrated(rng, rig, difficulty.calibration_error_px)
+    lasts_s = n_frames / difficulty.frame_rate
+    blockers = _block(rng, n_blockers, lasts_s)
+    players = _with_others(rng, blockers, rig, lasts_s, difficulty)
+    return BlockScene(
+        name=f"block jump {seed}",
+        seed=seed,
+        rig=rig,
+        calibrated=calibrated,
+        players=players,
+        n_frames=n_frames,
+        difficulty=difficulty,
+    )
+
+
+def paper_sequences(seed: int = 0, *, difficulty: Difficulty | None = None) -> list[BlockScene]:
+    """Draw as many sequences as the block-jump paper has: 22, of them 5 with two or three blockers, 1798 frames."""
+    rate = (difficulty or Difficulty()).frame_rate
+    counts, n_blockers = paper_lengths(np.random.default_rng([seed, 20]))
+    return [
+        block_scene(
+            1000 * (seed + 1) + k, n_blockers=int(n), difficulty=difficulty, n_frames=round(int(count) * rate / 60)
+        )
+        for k, (n, count) in enumerate(zip(n_blockers, counts, strict=True))
+    ]
+
+
+def paper_lengths(rng: np.random.Generator) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+    """Draw how many frames at 60 a second the paper's sequences have, (22,), and how many blockers, (22,)."""
+    lengths = np.clip(rng.normal(_MEAN_FRAMES, 6, _PAPER_SCENES), _FEWEST_FRAMES + 4, 100)
+    counts = np.diff(np.round(np.cumsum(lengths) * _PAPER_FRAMES / lengths.sum()), prepend=0).astype(int)
+    n_blockers = np.ones(_PAPER_SCENES, int)
+    n_blockers[rng.choice(_PAPER_SCENES, len(_PAPER_TEAMS), replace=False)] = _PAPER_TEAMS
+    return counts, n_blockers
+
+
+def _block(rng: np.random.Generator, n_blockers: int, lasts_s: float) -> list[Player]:
+    """Draw blockers side by side, as near to each other as bodies allow; they come the same way."""
+    first_s = float(rng.uniform(0.5, 0.62)) * (lasts_s - _FLIGHT_S)
+    approach = _APPROACHES[rng.choice(3, p=[0.4, 0.4, 0.2])]
+    direction = float(rng.choice([-1.0, 1.0]))
+    x = float(rng.uniform(*_PLACE_M)) - 0.35 * (n_blockers - 1)
+    found: list[Player] = []
+    for k in range(n_blockers):
+        takeoff_s = first_s + (float(rng.uniform(0, _SPREAD_S)) if k else 0.0)
+        player = _drawn(
+            lambda name=f"blocker{k + 1}", place=x, takeoff_s=takeoff_s: blocker(
+                rng, name, place, takeoff_s=takeoff_s, approach=approach, direction=direction, lasts_s=lasts_s
+            )
+        )
+        while found and gap_m(taken_room(player, lasts_s), taken_room(found[-1], lasts_s)) < CLEARANCE_M:
+            player = player.moved(np.array([_WIDER_M, 0.0]))
+            x += _WIDER_M
+        found.append(player)
+        x += float(rng.uniform(*_SPACING_M))
+    return found
+
+
+def _with_others(
+    rng: np.random.Generator, blockers: list[Player], rig: Rig, lasts_s: float, difficulty: Difficulty
+) -> tuple[Player, ...]:
+    """Add a spiker, one or two decoys and three team mates, each where there is room."""
+    players = list(blockers)
+    similarity = difficulty.colour_similarity
+    spot = np.mean([_place(player) for player in blockers], axis=0)
+    hit_s = float(np.mean([player.takeoff_s or 0.0 for player in blockers])) - float(rng.uniform(0.02, 0.15))
+
+    def spiker() -> Player:
+        x = spot[0] + _beside(rng, difficulty.occlusion)
+        return attacker(rng, "spiker", x, takeoff_s=hit_s, similarity=similarity, lasts_s=lasts_s)
+
+    def decoy(name: str) -> Player:
+        place = np.array([spot[0] + _beside(rng, difficulty.occlusion), rng.uniform(0.7, 1.6)])
+        return bystander(rng, name, place, is_opponent=True, similarity=similarity, lasts_s=lasts_s)
+
+    def mate(name: str) -> Player:
+        place = _in_defence(rng, spot, rig, difficulty.occlusion)
+        return bystander(rng, name, place, is_opponent=False, similarity=similarity, lasts_s=lasts_s)
+
+    draws = [spiker, *(partial(decoy, f"opponent{k}") for k in range(2, 3 + int(rng.integers(1, 3))))]
+    draws += [partial(mate, f"mate{k}") for k in (1, 2, 3)]
+    rooms = [taken_room(player, lasts_s) for player in players]
+    for draw in draws:
+        player = _drawn(draw, lambda drawn: _has_room(taken_room(drawn, lasts_s), rooms))
+        players.append(player)
+        rooms.append(taken_room(player, lasts_s))
+    return tuple(players)
+
+
+def _drawn(draw: Callable[[], Player], is_good: Callable[[Player], bool] = lambda _: True) -> Player:
+    """Draw until a player can do what was drawn and is where he may be."""
+    for _ in range(_TRIES):
+        try:
+            player = draw()
+        except TrialError:
+            continue
+        if is_good(player):
+            return player
+    raise TrialError("no room was found for all players; use another seed")
+
+
+def _has_room(room: Capsules, others: Sequence[Capsules]) -> bool:
+    """Say whether a player's room meets no other's; those far away are not looked at closely."""
+    middle = room[0][0].mean(axis=0)[:2]
+    near = [other for other in others if np.linalg.norm(other[0][0].mean(axis=0)[:2] - middle) < _NEAR_M]
+    return all(gap_m(room, other) >= CLEARANCE_M for other in near)
+
+
+def _place(player: Player) -> Array:
+    """Return where a player is when things happen: (2,) [m]."""
+    return player.poses(np.array([player.takeoff_s or 0.0])).root_t[0, :2]
+
+
+def _beside(rng: np.random.Generator, occlusion: float) -> float:
+    """Draw how far along the net an opponent is from the block [m]: behind it, or off to a side."""
+    if rng.random() < occlusion:
+        return float(rng.uniform(-0.35, 0.35))
+    return float(rng.choice([-1.0, 1.0]) * rng.uniform(0.8, 2.4))
+
+
+def _in_defence(rng: np.random.Generator, spot: Array, rig: Rig, occlusion: float) -> Array:
+    """Draw where a team mate stands (2,) [m]: in the way of one of the cameras, or out of the way of all."""
+    centres = np.array([camera.centre[:2] for camera in rig])
+    rays = (centres - spot) / np.linalg.norm(centres - spot, axis=1, keepdims=True)
+    if rng.random() < occlusion:
+        ray = rays[int(rng.integers(min(len(rays), 3)))]
+        return spot + ray * (rng.uniform(1.9, 2.8) / max(-ray[1], 0.4)) + rng.normal(0, 0.12, 2)
+    while True:
+        place = np.array([rng.uniform(-4.0, 4.0), rng.uniform(-7.0, -3.0)])
+        off = place - spot
+        beside = np.abs(rays[:, 0] * off[1] - rays[:, 1] * off[0])
+        if np.all(beside > _OUT_OF_WAY_M):
+            return place

@@ -1,0 +1,124 @@
+"""A block scene written as a trial: videos, cameras, hand-set start, truth."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.cameras import write_pose2sim
+from airborne.synthetic.block.pictures import frames_of
+from airborne.synthetic.block.players import Player
+from airborne.synthetic.block.scene import BlockScene
+from airborne.synthetic.block.truth import TRUTH_JOINTS, joints_of, jump_facts, starts_of
+from airborne.synthetic.throw.writing import require_room
+from airborne.video import VideoWriter
+
+Array = NDArray[np.floating]
+Progress = Callable[[int, int], None]  # frames done, frames in all
+
+_CRF = 20
+_TRUTH_NAMES = {**{landmark: column for column, landmark in TRUTH_JOINTS.items()}, "torso": "torso"}
+
+
+def write_block(folder: Path, scene: BlockScene, *, overwrite: bool = False, progress: Progress | None = None) -> None:
+    """Record a scene into a folder, which is made; `trial.toml` is written last, so it stands for a whole trial.
+
+    `<camera>.mp4`, `calib.toml` (the calibrated cameras), `calib_true.toml` where they differ, `first_frame.json` and
+    `trial.toml` (the start set by hand), `truth.csv` (the joints of all players) and `players.json` (clothes, and the
+    truth of the jumps). `progress` is told after every frame. Raises TrialError for a folder that holds anything,
+    unless `overwrite`: then files of these names are replaced.
+    """
+    require_room(folder, overwrite)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "trial.toml").unlink(missing_ok=True)
+    starts = starts_of(scene)
+    write_pose2sim(folder / "calib.toml", scene.calibrated)
+    if scene.difficulty.calibration_error_px > 0:
+        write_pose2sim(folder / "calib_true.toml", scene.rig)
+    _write_json(folder / "first_frame.json", _first_frame(scene, starts))
+    _write_json(folder / "players.json", [_about(player, scene) for player in scene.players])
+    _write_truth(folder / "truth.csv", scene)
+    _write_videos(folder, scene, progress)
+    (folder / "trial.toml").write_text(block_toml(scene, starts), encoding="utf-8")
+
+
+def block_toml(scene: BlockScene, starts: dict[str, dict[str, Array]]) -> str:
+    """Return the trial file of a scene's recording; `starts` as of `starts_of`."""
+    lines = [f"name = {json.dumps(scene.name)}"]
+    for name in scene.rig.names:
+        lines += ["", "[[camera]]", f"name = {json.dumps(name)}", f"video = {json.dumps(name + '.mp4')}"]
+    lines += ["", "[calibration]", 'file = "calib.toml"', "", "[body]", 'preset = "legs"']
+    lines += ["", "[track]", 'method = "blocker"', ""]
+    off = f"{1000 * scene.difficulty.start_noise_m:.0f} mm off"
+    lines += [f"[start]                # joints set by hand, {off}", "frame = 0"]
+    for player, joints in starts.items():
+        lines += ["", "[[start.player]]", f"name = {json.dumps(player)}", "[start.player.joints_m]"]
+        lines += [f"{joint} = {np.round(place, 4).tolist()}" for joint, place in joints.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _first_frame(scene: BlockScene, starts: dict[str, dict[str, Array]]) -> dict:
+    blockers = {player.name for player in scene.blockers}
+    return {
+        "frame": 0,
+        "unit": "m",
+        "note": f"set by hand: {1000 * scene.difficulty.start_noise_m:.0f} mm (one sigma, each axis) off; "
+        "foot = ball of the foot; torso = mean of hips and shoulders",
+        "blockers": {
+            player: {_TRUTH_NAMES[joint]: np.round(place, 4).tolist() for joint, place in joints.items()}
+            for player, joints in starts.items()
+            if player in blockers
+        },
+    }
+
+
+def _about(player: Player, scene: BlockScene) -> dict:
+    clothes = ("skin", "hair", "shorts", "shirt", "socks", "shoes")
+    colours = {name: np.round(getattr(player.outfit, name)).astype(int).tolist() for name in clothes}
+    found = {
+        "name": player.name,
+        "role": player.role,
+        "stature_m": round(player.stature_m, 3),
+        "side": "y<0 (target team)" if player.side < 0 else "y>0",
+        "jumps": player.takeoff_s is not None,
+        "colours_srgb": colours,
+    }
+    return found | ({} if player.takeoff_s is None else {"jump": jump_facts(player, float(scene.rate))})
+
+
+def _write_truth(path: Path, scene: BlockScene) -> None:
+    columns = [*TRUTH_JOINTS, "torso"]
+    places = [joints_of(player, scene.times_s) for player in scene.players]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["frame", "time_s", "player", *(f"{name}_{axis}" for name in columns for axis in "xyz")])
+        for i, time in enumerate(scene.times_s):
+            for player, joints in zip(scene.players, places, strict=True):
+                numbers = np.concatenate([joints[TRUTH_JOINTS.get(name, name)][i] for name in columns])
+                writer.writerow([i, repr(float(time)), player.name, *(f"{number:.6f}" for number in numbers)])
+
+
+def _write_videos(folder: Path, scene: BlockScene, progress: Progress | None) -> None:
+    with ExitStack() as stack:
+        writers = [
+            stack.enter_context(VideoWriter(folder / f"{camera.name}.mp4", size=camera.size, rate=scene.rate, crf=_CRF))
+            for camera in scene.rig
+        ]
+        uncompressed = replace(scene, difficulty=replace(scene.difficulty, jpeg_quality=0))
+        for frames in frames_of(uncompressed):
+            for writer, view in zip(writers, frames.views, strict=True):
+                if view is not None:
+                    writer.write(view.rgb)
+            if progress is not None:
+                progress(frames.index + 1, scene.n_frames)
+
+
+def _write_json(path: Path, value: object) -> None:
+    path.write_text(json.dumps(value, indent=1) + "\n", encoding="utf-8")

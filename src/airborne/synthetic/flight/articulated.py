@@ -1,0 +1,262 @@
+"""Free flight of a body that moves its joints: constant angular momentum, a parabola for the centre of mass.
+
+In the root's frame, about the centre of mass: I(q) w + h(q, q') = R^T L, and R' = R [w]x. L stays the same in the
+world, I is the inertia of the body as it is bent, and h the momentum of the joints' motion with the root held still.
+Source: Yeadon, Atha & Hales 1990, J. Biomech. 23, 85-89 (angle-driven simulation of aerial movement).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.interpolate import BPoly, PPoly
+from scipy.spatial.transform import Rotation
+
+from airborne.body import BodyModel
+from airborne.errors import BodyError
+from airborne.rendering import place_segments
+from airborne.synthetic.flight.rigid import GRAVITY_M_S2, Flight, Mass
+
+Array = NDArray[np.floating]
+Rate = Callable[[float, Array], Array]  # time and state to the state's rate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Takeoff:
+    """How a body that can bend flies at time 0."""
+
+    centre: Array  # (3,) centre of mass, world [m]
+    velocity: Array  # (3,) of the centre of mass, world [m/s]
+    R: Array  # (3, 3) world from root
+    angular_momentum: Array  # (3,) about the centre of mass, world [kg m^2/s]
+
+
+class Shape(NamedTuple):
+    """How the mass of n bent bodies lies and moves, in the root's frame, with the root held still."""
+
+    centre: Array  # (n, 3) centre of mass [m]
+    inertia: Array  # (n, 3, 3) about the centre of mass [kg m^2]
+    momentum: Array  # (n, 3) angular, of the joints' motion about the centre of mass [kg m^2/s]
+
+
+def still(joint_angles: Array) -> PPoly:
+    """Return the motion of joints that stay at the angles (joints, 3) [rad]."""
+    return PPoly(np.asarray(joint_angles, float)[None, None], [0.0, 1.0])
+
+
+def moves(time_s: Array, joint_angles: Array) -> PPoly:
+    """Return the motion of joints that rest at the angles (n, joints, 3) [rad] at the times (n,), increasing [s].
+
+    From rest to rest each angle goes by the quintic of least jerk, so that its acceleration is continuous.
+    """
+    angles = np.asarray(joint_angles, float)
+    at_rest = np.stack([angles, np.zeros_like(angles), np.zeros_like(angles)], axis=1)
+    return PPoly.from_bernstein_basis(BPoly.from_derivatives(np.asarray(time_s, float), at_rest))
+
+
+def together(motions: Sequence[PPoly]) -> PPoly:
+    """Return the sum of the joints' motions; each keeps its ends outside its own times. At most quintics."""
+    times = np.unique(np.concatenate([motion.x for motion in motions]))
+    derivatives = [sum(_clamped(motion, times, order) for motion in motions) for order in range(3)]
+    return PPoly.from_bernstein_basis(BPoly.from_derivatives(times, np.stack(derivatives, axis=1)))
+
+
+def slowed(motion: PPoly, factor: float) -> PPoly:
+    """Return the joints' motion with `factor` times the time for everything."""
+    powers = np.arange(len(motion.c))[::-1].reshape(-1, *[1] * (motion.c.ndim - 1))
+    return PPoly(motion.c / float(factor) ** powers, motion.x * factor)
+
+
+def mass_as_bent(model: BodyModel, joint_angles: Array) -> Mass:
+    """Add up a body's segments, its joints at the angles (joints, 3) [rad]; BodyError where an inertia is missing."""
+    angles = np.asarray(joint_angles, float)[None]
+    shape = _Segments.of(model).shape(angles, np.zeros_like(angles))
+    return Mass(float(_Segments.of(model).mass_kg.sum()), shape.centre[0], shape.inertia[0])
+
+
+def fly_articulated(
+    model: BodyModel, takeoff: Takeoff, joints: PPoly, time_s: Array, *, tolerance: float = 1e-12
+) -> Flight:
+    """Fly a body without air or torque, and sample it at the times (n,) [s], in any order, before or after take-off.
+
+    `joints` gives the joint angles (joints, 3) [rad] at a time, twice differentiable within its breaks; outside them
+    the joints rest at its ends. `tolerance` is that of the integration. Raises BodyError for a segment without inertia.
+    """
+    time_s = np.asarray(time_s, float)
+    segments = _Segments.of(model)
+
+    def turning(t: float, q: Array) -> Array:
+        return _quaternion_rate(q, segments.angular_velocity(_matrix(q), takeoff, *_state(joints, np.array([t])))[0])
+
+    start = Rotation.from_matrix(takeoff.R).as_quat()
+    quaternions = np.tile(start, (len(time_s), 1))
+    for chosen in (time_s > 0, time_s < 0):
+        times, back = np.unique(time_s[chosen], return_inverse=True)
+        if len(times):
+            order = slice(None, None, 1 if times[-1] > 0 else -1)
+            quaternions[chosen] = _solved(turning, start, joints.x, times[order], tolerance)[order][back]
+    R = Rotation.from_quat(quaternions).as_matrix()
+    angles, rates = _state(joints, time_s)
+    t = time_s[:, None]
+    centre = takeoff.centre + takeoff.velocity * t + GRAVITY_M_S2 * t**2 / 2
+    shape = segments.shape(angles, rates)
+    w = segments.angular_velocity(R, takeoff, angles, rates)
+    spin = np.einsum("nij,nj->ni", shape.inertia, w) + shape.momentum
+    return Flight(
+        time_s=time_s,
+        position=centre - np.einsum("nij,nj->ni", R, shape.centre),
+        R=R,
+        centre=centre,
+        angular_velocity=w,
+        joint_angles=angles,
+        angular_momentum=np.einsum("nij,nj->ni", R, spin),
+    )
+
+
+def with_shape_held(model: BodyModel, flight: Flight, joint_angles: Array) -> Flight:
+    """Return the flight with the root as it is and the joints held at the angles (joints, 3) [rad] (paper B, "Method").
+
+    Such a body has another centre of mass than the one that flew, and its angular momentum is not constant: NaN.
+    """
+    mass = mass_as_bent(model, joint_angles)
+    return replace(
+        flight,
+        joint_angles=np.broadcast_to(joint_angles, flight.joint_angles.shape),
+        centre=flight.position + flight.R @ mass.centre,
+        angular_momentum=np.full_like(flight.centre, np.nan),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Segments:
+    """A body's masses as arrays: s segments, j = s - 1 joints."""
+
+    model: BodyModel
+    mass_kg: Array  # (s,)
+    centre_m: Array  # (s, 3) segments' frames
+    tensor_kg_m2: Array  # (s, 3, 3) segments' axes
+    is_carried: Array  # (s, j) 1 where a joint carries a segment, else 0
+
+    @classmethod
+    def of(cls, model: BodyModel) -> _Segments:
+        """Lay out a body's inertias; raises BodyError where one is missing."""
+        inertias = []
+        for segment in model.segments:
+            if segment.inertia is None:
+                raise BodyError(
+                    f"segment '{segment.name}' has no inertia, so its flight cannot be found; "
+                    "give it [segment.inertia], or use the preset human18"
+                )
+            inertias.append(segment.inertia)
+        is_carried = np.zeros((len(model.segments), len(model.segments) - 1))
+        for k, parent in enumerate(model.parents[1:], start=1):
+            is_carried[k] = is_carried[parent]
+            is_carried[k, k - 1] = 1
+        return cls(
+            model,
+            np.array([inertia.mass_kg for inertia in inertias]),
+            np.array([inertia.centre_m for inertia in inertias]),
+            np.array([inertia.tensor_kg_m2 for inertia in inertias]),
+            is_carried,
+        )
+
+    def shape(self, angles: Array, rates: Array) -> Shape:
+        """Sum up n bodies with joint angles and rates (n, j, 3) [rad, rad/s]."""
+        n, parents = len(angles), self.model.parents[1:]
+        R, t = place_segments(self.model, np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3)), angles)
+        turning = np.einsum("nkij,nkj->nki", R[:, parents], _rates_in_parent(angles, rates))
+        w = self.is_carried @ turning  # (n, s, 3)
+        v = self.is_carried @ _cross(w[:, parents], t[:, 1:] - t[:, parents])  # of the segments' origins
+        arm = np.einsum("nsij,sj->nsi", R, self.centre_m)
+        share = self.mass_kg / self.mass_kg.sum()
+        place, speed = t + arm, v + _cross(w, arm)
+        centre = share @ place
+        d, d_rate = place - centre[:, None], speed - (share @ speed)[:, None]
+        own = R @ self.tensor_kg_m2 @ np.swapaxes(R, -1, -2)  # (n, s, 3, 3)
+        spread = np.einsum("nsk,nsk->ns", d, d)[..., None, None] * np.eye(3) - d[..., :, None] * d[..., None, :]
+        inertia = np.sum(own + self.mass_kg[:, None, None] * spread, axis=1)
+        momentum = np.einsum("nsij,nsj->ni", own, w) + self.mass_kg @ _cross(d, d_rate)
+        return Shape(centre, inertia, momentum)
+
+    def angular_velocity(self, R: Array, takeoff: Takeoff, angles: Array, rates: Array) -> Array:
+        """Return the root's angular velocity (n, 3) in its own frame [rad/s], from R (n, 3, 3) world from root."""
+        shape = self.shape(angles, rates)
+        own = np.einsum("...ji,j->...i", R, takeoff.angular_momentum) - shape.momentum
+        return np.linalg.solve(shape.inertia, own[..., None])[..., 0]
+
+
+def _solved(turning: Rate, start: Array, breaks: Array, times: Array, tolerance: float) -> Array:
+    """Integrate quaternions from time 0 to the times (n,), which all lie on one side of it, nearest first: (n, 4).
+
+    One stretch between breaks after another: a long step would miss a short move.
+    """
+    found = np.empty((len(times), 4))
+    for begin, end, chosen in _stretches(breaks, times):
+        at = times[chosen]
+        to_end = [] if len(at) and at[-1] == end else [end]
+        at = np.append(at, to_end)
+        solved = solve_ivp(turning, (begin, end), start, "DOP853", at, rtol=tolerance, atol=tolerance).y.T
+        start = solved[-1] / np.linalg.norm(solved[-1])
+        found[chosen] = solved[: len(solved) - len(to_end)]
+    return found
+
+
+def _stretches(breaks: Array, times: Array) -> Iterator[tuple[float, float, NDArray[np.bool_]]]:
+    """Cut the way from 0 to the last of the times at the breaks: begin, end, and which times lie on it."""
+    far, sign = times[-1], np.sign(times[-1])
+    ends = np.sort(sign * np.append(breaks[(sign * breaks > 0) & (sign * breaks < sign * far)], far))
+    begin = 0.0
+    for end in ends:
+        yield sign * begin, sign * end, (sign * times > begin) & (sign * times <= end)
+        begin = end
+
+
+def _state(joints: PPoly, time_s: Array) -> tuple[Array, Array]:
+    """Return joint angles and rates (n, j, 3) [rad, rad/s] at the times (n,) [s]."""
+    return _clamped(joints, time_s, 0), _clamped(joints, time_s, 1)
+
+
+def _clamped(joints: PPoly, time_s: Array, order: int) -> Array:
+    """Return a derivative (n, j, 3) of the joints' angles; outside the breaks they rest."""
+    values = joints(np.clip(time_s, joints.x[0], joints.x[-1]), order)
+    is_inside = (time_s >= joints.x[0]) & (time_s <= joints.x[-1])
+    return values if order == 0 else np.where(is_inside[:, None, None], values, 0.0)
+
+
+def _rates_in_parent(angles: Array, rates: Array) -> Array:
+    """Return the angular velocities (..., 3) of segments against their parents, in the parents' axes [rad/s].
+
+    x' e_x + y' Rx e_y + z' Rx Ry e_z, for the angles and rates (..., 3) of R = Rx Ry Rz.
+    """
+    (cx, cy, _), (sx, sy, _) = (np.moveaxis(f(angles), -1, 0) for f in (np.cos, np.sin))
+    x, y, z = np.moveaxis(rates, -1, 0)
+    return np.stack([x + sy * z, cx * y - sx * cy * z, sx * y + cx * cy * z], axis=-1)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Return a x b (..., 3); quicker than NumPy's for few vectors."""
+    return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
+
+
+def _matrix(q: Array) -> Array:
+    """Return the rotation (3, 3) of a quaternion x, y, z, w (4,) of about unit length."""
+    x, y, z, w = q / np.sqrt(q @ q)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _quaternion_rate(q: Array, w: Array) -> Array:
+    """Return q' = q (w, 0) / 2 for an angular velocity (3,) in the turning frame."""
+    x, y, z, s = q
+    a, b, c = w
+    return 0.5 * np.array([s * a + y * c - z * b, s * b + z * a - x * c, s * c + x * b - y * a, -x * a - y * b - z * c])

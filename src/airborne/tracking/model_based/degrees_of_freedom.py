@@ -1,0 +1,186 @@
+"""Which of a body's degrees of freedom a fit may change, what is known of them beforehand, and one step of the fit.
+
+A motion is a vector (6 + 3 joints,), see `body.chain`. The normal equations of the segments are mapped through the
+chain: H = sum J' A J, so that the pixels cost the same for 6 degrees of freedom as for 57.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import BodyModel, Pose, PosedBody
+from airborne.body.chain import motion_between, moved_pose, segment_jacobians
+from airborne.geometry.joint_rotations import turned
+from airborne.geometry.rotations import angles_from_world_rotation, matrix_from_angles
+
+Array = NDArray[np.floating]
+
+_LIMIT_SD_RAD = np.radians(0.5)  # how firmly a joint that has reached its limit is held there
+_ANYWHERE_SD = 1.5  # [m, rad]
+_DAMPING_SD_M, _DAMPING_SD_RAD = 0.5, 1.0  # keep what the pictures do not show where it is
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prior:
+    """Where a pose is expected to be; and limited joints are near the zero pose, within half their range."""
+
+    expected: Pose
+    sd: Array  # (6 + 3 joints,) [m, rad]
+
+    def loosened(self, columns: NDArray[np.integer]) -> Prior:
+        """Return the prior that says little of some degrees of freedom."""
+        sd = self.sd.copy()
+        sd[columns] = _ANYWHERE_SD
+        return replace(self, sd=sd)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Freedom:
+    """The degrees of freedom that a fit may change."""
+
+    model: BodyModel
+    columns: NDArray[np.int64]  # (d,) indices into a motion
+
+    @property
+    def _damping(self) -> Array:
+        """Inverse variances (d,) of a step, that hold back what the pictures do not show."""
+        return 1 / np.where(self.columns < 3, _DAMPING_SD_M, _DAMPING_SD_RAD) ** 2
+
+    def jacobian(self, posed: PosedBody, origin: Array) -> Array:
+        """Return how the segments move, about `origin`, with these degrees of freedom: (segments, 6, d)."""
+        return segment_jacobians(posed, origin)[..., self.columns]
+
+    def whole(self, motion: Array) -> Array:
+        """Return a motion (d,) as a whole one (6 + 3 joints,), which is zero elsewhere."""
+        full = np.zeros(6 + 3 * (len(self.model.segments) - 1))
+        full[self.columns] = motion
+        return full
+
+    def moved(self, pose: Pose, motion: Array) -> Pose:
+        """Move a pose by (d,) [m, rad], no joint beyond its limits."""
+        moved = moved_pose(pose, self.whole(motion))
+        return within_limits(self.model, moved)
+
+    def step(self, pose: Pose, H: Array, g: Array, prior: Prior | None = None) -> Array:
+        """Return the motion (d,) that solves H motion = g with the prior, joints held at their limits.
+
+        H (d, d), g (d,) in units of the noise's variance.
+        """
+        H, g = H + np.diag(self._damping), g.copy()
+        if prior is not None:
+            precision = 1 / prior.sd[self.columns] ** 2
+            H[np.diag_indices(len(g))] += precision
+            g -= precision * motion_between(prior.expected, pose)[self.columns]
+            rows, away = self.from_rest(pose)
+            H, g = H + rows.T @ rows, g - rows.T @ away
+        motion = np.linalg.solve(H, g)
+        for _ in range(3):
+            rows, targets = self._limits_met(pose, motion)
+            if not len(rows):
+                return motion
+            weight = 1 / _LIMIT_SD_RAD**2
+            H, g = H + weight * rows.T @ rows, g + weight * rows.T @ targets
+            motion = np.linalg.solve(H, g)
+        return motion
+
+    def prior_cost(self, pose: Pose, prior: Prior | None) -> float:
+        """Return half the squared distance to what is expected, in sds."""
+        if prior is None:
+            return 0.0
+        away = motion_between(prior.expected, pose)[self.columns] / prior.sd[self.columns]
+        rest = self.from_rest(pose)[1]
+        return 0.5 * float(away @ away + rest @ rest)
+
+    def from_rest(self, pose: Pose) -> tuple[Array, Array]:
+        """Return how far limited joint angles are from the zero pose, in sds: rows (k, d), values (k,)."""
+        limits = self.model.limits_rad
+        half = (limits[..., 1] - limits[..., 0]) / 2
+        by_own_rotation = _angles_by_own_rotation(pose.joint_angles)
+        is_regular = np.all(np.isfinite(by_own_rotation), axis=(1, 2))
+        used = np.isfinite(half) & (half > 0) & is_regular[:, None]
+        joints, axes = np.nonzero(used)
+        rows = np.zeros((len(joints), 6 + 3 * len(limits)))
+        columns = 6 + 3 * joints[:, None] + np.arange(3)
+        sd = half[joints, axes]
+        rows[np.arange(len(joints))[:, None], columns] = by_own_rotation[joints, axes] / sd[:, None]
+        away = pose.joint_angles - np.clip(0.0, limits[..., 0], limits[..., 1])
+        return rows[:, self.columns], away[joints, axes] / sd
+
+    def _limits_met(self, pose: Pose, motion: Array) -> tuple[Array, Array]:
+        """Return rows (k, d) and targets (k,) [rad] of the joint angles that the motion would take past a limit."""
+        limits = self.model.limits_rad
+        nothing = np.zeros((0, len(self.columns))), np.zeros(0)
+        if not np.isfinite(limits).any():
+            return nothing
+        after = turned(pose.joint_angles, self.whole(motion)[6:].reshape(-1, 3))
+        bound = np.clip(after, limits[..., 0], limits[..., 1])
+        joints, axes = np.nonzero(np.abs(after - bound) > 1e-6)
+        if not len(joints):
+            return nothing
+        by_own_rotation = _angles_by_own_rotation(pose.joint_angles[joints])
+        rows = np.zeros((len(joints), 6 + 3 * len(limits)))
+        for row, (joint, axis) in enumerate(zip(joints, axes, strict=True)):
+            rows[row, 6 + 3 * joint : 9 + 3 * joint] = by_own_rotation[row, axis]
+        targets = bound[joints, axes] - pose.joint_angles[joints, axes]
+        known = np.isfinite(rows).all(axis=1)
+        return rows[known][:, self.columns], targets[known]
+
+
+def within_limits(model: BodyModel, pose: Pose) -> Pose:
+    """Return the pose with every joint angle within its limits."""
+    if not pose.joint_angles.size:
+        return pose
+    return replace(pose, joint_angles=np.clip(pose.joint_angles, *np.moveaxis(model.limits_rad, -1, 0)))
+
+
+def root_only(model: BodyModel) -> Freedom:
+    """Free the root: the body moves in one piece."""
+    return Freedom(model, np.arange(6))
+
+
+def all_joints(model: BodyModel) -> Freedom:
+    """Free everything."""
+    return Freedom(model, np.arange(6 + 3 * (len(model.segments) - 1)))
+
+
+def outward(model: BodyModel) -> list[Freedom]:
+    """Free the trunk first, then what hangs on it, then outward (paper B, "Discussion"): one `Freedom` a stage."""
+    distance = _distance_from_trunk(model)
+    columns = np.arange(6 + 3 * (len(model.segments) - 1))
+    of_segment = np.concatenate([np.zeros(6, int), np.arange(1, len(model.segments)).repeat(3)])
+    return [Freedom(model, columns[distance[of_segment] <= stage]) for stage in range(distance.max() + 1)]
+
+
+def limb_of_segment(model: BodyModel) -> NDArray[np.int64]:
+    """Return for each segment the first segment of its limb, -1 for those of the trunk: (segments,)."""
+    distance, limb = _distance_from_trunk(model), np.full(len(model.segments), -1)
+    for segment in np.flatnonzero(distance > 0):
+        limb[segment] = segment if distance[segment] == 1 else limb[model.parents[segment]]
+    return limb
+
+
+def only(model: BodyModel, segments: NDArray[np.integer]) -> Freedom:
+    """Free the joints of some segments."""
+    return Freedom(model, (3 + 3 * np.asarray(segments)[:, None] + np.arange(3)).ravel())
+
+
+def _distance_from_trunk(model: BodyModel) -> NDArray[np.int64]:
+    """Count the joints from each segment to the trunk: what several chains hang on, and all between: (segments,)."""
+    parents = model.parents
+    is_trunk = np.bincount(parents[1:], minlength=len(parents)) > 1
+    is_trunk[0] = True
+    for segment in range(len(parents) - 1, 0, -1):
+        if is_trunk[segment]:
+            is_trunk[parents[segment]] = True
+    distance = np.zeros(len(parents), int)
+    for segment in range(1, len(parents)):
+        distance[segment] = 0 if is_trunk[segment] else distance[parents[segment]] + 1
+    return distance
+
+
+def _angles_by_own_rotation(angles: Array) -> Array:
+    """Differentiate joint angles (n, 3) by a rotation vector in the segment's own axes: (n, 3, 3); NaN near +-90."""
+    return angles_from_world_rotation(angles) @ matrix_from_angles(angles)

@@ -1,0 +1,41 @@
+"""Which colours are skin, shoe or shorts: learned from one picture, kept as bits beside each colour's bin.
+
+A colour belongs to a class where its posterior against the rest of the picture is above one half, at even odds
+(block-jump paper, section 2.2: "skin or shoe's color based recognition").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.appearance.foreground import count_colours
+from airborne.appearance.hue_saturation import CODES, bin_table
+from airborne.tracking.particle.rods import CLASS_SHIFT
+
+_UNSEEN = 2e-5  # chance given to a colour never seen, a cell: what neither shows belongs to no class
+
+
+def colour_counts(rgb: NDArray[np.uint8], chosen: NDArray) -> NDArray[np.float32]:
+    """Count the colours of the chosen pixels, spread over neighbours: rgb (h, w, 3), chosen (h, w) -> (32, 32, 32)."""
+    counts = np.zeros((32, 32, 32), np.float32)
+    count_colours(np.ascontiguousarray(rgb), chosen, 1, counts)
+    return counts
+
+
+def code_table(class_counts: Sequence[NDArray], rest_counts: NDArray) -> NDArray[np.uint16]:
+    """Return the code of every colour of 5 bits a channel: its bin, and a bit for each class that it belongs to.
+
+    class_counts: for each class its colours' counts (32, 32, 32); rest_counts the same for all else. -> (32768,)
+    """
+    table = bin_table().copy()
+    rest = _chances(rest_counts)
+    for bit, counts in enumerate(class_counts):
+        table |= ((_chances(counts) > rest).astype(np.uint16) << np.uint16(CLASS_SHIFT + bit)).astype(np.uint16)
+    return table
+
+
+def _chances(counts: NDArray) -> NDArray[np.floating]:
+    return np.asarray(counts, float).reshape(CODES) / max(float(np.sum(counts)), 1.0) + _UNSEEN

@@ -1,0 +1,50 @@
+"""A person's own body from a trial: what cannot be fitted is refused in one line."""
+
+import pytest
+
+from airborne.body import ATHLETE, human18
+from airborne.body.outfits import Border
+from airborne.body_fitting.fit import BodyFit
+from airborne.body_fitting.from_trial import Fitted, described, fit_person
+from airborne.errors import TrialError
+from airborne.trial.examples import example_trial
+from airborne.trial.file import read_trial
+
+
+@pytest.fixture(scope="module")
+def by_hand():
+    return read_trial(example_trial("thrown_cross"))
+
+
+def test_a_start_set_by_hand_does_not_say_where_the_joints_are(by_hand, tmp_path):
+    with pytest.raises(TrialError, match="detections or joints_m under"):
+        fit_person(by_hand, tmp_path / "person.toml")
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_frames_are_refused(by_hand, tmp_path):
+    with pytest.raises(TrialError, match="at least 1 frame"):
+        fit_person(by_hand, tmp_path / "person.toml", n_frames=0)
+
+
+def test_the_description_names_lengths_girths_borders_colours_and_residuals(tmp_path):
+    body = human18(outfit=ATHLETE)
+    fit = BodyFit(
+        model=body,
+        poses=(),
+        start=body,
+        start_poses=(),
+        lengths={"torso": 1.02, "thigh": 0.95},
+        girths={"torso": (1.1, 0.9), "thigh": (1.05, 1.05)},
+        borders={"thigh": Border(0.72, 2)},
+        rms_light=(0.04, 0.02),
+        landmark_rms_m=(0.015, 0.012),
+    )
+    lines = described(Fitted(fit, (0, 50), tmp_path / "fit_body.png")).splitlines()
+    assert lines[0] == "fitted to frames 0, 50"
+    assert "torso        1.02   1.10 0.90" in lines
+    assert "thigh        0.95   1.05" in lines
+    assert "colours change along: thigh at 0.72" in lines
+    assert any("thigh_shorts 196 32 44" in line for line in lines)
+    assert "residual: 10.20 to 5.10 (linear light, 0 to 255)" in lines
+    assert "joints: 15 to 12 mm off (RMS)" in lines

@@ -1,0 +1,118 @@
+"""The equations of the adjustment."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from airborne.calibration.bundle import Freedom, Lags, Lengths, Source
+from airborne.calibration.bundle.equations import (
+    free_frame,
+    length_residual_m,
+    normal_equations,
+    residual_px,
+    slopes_of,
+)
+from airborne.calibration.bundle.problem import state_of, stepped, task_of
+from airborne.calibration.initial.chaining import board_source
+from tests.support.rigs import MIDDLE, boards, ring, seen_board, seen_points
+
+
+def everything(rng):
+    """A rig and sources with every kind of unknown."""
+    rig = ring(3)
+    places = boards(rng, 8)
+    board = board_source(seen_board(rng, rig, places), places)
+    group = 8 * board.camera + board.moments
+    board = replace(board, lags=Lags(group=group, time_s=np.arange(8) / 10, sd_s=0.02))
+    points = rng.uniform(-0.5, 0.5, (10, 3)) + MIDDLE
+    lengths = Lengths(first=np.arange(5), second=np.arange(5, 10), length_m=np.full(5, 0.5))
+    free = replace(seen_points(rng, rig, points, is_free=np.ones(10, bool)), lengths=lengths)
+    floor = np.repeat([[True, True, False]], 4, axis=0)
+    known = seen_points(rng, rig, points[:4], name="known", is_free=floor)
+    return rig, (board, free, known), Freedom(principal_point=True, n_terms=5, shares_focal="all")
+
+
+def test_slopes_are_those_of_differences():
+    rng = np.random.default_rng(1)
+    rig, sources, freedom = everything(rng)
+    task = task_of(rig, sources, dict.fromkeys(rig.names, freedom))
+    state = state_of(rig, sources, task)
+    state = replace(state, lags=rng.normal(0, 0.01, len(state.lags)))
+    slopes = slopes_of(task, state)
+
+    def rows(step, others):
+        moved = stepped(task, state, step, others)
+        return np.concatenate([-residual_px(task, moved).ravel(), -length_residual_m(task, moved), moved.lags])
+
+    for count, found, place in (
+        (task.n_camera_columns, slopes.by_camera, 0),
+        (task.n_other_columns, slopes.by_other, 1),
+    ):
+        for column in range(count):
+            steps = [np.zeros(task.n_camera_columns), np.zeros(task.n_other_columns)]
+            steps[place][column] = 1e-6
+            expected = (rows(*steps) - rows(*(-step for step in steps))) / 2e-6
+            scale = 1 + np.abs(expected).max()
+            np.testing.assert_allclose(found[:, [column]].toarray()[:, 0] / scale, expected / scale, atol=2e-6)
+
+
+def test_elimination_solves_the_same_equations():
+    rng = np.random.default_rng(2)
+    rig, sources, _ = everything(rng)
+    sources = (*sources, seen_points(rng, rig, rng.uniform(-0.5, 0.5, (20, 3)) + MIDDLE, name="survey"))
+    task = task_of(rig, sources, dict.fromkeys(rig.names, Freedom()))
+    state = state_of(rig, sources, task)
+    slopes = slopes_of(task, state)
+    n_rows = slopes.by_camera.shape[0]
+    weights, residuals = rng.uniform(0.5, 2, n_rows), rng.standard_normal(n_rows)
+    normal = normal_equations(slopes, weights, residuals)
+    reduced, side, factors, back = normal.reduced(0.0)
+    camera = np.linalg.solve(reduced, side)
+    other = factors.solve(normal.other_side) - back @ camera
+    J = np.column_stack([slopes.by_camera.toarray(), slopes.by_other.toarray()])
+    root = np.sqrt(weights)[:, None]
+    expected = np.linalg.lstsq(root * J, root[:, 0] * residuals, rcond=None)[0]
+    np.testing.assert_allclose(np.concatenate([camera, other]), expected, rtol=1e-4, atol=1e-6)
+
+
+def frame_of(rig, sources, freedom):
+    task = task_of(rig, sources, freedom)
+    state = state_of(rig, sources, task)
+    slopes = slopes_of(task, state)
+    weights = np.concatenate([np.ones(2 * len(task.px)), 1 / task.length_sd_m**2, 1 / task.lag_sd_s**2])
+    normal = normal_equations(slopes, weights, np.zeros(len(weights)))
+    return free_frame(task, state, normal, normal.reduced(0.0)[0]).shape[1]
+
+
+def test_the_world_is_as_free_as_the_sources_leave_it():
+    rng = np.random.default_rng(3)
+    rig = ring(3)
+    points = rng.uniform(-0.5, 0.5, (30, 3)) + MIDDLE
+    loose = seen_points(rng, rig, points, is_free=np.ones(30, bool))
+    lengths = Lengths(first=np.array([0]), second=np.array([1]), length_m=np.array([0.5]))
+    all_free = dict.fromkeys(rig.names, Freedom())
+    assert frame_of(rig, [loose], all_free) == 7
+    assert frame_of(rig, [replace(loose, lengths=lengths)], all_free) == 6
+    assert frame_of(rig, [seen_points(rng, rig, points)], all_free) == 0
+    one_held = all_free | {"cam0": Freedom(place=False)}
+    assert frame_of(rig, [loose], one_held) == 1  # only the scale, about the held camera
+    places = boards(rng, 20)
+    board = board_source(seen_board(rng, rig, places), places)
+    assert frame_of(rig, [board], all_free) == 6
+    assert frame_of(rig, [replace(board, is_held=np.arange(20) == 4)], all_free) == 0
+
+
+def test_points_that_too_few_cameras_see_are_left_out():
+    rig = ring(3)
+    rows = np.array([0, 0, 1])
+    source = Source(
+        name="clicks",
+        camera=np.array([0, 1, 2]),
+        point=rows,
+        px=np.full((3, 2), 300.0),
+        points=np.array([[0, 0, 1.0], [0.1, 0, 1.0]]),
+        is_free=np.ones(2, bool),
+    )
+    task = task_of(rig, [source], dict.fromkeys(rig.names, Freedom()))
+    assert task.is_used.tolist() == [True, True, False]
+    assert task.n_other_columns == 3

@@ -1,0 +1,380 @@
+"""The command line on the bundled example: results, going on after a kill, and one plain line for every bad input."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from airborne import cli
+from airborne.motion import read_motion
+from tests.support.places import THROWN_CROSS
+from tests.support.players_trial import write_run, write_truth
+
+SHORT = 3  # fields that are tracked where the length does not matter
+LONG = 12
+KILLED_AFTER = 4  # rows
+PATIENCE_S = 120
+CALIBRATED = 'file = "calib_true.toml"'
+
+
+@pytest.fixture(scope="module")
+def trial(tmp_path_factory) -> Path:
+    """A copy of the example that ends after a few fields."""
+    folder = tmp_path_factory.mktemp("trial")
+    example = THROWN_CROSS
+    for path in example.iterdir():
+        if path.suffix == ".mp4":
+            (folder / path.name).symlink_to(path)
+        else:
+            shutil.copyfile(path, folder / path.name)
+    exact = ('control_points = "control_points.csv"', CALIBRATED)  # saves each run the fit of the cameras
+    changed(folder / "trial.toml", "trial.toml", ("[track]", f"[track]\nstop = {SHORT}"), exact)
+    changed(folder / "trial.toml", "long.toml", (f"stop = {SHORT}", f"stop = {LONG}"))
+    return folder / "trial.toml"
+
+
+@pytest.fixture(scope="module")
+def short_run(trial, tmp_path_factory) -> Path:
+    """The folder of a run of the short trial, which nobody changes but by `evaluate`."""
+    folder = tmp_path_factory.mktemp("runs") / "short"
+    assert in_process("track", trial, "-o", folder, "--no-pictures") == 0
+    return folder
+
+
+def changed(path: Path, name: str, *replacements: tuple[str, str]) -> Path:
+    """Write a changed copy of a text file beside it."""
+    text = path.read_text(encoding="utf-8")
+    for old, new in replacements:
+        assert old in text, f"{path.name} holds no {old!r}"
+        text = text.replace(old, new, 1)
+    path.with_name(name).write_text(text, encoding="utf-8")
+    return path.with_name(name)
+
+
+def in_process(*arguments) -> int:
+    """Run a command in this process, as its entry point does, and return the exit code."""
+    before, sys.argv = sys.argv, ["airborne", *map(str, arguments)]
+    try:
+        cli.main()
+    except SystemExit as end:
+        return int(end.code or 0)
+    finally:
+        sys.argv = before
+    return 0
+
+
+def started(*arguments) -> subprocess.Popen:
+    """Start a command of its own process."""
+    command = [sys.executable, "-c", "from airborne.cli import main; main()", *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for_rows(process: subprocess.Popen, motion: Path, rows: int) -> None:
+    """Wait until a running command has written so many frames."""
+    end = time.monotonic() + PATIENCE_S
+    while not motion.exists() or motion.read_bytes().count(b"\n") <= rows:
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+def test_track_prints_what_was_found_and_leaves_every_table(trial, tmp_path, capsys):
+    assert in_process("track", trial, "-o", tmp_path / "run", "--no-pictures", "--cameras", "cam1, cam2") == 0
+    out, err = capsys.readouterr()
+    assert f"{SHORT} frames at 50 Hz: {SHORT} tracked, 0 uncertain, 0 lost" in out
+    assert all(line.startswith("tracking ") for line in err.splitlines())
+    names = {path.name for path in (tmp_path / "run").iterdir()}
+    assert names == {
+        *("motion.csv", "motion.parquet", "angles.csv", "joints.csv"),
+        *("summary.json", "run.json", "calib.toml", "body.toml"),
+    }
+    assert list(tomllib.loads((tmp_path / "run" / "calib.toml").read_text())) == ["cam1", "cam2", "metadata"]
+
+
+def test_method_and_every_replace_those_of_the_trial(trial, tmp_path, capsys):
+    options = ("--method", "stepping", "--every", "2", "--no-pictures", "--json")
+    assert in_process("track", trial, "-o", tmp_path / "run", *options) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["method"]["method"] == "stepping"
+    assert summary["rate_hz"] == 25
+    assert in_process("track", trial, "-o", tmp_path / "one", "--every", "100", "--no-pictures") == 0
+    assert capsys.readouterr().out.startswith("1 frame: 1 tracked, ")
+    assert read_motion(tmp_path / "run" / "motion.csv").index.tolist() == [0, 2]
+
+
+def test_json_of_track_is_the_summary_file(trial, tmp_path, capsys):
+    assert in_process("track", trial, "-o", tmp_path / "run", "--no-pictures", "--json") == 0
+    assert capsys.readouterr().out == (tmp_path / "run" / "summary.json").read_text(encoding="utf-8")
+
+
+def test_pictures_and_report_are_written_and_then_show_the_errors(trial, tmp_path, capsys):
+    assert in_process("track", trial, "-o", tmp_path / "run") == 0
+    names = {path.name for path in (tmp_path / "run").iterdir()}
+    assert names >= {"report.html", "through_mask.png", "pose.png", "score.png", "overlay_cam1.mp4"}
+    assert "errors.png" not in names
+    assert in_process("evaluate", tmp_path / "run", trial.parent / "truth.csv") == 0
+    assert "errors.png" in {path.name for path in (tmp_path / "run").iterdir()}
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["truth"]["n_matched"] == SHORT
+
+
+def test_evaluate_compares_with_the_truth_and_with_clicks(trial, short_run, capsys):
+    folder = trial.parent
+    arguments = ("evaluate", short_run, folder / "truth.csv", "--digitised", folder / "digitised.csv")
+    assert in_process(*arguments) == 0
+    assert "position [mm]" in capsys.readouterr().out
+    assert in_process(*arguments, "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["truth"]["n_matched"] == SHORT
+    assert found["truth"]["position"]["rms_3d_mm"] < 10
+    assert found["digitised"]["tracked_minus_digitised"]["n_matched"] == SHORT
+
+
+def test_calibrate_writes_cameras_that_track_takes(trial, tmp_path, capsys):
+    out = trial.parent / "calib.toml"
+    points = trial.parent / "control_points.csv"
+    assert in_process("calibrate", points, "--size", "768x576", "-o", out) == 0
+    assert "held-out" in capsys.readouterr().out
+    assert in_process("calibrate", points, "--size", "cam1=768x576,cam2=768x576,cam3=768x576", "-o", out, "--json") == 0
+    assert set(json.loads(capsys.readouterr().out)["cameras"]) == {"cam1", "cam2", "cam3"}
+    for source in ('file = "calib.toml"', 'control_points = "control_points.csv"'):
+        other = changed(trial, "other.toml", (CALIBRATED, source))
+        assert in_process("track", other, "-o", tmp_path / source[:4], "--no-pictures", "--cameras", "cam1,cam2") == 0
+    motions = [read_motion(tmp_path / name / "motion.csv") for name in ("file", "cont")]
+    assert abs(motions[0].position - motions[1].position).max() < 5e-3
+
+
+def test_synth_cross_writes_a_trial_once(tmp_path, capsys, monkeypatch):
+    asked = []
+    monkeypatch.setattr("airborne.synthetic.write_thrown_cross", lambda folder, **options: asked.append(options))
+    assert in_process("synth", "cross", "-o", tmp_path / "new", "--seed", "3", "--preset", "side-somersault") == 0
+    assert (asked[0]["seed"], asked[0]["preset"]) == (3, "side-somersault")
+    assert capsys.readouterr().out == f"trial: {tmp_path / 'new' / 'trial.toml'}\n"
+
+
+def test_synth_block_writes_the_scene_that_was_asked_for(tmp_path, capsys, monkeypatch):
+    asked = []
+    monkeypatch.setattr("airborne.synthetic.write_block", lambda folder, scene, progress: asked.append((folder, scene)))
+    options = ("--seed", "4", "--blockers", "2", "--difficulty", "hard", "--frame-rate", "30", "--cameras", "2")
+    assert in_process("synth", "block", "-o", tmp_path / "new", *options) == 0
+    ((folder, scene),) = asked
+    assert (folder, scene.seed, len(scene.blockers), len(scene.rig)) == (tmp_path / "new", 4, 2, 2)
+    assert (scene.rate, scene.difficulty.occlusion, scene.difficulty.colour_similarity) == (30, 0.8, 1.0)
+    assert capsys.readouterr().out == f"trial: {tmp_path / 'new' / 'trial.toml'}\n"
+
+
+def test_synth_block_refuses_what_it_cannot_draw(tmp_path, capsys):
+    new = tmp_path / "new"
+    assert "choose 30, 60 or 120" in refusal(capsys, "synth", "block", "-o", new, "--frame-rate", "50")
+    assert "--blockers" in refusal(capsys, "synth", "block", "-o", new, "--blockers", "4")
+    assert "--cameras" in refusal(capsys, "synth", "block", "-o", new, "--cameras", "1")
+    assert "--difficulty" in refusal(capsys, "synth", "block", "-o", new, "--difficulty", "unfair")
+    assert not new.exists()
+    (tmp_path / "mine.txt").write_text("mine")
+    assert "not empty" in refusal(capsys, "synth", "block", "-o", tmp_path)
+
+
+def test_evaluate_compares_players_with_their_truth(tmp_path, capsys):
+    run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv", off_m=0.02)
+    assert in_process("evaluate", run, truth) == 0
+    out, _ = capsys.readouterr()
+    assert out.startswith("against the truth\n12 of 12 true times matched")
+    assert "number 7: 9 tracked, 3 uncertain, 0 lost" in out
+    assert "nan" not in out
+    assert in_process("evaluate", run, truth, "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["truth"]["players"]["Anna"]["parts"]["knees"]["mean_mm"] == pytest.approx(20)
+    assert "leave --digitised" in refusal(capsys, "evaluate", run, truth, "--digitised", truth)
+    assert "give a truth.csv" in refusal(capsys, "evaluate", run)
+    assert "cannot be read" in refusal(capsys, "evaluate", run, tmp_path / "none.csv")
+
+
+def test_bench_prints_what_it_measured(capsys, monkeypatch):
+    monkeypatch.setattr("airborne.run.bench.measure_speed", lambda: {"refined_ms_per_field": 12.5})
+    assert in_process("bench") == 0
+    assert capsys.readouterr().out == "refined_ms_per_field: 12.5\n"
+    assert in_process("bench", "--json") == 0
+    assert json.loads(capsys.readouterr().out) == {"refined_ms_per_field": 12.5}
+
+
+def test_demo_runs_again_in_its_own_folder_and_spares_any_other(trial, short_run, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("airborne.trial.examples.example_trial", lambda name: trial)
+    shutil.copytree(short_run, tmp_path / "demo")
+    assert in_process("demo", "-o", tmp_path / "demo", "--json") == 0
+    assert set(json.loads(capsys.readouterr().out)) == {"truth", "digitised", "agreement", "repeatability"}
+    assert (tmp_path / "demo" / "report.html").stat().st_size > 10_000
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "motion.csv").write_text("mine")
+    assert in_process("demo", "-o", tmp_path / "mine") == 2
+    assert (tmp_path / "mine" / "motion.csv").read_text() == "mine"
+
+
+def test_a_killed_run_is_readable_and_resumes_to_the_same_bytes(trial, tmp_path):
+    long = trial.with_name("long.toml")
+    whole = started("track", long, "-o", tmp_path / "whole", "--no-pictures")
+    whole.communicate()
+    assert whole.returncode == 0
+    process = started("track", long, "-o", tmp_path / "killed", "--no-pictures")
+    wait_for_rows(process, tmp_path / "killed" / "motion.csv", KILLED_AFTER)
+    process.kill()
+    process.communicate()
+    n_kept = len(read_motion(tmp_path / "killed" / "motion.csv"))
+    assert KILLED_AFTER <= n_kept < LONG
+    assert not (tmp_path / "killed" / "summary.json").exists()
+    resumed = started("track", long, "-o", tmp_path / "killed", "--no-pictures", "--resume")
+    resumed.communicate()
+    assert resumed.returncode == 0
+    for name in ("motion.csv", "angles.csv", "joints.csv"):
+        assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_ctrl_c_stops_with_one_line_and_keeps_the_frames(trial, tmp_path):
+    process = started("track", trial.with_name("long.toml"), "-o", tmp_path / "run", "--no-pictures")
+    wait_for_rows(process, tmp_path / "run" / "motion.csv", 1)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 130
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert "--resume" in err
+    assert len(read_motion(tmp_path / "run" / "motion.csv")) >= 1
+
+
+BROKEN_TRIALS = {  # what is replaced in trial.toml, and what the line says
+    "broken TOML": (("[calibration]", "[calibration"), "not a TOML file"),
+    "unknown key": ((f"stop = {SHORT}", "speed = 2"), "track.speed"),
+    "missing video": (("cam2.mp4", "cam9.mp4"), "cam9.mp4 not found"),
+    "text as video": (("cam2.mp4", "text.mp4"), "text.mp4 cannot be opened as a video"),
+    "truncated video": (("cam2.mp4", "cut.mp4"), "cut.mp4 cannot be opened as a video"),
+    "calibration of another size": ((CALIBRATED, 'file = "large.toml"'), "1920×1080"),
+    "calibration lacks a camera": (
+        (CALIBRATED, 'file = "two.toml"'),
+        "no camera 'cam3'; it has: cam1, cam2; say",
+    ),
+    "folder as video": (("cam2.mp4", "."), "is no file; give a video, or read pipes and devices with --live"),
+    "no such calibration": ((CALIBRATED, 'file = "no.toml"'), "no.toml not found"),
+    "start past the end": ((f"stop = {SHORT}", ""), "no frame 500"),
+}
+
+
+def spoil(folder: Path) -> None:
+    """Write the files that broken trials name."""
+    (folder / "text.mp4").write_text("no video\n")
+    (folder / "cut.mp4").write_bytes((folder / "cam2.mp4").read_bytes()[:100_000])
+    exact = (folder / "calib_true.toml").read_text()
+    (folder / "large.toml").write_text(exact.replace("[ 768.0, 576.0]", "[ 1920.0, 1080.0]"))
+    (folder / "two.toml").write_text(exact[: exact.index("[cam3]")])
+
+
+def refusal(capsys, *arguments) -> str:
+    """Return the one line on stderr of a command that must refuse."""
+    capsys.readouterr()
+    assert in_process(*arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1, err
+    assert err.startswith("airborne: ")
+    assert "Traceback" not in err
+    return err
+
+
+@pytest.mark.parametrize("what", BROKEN_TRIALS)
+def test_a_trial_that_cannot_be_used_gets_one_line(trial, tmp_path, capsys, what):
+    spoil(trial.parent)
+    replacement, said = BROKEN_TRIALS[what]
+    broken = changed(trial, "broken.toml", replacement)
+    if what == "start past the end":
+        broken = changed(broken, "broken.toml", ("frame = 0", "frame = 500"))
+    assert said in refusal(capsys, "track", broken, "-o", tmp_path / "run", "--no-pictures")
+
+
+def test_arguments_that_name_nothing_get_one_line(trial, tmp_path, capsys):
+    run = tmp_path / "run"
+    assert "none.toml" in refusal(capsys, "track", trial.with_name("none.toml"), "-o", run)
+    assert "cam7" in refusal(capsys, "track", trial, "-o", run, "--cameras", "cam1,cam7")
+    assert "--cameras names no camera" in refusal(capsys, "track", trial, "-o", run, "--cameras", " , ")
+    for kind in ("cross", "somersault", "block"):
+        assert "--seed" in refusal(capsys, "synth", kind, "-o", run, "--seed", "-1")
+    assert "--method magic: " in refusal(capsys, "track", trial, "-o", run, "--method", "magic")
+    assert not run.exists()
+
+
+def test_a_folder_with_a_run_is_not_overwritten(trial, short_run, capsys):
+    before = (short_run / "motion.csv").read_bytes()
+    assert "already holds a run" in refusal(capsys, "track", trial, "-o", short_run)
+    assert "another run" in refusal(capsys, "track", trial, "-o", short_run, "--resume", "--every", "2")
+    assert (short_run / "motion.csv").read_bytes() == before
+
+
+def test_a_damaged_record_of_a_run_is_not_guessed(trial, short_run, tmp_path, capsys):
+    run = tmp_path / "run"
+    shutil.copytree(short_run, run)
+    (run / "run.json").write_text("{")
+    assert "run.json is damaged" in refusal(capsys, "track", trial, "-o", run, "--resume")
+    (run / "run.json").unlink()
+    assert "run.json is missing" in refusal(capsys, "track", trial, "-o", run, "--resume")
+    assert (run / "motion.csv").read_bytes() == (short_run / "motion.csv").read_bytes()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a path below a file fails in another way there")
+def test_outputs_that_cannot_be_written_get_one_line(trial, tmp_path, capsys):
+    (tmp_path / "file").write_text("not a folder")
+    for out in (tmp_path / "file", tmp_path / "file" / "run"):
+        assert f"{tmp_path / 'file'} is a file; give a folder\n" in refusal(capsys, "track", trial, "-o", out)
+    calib, out = trial.parent / "calib_true.toml", tmp_path / "no" / "c.toml"
+    assert f"there is no folder {out.parent}; make it" in refusal(capsys, "convert", calib, out)
+    (tmp_path / "c.toml").mkdir()
+    assert "c.toml is a folder; give a file's name" in refusal(capsys, "convert", calib, tmp_path / "c.toml")
+
+
+def test_ctrl_c_is_answered_in_one_line_whatever_runs(monkeypatch, capsys):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("airborne.run.bench.measure_speed", interrupted)
+    assert in_process("bench") == 130
+    assert capsys.readouterr() == ("", "airborne: stopped\n")
+
+
+def test_evaluate_says_what_it_lacks(trial, short_run, tmp_path, capsys):
+    truth, clicks = trial.parent / "truth.csv", trial.parent / "digitised.csv"
+    assert "holds no run" in refusal(capsys, "evaluate", tmp_path, truth)
+    assert "nothing to compare with" in refusal(capsys, "evaluate", short_run)
+    assert "no column" in refusal(capsys, "evaluate", short_run, clicks)
+    assert "cannot be read" in refusal(capsys, "evaluate", short_run, tmp_path / "none.csv")
+    assert "cameras: cam1, cam2, cam3" in refusal(capsys, "evaluate", short_run, "--digitised", truth)
+
+
+def test_calibrate_says_what_it_lacks(trial, tmp_path, capsys):
+    points, out = trial.parent / "control_points.csv", tmp_path / "calib.toml"
+    assert "768x576" in refusal(capsys, "calibrate", points, "--size", "768", "-o", out)
+    assert "cam2" in refusal(capsys, "calibrate", points, "--size", "cam1=768x576", "-o", out)
+    assert "no column point" in refusal(capsys, "calibrate", trial.parent / "truth.csv", "--size", "768x576", "-o", out)
+    assert "no.toml does not exist" in refusal(capsys, "calibrate", tmp_path / "no.toml", "--size", "10x10", "-o", out)
+    assert "sides of 16" in refusal(capsys, "calibrate", points, "--size", "10x10", "-o", out)
+    for length in ("-1", "0", "nan", "1000"):
+        said = refusal(capsys, "calibrate", points, "--wand", length, "--size", "768x576", "-o", out)
+        assert f"--wand {length}: expected" in said
+    assert "not one point" in refusal(capsys, "calibrate", points, "--court", "men", "--size", "768x576", "-o", out)
+    assert not out.exists()
+
+
+def test_a_folder_with_anything_but_a_run_is_left_alone(trial, capsys):
+    before = {path.name: path.read_bytes() for path in trial.parent.iterdir() if path.is_file()}
+    assert "is not empty and holds no run" in refusal(capsys, "track", trial, "-o", trial.parent)
+    assert {path.name: path.read_bytes() for path in trial.parent.iterdir() if path.is_file()} == before
+
+
+def test_a_body_found_nowhere_is_said_plainly(trial, tmp_path, capsys):
+    far = changed(trial, "far.toml", ("position_m = [-0.42419,", "position_m = [40.0,"))
+    assert in_process("track", far, "-o", tmp_path / "run", "--no-pictures") == 1
+    out, _ = capsys.readouterr()
+    assert "found in no frame" in out
+    assert "the start pose lies in no camera's picture" in out
+    assert "nan" not in out

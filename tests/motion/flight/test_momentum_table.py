@@ -1,0 +1,102 @@
+"""What a flight comes to: centre of mass, momentum, turns, and checks against free fall."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.body import Pose
+from airborne.errors import BodyError, ResultError
+from airborne.motion import flight, flight_summary, has_inertias, write_flight
+from airborne.motion.flight.momentum import centre_of_mass
+from tests.support.motions import figure, motion_of, shaken, small_covariance, swinging
+from tests.support.tolerances import EXACT, ROUNDTRIP, sampled
+
+MODEL = figure()
+TIMES = np.arange(21) / 50
+COLUMNS = (
+    "frame,time_s,com_x_m,com_y_m,com_z_m,com_x_m_sd,com_y_m_sd,com_z_m_sd,"
+    "L_x_kg_m2_s,L_y_kg_m2_s,L_z_kg_m2_s,L_x_kg_m2_s_sd,L_y_kg_m2_s_sd,L_z_kg_m2_s_sd,"
+    "somersault_rev,twist_rev,tilt_deg"
+)
+
+
+def falling(gravity=9.81, turns=1.25):
+    """Poses whose centre of mass falls freely while the body, held stiff, somersaults."""
+    poses = []
+    for t in TIMES:
+        turn = Rotation.from_rotvec([2 * np.pi * turns * t / TIMES[-1], 0, 0])
+        still = Pose(world_from_root=RigidTransform.from_rotation(turn), joint_angles=np.full((4, 3), 0.2))
+        com, _ = centre_of_mass(MODEL.with_pose(still))
+        poses.append(still.moved(np.array([t, 0, 3 * t - gravity * t**2 / 2]) - com, np.zeros(3)))
+    return poses
+
+
+def test_centre_of_mass_deviations_are_those_of_sampled_poses():
+    rng, covariance, n = np.random.default_rng(1), small_covariance(MODEL), 1000
+    (pose,) = swinging(MODEL, [0.1])
+    table = flight(motion_of(MODEL, [pose], covariance=covariance), MODEL)
+    drawn = [centre_of_mass(MODEL.with_pose(shaken(rng, pose, covariance)))[0] for _ in range(n)]
+    np.testing.assert_allclose(table["com_sd"][0], np.std(drawn, axis=0), rtol=sampled(n))
+    assert np.isnan(table["angular_momentum"][0]).all()
+
+
+def test_summary_of_a_free_fall_finds_gravity_turns_and_a_constant_momentum():
+    summary = flight_summary(motion_of(MODEL, falling()), MODEL)
+    assert summary.fitted_gravity_m_s2 == pytest.approx(9.81, abs=ROUNDTRIP)
+    assert summary.ballistic_rms_mm < 1e3 * ROUNDTRIP
+    assert summary.somersault_rev == pytest.approx(1.25, abs=ROUNDTRIP)
+    assert summary.twist_rev == pytest.approx(0, abs=ROUNDTRIP)
+    assert max(np.abs(summary.tilt_range_deg)) < ROUNDTRIP
+    assert summary.n_poses == len(TIMES)
+    # a stiff body about a fixed axis: momentum turns with the body only across the axis, along it it stays
+    assert summary.angular_momentum_spread_kg_m2_s[0] < 1e-6 * summary.angular_momentum_kg_m2_s[0]
+    assert summary.to_dict()["fitted_gravity_m_s2"] == summary.fitted_gravity_m_s2
+
+
+def test_a_body_that_does_not_fall_freely_is_told_by_its_gravity_and_its_distance_from_a_free_fall():
+    summary = flight_summary(motion_of(MODEL, falling(gravity=8.0)), MODEL)
+    assert summary.fitted_gravity_m_s2 == pytest.approx(8.0, abs=ROUNDTRIP)
+    t = TIMES - TIMES.mean()
+    expected = 0.5 * 1.81 * np.std(t**2)  # what a line cannot take up of the lacking acceleration, even in time
+    assert summary.ballistic_rms_mm == pytest.approx(1e3 * expected, rel=ROUNDTRIP)
+
+
+@pytest.mark.parametrize("lost", [range(21), range(1, 21), range(2, 21)])
+def test_too_few_poses_leave_the_summary_unknown_not_broken(lost):
+    summary = flight_summary(motion_of(MODEL, falling(), lost=lost), MODEL)
+    assert np.isnan(summary.fitted_gravity_m_s2)
+    assert summary.n_poses == 21 - len(lost)
+
+
+def test_table_has_a_unit_in_every_column_and_empty_cells_where_lost(tmp_path):
+    motion = motion_of(MODEL, falling(), covariance=small_covariance(MODEL), lost=[5])
+    write_flight(tmp_path / "flight.csv", motion, MODEL)
+    with (tmp_path / "flight.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == COLUMNS.split(",")
+    assert all(rows[5][name] == "" for name in COLUMNS.split(",")[2:])
+    assert all(rows[4][name] != "" for name in COLUMNS.split(","))
+    table = flight(motion, MODEL)
+    assert float(rows[7]["com_z_m"]) == pytest.approx(float(table["com"][7, 2]), abs=EXACT)
+    assert float(rows[7]["L_x_kg_m2_s_sd"]) == pytest.approx(float(table["angular_momentum_sd"][7, 0]), rel=EXACT)
+    assert float(rows[7]["somersault_rev"]) == pytest.approx(1.25 * 7 / 20, abs=ROUNDTRIP)
+    assert "5 frames" in table.attrs["history"][0]
+    assert {table[name].attrs["units"] for name in ("com", "angular_momentum", "tilt")} == {"m", "kg m2/s", "deg"}
+
+
+def test_body_without_all_its_masses_is_refused_in_one_line():
+    segments = (*MODEL.segments[:2], replace(MODEL.segments[2], inertia=None), *MODEL.segments[3:])
+    weightless = replace(MODEL, segments=segments)
+    assert has_inertias(MODEL)
+    assert not has_inertias(weightless)
+    with pytest.raises(BodyError, match="no mass for arm; give every segment its inertia"):
+        flight(motion_of(MODEL, falling()), weightless)
+
+
+def test_motion_of_another_body_is_refused():
+    other = replace(MODEL, segments=MODEL.segments[:3], landmarks=MODEL.landmarks[:3])
+    with pytest.raises(ResultError, match="give the run's body"):
+        flight(motion_of(MODEL, falling()), other)

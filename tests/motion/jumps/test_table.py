@@ -1,0 +1,65 @@
+"""jumps.csv and the text for the terminal: every number with its interval, unknown ones empty."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from airborne.motion.jumps.heights import jumps
+from airborne.motion.jumps.table import describe, write_jumps
+from tests.support.jumping import Jumper, motion_of, players_motion
+
+CLEAN = Jumper()
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return jumps(motion_of(CLEAN))
+
+
+@pytest.fixture(scope="module")
+def cut():
+    n = round(60 * (CLEAN.takeoff_s + 0.4))
+    return jumps(players_motion(np.arange(n) / 60, CLEAN.points()[:n, None, :6]))
+
+
+def rows_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_table_reads_back_to_the_last_bit(whole, tmp_path):
+    write_jumps(tmp_path / "jumps.csv", whole)
+    (row,) = rows_of(tmp_path / "jumps.csv")
+    assert (row["player"], row["jump"], row["status"]) == ("one", "1", "whole")
+    assert tuple(float(row[f"foot_height_m{end}"]) for end in ("", "_low", "_high")) == tuple(whole[0].foot_height_m)
+    assert float(row["landing_y_m"]) == whole[0].landing_place_m[1].value
+    assert row["standing_source"] == "stance"
+    assert int(row["standing_first_frame"]) == whole[0].standing.frames[0]
+
+
+def test_unknown_numbers_are_empty_cells(cut, tmp_path):
+    write_jumps(tmp_path / "jumps.csv", cut)
+    (row,) = rows_of(tmp_path / "jumps.csv")
+    assert row["status"] == "no landing"
+    assert [row[name] for name in ("landing_s", "flight_time_height_m_low", "reach_m", "drift_m_high")] == [""] * 4
+    assert float(row["takeoff_speed_height_m"]) > 0.3
+
+
+def test_no_jump_leaves_a_table_with_its_first_line_alone(whole, tmp_path):
+    write_jumps(tmp_path / "none.csv", ())
+    write_jumps(tmp_path / "one.csv", whole)
+    none, one = ((tmp_path / name).read_text().splitlines() for name in ("none.csv", "one.csv"))
+    assert none == one[:1]
+    assert len(one) == 2
+    assert describe(()) == "no jump found"
+
+
+def test_text_shows_every_definition_in_centimetres_and_says_what_is_missing(whole, cut):
+    text = describe(whole + cut)
+    height = whole[0].foot_height_m
+    assert f"{100 * height.value:.1f} +-{50 * (height.high - height.low):.1f}" in text
+    for title in ("feet over standing", "hips over standing", "by flight time", "by take-off speed"):
+        assert title in text
+    assert "one 1: the landing is not seen" in text
+    assert "nan" not in text

@@ -1,0 +1,189 @@
+"""A finished run is compared with what is known, and its summary keeps the comparison."""
+
+import csv
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airborne.body.files import read_body
+from airborne.cameras import read_rig, write_pose2sim
+from airborne.errors import ResultError
+from airborne.motion import Motion, MotionWriter, write_joints
+from airborne.run.evaluate import agree, assess
+from tests.support.motions import estimate
+from tests.support.players_trial import PLAYERS, write_run, write_truth
+from tests.test_docs import DOCS
+
+
+@pytest.fixture
+def run(tmp_path, thrown_cross):
+    """A finished run of three frames, and the paths of its joints 10 mm higher."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    estimates = [estimate(k) for k in range(3)]
+    with MotionWriter(folder / "motion.csv") as writer:
+        for item in estimates:
+            writer.append(item)
+    shutil.copyfile(thrown_cross / "cross.toml", folder / "body.toml")
+    (folder / "summary.json").write_text('{"name": "run"}\n')
+    motion, body = Motion.collect(estimates), read_body(folder / "body.toml")
+    write_joints(tmp_path / "higher.csv", replace(motion, position=motion.position + np.array([0, 0, 0.01])), body)
+    return folder
+
+
+def test_paths_of_joints_are_compared_and_kept_in_the_summary(run):
+    found = assess(run, None, None, run.parent / "higher.csv")
+    assert list(found) == ["joints"]
+    assert found["joints"].whole.mean_mm == pytest.approx(10)
+    kept = json.loads((run / "summary.json").read_text())
+    assert kept["joints"]["whole"]["bias_mm"] == pytest.approx([0, 0, -10], abs=1e-9)
+    assert kept["name"] == "run"
+
+
+def test_nothing_to_compare_with_is_refused(run):
+    with pytest.raises(ResultError, match=r"give a truth\.csv"):
+        assess(run, None, None)
+
+
+def test_a_truth_given_as_joints_is_refused_in_one_line(run, thrown_cross):
+    with pytest.raises(ResultError, match="no column joint"):
+        assess(run, None, None, thrown_cross / "truth.csv")
+
+
+def test_players_are_compared_with_their_truth_and_the_summary_keeps_it(tmp_path):
+    run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv", off_m=0.03)
+    found = assess(run, truth, None)
+    assert list(found) == ["truth"]
+    assert [errors.parts["all"].mean_mm for errors in found["truth"].players.values()] == pytest.approx([30, 30])
+    kept = json.loads((run / "summary.json").read_text())
+    assert list(kept["truth"]["players"]) == list(PLAYERS)
+    assert kept["name"] == "a block"
+
+
+def test_a_broken_list_of_jumps_beside_the_truth_is_refused(tmp_path):
+    run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv")
+    (tmp_path / "players.json").write_text("[")
+    with pytest.raises(ResultError, match=r"players\.json"):
+        assess(run, truth, None)
+
+
+def test_players_without_a_summary_are_compared_and_none_is_made(tmp_path):
+    run = write_run(tmp_path / "run")
+    (run / "summary.json").unlink()
+    assert assess(run, write_truth(tmp_path / "truth.csv"), None)["truth"].n_matched == 12
+    assert not (run / "summary.json").exists()
+
+
+def test_players_have_a_truth_only(tmp_path):
+    run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv")
+    for given in ((None, None, None), (truth, truth, None), (truth, None, truth), (None, None, truth)):
+        with pytest.raises(ResultError, match=r"a run of players.*give a truth\.csv"):
+            assess(run, *given)
+
+
+def test_truths_of_players_and_of_a_body_are_told_apart(run, thrown_cross, tmp_path):
+    with pytest.raises(ResultError, match="expected a truth table of players"):
+        assess(write_run(tmp_path / "players"), thrown_cross / "truth.csv", None)
+    with pytest.raises(ResultError, match="no column x_m"):
+        assess(run, write_truth(tmp_path / "truth.csv"), None)
+
+
+def agreements(found, against):
+    return {row.name: row for row in found.agreements[against]}
+
+
+def test_agreement_of_joints_is_told_with_tables_figures_and_a_paragraph(run, tmp_path):
+    before = {path.name: path.read_bytes() for path in run.iterdir()}
+    found = agree(run, joints=run.parent / "higher.csv", out=tmp_path / "agreement")
+    rows = agreements(found, "the joints")
+    assert rows["all joints z"].bias.value == pytest.approx(-10)
+    assert rows["all joints x"].rmse.value == pytest.approx(0, abs=1e-9)
+    assert {path.name for path in (tmp_path / "agreement").iterdir()} == set(found.files)
+    assert set(found.files) == {"agreement.csv", "agreement_joints.png", "identity_joints.png", "agreement_methods.txt"}
+    text = (tmp_path / "agreement" / "agreement_methods.txt").read_text()
+    assert "Bland" in text and "McGraw" in text and "bias -10.00" in text and "airborne" in text
+    assert {path.name: path.read_bytes() for path in run.iterdir()} == before
+
+
+def test_each_number_of_the_table_has_its_interval(run, tmp_path):
+    agree(run, joints=run.parent / "higher.csv", out=tmp_path)
+    with (tmp_path / "agreement.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert rows[0]["against"] == "the joints"
+    for name in ("bias", "lower_limit", "upper_limit", "rmse", "nrmse_percent", "icc_a1", "icc_c1", "sem", "mdc"):
+        assert {f"{name}_low", f"{name}_high"} <= set(rows[0])
+
+
+def test_runs_of_one_trial_are_compared_with_one_another(run, tmp_path):
+    others = [shutil.copytree(run, tmp_path / name) for name in ("other", "third")]
+    found = agree(run, repeats=others, out=tmp_path)
+    rows = {row.name: row for row in found.repeats["runs"]}
+    assert rows["x"].n_ways == 3 and rows["x"].within_sd.value == pytest.approx(0, abs=1e-9)
+    assert {"somersault", "tilt", "twist", "all joints x"} <= set(rows)
+    assert "between runs" in found.describe()
+    assert not found.agreements
+    with pytest.raises(ResultError, match="holds no run"):
+        agree(run, repeats=[tmp_path])
+
+
+def test_nothing_is_compared_with_itself(run, thrown_cross, tmp_path):
+    other, clicks = shutil.copytree(run, tmp_path / "other"), thrown_cross / "digitised.csv"
+    for repeats in ([run], [other, tmp_path / "run" / ".." / "other"]):
+        with pytest.raises(ResultError, match=r"--repeat .* compared with itself"):
+            agree(run, repeats=repeats)
+    with pytest.raises(ResultError, match=r"--operator .* compared with itself"):
+        agree(run, digitised=clicks, operators=[clicks])
+
+
+@pytest.mark.parametrize("text", ["{", "[]", ""])
+def test_a_run_with_a_damaged_record_is_refused(run, text):
+    (run / "run.json").write_text(text)
+    with pytest.raises(ResultError, match=r"run\.json is damaged"):
+        assess(run, None, None, run.parent / "higher.csv")
+    players = write_run(run.parent / "players")
+    (players / "run.json").write_text(text)
+    with pytest.raises(ResultError, match=r"run\.json is damaged"):
+        assess(players, write_truth(run.parent / "truth.csv"), None)
+
+
+def test_a_run_without_its_body_is_refused(run):
+    (run / "body.toml").unlink()
+    with pytest.raises(ResultError, match=r"body\.toml is missing, .* track again"):
+        assess(run, None, None, run.parent / "higher.csv")
+
+
+def test_people_who_click_the_same_pictures_are_compared(run, thrown_cross, tmp_path):
+    write_pose2sim(run / "calib.toml", read_rig(thrown_cross / "calib_true.toml"))
+    clicks = thrown_cross / "digitised.csv"
+    others = shutil.copyfile(clicks, tmp_path / "others.csv")
+    found = agree(run, digitised=clicks, operators=[others], out=tmp_path)
+    assert {row.name for row in found.repeats["operators"]} == {"x", "y", "z", "somersault", "tilt", "twist"}
+    assert list(found.agreements) == ["points digitised"]
+    with pytest.raises(ResultError, match="give those as --digitised"):
+        agree(run, operators=[clicks])
+
+
+def test_players_and_their_jumps_agree_with_their_truth(tmp_path):
+    run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv", off_m=0.03)
+    found = agree(run, truth, repeats=[shutil.copytree(run, tmp_path / "again")])
+    rows = agreements(found, "the truth")
+    assert rows["ankle_left z"].bias.value == pytest.approx(30)
+    assert rows["ankle_left z"].n_individuals == 2
+    assert rows["all joints z"].n_individuals == 12
+    assert [row.name for row in found.repeats["runs"]][:3] == ["hip_left x", "all joints x", "hip_left y"]
+    with pytest.raises(ResultError, match="a run of players"):
+        agree(run, joints=truth)
+    plain = json.dumps(found.to_dict(), allow_nan=False)
+    assert "NaN" not in plain
+
+
+def test_every_number_is_documented(run, tmp_path):
+    agree(run, joints=run.parent / "higher.csv", repeats=[shutil.copytree(run, tmp_path / "again")], out=tmp_path)
+    text = (DOCS / "agreement.md").read_text(encoding="utf-8")
+    for name in ("agreement.csv", "repeatability.csv"):
+        header = (tmp_path / name).read_text().splitlines()[0].split(",")
+        stems = {column.removesuffix("_low").removesuffix("_high") for column in header}
+        assert {stem for stem in stems if f"`{stem}`" not in text} <= {"against", "between", "variable", "unit"}

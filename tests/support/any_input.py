@@ -1,0 +1,340 @@
+"""Feeds random and mutated files to every reader of the package: `python -m tests.support.any_input [files] [reader]`.
+
+Run by test_any_input_file.py in a process of its own. Prints one JSON object: how many files each reader saw, what came
+out that was no AirborneError, the slowest file, the memory taken.
+"""
+
+import contextlib
+import io
+import json
+import random
+import resource
+import signal
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from airborne import cli
+from airborne.body import human18
+from airborne.body.files import read_body, write_body
+from airborne.body.measurements import read_measurements, write_measurements
+from airborne.calibration.sources.boards import read_board
+from airborne.calibration.sources.control_points import read_control_points
+from airborne.calibration.sources.wand import read_wand
+from airborne.cameras import PixelCount, read_detections, read_rig, write_rig
+from airborne.cameras.clicks import read_clicks, read_places
+from airborne.cameras.detections import NETWORKS, Detections, write_detections
+from airborne.cameras.formats.dltdv import placed, read_digitisation, write_digitisation
+from airborne.cameras.formats.options import Given
+from airborne.errors import AirborneError
+from airborne.evaluation import read_clicked_frames, read_joint_paths, read_players_truth, read_truth
+from airborne.evaluation.players_truth import read_known_jumps
+from airborne.evaluation.variables import read_joint_angles
+from airborne.export.conversion import Wishes, convert
+from airborne.motion import MotionWriter, read_estimates, read_players
+from airborne.run.evaluate import assess
+from airborne.run.opening import holds_run_of
+from airborne.run.players_tracker import read_torsos
+from airborne.tracking.players import PlayerStart
+from airborne.trial.file import read_trial
+from airborne.video.decoding import VideoSource, inspect
+from tests.body.test_measurements import PERSON
+from tests.support import players_trial as players
+from tests.support.cameras import LENS, scattered, three_cameras
+from tests.support.motions import run_with_gap
+from tests.support.mutations import MUTATORS
+from tests.support.places import THROWN_CROSS
+
+EXAMPLE = THROWN_CROSS
+CPU_LIMIT_S = 4.0
+MEMORY_LIMIT_BYTES = 1_000_000_000  # above what the process takes with everything loaded
+CAMERAS = ("left", "right", "side")
+WEIGHTS = {"video": 0.2, "command line": 0.3, "mesh.ply": 0.5, "mesh.stl": 0.5, "run summary": 0.3}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One kind of file: where it lies, whole, and who reads it."""
+
+    name: str
+    path: Path
+    whole: bytes
+    read: Callable[[], object]
+
+
+# --- valid files ------------------------------------------------------------------------------------------------------
+
+
+def calibrations(folder):
+    rig, plain = three_cameras(LENS), three_cameras()
+    for kind, name in {
+        **{"pose2sim": "a.toml", "aniposelib": "b.toml", "caliscope": "c.toml", "qualisys": "d.qca.txt"},
+        **{"vicon": "e.xcp", "opencv": "f.yml", "dlt": "g.csv"},
+    }.items():
+        path = folder / kind / name
+        path.parent.mkdir()
+        write_rig(path, plain if kind == "dlt" else rig, format=kind, pixels=PixelCount("lower-left"))
+        size, pixels = ((768, 576), PixelCount("lower-left")) if kind == "dlt" else (None, None)
+        yield case(f"calibration {kind}", path, lambda p=path, s=size, x=pixels: read_rig(p, size=s, pixels=x))
+    write_rig(folder / "pair", rig, format="easymocap")
+    yield case("calibration easymocap", folder / "pair" / "intri.yml", lambda: read_rig(folder / "pair"))
+    yield case("calibration half", folder / "pair" / "extri.yml", lambda: read_rig(folder / "pair" / "extri.yml"))
+
+
+def points_in_pictures(folder):
+    table = folder / "table.csv"
+    table.write_text("point,left_u,left_v,right_u,right_v\nhip,1.5,2,3,4\nknee,,,5.5,6\n")
+    yield case("clicks", table, lambda: read_clicks(table, CAMERAS))
+    places = folder / "places.csv"
+    places.write_text("joint,x_m,y_m,z_m\nhip,0.1,0.2,1.0\nknee,,,\n")
+    yield case("places", places, lambda: read_places(places))
+    rig = three_cameras()
+    px = np.stack([camera.px_from_world(scattered(5 * 26).reshape(5, 26, 3)) for camera in rig], axis=2)
+    seen = Detections(cameras=rig.names, points=NETWORKS[26], px=px, visibility=np.full(px.shape[:-1], 0.9))
+    npz = folder / "detections.npz"
+    write_detections(npz, seen)
+    yield case("detections npz", npz, lambda: read_detections(npz, CAMERAS))
+    pose = folder / "pose"
+    write_detections(pose, seen, as_folder=True)
+    yield case("detections OpenPose", pose / "left_json" / "left_000002.json", lambda: read_detections(pose, CAMERAS))
+    few = Detections.of_clicks(rig.names, ("a", "b"), px[:, :2])
+    xypts = folder / "t_xypts.csv"
+    write_digitisation(xypts, placed(few, rig), Given())
+    yield case("DLTdv xypts", xypts, lambda: read_digitisation(xypts, Given()))
+    xyz = folder / "t_xyzpts.csv"
+    yield case("DLTdv xyzpts", xyz, lambda: read_digitisation(xypts, Given()))
+    wand = folder / "wand.csv"
+    wand.write_text("frame,marker,camera,u_px,v_px\n0,1,left,5,6\n0,2,left,7,8\n1,1,right,,\n")
+    yield case("wand", wand, lambda: read_wand(wand, CAMERAS, Given(), [0.5]))
+    board = folder / "board.toml"
+    board.write_text('kind = "charuco"\ncolumns = 4\nrows = 5\nsquare_m = 0.054\ndictionary = "DICT_4X4_50"\n')
+    yield case("board", board, lambda: read_board(board))
+    yield example_case("control points", folder, "control_points.csv", read_control_points)
+    yield example_case("digitised", folder, "digitised.csv", lambda p: read_clicked_frames(p, ("cam1", "cam2", "cam3")))
+    out = folder / "converted"
+    copy = folder / "any_xypts.csv"
+    copy.write_bytes(xypts.read_bytes())
+    yield case("convert points", copy, lambda: convert(copy, out, Wishes(to="digitised")))
+    some = folder / "some.toml"
+    write_rig(some, three_cameras(LENS))
+    yield case("convert cameras", some, lambda: convert(some, out, Wishes(to="vicon")))
+
+
+def bodies(folder):
+    person = folder / "person.toml"
+    write_body(person, human18())
+    yield case("body", person, lambda: read_body(person))
+    cube = folder / "cube.toml"
+    cube.write_text(
+        'name = "cube"\n[[segment]]\nname = "cube"\njoint_m = [0, 0, 0]\n[[segment.part]]\nname = "skin"\n'
+        'shape = "mesh"\nfile = "MESH"\ncolour_srgb = [1, 0, 0]\n'
+    )
+    import trimesh
+
+    for kind in ("obj", "ply", "stl"):
+        mesh, body = folder / f"cube.{kind}", folder / f"cube_{kind}.toml"
+        trimesh.creation.box((0.5, 0.5, 0.5)).export(mesh)
+        body.write_text(cube.read_text().replace("MESH", mesh.name))
+        yield case(f"mesh.{kind}", mesh, lambda b=body: read_body(b))
+    measured = folder / "athlete.txt"
+    write_measurements(measured, PERSON)
+    yield case("measurements", measured, lambda: read_measurements(measured))
+
+
+def trials(folder):
+    for name in ("calib_true.toml", "control_points.csv", "cross.toml", "digitised.csv"):
+        (folder / name).write_bytes((EXAMPLE / name).read_bytes())
+    for name in ("cam1.mp4", "cam2.mp4", "cam3.mp4"):
+        (folder / name).touch()
+
+    def whole(path):
+        trial = read_trial(path)
+        return (trial.settings, trial.players, trial.has_players or trial.model())
+
+    yield example_case("trial", folder, "trial.toml", whole)
+    legs = folder / "legs"
+    legs.mkdir()
+    write_rig(legs / "calib.toml", players.rig())
+    (legs / "trial.toml").write_text(players.trial_text())
+    yield case("trial of players", legs / "trial.toml", lambda: whole(legs / "trial.toml"))
+    torsos = folder / "torsos.csv"
+    torsos.write_text("player,frame,x_m,y_m,z_m\nAnna,0,0.1,0.2,1.2\nAnna,3,,,\nBea,0,1,1,1\n")
+    starts = [PlayerStart(name=name, joints_m={"torso": np.zeros(3)}) for name in ("Anna", "Bea")]
+    yield case("torsos", torsos, lambda: read_torsos(torsos, starts, first=0))
+    run = folder / "run"
+    run.mkdir()
+    (run / "run.json").write_text('{"inputs": {"a": "b"}, "settings": {}, "version": "1"}')
+    videos = folder / "with videos"
+    videos.mkdir()
+    for path in EXAMPLE.iterdir():
+        if path.is_file():
+            (videos / path.name).write_bytes(path.read_bytes())
+    yield case("run record", run / "run.json", lambda: holds_run_of(read_trial(videos / "trial.toml"), run))
+    video = folder / "video.mp4"
+    video.write_bytes((EXAMPLE / "cam1.mp4").read_bytes())
+    yield case("video", video, lambda: inspect(VideoSource("cam1", video)))
+
+
+def results(folder):
+    rigid, jointed = folder / "rigid", folder / "jointed"
+    for run, joints in ((rigid, ()), (jointed, ("arm", "leg"))):
+        run.mkdir()
+        with MotionWriter(run / "motion.csv", joints) as writer:
+            for estimate in run_with_gap(n_joints=len(joints)):
+                writer.append(estimate)
+    yield case("motion", rigid / "motion.csv", lambda: read_estimates(rigid / "motion.csv"))
+    yield case("motion with joints", jointed / "motion.csv", lambda: read_estimates(jointed / "motion.csv"))
+    yield case("covariances", jointed / "covariance.bin", lambda: read_estimates(jointed / "motion.csv"))
+    of_players = players.write_run(folder / "players")
+    truth = players.write_truth(folder / "truth_of_players.csv")
+    yield case("joints of players", of_players / "joints.csv", lambda: read_players(of_players / "joints.csv"))
+    yield case("truth of players", truth, lambda: read_players_truth(truth))
+    assessed, their_truth = players.write_run(folder / "assessed"), players.write_truth(folder / "theirs.csv")
+    yield case("run summary", assessed / "summary.json", lambda: assess(assessed, their_truth, None))
+    yield example_case("truth", folder, "truth.csv", read_truth)
+    jumps = folder / "players.json"
+    jumps.write_text('[{"name": "Anna", "jump": {"flight_s": 0.5, "last_contact_frame": 3.5}}, {"name": "Bea"}]')
+    yield case("known jumps", jumps, lambda: read_known_jumps(jumps))
+    long = folder / "joints.csv"
+    long.write_text("time_s,joint,x_m,y_m,z_m\n0,hip,1,2,3\n0,knee,1,2,\n0.02,hip,1,2,3\n0.02,knee,,,\n")
+    yield case("paths of joints", long, lambda: read_joint_paths(long))
+    trc = folder / "paths.trc"
+    trc.write_text(
+        "PathFileType\t4\t(X/Y/Z)\tpaths.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n50\t50\t2\t2\tm\n"
+        "Frame#\tTime\tRHip\t\t\tLHip\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n1\t0.0\t1\t2\t3\tNaN\tNaN\tNaN\n"
+        "2\t0.02\t1\t2\t3\t4\t5\t6\n"
+    )
+    yield case("TRC", trc, lambda: read_joint_paths(trc))
+    angles = folder / "angles.csv"
+    angles.write_text("time_s,knee_x_rad,knee_y_rad,knee_z_rad\n0,0.1,0.2,0.3\n0.02,0.1,,0.3\n")
+    yield case("joint angles", angles, lambda: read_joint_angles(angles))
+
+
+def commands(folder):
+    calib = folder / "calib.toml"
+    write_rig(calib, three_cameras(LENS))
+
+    def run():
+        words = ["convert", str(calib), str(folder / "out.xcp")]
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            sys.argv = ["airborne", *words]
+            try:
+                cli.main()
+            except SystemExit as left:
+                if left.code not in (0, 2, None):
+                    raise ValueError(f"exit code {left.code}") from left
+
+    yield case("command line", calib, run)
+
+
+def case(name, path, read):
+    return Case(name, path, path.read_bytes(), read)
+
+
+def example_case(name, folder, file, read):
+    (folder / file).write_bytes((EXAMPLE / file).read_bytes())
+    return case(name, folder / file, lambda: read(folder / file))
+
+
+# --- the run ----------------------------------------------------------------------------------------------------------
+
+
+class TooSlowError(Exception):
+    """A file took too long."""
+
+
+def too_slow(*_):
+    raise TooSlowError(f"more than {CPU_LIMIT_S} s of CPU")
+
+
+def fed(case, how, seed):
+    """Give a reader a mutated file; return the CPU time and what came out that should not."""
+    data = how(case.whole, random.Random(f"{case.name} {seed}"))
+    case.path.write_bytes(data)
+    before = time.process_time()
+    try:
+        wrong = complaint(case.read)
+    except TooSlowError:  # in the very moment when all was done
+        wrong = None
+    signal.setitimer(signal.ITIMER_PROF, 0)
+    cpu_s = time.process_time() - before
+    case.path.write_bytes(case.whole)
+    return cpu_s, wrong or (f"took {cpu_s:.1f} s" if cpu_s > CPU_LIMIT_S else None)
+
+
+def complaint(read):
+    """What came out of a reader that should not; None where nothing did."""
+    signal.setitimer(signal.ITIMER_PROF, CPU_LIMIT_S)
+    try:
+        read()
+    except AirborneError as error:
+        is_plain = "\n" not in str(error) and str(error).strip() and len(str(error)) < 2000
+        return None if is_plain else f"not one plain line: {str(error)[:300]!r}"
+    except BaseException as error:
+        where = traceback.extract_tb(error.__traceback__)
+        ours = [f"{Path(frame.filename).name}:{frame.lineno}" for frame in where if "airborne" in frame.filename]
+        return f"{type(error).__name__}: {str(error)[:200]} at {' '.join(ours[-3:])}"
+    return None
+
+
+def fuzz(case, n):
+    """Feed n files to one reader."""
+    seen, failures, slowest = 0, [], (0.0, "")
+
+    @settings(max_examples=n, derandomize=True, deadline=None, database=None, phases=[Phase.generate])
+    @given(how=st.sampled_from(MUTATORS), seed=st.integers(0, 2**32 - 1))
+    def feed(how, seed):
+        nonlocal seen, slowest
+        seen += 1
+        cpu_s, wrong = fed(case, how, seed)
+        slowest = max(slowest, (cpu_s, f"{how.__name__} {seed}"))
+        if wrong:
+            failures.append(f"{how.__name__} {seed}: {wrong}")
+
+    feed()
+    return seen, failures, slowest
+
+
+def cases(folder):
+    for i, make in enumerate((calibrations, points_in_pictures, bodies, trials, results, commands)):
+        inner = folder / f"{i}"
+        inner.mkdir()
+        yield from make(inner)
+
+
+def main(n=2000, only=""):
+    warnings.simplefilter("error")
+    signal.signal(signal.SIGPROF, too_slow)
+    found = {"files": {}, "failures": {}, "slowest": {}}
+    with tempfile.TemporaryDirectory() as name:
+        chosen = [each for each in cases(Path(name)) if only in each.name]
+        for each in chosen:
+            each.read()  # all that is loaded once is loaded now; and the file as it is is read without complaint
+        taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+        before_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+        resource.setrlimit(resource.RLIMIT_AS, (taken + MEMORY_LIMIT_BYTES,) * 2)
+        total = sum(WEIGHTS.get(each.name, 1.0) for each in chosen)
+        start = time.process_time()
+        for each in chosen:
+            count = -int(-n * WEIGHTS.get(each.name, 1.0) // total)
+            seen, failures, slowest = fuzz(each, count)
+            found["files"][each.name] = seen
+            found["slowest"][each.name] = (round(slowest[0], 3), slowest[1])
+            if failures:
+                found["failures"][each.name] = failures
+        found["cpu_s"] = round(time.process_time() - start, 1)
+    found["grown_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024 - before_mb
+    print(json.dumps(found))
+
+
+if __name__ == "__main__":
+    main(*(int(word) if word.isdigit() else word for word in sys.argv[1:]))
