@@ -253,7 +253,7 @@ def person(tmp_path_factory):
 def test_every_file_of_a_body_with_joints_is_documented(person, run):
     left = {path.name for path in person[0].iterdir()} - {path.name for path in run.iterdir()}
     rows = table_of(DOCS / "results.md", "Files of a body with joints")
-    assert left | {covariance_file.NAME} == {name for row in rows for name in named(row[0])}
+    assert left | {covariance_file.COVARIANCE_FILE} == {name for row in rows for name in named(row[0])}
 
 
 @pytest.mark.parametrize("name", ["joint_angles.csv", "flight.csv"])

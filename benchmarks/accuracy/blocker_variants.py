@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from rows import append
 
 from airborne.body.legs import LEG_POINTS
-from airborne.synthetic import block_scene, frames_of, joints_of, starts_of
+from airborne.synthetic import block_frames, block_scene, noisy_starts, true_joints
 from airborne.tracking.capsules import Blocker, dynamics, fit, surface_colours, tracker
 from airborne.tracking.players import PlayerStart
 
@@ -29,13 +29,13 @@ INSIDE_95 = 7.815  # squared distance that 95 % of a Gaussian in space lie withi
 Switch = tuple[ModuleType, str, Any]
 VARIANTS: dict[str, list[Switch]] = {
     "everything": [],
-    "without habits": [(fit, "_HABIT_INFORMATION", np.zeros_like(fit._HABIT_INFORMATION))],
-    "without standing feet": [(tracker, "_STANDING_M", -1.0)],
-    "without flight": [(tracker, "_FLYING_M", np.inf)],
-    "without hidden views": [(tracker, "_HIDDEN_RATE", 0.0)],
+    "without habits": [(fit, "_POSTURE_INFORMATION", np.zeros_like(fit._POSTURE_INFORMATION))],
+    "without standing feet": [(tracker, "_CONTACT_M", -1.0)],
+    "without flight": [(tracker, "_AIRBORNE_M", np.inf)],
+    "without hidden views": [(tracker, "_OCCLUSION_RATE", 0.0)],
     "clothes that stay": [(dynamics, "_SLIDING_SD", dynamics._SLIDING_SD * 0.01)],
     "colours as lit at first": [(surface_colours, "_LIGHTS", np.ones_like(surface_colours._LIGHTS))],
-    "socks and shoes as at first": [(tracker, "RENEWED_S", np.inf)],
+    "socks and shoes as at first": [(tracker, "COLOUR_UPDATE_S", np.inf)],
     "without other players": [(tracker, "_NEAR_M", 0.0)],
 }
 
@@ -58,12 +58,12 @@ def follow(seed: int, found: dict[str, list[tuple[np.ndarray, np.ndarray]]]) -> 
     scene = block_scene(seed, n_blockers=2 if seed in WITH_TWO else 1)
     truth = {}
     for player in scene.blockers:
-        paths = joints_of(player, scene.times_s)
+        paths = true_joints(player, scene.times_s)
         truth[player.name] = np.stack([paths[name] for name in LEG_POINTS], axis=1)
-    starts = [PlayerStart(name=name, joints_m=joints) for name, joints in starts_of(scene).items()]
+    starts = [PlayerStart(name=name, joints_m=joints) for name, joints in noisy_starts(scene).items()]
     tracking = Blocker(starts)
     states: dict[str, Any] = {name: tracking.init() for name in VARIANTS}
-    for k, frames in enumerate(frames_of(scene)):
+    for k, frames in enumerate(block_frames(scene)):
         for name, switches in VARIANTS.items():
             with switched(switches):
                 states[name], estimates = tracking.step(states[name], frames)

@@ -19,8 +19,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rows import ROOT, append
 
-from airborne.calibration import Calibrated, calibrate_from, sources_from
-from airborne.calibration.report import to_dict
+from airborne.calibration import RigCalibration, calibrate_from, sources_from
+from airborne.calibration.report import calibration_to_dict
 from airborne.calibration.sources.person import median_reprojection_px
 from airborne.cameras.detections import read_detections
 
@@ -32,18 +32,18 @@ def silent(what: str, done: int, total: int | None) -> None:
     """Tell nothing."""
 
 
-def charuco(sync: str) -> Calibrated:
+def charuco(sync: str) -> RigCalibration:
     """Calibrate the four webcams from their videos."""
     cameras = [{"name": f"cam_{k}", "video": f"cam_{k}.mp4"} for k in range(4)]
     board = {"file": "charuco.toml", "timestamps": "timestamps.csv", "sync": sync}
     return calibrate_from(sources_from({"camera": cameras, "board": board}, DATA / "charuco", "charuco"), silent)
 
 
-def square_errors(found: Calibrated) -> np.ndarray:
+def square_errors(found: RigCalibration) -> np.ndarray:
     """Compare triangulated squares with the board's (n,): corners as each camera would see them without its lag."""
-    adjusted = found.adjusted
+    adjusted = found.adjustment
     source, residual = adjusted.sources[0], adjusted.residual_px[0]
-    board = found.inputs.seen.views.board
+    board = found.inputs.board_detections.views.board
     placed = source.world_from_target
     px = np.full((source.n_moments, len(source.points), len(found.rig), 2), np.nan)
     world = placed[source.moments].apply(source.points[source.point])
@@ -79,7 +79,7 @@ def charuco_rows() -> list[dict]:
     baseline = max(np.linalg.norm(a - b) for a in theirs for b in theirs)
     for sync, method in (("auto", "bundle"), ("exact", "no lags")):
         found = charuco(sync)
-        told, errors = to_dict(found), square_errors(found)
+        told, errors = calibration_to_dict(found), square_errors(found)
         off, scale = off_aligned(np.stack([camera.centre for camera in found.rig]), theirs)
         base = {"data": "charuco, videos only", "method": method, "n": told["sources"]["board"]["n_observations"]}
         is_ours = sync == "auto"
@@ -151,16 +151,16 @@ def balance_rows() -> list[dict]:
     found = calibrate_from(sources_from(document, folder, "balance"), silent)
     seen = read_detections(folder / "detections_2d.npz", names)
     seen = replace(seen, visibility=np.maximum(seen.visibility, 1e-3))
-    before = median_reprojection_px(found.inputs.given, seen)
+    before = median_reprojection_px(found.inputs.start_rig, seen)
     after = median_reprojection_px(found.rig, seen)
     base = {"data": "balance, detections", "method": "bundle", "n": int(np.isfinite(seen.px[..., 0]).sum())}
-    wrong = ", ".join(mending.camera.name for mending in found.mended)
+    wrong = ", ".join(mending.camera.name for mending in found.resections)
     rows = [
         {**base, "metric": "cameras named as wrong", "unit": "", "value": wrong or "none", "floor": "cam03"},
         {**base, "metric": "median reprojection as shipped", "unit": "px", "value": before},
         {**base, "metric": "median reprojection, refined", "unit": "px", "value": after, "floor": 7.5},
     ]
-    for name, camera in to_dict(found)["cameras"].items():
+    for name, camera in calibration_to_dict(found)["cameras"].items():
         rows += [
             {**base, "metric": f"shift of {name}", "unit": "m", "value": camera["moved_m"]},
             {**base, "metric": f"turn of {name}", "unit": "deg", "value": camera["turned_deg"]},

@@ -17,10 +17,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from rows import append
 
 from airborne.evaluation.success import success_cover
-from airborne.reproduction.block.occlusion import FULLY_HIDDEN, hidden_shares
-from airborne.reproduction.block.plan import FULL, PARTS
-from airborne.reproduction.block.tracking import Told, hand_set, true_motion
-from airborne.synthetic import frames_of
+from airborne.reproduction.block.occlusion import FULLY_OCCLUDED, occlusion_shares
+from airborne.reproduction.block.plan import FULL, PAPER_PARTS
+from airborne.reproduction.block.tracking import SharedTorsos, hand_set_starts, true_motion
+from airborne.synthetic import block_frames
 from airborne.tracking.particle import LegsSettings, legs_tracker, torso_tracker
 
 SEQUENCES, SEEDS = (3, 6, 9, 15, 18, 20), range(2)
@@ -46,33 +46,33 @@ def main() -> None:
         if take.number not in SEQUENCES:
             continue
         scene = take.scene()
-        truth, visible = true_motion(scene), hidden_shares(scene) < FULLY_HIDDEN
-        at = [truth.joints.index(name) for name in PARTS]
+        truth, visible = true_motion(scene), occlusion_shares(scene) < FULLY_OCCLUDED
+        at = [truth.joints.index(name) for name in PAPER_PARTS]
         for seed in SEEDS:
-            starts, told = hand_set(scene, seed), Told([])
-            torsos = torso_tracker(scene.calibrated, starts, seed)
+            starts, shared = hand_set_starts(scene, seed), SharedTorsos([])
+            torsos = torso_tracker(scene.calibrated_rig, starts, seed)
             trackers = {
-                name: legs_tracker(LegsSettings(seed=seed, **each), scene.calibrated, starts, told)
+                name: legs_tracker(LegsSettings(seed=seed, **each), scene.calibrated_rig, starts, shared)
                 for name, each in VARIANTS.items()
             }
             of_torsos, states = torsos.init(), {name: tracker.init() for name, tracker in trackers.items()}
             points: dict[str, list] = {name: [] for name in VARIANTS}
-            for frames in frames_of(scene):
-                of_torsos, places = torsos.step(of_torsos, frames)
-                told.places.append(places)
+            for frames in block_frames(scene):
+                of_torsos, positions = torsos.step(of_torsos, frames)
+                shared.positions.append(positions)
                 for name, tracker in trackers.items():
                     states[name], estimates = tracker.step(states[name], frames)
                     points[name].append([each.points for each in estimates])
             for name, each in points.items():
                 for i in range(len(scene.blockers)):
                     place, true = np.array(each)[:, i], truth.points[:, i, at]
-                    cover = success_cover(scene.calibrated, place, true, PARTS, visible[:, i])
+                    cover = success_cover(scene.calibrated_rig, place, true, PAPER_PARTS, visible=visible[:, i])
                     found[name].append((cover, np.linalg.norm(place - true, axis=-1)))
         print(f"sequence {take.number} done", flush=True)
     rows = []
     for name, pairs in found.items():
         base = {"data": f"{len(SEQUENCES)} sequences, {len(SEEDS)} seeds", "method": name, "n": len(pairs)}
-        for part, names in (("hips", PARTS[:2]), ("knees", PARTS[2:4]), ("feet", PARTS[4:])):
+        for part, names in (("hips", PAPER_PARTS[:2]), ("knees", PAPER_PARTS[2:4]), ("feet", PAPER_PARTS[4:])):
             n = sum(cover.n[each] for cover, _ in pairs for each in names)
             for metric, rate in (("success", "rate"), ("touching", "touching_rate")):
                 hits = sum(getattr(cover, rate)[each] * cover.n[each] for cover, _ in pairs for each in names)

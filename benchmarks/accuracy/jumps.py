@@ -19,10 +19,10 @@ from rows import append
 from airborne.body.legs import LEG_POINTS
 from airborne.evaluation.jump_errors import EVENTS, HEIGHTS
 from airborne.evaluation.players import compare_players
-from airborne.evaluation.players_truth import known_jump
+from airborne.evaluation.players_truth import reference_jump
 from airborne.motion.free_fall import noise_covariance
 from airborne.reproduction.block.tracking import true_motion
-from airborne.synthetic import block_scene, jump_facts
+from airborne.synthetic import block_scene, jump_truth
 
 SCENES, SEEDS = range(8), range(4)
 FEET = ("foot_left", "foot_right")
@@ -36,8 +36,8 @@ def main() -> None:
         for sd_m in (0.01, 0.02):
             found = []
             for number, (scene, truth) in enumerate(zip(scenes, truths, strict=True)):
-                jumpers = [player for player in scene.players if player.course.flight is not None]
-                known = {player.name: known_jump(jump_facts(player, float(scene.rate))) for player in jumpers}
+                jumpers = [player for player in scene.players if player.movement.flight is not None]
+                known = {player.name: reference_jump(jump_truth(player, float(scene.rate))) for player in jumpers}
                 at = [truth.joints.index(name) for name in joints]
                 root = np.linalg.cholesky(noise_covariance(truth.time_s, np.full(len(truth), sd_m**2)))
                 for seed in SEEDS:
@@ -49,7 +49,7 @@ def main() -> None:
                         points=truth.points[:, :, at] + np.einsum("ij,jplk->iplk", root, noise),
                         covariance=np.broadcast_to(sd_m**2 * np.eye(3), (*shape, 3)),
                     )
-                    found += compare_players(noisy, truth, known_jumps=known).jumps
+                    found += compare_players(noisy, truth, reference_jumps=known).jumps
             data = f"{len(SCENES)} scenes, {len(joints)} joints, noise {1e3 * sd_m:.0f} mm"
             report(data, [jump for jump in found if jump.stated_height_error_m])
 

@@ -18,9 +18,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rows import append
 
-from airborne.body.chain import moved_pose
-from airborne.synthetic import frames
-from airborne.synthetic.flight.somersault import somersault
+from airborne.body.chain import move_pose
+from airborne.synthetic import scene_frames
+from airborne.synthetic.flight.somersault import somersault_scene
 from airborne.tracking.methods import Settings, tracker_of
 from airborne.tracking.tracker import step
 
@@ -33,7 +33,7 @@ def start_of(truth, seed: int):
     rng = np.random.default_rng([seed, 7])
     away = rng.normal(size=3)
     signs = np.sign(rng.normal(size=3 + truth.joint_angles.size))
-    return moved_pose(truth, np.concatenate([START_M * away / np.linalg.norm(away), START_RAD * signs]))
+    return move_pose(truth, np.concatenate([START_M * away / np.linalg.norm(away), START_RAD * signs]))
 
 
 def measure(name: str, scene, recorded: list, settings: Settings) -> None:
@@ -74,16 +74,16 @@ def measure(name: str, scene, recorded: list, settings: Settings) -> None:
 
 def main() -> None:
     """Measure every recording."""
-    exact = somersault("moving-arms", target="skin", style="exact")
-    drawn = list(frames(exact))
+    exact = somersault_scene("moving-arms", target="skin", style="exact")
+    drawn = list(scene_frames(exact))
     unknown = Settings(method="refined")
     known = replace(unknown, lights=exact.lights, is_light_exact=True)
     measure("somersault, moving arms, known light", exact, drawn, known)
     for method in ("refined", "joint", "hierarchical"):
         measure("somersault, moving arms, unknown light", exact, drawn, replace(unknown, method=method))
     if "--gym" in sys.argv[1:]:
-        gym = somersault("moving-arms", target="skin", style="gym")
-        measure("somersault, moving arms, in a hall", gym, list(frames(gym)), unknown)
+        gym = somersault_scene("moving-arms", target="skin", style="gym")
+        measure("somersault, moving arms, in a hall", gym, list(scene_frames(gym)), unknown)
 
 
 if __name__ == "__main__":

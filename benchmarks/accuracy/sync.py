@@ -20,14 +20,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rows import ROOT, append
 
-from airborne.run.opening import cameras_of, source_of
+from airborne.run.opening import cameras_of, video_source
 from airborne.sync import offsets_by_motion
 from airborne.sync.from_trial import synchronise
 from airborne.synthetic.throw.scene import thrown_cross
 from airborne.synthetic.throw.writing import write_trial
 from airborne.trial.file import read_trial
 from airborne.video import VideoWriter, fill_rows, weave
-from airborne.video.decoding import inspect, pictures, rgb_from_picture
+from airborne.video.decoding import inspect, decode, rgb_from_decoded
 
 LATE_MS = ((0, 3), (1, 10), (2, 17))  # seed, third camera's delay
 RESAMPLED_MS = (2, 5, 8, 10, 13, 16, 19)
@@ -40,7 +40,7 @@ def errors_ms(folder: Path, late_s: float) -> dict[str, float]:
     """Return the errors of the third camera's offset, and the sd that tracking states."""
     trial = read_trial(folder / "trial.toml")
     rig, _ = cameras_of(trial)
-    motion = offsets_by_motion([source_of(trial, camera) for camera in trial.camera], rig, within_s=0.3)
+    motion = offsets_by_motion([video_source(trial, camera) for camera in trial.camera], rig, within_s=0.3)
     tracking = synchronise(trial, within_s=0.3)
     print(folder.name, late_s, motion.describe(), tracking.describe(), sep="\n", flush=True)
     return {
@@ -60,9 +60,9 @@ def copied(folder: Path) -> Path:
 def fields_of(folder: Path, name: str) -> list[np.ndarray]:
     """Read a camera's fields as whole pictures, missing rows filled in."""
     trial = read_trial(folder / "trial.toml")
-    source = source_of(trial, next(camera for camera in trial.camera if camera.name == name))
+    source = video_source(trial, next(camera for camera in trial.camera if camera.name == name))
     facts = inspect(source)
-    return [fill_rows(rgb_from_picture(p, facts), p.parity or 0, facts.size[1]) for p in pictures(source, facts)]
+    return [fill_rows(rgb_from_decoded(p, facts), p.parity or 0, facts.size[1]) for p in decode(source, facts)]
 
 
 def write_fields(path: Path, fields: list[np.ndarray]) -> None:
@@ -107,7 +107,7 @@ def main() -> None:
         at = Path(scratch)
         generated = []
         for seed, late_ms in LATE_MS:
-            scene = replace(thrown_cross(seed=seed), late_s=(0.0, 0.0, late_ms / 1000))
+            scene = replace(thrown_cross(seed=seed), time_offsets_s=(0.0, 0.0, late_ms / 1000))
             write_trial(scene, at / f"g{seed}")
             generated.append(errors_ms(at / f"g{seed}", late_ms / 1000))
         mixed = [errors_ms(resampled(at / f"r{ms}", ms / 1000), ms / 1000) for ms in RESAMPLED_MS]

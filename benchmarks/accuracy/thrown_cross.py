@@ -16,11 +16,11 @@ from rows import append
 from airborne.body.files import read_body
 from airborne.body.symmetry import symmetries
 from airborne.evaluation import (
-    compare,
+    compare_motion,
     compare_digitised,
-    digitised_poses,
+    fit_digitised_poses,
     is_recovered,
-    perturbed,
+    perturb,
     read_digitised,
     read_truth,
 )
@@ -28,7 +28,7 @@ from airborne.evaluation.basin import Basin
 from airborne.motion import Motion
 from airborne.run.body_tracking import open_trial
 from airborne.tracking.methods import tracker_of
-from airborne.tracking.model_based.refined import Refined, RefinedState
+from airborne.tracking.model_based.refined import RefinedTracker, RefinedState
 from airborne.tracking.tracker import step
 from airborne.trial.examples import example_trial
 from airborne.trial.file import CalibrationTable, Trial, read_trial
@@ -72,7 +72,7 @@ def refined_rows() -> list[dict]:
     run(cases["exact cameras"][0])  # compiles
     for data, (settings, floor_mm, floor_deg) in cases.items():
         motion, times = run(settings)
-        found = compare(motion, TRUTH, ALIKE)
+        found = compare_motion(motion, TRUTH, ALIKE)
         base = {"data": f"thrown_cross, {data}", "method": "refined", "n": found.n_matched}
         rows += [
             {
@@ -103,9 +103,9 @@ def paper_rows() -> list[dict]:
         settings = trial(exact=False, method=method, **extra)
         recording, _ = open_trial(settings)
         motion, times = run(settings)
-        clicked = digitised_poses(read_digitised(FOLDER / "digitised.csv", recording.rig), recording.rig, MODEL)
+        clicked = fit_digitised_poses(read_digitised(FOLDER / "digitised.csv", recording.rig), recording.rig, MODEL)
         found = compare_digitised(motion, clicked, ALIKE).tracked_minus_digitised
-        true = compare(motion, TRUTH, ALIKE)
+        true = compare_motion(motion, TRUTH, ALIKE)
         name = method + (", v_literal" if extra else "")
         base = {"data": "thrown_cross against digitising", "method": name, "n": found.n_matched}
         for axis, value in zip("xyz", found.position.rms_mm, strict=True):
@@ -129,13 +129,13 @@ def basin_rows(n: int = 100) -> list[dict]:
     rows = []
     for distance_m, angle_deg, floor in ((0.1, 10, 98), (0.15, 15, 90), (0.2, 20, 50), (0.3, 30, None)):
         rng, found = np.random.default_rng(0), 0
-        tracker = Refined(MODEL, settings.start.pose)
+        tracker = RefinedTracker(MODEL, settings.start.pose)
         state = tracker.init()
         trials_of = np.bincount(4 + (29 * np.arange(n)) % 30, minlength=34)  # spread over the fields
         for frames, n_trials in zip(recording, trials_of, strict=True):
             true = replace(motion.pose(frames.index), world_from_root=TRUTH_POSES[frames.index])
-            for start in perturbed(rng, true, distance_m=distance_m, angle_rad=np.radians(angle_deg), n=int(n_trials)):
-                before = RefinedState(((frames.time_s - recording.rate**-1, start),), state.appearance, state.usual)
+            for start in perturb(rng, true, distance_m=distance_m, angle_rad=np.radians(angle_deg), n=int(n_trials)):
+                before = RefinedState(((frames.time_s - recording.rate**-1, start),), state.appearance, state.reference)
                 found += is_recovered(tracker.search(before, frames).pose, true, ALIKE)
             state, _ = step(tracker, state, frames)
         result = Basin(n, found)

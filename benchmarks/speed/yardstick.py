@@ -23,9 +23,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rows import append
 
-from airborne.body import BodyModel, Ellipsoid, Part, Segment, geometry
+from airborne.body import BodyModel, Ellipsoid, Part, Segment, surface_arrays
 from airborne.cameras import Camera
-from airborne.rendering import RULES, Lamp, Lights, place_segments, score, targets
+from airborne.rendering import RULES, Lamp, Lights, pose_segments, score, pack_targets
 from airborne.run.bench import measure_speed
 from airborne.video import View
 
@@ -56,7 +56,7 @@ def rebuilt_targets(scene, yardstick, case: str):
         planes = yardstick.images[v, :, :, : cams.H]  # (channel, column, row)
         views.append(View(camera, np.ascontiguousarray(planes.transpose(2, 1, 0)).astype(np.uint8)))
     lamps = tuple(Lamp(p, float(k)) for p, k in zip(scene.LIGHTS, scene.LINT, strict=True))
-    return targets(views, Lights(scene.AMB, lamps))
+    return pack_targets(views, Lights(scene.AMB, lamps))
 
 
 def airborne_numbers(poses: np.ndarray) -> np.ndarray:
@@ -73,14 +73,14 @@ def compare(case: str) -> list[dict]:
     yardstick = run.Yardstick(case)
     yardstick.images[:] = np.rint(yardstick.images)  # whole grey levels, as a camera gives them
     model, target = rebuilt_body(scene), rebuilt_targets(scene, yardstick, case)
-    shapes = geometry(model)
+    shapes = surface_arrays(model)
     poses = run.hypotheses(N_HYPOTHESES)
     numbers = airborne_numbers(poses)
 
     def ours() -> np.ndarray:
         root = Rotation.from_rotvec(numbers[:, 3:6]).as_matrix()
-        R, t = place_segments(model, root, numbers[:, :3], numbers[:, 6:].reshape(len(numbers), -1, 3))
-        return score(shapes, target, R, t, RULES["raw"])
+        R, t = pose_segments(model, root, numbers[:, :3], numbers[:, 6:].reshape(len(numbers), -1, 3))
+        return score(shapes, target, R, t, rule=RULES["raw"])
 
     difference = np.abs(ours() - yardstick(poses)).max()
     times = np.empty((ROUNDS, 2))

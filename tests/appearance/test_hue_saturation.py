@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from airborne.appearance.hue_saturation import BINS, CODES, bin_table, hsv_bins, look_up, root_shares
+from airborne.appearance.hue_saturation import CODES, HSV_BINS, bin_table, hsv_bins, look_up, root_histograms
 
 
 def standard_bin(rgb):
@@ -33,7 +33,7 @@ def test_pure_colours_and_greys_have_the_expected_bins(rgb, bin_):
 def test_every_colour_has_a_bin_and_all_of_them_are_reached():
     table = bin_table()
     assert table.shape == (CODES,)
-    assert table.max() < BINS
+    assert table.max() < HSV_BINS
     assert len(np.unique(table[:CODES])) > 95
 
 
@@ -50,6 +50,6 @@ def test_brightness_does_not_move_a_strong_colour_out_of_its_hue():
 
 
 def test_root_shares_have_unit_norm_and_nothing_counted_is_nothing():
-    roots = root_shares(np.array([[4, 0, 12], [0, 0, 0]]))
+    roots = root_histograms(np.array([[4, 0, 12], [0, 0, 0]]))
     assert np.sum(roots[0] ** 2) == pytest.approx(1)
     assert np.array_equal(roots[1], [0, 0, 0])

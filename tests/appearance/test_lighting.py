@@ -1,14 +1,21 @@
-"""Unknown light is found from the surface's own normals."""
+"""Unknown light is fitted from the surface's own normals."""
 
 import numpy as np
 
-from airborne.appearance.lighting import TERMS, TO_LIGHT, fit_light, light_planes, light_up, paint_evenly
+from airborne.appearance.lighting import (
+    LIGHT_FROM_SRGB,
+    LIGHT_TERMS,
+    fit_light,
+    flatten_shading,
+    light_planes,
+    shade_body,
+)
 from airborne.rendering.srgb import light_from_srgb
 from tests.support.tolerances import EXACT
 
 SHAPE = (40, 50)
 WHOLE = (0, 0, SHAPE[1], SHAPE[0])
-LIGHT = np.array(  # even, by normal (3), by place (2)
+LIGHT = np.array(  # ambient, normal (3), image coordinates (2)
     [
         [0.6, 0.2, -0.1, -0.3, 0.05, -0.03],
         [0.5, 0.1, 0.05, -0.2, 0.0, 0.04],
@@ -34,15 +41,15 @@ def body(seed=0):
     return part, normals.astype(np.float32), observed.astype(np.float32)
 
 
-def even_light():
-    light = np.zeros((3, TERMS), np.float32)
+def ambient_light():
+    light = np.zeros((3, LIGHT_TERMS), np.float32)
     light[:, 0] = 1
     return light
 
 
-def test_light_is_found_from_a_shaded_body():
+def test_light_is_fitted_from_a_shaded_body():
     part, normals, observed = body()
-    light = even_light()
+    light = ambient_light()
     sd = fit_light(observed, part, normals, ALBEDO, light, 3, *WHOLE)
     np.testing.assert_allclose(light, LIGHT, atol=FOUND)
     assert sd < 2e-3
@@ -52,15 +59,15 @@ def test_shadow_over_a_fifth_of_the_body_does_not_matter():
     part, normals, observed = body()
     shadowed = observed.copy()
     shadowed[:, 5:11] *= 0.2
-    light = even_light()
+    light = ambient_light()
     fit_light(shadowed, part, normals, ALBEDO, light, 8, *WHOLE)
     np.testing.assert_allclose(light, LIGHT, atol=0.03)
 
 
-def test_noise_averages_out_and_its_size_is_told():
+def test_noise_averages_out_and_its_size_is_returned():
     part, normals, observed = body()
     noise = np.random.default_rng(1).normal(0, 0.02, observed.shape).astype(np.float32)
-    light = even_light()
+    light = ambient_light()
     sd = fit_light(observed + noise, part, normals, ALBEDO, light, 4, *WHOLE)
     assert np.abs(light - LIGHT).max() < 0.05
     assert 0.02 < sd < 3 * 1.5 * 0.02
@@ -70,12 +77,12 @@ def test_too_few_pixels_leave_the_light_as_it_was():
     _, normals, observed = body()
     few = np.full(SHAPE, -1, np.int16)
     few[10, 10:21] = 0
-    light = even_light()
+    light = ambient_light()
     assert fit_light(observed, few, normals, ALBEDO, light, 3, *WHOLE) == 1
-    np.testing.assert_array_equal(light, even_light())
+    np.testing.assert_array_equal(light, ambient_light())
     few[10, 10:22] = 0
     fit_light(observed, few, normals, ALBEDO, light, 3, *WHOLE)
-    assert np.abs(light - even_light()).max() > 0.05
+    assert np.abs(light - ambient_light()).max() > 0.05
 
 
 def test_mixed_pixels_at_the_borders_of_facets_hardly_count():
@@ -83,44 +90,44 @@ def test_mixed_pixels_at_the_borders_of_facets_hardly_count():
     y, x = np.indices(SHAPE)
     is_border = (y % FACET_PX == 0) | (y % FACET_PX == FACET_PX - 1) | (x % FACET_PX == 0) | (x % FACET_PX == 4)
     mixed = np.where(is_border, 0.8 * observed, observed).astype(np.float32)
-    light = even_light()
+    light = ambient_light()
     fit_light(mixed, part, normals, ALBEDO, light, 8, *WHOLE)
     np.testing.assert_allclose(light, LIGHT, atol=0.04)
 
 
-def test_only_the_window_is_looked_at():
+def test_only_the_window_is_used():
     part, normals, observed = body()
     observed[:, :, 25:] = 9.0
-    light = even_light()
+    light = ambient_light()
     fit_light(observed, part, normals, ALBEDO, light, 3, 0, 0, 25, SHAPE[0])
     np.testing.assert_allclose(light, LIGHT, atol=FOUND)
 
 
 def test_black_body_leaves_a_finite_light():
     part, normals, observed = body()
-    light = even_light()
+    light = ambient_light()
     fit_light(observed, part, normals, np.zeros_like(ALBEDO), light, 3, *WHOLE)
     assert np.isfinite(light).all()
 
 
-def lit_by(light, part, normals, x0=0, y0=0, size=SHAPE):
+def shade(light, part, normals, x0=0, y0=0, size=SHAPE):
     """The body's light (3, h, w) in the window at (x0, y0)."""
     lit = np.zeros((3, *size), np.float32)
-    light_up(part, normals, ALBEDO, light.astype(np.float32), x0, y0, lit)
+    shade_body(part, normals, ALBEDO, light.astype(np.float32), x0, y0, lit)
     return lit
 
 
-def test_body_lit_by_the_right_light_is_what_was_seen():
+def test_body_lit_by_the_right_light_is_what_was_observed():
     part, normals, observed = body()
-    lit = lit_by(LIGHT, part, normals)
+    lit = shade(LIGHT, part, normals)
     np.testing.assert_allclose(lit[:, part >= 0], observed[:, part >= 0], atol=1e-6)
     assert np.all(lit[:, part < 0] == 0)
 
 
 def test_a_faceted_part_keeps_its_light_and_a_smooth_one_gets_its_mean_light():
     part, normals, observed = body()
-    lit = lit_by(LIGHT, part, normals)
-    paint_evenly(part, np.array([True, False]), 0, 0, lit)
+    lit = shade(LIGHT, part, normals)
+    flatten_shading(part, np.array([True, False]), 0, 0, lit)
     np.testing.assert_allclose(lit[:, part == 0], observed[:, part == 0], atol=1e-6)
     mean = observed[:, part == 1].mean(axis=1, keepdims=True)
     np.testing.assert_allclose(lit[:, part == 1], np.broadcast_to(mean, (3, (part == 1).sum())), rtol=1e-4)
@@ -128,7 +135,7 @@ def test_a_faceted_part_keeps_its_light_and_a_smooth_one_gets_its_mean_light():
 
 def test_light_covers_the_window_it_is_asked_for():
     part, normals, _ = body()
-    whole, window = lit_by(LIGHT, part, normals), lit_by(LIGHT, part, normals, 12, 7, (20, 25))
+    whole, window = shade(LIGHT, part, normals), shade(LIGHT, part, normals, 12, 7, (20, 25))
     np.testing.assert_array_equal(window, whole[:, 7:27, 12:37])
 
 
@@ -141,7 +148,7 @@ def test_light_of_srgb_has_its_known_values():
 def test_planes_of_an_image_are_the_light_of_its_channels():
     image = np.random.default_rng(4).integers(0, 256, (*SHAPE, 3), dtype=np.uint8)
     planes = np.empty((3, *SHAPE), np.float32)
-    light_planes(image, TO_LIGHT, planes)
+    light_planes(image, LIGHT_FROM_SRGB, planes)
     np.testing.assert_allclose(planes, light_from_srgb(image).transpose(2, 0, 1), atol=2e-3)
-    light_planes(image.astype(np.float32), TO_LIGHT, planes)
+    light_planes(image.astype(np.float32), LIGHT_FROM_SRGB, planes)
     np.testing.assert_allclose(planes, light_from_srgb(image).transpose(2, 0, 1), atol=2e-3)

@@ -6,9 +6,9 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Ellipsoid, Landmark, Part, Pose, Segment
 from airborne.body.chain import (
+    delta_between,
     joint_angles_of,
-    motion_between,
-    moved_pose,
+    move_pose,
     nearest_angles,
     point_jacobian,
     segment_jacobians,
@@ -51,7 +51,7 @@ MODEL = body()
 def test_point_jacobian_is_the_difference_quotient_of_every_degree_of_freedom(k):
     pose, motion = a_pose(MODEL), np.zeros(n_motion(MODEL))
     motion[k] = STEP
-    ahead, behind = (MODEL.with_pose(moved_pose(pose, sign * motion)).landmarks for sign in (1, -1))
+    ahead, behind = (MODEL.with_pose(move_pose(pose, sign * motion)).landmarks for sign in (1, -1))
     posed = MODEL.with_pose(pose)
     found = point_jacobian(posed, owners(MODEL), posed.landmarks)
     np.testing.assert_allclose(found[..., k], (ahead - behind) / (2 * STEP), atol=SECOND_ORDER)
@@ -63,7 +63,7 @@ def test_segment_jacobian_is_the_difference_quotient_of_every_degree_of_freedom(
     motion[k] = STEP
     now = MODEL.with_pose(pose)
     at_origin = np.einsum("sji,sj->si", now.R, origin - now.t)  # in each segment's own frame
-    ahead, behind = (MODEL.with_pose(moved_pose(pose, sign * motion)) for sign in (1, -1))
+    ahead, behind = (MODEL.with_pose(move_pose(pose, sign * motion)) for sign in (1, -1))
     places = [np.einsum("sij,sj->si", p.R, at_origin) + p.t for p in (ahead, behind)]
     turn = Rotation.from_matrix(ahead.R @ np.swapaxes(behind.R, -1, -2)).as_rotvec()
     found = segment_jacobians(now, origin)[..., k]
@@ -84,13 +84,13 @@ def test_body_in_one_piece_has_the_six_columns_of_a_rigid_body():
     posed = model.with_pose(a_pose(model))
     found = point_jacobian(posed, 0, posed.t[0] + [0.0, 0.0, 2.0])
     np.testing.assert_allclose(found, [[1, 0, 0, 0, 2, 0], [0, 1, 0, -2, 0, 0], [0, 0, 1, 0, 0, 0]], atol=EXACT)
-    assert moved_pose(a_pose(model), np.ones(6)).joint_angles.size == 0
+    assert move_pose(a_pose(model), np.ones(6)).joint_angles.size == 0
 
 
 @pytest.mark.parametrize("spread", [0.1, 1.0, 3.0])
 def test_no_motion_leaves_a_pose_where_it_is(spread):
     pose = a_pose(MODEL, spread=spread)  # 3 rad: most joints lie on another branch than a first reading gives
-    moved = moved_pose(pose, np.zeros(n_motion(MODEL)))
+    moved = move_pose(pose, np.zeros(n_motion(MODEL)))
     np.testing.assert_allclose(moved.joint_angles, pose.joint_angles, atol=ROUNDTRIP)
     np.testing.assert_allclose(moved.world_from_root.as_matrix(), pose.world_from_root.as_matrix(), atol=EXACT)
 
@@ -98,8 +98,8 @@ def test_no_motion_leaves_a_pose_where_it_is(spread):
 @pytest.mark.parametrize("seed", range(5))
 def test_turning_a_joint_back_undoes_the_turn(seed):
     pose, motion = a_pose(MODEL, seed), 0.3 * np.random.default_rng(seed).normal(size=n_motion(MODEL))
-    there = moved_pose(pose, motion)
-    back = moved_pose(there, -motion)
+    there = move_pose(pose, motion)
+    back = move_pose(there, -motion)
     np.testing.assert_allclose(back.joint_angles, pose.joint_angles, atol=ROUNDTRIP)
     np.testing.assert_allclose(back.world_from_root.as_matrix(), pose.world_from_root.as_matrix(), atol=ROUNDTRIP)
 
@@ -108,15 +108,15 @@ def test_turning_a_joint_back_undoes_the_turn(seed):
 def test_motion_between_two_poses_takes_the_one_to_the_other(seed):
     motion = 0.3 * np.random.default_rng(seed).normal(size=n_motion(MODEL))
     pose = a_pose(MODEL, seed)
-    np.testing.assert_allclose(motion_between(pose, moved_pose(pose, motion)), motion, atol=ROUNDTRIP)
+    np.testing.assert_allclose(delta_between(pose, move_pose(pose, motion)), motion, atol=ROUNDTRIP)
     rigid = Pose(world_from_root=pose.world_from_root)
-    np.testing.assert_allclose(motion_between(rigid, moved_pose(rigid, motion[:6])), motion[:6], atol=ROUNDTRIP)
+    np.testing.assert_allclose(delta_between(rigid, move_pose(rigid, motion[:6])), motion[:6], atol=ROUNDTRIP)
 
 
 def test_a_joint_turns_about_its_own_axes_after_its_angles():
     pose, motion = a_pose(MODEL), np.zeros(n_motion(MODEL))
     motion[6 + 3 * 3 : 9 + 3 * 3] = [0.2, -0.4, 0.1]  # the joint of the fourth segment after the root
-    before, after = MODEL.with_pose(pose), MODEL.with_pose(moved_pose(pose, motion))
+    before, after = MODEL.with_pose(pose), MODEL.with_pose(move_pose(pose, motion))
     expected = before.R[4] @ Rotation.from_rotvec([0.2, -0.4, 0.1]).as_matrix()
     np.testing.assert_allclose(after.R[4], expected, atol=EXACT)
     np.testing.assert_allclose(after.R[:4], before.R[:4], atol=EXACT)
@@ -126,7 +126,7 @@ def test_missing_joint_angles_are_straight_joints():
     root = a_pose(MODEL).world_from_root
     motion = np.zeros(n_motion(MODEL))
     motion[6] = 0.25
-    found = moved_pose(Pose(world_from_root=root), motion).joint_angles
+    found = move_pose(Pose(world_from_root=root), motion).joint_angles
     assert found[0].tolist() == pytest.approx([0.25, 0, 0], abs=EXACT)
     assert np.abs(found[1:]).max() < EXACT
 
@@ -135,7 +135,7 @@ def test_angles_run_smoothly_through_a_right_angle():
     motion, poses = np.array([0.0] * 7 + [0.02, 0.0]), [Pose(world_from_root=RigidTransform.identity())]
     poses[0] = Pose(world_from_root=RigidTransform.identity(), joint_angles=np.array([[0.3, 1.4, 0.0]]))
     for _ in range(20):
-        poses.append(moved_pose(poses[-1], motion))
+        poses.append(move_pose(poses[-1], motion))
     angles = np.array([pose.joint_angles[0] for pose in poses])
     np.testing.assert_allclose(angles, [[0.3, 1.4 + 0.02 * k, 0.0] for k in range(21)], atol=1e2 * ROUNDTRIP)
 
@@ -144,7 +144,7 @@ def test_angles_run_smoothly_through_a_right_angle():
 def test_x_stays_as_it_was_exactly_at_a_right_angle(sign):
     angles = np.array([[0.7, sign * np.pi / 2, -0.4]])
     pose = Pose(world_from_root=RigidTransform.identity(), joint_angles=angles)
-    np.testing.assert_allclose(moved_pose(pose, np.zeros(9)).joint_angles, angles, atol=ROUNDTRIP)
+    np.testing.assert_allclose(move_pose(pose, np.zeros(9)).joint_angles, angles, atol=ROUNDTRIP)
 
 
 def test_angles_read_off_a_posed_body_are_the_poses():

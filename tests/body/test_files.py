@@ -5,7 +5,19 @@ import pytest
 import trimesh
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import SAMPLED, BodyModel, Box, Ellipsoid, Inertia, Landmark, Mesh, Part, Segment, geometry, human18
+from airborne.body import (
+    SAMPLED,
+    BodyModel,
+    Box,
+    Ellipsoid,
+    Inertia,
+    Landmark,
+    Mesh,
+    Part,
+    Segment,
+    human18,
+    surface_arrays,
+)
 from airborne.body.files import body_toml, mesh_files, read_body, write_body
 from airborne.errors import BodyError
 from tests.support.tolerances import EXACT
@@ -172,7 +184,7 @@ def test_mesh_with_inward_faces_is_turned_outward(tmp_path):
     lump = trimesh.creation.box((0.2, 0.4, 0.6))
     lump.invert()
     lump.export(tmp_path / "lump.obj")
-    flat = geometry(read(tmp_path, MESH.replace("FILE", "lump.obj")))
+    flat = surface_arrays(read(tmp_path, MESH.replace("FILE", "lump.obj")))
     middles = flat.corners.reshape(-1, 3, 3).mean(axis=1)
     assert np.all(np.einsum("ij,ij->i", flat.normals, middles) > 0)
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import SAMPLED, Ellipsoid, Pose, human18, human18_from_measurements, total_inertia
-from airborne.body.anthropometry import bulks, measurements_of
+from airborne.body.anthropometry import mass_properties, measurements_of
 from airborne.body.human import PARENTS
 from airborne.errors import BodyError
 from tests.support.tolerances import EXACT, ROUNDTRIP
@@ -168,7 +168,7 @@ def test_an_ellipsoid_holds_its_segments_volume_between_the_joints(name):
     z = (edges[1:] + edges[:-1]) / 2 - part.segment_from_part.translation[2]
     a, b, c = part.shape.semi_axes_m
     volume = np.sum(np.pi * a * b * np.clip(1 - (z / c) ** 2, 0, None)) * np.diff(edges)[0]
-    assert volume == pytest.approx(bulks(person)[name].volume_m3, rel=1e-6)
+    assert volume == pytest.approx(mass_properties(person)[name].volume_m3, rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))

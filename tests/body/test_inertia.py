@@ -18,8 +18,8 @@ from airborne.body import (
     total_inertia,
     total_inertias,
 )
-from airborne.body.anthropometry import bulks, measurements_of
-from airborne.body.inertia import combined, placed
+from airborne.body.anthropometry import mass_properties, measurements_of
+from airborne.body.inertia import combine_inertias, transform_inertia
 from airborne.errors import BodyError
 from tests.support.tolerances import EXACT, ROUNDTRIP
 from tests.support.yeadon_oracle import random_configuration, same_pose, whole_by_slices, yeadon_person
@@ -55,17 +55,17 @@ def random_pose(seed):
 def test_pieces_together_are_all_their_points():
     mass, place = cloud(1)
     pieces = [of_points(mass[i : i + 10], place[i : i + 10]) for i in range(0, 40, 10)]
-    same(combined(pieces), of_points(mass, place), EXACT * 10)
+    same(combine_inertias(pieces), of_points(mass, place), EXACT * 10)
 
 
 def test_joining_is_associative():
     pieces = [of_points(*cloud(seed)) for seed in range(3)]
-    same(combined([combined(pieces[:2]), pieces[2]]), combined([pieces[0], combined(pieces[1:])]), EXACT * 10)
+    same(combine_inertias([combine_inertias(pieces[:2]), pieces[2]]), combine_inertias([pieces[0], combine_inertias(pieces[1:])]), EXACT * 10)
 
 
 def test_a_piece_in_another_frame_is_its_points_in_that_frame():
     (mass, place), R, t = cloud(2), Rotation.random(rng=np.random.default_rng(2)).as_matrix(), np.array([1.0, -2, 3])
-    same(placed(of_points(mass, place), R, t), of_points(mass, place @ R.T + t), EXACT * 10)
+    same(transform_inertia(of_points(mass, place), R, t), of_points(mass, place @ R.T + t), EXACT * 10)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -75,7 +75,7 @@ def test_moving_the_whole_body_moves_its_centre_and_turns_its_tensor(seed):
     motion = RigidTransform.from_components(step, turn)
     moved = Pose(world_from_root=motion * pose.world_from_root, joint_angles=pose.joint_angles)
     before, after = total_inertia(model.with_pose(pose)), total_inertia(model.with_pose(moved))
-    same(after, placed(before, turn.as_matrix(), step))
+    same(after, transform_inertia(before, turn.as_matrix(), step))
 
 
 def test_many_poses_at_once_are_each_alone():
@@ -83,8 +83,8 @@ def test_many_poses_at_once_are_each_alone():
     mass, centres, tensors = total_inertias(model, np.stack([b.R for b in bodies]), np.stack([b.t for b in bodies]))
     for body, centre, tensor in zip(bodies, centres, tensors, strict=True):
         same(Inertia(mass, centre, tensor), total_inertia(body), EXACT * 10)
-        pieces = [placed(s.inertia, R, t) for s, R, t in zip(model.segments, body.R, body.t, strict=True)]
-        same(Inertia(mass, centre, tensor), combined(pieces), EXACT * 10)
+        pieces = [transform_inertia(s.inertia, R, t) for s, R, t in zip(model.segments, body.R, body.t, strict=True)]
+        same(Inertia(mass, centre, tensor), combine_inertias(pieces), EXACT * 10)
 
 
 def test_body_of_unknown_mass_is_refused():
@@ -104,7 +104,7 @@ def test_a_person_in_any_configuration_is_the_sum_of_yeadons_solids(seed):
 
 def test_a_leaner_density_is_shared_by_all_segments():
     person = measurements_of(1.70, 64.0)
-    plain, weighed = bulks(replace(person, mass_kg=None)), bulks(replace(person, mass_kg=60.0))
+    plain, weighed = mass_properties(replace(person, mass_kg=None)), mass_properties(replace(person, mass_kg=60.0))
     for name, bulk in plain.items():
         np.testing.assert_allclose(weighed[name].inertia.mass_kg / bulk.inertia.mass_kg, 60 / 64, rtol=ROUNDTRIP)
         np.testing.assert_array_equal(weighed[name].inertia.centre_m, bulk.inertia.centre_m)
@@ -116,7 +116,7 @@ def test_left_and_right_limbs_have_their_own_measurements():
     person = measurements_of(1.80, 75.0)
     on_right = {key for key in person.values_m if key[:2] in ("Lb", "Lk") and key[-1] != "L"}
     thicker = {key: value * (1.1 if key in on_right else 1) for key, value in person.values_m.items()}
-    found, usual = bulks(replace(person, values_m=thicker, mass_kg=None)), bulks(replace(person, mass_kg=None))
+    found, usual = mass_properties(replace(person, values_m=thicker, mass_kg=None)), mass_properties(replace(person, mass_kg=None))
     for name in ("upper_arm", "forearm", "hand", "shank", "foot"):
         was = usual[f"{name}_right"].volume_m3
         assert found[f"{name}_left"].volume_m3 == pytest.approx(was, rel=EXACT)

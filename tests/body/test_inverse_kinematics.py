@@ -132,7 +132,7 @@ def test_search_from_a_start_stays_with_it():
     rng = np.random.default_rng(5)
     pose = pose_within_limits(rng, 0.4)
     nearby = Pose(
-        world_from_root=pose.moved(rng.normal(0, 0.02, 3), rng.normal(0, 0.05, 3)).world_from_root,
+        world_from_root=pose.move(rng.normal(0, 0.02, 3), rng.normal(0, 0.05, 3)).world_from_root,
         joint_angles=np.clip(pose.joint_angles + 0.05, MODEL.limits_rad[..., 0], MODEL.limits_rad[..., 1]),
     )
     fit = fit_pose(MODEL, landmarks(pose), start=nearby)

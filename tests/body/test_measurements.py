@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from airborne.body import human18, human18_from_measurements, read_measurements, write_measurements
-from airborne.body.anthropometry import bulks, measurements_of
-from airborne.body.measurements import STATURE_SHARES, checked
+from airborne.body.anthropometry import mass_properties, measurements_of
+from airborne.body.measurements import STATURE_SHARES, check_measurements
 from airborne.errors import BodyError
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
@@ -88,11 +88,11 @@ def test_numbers_may_be_written_in_any_way_and_any_order(tmp_path):
 
 def test_swapping_twice_changes_nothing_and_evening_ends_the_difference():
     uneven = replace(PERSON, values_m={key: v * (1.05 if key[1] in "ak" else 1) for key, v in PERSON.values_m.items()})
-    assert uneven.swapped().values_m != uneven.values_m
-    assert uneven.swapped().swapped().values_m == uneven.values_m
-    assert uneven.swapped().values_m["Lb2L"] == uneven.values_m["La2L"]
-    even = uneven.evened()
-    assert even.swapped().values_m == even.values_m
+    assert uneven.mirror().values_m != uneven.values_m
+    assert uneven.mirror().mirror().values_m == uneven.values_m
+    assert uneven.mirror().values_m["Lb2L"] == uneven.values_m["La2L"]
+    even = uneven.symmetrise()
+    assert even.mirror().values_m == even.values_m
     assert even.values_m["Lj3L"] == pytest.approx(1.025 * PERSON.values_m["Lj3L"], rel=EXACT)
     assert even.values_m["Ls1L"] == PERSON.values_m["Ls1L"]
 
@@ -116,7 +116,7 @@ def test_a_section_deeper_than_wide_weighs_as_the_round_one_that_yeadon_makes_of
     with pytest.warns(UserWarning, match="Ls2"):
         human = Human(dict(deep.values_m))
     assert "stadium set as circle" in capsys.readouterr().out
-    assert sum(b.inertia.mass_kg for b in bulks(deep).values()) == pytest.approx(human.mass, rel=EXACT * 10)
+    assert sum(b.inertia.mass_kg for b in mass_properties(deep).values()) == pytest.approx(human.mass, rel=EXACT * 10)
 
 
 FACTOR = "measurementconversionfactor: 0.01"
@@ -188,6 +188,6 @@ def test_files_of_another_kind_are_refused(tmp_path):
 def test_a_value_left_out_of_a_person_made_in_memory_is_named():
     values = {key: value for key, value in PERSON.values_m.items() if key != "Lk9w"}
     with pytest.raises(BodyError, match="Lk9w is missing; expected all 95 measurements"):
-        checked(replace(PERSON, values_m=values))
+        check_measurements(replace(PERSON, values_m=values))
     with pytest.raises(BodyError, match="Lk9w is missing"):
         human18_from_measurements(replace(PERSON, values_m=values))

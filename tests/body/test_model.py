@@ -58,14 +58,14 @@ def test_each_segment_stands_where_the_transforms_along_its_chain_put_it(seed):
 def test_moving_a_posed_body_is_posing_the_moved_body(seed):
     model, pose = leg(), random_pose(seed)
     motion = np.random.default_rng(seed).normal(size=6)
-    moved, posed = model.with_pose(pose).moved(motion), model.with_pose(pose.moved(motion[:3], motion[3:]))
+    moved, posed = model.with_pose(pose).move(motion), model.with_pose(pose.move(motion[:3], motion[3:]))
     np.testing.assert_allclose(moved.R, posed.R, atol=EXACT)
     np.testing.assert_allclose(moved.t, posed.t, atol=EXACT)
 
 
 def test_moving_turns_about_the_root_and_the_world_axes():
     pose = Pose(world_from_root=RigidTransform.from_translation([1.0, 2.0, 3.0]))
-    turned = pose.moved(np.array([0, 0, 0.5]), np.array([0, 0, np.pi / 2])).world_from_root
+    turned = pose.move(np.array([0, 0, 0.5]), np.array([0, 0, np.pi / 2])).world_from_root
     np.testing.assert_allclose(turned.translation, [1, 2, 3.5], atol=EXACT)
     np.testing.assert_allclose(turned.rotation.apply([1, 0, 0]), [0, 1, 0], atol=EXACT)
 

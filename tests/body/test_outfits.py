@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.body import ATHLETE, SAMPLED, human18
-from airborne.body.outfits import Border, extent_m, solid_of, with_borders
+from airborne.body.outfits import Border, ellipsoid_of, extent_m, with_borders
 from airborne.errors import BodyError
 from tests.support.tolerances import EXACT
 
@@ -121,7 +121,7 @@ def test_a_border_cuts_any_segment_across_any_axis_at_its_share(segment, axis):
     assert low.slab_m[1] == high.slab_m[0]
     at = height(low, low.slab_m[1])
     assert np.isclose(at, start + 0.3 * (end - start), atol=EXACT).any()
-    for ours, theirs in zip(solid_of(cut, segment), solid_of(body, segment), strict=True):
+    for ours, theirs in zip(ellipsoid_of(cut, segment), ellipsoid_of(body, segment), strict=True):
         np.testing.assert_allclose(getattr(ours, "semi_axes_m", ours), getattr(theirs, "semi_axes_m", theirs))
 
 

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import RigidTransform
 
-from airborne.body import ATHLETE, SAMPLED, BodyModel, Pose, geometry, human18, human18_from_measurements
+from airborne.body import ATHLETE, SAMPLED, BodyModel, Pose, human18, human18_from_measurements, surface_arrays
 from airborne.body.anthropometry import measurements_of
 from airborne.body.skin import skin_of
 from airborne.body.stadia import stadium
@@ -46,7 +46,7 @@ def masks(model, *, turn):
         np.block([[view, np.array([[0], [0], [5.0]])], [np.zeros((1, 3)), np.ones((1, 1))]])
     )
     K = np.array([[600.0, 0, 100], [0, 600, 150], [0, 0, 1]])
-    return render(geometry(model), posed, Camera(name="c", K=K, size=(201, 301), camera_from_world=place), FLAT)
+    return render(surface_arrays(model), posed, Camera(name="c", K=K, size=(201, 301), camera_from_world=place), FLAT)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from airborne.body import Mesh
-from airborne.body.splitting import between, split_at
+from airborne.body.splitting import faces_between, split_at
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
 BALL = trimesh.creation.icosphere(subdivisions=2, radius=0.3)
@@ -38,7 +38,7 @@ def test_pieces_between_heights_share_the_surface_and_lie_where_they_should():
     for height in (-0.1, 0.05):
         mesh = split_at(mesh, mesh.vertices_m[:, 2] - height)
     bounds = [(-np.inf, -0.1), (-0.1, 0.05), (0.05, np.inf)]
-    pieces = [between(mesh, mesh.vertices_m[:, 2], *bound) for bound in bounds]
+    pieces = [faces_between(mesh, mesh.vertices_m[:, 2], *bound) for bound in bounds]
     assert sum(solid(piece).area for piece in pieces) == pytest.approx(BALL.area, rel=ROUNDTRIP)
     for piece, (low, high) in zip(pieces, bounds, strict=True):
         assert piece.vertices_m[:, 2].min() > low - EXACT and piece.vertices_m[:, 2].max() < high + EXACT
@@ -51,7 +51,7 @@ def test_mesh_without_normals_has_none_after_the_cut():
     mesh = Mesh(ball().vertices_m, ball().faces)
     cut = split_at(mesh, mesh.vertices_m[:, 0])
     assert len(cut.faces) > len(mesh.faces)
-    assert cut.normals is None and between(cut, cut.vertices_m[:, 0], 0, np.inf).normals is None
+    assert cut.normals is None and faces_between(cut, cut.vertices_m[:, 0], 0, np.inf).normals is None
 
 
 def test_cut_beside_the_mesh_leaves_it_as_it_is():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.body.inertia import combined, placed
+from airborne.body.inertia import combine_inertias, transform_inertia
 from airborne.body.stadia import Stadium, circle, dome, half_solid, solid, stadium
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
@@ -41,14 +41,14 @@ def test_a_solid_is_the_sum_of_its_small_cubes(sections):
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_half_solid_is_the_sum_of_its_small_cubes(sign):
-    bulk = half_solid(WIDE, Stadium(0.04, 0.03), 0.12, 1000.0, sign)
+    bulk = half_solid(WIDE, Stadium(0.04, 0.03), 0.12, 1000.0, sign=sign)
     assert_is(bulk, *cubes(WIDE, Stadium(0.04, 0.03), 0.12, 1000.0, keep=lambda x: sign * x > 0))
     assert abs(bulk.inertia.tensor_kg_m2[0, 2]) > 10 * CUBES * 1e-3, "the half leans inward"
 
 
 def test_two_halves_are_the_whole():
-    halves = [half_solid(WIDE, NARROW, 0.1, 900.0, sign).inertia for sign in (1, -1)]
-    whole, both = solid(WIDE, NARROW, 0.1, 900.0).inertia, combined(halves)
+    halves = [half_solid(WIDE, NARROW, 0.1, 900.0, sign=sign).inertia for sign in (1, -1)]
+    whole, both = solid(WIDE, NARROW, 0.1, 900.0).inertia, combine_inertias(halves)
     np.testing.assert_allclose(both.centre_m, whole.centre_m, atol=EXACT)
     np.testing.assert_allclose(both.tensor_kg_m2, whole.tensor_kg_m2, atol=EXACT)
 
@@ -69,7 +69,7 @@ def test_a_cylinder_and_a_cone_are_those_of_the_textbook():
 def test_a_dome_is_half_an_ellipsoid():
     half = dome(2 * np.pi * 0.09, 0.11, 1100.0)
     mirror = np.diag([1.0, -1.0, -1.0])
-    whole = combined([half.inertia, placed(half.inertia, mirror, np.zeros(3))])
+    whole = combine_inertias([half.inertia, transform_inertia(half.inertia, mirror, np.zeros(3))])
     assert whole.mass_kg == pytest.approx(1100 * 4 / 3 * np.pi * 0.09**2 * 0.11, rel=EXACT)
     expected = whole.mass_kg / 5 * np.array([0.09**2 + 0.11**2] * 2 + [2 * 0.09**2])
     np.testing.assert_allclose(whole.tensor_kg_m2, np.diag(expected), atol=EXACT)
@@ -77,10 +77,10 @@ def test_a_dome_is_half_an_ellipsoid():
 
 def test_upside_down_and_cut_in_two_a_solid_is_the_same():
     whole = solid(WIDE, NARROW, 0.2, 1000.0).inertia
-    turned = placed(solid(NARROW, WIDE, 0.2, 1000.0).inertia, np.diag([1.0, -1, -1]), np.array([0, 0, 0.2]))
+    turned = transform_inertia(solid(NARROW, WIDE, 0.2, 1000.0).inertia, np.diag([1.0, -1, -1]), np.array([0, 0, 0.2]))
     middle = Stadium(0.07, 0.07)
-    upper = placed(solid(middle, NARROW, 0.1, 1000.0).inertia, np.eye(3), np.array([0, 0, 0.1]))
-    cut = combined([solid(WIDE, middle, 0.1, 1000.0).inertia, upper])
+    upper = transform_inertia(solid(middle, NARROW, 0.1, 1000.0).inertia, np.eye(3), np.array([0, 0, 0.1]))
+    cut = combine_inertias([solid(WIDE, middle, 0.1, 1000.0).inertia, upper])
     for other in (turned, cut):
         np.testing.assert_allclose(other.mass_kg, whole.mass_kg, rtol=EXACT)
         np.testing.assert_allclose(other.centre_m, whole.centre_m, atol=EXACT)
@@ -89,7 +89,7 @@ def test_upside_down_and_cut_in_two_a_solid_is_the_same():
 
 def test_a_turned_solid_is_wide_from_front_to_back():
     plain, turned = solid(WIDE, ROUND, 0.2, 1000.0).inertia, solid(WIDE, ROUND, 0.2, 1000.0, is_turned=True).inertia
-    quarter = placed(plain, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.zeros(3))
+    quarter = transform_inertia(plain, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.zeros(3))
     np.testing.assert_allclose(turned.tensor_kg_m2, quarter.tensor_kg_m2, atol=EXACT)
 
 

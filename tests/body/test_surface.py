@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Segment, geometry, has_flat_sides
+from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Segment, has_flat_sides, surface_arrays
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
 TURN = Rotation.from_euler("XYZ", [0.3, -0.8, 1.1])
@@ -34,7 +34,7 @@ def icosphere():
 
 
 def test_box_is_six_rectangles_whose_normals_point_away_from_its_centre():
-    flat = geometry(body(Box(SIZE)))
+    flat = surface_arrays(body(Box(SIZE)))
     assert [len(loop) for loop in loops(flat)] == [4] * 6
     for loop, normal in zip(loops(flat), flat.normals, strict=True):
         outward = loop.mean(axis=0) - CENTRE
@@ -42,13 +42,13 @@ def test_box_is_six_rectangles_whose_normals_point_away_from_its_centre():
 
 
 def test_box_has_its_size_along_its_own_axes():
-    corners = TURN.inv().apply(geometry(body(Box(SIZE))).corners - CENTRE)
+    corners = TURN.inv().apply(surface_arrays(body(Box(SIZE))).corners - CENTRE)
     np.testing.assert_allclose(np.abs(corners), np.tile(SIZE / 2, (24, 1)), atol=EXACT)
 
 
 def test_areas_of_a_closed_surface_sum_to_nothing_and_its_normals_agree_with_them():
     for shape in (Box(SIZE), icosphere()):
-        flat = geometry(body(shape))
+        flat = surface_arrays(body(shape))
         areas = np.array([area_vector(loop) for loop in loops(flat)])
         np.testing.assert_allclose(areas.sum(axis=0), 0, atol=ROUNDTRIP)
         np.testing.assert_allclose(flat.normals, areas / np.linalg.norm(areas, axis=1, keepdims=True), atol=ROUNDTRIP)
@@ -56,7 +56,7 @@ def test_areas_of_a_closed_surface_sum_to_nothing_and_its_normals_agree_with_the
 
 def test_polygons_enclose_the_shapes_volume():
     for shape, volume in ((Box(SIZE), SIZE.prod()), (icosphere(), trimesh.creation.icosphere(2, 0.3).volume)):
-        flat = geometry(body(shape))
+        flat = surface_arrays(body(shape))
         cones = [area_vector(loop) @ (loop.mean(axis=0) - CENTRE) / 3 for loop in loops(flat)]
         np.testing.assert_allclose(sum(cones), volume, atol=ROUNDTRIP)
 
@@ -64,18 +64,18 @@ def test_polygons_enclose_the_shapes_volume():
 def test_mesh_triangle_without_area_is_left_out():
     sphere = icosphere()
     pinched = Mesh(sphere.vertices_m, np.vstack([sphere.faces, [[0, 0, 1]]]))
-    assert len(geometry(body(pinched)).normals) == len(sphere.faces)
+    assert len(surface_arrays(body(pinched)).normals) == len(sphere.faces)
 
 
 def test_parts_keep_their_numbers_across_kinds_of_shape():
-    flat = geometry(body(Box(SIZE), Ellipsoid(SIZE), icosphere(), Ellipsoid(SIZE)))
+    flat = surface_arrays(body(Box(SIZE), Ellipsoid(SIZE), icosphere(), Ellipsoid(SIZE)))
     np.testing.assert_array_equal(flat.ellipsoid_part, [1, 3])
     np.testing.assert_array_equal(np.unique(flat.polygon_part), [0, 2])
     np.testing.assert_array_equal(flat.colours[:, 2], [0, 1, 2, 3])
 
 
 def test_ellipsoid_keeps_its_place_axes_and_semi_axes():
-    flat = geometry(body(Ellipsoid(SIZE)))
+    flat = surface_arrays(body(Ellipsoid(SIZE)))
     np.testing.assert_allclose(flat.ellipsoid_centre, [CENTRE], atol=EXACT)
     np.testing.assert_allclose(flat.ellipsoid_axes, [TURN.as_matrix()], atol=EXACT)
     np.testing.assert_array_equal(flat.ellipsoid_semi_axes, [SIZE])
@@ -85,7 +85,7 @@ def test_slab_is_kept_and_an_ellipsoid_without_one_is_unlimited():
     whole = body(Ellipsoid(SIZE), Ellipsoid(SIZE))
     (segment,) = whole.segments
     parts = (segment.parts[0], replace(segment.parts[1], slab_m=(-0.1, 0.3)))
-    flat = geometry(replace(whole, segments=(replace(segment, parts=parts),)))
+    flat = surface_arrays(replace(whole, segments=(replace(segment, parts=parts),)))
     np.testing.assert_array_equal(flat.ellipsoid_slab, [[-np.inf, np.inf], [-0.1, 0.3]])
 
 

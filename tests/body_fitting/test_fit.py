@@ -7,9 +7,16 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import ATHLETE, SAMPLED, Pose, human18, with_girths, with_segment_lengths
-from airborne.body.outfits import Border, solid_of, with_borders
-from airborne.body_fitting.fit import Sighting, fit_body
-from airborne.body_fitting.shape import border_knobs, borders_of, girths_of, knobs_of, lengths_of, shaped
+from airborne.body.outfits import Border, ellipsoid_of, with_borders
+from airborne.body_fitting.fit import BodyObservation, fit_body
+from airborne.body_fitting.shape import (
+    apply_shape,
+    border_parameters,
+    borders_of,
+    girths_of,
+    lengths_of,
+    shape_parameters,
+)
 from airborne.errors import BodyError
 from tests.support.scenes import CAMERAS, FPS, Scene
 
@@ -57,7 +64,7 @@ def filmed():
         posed = scene.model.with_pose(moving(Fraction(index, FPS)))
         seen = posed.landmarks + JOINT_SD_M * rng.standard_normal(posed.landmarks.shape)
         names = [landmark.name for landmark in scene.model.landmarks]
-        found.append(Sighting(scene.frames(index), dict(zip(names, seen, strict=True))))
+        found.append(BodyObservation(scene.frames(index), dict(zip(names, seen, strict=True))))
     return found
 
 
@@ -69,7 +76,7 @@ def fitted(filmed):
 
 def axes(model, segment):
     """Semi-axes of the segment's ellipsoid along the segment's axes."""
-    return solid_of(model, segment)[0].semi_axes_m
+    return ellipsoid_of(model, segment)[0].semi_axes_m
 
 
 def length(model, child):
@@ -121,7 +128,7 @@ def test_poses_come_nearer_to_the_truth_than_the_joints_were(fitted):
     assert off_m(fitted.model, fitted.poses) < 0.6 * off_m(fitted.start, fitted.start_poses)
 
 
-def test_the_pictures_agree_better_with_the_fitted_body(fitted):
+def test_the_images_agree_better_with_the_fitted_body(fitted):
     before, after = fitted.rms_light
     assert after < 0.75 * before
 
@@ -134,10 +141,10 @@ def test_left_and_right_are_alike_and_the_mass_is_as_given(fitted):
 
 def test_a_shape_of_zeros_is_the_body_itself_and_a_shape_says_its_factors():
     body = human18(outfit=ATHLETE)
-    knobs = (*knobs_of(body), *border_knobs(body, {"thigh": Border(0.5), "head": None}))
-    np.testing.assert_allclose(axes(shaped(body, knobs, np.zeros(len(knobs))), "thigh_left"), axes(body, "thigh_left"))
+    knobs = (*shape_parameters(body), *border_parameters(body, {"thigh": Border(0.5), "head": None}))
+    np.testing.assert_allclose(axes(apply_shape(body, knobs, np.zeros(len(knobs))), "thigh_left"), axes(body, "thigh_left"))
     shape = np.linspace(-0.1, 0.1, len(knobs))
-    other = shaped(body, knobs, shape)
+    other = apply_shape(body, knobs, shape)
     lengths, girths = lengths_of(knobs, shape), girths_of(knobs, shape)
     ratio = axes(other, "torso") / axes(body, "torso")
     np.testing.assert_allclose(ratio, (*girths["torso"], lengths["torso"]))

@@ -5,7 +5,7 @@ import pytest
 from airborne.body import ATHLETE, human18
 from airborne.body.outfits import Border
 from airborne.body_fitting.fit import BodyFit
-from airborne.body_fitting.from_trial import Fitted, described, fit_person
+from airborne.body_fitting.from_trial import PersonFit, describe_fit, fit_person
 from airborne.errors import TrialError
 from airborne.trial.examples import example_trial
 from airborne.trial.file import read_trial
@@ -40,7 +40,7 @@ def test_the_description_names_lengths_girths_borders_colours_and_residuals(tmp_
         rms_light=(0.04, 0.02),
         landmark_rms_m=(0.015, 0.012),
     )
-    lines = described(Fitted(fit, (0, 50), tmp_path / "fit_body.png")).splitlines()
+    lines = describe_fit(PersonFit(fit, (0, 50), tmp_path / "fit_body.png")).splitlines()
     assert lines[0] == "fitted to frames 0, 50"
     assert "torso        1.02   1.10 0.90" in lines
     assert "thigh        0.95   1.05" in lines

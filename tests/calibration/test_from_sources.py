@@ -7,7 +7,7 @@ import pytest
 
 from airborne import cli
 from airborne.calibration import calibrate_from, sources_from
-from airborne.calibration.report import to_dict
+from airborne.calibration.report import calibration_to_dict
 from airborne.cameras import Rig, read_rig, write_pose2sim
 from airborne.errors import AirborneError
 from tests.support.calibration_scenes import (
@@ -71,7 +71,7 @@ def test_the_world_is_the_board_at_one_moment_with_z_out_of_its_face(by_board):
 
 
 def test_the_report_has_every_number(by_board):
-    told = to_dict(by_board)
+    told = calibration_to_dict(by_board)
     json.dumps(told, allow_nan=False)
     camera = told["cameras"]["cam0"]
     assert {"x_m", "y_m", "z_m", "turn_x_rad", "fx_px"} <= set(camera["sd"])
@@ -100,11 +100,11 @@ def test_a_board_and_control_points_together_are_in_the_points_world(recordings)
         "control_points": {"file": "points.csv"},
     }
     found = calibrate_from(sources_from(document, recordings, "test"), silent)
-    assert [source.name for source in found.adjusted.sources] == ["control points", "board"]
+    assert [source.name for source in found.adjustment.sources] == ["control points", "board"]
     for camera in found.rig:
         np.testing.assert_allclose(camera.centre, RIG[camera.name].centre, atol=0.02)
     assert "control points" in found.world
-    sd = found.adjusted.camera_sd[:, 3:6]
+    sd = found.adjustment.camera_sd[:, 3:6]
     off = np.stack([camera.centre - RIG[camera.name].centre for camera in found.rig])
     assert np.mean(np.abs(off) < 3 * sd + 1e-3) > 0.7
 
@@ -128,7 +128,7 @@ def test_a_wand_alone_gives_the_rig_and_clicked_points_its_world(tmp_path):
         "world": {"points": "frame.csv", "origin": "A", "along_x": "B", "in_xy": "C"},
     }
     found = calibrate_from(sources_from(document, tmp_path, "test"), silent)
-    assert found.adjusted.rms_px() < 0.6
+    assert found.adjustment.rms_px() < 0.6
     np.testing.assert_allclose(apart(found.rig), apart(RIG), rtol=0.03)
     for camera in found.rig:
         np.testing.assert_allclose(camera.centre, RIG[camera.name].centre - np.array([0, 0, 0.6]), atol=0.1)
@@ -136,7 +136,7 @@ def test_a_wand_alone_gives_the_rig_and_clicked_points_its_world(tmp_path):
     first = {**document, "world": {"frame": "camera"}}
     seen = calibrate_from(sources_from(first, tmp_path, "test"), silent)
     np.testing.assert_allclose(seen.rig.cameras[0].centre, 0, atol=1e-9)
-    assert not seen.adjusted.camera_sd[0, :6].any()
+    assert not seen.adjustment.camera_sd[0, :6].any()
 
 
 def test_a_start_keeps_its_lenses_and_its_world(recordings):

@@ -44,7 +44,7 @@ def test_the_example_of_the_court_gives_its_cameras(tmp_path):
     (tmp_path / "court_clicks.csv").write_text(fences("text")[0])
     sources = sources_from(tomllib.loads(fences("toml")[0]), tmp_path, "the page")
     found = calibrate_from(sources, lambda what, done, total: None)
-    assert found.adjusted.rms_px() < 1
+    assert found.adjustment.rms_px() < 1
     assert np.allclose(found.rig["left"].centre, (-6.2, -13.5, 3.6), atol=0.1)
     assert np.allclose(found.rig["right"].centre, (7.1, -12.8, 4.1), atol=0.1)
 
@@ -52,7 +52,7 @@ def test_the_example_of_the_court_gives_its_cameras(tmp_path):
 def test_four_points_a_camera_do_not_claim_more_than_clicks_can_say(tmp_path):
     (tmp_path / "court_clicks.csv").write_text("\n".join(fences("text")[0].splitlines()[:5]))
     sources = sources_from(tomllib.loads(fences("toml")[0]), tmp_path, "the page")
-    sd_m = calibrate_from(sources, lambda what, done, total: None).adjusted.camera_sd[:, 3:6]
+    sd_m = calibrate_from(sources, lambda what, done, total: None).adjustment.camera_sd[:, 3:6]
     assert (np.linalg.norm(sd_m, axis=1) > 0.05).all()
 
 
@@ -66,8 +66,8 @@ def test_every_kind_of_finding_is_explained():
 
 def test_examples_of_sources_are_valid():
     court, wand = fences("toml")
-    assert sources_from(tomllib.loads(court), Path(), "the page").given == ["court"]
-    assert sources_from(tomllib.loads(court + wand), Path(), "the page").given == ["court", "wand"]
+    assert sources_from(tomllib.loads(court), Path(), "the page").kinds == ["court"]
+    assert sources_from(tomllib.loads(court + wand), Path(), "the page").kinds == ["court", "wand"]
 
 
 def test_the_example_of_a_finding_runs():

@@ -4,12 +4,12 @@ from dataclasses import replace
 import pytest
 
 from airborne.calibration.from_points import calibrate
-from airborne.calibration.points_report import describe, to_dict
+from airborne.calibration.points_report import describe_points_calibration, points_calibration_to_dict
 from tests.support.cameras import seen_only_by
 
 
 def test_the_table_has_a_row_for_every_camera_with_its_errors(calibration):
-    lines = describe(calibration).splitlines()
+    lines = describe_points_calibration(calibration).splitlines()
     assert lines[0].split("  ")[0] == "camera"
     for line, fit in zip(lines[1:4], calibration.fits, strict=True):
         assert line.startswith(fit.name)
@@ -20,19 +20,19 @@ def test_the_table_has_a_row_for_every_camera_with_its_errors(calibration):
 
 
 def test_the_table_says_why_a_model_was_chosen(calibration):
-    reasons = [line for line in describe(calibration).splitlines() if "not clearly worse" in line]
+    reasons = [line for line in describe_points_calibration(calibration).splitlines() if "not clearly worse" in line]
     assert len(reasons) == 3
     assert "7 + principal point" in reasons[0]
 
 
 def test_warnings_stand_at_the_end(calibration):
     doubtful = replace(calibration, warnings=("something is odd",))
-    assert describe(doubtful).splitlines()[-1] == "warning: something is odd"
-    assert "warning" not in describe(calibration)
+    assert describe_points_calibration(doubtful).splitlines()[-1] == "warning: something is odd"
+    assert "warning" not in describe_points_calibration(calibration)
 
 
 def test_the_dictionary_survives_json_and_holds_what_the_table_says(calibration):
-    data = json.loads(json.dumps(to_dict(calibration), allow_nan=False))
+    data = json.loads(json.dumps(points_calibration_to_dict(calibration), allow_nan=False))
     assert data["method"] == "lm"
     assert data["held_out_3d_rms_mm"] == pytest.approx(calibration.held_out_3d_m * 1e3)
     for fit in calibration.fits:
@@ -42,11 +42,11 @@ def test_the_dictionary_survives_json_and_holds_what_the_table_says(calibration)
 
 
 def test_height_angle_is_what_the_picture_spans(calibration):
-    angle = to_dict(calibration)["cameras"]["cam3"]["height_angle_deg"]
+    angle = points_calibration_to_dict(calibration)["cameras"]["cam3"]["height_angle_deg"]
     assert angle == pytest.approx(30.5, abs=0.1)  # 576 rows at 1055 px
 
 
 def test_one_camera_has_no_error_in_space(points, sizes):
     alone = calibrate(seen_only_by(points, "cam1"), sizes, method="annealing")
-    assert to_dict(alone)["held_out_3d_rms_mm"] is None
-    assert "in 3D" not in describe(alone)
+    assert points_calibration_to_dict(alone)["held_out_3d_rms_mm"] is None
+    assert "in 3D" not in describe_points_calibration(alone)

@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration import calibrate_from, read_sources
-from airborne.calibration.report import describe, to_dict
+from airborne.calibration.report import describe_calibration, calibration_to_dict
 from airborne.cameras import read_rig, write_pose2sim
 from airborne.errors import CalibrationError
 from tests.support import wand_waving as waving
@@ -86,27 +86,27 @@ def test_the_court_alone_gives_cameras_in_its_world(hall):
     found = calibrated(hall, COURT)
     assert off_m(found.rig) < 0.025
     assert found.world == "that of the court"
-    assert to_dict(found)["findings"] == []
+    assert calibration_to_dict(found)["findings"] == []
 
 
 def test_the_wand_alone_gives_cameras_and_the_scale(hall):
     found = calibrated(hall, WAND)
-    sd_m = np.linalg.norm(found.adjusted.camera_sd[:, 3:6], axis=1)
+    sd_m = np.linalg.norm(found.adjustment.camera_sd[:, 3:6], axis=1)
     assert waving.misplaced_m(RIG, found.rig).max() < 3 * sd_m.max()
     assert sd_m.max() < 0.05
-    assert to_dict(found)["findings"] == []
+    assert calibration_to_dict(found)["findings"] == []
 
 
 def test_all_sources_in_one_adjustment_are_better_than_each_alone(hall):
     both, court, wand = (calibrated(hall, tables) for tables in (COURT + WAND, COURT, WAND))
-    assert set(to_dict(both)["sources"]) == {"court", "wand"}
+    assert set(calibration_to_dict(both)["sources"]) == {"court", "wand"}
     assert waving.misplaced_m(RIG, both.rig).max() < waving.misplaced_m(RIG, court.rig).max()
     assert np.abs(waving.focal_errors(RIG, both.rig)).max() < np.abs(waving.focal_errors(RIG, court.rig)).max()
     places = {
-        name: np.linalg.norm(each.adjusted.camera_sd[:, 3:6], axis=1) for name, each in (("b", both), ("c", court))
+        name: np.linalg.norm(each.adjustment.camera_sd[:, 3:6], axis=1) for name, each in (("b", both), ("c", court))
     }
     assert (places["b"] < places["c"]).all()
-    sds = [each.adjusted.camera_sd[:, 6] for each in (both, court, wand)]
+    sds = [each.adjustment.camera_sd[:, 6] for each in (both, court, wand)]
     assert (sds[0] < sds[1]).all() and (sds[0] < 1.02 * sds[2]).all()
     assert off_m(both.rig) < 0.012
 
@@ -114,7 +114,7 @@ def test_all_sources_in_one_adjustment_are_better_than_each_alone(hall):
 def test_three_clicked_points_set_the_world(hall):
     world = '[world]\npoints = "frame.csv"\norigin = "A"\nalong_x = "B"\nin_xy = "C"\n'
     found = calibrated(hall, WAND + world)
-    assert off_m(found.adjusted.moved(RigidTransform.from_translation([0.5, 0.3, 0]))[0]) < 0.02
+    assert off_m(found.adjustment.transform(RigidTransform.from_translation([0.5, 0.3, 0]))[0]) < 0.02
 
 
 def test_a_throw_tells_which_way_is_up(hall):
@@ -122,7 +122,7 @@ def test_a_throw_tells_which_way_is_up(hall):
         f'[world]\npoints = "frame.csv"\norigin = "A"\nalong_x = "B"\nthrow = "throw_xypts.csv"\nrate_hz = {RATE_HZ}\n'
     )
     found = calibrated(hall, WAND + world)
-    assert off_m(found.adjusted.moved(RigidTransform.from_translation([0.5, 0.3, 0]))[0]) < 0.03
+    assert off_m(found.adjustment.transform(RigidTransform.from_translation([0.5, 0.3, 0]))[0]) < 0.03
     assert found.world.startswith("up from 1 throw: known to 0.")
     assert "lengths come out" not in found.world
     half = calibrated(hall, WAND + world.replace("= 50", "= 25"))
@@ -180,9 +180,9 @@ def test_a_wand_in_millimetres_is_refused(hall):
 
 def test_a_wand_of_another_length_contradicts_the_court(hall):
     found = calibrated(hall, COURT + WAND.replace("[0.6, 0.4]", "[1.8, 1.2]"))
-    sentences = [each["sentence"] for each in to_dict(found)["findings"]]
+    sentences = [each["sentence"] for each in calibration_to_dict(found)["findings"]]
     assert any("times as far apart by the wand as by the court" in sentence for sentence in sentences)
-    assert "found: cameras are" in describe(found)
+    assert "found: cameras are" in describe_calibration(found)
 
 
 def test_names_of_left_and_right_exchanged_put_cameras_below_the_floor(hall, tmp_path):
@@ -190,7 +190,7 @@ def test_names_of_left_and_right_exchanged_put_cameras_below_the_floor(hall, tmp
     swapped = text.replace("left", "LEFT").replace("right", "left").replace("LEFT", "right")
     rows = [row for row in swapped.splitlines() if "net" not in row and "antenna" not in row]
     (tmp_path / "court.csv").write_text("\n".join(rows))
-    kinds = {each["kind"] for each in to_dict(calibrated(tmp_path, COURT))["findings"]}
+    kinds = {each["kind"] for each in calibration_to_dict(calibrated(tmp_path, COURT))["findings"]}
     assert "mirrored" in kinds
 
 
@@ -203,7 +203,7 @@ def test_a_knocked_camera_is_named_by_the_report(hall, tmp_path):
     px[50:, :, 1] = late[50:, :, 1]
     (tmp_path / "wand_xypts.csv").write_text(xypts(px))
     (tmp_path / "court.csv").write_text((hall / "court.csv").read_text())
-    findings = to_dict(calibrated(tmp_path, COURT + WAND))["findings"]
+    findings = calibration_to_dict(calibrated(tmp_path, COURT + WAND))["findings"]
     moved = [each for each in findings if each["kind"] == "moved"]
     assert [each["cameras"] for each in moved] == [["cam2"]]
     assert "between frame 49 and frame 50" in moved[0]["sentence"]
@@ -220,13 +220,13 @@ def test_exchanged_columns_are_named_by_the_calibration_before(hall, tmp_path):
     (tmp_path / "truth.toml").write_text((hall / "truth.toml").read_text())
     start = '[start]\nfile = "truth.toml"\n'
     try:
-        sentences = [each["sentence"] for each in to_dict(calibrated(tmp_path, start + WAND))["findings"]]
+        sentences = [each["sentence"] for each in calibration_to_dict(calibrated(tmp_path, start + WAND))["findings"]]
     except CalibrationError as error:
         sentences = [str(error)]
     assert any("the files of cam2 and cam4 are swapped" in sentence for sentence in sentences)
 
 
 def test_a_court_with_another_net_fits_badly_and_this_is_said(hall):
-    assert not [each for each in to_dict(calibrated(hall, COURT))["findings"] if each["kind"] == "misfit"]
-    wrong = to_dict(calibrated(hall, COURT.replace("men", "women")))["findings"]
+    assert not [each for each in calibration_to_dict(calibrated(hall, COURT))["findings"] if each["kind"] == "misfit"]
+    wrong = calibration_to_dict(calibrated(hall, COURT.replace("men", "women")))["findings"]
     assert any("court: the points fit to" in each["sentence"] and "another net" in each["sentence"] for each in wrong)

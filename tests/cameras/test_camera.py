@@ -9,8 +9,8 @@ from tests.support.tolerances import ROUNDTRIP
 def test_an_undistorted_pixel_is_the_pixel_of_the_undistorted_camera():
     camera = camera_at((-4, -5, 1.5), distortion=LENS)
     points = scattered(20)
-    straight = camera.undistorted_px(camera.px_from_world(points))
-    assert np.allclose(straight, camera.undistorted().px_from_world(points), atol=1e3 * ROUNDTRIP)
+    straight = camera.undistort_px(camera.px_from_world(points))
+    assert np.allclose(straight, camera.without_distortion().px_from_world(points), atol=1e3 * ROUNDTRIP)
 
 
 @pytest.mark.parametrize("distortion", [None, LENS])
@@ -25,7 +25,7 @@ def test_a_rig_gives_back_the_points_that_it_sees(distortion):
 def test_a_scaled_and_cropped_picture_has_the_calibration_pixels_at_their_places():
     """The first cameras of the balance trial: image = (x / 1.00741, (y + 7.11) / 1.00741) of calibration pixels."""
     camera = camera_at((-4, -5, 1.5), distortion=LENS)
-    saved = camera.resampled(scale=(1.00741, 1.00741), offset=(0.0, -7.11), size=(1080, 1920))
+    saved = camera.resample(scale=(1.00741, 1.00741), offset=(0.0, -7.11), size=(1080, 1920))
     points = scattered(20)
     x, y = camera.px_from_world(points).T
     expected = np.stack([x / 1.00741, (y + 7.11) / 1.00741], axis=-1)
@@ -35,8 +35,8 @@ def test_a_scaled_and_cropped_picture_has_the_calibration_pixels_at_their_places
 
 def test_resampling_there_and_back_is_the_same_camera():
     camera = camera_at((-4, -5, 1.5))
-    there = camera.resampled(scale=(2.0, 3.0), offset=(5.0, -7.0), size=(384, 192))
-    back = there.resampled(scale=(1 / 2, 1 / 3), offset=(-5 / 2, 7 / 3), size=camera.size)
+    there = camera.resample(scale=(2.0, 3.0), offset=(5.0, -7.0), size=(384, 192))
+    back = there.resample(scale=(1 / 2, 1 / 3), offset=(-5 / 2, 7 / 3), size=camera.size)
     assert np.allclose(back.K, camera.K, atol=ROUNDTRIP)
 
 

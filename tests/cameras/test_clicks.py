@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.cameras.clicks import read_clicks, read_places
+from airborne.cameras.clicks import read_clicks, read_positions
 from airborne.errors import CalibrationError
 
 CLICKS = "point,right_u,right_v,left_u,left_v\nhip_left,3,4,1,2\nknee_left,,,5,6\n"
@@ -51,10 +51,10 @@ def test_malformed_table_is_refused_in_one_line(tmp_path, old, new, said):
 
 
 def test_places_are_read_and_blank_ones_unknown(tmp_path):
-    found = read_places(write(tmp_path, PLACES))
+    found = read_positions(write(tmp_path, PLACES))
     np.testing.assert_array_equal(found["hip_left"], [1, 2, 3])
     assert np.isnan(found["head"]).all()
-    swapped = read_places(write(tmp_path, "z_m,joint,y_m,x_m\n3,hip_left,2,1\n"))
+    swapped = read_positions(write(tmp_path, "z_m,joint,y_m,x_m\n3,hip_left,2,1\n"))
     np.testing.assert_array_equal(swapped["hip_left"], [1, 2, 3])
 
 
@@ -63,12 +63,12 @@ def test_places_are_read_and_blank_ones_unknown(tmp_path):
 )
 def test_places_of_other_columns_are_refused(tmp_path, text):
     with pytest.raises(CalibrationError, match=r"expected joint,x_m,y_m,z_m"):
-        read_places(write(tmp_path, text))
+        read_positions(write(tmp_path, text))
 
 
 def test_file_that_is_no_text_or_not_there_is_refused(tmp_path):
     (tmp_path / "points.csv").write_bytes(bytes(range(256)))
     with pytest.raises(CalibrationError, match="is not a text file"):
-        read_places(tmp_path / "points.csv")
+        read_positions(tmp_path / "points.csv")
     with pytest.raises(CalibrationError, match="cannot be read"):
-        read_places(tmp_path / "none.csv")
+        read_positions(tmp_path / "none.csv")

@@ -218,7 +218,7 @@ def test_selecting_cameras_keeps_their_columns():
 
 def test_less_sure_detections_are_not_seen():
     given = detections()
-    sure = given.surer_than(0.5)
+    sure = given.above_visibility(0.5)
     is_kept = given.visibility >= 0.5
     np.testing.assert_array_equal(np.isfinite(sure.px).all(axis=-1), is_kept)
     np.testing.assert_array_equal(sure.visibility[is_kept], given.visibility[is_kept])

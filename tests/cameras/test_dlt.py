@@ -1,7 +1,7 @@
 import cv2
 import numpy as np
 
-from airborne.cameras.dlt import coefficients, compose, decompose, decompose_with_skew, fit_dlt
+from airborne.cameras.dlt import dlt_coefficients, compose, decompose, decompose_with_skew, fit_dlt
 from tests.support.cameras import camera_at, scattered
 from tests.support.tolerances import ROUNDTRIP
 
@@ -45,7 +45,7 @@ def test_the_coefficients_solve_the_eleven_parameter_equations():
         ]
     )
     oracle = np.linalg.lstsq(rows, np.concatenate([u, v]))[0]
-    assert np.allclose(coefficients(fit_dlt(WORLD, PX)), oracle, rtol=1e3 * ROUNDTRIP)
+    assert np.allclose(dlt_coefficients(fit_dlt(WORLD, PX)), oracle, rtol=1e3 * ROUNDTRIP)
 
 
 def test_a_far_origin_does_not_harm_the_fit():

@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform
 
 from airborne.cameras import Rig
-from airborne.cameras.units import odd_distances, scales_apart
+from airborne.cameras.units import check_baselines, check_scales
 from tests.support import wand_waving as waving
 
 
@@ -22,14 +22,14 @@ RIG = waving.hall()
 
 
 def test_a_hall_and_a_table_are_plausible():
-    assert odd_distances(RIG) == []
-    assert odd_distances(grown(RIG, 0.01)) == []
-    assert odd_distances(RIG.select(["cam1"])) == []
+    assert check_baselines(RIG) == []
+    assert check_baselines(grown(RIG, 0.01)) == []
+    assert check_baselines(RIG.select(["cam1"])) == []
 
 
 @pytest.mark.parametrize(("scale", "told"), [(1000.0, "2.19e+04 m apart"), (0.0005, "0.011 m apart")])
 def test_cameras_implausibly_far_or_near_are_told(scale, told):
-    [found] = odd_distances(grown(RIG, scale))
+    [found] = check_baselines(grown(RIG, scale))
     assert told in found.sentence
     assert "not in metres" in found.sentence
 
@@ -38,17 +38,17 @@ def test_cameras_implausibly_far_or_near_are_told(scale, told):
 @pytest.mark.parametrize("is_wand", [True, False])
 def test_the_unit_of_one_source_is_guessed(scale, unit, is_wand):
     large, small = ("wand", "court") if is_wand else ("court", "wand")
-    [found] = scales_apart({large: grown(RIG, 1.03 * scale), small: RIG})
+    [found] = check_scales({large: grown(RIG, 1.03 * scale), small: RIG})
     assert f"times as far apart by the {large} as by the {small}" in found.sentence
     assert f"the lengths of the {large} seem to be in {unit}" in found.sentence
 
 
 def test_a_wrong_length_without_a_unit_is_told_as_that():
-    [found] = scales_apart({"wand": grown(RIG, 1.5), "board": RIG})
+    [found] = check_scales({"wand": grown(RIG, 1.5), "board": RIG})
     assert "cameras are 1.5 times as far apart" in found.sentence
     assert "one length is wrong" in found.sentence
 
 
 def test_starts_that_agree_or_share_too_little_tell_nothing():
-    assert scales_apart({"wand": grown(RIG, 1.08), "board": RIG}) == []
-    assert scales_apart({"wand": RIG.select(["cam1", "cam2"]), "board": RIG.select(["cam2", "cam3"])}) == []
+    assert check_scales({"wand": grown(RIG, 1.08), "board": RIG}) == []
+    assert check_scales({"wand": RIG.select(["cam1", "cam2"]), "board": RIG.select(["cam2", "cam3"])}) == []

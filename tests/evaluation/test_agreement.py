@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from airborne.evaluation import Series, agreement
-from airborne.evaluation.agreement import Z, limits, n_effective, spread_of
+from airborne.evaluation import Series, analyse_agreement
+from airborne.evaluation.agreement import Z, effective_sample_size, limits_of_agreement, variance_components
 from tests.support.tolerances import ROUNDTRIP, sampled
 
 
@@ -24,8 +24,8 @@ def fading(rng, n, keep):
 
 def test_of_one_individual_without_correlation_it_is_mean_and_1_96_deviations():
     difference = np.random.default_rng(0).normal(2.0, 3.0, 500)
-    spread = spread_of([difference], [500.0])
-    low, high = limits(spread)
+    spread = variance_components([difference], [500.0])
+    low, high = limits_of_agreement(spread)
     assert spread.mean == pytest.approx(difference.mean(), abs=ROUNDTRIP)
     assert (high.value - low.value) / 2 == pytest.approx(1.959964 * difference.std(ddof=1), rel=1e-6)
 
@@ -35,14 +35,14 @@ def test_balanced_repeats_give_bland_and_altmans_variances():
     table = rng.normal(size=(12, 1)) + 0.5 * rng.normal(size=(12, 6))
     within = table.var(axis=1, ddof=1).mean()
     between = (6 * table.mean(axis=1).var(ddof=1) - within) / 6  # from the mean squares of the one-way analysis
-    assert spread_of(list(table), [6.0] * 12).total == pytest.approx(between + within, rel=1e-12)
+    assert variance_components(list(table), [6.0] * 12).total == pytest.approx(between + within, rel=1e-12)
 
 
 def test_limits_hold_95_of_100_differences_of_new_individuals():
     rng, held = np.random.default_rng(2), []
     for _ in range(60):
         own = [rng.normal(0.5, 2.0) + rng.normal(0, 1.0, m) for m in rng.integers(3, 12, 100)]
-        low, high = limits(spread_of(own, [float(len(one)) for one in own]))
+        low, high = limits_of_agreement(variance_components(own, [float(len(one)) for one in own]))
         new = rng.normal(0.5, 2.0, 200) + rng.normal(0, 1.0, 200)
         held.append(np.mean((new > low.value) & (new < high.value)))
     assert np.mean(held) == pytest.approx(0.95, abs=0.015)
@@ -54,7 +54,7 @@ def test_intervals_of_bias_and_limits_hold_the_truth_in_95_of_100():
     for _ in range(400):
         own = [0.5 + rng.normal() + 0.7 * rng.normal(size=8) for _ in range(10)]
         who = np.repeat([f"player {k}" for k in range(10)], 8)
-        found = agreement(series(np.concatenate(own), who))
+        found = analyse_agreement(series(np.concatenate(own), who))
         held.append([found.bias.low < 0.5 < found.bias.high, found.upper_limit.low < true < found.upper_limit.high])
     shares = np.mean(held, axis=0)
     assert shares.min() > 0.92 and shares.max() < 0.99  # short series count as a little fewer than they are
@@ -63,16 +63,16 @@ def test_intervals_of_bias_and_limits_hold_the_truth_in_95_of_100():
 @pytest.mark.parametrize("keep", [0.0, 0.5, 0.8])
 def test_frames_that_err_alike_count_as_fewer(keep):
     rng = np.random.default_rng(4)
-    counts = [n_effective(fading(rng, 400, keep)) for _ in range(60)]
+    counts = [effective_sample_size(fading(rng, 400, keep)) for _ in range(60)]
     assert np.mean(counts) == pytest.approx(400 * (1 - keep) / (1 + keep), rel=0.2)
     assert max(counts) <= 400
 
 
 def test_the_bias_of_a_series_that_errs_alike_keeps_its_interval():
     rng = np.random.default_rng(5)
-    held = [agreement(series(1.0 + fading(rng, 300, 0.7))).bias for _ in range(200)]
+    held = [analyse_agreement(series(1.0 + fading(rng, 300, 0.7))).bias for _ in range(200)]
     assert np.mean([b.low < 1.0 < b.high for b in held]) > 0.88
-    naive = [agreement(series(1.0 + rng.permutation(fading(rng, 300, 0.7)))).bias for _ in range(20)]
+    naive = [analyse_agreement(series(1.0 + rng.permutation(fading(rng, 300, 0.7)))).bias for _ in range(20)]
     assert np.mean([b.high - b.low for b in held]) > 1.8 * np.mean([b.high - b.low for b in naive])
 
 
@@ -80,7 +80,7 @@ def test_individuals_with_their_own_bias_widen_the_limits_and_the_interval_of_th
     rng = np.random.default_rng(6)
     who = np.repeat(list("abcd"), 50)
     own = np.repeat([-3.0, -1.0, 1.0, 3.0], 50) + rng.normal(size=200)
-    apart, alike = agreement(series(own, who)), agreement(series(own))
+    apart, alike = analyse_agreement(series(own, who)), analyse_agreement(series(own))
     assert apart.n_individuals == 4
     assert apart.between_sd == pytest.approx(2.6, abs=0.3) and apart.within_sd == pytest.approx(1.0, abs=0.15)
     assert apart.bias.high - apart.bias.low > 5
@@ -89,7 +89,7 @@ def test_individuals_with_their_own_bias_widen_the_limits_and_the_interval_of_th
 
 def test_errors_come_with_their_range_and_reliability():
     rng = np.random.default_rng(17)
-    found = agreement(series(1.0 + rng.normal(size=400)))
+    found = analyse_agreement(series(1.0 + rng.normal(size=400)))
     assert found.rmse.value == pytest.approx(2**0.5, rel=0.1)
     assert found.rmse.low < 2**0.5 < found.rmse.high
     assert found.nrmse_percent.value == pytest.approx(found.rmse.value / found.range * 100)
@@ -104,14 +104,14 @@ def test_moments_without_a_number_are_left_out():
     holed[[3, 17]] = np.nan
     reference = np.arange(50.0)
     kept = np.delete(np.arange(50), [3, 17])
-    assert agreement(series(holed, reference=reference)) == agreement(
+    assert analyse_agreement(series(holed, reference=reference)) == analyse_agreement(
         series(difference[kept], reference=reference[kept])
     )
 
 
 @pytest.mark.parametrize("n", [0, 1, 2])
 def test_hardly_any_moment_gives_what_it_can(n):
-    found = agreement(series(np.arange(float(n)) + 2.0, reference=np.zeros(n)))
+    found = analyse_agreement(series(np.arange(float(n)) + 2.0, reference=np.zeros(n)))
     assert found.n == n
     assert np.isnan(found.bias.value) == (n == 0)
     assert np.isnan(found.upper_limit.value) == (n < 2)
@@ -121,6 +121,6 @@ def test_hardly_any_moment_gives_what_it_can(n):
 def test_of_single_measurements_of_several_individuals_the_limits_are_the_usual_ones():
     rng = np.random.default_rng(9)
     difference = rng.normal(size=12)
-    found = agreement(series(difference, [f"jump {k}" for k in range(12)]))
+    found = analyse_agreement(series(difference, [f"jump {k}" for k in range(12)]))
     assert found.upper_limit.value - found.bias.value == pytest.approx(1.959964 * difference.std(ddof=1), rel=1e-6)
     assert np.isnan(found.within_sd)

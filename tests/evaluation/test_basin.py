@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
-from airborne.evaluation import Basin, is_recovered, perturbed
+from airborne.evaluation import Basin, is_recovered, perturb
 from airborne.geometry.rotations import geodesic
 from tests.support.evaluation import HALF_TURN, IDENTITY
 from tests.support.tolerances import ROUNDTRIP, sampled
@@ -16,7 +16,7 @@ START = Pose(
 
 
 def trials(n=200, distance_m=0.05, angle_rad=0.2):
-    return perturbed(np.random.default_rng(1), START, distance_m=distance_m, angle_rad=angle_rad, n=n)
+    return perturb(np.random.default_rng(1), START, distance_m=distance_m, angle_rad=angle_rad, n=n)
 
 
 def test_trials_lie_exactly_the_distance_and_the_angle_away():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airborne.errors import ResultError
-from airborne.evaluation import compare
+from airborne.evaluation import compare_motion
 from tests.support.evaluation import HALF_TURN, IDENTITY, flight, motion_of, shifted, turned
 from tests.support.tolerances import ROUNDTRIP, sampled
 
@@ -19,7 +19,7 @@ def rows(truth, keep):
 
 
 def test_truth_has_no_error_against_itself():
-    result = compare(motion_of(flight()), flight(), IDENTITY)
+    result = compare_motion(motion_of(flight()), flight(), IDENTITY)
     assert (result.n_frames, result.n_truth, result.n_matched, result.n_tracked) == (40, 40, 40, 40)
     assert result.position.largest_3d_mm == pytest.approx(0, abs=ROUNDTRIP)
     assert result.raw.geodesic_largest_deg == pytest.approx(0, abs=ROUNDTRIP)
@@ -27,7 +27,7 @@ def test_truth_has_no_error_against_itself():
 
 
 def test_constant_shift_is_the_error_of_its_axis_in_millimetres():
-    result = compare(shifted(motion_of(flight()), [0.003, 0, -0.004]), flight(), IDENTITY)
+    result = compare_motion(shifted(motion_of(flight()), [0.003, 0, -0.004]), flight(), IDENTITY)
     np.testing.assert_allclose(result.position.rms_mm, [3, 0, 4], atol=ROUNDTRIP)
     np.testing.assert_allclose(result.position.largest_mm, [3, 0, 4], atol=ROUNDTRIP)
     assert result.position.rms_3d_mm == pytest.approx(5)
@@ -36,26 +36,26 @@ def test_constant_shift_is_the_error_of_its_axis_in_millimetres():
 def test_one_bad_frame_is_the_largest_error_and_its_share_of_the_rms():
     bad = np.zeros((40, 3))
     bad[7, 1] = 0.040
-    result = compare(shifted(motion_of(flight()), bad), flight(), IDENTITY)
+    result = compare_motion(shifted(motion_of(flight()), bad), flight(), IDENTITY)
     assert result.position.largest_mm[1] == pytest.approx(40)
     assert result.position.rms_mm[1] == pytest.approx(40 / np.sqrt(40))
 
 
 def test_turn_about_the_somersault_axis_is_a_somersault_error_only():
-    result = compare(turned(motion_of(flight()), np.tile([np.deg2rad(2), 0, 0], (40, 1))), flight(), IDENTITY)
+    result = compare_motion(turned(motion_of(flight()), np.tile([np.deg2rad(2), 0, 0], (40, 1))), flight(), IDENTITY)
     np.testing.assert_allclose(result.raw.rms_deg, [2, 0, 0], atol=ROUNDTRIP)
     assert result.raw.geodesic_rms_deg == pytest.approx(2)
 
 
 def test_angle_errors_do_not_jump_where_the_angles_wrap():
     offset = np.tile([np.deg2rad(12), 0, 0], (40, 1))  # over one frame's turn: one frame straddles 180 degrees
-    result = compare(turned(motion_of(flight()), offset), flight(), IDENTITY)
+    result = compare_motion(turned(motion_of(flight()), offset), flight(), IDENTITY)
     np.testing.assert_allclose(result.raw.largest_deg, [12, 0, 0], atol=ROUNDTRIP)
 
 
 def test_whole_run_seen_flipped_is_wrong_raw_and_right_modulo_symmetry():
     motion = motion_of(flight())
-    result = compare(replace(motion, R=motion.R @ HALF_TURN[1]), flight(), HALF_TURN)
+    result = compare_motion(replace(motion, R=motion.R @ HALF_TURN[1]), flight(), HALF_TURN)
     assert result.raw.geodesic_rms_deg == pytest.approx(180)
     assert result.modulo_run.geodesic_rms_deg == pytest.approx(0, abs=ROUNDTRIP)
     assert result.modulo_frame.geodesic_rms_deg == pytest.approx(0, abs=ROUNDTRIP)
@@ -66,7 +66,7 @@ def test_flip_within_the_run_is_forgiven_by_frame_only_and_counted():
     motion = motion_of(flight())
     R = motion.R.copy()
     R[30:] = R[30:] @ HALF_TURN[1]
-    result = compare(replace(motion, R=R), flight(), HALF_TURN)
+    result = compare_motion(replace(motion, R=R), flight(), HALF_TURN)
     assert result.n_flips == 1
     assert result.modulo_frame.geodesic_largest_deg == pytest.approx(0, abs=ROUNDTRIP)
     assert result.modulo_run.geodesic_rms_deg == pytest.approx(180 * np.sqrt(10 / 40))
@@ -74,7 +74,7 @@ def test_flip_within_the_run_is_forgiven_by_frame_only_and_counted():
 
 
 def test_lost_frames_count_and_carry_no_error():
-    result = compare(motion_of(flight(), lost=[3, 4], uncertain=[5]), flight(), IDENTITY)
+    result = compare_motion(motion_of(flight(), lost=[3, 4], uncertain=[5]), flight(), IDENTITY)
     assert (result.n_matched, result.n_tracked, result.n_uncertain, result.n_lost) == (40, 37, 1, 2)
     assert result.position.largest_3d_mm == pytest.approx(0, abs=ROUNDTRIP)
 
@@ -82,13 +82,13 @@ def test_lost_frames_count_and_carry_no_error():
 def test_frames_are_matched_by_time_not_by_number():
     truth = rows(flight(), slice(5, 25))
     motion = replace(motion_of(truth), index=np.arange(20), time_s=truth.time_s + 0.0015)
-    result = compare(motion, truth, IDENTITY)
+    result = compare_motion(motion, truth, IDENTITY)
     assert result.n_matched == 20
     assert result.largest_time_offset_s == pytest.approx(0.0015)
 
 
 def test_field_between_two_frames_of_the_truth_is_left_out():
-    result = compare(motion_of(flight()), rows(flight(), slice(None, None, 2)), IDENTITY)
+    result = compare_motion(motion_of(flight()), rows(flight(), slice(None, None, 2)), IDENTITY)
     assert (result.n_frames, result.n_truth, result.n_matched) == (40, 20, 20)
     assert result.position.largest_3d_mm == pytest.approx(0, abs=ROUNDTRIP)
 
@@ -96,21 +96,21 @@ def test_field_between_two_frames_of_the_truth_is_left_out():
 @pytest.mark.parametrize("n_motion", [1, 40])
 def test_one_true_frame_can_be_compared(n_motion):
     truth = rows(flight(), slice(0, 1))
-    result = compare(rows(motion_of(flight()), slice(0, n_motion)), truth, IDENTITY)
+    result = compare_motion(rows(motion_of(flight()), slice(0, n_motion)), truth, IDENTITY)
     assert (result.n_matched, result.raw.geodesic_rms_deg) == (1, pytest.approx(0, abs=ROUNDTRIP))
 
 
 def test_truth_of_another_time_is_refused():
     late = replace(flight(), time_s=flight().time_s + 60)
     with pytest.raises(ResultError, match=r"no pose to compare: motion 0\.000 to 0\.780 s .* truth 60\.000 to 60\.780"):
-        compare(motion_of(flight()), late, IDENTITY)
+        compare_motion(motion_of(flight()), late, IDENTITY)
 
 
 def test_motion_lost_throughout_or_empty_is_refused():
     with pytest.raises(ResultError, match="with 0 poses"):
-        compare(motion_of(flight(), lost=range(40)), flight(), IDENTITY)
+        compare_motion(motion_of(flight(), lost=range(40)), flight(), IDENTITY)
     with pytest.raises(ResultError, match="motion empty"):
-        compare(rows(motion_of(flight()), slice(0, 0)), flight(), IDENTITY)
+        compare_motion(rows(motion_of(flight()), slice(0, 0)), flight(), IDENTITY)
 
 
 def test_honest_deviations_hold_the_normal_share_of_the_errors():
@@ -119,7 +119,7 @@ def test_honest_deviations_hold_the_normal_share_of_the_errors():
     sd = np.array([1e-3, 2e-3, 3e-3, 0.01, 0.02, 0.005])
     noise = rng.normal(size=(n, 6)) * sd
     motion = turned(shifted(motion_of(truth, covariance=np.diag(sd**2)), noise[:, :3]), noise[:, 3:])
-    result = compare(motion, truth, IDENTITY)
+    result = compare_motion(motion, truth, IDENTITY)
     for share in (result.position_calibration, result.rotation_calibration):
         assert share.n == 3 * n
         assert share.within_1sd == pytest.approx(0.6827, abs=sampled(3 * n))
@@ -128,13 +128,13 @@ def test_honest_deviations_hold_the_normal_share_of_the_errors():
 
 def test_deviations_that_are_infinite_or_unknown_are_not_counted():
     covariance = np.diag([1e-6, 1e-6, np.inf, 1e-4, np.nan, 1e-4])
-    result = compare(motion_of(flight(), covariance=covariance), flight(), IDENTITY)
+    result = compare_motion(motion_of(flight(), covariance=covariance), flight(), IDENTITY)
     assert (result.position_calibration.n, result.rotation_calibration.n) == (80, 80)
 
 
 def test_rotation_errors_are_judged_modulo_symmetry():
     motion = motion_of(flight(), covariance=np.eye(6) * 1e-6)
-    result = compare(replace(motion, R=motion.R @ HALF_TURN[1]), flight(), HALF_TURN)
+    result = compare_motion(replace(motion, R=motion.R @ HALF_TURN[1]), flight(), HALF_TURN)
     assert result.rotation_calibration.within_1sd == 1
 
 
@@ -143,11 +143,11 @@ def test_frames_near_the_singularity_are_counted():
     R = truth.R.copy()
     R[1] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]  # 90 degrees of tilt
     truth = replace(truth, R=R)
-    assert compare(motion_of(truth), truth, IDENTITY).n_singular == 1
+    assert compare_motion(motion_of(truth), truth, IDENTITY).n_singular == 1
 
 
 def test_numbers_go_to_json_with_unknown_as_null():
-    result = compare(motion_of(flight()), flight(), HALF_TURN)
+    result = compare_motion(motion_of(flight()), flight(), HALF_TURN)
     numbers = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert numbers["position_calibration"] == {"within_1sd": None, "within_2sd": None, "n": 0}
     assert numbers["position"]["rms_mm"][0] == result.position.rms_mm[0]
@@ -155,7 +155,7 @@ def test_numbers_go_to_json_with_unknown_as_null():
 
 def test_description_names_every_axis_and_symmetry_only_where_there_is_one():
     motion = motion_of(flight(), covariance=np.eye(6) * 1e-6)
-    plain = compare(motion, flight(), IDENTITY).describe()
+    plain = compare_motion(motion, flight(), IDENTITY).describe()
     assert all(name in plain for name in ("x ", "y ", "z ", "somersault", "tilt", "twist", "RMS", "mm", "deg", "1 sd"))
     assert "symmetry" not in plain
-    assert "symmetry" in compare(motion, flight(), HALF_TURN).describe()
+    assert "symmetry" in compare_motion(motion, flight(), HALF_TURN).describe()

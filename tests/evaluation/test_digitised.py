@@ -12,8 +12,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import BodyModel, Box, Ellipsoid, Part, Segment
 from airborne.cameras import read_rig
 from airborne.errors import ResultError
-from airborne.evaluation import compare_digitised, digitised_poses, read_digitised, read_truth
-from airborne.evaluation.digitised import Digitised, body_points, fit_rigid
+from airborne.evaluation import compare_digitised, fit_digitised_poses, read_digitised, read_truth
+from airborne.evaluation.digitised import DigitisedPoints, body_points, fit_rigid
 from tests.support.evaluation import HALF_TURN, IDENTITY, cross, motion_of, shifted
 from tests.support.tolerances import ROUNDTRIP, SOLVED
 
@@ -34,7 +34,7 @@ def clicks(truth, rig, noise_px=0.0):
     world = np.einsum("nij,pj->npi", truth.R, body_points(cross(), ENDS)) + truth.position[:, None]
     px = np.stack([camera.px_from_world(world) for camera in rig], axis=2)
     noise = np.random.default_rng(0).normal(size=px.shape) * noise_px
-    return Digitised(index=truth.index, points=ENDS, px=px + noise)
+    return DigitisedPoints(index=truth.index, points=ENDS, px=px + noise)
 
 
 def test_points_of_the_cross_are_the_ends_of_its_bars():
@@ -59,7 +59,7 @@ def test_point_of_no_box_is_refused_with_the_boxes_there_are(point):
 
 
 def test_exact_clicks_give_the_true_poses(rig, truth):
-    poses = digitised_poses(clicks(truth, rig), rig, cross())
+    poses = fit_digitised_poses(clicks(truth, rig), rig, cross())
     np.testing.assert_allclose(poses.position, truth.position, atol=ROUNDTRIP)
     np.testing.assert_allclose(poses.R, truth.R, atol=ROUNDTRIP)
     assert poses.residual.max() < ROUNDTRIP
@@ -67,7 +67,7 @@ def test_exact_clicks_give_the_true_poses(rig, truth):
 
 def test_exact_clicks_through_bent_lenses_give_the_true_poses(rig, truth):
     bent = replace(rig, cameras=tuple(replace(c, distortion=np.array([-0.1, 0.02, 1e-3, 1e-3, 0])) for c in rig))
-    poses = digitised_poses(clicks(truth, bent), bent, cross())
+    poses = fit_digitised_poses(clicks(truth, bent), bent, cross())
     np.testing.assert_allclose(poses.position, truth.position, atol=SOLVED)
 
 
@@ -77,14 +77,14 @@ def test_pose_needs_three_points_not_in_a_line(rig, truth):
     seen.px[1, :2] = np.nan  # two are left
     seen.px[2, 2, 1:] = np.nan  # one of the three points left is seen by one camera only
     seen.px[2, 0] = np.nan
-    poses = digitised_poses(seen, rig, cross())
+    poses = fit_digitised_poses(seen, rig, cross())
     is_known = np.isfinite(poses.position).all(axis=-1)
     assert is_known[:4].tolist() == [True, False, False, True]
     np.testing.assert_allclose(poses.R[0], truth.R[0], atol=ROUNDTRIP)
 
 
 def test_bundled_clicks_are_near_the_truth(thrown_cross, rig, truth):
-    poses = digitised_poses(read_digitised(thrown_cross / "digitised.csv", rig), rig, cross())
+    poses = fit_digitised_poses(read_digitised(thrown_cross / "digitised.csv", rig), rig, cross())
     result = compare_digitised(motion_of(truth), poses, HALF_TURN)
     assert result.n_poses == 34
     assert result.tracked_minus_digitised.n_matched == 34
@@ -95,7 +95,7 @@ def test_bundled_clicks_are_near_the_truth(thrown_cross, rig, truth):
 
 def test_difference_is_tracked_minus_digitised_by_frame_number(rig, truth):
     motion = shifted(motion_of(truth), [0.005, 0, 0])
-    poses = digitised_poses(clicks(truth, rig), rig, cross())
+    poses = fit_digitised_poses(clicks(truth, rig), rig, cross())
     late = replace(motion, time_s=motion.time_s + 10)  # clicked fields have numbers, not times
     result = compare_digitised(late, poses, IDENTITY).tracked_minus_digitised
     np.testing.assert_allclose(result.position.rms_mm, [5, 0, 0], atol=1e3 * ROUNDTRIP)
@@ -105,20 +105,20 @@ def test_difference_is_tracked_minus_digitised_by_frame_number(rig, truth):
 def test_fields_that_were_not_tracked_or_not_clicked_are_left_out(rig, truth):
     seen = clicks(truth, rig)
     seen.px[10:15] = np.nan
-    poses = digitised_poses(seen, rig, cross())
+    poses = fit_digitised_poses(seen, rig, cross())
     result = compare_digitised(motion_of(truth, lost=range(20, 24)), poses, IDENTITY)
     assert result.n_poses == 29
     assert (result.tracked_minus_digitised.n_tracked, result.tracked_minus_digitised.n_lost) == (25, 4)
 
 
 def test_clicks_of_other_fields_are_refused(rig, truth):
-    poses = digitised_poses(clicks(truth, rig), rig, cross())
+    poses = fit_digitised_poses(clicks(truth, rig), rig, cross())
     with pytest.raises(ResultError, match=r"34 poses, 34 frames"):
         compare_digitised(motion_of(replace(truth, index=truth.index + 100)), poses, IDENTITY)
 
 
 def test_deviations_are_not_judged_by_clicks_and_the_rest_goes_to_json(rig, truth):
-    poses = digitised_poses(clicks(truth, rig, noise_px=1.0), rig, cross())
+    poses = fit_digitised_poses(clicks(truth, rig, noise_px=1.0), rig, cross())
     result = compare_digitised(motion_of(truth, covariance=np.eye(6)), poses, IDENTITY)
     numbers = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert numbers["tracked_minus_digitised"]["position_calibration"]["n"] == 0

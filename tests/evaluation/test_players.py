@@ -11,7 +11,7 @@ from airborne.body.legs import LEG_POINTS
 from airborne.cameras import read_rig
 from airborne.errors import ResultError
 from airborne.evaluation.players import assess_players, compare_players
-from airborne.evaluation.players_truth import read_known_jumps, read_players_truth
+from airborne.evaluation.players_truth import read_players_truth, read_reference_jumps
 from airborne.evaluation.success import success_cover
 from airborne.motion.players import PlayersWriter
 from airborne.tracking import Status
@@ -112,7 +112,7 @@ def test_jumps_are_compared_in_every_definition():
     shaken = replace(TRUTH, points=TRUTH.points + 0.01 * noise(rng, TRUTH.points.shape))
     shaken = replace(shaken, covariance=np.broadcast_to(1e-4 * np.eye(3), TRUTH.covariance.shape))
     stated = {"one": {"takeoff_frame": 60 * JUMPER.takeoff_s, "takeoff_speed_height_m": JUMPER.rise_m}}
-    comparison = compare_players(shaken, TRUTH, known_jumps=stated)
+    comparison = compare_players(shaken, TRUTH, reference_jumps=stated)
     (jump,) = comparison.jumps
     assert jump.is_found
     assert all(abs(error) < 0.03 for error in jump.height_error_m.values())
@@ -215,24 +215,24 @@ def test_broken_truth_is_refused_in_one_line(tmp_path, lines, said):
 
 def test_stated_jumps_are_read_where_there_are_any(tmp_path):
     path = tmp_path / "players.json"
-    assert read_known_jumps(path) == {}
+    assert read_reference_jumps(path) == {}
     path.write_text('[{"name": "a", "jump": {"last_contact_frame": 29.5, "flight_s": 0.6}}, {"name": "b"}]')
-    assert read_known_jumps(path) == {"a": {"takeoff_frame": 29.5, "flight_time_height_m": 9.81 * 0.36 / 8}}
+    assert read_reference_jumps(path) == {"a": {"takeoff_frame": 29.5, "flight_time_height_m": 9.81 * 0.36 / 8}}
     path.write_text("[1]")
     with pytest.raises(ResultError, match="no list of players"):
-        read_known_jumps(path)
+        read_reference_jumps(path)
 
 
 def test_noisy_tracking_of_the_block_jump_clip_gives_heights_to_two_centimetres(shared_data):
     folder = shared_data("block_jump")
     truth = read_players_truth(folder / "truth.csv")
-    stated = read_known_jumps(folder / "players.json")
+    stated = read_reference_jumps(folder / "players.json")
     errors = []
     for seed in range(2):
         rng = np.random.default_rng(seed)
         points = truth.points + 0.01 * noise(rng, truth.points.shape)
         estimate = replace(truth, points=points, covariance=np.broadcast_to(1e-4 * np.eye(3), truth.covariance.shape))
-        comparison = compare_players(estimate, truth, known_jumps=stated)
+        comparison = compare_players(estimate, truth, reference_jumps=stated)
         assert [jump.player for jump in comparison.jumps] == ["blocker1", "spiker"], "nobody else jumps"
         for jump in comparison.jumps:
             assert all(abs(error) < 1.0 for error in jump.stated_event_error_frames.values())
@@ -267,10 +267,10 @@ def test_cover_leaves_frames_out_that_fewer_than_two_cameras_show(rig):
     truth = STILL.points[:, 0]
     visible = np.ones((40, 3, 6), bool)
     visible[:15, :2, 4] = False
-    cover = success_cover(rig, truth, truth, LEG_POINTS, visible)
+    cover = success_cover(rig, truth, truth, LEG_POINTS, visible=visible)
     assert (cover.n["ankle_left"], cover.n["ankle_right"]) == (25, 40)
     visible[:] = False
-    assert np.isnan(success_cover(rig, truth, truth, LEG_POINTS, visible).rate["hip_left"])
+    assert np.isnan(success_cover(rig, truth, truth, LEG_POINTS, visible=visible).rate["hip_left"])
 
 
 def test_unknown_places_and_errors_along_one_ray_cover_nothing(rig):

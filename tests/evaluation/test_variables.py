@@ -6,13 +6,13 @@ from scipy.spatial.transform import Rotation
 
 from airborne.errors import ResultError
 from airborne.evaluation.variables import (
-    headline,
-    of_joint_angles,
-    of_points,
-    of_root,
+    align_symmetry,
+    common_series,
+    headline_series,
+    joint_angle_variables,
+    point_variables,
     read_joint_angles,
-    side_by_side,
-    turned_alike,
+    root_variables,
 )
 from tests.support.evaluation import HALF_TURN, flight, motion_of
 
@@ -21,7 +21,7 @@ T = np.arange(40) / 50
 
 def root(angle_deg, t=T):
     R = Rotation.from_rotvec(np.deg2rad(angle_deg) * np.tile([1.0, 0.0, 0.0], (len(t), 1))).as_matrix()
-    return of_root(t, np.zeros((len(t), 3)), R)
+    return root_variables(t, np.zeros((len(t), 3)), R)
 
 
 def named(series):
@@ -29,23 +29,23 @@ def named(series):
 
 
 def test_angles_differ_on_the_circle_and_not_by_a_turn():
-    found = named(side_by_side([root(179.0), root(-179.0)], "both"))["somersault"]
+    found = named(common_series([root(179.0), root(-179.0)], "both"))["somersault"]
     assert found.unit == "deg"
     assert found.values[:, 0] - found.values[:, 1] == pytest.approx(np.full(40, -2.0), abs=1e-9)
 
 
 def test_somersault_and_twist_are_left_out_where_they_cannot_be_told_apart():
     R = Rotation.from_euler("XYZ", np.stack([0 * T, np.linspace(0, np.pi / 2, 40), 0 * T], 1)).as_matrix()
-    found = of_root(T, np.zeros((40, 3)), R)
+    found = root_variables(T, np.zeros((40, 3)), R)
     assert np.isnan(found.columns["twist", "body"][-1])
     assert np.isfinite(found.columns["tilt", "body"]).all()
 
 
 def test_only_common_times_and_variables_count():
-    one = of_points(T, np.ones((40, 2, 3)), ["hip", "knee"])
-    other = of_points(T[5:30] + 1e-4, np.zeros((25, 2, 3)), ["knee", "head"])
-    third = of_points(T[10:], np.zeros((30, 1, 3)), ["knee"])
-    found = named(side_by_side([one, other, third], "the three"))
+    one = point_variables(T, np.ones((40, 2, 3)), ["hip", "knee"])
+    other = point_variables(T[5:30] + 1e-4, np.zeros((25, 2, 3)), ["knee", "head"])
+    third = point_variables(T[10:], np.zeros((30, 1, 3)), ["knee"])
+    found = named(common_series([one, other, third], "the three"))
     assert set(found) == {"knee x", "knee y", "knee z", "all joints x", "all joints y", "all joints z"}
     assert found["knee x"].values.shape == (20, 3)
     assert found["knee x"].values[:, 0] == pytest.approx(np.full(20, 1000.0))
@@ -53,24 +53,26 @@ def test_only_common_times_and_variables_count():
 
 def test_nothing_in_common_is_said_plainly():
     with pytest.raises(ResultError, match=r"the runs have no time in common .* give those of one recording"):
-        side_by_side([root(0.0), root(0.0, T + 100)], "the runs")
+        common_series([root(0.0), root(0.0, T + 100)], "the runs")
     with pytest.raises(ResultError, match="no variable in common"):
-        side_by_side([root(0.0), of_points(T, np.ones((40, 1, 3)), ["hip"])], "the runs")
+        common_series([root(0.0), point_variables(T, np.ones((40, 1, 3)), ["hip"])], "the runs")
 
 
 def test_players_and_joints_are_individuals():
     points = np.random.default_rng(0).normal(size=(40, 2, 3))
-    both = of_points(T, points, ["hip", "knee"], "Anna") | of_points(T, points, ["hip", "knee"], "Berta")
-    found = named(side_by_side([both, both], "both"))
+    both = point_variables(T, points, ["hip", "knee"], "Anna") | point_variables(T, points, ["hip", "knee"], "Berta")
+    found = named(common_series([both, both], "both"))
     assert set(found["hip x"].individual) == {"Anna", "Berta"}
     assert len(set(found["all joints z"].individual)) == 4
-    assert [one.name for one in headline(list(found.values()))] == [f"all joints {axis}" for axis in "xyz"]
+    assert [one.name for one in headline_series(list(found.values()))] == [f"all joints {axis}" for axis in "xyz"]
 
 
 def test_joint_angles_of_both_branches_are_the_same_turn():
     angles = np.random.default_rng(1).uniform(-1, 1, (40, 1, 3))
     other = np.stack([angles[..., 0] + np.pi, np.pi - angles[..., 1], angles[..., 2] - np.pi], axis=-1)
-    found = side_by_side([of_joint_angles(T, angles, ["knee"]), of_joint_angles(T, other, ["knee"])], "both")
+    found = common_series(
+        [joint_angle_variables(T, angles, ["knee"]), joint_angle_variables(T, other, ["knee"])], "both"
+    )
     for one in found:
         assert one.values[:, 0] == pytest.approx(one.values[:, 1], abs=1e-9)
 
@@ -78,7 +80,7 @@ def test_joint_angles_of_both_branches_are_the_same_turn():
 def test_a_symmetric_body_is_turned_to_look_like_the_reference():
     truth = flight()
     motion = motion_of(truth)
-    turned = turned_alike(motion, truth.R @ HALF_TURN[1], truth.time_s, HALF_TURN)
+    turned = align_symmetry(motion, truth.R @ HALF_TURN[1], truth.time_s, HALF_TURN)
     assert turned == pytest.approx(truth.R @ HALF_TURN[1], abs=1e-9)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from airborne.evaluation import Series, agreement
+from airborne.evaluation import Series, analyse_agreement
 from airborne.export.analysis_figures import write_bland_altman, write_identity, write_residuals
 from airborne.motion.smoothing import residual_analysis
 
@@ -17,7 +17,7 @@ def drawn(n_variables, n=40, sd=1.0):
         reference = np.linspace(0, 100, n)
         values = np.stack([reference + sd * rng.normal(size=n), reference], axis=1)
         series = Series(f"variable {k}", "mm", values, np.where(np.arange(n) % 2, "one", "two"))
-        found.append((series, agreement(series)))
+        found.append((series, analyse_agreement(series)))
     return found
 
 

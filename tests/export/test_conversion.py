@@ -9,7 +9,7 @@ import pytest
 from airborne import cli
 from airborne.cameras import Rig, read_detections, read_rig, write_rig
 from airborne.errors import AirborneError
-from airborne.export.conversion import FORMATS, Wishes, convert
+from airborne.export.conversion import FORMATS, ConversionOptions, convert
 from tests.support.cameras import LENS, three_cameras
 from tests.support.format_rigs import assert_same
 
@@ -153,8 +153,8 @@ def test_detections_go_to_openpose_and_back(tmp_path, shared_data, airborne):
     ("words", "complaint"),
     [
         (("calib.toml", "x.txt"), "the name asks for no format"),
-        (("calib.toml", "x.toml", "--origin", "lower-left"), "--origin says nothing about a pose2sim file to read"),
-        (("calib.toml", "x.toml", "--to-unit", "mm"), "--to-unit says nothing about a pose2sim file to write"),
+        (("calib.toml", "x.toml", "--origin", "lower-left"), "--origin does not apply to a pose2sim file to read"),
+        (("calib.toml", "x.toml", "--to-unit", "mm"), "--to-unit does not apply to a pose2sim file to write"),
         (("calib.toml", "x.npz", "--to", "npz"), "holds cameras, which cannot be written as npz"),
         (("calib.toml", "x.toml", "--to", "bvh"), "--to bvh: no such format"),
         (("clicks.csv", "x_xypts.csv"), "say which cameras its columns are of: --cameras"),
@@ -179,5 +179,5 @@ def test_what_cannot_be_is_told(tmp_path, monkeypatch, airborne, words, complain
 def test_a_file_is_not_written_over_itself(tmp_path, thrown_cross):
     path = shutil.copy(thrown_cross / "calib_true.toml", tmp_path / "calib.toml")
     with pytest.raises(AirborneError, match="is the file that is read"):
-        convert(path, tmp_path / "." / "calib.toml", Wishes())
+        convert(path, tmp_path / "." / "calib.toml", ConversionOptions())
     assert path.read_bytes() == (thrown_cross / "calib_true.toml").read_bytes()

@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 from airborne.evaluation import DigitisedPoses, Truth
 from airborne.export import panels, write_errors, write_figures, write_pose
 from airborne.export.figures import (
+    _align_by_symmetry,
+    _align_rows,
     _differences,
-    _panes,
-    _reference,
-    _same_turn,
-    _turned_alike,
+    _joint_panels,
+    _match_revolutions,
     write_flight_figure,
     write_joints_figure,
 )
@@ -79,7 +79,7 @@ def test_a_motion_turned_by_a_symmetry_of_the_body_gives_the_same_figure(tmp_pat
 
 def test_differences_are_motion_minus_reference_in_millimetres_and_degrees():
     motion = run(lost=(3,))
-    reference = _reference(motion, np.arange(20), run().position - [0.001, 0, -0.002], run().R)
+    reference = _align_rows(motion, np.arange(20), run().position - [0.001, 0, -0.002], run().R)
     position_mm, angle_deg = _differences(motion, reference)
     assert np.isnan(position_mm[3]).all() and np.isnan(angle_deg[3]).all()
     is_known = np.arange(20) != 3
@@ -91,15 +91,15 @@ def test_one_symmetry_is_chosen_for_the_whole_run():
     motion = run()
     R = motion.R.copy()
     R[:5] = R[:5] @ HALF_TURN
-    reference = _reference(motion, np.arange(20), motion.position, motion.R)
-    chosen = _turned_alike(replace(motion, R=R), reference, [np.eye(3), HALF_TURN])
+    reference = _align_rows(motion, np.arange(20), motion.position, motion.R)
+    chosen = _align_by_symmetry(replace(motion, R=R), reference, [np.eye(3), HALF_TURN])
     np.testing.assert_allclose(chosen.R, R)
 
 
 def test_reference_angles_lie_in_the_turn_of_the_tracked_ones():
     tracked = np.array([[370.0, 1.0, -350.0], [np.nan] * 3, [380.0, 1.0, -340.0]])
     reference = np.array([[12.0, 1.0, 9.0], [15.0, 1.0, 15.0], [21.0, 1.0, 22.0]])
-    np.testing.assert_allclose(_same_turn(tracked, reference), reference + np.array([360, 0, -360]))
+    np.testing.assert_allclose(_match_revolutions(tracked, reference), reference + np.array([360, 0, -360]))
 
 
 def test_the_line_breaks_where_frames_are_lost_and_the_gap_is_shaded():
@@ -129,7 +129,7 @@ def test_the_band_is_two_standard_deviations_wide_and_absent_where_they_are_infi
 def drawn(monkeypatch):
     """Everything drawn as an estimate: panel label -> values; labels are given after drawing."""
     panes, found = {}, {}
-    estimate, name = panels.draw_estimate, panels.name_panel
+    estimate, name = panels.draw_estimate, panels.label_panel
 
     def draw(axes, motion, values):
         panes[axes] = values
@@ -195,8 +195,8 @@ def test_the_legend_lies_within_the_figure_however_much_it_has_to_say(tmp_path, 
 
 
 def test_other_bodies_show_their_first_joints():
-    assert _panes(["flipper", "tail"]) == [("flipper", "flipper, x", 1.0), ("tail", "tail, x", 1.0)]
-    assert len(_panes([f"link {k}" for k in range(30)])) == 8
+    assert _joint_panels(["flipper", "tail"]) == [("flipper", "flipper, x", 1.0), ("tail", "tail, x", 1.0)]
+    assert len(_joint_panels([f"link {k}" for k in range(30)])) == 8
 
 
 def test_the_height_of_a_falling_stiff_body_is_a_parabola_and_its_momentum_is_none(tmp_path, drawn):

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Ellipsoid, Inertia, Mesh, Part, Segment, total_inertia
-from airborne.export.opensim_model import coordinates_of, write_osim
+from airborne.export.opensim_model import coordinate_names, write_osim
 from airborne.export.opensim_motion import write_mot
 from airborne.export.takes import player_takes
 from airborne.export.trc import write_trc
@@ -118,7 +118,7 @@ def test_the_model_has_the_bodys_masses(opensim, tmp_path):
     row = 2
     values = columns_of(write_mot(tmp_path / "run.mot", take)[0])[2][row, 1:]
     coordinates = model.updCoordinateSet()
-    for name, value in zip(coordinates_of(take.model), values, strict=True):
+    for name, value in zip(coordinate_names(take.model), values, strict=True):
         is_slide = name[-3:] in ("_tx", "_ty", "_tz")
         coordinates.get(name).setValue(state, value if is_slide else np.deg2rad(value), False)
     whole = total_inertia(PERSON.with_pose(tumbling(4).pose(row)))
@@ -185,8 +185,8 @@ def test_angles_are_ours_in_degrees_and_run_on(tmp_path):
     take = take_of(tumbling(60, turns=3.0), PERSON)
     _, names, values = columns_of(write_mot(tmp_path / "run.mot", take)[0])
     assert names[:8] == ["time", "somersault", "tilt", "twist", "pelvis_tx", "pelvis_ty", "pelvis_tz", "torso_x"]
-    assert names[1:] == coordinates_of(take.model)
-    np.testing.assert_allclose(values[:, 1:4], np.rad2deg(take.turns), atol=1e-5)
+    assert names[1:] == coordinate_names(take.model)
+    np.testing.assert_allclose(values[:, 1:4], np.rad2deg(take.root_angles), atol=1e-5)
     np.testing.assert_allclose(values[:, 4:7], take.position[:, Y_UP], atol=1e-8)
     np.testing.assert_allclose(values[:, 7:], np.rad2deg(take.joint_angles).reshape(60, -1), atol=1e-6)
     assert values[-1, 1] > 1000
@@ -208,4 +208,4 @@ def test_names_of_a_body_file_become_names_that_opensim_takes(opensim, tmp_path)
     assert read.getName() == "Ubung_1"
     bodies = read.getBodySet()
     assert [bodies.get(k).getName() for k in range(3)] == ["the_trunk", "l_arm", "l_arm_2"]
-    assert "l_arm_2_z" in coordinates_of(model)
+    assert "l_arm_2_z" in coordinate_names(model)

@@ -4,13 +4,13 @@ import av
 import numpy as np
 import pytest
 
-from airborne.body import geometry
+from airborne.body import surface_arrays
 from airborne.cameras import Rig
 from airborne.errors import VideoError
 from airborne.export import OverlayVideos
 from airborne.export.overlays import LONGEST_SIDE_PX
 from airborne.export.palette import STATUS_RGB
-from airborne.export.views import seen_by
+from airborne.export.views import resample_view
 from airborne.rendering import FLAT, render
 from airborne.tracking import Status
 from airborne.video import View
@@ -40,7 +40,7 @@ def test_the_outline_has_the_colour_of_the_status_and_hides_none_of_the_body(tmp
     rig = Rig((camera(size=(960, 720)),))
     body = posed(position=(0.1, 0.0, -0.1))
     ((picture,),) = written(tmp_path, [(frames(rig=rig), body, status)], rig)
-    mask = render(geometry(BOX), body, rig.cameras[0], FLAT).mask
+    mask = render(surface_arrays(BOX), body, rig.cameras[0], FLAT).mask
     rows, columns = np.nonzero(mask)
     middle, left = round(rows.mean()), columns.min()
     line = picture[middle, left - 2]
@@ -81,7 +81,7 @@ def test_a_still_scene_does_not_move_between_its_fields():
     rows = np.arange(whole.size[1], dtype=float)[:, None, None]
     scene = np.broadcast_to(128 + 100 * np.sin(rows / 15), (whole.size[1], whole.size[0], 3)).round().astype(np.uint8)
     for parity in (0, 1):
-        shown = seen_by(View(whole.field(parity), scene[parity::2]), whole)
+        shown = resample_view(View(whole.field(parity), scene[parity::2]), whole)
         assert shown.shape == scene.shape
         np.testing.assert_array_equal(shown[parity::2][1:-1], scene[parity::2][1:-1])
         assert np.abs(shown[2:-2].astype(int) - scene[2:-2]).max() <= 2

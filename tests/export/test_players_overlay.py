@@ -21,7 +21,7 @@ from airborne.video import Frames, View
 from tests.support.players_trial import LEG_POINTS, PLAYERS, StandIn, camera, points_of
 
 GREY = 120
-BIG = camera("left").resampled(scale=(0.25, 0.25), offset=(-0.375, -0.375), size=(640, 480))
+BIG = camera("left").resample(scale=(0.25, 0.25), offset=(-0.375, -0.375), size=(640, 480))
 STARTS = [
     PlayerStart(name=name, joints_m=dict(zip(LEG_POINTS, points_of(x), strict=True))) for name, x in PLAYERS.items()
 ]
@@ -146,7 +146,7 @@ def test_rulers_of_two_players_stand_outside_of_both():
 def test_heights_count_from_the_feet_at_the_start_and_the_peak_holds_until_the_next_jump():
     heights = Heights(STARTS)
     path = [0.0, 0.02, 0.08, 0.3, 0.5, 0.2, 0.01, 0.06, 0.0, 0.2, 0.35, 0.1, 0.0]
-    shown = [heights.after({"Anna": (points_of(-0.6, z), Status.TRACKED)})["Anna"] for z in path]
+    shown = [heights.update({"Anna": (points_of(-0.6, z), Status.TRACKED)})["Anna"] for z in path]
     np.testing.assert_allclose([height.now_m for height in shown], path, atol=1e-12)
     peaks = [height.peak_m for height in shown]
     assert peaks[:3] == [None] * 3
@@ -156,7 +156,7 @@ def test_heights_count_from_the_feet_at_the_start_and_the_peak_holds_until_the_n
 def test_an_uncertain_height_is_no_peak():
     heights = Heights(STARTS)
     for z, status in ((0.2, Status.TRACKED), (0.9, Status.UNCERTAIN), (0.3, Status.TRACKED)):
-        height = heights.after({"Anna": (points_of(-0.6, z), status)})["Anna"]
+        height = heights.update({"Anna": (points_of(-0.6, z), status)})["Anna"]
     assert height.peak_m == pytest.approx(0.3)
 
 

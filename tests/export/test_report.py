@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from airborne.errors import ResultError
-from airborne.evaluation import JointPaths, Truth, compare, compare_joints
+from airborne.evaluation import JointPaths, Truth, compare_joints, compare_motion
 from airborne.export import headline, write_figures, write_report
-from airborne.export.page import label, shown
+from airborne.export.page import format_value, label
 from airborne.motion import Motion, flight_summary, landmarks
 from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run
 
@@ -72,7 +72,7 @@ def test_a_comparison_with_the_truth_becomes_a_table(tmp_path):
     truth = Truth(
         index=motion.index, time_s=motion.time_s, position=motion.position + np.array([0.003, 0, 0]), R=motion.R
     )
-    html = html_of(tmp_path, motion, truth=compare(motion, truth, [np.eye(3), HALF_TURN]).to_dict())
+    html = html_of(tmp_path, motion, truth=compare_motion(motion, truth, [np.eye(3), HALF_TURN]).to_dict())
     assert "Against the truth" in html
     assert "<th>x [mm]</th><td>3.00</td><td>3.00</td>" in html
     assert "20 of 20 reference times matched" in html
@@ -127,7 +127,7 @@ def test_keys_become_words_with_their_unit():
 
 
 def test_values_are_shown_as_a_reader_would_write_them():
-    assert [shown(v) for v in (None, True, 3, 0.123456, [768, 576], "x")] == [
+    assert [format_value(v) for v in (None, True, 3, 0.123456, [768, 576], "x")] == [
         "not known",
         "yes",
         "3",

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from airborne.export import ContactSheet
-from airborne.export.sheet import BACKGROUND_GREY, N_HELD, _cell
-from airborne.export.views import CELL_PX, ROOM, close_up
+from airborne.export.sheet import BACKGROUND_GREY, N_BUFFERED, _cell
+from airborne.export.views import CELL_PX, CROP_MARGIN, crop_camera
 from airborne.tracking import Status
 from tests.support.export_scenes import BALL, BOX, RIG, SCENE_GREY, camera, frames, posed
 
@@ -18,7 +18,7 @@ def shown_px(camera, position):
 @pytest.mark.parametrize("distance_m", [3.0, 12.0])
 @pytest.mark.parametrize("position", [(0, 0, 0), (0.3, 2.0, -0.2)])
 def test_the_body_has_one_size_in_all_cells_however_far_it_is(distance_m, position):
-    disc_px = np.pi / 4 * (CELL_PX / ROOM) ** 2
+    disc_px = np.pi / 4 * (CELL_PX / CROP_MARGIN) ** 2
     assert shown_px(camera(distance_m=distance_m), position) == pytest.approx(disc_px, rel=0.04)
 
 
@@ -34,7 +34,7 @@ def test_fields_and_whole_pictures_give_the_same_cell():
 
 
 def test_there_is_no_cell_behind_the_camera_or_without_a_view():
-    assert close_up(camera(), posed(BALL, (0, -10.0, 0))) is None
+    assert crop_camera(camera(), posed(BALL, (0, -10.0, 0))) is None
     assert _cell(None, camera(), posed()) is None
 
 
@@ -42,7 +42,7 @@ def test_memory_stays_flat_and_the_times_evenly_spaced(tmp_path):
     with ContactSheet(tmp_path / "sheet.png", RIG) as sheet:
         for i in range(150):
             sheet.write(frames(i), posed(BOX, (0.01 * i, 0, 0)), Status.TRACKED)
-            assert len(sheet._columns) <= N_HELD
+            assert len(sheet._columns) <= N_BUFFERED
         held = [int(column.title.split()[1]) for column in sheet._columns]
     assert held[0] == 0
     assert set(np.diff(held)) == {8}

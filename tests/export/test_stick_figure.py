@@ -6,13 +6,13 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
 from airborne.errors import ResultError
-from airborne.export.stick_figure import stick_figure
+from airborne.export.stick_figure import fit_stick_figure
 from tests.support.takes import LEGS, jumping
 from tests.support.tolerances import ROUNDTRIP
 
 
 def placed(figure, row):
-    R = Rotation.from_euler("XYZ", figure.turns[row])
+    R = Rotation.from_euler("XYZ", figure.root_angles[row])
     root = RigidTransform.from_components(figure.position[row], R)
     return figure.model.with_pose(Pose(world_from_root=root, joint_angles=figure.joint_angles[row]))
 
@@ -20,7 +20,7 @@ def placed(figure, row):
 @pytest.mark.parametrize("joints", [(*LEGS, "torso"), LEGS, LEGS[:6], (*LEGS[:6], "torso")])
 def test_its_pose_gives_the_joints_back(joints):
     motion = jumping(joints=joints)
-    figure = stick_figure(motion.points[:, 1], motion.joints)
+    figure = fit_stick_figure(motion.points[:, 1], motion.joints)
     names = [landmark.name for landmark in figure.model.landmarks]
     assert sorted(names) == sorted(name for name in joints if name != "torso")
     at = [joints.index(name) for name in names]
@@ -30,8 +30,8 @@ def test_its_pose_gives_the_joints_back(joints):
 
 def test_what_joint_centres_do_not_show_is_zero_and_locked():
     motion = jumping()
-    figure = stick_figure(motion.points[:, 0], motion.joints)
-    x, _, z = np.moveaxis(Rotation.from_euler("XYZ", figure.turns).as_matrix(), -1, 0)
+    figure = fit_stick_figure(motion.points[:, 0], motion.joints)
+    x, _, z = np.moveaxis(Rotation.from_euler("XYZ", figure.root_angles).as_matrix(), -1, 0)
     np.testing.assert_allclose(np.sum(np.cross(x, [0, 0, 1]) * z, axis=1), 0, atol=ROUNDTRIP)  # as vertical as it can
     assert (z[:, 2] > 0).all()
     for segment, angles in zip(figure.model.segments[1:], np.moveaxis(figure.joint_angles, 1, 0), strict=True):
@@ -42,7 +42,7 @@ def test_what_joint_centres_do_not_show_is_zero_and_locked():
 
 def test_the_torso_points_from_the_hips_to_its_joint():
     motion = jumping()
-    figure = stick_figure(motion.points[:, 0], motion.joints)
+    figure = fit_stick_figure(motion.points[:, 0], motion.joints)
     body = placed(figure, 3)
     up = body.R[figure.model.index_of("torso")] @ [0, 0, 1]
     seen = motion.points[3, 0, 8] - motion.points[3, 0, :2].mean(axis=0)
@@ -52,16 +52,16 @@ def test_the_torso_points_from_the_hips_to_its_joint():
 def test_a_person_at_attention_has_no_angle():
     heights = np.repeat([0.9, 0.5, 0.1], 2)
     points = np.stack([np.tile([0.1, -0.1], 3), np.zeros(6), heights], axis=-1)[None]
-    figure = stick_figure(points, LEGS[:6])
+    figure = fit_stick_figure(points, LEGS[:6])
     np.testing.assert_allclose(figure.joint_angles, 0, atol=ROUNDTRIP)
-    np.testing.assert_allclose(figure.turns, 0, atol=ROUNDTRIP)
+    np.testing.assert_allclose(figure.root_angles, 0, atol=ROUNDTRIP)
 
 
 def test_a_joint_that_is_not_known_leaves_the_rest_of_the_body_known():
     motion = jumping()
     points = motion.points[:, 0].copy()
     points[2, LEGS.index("knee_left")] = np.nan
-    figure = stick_figure(points, motion.joints)
+    figure = fit_stick_figure(points, motion.joints)
     names = [segment.name for segment in figure.model.segments[1:]]
     unknown = {name for name, angle in zip(names, figure.joint_angles[2], strict=True) if np.isnan(angle).any()}
     assert unknown == {"thigh_left", "shank_left", "foot_left"}
@@ -74,7 +74,7 @@ def test_lengths_are_medians_over_time():
     points = motion.points[:, 0].copy()
     down = points[:, 4] - points[:, 2]
     points[:, 4] += down * np.linspace(-0.1, 0.1, 9)[:, None]
-    figure = stick_figure(points, motion.joints)
+    figure = fit_stick_figure(points, motion.joints)
     foot = figure.model.segments[figure.model.index_of("foot_left")]
     np.testing.assert_allclose(np.linalg.norm(foot.joint_m), 0.42, atol=ROUNDTRIP)
 
@@ -84,6 +84,6 @@ def test_no_figure_without_legs():
     points = motion.points[:, 0].copy()
     points[:, 2] = np.nan
     with pytest.raises(ResultError, match="has no knee_left"):
-        stick_figure(points, motion.joints)
+        fit_stick_figure(points, motion.joints)
     with pytest.raises(ResultError, match="has no ankle_left, ankle_right"):
-        stick_figure(motion.points[:, 0, :4], motion.joints[:4])
+        fit_stick_figure(motion.points[:, 0, :4], motion.joints[:4])

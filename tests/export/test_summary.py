@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airborne.export import headline, warnings, write_json
-from airborne.export.summary import plain
+from airborne.export import body_warnings, headline, write_json
+from airborne.export.summary import json_ready
 from airborne.motion import Motion
 from tests.support.export_scenes import run
 from tests.support.tolerances import ROUNDTRIP
@@ -41,16 +41,16 @@ def test_only_lost_frames_between_poses_make_a_gap():
 
 @pytest.mark.parametrize("motion", [Motion.collect([]), run(3, lost=(0, 1, 2))], ids=["no frame", "all lost"])
 def test_a_run_without_poses_claims_no_number(motion):
-    head = plain(headline(motion))
+    head = json_ready(headline(motion))
     for key in ("somersault_rev", "twist_rev", "median_position_sd_mm", "median_rotation_sd_deg", "median_score"):
         assert head[key] is None
     assert head["range_m"] == [None] * 3
     assert head["tilt_range_deg"] == [None] * 2
-    assert "found in no frame" in " ".join(warnings(head))
+    assert "found in no frame" in " ".join(body_warnings(head))
 
 
 def test_a_sound_run_warns_of_nothing():
-    assert list(warnings(plain(headline(run())))) == []
+    assert list(body_warnings(json_ready(headline(run())))) == []
 
 
 @pytest.mark.parametrize(
@@ -63,12 +63,12 @@ def test_a_sound_run_warns_of_nothing():
     ],
 )
 def test_each_weakness_has_its_warning(kwargs, words):
-    assert words in " ".join(warnings(plain(headline(run(**kwargs)))))
+    assert words in " ".join(body_warnings(json_ready(headline(run(**kwargs)))))
 
 
 def test_unknown_spread_is_warned_of():
-    head = plain(headline(run())) | {"median_position_sd_mm": None}
-    assert "uncertainty of the position is not known" in " ".join(warnings(head))
+    head = json_ready(headline(run())) | {"median_position_sd_mm": None}
+    assert "uncertainty of the position is not known" in " ".join(body_warnings(head))
 
 
 def test_json_holds_null_for_what_is_not_a_number(tmp_path):

@@ -7,13 +7,13 @@ import pytest
 from pyarrow import csv
 
 from airborne.export.tables import body_columns, players_columns, write_csv, write_parquet
-from airborne.motion import flight, joint_angles, landmarks
+from airborne.motion import joint_angles, landmarks, measure_flight
 from tests.support.export_scenes import BOX, PERSON
 from tests.support.takes import jumping, tumbling
 
 
 def person_columns(motion):
-    table = flight(motion, PERSON)
+    table = measure_flight(motion, PERSON)
     com = table["com"].to_numpy(), table["com_sd"].to_numpy()
     return body_columns(motion, PERSON, *landmarks(motion, PERSON), com)
 
@@ -36,7 +36,7 @@ def test_a_row_holds_places_angles_and_the_centre_of_mass_with_their_deviations(
     angles = joint_angles(motion, PERSON).sel(joint="thigh_right", axis="y")
     np.testing.assert_array_equal(columns["thigh_right_y_deg"].values, angles["angle"])
     np.testing.assert_array_equal(columns["thigh_right_y_deg_sd"].values, angles["angle_sd"])
-    np.testing.assert_array_equal(columns["com_z_m"].values, flight(motion, PERSON)["com"].to_numpy()[:, 2])
+    np.testing.assert_array_equal(columns["com_z_m"].values, measure_flight(motion, PERSON)["com"].to_numpy()[:, 2])
     assert list(columns)[:5] == ["frame", "time_s", "status", "somersault_deg", "somersault_deg_sd"]
     assert all(name.endswith(("_m", "_deg", "_m_sd", "_deg_sd")) for name in list(columns)[3:])
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.errors import ResultError
-from airborne.export.takes import part_paths, plain_names, player_takes, rate_of, with_axis_markers
+from airborne.export.takes import part_paths, player_takes, portable_names, sampling_rate, with_axis_markers
 from tests.support.export_scenes import BOX, PERSON
 from tests.support.takes import NTSC, jumping, take_of, tumbling
 from tests.support.tolerances import EXACT, ROUNDTRIP
@@ -15,11 +15,13 @@ from tests.support.tolerances import EXACT, ROUNDTRIP
 @pytest.mark.parametrize("rate", [NTSC, Fraction(50), Fraction(24000, 1001), Fraction(25, 2), Fraction(240)])
 def test_the_rate_is_the_fraction_that_the_recording_had(rate):
     index = np.array([3, 4, 6, 900])
-    assert rate_of(index, np.array([float(i / rate) for i in index])) == rate
+    assert sampling_rate(index, np.array([float(i / rate) for i in index])) == rate
 
 
 def test_a_rate_that_is_no_simple_fraction_is_kept_as_it_is():
-    assert float(rate_of(np.array([0, 100]), np.array([0.0, 100 / 59.9512345]))) == pytest.approx(59.9512345, rel=EXACT)
+    assert float(sampling_rate(np.array([0, 100]), np.array([0.0, 100 / 59.9512345]))) == pytest.approx(
+        59.9512345, rel=EXACT
+    )
 
 
 def test_frames_that_the_run_left_out_are_gaps_at_their_times():
@@ -34,7 +36,7 @@ def test_frames_that_the_run_left_out_are_gaps_at_their_times():
     np.testing.assert_array_equal(take.has_pose, [True, True, False, False, True, True])
     np.testing.assert_array_equal(np.isfinite(take.points).all(axis=(1, 2)), take.has_pose)
     np.testing.assert_allclose(take.time_s, [float(i / NTSC) for i in range(6, 18, 2)], atol=ROUNDTRIP)
-    assert take.stray_s < ROUNDTRIP
+    assert take.jitter_s < ROUNDTRIP
     assert take.stretches() == [slice(0, 2), slice(4, 6)]
 
 
@@ -47,15 +49,15 @@ def test_lost_frames_at_both_ends_and_between_split_a_take():
 def test_turns_run_on_and_give_the_rotation_back():
     motion = tumbling(40, turns=3.0)
     take = take_of(motion, PERSON)
-    assert np.rad2deg(take.turns[-1, 0]) == pytest.approx(1080, abs=40)
-    assert np.abs(np.diff(take.turns, axis=0)).max() < np.pi / 2
+    assert np.rad2deg(take.root_angles[-1, 0]) == pytest.approx(1080, abs=40)
+    assert np.abs(np.diff(take.root_angles, axis=0)).max() < np.pi / 2
     np.testing.assert_allclose(take.R, motion.R, atol=ROUNDTRIP)
 
 
 def test_times_that_stray_from_the_beat_are_measured():
     motion = tumbling(5, rate=Fraction(50))
     motion.time_s[2] += 0.004
-    assert take_of(motion, PERSON).stray_s == pytest.approx(0.004)
+    assert take_of(motion, PERSON).jitter_s == pytest.approx(0.004)
 
 
 def test_a_body_known_by_its_origin_alone_gets_markers_on_its_axes_and_a_person_does_not():
@@ -68,7 +70,7 @@ def test_a_body_known_by_its_origin_alone_gets_markers_on_its_axes_and_a_person_
 
 
 def test_names_become_plain_and_stay_apart():
-    names = plain_names(["Jürgen Müller (7)", "hip_left", "a/b", "a b", "№", "", "x" * 300])
+    names = portable_names(["Jürgen Müller (7)", "hip_left", "a/b", "a b", "№", "", "x" * 300])
     assert names[:4] == ("Jurgen_Muller_7", "hip_left", "a_b", "a_b_2")
     assert len(set(names)) == len(names)
     assert all(0 < len(name) <= 62 and name.isascii() and " " not in name for name in names)

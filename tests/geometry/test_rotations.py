@@ -12,8 +12,8 @@ from airborne.geometry.rotations import (
     geodesic,
     is_near_singular,
     matrix_from_angles,
-    unwrapped,
-    wrapped,
+    unwrap,
+    wrap,
 )
 from tests.support.tolerances import EXACT, ROUNDTRIP, SOLVED
 
@@ -78,7 +78,7 @@ def test_unwrapped_steady_rotation_is_a_straight_line(rate, n):
     time_s = np.arange(n) * 1.0
     truth = np.stack([rate * time_s, 0.3 * np.sin(time_s), -rate * time_s], axis=-1)
     seen = angles_from_matrix(matrix_from_angles(truth))
-    np.testing.assert_allclose(unwrapped(seen, time_s), truth, atol=ROUNDTRIP)
+    np.testing.assert_allclose(unwrap(seen, time_s), truth, atol=ROUNDTRIP)
 
 
 def test_unwrapped_somersault_keeps_its_turns_over_a_long_gap():
@@ -86,7 +86,7 @@ def test_unwrapped_somersault_keeps_its_turns_over_a_long_gap():
     truth = np.stack([4 * np.pi * time_s, 0 * time_s, -6 * np.pi * time_s], axis=-1)
     seen = angles_from_matrix(matrix_from_angles(truth))
     seen[20:45] = np.nan  # half a second: one whole somersault unseen
-    result = unwrapped(seen, time_s)
+    result = unwrap(seen, time_s)
     np.testing.assert_allclose(result[:20], truth[:20], atol=ROUNDTRIP)
     np.testing.assert_allclose(result[45:], truth[45:], atol=ROUNDTRIP)
     assert np.isnan(result[20:45]).all()
@@ -95,7 +95,7 @@ def test_unwrapped_somersault_keeps_its_turns_over_a_long_gap():
 def test_unwrapping_changes_no_rotation_and_never_the_tilt():
     angles = random_angles((40,), seed=3)
     angles[[5, 6, 20]] = np.nan
-    result = unwrapped(angles, np.arange(40) / 50)
+    result = unwrap(angles, np.arange(40) / 50)
     np.testing.assert_array_equal(result[:, 1], angles[:, 1])
     np.testing.assert_allclose(matrix_from_angles(result), matrix_from_angles(angles), atol=ROUNDTRIP)
 
@@ -103,11 +103,11 @@ def test_unwrapping_changes_no_rotation_and_never_the_tilt():
 @pytest.mark.parametrize("rows", [0, 1])
 def test_unwrapping_one_row_or_none_leaves_it(rows):
     angles = random_angles((rows,))
-    np.testing.assert_array_equal(unwrapped(angles, np.zeros(rows)), angles)
+    np.testing.assert_array_equal(unwrap(angles, np.zeros(rows)), angles)
 
 
 def test_unwrapping_only_unknown_rows_leaves_them():
-    assert np.isnan(unwrapped(np.full((3, 3), np.nan), np.arange(3.0))).all()
+    assert np.isnan(unwrap(np.full((3, 3), np.nan), np.arange(3.0))).all()
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.3, 3.1, np.pi - 1e-9, np.pi])
@@ -133,7 +133,7 @@ def test_derivative_of_the_angles_is_the_finite_difference():
     columns = []
     for axis in np.eye(3):
         turned = [Rotation.from_rotvec(s * step * axis).as_matrix() @ R for s in (1, -1)]
-        columns.append(wrapped(angles_from_matrix(turned[0]) - angles_from_matrix(turned[1])) / (2 * step))
+        columns.append(wrap(angles_from_matrix(turned[0]) - angles_from_matrix(turned[1])) / (2 * step))
     np.testing.assert_allclose(angles_from_world_rotation(angles), np.stack(columns, axis=-1), atol=SOLVED)
 
 
@@ -146,7 +146,7 @@ def test_derivative_of_the_angles_is_unknown_near_the_singularity():
 @given(angle=st.floats(-100, 100))
 @settings(max_examples=100, deadline=None, derandomize=True)
 def test_wrapping_takes_away_whole_turns(angle):
-    result = float(wrapped(np.array(angle)))
+    result = float(wrap(np.array(angle)))
     assert -np.pi <= result < np.pi
     turns = (angle - result) / (2 * np.pi)
     assert turns == pytest.approx(round(turns), abs=ROUNDTRIP)

@@ -5,7 +5,7 @@ import tomllib
 
 import pytest
 
-from airborne.io.text import parsed_toml, read_json, read_toml
+from airborne.io.text import parse_toml, read_json, read_toml
 
 
 def test_plain_files_are_read(tmp_path):
@@ -19,7 +19,7 @@ def test_plain_files_are_read(tmp_path):
 def test_odd_toml_is_broken_toml_and_soon(text):
     before = time.process_time()
     with pytest.raises(tomllib.TOMLDecodeError):
-        parsed_toml(text)
+        parse_toml(text)
     assert time.process_time() - before < 2
 
 
@@ -32,4 +32,4 @@ def test_odd_json_is_a_value_error(tmp_path, text):
 
 def test_many_numbers_with_points_are_no_deep_key():
     row = ", ".join(["1.5"] * 10_000)
-    assert len(parsed_toml(f"a = [{row}]")["a"]) == 10_000
+    assert len(parse_toml(f"a = [{row}]")["a"]) == 10_000

@@ -13,7 +13,7 @@ from airborne.body import BodyModel, Box, Part, Pose, Segment
 from airborne.geometry.rotations import angles_from_matrix
 from airborne.motion import (
     Motion,
-    angles,
+    root_angles,
     write_angles,
     write_flight,
     write_joint_angles,
@@ -39,7 +39,7 @@ def jointed_body():
 
 def test_angles_of_a_steady_somersault_run_on_past_half_a_turn():
     estimates, truth = somersault(turns=2.0)
-    table = angles(Motion.collect(estimates))
+    table = root_angles(Motion.collect(estimates))
     for k, name in enumerate(("somersault", "tilt", "twist")):
         np.testing.assert_allclose(table[name], np.rad2deg(truth[:, k]), atol=1e3 * ROUNDTRIP)
         assert table[name].attrs["units"] == "deg"
@@ -49,7 +49,7 @@ def test_angles_run_on_over_lost_frames():
     estimates, truth = somersault()
     for i in range(10, 16):
         estimates[i] = replace(estimates[i], status=Status.LOST, pose=None, covariance=None)
-    table = angles(Motion.collect(estimates))
+    table = root_angles(Motion.collect(estimates))
     assert np.isnan(table["somersault"][10:16]).all()
     np.testing.assert_allclose(table["somersault"][16:], np.rad2deg(truth[16:, 0]), atol=1e3 * ROUNDTRIP)
 
@@ -57,7 +57,7 @@ def test_angles_run_on_over_lost_frames():
 def test_angle_deviations_are_those_of_sampled_rotations():
     item = estimate(2)
     covariance = item.covariance * 1e-3
-    table = angles(Motion.collect([replace(item, covariance=covariance)]))
+    table = root_angles(Motion.collect([replace(item, covariance=covariance)]))
     n = 20000
     vectors = np.random.default_rng(0).multivariate_normal(np.zeros(3), covariance[3:, 3:], size=n)
     R = item.pose.world_from_root.rotation.as_matrix()
@@ -70,7 +70,7 @@ def test_angle_deviations_are_those_of_sampled_rotations():
 def test_angle_deviations_are_unknown_where_the_covariance_is_infinite_or_missing():
     blind = estimate(0)
     blind.covariance[4, 4] = np.inf
-    table = angles(Motion.collect([blind, estimate(1, covariance=False), estimate(2)]))
+    table = root_angles(Motion.collect([blind, estimate(1, covariance=False), estimate(2)]))
     assert np.isnan(table["twist_sd"]).to_numpy().tolist() == [True, True, False]
 
 

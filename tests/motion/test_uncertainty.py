@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.motion.uncertainty import deviation, variances
+from airborne.motion.uncertainty import propagate_variances, standard_deviation
 from tests.support.tolerances import EXACT
 
 RNG = np.random.default_rng(0)
@@ -13,7 +13,7 @@ COVARIANCE = ROOT @ ROOT.T
 
 def test_variances_are_the_diagonal_of_j_c_jt():
     expected = np.diagonal(JACOBIAN @ COVARIANCE @ np.swapaxes(JACOBIAN, -1, -2), axis1=-2, axis2=-1)
-    np.testing.assert_allclose(variances(JACOBIAN, COVARIANCE), expected, rtol=EXACT * 10)
+    np.testing.assert_allclose(propagate_variances(JACOBIAN, COVARIANCE), expected, rtol=EXACT * 10)
 
 
 @pytest.mark.parametrize("odd", [np.inf, np.nan])
@@ -23,18 +23,20 @@ def test_unseen_or_unknown_direction_counts_only_for_what_moves_with_it(odd):
     covariance[2, 2] = odd
     jacobian = JACOBIAN.copy()
     jacobian[0, :, 2] = 1e-17  # a rounding error, no motion
-    found = variances(jacobian, covariance)
+    found = propagate_variances(jacobian, covariance)
     seen = [0, 1, 3, 4, 5]
-    np.testing.assert_allclose(found[0], variances(jacobian[..., seen], COVARIANCE[np.ix_(seen, seen)])[0])
+    np.testing.assert_allclose(found[0], propagate_variances(jacobian[..., seen], COVARIANCE[np.ix_(seen, seen)])[0])
     np.testing.assert_array_equal(found[1:], np.full((2, 4), odd))
 
 
 def test_unknown_correlations_leave_what_rests_on_them_unknown():
     covariance = COVARIANCE.copy()
     covariance[0, 1] = covariance[1, 0] = np.nan
-    found = variances(np.array([[1.0, 1, 0, 0, 0, 0], [1, 0, 1, 0, 0, 0]]), covariance)
+    found = propagate_variances(np.array([[1.0, 1, 0, 0, 0, 0], [1, 0, 1, 0, 0, 0]]), covariance)
     assert np.isnan(found).tolist() == [True, False]
 
 
 def test_negative_variance_is_an_unknown_deviation():
-    np.testing.assert_array_equal(deviation(np.array([4.0, -1.0, np.inf, np.nan])), [2.0, np.nan, np.inf, np.nan])
+    np.testing.assert_array_equal(
+        standard_deviation(np.array([4.0, -1.0, np.inf, np.nan])), [2.0, np.nan, np.inf, np.nan]
+    )

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Pose, Segment, geometry
+from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Pose, Segment, surface_arrays
 from airborne.cameras import Camera
 from airborne.errors import CalibrationError
 from airborne.rendering import FLAT, render, render_reference
@@ -32,7 +32,7 @@ def one_part(shape, position=(0.0, 0.0, 0.0), rotation=None) -> BodyModel:
 
 
 def at_origin(model: BodyModel):
-    return geometry(model), model.with_pose(Pose(world_from_root=RigidTransform.identity()))
+    return surface_arrays(model), model.with_pose(Pose(world_from_root=RigidTransform.identity()))
 
 
 def axis_camera(size=(81, 61), focal=100.0) -> Camera:
@@ -64,14 +64,14 @@ def test_maps_equal_rays_where_the_image_edge_cuts_the_body(kinds, corner):
     shapes, posed = posed_random(kinds, 3)
     v, u = np.nonzero(render(shapes, posed, camera(), FLAT).mask)
     offset = (int(np.median(u)) - corner[0], int(np.median(v)) - corner[1])  # a corner lies in the body's middle
-    cropped = camera().resampled(scale=(1, 1), offset=offset, size=(21, 19))
+    cropped = camera().resample(scale=(1, 1), offset=offset, size=(21, 19))
     cast = render_reference(shapes, posed, cropped, LIGHTS)
     assert cast.mask[corner[1]].any() and cast.mask[:, corner[0]].any()
     assert_same_maps(render(shapes, posed, cropped, LIGHTS), cast)
 
 
-def test_every_kind_of_shape_hides_every_other():
-    hidden = set()
+def test_every_kind_of_shape_occludes_every_other():
+    occlusions = set()
     for seed in range(8):
         shapes, posed = posed_random(KINDS["a mixture"], seed)
         whole = render(shapes, posed, camera(), FLAT)
@@ -92,8 +92,8 @@ def test_every_kind_of_shape_hides_every_other():
                 FLAT,
             )
             covering = whole.part[(alone.part == part) & (whole.part != part)]
-            hidden |= {(kinds[other], kinds[part]) for other in np.unique(covering)}
-    assert hidden == {(a, b) for a in ("ellipsoid", "polygon") for b in ("ellipsoid", "polygon")}
+            occlusions |= {(kinds[other], kinds[part]) for other in np.unique(covering)}
+    assert occlusions == {(a, b) for a in ("ellipsoid", "polygon") for b in ("ellipsoid", "polygon")}
 
 
 @pytest.mark.parametrize("centre", [(0.0, 0.0, 5.0), (0.8, -0.5, 4.0), (-1.0, 0.9, 3.0)])
@@ -157,10 +157,10 @@ def test_slabs_of_one_ellipsoid_cover_it_without_a_gap_each_where_its_heights_ar
     v, u = np.nonzero(drawn.mask)
     hits = np.stack([(u - 40) / 100, (v - 30) / 100, np.ones(len(u))], axis=1) / drawn.inverse_depth[v, u][:, None]
     height = cut.model.parts[0].segment_from_part.inv().apply(hits)[:, 2]
-    found = np.searchsorted(heights, height)
+    slab = np.searchsorted(heights, height)
     is_clear = np.abs(height[:, None] - heights).min(axis=1) > 1e-4  # float32 depths place the rest on either side
-    assert np.array_equal(drawn.part[v, u][is_clear], found[is_clear])
-    assert len(np.unique(found)) >= 2
+    assert np.array_equal(drawn.part[v, u][is_clear], slab[is_clear])
+    assert len(np.unique(slab)) >= 2
 
 
 def test_a_slab_seen_along_its_axis_is_a_disc_or_a_ring():
@@ -168,7 +168,7 @@ def test_a_slab_seen_along_its_axis_is_a_disc_or_a_ring():
     ball = one_part(Ellipsoid(np.full(3, 0.5)), (0.0, 0.0, 4.0), upside_down)
     row = render(*at_origin(cut_at(ball, [-0.2, 0.2, 0.4])), axis_camera(focal=300.0), FLAT).part[30]
     runs = row[np.append(True, np.diff(row) != 0)]
-    assert list(runs[runs >= 0]) == [1, 2, 3, 2, 1]  # the lowest part is hidden by the ellipsoid itself
+    assert list(runs[runs >= 0]) == [1, 2, 3, 2, 1]  # the lowest part is occluded by the ellipsoid itself
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 90.0, 31.0])

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airborne.body import geometry
+from airborne.body import surface_arrays
 from airborne.rendering import FLAT, evidence_maps, mask_evidence, render
-from airborne.rendering.reduction import reduced, reduced_camera
+from airborne.rendering.reduction import reduce_camera, reduce_image
 from tests.support.bodies import batch, camera, in_slabs, random_body
 
 CAMERAS = [camera("a"), camera("b", turn=2.0, size=(77, 90))]
@@ -19,24 +19,24 @@ SUM = 5e-2  # nats, of sums over hundreds of pixels in float32
 @pytest.mark.parametrize("scale", [1, 2])
 def test_evidence_is_the_sum_over_the_drawn_mask_each_pixel_once(kinds, scale):
     model = random_body(kinds, np.random.default_rng(3))
-    shapes, (R, t) = geometry(model), batch(model, 6, 4)
-    gathered = mask_evidence(shapes, evidence_maps(CAMERAS, MAPS, scale=scale), R, t)
-    for hypothesis, R_h, t_h in zip(gathered, R, t, strict=True):
+    shapes, (R, t) = surface_arrays(model), batch(model, 6, 4)
+    evidence = mask_evidence(shapes, evidence_maps(CAMERAS, MAPS, scale=scale), R, t)
+    for hypothesis, R_h, t_h in zip(evidence, R, t, strict=True):
         body = type("Body", (), {"R": R_h, "t": t_h})
         for total, seen_by, plane in zip(hypothesis, CAMERAS, MAPS, strict=True):
-            mask = render(shapes, body, reduced_camera(seen_by, scale), FLAT).mask  # type: ignore[arg-type]
+            mask = render(shapes, body, reduce_camera(seen_by, scale), FLAT).mask  # type: ignore[arg-type]
             assert mask.sum() > 50
-            assert total == pytest.approx(reduced(plane, scale)[mask].sum(dtype=float), abs=SUM)
+            assert total == pytest.approx(reduce_image(plane, scale)[mask].sum(dtype=float), abs=SUM)
 
 
-def test_an_ellipsoid_in_two_colours_gathers_as_much_as_in_one():
+def test_an_ellipsoid_in_two_colours_has_as_much_evidence_as_in_one():
     model = random_body(["ellipsoid"] * 4, np.random.default_rng(1))
     segments = [
         replace(s, parts=tuple(piece for each in s.parts for piece in in_slabs(each, [-0.07, 0.04])))
         for s in model.segments
     ]
     (R, t), maps = batch(model, 6, 5), evidence_maps(CAMERAS, MAPS)
-    one, two = (mask_evidence(geometry(m), maps, R, t) for m in (model, replace(model, segments=tuple(segments))))
+    one, two = (mask_evidence(surface_arrays(m), maps, R, t) for m in (model, replace(model, segments=tuple(segments))))
     assert np.abs(one).max() > 10
     np.testing.assert_allclose(two, one, atol=SUM)
 

@@ -2,7 +2,7 @@ import numpy as np
 
 from airborne.rendering import FLAT, render
 from airborne.rendering.maps import empty_maps, surface_maps
-from airborne.rendering.packing import packed_view
+from airborne.rendering.packing import pack_view
 from airborne.rendering.shapes import new_shapes
 from tests.support.bodies import camera, posed_random
 from tests.support.tolerances import SOLVED
@@ -12,17 +12,17 @@ def test_surface_maps_are_the_rendering_with_normals_that_point_at_the_camera():
     shapes, posed = posed_random(["ellipsoid", "box", "mesh", "slab"], 1)
     seen_by = camera(turn=0.7)
     part, inverse_depth, normals = empty_maps(seen_by.size)
-    surface_maps(new_shapes(shapes), shapes, posed.R, posed.t, packed_view(seen_by), part, inverse_depth, normals)
+    surface_maps(new_shapes(shapes), shapes, posed.R, posed.t, pack_view(seen_by), part, inverse_depth, normals)
     drawn = render(shapes, posed, seen_by, FLAT)
     assert np.array_equal(part, drawn.part)
     is_flat = np.isin(part, [1, 2])  # the box and the mesh
     assert is_flat.any()
     assert np.array_equal(inverse_depth[is_flat], drawn.inverse_depth[is_flat])
-    is_round = np.isin(part, [0, 3])  # the outline lies behind what is seen
+    is_round = np.isin(part, [0, 3])  # the outline lies behind the visible surface
     assert np.all(inverse_depth[is_round] <= drawn.inverse_depth[is_round] + 1e-6)
     assert np.all(inverse_depth[is_round] > 0)
     v, u = np.nonzero(drawn.mask)
     rays = np.stack([u, v, np.ones_like(u)], axis=1) @ np.linalg.inv(seen_by.K).T
-    seen = normals[:, v, u].T
-    np.testing.assert_allclose(np.linalg.norm(seen, axis=1), 1, rtol=SOLVED)
-    assert np.all(np.sum(seen * rays, axis=1) < 1e-3)
+    visible = normals[:, v, u].T
+    np.testing.assert_allclose(np.linalg.norm(visible, axis=1), 1, rtol=SOLVED)
+    assert np.all(np.sum(visible * rays, axis=1) < 1e-3)

@@ -1,20 +1,20 @@
 import numpy as np
 import pytest
 
-from airborne.body import Geometry, PosedBody, geometry
+from airborne.body import PosedBody, SurfaceArrays, surface_arrays
 from airborne.rendering import (
     FLAT,
     RULES,
     ScoreRule,
+    colour_sums,
     mask_evidence,
-    measure,
+    pack_targets,
     render,
     render_reference,
     score,
     scores_from_sums,
-    targets,
 )
-from airborne.rendering.reduction import reduced, reduced_camera
+from airborne.rendering.reduction import reduce_camera, reduce_image
 from airborne.rendering.scores import GAINS, MISSED_GREY
 from airborne.video import View
 from tests.support.bodies import LIGHTS, batch, camera, noise_view, posed_random, random_body
@@ -26,8 +26,8 @@ VIEWS = [noise_view(c, i) for i, c in enumerate(CAMERAS)]
 MIXTURE = ["ellipsoid", "box", "mesh", "ellipsoid", "box"]
 
 
-def pixels(shapes: Geometry, posed: PosedBody, views=VIEWS, lights=LIGHTS):
-    """What each view shows through the body's mask, and the model there: pairs of (pixels, 3)."""
+def pixels(shapes: SurfaceArrays, posed: PosedBody, views=VIEWS, lights=LIGHTS):
+    """What each view shows inside the body's mask, and the model there: pairs of (pixels, 3)."""
     pairs = []
     for view in views:
         cast = render_reference(shapes, posed, view.camera, lights)
@@ -40,28 +40,28 @@ def chroma(rgb):
 
 
 def one(shapes, posed, rule=RULES["raw"], views=VIEWS, lights=LIGHTS, **options):
-    return score(shapes, targets(views, lights, **options), posed.R[None], posed.t[None], rule)[0]
+    return score(shapes, pack_targets(views, lights, **options), posed.R[None], posed.t[None], rule=rule)[0]
 
 
 @pytest.mark.parametrize("kinds", [["ellipsoid"] * 5, ["box"] * 3, ["mesh"] * 3, MIXTURE], ids=lambda k: k[0])
 @pytest.mark.parametrize("seed", range(3))
 def test_raw_score_is_the_rms_over_the_mask_by_rays(kinds, seed):
     shapes, posed = posed_random(kinds, seed)
-    seen, model, _ = (np.concatenate(column) for column in zip(*pixels(shapes, posed), strict=True))
-    assert one(shapes, posed) == pytest.approx(np.sqrt(np.mean((seen - model) ** 2)), abs=GREY)
+    observed, model, _ = (np.concatenate(column) for column in zip(*pixels(shapes, posed), strict=True))
+    assert one(shapes, posed) == pytest.approx(np.sqrt(np.mean((observed - model) ** 2)), abs=GREY)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_normalised_score_is_the_rms_of_chromaticities_of_pixels_that_are_not_dark(seed):
     shapes, posed = posed_random(MIXTURE, seed)
-    seen, _, colour = (np.concatenate(column) for column in zip(*pixels(shapes, posed), strict=True))
-    bright = (seen.sum(axis=1) >= 30) & (colour.sum(axis=1) >= 30)
+    observed, _, colour = (np.concatenate(column) for column in zip(*pixels(shapes, posed), strict=True))
+    bright = (observed.sum(axis=1) >= 30) & (colour.sum(axis=1) >= 30)
     assert not bright.all()
-    expected = np.sqrt(np.mean((chroma(seen[bright]) - chroma(colour[bright])) ** 2))
+    expected = np.sqrt(np.mean((chroma(observed[bright]) - chroma(colour[bright])) ** 2))
     assert one(shapes, posed, RULES["normalised"]) == pytest.approx(expected, abs=GREY)
 
 
-def test_normalised_score_does_not_see_brightness():
+def test_normalised_score_does_not_depend_on_brightness():
     shapes, posed = posed_random(MIXTURE, 1)
     dim = [View(v.camera, (v.rgb // 10 * 4 + 12).astype(np.uint8)) for v in VIEWS]
     bright = [View(v.camera, 2 * v.rgb) for v in dim]
@@ -79,7 +79,7 @@ def test_blend_is_the_weighted_sum_of_both():
 
 def test_pooling_by_views_weighs_each_view_the_same():
     shapes, posed = posed_random(MIXTURE, 4)
-    per_view = [np.sqrt(np.mean((seen - model) ** 2)) for seen, model, _ in pixels(shapes, posed)]
+    per_view = [np.sqrt(np.mean((observed - model) ** 2)) for observed, model, _ in pixels(shapes, posed)]
     assert abs(per_view[0] - per_view[1]) > 1
     assert one(shapes, posed, ScoreRule(pool="views")) == pytest.approx(np.mean(per_view), abs=GREY)
 
@@ -87,14 +87,14 @@ def test_pooling_by_views_weighs_each_view_the_same():
 def test_fitted_gain_is_the_least_squares_gain_of_each_view_within_its_bounds():
     shapes, posed = posed_random(MIXTURE, 5)
     errors, count = 0.0, 0
-    for seen, model, _ in pixels(shapes, posed):
-        gain = np.linalg.lstsq(model.reshape(-1, 1), seen.ravel(), rcond=None)[0][0]
+    for observed, model, _ in pixels(shapes, posed):
+        gain = np.linalg.lstsq(model.reshape(-1, 1), observed.ravel(), rcond=None)[0][0]
         gain = np.clip(gain, *GAINS)
-        errors, count = errors + np.sum((seen - gain * model) ** 2), count + seen.size
+        errors, count = errors + np.sum((observed - gain * model) ** 2), count + observed.size
     assert one(shapes, posed, ScoreRule(fits_gain=True)) == pytest.approx(np.sqrt(errors / count), abs=GREY)
 
 
-def test_the_drawn_pose_scores_best_and_a_gain_mends_its_brightness():
+def test_the_drawn_pose_scores_best_and_a_gain_corrects_its_brightness():
     shapes, posed = posed_random(MIXTURE, 6)
     views = [View(c, np.rint(render_reference(shapes, posed, c, LIGHTS).colour / 2).astype(np.uint8)) for c in CAMERAS]
     assert one(shapes, posed, ScoreRule(fits_gain=True), views) < 0.4
@@ -106,11 +106,11 @@ def test_union_adds_the_foreground_outside_the_mask():
     rng = np.random.default_rng(0)
     evidence = [rng.normal(-1, 1, v.rgb.shape[:2]) for v in VIEWS]
     errors, count = 0.0, 0
-    for view, plane, (seen, model, _) in zip(VIEWS, evidence, pixels(shapes, posed), strict=True):
+    for view, plane, (observed, model, _) in zip(VIEWS, evidence, pixels(shapes, posed), strict=True):
         missed = np.sum((plane > 0) & ~render_reference(shapes, posed, view.camera, FLAT).mask)
         assert missed > 100
-        errors += np.sum((seen - model) ** 2) + 3 * missed * MISSED_GREY**2
-        count += seen.size + 3 * missed
+        errors += np.sum((observed - model) ** 2) + 3 * missed * MISSED_GREY**2
+        count += observed.size + 3 * missed
     assert one(shapes, posed, RULES["union"], evidence=evidence) == pytest.approx(np.sqrt(errors / count), abs=GREY)
 
 
@@ -128,47 +128,49 @@ def test_views_that_do_not_exist_are_left_out():
 
 def test_a_batch_scores_what_its_members_score_alone():
     model = random_body(MIXTURE, np.random.default_rng(0))
-    shapes, target = geometry(model), targets(VIEWS, LIGHTS)
+    shapes, target = surface_arrays(model), pack_targets(VIEWS, LIGHTS)
     R, t = batch(model, 7, 1)
-    alone = [score(shapes, target, R[i : i + 1], t[i : i + 1], RULES["blend"])[0] for i in range(7)]
-    assert np.array_equal(score(shapes, target, R, t, RULES["blend"]), alone)
+    alone = [score(shapes, target, R[i : i + 1], t[i : i + 1], rule=RULES["blend"])[0] for i in range(7)]
+    assert np.array_equal(score(shapes, target, R, t, rule=RULES["blend"]), alone)
 
 
 @pytest.mark.parametrize("threads", [2, 3, 20])
 def test_the_number_of_threads_changes_no_bit(threads):
     model = random_body(MIXTURE, np.random.default_rng(0))
-    shapes = geometry(model)
-    target = targets(VIEWS, LIGHTS, evidence=[v.rgb[..., 0] - 128.0 for v in VIEWS])
+    shapes = surface_arrays(model)
+    target = pack_targets(VIEWS, LIGHTS, evidence=[v.rgb[..., 0] - 128.0 for v in VIEWS])
     R, t = batch(model, 11, 2)
     rule = ScoreRule(normalised=0.5, counts_missed=True)
-    assert np.array_equal(score(shapes, target, R, t, rule), score(shapes, target, R, t, rule, threads=threads))
+    assert np.array_equal(
+        score(shapes, target, R, t, rule=rule), score(shapes, target, R, t, rule=rule, threads=threads)
+    )
     assert target.foreground is not None
     single = mask_evidence(shapes, target.foreground, R, t)
     assert np.array_equal(single, mask_evidence(shapes, target.foreground, R, t, threads=threads))
 
 
 @pytest.mark.parametrize("scale", [2, 4])
-def test_a_reduced_target_is_the_reduced_picture_seen_by_its_own_camera(scale):
+def test_a_reduced_target_is_the_reduced_image_of_its_own_camera(scale):
     shapes, posed = posed_random(MIXTURE, 3)
-    small = [View(reduced_camera(v.camera, scale), reduced(v.rgb, scale)) for v in VIEWS]
+    small = [View(reduce_camera(v.camera, scale), reduce_image(v.rgb, scale)) for v in VIEWS]
     assert small[0].camera.size == (90 // scale, 70 // scale)
     assert one(shapes, posed, scale=scale) == pytest.approx(one(shapes, posed, views=small), abs=GREY)
-    seen, model, _ = (np.concatenate(column) for column in zip(*pixels(shapes, posed, small), strict=True))
-    assert one(shapes, posed, scale=scale) == pytest.approx(np.sqrt(np.mean((seen - model) ** 2)), abs=GREY)
+    observed, model, _ = (np.concatenate(column) for column in zip(*pixels(shapes, posed, small), strict=True))
+    assert one(shapes, posed, scale=scale) == pytest.approx(np.sqrt(np.mean((observed - model) ** 2)), abs=GREY)
 
 
 @pytest.mark.parametrize("scale", [2, 4])
-def test_a_reduced_pixel_looks_at_the_middle_of_the_pixels_it_averages(scale):
+def test_a_reduced_pixel_is_centred_at_the_middle_of_the_pixels_it_averages(scale):
     image = np.arange(64 * 48, dtype=np.float32).reshape(48, 64)
-    np.testing.assert_allclose(reduced(image, scale)[1, 2], image[scale : 2 * scale, 2 * scale : 3 * scale].mean())
+    np.testing.assert_allclose(reduce_image(image, scale)[1, 2], image[scale : 2 * scale, 2 * scale : 3 * scale].mean())
     point = np.array([0.3, -0.2, 0.4])
-    full, small = camera().px_from_world(point), reduced_camera(camera(), scale).px_from_world(point)
+    full, small = camera().px_from_world(point), reduce_camera(camera(), scale).px_from_world(point)
     np.testing.assert_allclose(full, scale * small + (scale - 1) / 2, rtol=SOLVED)
 
 
 def test_sums_over_the_mask_count_its_pixels():
     shapes, posed = posed_random(MIXTURE, 1)
-    target = targets(VIEWS, LIGHTS)
-    sums = measure(shapes, target, posed.R[None], posed.t[None], with_chroma=False)
+    target = pack_targets(VIEWS, LIGHTS)
+    sums = colour_sums(shapes, target, posed.R[None], posed.t[None], with_chroma=False)
     assert sums[0, :, 0].tolist() == [render(shapes, posed, c, FLAT).mask.sum() for c in CAMERAS]
     assert np.isfinite(scores_from_sums(sums, RULES["raw"])).all()

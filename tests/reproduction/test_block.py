@@ -12,12 +12,12 @@ from airborne import cli
 from airborne.errors import ResultError, TrialError
 from airborne.reproduction.block import experiment, plan, tracking
 from airborne.reproduction.block import takes as takes_module
-from airborne.reproduction.block.experiment import describe, reproduce_blockjump
-from airborne.reproduction.block.plan import FULL, PAPER, PARTS, QUICK, Plan, Run, Take
+from airborne.reproduction.block.experiment import describe_blockjump, reproduce_blockjump
+from airborne.reproduction.block.plan import FULL, PAPER_PARTS, PAPER_SUCCESS, QUICK, BlockRun, BlockTake, Plan
 from airborne.reproduction.block.table import markdown
 from airborne.reproduction.block.takes import do_takes
-from airborne.reproduction.block.tracking import hand_set, track_scene, true_motion
-from airborne.synthetic import block_scene, frames_of, starts_of
+from airborne.reproduction.block.tracking import hand_set_starts, track_scene, true_motion
+from airborne.synthetic import block_frames, block_scene, noisy_starts
 from airborne.tracking.particle import LegsSettings, legs_tracker
 from tests.support.tolerances import EXACT, sampled
 
@@ -36,23 +36,23 @@ TINY = Plan(
 @pytest.fixture(scope="module")
 def scene():
     """Two blockers, a spiker and one more, four frames."""
-    drawn = block_scene(1011, n_blockers=2, n_frames=75)
-    return replace(drawn, players=drawn.players[:4], n_frames=SHORT)
+    scene = block_scene(1011, n_blockers=2, n_frames=75)
+    return replace(scene, players=scene.players[:4], n_frames=SHORT)
 
 
 @pytest.fixture(scope="module")
-def pictures(scene):
-    """The scene's frames, recorded once."""
-    return list(frames_of(scene))
+def all_frames(scene):
+    """The scene's frames, rendered once."""
+    return list(block_frames(scene))
 
 
 @pytest.fixture(scope="module")
-def tiny(scene, pictures):
+def tiny(scene, all_frames):
     """Plans whose sequences are four frames of one scene, as a context for `reproduce_blockjump`."""
     patch = pytest.MonkeyPatch()
-    patch.setattr(tracking, "frames_of", lambda _: iter(pictures))
+    patch.setattr(tracking, "block_frames", lambda _: iter(all_frames))
     patch.setattr(experiment, "QUICK", TINY)
-    patch.setattr(Take, "scene", lambda _: scene)
+    patch.setattr(BlockTake, "scene", lambda _: scene)
     patch.setattr(plan, "paper_lengths", lambda _: (np.full(22, SHORT), np.full(22, 2)))
     yield
     patch.undo()
@@ -60,10 +60,10 @@ def tiny(scene, pictures):
 
 @pytest.fixture(scope="module")
 def done(tiny, tmp_path_factory):
-    """A folder with a finished run, what it told of its progress, and its summary."""
-    folder, told = tmp_path_factory.mktemp("block") / "out", []
-    summary = reproduce_blockjump(folder, True, lambda *now: told.append(now), n_processes=1)
-    return folder, told, summary
+    """A folder with a finished run, its reports of progress, and its summary."""
+    folder, reports = tmp_path_factory.mktemp("block") / "out", []
+    summary = reproduce_blockjump(folder, True, lambda *now: reports.append(now), n_processes=1)
+    return folder, reports, summary
 
 
 def test_full_form_is_the_papers_22_sequences_with_1798_frames_and_five_of_several_blockers():
@@ -74,7 +74,7 @@ def test_full_form_is_the_papers_22_sequences_with_1798_frames_and_five_of_sever
     assert sorted(take.number for take in takes) == list(range(22))
     for take in takes:
         assert {run.seed for run in take.runs if run.method == "blocker"} == set(range(5))
-        assert {run.method for run in take.runs} == {*PAPER, "blocker"}
+        assert {run.method for run in take.runs} == {*PAPER_SUCCESS, "blocker"}
         assert len({run.key for run in take.runs}) == len(take.runs)
 
 
@@ -90,9 +90,9 @@ def test_quick_form_has_a_sequence_with_one_and_one_with_two_blockers():
     assert sorted(take.n_blockers for take in QUICK.takes()) == [1, 2]
 
 
-def test_seed_moves_what_is_set_by_hand_and_nothing_else(scene):
-    own = {name: joints["hip_left"] for name, joints in starts_of(scene).items() if "hip_left" in joints}
-    starts = [hand_set(scene, seed) for seed in range(20)]
+def test_seed_perturbs_the_hand_set_joints_and_nothing_else(scene):
+    own = {name: joints["hip_left"] for name, joints in noisy_starts(scene).items() if "hip_left" in joints}
+    starts = [hand_set_starts(scene, seed) for seed in range(20)]
     for start in starts[0]:
         if start.name in own:
             np.testing.assert_array_equal(start.joints_m["hip_left"], own[start.name])
@@ -104,15 +104,15 @@ def test_seed_moves_what_is_set_by_hand_and_nothing_else(scene):
     assert errors.std() == pytest.approx(sd_m, rel=sampled(errors.size))
 
 
-def test_torsos_tracked_once_for_three_filters_are_those_that_each_would_track_for_itself(scene, pictures, tiny):
-    runs = [Run(method=method, seed=3, n_particles=50) for method in PAPER]
+def test_torsos_tracked_once_for_three_filters_are_those_that_each_would_track_for_itself(scene, all_frames, tiny):
+    runs = [BlockRun(method=method, seed=3, n_particles=50) for method in PAPER_SUCCESS]
     frames = []
     shared = track_scene(scene, runs, lambda: frames.append(1))
     assert len(frames) == SHORT
     settings = LegsSettings(method="mixture", seed=3, n_particles=50)
-    tracker = legs_tracker(settings, scene.calibrated, hand_set(scene, 3))
+    tracker = legs_tracker(settings, scene.calibrated_rig, hand_set_starts(scene, 3))
     state, alone = tracker.init(), []
-    for each in pictures:
+    for each in all_frames:
         state, estimates = tracker.step(state, each)
         alone.append([estimate.points for estimate in estimates])
     np.testing.assert_array_equal(shared.motions[runs[1]].points, alone)
@@ -121,41 +121,41 @@ def test_torsos_tracked_once_for_three_filters_are_those_that_each_would_track_f
 def test_true_motion_has_every_player_with_blockers_first(scene):
     truth = true_motion(scene)
     assert truth.players == tuple(player.name for player in scene.players)
-    assert truth.joints[: len(PARTS)] == PARTS
+    assert truth.joints[: len(PAPER_PARTS)] == PAPER_PARTS
     thigh_m = np.linalg.norm(truth.points[:, :, 0] - truth.points[:, :, 2], axis=-1)
     np.testing.assert_allclose(thigh_m, np.broadcast_to(thigh_m[0], thigh_m.shape), atol=1e-9)
 
 
 def test_run_leaves_its_files_and_says_the_same_in_each(done):
-    folder, told, summary = done
-    assert told == [(k + 1, 2 * SHORT) for k in range(2 * SHORT)]
+    folder, reports, summary = done
+    assert reports == [(k + 1, 2 * SHORT) for k in range(2 * SHORT)]
     left = {path.name for path in folder.iterdir()}
     figures = {"success.png", "worst.png", "sweep.png"}
     assert left == {"plan.json", "sequences", "table1.csv", "table.md", "summary.json", *figures}
     for name in figures:
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
     assert {path.name for path in (folder / "sequences").iterdir()} == {"11.json", "11.npz", "21.json", "21.npz"}
-    kept = json.loads((folder / "summary.json").read_text())
+    stored = json.loads((folder / "summary.json").read_text())
     rows = list(csv.DictReader((folder / "table1.csv").read_text().splitlines()))
-    assert len(rows) == 6 * len(PARTS)
-    told = [float(row["success_percent"]) for row in rows if row["row"] == "blocker"]
-    np.testing.assert_allclose(told, 100 * np.array(kept["rows"]["blocker"]["success"]["mean"]), rtol=1e-4)
-    assert kept["n_frames"] == 2 * SHORT
-    assert kept["n_player_frames"] == 4 * SHORT
-    assert kept["jumps"]["blocker"]["n"] == 0
+    assert len(rows) == 6 * len(PAPER_PARTS)
+    reports = [float(row["success_percent"]) for row in rows if row["row"] == "blocker"]
+    np.testing.assert_allclose(reports, 100 * np.array(stored["rows"]["blocker"]["success"]["mean"]), rtol=1e-4)
+    assert stored["n_frames"] == 2 * SHORT
+    assert stored["n_player_frames"] == 4 * SHORT
+    assert stored["jumps"]["blocker"]["n"] == 0
     text = (folder / "table.md").read_text()
     assert text == markdown(summary)
     for said in ("paper's `framework`", "may be off by [m]", "`block-jump`, torsos given", "| 93.9 | 93.8 |"):
         assert said in text
-    assert describe(summary) in text
+    assert describe_blockjump(summary) in text
 
 
-def test_joints_set_by_hand_are_a_success_in_every_method_and_off_by_their_noise(done):
+def test_hand_set_joints_are_a_success_in_every_method_and_off_by_their_noise(done):
     folder, _, summary = done
     for name in summary["rows"]:
         assert min(summary["rows"][name]["success"]["mean"]) > 0.2, name  # one frame of four at least
-    with np.load(folder / "sequences" / "21.npz") as kept:
-        first = np.linalg.norm(kept["mixture-tracked-50-0/0"][0] - kept["truth/0"][0], axis=-1)
+    with np.load(folder / "sequences" / "21.npz") as stored:
+        first = np.linalg.norm(stored["mixture-tracked-50-0/0"][0] - stored["truth/0"][0], axis=-1)
     assert 0.005 < first.mean() < 0.05
 
 
@@ -168,10 +168,10 @@ def test_run_goes_on_with_the_sequences_that_are_missing_and_gives_the_same(done
         (again / "sequences" / name).write_bytes((folder / "sequences" / name).read_bytes())
     tracked = []
     monkeypatch.setattr(takes_module, "track_scene", lambda *args: tracked.append(args[0].name) or track_scene(*args))
-    told = []
-    resumed = reproduce_blockjump(again, True, lambda *now: told.append(now), n_processes=1)
+    reports = []
+    resumed = reproduce_blockjump(again, True, lambda *now: reports.append(now), n_processes=1)
     assert len(tracked) == 1
-    assert told[0] == (SHORT + 1, 2 * SHORT)
+    assert reports[0] == (SHORT + 1, 2 * SHORT)
     for name, row in summary["rows"].items():
         np.testing.assert_allclose(resumed["rows"][name]["mean_mm"]["mean"], row["mean_mm"]["mean"], atol=EXACT)
 
@@ -206,11 +206,11 @@ def test_stopped_command_says_how_to_go_on_and_exits_130(tmp_path, monkeypatch, 
     with pytest.raises(SystemExit) as end:
         cli.main()
     assert end.value.code == 130
-    assert "go on" in capsys.readouterr().err
+    assert "to resume" in capsys.readouterr().err
 
 
 def test_what_goes_wrong_in_another_process_is_raised_here(tmp_path):
-    takes = [Take(number=k, scene_seed=k, n_blockers=1, n_frames=10, runs=()) for k in range(2)]
+    takes = [BlockTake(number=k, scene_seed=k, n_blockers=1, n_frames=10, runs=()) for k in range(2)]
     with pytest.raises(TrialError, match="too few"):
         do_takes(tmp_path / "sequences", takes, n_processes=2)
     assert list((tmp_path / "sequences").iterdir()) == []

@@ -8,13 +8,21 @@ import numpy as np
 import pytest
 
 from airborne import cli
-from airborne.body import geometry
-from airborne.body.outfits import PALETTE, in_flat_colours
+from airborne.body import surface_arrays
+from airborne.body.outfits import PALETTE, with_flat_colours
 from airborne.errors import BodyError, ResultError
 from airborne.geometry.rotations import geodesic
-from airborne.reproduction import CASES, METHODS, Errors, convergence, experiment, half_width, tracked
-from airborne.reproduction.rigid.experiment import describe, reproduce_rigid
-from airborne.reproduction.rigid.sensitivity import run_case, sized, with_wrong_cameras, wrong_lights
+from airborne.reproduction import (
+    CASES,
+    RIGID_METHODS,
+    Errors,
+    half_width,
+    make_experiment,
+    score_curves,
+    track_experiment,
+)
+from airborne.reproduction.rigid.experiment import describe_rigid, reproduce_rigid
+from airborne.reproduction.rigid.sensitivity import perturb_cameras, perturb_lights, run_case, scale_body
 from airborne.reproduction.rigid.somersaults import PAPER_LARGEST, PAPER_RMS, VARIABLES
 from airborne.synthetic.flight.somersault import LIGHTS
 from tests.support.tolerances import EXACT, ROUNDTRIP
@@ -23,7 +31,7 @@ from tests.support.tolerances import EXACT, ROUNDTRIP
 @pytest.fixture(scope="module")
 def exact():
     """Three poses of ellipsoids."""
-    return experiment("ellipsoids", n_poses=3)
+    return make_experiment("ellipsoids", n_poses=3)
 
 
 @pytest.fixture(scope="module")
@@ -37,10 +45,10 @@ def folder(tmp_path_factory):
 
 
 def test_both_bodies_wear_one_colour_a_segment_and_no_two_the_same(exact):
-    skin = experiment("skin", n_poses=1).scene.body
+    skin = make_experiment("skin", n_poses=1).scene.body
     for body in (exact.model, skin):
         assert [len(segment.parts) for segment in body.segments] == [1] * 18
-    np.testing.assert_array_equal(geometry(skin).colours, geometry(exact.model).colours)
+    np.testing.assert_array_equal(surface_arrays(skin).colours, surface_arrays(exact.model).colours)
     assert len({*PALETTE.values()}) == 18
     light = LIGHTS.ambient + sum(lamp.intensity for lamp in LIGHTS.lamps)
     assert max(map(max, PALETTE.values())) * light < 255  # nothing is white in full light
@@ -48,20 +56,20 @@ def test_both_bodies_wear_one_colour_a_segment_and_no_two_the_same(exact):
 
 def test_flat_colours_need_one_for_every_segment(exact):
     with pytest.raises(BodyError, match="no colour for segment 'pelvis'"):
-        in_flat_colours(exact.model, {"head": (1.0, 2.0, 3.0)})
+        with_flat_colours(exact.model, {"head": (1.0, 2.0, 3.0)})
 
 
 def test_errors_are_signed_in_the_papers_order_and_leave_the_lost_out():
     values = np.array([[3.0, 0, 0, 0, 0, 0], [-4.0, 1, 2, 0.3, 0.4, 0.5], [np.nan] * 6, [0, 900.0, 0, 0, 0, 0]])
-    found = Errors(values[:3])
-    np.testing.assert_allclose(found.rms, [np.sqrt(12.5), *np.array([1, 2, 0.3, 0.4, 0.5]) / np.sqrt(2)], atol=EXACT)
-    np.testing.assert_array_equal(found.largest, [4, 1, 2, 0.3, 0.4, 0.5])
-    assert (found.n_lost, Errors(values).n_lost) == (1, 2)
+    errors = Errors(values[:3])
+    np.testing.assert_allclose(errors.rms, [np.sqrt(12.5), *np.array([1, 2, 0.3, 0.4, 0.5]) / np.sqrt(2)], atol=EXACT)
+    np.testing.assert_array_equal(errors.largest, [4, 1, 2, 0.3, 0.4, 0.5])
+    assert (errors.n_lost, Errors(values).n_lost) == (1, 2)
     assert np.isnan(Errors(values[2:3]).rms).all()
 
 
-def test_refined_finds_the_ellipsoids_it_was_drawn_with(exact):
-    errors, poses = tracked(exact, "refined")
+def test_refined_finds_the_ellipsoids_it_was_rendered_with(exact):
+    errors, poses = track_experiment(exact, "refined")
     assert errors.largest[:3].max() < 0.1
     assert errors.largest[3:].max() < 0.02
     assert len(poses) == 3
@@ -70,19 +78,19 @@ def test_refined_finds_the_ellipsoids_it_was_drawn_with(exact):
 def test_papers_search_follows_poses_a_tenth_of_the_movement_apart(exact):
     step_rad = geodesic(*[pose.world_from_root.rotation.as_matrix() for pose in exact.poses[:2]])
     assert step_rad > np.radians(30)
-    errors, _ = tracked(exact, "faithful")
+    errors, _ = track_experiment(exact, "faithful")
     assert errors.n_lost == 0
     assert errors.rms[:3].max() < 5
     assert errors.rms[3:].max() < 0.5
 
 
 def test_methods_have_the_papers_own_among_them():
-    assert "faithful" in METHODS
+    assert "faithful" in RIGID_METHODS
     assert len(PAPER_RMS) == len(PAPER_LARGEST) == len(VARIABLES) == 6
 
 
 def test_score_of_the_true_body_is_lowest_at_the_truth_and_rises_on_both_sides(exact):
-    for curve in convergence(exact):
+    for curve in score_curves(exact):
         assert curve.offset[curve.scores.argmin(axis=1)] == pytest.approx(0, abs=ROUNDTRIP)
         assert curve.scores.min() < 0.5  # rounding to whole grey levels
         assert curve.half_widths.min() > (50 if curve.variable < 3 else 10)
@@ -96,8 +104,8 @@ def test_half_width_ends_where_the_nearer_side_first_falls(values, expected):
     assert half_width(np.arange(-3.0, 4.0), np.array(values, float)) == expected
 
 
-def test_wrong_lights_are_turned_about_the_flight_and_only_the_lamps_are_stronger():
-    wrong = wrong_lights(LIGHTS, turned_rad=np.radians(20), power=1.2)
+def test_perturbed_lights_rotate_about_the_flight_and_only_the_lamps_are_stronger():
+    wrong = perturb_lights(LIGHTS, rotation_rad=np.radians(20), power=1.2)
     assert wrong.ambient == LIGHTS.ambient
     for lamp, true in zip(wrong.lamps, LIGHTS.lamps, strict=True):
         assert lamp.intensity == pytest.approx(1.2 * true.intensity)
@@ -106,32 +114,32 @@ def test_wrong_lights_are_turned_about_the_flight_and_only_the_lamps_are_stronge
         assert np.degrees(angle) % 360 == pytest.approx(20)
 
 
-def test_wrong_cameras_move_the_picture_by_what_is_asked(exact):
+def test_perturbed_cameras_shift_the_image_as_asked(exact):
     sd, moved = 2.0, []
     for seed in range(30):
-        for true, wrong in zip(exact.frames[0].views, with_wrong_cameras(exact.frames, sd, seed)[0].views, strict=True):
+        for true, wrong in zip(exact.frames[0].views, perturb_cameras(exact.frames, sd, seed)[0].views, strict=True):
             assert true is not None
             assert wrong is not None
             point = true.camera.camera_from_world.inv().apply([0.0, 0.0, 5.0])
             moved.append(wrong.camera.px_from_world(point) - true.camera.px_from_world(point))
     assert np.std(moved) == pytest.approx(sd, rel=3 / np.sqrt(2 * np.size(moved)))
-    assert with_wrong_cameras(exact.frames, 0.0) is exact.frames
+    assert perturb_cameras(exact.frames, 0.0) is exact.frames
 
 
 def test_bigger_body_is_bigger_all_over(exact):
-    big = sized(exact.model, 1.05)
+    big = scale_body(exact.model, 1.05)
     pose = exact.poses[0]
     here, there = (body.with_pose(pose).landmarks - pose.world_from_root.translation for body in (exact.model, big))
     np.testing.assert_allclose(there, 1.05 * here, atol=2e-3)
-    assert sized(exact.model, 1.0) is exact.model
+    assert scale_body(exact.model, 1.0) is exact.model
 
 
-def test_every_case_is_wrong_in_one_thing(exact):
+def test_every_case_perturbs_one_thing(exact):
     for case in CASES:
-        wrong = (case.turned_rad != 0, case.power != 1, case.camera_sd_px != 0, case.noise != 0, case.size != 1)
+        wrong = (case.rotation_rad != 0, case.power != 1, case.camera_sd_px != 0, case.noise != 0, case.size != 1)
         assert sum(wrong) == 1
     big = next(case for case in CASES if case.size != 1)
-    assert run_case(big, exact, "faithful").rms[:3].max() > tracked(exact, "faithful")[0].rms[:3].max()
+    assert run_case(big, exact, "faithful").rms[:3].max() > track_experiment(exact, "faithful")[0].rms[:3].max()
 
 
 def test_quick_run_leaves_its_files_and_says_the_same_in_each(folder):
@@ -142,9 +150,9 @@ def test_quick_run_leaves_its_files_and_says_the_same_in_each(folder):
     summary = json.loads((folder / "summary.json").read_text())
     table = csv.DictReader((folder / "table.csv").read_text().splitlines())
     rows = [row for row in table if row["method"] == "faithful"]
-    told = [float(row["rms"]) for row in rows if row["target"] == "skin"]
-    np.testing.assert_allclose(told, summary["skin"]["faithful"]["rms"], rtol=1e-4)
-    text = describe(summary)
+    written = [float(row["rms"]) for row in rows if row["target"] == "skin"]
+    np.testing.assert_allclose(written, summary["skin"]["faithful"]["rms"], rtol=1e-4)
+    text = describe_rigid(summary)
     assert "paper B" in text
     assert "faithful, NURBS" in text
     for name in ("figure4.png", "convergence.png"):

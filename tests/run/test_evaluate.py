@@ -12,7 +12,7 @@ from airborne.body.files import read_body
 from airborne.cameras import read_rig, write_pose2sim
 from airborne.errors import ResultError
 from airborne.motion import Motion, MotionWriter, write_joints
-from airborne.run.evaluate import agree, assess
+from airborne.run.evaluate import assess, evaluate_agreement
 from tests.support.motions import estimate
 from tests.support.players_trial import PLAYERS, write_run, write_truth
 from tests.test_docs import DOCS
@@ -97,7 +97,7 @@ def agreements(found, against):
 
 def test_agreement_of_joints_is_told_with_tables_figures_and_a_paragraph(run, tmp_path):
     before = {path.name: path.read_bytes() for path in run.iterdir()}
-    found = agree(run, joints=run.parent / "higher.csv", out=tmp_path / "agreement")
+    found = evaluate_agreement(run, joints=run.parent / "higher.csv", out=tmp_path / "agreement")
     rows = agreements(found, "the joints")
     assert rows["all joints z"].bias.value == pytest.approx(-10)
     assert rows["all joints x"].rmse.value == pytest.approx(0, abs=1e-9)
@@ -109,7 +109,7 @@ def test_agreement_of_joints_is_told_with_tables_figures_and_a_paragraph(run, tm
 
 
 def test_each_number_of_the_table_has_its_interval(run, tmp_path):
-    agree(run, joints=run.parent / "higher.csv", out=tmp_path)
+    evaluate_agreement(run, joints=run.parent / "higher.csv", out=tmp_path)
     with (tmp_path / "agreement.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert rows[0]["against"] == "the joints"
@@ -119,23 +119,23 @@ def test_each_number_of_the_table_has_its_interval(run, tmp_path):
 
 def test_runs_of_one_trial_are_compared_with_one_another(run, tmp_path):
     others = [shutil.copytree(run, tmp_path / name) for name in ("other", "third")]
-    found = agree(run, repeats=others, out=tmp_path)
+    found = evaluate_agreement(run, repeats=others, out=tmp_path)
     rows = {row.name: row for row in found.repeats["runs"]}
     assert rows["x"].n_ways == 3 and rows["x"].within_sd.value == pytest.approx(0, abs=1e-9)
     assert {"somersault", "tilt", "twist", "all joints x"} <= set(rows)
     assert "between runs" in found.describe()
     assert not found.agreements
     with pytest.raises(ResultError, match="holds no run"):
-        agree(run, repeats=[tmp_path])
+        evaluate_agreement(run, repeats=[tmp_path])
 
 
 def test_nothing_is_compared_with_itself(run, thrown_cross, tmp_path):
     other, clicks = shutil.copytree(run, tmp_path / "other"), thrown_cross / "digitised.csv"
     for repeats in ([run], [other, tmp_path / "run" / ".." / "other"]):
         with pytest.raises(ResultError, match=r"--repeat .* compared with itself"):
-            agree(run, repeats=repeats)
+            evaluate_agreement(run, repeats=repeats)
     with pytest.raises(ResultError, match=r"--operator .* compared with itself"):
-        agree(run, digitised=clicks, operators=[clicks])
+        evaluate_agreement(run, digitised=clicks, operators=[clicks])
 
 
 @pytest.mark.parametrize("text", ["{", "[]", ""])
@@ -159,29 +159,31 @@ def test_people_who_click_the_same_pictures_are_compared(run, thrown_cross, tmp_
     write_pose2sim(run / "calib.toml", read_rig(thrown_cross / "calib_true.toml"))
     clicks = thrown_cross / "digitised.csv"
     others = shutil.copyfile(clicks, tmp_path / "others.csv")
-    found = agree(run, digitised=clicks, operators=[others], out=tmp_path)
+    found = evaluate_agreement(run, digitised=clicks, operators=[others], out=tmp_path)
     assert {row.name for row in found.repeats["operators"]} == {"x", "y", "z", "somersault", "tilt", "twist"}
     assert list(found.agreements) == ["points digitised"]
     with pytest.raises(ResultError, match="give those as --digitised"):
-        agree(run, operators=[clicks])
+        evaluate_agreement(run, operators=[clicks])
 
 
 def test_players_and_their_jumps_agree_with_their_truth(tmp_path):
     run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv", off_m=0.03)
-    found = agree(run, truth, repeats=[shutil.copytree(run, tmp_path / "again")])
+    found = evaluate_agreement(run, truth, repeats=[shutil.copytree(run, tmp_path / "again")])
     rows = agreements(found, "the truth")
     assert rows["ankle_left z"].bias.value == pytest.approx(30)
     assert rows["ankle_left z"].n_individuals == 2
     assert rows["all joints z"].n_individuals == 12
     assert [row.name for row in found.repeats["runs"]][:3] == ["hip_left x", "all joints x", "hip_left y"]
     with pytest.raises(ResultError, match="a run of players"):
-        agree(run, joints=truth)
+        evaluate_agreement(run, joints=truth)
     plain = json.dumps(found.to_dict(), allow_nan=False)
     assert "NaN" not in plain
 
 
 def test_every_number_is_documented(run, tmp_path):
-    agree(run, joints=run.parent / "higher.csv", repeats=[shutil.copytree(run, tmp_path / "again")], out=tmp_path)
+    evaluate_agreement(
+        run, joints=run.parent / "higher.csv", repeats=[shutil.copytree(run, tmp_path / "again")], out=tmp_path
+    )
     text = (DOCS / "agreement.md").read_text(encoding="utf-8")
     for name in ("agreement.csv", "repeatability.csv"):
         header = (tmp_path / name).read_text().splitlines()[0].split(",")

@@ -12,7 +12,7 @@ from airborne.body.files import write_body
 from airborne.errors import ResultError
 from airborne.evaluation import read_joint_paths
 from airborne.motion import MotionWriter, landmarks, read_players
-from airborne.run.export import KINDS, export_run
+from airborne.run.export import EXPORT_FORMATS, export_run
 from airborne.tracking import Estimate, Status
 from tests.support.export_scenes import BOX, PERSON
 from tests.support.players_trial import write_run
@@ -114,7 +114,7 @@ def test_uneven_times_are_kept_out_of_files_without_times(tmp_path):
         "frames stray from an even beat by up to 0.15 frames: left out c3d, bvh, which hold no times",
     )
     with pytest.raises(ResultError, match=r"0\.15 frames, and c3d hold no times; give --trc"):
-        export_run(folder, kinds=["c3d", "trc"])
+        export_run(folder, formats=["c3d", "trc"])
 
 
 def test_where_nothing_was_found_there_is_nothing_to_export(tmp_path):
@@ -146,7 +146,7 @@ def test_the_command_lists_its_files(players_run, tmp_path, monkeypatch, capsys)
 
 
 def test_every_kind_has_its_option(players_run, tmp_path, monkeypatch):
-    for kind in KINDS:
+    for kind in EXPORT_FORMATS:
         assert run_command(monkeypatch, "export", players_run, "-o", tmp_path / kind, f"--{kind}") == 0
         suffix = "glb" if kind == "gltf" else kind
         assert {path.suffix for path in (tmp_path / kind).iterdir()} == {f".{suffix}"}

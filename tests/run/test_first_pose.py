@@ -11,8 +11,8 @@ from airborne.body import Pose, human18
 from airborne.cameras import Rig, write_pose2sim
 from airborne.cameras.detections import NETWORKS
 from airborne.errors import BodyError, CalibrationError, TrialError
-from airborne.run.body_tracking import cameras_of, inputs_of, open_trial
-from airborne.run.first_pose import first_pose, landmarks_over_time, mended_rig
+from airborne.run.body_tracking import cameras_of, input_hashes, open_trial
+from airborne.run.first_pose import find_first_pose, landmarks_over_time, resect_moved_cameras
 from airborne.trial.file import read_trial
 from tests.support.cameras import camera_at
 from tests.support.clips import numbered, write_clip
@@ -24,7 +24,7 @@ NAMES = [landmark.name for landmark in MODEL.landmarks]
 CENTRES = {"cam1": (-4, -5, 1.5), "cam2": (4, -5, 2), "cam3": (6, 3, 2.5), "cam4": (-5, 4, 2.0)}
 RIG = Rig(
     tuple(
-        replace(camera_at(centre, name=name, focal=120.0, target=(0, 0, 1)), size=(96, 72)).resampled(
+        replace(camera_at(centre, name=name, focal=120.0, target=(0, 0, 1)), size=(96, 72)).resample(
             scale=(1.0, 1.0), offset=(335.5, 251.5), size=(96, 72)
         )
         for name, centre in CENTRES.items()
@@ -115,7 +115,7 @@ def test_root_and_joint_angles_set_by_hand(trial):
     start += "[start.joint_angles_deg]\n"
     for segment, xyz in zip(MODEL.segments[1:], np.degrees(true.joint_angles), strict=True):
         start += f"{segment.name} = {xyz.tolist()}\n" if xyz.any() else ""
-    found = first_pose(trial(start), MODEL, RIG)
+    found = find_first_pose(trial(start), MODEL, RIG)
     assert off_m(found.pose) < 1e-9
     assert found.notes == ()
 
@@ -123,19 +123,19 @@ def test_root_and_joint_angles_set_by_hand(trial):
 def test_joint_angles_of_an_unknown_joint_are_refused_and_impossible_ones_noted(trial):
     root = "[start]\nposition_m = [0, 0, 1]\nquaternion_xyzw = [0, 0, 0, 1]\n"
     with pytest.raises(TrialError, match="body 'human18' has no joint 'knee_left'; it has: torso, chest"):
-        first_pose(trial(root + "joint_angles_deg = {knee_left = [1, 2, 3]}\n"), MODEL, RIG)
-    found = first_pose(trial(root + "joint_angles_deg = {shank_left = [-90, 0, 0]}\n"), MODEL, RIG)
+        find_first_pose(trial(root + "joint_angles_deg = {knee_left = [1, 2, 3]}\n"), MODEL, RIG)
+    found = find_first_pose(trial(root + "joint_angles_deg = {shank_left = [-90, 0, 0]}\n"), MODEL, RIG)
     assert found.notes == ("start.joint_angles_deg: shank_left beyond the body's joint limits",)
 
 
 def test_places_of_landmarks_in_the_file_or_in_a_table(trial, tmp_path):
     places = dict(zip(NAMES, TRUE[0].tolist(), strict=True))
     written = ", ".join(f"{name} = {place}" for name, place in places.items())
-    found = first_pose(trial(f"[start]\njoints_m = {{{written}}}\n"), MODEL, RIG)
+    found = find_first_pose(trial(f"[start]\njoints_m = {{{written}}}\n"), MODEL, RIG)
     assert off_m(found.pose) < 1e-3
     rows = [f"{name},{','.join(map(str, place))}" for name, place in places.items()]
     (tmp_path / "joints.csv").write_text("\n".join(["joint,x_m,y_m,z_m", *rows]))
-    again = first_pose(trial('[start]\njoints_m = "joints.csv"\n'), MODEL, RIG)
+    again = find_first_pose(trial('[start]\njoints_m = "joints.csv"\n'), MODEL, RIG)
     assert off_m(again.pose) < 1e-3
     assert "first pose found, landmarks 0 mm off (RMS)" in again.notes[0]
 
@@ -146,15 +146,15 @@ def test_points_clicked_in_the_pictures(trial, tmp_path):
     rows = [[name, *np.concatenate([at[i] for at in px.values()]).tolist()] for i, name in enumerate(NAMES)]
     rows[NAMES.index("wrist_left")][1:5] = [""] * 4  # two cameras are enough
     (tmp_path / "clicks.csv").write_text("\n".join(",".join(map(str, row)) for row in [header, *rows]))
-    assert off_m(first_pose(trial('[start]\npoints_px = "clicks.csv"\n'), MODEL, RIG).pose) < 1e-3
+    assert off_m(find_first_pose(trial('[start]\npoints_px = "clicks.csv"\n'), MODEL, RIG).pose) < 1e-3
     (tmp_path / "clicks.csv").write_text("\n".join(",".join(map(str, row)) for row in [header, ["hip", *rows[0][1:]]]))
     with pytest.raises(TrialError, match=r"clicks\.csv: body 'human18' has no landmark hip; it has: hip_left"):
-        first_pose(trial('[start]\npoints_px = "clicks.csv"\n'), MODEL, RIG)
+        find_first_pose(trial('[start]\npoints_px = "clicks.csv"\n'), MODEL, RIG)
 
 
 def test_detections_at_the_first_frame_tracked(trial):
     given = trial(DETECTIONS + "frame = 7\n", tables=detections())
-    found = first_pose(given, MODEL, RIG)
+    found = find_first_pose(given, MODEL, RIG)
     assert off_m(found.pose, 7, ON_COCO) < 2e-3
     assert found.notes[0].startswith("found.npz, frame 7: first pose found, landmarks ")
 
@@ -164,7 +164,7 @@ def test_cameras_with_other_times_are_matched_by_time(trial):
     late = detections(frames=range(3, N_FRAMES))
     tables["cam2"] = late["cam2"]  # began three frames later
     given = trial(DETECTIONS + "frame = 5\n", tables=tables, extra={"cam2": "offset_s = 0.12\n"})
-    assert off_m(first_pose(given, MODEL, RIG).pose, 5, ON_COCO) < 2e-3
+    assert off_m(find_first_pose(given, MODEL, RIG).pose, 5, ON_COCO) < 2e-3
     found = landmarks_over_time(given, RIG)
     for name in ON_COCO:
         np.testing.assert_allclose(found[name], TRUE[:, NAMES.index(name)], atol=SOLVED)
@@ -174,14 +174,14 @@ def test_a_field_takes_the_detections_of_its_frame(trial):
     given = trial(
         DETECTIONS + "frame = 9\n", tables=detections(), extra={n: 'fields = "top-first"\n' for n in RIG.names}
     )
-    assert off_m(first_pose(given, MODEL, RIG).pose, 4, ON_COCO) < 2e-3
+    assert off_m(find_first_pose(given, MODEL, RIG).pose, 4, ON_COCO) < 2e-3
 
 
 def test_camera_that_saw_something_else_is_left_out_and_named(trial):
     tables = detections()
     tables["cam3"][0, NETWORKS[17].index("wrist_left")] += [25, 0, 0]
     tables["cam3"][0, NETWORKS[17].index("nose")] += [25, 0, 0]
-    found = first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG)
+    found = find_first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG)
     assert off_m(found.pose, 0, ON_COCO) < 2e-3
     assert found.notes[0] == (
         "found.npz, frame 0: cam3 left out at wrist_left, up to 25 px from where the other cameras see them"
@@ -193,7 +193,7 @@ def test_unseen_limb_is_named(trial):
     for name in ("wrist_left", "elbow_left"):
         for table in tables.values():
             table[:, NETWORKS[17].index(name), 2] = 0.1
-    notes = first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG).notes
+    notes = find_first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG).notes
     assert any("no place of elbow_left, wrist_left; " in note for note in notes)
 
 
@@ -202,16 +202,16 @@ def test_detections_that_do_not_settle_a_pose_are_refused(trial):
     for table in tables.values():
         table[:, NETWORKS[17].index("hip_left"), 2] = 0.0
     with pytest.raises(TrialError, match=r"found\.npz, frame 0: a pose needs both hips .* not given: hip_left"):
-        first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG)
+        find_first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG)
     with pytest.raises(TrialError, match=r"found\.npz, frame 40: a pose needs both hips"):
-        first_pose(trial(DETECTIONS + "frame = 40\n", tables=detections()), MODEL, RIG)
+        find_first_pose(trial(DETECTIONS + "frame = 40\n", tables=detections()), MODEL, RIG)
 
 
 def test_camera_without_detections_is_refused(trial):
     tables = detections()
     del tables["cam4"]
     with pytest.raises(CalibrationError, match=r"found\.npz holds no detections of 'cam4'"):
-        first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG)
+        find_first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG)
 
 
 def test_camera_is_mended_where_the_trial_asks_for_it(trial, tmp_path):
@@ -227,24 +227,24 @@ def test_camera_is_mended_where_the_trial_asks_for_it(trial, tmp_path):
 
 def test_camera_that_disagrees_is_named_with_the_remedy_and_left_alone(trial, tmp_path):
     wrong = knocked(RIG, "cam3", (0.5, -0.4, 0.3), (8, -9, 3))
-    rig, notes = mended_rig(trial(DETECTIONS, tables=detections()), wrong)
+    rig, notes = resect_moved_cameras(trial(DETECTIONS, tables=detections()), wrong)
     assert rig is wrong
     assert len(notes) == 1
     assert notes[0].startswith("cam3 disagrees with the other cameras: half of its detections lie over ")
     assert 'give mend = ["cam3"] under [calibration]' in notes[0]
-    assert mended_rig(trial(DETECTIONS, tables=detections()), RIG) == (RIG, ())
+    assert resect_moved_cameras(trial(DETECTIONS, tables=detections()), RIG) == (RIG, ())
 
 
 def test_without_detections_no_camera_is_looked_at(trial):
     given = trial("[start]\nposition_m = [0, 0, 1]\nquaternion_xyzw = [0, 0, 0, 1]\n")
-    assert mended_rig(given, RIG) == (RIG, ())
+    assert resect_moved_cameras(given, RIG) == (RIG, ())
 
 
 def test_another_start_is_another_run(trial):
-    one = inputs_of(trial(DETECTIONS, tables=detections()))
-    other = inputs_of(trial(DETECTIONS, tables=detections(sd_px=1.0)))
+    one = input_hashes(trial(DETECTIONS, tables=detections()))
+    other = input_hashes(trial(DETECTIONS, tables=detections(sd_px=1.0)))
     assert {name for name in one if one[name] != other[name]} == {"found.npz"}
-    mended = inputs_of(trial(DETECTIONS, calibration=CALIBRATION + 'mend = ["cam3"]\n'))
+    mended = input_hashes(trial(DETECTIONS, calibration=CALIBRATION + 'mend = ["cam3"]\n'))
     assert [name for name in other if other[name] != mended[name]] == ["start and lights"]
 
 
@@ -270,7 +270,7 @@ def test_the_man_on_the_beam(shared_data, tmp_path):
     assert [event.split(" with ")[0] for event in recording.events] == ["cam03 disagrees"]
     (tmp_path / "trial.toml").write_text(text.replace("[body]", 'mend = ["cam03"]\n[body]'))
     mending = read_trial(tmp_path / "trial.toml")
-    mended, notes = mended_rig(mending, rig)
+    mended, notes = resect_moved_cameras(mending, rig)
     assert [note.split(":")[0] for note in notes] == ["cam03"]
     static = np.array(  # white dots on the platform's left, near and far, and a post's rim, by hand; 2 px
         [
@@ -288,7 +288,7 @@ def test_the_man_on_the_beam(shared_data, tmp_path):
         for cameras in (rig, mended)
     )
     assert after < 10 < 15 < before
-    found = first_pose(mending, MODEL, mended)
+    found = find_first_pose(mending, MODEL, mended)
     joints = landmarks_over_time(mending, mended)
     posed = MODEL.with_pose(found.pose).landmarks
     off = [

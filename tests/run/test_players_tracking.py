@@ -14,7 +14,7 @@ import pytest
 from airborne.cameras import read_rig
 from airborne.errors import AirborneError, ResultError, TrialError
 from airborne.motion import read_players
-from airborne.motion.players import COLUMNS
+from airborne.motion.players import PLAYERS_COLUMNS
 from airborne.run import players_tracking
 from airborne.run.players_tracking import track_players
 from airborne.tracking import Status
@@ -96,7 +96,7 @@ def test_everything_that_a_run_leaves_is_documented(path, tmp_path):
     left = {re.sub(r"_(left|right)\.mp4", "_<camera>.mp4", file.name) for file in (tmp_path / "run").iterdir()}
     assert left == {name for row in table_of(page, "Files of a run of players") for name in named(row[0])}
     documented = [name for row in table_of(page, "`joints.csv` of players") for name in named(row[0])]
-    assert sorted(documented) == sorted(COLUMNS)
+    assert sorted(documented) == sorted(PLAYERS_COLUMNS)
     keys = {name for row in table_of(page, "`summary.json` of players") for name in named(row[0])}
     assert keys == {*run.summary, "live"}
 

@@ -29,7 +29,7 @@ def run(tmp_path, thrown_cross):
     with MotionWriter(folder / "motion.csv") as writer:
         for k, item in enumerate(estimates):
             lost = {"pose": None, "covariance": None, "status": type(item.status)("lost"), "n_views": 0}
-            moved = item.pose.moved(1e-3 * rng.normal(size=3), 1e-3 * rng.normal(size=3))
+            moved = item.pose.move(1e-3 * rng.normal(size=3), 1e-3 * rng.normal(size=3))
             writer.append(replace(item, **lost) if k in (20, 21) else replace(item, pose=moved))
     shutil.copyfile(thrown_cross / "cross.toml", folder / "body.toml")
     return folder

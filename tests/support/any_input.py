@@ -30,16 +30,16 @@ from airborne.body.measurements import read_measurements, write_measurements
 from airborne.calibration.sources.boards import read_board
 from airborne.calibration.sources.control_points import read_control_points
 from airborne.calibration.sources.wand import read_wand
-from airborne.cameras import PixelCount, read_detections, read_rig, write_rig
-from airborne.cameras.clicks import read_clicks, read_places
+from airborne.cameras import PixelConvention, read_detections, read_rig, write_rig
+from airborne.cameras.clicks import read_clicks, read_positions
 from airborne.cameras.detections import NETWORKS, Detections, write_detections
-from airborne.cameras.formats.dltdv import placed, read_digitisation, write_digitisation
-from airborne.cameras.formats.options import Given
+from airborne.cameras.formats.dltdv import triangulate_digitisation, read_digitisation, write_digitisation
+from airborne.cameras.formats.options import FileOptions
 from airborne.errors import AirborneError
 from airborne.evaluation import read_clicked_frames, read_joint_paths, read_players_truth, read_truth
-from airborne.evaluation.players_truth import read_known_jumps
+from airborne.evaluation.players_truth import read_reference_jumps
 from airborne.evaluation.variables import read_joint_angles
-from airborne.export.conversion import Wishes, convert
+from airborne.export.conversion import ConversionOptions, convert
 from airborne.motion import MotionWriter, read_estimates, read_players
 from airborne.run.evaluate import assess
 from airborne.run.opening import holds_run_of
@@ -82,8 +82,8 @@ def calibrations(folder):
     }.items():
         path = folder / kind / name
         path.parent.mkdir()
-        write_rig(path, plain if kind == "dlt" else rig, format=kind, pixels=PixelCount("lower-left"))
-        size, pixels = ((768, 576), PixelCount("lower-left")) if kind == "dlt" else (None, None)
+        write_rig(path, plain if kind == "dlt" else rig, format=kind, pixels=PixelConvention("lower-left"))
+        size, pixels = ((768, 576), PixelConvention("lower-left")) if kind == "dlt" else (None, None)
         yield case(f"calibration {kind}", path, lambda p=path, s=size, x=pixels: read_rig(p, size=s, pixels=x))
     write_rig(folder / "pair", rig, format="easymocap")
     yield case("calibration easymocap", folder / "pair" / "intri.yml", lambda: read_rig(folder / "pair"))
@@ -96,7 +96,7 @@ def points_in_pictures(folder):
     yield case("clicks", table, lambda: read_clicks(table, CAMERAS))
     places = folder / "places.csv"
     places.write_text("joint,x_m,y_m,z_m\nhip,0.1,0.2,1.0\nknee,,,\n")
-    yield case("places", places, lambda: read_places(places))
+    yield case("places", places, lambda: read_positions(places))
     rig = three_cameras()
     px = np.stack([camera.px_from_world(scattered(5 * 26).reshape(5, 26, 3)) for camera in rig], axis=2)
     seen = Detections(cameras=rig.names, points=NETWORKS[26], px=px, visibility=np.full(px.shape[:-1], 0.9))
@@ -106,15 +106,15 @@ def points_in_pictures(folder):
     pose = folder / "pose"
     write_detections(pose, seen, as_folder=True)
     yield case("detections OpenPose", pose / "left_json" / "left_000002.json", lambda: read_detections(pose, CAMERAS))
-    few = Detections.of_clicks(rig.names, ("a", "b"), px[:, :2])
+    few = Detections.from_clicks(rig.names, ("a", "b"), px[:, :2])
     xypts = folder / "t_xypts.csv"
-    write_digitisation(xypts, placed(few, rig), Given())
-    yield case("DLTdv xypts", xypts, lambda: read_digitisation(xypts, Given()))
+    write_digitisation(xypts, triangulate_digitisation(few, rig), FileOptions())
+    yield case("DLTdv xypts", xypts, lambda: read_digitisation(xypts, FileOptions()))
     xyz = folder / "t_xyzpts.csv"
-    yield case("DLTdv xyzpts", xyz, lambda: read_digitisation(xypts, Given()))
+    yield case("DLTdv xyzpts", xyz, lambda: read_digitisation(xypts, FileOptions()))
     wand = folder / "wand.csv"
     wand.write_text("frame,marker,camera,u_px,v_px\n0,1,left,5,6\n0,2,left,7,8\n1,1,right,,\n")
-    yield case("wand", wand, lambda: read_wand(wand, CAMERAS, Given(), [0.5]))
+    yield case("wand", wand, lambda: read_wand(wand, CAMERAS, FileOptions(), [0.5]))
     board = folder / "board.toml"
     board.write_text('kind = "charuco"\ncolumns = 4\nrows = 5\nsquare_m = 0.054\ndictionary = "DICT_4X4_50"\n')
     yield case("board", board, lambda: read_board(board))
@@ -123,10 +123,10 @@ def points_in_pictures(folder):
     out = folder / "converted"
     copy = folder / "any_xypts.csv"
     copy.write_bytes(xypts.read_bytes())
-    yield case("convert points", copy, lambda: convert(copy, out, Wishes(to="digitised")))
+    yield case("convert points", copy, lambda: convert(copy, out, ConversionOptions(to="digitised")))
     some = folder / "some.toml"
     write_rig(some, three_cameras(LENS))
-    yield case("convert cameras", some, lambda: convert(some, out, Wishes(to="vicon")))
+    yield case("convert cameras", some, lambda: convert(some, out, ConversionOptions(to="vicon")))
 
 
 def bodies(folder):
@@ -203,7 +203,7 @@ def results(folder):
     yield example_case("truth", folder, "truth.csv", read_truth)
     jumps = folder / "players.json"
     jumps.write_text('[{"name": "Anna", "jump": {"flight_s": 0.5, "last_contact_frame": 3.5}}, {"name": "Bea"}]')
-    yield case("known jumps", jumps, lambda: read_known_jumps(jumps))
+    yield case("known jumps", jumps, lambda: read_reference_jumps(jumps))
     long = folder / "joints.csv"
     long.write_text("time_s,joint,x_m,y_m,z_m\n0,hip,1,2,3\n0,knee,1,2,\n0.02,hip,1,2,3\n0.02,knee,,,\n")
     yield case("paths of joints", long, lambda: read_joint_paths(long))

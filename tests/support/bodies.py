@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import BodyModel, Box, Ellipsoid, Geometry, Mesh, Part, Pose, PosedBody, Segment, geometry
+from airborne.body import BodyModel, Box, Ellipsoid, SurfaceArrays, Mesh, Part, Pose, PosedBody, Segment, surface_arrays
 from airborne.cameras import Camera
 from airborne.rendering import Lamp, Lights
 from airborne.video import View
@@ -81,10 +81,10 @@ def random_pose(rng: np.random.Generator, *, spread: float = 0.15) -> Pose:
     return Pose(world_from_root=root, joint_angles=rng.normal(0, 0.6, (1, 3)))
 
 
-def posed_random(kinds: list[str], seed: int) -> tuple[Geometry, PosedBody]:
+def posed_random(kinds: list[str], seed: int) -> tuple[SurfaceArrays, PosedBody]:
     rng = np.random.default_rng(seed)
     model = random_body(kinds, rng)
-    return geometry(model), model.with_pose(random_pose(rng))
+    return surface_arrays(model), model.with_pose(random_pose(rng))
 
 
 def noise_view(seen_by: Camera, seed: int) -> View:

@@ -1,4 +1,4 @@
-"""Small pictures of players drawn as coloured rods on a court, with truth."""
+"""Small images of players drawn as coloured rods on a court, with truth."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -43,8 +43,8 @@ def camera(name: str, centre: Sequence[float]) -> Camera:
     x = np.cross(z, [0, 0, 1.0]) / np.linalg.norm(np.cross(z, [0, 0, 1.0]))
     rotation = Rotation.from_matrix(np.stack([x, np.cross(z, x), z]))
     K = np.array([[FOCAL_PX, 0, SIZE[0] / 2], [0, FOCAL_PX, SIZE[1] / 2], [0, 0, 1.0]])
-    place = RigidTransform.from_components(-rotation.apply(at), rotation)
-    return Camera(name=name, K=K, size=SIZE, camera_from_world=place)
+    camera_from_world = RigidTransform.from_components(-rotation.apply(at), rotation)
+    return Camera(name=name, K=K, size=SIZE, camera_from_world=camera_from_world)
 
 
 RIG = Rig((camera("left", (-4, -4.5, 2.2)), camera("right", (4, -4.5, 2.2)), camera("behind", (0, -6, 2.5))))
@@ -66,7 +66,7 @@ class Player:
     """Who is drawn; points and torso are moved as a whole."""
 
     name: str
-    place: tuple[float, float] = (0.0, 0.0)
+    position: tuple[float, float] = (0.0, 0.0)
     shirt: tuple[int, int, int] = RED
     motion: Callable[[float], np.ndarray] = still
     has_legs: bool = True
@@ -78,12 +78,12 @@ class Player:
         return TORSO + self.shift(time_s)
 
     def shift(self, time_s: float) -> np.ndarray:
-        return np.array([*self.place, 0]) + self.motion(time_s)
+        return np.array([*self.position, 0]) + self.motion(time_s)
 
 
 @dataclass(frozen=True)
 class Court:
-    """What is filmed; every picture is a pure function of it."""
+    """What is filmed; every image is a pure function of it."""
 
     players: tuple[Player, ...] = (Player("one", motion=jump),)
     state: Callable[[int, str], str] = lambda index, name: "fine"  # or "none", "dark" or "empty"
@@ -91,7 +91,7 @@ class Court:
 
     @lru_cache(maxsize=40)  # noqa: B019 - courts are few
     def frames(self, index: int) -> Frames:
-        views = tuple(self._view(index, seen_by) for seen_by in self.rig)
+        views = tuple(self._view(index, view_camera) for view_camera in self.rig)
         return Frames(index, Fraction(index, FPS), views)
 
     def starts(self) -> list[PlayerStart]:
@@ -107,41 +107,41 @@ class Court:
     def torsos(self, n: int) -> np.ndarray:
         return np.array([[player.torso(k / FPS) for player in self.players] for k in range(n)])
 
-    def _view(self, index: int, seen_by: Camera) -> View | None:
-        state = self.state(index, seen_by.name)
+    def _view(self, index: int, view_camera: Camera) -> View | None:
+        state = self.state(index, view_camera.name)
         if state == "none":
             return None
         if state == "dark":
-            return View(seen_by, noisy(np.full((SIZE[1], SIZE[0], 3), 3, np.uint8), index, seen_by.name))
-        picture = np.full((SIZE[1], SIZE[0], 3), FLOOR, np.uint8)
+            return View(view_camera, noisy(np.full((SIZE[1], SIZE[0], 3), 3, np.uint8), index, view_camera.name))
+        image = np.full((SIZE[1], SIZE[0], 3), FLOOR, np.uint8)
         if state != "empty":
             nearest_last = sorted(
-                self.players, key=lambda player: -np.linalg.norm(player.torso(index / FPS) - seen_by.centre)
+                self.players, key=lambda player: -np.linalg.norm(player.torso(index / FPS) - view_camera.centre)
             )
             for player in nearest_last:
-                draw(picture, seen_by, player, index / FPS)
-        return View(seen_by, noisy(picture, index, seen_by.name))
+                draw(image, view_camera, player, index / FPS)
+        return View(view_camera, noisy(image, index, view_camera.name))
 
 
-def noisy(picture: np.ndarray, index: int, name: str) -> np.ndarray:
-    """Add noise, cut at another place for every picture."""
+def noisy(image: np.ndarray, index: int, name: str) -> np.ndarray:
+    """Add noise, cut at another offset for every image."""
     y, x = np.random.default_rng([index, *name.encode()]).integers(0, 100, 2)
-    return cv2.add(picture, NOISE[y : y + SIZE[1], x : x + SIZE[0]], dtype=cv2.CV_8U)
+    return cv2.add(image, NOISE[y : y + SIZE[1], x : x + SIZE[0]], dtype=cv2.CV_8U)
 
 
-def draw(picture: np.ndarray, seen_by: Camera, player: Player, time_s: float) -> None:
+def draw(image: np.ndarray, view_camera: Camera, player: Player, time_s: float) -> None:
     ends = ends_of(player.points(time_s)[None])[0]
-    corners = rod_corners(ends, seen_by.P, FOCAL_PX, WIDTHS_M)
+    corners = rod_corners(ends, view_camera.P, FOCAL_PX, WIDTHS_M)
     for part in (2, 3, 4, 5, 6, 7, 0, 1):
-        fill(picture, corners[part], PART_COLOURS[part])
+        fill(image, corners[part], PART_COLOURS[part])
     torso, half = player.torso(time_s), np.array([0, 0, TORSO_SIZE_M[1] / 2])
-    shirt = rod_corners(np.array([[torso + half, torso - half]]), seen_by.P, FOCAL_PX, np.array([TORSO_SIZE_M[0]]))
-    fill(picture, shirt[0], player.shirt)
+    shirt = rod_corners(np.array([[torso + half, torso - half]]), view_camera.P, FOCAL_PX, np.array([TORSO_SIZE_M[0]]))
+    fill(image, shirt[0], player.shirt)
 
 
-def fill(picture: np.ndarray, outline: np.ndarray, colour: Sequence[int]) -> None:
+def fill(image: np.ndarray, outline: np.ndarray, colour: Sequence[int]) -> None:
     if np.isfinite(outline).all():
-        cv2.fillConvexPoly(picture, np.rint(16 * outline).astype(np.int32), list(colour), cv2.LINE_8, 4)
+        cv2.fillConvexPoly(image, np.rint(16 * outline).astype(np.int32), list(colour), cv2.LINE_8, 4)
 
 
 def track(
@@ -152,8 +152,8 @@ def track(
     tracker = legs_tracker(settings, court.rig, court.starts(), given)
     state, estimates = tracker.init(), []
     for index in range(n):
-        state, found = tracker.step(state, court.frames(index))
-        estimates.append(found)
+        state, now = tracker.step(state, court.frames(index))
+        estimates.append(now)
     return estimates
 
 
@@ -162,7 +162,7 @@ def errors_m(court: Court, estimates: Sequence[tuple[PlayerEstimate, ...]]) -> n
     players = [player for player in court.players if player.has_legs]
     return np.array(
         [
-            [np.linalg.norm(e.points - p.points(float(e.time_s)), axis=-1) for p, e in zip(players, found, strict=True)]
-            for found in estimates
+            [np.linalg.norm(e.points - p.points(float(e.time_s)), axis=-1) for p, e in zip(players, step, strict=True)]
+            for step in estimates
         ]
     )

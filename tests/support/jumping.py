@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from airborne.body.legs import LEG_POINTS
-from airborne.motion.free_fall import OF_PLAYERS
+from airborne.motion.free_fall import PLAYER_NOISE
 from airborne.motion.jumps.leg_track import LegTrack
-from airborne.motion.jumps.leg_track import leg_track as track_of
+from airborne.motion.jumps.leg_track import extract_legs as track_of
 from airborne.motion.players import PlayersMotion
 
 G = 9.81
@@ -117,11 +117,11 @@ def motion_of(jumper, *, sd_m=1e-3, rng=None, feet=False):
 
 def noise(rng, shape, rate=60.0):
     """Unit noise (n, ...), in part white, else fading, as `OF_PLAYERS` has it."""
-    keep = np.exp(-1 / rate / OF_PLAYERS.fading_s)
+    keep = np.exp(-1 / rate / PLAYER_NOISE.correlation_time_s)
     steps = rng.standard_normal(shape)
     slow = np.empty(shape)
     slow[0] = steps[0]
     for k in range(1, shape[0]):
         slow[k] = keep * slow[k - 1] + np.sqrt(1 - keep**2) * steps[k]
-    white = OF_PLAYERS.white_share
+    white = PLAYER_NOISE.white_share
     return np.sqrt(white) * rng.standard_normal(shape) + np.sqrt(1 - white) * slow

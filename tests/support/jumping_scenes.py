@@ -13,7 +13,7 @@ from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.capsules.first_frame import points_of
 from airborne.tracking.capsules.jumper import JOINTS, N_DOF
-from airborne.tracking.capsules.surface_colours import drawn
+from airborne.tracking.capsules.surface_colours import class_image
 from airborne.tracking.players import PlayerEstimate, PlayerStart
 from airborne.video import Frames, View
 
@@ -28,18 +28,18 @@ STANDING, SQUATTING, STRAIGHT = 0.15, 0.60, 0.12  # a leg's bend at the hip, hal
 N_FRAMES = 50
 
 
-def camera(turn: float, number: int = 0) -> Camera:
-    """A camera 9 m away, 2.8 m high, `turn` [rad] round the vertical from behind (y < 0)."""
-    centre, target = np.array([9 * np.sin(turn), -9 * np.cos(turn), 2.8]), np.array([0.35, 0.0, 1.0])
+def camera(angle: float, number: int = 0) -> Camera:
+    """A camera 9 m away, 2.8 m high, `angle` [rad] about the vertical from behind (y < 0)."""
+    centre, target = np.array([9 * np.sin(angle), -9 * np.cos(angle), 2.8]), np.array([0.35, 0.0, 1.0])
     z = (target - centre) / np.linalg.norm(target - centre)
     x = np.cross(z, [0, 0, 1.0]) / np.linalg.norm(np.cross(z, [0, 0, 1.0]))
-    turned = Rotation.from_matrix(np.stack([x, np.cross(z, x), z]))
+    rotation = Rotation.from_matrix(np.stack([x, np.cross(z, x), z]))
     K = np.array([[600.0, 0, (SIZE[0] - 1) / 2], [0, 600.0, (SIZE[1] - 1) / 2 - 20], [0, 0, 1.0]])
-    place = RigidTransform.from_components(-turned.apply(centre), turned)
-    return Camera(name=f"cam{number}", K=K, size=SIZE, camera_from_world=place)
+    camera_from_world = RigidTransform.from_components(-rotation.apply(centre), rotation)
+    return Camera(name=f"cam{number}", K=K, size=SIZE, camera_from_world=camera_from_world)
 
 
-CAMERAS = tuple(camera(turn, i) for i, turn in enumerate((-0.75, 0.1, 0.8)))
+CAMERAS = tuple(camera(angle, i) for i, angle in enumerate((-0.75, 0.1, 0.8)))
 
 
 def _bend(t: float) -> tuple[float, float]:
@@ -60,22 +60,22 @@ def _bend(t: float) -> tuple[float, float]:
 
 
 def hop(
-    place: Sequence[float] = (0.0, 0.0), heading: float = 0.3, late_s: float = 0.0
+    position: Sequence[float] = (0.0, 0.0), heading: float = 0.3, late_s: float = 0.0
 ) -> Callable[[float], np.ndarray]:
-    """A hop with the feet about a place (2,) [m] on the floor: t [s] -> state (35,)."""
+    """A hop with the feet about a position (2,) [m] on the floor: t [s] -> state (35,)."""
 
     def state_at(t: float) -> np.ndarray:
         bend, lift = _bend(max(t - late_s, 0.0))
         lean = 0.1 + 0.3 * bend
         pose = np.zeros(N_DOF)
-        pose[:2], pose[3], pose[5], pose[6] = place, heading, lean, 0.1
+        pose[:2], pose[3], pose[5], pose[6] = position, heading, lean, 0.1
         for first, sign in ((8, 1.0), (13, -1.0)):
             point = 0.35 * min(lift / 0.1, 1.0)
             pose[first : first + 5] = -bend - lean, -0.06 * sign, 0.1 * sign, 2 * bend, -bend + point
         state = np.concatenate([pose, LENGTHS, RADII])
-        balls = points_of(state)[6:8]
-        state[:2] += np.asarray(place) - balls.mean(axis=0)[:2]
-        state[2] = 0.03 + lift - balls[:, 2].min()
+        feet = points_of(state)[6:8]
+        state[:2] += np.asarray(position) - feet.mean(axis=0)[:2]
+        state[2] = 0.03 + lift - feet[:, 2].min()
         return state
 
     return state_at
@@ -95,7 +95,7 @@ def walk(start: Sequence[float], speed: Sequence[float], heading: float) -> Call
 
 @cache
 def _floor(number: int) -> np.ndarray:
-    """An uneven floor (h, w, 3), the same in every picture of a camera."""
+    """An uneven floor (h, w, 3), the same in every image of a camera."""
     rng = np.random.default_rng([7, number])
     coarse = rng.normal(scale=14, size=(SIZE[1] // 16, SIZE[0] // 16, 1)).repeat(16, axis=0).repeat(16, axis=1)
     return (FLOOR + coarse + rng.normal(scale=4, size=(*SIZE[::-1], 3))).astype(np.float32)
@@ -103,17 +103,17 @@ def _floor(number: int) -> np.ndarray:
 
 @cache
 def _grain() -> np.ndarray:
-    """Noise [grey levels] that every picture takes its own piece of."""
+    """Noise [grey levels] of which every image takes its own crop."""
     return np.random.default_rng(5).normal(scale=5, size=(SIZE[1] + 97, SIZE[0] + 97, 3)).astype(np.float32)
 
 
 @dataclass(frozen=True)
 class Hall:
-    """What is filmed; every picture is a pure function of it."""
+    """What is filmed; every image is a pure function of it."""
 
     motions: dict[str, Callable[[float], np.ndarray]]
     cameras: Sequence[Camera] = CAMERAS
-    is_without: Callable[[int, int], bool] = lambda index, number: False  # a camera without a picture at a frame
+    is_without: Callable[[int, int], bool] = lambda index, number: False  # a camera without an image at a frame
     is_black: Callable[[int, int], bool] = lambda index, number: False  # or with a black one
     is_noise: Callable[[int, int], bool] = lambda index, number: False  # or with one that shows nothing
     is_there: Callable[[int], bool] = lambda index: True  # whether the players are
@@ -124,54 +124,54 @@ class Hall:
         return Frames(index, Fraction(index, FPS), tuple(views))
 
     def _view(self, index: int, number: int) -> View:
-        seen_by, rng = self.cameras[number], np.random.default_rng([self.seed, index, number])
-        width, height = seen_by.size
+        view_camera, rng = self.cameras[number], np.random.default_rng([self.seed, index, number])
+        width, height = view_camera.size
         if self.is_black(index, number):
-            return View(seen_by, np.zeros((height, width, 3), np.uint8))
+            return View(view_camera, np.zeros((height, width, 3), np.uint8))
         if self.is_noise(index, number):
-            return View(seen_by, rng.integers(0, 256, (height, width, 3), np.uint8))
-        picture = _floor(number)[:height, :width].copy()
-        for state in self._far_to_near(index, seen_by) if self.is_there(index) else ():
-            kind = drawn(state, seen_by, 1.0)
-            picture[kind >= 0] = COLOURS[kind[kind >= 0]]
+            return View(view_camera, rng.integers(0, 256, (height, width, 3), np.uint8))
+        image = _floor(number)[:height, :width].copy()
+        for state in self._far_to_near(index, view_camera) if self.is_there(index) else ():
+            surface_class = class_image(state, view_camera, 1.0)
+            image[surface_class >= 0] = COLOURS[surface_class[surface_class >= 0]]
         x, y = rng.integers(0, 97, 2)
-        picture += _grain()[y : y + height, x : x + width]
-        return View(seen_by, np.clip(picture, 0, 255).astype(np.uint8))
+        image += _grain()[y : y + height, x : x + width]
+        return View(view_camera, np.clip(image, 0, 255).astype(np.uint8))
 
-    def _far_to_near(self, index: int, seen_by: Camera) -> list[np.ndarray]:
+    def _far_to_near(self, index: int, view_camera: Camera) -> list[np.ndarray]:
         states = [motion(index / FPS) for motion in self.motions.values()]
-        return sorted(states, key=lambda state: -seen_by.camera_from_world.apply(state[:3])[2])
+        return sorted(states, key=lambda state: -view_camera.camera_from_world.apply(state[:3])[2])
 
     def truth(self, name: str, index: int) -> np.ndarray:
         """A player's joints (9, 3) [m]."""
         return points_of(self.motions[name](index / FPS))
 
     def starts(self, wrong_m: float = 0.01, index: int = 0) -> list[PlayerStart]:
-        """The players as somebody would have set them, each joint wrong by a length [m] in some direction."""
-        found = []
+        """The players as if set by hand, each joint wrong by a length [m] in some direction."""
+        starts = []
         for number, name in enumerate(self.motions):
             off = np.random.default_rng([11, number]).normal(size=(len(JOINTS), 3))
             off *= wrong_m / np.linalg.norm(off, axis=1, keepdims=True)
             points: dict[str, np.ndarray] = dict(zip(JOINTS, self.truth(name, index) + off, strict=True))
-            found.append(PlayerStart(name=name, joints_m=points))
-        return found
+            starts.append(PlayerStart(name=name, joints_m=points))
+        return starts
 
 
 def tracked(hall: Hall, indices: Sequence[int], starts: list[PlayerStart] | None = None) -> list[list[PlayerEstimate]]:
-    """Track some frames; what each player's estimates are, in the order of the starts."""
+    """Track some frames; return each player's estimates, in the order of the starts."""
     blocker = Blocker(starts or hall.starts(index=indices[0]))
-    state, found = blocker.init(), []
+    state, steps = blocker.init(), []
     for index in indices:
         state, estimates = blocker.step(state, hall.frames(index))
-        found.append(estimates)
-    return [list(each) for each in zip(*found, strict=True)]
+        steps.append(estimates)
+    return [list(each) for each in zip(*steps, strict=True)]
 
 
 def errors_mm(hall: Hall, estimates: Sequence[PlayerEstimate]) -> np.ndarray:
     """How far hips, knees and ankles are from the truth: (frames, 6) [mm], NaN where lost."""
     truth = np.array([hall.truth(each.player, each.index) for each in estimates])
-    found = np.array([each.points for each in estimates])
-    return 1000 * np.linalg.norm(found - truth, axis=-1)[:, :6]
+    points = np.array([each.points for each in estimates])
+    return 1000 * np.linalg.norm(points - truth, axis=-1)[:, :6]
 
 
 def share_within(hall: Hall, estimates: Sequence[PlayerEstimate]) -> float:

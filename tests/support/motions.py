@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Ellipsoid, Inertia, Landmark, Part, Pose, Segment
-from airborne.body.chain import moved_pose
+from airborne.body.chain import move_pose
 from airborne.motion import Motion
 from airborne.tracking import Estimate, Status
 
@@ -98,7 +98,7 @@ def small_covariance(model, sd=1e-3, seed=0):
 
 def shaken(rng, pose, covariance):
     """Draw a pose whose errors have this covariance."""
-    return moved_pose(pose, rng.multivariate_normal(np.zeros(len(covariance)), covariance, method="cholesky"))
+    return move_pose(pose, rng.multivariate_normal(np.zeros(len(covariance)), covariance, method="cholesky"))
 
 
 def swinging(model, time_s, seed=0):

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Pose, human18
-from airborne.body.chain import moved_pose
+from airborne.body.chain import move_pose
 from airborne.tracking import Estimate
 from airborne.tracking.methods import Settings, tracker_of
-from airborne.tracking.model_based.degrees_of_freedom import within_limits
+from airborne.tracking.model_based.degrees_of_freedom import clamp_to_limits
 from airborne.tracking.tracker import Tracker
 from tests.support.scenes import TURNS, Scene, camera
 
@@ -68,7 +68,7 @@ def turned_to(turn: Rotation, **held: tuple[float, float, float]) -> Callable[[F
             angles[HUMAN.index_of(name) - 1] = xyz
         turned = Rotation.from_rotvec([0.6 * t, 0.3 * t, 1.2 * t]) * turn
         root = RigidTransform.from_components(PLACE + np.array([0.5, 0.2, 0.6]) * t, turned)
-        return within_limits(HUMAN, Pose(world_from_root=root, joint_angles=angles))
+        return clamp_to_limits(HUMAN, Pose(world_from_root=root, joint_angles=angles))
 
     return motion
 
@@ -86,7 +86,7 @@ def wrong(pose: Pose, *, off_m: float = 0.025, off_deg: float = 3.0, seed: int =
     axes = np.random.default_rng(seed).normal(size=(len(model.segments) + 1, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     sizes = np.append(off_m, np.full(len(model.segments), np.radians(off_deg)))
-    return within_limits(model, moved_pose(pose, (sizes[:, None] * axes).ravel()))
+    return clamp_to_limits(model, move_pose(pose, (sizes[:, None] * axes).ravel()))
 
 
 def tracker(scene: Scene, start: Pose | None = None, model: BodyModel | None = None, **settings) -> Tracker:

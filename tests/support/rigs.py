@@ -7,8 +7,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.bundle import Source
 from airborne.calibration.initial.chaining import Views
-from airborne.calibration.sources.boards import Board, Sighting
-from airborne.cameras import Rig, aimed
+from airborne.calibration.sources.boards import Board, DetectedCorners
+from airborne.cameras import Rig, camera_looking_at
 
 SIZE = (1280, 720)
 MIDDLE = np.array([0.0, 0.0, 1.0])
@@ -23,7 +23,7 @@ def ring(n=4, *, distortion=BROWN, lens="brown"):
     for i in range(n):
         angle = 2 * np.pi * i / n
         place = [3.0 * np.cos(angle), 3.0 * np.sin(angle), 1.6 + 0.2 * i]
-        camera = aimed(f"cam{i}", place, [0, 0, 1.0], 900 + 40 * i, SIZE)
+        camera = camera_looking_at(f"cam{i}", place, [0, 0, 1.0], 900 + 40 * i, SIZE)
         found.append(replace(camera, distortion=distortion.copy(), lens=lens))
     return Rig(tuple(found))
 
@@ -45,7 +45,7 @@ def seen_board(rng, rig, places, *, noise_px=0.3, board=BOARD, moving=None):
             px = camera.px_from_world(world)
             inside = np.isfinite(px).all(axis=1) & (px >= 0).all(axis=1) & (px < np.array(camera.size) - 1).all(axis=1)
             kept = np.flatnonzero(inside) if is_front and inside.sum() > 9 else np.zeros(0, int)
-            row.append(Sighting(kept, px[kept] + noise_px * rng.standard_normal((len(kept), 2))))
+            row.append(DetectedCorners(kept, px[kept] + noise_px * rng.standard_normal((len(kept), 2))))
         rows.append(tuple(row))
     return Views(board, rig.names, tuple(rows))
 

@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import BodyModel, Box, Ellipsoid, Part, Pose, Segment, geometry
+from airborne.body import BodyModel, Box, Ellipsoid, Part, Pose, Segment, surface_arrays
 from airborne.cameras import Camera
 from airborne.rendering import Lamp, Lights, render
 from airborne.rendering.srgb import light_from_srgb
 from airborne.tracking import Estimate
-from airborne.tracking.model_based.refined import Refined
+from airborne.tracking.model_based.refined import RefinedTracker
 from airborne.tracking.tracker import Tracker, step
 from airborne.video import Frames, View
 
@@ -159,14 +159,14 @@ def _drawn(model: BodyModel, pose: Pose, seen_by: Camera, reach: float) -> tuple
     width, height = SIZE
     fine_size = (FINER * width, FINER * height)
     offset = -(FINER - 1) / (2 * FINER)
-    fine = seen_by.resampled(scale=(1 / FINER, 1 / FINER), offset=(offset, offset), size=fine_size)
+    fine = seen_by.resample(scale=(1 / FINER, 1 / FINER), offset=(offset, offset), size=fine_size)
     share, shown = np.zeros((height, width, 1), np.float32), np.zeros((height, width, 3), np.float32)
     reach_px = round(reach * seen_by.K[0, 0])
     u, v = np.rint(seen_by.px_from_world(pose.world_from_root.translation)).astype(int)
     x0, x1 = np.clip([u - reach_px, u + reach_px], 0, width)
     y0, y1 = np.clip([v - reach_px, v + reach_px], 0, height)
     if x0 < x1 and y0 < y1:
-        posed, flat = model.with_pose(pose), geometry(model)
+        posed, flat = model.with_pose(pose), surface_arrays(model)
         drawn = render(flat, posed, fine, LIGHTS, region=(FINER * x0, FINER * y0, FINER * x1, FINER * y1))
         red = np.append(flat.colours[:, 0], 1.0)[drawn.part]  # the last one stands for no part
         albedo = np.append(light_from_srgb(flat.colours), np.zeros((1, 3)), axis=0).astype(np.float32)
@@ -178,8 +178,8 @@ def _drawn(model: BodyModel, pose: Pose, seen_by: Camera, reach: float) -> tuple
 
 
 def track(scene: Scene, indices: Sequence[int], tracker: Tracker | None = None) -> list[Estimate]:
-    """Track the frames of the scene, by `Refined` from the true pose of the first if no tracker is given."""
-    tracker = tracker or Refined(scene.model, scene.start(indices[0]))
+    """Track the frames of the scene, by `RefinedTracker` from the true pose of the first if no tracker is given."""
+    tracker = tracker or RefinedTracker(scene.model, scene.start(indices[0]))
     state, estimates = tracker.init(), []
     for index in indices:
         state, estimate = step(tracker, state, scene.frames(index))

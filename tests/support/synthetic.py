@@ -11,7 +11,7 @@ def small_scene(preset="half-twist", *, scale=4, **changes):
     scene = thrown_cross(preset, seed=3, clutter=6)
     small = Rig(
         tuple(
-            camera.resampled(
+            camera.resample(
                 scale=(scale, scale),
                 offset=((scale - 1) / 2, (scale - 1) / 2),
                 size=(camera.size[0] // scale, camera.size[1] // scale),

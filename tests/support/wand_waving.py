@@ -7,7 +7,7 @@ import numpy as np
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.calibration.sources.court import court_points
 from airborne.calibration.sources.wand import WandTracks
-from airborne.cameras import Rig, aimed
+from airborne.cameras import Rig, camera_looking_at
 
 SIZE = (1920, 1080)
 PLACES = [(-7, -9, 3.0), (7, -9, 4.0), (8, 7, 3.5), (-8, 6, 3.0)]
@@ -17,7 +17,7 @@ SIZES = {f"cam{i + 1}": SIZE for i in range(4)}
 
 def hall(focals_px=FOCALS_PX, k1=0.0) -> Rig:
     """Four cameras in the corners."""
-    rig = [aimed(f"cam{i + 1}", place, (0.3 * i, 0.2, 1.4), focals_px[i], SIZE) for i, place in enumerate(PLACES)]
+    rig = [camera_looking_at(f"cam{i + 1}", place, (0.3 * i, 0.2, 1.4), focals_px[i], SIZE) for i, place in enumerate(PLACES)]
     return Rig(tuple(replace(camera, distortion=np.array([k1, 0, 0, 0, 0])) for camera in rig))
 
 

@@ -14,7 +14,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import Inertia, Pose
 from airborne.body.anthropometry import FOOT_SLOPE_RAD
 from airborne.body.human import PARENTS
-from airborne.body.inertia import combined, placed
+from airborne.body.inertia import combine_inertias, transform_inertia
 
 # where yeadon's 21 configuration angles go: the segment whose joint angle, or the root, about x, y, z
 ANGLES = {
@@ -115,6 +115,6 @@ def _by_slices(piece, n=600):
 
 def whole_by_slices(human):
     """Put all of a yeadon person's solids together in world axes."""
-    return combined(
-        [placed(by_slices(p), segment.rot_mat, p.pos.ravel()) for segment in human.segments for p in segment.solids]
+    return combine_inertias(
+        [transform_inertia(by_slices(p), segment.rot_mat, p.pos.ravel()) for segment in human.segments for p in segment.solids]
     )

@@ -5,7 +5,7 @@ import pytest
 
 from airborne.errors import VideoError
 from airborne.sync import offsets_by_flash
-from airborne.sync.flash import brightness_of, flashes_of, paired
+from airborne.sync.flash import brightness_of, flashes_of, pair_times
 from airborne.video import VideoSource
 from tests.support.clips import write_clip
 from tests.support.tolerances import EXACT
@@ -24,7 +24,7 @@ def filmed(path, late_s, *, rate=50, seed=0, n_s=4.0, moments=MOMENTS_S, slow=0.
     )
 
 
-def test_flashes_bring_cameras_together_within_a_picture(tmp_path):
+def test_flashes_bring_cameras_together_within_an_image(tmp_path):
     sources = [filmed(tmp_path / "a.mkv", 0.0), filmed(tmp_path / "b.mkv", 0.213, seed=1)]
     found = offsets_by_flash(sources)
     assert found.names == ("a", "b")
@@ -71,12 +71,12 @@ def test_a_wavering_light_is_no_flash(tmp_path):
 
 
 def test_a_flash_that_one_camera_missed_does_not_spoil_the_pairs():
-    pairs = paired(np.array([1.0, 2.2, 5.0]), np.array([0.9, 4.9]), 0.02)
+    pairs = pair_times(np.array([1.0, 2.2, 5.0]), np.array([0.9, 4.9]), 0.02)
     assert pairs.tolist() == [[0, 0], [2, 1]]
-    assert paired(np.array([1.0]), np.array([4.0]), 0.02).tolist() == [[0, 0]]
+    assert pair_times(np.array([1.0]), np.array([4.0]), 0.02).tolist() == [[0, 0]]
 
 
-def test_without_drift_one_flash_says_as_much_as_its_two_pictures(tmp_path):
+def test_without_drift_one_flash_says_as_much_as_its_two_images(tmp_path):
     sources = [filmed(tmp_path / f"{n}.mkv", 0.0, moments=MOMENTS_S[:1], n_s=1.5) for n in "ab"]
     found = offsets_by_flash(sources)
     assert found.offset_s[1] == 0

@@ -12,7 +12,7 @@ import pytest
 from airborne import cli
 from airborne.errors import TrialError
 from airborne.sync import Offsets
-from airborne.sync.from_trial import in_whole_pictures, synchronise, write_offsets
+from airborne.sync.from_trial import round_to_images, synchronise, write_offsets
 from airborne.trial.file import read_trial
 from airborne.video import VideoSource
 from tests.support.places import THROWN_CROSS
@@ -77,7 +77,7 @@ def test_drift_is_kept_in_millionths(trial):
     camera = read_trial(trial).camera[1]
     assert (camera.offset_s, camera.drift_ppm) == (0.012346, 25.0)
     source = VideoSource("cam2", trial, "progressive", camera.offset_s, camera.drift_ppm)
-    assert abs(float(source.on_clock(100)) - (100 * (1 + 25e-6) + 0.012346)) < EXACT
+    assert abs(float(source.trial_time(100)) - (100 * (1 + 25e-6) + 0.012346)) < EXACT
 
 
 LISTED = """name = "my throw"
@@ -110,9 +110,9 @@ def test_cameras_written_in_another_way_are_left_to_the_user(tmp_path):
         write_offsets(path, offsets((0, 0, 0)))
 
 
-def test_whole_pictures_are_rounded_to_and_doubts_told():
+def test_whole_images_are_rounded_to_and_doubts_told():
     sources = [VideoSource(name, EXAMPLE / f"{name}.mp4", "top-first") for name in NAMES]
-    found = in_whole_pictures(offsets((0, 0.041, -0.0085), sd_s=(0, 0.001, 0.001)), sources)
+    found = round_to_images(offsets((0, 0.041, -0.0085), sd_s=(0, 0.001, 0.001)), sources)
     assert np.allclose(found.offset_s, (0, 2 * FIELD_S, 0), atol=EXACT)
     assert len(found.notes) == 1
     assert "cam3 lies 8.5 ms beside a whole picture" in found.notes[0]

@@ -1,6 +1,6 @@
 import numpy as np
 
-from airborne.sync.lags import Sightings, find_lags, solve_lags
+from airborne.sync.lags import LagEquations, find_lags, solve_lags
 from tests.support.tolerances import EXACT, SOLVED
 
 N, C = 40, 3
@@ -11,7 +11,7 @@ _HALVES = RNG.normal(size=(N, C, 4, 6)) * 100
 CURVATURE = np.einsum("kcai,kcaj->kcij", _HALVES, _HALVES)
 
 
-def sightings(lag_s, drift=(0, 0, 0), noise=0.0, seed=0) -> Sightings:
+def sightings(lag_s, drift=(0, 0, 0), noise=0.0, seed=0) -> LagEquations:
     """What cameras of given lags see of a body whose poses were found slightly wrong."""
     rng = np.random.default_rng(seed)
     wrong = rng.normal(0, 1e-3, (N, 1, 6))
@@ -19,7 +19,7 @@ def sightings(lag_s, drift=(0, 0, 0), noise=0.0, seed=0) -> Sightings:
     moved = VELOCITY[:, None] * late[..., None] + wrong
     slope = np.einsum("kcij,kcj->kci", CURVATURE, moved)
     slope += noise * np.einsum("kcai,kca->kci", _HALVES, rng.normal(size=(N, C, 4)))
-    return Sightings(TIMES, VELOCITY, CURVATURE.copy(), slope)
+    return LagEquations(TIMES, VELOCITY, CURVATURE.copy(), slope)
 
 
 def test_lags_come_out_of_exact_sightings_exactly_whatever_the_poses_errors():
@@ -49,7 +49,7 @@ def test_errors_lie_within_the_stated_sds():
 
 def test_a_camera_that_saw_nothing_has_no_lag():
     seen = sightings((0, 0.004, -0.002))
-    seen.curvature[:, 2] = seen.slope[:, 2] = 0
+    seen.information[:, 2] = seen.gradient[:, 2] = 0
     step, sd = solve_lags(seen)
     assert np.isnan([step[2], sd[2]]).all()
     assert abs(step[1] - 0.004) < 1e-9
@@ -57,7 +57,7 @@ def test_a_camera_that_saw_nothing_has_no_lag():
 
 def test_without_the_first_camera_the_next_one_is_the_clock():
     seen = sightings((0, 0.004, -0.002))
-    seen.curvature[:, 0] = seen.slope[:, 0] = 0
+    seen.information[:, 0] = seen.gradient[:, 0] = 0
     step, sd = solve_lags(seen)
     assert np.isnan([step[0], sd[0]]).all()
     assert step[1] == sd[1] == 0
@@ -69,7 +69,7 @@ def test_a_camera_that_never_sees_the_body_keeps_no_other_from_its_lag():
 
     def look(lag_s, drift):
         seen = sightings(truth - lag_s)
-        seen.curvature[:, 2] = seen.slope[:, 2] = 0
+        seen.information[:, 2] = seen.gradient[:, 2] = 0
         return seen
 
     found = find_lags(look, np.zeros(C))

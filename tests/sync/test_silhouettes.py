@@ -4,24 +4,24 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from airborne.cameras import Rig, aimed, read_rig
+from airborne.cameras import Rig, camera_looking_at, read_rig
 from airborne.errors import VideoError
 from airborne.sync import offsets_by_motion
-from airborne.sync.silhouettes import Silhouettes, silhouettes_of, smoothed, solve_shifts
+from airborne.sync.silhouettes import Silhouettes, silhouettes_of, smooth_at, solve_shifts
 from airborne.video import VideoSource
 from tests.support.clips import numbered, plain_rig, write_clip
 from tests.support.places import THROWN_CROSS
 from tests.support.tolerances import ROUNDTRIP
 
 PLACES = ((-3.0, -5.0, 1.5), (3.0, -4.5, 2.0), (0.3, -1.0, 6.0))
-RIG = Rig(tuple(aimed(f"cam{i}", place, (0, 0, 1.4), 700.0, (640, 480)) for i, place in enumerate(PLACES)))
+RIG = Rig(tuple(camera_looking_at(f"cam{i}", place, (0, 0, 1.4), 700.0, (640, 480)) for i, place in enumerate(PLACES)))
 CORNERS = np.random.default_rng(2).uniform(-0.3, 0.3, (12, 3))
 PERIOD_S = 0.02
 THROWN = THROWN_CROSS
 
 
 def seen(camera, late_s, n=40, noise=0.0, seed=0):
-    """Silhouettes of a tumbling thing of 12 corners; picture k is taken at late_s + k periods, and says k periods."""
+    """Silhouettes of a tumbling thing of 12 corners; image k is taken at late_s + k periods, and says k periods."""
     rng = np.random.default_rng(seed)
     times = late_s + np.arange(n) * PERIOD_S
     hulls = []
@@ -62,7 +62,7 @@ def thrown():
 
 
 def starting(each: Silhouettes, first: int) -> Silhouettes:
-    """The same camera, started `first` pictures later."""
+    """The same camera, started `first` images later."""
     return replace(each, time_s=each.time_s[first:] - each.time_s[first], hulls=each.hulls[first:])
 
 
@@ -84,8 +84,8 @@ def test_smoothing_keeps_parabolas_whatever_the_moment():
     values = np.stack([1 + 2 * t - 3 * t**2, t], axis=1)
     wanted = np.linspace(0.05, 0.33, 17)
     expected = np.stack([1 + 2 * wanted - 3 * wanted**2, wanted], axis=1)
-    assert np.allclose(smoothed(t, values, wanted, 0.02), expected, atol=ROUNDTRIP)
-    assert np.isnan(smoothed(t, values, np.array([-0.1, 0.5]), 0.02)).all()
+    assert np.allclose(smooth_at(t, values, wanted, 0.02), expected, atol=ROUNDTRIP)
+    assert np.isnan(smooth_at(t, values, np.array([-0.1, 0.5]), 0.02)).all()
 
 
 def test_a_camera_before_which_nothing_moves_is_named(tmp_path):

@@ -1,4 +1,4 @@
-"""An arm that is hidden behind the trunk from every camera is not invented, and is found again when it comes out."""
+"""An arm that is occluded by the trunk from every camera is not invented, and is found again when it comes out."""
 
 from fractions import Fraction
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import Pose, geometry
+from airborne.body import Pose, surface_arrays
 from airborne.rendering import FLAT, render
 from tests.support.people import FOCAL_PX, HELD, HUMAN, PLACE, SWING, landmark_errors_mm, person, sd_rad, tracker
 from tests.support.scenes import FPS, camera, statuses, track
@@ -15,13 +15,13 @@ SIDE = tuple(camera(f"side{i}", np.pi / 2 + turn, FOCAL_PX) for i, turn in enume
 FRAMES, HIDDEN, OUT_AGAIN = 17, (8, 9, 10), 14
 
 
-def swept(time_s: Fraction) -> Pose:
+def swing_arm(time_s: Fraction) -> Pose:
     """The right arm swings from in front to behind the trunk, rests there and comes out; the left one is held high."""
     t = float(time_s)
     out = np.interp(t * FPS, [0, 8, 10, 18], [1, 0, 0, 1])
     share = out * out * (3 - 2 * out)
     angles = HELD + 0.3 * SWING * np.sin(4 * t)
-    held = {
+    fixed = {
         "upper_arm_right": (-0.1 - 0.7 * share, 0, 0),
         "forearm_right": (-0.3 * share, 0, 0),
         "upper_arm_left": (-2.4 - t, -0.2, 0),
@@ -29,7 +29,7 @@ def swept(time_s: Fraction) -> Pose:
         "thigh_right": (0, 0, 0),
         "shank_right": (0.2, 0, 0),
     }
-    for name, xyz in held.items():
+    for name, xyz in fixed.items():
         angles[HUMAN.index_of(name) - 1] = xyz
     turn = Rotation.from_euler("XYZ", [0.05, 0, 0.2 * t])
     return Pose(
@@ -37,7 +37,7 @@ def swept(time_s: Fraction) -> Pose:
     )
 
 
-SCENE = person(swept, SIDE)
+SCENE = person(swing_arm, SIDE)
 
 
 @pytest.fixture(scope="module")
@@ -49,27 +49,29 @@ def off_mm(estimate, name):
     return landmark_errors_mm(SCENE, estimate)[[each.name for each in HUMAN.landmarks].index(name)]
 
 
-def test_the_scene_hides_the_arm():
+def test_the_arm_is_occluded_in_the_scene():
     arm = [HUMAN.index_of(name) for name in ("upper_arm_right", "forearm_right", "hand_right")]
 
-    def shown_px(index):
-        drawn = [render(geometry(HUMAN), HUMAN.with_pose(SCENE.start(index)), each, FLAT).segment for each in SIDE]
+    def visible_px(index):
+        drawn = [
+            render(surface_arrays(HUMAN), HUMAN.with_pose(SCENE.start(index)), each, FLAT).segment for each in SIDE
+        ]
         return max(np.count_nonzero(np.isin(segment, arm)) for segment in drawn)
 
-    assert shown_px(0) > 200
-    assert all(shown_px(index) < 25 for index in HIDDEN)
+    assert visible_px(0) > 200
+    assert all(visible_px(index) < 25 for index in HIDDEN)
 
 
-def test_hidden_arm_stays_near_where_it_went_and_is_found_when_it_comes_out(estimates):
+def test_occluded_arm_stays_near_where_it_went_and_is_found_when_it_comes_out(estimates):
     assert statuses(estimates) == ["tracked"] * FRAMES
     for estimate in estimates:
-        hidden = 5 <= estimate.index < OUT_AGAIN
-        assert off_mm(estimate, "hand_right") < (60 if hidden else 16)
-        assert off_mm(estimate, "elbow_right") < (32 if hidden else 16)
+        is_occluded = 5 <= estimate.index < OUT_AGAIN
+        assert off_mm(estimate, "hand_right") < (60 if is_occluded else 16)
+        assert off_mm(estimate, "elbow_right") < (32 if is_occluded else 16)
         assert off_mm(estimate, "hand_left") < 12
 
 
-def test_hidden_arm_is_not_claimed_to_be_known(estimates):
+def test_occluded_arm_is_not_claimed_to_be_known(estimates):
     for index in HIDDEN:
         assert np.all(np.isinf(sd_rad(estimates[index], "upper_arm_right")))
         assert np.all(np.isinf(sd_rad(estimates[index], "forearm_right")))

@@ -1,4 +1,4 @@
-"""Things behind the body that have its colours are told from it, because they stay."""
+"""Things behind the body that have its colours are distinguished from it, because they stay."""
 
 from tests.support.scenes import BLUE, RED, YELLOW, Scene, clutter, statuses, track, worst
 

@@ -1,4 +1,4 @@
-"""A camera may have no picture for a while."""
+"""A camera may have no image for a while."""
 
 from tests.support.scenes import Scene, statuses, track, worst
 

@@ -1,4 +1,4 @@
-"""Few frames a second, and motion that no prediction foresees, are met by a wider search."""
+"""Few frames a second, and motion that no prediction foresees, are met by the global search."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -20,10 +20,10 @@ def jumping(time_s):
     pose = thrown(time_s)
     if time_s * FPS < 6:
         return pose
-    return pose.moved(np.array([0.08, 0.06, 0.06]), Rotation.from_euler("xyz", [15, -15, 14], degrees=True).as_rotvec())
+    return pose.move(np.array([0.08, 0.06, 0.06]), Rotation.from_euler("xyz", [15, -15, 14], degrees=True).as_rotvec())
 
 
-def test_sudden_jump_is_found_by_the_wide_search():
+def test_sudden_jump_is_found_by_the_global_search():
     scene = Scene(motion=jumping)
     estimates = track(scene, range(0, 15, 3))
     assert statuses(estimates) == ["tracked"] * 5

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.body.chain import motion_between
+from airborne.body.chain import delta_between
 from airborne.tracking.methods import Settings, tracker_of
 from tests.support.people import HUMAN, person, tracker, wrong
 from tests.support.scenes import FIGURE, LIGHTS, Scene, standing, statuses, track
@@ -27,20 +27,20 @@ def test_covariance_is_symmetric_and_positive_over_root_and_joints(run):
     for estimate in estimates:
         assert estimate.covariance.shape == (n, n)
         np.testing.assert_array_equal(estimate.covariance, estimate.covariance.T)
-        seen = np.isfinite(np.diag(estimate.covariance))
-        assert np.all(np.isfinite(estimate.covariance[np.ix_(seen, seen)]))
-        assert np.linalg.eigvalsh(estimate.covariance[np.ix_(seen, seen)]).min() > -EXACT
+        observed = np.isfinite(np.diag(estimate.covariance))
+        assert np.all(np.isfinite(estimate.covariance[np.ix_(observed, observed)]))
+        assert np.linalg.eigvalsh(estimate.covariance[np.ix_(observed, observed)]).min() > -EXACT
         assert np.all(np.diag(estimate.covariance) > 0)
-        hidden = np.flatnonzero(~seen)
-        assert not np.delete(estimate.covariance[hidden], hidden, axis=1).any()
+        unobserved = np.flatnonzero(~observed)
+        assert not np.delete(estimate.covariance[unobserved], unobserved, axis=1).any()
 
 
 def test_errors_are_about_as_large_as_the_covariance_says(run):
-    """Six in seven within two sds; and the sds are not so wide that they say nothing."""
+    """Six in seven within two sds; and the sds are not uselessly wide."""
     scene, estimates = run
     ratios = []
     for estimate in estimates:
-        off = motion_between(scene.start(estimate.index), estimate.pose)
+        off = delta_between(scene.start(estimate.index), estimate.pose)
         sd = np.sqrt(np.diag(estimate.covariance))
         ratios.append((off / sd)[np.isfinite(sd)])
     ratios = np.concatenate(ratios)
@@ -57,11 +57,11 @@ def test_fixed_shape_moves_the_root_alone():
         assert not estimate.covariance[6:].any()
         assert np.all(np.diag(estimate.covariance)[:6] > 0)
         np.testing.assert_allclose(estimate.pose.joint_angles, start.joint_angles, atol=EXACT)
-        assert np.abs(motion_between(STILL.start(), estimate.pose)[:3]).max() < 0.004
+        assert np.abs(delta_between(STILL.start(), estimate.pose)[:3]).max() < 0.004
 
 
 @pytest.mark.parametrize("method", ["stepping", "simplex"])
-def test_methods_that_only_ask_for_a_score_keep_the_joints_of_the_start(method):
+def test_methods_that_only_evaluate_a_score_keep_the_joints_of_the_start(method):
     start = STILL.start()
     settings = Settings(method=method, loops=LOOPS, lights=LIGHTS, scale=2)
     (estimate,) = track(STILL, range(1), tracker_of(settings, FIGURE, start))
@@ -70,4 +70,4 @@ def test_methods_that_only_ask_for_a_score_keep_the_joints_of_the_start(method):
     assert estimate.covariance.shape == (21, 21)
     assert not estimate.covariance[6:].any()
     assert np.all(np.diag(estimate.covariance)[:6] > 0)
-    assert np.abs(motion_between(start, estimate.pose)[:3]).max() < 0.03
+    assert np.abs(delta_between(start, estimate.pose)[:3]).max() < 0.03

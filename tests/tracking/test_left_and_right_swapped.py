@@ -1,11 +1,11 @@
-"""Left taken for right: legs that have changed sides are put right."""
+"""Left-right swaps: legs that have changed sides are put right."""
 
 import numpy as np
 import pytest
 
 from airborne.body import Pose
-from airborne.body.chain import moved_pose
-from airborne.tracking.model_based.left_right_swap import is_nearer, swapped
+from airborne.body.chain import move_pose
+from airborne.tracking.model_based.left_right_swap import is_nearer, swap_limbs
 from tests.support.people import HUMAN, mean_errors_mm, person, swinging, tracker, wrong
 from tests.support.scenes import CROSS, FIGURE, standing, statuses, thrown, track
 from tests.support.tolerances import EXACT, ROUNDTRIP
@@ -20,18 +20,20 @@ OTHERS = [i for i in range(len(HUMAN.segments)) if i not in EITHER]
 def with_legs_swapped(pose: Pose) -> Pose:
     """The one of the two swaps in which the legs have changed sides."""
     joints = np.array(EITHER) - 1
-    changed = [np.abs(each.joint_angles - pose.joint_angles)[joints].max() > ROUNDTRIP for each in swapped(HUMAN, pose)]
+    changed = [
+        np.abs(each.joint_angles - pose.joint_angles)[joints].max() > ROUNDTRIP for each in swap_limbs(HUMAN, pose)
+    ]
     assert sum(changed) == 1
-    return swapped(HUMAN, pose)[changed.index(True)]
+    return swap_limbs(HUMAN, pose)[changed.index(True)]
 
 
-def test_there_is_a_swap_for_the_arms_and_one_for_the_legs_and_none_without_twins():
-    assert len(swapped(HUMAN, TRUTH)) == 2
-    assert len(swapped(FIGURE, standing(0))) == 1
-    assert swapped(CROSS, thrown(0)) == []
+def test_there_is_a_swap_for_the_arms_and_one_for_the_legs_and_none_without_pairs():
+    assert len(swap_limbs(HUMAN, TRUTH)) == 2
+    assert len(swap_limbs(FIGURE, standing(0))) == 1
+    assert swap_limbs(CROSS, thrown(0)) == []
 
 
-def test_each_segment_of_a_swapped_leg_is_turned_as_its_twin_was_and_nothing_else_moves():
+def test_each_segment_of_a_swapped_leg_takes_its_counterparts_orientation_and_nothing_else_moves():
     before, after = HUMAN.with_pose(TRUTH), HUMAN.with_pose(with_legs_swapped(TRUTH))
     for left, right in LEGS.items():
         np.testing.assert_allclose(after.R[left], before.R[right], atol=ROUNDTRIP)
@@ -49,11 +51,11 @@ def test_legs_swapped_twice_are_where_they_were(time_s):
 @pytest.mark.parametrize("swap", [0, 1])
 def test_swapped_pose_is_within_the_limits(swap):
     low, high = np.moveaxis(HUMAN.limits_rad, -1, 0)
-    angles = swapped(HUMAN, TRUTH)[swap].joint_angles
+    angles = swap_limbs(HUMAN, TRUTH)[swap].joint_angles
     assert np.all((low <= angles) & (angles <= high))
 
 
-def test_truth_is_nearer_than_its_swap_by_more_than_a_doubt():
+def test_truth_is_nearer_than_its_swap_by_more_than_the_margin():
     swap = with_legs_swapped(TRUTH)
     assert is_nearer(HUMAN, TRUTH, swap, expected=TRUTH)
     assert not is_nearer(HUMAN, swap, TRUTH, expected=TRUTH)
@@ -64,7 +66,7 @@ def test_neither_of_two_poses_is_nearer_when_they_are_the_same_or_equally_far():
     assert not is_nearer(HUMAN, TRUTH, TRUTH, expected=with_legs_swapped(TRUTH))
     turn = np.zeros(6 + 3 * len(TRUTH.joint_angles))
     turn[3 + 3 * HUMAN.index_of("thigh_left")] = np.radians(20)
-    either_way = [moved_pose(TRUTH, sign * turn) for sign in (1, -1)]
+    either_way = [move_pose(TRUTH, sign * turn) for sign in (1, -1)]
     assert not is_nearer(HUMAN, *either_way, expected=TRUTH)
     assert not is_nearer(HUMAN, *either_way[::-1], expected=TRUTH)
 

@@ -1,11 +1,11 @@
-"""Known lights find a body better than fitted ones in a drawing in exactly that light."""
+"""Known lights find a body better than fitted ones in images rendered in exactly that light."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
-from airborne.body import geometry
+from airborne.body import surface_arrays
 from airborne.rendering import render
 from tests.support.people import CAMERAS, HUMAN, REACH, mean_errors_mm, swinging, tracker, wrong
 from tests.support.scenes import CROSS, LIGHTS, Scene, srgb_from_light, statuses, thrown, track, worst
@@ -13,10 +13,10 @@ from tests.support.scenes import CROSS, LIGHTS, Scene, srgb_from_light, statuses
 
 @dataclass(frozen=True)
 class Exact(Scene):
-    """Drawn as the tracker draws: one colour for each pixel's centre, shaded in sRGB."""
+    """Rendered as the tracker renders: one colour for each pixel's centre, shaded in sRGB."""
 
     def _picture(self, index, i, seen_by, pose):
-        drawn = render(geometry(self.model), self.model.with_pose(pose), seen_by, LIGHTS)
+        drawn = render(surface_arrays(self.model), self.model.with_pose(pose), seen_by, LIGHTS)
         picture = np.where(drawn.mask[..., None], drawn.colour, srgb_from_light(self.backgrounds[i]))
         noise = self.noise_grey * np.random.default_rng([index, i]).standard_normal(picture.shape)
         return np.clip(np.rint(picture + noise), 0, 255).astype(np.uint8)
@@ -47,5 +47,5 @@ def test_thrown_cross_in_known_light_is_where_it_is_in_unknown():
 
 @pytest.mark.parametrize("scene", [PERSON, THROWN], ids=["person", "cross"])
 def test_lights_that_are_not_exact_are_fitted_as_if_unknown(scene):
-    told, untold = (track(scene, range(1), tracker(scene, scene.start(), lights=each)) for each in (LIGHTS, None))
-    np.testing.assert_array_equal(told[0].covariance, untold[0].covariance)
+    known, unknown = (track(scene, range(1), tracker(scene, scene.start(), lights=each)) for each in (LIGHTS, None))
+    np.testing.assert_array_equal(known[0].covariance, unknown[0].covariance)

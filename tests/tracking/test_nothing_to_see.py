@@ -29,7 +29,7 @@ def test_no_pictures_at_all_is_lost(settings):
 
 
 def test_start_outside_every_picture_is_lost(settings):
-    outside = thrown(0).moved(np.array([0, 0, 40.0]), np.zeros(3))
+    outside = thrown(0).move(np.array([0, 0, 40.0]), np.zeros(3))
     assert statuses(track(Scene(), range(2), tracker_of(settings, CROSS, outside))) == ["lost"] * 2
 
 

@@ -30,7 +30,7 @@ def test_spindle_shows_where_its_axis_points_and_not_its_spin():
         assert np.all(np.diag(estimate.covariance)[:3] < 0.003**2)
 
 
-def test_unseen_spin_stays_as_it_was():
+def test_unobserved_spin_stays_as_it_was():
     scene = Scene(model=BALL)
     turned = [
         estimate.pose.world_from_root.rotation * scene.start().world_from_root.rotation.inv()

@@ -46,15 +46,17 @@ def test_legs_are_tracked_as_blockers_unless_told(folder):
     assert read(folder, trial_text().replace("[track]\n", "")).track.method == "blocker"
 
 
-def test_a_method_is_told_only_what_it_may_read(folder):
-    of_filter = read(folder, trial_text(track='method = "block-jump"\nseed = 3\nn_particles = 200')).track.told
+def test_a_method_gets_only_the_settings_it_reads(folder):
+    of_filter = read(
+        folder, trial_text(track='method = "block-jump"\nseed = 3\nn_particles = 200')
+    ).track.method_settings
     assert set(of_filter) == {
         *("method", "every", "stop", "overlay"),
         *("n_particles", "seed", "swing", "estimate", "views", "tempered"),
         *("torso_shift", "resample", "resample_when", "torso"),
     }
     assert (of_filter["seed"], of_filter["n_particles"], of_filter["estimate"]) == (3, 200, None)
-    assert set(read(folder, trial_text()).track.told) == {"method", "every", "stop", "overlay"}
+    assert set(read(folder, trial_text()).track.method_settings) == {"method", "every", "stop", "overlay"}
 
 
 def test_the_shared_clip_is_read_as_it_is(shared_data):
@@ -81,7 +83,11 @@ def test_the_shared_clip_is_read_as_it_is(shared_data):
         ("[track]", '[track]\noverlay = "fancy"', "track.overlay"),
         ("[track]", '[track]\ntorso = "torso.csv"', "torso.csv not found beside it"),
         ('"number 7"', '"Anna"', "two players share a name: Anna, Anna, referee"),
-        ('"number 7"', '"a, b"', "start.player.1.name: must not hold a comma, a quote or a line's end (found 'a, b')"),
+        (
+            '"number 7"',
+            '"a, b"',
+            "start.player.1.name: must not contain a comma, a quote or a line break (found 'a, b')",
+        ),
         ('"number 7"', '""', "start.player.1.name: must not be empty"),
         ("knee_left =", "knie_left =", "player 'Anna': no point knie_left; there are: torso, hip_left"),
         ("knee_left = [-0.72, 0.0, 0.5]\n", "", "player 'Anna': joints_m has no knee_left; give all of torso"),
@@ -153,7 +159,7 @@ def test_a_player_whom_no_camera_sees_is_refused_and_a_bystander_is_not(folder):
     players_tracker_of(read(folder, away), rig())
     gone = text.replace("0.0, 0.9]", "90.0, 0.9]").replace("0.0, 0.5]", "90.0, 0.5]").replace("0.0, 0.1]", "90.0, 0.1]")
     gone = gone.replace("0.0, 1.2]", "90.0, 1.2]").replace("[-0", "[-80").replace("[0.", "[80.")
-    with pytest.raises(TrialError, match="player 'Anna' lies in no camera's picture"):
+    with pytest.raises(TrialError, match="player 'Anna' lies in no camera's image"):
         players_tracker_of(read(folder, gone), rig())
 
 

@@ -48,7 +48,7 @@ def test_a_file_without_its_index_cannot_be_opened(clip, tmp_path):
     assert "a.mp4 cannot be opened as a video" in message or "a.mp4 holds no video stream" in message
 
 
-def test_a_file_cut_off_before_its_first_picture_is_refused(clip, tmp_path):
+def test_a_file_cut_off_before_its_first_image_is_refused(clip, tmp_path):
     data = clip.read_bytes()
     (tmp_path / "a.mp4").write_bytes(data[: data.index(b"mdat") + 40])
     assert "no picture" in refusal(tmp_path / "a.mp4")

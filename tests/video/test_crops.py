@@ -1,4 +1,4 @@
-"""Only the part of a picture that somebody looks at is converted; it is the part of the whole picture."""
+"""Only the part of an image that somebody looks at is converted; it is the part of the whole image."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -12,7 +12,7 @@ from airborne.cameras import Rig
 from airborne.errors import VideoError
 from airborne.video import VideoSource, open_recording
 from airborne.video import lazy as lazy_frames
-from airborne.video.crops import colours_of, rgb_from_part
+from airborne.video.crops import conversion_of, rgb_from_part
 from airborne.video.pixels import frame_from_rgb, rgb_from_frame
 from tests.support.clips import plain_camera, plain_rig, textured, write_clip
 
@@ -34,7 +34,7 @@ def lazy(path, rig, **kwargs):
 def test_a_part_is_the_part_of_the_whole_within_a_grey_level(pix_fmt, short_side):
     frame = noisy_frame(pix_fmt, short_side=short_side)
     frame.color_range = ColorRange.JPEG if pix_fmt.startswith("yuvj") else ColorRange.MPEG
-    colours = colours_of(frame, short_side=short_side)
+    colours = conversion_of(frame, short_side=short_side)
     assert colours is not None
     whole = rgb_from_frame(frame, short_side=short_side).astype(int)
     for box in BOXES:
@@ -46,7 +46,7 @@ def test_a_part_is_the_part_of_the_whole_within_a_grey_level(pix_fmt, short_side
 
 @pytest.mark.parametrize("pix_fmt", ["yuv444p", "yuv420p10le", "rgb24", "gray"])
 def test_of_rare_formats_there_is_only_the_whole(pix_fmt):
-    assert colours_of(noisy_frame(pix_fmt), short_side=1080) is None
+    assert conversion_of(noisy_frame(pix_fmt), short_side=1080) is None
 
 
 @pytest.mark.parametrize("location", ["left", "center", "topleft"])
@@ -58,7 +58,7 @@ def test_the_place_of_the_chroma_is_found_out(tmp_path, location):
     path = write_clip(tmp_path / "cam1.mp4", frames, codec="libx264", pix_fmt="yuv420p", options=options)
     with av.open(str(path)) as video:
         frame = next(video.decode(video=0))
-    colours = colours_of(frame, short_side=48)
+    colours = conversion_of(frame, short_side=48)
     assert colours is not None
     found = (colours.siting_x == (0, 2), colours.siting_y == (0, 2))
     assert found == {"left": (True, False), "center": (False, False), "topleft": (True, True)}[location]
@@ -81,7 +81,7 @@ def test_a_lazy_recording_shows_what_the_eager_one_does(tmp_path, distortion):
         np.testing.assert_array_equal(view.rgb, expected.rgb)
 
 
-def test_looking_at_a_part_converts_no_whole_picture_and_the_whole_is_converted_once(tmp_path, monkeypatch):
+def test_looking_at_a_part_converts_no_whole_image_and_the_whole_is_converted_once(tmp_path, monkeypatch):
     frames = [frame_from_rgb(image, short_side=50) for image in textured(1, SIZE)]
     path = write_clip(tmp_path / "cam1.mp4", frames, codec="libx264", pix_fmt="yuv420p")
     asked, whole_of = [], lazy_frames.rgb_from_picture
@@ -94,7 +94,7 @@ def test_looking_at_a_part_converts_no_whole_picture_and_the_whole_is_converted_
 
 
 @pytest.mark.parametrize("rotation_deg", [90, 180])
-def test_turned_pictures_are_cropped_by_way_of_the_whole(tmp_path, rotation_deg):
+def test_turned_images_are_cropped_by_way_of_the_whole(tmp_path, rotation_deg):
     path = write_clip(tmp_path / "cam1.mp4", textured(2), codec="libx264", pix_fmt="yuv420p", rotation_deg=rotation_deg)
     size = (48, 64) if rotation_deg == 90 else (64, 48)
     rig = plain_rig("cam1", size=size)

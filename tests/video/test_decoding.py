@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.video import VideoSource, VideoWriter, inspect
-from airborne.video.decoding import pictures, rgb_from_picture
+from airborne.video.decoding import decode, rgb_from_decoded
 from tests.support.clips import SIZE, numbered, packets_of, textured, with_noise, write_clip
 
 NTSC = Fraction(60000, 1001)
@@ -15,7 +15,7 @@ NTSC = Fraction(60000, 1001)
 def read(path, fields="progressive"):
     source = VideoSource("cam1", path, fields)
     facts = inspect(source)
-    return facts, list(pictures(source, facts))
+    return facts, list(decode(source, facts))
 
 
 def half(packet):
@@ -48,7 +48,7 @@ def test_a_file_of_varying_rate_keeps_its_own_stamps(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a.mkv", "a.ts"])
-def test_times_start_at_the_first_picture(tmp_path, name):
+def test_times_start_at_the_first_image(tmp_path, name):
     codec = "libx264" if name.endswith("ts") else "ffv1"
     path = write_clip(
         tmp_path / name,
@@ -63,14 +63,14 @@ def test_times_start_at_the_first_picture(tmp_path, name):
     assert [picture.time_s for picture in read(path)[1]] == [Fraction(k, 25) for k in range(5)]
 
 
-def test_pictures_stored_out_of_order_come_in_order(tmp_path):
+def test_images_stored_out_of_order_come_in_order(tmp_path):
     path = write_clip(
         tmp_path / "a.mp4", numbered(30), codec="libx264", pix_fmt="yuv444p", options={"bf": "3", "b-adapt": "0"}
     )
     stamps = [stamp for *_, stamp, _ in packets_of(path)]
     assert stamps != sorted(stamps)
     facts, seen = read(path)
-    levels = [rgb_from_picture(picture, facts)[5, 5, 0] for picture in seen]
+    levels = [rgb_from_decoded(picture, facts)[5, 5, 0] for picture in seen]
     assert np.allclose(levels, 2 * np.arange(30), atol=1)
 
 
@@ -80,7 +80,7 @@ def test_flags_tell_the_field_order_and_fields_have_their_own_times(tmp_path, fi
         for image in numbered(4):
             writer.write(image)
     facts, seen = read(tmp_path / "a.mp4", "auto")
-    assert facts.flagged == facts.fields == fields
+    assert facts.flagged_order == facts.fields == fields
     assert facts.image_rate == 50
     assert [picture.time_s for picture in seen] == [Fraction(j, 50) for j in range(8)]
     assert [picture.parity for picture in seen] == parities * 4
@@ -92,7 +92,7 @@ def test_a_phones_rotation_is_applied_as_other_readers_do(tmp_path, rotation_deg
     picture[:12, :20] = [200, 60, 30]
     path = write_clip(tmp_path / "a.mp4", [picture] * 3, codec="libx264", pix_fmt="yuv444p", rotation_deg=rotation_deg)
     facts, seen = read(path)
-    ours = rgb_from_picture(seen[0], facts)
+    ours = rgb_from_decoded(seen[0], facts)
     reader = cv2.VideoCapture(str(path))
     theirs = reader.read()[1][..., ::-1]
     reader.release()

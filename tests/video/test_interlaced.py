@@ -10,8 +10,8 @@ from av.error import EOFError as Ended
 from av.filter import Graph
 
 from airborne.video import VideoSource, VideoWriter, inspect, open_recording, weave
-from airborne.video.decoding import pictures
-from airborne.video.pixels import field_frame, frame_from_rgb, rgb_from_frame, woven_frame
+from airborne.video.decoding import decode
+from airborne.video.pixels import field_frame, frame_from_rgb, rgb_from_frame, weave_frame
 from tests.support.clips import SIZE, plain_rig, write_clip
 
 PARITIES = {"top-first": (0, 1), "bottom-first": (1, 0)}
@@ -67,7 +67,7 @@ def test_stored_rows_come_back_unchanged_whatever_the_chroma(tmp_path, pix_fmt):
         [frame_from_rgb(moving_edge((2 * k + p) / 50)[p::2], short_side=48, pix_fmt=pix_fmt) for p in (0, 1)]
         for k in range(4)
     ]
-    path = write_clip(tmp_path / "a.mkv", [woven_frame(*pair) for pair in fields], rate=Fraction(25), pix_fmt=pix_fmt)
+    path = write_clip(tmp_path / "a.mkv", [weave_frame(*pair) for pair in fields], rate=Fraction(25), pix_fmt=pix_fmt)
     seen = read(path, "top-first", "rows")
     for frames, pair in zip(zip(seen[0::2], seen[1::2], strict=True), fields, strict=True):
         for frame, field in zip(frames, pair, strict=True):
@@ -91,7 +91,7 @@ def test_a_still_scene_does_not_wobble_by_half_a_row(tmp_path, fields_as, row):
 
 
 def bwdif_fields(path):
-    """Yield (time [s], frame) of FFmpeg's deinterlacer, one full picture per field."""
+    """Yield (time [s], frame) of FFmpeg's deinterlacer, one full image per field."""
     with av.open(path) as container:
         stream = container.streams.video[0]
         graph = Graph()
@@ -116,7 +116,7 @@ def assert_agrees_with_bwdif(path, fields, n_fields):
     source = VideoSource("cam1", path, "auto")
     facts = inspect(source)
     assert facts.fields == fields
-    ours = [(p.time_s, p.parity, luma(field_frame(p.frame, p.parity))) for p in pictures(source, facts)]
+    ours = [(p.time_s, p.parity, luma(field_frame(p.frame, p.parity))) for p in decode(source, facts)]
     theirs = [(time_s, luma(frame)) for time_s, frame in bwdif_fields(path)]
     assert len(ours) == len(theirs) == n_fields
     for (time_s, parity, rows), (their_time_s, full) in zip(ours, theirs, strict=True):

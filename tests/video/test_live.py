@@ -1,4 +1,4 @@
-"""Live pictures: the newest of each camera, matched in time; late ones are dropped and counted, never queued."""
+"""Live images: the newest of each camera, matched in time; late ones are dropped and counted, never queued."""
 
 import os
 import threading
@@ -12,9 +12,9 @@ import pytest
 
 from airborne.cameras import Rig
 from airborne.errors import VideoError
-from airborne.video import VideoSource, connected, live_recording
-from airborne.video.crops import colours_of
-from airborne.video.live import PATIENCE_S
+from airborne.video import VideoSource, connect, live_recording
+from airborne.video.crops import conversion_of
+from airborne.video.live import _LONGEST_WAIT_S
 from airborne.video.pixels import frame_from_rgb
 from tests.support.clips import numbered, plain_camera, plain_rig, write_clip
 
@@ -26,17 +26,17 @@ OPTIONS = {"mpegts": {"flush_packets": "1"}, "matroska": {"cluster_time_limit": 
 
 @pytest.fixture(scope="module", autouse=True)
 def _compiled():
-    """Load what converts pictures, which takes longer than any picture waits."""
-    colours_of(frame_from_rgb(np.zeros((48, 64, 3), np.uint8), short_side=48), short_side=48)
+    """Load what converts images, which takes longer than any image waits."""
+    conversion_of(frame_from_rgb(np.zeros((48, 64, 3), np.uint8), short_side=48), short_side=48)
 
 
 def level_of(k):
-    """The grey level of a picture, coarse enough to come through a codec, for up to 55 pictures."""
+    """The grey level of an image, coarse enough to come through a codec, for up to 55 images."""
     return 20 + 4 * (k % 56)
 
 
 class Sender(threading.Thread):
-    """Writes numbered pictures into a pipe at their own speed."""
+    """Writes numbered images into a pipe at their own speed."""
 
     def __init__(self, path, n, *, container="mpegts", silent=(), gone_after=None):
         super().__init__(daemon=True)
@@ -72,7 +72,7 @@ def piped(folder, n, names=NAMES, rig=None, **of_camera):
     senders = [Sender(folder / name, n, **of_camera.get(name, {})) for name in names]
     for sender in senders:
         sender.start()
-    with connected([VideoSource(name, folder / name) for name in names]) as cameras:
+    with connect([VideoSource(name, folder / name) for name in names]) as cameras:
         yield live_recording(cameras, rig or plain_rig(*names))
     for sender in senders:
         sender.join(5)
@@ -80,17 +80,17 @@ def piped(folder, n, names=NAMES, rig=None, **of_camera):
 
 
 def shown(frames):
-    """The numbers of the pictures of one time."""
+    """The numbers of the images of one time."""
     levels = [None if view is None else int(view.crop((5, 5, 6, 6))[0, 0, 0]) for view in frames.views]
     return [None if level is None else round((level - level_of(0)) / 4) for level in levels]
 
 
 def counted(recording):
-    return {each["name"]: (each["n_received"], each["n_used"], each["n_dropped"]) for each in recording.dropped()}
+    return {each["name"]: (each["n_received"], each["n_used"], each["n_dropped"]) for each in recording.image_counts()}
 
 
 @pytest.mark.parametrize("container", ["mpegts", "matroska"])
-def test_pictures_of_one_time_come_together_and_in_order(tmp_path, container):
+def test_images_of_one_time_come_together_and_in_order(tmp_path, container):
     with piped(tmp_path, 40, **{name: {"container": container} for name in NAMES}) as recording:
         assert recording.rate == RATE
         seen = [(frames.index, frames.time_s, shown(frames)) for frames in recording]
@@ -108,11 +108,11 @@ def test_pictures_of_one_time_come_together_and_in_order(tmp_path, container):
         assert counts[name] == (40, n_used, 40 - n_used)
 
 
-def test_a_slow_tracker_drops_pictures_and_falls_behind_by_no_more_than_its_own_time(tmp_path):
+def test_a_slow_tracker_drops_images_and_falls_behind_by_no_more_than_its_own_time(tmp_path):
     step_s, delays_s = 0.09, []
     with piped(tmp_path, 60) as recording:
         for frames in recording:
-            delays_s.append(time.monotonic() - recording.arrived_s)
+            delays_s.append(time.monotonic() - recording.arrival_s)
             last = frames.index
             time.sleep(step_s)
         counts = counted(recording)
@@ -121,7 +121,7 @@ def test_a_slow_tracker_drops_pictures_and_falls_behind_by_no_more_than_its_own_
         assert n_received == 60 == n_used + n_dropped
         assert n_dropped > 60 / 2
         assert 4 <= n_used <= 60 / RATE / step_s + 3
-    assert max(delays_s) < 2 * PATIENCE_S
+    assert max(delays_s) < 2 * _LONGEST_WAIT_S
     assert np.median(delays_s) < 2 / RATE
 
 
@@ -135,7 +135,7 @@ def test_a_camera_that_goes_quiet_is_waited_for_once_and_then_missed(tmp_path):
     late = [numbers for index, numbers in seen if index >= 58]
     assert len(late) > 15
     assert all(numbers[1] is None and numbers[0] is not None and numbers[2] is not None for numbers in late)
-    assert max(gaps_s[1:]) < 2 * PATIENCE_S
+    assert max(gaps_s[1:]) < 2 * _LONGEST_WAIT_S
 
 
 def test_cameras_that_end_early_leave_the_others_even_if_one_was_the_clock(tmp_path):
@@ -146,9 +146,9 @@ def test_cameras_that_end_early_leave_the_others_even_if_one_was_the_clock(tmp_p
     assert all(numbers[1] is not None for index, numbers in seen.items() if index > 14)
 
 
-def test_files_play_at_their_own_speed_and_nothing_is_missed_while_the_first_pictures_are_looked_at(tmp_path):
+def test_files_play_at_their_own_speed_and_nothing_is_missed_while_the_first_images_are_looked_at(tmp_path):
     sources = [VideoSource(name, write_clip(tmp_path / f"{name}.mkv", numbered(20))) for name in NAMES[:2]]
-    with connected(sources) as cameras:
+    with connect(sources) as cameras:
         recording = live_recording(cameras, plain_rig(*NAMES[:2]))
         frames = iter(recording)
         assert next(frames).index == 0
@@ -163,7 +163,7 @@ def test_files_play_at_their_own_speed_and_nothing_is_missed_while_the_first_pic
 def test_offsets_move_a_cameras_times(tmp_path):
     clip = write_clip(tmp_path / "clip.mkv", numbered(30))
     sources = [VideoSource("cam1", clip), VideoSource("cam2", clip, offset_s=0.1)]
-    with connected(sources) as cameras:
+    with connect(sources) as cameras:
         pairs = [
             [round(int(view.rgb[5, 5, 0]) / 2) for view in frames.views]
             for frames in live_recording(cameras, plain_rig("cam1", "cam2"))
@@ -174,7 +174,7 @@ def test_offsets_move_a_cameras_times(tmp_path):
 
 def test_start_every_and_stop_choose_frames(tmp_path):
     sources = [VideoSource("cam1", write_clip(tmp_path / "cam1.mkv", numbered(30)))]
-    with connected(sources) as cameras:
+    with connect(sources) as cameras:
         recording = live_recording(cameras, plain_rig("cam1"), start=4, every=3, stop=20)
         indices = [frames.index for frames in recording]
     assert set(indices) <= set(range(4, 20, 3)) and len(indices) >= 3
@@ -190,7 +190,7 @@ def test_leaving_early_lets_the_senders_go(tmp_path):
     assert threading.active_count() == n_threads
 
 
-def test_waiting_for_pictures_is_told_and_can_be_interrupted(tmp_path):
+def test_waiting_for_images_is_told_and_can_be_interrupted(tmp_path):
     os.mkfifo(tmp_path / "cam1")
     told = []
 
@@ -199,7 +199,7 @@ def test_waiting_for_pictures_is_told_and_can_be_interrupted(tmp_path):
         if len(told) == 3:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt), connected([VideoSource("cam1", tmp_path / "cam1")], waiting):
+    with pytest.raises(KeyboardInterrupt), connect([VideoSource("cam1", tmp_path / "cam1")], waiting):
         pass
     assert len(told) == 3
 
@@ -213,16 +213,16 @@ def test_waiting_for_pictures_is_told_and_can_be_interrupted(tmp_path):
         ([("cam1", "text", "progressive")], "no pictures come from"),
     ],
 )
-def test_what_gives_no_pictures_is_refused_in_one_line(tmp_path, sources, said):
+def test_what_gives_no_images_is_refused_in_one_line(tmp_path, sources, said):
     write_clip(tmp_path / "clip.mkv", numbered(3))
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "text").write_text("no video")
-    with pytest.raises(VideoError) as caught, connected([VideoSource(n, tmp_path / p, f) for n, p, f in sources]):
+    with pytest.raises(VideoError) as caught, connect([VideoSource(n, tmp_path / p, f) for n, p, f in sources]):
         pass
     assert said in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_a_camera_of_another_size_is_refused(tmp_path):
     sources = [VideoSource("cam1", write_clip(tmp_path / "cam1.mkv", numbered(3)))]
-    with connected(sources) as cameras, pytest.raises(VideoError, match="64×48 px, but the calibration's"):
+    with connect(sources) as cameras, pytest.raises(VideoError, match="64×48 px, but the calibration's"):
         live_recording(cameras, Rig((plain_camera(size=(80, 60)),)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.video import Frames, Outages, View
-from airborne.video.outages import DARK_GREY, LISTED, is_dark
+from airborne.video.outages import DARK_LEVEL, N_LISTED, is_dark
 from tests.support.clips import plain_camera
 
 
@@ -16,19 +16,19 @@ def view(level):
 
 
 def told(levels, step=1):
-    """What is said of a first camera that shows these levels (None: no picture), beside a sound one."""
+    """What is said of a first camera that shows these levels (None: no image), beside a sound one."""
     outages = Outages(("left", "right"))
     for k, level in enumerate(levels):
         views = (None if level is None else view(level), view(90))
         outages.add(Frames(step * k, Fraction(k, 50), views))
-    return list(outages.described())
+    return list(outages.describe())
 
 
 def test_nothing_is_said_of_cameras_that_show_something():
-    assert told([90, 200, DARK_GREY]) == []
+    assert told([90, 200, DARK_LEVEL]) == []
 
 
-def test_missing_and_dark_pictures_are_told_by_camera_and_frames():
+def test_missing_and_dark_images_are_told_by_camera_and_frames():
     assert told([90, None, None, 90, 3, 90, None]) == [
         "left: no picture at 3 of 7 frames: frames 1 to 2, 6",
         "left: dark at 1 of 7 frames: frame 4",
@@ -43,10 +43,10 @@ def test_frames_that_are_left_out_on_purpose_make_no_new_stretch():
 def test_what_is_said_and_kept_does_not_grow_with_the_run(n):
     (said,) = told([None if k % 2 else 90 for k in range(n)])
     assert said.startswith(f"left: no picture at {n // 2} of {n} frames: frames 1, 3, 5, 7, 9 and")
-    assert said.endswith(f"{n // 2 - LISTED} more times")
+    assert said.endswith(f"{n // 2 - N_LISTED} more times")
 
 
-def test_a_dark_picture_with_a_bright_corner_is_not_dark():
+def test_a_dark_image_with_a_bright_corner_is_not_dark():
     shown = view(0)
     assert is_dark(shown)
     shown.rgb[-4:, -4:] = 200

@@ -2,7 +2,7 @@ import av
 import numpy as np
 import pytest
 
-from airborne.video.pixels import field_frame, frame_from_rgb, rgb_from_frame, woven_frame
+from airborne.video.pixels import field_frame, frame_from_rgb, rgb_from_frame, weave_frame
 
 RNG = np.random.default_rng(5)
 RED_BLUE_SHARE = {1: (0.2126, 0.0722), 5: (0.299, 0.114), 6: (0.299, 0.114), 9: (0.2627, 0.0593)}  # by matrix tag
@@ -83,7 +83,7 @@ def test_rgb_and_grey_frames_keep_their_levels():
 @pytest.mark.parametrize("pix_fmt", ["yuv420p", "yuv422p", "yuv444p", "yuv420p10le", "nv12", "bgr0", "gray"])
 def test_parting_and_weaving_frames_are_inverse(pix_fmt):
     frame = random_frame(pix_fmt)
-    again = woven_frame(field_frame(frame, 0), field_frame(frame, 1))
+    again = weave_frame(field_frame(frame, 0), field_frame(frame, 1))
     for before, after in zip(frame.planes, again.planes, strict=True):
         assert bytes(before) == bytes(after)
 
@@ -99,7 +99,7 @@ def test_a_fields_colours_are_those_of_the_whole_frame_where_no_chroma_is_shared
 def test_chroma_of_the_two_fields_never_mixes(pix_fmt):
     colours = np.array([[200, 30, 30], [30, 30, 200]], np.uint8)
     fields = [frame_from_rgb(np.full((24, 64, 3), c, np.uint8), short_side=48, pix_fmt=pix_fmt) for c in colours]
-    frame = woven_frame(*fields)
+    frame = weave_frame(*fields)
     for parity, colour in enumerate(colours):
         rgb = rgb_from_frame(field_frame(frame, parity), short_side=48)
         assert np.abs(rgb.astype(int) - colour).max() <= 2

@@ -36,7 +36,7 @@ def test_views_are_in_the_rigs_order_whatever_the_order_of_the_sources(tmp_path)
     assert numbers_of(list(trial)[-1].views) == [None, 4]
 
 
-def test_a_shift_of_whole_pictures_pairs_other_numbers(tmp_path):
+def test_a_shift_of_whole_images_pairs_other_numbers(tmp_path):
     paths = clip(tmp_path / "a.mkv", 8), clip(tmp_path / "b.mkv", 8)
     later = [numbers_of(f.views) for f in recording(*paths, offsets=(0, 0.04))]
     assert later == [[0, None], [1, None], *([k, k - 2] for k in range(2, 8)), [None, 6], [None, 7]]
@@ -45,7 +45,7 @@ def test_a_shift_of_whole_pictures_pairs_other_numbers(tmp_path):
 
 
 @pytest.mark.parametrize("offset_s", [0.009, -0.009, 0.01, Fraction(-1, 100)])
-def test_within_half_a_period_each_picture_is_used_once(tmp_path, offset_s):
+def test_within_half_a_period_each_image_is_used_once(tmp_path, offset_s):
     frames = recording(clip(tmp_path / "a.mkv", 6), clip(tmp_path / "b.mkv", 6), offsets=(0, offset_s))
     seconds = [numbers_of(f.views)[1] for f in frames]
     seen = [number for number in seconds if number is not None]
@@ -65,7 +65,7 @@ def test_a_slower_camera_is_empty_in_between(tmp_path):
     assert [numbers_of(f.views)[1] for f in frames] == [0, None, 1, None, 2, None]
 
 
-def test_a_faster_camera_gives_the_pictures_at_the_clocks_times(tmp_path):
+def test_a_faster_camera_gives_the_images_at_the_clocks_times(tmp_path):
     frames = recording(clip(tmp_path / "a.mkv", 3, 25), clip(tmp_path / "b.mkv", 6, 50))
     assert [numbers_of(f.views) for f in frames] == [[0, 0], [1, 2], [2, 4]]
 
@@ -98,7 +98,7 @@ def test_a_recording_can_be_read_twice(tmp_path):
 
 @pytest.fixture
 def noisy(tmp_path):
-    """A clip whose pictures are all different and never repeat each other."""
+    """A clip whose images are all different and never repeat each other."""
     return write_clip(
         tmp_path / "clean.mp4",
         textured(30),
@@ -109,7 +109,7 @@ def noisy(tmp_path):
 
 
 @pytest.mark.parametrize("damaged_first", [True, False])
-def test_a_broken_picture_is_an_empty_view_and_an_event(noisy, tmp_path, damaged_first):
+def test_a_broken_image_is_an_empty_view_and_an_event(noisy, tmp_path, damaged_first):
     broken = with_noise(noisy, tmp_path / "broken.mp4", packets_of(noisy)[12])
     trial = recording(*((broken, noisy) if damaged_first else (noisy, broken)))
     frames = list(trial)
@@ -124,7 +124,7 @@ def test_a_broken_picture_is_an_empty_view_and_an_event(noisy, tmp_path, damaged
 
 
 @pytest.mark.parametrize("damaged_first", [True, False])
-def test_pictures_left_out_of_a_file_are_empty_views(tmp_path, damaged_first):
+def test_images_left_out_of_a_file_are_empty_views(tmp_path, damaged_first):
     kept = [k for k in range(12) if k not in (4, 5, 9)]
     gaps = write_clip(tmp_path / "gaps.mkv", [numbered(12)[k] for k in kept], stamps=kept)
     whole = clip(tmp_path / "whole.mkv", 12)

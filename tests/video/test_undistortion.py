@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform
 
 from airborne.cameras import Camera
-from airborne.video.undistortion import lens_of
+from airborne.video.undistortion import undistortion_of
 from tests.support.clips import plain_camera
 
 BARREL = (-0.25, 0.05, 0.002, -0.001, 0.0)
@@ -32,7 +32,7 @@ def test_points_lie_on_the_straight_image_where_the_straight_camera_sees_them(pa
     if parity is not None:
         camera = camera.field(parity)
     points = np.array([[-0.3, -0.2, 1], [0.3, -0.2, 1], [0.3, 0.2, 1], [-0.3, 0.22, 1], [0.02, 0.01, 1]])
-    view = lens_of(camera).view(spots(camera, points))
+    view = undistortion_of(camera).view(spots(camera, points))
     assert not view.camera.is_distorted
     straight_px = view.camera.px_from_world(points)
     assert np.max(np.abs(straight_px - camera.px_from_world(points))) > 1
@@ -43,14 +43,14 @@ def test_points_lie_on_the_straight_image_where_the_straight_camera_sees_them(pa
 def test_an_image_without_distortion_is_passed_on_untouched():
     camera = plain_camera(size=SIZE)
     image = np.zeros((120, 160, 3), np.uint8)
-    assert lens_of(camera).view(image).rgb is image
+    assert undistortion_of(camera).view(image).rgb is image
 
 
 def test_a_lens_that_moves_no_pixel_by_a_twentieth_is_left_alone():
     camera = plain_camera(size=SIZE, distortion=BARREL)
-    assert lens_of(camera).px_from_straight is not None
-    faint = lens_of(replace(camera, distortion=np.array(BARREL) / 10_000))
-    assert faint.px_from_straight is None
+    assert undistortion_of(camera).px_from_undistorted is not None
+    faint = undistortion_of(replace(camera, distortion=np.array(BARREL) / 10_000))
+    assert faint.px_from_undistorted is None
     assert not faint.camera.is_distorted
 
 
@@ -71,4 +71,4 @@ def test_the_laboratorys_lenses_need_straightening_only_where_they_move_pixels(s
         corner = np.array([[[0, 0], [size[0] - 1, 0], [0, size[1] - 1], [size[0] - 1, size[1] - 1]]], float)
         xy = np.concatenate([corner - camera.K[:2, 2], np.zeros((1, 4, 1))], -1) / [camera.K[0, 0], camera.K[1, 1], 1]
         moved = np.linalg.norm(camera.px_from_world(xy + np.array([0, 0, 1])) - corner, axis=-1).max()
-        assert (lens_of(camera).px_from_straight is not None) == (moved > 0.05)
+        assert (undistortion_of(camera).px_from_undistorted is not None) == (moved > 0.05)

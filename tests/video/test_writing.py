@@ -23,7 +23,7 @@ def read(path, size):
     return list(open_recording([VideoSource("cam1", path, "auto")], plain_rig("cam1", size=size)))
 
 
-def test_pictures_and_rate_survive_writing(tmp_path):
+def test_images_and_rate_survive_writing(tmp_path):
     with VideoWriter(tmp_path / "a.mp4", size=(64, 48), rate=Fraction(60000, 1001), crf=4) as writer:
         for k in range(20):
             writer.write(np.roll(ramp(64, 48), k, axis=0))
@@ -46,14 +46,14 @@ def test_the_file_is_flagged_as_written(tmp_path, fields, tag):
     path = tmp_path / "a.mp4"
     with VideoWriter(path, size=(64, 48), rate=Fraction(25), fields=fields) as writer:
         writer.write(ramp(64, 48))
-    assert inspect(VideoSource("cam1", path, "auto")).flagged == fields
+    assert inspect(VideoSource("cam1", path, "auto")).flagged_order == fields
     with av.open(path) as container:
         frame = next(container.decode(video=0))
         assert frame.interlaced_frame is tag
         assert (frame.colorspace, frame.color_range) == (6, 1)  # BT.601, limited
 
 
-def test_a_picture_of_another_size_is_refused_with_both_sizes(tmp_path):
+def test_an_image_of_another_size_is_refused_with_both_sizes(tmp_path):
     with (
         VideoWriter(tmp_path / "a.mp4", size=(64, 48), rate=Fraction(25)) as writer,
         pytest.raises(VideoError, match="24×64×3 was given, expected 48×64×3"),

@@ -1,26 +1,26 @@
-"""Appearance: in come pictures and masks, out come colours, light, and the scene without the body.
+"""Appearance: in come images and masks, out come colours, light and background models.
 
 Knows no body and no search.
 """
 
-from airborne.appearance.background import Plate, fill, look
-from airborne.appearance.foreground import agreement, count_colours, posterior
-from airborne.appearance.hue_saturation import bin_table, hsv_bins, look_up, root_shares
-from airborne.appearance.lighting import fit_light, light_planes, light_up, paint_evenly
+from airborne.appearance.background import BackgroundModel, inpaint, update_background
+from airborne.appearance.foreground import count_colours, posterior, posterior_sums
+from airborne.appearance.hue_saturation import bin_table, hsv_bins, look_up, root_histograms
+from airborne.appearance.lighting import fit_light, flatten_shading, light_planes, shade_body
 
 __all__ = [
-    "Plate",
-    "agreement",
+    "BackgroundModel",
     "bin_table",
     "count_colours",
-    "fill",
     "fit_light",
+    "flatten_shading",
     "hsv_bins",
+    "inpaint",
     "light_planes",
-    "light_up",
-    "look",
     "look_up",
-    "paint_evenly",
     "posterior",
-    "root_shares",
+    "posterior_sums",
+    "root_histograms",
+    "shade_body",
+    "update_background",
 ]

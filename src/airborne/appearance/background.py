@@ -1,4 +1,4 @@
-"""The empty scene as each camera sees it, learned from the pixels that the body does not cover."""
+"""Background models: the empty scene in each camera, learned from the pixels that the body does not cover."""
 
 from __future__ import annotations
 
@@ -6,36 +6,36 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-START_SD = 6.0  # grey levels: what one look at a pixel is worth
-_SLOWEST = 0.05  # a pixel's newest look counts at least this much: slow changes of light are followed
+START_SD = 6.0  # [grey levels] of a pixel that was observed once
+_MIN_RATE = 0.05  # least weight of a pixel's newest observation, so that slow changes of light are followed
 
 
-class Plate:
-    """Mean and spread of every background pixel of one camera [sRGB grey levels]; owned and updated by its tracker."""
+class BackgroundModel:
+    """Running mean and sd of one camera's background pixels [sRGB grey levels]; owned and updated by its tracker."""
 
-    __slots__ = ("looks", "mean", "sd")
+    __slots__ = ("mean", "n_observations", "sd")
 
     def __init__(self, height: int, width: int) -> None:
         self.mean = np.zeros((height, width, 3), np.float32)
         self.sd = np.full((height, width), START_SD, np.float32)
-        self.looks: NDArray[np.uint8] = np.zeros((height, width), np.uint8)
+        self.n_observations: NDArray[np.uint8] = np.zeros((height, width), np.uint8)
 
 
-# one signature for whole pictures and for regions of them: whichever a process looks at first, rounding is the same
+# one signature for whole images and for regions of them: rounding is the same whichever a process meets first
 @njit("(u1[:,:,:], b1[:,:], f4[:,:,:], f4[:,:], u1[:,:])", cache=True, nogil=True, fastmath=True)
-def look(rgb, covered, mean, sd, looks):
-    """Learn from one picture: rgb (h, w, 3) uint8, covered (h, w) bool where the body may be; the rest in place."""
+def update_background(rgb, covered, mean, sd, n_observations):
+    """Learn from one image: rgb (h, w, 3) uint8, covered (h, w) bool where the body may be; the rest in place."""
     h, w, _ = rgb.shape
     for y in range(h):
         for x in range(w):
             if covered[y, x]:
                 continue
-            n = looks[y, x]
+            n = n_observations[y, x]
             if n == 0:
                 for k in range(3):
                     mean[y, x, k] = rgb[y, x, k]
             else:
-                rate = max(np.float32(1.0) / (n + 1), np.float32(_SLOWEST))
+                rate = max(np.float32(1.0) / (n + 1), np.float32(_MIN_RATE))
                 d2 = np.float32(0)
                 for k in range(3):
                     d = rgb[y, x, k] - mean[y, x, k]
@@ -43,25 +43,25 @@ def look(rgb, covered, mean, sd, looks):
                     d2 += d * d
                 variance = sd[y, x] * sd[y, x]
                 sd[y, x] = np.sqrt(max(variance + rate * (d2 / 3 - variance), np.float32(4.0)))
-            looks[y, x] = min(n + 1, 250)
+            n_observations[y, x] = min(n + 1, 250)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def fill(mean, looks, out):
-    """Copy mean (h, w, 3) to out, growing known pixels into unseen ones, ring by ring; False if none is known."""
+def inpaint(mean, n_observations, out):
+    """Copy mean (h, w, 3) to out and grow observed pixels into the others, ring by ring; False if none was observed."""
     h, w, _ = mean.shape
     done = np.zeros((h, w), np.uint8)
     queue = np.empty(h * w, np.int32)
     tail = 0
     for y in range(h):
         for x in range(w):
-            if looks[y, x] > 0:
+            if n_observations[y, x] > 0:
                 done[y, x] = 1
                 for k in range(3):
                     out[y, x, k] = mean[y, x, k]
     for y in range(h):
         for x in range(w):
-            if not done[y, x] and _known_neighbours(done, y, x) > 0:
+            if not done[y, x] and _count_done_neighbours(done, y, x) > 0:
                 done[y, x] = 2
                 queue[tail] = y * w + x
                 tail += 1
@@ -98,7 +98,7 @@ def fill(mean, looks, out):
 
 
 @njit(cache=True, nogil=True)
-def _known_neighbours(done, y, x):
+def _count_done_neighbours(done, y, x):
     h, w = done.shape
     n = 0
     for dy in range(-1, 2):

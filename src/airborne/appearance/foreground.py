@@ -1,7 +1,7 @@
 """Which pixels look like the body: colour histograms of body and background, learned while tracking.
 
 The histograms have 32 bins a channel of sRGB. A pixel's evidence is log p(colour | body) - log p(colour | background)
-in nats; where the empty scene is known (`plate`), a pixel that looks like it is background whatever its colour.
+in nats; where a background model exists, a pixel that agrees with it is background whatever its colour.
 """
 
 from __future__ import annotations
@@ -10,28 +10,28 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-BINS = 32
-EVIDENCE_LIMIT = 5.0  # nats; no single pixel may shout louder
-_UNSEEN = np.float32(2e-5)  # probability given to a colour never seen, a bin
-_BIN_AT_PEAK = np.float32(37.1)  # a bin's volume times the Student density's peak at a spread of one grey level
+BINS_PER_CHANNEL = 32
+EVIDENCE_LIMIT = 5.0  # [nats] bound of a single pixel's evidence
+_FLOOR = np.float32(2e-5)  # probability of a bin that was never observed
+_BIN_AT_PEAK = np.float32(37.1)  # a bin's volume times the Student density's peak at an sd of one grey level
 _HALF = np.float32(0.5)
-_SPREAD = np.array([0.25, 0.5, 0.25], np.float32)  # a colour also counts in its neighbours' bins
+_KERNEL = np.array([0.25, 0.5, 0.25], np.float32)  # a colour also counts in its neighbours' bins
 
 
 @njit(cache=True, nogil=True)
 def count_colours(rgb, chosen, stride, counts):
-    """Add the colours of the chosen pixels to counts (32, 32, 32), each spread over its 27 neighbours' bins.
+    """Add the colours of the chosen pixels to counts (32, 32, 32), each blurred over the 27 bins around it.
 
-    rgb (h, w, 3) uint8, chosen (h, w) bool; every `stride`-th chosen pixel is taken. Returns how many were.
+    rgb (h, w, 3) uint8, chosen (h, w) bool; every `stride`-th chosen pixel is taken. Returns how many.
     """
     h, w, _ = rgb.shape
-    seen, taken = 0, 0
+    n_chosen, taken = 0, 0
     for y in range(h):
         for x in range(w):
             if not chosen[y, x]:
                 continue
-            seen += 1
-            if seen % stride:
+            n_chosen += 1
+            if n_chosen % stride:
                 continue
             taken += 1
             r, g, b = rgb[y, x, 0] >> 3, rgb[y, x, 1] >> 3, rgb[y, x, 2] >> 3
@@ -39,28 +39,28 @@ def count_colours(rgb, chosen, stride, counts):
                 for j in range(-1, 2):
                     for k in range(-1, 2):
                         ri, gj, bk = min(max(r + i, 0), 31), min(max(g + j, 0), 31), min(max(b + k, 0), 31)
-                        counts[ri, gj, bk] += _SPREAD[i + 1] * _SPREAD[j + 1] * _SPREAD[k + 1]
+                        counts[ri, gj, bk] += _KERNEL[i + 1] * _KERNEL[j + 1] * _KERNEL[k + 1]
     return taken
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def posterior(rgb, body, background, plate, plate_sd, known, out):
+def posterior(rgb, body, background, mean, sd, n_observations, out):
     """Fill out (h, w) with each pixel's probability to be body, at even odds.
 
-    rgb (h, w, 3) uint8; body, background (32, 32, 32) probabilities; plate (h, w, 3) the empty scene's sRGB with sd
-    plate_sd (h, w) grey levels, used where known (h, w) is above zero: half of the background's chance is then a
-    Student distribution (5 degrees of freedom) about the plate.
+    rgb (h, w, 3) uint8; body, background (32, 32, 32) probabilities; mean (h, w, 3), sd (h, w) the background model in
+    grey levels, used where n_observations (h, w) is above zero: half of the background's probability is then a
+    Student distribution (5 degrees of freedom) about the mean.
     """
     h, w, _ = rgb.shape
     for y in range(h):
         for x in range(w):
             r, g, b = rgb[y, x, 0], rgb[y, x, 1], rgb[y, x, 2]
-            p_body = body[r >> 3, g >> 3, b >> 3] + _UNSEEN
-            p_back = background[r >> 3, g >> 3, b >> 3] + _UNSEEN
-            if known[y, x] > 0:
-                d0, d1, d2 = r - plate[y, x, 0], g - plate[y, x, 1], b - plate[y, x, 2]
-                s2 = plate_sd[y, x] * plate_sd[y, x]
-                near = _BIN_AT_PEAK / (s2 * plate_sd[y, x])
+            p_body = body[r >> 3, g >> 3, b >> 3] + _FLOOR
+            p_back = background[r >> 3, g >> 3, b >> 3] + _FLOOR
+            if n_observations[y, x] > 0:
+                d0, d1, d2 = r - mean[y, x, 0], g - mean[y, x, 1], b - mean[y, x, 2]
+                s2 = sd[y, x] * sd[y, x]
+                near = _BIN_AT_PEAK / (s2 * sd[y, x])
                 far2 = np.float32(1) + (d0 * d0 + d1 * d1 + d2 * d2) / (np.float32(5) * s2)
                 far4 = far2 * far2
                 p_back = _HALF * p_back + _HALF * min(near, np.float32(1)) / (far4 * far4)
@@ -68,8 +68,8 @@ def posterior(rgb, body, background, plate, plate_sd, known, out):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def evidence(posterior, out):
-    """Fill out (h, w) with the evidence [nats] of posterior (h, w)."""
+def log_odds(posterior, out):
+    """Fill out (h, w) with the evidence of posterior (h, w): its log-odds [nats], within EVIDENCE_LIMIT."""
     limit = np.float32(EVIDENCE_LIMIT)
     h, w = posterior.shape
     for y in range(h):
@@ -79,8 +79,8 @@ def evidence(posterior, out):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def agreement(posterior, part, margin_u, margin_v):
-    """Compare a mask, part (h, w) >= 0, with the posterior (h, w).
+def posterior_sums(posterior, part, margin_u, margin_v):
+    """Sum the posterior (h, w) over a mask, part (h, w) >= 0, and around it.
 
     Returns (pixels of the mask, posterior summed inside, posterior summed over the mask's box widened by the margins,
     evidence summed inside [nats]).
@@ -104,18 +104,18 @@ def agreement(posterior, part, margin_u, margin_v):
 
 
 def body_like(rgb: NDArray[np.uint8], part: NDArray[np.int16], colours: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """Say which pixels of a mask have a hue nearer to their part's colour than to the background's: (h, w).
+    """Return which pixels of a mask have a hue nearer to their part's colour than to the background's: (h, w).
 
     rgb (h, w, 3); part (h, w) index or -1; colours (parts, 3) sRGB. Hues are chromaticities, which do not depend on the
-    light's strength. Where fewer than a tenth of the mask would be left, all of it is.
+    light's strength. Where less than a tenth of the mask would be left, the whole mask is returned.
     """
-    seen, own = _chromaticity(rgb), _chromaticity(colours)
+    observed, own = _chromaticity(rgb), _chromaticity(colours)
     inside = part >= 0
     if not inside.any() or inside.all():
         return inside
-    background = np.median(seen[~inside], axis=0)
-    to_body = np.linalg.norm(seen - own[part], axis=-1)
-    alike = inside & (to_body < np.linalg.norm(seen - background, axis=-1))
+    background = np.median(observed[~inside], axis=0)
+    to_body = np.linalg.norm(observed - own[part], axis=-1)
+    alike = inside & (to_body < np.linalg.norm(observed - background, axis=-1))
     return alike if np.count_nonzero(alike) > 0.1 * np.count_nonzero(inside) else inside
 
 

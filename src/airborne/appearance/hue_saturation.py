@@ -1,7 +1,7 @@
 """Colours as bins of hue and saturation, read through a table.
 
 There are 110 bins (after Pérez et al. 2002): 10 of hue by 10 of saturation for pixels with colour (saturation above
-0.1, value above 0.2), then 10 of value for the rest. What lies outside a picture has a bin of its own.
+0.1, value above 0.2), then 10 of value for the rest. What lies outside an image has a bin of its own.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-BINS = 110
-OUTSIDE = BINS  # the bin of what no picture shows
+HSV_BINS = 110
+OUTSIDE = HSV_BINS  # the bin of what no image shows
 CODES = 1 << 15  # RGB with 5 bits a channel
 
 _SATURATION_FROM, _VALUE_FROM = 0.1, 0.2  # above both, a pixel has a colour
@@ -54,7 +54,7 @@ def look_up(rgb, table):
     return codes
 
 
-def root_shares(counts: NDArray) -> NDArray[np.float32]:
+def root_histograms(counts: NDArray) -> NDArray[np.float32]:
     """Return the square roots of histograms (..., bins) scaled to sum 1; zeros where nothing was counted."""
     counts = np.asarray(counts, float)
     total = counts.sum(axis=-1, keepdims=True)

@@ -11,17 +11,17 @@ from numba import njit
 
 from airborne.rendering.srgb import light_from_srgb
 
-TO_LIGHT = light_from_srgb(np.arange(1024) * (255 / 1023)).astype(np.float32)
-_RIDGE = 1e-4  # pull of the direction-dependent part toward zero, per pixel of unit albedo
-TERMS = 6  # even light, normal (3), place in the picture (2)
+LIGHT_FROM_SRGB = light_from_srgb(np.arange(1024) * (255 / 1023)).astype(np.float32)
+_RIDGE = 1e-4  # of the direction-dependent part toward zero, per pixel of unit albedo
+LIGHT_TERMS = 6  # ambient light, normal (3), image coordinates (2)
 _MOST_SAMPLES = 300
-_BORDER_TRUST = np.float32(0.02)  # weight of a mixed pixel: it speaks only for faces that have no other
+_BORDER_WEIGHT = np.float32(0.02)  # weight of a mixed pixel: it matters only for faces that have no other
 _SAME_FACE = 0.9  # cosine between neighbouring normals
 
 
 @njit(cache=True, nogil=True, fastmath=True)
 def light_planes(image, table, out):
-    """Turn an image (h, w, 3), sRGB 0..255 of any type, into planes (3, h, w) by a table of 1024 (`TO_LIGHT`)."""
+    """Turn an image (h, w, 3), sRGB 0..255 of any type, into planes (3, h, w) by a table like `LIGHT_FROM_SRGB`."""
     h, w, _ = image.shape
     for k in range(3):
         for y in range(h):
@@ -30,13 +30,13 @@ def light_planes(image, table, out):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def fit_light(observed, part, normals, albedo, coefficients, rounds, x0, y0, x1, y1):
-    """Fit coefficients (3, TERMS) in place so that albedo * (a + b . n + c . place) is the light seen inside the mask.
+def fit_light(observed, part, normals, albedo, coefficients, iterations, x0, y0, x1, y1):
+    """Fit coefficients (3, LIGHT_TERMS) in place: albedo * (a + b . n + c . u) is the light observed inside the mask.
 
-    place (2,) runs from -1 to 1 over the picture. observed (3, h, w) linear light, part (h, w) index or -1, normals
-    (3, h, w) unit, albedo (parts, 3); only the window x0 <= x < x1, y0 <= y < y1 is looked at. Pixels at a border of
-    the mask or of a face are mixed and count little. Under twelve pixels, the coefficients stay. Returns the robust sd
-    of what stays unexplained.
+    u (2,) runs from -1 to 1 over the region. observed (3, h, w) linear light, part (h, w) index or -1, normals
+    (3, h, w) unit, albedo (parts, 3); only the window x0 <= x < x1, y0 <= y < y1 is used. Pixels at a border of
+    the mask or of a face are mixed and count little. With fewer than twelve pixels the coefficients do not change.
+    Returns the robust sd of the residual.
     """
     inside = 0
     for y in range(y0, y1):
@@ -46,64 +46,64 @@ def fit_light(observed, part, normals, albedo, coefficients, rounds, x0, y0, x1,
         return np.float32(1.0)
     n = min(inside, _MOST_SAMPLES)
     share = np.uint64(n / inside * 2**32)
-    rows, trust = np.empty((n, TERMS), np.float32), np.empty(n, np.float32)
-    seen, own = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
+    rows, confidence = np.empty((n, LIGHT_TERMS), np.float32), np.empty(n, np.float32)
+    values, own = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
     i, count = 0, 0
     for y in range(y0, y1):
         for x in range(x0, x1):
             if part[y, x] < 0:
                 continue
-            scattered = (np.uint64(count) * np.uint64(2654435761)) & np.uint64(0xFFFFFFFF)  # no pattern of the body's
+            scattered = (np.uint64(count) * np.uint64(2654435761)) & np.uint64(0xFFFFFFFF)  # no pattern
             if i < n and (n == inside or scattered < share):
-                trust[i] = 1 if _is_surrounded(part, normals, y, x) else _BORDER_TRUST
+                confidence[i] = 1 if _is_surrounded(part, normals, y, x) else _BORDER_WEIGHT
                 rows[i, 0] = 1
-                rows[i, 4], rows[i, 5] = _place(part, y, x)
+                rows[i, 4], rows[i, 5] = _region_coordinates(part, y, x)
                 for k in range(3):
                     rows[i, k + 1] = normals[k, y, x]
-                    seen[i, k] = observed[k, y, x]
+                    values[i, k] = observed[k, y, x]
                     own[i, k] = albedo[part[y, x], k]
                 i += 1
             count += 1
     error = np.empty(i, np.float32)
     sd = np.float32(1.0)
-    for step in range(rounds + 1):
+    for step in range(iterations + 1):
         for j in range(i):
             e = np.float32(0)
             for k in range(3):
                 light = np.float32(0)
-                for q in range(TERMS):
+                for q in range(LIGHT_TERMS):
                     light += coefficients[k, q] * rows[j, q]
-                e += abs(seen[j, k] - own[j, k] * light)
+                e += abs(values[j, k] - own[j, k] * light)
             error[j] = e
         sd = np.float32(1.48) * np.median(error) + np.float32(1e-3)
-        if step == rounds:
+        if step == iterations:
             break
         for k in range(3):
-            normal_matrix = np.zeros((TERMS, TERMS))
-            right = np.zeros(TERMS)
+            normal_matrix = np.zeros((LIGHT_TERMS, LIGHT_TERMS))
+            right = np.zeros(LIGHT_TERMS)
             for j in range(i):
                 q = error[j] / (2 * sd)
                 weight = 1.0 / (1.0 + q * q)
-                weight *= weight * own[j, k] * trust[j]
-                for p in range(TERMS):
-                    right[p] += weight * rows[j, p] * seen[j, k]
+                weight *= weight * own[j, k] * confidence[j]
+                for p in range(LIGHT_TERMS):
+                    right[p] += weight * rows[j, p] * values[j, k]
                     for r in range(p + 1):
                         normal_matrix[p, r] += weight * own[j, k] * rows[j, p] * rows[j, r]
             trace = normal_matrix[0, 0]
             normal_matrix[0, 0] += 1e-9
-            for p in range(1, TERMS):
+            for p in range(1, LIGHT_TERMS):
                 normal_matrix[p, p] += _RIDGE * trace + 1e-9
                 for r in range(p):
                     normal_matrix[r, p] = normal_matrix[p, r]
             solved = np.linalg.solve(normal_matrix, right)
-            for p in range(TERMS):
+            for p in range(LIGHT_TERMS):
                 coefficients[k, p] = solved[p]
     return sd
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _place(part, y, x):
-    """Return where a pixel lies in its region, -1 to 1 in both directions."""
+def _region_coordinates(part, y, x):
+    """Return a pixel's coordinates in its region, -1 to 1 in both directions."""
     h, w = part.shape
     return np.float32(2) * x / w - np.float32(1), np.float32(2) * y / h - np.float32(1)
 
@@ -125,10 +125,10 @@ def _is_surrounded(part, normals, y, x):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def light_up(part, normals, albedo, coefficients, x0, y0, lit):
+def shade_body(part, normals, albedo, coefficients, x0, y0, lit):
     """Fill lit (3, h, w), zero before, with the body's linear light; (x0, y0) is the first pixel of its window.
 
-    part (H, W) index or -1, normals (3, H, W) unit, albedo (parts, 3), coefficients (3, TERMS) as `fit_light` has them.
+    part (H, W) index or -1, normals (3, H, W) unit, albedo (parts, 3), coefficients (3, LIGHT_TERMS) of `fit_light`.
     """
     _, h, w = lit.shape
     for y in range(h):
@@ -136,7 +136,7 @@ def light_up(part, normals, albedo, coefficients, x0, y0, lit):
             p = part[y + y0, x + x0]
             if p < 0:
                 continue
-            u, v = _place(part, y + y0, x + x0)
+            u, v = _region_coordinates(part, y + y0, x + x0)
             n0, n1, n2 = normals[0, y + y0, x + x0], normals[1, y + y0, x + x0], normals[2, y + y0, x + x0]
             for k in range(3):
                 c = coefficients[k]
@@ -145,10 +145,10 @@ def light_up(part, normals, albedo, coefficients, x0, y0, lit):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def paint_evenly(part, is_faceted, x0, y0, lit):
-    """Give every part that is not faceted its mean light all over: shading does not turn with a smooth surface.
+def flatten_shading(part, is_faceted, x0, y0, lit):
+    """Give every part that is not faceted its mean light: shading does not rotate with a smooth surface.
 
-    What is left says how the picture would move with the body; see `light_up` for the arguments.
+    What is left shows how the image would move with the body; see `shade_body` for the arguments.
     """
     _, h, w = lit.shape
     total, count = np.zeros((len(is_faceted), 3), np.float32), np.zeros(len(is_faceted), np.float32)

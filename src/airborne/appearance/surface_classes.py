@@ -1,8 +1,8 @@
-"""How like skin, shorts, shoes a pixel is: evidence maps of several kinds of surface, by one look-up a pixel.
+"""Surface classes (skin, shorts, shoes): evidence maps of all of them, by one look-up a pixel.
 
-The evidence of a pixel for a kind, in nats, is log((1 - o) p(colour | kind) + o p(colour | anyone)) less the same of
-the background: o is the chance that somebody else is there, in front of the player or beside him, dressed like him or
-not. No kernel uses fast maths, so that maps are the same to the last bit however it was compiled.
+The evidence of a pixel for a class, in nats, is log((1 - o) p(colour | class) + o p(colour | anyone)) less the same of
+the background: o is the probability that somebody else is there, in front of the player or beside him, dressed like him
+or not. No kernel uses fast maths, so that maps are the same to the last bit however it was compiled.
 """
 
 from __future__ import annotations
@@ -11,45 +11,45 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airborne.appearance.foreground import BINS
+from airborne.appearance.foreground import BINS_PER_CHANNEL
 
-COLUMNS = 8  # of a table: room for the kinds, a whole number of cache lines
-_UNSEEN = 1e-6  # probability of a colour never seen, a bin
-_LIKE_THEM = 0.8  # share of what anyone wears that has the player's own colours
+TABLE_COLUMNS = 8  # room for the classes, a whole number of cache lines
+_FLOOR = 1e-6  # probability of a bin that was never observed
+_SHARED_COLOURS = 0.8  # share of what anyone wears that has the player's own colours
 
 
-def ratio_table(kinds: NDArray, background: NDArray, hidden: NDArray) -> NDArray[np.float32]:
-    """Return the table (32768, COLUMNS) of evidence [nats] for kinds (k, 32, 32, 32) of colour probabilities.
+def log_ratio_table(classes: NDArray, background: NDArray, occlusion: NDArray) -> NDArray[np.float32]:
+    """Return the table (32768, TABLE_COLUMNS) of evidence [nats]; classes (k, 32, 32, 32) are colour probabilities.
 
-    background (32, 32, 32) likewise, hidden (k,) the chance that somebody else is where a pixel of that kind would be.
+    background (32, 32, 32) likewise, occlusion (k,) the probability that somebody else covers a pixel of that class.
     """
-    table = np.zeros((BINS**3, COLUMNS), np.float32)
-    flat = np.ascontiguousarray(kinds.reshape(len(kinds), -1), np.float32)
-    _fill_table(flat, np.ascontiguousarray(background.reshape(-1), np.float32), hidden.astype(np.float32), table)
+    table = np.zeros((BINS_PER_CHANNEL**3, TABLE_COLUMNS), np.float32)
+    flat = np.ascontiguousarray(classes.reshape(len(classes), -1), np.float32)
+    _fill_table(flat, np.ascontiguousarray(background.reshape(-1), np.float32), occlusion.astype(np.float32), table)
     return table
 
 
 @njit(cache=True, nogil=True)
-def _fill_table(kinds, background, hidden, table):
-    n, cells = kinds.shape
+def _fill_table(classes, background, occlusion, table):
+    n, cells = classes.shape
     one = np.float32(1)
     for cell in range(cells):
-        seen = background[cell]
+        most = background[cell]
         for c in range(n):
-            seen = max(seen, kinds[c, cell])
-        if seen == 0:  # a colour that nothing has says nothing
+            most = max(most, classes[c, cell])
+        if most == 0:  # a colour that nothing has is no evidence
             continue
-        anyone = np.float32((1 - _LIKE_THEM) / cells)
+        anyone = np.float32((1 - _SHARED_COLOURS) / cells)
         for c in range(n):
-            anyone += np.float32(_LIKE_THEM / n) * kinds[c, cell]
+            anyone += np.float32(_SHARED_COLOURS / n) * classes[c, cell]
         for c in range(n):
-            o = hidden[c]
-            other = o * anyone + np.float32(_UNSEEN)
-            table[cell, c] = np.log(((one - o) * kinds[c, cell] + other) / ((one - o) * background[cell] + other))
+            o = occlusion[c]
+            other = o * anyone + np.float32(_FLOOR)
+            table[cell, c] = np.log(((one - o) * classes[c, cell] + other) / ((one - o) * background[cell] + other))
 
 
 @njit(cache=True, nogil=True)
-def evidence_maps(rgb, table, reduction, out):
+def class_evidence(rgb, table, reduction, out):
     """Fill out (5, h // r, w // r) with the mean evidence over blocks of r x r pixels of rgb (h, w, 3) uint8."""
     _, h, w = out.shape
     share = np.float32(1.0 / (reduction * reduction))
@@ -69,7 +69,7 @@ def evidence_maps(rgb, table, reduction, out):
 
 
 @njit(cache=True, nogil=True)
-def smooth(maps, out):
+def blur_maps(maps, out):
     """Blur maps (k, h, w) with [1 2 1] / 4 along rows and columns into out; the border stays."""
     k, h, w = maps.shape
     quarter, two = np.float32(0.25), np.float32(2)

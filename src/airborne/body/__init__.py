@@ -1,4 +1,4 @@
-"""Bodies: in come body files, out come `BodyModel`, `Pose` and `PosedBody`; knows no camera and no image."""
+"""Body models: body files in, `BodyModel`, `Pose` and `PosedBody` out; independent of cameras and images."""
 
 from airborne.body.human import human18, human18_from_measurements
 from airborne.body.inertia import total_inertia, total_inertias
@@ -19,7 +19,7 @@ from airborne.body.model import (
 )
 from airborne.body.outfits import ATHLETE, SAMPLED, Outfit
 from airborne.body.shaping import with_girths, with_segment_lengths
-from airborne.body.surface import Geometry, geometry, has_flat_sides
+from airborne.body.surface import SurfaceArrays, has_flat_sides, surface_arrays
 
 __all__ = [
     "ATHLETE",
@@ -27,7 +27,6 @@ __all__ = [
     "BodyModel",
     "Box",
     "Ellipsoid",
-    "Geometry",
     "Inertia",
     "Landmark",
     "Measurements",
@@ -39,13 +38,14 @@ __all__ = [
     "PosedBody",
     "Segment",
     "Shape",
+    "SurfaceArrays",
     "fit_lengths",
     "fit_pose",
-    "geometry",
     "has_flat_sides",
     "human18",
     "human18_from_measurements",
     "read_measurements",
+    "surface_arrays",
     "total_inertia",
     "total_inertias",
     "with_girths",

@@ -1,7 +1,7 @@
-"""From 95 measurements to the mass, volume and place of 18 segments, with Yeadon's solids and Dempster's densities.
+"""From 95 measurements to the mass, volume and inertia of 18 segments, with Yeadon's solids and Dempster's densities.
 
-Yeadon (1990-II) builds a person of solids, each between two measured levels. Here they are joined into the segments of
-`human18`, in whose zero pose the palms face the thighs and the soles are level (Yeadon's person stands with the palms
+Yeadon (1990-II) builds a person of solids, each between two measured levels. Here they are combined into the segments of
+`human18`, with palms facing the thighs and level soles in the zero pose (Yeadon's person stands with the palms
 forward and the toes pointed down).
 """
 
@@ -12,21 +12,19 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from airborne.body.inertia import combined, placed
-from airborne.body.measurements import STATURE_SHARES, Measurements, checked
+from airborne.body.inertia import combine_inertias, transform_inertia
+from airborne.body.measurements import STATURE_SHARES, Measurements, check_measurements
 from airborne.body.model import Inertia
-from airborne.body.stadia import Bulk, Stadium, circle, dome, half_solid, solid, stadium
+from airborne.body.stadia import MassProperties, Stadium, circle, dome, half_solid, solid, stadium
 from airborne.errors import BodyError
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 FOOT_SLOPE_RAD = np.radians(
     22.0
 )  # the line from the ankle to the ball of the foot falls by this when the sole is level
-DENSITIES = {  # [kg/m^3], Dempster's, as in Yeadon (1990-II)
+_DENSITIES = {  # [kg/m^3], Dempster's, as in Yeadon (1990-II)
     "head": 1110.0,
     "shoulders": 1040.0,
     "thorax": 920.0,
@@ -59,74 +57,75 @@ def measurements_of(stature_m: float, mass_kg: float) -> Measurements:
     girth = float(np.sqrt(mass_kg / (_mass_per_cubic_stature() * stature_m**3)))
     if not _GIRTHS[0] <= girth <= _GIRTHS[1]:
         raise BodyError(
-            f"{mass_kg:g} kg at {stature_m:g} m means girths {girth:.2f} times the usual; expected {_GIRTHS[0]:g} to "
+            f"{mass_kg:g} kg at {stature_m:g} m means girths {girth:.2f} times the average; expected {_GIRTHS[0]:g} to "
             f"{_GIRTHS[1]:g}; check both numbers"
         )
     values = {key: share * stature_m * (1 if key[-1] == "L" else girth) for key, share in STATURE_SHARES.items()}
     return Measurements(f"{stature_m:g} m, {mass_kg:g} kg", values, mass_kg)
 
 
-def clavicle_m(values_m: Mapping[str, float], sign: float) -> Array:
-    """Return where the shoulder girdle turns, by the breastbone: (3,) from the middle of the shoulder joints [m].
+def sternoclavicular_m(values_m: Mapping[str, float], sign: float) -> Array:
+    """Return the sternoclavicular joint, about which the shoulder girdle turns: (3,) from mid-shoulder [m].
 
-    sign: +1 left, -1 right. Near the midline, before it, half way up to the acromia: of our own choice.
+    sign: +1 left, -1 right. Near the midline, in front of it, half way up to the acromia: our own choice.
     """
     rise = (values_m["Ls5L"] - values_m["Ls4L"]) / 2
     return np.array([sign * 0.07 * values_m["Ls4w"], -0.2 * values_m["Ls4d"], rise])
 
 
-def bulks(measurements: Measurements) -> dict[str, Bulk]:
-    """Find what each of the 18 segments is made of, in the segments' own frames; raises BodyError as `checked`.
+def mass_properties(measurements: Measurements) -> dict[str, MassProperties]:
+    """Compute each segment's mass properties, in the segments' own frames; raises BodyError as `check_measurements`.
 
-    With a weighed mass, all densities are scaled by one factor to give it.
+    With a measured mass, one factor on all densities gives it.
     """
-    v = checked(measurements).values_m
-    found = _trunk(v)
+    v = check_measurements(measurements).values_m
+    segments = _trunk(v)
     for side, arm, leg in (("left", "a", "j"), ("right", "b", "k")):
-        found |= {f"{name}_{side}": bulk for name, bulk in {**_arm(v, arm), **_leg(v, leg)}.items()}
+        segments |= {f"{name}_{side}": properties for name, properties in {**_arm(v, arm), **_leg(v, leg)}.items()}
     if measurements.mass_kg is None:
-        return found
-    share = measurements.mass_kg / sum(bulk.inertia.mass_kg for bulk in found.values())
-    return {name: bulk._replace(inertia=_denser(bulk.inertia, share)) for name, bulk in found.items()}
+        return segments
+    share = measurements.mass_kg / sum(each.inertia.mass_kg for each in segments.values())
+    return {name: each._replace(inertia=_scale_density(each.inertia, share)) for name, each in segments.items()}
 
 
-def _trunk(v: Mapping[str, float]) -> dict[str, Bulk]:
+def _trunk(v: Mapping[str, float]) -> dict[str, MassProperties]:
     sections = [stadium(v[f"Ls{i}p"], v[f"Ls{i}w"]) for i in range(4)]
     radius = v["Ls4d"] / 2
     shoulders = Stadium(v["Ls4w"] / 2 - radius, radius)
     acromia = Stadium(v["Ls4w"] / 2 - _ACROMION_PER_SHOULDER * radius, _ACROMION_PER_SHOULDER * radius)
     neck, nose, ear = (circle(v[f"Ls{i}p"]) for i in (5, 6, 7))
     heights = np.diff([0.0, *(v[f"Ls{i}L"] for i in range(1, 6))])
-    found = {
-        "pelvis": _moved(_pile(sections[:3], heights[:2], "abdomen"), -v["Ls2L"]),
-        "torso": solid(sections[2], sections[3], heights[2], DENSITIES["thorax"]),
-        "chest": solid(sections[3], shoulders, heights[3], DENSITIES["thorax"]),
-        "head": _joined(
+    segments = {
+        "pelvis": _shift(_stack(sections[:3], heights[:2], "abdomen"), -v["Ls2L"]),
+        "torso": solid(sections[2], sections[3], heights[2], _DENSITIES["thorax"]),
+        "chest": solid(sections[3], shoulders, heights[3], _DENSITIES["thorax"]),
+        "head": _join(
             [
-                _pile([neck, nose, ear], [v["Ls6L"], v["Ls7L"] - v["Ls6L"]], "head"),
-                _moved(dome(v["Ls7p"], v["Ls8L"] - v["Ls7L"], DENSITIES["head"]), v["Ls7L"]),
+                _stack([neck, nose, ear], [v["Ls6L"], v["Ls7L"] - v["Ls6L"]], "head"),
+                _shift(dome(v["Ls7p"], v["Ls8L"] - v["Ls7L"], _DENSITIES["head"]), v["Ls7L"]),
             ]
         ),
     }
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        half = half_solid(shoulders, acromia, heights[4], DENSITIES["shoulders"], sign)
-        found[f"shoulder_{side}"] = half._replace(inertia=placed(half.inertia, np.eye(3), -clavicle_m(v, sign)))
-    return found
+        half = half_solid(shoulders, acromia, heights[4], _DENSITIES["shoulders"], sign=sign)
+        inertia = transform_inertia(half.inertia, np.eye(3), -sternoclavicular_m(v, sign))
+        segments[f"shoulder_{side}"] = half._replace(inertia=inertia)
+    return segments
 
 
-def _arm(v: Mapping[str, float], arm: str) -> dict[str, Bulk]:
+def _arm(v: Mapping[str, float], arm: str) -> dict[str, MassProperties]:
     rounds = [circle(v[f"L{arm}{i}p"]) for i in range(4)]
     flats = [stadium(v[f"L{arm}{i}p"], v[f"L{arm}{i}w"]) for i in range(4, 8)]
     elbow, widest, wrist = (v[f"L{arm}{i}L"] for i in (2, 3, 4))
     hand = np.diff([0.0, *(v[f"L{arm}{i}L"] for i in (5, 6, 7))])
     return {
-        "upper_arm": _pile(rounds[:3], [-elbow / 2, -elbow / 2], "upper_arm"),
-        "forearm": _turned(_pile([*rounds[2:], flats[0]], [elbow - widest, widest - wrist], "forearm"), _PALM_INWARD),
-        "hand": _turned(_pile(flats, -hand, "hand"), _PALM_INWARD),
+        "upper_arm": _stack(rounds[:3], [-elbow / 2, -elbow / 2], "upper_arm"),
+        "forearm": _rotate(_stack([*rounds[2:], flats[0]], [elbow - widest, widest - wrist], "forearm"), _PALM_INWARD),
+        "hand": _rotate(_stack(flats, -hand, "hand"), _PALM_INWARD),
     }
 
 
-def _leg(v: Mapping[str, float], leg: str) -> dict[str, Bulk]:
+def _leg(v: Mapping[str, float], leg: str) -> dict[str, MassProperties]:
     hips = stadium(v["Ls0p"], v["Ls0w"])
     top = Stadium(0.0, np.sqrt(hips.radius_m * (hips.radius_m + hips.flat_m) / 2))  # as Yeadon's program has it
     rounds = [top, *(circle(v[f"L{leg}{i}p"]) for i in range(1, 6))]
@@ -138,48 +137,52 @@ def _leg(v: Mapping[str, float], leg: str) -> dict[str, Bulk]:
     back = [rounds[5], stadium(v[f"L{leg}6p"], v[f"L{leg}6d"]), arch]  # the heel is wide from front to back
     instep = (heel + ball) / 2
     foot = [
-        _pile(back, [-heel, heel - instep], "foot", is_turned=True),
-        _moved(_pile([arch, *front], [instep - ball, ball - toes], "foot"), -instep),
+        _stack(back, [-heel, heel - instep], "foot", is_turned=True),
+        _shift(_stack([arch, *front], [instep - ball, ball - toes], "foot"), -instep),
     ]
     return {
-        "thigh": _pile(rounds[:4], -np.array(thigh), "thigh"),
-        "shank": _pile(rounds[3:], [knee - calf, calf - ankle], "shank"),
-        "foot": _turned(_joined(foot), _SOLE_LEVEL),
+        "thigh": _stack(rounds[:4], -np.array(thigh), "thigh"),
+        "shank": _stack(rounds[3:], [knee - calf, calf - ankle], "shank"),
+        "foot": _rotate(_join(foot), _SOLE_LEVEL),
     }
 
 
-def _pile(
+def _stack(
     sections: Sequence[Stadium], heights_m: Sequence[float] | Array, kind: str, *, is_turned: bool = False
-) -> Bulk:
-    """Join the solids between successive sections, the first at z = 0; heights below zero [m] go down."""
+) -> MassProperties:
+    """Stack the solids between successive sections, the first at z = 0; heights below zero [m] go down."""
     pieces, z = [], 0.0
     for near, far, height in zip(sections, sections[1:], heights_m, strict=False):
         low, high = (near, far) if height > 0 else (far, near)
-        piece = solid(low, high, abs(height), DENSITIES[kind], is_turned=is_turned)
-        pieces.append(_moved(piece, min(z, z + height)))
+        piece = solid(low, high, abs(height), _DENSITIES[kind], is_turned=is_turned)
+        pieces.append(_shift(piece, min(z, z + height)))
         z += height
-    return _joined(pieces)
+    return _join(pieces)
 
 
-def _joined(pieces: Sequence[Bulk]) -> Bulk:
-    return Bulk(combined([piece.inertia for piece in pieces]), sum(piece.volume_m3 for piece in pieces))
+def _join(pieces: Sequence[MassProperties]) -> MassProperties:
+    return MassProperties(
+        combine_inertias([piece.inertia for piece in pieces]), sum(piece.volume_m3 for piece in pieces)
+    )
 
 
-def _moved(bulk: Bulk, z_m: float) -> Bulk:
-    return bulk._replace(inertia=placed(bulk.inertia, np.eye(3), np.array([0.0, 0.0, z_m])))
+def _shift(properties: MassProperties, z_m: float) -> MassProperties:
+    return properties._replace(inertia=transform_inertia(properties.inertia, np.eye(3), np.array([0.0, 0.0, z_m])))
 
 
-def _turned(bulk: Bulk, R: Array) -> Bulk:
-    return bulk._replace(inertia=placed(bulk.inertia, R, np.zeros(3)))
+def _rotate(properties: MassProperties, R: Array) -> MassProperties:
+    return properties._replace(inertia=transform_inertia(properties.inertia, R, np.zeros(3)))
 
 
-def _denser(inertia: Inertia, share: float) -> Inertia:
+def _scale_density(inertia: Inertia, share: float) -> Inertia:
     return replace(inertia, mass_kg=inertia.mass_kg * share, tensor_kg_m2=inertia.tensor_kg_m2 * share)
 
 
 @lru_cache(maxsize=1)
 def _mass_per_cubic_stature() -> float:
     """Return the mass of a person of our proportions over the cube of the stature [kg/m^3]."""
-    usual = 1.75  # as tall as people are, so that the check of units says nothing
-    values = {key: share * usual for key, share in STATURE_SHARES.items()}
-    return sum(bulk.inertia.mass_kg for bulk in bulks(Measurements("usual", values)).values()) / usual**3
+    stature_m = 1.75  # of an average person, so that the check of units passes
+    values = {key: share * stature_m for key, share in STATURE_SHARES.items()}
+    return (
+        sum(each.inertia.mass_kg for each in mass_properties(Measurements("average", values)).values()) / stature_m**3
+    )

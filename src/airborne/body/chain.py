@@ -1,8 +1,8 @@
-"""The chain of joints: how a body's points and segments move with its degrees of freedom, to first order.
+"""The kinematic chain: changes of a pose, and the Jacobians of a body's points and segments.
 
-A motion vector (6 + 3 joints,) is the root's translation [m] and rotation vector [rad], both in world axes, then for
-the joint of every segment after the root a rotation vector [rad] in that segment's own axes. Covariances are over the
-same numbers in the same order.
+A change of a pose, `delta` (6 + 3 joints,), is the root's translation [m] and rotation vector [rad], both in world
+axes, then for the joint of every segment after the root a rotation vector [rad] in that segment's own axes. Covariances
+of poses are over the same numbers in the same order.
 """
 
 from __future__ import annotations
@@ -13,42 +13,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body.model import BodyModel, Pose, PosedBody
-from airborne.geometry.joint_rotations import turned, turns_between
+from airborne.geometry.joint_rotations import compose_rotation_vectors, rotation_vectors_between
 from airborne.geometry.rotations import angles_from_matrix
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _LOCKED = 1e-8  # cosine of the middle angle below which the other two are one angle
 
 
-def moved_pose(pose: Pose, motion: Array) -> Pose:
-    """Apply a motion vector (6 + 3 joints,) to a pose.
+def move_pose(pose: Pose, delta: Array) -> Pose:
+    """Apply a change `delta` (6 + 3 joints,) to a pose.
 
-    The root moves by the translation and turns about its own origin; a joint's parent_from_segment is followed by the
-    turn in the segment's axes. The new joint angles lie on the branch nearest to the old ones.
+    The root is translated, and rotated about its own origin; a joint's parent_from_segment is followed by the
+    rotation in the segment's axes. The new joint angles lie on the branch nearest to the old ones.
     """
-    moved = pose.moved(motion[:3], motion[3:6])
-    n_joints = (len(motion) - 6) // 3
+    root = pose.move(delta[:3], delta[3:6])
+    n_joints = (len(delta) - 6) // 3
     if not n_joints:
-        return moved
-    return replace(moved, joint_angles=turned(_angles_of(pose, n_joints), np.reshape(motion[6:], (n_joints, 3))))
+        return root
+    return replace(
+        root, joint_angles=compose_rotation_vectors(_angles_of(pose, n_joints), np.reshape(delta[6:], (n_joints, 3)))
+    )
 
 
-def motion_between(earlier: Pose, later: Pose) -> Array:
-    """Return the motion vector (6 + 3 joints,) that takes one pose to another: the inverse of `moved_pose`."""
+def delta_between(earlier: Pose, later: Pose) -> Array:
+    """Return the change (6 + 3 joints,) from one pose to another: the inverse of `move_pose`."""
     a, b = earlier.world_from_root, later.world_from_root
     root = np.concatenate([b.translation - a.translation, (b.rotation * a.rotation.inv()).as_rotvec()])
     n_joints = max(len(earlier.joint_angles), len(later.joint_angles))
     if not n_joints:
         return root
-    turns = turns_between(_angles_of(earlier, n_joints), _angles_of(later, n_joints))
-    return np.concatenate([root, turns.ravel()])
+    rotations = rotation_vectors_between(_angles_of(earlier, n_joints), _angles_of(later, n_joints))
+    return np.concatenate([root, rotations.ravel()])
 
 
 def joint_angles_of(model: BodyModel, R: Array, near: Array | None = None) -> Array:
     """Read the joint angles (..., joints, 3) [rad] off the rotations, world from segment, (..., segments, 3, 3).
 
-    `near` (..., joints, 3) are angles whose branch to stay on; without it y lies in [-pi/2, pi/2].
+    `near` (..., joints, 3) are angles that fix the branch; without it y lies in [-pi/2, pi/2].
     """
     parent_from_segment = np.swapaxes(R[..., model.parents[1:], :, :], -1, -2) @ R[..., 1:, :, :]
     return angles_from_matrix(parent_from_segment) if near is None else _angles_near(parent_from_segment, near)
@@ -57,7 +58,7 @@ def joint_angles_of(model: BodyModel, R: Array, near: Array | None = None) -> Ar
 def nearest_angles(angles: Array, near: Array) -> Array:
     """Return, of all x-y-z angles (..., 3) [rad] of the same rotation, those nearest to `near` (..., 3).
 
-    (x, y, z) and (x + pi, pi - y, z + pi) are the same rotation, and so are whole turns more. NaN stays NaN.
+    (x, y, z) and (x + pi, pi - y, z + pi) are the same rotation, and so are angles 2 pi apart. NaN stays NaN.
     """
     angles = np.asarray(angles, float)
     other = np.stack([angles[..., 0] + np.pi, np.pi - angles[..., 1], angles[..., 2] + np.pi], axis=-1)
@@ -68,7 +69,7 @@ def nearest_angles(angles: Array, near: Array) -> Array:
 
 
 def segment_jacobians(posed: PosedBody, origin: Array) -> Array:
-    """Differentiate every segment's rigid motion by the motion vector: (segments, 6, 6 + 3 joints).
+    """Differentiate every segment's rigid motion by the pose: (segments, 6, 6 + 3 joints).
 
     Rows are the translation of that point of the segment which is now at `origin` (3,) world [m], and the segment's
     rotation vector [rad], both in world axes.
@@ -82,24 +83,24 @@ def segment_jacobians(posed: PosedBody, origin: Array) -> Array:
 
 
 def point_jacobian(posed: PosedBody, segment: int | NDArray[np.integer], points: Array) -> Array:
-    """Differentiate world points (..., 3) [m], fixed in `segment` (...), by the motion vector: (..., 3, 6 + 3 joints).
+    """Differentiate world points (..., 3) [m], fixed in `segment` (...), by the pose: (..., 3, 6 + 3 joints).
 
     The root gives I and w x (p - t_root), the joint of an ancestor k, or of the segment itself, a x (p - t_k) for each
     axis a of segment k; other joints give 0. `segment` holds indices, one for all points or one each.
     """
     segment, points = np.asarray(segment), np.asarray(points, float)
     shape = np.broadcast_shapes(segment.shape, points.shape[:-1])
-    axes = np.concatenate([np.eye(3)[None], posed.R[1:]])  # (segments, 3, 3): columns are what each turns about
+    axes = np.concatenate([np.eye(3)[None], posed.R[1:]])  # (segments, 3, 3): columns are the axes of rotation
     lever = points[..., None, :] - posed.t  # (..., segments, 3)
-    turned = np.cross(np.swapaxes(axes, -1, -2), lever[..., None, :])  # (..., segments, axis, 3)
+    derivatives = np.cross(np.swapaxes(axes, -1, -2), lever[..., None, :])  # (..., segments, axis, 3)
     is_carried = np.concatenate([np.ones((len(axes), 1), bool), _is_carried(posed.model)], axis=1)[segment]
-    turned = np.where(is_carried[..., None, None], turned, 0.0)
-    columns = np.moveaxis(turned.reshape(*shape, 3 * len(axes), 3), -1, -2)
+    derivatives = np.where(is_carried[..., None, None], derivatives, 0.0)
+    columns = np.moveaxis(derivatives.reshape(*shape, 3 * len(axes), 3), -1, -2)
     return np.concatenate([np.broadcast_to(np.eye(3), (*shape, 3, 3)), columns], axis=-1)
 
 
 def _angles_of(pose: Pose, n_joints: int) -> Array:
-    """Return the joint angles (joints, 3) of a pose, which leaves them out where all joints are straight."""
+    """Return the joint angles (joints, 3) of a pose, where an empty array stands for straight joints."""
     return np.asarray(pose.joint_angles, float) if pose.joint_angles.size else np.zeros((n_joints, 3))
 
 

@@ -31,16 +31,16 @@ from airborne.body.model import (
 )
 from airborne.errors import BodyError, one_line
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
-from airborne.io.text import listed_keys, read_toml
+from airborne.io.text import list_keys, read_toml
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
-Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
-Bound = Annotated[float, Field(allow_inf_nan=True)]  # inf: no bound
-Range = Annotated[list[Bound], Field(min_length=2, max_length=2)]
-Channel = Annotated[float, Field(ge=0, le=255)]
+_Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
+_Bound = Annotated[float, Field(allow_inf_nan=True)]  # inf: no bound
+_Range = Annotated[list[_Bound], Field(min_length=2, max_length=2)]
+_Channel = Annotated[float, Field(ge=0, le=255)]
 
 
-_SAME_TURN = 1e-15  # rounding of a turn
+_SAME_ROTATION = 1e-15  # rounding of a rotation matrix
 _LARGEST_KG_M2 = 1e6
 
 
@@ -57,15 +57,15 @@ class _PartTable(_Strict):
     scale: float = Field(1.0, gt=0)  # metres per unit of the mesh file
     centre_m: Vector = [0.0, 0.0, 0.0]
     rotation_deg: Vector = [0.0, 0.0, 0.0]  # about the segment's x, then the new y, then the new z
-    colour_srgb: Annotated[list[Channel], Field(min_length=3, max_length=3)] | None = None
+    colour_srgb: Annotated[list[_Channel], Field(min_length=3, max_length=3)] | None = None
     colour: Literal["sample"] | None = None
-    slab_m: Range | None = None  # along the part's own z
+    slab_m: _Range | None = None  # along the part's own z
 
 
 class _InertiaTable(_Strict):
     mass_kg: float = Field(gt=0)
     centre_m: Vector
-    tensor_kg_m2: Matrix
+    tensor_kg_m2: _Matrix
 
 
 class _LandmarkTable(_Strict):
@@ -78,7 +78,7 @@ class _SegmentTable(_Strict):
     name: str
     parent: str | None = None
     joint_m: Vector = [0.0, 0.0, 0.0]
-    limits_deg: Annotated[list[Range], Field(min_length=3, max_length=3)] | None = None  # about x, y, z
+    limits_deg: Annotated[list[_Range], Field(min_length=3, max_length=3)] | None = None  # about x, y, z
     part: list[_PartTable] = []
     inertia: _InertiaTable | None = None
 
@@ -94,7 +94,7 @@ def read_body(path: Path) -> BodyModel:
     try:
         document = read_toml(path)
         if "segment" not in document:
-            raise BodyError(f"{path.name} is no body file: it has no [[segment]] (found {listed_keys(document)})")
+            raise BodyError(f"{path.name} is no body file: it has no [[segment]] (found {list_keys(document)})")
         table = _BodyTable.model_validate(document)
     except OSError as error:
         raise BodyError(f"{path.name}: cannot be read ({error.strerror})") from error
@@ -117,15 +117,15 @@ def _segment(table: _SegmentTable, path: Path) -> Segment:
     return Segment(table.name, table.parent, np.array(table.joint_m), parts, limits, inertia)
 
 
-def _inertia(table: _InertiaTable, place: str) -> Inertia:
+def _inertia(table: _InertiaTable, owner: str) -> Inertia:
     tensor = np.array(table.tensor_kg_m2)
     if np.abs(tensor).max() > _LARGEST_KG_M2:
-        raise BodyError(f"{place}: tensor_kg_m2 belongs to no body; expected kilograms times square metres")
+        raise BodyError(f"{owner}: tensor_kg_m2 belongs to no body; expected kilograms times square metres")
     moments = np.linalg.eigvalsh((tensor + tensor.T) / 2)
     slack = 1e-6 * np.abs(tensor).max()
     if np.abs(tensor - tensor.T).max() > slack or moments[0] < -slack or moments[:2].sum() < moments[2] - slack:
         raise BodyError(
-            f"{place}: tensor_kg_m2 belongs to no solid; it must be symmetric, about the centre of mass, and no "
+            f"{owner}: tensor_kg_m2 belongs to no solid; it must be symmetric, about the centre of mass, and no "
             "principal moment may exceed the sum of the other two"
         )
     return Inertia(table.mass_kg, np.array(table.centre_m), tensor)
@@ -136,11 +136,13 @@ def _part(table: _PartTable, path: Path) -> Part:
         raise BodyError(
             f"{path.name}: part '{table.name}' needs colour_srgb = [r, g, b] or colour = \"sample\", one of them"
         )
-    place = RigidTransform.from_components(table.centre_m, Rotation.from_euler("XYZ", table.rotation_deg, degrees=True))
+    segment_from_part = RigidTransform.from_components(
+        table.centre_m, Rotation.from_euler("XYZ", table.rotation_deg, degrees=True)
+    )
     colour = None if table.colour_srgb is None else np.array(table.colour_srgb)
     shape, slab = _shape(table, path), WHOLE if table.slab_m is None else (table.slab_m[0], table.slab_m[1])
     try:
-        return Part(table.name, shape, place, colour, slab)
+        return Part(table.name, shape, segment_from_part, colour, slab)
     except BodyError as error:
         raise BodyError(f"{path.name}: {error}") from error
 
@@ -199,7 +201,7 @@ def write_body(path: Path, model: BodyModel) -> None:
     path.write_text(body_toml(model), encoding="utf-8")
     for name, part in zip(_mesh_names(model), model.parts, strict=True):
         if isinstance(part.shape, Mesh):
-            corners = [f"v {_spaced(corner)}" for corner in part.shape.vertices_m]
+            corners = [f"v {_join_numbers(corner)}" for corner in part.shape.vertices_m]
             faces = [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in part.shape.faces.tolist()]
             (path.parent / name).write_text("\n".join([*corners, *faces]) + "\n", encoding="utf-8")
 
@@ -237,8 +239,11 @@ def _part_lines(part: Part, mesh_name: str) -> list[str]:
         lines = ['shape = "ellipsoid"', f"semi_axes_m = {_numbers(part.shape.semi_axes_m)}"]
     else:
         lines = ['shape = "mesh"', f"file = {_text(mesh_name)}"]
-    place = part.segment_from_part
-    lines += [f"centre_m = {_numbers(place.translation)}", *_rotation_lines(place.rotation.as_matrix())]
+    segment_from_part = part.segment_from_part
+    lines += [
+        f"centre_m = {_numbers(segment_from_part.translation)}",
+        *_rotation_lines(segment_from_part.rotation.as_matrix()),
+    ]
     lines += ['colour = "sample"' if part.colour is None else f"colour_srgb = {_numbers(part.colour)}"]
     return lines + ([] if part.slab_m == WHOLE else [f"slab_m = {_numbers(part.slab_m)}"])
 
@@ -248,17 +253,17 @@ def _rotation_lines(R: np.ndarray) -> list[str]:
         return []
     exact = np.degrees(angles_from_matrix(R))
     short = exact.round(9) + 0.0  # no -0
-    is_same = np.abs(matrix_from_angles(np.radians(short)) - R).max() < _SAME_TURN
+    is_same = np.abs(matrix_from_angles(np.radians(short)) - R).max() < _SAME_ROTATION
     return [f"rotation_deg = {_numbers(short if is_same else exact)}"]
 
 
 def _mesh_names(model: BodyModel) -> list[str]:
-    """Name a mesh file for every part, each its own: letters and digits of the part's name, and its place."""
+    """Name a mesh file for every part, each its own: letters and digits of the part's name, and its index."""
     return [f"{re.sub(r'[^A-Za-z0-9]+', '_', part.name)[:40]}_{i}.obj" for i, part in enumerate(model.parts)]
 
 
 def _own_landmarks(model: BodyModel) -> tuple[Landmark, ...]:
-    """Return the landmarks, none where they are the segments' origins, as a body without any has them."""
+    """Return the landmarks; none where they are the segments' origins, the default of `BodyModel`."""
     origins = [(segment.name, segment.name, False) for segment in model.segments]
     own = [(mark.name, mark.segment, bool(np.any(mark.position_m))) for mark in model.landmarks]
     return () if own == origins else model.landmarks
@@ -276,5 +281,5 @@ def _rows(values: Iterable[ArrayLike]) -> str:
     return "[" + ", ".join(map(_numbers, values)) + "]"
 
 
-def _spaced(values: np.ndarray) -> str:
+def _join_numbers(values: np.ndarray) -> str:
     return " ".join(repr(float(value)) for value in values)

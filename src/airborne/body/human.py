@@ -1,14 +1,14 @@
 """The preset `human18`: 18 segments after paper B, sizes and masses after Yeadon (1990-II).
 
 Zero pose: upright, arms hanging with the palms toward the thighs, soles level, toes toward -y. Joint angles are
-successive turns about the segment's x, y and z axes (Yeadon 1990-I). With x to the left, y backward, z headward:
+successive rotations about the segment's x, y and z axes (Yeadon 1990-I). With x to the left, y backward, z headward:
 
 - flexion: trunk and neck forward +x; hip -x, knee +x, ankle (plantar) +x; shoulder -x, elbow -x
 - sideways: the left thigh and arm go outward with -y, the right ones with +y; the left wrist flexes (to the thigh) +y
-- turns: the left thigh and arm turn outward with +z, the right ones with -z; trunk and head turn to the left with +z
+- axial rotation: the left thigh and arm outward with +z, the right ones with -z; trunk and head to the left with +z
 
 Yeadon's configuration angles are the same numbers at the same joints (pelvis - thorax: torso; thorax - chest: chest);
-his palms and toes point otherwise, which is 90 degrees of z at our forearm and 68 of x at our ankle.
+his palms and toes point in other directions, which is 90 degrees of z at our forearm and 68 of x at our ankle.
 """
 
 from __future__ import annotations
@@ -18,15 +18,13 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airborne.body.anthropometry import FOOT_SLOPE_RAD, bulks, clavicle_m, measurements_of
-from airborne.body.measurements import Measurements, checked, read_measurements
+from airborne.body.anthropometry import FOOT_SLOPE_RAD, mass_properties, measurements_of, sternoclavicular_m
+from airborne.body.measurements import Measurements, check_measurements, read_measurements
 from airborne.body.model import UNLIMITED, BodyModel, Ellipsoid, Landmark, Segment
 from airborne.body.outfits import ATHLETE, Outfit
-from airborne.body.stadia import Bulk
-
-Array = NDArray[np.floating]
+from airborne.body.stadia import MassProperties
+from airborne.types import Array
 
 PARENTS = {
     "pelvis": None,
@@ -75,7 +73,7 @@ _LIMB_LANDMARKS = ("hip", "knee", "ankle", "foot", "shoulder", "elbow", "wrist",
 _ROUNDING = 0.5  # an ellipsoid reaches beyond its joints by this share of the segment's mean radius
 _HEAD_WIDTH_PER_DEPTH = 0.79
 _SOLE_PER_BALL = 0.039 / 0.0735  # depth of the sole below the ankle, over the distance from the ankle to the ball
-_HEEL_PER_TOE = 0.42  # how far the heel reaches behind the ankle, over how far the toes reach before it
+_HEEL_PER_TOE = 0.42  # how far the heel reaches behind the ankle, over how far the toes reach in front of it
 
 
 @lru_cache(maxsize=64)
@@ -93,20 +91,20 @@ def human18_from_measurements(
     nipples (torso - chest), and the layer between the shoulder joints and the acromia is halved into the two shoulders.
     Unless `symmetric` is False, left and right limbs get the mean of both sides' measurements, as in Yeadon's own.
     """
-    measured = checked(source) if isinstance(source, Measurements) else read_measurements(Path(source))
-    person = measured.evened() if symmetric else measured
-    values, found = person.values_m, bulks(person)
+    measurements = check_measurements(source) if isinstance(source, Measurements) else read_measurements(Path(source))
+    person = measurements.symmetrise() if symmetric else measurements
+    values, properties = person.values_m, mass_properties(person)
     joints = _joints(values)
     segments = []
     for name, parent in PARENTS.items():
-        ellipsoid, centre, span = _ellipsoid(name, found[name], values, joints)
+        ellipsoid, centre, span = _ellipsoid(name, properties[name], values, joints)
         parts = tuple(outfit.parts(name, ellipsoid, centre, span))
-        segments.append(Segment(name, parent, joints[name], parts, _limits(name), found[name].inertia))
+        segments.append(Segment(name, parent, joints[name], parts, _limits(name), properties[name].inertia))
     return BodyModel("human18", tuple(segments), _landmarks(values))
 
 
 def _joints(v: Mapping[str, float]) -> dict[str, Array]:
-    """Where each segment's joint lies in its parent's frame [m]."""
+    """Return each segment's joint in its parent's frame [m]."""
     chest, shoulders = v["Ls4L"] - v["Ls3L"], v["Ls5L"] - v["Ls4L"]
     joints = {
         "pelvis": np.zeros(3),
@@ -115,9 +113,9 @@ def _joints(v: Mapping[str, float]) -> dict[str, Array]:
         "head": np.array([0, 0, chest + shoulders]),
     }
     for side, arm, leg, sign in (("left", "a", "j", 1.0), ("right", "b", "k", -1.0)):
-        clavicle = np.array([0, 0, chest]) + clavicle_m(v, sign)
-        joints[f"shoulder_{side}"] = clavicle
-        joints[f"upper_arm_{side}"] = np.array([sign * v["Ls4w"] / 2, 0, chest]) - clavicle
+        sternoclavicular = np.array([0, 0, chest]) + sternoclavicular_m(v, sign)
+        joints[f"shoulder_{side}"] = sternoclavicular
+        joints[f"upper_arm_{side}"] = np.array([sign * v["Ls4w"] / 2, 0, chest]) - sternoclavicular
         joints[f"forearm_{side}"] = np.array([0, 0, -v[f"L{arm}2L"]])
         joints[f"hand_{side}"] = np.array([0, 0, v[f"L{arm}2L"] - v[f"L{arm}4L"]])
         joints[f"thigh_{side}"] = np.array([sign * v["Ls0w"] / 4, 0, -v["Ls2L"]])
@@ -127,19 +125,19 @@ def _joints(v: Mapping[str, float]) -> dict[str, Array]:
 
 
 def _ellipsoid(
-    name: str, bulk: Bulk, v: Mapping[str, float], joints: dict[str, Array]
+    name: str, properties: MassProperties, v: Mapping[str, float], joints: dict[str, Array]
 ) -> tuple[Ellipsoid, Array, tuple[float, float]]:
-    """Give a segment's ellipsoid, its centre in the segment's frame [m] and the heights of the segment's ends [m].
+    """Make a segment's ellipsoid; return it, its centre in the segment's frame [m] and the heights of the segment's ends [m].
 
-    Along the segment it spans the joints and a little more, so that joints do not gape; its widths give the segment's
-    volume between the joints, in the proportion of the solids' spread.
+    Along the segment it spans the joints and a little more, so that joints leave no gap; its widths give the segment's
+    volume between the joints, in the ratio of the solids' second moments.
     """
     kind, _, side = name.rpartition("_") if name.endswith(("_left", "_right")) else (name, "", "")
     arm, leg = ("a", "j") if side == "left" else ("b", "k")
     if kind == "shoulder":
-        return _shoulder(bulk, v, joints[name], joints[f"upper_arm_{side}"])
+        return _shoulder(properties, v, joints[name], joints[f"upper_arm_{side}"])
     if kind == "foot":
-        return _foot(bulk, v, leg)
+        return _foot(properties, v, leg)
     low, high = {
         "pelvis": (-v["Ls2L"], 0.0),
         "torso": (0.0, v["Ls3L"] - v["Ls2L"]),
@@ -151,54 +149,56 @@ def _ellipsoid(
         "thigh": (-v[f"L{leg}3L"], 0.0),
         "shank": (v[f"L{leg}3L"] - v[f"L{leg}5L"], 0.0),
     }[kind]
-    beyond = _ROUNDING * np.sqrt(bulk.volume_m3 / (np.pi * (high - low)))
+    beyond = _ROUNDING * np.sqrt(properties.volume_m3 / (np.pi * (high - low)))
     bottom = low if kind in ("head", "hand") else low - beyond
     top = high if kind == "head" else high + beyond
     centre, half = (top + bottom) / 2, (top - bottom) / 2
     ends = (np.array([low, high]) - centre) / half
-    filled = half * (np.diff(ends) - np.diff(ends**3) / 3).item()  # of an ellipsoid of unit section
-    spread = _spread(bulk.inertia.tensor_kg_m2)
-    ratio = _HEAD_WIDTH_PER_DEPTH if kind == "head" else np.sqrt(spread[0] / spread[1])
-    depth = np.sqrt(bulk.volume_m3 / (np.pi * filled * ratio))
+    unit_volume = half * (np.diff(ends) - np.diff(ends**3) / 3).item()  # of an ellipsoid of unit section
+    moments = _second_moments(properties.inertia.tensor_kg_m2)
+    ratio = _HEAD_WIDTH_PER_DEPTH if kind == "head" else np.sqrt(moments[0] / moments[1])
+    depth = np.sqrt(properties.volume_m3 / (np.pi * unit_volume * ratio))
     return Ellipsoid(np.array([ratio * depth, depth, half])), np.array([0, 0, centre]), (low, high)
 
 
 def _shoulder(
-    bulk: Bulk, v: Mapping[str, float], joint: Array, arm: Array
+    properties: MassProperties, v: Mapping[str, float], joint: Array, arm: Array
 ) -> tuple[Ellipsoid, Array, tuple[float, float]]:
-    """Stretch from the breastbone to beyond the shoulder joint."""
+    """Span from the breastbone to beyond the shoulder joint."""
     side = np.sign(arm[0])
     inner, outer = -joint[0] / 2, arm[0] + side * 0.15 * v["Ls4w"] / 2
     half = abs(outer - inner) / 2
-    depth = np.sqrt(bulk.volume_m3 / (4 / 3 * np.pi * half * 0.6))
+    depth = np.sqrt(properties.volume_m3 / (4 / 3 * np.pi * half * 0.6))
     centre = np.array([(inner + outer) / 2, arm[1], arm[2] + 0.4 * (v["Ls5L"] - v["Ls4L"])])
     return Ellipsoid(np.array([half, depth, 0.6 * depth])), centre, (centre[2] - 0.6 * depth, centre[2] + 0.6 * depth)
 
 
-def _foot(bulk: Bulk, v: Mapping[str, float], leg: str) -> tuple[Ellipsoid, Array, tuple[float, float]]:
-    """Stretch from the heel to the toes, standing on the sole, as wide as the ball."""
+def _foot(properties: MassProperties, v: Mapping[str, float], leg: str) -> tuple[Ellipsoid, Array, tuple[float, float]]:
+    """Span from the heel to the toes, resting on the sole, as wide as the ball."""
     toe = v[f"L{leg}9L"] * np.cos(FOOT_SLOPE_RAD)
     length, width = (1 + _HEEL_PER_TOE) * toe / 2, v[f"L{leg}8w"] / 2
-    height = bulk.volume_m3 / (4 / 3 * np.pi * length * width)
+    height = properties.volume_m3 / (4 / 3 * np.pi * length * width)
     sole = -_SOLE_PER_BALL * v[f"L{leg}8L"]
     centre = np.array([0, length - toe, sole + height])
     return Ellipsoid(np.array([width, length, height])), centre, (sole, sole + 2 * height)
 
 
-def _spread(tensor: Array) -> Array:
-    """Return the integrals of x^2, y^2 and z^2 dm from an inertia tensor."""
+def _second_moments(tensor: Array) -> Array:
+    """Return the integrals of x^2, y^2 and z^2 dm, from an inertia tensor."""
     return np.trace(tensor) / 2 - np.diag(tensor)
 
 
 def _landmarks(v: Mapping[str, float]) -> tuple[Landmark, ...]:
-    found = []
+    limbs = []
     for side, arm, leg in (("left", "a", "j"), ("right", "b", "k")):
         ball = v[f"L{leg}8L"] * np.array([0, -np.cos(FOOT_SLOPE_RAD), -np.sin(FOOT_SLOPE_RAD)])
-        places = {name: (segment, np.zeros(3)) for name, segment in _JOINT_LANDMARKS.items()}
-        places |= {"foot": ("foot", ball), "hand": ("hand", np.array([0, 0, -v[f"L{arm}7L"] / 2]))}
-        found += [Landmark(f"{name}_{side}", f"{places[name][0]}_{side}", places[name][1]) for name in _LIMB_LANDMARKS]
+        positions = {name: (segment, np.zeros(3)) for name, segment in _JOINT_LANDMARKS.items()}
+        positions |= {"foot": ("foot", ball), "hand": ("hand", np.array([0, 0, -v[f"L{arm}7L"] / 2]))}
+        limbs += [
+            Landmark(f"{name}_{side}", f"{positions[name][0]}_{side}", positions[name][1]) for name in _LIMB_LANDMARKS
+        ]
     return (
-        *found,
+        *limbs,
         Landmark("pelvis", "pelvis", np.array([0, 0, -v["Ls2L"]])),
         Landmark("torso", "torso", np.zeros(3)),
         Landmark("neck", "head", np.zeros(3)),

@@ -12,23 +12,22 @@ from scipy.spatial.transform import Rotation
 from airborne.body.chain import point_jacobian
 from airborne.body.model import BodyModel, PosedBody
 from airborne.geometry.rotations import matrix_from_angles
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-ANGLE_SD_RAD = 1.0  # how far from neutral an angle is expected
-FINE, COARSE = 1e-6, 1e-4  # shares of the cost; smaller gains end a search
+_ANGLE_SD_RAD = 1.0  # prior sd of an angle about neutral
+_FINE_GAIN, COARSE_GAIN = 1e-6, 1e-4  # shares of the cost; a smaller gain ends the iteration
 _N_STEPS = 100
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is fitted to what."""
+    """A fit of a body's landmarks to targets."""
 
     model: BodyModel
     targets: Array  # (landmarks, 3) world [m]; NaN where unknown
     root_weights: Array  # (landmarks,) square roots
     sd_m: float  # of a landmark of weight 1 [m]
-    neutral: Array | None = None  # (joints, 3) [rad]; None: straight, as far as the limits let it
+    neutral: Array | None = None  # (joints, 3) [rad]; None: straight, as far as the limits allow
 
     @cached_property
     def segments(self) -> NDArray[np.int64]:
@@ -52,30 +51,33 @@ class Problem:
 
     @cached_property
     def prior(self) -> Array:
-        """The angles that are expected: (joints, 3) [rad]."""
-        wanted = np.zeros(self.limits.shape[:2]) if self.neutral is None else self.neutral
-        return np.clip(wanted, self.limits[..., 0], self.limits[..., 1])
+        """The prior mean of the angles: (joints, 3) [rad]."""
+        neutral = np.zeros(self.limits.shape[:2]) if self.neutral is None else self.neutral
+        return np.clip(neutral, self.limits[..., 0], self.limits[..., 1])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class State:
+class PoseState:
     """A pose as arrays."""
 
     R: Array  # (3, 3) world from root
     t: Array  # (3,) [m]
-    angles: Array  # (joints, 3) [rad]; where many are tried, (..., joints, 3)
+    angles: Array  # (joints, 3) [rad]; for a batch (..., joints, 3)
 
 
-def solved(problem: Problem, state: State, free: NDArray[np.bool_], least_gain: float = FINE) -> tuple[State, float]:
-    """Search from a state over the free variables (6 + 3 joints,); return the best state and its cost."""
+def minimise(
+    problem: Problem, state: PoseState, free: NDArray[np.bool_], least_gain: float = _FINE_GAIN
+) -> tuple[PoseState, float]:
+    """Minimise the cost over the free variables (6 + 3 joints,); return the state and its cost."""
     free_m = np.full((6, 2), [-np.inf, np.inf])
     low, high = np.concatenate([free_m, problem.limits.reshape(-1, 2)]).T
     cost, gradient, hessian = _equations(problem, state)
     damping = 1e-4
     for _ in range(_N_STEPS):
         now = np.concatenate([np.zeros(6), state.angles.ravel()])
-        step = _step(gradient, hessian, damping, np.where(free, low - now, 0.0), np.where(free, high - now, 0.0))
-        trial = State(
+        down, up = np.where(free, low - now, 0.0), np.where(free, high - now, 0.0)
+        step = _step(gradient, hessian, damping, low=down, high=up)
+        trial = PoseState(
             Rotation.from_rotvec(step[3:6]).as_matrix() @ state.R,
             state.t + step[:3],
             np.clip(now + step, low, high)[6:].reshape(-1, 3),
@@ -94,44 +96,44 @@ def solved(problem: Problem, state: State, free: NDArray[np.bool_], least_gain: 
     return state, cost
 
 
-def _step(gradient: Array, hessian: Array, damping: float, low: Array, high: Array) -> Array:
-    """Return the damped Gauss-Newton step (variables,) within bounds on it; what reaches a bound stays there."""
+def _step(gradient: Array, hessian: Array, damping: float, *, low: Array, high: Array) -> Array:
+    """Return the damped Gauss-Newton step (variables,) within bounds; a variable at its bound stays there (active set)."""
     step, moving = np.zeros(len(gradient)), (low < 0) & (high > 0)
     moving |= (low < 0) & (high >= 0) & (gradient > 0) | (low <= 0) & (high > 0) & (gradient < 0)
     damped = hessian + np.diag(damping * np.diag(hessian) + 1e-9)
     while moving.any():
-        held = ~moving
-        pull = gradient[moving] + damped[np.ix_(moving, held)] @ step[held]
-        wanted = np.zeros(len(step))
-        wanted[moving] = np.linalg.solve(damped[np.ix_(moving, moving)], -pull)
-        is_out = moving & ((wanted < low) | (wanted > high))
-        step[moving] = np.clip(wanted, low, high)[moving]
+        at_bound = ~moving
+        slope = gradient[moving] + damped[np.ix_(moving, at_bound)] @ step[at_bound]
+        unbounded = np.zeros(len(step))
+        unbounded[moving] = np.linalg.solve(damped[np.ix_(moving, moving)], -slope)
+        is_out = moving & ((unbounded < low) | (unbounded > high))
+        step[moving] = np.clip(unbounded, low, high)[moving]
         if not is_out.any():
             break
         moving &= ~is_out
     return step
 
 
-def _equations(problem: Problem, state: State) -> tuple[float, Array, Array]:
-    """Return half the squared residuals, and their gradient and Gauss-Newton Hessian by the variables."""
-    given, scale = problem.is_given, (problem.root_weights / problem.sd_m)[problem.is_given]
-    posed = PosedBody(problem.model, *_placed(problem.model, state))
-    points = posed.landmarks[given]
-    jacobian = point_jacobian(posed, problem.segments[given], points)
+def _equations(problem: Problem, state: PoseState) -> tuple[float, Array, Array]:
+    """Return half the squared residuals, their gradient and Gauss-Newton Hessian."""
+    has_target, scale = problem.is_given, (problem.root_weights / problem.sd_m)[problem.is_given]
+    posed = PosedBody(problem.model, *_forward_kinematics(problem.model, state))
+    points = posed.landmarks[has_target]
+    jacobian = point_jacobian(posed, problem.segments[has_target], points)
     n_joints = len(state.angles)
     by_joint = jacobian[..., 6:].reshape(*jacobian.shape[:2], n_joints, 3)
-    by_angle = np.einsum("...ki,kij->...kj", by_joint, _turn_from_angles(state.angles))
+    by_angle = np.einsum("...ki,kij->...kj", by_joint, _rotation_jacobian(state.angles))
     jacobian = np.concatenate([jacobian[..., :6], by_angle.reshape(*jacobian.shape[:2], -1)], axis=-1)
     J = (scale[:, None, None] * jacobian).reshape(-1, 6 + 3 * n_joints)
-    r = (scale[:, None] * (points - problem.targets[given])).ravel()
-    off = (state.angles - problem.prior).ravel() / ANGLE_SD_RAD
+    r = (scale[:, None] * (points - problem.targets[has_target])).ravel()
+    deviation = (state.angles - problem.prior).ravel() / _ANGLE_SD_RAD
     gradient, hessian = J.T @ r, J.T @ J
-    gradient[6:] += off / ANGLE_SD_RAD
-    hessian[range(6, len(hessian)), range(6, len(hessian))] += ANGLE_SD_RAD**-2
-    return float(r @ r + off @ off) / 2, gradient, hessian
+    gradient[6:] += deviation / _ANGLE_SD_RAD
+    hessian[range(6, len(hessian)), range(6, len(hessian))] += _ANGLE_SD_RAD**-2
+    return float(r @ r + deviation @ deviation) / 2, gradient, hessian
 
 
-def _turn_from_angles(angles: Array) -> Array:
+def _rotation_jacobian(angles: Array) -> Array:
     """Differentiate a joint's rotation vector, segment's own axes, by its x, y, z angles (..., 3): (..., 3, 3)."""
     cos, sin = np.cos(angles), np.sin(angles)
     zero, one = np.zeros(angles.shape[:-1]), np.ones(angles.shape[:-1])
@@ -140,22 +142,25 @@ def _turn_from_angles(angles: Array) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def _placed(model: BodyModel, state: State) -> tuple[Array, Array]:
+def _forward_kinematics(model: BodyModel, state: PoseState) -> tuple[Array, Array]:
     """Return world from segment, rotations (..., segments, 3, 3) and translations (..., segments, 3) [m]."""
-    turns = matrix_from_angles(state.angles)  # (..., joints, 3, 3)
-    R, t = [np.broadcast_to(state.R, (*turns.shape[:-3], 3, 3))], [np.broadcast_to(state.t, (*turns.shape[:-3], 3))]
+    rotations = matrix_from_angles(state.angles)  # (..., joints, 3, 3)
+    R, t = (
+        [np.broadcast_to(state.R, (*rotations.shape[:-3], 3, 3))],
+        [np.broadcast_to(state.t, (*rotations.shape[:-3], 3))],
+    )
     for index, (segment, parent) in enumerate(zip(model.segments[1:], model.parents[1:], strict=True)):
         t.append(t[parent] + R[parent] @ segment.joint_m)
-        R.append(R[parent] @ turns[..., index, :, :])
+        R.append(R[parent] @ rotations[..., index, :, :])
     return np.stack(R, axis=-3), np.stack(t, axis=-2)
 
 
-def places(problem: Problem, state: State) -> Array:
-    """Return where the landmarks are: (..., landmarks, 3) world [m]."""
-    R, t = _placed(problem.model, state)
+def landmark_positions(problem: Problem, state: PoseState) -> Array:
+    """Return the landmarks' positions: (..., landmarks, 3) world [m]."""
+    R, t = _forward_kinematics(problem.model, state)
     return np.einsum("...nij,nj->...ni", R[..., problem.segments, :, :], problem.local) + t[..., problem.segments, :]
 
 
-def distances(problem: Problem, state: State) -> Array:
-    """Return how far the landmarks are from their targets: (..., landmarks) [m]; NaN where there is none."""
-    return np.linalg.norm(places(problem, state) - problem.targets, axis=-1)
+def landmark_distances(problem: Problem, state: PoseState) -> Array:
+    """Return the landmarks' distances from their targets: (..., landmarks) [m]; NaN without a target."""
+    return np.linalg.norm(landmark_positions(problem, state) - problem.targets, axis=-1)

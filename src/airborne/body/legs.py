@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.errors import BodyError
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 LEG_POINTS = ("hip_left", "hip_right", "knee_left", "knee_right", "ankle_left", "ankle_right")
 RODS = ((0, 2), (1, 3), (2, 4), (3, 5))  # thighs and shanks, left first, as pairs of LEG_POINTS
-THIGH_WIDTH_M, SHANK_WIDTH_M = 0.15, 0.11  # of the rods' rectangles in the pictures
+THIGH_WIDTH_M, SHANK_WIDTH_M = 0.15, 0.11  # of the rods' rectangles in the images
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

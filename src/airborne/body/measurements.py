@@ -91,8 +91,8 @@ _ASCENDING = (  # levels along one axis, from the joint outward
     *(tuple(f"L{side}{level}L" for level in levels) for side in "ab" for levels in ("234", "567")),
     *(tuple(f"L{side}{level}L" for level in levels) for side in "jk" for levels in ("1345", "689")),
 )
-_USUAL_STATURE_M = 1.7
-_LEAST_RATIO, _GREATEST_RATIO = 0.125, 4.0  # to the usual value; beyond, the unit is wrong
+_TYPICAL_STATURE_M = 1.7
+_LEAST_RATIO, _GREATEST_RATIO = 0.125, 4.0  # to the typical value; beyond, the unit is wrong
 _FLATTEST, _DEEPEST = 2.0, 4.0  # a section's perimeter over its width; above pi it is deeper than wide
 _UNITS = "measurementconversionfactor = 1 for metres, 0.01 for centimetres, 0.001 for millimetres"
 
@@ -103,17 +103,17 @@ class Measurements:
 
     name: str
     values_m: Mapping[str, float]  # every key of STATURE_SHARES [m]
-    mass_kg: float | None = None  # as weighed; None: what the densities give
+    mass_kg: float | None = None  # as weighed; None: by the densities
 
-    def swapped(self) -> Measurements:
-        """Return the person seen in a mirror: left and right measurements change places."""
+    def mirror(self) -> Measurements:
+        """Return the mirrored person: left and right measurements exchanged."""
         other = dict(zip("abjk", "bakj", strict=True))
         values = {key: self.values_m[key[0] + other.get(key[1], key[1]) + key[2:]] for key in self.values_m}
         return replace(self, values_m=values)
 
-    def evened(self) -> Measurements:
+    def symmetrise(self) -> Measurements:
         """Return the person with both arms and both legs the mean of left and right."""
-        mirrored = self.swapped().values_m
+        mirrored = self.mirror().values_m
         return replace(self, values_m={key: (value + mirrored[key]) / 2 for key, value in self.values_m.items()})
 
 
@@ -129,14 +129,14 @@ def read_measurements(path: Path) -> Measurements:
     except OSError as error:
         raise BodyError(f"{path.name}: cannot be read ({error.strerror})") from error
     except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
-        said = " ".join(str(error).split())[:160]
-        raise BodyError(f"{path.name}: not a YAML file of measurements: {said}") from error
+        reason = " ".join(str(error).split())[:160]
+        raise BodyError(f"{path.name}: not a YAML file of measurements: {reason}") from error
     if not isinstance(table, dict) or not isinstance(node, yaml.MappingNode):
         raise BodyError(f"{path.name}: holds no measurements; expected lines such as 'Ls1L: 0.135'")
-    known = {"measurementconversionfactor", "totalmass", *STATURE_SHARES}
+    allowed = {"measurementconversionfactor", "totalmass", *STATURE_SHARES}
     keys = [str(key.value) for key, _ in node.value]
     for key in keys:
-        if key not in known:
+        if key not in allowed:
             raise BodyError(f"{path.name}: {key:.40} is no measurement; expected Yeadon's 95 names, such as Ls1L")
         if keys.count(key) > 1:
             raise BodyError(f"{path.name}: {key} is given twice; expected each measurement once")
@@ -144,13 +144,13 @@ def read_measurements(path: Path) -> Measurements:
     if factor <= 0:
         raise BodyError(f"{path.name}: measurementconversionfactor is {factor:g}; give {_UNITS}")
     values = {key: factor * _number(table, key, path, "expected a length above zero") for key in STATURE_SHARES}
-    weighed = _number(table, "totalmass", path, "expected kilograms") if "totalmass" in table else -1.0
-    if "totalmass" in table and weighed != -1 and not 10 <= weighed <= 300:
+    mass_kg = _number(table, "totalmass", path, "expected kilograms") if "totalmass" in table else -1.0
+    if "totalmass" in table and mass_kg != -1 and not 10 <= mass_kg <= 300:
         raise BodyError(
-            f"{path.name}: totalmass is {weighed:g}; expected 10 to 300 kilograms; leave it out where not weighed"
+            f"{path.name}: totalmass is {mass_kg:g}; expected 10 to 300 kilograms; leave it out where not weighed"
         )
     try:
-        return checked(Measurements(path.stem, values, weighed if weighed > 0 else None))
+        return check_measurements(Measurements(path.stem, values, mass_kg if mass_kg > 0 else None))
     except BodyError as error:
         raise BodyError(f"{path.name}: {error}") from error
 
@@ -163,18 +163,18 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def checked(measurements: Measurements) -> Measurements:
-    """Return measurements that a body can be made of; raises BodyError, naming the key, for any other."""
+def check_measurements(measurements: Measurements) -> Measurements:
+    """Return the measurements if a body can be made of them; else raises BodyError, naming the key."""
     values = measurements.values_m
     for key, share in STATURE_SHARES.items():
         if key not in values:
             raise BodyError(f"{key} is missing; expected all 95 measurements")
-        usual = share * _USUAL_STATURE_M
+        typical = share * _TYPICAL_STATURE_M
         if not values[key] > 0:
-            raise BodyError(f"{key} is {values[key]:g} m; expected a length above zero, usually about {usual:.3f} m")
-        if not usual * _LEAST_RATIO < values[key] < usual * _GREATEST_RATIO:
+            raise BodyError(f"{key} is {values[key]:g} m; expected a length above zero, usually about {typical:.3f} m")
+        if not typical * _LEAST_RATIO < values[key] < typical * _GREATEST_RATIO:
             raise BodyError(
-                f"{key} is {values[key]:g} m after conversion; expected about {usual:.3f} m: check its unit ({_UNITS})"
+                f"{key} is {values[key]:g} m after conversion; expected about {typical:.3f} m: check its unit ({_UNITS})"
             )
     for levels in _ASCENDING:
         for near, far in pairwise(levels):
@@ -197,14 +197,14 @@ def checked(measurements: Measurements) -> Measurements:
     return measurements
 
 
-def _number(table: dict, key: str, path: Path, wanted: str) -> float:
+def _number(table: dict, key: str, path: Path, hint: str) -> float:
     value = table.get(key)
     if key not in table or value is None:
-        raise BodyError(f"{path.name}: {key} is missing; {wanted}")
+        raise BodyError(f"{path.name}: {key} is missing; {hint}")
     try:
         number = math.nan if isinstance(value, bool) else float(value)  # YAML reads 1e-2 as text
     except (TypeError, ValueError):
         number = math.nan
     if not math.isfinite(number):
-        raise BodyError(f"{path.name}: {key} is {value!r:.40}; {wanted}, a number")
+        raise BodyError(f"{path.name}: {key} is {value!r:.40}; {hint}, a number")
     return number

@@ -1,4 +1,4 @@
-"""Bodies: a tree of segments, each carrying coloured parts; a pose makes a body a posed one."""
+"""Body models: a tree of segments with coloured parts; with a pose, a posed body."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.errors import BodyError
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,8 +45,8 @@ class Mesh:
 Shape = Ellipsoid | Box | Mesh
 
 LONGEST_M = 20.0  # no part of a body is longer
-WHOLE = (-np.inf, np.inf)  # a part that is not cut
-UNLIMITED = np.tile([-np.inf, np.inf], (3, 1))  # a joint that turns freely
+WHOLE = (-np.inf, np.inf)  # a part that is not clipped to a slab
+UNLIMITED = np.tile([-np.inf, np.inf], (3, 1))  # a free joint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +75,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inertia:
-    """The mass of a segment and how it lies in the segment's frame."""
+    """A segment's mass, centre of mass and inertia tensor."""
 
     mass_kg: float
     centre_m: Array  # (3,) centre of mass, segment's frame [m]
@@ -94,30 +93,30 @@ class Landmark:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segment:
-    """A rigid piece of the body; it turns about a point fixed in its parent."""
+    """A rigid segment of the body; it rotates about a joint centre fixed in its parent."""
 
     name: str
     parent: str | None
     joint_m: Array  # (3,) the joint in the parent's frame [m]; the segment's own origin
     parts: tuple[Part, ...]
     limits_rad: Array = field(default_factory=lambda: UNLIMITED)  # (3, 2) least and greatest x, y, z joint angle [rad]
-    inertia: Inertia | None = None  # None: not known
+    inertia: Inertia | None = None  # None: unknown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pose:
-    """A body's degrees of freedom: the root's place in the world and the joint angles."""
+    """A body's degrees of freedom: the root's position and orientation, and the joint angles."""
 
     world_from_root: RigidTransform
     joint_angles: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (segments - 1, 3) x-y-z [rad]
 
-    def moved(self, translation_m: Array, rotation_vector: Array) -> Pose:
-        """Return the pose moved by (3,) [m] and turned about its root by a rotation vector (3,) [rad], world axes."""
+    def move(self, translation_m: Array, rotation_vector: Array) -> Pose:
+        """Translate by (3,) [m] and rotate about the root by a rotation vector (3,) [rad], both in world axes."""
         root = self.world_from_root
-        turned = RigidTransform.from_components(
+        moved = RigidTransform.from_components(
             root.translation + translation_m, Rotation.from_rotvec(rotation_vector) * root.rotation
         )
-        return replace(self, world_from_root=turned)
+        return replace(self, world_from_root=moved)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,24 +128,24 @@ class BodyModel:
     landmarks: tuple[Landmark, ...] = ()  # empty: the origin of every segment, under the segment's name
 
     def __post_init__(self) -> None:
-        known: list[str] = []
+        names: list[str] = []
         for segment in self.segments:
-            if segment.name in known:
+            if segment.name in names:
                 raise BodyError(f"two segments are named '{segment.name}'; give each its own name")
-            if (segment.parent is None) != (not known):
+            if (segment.parent is None) != (not names):
                 raise BodyError(f"segment '{segment.name}': exactly the first segment has no parent")
-            if segment.parent is not None and segment.parent not in known:
-                listed = ", ".join(known)
+            if segment.parent is not None and segment.parent not in names:
+                listed = ", ".join(names)
                 raise BodyError(
                     f"segment '{segment.name}': parent '{segment.parent}' must stand before it; so far: {listed}"
                 )
             if segment.limits_rad.shape != (3, 2) or not np.all(segment.limits_rad[:, 0] <= segment.limits_rad[:, 1]):
                 raise BodyError(f"segment '{segment.name}': each joint limit needs a least and a greatest angle")
-            known.append(segment.name)
+            names.append(segment.name)
         for landmark in self.landmarks:
-            if landmark.segment not in known:
+            if landmark.segment not in names:
                 raise BodyError(
-                    f"landmark '{landmark.name}': no segment '{landmark.segment}'; it has: {', '.join(known)}"
+                    f"landmark '{landmark.name}': no segment '{landmark.segment}'; it has: {', '.join(names)}"
                 )
         if len({landmark.name for landmark in self.landmarks}) < len(self.landmarks):
             raise BodyError(f"two landmarks of body '{self.name}' share a name; give each its own")
@@ -181,7 +180,7 @@ class BodyModel:
 
     @property
     def needs_colours(self) -> bool:
-        """Whether a part's colour is still to be sampled from the video."""
+        """Whether a part's colour has yet to be sampled from the video."""
         return any(part.colour is None for part in self.parts)
 
     def with_colours(self, colours: Array) -> BodyModel:
@@ -193,18 +192,18 @@ class BodyModel:
         return replace(self, segments=segments)
 
     def with_pose(self, pose: Pose) -> PosedBody:
-        """Place the body in the world."""
+        """Pose the body in the world (forward kinematics)."""
         angles = pose.joint_angles if pose.joint_angles.size else np.zeros((len(self.segments) - 1, 3))
         if angles.shape != (len(self.segments) - 1, 3):
             raise BodyError(f"body '{self.name}' has {len(self.segments) - 1} joints, the pose {len(angles)}")
-        placed = [pose.world_from_root]
+        transforms = [pose.world_from_root]
         for segment, parent, xyz in zip(self.segments[1:], self.parents[1:], angles, strict=True):
             parent_from_segment = RigidTransform.from_components(segment.joint_m, Rotation.from_euler("XYZ", xyz))
-            placed.append(placed[parent] * parent_from_segment)
+            transforms.append(transforms[parent] * parent_from_segment)
         return PosedBody(
             self,
-            np.stack([p.rotation.as_matrix() for p in placed]),
-            np.stack([p.translation for p in placed]),
+            np.stack([p.rotation.as_matrix() for p in transforms]),
+            np.stack([p.translation for p in transforms]),
         )
 
 
@@ -218,19 +217,19 @@ class PosedBody:
 
     @property
     def landmarks(self) -> Array:
-        """Where the model's landmarks are: (landmarks, 3) world [m]."""
+        """The positions of the model's landmarks: (landmarks, 3) world [m]."""
         owners = [self.model.index_of(landmark.segment) for landmark in self.model.landmarks]
         local = np.array([landmark.position_m for landmark in self.model.landmarks])
         return np.einsum("nij,nj->ni", self.R[owners], local) + self.t[owners]
 
-    def moved(self, motion: Array) -> PosedBody:
-        """Move the whole body: motion (6,) is a translation [m], a turn about the root's origin [rad], world axes."""
-        turn = Rotation.from_rotvec(motion[3:]).as_matrix()
-        return PosedBody(self.model, turn @ self.R, (self.t - self.t[0]) @ turn.T + self.t[0] + motion[:3])
+    def move(self, motion: Array) -> PosedBody:
+        """Move the whole body: motion (6,) is a translation [m], a rotation about the root [rad], world axes."""
+        R = Rotation.from_rotvec(motion[3:]).as_matrix()
+        return PosedBody(self.model, R @ self.R, (self.t - self.t[0]) @ R.T + self.t[0] + motion[:3])
 
     @property
     def world_from_root(self) -> RigidTransform:
-        """Where the root is."""
+        """The root's position and orientation."""
         return RigidTransform.from_components(self.t[0], Rotation.from_matrix(self.R[0]))
 
 

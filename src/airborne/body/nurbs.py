@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
 from airborne.body.model import Mesh
 from airborne.errors import BodyError
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 # a stadium from the middle of its lower straight side, counter-clockwise, as multiples of (half flat, radius)
 _FLAT = np.array([0, 0.5, 1, 1, 1, 1, 1, 0, -1, -1, -1, -1, -1, -0.5, 0])
@@ -58,10 +56,10 @@ class RationalSurface:
         low, high = self.knots[1][self.degrees[1]], self.knots[1][-self.degrees[1] - 1]
         inside = np.clip(v, low + _OFF_POLE * (high - low), high - _OFF_POLE * (high - low))
         value = self._homogeneous(u, inside)
-        place, weight = value[..., :3] / value[..., 3:], value[..., 3:]
+        points, weight = value[..., :3] / value[..., 3:], value[..., 3:]
         along_u, along_v = self._homogeneous(u, inside, (1, 0)), self._homogeneous(u, inside, (0, 1))
-        tangent_u = (along_u[..., :3] - along_u[..., 3:] * place) / weight
-        tangent_v = (along_v[..., :3] - along_v[..., 3:] * place) / weight
+        tangent_u = (along_u[..., :3] - along_u[..., 3:] * points) / weight
+        tangent_v = (along_v[..., :3] - along_v[..., 3:] * points) / weight
         normal = np.cross(tangent_u, tangent_v)
         return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
 
@@ -104,7 +102,7 @@ class RationalSurface:
 def stadium_loft(stations: Array) -> RationalSurface:
     """Loft a surface through stadium sections, exact at each: quadratic around, cubic along, by chord length.
 
-    stations (n, 5), n >= 4 [m]: place along z, half the straight side (along x), radius (along y), the section's centre
+    stations (n, 5), n >= 4 [m]: position along z, half the straight side (along x), radius (along y), the section's centre
     in x and y. A stadium is two half circles joined by straight lines; the section has width 2 (half side + radius) and
     depth 2 radius. A section of radius 0 is a point.
     """

@@ -1,4 +1,4 @@
-"""What a person wears: colours, and the borders where a segment changes from one to another."""
+"""Outfits: colours of clothes and skin, and the borders where a segment changes from one to another."""
 
 from __future__ import annotations
 
@@ -52,51 +52,82 @@ class Outfit:
         kind = segment.removesuffix("_left").removesuffix("_right")
         if kind == "head":
             a, b, c = ellipsoid.semi_axes_m
-            place = RigidTransform.from_components(centre_m, _BACKWARD)
+            segment_from_part = RigidTransform.from_components(centre_m, _BACKWARD)
             border = b - 2 * b * self.hair_share
             return _cut(
-                segment, Ellipsoid(np.array([a, c, b])), place, border, ("face", self.skin), ("hair", self.hair)
+                segment,
+                Ellipsoid(np.array([a, c, b])),
+                segment_from_part,
+                border,
+                below=("face", self.skin),
+                above=("hair", self.hair),
             )
-        place = RigidTransform.from_translation(centre_m)
+        segment_from_part = RigidTransform.from_translation(centre_m)
         if kind == "upper_arm":
             border = high - length * self.sleeve_share
-            return _cut(segment, ellipsoid, place, border, ("skin", self.skin), ("sleeve", self.shirt), (low, high))
+            return _cut(
+                segment,
+                ellipsoid,
+                segment_from_part,
+                border,
+                below=("skin", self.skin),
+                above=("sleeve", self.shirt),
+                span=(low, high),
+            )
         if kind == "thigh":
             border = high - length * self.shorts_share
-            return _cut(segment, ellipsoid, place, border, ("skin", self.skin), ("shorts", self.shorts), (low, high))
+            return _cut(
+                segment,
+                ellipsoid,
+                segment_from_part,
+                border,
+                below=("skin", self.skin),
+                above=("shorts", self.shorts),
+                span=(low, high),
+            )
         if kind == "shank":
             border = low + length * self.socks_share
-            return _cut(segment, ellipsoid, place, border, ("sock", self.socks), ("skin", self.skin), (low, high))
+            return _cut(
+                segment,
+                ellipsoid,
+                segment_from_part,
+                border,
+                below=("sock", self.socks),
+                above=("skin", self.skin),
+                span=(low, high),
+            )
         colours = {"pelvis": self.shorts, "foot": self.shoes, "forearm": self.skin, "hand": self.skin}
-        return [Part(segment, ellipsoid, place, _array(colours.get(kind, self.shirt)))]
+        return [Part(segment, ellipsoid, segment_from_part, _array(colours.get(kind, self.shirt)))]
 
 
 @dataclass(frozen=True, slots=True)
 class Border:
-    """Where a segment's surface changes colour: across one of the segment's axes, as a share of its extent there."""
+    """Where a segment changes colour: at a share of its extent along one of its axes."""
 
     share: float  # along the length axis from the segment's joint to its end; along another from its low side
     axis: int | None = None  # 0, 1, 2: x, y, z; None: the length axis
 
 
 def with_borders(model: BodyModel, borders: Mapping[str, Border | None]) -> BodyModel:
-    """Return the body with the colours of segments changing at other places; None: a segment of one colour.
+    """Return the body with other borders on its segments; None: a segment of one colour.
 
-    A name without its side ("thigh") stands for both. A segment cut the same way before keeps its two parts' names and
-    colours; one cut anew has its colour on both sides. Raises BodyError for an unknown segment, a share outside 0..1,
+    A name without its side ("thigh") stands for both. A segment already cut along the same axis keeps its two parts'
+    names and colours; a newly cut one has its colour on both sides. Raises BodyError for an unknown segment, a share outside 0..1,
     and a segment that is not one ellipsoid.
     """
     names = {segment.name for segment in model.segments}
-    wanted: dict[str, Border | None] = {}
+    border_of: dict[str, Border | None] = {}
     for name, border in borders.items():
         sides = [name] if name in names else [f"{name}_{side}" for side in ("left", "right")]
         if not {*sides} <= names:
             model.index_of(name)
         if border is not None and not 0 < border.share < 1:
             raise BodyError(f"segment '{name}': the border's share is {border.share:g}; expected between 0 and 1")
-        wanted |= dict.fromkeys(sides, border)
+        border_of |= dict.fromkeys(sides, border)
     segments = tuple(
-        replace(segment, parts=_bordered(model, segment, wanted[segment.name])) if segment.name in wanted else segment
+        replace(segment, parts=_cut_at_border(model, segment, border_of[segment.name]))
+        if segment.name in border_of
+        else segment
         for segment in model.segments
     )
     return replace(model, segments=segments)
@@ -105,9 +136,9 @@ def with_borders(model: BodyModel, borders: Mapping[str, Border | None]) -> Body
 def extent_m(model: BodyModel, segment: str, axis: int | None = None) -> tuple[float, float]:
     """Return where a `Border`'s shares 0 and 1 lie along an axis of the segment's frame [m].
 
-    Along the length axis: its joint, and the farthest joint of a segment that hangs on it, or the end of its surface.
+    Along the length axis: its joint, and the farthest joint of its children, or the end of its surface.
     """
-    ellipsoid, centre = solid_of(model, segment)
+    ellipsoid, centre = ellipsoid_of(model, segment)
     length = length_axis(model, segment)
     if axis is None or axis == length:
         ends = [child.joint_m[length] for child in model.segments if child.parent == segment]
@@ -118,40 +149,40 @@ def extent_m(model: BodyModel, segment: str, axis: int | None = None) -> tuple[f
     return float(centre[axis] - ellipsoid.semi_axes_m[axis]), float(centre[axis] + ellipsoid.semi_axes_m[axis])
 
 
-def solid_of(model: BodyModel, segment: str) -> tuple[Ellipsoid, np.ndarray]:
+def ellipsoid_of(model: BodyModel, segment: str) -> tuple[Ellipsoid, np.ndarray]:
     """Return the ellipsoid that a segment's parts are cut from, its axes along the segment's, and its centre (3,) [m].
 
     Raises BodyError for a segment that is not one ellipsoid.
     """
-    found = []
+    solids = []
     for part in model.segments[model.index_of(segment)].parts:
-        turn = np.abs(part.segment_from_part.rotation.as_matrix())
-        if isinstance(part.shape, Ellipsoid) and np.abs(turn - turn.round()).max() < _ALIGNED:
-            found.append((turn.round() @ part.shape.semi_axes_m, part.segment_from_part.translation))
+        axes = np.abs(part.segment_from_part.rotation.as_matrix())
+        if isinstance(part.shape, Ellipsoid) and np.abs(axes - axes.round()).max() < _ALIGNED:
+            solids.append((axes.round() @ part.shape.semi_axes_m, part.segment_from_part.translation))
         else:
-            found.append((np.full(3, np.nan), np.full(3, np.nan)))
-    if not found or not np.allclose(found, found[0], rtol=0, atol=_ALIGNED):
+            solids.append((np.full(3, np.nan), np.full(3, np.nan)))
+    if not solids or not np.allclose(solids, solids[0], rtol=0, atol=_ALIGNED):
         raise BodyError(f"segment '{segment}' is not one ellipsoid along its axes, so it cannot be cut; leave it whole")
-    return Ellipsoid(found[0][0]), found[0][1]
+    return Ellipsoid(solids[0][0]), solids[0][1]
 
 
-def _bordered(model: BodyModel, segment: Segment, border: Border | None) -> tuple[Part, ...]:
-    ellipsoid, centre = solid_of(model, segment.name)
+def _cut_at_border(model: BodyModel, segment: Segment, border: Border | None) -> tuple[Part, ...]:
+    ellipsoid, centre = ellipsoid_of(model, segment.name)
     old = sorted(segment.parts, key=lambda part: part.slab_m)
     if border is None:
-        most = max(old, key=lambda part: _height_m(part))
-        return (Part(segment.name, ellipsoid, RigidTransform.from_translation(centre), most.colour),)
+        largest = max(old, key=lambda part: _height_m(part))
+        return (Part(segment.name, ellipsoid, RigidTransform.from_translation(centre), largest.colour),)
     axis = length_axis(model, segment.name) if border.axis is None else border.axis
     start, end = extent_m(model, segment.name, axis)
     height = start + border.share * (end - start) - centre[axis]
     own = Ellipsoid(np.abs(_TOWARD[axis].as_matrix()).round().T @ ellipsoid.semi_axes_m)
-    place = RigidTransform.from_components(centre, _TOWARD[axis])
+    segment_from_part = RigidTransform.from_components(centre, _TOWARD[axis])
     is_cut_so = len(old) == 2 and np.allclose(old[0].segment_from_part.rotation.apply([0, 0, 1]), np.eye(3)[axis])
-    named = [f"{segment.name}_low", f"{segment.name}_high"]
-    below, above = old if is_cut_so else (replace(old[0], name=name) for name in named)
+    names = [f"{segment.name}_low", f"{segment.name}_high"]
+    below, above = old if is_cut_so else (replace(old[0], name=name) for name in names)
     return (
-        Part(below.name, own, place, below.colour, (WHOLE[0], float(height))),
-        Part(above.name, own, place, above.colour, (float(height), WHOLE[1])),
+        Part(below.name, own, segment_from_part, below.colour, (WHOLE[0], float(height))),
+        Part(above.name, own, segment_from_part, above.colour, (float(height), WHOLE[1])),
     )
 
 
@@ -164,8 +195,9 @@ def _height_m(part: Part) -> float:
 def _cut(
     segment: str,
     ellipsoid: Ellipsoid,
-    place: RigidTransform,
+    segment_from_part: RigidTransform,
     border: float,
+    *,
     below: tuple[str, Colour],
     above: tuple[str, Colour],
     span: tuple[float, float] | None = None,
@@ -173,12 +205,12 @@ def _cut(
     """Cut at a height along the part's own z; a border at an end of the span leaves one part."""
     low, high = span or (-ellipsoid.semi_axes_m[2], ellipsoid.semi_axes_m[2])
     if border <= low:
-        return [Part(segment, ellipsoid, place, _array(above[1]))]
+        return [Part(segment, ellipsoid, segment_from_part, _array(above[1]))]
     if border >= high:
-        return [Part(segment, ellipsoid, place, _array(below[1]))]
+        return [Part(segment, ellipsoid, segment_from_part, _array(below[1]))]
     return [
-        Part(f"{segment}_{below[0]}", ellipsoid, place, _array(below[1]), (WHOLE[0], float(border))),
-        Part(f"{segment}_{above[0]}", ellipsoid, place, _array(above[1]), (float(border), WHOLE[1])),
+        Part(f"{segment}_{below[0]}", ellipsoid, segment_from_part, _array(below[1]), (WHOLE[0], float(border))),
+        Part(f"{segment}_{above[0]}", ellipsoid, segment_from_part, _array(above[1]), (float(border), WHOLE[1])),
     ]
 
 
@@ -207,7 +239,7 @@ SAMPLED = Outfit(
     socks_share=0.0,
 )
 
-# Hue [deg], saturation, value. The hue goes once round the body, so that left and right differ and what lies near looks
+# Hue [deg], saturation, value. The hue goes once round the body, so that left and right differ and neighbours look
 # alike; the trunk is grey. No channel is above 200: light of up to 1.27 leaves every colour below white.
 _HUES = {
     "pelvis": (0, 0.0, 0.45),
@@ -235,8 +267,8 @@ PALETTE = {
 }  # sRGB
 
 
-def in_flat_colours(model: BodyModel, colours: Mapping[str, tuple[float, ...]] = PALETTE) -> BodyModel:
-    """Give each segment one colour all over, sRGB 0..255, as paper B's models have; by default those of `PALETTE`.
+def with_flat_colours(model: BodyModel, colours: Mapping[str, tuple[float, ...]] = PALETTE) -> BodyModel:
+    """Give each segment one uniform colour, sRGB 0..255, as paper B's models have; by default those of `PALETTE`.
 
     Raises BodyError for a segment without a colour, and one that is not one ellipsoid.
     """

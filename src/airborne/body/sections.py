@@ -1,6 +1,6 @@
-"""Where a person's skin runs: stadium sections along each segment, from Yeadon's measurements (1990-II).
+"""Cross-sections of a person's skin: stadia along each segment, from Yeadon's measurements (1990-II).
 
-Measured girths and widths are kept. Between them, and where nothing is measured, the shape is of our own choice: how
+Measured girths and widths hold exactly. Between them, and where nothing is measured, the shape is our own choice: how
 much deeper than wide a limb is, where a calf, a seat or a face stands out, how a foot rises to the ankle.
 """
 
@@ -10,12 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from airborne.body.stadia import Stadium, stadium
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 Values = Mapping[str, float]  # measurements [m]
 
 _SECTIONS = 9  # between the ends of a segment
@@ -44,20 +43,20 @@ class Profile:
     """
 
     axes: Array  # (3, 3) rows: the loft's axes in the segment's frame
-    levels: Array  # (n, 5) place along z, half the straight side, radius, centre in x and y [m]
+    levels: Array  # (n, 5) position along z, half the straight side, radius, centre in x and y [m]
     caps_m: tuple[float, float]
 
     def piece(self, low_m: float, high_m: float, origin_m: float, caps_m: tuple[float, float]) -> Profile:
-        """Cut out what lies between two places, as one that starts from `origin_m`, with its own rounded ends."""
+        """Cut out the piece between two levels, measured from `origin_m`, with its own rounded ends."""
         along = np.linspace(low_m, high_m, _SECTIONS)
-        levels = self._between(along)
+        levels = self._sections_at(along)
         levels[:, 0] = along - origin_m
         return Profile(self.axes, levels, caps_m)
 
     def stations(self, first: float, last: float) -> Array:
         """Return a loft's sections (n, 5), girths times `first` at one end, `last` at the other, linear between."""
         along = np.linspace(self.levels[0, 0], self.levels[-1, 0], _SECTIONS)
-        body = self._between(along)
+        body = self._sections_at(along)
         body[:, 1:3] *= np.linspace(first, last, _SECTIONS)[:, None]
         ends = []
         for end, cap, angles in ((body[0], -self.caps_m[0], _CAP_RAD), (body[-1], self.caps_m[1], _CAP_RAD[::-1])):
@@ -70,8 +69,8 @@ class Profile:
         (low_tip, low), (high_tip, high) = ends
         return np.vstack([low_tip, low, body, high, high_tip])
 
-    def _between(self, along: Array) -> Array:
-        """Return the sections at places between the levels; no girth overshoots its neighbours."""
+    def _sections_at(self, along: Array) -> Array:
+        """Interpolate the sections between the levels; no girth overshoots its neighbours."""
         return PchipInterpolator(self.levels[:, 0], self.levels)(along)
 
 
@@ -89,12 +88,12 @@ def trunk_profile(kind: str, v: Values) -> Profile:
             return trunk.piece(v["Ls2L"], v["Ls3L"], v["Ls2L"], (0.5 * rib.radius_m, 0.5 * nipple.radius_m))
         caps = 0.5 * nipple.radius_m, 1.7 * (v["Ls5L"] - v["Ls4L"])
         return trunk.piece(v["Ls3L"], v["Ls4L"], v["Ls3L"], caps)
-    neck, face, skull = _deep(v["Ls5p"], _NECK), _deep(v["Ls6p"], _SKULL), _deep(v["Ls7p"], _SKULL)
-    jaw = _deep(0.45 * v["Ls5p"] + 0.55 * v["Ls6p"], (_NECK + _SKULL) / 2)
+    neck, face, skull = _oval(v["Ls5p"], _NECK), _oval(v["Ls6p"], _SKULL), _oval(v["Ls7p"], _SKULL)
+    jaw = _oval(0.45 * v["Ls5p"] + 0.55 * v["Ls6p"], (_NECK + _SKULL) / 2)
     back, front = 0.1 * neck.radius_m, -0.1 * skull.radius_m
     levels = [
         (0, neck, back),
-        (0.5 * v["Ls6L"], _deep(0.97 * v["Ls5p"], _NECK), back),
+        (0.5 * v["Ls6L"], _oval(0.97 * v["Ls5p"], _NECK), back),
         (0.75 * v["Ls6L"], jaw, front / 2),
         (v["Ls6L"], face, front),
         (v["Ls7L"], skull, 0),
@@ -119,7 +118,7 @@ def shoulder_profile(v: Values, joint_m: Array, arm_joint_m: Array) -> Profile:
 
 def arm_profile(kind: str, v: Values) -> Profile:
     """Give the sections of the left upper arm, forearm or hand, from below."""
-    elbow, wrist = _deep(v["La2p"], _ELBOW), stadium(v["La4p"], v["La4w"])
+    elbow, wrist = _oval(v["La2p"], _ELBOW), stadium(v["La4p"], v["La4w"])
     if kind == "hand":
         palm = [(-v[f"La{i}L"], stadium(v[f"La{i}p"], v[f"La{i}w"])) for i in (7, 6, 5)]
         tips = palm[0][1]
@@ -127,10 +126,10 @@ def arm_profile(kind: str, v: Values) -> Profile:
         return replace(hand, caps_m=(tips.radius_m, 0.8 * wrist.radius_m))
     levels = [
         (-v["La4L"], wrist),
-        (-v["La3L"], _deep(v["La3p"], _FOREARM)),
+        (-v["La3L"], _oval(v["La3p"], _FOREARM)),
         (-v["La2L"], elbow),
-        (-v["La2L"] / 2, _deep(v["La1p"], _UPPER_ARM)),
-        (0, _deep(v["La0p"], _UPPER_ARM)),
+        (-v["La2L"] / 2, _oval(v["La1p"], _UPPER_ARM)),
+        (0, _oval(v["La0p"], _UPPER_ARM)),
     ]
     arm, round_elbow = _profile(_DEEP, levels), 0.9 * elbow.radius_m
     if kind == "upper_arm":
@@ -140,15 +139,15 @@ def arm_profile(kind: str, v: Values) -> Profile:
 
 def leg_profile(kind: str, v: Values) -> Profile:
     """Give the sections of the left thigh or shank, from below."""
-    knee, calf, ankle = _deep(v["Lj3p"], _KNEE), _deep(v["Lj4p"], _CALF), _deep(v["Lj5p"], _CALF)
+    knee, calf, ankle = _oval(v["Lj3p"], _KNEE), _oval(v["Lj4p"], _CALF), _oval(v["Lj5p"], _CALF)
     hip, seat = v["Ls0w"] / 4, stadium(v["Ls0p"], v["Ls0w"]).radius_m
     levels = [
         (-v["Lj5L"], ankle),
         (-v["Lj4L"], calf, 0.1 * calf.radius_m),
-        (-0.65 * v["Lj3L"] - 0.35 * v["Lj4L"], _deep(0.95 * min(v["Lj3p"], v["Lj4p"]), _CALF), 0.05 * calf.radius_m),
+        (-0.65 * v["Lj3L"] - 0.35 * v["Lj4L"], _oval(0.95 * min(v["Lj3p"], v["Lj4p"]), _CALF), 0.05 * calf.radius_m),
         (-v["Lj3L"], knee),
-        (-(v["Lj1L"] + v["Lj3L"]) / 2, _deep(v["Lj2p"], _THIGH)),
-        (-v["Lj1L"], _deep(v["Lj1p"], _THIGH)),
+        (-(v["Lj1L"] + v["Lj3L"]) / 2, _oval(v["Lj2p"], _THIGH)),
+        (-v["Lj1L"], _oval(v["Lj1p"], _THIGH)),
         (0, Stadium(max(0.88 * seat - hip, 0.02 * hip), hip)),
     ]
     leg = _profile(_DEEP, levels)
@@ -158,7 +157,7 @@ def leg_profile(kind: str, v: Values) -> Profile:
 
 
 def foot_profile(v: Values, heel_m: float, toe_m: float, sole_m: float) -> Profile:
-    """Give the sections of the left foot from heel to toe; places before the ankle and below it [m]."""
+    """Give the sections of the left foot from heel to toe; positions in front of the ankle and below it [m]."""
     half, rise = v["Lj8w"] / 2, -sole_m / 2
     levels = []
     for share, width, height in _FOOT:
@@ -167,13 +166,13 @@ def foot_profile(v: Values, heel_m: float, toe_m: float, sole_m: float) -> Profi
     return replace(_profile(_FORWARD, levels), caps_m=(levels[0][0] - heel_m, toe_m - levels[-1][0]))
 
 
-def _deep(perimeter: float, ratio: float) -> Stadium:
+def _oval(perimeter: float, ratio: float) -> Stadium:
     """Make the section of a perimeter, `ratio` times as long along its straight sides as across."""
     radius = perimeter / (2 * np.pi + 4 * (ratio - 1))
     return Stadium((ratio - 1) * radius, radius)
 
 
 def _profile(axes: Array, levels: list[tuple]) -> Profile:
-    """Take levels (place, section, shift along x, shift along y), shifts zero where not given; without caps yet."""
+    """Make a profile of levels (position, section, shift along x, shift along y), shifts 0 by default; no caps yet."""
     rows = [(at, section.flat_m, section.radius_m, *shift, *[0.0] * (2 - len(shift))) for at, section, *shift in levels]
     return Profile(axes, np.array(rows, float), (0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Fitting a body to a person: segments made longer or thicker, with all that hangs on them."""
+"""Scaling a body to a person: segments made longer or thicker, and all that they carry with them."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from airborne.body.model import BodyModel, Box, Ellipsoid, Inertia, Part, Segment, Shape
 from airborne.errors import BodyError
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _RANGE = (0.1, 10.0)  # a scale beyond these is a mistake
 _ALIGNED = 1e-9
@@ -23,9 +21,9 @@ def with_segment_lengths(model: BodyModel, scales: Mapping[str, float]) -> BodyM
 
     A name without its side ("thigh") stands for both. The joints and landmarks that a segment carries move with it; its
     parts, their slabs and its inertia stretch at constant density. Raises BodyError for an unknown segment, a factor
-    that is no length's, or a part that stands askew to its segment.
+    out of range, or a part that is oblique in its segment.
     """
-    return _scaled(model, scales, along=True)
+    return _scale(model, scales, along=True)
 
 
 def with_girths(model: BodyModel, scales: Mapping[str, float | tuple[float, float]]) -> BodyModel:
@@ -34,11 +32,11 @@ def with_girths(model: BodyModel, scales: Mapping[str, float | tuple[float, floa
     A pair scales the two axes across, in the order x, y, z: of the trunk its width and its depth. Names as in
     `with_segment_lengths`. Joints, landmarks and centres of mass stay. Raises BodyError likewise.
     """
-    return _scaled(model, scales, along=False)
+    return _scale(model, scales, along=False)
 
 
 def with_mass(model: BodyModel, mass_kg: float) -> BodyModel:
-    """Return the body with a total mass [kg], shared out as before; BodyError where a segment's is not known."""
+    """Return the body with a total mass [kg], distributed as before; BodyError where a segment's is not known."""
     if not 0 < mass_kg < np.inf:
         raise BodyError(f"mass_kg is {mass_kg:g}; expected a mass above zero, in kilograms")
     unknown = [segment.name for segment in model.segments if segment.inertia is None]
@@ -64,23 +62,23 @@ def length_axis(model: BodyModel, segment: str) -> int:
     return int(np.argmax(extent)) if extent.any() else 2
 
 
-def _scaled(model: BodyModel, scales: Mapping[str, float | tuple[float, float]], *, along: bool) -> BodyModel:
+def _scale(model: BodyModel, scales: Mapping[str, float | tuple[float, float]], *, along: bool) -> BodyModel:
     factors = _per_segment(model, scales)
-    shape, place = {}, {}
+    shape, position = {}, {}
     for name, scale in factors.items():
         on_axis = np.arange(3) == length_axis(model, name)
         shape[name] = np.ones(3)
         shape[name][on_axis == along] = scale
-        place[name] = shape[name] if along else np.ones(3)
+        position[name] = shape[name] if along else np.ones(3)
     segments = []
     for segment in model.segments:
-        joint = segment.joint_m * place[segment.parent] if segment.parent in place else segment.joint_m
+        joint = segment.joint_m * position[segment.parent] if segment.parent in position else segment.joint_m
         changed = replace(segment, joint_m=joint)
         segments.append(
-            _segment(changed, shape[segment.name], place[segment.name]) if segment.name in shape else changed
+            _segment(changed, shape[segment.name], position[segment.name]) if segment.name in shape else changed
         )
     landmarks = tuple(
-        replace(mark, position_m=mark.position_m * place[mark.segment]) if mark.segment in place else mark
+        replace(mark, position_m=mark.position_m * position[mark.segment]) if mark.segment in position else mark
         for mark in model.landmarks
     )
     return BodyModel(model.name, tuple(segments), landmarks)
@@ -88,7 +86,7 @@ def _scaled(model: BodyModel, scales: Mapping[str, float | tuple[float, float]],
 
 def _per_segment(model: BodyModel, scales: Mapping[str, float | tuple[float, float]]) -> dict[str, Array]:
     """Resolve names without a side; a name with its side goes before one without."""
-    found: dict[str, Array] = {}
+    factors: dict[str, Array] = {}
     names = {segment.name for segment in model.segments}
     for name, scale in sorted(scales.items(), key=lambda item: item[0] in names):
         for factor in np.atleast_1d(scale):
@@ -98,39 +96,39 @@ def _per_segment(model: BodyModel, scales: Mapping[str, float | tuple[float, flo
         sides = [side for side in (f"{name}_left", f"{name}_right") if side in names]
         if name not in names and not sides:
             model.index_of(name)
-        found |= dict.fromkeys([name] if name in names else sides, np.asarray(scale, float))
-    return found
+        factors |= dict.fromkeys([name] if name in names else sides, np.asarray(scale, float))
+    return factors
 
 
-def _segment(segment: Segment, shape: Array, place: Array) -> Segment:
-    parts = tuple(_part(part, shape, place) for part in segment.parts)
+def _segment(segment: Segment, shape: Array, position: Array) -> Segment:
+    parts = tuple(_part(part, shape, position) for part in segment.parts)
     inertia = segment.inertia
     if inertia is not None:
         tensor = inertia.tensor_kg_m2
-        spread = np.trace(tensor) / 2 * np.eye(3) - tensor  # of x x' dm
-        spread = spread * np.outer(shape, shape) * shape.prod()
+        moments = np.trace(tensor) / 2 * np.eye(3) - tensor  # of x x' dm
+        moments = moments * np.outer(shape, shape) * shape.prod()
         inertia = Inertia(
-            inertia.mass_kg * float(shape.prod()), inertia.centre_m * place, np.trace(spread) * np.eye(3) - spread
+            inertia.mass_kg * float(shape.prod()), inertia.centre_m * position, np.trace(moments) * np.eye(3) - moments
         )
     return replace(segment, parts=parts, inertia=inertia)
 
 
-def _part(part: Part, shape: Array, place: Array) -> Part:
+def _part(part: Part, shape: Array, position: Array) -> Part:
     rotation = part.segment_from_part.rotation
-    moved = RigidTransform.from_components(part.segment_from_part.translation * place, rotation)
+    moved = RigidTransform.from_components(part.segment_from_part.translation * position, rotation)
     if isinstance(part.shape, Box | Ellipsoid):
-        turn = np.abs(rotation.as_matrix())
-        if np.abs(turn - turn.round()).max() > _ALIGNED:
+        axes = np.abs(rotation.as_matrix())
+        if np.abs(axes - axes.round()).max() > _ALIGNED:
             raise BodyError(
-                f"part '{part.name}' stands askew in its segment, so that stretching would bend it; give it axes along "
+                f"part '{part.name}' is oblique in its segment, so that stretching would shear it; give it axes along "
                 "the segment's, or make it a mesh"
             )
-        own = turn.round().T @ shape  # along the part's own axes
-        grown: Shape = (
+        own = axes.round().T @ shape  # along the part's own axes
+        scaled: Shape = (
             Box(part.shape.size_m * own) if isinstance(part.shape, Box) else Ellipsoid(part.shape.semi_axes_m * own)
         )
         return replace(
-            part, shape=grown, segment_from_part=moved, slab_m=(part.slab_m[0] * own[2], part.slab_m[1] * own[2])
+            part, shape=scaled, segment_from_part=moved, slab_m=(part.slab_m[0] * own[2], part.slab_m[1] * own[2])
         )
     vertices = rotation.apply(rotation.apply(part.shape.vertices_m) * shape, inverse=True)
     return replace(part, shape=replace(part.shape, vertices_m=vertices), segment_from_part=moved)

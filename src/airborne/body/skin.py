@@ -1,9 +1,9 @@
-"""A person's skin: each segment a closed rational B-spline surface through stadium sections (Yeadon 1990-II).
+"""A smooth skin for a person: each segment a closed rational B-spline surface through stadium sections (Yeadon 1990-II).
 
 Paper B draws its targets with a smooth model of a body scan and tracks them with ellipsoids: the same joints and
-colours, another surface. This is the smooth one. It owes nothing to the ellipsoids: its sections are the measured ones,
-so that limbs taper, calves bulge, hands and feet are flat. What B's subject was beyond his model's measurements, a seed
-adds here.
+colours, another surface. This is the smooth one, independent of the ellipsoids: its sections are the measured
+ones, so that limbs taper, calves bulge, hands and feet are flat. How B's subject differed from his model's measurements
+is drawn from a seed here.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from airborne.body.anthropometry import measurements_of
@@ -28,12 +27,11 @@ from airborne.body.sections import (
     shoulder_profile,
     trunk_profile,
 )
-from airborne.body.splitting import between, split_at
+from airborne.body.splitting import faces_between, split_at
 from airborne.errors import BodyError
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-_STATIONS = {  # the two ends of a segment's loft; neighbours share the change of girth there
+_STATIONS = {  # the two ends of a segment's loft; neighbouring segments share the change of girth there
     "pelvis": ("hip", "waist"),
     "torso": ("waist", "nipples"),
     "chest": ("nipples", "neck"),
@@ -46,7 +44,7 @@ _STATIONS = {  # the two ends of a segment's loft; neighbours share the change o
     "shank": ("ankle", "knee"),
     "foot": ("heel", "toes"),
 }
-_PLACES = sorted({name for ends in _STATIONS.values() for name in ends})
+_LEVELS = sorted({name for ends in _STATIONS.values() for name in ends})
 _SAME_JOINT_M, _SAME_MASS = 5e-4, 5e-3
 _FEWEST_ALONG, _MOST_ALONG = 24, 48
 
@@ -70,22 +68,22 @@ def skin_of(
     """
     person = _person_of(model, measurements)
     rng = np.random.default_rng(seed)
-    girths = dict(zip(_PLACES, 1 + radius_change * rng.uniform(-1, 1, len(_PLACES)), strict=True))
+    girths = dict(zip(_LEVELS, 1 + radius_change * rng.uniform(-1, 1, len(_LEVELS)), strict=True))
     shifts = dict(zip(_STATIONS, border_change_m * rng.uniform(-1, 1, len(_STATIONS)), strict=True))
     segments = []
     for segment in model.segments:
         kind, side = _kind_and_side(segment.name)
-        profile = _profile(model, segment, (person.swapped() if side == "right" else person).values_m)
+        profile = _profile(model, segment, (person.mirror() if side == "right" else person).values_m)
         first, last = _STATIONS[kind]
         mesh = _mesh(stadium_loft(profile.stations(girths[first], girths[last])), profile.axes, n_around)
         if side == "right":
-            mesh = _turned(mesh, np.diag([-1.0, 1, 1]))
-        segments.append(replace(segment, parts=_dressed(segment, mesh, shifts[kind])))
+            mesh = _transform_mesh(mesh, np.diag([-1.0, 1, 1]))
+        segments.append(replace(segment, parts=_cut_skin(segment, mesh, shifts[kind])))
     return replace(model, name=f"{model.name} skin", segments=tuple(segments))
 
 
 def _person_of(model: BodyModel, measurements: Measurements | None) -> Measurements:
-    """Find the measurements whose joints the model has."""
+    """Find the measurements that give the model's joints."""
     names = [segment.name for segment in model.segments]
     masses = [segment.inertia.mass_kg for segment in model.segments if segment.inertia is not None]
     if "shank_left" not in names or len(masses) < len(names):
@@ -94,15 +92,15 @@ def _person_of(model: BodyModel, measurements: Measurements | None) -> Measureme
         thigh = -float(model.segments[names.index("shank_left")].joint_m[2])
         measurements = measurements_of(thigh / STATURE_SHARES["Lj3L"], sum(masses))
     off_m = np.inf
-    for person in (measurements.evened(), measurements):
-        wanted = human18_from_measurements(person, symmetric=False).segments
-        if [segment.name for segment in wanted] != names:
+    for person in (measurements.symmetrise(), measurements):
+        segments = human18_from_measurements(person, symmetric=False).segments
+        if [segment.name for segment in segments] != names:
             raise BodyError(f"body '{model.name}' has other segments than human18; make it with human18(stature, mass)")
         off_m = min(
-            off_m, max(np.abs(a.joint_m - b.joint_m).max() for a, b in zip(model.segments, wanted, strict=True))
+            off_m, max(np.abs(a.joint_m - b.joint_m).max() for a, b in zip(model.segments, segments, strict=True))
         )
-        wanted_masses = [segment.inertia.mass_kg for segment in wanted if segment.inertia is not None]
-        if off_m < _SAME_JOINT_M and np.allclose(masses, wanted_masses, rtol=_SAME_MASS):
+        person_masses = [segment.inertia.mass_kg for segment in segments if segment.inertia is not None]
+        if off_m < _SAME_JOINT_M and np.allclose(masses, person_masses, rtol=_SAME_MASS):
             return person
     raise BodyError(
         f"body '{model.name}' is not the one of measurements '{measurements.name}': joints lie up to "
@@ -116,7 +114,7 @@ def _kind_and_side(name: str) -> tuple[str, str]:
 
 
 def _profile(model: BodyModel, segment: Segment, values: Values) -> Profile:
-    """Give the sections of a segment, of a left one for a right one."""
+    """Return the profile of a segment; of the left one for a right one."""
     kind, side = _kind_and_side(segment.name)
     if kind in ("pelvis", "torso", "chest", "head"):
         return trunk_profile(kind, values)
@@ -141,16 +139,16 @@ def _mesh(surface: RationalSurface, axes: Array, n_around: int) -> Mesh:
     around = np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()
     n_along = int(np.clip(round(n_around * length / around), _FEWEST_ALONG, _MOST_ALONG))
     mesh = surface.mesh(n_around, n_along)
-    return _turned(mesh, axes)
+    return _transform_mesh(mesh, axes)
 
 
-def _turned(mesh: Mesh, to: Array) -> Mesh:
-    """Turn or mirror a mesh: rows of `to` (3, 3) are where its axes go."""
+def _transform_mesh(mesh: Mesh, to: Array) -> Mesh:
+    """Rotate or mirror a mesh: rows of `to` (3, 3) are the images of its axes."""
     faces = mesh.faces if np.linalg.det(to) > 0 else mesh.faces[:, ::-1]
     return Mesh(mesh.vertices_m @ to, faces, None if mesh.normals is None else mesh.normals @ to)
 
 
-def _dressed(segment: Segment, mesh: Mesh, shift_m: float) -> tuple[Part, ...]:
+def _cut_skin(segment: Segment, mesh: Mesh, shift_m: float) -> tuple[Part, ...]:
     """Cut the skin where the segment's colours change, `shift_m` further along the parts' own z."""
     for part in segment.parts:
         for border in part.slab_m:
@@ -159,12 +157,12 @@ def _dressed(segment: Segment, mesh: Mesh, shift_m: float) -> tuple[Part, ...]:
     parts = []
     for part in segment.parts:
         low, high = part.slab_m
-        kept = between(mesh, _heights(part, mesh.vertices_m), low + shift_m, high + shift_m)
-        if len(kept.faces):
-            parts.append(Part(part.name, kept, RigidTransform.identity(), part.colour))
+        piece = faces_between(mesh, _heights(part, mesh.vertices_m), low + shift_m, high + shift_m)
+        if len(piece.faces):
+            parts.append(Part(part.name, piece, RigidTransform.identity(), part.colour))
     return tuple(parts)
 
 
 def _heights(part: Part, vertices: Array) -> Array:
-    """Return how high points of the segment's frame lie along the part's own z: (v,) [m]."""
+    """Return the heights of points of the segment's frame along the part's own z: (v,) [m]."""
     return part.segment_from_part.inv().apply(vertices)[:, 2]

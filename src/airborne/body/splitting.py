@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body.model import Mesh
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _ON_CUT_M = 1e-9
 
@@ -49,12 +48,12 @@ def split_at(mesh: Mesh, heights_m: Array) -> Mesh:
     return Mesh(vertices, np.concatenate([mesh.faces[~is_cut], *pieces]), normals)
 
 
-def between(mesh: Mesh, heights_m: Array, low_m: float, high_m: float) -> Mesh:
+def faces_between(mesh: Mesh, heights_m: Array, low_m: float, high_m: float) -> Mesh:
     """Keep the faces whose middle lies at a height of `low_m` to `high_m`, and the vertices they need."""
     middle = heights_m[mesh.faces].mean(axis=1)
-    kept, renamed = np.unique(mesh.faces[(middle >= low_m) & (middle <= high_m)], return_inverse=True)
-    normals = None if mesh.normals is None else mesh.normals[kept]
-    return replace(mesh, vertices_m=mesh.vertices_m[kept], faces=renamed.reshape(-1, 3), normals=normals)
+    vertices, faces = np.unique(mesh.faces[(middle >= low_m) & (middle <= high_m)], return_inverse=True)
+    normals = None if mesh.normals is None else mesh.normals[vertices]
+    return replace(mesh, vertices_m=mesh.vertices_m[vertices], faces=faces.reshape(-1, 3), normals=normals)
 
 
 def _along(values: Array, edges: NDArray[np.integer], share: Array) -> Array:

@@ -10,18 +10,16 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body.model import Inertia
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _NODES, _WEIGHTS = (values / 2 for values in np.polynomial.legendre.leggauss(4))
 _NODES = _NODES + 0.5
 
 
-class Bulk(NamedTuple):
-    """What a piece of a body is made of."""
+class MassProperties(NamedTuple):
+    """The inertia and the volume of a piece of a body."""
 
     inertia: Inertia
     volume_m3: float
@@ -29,7 +27,7 @@ class Bulk(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Stadium:
-    """A section of a body, wide along x."""
+    """A stadium-shaped section of a body, wide along x."""
 
     flat_m: float  # half the length of the flat sides
     radius_m: float
@@ -48,12 +46,12 @@ def circle(perimeter_m: float) -> Stadium:
     return Stadium(0.0, perimeter_m / (2 * np.pi))
 
 
-def solid(low: Stadium, high: Stadium, height_m: float, density: float, *, is_turned: bool = False) -> Bulk:
-    """Fill the space between two sections; the origin is the centre of the low one, z goes to the high one.
+def solid(low: Stadium, high: Stadium, height_m: float, density: float, *, is_turned: bool = False) -> MassProperties:
+    """Fill the space between two sections; the origin is the centre of the low one, z points to the high one.
 
     density [kg/m^3]; `is_turned`: the sections are wide along y.
     """
-    t, r = _between(low, high)
+    t, r = _at_nodes(low, high)
     area = 4 * t * r + np.pi * r**2
     xx = 4 * r * t**3 / 3 + np.pi * r**2 * t**2 + 8 * r**3 * t / 3 + np.pi * r**4 / 4  # of x^2 over a section
     yy = 4 * r**3 * t / 3 + np.pi * r**4 / 4
@@ -65,33 +63,33 @@ def solid(low: Stadium, high: Stadium, height_m: float, density: float, *, is_tu
     if is_turned:
         spread = spread[[1, 0, 2]]
     tensor = np.diag(spread.sum() - spread)
-    return Bulk(Inertia(density * volume, np.array([0.0, 0.0, centre]), tensor), volume)
+    return MassProperties(Inertia(density * volume, np.array([0.0, 0.0, centre]), tensor), volume)
 
 
-def half_solid(low: Stadium, high: Stadium, height_m: float, density: float, sign: float) -> Bulk:
-    """Cut `solid` in the plane x = 0 and keep the side of sign * x > 0; same frame."""
+def half_solid(low: Stadium, high: Stadium, height_m: float, density: float, *, sign: float) -> MassProperties:
+    """Cut `solid` in the plane x = 0 and keep the half where sign * x > 0; same frame."""
     whole = solid(low, high, height_m, density)
-    t, r = _between(low, high)
+    t, r = _at_nodes(low, high)
     moment = t**2 * r + np.pi * r**2 / 2 * (t + 4 * r / (3 * np.pi))  # of x over half a section
     x_dm = sign * density * height_m * _WEIGHTS * moment
     mass, middle = whole.inertia.mass_kg / 2, whole.inertia.centre_m
     x = x_dm.sum() / mass
     tensor = whole.inertia.tensor_kg_m2 / 2 - mass * x**2 * np.diag([0.0, 1.0, 1.0])
     tensor[0, 2] = tensor[2, 0] = -x_dm @ (height_m * _NODES - middle[2])
-    return Bulk(Inertia(mass, middle + np.array([x, 0.0, 0.0]), tensor), whole.volume_m3 / 2)
+    return MassProperties(Inertia(mass, middle + np.array([x, 0.0, 0.0]), tensor), whole.volume_m3 / 2)
 
 
-def dome(perimeter_m: float, height_m: float, density: float) -> Bulk:
+def dome(perimeter_m: float, height_m: float, density: float) -> MassProperties:
     """Make half an ellipsoid on a round base at z = 0."""
     radius = perimeter_m / (2 * np.pi)
     volume = 2 / 3 * np.pi * radius**2 * height_m
     mass, centre = density * volume, 3 / 8 * height_m
     side = mass * ((radius**2 + height_m**2) / 5 - centre**2)
     tensor = np.diag([side, side, 2 / 5 * mass * radius**2])
-    return Bulk(Inertia(mass, np.array([0.0, 0.0, centre]), tensor), volume)
+    return MassProperties(Inertia(mass, np.array([0.0, 0.0, centre]), tensor), volume)
 
 
-def _between(low: Stadium, high: Stadium) -> tuple[Array, Array]:
+def _at_nodes(low: Stadium, high: Stadium) -> tuple[Array, Array]:
     """Return t and r at the Gauss nodes: (4,), (4,) [m]."""
     return (
         low.flat_m + (high.flat_m - low.flat_m) * _NODES,

@@ -9,8 +9,8 @@ import trimesh
 from numpy.typing import NDArray
 
 from airborne.body.model import BodyModel, Box, Ellipsoid, Mesh, Shape
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 Indices = NDArray[np.int64]
 
 _BOX_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -22,12 +22,12 @@ _BOX_FACES = [  # corners of each side, counter-clockwise from outside
     (0, 2, 6, 4),
     (1, 5, 7, 3),
 ]
-_FLAT_RAD, _SHARP_RAD = 0.01, 0.5  # neighbouring faces turned by less are one side; by more, their edge is seen
+_FLAT_RAD, _SHARP_RAD = 0.01, 0.5  # faces at a smaller angle are one side; at a larger one, their edge is visible
 _NO_AREA = 1e-12  # twice a triangle's area over its longest side squared
 _UNSAMPLED = np.full(3, 128.0)  # stands in for a colour not yet sampled
 
 
-class Geometry(NamedTuple):
+class SurfaceArrays(NamedTuple):
     """Ellipsoids, some cut to a slab, and plane convex polygons, in the frames of their segments.
 
     Polygon p has the corners `corners[start[p]:start[p + 1]]`, counter-clockwise from outside.
@@ -44,31 +44,33 @@ class Geometry(NamedTuple):
     start: Indices  # (p + 1,)
     corners: Array  # (c, 3) [m]
     normals: Array  # (p, 3) outward unit normals
-    is_smooth: NDArray[np.bool_]  # (p,) triangles whose shading goes over from corner to corner
+    is_smooth: NDArray[np.bool_]  # (p,) triangles whose shading is interpolated between corners
     corner_normals: Array  # (c, 3) outward unit normals there, of smooth triangles; zero elsewhere
     colours: Array  # (parts, 3) sRGB 0..255
 
 
-def geometry(model: BodyModel) -> Geometry:
+def surface_arrays(model: BodyModel) -> SurfaceArrays:
     """Flatten a body's parts: boxes become six rectangles, meshes their triangles."""
     ellipsoids: list[tuple] = []
     polygons: list[tuple[int, int, Array, Array | None]] = []  # segment, part, corners and normals (p, k, 3)
     part_index = 0
     for segment_index, segment in enumerate(model.segments):
         for part in segment.parts:
-            place = part.segment_from_part
+            segment_from_part = part.segment_from_part
             ids = (segment_index, part_index)
             if isinstance(part.shape, Ellipsoid):
-                axes = place.rotation.as_matrix()
-                ellipsoids.append((*ids, place.translation, axes, part.shape.semi_axes_m, part.slab_m))
+                axes = segment_from_part.rotation.as_matrix()
+                ellipsoids.append((*ids, segment_from_part.translation, axes, part.shape.semi_axes_m, part.slab_m))
             else:
-                loops, normals = _loops(part.shape)
-                loops = place.apply(loops.reshape(-1, 3)).reshape(loops.shape)
-                polygons.append((*ids, loops, None if normals is None else normals @ place.rotation.as_matrix().T))
+                loops, normals = _polygons(part.shape)
+                loops = segment_from_part.apply(loops.reshape(-1, 3)).reshape(loops.shape)
+                polygons.append(
+                    (*ids, loops, None if normals is None else normals @ segment_from_part.rotation.as_matrix().T)
+                )
             part_index += 1
     counts = [len(p[2]) for p in polygons]
     sizes = np.repeat([p[2].shape[1] for p in polygons], counts).astype(np.int64)
-    return Geometry(
+    return SurfaceArrays(
         ellipsoid_segment=np.array([e[0] for e in ellipsoids], np.int64),
         ellipsoid_part=np.array([e[1] for e in ellipsoids], np.int64),
         ellipsoid_centre=np.array([e[2] for e in ellipsoids], float).reshape(-1, 3),
@@ -89,15 +91,15 @@ def geometry(model: BodyModel) -> Geometry:
 
 
 def has_flat_sides(shape: Shape) -> bool:
-    """Say whether the edges between a shape's sides can be seen: boxes, and meshes without a gently curved part."""
+    """Say whether a shape's edges are visible: boxes, and meshes without a gently curved part."""
     if not isinstance(shape, Mesh):
         return isinstance(shape, Box)
     angles = trimesh.Trimesh(shape.vertices_m, shape.faces).face_adjacency_angles
-    bends = angles[angles > _FLAT_RAD]
-    return bool(len(bends) and np.all(bends > _SHARP_RAD))
+    angles_at_edges = angles[angles > _FLAT_RAD]
+    return bool(len(angles_at_edges) and np.all(angles_at_edges > _SHARP_RAD))
 
 
-def _loops(shape: Box | Mesh) -> tuple[Array, Array | None]:
+def _polygons(shape: Box | Mesh) -> tuple[Array, Array | None]:
     """Return the polygons of a box or a mesh, (p, corners of each, 3) [m], and normals at their corners, if it has any.
 
     Triangles without area are left out.

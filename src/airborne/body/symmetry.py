@@ -1,4 +1,4 @@
-"""Which turns of a rigid body no camera can tell from the body itself."""
+"""Rotational symmetries of a rigid body: rotations that no camera can detect."""
 
 from __future__ import annotations
 
@@ -6,39 +6,37 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body.model import BodyModel, Box, Ellipsoid, Part, Pose
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-_SAME_PLACE_M = 1e-6
-_SAME_SPREAD_M2 = 1e-7
+_SAME_POINT_M = 1e-6
+_SAME_MOMENT_M2 = 1e-7
 _SAME_COLOUR = 1.0  # grey levels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Solid:
-    """A part in the root's frame, free of how its axes are named."""
+    """A part in the root's frame, whatever the order and signs of its axes."""
 
     index: int
     points: Array  # (p, 3) corners, or vertices and face centres, or an ellipsoid's centre and ends of its slab [m]
-    spread: Array  # (3, 3) an ellipsoid's axes as a sum of squares [m^2]; zero for other shapes
+    moment: Array  # (3, 3) an ellipsoid's axes as a sum of squares [m^2]; zero for other shapes
     colour: Array | None
 
-    def turned(self, R: Array) -> _Solid:
-        return _Solid(self.index, self.points @ R.T, R @ self.spread @ R.T, self.colour)
+    def rotate(self, R: Array) -> _Solid:
+        return _Solid(self.index, self.points @ R.T, R @ self.moment @ R.T, self.colour)
 
-    def looks_like(self, other: _Solid) -> bool:
+    def matches(self, other: _Solid) -> bool:
         if len(self.points) != len(other.points) or not self._has_colour_of(other):
             return False
-        if np.any(np.abs(self.spread - other.spread) > _SAME_SPREAD_M2):
+        if np.any(np.abs(self.moment - other.moment) > _SAME_MOMENT_M2):
             return False
-        there, _ = KDTree(other.points).query(self.points)
-        back, _ = KDTree(self.points).query(other.points)
-        return bool(max(there.max(), back.max()) < _SAME_PLACE_M)
+        forward, _ = KDTree(other.points).query(self.points)
+        reverse, _ = KDTree(self.points).query(other.points)
+        return bool(max(forward.max(), reverse.max()) < _SAME_POINT_M)
 
     def _has_colour_of(self, other: _Solid) -> bool:
         if self.colour is None or other.colour is None:
@@ -50,15 +48,15 @@ def symmetries(model: BodyModel) -> list[Array]:
     """Find the rotations (3, 3) about the root's origin under which the body, joints straight, looks the same.
 
     Searched among the 24 rotations of the cube; the identity is always the first. A body seen at `R` and at `R @ S`
-    gives the same images. A part whose colour is still to be sampled is like no other part.
+    gives the same images. A part whose colour has yet to be sampled matches no other part.
     """
     solids = _solids(model)
-    found = [R for R in Rotation.create_group("O").as_matrix().round() + 0.0 if _is_same(R, solids)]
-    return sorted(found, key=lambda R: -float(np.trace(R)))
+    rotations = [R for R in Rotation.create_group("O").as_matrix().round() + 0.0 if _is_same(R, solids)]
+    return sorted(rotations, key=lambda R: -float(np.trace(R)))
 
 
 def continuous_axes(model: BodyModel) -> Array:
-    """Find the axes through the root's origin about which no turn can be seen: unit rows (k, 3), root's frame.
+    """Find the axes through the root's origin about which no rotation is visible: unit rows (k, 3), root's frame.
 
     None for most bodies, one for spheroids and spheres lined up, and all three where every axis is one (a ball).
     """
@@ -67,10 +65,10 @@ def continuous_axes(model: BodyModel) -> Array:
         if not isinstance(part.shape, Ellipsoid):
             return np.zeros((0, 3))
         centre = solid.points[0]
-        if np.linalg.norm(centre) > _SAME_PLACE_M:
+        if np.linalg.norm(centre) > _SAME_POINT_M:
             axes.append(centre / np.linalg.norm(centre))
-        variances, directions = np.linalg.eigh(solid.spread)
-        steps = np.diff(np.sqrt(variances)) > _SAME_PLACE_M
+        variances, directions = np.linalg.eigh(solid.moment)
+        steps = np.diff(np.sqrt(variances)) > _SAME_POINT_M
         if steps.all():
             return np.zeros((0, 3))
         if steps.any():
@@ -80,7 +78,7 @@ def continuous_axes(model: BodyModel) -> Array:
             axes.append(along / np.linalg.norm(along))
     if not axes:
         return np.eye(3)
-    is_one_axis = all(np.linalg.norm(np.cross(axes[0], axis)) < _SAME_PLACE_M for axis in axes)
+    is_one_axis = all(np.linalg.norm(np.cross(axes[0], axis)) < _SAME_POINT_M for axis in axes)
     return axes[0][None] if is_one_axis else np.zeros((0, 3))
 
 
@@ -89,12 +87,12 @@ def _solids(model: BodyModel) -> list[_Solid]:
     solids: list[_Solid] = []
     for segment, R, t in zip(model.segments, posed.R, posed.t, strict=True):
         for part in segment.parts:
-            turn = R @ part.segment_from_part.rotation.as_matrix()
-            place = R @ part.segment_from_part.translation + t
-            spread = np.zeros((3, 3))
+            rotation = R @ part.segment_from_part.rotation.as_matrix()
+            centre = R @ part.segment_from_part.translation + t
+            moment = np.zeros((3, 3))
             if isinstance(part.shape, Ellipsoid):
-                spread = turn @ np.diag(np.square(part.shape.semi_axes_m)) @ turn.T
-            solids.append(_Solid(len(solids), _points(part) @ turn.T + place, spread, part.colour))
+                moment = rotation @ np.diag(np.square(part.shape.semi_axes_m)) @ rotation.T
+            solids.append(_Solid(len(solids), _points(part) @ rotation.T + centre, moment, part.colour))
     return solids
 
 
@@ -111,10 +109,10 @@ def _points(part: Part) -> Array:
 
 
 def _is_same(R: Array, solids: list[_Solid]) -> bool:
-    left = list(solids)
-    for solid in (solid.turned(R) for solid in solids):
-        twin = next((other for other in left if solid.looks_like(other)), None)
+    unmatched = list(solids)
+    for solid in (solid.rotate(R) for solid in solids):
+        twin = next((other for other in unmatched if solid.matches(other)), None)
         if twin is None:
             return False
-        left.remove(twin)
+        unmatched.remove(twin)
     return True

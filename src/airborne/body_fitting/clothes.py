@@ -1,4 +1,4 @@
-"""What a person wears, read off the pictures: where along each segment the colour changes, and the colours."""
+"""What a person wears, read off the images: where along each segment the colour changes, and the colours."""
 
 from __future__ import annotations
 
@@ -13,19 +13,18 @@ from numpy.typing import NDArray
 from airborne.appearance.model import Region
 from airborne.body import BodyModel, Part, PosedBody
 from airborne.body.colours import with_sampled_colours
-from airborne.body.outfits import Border, extent_m, solid_of
+from airborne.body.outfits import Border, ellipsoid_of, extent_m
 from airborne.body.shaping import length_axis
-from airborne.tracking.model_based.render_model import Synthesis
+from airborne.tracking.model_based.render_model import RenderModel
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-N_BINS = 50  # along a segment
-LEAST_SHARE = 0.1  # of a segment's length on either side of a border: less is the neighbour's colour
-LEAST_CONTRAST = 25.0  # sRGB grey levels, root mean square of the channels, between the sides of a border
-LEAST_EXPLAINED = 0.4  # of the colour's variance along the segment
-STRONG_CONTRAST = 0.4  # of the segment's brightness: no shading of one colour differs as much from end to end
+_N_BINS = 50  # along a segment
+_LEAST_SHARE = 0.1  # of a segment's length on either side of a border: less is the neighbour's colour
+_LEAST_CONTRAST = 25.0  # sRGB grey levels, root mean square of the channels, between the sides of a border
+_LEAST_EXPLAINED = 0.4  # of the colour's variance along the segment
+_STRONG_CONTRAST = 0.4  # of the segment's brightness: no shading of one colour differs as much from end to end
 _CORE_PX = 1  # this near to another segment or the scene, a pixel is mixed
-_FEWEST_PX = 60  # of one picture, and on either side of a border: fewer say nothing
+_FEWEST_PX = 60  # of one image, and on either side of a border: fewer say nothing
 _LEAST_PIXELS = 0.1  # of a segment's pixels that lie on either side of a border
 _SIDED = ("_left", "_right")
 
@@ -36,34 +35,34 @@ def stem_of(segment: str) -> str:
 
 
 @dataclass(slots=True)
-class _Sums:
-    """Colours along a segment, one array a picture: pixels (bins,), colour (bins, 3), its square (bins,)."""
+class _ColourProfiles:
+    """Colours along a segment, one array an image: pixels (bins,), colour (bins, 3), its square (bins,)."""
 
-    pictures: list[tuple[Array, Array, Array]] = field(default_factory=list)
+    images: list[tuple[Array, Array, Array]] = field(default_factory=list)
 
     def add(self, share: Array, rgb: Array) -> None:
         is_on = (share >= 0) & (share < 1)
-        at = (share[is_on] * N_BINS).astype(int)
+        at = (share[is_on] * _N_BINS).astype(int)
         rgb = rgb[is_on]
         if len(at) < _FEWEST_PX:
             return
-        n = np.bincount(at, minlength=N_BINS).astype(float)
-        colour = np.stack([np.bincount(at, rgb[:, k], N_BINS) for k in range(3)], axis=1).astype(float)
-        square = np.bincount(at, np.einsum("nk,nk->n", rgb, rgb), N_BINS).astype(float)
+        n = np.bincount(at, minlength=_N_BINS).astype(float)
+        colour = np.stack([np.bincount(at, rgb[:, k], _N_BINS) for k in range(3)], axis=1).astype(float)
+        square = np.bincount(at, np.einsum("nk,nk->n", rgb, rgb), _N_BINS).astype(float)
         self.pictures.append((n, colour, square))
 
     def border(self) -> tuple[float, float] | None:
         """Find the share where the colour steps, and the share of variance that explains; None where it does not.
 
-        Each picture has its own two colours. A step must be strong, or explain more than an even change along the
+        Each image has its own two colours. A step must be strong, or explain more than an even change along the
         segment does, which shading may be.
         """
         if not self.pictures:
             return None
-        cuts = np.arange(round(LEAST_SHARE * N_BINS), N_BINS - round(LEAST_SHARE * N_BINS) + 1)
+        cuts = np.arange(round(_LEAST_SHARE * _N_BINS), _N_BINS - round(_LEAST_SHARE * _N_BINS) + 1)
         whole, ramp, split, contrast, bright = 0.0, 0.0, np.zeros(len(cuts)), np.zeros(len(cuts)), 0.0
         pixels, below = 0.0, np.zeros(len(cuts))
-        u = (np.arange(N_BINS) + 0.5) / N_BINS
+        u = (np.arange(_N_BINS) + 0.5) / _N_BINS
         for n, colour, square in self.pictures:
             total = n.sum()
             mean, away = colour.sum(axis=0) / total, u - (n @ u) / total
@@ -88,18 +87,18 @@ class _Sums:
         if not np.isfinite(split[best]):
             return None
         explained = 1 - split[best] / max(whole, 1e-9)
-        is_step = split[best] < ramp and explained > LEAST_EXPLAINED
-        if not (is_step or contrast[best] > bright * STRONG_CONTRAST**2):
+        is_step = split[best] < ramp and explained > _LEAST_EXPLAINED
+        if not (is_step or contrast[best] > bright * _STRONG_CONTRAST**2):
             return None
-        if contrast[best] < pixels * LEAST_CONTRAST**2:
+        if contrast[best] < pixels * _LEAST_CONTRAST**2:
             return None
-        return float(cuts[best] / N_BINS), float(explained)
+        return float(cuts[best] / _N_BINS), float(explained)
 
 
-Sight = tuple[Synthesis, PosedBody, Region]  # the body in one picture
+PosedView = tuple[RenderModel, PosedBody, Region]  # the body in one image
 
 
-def coloured(model: BodyModel, sights: Sequence[Sight]) -> BodyModel:
+def sample_colours(model: BodyModel, views: Sequence[PosedView]) -> BodyModel:
     """Sample the colours of a body's parts, left and right alike; BodyError for a part that too few pixels show.
 
     The bodies of the sights may differ from the model in their surface.
@@ -108,12 +107,12 @@ def coloured(model: BodyModel, sights: Sequence[Sight]) -> BodyModel:
         model,
         segments=tuple(replace(s, parts=tuple(replace(p, colour=None) for p in s.parts)) for s in model.segments),
     )
-    synthesis = Synthesis.of(uncoloured)
+    synthesis = RenderModel.of(uncoloured)
     seen: dict[str, list[NDArray[np.uint8]]] = defaultdict(list)
     keys = [_key(part) for part in model.parts]
-    for _, posed, region in sights:
-        drawn = synthesis.parts(PosedBody(uncoloured, posed.R, posed.t), region)
-        core = _core(drawn)
+    for _, posed, region in views:
+        drawn = synthesis.draw_parts(PosedBody(uncoloured, posed.R, posed.t), region)
+        core = _interior(drawn)
         for index, key in enumerate(keys):
             seen[key].append(region.rgb[core & (drawn == index)])
     return with_sampled_colours(uncoloured, [np.concatenate(seen[key]) for key in keys])
@@ -124,19 +123,19 @@ def _key(part: Part) -> str:
     return part.name.replace(_SIDED[0], "").replace(_SIDED[1], "")
 
 
-def borders_seen(model: BodyModel, sights: Sequence[Sight]) -> dict[str, Border | None]:
+def find_borders(model: BodyModel, views: Sequence[PosedView]) -> dict[str, Border | None]:
     """Find where the colours of a body's segments change, left and right alike: stem -> Border, or None."""
-    sums: dict[tuple[str, int], _Sums] = defaultdict(_Sums)
-    axes = {s.name: _axes(model, s.name) for s in model.segments if s.parts}
-    for synthesis, posed, region in sights:
-        drawn = synthesis.parts(posed, region)
+    sums: dict[tuple[str, int], _ColourProfiles] = defaultdict(_ColourProfiles)
+    axes = {s.name: _border_axes(model, s.name) for s in model.segments if s.parts}
+    for synthesis, posed, region in views:
+        drawn = synthesis.draw_parts(posed, region)
         segment = np.where(drawn >= 0, synthesis.segment_of_part[drawn], -1)
-        core = _core(segment)
+        core = _interior(segment)
         for index, name in enumerate(s.name for s in model.segments):
             rows, columns = np.nonzero(core & (segment == index))
             if not len(rows) or name not in axes:
                 continue
-            local = _surface(model, index, posed, region, np.stack([columns, rows], axis=1))
+            local = _surface_points(model, index, posed, region, np.stack([columns, rows], axis=1))
             for axis in axes[name]:
                 start, end = extent_m(model, name, axis)
                 sums[stem_of(name), axis].add((local[:, axis] - start) / (end - start), region.rgb[rows, columns] * 1.0)
@@ -149,26 +148,26 @@ def borders_seen(model: BodyModel, sights: Sequence[Sight]) -> dict[str, Border 
     return found
 
 
-def _axes(model: BodyModel, segment: str) -> list[int]:
+def _border_axes(model: BodyModel, segment: str) -> list[int]:
     """Return the axes that a segment's border may cross: its length; of one in which no joint hangs, its depth too."""
     is_end = all(child.parent != segment for child in model.segments)
     along = length_axis(model, segment)
     return sorted({along, 1}) if is_end and not segment.endswith(_SIDED) else [along]
 
 
-def _core(labels: NDArray[np.integer]) -> NDArray[np.bool_]:
+def _interior(labels: NDArray[np.integer]) -> NDArray[np.bool_]:
     """Say which pixels have only pixels of their own label round them."""
     size = np.ones((2 * _CORE_PX + 1,) * 2, np.uint8)
     shifted = (labels + 1).astype(np.uint16)
     return (cv2.erode(shifted, size) == cv2.dilate(shifted, size)) & (labels >= 0)
 
 
-def _surface(model: BodyModel, index: int, posed: PosedBody, region: Region, px: NDArray[np.integer]) -> Array:
+def _surface_points(model: BodyModel, index: int, posed: PosedBody, region: Region, px: NDArray[np.integer]) -> Array:
     """Return where the rays of pixels (n, 2) meet a segment's ellipsoid, in the segment's frame: (n, 3) [m].
 
     The nearest point of the ellipsoid's outline for a ray that just misses it.
     """
-    ellipsoid, centre = solid_of(model, model.segments[index].name)
+    ellipsoid, centre = ellipsoid_of(model, model.segments[index].name)
     camera, R = region.camera, posed.R[index]
     rays = np.concatenate([px, np.ones((len(px), 1))], axis=1) @ np.linalg.inv(camera.K).T
     world_from_camera = camera.camera_from_world.inv()

@@ -1,6 +1,6 @@
-"""How the pictures of a body change with its shape and its poses at once, by differences of synthetic pictures.
+"""How the images of a body change with its shape and its poses at once, by differences of synthetic images.
 
-The same composite as `gauss_newton.fit_pictures`, the lit body over the empty scene, blurred, with the same robust
+The same composite as `gauss_newton.fit_images`, the lit body over the empty scene, blurred, with the same robust
 cost; here its derivatives come from drawing the body twice for each parameter, so that any parameter will do.
 """
 
@@ -13,43 +13,42 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.appearance.lighting import fit_light, light_up
+from airborne.appearance.lighting import fit_light, shade_body
 from airborne.body import PosedBody
 from airborne.rendering.maps import surface_maps
 from airborne.tracking.model_based.normal_equations import BLOCK_PX, RADIUS_PX, blur, gaussian_taps
-from airborne.tracking.model_based.render_model import Laid, Synthesis
+from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-SIGMA_PX = 1.2  # of the blur
-CLIP = 0.1  # linear light, 0..1: a residual this large counts a quarter
-CORRELATED_PX = BLOCK_PX**2  # pixels this near show the same fault of a shape that is only about right
+_SIGMA_PX = 1.2  # of the blur
+_SCALE_LIGHT = 0.1  # linear light, 0..1: a residual this large counts a quarter
+_CORRELATED_PX = BLOCK_PX**2  # pixels this near show the same fault of a shape that is only about right
 _LIGHT_ROUNDS = 3
 _NEAR_PX = 4  # beyond this from the mask, a small step changes nothing
 
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """How far a body's pictures are from those seen, summed over pixels."""
+    """How far a body's images are from those seen, summed over pixels."""
 
     cost: float  # robust squared residual of the whole regions
     weight: float  # of the whole regions
-    total: float  # weighted squared residual where there is body
-    covered: float  # weight where there is body
+    body_cost: float  # weighted squared residual where there is body
+    body_weight: float  # weight where there is body
 
     def __add__(self, other: Misfit) -> Misfit:
         """Add up views."""
         return Misfit(
             self.cost + other.cost,
             self.weight + other.weight,
-            self.total + other.total,
-            self.covered + other.covered,
+            self.body_cost + other.body_cost,
+            self.body_weight + other.body_weight,
         )
 
     @property
     def noise(self) -> float:
         """Mean square of the weighted residual, times how many pixels share it."""
-        return CORRELATED_PX * max(self.total / self.covered, 1e-9) if self.covered else 1.0
+        return _CORRELATED_PX * max(self.body_cost / self.body_weight, 1e-9) if self.body_weight else 1.0
 
     @property
     def rms_light(self) -> float:
@@ -57,20 +56,20 @@ class Misfit:
         return (self.cost / self.weight) ** 0.5 if self.weight else float("nan")
 
 
-NOTHING = Misfit(0.0, 0.0, 0.0, 0.0)
+NO_MISFIT = Misfit(0.0, 0.0, 0.0, 0.0)
 
 
-def misfit(synthesis: Synthesis, posed: PosedBody, view: Laid) -> Misfit:
+def misfit(synthesis: RenderModel, posed: PosedBody, view: ViewBuffers) -> Misfit:
     """Compare a body with a view; the view's light is fitted anew, in place."""
     _fit_light(synthesis, posed, view)
-    return _weighed(view, _residual(view, _shown(synthesis, posed, view)))[0]
+    return _weigh(view, _residual(view, _compose(synthesis, posed, view)))[0]
 
 
-Placed = tuple[Synthesis, PosedBody]
+PosedModel = tuple[RenderModel, PosedBody]
 
 
-def equations(
-    synthesis: Synthesis, posed: PosedBody, view: Laid, steps: Sequence[tuple[Placed, Placed | None, float]]
+def normal_equations(
+    synthesis: RenderModel, posed: PosedBody, view: ViewBuffers, steps: Sequence[tuple[PosedModel, PosedModel | None, float]]
 ) -> tuple[Misfit, Array, Array]:
     """Return a view's misfit and the normal equations H (d, d), g (d,) of d parameters: H step = g.
 
@@ -78,14 +77,14 @@ def equations(
     difference of the parameter between the two.
     """
     _fit_light(synthesis, posed, view)
-    here = _shown(synthesis, posed, view)
+    here = _compose(synthesis, posed, view)
     residual = _residual(view, here)
-    found, weights = _weighed(view, residual)
+    found, weights = _weigh(view, residual)
     near = cv2.dilate((view.maps[0] >= 0).astype(np.uint8), np.ones((2 * _NEAR_PX + 1,) * 2, np.uint8)) > 0
     rows, across = _box(near)
     columns = np.zeros((len(steps), 3, rows.stop - rows.start, across.stop - across.start), np.float32)
     for column, (above, below, step) in zip(columns, steps, strict=True):
-        change = (_shown(*above, view) - (here if below is None else _shown(*below, view)))[:, rows, across]
+        change = (_compose(*above, view) - (here if below is None else _compose(*below, view)))[:, rows, across]
         v, u = _box(np.abs(change).max(axis=0, initial=0) > 0, RADIUS_PX)
         if v.stop > v.start:
             blurred = np.empty_like(change[:, v, u])
@@ -97,33 +96,33 @@ def equations(
     return found, (weighed @ flat.T).astype(float), (weighed @ residual[:, rows, across].ravel()).astype(float)
 
 
-def _fit_light(synthesis: Synthesis, posed: PosedBody, view: Laid) -> None:
+def _fit_light(synthesis: RenderModel, posed: PosedBody, view: ViewBuffers) -> None:
     part, _, normals = view.maps
-    surface_maps(synthesis.shapes, synthesis.geometry, posed.R, posed.t, view.packed, *view.maps)
+    surface_maps(synthesis.shapes, synthesis.geometry, posed.R, posed.t, view.packed_view, *view.maps)
     height, width = part.shape
-    fit_light(view.seen[0], part, normals, synthesis.albedo, view.light, _LIGHT_ROUNDS, 0, 0, width, height)
+    fit_light(view.observation[0], part, normals, synthesis.albedo, view.light, _LIGHT_ROUNDS, 0, 0, width, height)
 
 
-def _shown(synthesis: Synthesis, posed: PosedBody, view: Laid) -> NDArray[np.float32]:
+def _compose(synthesis: RenderModel, posed: PosedBody, view: ViewBuffers) -> NDArray[np.float32]:
     """Draw the body over the scene under the view's light: (3, h, w) linear light."""
     part, _, normals = view.maps
-    surface_maps(synthesis.shapes, synthesis.geometry, posed.R, posed.t, view.packed, *view.maps)
+    surface_maps(synthesis.shapes, synthesis.geometry, posed.R, posed.t, view.packed_view, *view.maps)
     lit = np.zeros((3, *part.shape), np.float32)
-    light_up(part, normals, synthesis.albedo, view.light, 0, 0, lit)
-    return np.where(part >= 0, lit, view.seen[1])
+    shade_body(part, normals, synthesis.albedo, view.light, 0, 0, lit)
+    return np.where(part >= 0, lit, view.observation[1])
 
 
-def _residual(view: Laid, shown: NDArray[np.float32]) -> NDArray[np.float32]:
-    out = np.empty_like(shown)
-    blur(view.seen[0] - shown, *_taps(view), out)
+def _residual(view: ViewBuffers, composite: NDArray[np.float32]) -> NDArray[np.float32]:
+    out = np.empty_like(composite)
+    blur(view.observation[0] - composite, *_taps(view), out)
     return out
 
 
-def _weighed(view: Laid, residual: NDArray[np.float32]) -> tuple[Misfit, NDArray[np.float32]]:
+def _weigh(view: ViewBuffers, residual: NDArray[np.float32]) -> tuple[Misfit, NDArray[np.float32]]:
     """Return the misfit and each pixel's weight (h, w), given that the view's maps hold the body."""
-    certainty, covered = view.seen[2], view.maps[0] >= 0
+    certainty, covered = view.observation[2], view.maps[0] >= 0
     e2 = np.einsum("khw,khw->hw", residual, residual)
-    down = 1 / (1 + e2 / CLIP**2)
+    down = 1 / (1 + e2 / _SCALE_LIGHT**2)
     weights = certainty * down**2
     found = Misfit(
         float(np.sum(certainty * e2 * down)),
@@ -134,10 +133,10 @@ def _weighed(view: Laid, residual: NDArray[np.float32]) -> tuple[Misfit, NDArray
     return found, weights
 
 
-def _taps(view: Laid) -> tuple[Array, Array]:
+def _taps(view: ViewBuffers) -> tuple[Array, Array]:
     """Return the blur's taps along rows and columns; a field's rows are farther apart."""
     aspect = float(view.K[1, 1] / view.K[0, 0])
-    return gaussian_taps(SIGMA_PX), gaussian_taps(max(SIGMA_PX * aspect, 0.5))
+    return gaussian_taps(_SIGMA_PX), gaussian_taps(max(_SIGMA_PX * aspect, 0.5))
 
 
 def _box(chosen: NDArray[np.bool_], room: int = 0) -> tuple[slice, slice]:

@@ -1,4 +1,4 @@
-"""A person's own body from a trial: detections -> a few frames -> `tracking.body_fit` -> a body file and a picture."""
+"""A person's own body from a trial: detections -> a few frames -> `tracking.body_fit` -> a body file and an image."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body import BodyModel, Pose, geometry
+from airborne.body import BodyModel, Pose, surface_arrays
 from airborne.body.files import write_body
 from airborne.body.inverse_kinematics import CORE
-from airborne.body_fitting.fit import BodyFit, Sighting, fit_body
-from airborne.cameras.clicks import read_places
+from airborne.body_fitting.fit import BodyFit, BodyObservation, fit_body
+from airborne.cameras.clicks import read_positions
 from airborne.errors import TrialError
-from airborne.export.views import close_up, seen_by
+from airborne.export.views import crop_camera, resample_view
 from airborne.rendering import FLAT, render
 from airborne.run.body_tracking import open_trial
 from airborne.run.first_pose import WEIGHTS, landmarks_over_time
 from airborne.trial.file import Trial
+from airborne.types import Array
 from airborne.video import Frames, Recording
 
-Array = NDArray[np.floating]
 Progress = Callable[[str, int, int], None]  # what is being done, how far, of how many
 
-N_SCENERY = 10  # further frames that show the scene without the person
-PICTURE = "fit_body.png"
-_CELL_PX, _CELL_SCALE = 400, 0.4  # a cell of the picture, and its pixels in those of `close_up`
+_N_SCENERY = 10  # further frames that show the scene without the person
+_PICTURE_NAME = "fit_body.png"
+_CELL_PX, _CELL_SCALE = 400, 0.4  # a cell of the image, and its pixels in those of `close_up`
 _LINE_RGB, _EMPTY_GREY = (255, 230, 0), 60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fitted:
+class PersonFit:
     """What fitting a trial's person leaves."""
 
     fit: BodyFit
@@ -42,8 +42,8 @@ class Fitted:
     picture: Path
 
 
-def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: Progress | None = None) -> Fitted:
-    """Fit a trial's body to the person that its pictures show; write the body file, and beside it `fit_body.png`.
+def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: Progress | None = None) -> PersonFit:
+    """Fit a trial's body to the person that its images show; write the body file, and beside it `fit_body.png`.
 
     Where the trial's joints are known comes from the detections of its [start], or for one frame from its joints_m.
     Raises an AirborneError for input that cannot be used.
@@ -53,8 +53,8 @@ def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: Progr
     told = progress or (lambda what, done, total: None)
     model = trial.model()
     recording, _ = open_trial(trial)
-    known = _known(trial, recording)
-    chosen, around = _chosen(trial, known, n_frames)
+    known = _landmarks_by_frame(trial, recording)
+    chosen, around = _choose_frames(trial, known, n_frames)
     sightings = _read(recording, known, sorted({*chosen, *around}), told)
     missing = [index for index in chosen if index not in sightings]
     if missing:
@@ -67,16 +67,16 @@ def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: Progr
         mass_kg=trial.body.mass_kg,
         progress=lambda done, total: told("fitting", done, total),
     )
-    picture = output.with_name(PICTURE)
+    picture = output.with_name(_PICTURE_NAME)
     write_body(output, fit.model)
     picture.write_bytes(_contact_sheet(fit, [sightings[index].frames for index in chosen]))
-    return Fitted(fit, tuple(chosen), picture)
+    return PersonFit(fit, tuple(chosen), picture)
 
 
-def described(fitted: Fitted) -> str:
+def describe_fit(person: PersonFit) -> str:
     """Say in a few lines what was found."""
-    fit = fitted.fit
-    lines = [f"fitted to frames {', '.join(map(str, fitted.frames))}", "segment     length  girth (two across)"]
+    fit = person.fit
+    lines = [f"fitted to frames {', '.join(map(str, person.frames))}", "segment     length  girth (two across)"]
     for stem, length in fit.lengths.items():
         wide, deep = fit.girths[stem]
         girth = f"{wide:.2f}" if wide == deep else f"{wide:.2f} {deep:.2f}"
@@ -96,7 +96,7 @@ def described(fitted: Fitted) -> str:
     return "\n".join(lines)
 
 
-def _known(trial: Trial, recording: Recording) -> dict[int, dict[str, Array]]:
+def _landmarks_by_frame(trial: Trial, recording: Recording) -> dict[int, dict[str, Array]]:
     """Return the landmarks known at each frame of the recording: frame -> landmark -> (3,) [m]."""
     if trial.start.detections is not None:
         over_time = landmarks_over_time(trial, recording.rig)
@@ -112,41 +112,41 @@ def _known(trial: Trial, recording: Recording) -> dict[int, dict[str, Array]]:
     if isinstance(trial.start.joints_m, dict):
         return {trial.start.frame: {name: np.array(place) for name, place in trial.start.joints_m.items()}}
     if trial.start.joints_m is not None:
-        return {trial.start.frame: read_places(trial.path(trial.start.joints_m))}
+        return {trial.start.frame: read_positions(trial.path(trial.start.joints_m))}
     raise TrialError(f"{trial.name}: fitting the body needs known joints; give detections or joints_m under [start]")
 
 
-def _chosen(trial: Trial, known: dict[int, dict[str, Array]], n: int) -> tuple[list[int], list[int]]:
+def _choose_frames(trial: Trial, landmarks: dict[int, dict[str, Array]], n: int) -> tuple[list[int], list[int]]:
     """Choose frames spread over the recording, the fullest of each stretch; and more to see the scene by."""
-    usable = [index for index, places in known.items() if set(CORE) <= set(places)]
+    usable = [index for index, places in landmarks.items() if set(CORE) <= set(places)]
     if not usable:
         raise TrialError(f"{trial.name}: no frame has both hips and both shoulders seen by two cameras that agree")
     stretches = [stretch for stretch in np.array_split(np.array(usable), min(n, len(usable))) if len(stretch)]
     chosen = []
     for stretch in stretches:
         middle = stretch[len(stretch) // 2]
-        chosen.append(int(max(stretch, key=lambda index: (len(known[int(index)]), -abs(int(index) - int(middle))))))
+        chosen.append(int(max(stretch, key=lambda index: (len(landmarks[int(index)]), -abs(int(index) - int(middle))))))
     rest = [index for index in usable if index not in chosen]
-    around = [rest[i] for i in np.unique(np.linspace(0, len(rest) - 1, N_SCENERY).round().astype(int))] if rest else []
+    around = [rest[i] for i in np.unique(np.linspace(0, len(rest) - 1, _N_SCENERY).round().astype(int))] if rest else []
     return chosen, around
 
 
 def _read(
-    recording: Recording, known: dict[int, dict[str, Array]], wanted: Sequence[int], told: Progress
-) -> dict[int, Sighting]:
+    recording: Recording, landmarks: dict[int, dict[str, Array]], wanted: Sequence[int], progress: Progress
+) -> dict[int, BodyObservation]:
     found = {}
     with closing(iter(recording)) as stream:
         for frames in stream:
             if frames.index in wanted:
-                found[frames.index] = Sighting(frames, known[frames.index])
-                told("reading", len(found), len(wanted))
+                found[frames.index] = BodyObservation(frames, landmarks[frames.index])
+                progress("reading", len(found), len(wanted))
             if frames.index >= wanted[-1]:
                 break
     return found
 
 
 def _contact_sheet(fit: BodyFit, frames: Sequence[Frames]) -> bytes:
-    """Draw the fitted body over every picture it was fitted to, as a PNG: rows are times, columns cameras."""
+    """Draw the fitted body over every image it was fitted to, as a PNG: rows are times, columns cameras."""
     rows = []
     for seen, pose in zip(frames, fit.poses, strict=True):
         rows.append(np.concatenate([_cell(seen, i, fit.model, pose) for i in range(len(seen.views))], axis=1))
@@ -156,15 +156,15 @@ def _contact_sheet(fit: BodyFit, frames: Sequence[Frames]) -> bytes:
 
 
 def _cell(frames: Frames, camera: int, model: BodyModel, pose: Pose) -> NDArray[np.uint8]:
-    """Show one camera's picture round the body, with lines where one part's colour meets another's or the scene."""
+    """Show one camera's image round the body, with lines where one part's colour meets another's or the scene."""
     view, posed = frames.views[camera], model.with_pose(pose)
-    crop = None if view is None else close_up(view.camera, posed)
+    crop = None if view is None else crop_camera(view.camera, posed)
     if view is None or crop is None:
         return np.full((_CELL_PX, _CELL_PX, 3), _EMPTY_GREY, np.uint8)
     middle = (_CELL_SCALE - 1) / 2
-    larger = crop.resampled(scale=(_CELL_SCALE, _CELL_SCALE), offset=(middle, middle), size=(_CELL_PX, _CELL_PX))
-    picture = seen_by(view, larger)
-    part = render(geometry(model), posed, larger, FLAT).part
+    larger = crop.resample(scale=(_CELL_SCALE, _CELL_SCALE), offset=(middle, middle), size=(_CELL_PX, _CELL_PX))
+    picture = resample_view(view, larger)
+    part = render(surface_arrays(model), posed, larger, FLAT).part
     edge = np.zeros(part.shape, bool)
     edge[1:] |= part[1:] != part[:-1]
     edge[:, 1:] |= part[:, 1:] != part[:, :-1]

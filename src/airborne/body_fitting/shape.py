@@ -7,22 +7,20 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Box, Ellipsoid, Part
 from airborne.body.outfits import Border, extent_m, with_borders
 from airborne.body.shaping import length_axis, with_girths, with_segment_lengths
 from airborne.body_fitting.clothes import stem_of
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-LENGTH_SD, END_LENGTH_SD, GIRTH_SD = 0.03, 0.08, 0.12  # of a factor; END: of a segment in which no joint hangs
-BORDER_SD = 0.05  # of a border's share, about where it is seen to be
+_LENGTH_SD, _END_LENGTH_SD, _GIRTH_SD = 0.03, 0.08, 0.12  # of a factor; END: of a segment in which no joint hangs
+_BORDER_SD = 0.05  # of a border's share, about where it is seen to be
 _INSIDE = 0.02, 0.98  # shares of a segment within which a border stays
 
 
 @dataclass(frozen=True, slots=True)
-class Knob:
+class ShapeParameter:
     """One number of a shape."""
 
     stem: str  # the segment without its side
@@ -33,9 +31,9 @@ class Knob:
     border: Border | None = None  # of a border: where it is at 0
 
 
-def knobs_of(model: BodyModel) -> tuple[Knob, ...]:
+def shape_parameters(model: BodyModel) -> tuple[ShapeParameter, ...]:
     """List what may change: of every segment its length and girth; of one without a side, both girths apart."""
-    found: list[Knob] = []
+    found: list[ShapeParameter] = []
     for segment in model.segments:
         stem = stem_of(segment.name)
         if not segment.parts or stem in {knob.stem for knob in found}:
@@ -44,55 +42,55 @@ def knobs_of(model: BodyModel) -> tuple[Knob, ...]:
         along = length_axis(model, segment.name)
         is_end = all(child.parent != segment.name for child in model.segments)
         across = [axis for axis in range(3) if axis != along]
-        found.append(Knob(stem, "length", 2 * float(half[along]), END_LENGTH_SD if is_end else LENGTH_SD))
+        found.append(ShapeParameter(stem, "length", 2 * float(half[along]), _END_LENGTH_SD if is_end else _LENGTH_SD))
         if stem == segment.name:
-            found += [Knob(stem, "girth", float(half[axis]), GIRTH_SD, axis=i) for i, axis in enumerate(across)]
+            found += [ShapeParameter(stem, "girth", float(half[axis]), _GIRTH_SD, axis=i) for i, axis in enumerate(across)]
         else:
-            found.append(Knob(stem, "girth", float(half[across].mean()), GIRTH_SD))
+            found.append(ShapeParameter(stem, "girth", float(half[across].mean()), _GIRTH_SD))
     return tuple(found)
 
 
-def shaped(base: BodyModel, knobs: Sequence[Knob], shape: Array) -> BodyModel:
+def apply_shape(base: BodyModel, parameters: Sequence[ShapeParameter], shape: Array) -> BodyModel:
     """Return the body of a shape (k,), which is 0 for `base`."""
-    bordered = with_borders(base, borders_of(knobs, shape)) if any(knob.border for knob in knobs) else base
-    return with_girths(with_segment_lengths(bordered, lengths_of(knobs, shape)), girths_of(knobs, shape))
+    bordered = with_borders(base, borders_of(parameters, shape)) if any(knob.border for knob in parameters) else base
+    return with_girths(with_segment_lengths(bordered, lengths_of(parameters, shape)), girths_of(parameters, shape))
 
 
-def border_knobs(model: BodyModel, borders: Mapping[str, Border | None]) -> tuple[Knob, ...]:
+def border_parameters(model: BodyModel, borders: Mapping[str, Border | None]) -> tuple[ShapeParameter, ...]:
     """List the borders that may shift."""
     names = {stem_of(segment.name): segment.name for segment in model.segments}
     return tuple(
-        Knob(
-            stem, "border", abs(float(np.diff(extent_m(model, names[stem], border.axis))[0])), BORDER_SD, border=border
+        ShapeParameter(
+            stem, "border", abs(float(np.diff(extent_m(model, names[stem], border.axis))[0])), _BORDER_SD, border=border
         )
         for stem, border in borders.items()
         if border is not None
     )
 
 
-def borders_of(knobs: Sequence[Knob], shape: Array) -> dict[str, Border]:
+def borders_of(parameters: Sequence[ShapeParameter], shape: Array) -> dict[str, Border]:
     """Return a shape's borders by stem."""
     return {
         knob.stem: replace(knob.border, share=float(np.clip(knob.border.share + value, *_INSIDE)))
-        for knob, value in zip(knobs, shape, strict=True)
+        for knob, value in zip(parameters, shape, strict=True)
         if knob.border is not None
     }
 
 
-def lengths_of(knobs: Sequence[Knob], shape: Array, first: Mapping[str, float] | None = None) -> dict[str, float]:
+def lengths_of(parameters: Sequence[ShapeParameter], shape: Array, first: Mapping[str, float] | None = None) -> dict[str, float]:
     """Return a shape's factors of length by stem, multiplied by those of `first`, by segment, where given."""
     by_stem = {stem_of(name): scale for name, scale in (first or {}).items()}
     return {
         knob.stem: by_stem.get(knob.stem, 1.0) * float(np.exp(value))
-        for knob, value in zip(knobs, shape, strict=True)
+        for knob, value in zip(parameters, shape, strict=True)
         if knob.kind == "length"
     }
 
 
-def girths_of(knobs: Sequence[Knob], shape: Array) -> dict[str, tuple[float, float]]:
+def girths_of(parameters: Sequence[ShapeParameter], shape: Array) -> dict[str, tuple[float, float]]:
     """Return a shape's factors across, by stem."""
     found: dict[str, list[float]] = {}
-    for knob, value in zip(knobs, shape, strict=True):
+    for knob, value in zip(parameters, shape, strict=True):
         if knob.kind == "girth":
             own = found.setdefault(knob.stem, [1.0, 1.0])
             for axis in (0, 1) if knob.axis is None else (knob.axis,):

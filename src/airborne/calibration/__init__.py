@@ -5,21 +5,21 @@ or a `Calibrated` rig that say how far to trust them, and their report. Knows no
 """
 
 from airborne.calibration.from_points import Calibration, CameraFit, calibrate
-from airborne.calibration.from_sources import Calibrated, calibrate_from
-from airborne.calibration.initial.resection import Mending, mend
+from airborne.calibration.from_sources import RigCalibration, calibrate_from
+from airborne.calibration.initial.resection import Resection, resect_cameras
 from airborne.calibration.sources.control_points import ControlPoints, read_control_points
 from airborne.calibration.sources.files import Sources, read_sources, sources_from
 
 __all__ = [
-    "Calibrated",
+    "RigCalibration",
     "Calibration",
     "CameraFit",
     "ControlPoints",
-    "Mending",
+    "Resection",
     "Sources",
     "calibrate",
     "calibrate_from",
-    "mend",
+    "resect_cameras",
     "read_control_points",
     "read_sources",
     "sources_from",

@@ -5,49 +5,46 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from airborne.calibration.bundle import HELD, Adjusted, Source, adjust
+from airborne.calibration.bundle import ALL_FIXED, Adjustment, Source, adjust
 from airborne.errors import CalibrationError
+from airborne.types import Array, Ints
 
-Array = NDArray[np.floating]
-Ints = NDArray[np.integer]
-
-N_FOLDS = 3
-BLOCK = 8  # moments that go together where they say of each other how the board moves
+_N_FOLDS = 3
+_BLOCK_MOMENTS = 8  # moments that go together where they say of each other how the board moves
 
 
-def held_out(adjusted: Adjusted, told: Callable[[int, int], None]) -> dict[str, Array]:
+def cross_validate(adjustment: Adjustment, progress: Callable[[int, int], None]) -> dict[str, Array]:
     """Return by source the distances [px] of observations from cameras fitted without them.
 
     Left out together: a board's moment with all its views, a point with all its views, points tied by a length. Their
     own places are found from them, the cameras stay; a known point is simply projected. NaN where nothing can be told.
     """
-    sources = adjusted.with_noise_known()
-    units = [units_of(source) for source in sources]
+    sources = adjustment.with_estimated_noise()
+    units = [observation_groups(source) for source in sources]
     missed = {source.name: np.full(len(source.px), np.nan) for source in sources}
-    for fold in range(N_FOLDS):
+    for fold in range(_N_FOLDS):
         left = [_fold(s, unit) == fold for s, unit in zip(sources, units, strict=True)]
-        kept = [s.only(~out) for s, out in zip(sources, left, strict=True)]
+        kept = [s.select(~out) for s, out in zip(sources, left, strict=True)]
         try:
-            cameras = adjust(adjusted.rig, kept, adjusted.freedom, prior=adjusted.prior).rig
+            cameras = adjust(adjustment.rig, kept, adjustment.free, prior=adjustment.prior).rig
             for source, out in zip(sources, left, strict=True):
                 if out.any():
-                    found = adjust(cameras, [source.only(out)], HELD)
+                    found = adjust(cameras, [source.select(out)], ALL_FIXED)
                     missed[source.name][out] = np.linalg.norm(found.residual_px[0], axis=1)
         except CalibrationError:
             continue  # too little is left: these distances stay unknown
-        told(fold + 1, N_FOLDS)
+        progress(fold + 1, _N_FOLDS)
     return missed
 
 
 def _fold(source: Source, unit: Ints) -> Ints:
-    return unit // (1 if source.lags is None else BLOCK) % N_FOLDS
+    return unit // (1 if source.lags is None else _BLOCK_MOMENTS) % _N_FOLDS
 
 
-def units_of(source: Source) -> Ints:
+def observation_groups(source: Source) -> Ints:
     """Return to which unit each observation belongs (n,), numbered from 0: what is left out together."""
     p, m = len(source.points), source.n_moments
     nodes = np.where(source.moments >= 0, p + source.moments, source.point)

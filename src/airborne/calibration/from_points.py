@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.diagnosis import check_points, decompose_cameras, warnings_about
-from airborne.calibration.intrinsics.model_selection import Solution, choose, leave_one_out, supported
+from airborne.calibration.intrinsics.model_selection import Solution, choose_simplest, leave_one_out, supported_models
 from airborne.calibration.intrinsics.physical import (
-    MODELS,
+    PINHOLE_MODELS,
     SEVEN_PARAMETERS,
     Pinhole,
     anneal_pinhole,
@@ -23,12 +23,12 @@ from airborne.calibration.intrinsics.physical import (
 )
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras.camera import Camera, Rig
-from airborne.cameras.dlt import Decomposition, coefficients, fit_dlt
+from airborne.cameras.dlt import Decomposition, dlt_coefficients, fit_dlt
 from airborne.errors import CalibrationError
 from airborne.geometry.triangulation import px_from_points, triangulate
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-Method = Literal["lm", "annealing"]
+CalibrationMethod = Literal["lm", "annealing"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,7 +67,7 @@ class Calibration:
     """A rig and how far it can be trusted."""
 
     rig: Rig
-    method: Method
+    method: CalibrationMethod
     fits: tuple[CameraFit, ...]  # in the rig's order
     held_out_points_m: (
         Array  # (n, 3) [m], triangulated minus surveyed, by cameras fitted without the point; NaN: < 2 views
@@ -81,7 +81,7 @@ class Calibration:
 
 
 def calibrate(
-    points: ControlPoints, sizes: Mapping[str, tuple[int, int]], *, method: Method = "lm", seed: int = 0
+    points: ControlPoints, sizes: Mapping[str, tuple[int, int]], *, method: CalibrationMethod = "lm", seed: int = 0
 ) -> Calibration:
     """Find every camera that the control points were clicked in.
 
@@ -97,22 +97,22 @@ def calibrate(
     cameras, fits, solutions = [], [], {}
     for name in points.cameras:
         candidates = _solve(points, name, sizes[name], decompositions[name], method, seed)
-        solutions[name] = choose(candidates)
+        solutions[name] = choose_simplest(candidates)
         cameras.append(_camera(name, sizes[name], solutions[name]))
         fits.append(_describe_fit(points, name, solutions[name], candidates))
     return Calibration(
         rig=Rig(tuple(cameras)),
         method=method,
         fits=tuple(fits),
-        held_out_points_m=_held_out_points(points, solutions),
+        held_out_points_m=_held_out_point_errors(points, solutions),
         warnings=warnings_about(points, sizes, decompositions, solutions),
     )
 
 
 def _solve(
-    points: ControlPoints, name: str, size: tuple[int, int], decomposition: Decomposition, method: Method, seed: int
+    points: ControlPoints, name: str, size: tuple[int, int], decomposition: Decomposition, method: CalibrationMethod, seed: int
 ) -> list[Solution]:
-    seen = points.seen_by(name)
+    seen = points.is_seen_by(name)
     world, px = points.world[seen], points.px[seen, points.cameras.index(name)]
     start = Pinhole(
         decomposition.R,
@@ -124,7 +124,7 @@ def _solve(
         pinhole = anneal_pinhole(start, world, px, seed=seed)
         return [leave_one_out(pinhole, SEVEN_PARAMETERS, world, px)]
     return [
-        leave_one_out(fit_pinhole(start, model, world, px), model, world, px) for model in supported(MODELS, len(world))
+        leave_one_out(fit_pinhole(start, model, world, px), model, world, px) for model in supported_models(PINHOLE_MODELS, len(world))
     ]
 
 
@@ -142,38 +142,38 @@ def _camera(name: str, size: tuple[int, int], solution: Solution) -> Camera:
 
 
 def _describe_fit(points: ControlPoints, name: str, chosen: Solution, candidates: list[Solution]) -> CameraFit:
-    seen = points.seen_by(name)
+    seen = points.is_seen_by(name)
     P_dlt = fit_dlt(chosen.world, chosen.px)
     sd = parameter_sd(chosen.pinhole, chosen.model, chosen.world, chosen.px)
     return CameraFit(
         name=name,
         model=chosen.model.name,
         n_points=int(seen.sum()),
-        residual_px=_at(seen, chosen.residual_px),
-        held_out_px=_at(seen, chosen.held_out_px),
-        m_per_px=_at(seen, chosen.pinhole.depth(chosen.world) / chosen.pinhole.focal_px),
+        residual_px=_spread_over_points(seen, chosen.residual_px),
+        held_out_px=_spread_over_points(seen, chosen.held_out_px),
+        m_per_px=_spread_over_points(seen, chosen.pinhole.depth(chosen.world) / chosen.pinhole.focal_px),
         held_out_rms_px={solution.model.name: _rms(solution.held_out_px) for solution in candidates},
         sd=dict(zip(parameter_names(chosen.model), sd.tolist(), strict=True)),
         dlt_rms_px=_rms(chosen.px - px_from_points(P_dlt[None], chosen.world)[:, 0]),
-        dlt=coefficients(P_dlt),
+        dlt=dlt_coefficients(P_dlt),
     )
 
 
-def _held_out_points(points: ControlPoints, solutions: Mapping[str, Solution]) -> Array:
+def _held_out_point_errors(points: ControlPoints, solutions: Mapping[str, Solution]) -> Array:
     """Triangulate each point with cameras fitted without it: (n, 3) [m] minus the surveyed points."""
     n, c = points.px.shape[:2]
     P, px = np.zeros((n, c, 3, 4)), np.full((n, c, 2), np.nan)
     for i, name in enumerate(points.cameras):
         solution = solutions[name]
         for row, pinhole, seen_px in zip(
-            np.flatnonzero(points.seen_by(name)), solution.held_out, solution.px, strict=True
+            np.flatnonzero(points.is_seen_by(name)), solution.refits, solution.px, strict=True
         ):
             P[row, i] = pinhole.P
-            px[row, i] = pinhole.undistorted_px(seen_px)
+            px[row, i] = pinhole.undistort_px(seen_px)
     return triangulate(P, px) - points.world
 
 
-def _at(seen: NDArray[np.bool_], values: Array) -> Array:
+def _spread_over_points(seen: NDArray[np.bool_], values: Array) -> Array:
     """Spread the values of seen points over all points, NaN elsewhere."""
     full = np.full((len(seen), *values.shape[1:]), np.nan)
     full[seen] = values

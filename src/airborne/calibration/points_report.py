@@ -7,7 +7,7 @@ import math
 from airborne.calibration.from_points import Calibration, CameraFit
 
 
-def describe(calibration: Calibration) -> str:
+def describe_points_calibration(calibration: Calibration) -> str:
     """Return a short plain table: RMS per camera in px and mm, held-out errors, chosen models, warnings.
 
     RMS of 2D distances; mm across the line of sight at each point's depth. "held out": each point measured by a camera
@@ -26,7 +26,7 @@ def describe(calibration: Calibration) -> str:
     return "\n".join(lines)
 
 
-def to_dict(calibration: Calibration) -> dict:
+def points_calibration_to_dict(calibration: Calibration) -> dict:
     """Return the same, and the cameras' numbers, as plain values for JSON; None where a value does not exist."""
     cameras = {}
     for camera, fit in zip(calibration.rig, calibration.fits, strict=True):

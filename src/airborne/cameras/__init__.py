@@ -4,17 +4,17 @@ In come calibration files of any known format, detections and clicks; out go `Ca
 Knows no video, no body and no trial, and finds no camera: that is `calibration`.
 """
 
-from airborne.cameras.camera import Camera, Rig, aimed
+from airborne.cameras.camera import Camera, Rig, camera_looking_at
 from airborne.cameras.detections import Detections, read_detections
 from airborne.cameras.files import read_rig, write_pose2sim, write_rig
-from airborne.cameras.formats.options import PixelCount
+from airborne.cameras.formats.options import PixelConvention
 
 __all__ = [
     "Camera",
     "Detections",
-    "PixelCount",
+    "PixelConvention",
     "Rig",
-    "aimed",
+    "camera_looking_at",
     "read_detections",
     "read_rig",
     "write_pose2sim",

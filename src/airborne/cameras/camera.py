@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras.distortion import distort, distort_fisheye, undistort, undistort_fisheye
 from airborne.errors import CalibrationError
 from airborne.geometry.triangulation import triangulate
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 Lens = Literal["brown", "fisheye"]
 
 
@@ -53,14 +53,14 @@ class Camera:
         points = np.asarray(points, float)
         xyz = points @ self.camera_from_world.rotation.as_matrix().T + self.camera_from_world.translation
         z = np.where(xyz[..., 2:] > 0, xyz[..., 2:], np.nan)
-        return self._bent(xyz[..., :2] / z) @ self.K[:2, :2].T + self.K[:2, 2]
+        return self._distort(xyz[..., :2] / z) @ self.K[:2, :2].T + self.K[:2, 2]
 
-    def distorted_px(self, px: Array) -> Array:
+    def distort_px(self, px: Array) -> Array:
         """Move pixels (..., 2) of the same camera without distortion to where this one sees them: (..., 2) [px]."""
         xy = (np.asarray(px, float) - self.K[:2, 2]) @ np.linalg.inv(self.K[:2, :2]).T
-        return self._bent(xy) @ self.K[:2, :2].T + self.K[:2, 2]
+        return self._distort(xy) @ self.K[:2, :2].T + self.K[:2, 2]
 
-    def undistorted_px(self, px: Array) -> Array:
+    def undistort_px(self, px: Array) -> Array:
         """Move pixels (..., 2) [px] to where the same camera without distortion would see them: (..., 2) [px].
 
         NaN stays NaN, and comes out where the lens model has no inverse.
@@ -72,12 +72,12 @@ class Camera:
         straighten = undistort_fisheye if self.lens == "fisheye" else undistort
         return straighten(xy, self.distortion) @ self.K[:2, :2].T + self.K[:2, 2]
 
-    def _bent(self, xy: Array) -> Array:
+    def _distort(self, xy: Array) -> Array:
         if not self.is_distorted:
             return xy
         return (distort_fisheye if self.lens == "fisheye" else distort)(xy, self.distortion)
 
-    def resampled(
+    def resample(
         self, *, scale: tuple[float, float], offset: tuple[float, float] = (0.0, 0.0), size: tuple[int, int]
     ) -> Camera:
         """Return the camera of an image whose pixel (i, j) is this image's pixel `scale * (i, j) + offset`.
@@ -92,14 +92,14 @@ class Camera:
     def field(self, parity: int) -> Camera:
         """Return the camera of one field: the rows `parity, parity + 2, ...` kept at their own places."""
         width, height = self.size
-        return self.resampled(scale=(1, 2), offset=(0, parity), size=(width, (height - parity + 1) // 2))
+        return self.resample(scale=(1, 2), offset=(0, parity), size=(width, (height - parity + 1) // 2))
 
-    def undistorted(self) -> Camera:
+    def without_distortion(self) -> Camera:
         """Return the same camera without distortion."""
         return replace(self, distortion=np.zeros(5), lens="brown")
 
 
-def aimed(
+def camera_looking_at(
     name: str,
     position: ArrayLike,
     target: ArrayLike,
@@ -164,5 +164,5 @@ class Rig:
         Lens distortion is taken out first; NaN where fewer than two cameras see the point (see `triangulate`).
         """
         px = np.asarray(px, float)
-        straight = [camera.undistorted_px(px[..., i, :]) for i, camera in enumerate(self.cameras)]
+        straight = [camera.undistort_px(px[..., i, :]) for i, camera in enumerate(self.cameras)]
         return triangulate(self.P, np.stack(straight, axis=-2), weights)

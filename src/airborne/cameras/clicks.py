@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.errors import CalibrationError
 from airborne.io.text import read_csv
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 
 def read_clicks(path: Path, cameras: Sequence[str]) -> tuple[tuple[str, ...], Array]:
@@ -42,7 +40,7 @@ def read_clicks(path: Path, cameras: Sequence[str]) -> tuple[tuple[str, ...], Ar
     return names, px
 
 
-def read_places(path: Path) -> dict[str, Array]:
+def read_positions(path: Path) -> dict[str, Array]:
     """Read a table `joint,x_m,y_m,z_m`: joint -> (3,) world [m], NaN where blank; raises CalibrationError."""
     expected = "expected joint,x_m,y_m,z_m"
     names, columns, values = read_named_numbers(path, "joint", expected)

@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.cameras.camera import Rig
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-LIMIT_SHARE = 0.01  # of a picture's longer side: a detection further off than this is of something else
+OUTLIER_SHARE = 0.01  # of a picture's longer side: a detection further off than this is of something else
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Agreed:
+class Consensus:
     """Points as most cameras see them."""
 
     points: Array  # (..., 3) world [m]; NaN where fewer than two cameras agree
@@ -23,7 +22,7 @@ class Agreed:
     is_used: NDArray[np.bool_]  # (..., cameras)
 
 
-def agreed_points(rig: Rig, px: Array, weights: Array) -> Agreed:
+def triangulate_consensus(rig: Rig, px: Array, weights: Array) -> Consensus:
     """Triangulate pixels (..., cameras, 2) [px], NaN where not seen, without the detections that do not fit.
 
     weights (..., cameras) as in `triangulate`. While a point's detections lie further from its projection than
@@ -31,29 +30,29 @@ def agreed_points(rig: Rig, px: Array, weights: Array) -> Agreed:
     """
     shape = np.shape(px)[:-2]
     px, weights = np.reshape(px, (-1, len(rig), 2)).astype(float), np.reshape(weights, (-1, len(rig)))
-    limit_px = LIMIT_SHARE * np.array([max(camera.size) for camera in rig])
+    limit_px = OUTLIER_SHARE * np.array([max(camera.size) for camera in rig])
     used = np.isfinite(px).all(axis=-1) & (weights > 0)
     weights = np.where(used, weights, 1.0)
-    points, distance = triangulated_with(rig, px, weights, used)
+    points, distance = triangulate_views(rig, px, weights, used)
     for _ in range(len(rig) - 2):
         is_bad = ~np.all(~used | (distance <= limit_px), axis=1) & (used.sum(axis=1) > 2)
         if not is_bad.any():
             break
         rows = np.flatnonzero(is_bad)
         fewer = used[rows][:, None, :] & ~np.eye(len(rig), dtype=bool)  # (rows, the camera left out, cameras)
-        _, left = triangulated_with(rig, px[rows][:, None], weights[rows][:, None], fewer)
+        _, left = triangulate_views(rig, px[rows][:, None], weights[rows][:, None], fewer)
         misfit = np.where(fewer, np.nan_to_num(left, nan=np.inf), 0.0).max(axis=-1)
         misfit = np.where(used[rows], misfit, np.inf)
         used[rows, np.argmin(misfit, axis=1)] = False
-        points[rows], distance[rows] = triangulated_with(rig, px[rows], weights[rows], used[rows])
+        points[rows], distance[rows] = triangulate_views(rig, px[rows], weights[rows], used[rows])
     is_agreed = np.all(~used | (distance <= limit_px), axis=1) & (used.sum(axis=1) >= 2)
     points = np.where(is_agreed[:, None], points, np.nan)
     distance = np.where(is_agreed[:, None], distance, np.nan)
     used &= is_agreed[:, None]
-    return Agreed(points.reshape(*shape, 3), distance.reshape(*shape, len(rig)), used.reshape(*shape, len(rig)))
+    return Consensus(points.reshape(*shape, 3), distance.reshape(*shape, len(rig)), used.reshape(*shape, len(rig)))
 
 
-def triangulated_with(rig: Rig, px: Array, weights: Array, used: NDArray[np.bool_]) -> tuple[Array, Array]:
+def triangulate_views(rig: Rig, px: Array, weights: Array, used: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Return the points (..., 3) of the used views and every view's distance from them (..., cameras) [px]."""
     points = rig.points_from_px(np.where(used[..., None], px, np.nan), weights)
     projected = np.stack([camera.px_from_world(points) for camera in rig], axis=-2)

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from airborne.cameras.formats.openpose import camera_folders, number_at_end, read_folder, write_folders
 from airborne.errors import CalibrationError
 from airborne.io.npz import read_arrays, write_arrays
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,7 +31,7 @@ class Detections:
     notes: tuple[str, ...] = ()  # what the reader should know, one line each
 
     @classmethod
-    def of_clicks(cls, cameras: Sequence[str], points: Sequence[str], px: Array) -> Detections:
+    def from_clicks(cls, cameras: Sequence[str], points: Sequence[str], px: Array) -> Detections:
         """Return points clicked by hand, px (frames, points, cameras, 2) [px]; seen where both numbers are known."""
         is_seen = np.asarray(np.isfinite(px).all(axis=-1))
         px = np.where(is_seen[..., None], px, np.nan)
@@ -53,7 +52,7 @@ class Detections:
         px = np.where(is_there[:, None, :, None], px, np.nan)
         return replace(self, px=px, visibility=np.where(is_there[:, None], visibility, 0.0))
 
-    def surer_than(self, least: float) -> Detections:
+    def above_visibility(self, least: float) -> Detections:
         """Return the detections without those less sure than `least`."""
         is_sure = self.visibility >= least
         return replace(
@@ -75,7 +74,7 @@ def read_detections(
     if path.is_dir():
         found = camera_folders(path)
         named = {camera: name.removesuffix("_json") for camera, name in (named or {}).items()}
-        chosen = _matched(str(path), cameras, list(found), named)
+        chosen = _match_cameras(str(path), cameras, list(found), named)
         tables, notes = {}, []
         for camera, name in chosen.items():
             tables[camera], n_people = read_folder(found[name], person)
@@ -91,11 +90,11 @@ def read_detections(
         raise CalibrationError(
             f"{path} is not a .npz of numbers; expected one array (frames, points, 3) a camera"
         ) from None
-    chosen = _matched(path.name, cameras, list(arrays), named or {})
+    chosen = _match_cameras(path.name, cameras, list(arrays), named or {})
     return _detections(path.name, {camera: arrays[name] for camera, name in chosen.items()})
 
 
-def cameras_in(path: Path) -> tuple[str, ...]:
+def camera_names(path: Path) -> tuple[str, ...]:
     """Return the names of all cameras in a file or folder of detections. Raises CalibrationError."""
     if path.is_dir():
         return tuple(camera_folders(path))
@@ -126,7 +125,7 @@ def write_detections(path: Path, detections: Detections, *, as_folder: bool = Fa
         write_arrays(path, tables)
 
 
-def _matched(where: str, cameras: Sequence[str], keys: Sequence[str], named: Mapping[str, str]) -> dict[str, str]:
+def _match_cameras(where: str, cameras: Sequence[str], keys: Sequence[str], named: Mapping[str, str]) -> dict[str, str]:
     """Return the key of every camera: as named, of the same name, or the only one that ends in the same number."""
     chosen = {}
     for camera in cameras:
@@ -182,7 +181,7 @@ def landmarks_from_points(names: Sequence[str], points: Array) -> dict[str, Arra
     where a point that it needs is NaN; left out where there is no such point.
     """
     found = {name: points[..., i, :] for i, name in enumerate(names)}
-    for landmark, recipes in MADE_OF.items():
+    for landmark, recipes in LANDMARK_RECIPES.items():
         for recipe in recipes:
             if landmark not in found and set(recipe) <= set(names):
                 between = points[..., [names.index(name) for name in recipe], :]
@@ -190,7 +189,7 @@ def landmarks_from_points(names: Sequence[str], points: Array) -> dict[str, Arra
     return found
 
 
-def _both(*names: str) -> tuple[str, ...]:
+def _both_sides(*names: str) -> tuple[str, ...]:
     return tuple(f"{name}_{side}" for name in names for side in ("left", "right"))
 
 
@@ -198,8 +197,8 @@ def _limb(side: str, *names: str) -> tuple[str, ...]:
     return tuple(f"{name}_{side}" for name in names)
 
 
-_COCO = ("nose", *_both("eye", "ear", "shoulder", "elbow", "wrist", "hip", "knee", "ankle"))
-_HALPE = (*_COCO, "head_top", "mid_shoulder", "mid_hip", *_both("toe", "small_toe", "heel"))
+_COCO = ("nose", *_both_sides("eye", "ear", "shoulder", "elbow", "wrist", "hip", "knee", "ankle"))
+_HALPE = (*_COCO, "head_top", "mid_shoulder", "mid_hip", *_both_sides("toe", "small_toe", "heel"))
 _ARM, _LEG, _TOES = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"), ("toe", "small_toe", "heel")
 _FACE = ("eye_right", "eye_left", "ear_right", "ear_left")
 _RIGHT_FIRST = ("nose", "mid_shoulder", *_limb("right", *_ARM), *_limb("left", *_ARM))
@@ -214,8 +213,8 @@ NETWORKS: dict[int, tuple[str, ...]] = {
     ),
     26: _HALPE,
     33: (
-        *("nose", *_EYES, *_both("ear", "mouth", "shoulder", "elbow", "wrist")),
-        *_both("little_knuckle", "index_knuckle", "thumb", "hip", "knee", "ankle", "heel", "toe"),
+        *("nose", *_EYES, *_both_sides("ear", "mouth", "shoulder", "elbow", "wrist")),
+        *_both_sides("little_knuckle", "index_knuckle", "thumb", "hip", "knee", "ankle", "heel", "toe"),
     ),
     133: (*_COCO, *_limb("left", *_TOES), *_limb("right", *_TOES)),
     136: _HALPE,
@@ -230,7 +229,7 @@ def _recipes(side: str) -> dict[str, tuple[dict[str, float], ...]]:
     }
 
 
-MADE_OF: dict[str, tuple[dict[str, float], ...]] = {
+LANDMARK_RECIPES: dict[str, tuple[dict[str, float], ...]] = {
     "head": ({"ear_left": 0.5, "ear_right": 0.5},),
     **_recipes("left"),
     **_recipes("right"),

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
+from airborne.types import Array
 
-N_STEPS = 20  # Newton steps; four are enough for ordinary lenses
-UNSOLVED = 1e-9  # a point still this far off lies where the lens model has no inverse
+_N_STEPS = 20  # Newton steps; four are enough for ordinary lenses
+_TOLERANCE = 1e-9  # a point still this far off lies where the lens model has no inverse
 
 
 def distort(xy: Array, coefficients: Array) -> Array:
@@ -34,16 +33,16 @@ def undistort(xy: Array, coefficients: Array) -> Array:
     xy = np.asarray(xy, float)
     ideal = xy.copy()
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a diverging point ends as NaN below
-        for _ in range(N_STEPS):
+        for _ in range(_N_STEPS):
             miss = distort(ideal, coefficients) - xy
-            ideal = ideal - np.einsum("...ij,...j->...i", _inverse_slope(ideal, coefficients), miss)
+            ideal = ideal - np.einsum("...ij,...j->...i", _inverse_jacobian(ideal, coefficients), miss)
         miss = np.abs(distort(ideal, coefficients) - xy).max(axis=-1)
-        is_before_fold = np.linalg.det(_inverse_slope(ideal, coefficients)) > 0
-    is_solved = is_before_fold & (miss <= UNSOLVED * (1 + np.abs(xy).max(axis=-1)))
+        is_before_fold = np.linalg.det(_inverse_jacobian(ideal, coefficients)) > 0
+    is_solved = is_before_fold & (miss <= _TOLERANCE * (1 + np.abs(xy).max(axis=-1)))
     return np.where(is_solved[..., None], ideal, np.nan)
 
 
-def _inverse_slope(xy: Array, coefficients: Array) -> Array:
+def _inverse_jacobian(xy: Array, coefficients: Array) -> Array:
     """Return the inverse of the derivative of `distort` at xy (..., 2): (..., 2, 2)."""
     k1, k2, p1, p2, k3 = (*coefficients, 0.0, 0.0, 0.0, 0.0)[:5]
     x, y = xy[..., 0], xy[..., 1]
@@ -78,10 +77,10 @@ def undistort_fisheye(xy: Array, coefficients: Array) -> Array:
     radius = np.hypot(xy[..., 0], xy[..., 1])
     angle = np.minimum(radius, 1.5)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a diverging point ends as NaN below
-        for _ in range(N_STEPS):
-            angle = angle - (_fisheye_radius(angle, coefficients) - radius) / _fisheye_slope(angle, coefficients)
+        for _ in range(_N_STEPS):
+            angle = angle - (_fisheye_radius(angle, coefficients) - radius) / _fisheye_derivative(angle, coefficients)
         miss = np.abs(_fisheye_radius(angle, coefficients) - radius)
-        is_solved = (miss <= UNSOLVED * (1 + radius)) & (_fisheye_slope(angle, coefficients) > 0)
+        is_solved = (miss <= _TOLERANCE * (1 + radius)) & (_fisheye_derivative(angle, coefficients) > 0)
         is_solved &= (angle >= 0) & (angle < np.pi / 2)
         scale = np.where(radius > 0, np.tan(angle) / radius, 1)
     return np.where(is_solved[..., None], xy * scale[..., None], np.nan)
@@ -93,7 +92,7 @@ def _fisheye_radius(angle: Array, coefficients: Array) -> Array:
     return angle * (1 + a2 * (k1 + a2 * (k2 + a2 * (k3 + a2 * k4))))
 
 
-def _fisheye_slope(angle: Array, coefficients: Array) -> Array:
+def _fisheye_derivative(angle: Array, coefficients: Array) -> Array:
     k1, k2, k3, k4 = coefficients[:4]
     a2 = angle * angle
     return 1 + a2 * (3 * k1 + a2 * (5 * k2 + a2 * (7 * k3 + a2 * 9 * k4)))

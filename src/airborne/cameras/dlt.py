@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
+from airborne.types import Array
 
-N_POINTS = 6  # needed for 11 numbers
+FEWEST_DLT_POINTS = 6  # needed for 11 numbers
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +38,7 @@ def fit_dlt(world: Array, px: Array) -> Array:
     Both sides are first moved to their mean and scaled to unit spread, which conditions the equations. The points lie
     in front of the camera: P's sign is chosen so that most depths are positive.
     """
-    assert len(world) == len(px) >= N_POINTS
+    assert len(world) == len(px) >= FEWEST_DLT_POINTS
     world_mean, px_mean = world.mean(axis=0), px.mean(axis=0)
     world_spread, px_spread = np.std(world - world_mean), np.std(px - px_mean)
     points = np.column_stack([(world - world_mean) / world_spread, np.ones(len(world))])
@@ -56,7 +55,7 @@ def fit_dlt(world: Array, px: Array) -> Array:
     return P if np.median(world @ P[2, :3] + P[2, 3]) > 0 else -P
 
 
-def coefficients(P: Array) -> Array:
+def dlt_coefficients(P: Array) -> Array:
     """Return L1..L11 (11,) of P (3, 4): P divided by its last element."""
     return (P / P[2, 3]).ravel()[:11]
 

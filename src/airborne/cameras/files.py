@@ -11,32 +11,32 @@ from typing import Any
 
 from airborne.cameras.camera import Rig
 from airborne.cameras.formats.aniposelib import aniposelib_text
-from airborne.cameras.formats.caliscope import caliscope_loses, caliscope_text, rig_from_caliscope
-from airborne.cameras.formats.dlt import dlt_loses, dlt_text, is_dlt, rig_from_dlt
-from airborne.cameras.formats.opencv import document_of, easymocap_texts, halves_of, opencv_text, rig_from_opencv
-from airborne.cameras.formats.options import Given, PixelCount, Size, Unit
+from airborne.cameras.formats.caliscope import caliscope_losses, caliscope_text, rig_from_caliscope
+from airborne.cameras.formats.dlt import dlt_losses, dlt_text, is_dlt, rig_from_dlt
+from airborne.cameras.formats.opencv import parse_opencv, easymocap_texts, halves_in, opencv_text, rig_from_opencv
+from airborne.cameras.formats.options import FileOptions, PixelConvention, Size, Unit
 from airborne.cameras.formats.pose2sim import pose2sim_text, rig_from_tables
 from airborne.cameras.formats.qualisys import qualisys_text, rig_from_qualisys
-from airborne.cameras.formats.vicon import rig_from_vicon, vicon_loses, vicon_text
-from airborne.cameras.formats.xml import root_of
-from airborne.cameras.units import FARTHEST_M, odd_distances, widest
+from airborne.cameras.formats.vicon import rig_from_vicon, vicon_losses, vicon_text
+from airborne.cameras.formats.xml import parse_xml
+from airborne.cameras.units import FARTHEST_M, check_baselines, longest_baseline_m
 from airborne.errors import CalibrationError
-from airborne.io.text import parsed_toml
+from airborne.io.text import parse_toml
 
-LARGEST_FILE_BYTES = 2_000_000  # a hundred cameras take a tenth of it
+_LARGEST_FILE_BYTES = 2_000_000  # a hundred cameras take a tenth of it
 
-EXPECTED = (
+_EXPECTED = (
     "expected Pose2Sim, aniposelib or Caliscope TOML, Qualisys .qca.txt, Vicon .xcp, OpenCV YAML or DLT coefficients"
 )
-SUFFIXES = {
+_SUFFIXES = {
     **{".toml": "pose2sim", ".qca.txt": "qualisys", ".xcp": "vicon"},
     **{".yml": "opencv", ".yaml": "opencv", ".csv": "dlt"},
 }
-UNITS: dict[str, tuple[Unit, ...]] = {
+FORMAT_UNITS: dict[str, tuple[Unit, ...]] = {
     **{"pose2sim": ("m",), "aniposelib": ("m", "mm"), "caliscope": ("m",), "qualisys": ("mm",)},
     **{"vicon": ("mm",), "opencv": ("m", "mm"), "easymocap": ("m", "mm"), "dlt": ("m", "mm")},
 }  # of lengths as a format is written, the usual one first
-ROOTS = {"calibration": ("qualisys", rig_from_qualisys), "Cameras": ("vicon", rig_from_vicon)}
+_XML_ROOTS = {"calibration": ("qualisys", rig_from_qualisys), "Cameras": ("vicon", rig_from_vicon)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class CalibrationFile:
 
     format: str  # one of UNITS; pose2sim also for aniposelib, which has the same layout
     where: str
-    rig_of: Callable[[Given], Rig]
+    build: Callable[[FileOptions], Rig]
 
 
 def read_rig(
@@ -53,7 +53,7 @@ def read_rig(
     *,
     unit: Unit | None = None,
     size: Size | Mapping[str, Size] | None = None,
-    pixels: PixelCount | None = None,
+    pixels: PixelConvention | None = None,
 ) -> Rig:
     """Read a calibration of any known format, in the file's order of cameras; a folder of OpenCV YAML counts as one.
 
@@ -62,21 +62,21 @@ def read_rig(
     coefficients count pixels from; None takes DLTdv 8's way. Raises CalibrationError for a file that is of no known
     format, and where no unit was given and the cameras lie more than 200 m or all within 5 cm of each other.
     """
-    return rig_of(open_calibration(path), Given(unit=unit, size=size, pixels=pixels or PixelCount()))
+    return build_rig(open_calibration(path), FileOptions(unit=unit, size=size, pixels=pixels or PixelConvention()))
 
 
-def rig_of(file: CalibrationFile, given: Given) -> Rig:
+def build_rig(file: CalibrationFile, options: FileOptions) -> Rig:
     """Return the rig of a calibration file, checked against what was given (see `read_rig`)."""
-    rig = file.rig_of(given)
+    rig = file.build(options)
     for camera in rig:
-        size = given.size.get(camera.name) if isinstance(given.size, Mapping) else given.size
+        size = options.size.get(camera.name) if isinstance(options.size, Mapping) else options.size
         if size not in (None, camera.size):
             said = f"{camera.size[0]}x{camera.size[1]}"
             raise CalibrationError(f"{file.where} says that '{camera.name}' has pictures of {said}; leave --size out")
-    if given.unit is None and odd_distances(rig):
-        asked = "millimetres? Then say --unit mm" if widest(rig) > FARTHEST_M else "metres? Then say --unit m"
+    if options.unit is None and check_baselines(rig):
+        asked = "millimetres? Then say --unit mm" if longest_baseline_m(rig) > FARTHEST_M else "metres? Then say --unit m"
         raise CalibrationError(
-            f"{file.where}: the cameras lie up to {widest(rig):.3g} m from each other; are its lengths in {asked}; "
+            f"{file.where}: the cameras lie up to {longest_baseline_m(rig):.3g} m from each other; are its lengths in {asked}; "
             "`airborne convert` writes such a file anew, in metres"
         )
     return rig
@@ -87,26 +87,26 @@ def open_calibration(path: str | Path) -> CalibrationFile:
     path = Path(path)
     where = str(path)
     if path.is_dir():
-        return _opencv(path, where, _opencv_folder(path))
+        return _opencv_calibration(path, where, _opencv_folder(path))
     text = _read_text(path)
     if not text.strip():
-        raise CalibrationError(f"{where} is empty; {EXPECTED}")
+        raise CalibrationError(f"{where} is empty; {_EXPECTED}")
     if text.lstrip().startswith("<"):
-        root = root_of(text, where)
-        if root.tag not in ROOTS:
-            raise CalibrationError(f"{where} is XML with the root <{root.tag[:60]}>; {EXPECTED}")
-        name, build = ROOTS[root.tag]
+        root = parse_xml(text, where)
+        if root.tag not in _XML_ROOTS:
+            raise CalibrationError(f"{where} is XML with the root <{root.tag[:60]}>; {_EXPECTED}")
+        name, build = _XML_ROOTS[root.tag]
         return CalibrationFile(name, where, partial(build, root, where))
     if text.startswith("%YAML"):
-        return _opencv(path, where, document_of(text, where))
+        return _opencv_calibration(path, where, parse_opencv(text, where))
     if is_dlt(text):
         return CalibrationFile("dlt", where, partial(rig_from_dlt, text, where))
     try:
-        document = parsed_toml(text)
+        document = parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         first = text.strip().splitlines()[0][:40]
         found = f"as TOML, {_short(error)}" if path.suffix.lower() == ".toml" else f"it begins with {first!r}"
-        raise CalibrationError(f"{where} is no calibration ({found}); {EXPECTED}") from None
+        raise CalibrationError(f"{where} is no calibration ({found}); {_EXPECTED}") from None
     if isinstance(document.get("cameras"), dict):
         return CalibrationFile("caliscope", where, partial(rig_from_caliscope, document, where))
     return CalibrationFile("pose2sim", where, partial(rig_from_tables, document, where))
@@ -118,7 +118,7 @@ def write_rig(
     *,
     format: str | None = None,
     unit: Unit | None = None,
-    pixels: PixelCount | None = None,
+    pixels: PixelConvention | None = None,
     errors_px: Mapping[str, float] | None = None,
 ) -> tuple[str, ...]:
     """Write a calibration and return what the format cannot hold, a phrase each; `read_rig` gives the rest back.
@@ -133,7 +133,7 @@ def write_rig(
     for name in rig.names:
         if not name.isprintable() or not name.strip():
             raise CalibrationError(f"camera {name!r} has a name that files cannot hold; rename it")
-    texts, notes = _texts(kind, rig, chosen, pixels or PixelCount(), errors_px)
+    texts, notes = _texts(kind, rig, chosen, pixels or PixelConvention(), errors_px)
     if kind == "easymocap":
         path.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
@@ -152,14 +152,14 @@ def write_pose2sim(path: str | Path, rig: Rig, *, errors_px: Mapping[str, float]
 
 def format_of_name(path: Path) -> str:
     """Return the format that a file's name asks for. Raises CalibrationError."""
-    for suffix, kind in SUFFIXES.items():
+    for suffix, kind in _SUFFIXES.items():
         if path.name.lower().endswith(suffix):
             return kind
-    raise CalibrationError(f"{path}: the name asks for no format; end it in {', '.join(SUFFIXES)}, or give --to")
+    raise CalibrationError(f"{path}: the name asks for no format; end it in {', '.join(_SUFFIXES)}, or give --to")
 
 
 def _texts(
-    kind: str, rig: Rig, unit: Unit, pixels: PixelCount, errors_px: Mapping[str, float] | None
+    kind: str, rig: Rig, unit: Unit, pixels: PixelConvention, errors_px: Mapping[str, float] | None
 ) -> tuple[dict[str, str], tuple[str, ...]]:
     """Return the texts by the name of their file, and what they do not hold."""
     if kind == "easymocap":
@@ -167,40 +167,40 @@ def _texts(
     write = {
         "pose2sim": lambda: (pose2sim_text(rig, errors_px), ()),
         "aniposelib": lambda: (aniposelib_text(rig, unit), ()),
-        "caliscope": lambda: (caliscope_text(rig, errors_px), caliscope_loses(rig)),
+        "caliscope": lambda: (caliscope_text(rig, errors_px), caliscope_losses(rig)),
         "qualisys": lambda: (qualisys_text(rig), ()),
-        "vicon": lambda: (vicon_text(rig), vicon_loses(rig)),
+        "vicon": lambda: (vicon_text(rig), vicon_losses(rig)),
         "opencv": lambda: (opencv_text(rig, unit), ()),
-        "dlt": lambda: (dlt_text(rig, pixels, unit), dlt_loses(rig)),
+        "dlt": lambda: (dlt_text(rig, pixels, unit), dlt_losses(rig)),
     }
     text, notes = write[kind]()
     return {"": text}, notes
 
 
 def _unit(kind: str, unit: Unit | None) -> Unit:
-    if kind not in UNITS:
-        raise CalibrationError(f"no calibration format '{kind}'; choose from {', '.join(UNITS)}")
-    if unit not in (None, *UNITS[kind]):
-        raise CalibrationError(f"{kind} files are always in {UNITS[kind][0]}; leave the unit out")
-    return unit or UNITS[kind][0]
+    if kind not in FORMAT_UNITS:
+        raise CalibrationError(f"no calibration format '{kind}'; choose from {', '.join(FORMAT_UNITS)}")
+    if unit not in (None, *FORMAT_UNITS[kind]):
+        raise CalibrationError(f"{kind} files are always in {FORMAT_UNITS[kind][0]}; leave the unit out")
+    return unit or FORMAT_UNITS[kind][0]
 
 
 def _read_text(path: Path) -> str:
     try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise CalibrationError(f"{path} is larger than any calibration ({path.stat().st_size} bytes); {EXPECTED}")
+        if path.stat().st_size > _LARGEST_FILE_BYTES:
+            raise CalibrationError(f"{path} is larger than any calibration ({path.stat().st_size} bytes); {_EXPECTED}")
         return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a calibration file") from None
     except UnicodeDecodeError:
-        raise CalibrationError(f"{path} is not a text file; {EXPECTED}") from None
+        raise CalibrationError(f"{path} is not a text file; {_EXPECTED}") from None
 
 
-def _opencv(path: Path, where: str, document: dict[str, Any]) -> CalibrationFile:
+def _opencv_calibration(path: Path, where: str, document: dict[str, Any]) -> CalibrationFile:
     """Return an OpenCV calibration; where it has only one half, the other is looked for beside it."""
-    if path.is_file() and len(halves_of(document)) == 1:
+    if path.is_file() and len(halves_in(document)) == 1:
         beside = [_opencv_file(other) for other in _yaml_files(path.parent) if other != path]
-        others = [other for other in beside if len(halves_of(other) | halves_of(document)) == 2]
+        others = [other for other in beside if len(halves_in(other) | halves_in(document)) == 2]
         if len(others) == 1:
             document = others[0] | document
     return CalibrationFile("opencv", where, partial(rig_from_opencv, document, where))
@@ -209,12 +209,12 @@ def _opencv(path: Path, where: str, document: dict[str, Any]) -> CalibrationFile
 def _opencv_folder(folder: Path) -> dict[str, Any]:
     documents = [_opencv_file(path) for path in _yaml_files(folder)]
     if not documents:
-        raise CalibrationError(f"{folder} is a folder without OpenCV YAML (intri.yml, extri.yml); {EXPECTED}")
+        raise CalibrationError(f"{folder} is a folder without OpenCV YAML (intri.yml, extri.yml); {_EXPECTED}")
     return {key: node for document in documents for key, node in document.items()}
 
 
 def _opencv_file(path: Path) -> dict[str, Any]:
-    return document_of(_read_text(path), str(path))
+    return parse_opencv(_read_text(path), str(path))
 
 
 def _yaml_files(folder: Path) -> list[Path]:

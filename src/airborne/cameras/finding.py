@@ -21,6 +21,6 @@ class Finding:
         return f"{self.what}: {self.advice}"
 
 
-def listed(names: Sequence[str]) -> str:
+def join_names(names: Sequence[str]) -> str:
     """Return names as people write them: a, b and c."""
     return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]])) if names else "none"

@@ -6,23 +6,20 @@ from collections.abc import Mapping
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.cameras.camera import Rig
 from airborne.cameras.finding import Finding
 
-Array = NDArray[np.floating]
-
-FARTHEST_M, NEAREST_M = 200.0, 0.05  # where the largest distance between two cameras is in metres
-UNITS = {1000.0: "mm", 100.0: "cm", 10.0: "dm", 1 / 0.0254: "inches", 1 / 0.3048: "feet"}  # in a metre
-LIKE = 0.08  # relative distance of a ratio from a unit's
-DIFFERENT = 0.15  # relative difference of two scales that is told
+FARTHEST_M, _NEAREST_M = 200.0, 0.05  # where the largest distance between two cameras is in metres
+_UNIT_NAMES = {1000.0: "mm", 100.0: "cm", 10.0: "dm", 1 / 0.0254: "inches", 1 / 0.3048: "feet"}  # in a metre
+_UNIT_TOLERANCE = 0.08  # relative distance of a ratio from a unit's
+_SCALE_TOLERANCE = 0.15  # relative difference of two scales that is told
 
 
-def odd_distances(rig: Rig) -> list[Finding]:
+def check_baselines(rig: Rig) -> list[Finding]:
     """Say whether cameras stand implausibly far apart or near to each other."""
-    widest_m = widest(rig)
-    if len(rig) < 2 or NEAREST_M <= widest_m <= FARTHEST_M:
+    widest_m = longest_baseline_m(rig)
+    if len(rig) < 2 or _NEAREST_M <= widest_m <= FARTHEST_M:
         return []
     return [
         Finding(
@@ -33,20 +30,20 @@ def odd_distances(rig: Rig) -> list[Finding]:
     ]
 
 
-def widest(rig: Rig) -> float:
+def longest_baseline_m(rig: Rig) -> float:
     """Return the largest distance between two cameras [m]; 0 for a single one."""
     return max((float(np.linalg.norm(a.centre - b.centre)) for a, b in combinations(rig, 2)), default=0.0)
 
 
-def scales_apart(starts: Mapping[str, Rig]) -> list[Finding]:
+def check_scales(starts: Mapping[str, Rig]) -> list[Finding]:
     """Say which sources see the same cameras at different distances; starts: the rig that each gives by itself."""
     found = []
     for (one, rig), (other, rig_other) in combinations(starts.items(), 2):
-        ratio = _ratio(rig, rig_other)
-        if not np.isfinite(ratio) or abs(ratio - 1) <= DIFFERENT:
+        ratio = _scale_ratio(rig, rig_other)
+        if not np.isfinite(ratio) or abs(ratio - 1) <= _SCALE_TOLERANCE:
             continue
         larger, smaller, ratio = (one, other, ratio) if ratio > 1 else (other, one, 1 / ratio)
-        unit = next((name for value, name in UNITS.items() if abs(ratio / value - 1) < LIKE), None)
+        unit = next((name for value, name in _UNIT_NAMES.items() if abs(ratio / value - 1) < _UNIT_TOLERANCE), None)
         guess = f"the lengths of the {larger} seem to be in {unit}; give metres" if unit else "one length is wrong"
         found.append(
             Finding(
@@ -58,7 +55,7 @@ def scales_apart(starts: Mapping[str, Rig]) -> list[Finding]:
     return found
 
 
-def _ratio(rig: Rig, other: Rig) -> float:
+def _scale_ratio(rig: Rig, other: Rig) -> float:
     """Return the median ratio of distances between the cameras that both hold; NaN for fewer than two."""
     shared = [name for name in rig.names if name in other.names]
     ratios = [

@@ -10,29 +10,33 @@ import typer
 
 from airborne import __version__
 from airborne.cli import reproduce, results, synth, track
-from airborne.cli.calibrate import calibrate
-from airborne.cli.console import STOPPED, refuse, stopped
-from airborne.cli.convert import convert
-from airborne.cli.export import export
-from airborne.cli.smooth import smooth
-from airborne.cli.sync import sync
+from airborne.cli.calibrate import calibrate_command
+from airborne.cli.console import STOPPED, refuse, stop
+from airborne.cli.convert import convert_command
+from airborne.cli.export import export_command
+from airborne.cli.smooth import smooth_command
+from airborne.cli.sync import sync_command
 from airborne.errors import AirborneError
 
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
 _COMMANDS = {
-    "demo": track.demo,
-    "track": track.track,
-    "calibrate": calibrate,
-    "sync": sync,
-    "convert": convert,
-    "fit-body": track.fit_body,
-    "smooth": smooth,
-    "evaluate": results.evaluate,
-    "export": export,
-    "bench": track.bench,
+    "demo": track.demo_command,
+    "track": track.track_command,
+    "calibrate": calibrate_command,
+    "sync": sync_command,
+    "convert": convert_command,
+    "fit-body": track.fit_body_command,
+    "smooth": smooth_command,
+    "evaluate": results.evaluate_command,
+    "export": export_command,
+    "bench": track.bench_command,
 }
-_SYNTH = {"cross": synth.synth_cross, "somersault": synth.synth_somersault, "block": synth.synth_block}
-_REPRODUCE = {"rigid": reproduce.reproduce_rigid, "blockjump": reproduce.reproduce_blockjump}
+_SYNTH = {
+    "cross": synth.synth_cross_command,
+    "somersault": synth.synth_somersault_command,
+    "block": synth.synth_block_command,
+}
+_REPRODUCE = {"rigid": reproduce.reproduce_rigid_command, "blockjump": reproduce.reproduce_blockjump_command}
 
 
 def _group(commands: dict, text: str, **options: Any) -> typer.Typer:
@@ -49,7 +53,7 @@ app = _group(
     pretty_exceptions_enable=False,
 )
 app.add_typer(_group(_SYNTH, "Write a synthetic trial with its truth."), name="synth")
-app.add_typer(_group(_REPRODUCE, "Make a paper's experiment anew: its table beside ours."), name="reproduce")
+app.add_typer(_group(_REPRODUCE, "Repeat a paper's experiment: its table beside ours."), name="reproduce")
 
 
 def main() -> None:
@@ -57,27 +61,27 @@ def main() -> None:
     try:
         code = app(standalone_mode=False)
         if code == STOPPED:  # typer's answer to Ctrl-C
-            stopped()
+            stop()
         sys.exit(code)
     except _UsageError as error:
-        said, context = error.format_message(), getattr(error, "ctx", None)
-        if "Usage:" in said or not said:  # a command without arguments: its help
-            print(said, end="")
+        message, context = error.format_message(), getattr(error, "ctx", None)
+        if "Usage:" in message or not message:  # a command without arguments: its help
+            print(message, end="")
             sys.exit(2)
-        said = said.replace("Value error, ", "").replace("Input should be", "expected a number")
-        refuse(f"{' '.join(said.split()).rstrip('.')}; see {context.command_path if context else 'airborne'} --help")
+        message = message.replace("Value error, ", "").replace("Input should be", "expected a number")
+        refuse(f"{' '.join(message.split()).rstrip('.')}; see {context.command_path if context else 'airborne'} --help")
     except (KeyboardInterrupt, typer.Abort):
-        stopped()
+        stop()
     except AirborneError as error:
         refuse(str(error))
     except OSError as error:
-        refuse(_said_of_path(error))
+        refuse(_describe_path_error(error))
 
 
-def _said_of_path(error: OSError) -> str:
-    """Say what stands in the way at the path that an error is about."""
+def _describe_path_error(error: OSError) -> str:
+    """Describe what is wrong with the path of a file error."""
     path = Path(str(error.filename or "a file"))
-    file = next((place for place in (path, *path.parents) if place.is_file()), path)
+    file = next((each for each in (path, *path.parents) if each.is_file()), path)
     match error:
         case FileExistsError() | NotADirectoryError():
             return f"{file} is a file; give a folder"

@@ -1,4 +1,4 @@
-"""The command that finds cameras."""
+"""The command that calibrates cameras."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from airborne.cli.console import Json, progress, sizes_px
 from airborne.errors import AirborneError
 
 
-def calibrate(
+def calibrate_command(
     files: Annotated[
         list[Path],
         typer.Argument(
@@ -30,21 +30,23 @@ def calibrate(
     ] = "lm",
     board: Annotated[Path | None, typer.Option(help="The board's file: columns, rows, square_m, dictionary.")] = None,
     timestamps: Annotated[
-        Path | None, typer.Option(help="Which frames belong together: sync_index,cam_id,frame_time.")
+        Path | None, typer.Option(help="Which frames are simultaneous: sync_index,cam_id,frame_time.")
     ] = None,
     court: Annotated[
         str | None, typer.Option(help="The file holds clicked points of a court; its net: men, women, or metres.")
     ] = None,
     wand: Annotated[
-        float | None, typer.Option(help="The file holds the tracks of a wand with two markers, so many metres apart.")
+        float | None,
+        typer.Option(help="The file holds the tracks of a wand; the distance of its two markers in metres."),
     ] = None,
     fisheye: Annotated[bool, typer.Option("--fisheye", help="With --board: the lenses are fisheyes.")] = False,
     report: Annotated[
-        Path | None, typer.Option(help="Folder for report.json and a picture a camera; <output>_report by default.")
+        Path | None,
+        typer.Option(help="Folder for report.json and a figure of each camera; <output>_report by default."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Find the cameras from control points, boards, wands, courts, detections, alone or together.
+    """Calibrate cameras from control points, boards, wands, courts or detections, alone or together.
 
     Example: airborne calibrate --board charuco.toml cam_0.mp4 cam_1.mp4 -o calib.toml
     """
@@ -52,33 +54,33 @@ def calibrate(
         if path is not None and not path.exists():
             raise AirborneError(f"{path} does not exist; check the path")
     if board is None and files[0].is_dir():
-        raise AirborneError(f"{files[0]} is a folder; give a table or a file of sources, or --board for its pictures")
+        raise AirborneError(f"{files[0]} is a folder; give a table or a file of sources, or --board for its images")
     if court is not None or wand is not None:
-        sources = _scene(files, court, wand, size)
+        sources = _table_sources(files, court, wand, size)
         _from_sources(sources, output, report or output.with_name(f"{output.stem}_report"), as_json)
         return
     if board is None and len(files) == 1 and files[0].suffix.lower() != ".toml":
         if report is not None:
-            raise AirborneError("--report goes with sources; a table of control points alone is told on the screen")
-        _from_control_points(files[0], size, output, method, as_json)
+            raise AirborneError("--report goes with sources; the result of a table of control points alone is printed")
+        _from_control_points(files[0], size, output, method=method, as_json=as_json)
         return
     if size is not None:
         raise AirborneError("--size goes with a table of control points; a file of sources has size = [width, height]")
     if board is not None:
-        sources = _short_form(files, board, timestamps, fisheye)
+        sources = _board_sources(files, board, timestamps, fisheye)
     elif len(files) == 1:
-        sources = _read(files[0])
+        sources = _read_sources(files[0])
     else:
         raise AirborneError(f"{len(files)} files are given without --board; give one file of sources, or the board's")
     _from_sources(sources, output, report or output.with_name(f"{output.stem}_report"), as_json)
 
 
 def _from_control_points(
-    points: Path, size: str | None, output: Path, method: Literal["lm", "annealing"], as_json: bool
+    points: Path, size: str | None, output: Path, *, method: Literal["lm", "annealing"], as_json: bool
 ) -> None:
     from airborne.calibration import calibrate as calibrate_cameras
     from airborne.calibration import read_control_points
-    from airborne.calibration.points_report import describe, to_dict
+    from airborne.calibration.points_report import describe_points_calibration, points_calibration_to_dict
     from airborne.cameras import write_pose2sim
 
     if size is None:
@@ -86,36 +88,36 @@ def _from_control_points(
     table = read_control_points(points)
     calibration = calibrate_cameras(table, _sizes(size, table.cameras), method=method)
     write_pose2sim(output, calibration.rig, errors_px={fit.name: fit.rms_px for fit in calibration.fits})
-    print(json.dumps(to_dict(calibration)) if as_json else describe(calibration))
+    print(json.dumps(points_calibration_to_dict(calibration)) if as_json else describe_points_calibration(calibration))
     if not as_json:
         print(f"written: {output}")
 
 
-def _read(path: Path) -> Any:
+def _read_sources(path: Path) -> Any:
     from airborne.calibration import read_sources
 
     return read_sources(path)
 
 
-def _short_form(videos: list[Path], board: Path, timestamps: Path | None, fisheye: bool) -> Any:
-    """Return the sources of a board seen by videos, or by folders of pictures; cameras are named like these."""
+def _board_sources(videos: list[Path], board: Path, timestamps: Path | None, fisheye: bool) -> Any:
+    """Return the sources of a board in videos, or in folders of images; cameras are named like these."""
     from airborne.calibration import sources_from
 
-    kinds = [{"pictures" if path.is_dir() else "video": str(path.resolve())} for path in videos]
+    media = [{"pictures" if path.is_dir() else "video": str(path.resolve())} for path in videos]
     lens = "fisheye" if fisheye else "brown"
     table = {"file": str(board.resolve()), **({"timestamps": str(timestamps.resolve())} if timestamps else {})}
-    cameras = [{"name": path.stem, "lens": lens, **kind} for path, kind in zip(videos, kinds, strict=True)]
+    cameras = [{"name": path.stem, "lens": lens, **medium} for path, medium in zip(videos, media, strict=True)]
     return sources_from({"camera": cameras, "board": table}, Path(), "the videos")
 
 
-def _scene(files: list[Path], court: str | None, wand_m: float | None, size: str | None) -> Any:
-    """Return the sources of one table: clicked points of a court, or a wand's tracks (cameras as --size names them)."""
+def _table_sources(files: list[Path], court: str | None, wand_m: float | None, size: str | None) -> Any:
+    """Return the sources of one table: clicked points of a court, or a wand's tracks (cameras named by --size)."""
     from airborne.calibration import sources_from
     from airborne.calibration.sources.control_points import read_control_points
     from airborne.calibration.sources.court import court_points
     from airborne.calibration.sources.wand import LENGTH_RANGE_M
     from airborne.cameras.formats.dltdv import read_xypts
-    from airborne.cameras.formats.options import Given
+    from airborne.cameras.formats.options import FileOptions
 
     if len(files) != 1 or (court is None) == (wand_m is None):
         raise AirborneError("--court and --wand go with one table each; for several sources write a file of sources")
@@ -131,8 +133,11 @@ def _scene(files: list[Path], court: str | None, wand_m: float | None, size: str
         net = court if court in ("men", "women") else _metres(court)
         names, table = read_control_points(path, court_points(net)).cameras, {"court": {"file": str(path), "net": net}}
     else:
-        named = tuple(item.partition("=")[0] for item in size.split(",") if "=" in item)
-        names, table = named or read_xypts(path, Given()).cameras, {"wand": {"file": str(path), "length_m": wand_m}}
+        names_in_size = tuple(item.partition("=")[0] for item in size.split(",") if "=" in item)
+        names, table = (
+            names_in_size or read_xypts(path, FileOptions()).cameras,
+            {"wand": {"file": str(path), "length_m": wand_m}},
+        )
     cameras = [{"name": name, "size": list(own)} for name, own in _sizes(size, names).items()]
     return sources_from({"camera": cameras, **table}, Path(), str(path))
 
@@ -146,25 +151,27 @@ def _metres(text: str) -> float:
 
 def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> None:
     from airborne.calibration import calibrate_from
-    from airborne.calibration.report import describe, to_dict
-    from airborne.calibration.residual_figures import write_pictures
+    from airborne.calibration.report import calibration_to_dict, describe_calibration
+    from airborne.calibration.residual_figures import write_residual_figures
     from airborne.cameras import write_pose2sim
 
     with _Phases() as phases:
-        found = calibrate_from(sources, phases)
-    told = to_dict(found)
+        calibration = calibrate_from(sources, phases)
+    report = calibration_to_dict(calibration)
     write_pose2sim(
-        output, found.rig, errors_px={name: told["cameras"][name]["rms_px"] or 0.0 for name in found.rig.names}
+        output,
+        calibration.rig,
+        errors_px={name: report["cameras"][name]["rms_px"] or 0.0 for name in calibration.rig.names},
     )
-    pictures = write_pictures(folder, found)
-    (folder / "report.json").write_text(json.dumps(told, indent=1), encoding="utf-8")
-    print(json.dumps(told) if as_json else describe(found))
+    pictures = write_residual_figures(folder, calibration)
+    (folder / "report.json").write_text(json.dumps(report, indent=1), encoding="utf-8")
+    print(json.dumps(report) if as_json else describe_calibration(calibration))
     if not as_json:
         print(f"written: {output}\nreport: {folder / 'report.json'} and {len(pictures)} pictures beside it")
 
 
 class _Phases(ExitStack):
-    """A bar of progress for each thing that is done, one after the other."""
+    """A progress bar for each phase, one after the other."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -178,7 +185,7 @@ class _Phases(ExitStack):
 
 
 def _sizes(text: str, names: tuple[str, ...]) -> dict[str, tuple[int, int]]:
-    """Return the size of every camera's pictures."""
+    """Return the image size of every camera."""
     sizes = sizes_px(text)
     sizes = (dict.fromkeys(names, sizes.pop("")) if "" in sizes else {}) | sizes
     missing = [name for name in names if name not in sizes]

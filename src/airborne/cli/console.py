@@ -1,4 +1,4 @@
-"""What all commands share: options, progress, and how an error is told."""
+"""What all commands share: options, progress, and the text of errors."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from airborne.errors import AirborneError
 
 STOPPED = 130  # the exit code
 _SECONDS_A_LINE = 5.0
-_SIDES_PX = range(16, 20_001)  # of a picture
+_SIDES_PX = range(16, 20_001)  # of an image
 
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -26,13 +26,13 @@ Out = Annotated[Path, typer.Option("-o", "--output", help="Folder for the result
 
 
 def refuse(reason: str) -> NoReturn:
-    """Say why in one line and leave with code 2."""
+    """Print the reason in one line and exit with code 2."""
     errors.print(f"airborne: {reason}", style="red", markup=False)
     sys.exit(2)
 
 
-def stopped(left: str = "") -> NoReturn:
-    """Say that the user stopped the command, and what of it is left; leave with code 130."""
+def stop(left: str = "") -> NoReturn:
+    """Print that the user stopped the command, and what is left of it; exit with code 130."""
     errors.print(f"airborne: stopped{'; ' if left else ''}{left}", markup=False)
     sys.exit(STOPPED)
 
@@ -54,9 +54,9 @@ def sizes_px(text: str) -> dict[str, tuple[int, int]]:
 
 @contextmanager
 def progress(what: str) -> Iterator:
-    """Show a bar on stderr while frames go by; where stderr is no terminal, a line every few seconds."""
+    """Show a progress bar on stderr; where stderr is no terminal, a line every few seconds."""
     if not errors.is_terminal:
-        yield _Lines(what)
+        yield _ProgressLines(what)
         return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=errors, transient=True) as bar:
@@ -64,7 +64,7 @@ def progress(what: str) -> Iterator:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-class _Lines:
+class _ProgressLines:
     """Progress as plain lines."""
 
     def __init__(self, what: str) -> None:

@@ -1,4 +1,4 @@
-"""The command that hands a run to other programs."""
+"""The command that exports a run for other programs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import typer
 from airborne.cli.console import Json, progress
 
 
-def export(
+def export_command(
     results: Annotated[Path, typer.Argument(help="Folder of a run, finished or not.")],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for the files; the run's folder `export`.")
@@ -22,11 +22,11 @@ def export(
     osim: Annotated[bool, typer.Option("--osim", help="The body as an OpenSim model.")] = False,
     gltf: Annotated[bool, typer.Option("--gltf", help="The moving body (.glb) for Blender, browsers, ...")] = False,
     bvh: Annotated[bool, typer.Option("--bvh", help="The moving skeleton for animation programs.")] = False,
-    csv: Annotated[bool, typer.Option("--csv", help="A wide table: a row a frame.")] = False,
+    csv: Annotated[bool, typer.Option("--csv", help="A wide table: one row per frame.")] = False,
     parquet: Annotated[bool, typer.Option("--parquet", help="The same with types and units.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Write a run as files for other programs; without a kind, all of them. Files of the same names are replaced.
+    """Write a run as files for other programs, by default in all formats. Files of the same names are replaced.
 
     Example: airborne export results --c3d --trc
     """

@@ -1,4 +1,4 @@
-"""Commands that make a paper's experiment anew."""
+"""Commands that repeat a paper's experiment."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from airborne.cli.console import Json, Out, progress, stopped
+from airborne.cli.console import Json, Out, progress, stop
 
 
-def reproduce_rigid(
+def reproduce_rigid_command(
     output: Out = Path("reproduced-rigid"),
     quick: Annotated[bool, typer.Option("--quick", help="Fewer poses, methods and cases: under a minute.")] = False,
     as_json: Json = False,
@@ -19,38 +19,38 @@ def reproduce_rigid(
 
     Example: airborne reproduce rigid -o rigid
     """
-    from airborne.reproduction.rigid.experiment import describe
+    from airborne.reproduction.rigid.experiment import describe_rigid
     from airborne.reproduction.rigid.experiment import reproduce_rigid as reproduce
 
     try:
         with progress("tracking") as report:
             summary = reproduce(output, quick=quick, progress=report)
     except KeyboardInterrupt:
-        stopped(f"the files finished so far are in {output}")
-    print((output / "summary.json").read_text(encoding="utf-8") if as_json else describe(summary))
+        stop(f"the files finished so far are in {output}")
+    print((output / "summary.json").read_text(encoding="utf-8") if as_json else describe_rigid(summary))
     if not as_json:
         print(f"results: {output}")
 
 
-def reproduce_blockjump(
+def reproduce_blockjump_command(
     output: Out = Path("reproduced-blockjump"),
     quick: Annotated[bool, typer.Option("--quick", help="Two sequences, two seeds: about a minute.")] = False,
     seeds: Annotated[int | None, typer.Option(min=1, help="Seeds of each method; 5 unless --quick.")] = None,
-    processes: Annotated[int | None, typer.Option(min=1, help="Sequences at a time; as many as cores.")] = None,
+    processes: Annotated[int | None, typer.Option(min=1, help="Sequences at a time; by default one per core.")] = None,
     as_json: Json = False,
 ) -> None:
     """Track 22 synthetic block jumps as the block-jump paper does, and better: its Table I, strict errors; 20 minutes.
 
-    A command that was stopped goes on where it was. Example: airborne reproduce blockjump -o blockjump
+    A command that was stopped resumes. Example: airborne reproduce blockjump -o blockjump
     """
-    from airborne.reproduction.block.experiment import describe
+    from airborne.reproduction.block.experiment import describe_blockjump
     from airborne.reproduction.block.experiment import reproduce_blockjump as reproduce
 
     try:
         with progress("tracking") as report:
             summary = reproduce(output, quick=quick, progress=report, n_processes=processes, n_seeds=seeds)
     except KeyboardInterrupt:
-        stopped(f"give the same command again to go on; sequences in {output}")
-    print((output / "summary.json").read_text(encoding="utf-8") if as_json else describe(summary))
+        stop(f"give the same command again to resume; sequences in {output}")
+    print((output / "summary.json").read_text(encoding="utf-8") if as_json else describe_blockjump(summary))
     if not as_json:
         print(f"results: {output}")

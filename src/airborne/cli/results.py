@@ -17,7 +17,7 @@ _AGAINST = {
 }
 
 
-def evaluate(
+def evaluate_command(
     results: Annotated[Path, typer.Argument(help="Folder of a run.")],
     truth: Annotated[
         Path | None,
@@ -32,7 +32,7 @@ def evaluate(
         Path | None, typer.Option(help="Paths of joints: time_s,joint,x_m,y_m,z_m line by line, or a .trc file.")
     ] = None,
     joint_angles: Annotated[
-        Path | None, typer.Option(help="How joints are turned: time_s,<joint>_x_rad,<joint>_y_rad,<joint>_z_rad,...")
+        Path | None, typer.Option(help="Joint angles: time_s,<joint>_x_rad,<joint>_y_rad,<joint>_z_rad,...")
     ] = None,
     repeat: Annotated[
         list[Path] | None, typer.Option(help="Another run of the same trial, for the repeatability; may be repeated.")
@@ -45,17 +45,17 @@ def evaluate(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Compare a run with the truth, with paths of joints, or with points clicked by hand; of players with their truth.
+    """Compare a run with the truth, with paths of joints, or with points clicked by hand; players with their truth.
 
-    Also says how well they agree (bias, limits of agreement, ICC, SEM), and how well several runs or people do.
+    Also reports agreement (bias, limits of agreement, ICC, SEM), and repeatability between runs or people.
 
     Example: airborne evaluate results truth.csv --digitised digitised.csv --repeat results2
     """
-    from airborne.run.evaluate import agree, assess
+    from airborne.run.evaluate import assess, evaluate_agreement
 
     others = repeat or joint_angles
-    found = {} if others and not (truth or digitised or joints) else assess(results, truth, digitised, joints)
-    concord = agree(
+    comparisons = {} if others and not (truth or digitised or joints) else assess(results, truth, digitised, joints)
+    agreement = evaluate_agreement(
         results,
         truth,
         digitised,
@@ -66,9 +66,11 @@ def evaluate(
         out=output,
     )
     if as_json:
-        print(json.dumps({name: comparison.to_dict() for name, comparison in found.items()} | concord.to_dict()))
+        print(
+            json.dumps({name: comparison.to_dict() for name, comparison in comparisons.items()} | agreement.to_dict())
+        )
         return
-    for name, comparison in found.items():
+    for name, comparison in comparisons.items():
         print(_AGAINST[name])
         print(comparison.describe())
-    print(concord.describe())
+    print(agreement.describe())

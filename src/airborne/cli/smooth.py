@@ -15,38 +15,41 @@ if TYPE_CHECKING:
     from airborne.motion.smoothing.smoother import Smoothing
 
 
-def smooth(
+def smooth_command(
     results: Annotated[Path, typer.Argument(help="Folder of a run.")],
     butterworth: Annotated[
         str | None,
-        typer.Option(help="Cut-off in Hz of a zero-lag Butterworth filter, or auto: the residual analysis'."),
+        typer.Option(help="Cut-off in Hz of a zero-lag Butterworth filter, or auto: that of the residual analysis."),
     ] = None,
     spline: Annotated[bool, typer.Option("--spline", help="Smoothing splines by cross-validation.")] = False,
     kalman: Annotated[bool, typer.Option("--kalman", help="Kalman smoother with the run's own covariances.")] = False,
     fill: Annotated[float, typer.Option(help="Fill gaps up to so many seconds.")] = 0.0,
     events: Annotated[
-        str, typer.Option(help="Times in s that no filter may cross, as 0.31,0.92; or auto: those found; or none.")
+        str,
+        typer.Option(help="Times in s that no filter crosses, as 0.31,0.92; or auto: take-offs and landings; or none."),
     ] = "auto",
-    resample: Annotated[float | None, typer.Option(help="Rate in Hz of the filter where frames are not even.")] = None,
+    resample: Annotated[float | None, typer.Option(help="Rate in Hz of the filter where sampling is uneven.")] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for the results; else the run's.")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Smooth a run and find its velocities and accelerations: new tables beside the raw ones.
+    """Smooth a run and compute velocities and accelerations: new tables beside the raw ones.
 
     Example: airborne smooth results --butterworth 6 --fill 0.1
     """
-    from airborne.export.summary import plain
+    from airborne.export.summary import json_ready
     from airborne.run.smooth import smooth_run
 
-    how = _how(butterworth, spline=spline, kalman=kalman, fill_s=fill, resample_hz=resample)
+    settings = _smoothing(butterworth, spline=spline, kalman=kalman, fill_s=fill, resample_hz=resample)
     with progress("smoothing") as report:
-        done = smooth_run(results, how, events_s=_times(events), out=output, progress=report)
-    print(json.dumps(plain(done.to_dict())) if as_json else done.describe())
+        done = smooth_run(results, settings, events_s=_times(events), out=output, progress=report)
+    print(json.dumps(json_ready(done.to_dict())) if as_json else done.describe())
 
 
-def _how(butterworth: str | None, *, spline: bool, kalman: bool, fill_s: float, resample_hz: float | None) -> Smoothing:
+def _smoothing(
+    butterworth: str | None, *, spline: bool, kalman: bool, fill_s: float, resample_hz: float | None
+) -> Smoothing:
     from airborne.motion.smoothing.smoother import Smoothing
 
     if (butterworth is not None) + spline + kalman != 1:

@@ -1,4 +1,4 @@
-"""The command that puts cameras on one clock."""
+"""The command that synchronises cameras."""
 
 from __future__ import annotations
 
@@ -11,21 +11,23 @@ import typer
 from airborne.cli.console import Json, progress
 
 
-def sync(
+def sync_command(
     trial: Annotated[Path, typer.Argument(help="The trial's TOML file; the offsets are written into it.")],
     by: Annotated[
         Literal["auto", "flash", "sound", "motion", "tracking"],
-        typer.Option(help="What tells the time; auto: motion, then tracking of the body."),
+        typer.Option(help="What the offsets come from; auto: motion, then tracking of the body."),
     ] = "auto",
-    within: Annotated[float, typer.Option(min=0.01, max=60, help="Motion: the largest offset looked for, in s.")] = 1.0,
+    within: Annotated[float, typer.Option(min=0.01, max=60, help="Motion: the largest offset searched, in s.")] = 1.0,
     whole_pictures: Annotated[
-        bool, typer.Option("--whole-pictures", help="The cameras are genlocked: round to whole pictures.")
+        bool, typer.Option("--whole-pictures", help="The cameras are genlocked: round to whole frames.")
     ] = False,
-    drift: Annotated[bool, typer.Option("--drift", help="Find each clock's drift too, of long recordings.")] = False,
+    drift: Annotated[
+        bool, typer.Option("--drift", help="Also estimate the drift of each clock, for long recordings.")
+    ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the offsets and write nothing.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Find by how much each camera started late, and write it into the trial file.
+    """Estimate the time offset of each camera, and write it into the trial file.
 
     Example: airborne sync trial.toml --by flash
     """
@@ -33,7 +35,7 @@ def sync(
     from airborne.trial.file import read_trial
 
     with progress("synchronising: pictures read") as report:
-        found = synchronise(
+        offsets = synchronise(
             read_trial(trial),
             by=by,
             within_s=within,
@@ -42,7 +44,7 @@ def sync(
             progress=report,
         )
     if not dry_run:
-        write_offsets(trial, found)
-    print(json.dumps(found.to_dict()) if as_json else found.describe())
+        write_offsets(trial, offsets)
+    print(json.dumps(offsets.to_dict()) if as_json else offsets.describe())
     if not as_json and not dry_run:
         print(f"written: {trial}")

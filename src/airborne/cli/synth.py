@@ -8,10 +8,10 @@ import typer
 
 from airborne.cli.console import Out, progress
 
-Seed = Annotated[int, typer.Option(min=0, help="Seed of everything random.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")]
 
 
-def synth_cross(
+def synth_cross_command(
     output: Out,
     preset: Annotated[Literal["half-twist", "side-somersault"], typer.Option(help="The throw.")] = "half-twist",
     seed: Seed = 0,
@@ -27,14 +27,14 @@ def synth_cross(
     print(f"trial: {output / 'trial.toml'}")
 
 
-def synth_somersault(
+def synth_somersault_command(
     output: Out,
     preset: Annotated[
-        Literal["paper", "moving-arms", "pike"], typer.Option(help="11 poses of one shape, or 50 frames/s that move.")
+        Literal["paper", "moving-arms", "pike"], typer.Option(help="11 poses of one shape, or motion at 50 frames/s.")
     ] = "paper",
     target: Annotated[Literal["skin", "ellipsoids"], typer.Option(help="The surface of the person drawn.")] = "skin",
     style: Annotated[
-        Literal["exact", "gym"], typer.Option(help="Pictures in the tracker's own light, or of cameras in a hall.")
+        Literal["exact", "gym"], typer.Option(help="Images in the tracker's own light, or as of cameras in a hall.")
     ] = "exact",
     seed: Seed = 0,
 ) -> None:
@@ -43,15 +43,15 @@ def synth_somersault(
     Example: airborne synth somersault -o my-somersault --preset moving-arms --style gym
     """
     from airborne.export import write_model
-    from airborne.synthetic import somersault, write_somersault
+    from airborne.synthetic import somersault_scene, write_somersault
 
     with progress("rendering") as report:
         write_somersault(output, preset=preset, target=target, style=style, seed=seed, progress=report)
-    write_model(output / "person.glb", somersault(preset, target=target, style=style, seed=seed).body)
+    write_model(output / "person.glb", somersault_scene(preset, target=target, style=style, seed=seed).body)
     print(f"trial: {output / 'trial.toml'}")
 
 
-def synth_block(
+def synth_block_command(
     output: Out,
     seed: Seed = 0,
     blockers: Annotated[int, typer.Option(min=1, max=3, help="How many players jump to block.")] = 1,
@@ -69,8 +69,8 @@ def synth_block(
 
     from airborne.synthetic import DIFFICULTIES, block_scene, write_block
 
-    given = {"frame_rate": frame_rate, "n_cameras": cameras}
-    hardness = replace(DIFFICULTIES[difficulty], **{key: value for key, value in given.items() if value is not None})
+    options = {"frame_rate": frame_rate, "n_cameras": cameras}
+    hardness = replace(DIFFICULTIES[difficulty], **{key: value for key, value in options.items() if value is not None})
     with progress("rendering") as report:
         write_block(output, block_scene(seed, n_blockers=blockers, difficulty=hardness), progress=report)
     print(f"trial: {output / 'trial.toml'}")

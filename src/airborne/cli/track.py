@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from airborne.cli.console import Json, Out, progress, stopped
-from airborne.cli.results import evaluate
+from airborne.cli.console import Json, Out, progress, stop
+from airborne.cli.results import evaluate_command
 from airborne.errors import AirborneError
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from airborne.run.players_tracking import PlayersRun
 
 
-def demo(
+def demo_command(
     output: Out = Path("airborne-demo"),
     as_json: Json = False,
 ) -> None:
@@ -29,17 +29,17 @@ def demo(
     from airborne.trial.examples import example_trial
 
     trial = example_trial("thrown_cross")
-    _forget_demo(trial, output)
+    _clear_demo(trial, output)
     run = _track(trial, output, resume=False, pictures=True)
     if not as_json:
-        print(_in_short(run.summary))
-    evaluate(output, trial.parent / "truth.csv", trial.parent / "digitised.csv", as_json=as_json)
+        print(_describe(run.summary))
+    evaluate_command(output, trial.parent / "truth.csv", trial.parent / "digitised.csv", as_json=as_json)
     if not as_json:
         print(f"report: {output / 'report.html'}")
 
 
-def _forget_demo(path: Path, output: Path) -> None:
-    """Let the demo be run again in its own folder; a folder with any other run is left alone."""
+def _clear_demo(path: Path, output: Path) -> None:
+    """Let the demo run again in its own folder; a folder with any other run is left alone."""
     from airborne.run.body_tracking import holds_run_of
     from airborne.trial.file import read_trial
 
@@ -47,10 +47,10 @@ def _forget_demo(path: Path, output: Path) -> None:
         (output / "motion.csv").unlink(missing_ok=True)
 
 
-def track(
+def track_command(
     trial: Annotated[Path, typer.Argument(help="The trial's TOML file.")],
     output: Out,
-    resume: Annotated[bool, typer.Option(help="Go on with a run that was stopped.")] = False,
+    resume: Annotated[bool, typer.Option(help="Resume a run that was stopped.")] = False,
     method: Annotated[
         str | None,
         typer.Option(
@@ -67,17 +67,17 @@ def track(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Track a trial; results appear in the output folder as they are found.
+    """Track a trial; results appear in the output folder while it is tracked.
 
     Example: airborne track trial.toml -o results
     """
-    given = {"method": method, "every": every, "overlay": overlay}
-    changes = {key: value for key, value in given.items() if value is not None}
+    options = {"method": method, "every": every, "overlay": overlay}
+    changes = {key: value for key, value in options.items() if value is not None}
     run = _track(trial, output, resume=resume, pictures=pictures, changes=changes, cameras=cameras, live=live)
     if as_json:
         print((output / "summary.json").read_text(encoding="utf-8"), end="")
     else:
-        print(f"{_in_short(run.summary)}\nresults: {output}")
+        print(f"{_describe(run.summary)}\nresults: {output}")
     if run.summary["n_frames"] == run.summary["n_lost"]:
         raise typer.Exit(1)
 
@@ -109,61 +109,61 @@ def _track(
             return track_body(trial, output, resume=resume, pictures=pictures, progress=report)
     except KeyboardInterrupt:
         if live and not output.exists():
-            stopped("not every camera had shown a picture yet, so nothing is written")
-        stopped(f"the frames found so far are in {output}{'' if live else '; --resume goes on'}")
+            stop("not every camera had delivered a frame yet, so nothing is written")
+        stop(f"the frames found so far are in {output}{'' if live else '; --resume goes on'}")
 
 
-def _in_short(summary: dict) -> str:
-    from airborne.export.players_report import players_in_short
+def _describe(summary: dict) -> str:
+    from airborne.export.players_report import players_summary
 
     counts = ", ".join(f"{summary[f'n_{status}']} {status}" for status in ("tracked", "uncertain", "lost"))
     n, rate_hz = summary["n_frames"], summary["rate_hz"]
     lines = [f"{n} frames at {rate_hz:.5g} Hz: {counts}" if n > 1 else f"{n} frame: {counts}"]
     if "players" in summary:
-        lines += players_in_short(summary)
+        lines += players_summary(summary)
         if n == summary["n_lost"]:
-            lines.append("no player was found in any frame: look at the overlay videos, mend [[start.player]]")
+            lines.append("no player was found in any frame: look at the overlay videos, correct [[start.player]]")
     elif summary["n_frames"] == summary["n_lost"]:
-        lines.append("the body was found in no frame: look at the first picture of the overlay videos, mend [start]")
+        lines.append("the body was found in no frame: look at the first frame of the overlay videos, correct [start]")
     else:
         position, rotation = summary["median_position_sd_mm"], summary["median_rotation_sd_deg"]
         lines.append(
-            f"median sd: position {_or_unseen(position, 'mm')}, rotation {_or_unseen(rotation, 'degrees')}; "
+            f"median sd: position {_describe_sd(position, 'mm')}, rotation {_describe_sd(rotation, 'degrees')}; "
             "summary.json says which errors it holds"
         )
     lines += [f"note: {text}" for text in [*summary["warnings"], *summary["events"]]]
     return "\n".join(lines)
 
 
-def _or_unseen(sd: float, unit: str) -> str:
+def _describe_sd(sd: float, unit: str) -> str:
     return f"{sd:.2g} {unit}" if math.isfinite(sd) else "not seen in the pictures"
 
 
-def fit_body(
+def fit_body_command(
     trial: Annotated[Path, typer.Argument(help="The trial's TOML file; its [start] has detections or joints_m.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The body file to write.")],
     frames: Annotated[int, typer.Option(min=1, help="How many frames to fit the body to.")] = 5,
 ) -> None:
-    """Fit the trial's body to the person in its videos: lengths, girths, colours and where these change.
+    """Fit the trial's body to the person in its videos: lengths, girths, colours and their borders.
 
     Example: airborne fit-body trial.toml -o person.toml
     """
-    from airborne.body_fitting.from_trial import described, fit_person
+    from airborne.body_fitting.from_trial import describe_fit, fit_person
     from airborne.trial.file import read_trial
 
     with progress("reading and fitting") as report:
         fitted = fit_person(
             read_trial(trial), output, n_frames=frames, progress=lambda what, done, total: report(done, total)
         )
-    print(f"{described(fitted)}\nbody: {output}\npicture: {fitted.picture}")
+    print(f"{describe_fit(fitted)}\nbody: {output}\npicture: {fitted.picture}")
 
 
-def bench(as_json: Json = False) -> None:
+def bench_command(as_json: Json = False) -> None:
     """Measure the speed of this machine on the bundled example: CPU time per field, and per hypothesis.
 
     Example: airborne bench
     """
     from airborne.run.bench import measure_speed
 
-    found = measure_speed()
-    print(json.dumps(found) if as_json else "\n".join(f"{name}: {value:.3g}" for name, value in found.items()))
+    speeds = measure_speed()
+    print(json.dumps(speeds) if as_json else "\n".join(f"{name}: {value:.3g}" for name, value in speeds.items()))

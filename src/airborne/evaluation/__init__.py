@@ -1,19 +1,19 @@
-"""Evaluation: in come a `Motion` and what is known to be true, out come errors with their units, and agreement.
+"""Evaluation: a `Motion` and a reference come in; errors with their units, and agreement, go out.
 
-Truth is a table of poses, paths of joints, points clicked by hand (paper B), joints and jumps of several players, or
-a known pose that a search has to find again.
-Knows no image and no search.
+A reference is a table of true poses, paths of joints, digitised points (paper B), joints and jumps of several players,
+or a known pose that a search has to recover.
+Independent of images and searches.
 """
 
-from airborne.evaluation.agreement import Agreement, Series, agreement
-from airborne.evaluation.basin import Basin, is_recovered, perturbed
-from airborne.evaluation.compare import Calibration, Comparison, OrientationErrors, PositionErrors, compare
+from airborne.evaluation.agreement import Agreement, Series, analyse_agreement
+from airborne.evaluation.basin import Basin, is_recovered, perturb
+from airborne.evaluation.compare import Comparison, OrientationErrors, PositionErrors, SdCalibration, compare_motion
 from airborne.evaluation.digitised import (
-    Digitised,
     DigitisedComparison,
+    DigitisedPoints,
     DigitisedPoses,
     compare_digitised,
-    digitised_poses,
+    fit_digitised_poses,
     read_clicked_frames,
     read_digitised,
     write_clicked_frames,
@@ -23,15 +23,15 @@ from airborne.evaluation.joint_files import JointPaths, landmark_of, read_joint_
 from airborne.evaluation.joints import JointComparison, JointErrors, compare_joints
 from airborne.evaluation.players import PlayerErrors, PlayersComparison, assess_players, compare_players
 from airborne.evaluation.players_truth import read_players_truth
-from airborne.evaluation.repeatability import Repeatability, repeatability
+from airborne.evaluation.repeatability import Repeatability, analyse_repeatability
 from airborne.evaluation.truth import Truth, read_truth
 
 __all__ = [
     "Agreement",
     "Basin",
-    "Calibration",
+    "SdCalibration",
     "Comparison",
-    "Digitised",
+    "DigitisedPoints",
     "DigitisedComparison",
     "DigitisedPoses",
     "JointComparison",
@@ -45,22 +45,22 @@ __all__ = [
     "Repeatability",
     "Series",
     "Truth",
-    "agreement",
+    "analyse_agreement",
     "assess_players",
-    "compare",
+    "compare_motion",
     "compare_digitised",
     "compare_joints",
     "compare_players",
-    "digitised_poses",
+    "fit_digitised_poses",
     "is_recovered",
     "landmark_of",
-    "perturbed",
+    "perturb",
     "read_clicked_frames",
     "read_digitised",
     "read_joint_paths",
     "read_players_truth",
     "read_truth",
     "reliability",
-    "repeatability",
+    "analyse_repeatability",
     "write_clicked_frames",
 ]

@@ -1,12 +1,13 @@
-"""How well two ways of measuring agree: bias, limits of agreement with repeated measures, errors, reliability.
+"""Agreement of two methods of measurement: bias, limits of agreement with repeated measures, errors, reliability.
 
-Arrays in, numbers with 95 % intervals out. Sources: Bland and Altman 2007, "Agreement between methods of measurement
-with multiple observations per individual", its case of a true value that varies; Zou 2013, "Confidence interval
+Arrays come in; numbers with 95 % intervals go out. Sources: Bland and Altman 2007, "Agreement between methods of
+measurement with multiple observations per individual", for a varying true value; Zou 2013, "Confidence interval
 estimation for the Bland-Altman limits of agreement with multiple observations per individual" (intervals, and unequal
 numbers of observations); McGraw and Wong 1996 (see `icc`).
 
-Frames that follow one another err alike. Intervals therefore count n_effective = n / (1 + 2 sum of autocorrelations of
-the differences) frames, not n (Sokal 1997, "Monte Carlo methods in statistical mechanics"; Geyer's initial sequence).
+Errors of successive frames are correlated. Intervals therefore count n_effective = n / (1 + 2 sum of the
+differences' autocorrelations) frames, not n (Sokal 1997, "Monte Carlo methods in statistical mechanics"; Geyer's
+initial sequence).
 """
 
 from __future__ import annotations
@@ -20,26 +21,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, norm, t
 
-from airborne.evaluation.compare import without_nan
+from airborne.evaluation.compare import nan_to_none
 from airborne.evaluation.icc import Reliability, reliability
-from airborne.motion.jumps.jump import UNKNOWN, Measured
-
-Array = NDArray[np.floating]
+from airborne.motion.jumps.jump import UNKNOWN, Measurement
+from airborne.types import Array
 
 Z = float(norm.ppf(0.975))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Series:
-    """One variable, measured in two ways or more at the same moments; the second of two is the reference."""
+    """One variable, measured by two methods or more at the same moments; the second of two is the reference."""
 
     name: str
     unit: str
-    values: Array  # (n, ways), in order of time within each individual
-    individual: NDArray[np.str_]  # (n,) whose each moment is: a player, a joint, a jump
+    values: Array  # (n, methods), in order of time within each individual
+    individual: NDArray[np.str_]  # (n,) to which each moment belongs: a player, a joint, a jump
 
-    def known(self) -> Series:
-        """Leave out moments in which one way has no number."""
+    def drop_missing(self) -> Series:
+        """Leave out moments at which a method has no value."""
         rows = np.isfinite(self.values).all(axis=1)
         return Series(self.name, self.unit, self.values[rows], self.individual[rows])
 
@@ -52,26 +52,26 @@ class Agreement:
     unit: str
     n: int
     n_individuals: int
-    n_effective: float  # as many independent moments say as much about the bias
-    bias: Measured
-    between_sd: float  # of the individuals' own biases; NaN for one individual
-    within_sd: float  # about them; NaN for one moment each
-    lower_limit: Measured  # 95 % of differences are expected between the limits
-    upper_limit: Measured
-    rmse: Measured
+    n_effective: float  # number of independent moments with the same information on the bias
+    bias: Measurement
+    between_sd: float  # of the individuals' biases; NaN for one individual
+    within_sd: float  # about these biases; NaN for one moment each
+    lower_limit: Measurement  # 95 % of differences are expected between the limits
+    upper_limit: Measurement
+    rmse: Measurement
     range: float  # of the reference, largest minus smallest
-    nrmse_percent: Measured  # of that range
+    nrmse_percent: Measurement  # of that range
     icc: Reliability
-    sem: Measured  # standard error of measurement: square root of the residual mean square
-    mdc: Measured  # minimal detectable change: 1.96 sqrt(2) sem
+    sem: Measurement  # standard error of measurement: square root of the residual mean square
+    mdc: Measurement  # minimal detectable change: 1.96 sqrt(2) sem
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file; what is unknown is None."""
         return plain_numbers(asdict(self))
 
 
-class Spread(NamedTuple):
-    """Variances of differences by Zou's estimators, and what their intervals rest on."""
+class VarianceComponents(NamedTuple):
+    """Variance components of differences by Zou's estimators, with their degrees of freedom."""
 
     mean: float
     mean_se: float
@@ -88,14 +88,14 @@ class Spread(NamedTuple):
         return self.between + self.within_share * self.within
 
 
-def agreement(series: Series) -> Agreement:
-    """Compare the first way with the second, the reference."""
-    series = series.known()
+def analyse_agreement(series: Series) -> Agreement:
+    """Compare the first method with the second, the reference."""
+    series = series.drop_missing()
     difference = series.values[:, 0] - series.values[:, 1] if len(series.values) else np.empty(0)
     groups = [difference[series.individual == name] for name in dict.fromkeys(series.individual.tolist())]
-    counts = [n_effective(group) for group in groups]
-    spread = spread_of(groups, counts)
-    low, high = limits(spread)
+    counts = [effective_sample_size(group) for group in groups]
+    components = variance_components(groups, counts)
+    low, high = limits_of_agreement(components)
     span = float(np.ptp(series.values[:, 1])) if len(difference) else math.nan
     rmse = _rmse(difference, sum(counts))
     icc = reliability(series.values, sum(counts))
@@ -105,37 +105,37 @@ def agreement(series: Series) -> Agreement:
         n=len(difference),
         n_individuals=len(groups),
         n_effective=float(sum(counts)),
-        bias=_about(spread.mean, spread.mean_se, spread.mean_freedom),
-        between_sd=math.sqrt(spread.between) if len(groups) > 1 else math.nan,
-        within_sd=math.sqrt(spread.within) if spread.within_freedom else math.nan,
+        bias=_t_interval(components.mean, components.mean_se, components.mean_freedom),
+        between_sd=math.sqrt(components.between) if len(groups) > 1 else math.nan,
+        within_sd=math.sqrt(components.within) if components.within_freedom else math.nan,
         lower_limit=low,
         upper_limit=high,
         rmse=rmse,
         range=span,
-        nrmse_percent=scaled(rmse, 100 / span) if span > 0 else UNKNOWN,
+        nrmse_percent=scale_measurement(rmse, 100 / span) if span > 0 else UNKNOWN,
         icc=icc,
         sem=icc.sem,
-        mdc=scaled(icc.sem, Z * math.sqrt(2)),
+        mdc=scale_measurement(icc.sem, Z * math.sqrt(2)),
     )
 
 
-def n_effective(difference: Array) -> float:
-    """Return how many independent values say as much about the mean as a series in order of time: 1 to n."""
+def effective_sample_size(difference: Array) -> float:
+    """Return the effective sample size of the mean of a series in order of time: 1 to n."""
     n = len(difference)
-    rest = difference - difference.mean() if n else difference
-    power = float(rest @ rest)
+    deviation = difference - difference.mean() if n else difference
+    power = float(deviation @ deviation)
     if n < 4 or power == 0:
         return float(n)
-    correlation = np.array([rest[lag:] @ rest[: n - lag] for lag in range(n // 2)]) / power
+    correlation = np.array([deviation[lag:] @ deviation[: n - lag] for lag in range(n // 2)]) / power
     pairs = correlation[: len(correlation) // 2 * 2].reshape(-1, 2).sum(axis=1)
     stop = int(np.argmax(pairs <= 0)) if (pairs <= 0).any() else len(pairs)
     return float(np.clip(n / max(2 * pairs[:stop].sum() - 1, 1e-9), 1.0, n))
 
 
-def spread_of(groups: Sequence[Array], counts: Sequence[float]) -> Spread:
-    """Split the variance of differences, one array for each individual, with their effective numbers."""
+def variance_components(groups: Sequence[Array], counts: Sequence[float]) -> VarianceComponents:
+    """Estimate the variance components of differences, one array per individual, given effective sample sizes."""
     if not groups:
-        return Spread(*[math.nan] * 8)
+        return VarianceComponents(*[math.nan] * 8)
     freedom = [max(m - 1, 0.0) if len(group) > 1 else 0.0 for group, m in zip(groups, counts, strict=True)]
     squares = [m * float(np.var(group)) if f else 0.0 for group, m, f in zip(groups, counts, freedom, strict=True)]
     within_freedom = sum(freedom)
@@ -144,42 +144,47 @@ def spread_of(groups: Sequence[Array], counts: Sequence[float]) -> Spread:
     k = len(groups)
     if k == 1:
         se = math.sqrt(within / counts[0]) if within_freedom else math.nan
-        return Spread(float(means[0]), se, within_freedom, 0.0, 0.0, within, within_freedom, 1.0)
+        return VarianceComponents(float(means[0]), se, within_freedom, 0.0, 0.0, within, within_freedom, 1.0)
     between = float(np.var(means, ddof=1))
     share = 1 - float(np.mean(1 / np.array(counts)))
-    return Spread(float(means.mean()), math.sqrt(between / k), k - 1, between, k - 1, within, within_freedom, share)
+    return VarianceComponents(
+        float(means.mean()), math.sqrt(between / k), k - 1, between, k - 1, within, within_freedom, share
+    )
 
 
-def limits(spread: Spread) -> tuple[Measured, Measured]:
+def limits_of_agreement(components: VarianceComponents) -> tuple[Measurement, Measurement]:
     """Return the 95 % limits of agreement, each with its interval by the method of variance estimates recovery."""
-    if not spread.mean_freedom > 0:
+    if not components.mean_freedom > 0:
         return UNKNOWN, UNKNOWN
-    sd = math.sqrt(spread.total)
-    parts = ((spread.between, spread.between_freedom), (spread.within_share * spread.within, spread.within_freedom))
+    sd = math.sqrt(components.total)
+    parts = (
+        (components.between, components.between_freedom),
+        (components.within_share * components.within, components.within_freedom),
+    )
     parts = tuple((variance, freedom) for variance, freedom in parts if freedom > 0)
     less = math.sqrt(sum((v * (1 - f / chi2.ppf(0.975, f))) ** 2 for v, f in parts))
     more = math.sqrt(sum((v * (f / chi2.ppf(0.025, f) - 1)) ** 2 for v, f in parts))
-    narrower = sd - math.sqrt(max(spread.total - less, 0.0))
-    wider = math.sqrt(spread.total + more) - sd
-    shift = float(t.ppf(0.975, spread.mean_freedom)) * spread.mean_se
+    narrower = sd - math.sqrt(max(components.total - less, 0.0))
+    wider = math.sqrt(components.total + more) - sd
+    shift = float(t.ppf(0.975, components.mean_freedom)) * components.mean_se
     inner, outer = math.hypot(shift, Z * narrower), math.hypot(shift, Z * wider)
-    low, high = spread.mean - Z * sd, spread.mean + Z * sd
-    return Measured(low, low - outer, low + inner), Measured(high, high - inner, high + outer)
+    low, high = components.mean - Z * sd, components.mean + Z * sd
+    return Measurement(low, low - outer, low + inner), Measurement(high, high - inner, high + outer)
 
 
-def scaled(measured: Measured, factor: float) -> Measured:
-    """Return a number and its interval times a positive factor."""
-    return Measured(*(factor * each for each in measured))
+def scale_measurement(measured: Measurement, factor: float) -> Measurement:
+    """Multiply a measurement and its interval by a positive factor."""
+    return Measurement(*(factor * each for each in measured))
 
 
-def _about(value: float, se: float, freedom: float) -> Measured:
+def _t_interval(value: float, se: float, freedom: float) -> Measurement:
     if not freedom > 0:
-        return Measured(value, math.nan, math.nan)
+        return Measurement(value, math.nan, math.nan)
     half = float(t.ppf(0.975, freedom)) * se
-    return Measured(value, value - half, value + half)
+    return Measurement(value, value - half, value + half)
 
 
-def _rmse(difference: Array, count: float) -> Measured:
+def _rmse(difference: Array, count: float) -> Measurement:
     """Return the root mean square with an interval to first order on its logarithm."""
     if not len(difference):
         return UNKNOWN
@@ -187,17 +192,17 @@ def _rmse(difference: Array, count: float) -> Measured:
     bias, variance = float(difference.mean()), float(difference.var())
     value = math.sqrt(mean_square)
     if count < 2 or value == 0:
-        return Measured(value, math.nan, math.nan)
+        return Measurement(value, math.nan, math.nan)
     se = math.sqrt((2 * variance**2 + 4 * bias**2 * variance) / count) / (2 * mean_square)
-    return Measured(value, value * math.exp(-Z * se), value * math.exp(Z * se))
+    return Measurement(value, value * math.exp(-Z * se), value * math.exp(Z * se))
 
 
 def plain_numbers(value: Any) -> Any:
-    """Turn measured numbers into dictionaries and NaN into None, all the way down."""
+    """Turn measurements into dictionaries and NaN into None, recursively."""
     if isinstance(value, dict):
         return {key: plain_numbers(item) for key, item in value.items()}
-    if isinstance(value, Measured):
-        return without_nan(value._asdict())
+    if isinstance(value, Measurement):
+        return nan_to_none(value._asdict())
     if isinstance(value, tuple):
-        return [without_nan(item) for item in value]
-    return without_nan(value)
+        return [nan_to_none(item) for item in value]
+    return nan_to_none(value)

@@ -1,4 +1,4 @@
-"""The tables of agreement: agreement.csv and repeatability.csv, each number beside the ends of its 95 % interval."""
+"""The tables agreement.csv and repeatability.csv: each number with the ends of its 95 % interval."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from airborne.evaluation.agreement import Agreement
 from airborne.evaluation.icc import Reliability
 from airborne.evaluation.repeatability import Repeatability
-from airborne.motion.jumps.jump import Measured
+from airborne.motion.jumps.jump import Measurement
 from airborne.motion.tables import cell
 
 Row = dict[str, object]
@@ -23,41 +23,43 @@ _ICC = {
 }
 
 
-def write_agreements(path: Path, found: Mapping[str, Sequence[Agreement]]) -> None:
-    """Write agreement.csv, one row a variable and reference; empty where unknown."""
-    _write(path, [{"against": name} | _agreement(row) for name, rows in found.items() for row in rows])
+def write_agreements(path: Path, agreements: Mapping[str, Sequence[Agreement]]) -> None:
+    """Write agreement.csv, one row per variable and reference; empty where unknown."""
+    _write(path, [{"against": name} | _agreement(row) for name, rows in agreements.items() for row in rows])
 
 
-def write_repeats(path: Path, found: Mapping[str, Sequence[Repeatability]]) -> None:
-    """Write repeatability.csv, one row a variable and kind of repetition; empty where unknown."""
-    _write(path, [{"between": name} | _repeats(row) for name, rows in found.items() for row in rows])
+def write_repeatability(path: Path, repeatabilities: Mapping[str, Sequence[Repeatability]]) -> None:
+    """Write repeatability.csv, one row per variable and kind of repetition; empty where unknown."""
+    _write(path, [{"between": name} | _repeatability(row) for name, rows in repeatabilities.items() for row in rows])
 
 
 def _agreement(row: Agreement) -> Row:
     columns: Row = {"variable": row.name, "unit": row.unit, "n": row.n, "n_individuals": row.n_individuals}
-    columns |= {"n_effective": row.n_effective} | _three("bias", row.bias)
+    columns |= {"n_effective": row.n_effective} | _with_interval("bias", row.bias)
     columns |= {"between_sd": row.between_sd, "within_sd": row.within_sd}
-    columns |= _three("lower_limit", row.lower_limit) | _three("upper_limit", row.upper_limit)
-    columns |= _three("rmse", row.rmse) | {"range": row.range} | _three("nrmse_percent", row.nrmse_percent)
-    return columns | _correlations(row.icc) | _three("sem", row.sem) | _three("mdc", row.mdc)
+    columns |= _with_interval("lower_limit", row.lower_limit) | _with_interval("upper_limit", row.upper_limit)
+    columns |= (
+        _with_interval("rmse", row.rmse) | {"range": row.range} | _with_interval("nrmse_percent", row.nrmse_percent)
+    )
+    return columns | _correlations(row.icc) | _with_interval("sem", row.sem) | _with_interval("mdc", row.mdc)
 
 
-def _repeats(row: Repeatability) -> Row:
+def _repeatability(row: Repeatability) -> Row:
     columns: Row = {"variable": row.name, "unit": row.unit, "n": row.n, "n_ways": row.n_ways}
-    columns |= {"n_effective": row.n_effective} | _three("within_sd", row.within_sd)
-    columns |= _three("coefficient", row.coefficient) | _correlations(row.icc) | _three("sem", row.sem)
-    columns |= _three("mdc", row.mdc)
+    columns |= {"n_effective": row.n_effective} | _with_interval("within_sd", row.within_sd)
+    columns |= _with_interval("coefficient", row.coefficient) | _correlations(row.icc) | _with_interval("sem", row.sem)
+    columns |= _with_interval("mdc", row.mdc)
     return columns | {f"bias_{k}": bias for k, bias in enumerate(row.biases, 1)}
 
 
 def _correlations(icc: Reliability) -> Row:
-    found: Row = {}
+    row: Row = {}
     for name, field in _ICC.items():
-        found |= _three(name, getattr(icc, field))
-    return found
+        row |= _with_interval(name, getattr(icc, field))
+    return row
 
 
-def _three(name: str, measured: Measured) -> Row:
+def _with_interval(name: str, measured: Measurement) -> Row:
     return {name: measured.value, f"{name}_low": measured.low, f"{name}_high": measured.high}
 
 

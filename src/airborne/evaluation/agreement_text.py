@@ -1,4 +1,4 @@
-"""Agreement in words: a short table, and a methods paragraph that can be cited, its numbers filled in."""
+"""Agreement as text: a short table, and a methods paragraph with its numbers filled in."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from airborne.evaluation.agreement import Agreement
 from airborne.evaluation.compare import or_dash
 from airborne.evaluation.repeatability import Repeatability
-from airborne.motion.jumps.jump import Measured
+from airborne.motion.jumps.jump import Measurement
 
 _REFERENCES = (
     "Bland JM, Altman DG (1999) Measuring agreement in method comparison studies. Stat Methods Med Res 8:135-160.",
@@ -26,12 +26,12 @@ def agreement_table(rows: Sequence[Agreement]) -> str:
     width = max(16, *(len(f"{row.name} [{row.unit}]") + 2 for row in rows))
     lines = [f"{'agreement':<{width}}{'bias':>9}{'95 % limits':>19}{'RMSE':>9}{'nRMSE':>8}{'ICC(A,1)':>10}{'SEM':>9}"]
     for row in rows:
-        limits = f"{_short(row.lower_limit.value)} to {_short(row.upper_limit.value)}"
+        limits = f"{_fixed(row.lower_limit.value)} to {_fixed(row.upper_limit.value)}"
         share = or_dash(row.nrmse_percent.value / 100, ".2%")
         icc = or_dash(row.icc.agreement.value, ".4f")
         lines.append(
-            f"{f'  {row.name} [{row.unit}]':<{width}}{_short(row.bias.value):>9}{limits:>19}"
-            f"{_short(row.rmse.value):>9}{share:>8}{icc:>10}{_short(row.sem.value):>9}"
+            f"{f'  {row.name} [{row.unit}]':<{width}}{_fixed(row.bias.value):>9}{limits:>19}"
+            f"{_fixed(row.rmse.value):>9}{share:>8}{icc:>10}{_fixed(row.sem.value):>9}"
         )
     return "\n".join(lines)
 
@@ -42,21 +42,21 @@ def repeatability_table(rows: Sequence[Repeatability]) -> str:
     lines = [f"{'repeatability':<{width}}{'within sd':>10}{'coefficient':>12}{'ICC(A,1)':>10}{'SEM':>9}{'MDC':>9}"]
     for row in rows:
         icc = or_dash(row.icc.agreement.value, ".4f")
-        numbers = f"{_short(row.within_sd.value):>10}{_short(row.coefficient.value):>12}{icc:>10}"
+        numbers = f"{_fixed(row.within_sd.value):>10}{_fixed(row.coefficient.value):>12}{icc:>10}"
         lines.append(
-            f"{f'  {row.name} [{row.unit}]':<{width}}{numbers}{_short(row.sem.value):>9}{_short(row.mdc.value):>9}"
+            f"{f'  {row.name} [{row.unit}]':<{width}}{numbers}{_fixed(row.sem.value):>9}{_fixed(row.mdc.value):>9}"
         )
     return "\n".join(lines)
 
 
 def methods_text(
     agreements: Mapping[str, Sequence[Agreement]],
-    repeats: Mapping[str, Sequence[Repeatability]],
+    repeatabilities: Mapping[str, Sequence[Repeatability]],
     versions: Mapping[str, str],
 ) -> str:
     """Return a paragraph for a methods section, its results, and its references; numbers with 95 % intervals.
 
-    `agreements` and `repeats` are headline variables by what they were compared with.
+    `agreements` and `repeatabilities` hold the headline variables by what they were compared with.
     """
     software = ", ".join(f"{name} {version}" for name, version in versions.items())
     text = [
@@ -77,7 +77,7 @@ def methods_text(
             "(McGraw and Wong 1996). SEM is the square root of the two-way residual mean square, and the minimal "
             "detectable change 1.96 sqrt(2) SEM."
         )
-    if repeats:
+    if repeatabilities:
         text.append(
             "Repeatability is the standard deviation within moments, over all measurements of a moment, and its "
             "coefficient 1.96 sqrt(2) times that (Bland and Altman 1999)."
@@ -89,36 +89,36 @@ def methods_text(
     lines = [" ".join(text), ""]
     for against, rows in agreements.items():
         lines += [f"Against {against}:", *(_agreement_sentence(row) for row in rows), ""]
-    for what, some in repeats.items():
-        lines += [f"Between {what}:", *(_repeat_sentence(row) for row in some), ""]
+    for ways, rows in repeatabilities.items():
+        lines += [f"Between {ways}:", *(_repeat_sentence(row) for row in rows), ""]
     return "\n".join([*lines, "References", *_REFERENCES]) + "\n"
 
 
 def _agreement_sentence(row: Agreement) -> str:
     if row.n < 2:
-        found = "one value" if row.n else "no value"
-        return f"{row.name}: {found}, measured minus reference {_whole(row.bias)} {row.unit}."
+        count = "one value" if row.n else "no value"
+        return f"{row.name}: {count}, measured minus reference {_ci(row.bias)} {row.unit}."
     who = f"{row.n_individuals} individuals, " if row.n_individuals > 1 else ""
     return (
-        f"{row.name} ({who}n = {row.n}, effectively {row.n_effective:.0f}): bias {_whole(row.bias)} {row.unit}, limits "
-        f"{_whole(row.lower_limit)} to {_whole(row.upper_limit)} {row.unit}, RMSE {_whole(row.rmse)} {row.unit}, nRMSE "
-        f"{_whole(row.nrmse_percent)} % of {row.range:.4g} {row.unit}, ICC(A,1) {_whole(row.icc.agreement, 4)}, "
-        f"ICC(C,1) {_whole(row.icc.consistency, 4)}, SEM {_whole(row.sem)} {row.unit}, minimal detectable change "
-        f"{_whole(row.mdc)} {row.unit}."
+        f"{row.name} ({who}n = {row.n}, effectively {row.n_effective:.0f}): bias {_ci(row.bias)} {row.unit}, limits "
+        f"{_ci(row.lower_limit)} to {_ci(row.upper_limit)} {row.unit}, RMSE {_ci(row.rmse)} {row.unit}, nRMSE "
+        f"{_ci(row.nrmse_percent)} % of {row.range:.4g} {row.unit}, ICC(A,1) {_ci(row.icc.agreement, 4)}, "
+        f"ICC(C,1) {_ci(row.icc.consistency, 4)}, SEM {_ci(row.sem)} {row.unit}, minimal detectable change "
+        f"{_ci(row.mdc)} {row.unit}."
     )
 
 
 def _repeat_sentence(row: Repeatability) -> str:
     return (
         f"{row.name} ({row.n_ways} measurements, n = {row.n}, effectively {row.n_effective:.0f}): standard deviation "
-        f"within moments {_whole(row.within_sd)} {row.unit}, coefficient of repeatability {_whole(row.coefficient)} "
-        f"{row.unit}, ICC(A,1) {_whole(row.icc.agreement, 4)}, SEM {_whole(row.sem)} {row.unit}, minimal detectable "
-        f"change {_whole(row.mdc)} {row.unit}."
+        f"within moments {_ci(row.within_sd)} {row.unit}, coefficient of repeatability {_ci(row.coefficient)} "
+        f"{row.unit}, ICC(A,1) {_ci(row.icc.agreement, 4)}, SEM {_ci(row.sem)} {row.unit}, minimal detectable "
+        f"change {_ci(row.mdc)} {row.unit}."
     )
 
 
-def _whole(measured: Measured, digits: int = 2) -> str:
-    """Write a number with its interval in brackets."""
+def _ci(measured: Measurement, digits: int = 2) -> str:
+    """Format a number with its interval in brackets."""
     if math.isnan(measured.value):
         return "unknown"
     if math.isnan(measured.low):
@@ -126,5 +126,5 @@ def _whole(measured: Measured, digits: int = 2) -> str:
     return f"{measured.value:.{digits}f} [{measured.low:.{digits}f}, {measured.high:.{digits}f}]"
 
 
-def _short(value: float) -> str:
+def _fixed(value: float) -> str:
     return or_dash(value, ".2f")

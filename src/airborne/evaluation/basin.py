@@ -1,4 +1,4 @@
-"""From how far away a search still finds the pose: trials about a known pose, and their success rate."""
+"""Basin of convergence of a search: trials from perturbed poses about a known one, and their success rate."""
 
 from __future__ import annotations
 
@@ -6,21 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body import Pose
 from airborne.geometry.rotations import geodesic
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-RECOVERED_WITHIN_M = 0.010
-RECOVERED_WITHIN_RAD = np.deg2rad(2.0)
-_Z_95 = 1.959963984540054  # the normal distribution's 97.5 % point
+_RECOVERED_WITHIN_M = 0.010
+_RECOVERED_WITHIN_RAD = np.deg2rad(2.0)
+_Z_95 = 1.959963984540054  # the normal distribution's 97.5 % quantile
 
 
 @dataclass(frozen=True, slots=True)
 class Basin:
-    """How many trials came back to the true pose: within 10 mm and 2 degrees."""
+    """How many trials recovered the true pose: within 10 mm and 2 degrees."""
 
     n: int
     n_recovered: int
@@ -41,20 +39,20 @@ class Basin:
         return f"{self.n_recovered} of {self.n} found again within 10 mm and 2 degrees (95 %: {low:.0%} to {high:.0%})"
 
 
-def perturbed(rng: np.random.Generator, pose: Pose, *, distance_m: float, angle_rad: float, n: int) -> list[Pose]:
+def perturb(rng: np.random.Generator, pose: Pose, *, distance_m: float, angle_rad: float, n: int) -> list[Pose]:
     """Draw n poses exactly `distance_m` and `angle_rad` from `pose`, in directions and about axes uniform in space."""
     directions, axes = rng.normal(size=(2, n, 3))
     return [
-        pose.moved(distance_m * d / np.linalg.norm(d), angle_rad * a / np.linalg.norm(a))
+        pose.move(distance_m * d / np.linalg.norm(d), angle_rad * a / np.linalg.norm(a))
         for d, a in zip(directions, axes, strict=True)
     ]
 
 
-def is_recovered(found: Pose | None, true: Pose, symmetries: Sequence[Array]) -> bool:
-    """Say whether a search came back: within 10 mm and 2 degrees of a pose that looks like the true one."""
-    if found is None:
+def is_recovered(estimate: Pose | None, true: Pose, symmetries: Sequence[Array]) -> bool:
+    """Tell whether a search recovered the true pose, up to symmetry, within 10 mm and 2 degrees."""
+    if estimate is None:
         return False
-    a, b = found.world_from_root, true.world_from_root
+    a, b = estimate.world_from_root, true.world_from_root
     angle = geodesic(a.rotation.as_matrix() @ np.stack(list(symmetries)), b.rotation.as_matrix())
     distance = np.linalg.norm(a.translation - b.translation)
-    return bool(distance <= RECOVERED_WITHIN_M and angle.min() <= RECOVERED_WITHIN_RAD)
+    return bool(distance <= _RECOVERED_WITHIN_M and angle.min() <= _RECOVERED_WITHIN_RAD)

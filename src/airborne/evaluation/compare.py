@@ -1,4 +1,4 @@
-"""How far a measured motion is from the true one."""
+"""Errors of a measured motion against the true one."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from scipy.spatial.transform import Rotation
 
 from airborne.errors import ResultError
 from airborne.evaluation.truth import Truth
-from airborne.geometry.rotations import angles_from_matrix, geodesic, is_near_singular, wrapped
+from airborne.geometry.rotations import angles_from_matrix, geodesic, is_near_singular, wrap
 from airborne.motion import Motion
 from airborne.tracking import Status
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 Triple = tuple[float, float, float]
 
-_SAME_TIME_S = 1e-6  # where neither table has two times to tell its period
+_SAME_TIME_S = 1e-6  # where neither table has two times, so that no period is known
 _HARDLY_ANY = 0.2
-_SAME_SHARE = 0.1  # of the shorter period: times further apart are not the same time
+_SAME_SHARE = 0.1  # of the shorter period: times further apart do not match
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,10 +46,10 @@ class OrientationErrors:
 
 
 @dataclass(frozen=True, slots=True)
-class Calibration:
+class SdCalibration:
     """Shares of the errors, axis by axis, inside one and two reported standard deviations; NaN for n = 0.
 
-    Normal errors with honest deviations give 0.683 and 0.954. Infinite and unknown deviations are not counted.
+    Normal errors with correct standard deviations give 0.683 and 0.954. Infinite and unknown ones are not counted.
     """
 
     within_1sd: float
@@ -64,23 +64,23 @@ class Comparison:
     n_frames: int  # of the motion
     n_truth: int
     n_matched: int
-    n_tracked: int  # of the matched, likewise the next two
+    n_tracked: int  # of the matched frames, like the next two
     n_uncertain: int
     n_lost: int
     largest_time_offset_s: float
     position: PositionErrors
     raw: OrientationErrors
-    modulo_run: OrientationErrors  # the one symmetry of the body that suits the whole run best
-    modulo_frame: OrientationErrors  # the nearest symmetry in every frame
-    n_symmetries: int  # with the identity
+    modulo_run: OrientationErrors  # up to the one symmetry of the body that fits the whole run best
+    modulo_frame: OrientationErrors  # up to the nearest symmetry in every frame
+    n_symmetries: int  # including the identity
     n_flips: int  # frames whose nearest symmetry is not that of the frame before
     n_singular: int  # true tilts near +-90 degrees, where somersault and twist errors mean little
-    position_calibration: Calibration
-    rotation_calibration: Calibration
+    position_calibration: SdCalibration
+    rotation_calibration: SdCalibration
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file; what is unknown is None."""
-        return without_nan(asdict(self))
+        return nan_to_none(asdict(self))
 
     def describe(self) -> str:
         """Return the numbers as a short plain table."""
@@ -120,27 +120,27 @@ class Comparison:
         return "\n".join(lines)
 
 
-def compare(motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> Comparison:
+def compare_motion(motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> Comparison:
     """Compare a motion with the truth, or another reference, frame by frame.
 
     Each frame goes with the nearest time of the truth, less than a tenth of the shorter period of the two away.
-    `symmetries` are the body's (see `airborne.body.symmetry`), the identity among them: a body at `R` looks like one
-    at `R @ S`. Raises ResultError where no frame with a pose has a true time.
+    `symmetries` are the body's (see `airborne.body.symmetry`), including the identity: a body at `R` looks like one at
+    `R @ S`. Raises ResultError if no frame with a pose has a matching true time.
     """
-    frames, rows, offset = matched(motion.time_s, truth.time_s)
+    frames, rows, offset = match_times(motion.time_s, truth.time_s)
     status = motion.status[frames]
     has_pose = motion.has_pose[frames]
-    frames, rows, offset_seen = frames[has_pose], rows[has_pose], offset[has_pose]
+    frames, rows, posed_offset = frames[has_pose], rows[has_pose], offset[has_pose]
     if not len(frames):
         raise ResultError(
             f"no pose to compare: motion {span(motion.time_s)} with {int(motion.has_pose.sum())} poses, "
             f"truth {span(truth.time_s)}; give the truth of this recording"
         )
     R, true_R = motion.R[frames], truth.R[rows]
-    alike = R[:, None] @ np.stack(list(symmetries))  # (n, symmetries, 3, 3)
-    angle = geodesic(alike, true_R[:, None])
+    equivalent_R = R[:, None] @ np.stack(list(symmetries))  # (n, symmetries, 3, 3)
+    angle = geodesic(equivalent_R, true_R[:, None])
     nearest = np.argmin(angle, axis=1)
-    nearest_R = alike[np.arange(len(R)), nearest]
+    nearest_R = equivalent_R[np.arange(len(R)), nearest]
     best = int(np.argmin(np.mean(angle**2, axis=0)))
     position_error = motion.position[frames] - truth.position[rows]
     rotation_error = Rotation.from_matrix(nearest_R @ np.swapaxes(true_R, -1, -2)).as_rotvec()
@@ -151,21 +151,21 @@ def compare(motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> Compar
         n_tracked=int(np.sum(status == Status.TRACKED.value)),
         n_uncertain=int(np.sum(status == Status.UNCERTAIN.value)),
         n_lost=int(np.sum(status == Status.LOST.value)),
-        largest_time_offset_s=float(offset_seen.max()),
+        largest_time_offset_s=float(posed_offset.max()),
         position=_position_errors(position_error),
         raw=_orientation_errors(R, true_R),
-        modulo_run=_orientation_errors(alike[:, best], true_R),
+        modulo_run=_orientation_errors(equivalent_R[:, best], true_R),
         modulo_frame=_orientation_errors(nearest_R, true_R),
         n_symmetries=len(symmetries),
         n_flips=int(np.sum(np.diff(nearest) != 0)),
         n_singular=int(np.sum(is_near_singular(angles_from_matrix(true_R)))),
-        position_calibration=calibrated(position_error, motion.position_sd[frames]),
-        rotation_calibration=calibrated(rotation_error, motion.rotation_sd[frames]),
+        position_calibration=sd_calibration(position_error, motion.position_sd[frames]),
+        rotation_calibration=sd_calibration(rotation_error, motion.rotation_sd[frames]),
     )
 
 
-def matched(time_s: Array, true_time_s: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    """Rows of the motion, rows of the truth nearest in time, and the time between them [s]."""
+def match_times(time_s: Array, true_time_s: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Match times: rows of the motion, rows of the truth nearest in time, and their time offsets [s]."""
     periods = [float(np.median(np.diff(t))) for t in (time_s, true_time_s) if len(t) > 1]
     reach = _SAME_SHARE * min(periods) if periods else _SAME_TIME_S
     rows = np.searchsorted((true_time_s[1:] + true_time_s[:-1]) / 2, time_s)
@@ -185,20 +185,20 @@ def _position_errors(error: Array) -> PositionErrors:
 
 
 def _orientation_errors(R: Array, true_R: Array) -> OrientationErrors:
-    error = np.rad2deg(wrapped(angles_from_matrix(R) - angles_from_matrix(true_R)))
+    error = np.rad2deg(wrap(angles_from_matrix(R) - angles_from_matrix(true_R)))
     angle = np.rad2deg(geodesic(R, true_R))
     return OrientationErrors(
         _triple(_rms(error)), _triple(np.abs(error).max(axis=0)), float(_rms(angle)), float(angle.max())
     )
 
 
-def calibrated(error: Array, sd: Array) -> Calibration:
-    """Count the errors inside one and two of their reported deviations, both of one shape."""
+def sd_calibration(error: Array, sd: Array) -> SdCalibration:
+    """Count the errors within one and two of their reported standard deviations, arrays of one shape."""
     is_known = np.isfinite(sd)
-    ratio, spread = np.abs(error[is_known]), sd[is_known]
-    if not len(ratio):
-        return Calibration(math.nan, math.nan, 0)
-    return Calibration(float(np.mean(ratio <= spread)), float(np.mean(ratio <= 2 * spread)), len(ratio))
+    error, sd = np.abs(error[is_known]), sd[is_known]
+    if not len(error):
+        return SdCalibration(math.nan, math.nan, 0)
+    return SdCalibration(float(np.mean(error <= sd)), float(np.mean(error <= 2 * sd)), len(error))
 
 
 def _rms(values: Array) -> Array:
@@ -211,17 +211,17 @@ def _triple(values: Array) -> Triple:
 
 
 def span(time_s: Array) -> str:
-    """Say from when to when times go."""
+    """Format the range of times."""
     return f"{time_s[0]:.3f} to {time_s[-1]:.3f} s" if len(time_s) else "empty"
 
 
 def or_dash(number: float, form: str) -> str:
-    """Write a number in a format such as ".1f"; NaN as a dash."""
+    """Format a number with a specification such as ".1f"; NaN as a dash."""
     return "-" if math.isnan(number) else format(number, form)
 
 
-def without_nan(value: Any) -> Any:
-    """Turn NaN into None, all the way down."""
+def nan_to_none(value: Any) -> Any:
+    """Turn NaN into None, recursively."""
     if isinstance(value, dict):
-        return {key: without_nan(item) for key, item in value.items()}
+        return {key: nan_to_none(item) for key, item in value.items()}
     return None if isinstance(value, float) and math.isnan(value) else value

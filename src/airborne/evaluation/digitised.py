@@ -1,4 +1,4 @@
-"""Paper B's comparison (its figs 9, 10): tracked poses against poses from points that a person clicked."""
+"""Paper B's comparison (its figs 9, 10): tracked poses against poses from manually digitised points."""
 
 from __future__ import annotations
 
@@ -13,20 +13,19 @@ from scipy.spatial.transform import RigidTransform
 from airborne.body import BodyModel, Box, Pose
 from airborne.cameras import Rig
 from airborne.errors import ResultError
-from airborne.evaluation.compare import Comparison, compare
+from airborne.evaluation.compare import Comparison, compare_motion
 from airborne.evaluation.table import read_table
 from airborne.evaluation.truth import Truth
 from airborne.motion import Motion
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _EXPECTED = "a table of clicked points with the columns field, <point>_<camera>_u, <point>_<camera>_v, ..."
-_COLLINEAR = 1e-6  # of the largest spread: points nearer to one line give no orientation
+_COLLINEAR = 1e-6  # of the largest singular value: points closer to collinear give no orientation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Digitised:
-    """Points clicked by hand, as `<part>_minus` and `<part>_plus`: the ends of a bar."""
+class DigitisedPoints:
+    """Manually digitised points, `<part>_minus` and `<part>_plus`: the ends of a bar."""
 
     index: NDArray[np.int64]  # (n,) frame or field numbers
     points: tuple[str, ...]
@@ -35,12 +34,12 @@ class Digitised:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DigitisedPoses:
-    """The body's root as the clicked points place it; NaN where too few were clicked."""
+    """The root's poses fitted to the digitised points; NaN where too few were clicked."""
 
     index: NDArray[np.int64]  # (n,)
     position: Array  # (n, 3) [m]
     R: Array  # (n, 3, 3) world from root
-    residual: Array  # (n, points) distance between a point and its place on the fitted body [m]
+    residual: Array  # (n, points) distance of each point from the fitted body's [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,16 +64,16 @@ class DigitisedComparison:
         return f"{fit}\n{self.tracked_minus_digitised.describe()}"
 
 
-def read_digitised(path: Path, rig: Rig) -> Digitised:
+def read_digitised(path: Path, rig: Rig) -> DigitisedPoints:
     """Read clicked points; blank cells are points not clicked. Raises ResultError in one line.
 
-    Pixels are those of the full image, (0, 0) the centre of its top-left pixel, with the lens's distortion.
+    Pixel coordinates are distorted ones of the full image, (0, 0) the centre of its top-left pixel.
     """
     return read_clicked_frames(path, rig.names)
 
 
-def read_clicked_frames(path: Path, cameras: Sequence[str]) -> Digitised:
-    """Read clicked points of cameras of these names, as `read_digitised` does."""
+def read_clicked_frames(path: Path, cameras: Sequence[str]) -> DigitisedPoints:
+    """Read clicked points of the named cameras, as `read_digitised` does."""
     table = read_table(path, _EXPECTED)
     if table.names[0] not in ("field", "frame"):
         raise ResultError(f"{path} begins with column {table.names[0]}; expected {_EXPECTED}")
@@ -86,10 +85,10 @@ def read_clicked_frames(path: Path, cameras: Sequence[str]) -> Digitised:
     px = np.full((len(values), len(points), len(cameras), 2), np.nan)
     for k, (point, camera, axis) in enumerate(columns.values()):
         px[:, points.index(point), camera, axis] = values[:, k]
-    return Digitised(index=table.whole_numbers(table.names[0]), points=points, px=px)
+    return DigitisedPoints(index=table.whole_numbers(table.names[0]), points=points, px=px)
 
 
-def write_clicked_frames(path: Path, digitised: Digitised, cameras: Sequence[str]) -> None:
+def write_clicked_frames(path: Path, digitised: DigitisedPoints, cameras: Sequence[str]) -> None:
     """Write clicked points as `read_clicked_frames` reads them, blank where a point was not clicked."""
     header = [
         "frame",
@@ -102,10 +101,10 @@ def write_clicked_frames(path: Path, digitised: Digitised, cameras: Sequence[str
 
 
 def body_points(model: BodyModel, points: Sequence[str]) -> Array:
-    """Place clicked points on the body, in the root's frame, joints straight: (points, 3) [m].
+    """Return the digitised points of the body in the root's frame, all joints at zero: (points, 3) [m].
 
     `<stem>_minus` and `<stem>_plus` are the ends of the longest axis of the box whose part's name begins with the
-    stem. Raises ResultError where no single box answers to the name.
+    stem. Raises ResultError unless exactly one box matches.
     """
     posed = model.with_pose(Pose(world_from_root=RigidTransform.identity()))
     boxes: dict[str, tuple[Array, Array]] = {}  # centre and half of the longest axis
@@ -113,13 +112,14 @@ def body_points(model: BodyModel, points: Sequence[str]) -> Array:
         for part in segment.parts:
             if isinstance(part.shape, Box):
                 half = np.where(np.arange(3) == np.argmax(part.shape.size_m), part.shape.size_m / 2, 0.0)
-                place = part.segment_from_part
-                boxes[part.name] = (R @ place.translation + t, R @ place.rotation.apply(half))
-    return np.stack([_end(point, boxes) for point in points])
+                segment_from_part = part.segment_from_part
+                centre = R @ segment_from_part.translation + t
+                boxes[part.name] = (centre, R @ segment_from_part.rotation.apply(half))
+    return np.stack([_box_end(point, boxes) for point in points])
 
 
-def digitised_poses(digitised: Digitised, rig: Rig, model: BodyModel) -> DigitisedPoses:
-    """Triangulate the clicked points and fit the rigid body to them, each weighted by the cameras that saw it."""
+def fit_digitised_poses(digitised: DigitisedPoints, rig: Rig, model: BodyModel) -> DigitisedPoses:
+    """Triangulate the clicked points and fit the rigid body to them, weighted by their numbers of views."""
     on_body = body_points(model, digitised.points)
     in_world = rig.points_from_px(digitised.px)
     n_views = np.isfinite(digitised.px).all(axis=-1).sum(axis=-1)
@@ -133,7 +133,7 @@ def digitised_poses(digitised: Digitised, rig: Rig, model: BodyModel) -> Digitis
 def compare_digitised(motion: Motion, poses: DigitisedPoses, symmetries: Sequence[Array]) -> DigitisedComparison:
     """Compare the tracked poses with the digitised ones of the same frame or field numbers.
 
-    `symmetries` as in `compare`. Raises ResultError where the two have no frame in common.
+    `symmetries` as in `compare`. Raises ResultError if the two have no frame in common.
     """
     is_known = np.isfinite(poses.position).all(axis=-1)
     _, rows, frames = np.intersect1d(poses.index[is_known], motion.index, return_indices=True)
@@ -148,25 +148,27 @@ def compare_digitised(motion: Motion, poses: DigitisedPoses, symmetries: Sequenc
         position=poses.position[is_known][rows],
         R=poses.R[is_known][rows],
     )
-    unrated = replace(motion, covariance=np.full_like(motion.covariance, np.nan))  # clicks err too: they test no sd
+    unrated = replace(
+        motion, covariance=np.full_like(motion.covariance, np.nan)
+    )  # clicks have errors too, so sd are not tested
     return DigitisedComparison(
-        tracked_minus_digitised=compare(unrated, truth, symmetries),
+        tracked_minus_digitised=compare_motion(unrated, truth, symmetries),
         rigid_fit_residual_rms_mm=float(1e3 * np.sqrt(np.nanmean(poses.residual**2))),
         n_poses=int(is_known.sum()),
     )
 
 
 def fit_rigid(source: Array, target: Array, weights: Array) -> tuple[Array, Array]:
-    """Find R (3, 3), t (3,) [m] that least `sum w |R source + t - target|^2`, points (p, 3); NaN targets are left out.
+    """Find R (3, 3), t (3,) [m] that minimise `sum w |R source + t - target|^2`, points (p, 3); NaN is ignored.
 
-    Kabsch's solution by SVD. NaN where fewer than three points are left, or they lie in a line.
+    Kabsch's algorithm (SVD). NaN for fewer than three points, or collinear ones.
     """
     is_known = np.isfinite(target).all(axis=-1) & (weights > 0)
     a, b, w = source[is_known], target[is_known], weights[is_known, None]
     if len(a) >= 3:
         mean_a, mean_b = (w * a).sum(axis=0) / w.sum(), (w * b).sum(axis=0) / w.sum()
-        U, spread, Vt = np.linalg.svd((w * (b - mean_b)).T @ (a - mean_a))
-        if spread[1] > _COLLINEAR * spread[0]:
+        U, singular, Vt = np.linalg.svd((w * (b - mean_b)).T @ (a - mean_a))
+        if singular[1] > _COLLINEAR * singular[0]:
             R = U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
             return R, mean_b - R @ mean_a
     return np.full((3, 3), np.nan), np.full(3, np.nan)
@@ -181,14 +183,14 @@ def _point_and_camera(path: Path, name: str, cameras: Sequence[str]) -> tuple[st
     raise ResultError(f"{path}: column {name} is no <point>_<camera>_u or _v; cameras: {', '.join(cameras)}")
 
 
-def _end(point: str, boxes: dict[str, tuple[Array, Array]]) -> Array:
+def _box_end(point: str, boxes: dict[str, tuple[Array, Array]]) -> Array:
     stem, _, end = point.rpartition("_")
-    found = [name for name in boxes if name.startswith(stem)] if stem and end in ("minus", "plus") else []
-    if len(found) != 1:
+    matches = [name for name in boxes if name.startswith(stem)] if stem and end in ("minus", "plus") else []
+    if len(matches) != 1:
         listed = ", ".join(boxes) or "none"
         raise ResultError(
             f"point '{point}' is the end of no single box of the body; name it <part>_minus or <part>_plus, "
             f"with one of the boxes: {listed}"
         )
-    centre, half = boxes[found[0]]
+    centre, half = boxes[matches[0]]
     return centre + half if end == "plus" else centre - half

@@ -1,4 +1,4 @@
-"""Paths of joints as other systems give them: a long table, or a TRC file."""
+"""Paths of joints from other systems: a long table, or a TRC file."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.errors import ResultError
 from airborne.evaluation.table import read_table
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _LONG = "a table with the columns time_s, joint, x_m, y_m, z_m, one line for each time and joint"
 _TRC = "a TRC file of markers: PathFileType, rates and units, marker names, then tab-separated lines"
@@ -26,22 +24,22 @@ _SINGLE |= {"hip": "pelvis", "midhip": "pelvis", "chip": "pelvis"}
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointPaths:
-    """Where joints were over time, by another system or in truth."""
+    """Positions of joints over time, from another system or true."""
 
-    names: tuple[str, ...]  # as the file has them
+    names: tuple[str, ...]  # as in the file
     time_s: Array  # (n,) increasing [s]
     points: Array  # (n, joints, 3) world [m]; NaN where not known
 
 
 def read_joint_paths(path: Path) -> JointPaths:
-    """Read paths of joints: `.trc`, or else a long table as joints.csv is. Raises ResultError in one line."""
+    """Read paths of joints: a `.trc` file, or else a long table like joints.csv. Raises ResultError in one line."""
     return _read_trc(path) if path.suffix.lower() == ".trc" else _read_long(path)
 
 
 def landmark_of(marker: str) -> str | None:
-    """Name the landmark that a marker of a pose network stands for: RHip, left_hip, hip_left, RBigToe; None for none.
+    """Return the landmark for a pose network's keypoint name (RHip, left_hip, hip_left, RBigToe), or None.
 
-    HALPE, BODY_25, COCO and BlazePose names are known. The big toe stands for the ball of the foot.
+    Handles the names of HALPE, BODY_25, COCO and BlazePose. The big toe stands for the ball of the foot.
     """
     words = [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", marker)]
     sides = [_SIDES[word] for word in words if word in _SIDES]
@@ -56,7 +54,7 @@ def _read_long(path: Path) -> JointPaths:
     missing = [name for name in ("time_s", "joint", "x_m", "y_m", "z_m") if name not in table.names]
     if missing:
         raise ResultError(f"{path} has no column {', '.join(missing)}; expected {_LONG}, or a .trc file")
-    places, times_s = table.numbers(["x_m", "y_m", "z_m"]), table.times_s()
+    positions, times_s = table.numbers(["x_m", "y_m", "z_m"]), table.times_s()
     if "player" in table.names:
         players = sorted({cells[table.names.index("player")] for cells in table.lines})
         if len(players) > 1:
@@ -70,7 +68,7 @@ def _read_long(path: Path) -> JointPaths:
         when, who = divmod(int(cell[np.argmax(count)]), len(names))
         raise ResultError(f"{path} has {names[who]} {count.max()} times at {time_s[when]:g} s; give each joint once")
     points = np.full((len(time_s), len(names), 3), np.nan)
-    points[at, joint] = places
+    points[at, joint] = positions
     return JointPaths(names=names, time_s=time_s, points=points)
 
 
@@ -83,7 +81,7 @@ def _read_trc(path: Path) -> JointPaths:
     except UnicodeDecodeError:
         raise ResultError(f"{path} is not text; expected {_TRC}") from None
     if len(lines) < 6 or lines[0][0] != "PathFileType" or lines[3][:1] != ["Frame#"]:
-        raise ResultError(f"{path} does not begin as a TRC file does; expected {_TRC}")
+        raise ResultError(f"{path} does not begin like a TRC file; expected {_TRC}")
     header = dict(zip(lines[1], lines[2], strict=False))
     unit = header.get("Units", "").strip()
     if unit not in _METRES:
@@ -105,9 +103,9 @@ def _read_trc(path: Path) -> JointPaths:
 def _numbers(path: Path, line: int, cells: list[str], width: int) -> list[float]:
     """Read one line of a TRC file; blank cells, and those left out at its end, are NaN."""
     if any(cell.strip() for cell in cells[width:]):
-        raise ResultError(f"{path} line {line} has {len(cells)} cells, expected {width}; mend it")
+        raise ResultError(f"{path} line {line} has {len(cells)} cells, expected {width}; correct it")
     cells = [*cells[:width], *[""] * (width - len(cells))]
     try:
         return [float(cell) if cell.strip() else np.nan for cell in cells]
     except ValueError:
-        raise ResultError(f"{path} line {line}: a cell is not a number; mend it") from None
+        raise ResultError(f"{path} line {line}: a cell is not a number; correct it") from None

@@ -1,4 +1,4 @@
-"""How far a body's landmarks are from where another system, or the truth, has them."""
+"""Errors of a body's landmarks against another system, or the truth."""
 
 from __future__ import annotations
 
@@ -6,21 +6,20 @@ import math
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.errors import ResultError
-from airborne.evaluation.compare import Calibration, calibrated, matched, span, without_nan
+from airborne.evaluation.compare import SdCalibration, match_times, nan_to_none, sd_calibration, span
 from airborne.evaluation.joint_files import JointPaths, landmark_of
 from airborne.motion import Motion, landmarks
 from airborne.tracking import Status
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 Triple = tuple[float, float, float]
 
-_FARTHEST_SHIFT = 3  # periods by which the two clocks are tried against each other
-_CLEARLY_BETTER = 0.98  # of the distance as it is
-_MOST_FRAMES = 0.9  # a shift that leaves fewer of the frames is not tried
+_FARTHEST_SHIFT = 3  # periods by which the clocks are shifted relative to each other
+_CLEARLY_BETTER = 0.98  # of the unshifted distance
+_MOST_FRAMES = 0.9  # shifts that leave fewer of the frames are ignored
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,8 +30,8 @@ class JointErrors:
     mean_mm: float
     rms_mm: float
     largest_mm: float
-    mean_without_offset_mm: float  # the mean offset in the landmark's segment taken off: two definitions of one joint
-    mean_without_bias_mm: float  # the mean offset in the world taken off; both NaN for one frame
+    mean_without_offset_mm: float  # after removing the mean offset in the segment: definitions of a joint differ
+    mean_without_bias_mm: float  # after removing the mean offset in the world; both NaN for one frame
     bias_mm: Triple  # mean, world axes
     offset_mm: Triple | None  # mean, the segment's axes; None for all landmarks together
 
@@ -44,21 +43,21 @@ class JointComparison:
     n_frames: int  # of the motion
     n_reference: int
     n_matched: int
-    n_tracked: int  # of the matched, likewise the next two
+    n_tracked: int  # of the matched frames, like the next two
     n_uncertain: int
     n_lost: int
     largest_time_offset_s: float
     joints: dict[str, JointErrors]  # by landmark
-    whole: JointErrors  # its mean is the mean per-joint position error, MPJPE
+    whole: JointErrors  # its mean is the mean per-joint position error (MPJPE)
     tracked: JointErrors | None  # the same over the tracked frames alone; None where there are none
     not_compared: tuple[str, ...]  # markers without a landmark, and landmarks without a marker
-    calibration: Calibration  # errors against the landmarks' reported deviations
-    better_shift_s: float  # added to the reference's times, whole periods, this would agree clearly better; else 0
-    better_mean_without_offset_mm: float  # and leave this
+    calibration: SdCalibration  # errors against the landmarks' reported deviations
+    better_shift_s: float  # added to the reference's times, this would clearly agree better; whole periods, or 0
+    better_mean_without_offset_mm: float  # the error with that shift
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file; what is unknown is None."""
-        return without_nan(asdict(self))
+        return nan_to_none(asdict(self))
 
     def describe(self) -> str:
         """Return the numbers as a short plain table."""
@@ -76,7 +75,7 @@ class JointComparison:
         if self.better_shift_s:
             lines.append(
                 f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, {'no offset'!r} would be "
-                f"{self.better_mean_without_offset_mm:.1f} mm: do both clocks begin at the same picture?"
+                f"{self.better_mean_without_offset_mm:.1f} mm: do both clocks start at the same frame?"
             )
         share = self.calibration
         if share.n:
@@ -103,16 +102,16 @@ class _Pairs:
 
 
 def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> JointComparison:
-    """Compare a motion's landmarks with a reference, frame by frame, as `compare` matches them.
+    """Compare a motion's landmarks with a reference, frame by frame, matched as in `compare_motion`.
 
-    A marker goes with the landmark of its name, or with the one that `landmark_of` says. Raises ResultError where no
-    marker has a landmark, or no frame with a pose has a reference.
+    A marker is matched with the landmark of its name, or else that of `landmark_of`. Raises ResultError if no marker
+    has a landmark, or no frame with a pose has a reference.
     """
-    of_landmark, not_compared = _markers(model, reference)
-    columns = [k for k, mark in enumerate(model.landmarks) if mark.name in of_landmark]
+    marker_columns, not_compared = _match_markers(model, reference)
+    columns = [k for k, mark in enumerate(model.landmarks) if mark.name in marker_columns]
     names = [model.landmarks[k].name for k in columns]
-    reference = replace(reference, points=reference.points[:, [of_landmark[name] for name in names]])
-    frames, rows, offset = matched(motion.time_s, reference.time_s)
+    reference = replace(reference, points=reference.points[:, [marker_columns[name] for name in names]])
+    frames, rows, offset = match_times(motion.time_s, reference.time_s)
     status = motion.status[frames]
     has_pose = motion.has_pose[frames]
     if not has_pose.any():
@@ -122,8 +121,8 @@ def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> J
         )
     measured, sd = (values[:, columns] for values in landmarks(motion, model))
     R = _rotations(motion, model, columns)
-    at, of = frames[has_pose], rows[has_pose]
-    pairs = _Pairs(measured[at], reference.points[of], R[at])
+    frames, rows = frames[has_pose], rows[has_pose]
+    pairs = _Pairs(measured[frames], reference.points[rows], R[frames])
     is_known = np.asarray(np.isfinite(pairs.error).all(axis=-1))
     if not is_known.any():
         raise ResultError("the reference has no number where the motion has a pose; give the joints of this recording")
@@ -132,7 +131,9 @@ def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> J
     tracked = _Pairs(pairs.measured[is_tracked], pairs.reference[is_tracked], pairs.R[is_tracked])
     everything = list(range(len(names)))
     whole = _errors(pairs, everything)
-    shift_s, shifted_mm = _better_shift(motion.time_s, reference, measured, R, whole.mean_without_offset_mm)
+    shift_s, shifted_mm = _best_time_shift(
+        motion.time_s, reference, measured=measured, R=R, unshifted_mm=whole.mean_without_offset_mm
+    )
     return JointComparison(
         n_frames=len(motion),
         n_reference=len(reference.time_s),
@@ -145,28 +146,28 @@ def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> J
         whole=whole,
         tracked=_errors(tracked, everything) if np.isfinite(tracked.error).all(axis=-1).any() else None,
         not_compared=(*not_compared, *(name for name in names if name not in joints)),
-        calibration=calibrated(pairs.error[is_known], np.repeat(sd[at][is_known][:, None], 3, axis=1)),
+        calibration=sd_calibration(pairs.error[is_known], np.repeat(sd[frames][is_known][:, None], 3, axis=1)),
         better_shift_s=shift_s,
         better_mean_without_offset_mm=shifted_mm,
     )
 
 
-def _markers(model: BodyModel, reference: JointPaths) -> tuple[dict[str, int], list[str]]:
-    """Return the column of the reference for each landmark that has one; and the names that found no partner."""
-    known = [landmark.name for landmark in model.landmarks]
-    found = {name: k for k, name in enumerate(reference.names) if name in known}
+def _match_markers(model: BodyModel, reference: JointPaths) -> tuple[dict[str, int], list[str]]:
+    """Return the reference's column for each landmark that has one, and the unmatched names."""
+    names = [landmark.name for landmark in model.landmarks]
+    columns = {name: k for k, name in enumerate(reference.names) if name in names}
     for k, marker in enumerate(reference.names):
         name = landmark_of(marker)
-        if name in known:
-            found.setdefault(name, k)
-    if not found:
+        if name in names:
+            columns.setdefault(name, k)
+    if not columns:
         raise ResultError(
             f"no joint in common: the reference has {', '.join(reference.names[:4])}, ..., "
-            f"body '{model.name}' has {', '.join(known[:4])}, ...; name the columns by the body's landmarks"
+            f"body '{model.name}' has {', '.join(names[:4])}, ...; name the columns by the body's landmarks"
         )
-    used = set(found.values())
-    idle = [marker for k, marker in enumerate(reference.names) if k not in used]
-    return found, idle + [name for name in known if name not in found]
+    used = set(columns.values())
+    unmatched = [marker for k, marker in enumerate(reference.names) if k not in used]
+    return columns, unmatched + [name for name in names if name not in columns]
 
 
 def _rotations(motion: Motion, model: BodyModel, columns: list[int]) -> Array:
@@ -206,28 +207,30 @@ def _mean_about(error: Array) -> float:
     return float(1e3 * np.nanmean(np.linalg.norm(error - np.nanmean(error, axis=0), axis=-1)))
 
 
-def _better_shift(
-    time_s: Array, reference: JointPaths, measured: Array, R: Array, now_mm: float
+def _best_time_shift(
+    time_s: Array, reference: JointPaths, *, measured: Array, R: Array, unshifted_mm: float
 ) -> tuple[float, float]:
-    """Try the reference's clock some whole periods earlier and later: the shift [s] and what it leaves [mm]."""
-    if len(reference.time_s) < 2 or math.isnan(now_mm):
-        return 0.0, now_mm
+    """Shift the reference's clock by whole periods: return the best shift [s] and its error [mm]."""
+    if len(reference.time_s) < 2 or math.isnan(unshifted_mm):
+        return 0.0, unshifted_mm
     period = float(np.median(np.diff(reference.time_s)))
-    best = 0.0, now_mm
-    _, n_now = _at_shift(time_s, reference, measured, R, 0.0)
+    best = 0.0, unshifted_mm
+    _, n_unshifted = _errors_at_shift(time_s, reference, measured=measured, R=R, shift_s=0.0)
     for step in range(-_FARTHEST_SHIFT, _FARTHEST_SHIFT + 1):
-        local, n = _at_shift(time_s, reference, measured, R, step * period)
-        if n < _MOST_FRAMES * n_now:
+        local, n = _errors_at_shift(time_s, reference, measured=measured, R=R, shift_s=step * period)
+        if n < _MOST_FRAMES * n_unshifted:
             continue
-        found = _mean_about(local)
-        if found < min(best[1], _CLEARLY_BETTER * now_mm):
-            best = step * period, found
+        error_mm = _mean_about(local)
+        if error_mm < min(best[1], _CLEARLY_BETTER * unshifted_mm):
+            best = step * period, error_mm
     return best
 
 
-def _at_shift(time_s: Array, reference: JointPaths, measured: Array, R: Array, shift_s: float) -> tuple[Array, int]:
-    """Return the errors in the segments' axes with the reference's clock shifted, and how many there are."""
-    frames, rows, _ = matched(time_s, reference.time_s + shift_s)
+def _errors_at_shift(
+    time_s: Array, reference: JointPaths, *, measured: Array, R: Array, shift_s: float
+) -> tuple[Array, int]:
+    """Return the errors in the segments' axes with the reference's clock shifted, and their number."""
+    frames, rows, _ = match_times(time_s, reference.time_s + shift_s)
     local = np.einsum("nlji,nlj->nli", R[frames], measured[frames] - reference.points[rows])
     return local, int(np.isfinite(local).all(axis=-1).sum())
 

@@ -1,4 +1,4 @@
-"""How far measured jumps are from the true ones: each definition of height, take-off and landing."""
+"""Errors of measured jumps: each definition of height, take-off and landing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from airborne.motion.jumps.heights import jumps
+from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.jump import Jump
 from airborne.motion.players import PlayersMotion
 
@@ -21,7 +21,7 @@ _TITLES = ("feet", "hips", "flight time", "take-off speed", "hips from take-off"
 class JumpErrors:
     """One true jump against the measured one, measured minus true; NaN where either is unknown.
 
-    Two truths: what the same functions make of the true paths, and what the truth's own file says of the jump.
+    Two references: the same functions applied to the true paths, and the numbers that the truth's file states.
     """
 
     player: str
@@ -29,9 +29,9 @@ class JumpErrors:
     is_found: bool
     height_error_m: dict[str, float]  # by definition, as `Jump` names them; against the true paths
     event_error_frames: dict[str, float]
-    stated_height_error_m: dict[str, float]  # against the file, where it says something
+    stated_height_error_m: dict[str, float]  # against the file, where it states a number
     stated_event_error_frames: dict[str, float]
-    within_95: dict[str, bool]  # whether the interval holds what the true paths give
+    within_95: dict[str, bool]  # whether the interval contains the number of the true paths
 
     def describe(self) -> str:
         """Return the errors as two lines at most."""
@@ -55,50 +55,50 @@ class JumpErrors:
 
 
 def compare_jumps(
-    motion: PlayersMotion, truth: PlayersMotion, players: Sequence[str], known: dict[str, dict[str, float]]
+    motion: PlayersMotion, truth: PlayersMotion, players: Sequence[str], references: dict[str, dict[str, float]]
 ) -> tuple[JumpErrors, ...]:
-    """Compare the jumps of the named players; `known` is what a file says of a player's only jump.
+    """Compare the jumps of the named players; `references` holds the stated numbers of a player's only jump.
 
-    A measured jump goes with the true one whose flight it overlaps. Empty where legs are not among the joints.
+    Jumps are matched by overlapping flights. Empty if the joints include no legs.
     """
-    errors, pairs = [], paired_jumps(motion, truth, players)
+    errors, pairs = [], pair_jumps(motion, truth, players)
     for jump, partner in pairs:
         is_only = sum(j.player == jump.player for j, _ in pairs) == 1
-        errors.append(_errors(jump, partner, known.get(jump.player, {}) if is_only else {}))
+        errors.append(_errors(jump, partner, references.get(jump.player, {}) if is_only else {}))
     return tuple(errors)
 
 
-def paired_jumps(
+def pair_jumps(
     motion: PlayersMotion, truth: PlayersMotion, players: Sequence[str]
 ) -> tuple[tuple[Jump, Jump | None], ...]:
-    """Return every true jump of the named players with the measured one whose flight it overlaps, if any.
+    """Return every true jump of the named players with the measured one whose flight overlaps it, if any.
 
-    Empty where legs are not among the joints.
+    Empty if the joints include no legs.
     """
     if not all(_has_legs(each) for each in (motion, truth)):
         return ()
-    found = jumps(_only(motion, players))
+    measured = measure_jumps(_select_players(motion, players))
     return tuple(
-        (jump, next((j for j in found if j.player == jump.player and _overlap(j, jump)), None))
-        for jump in jumps(_only(truth, players))
+        (jump, next((j for j in measured if j.player == jump.player and _overlap(j, jump)), None))
+        for jump in measure_jumps(_select_players(truth, players))
     )
 
 
-def _errors(true: Jump, found: Jump | None, known: dict[str, float]) -> JumpErrors:
+def _errors(true: Jump, measured: Jump | None, reference: dict[str, float]) -> JumpErrors:
     names = (*HEIGHTS, *EVENTS)
-    got = {name: getattr(found, name).value if found else math.nan for name in names}
-    error = {name: got[name] - getattr(true, name).value for name in names}
-    stated = {name: got[name] - known[name] for name in names if name in known}
+    values = {name: getattr(measured, name).value if measured else math.nan for name in names}
+    error = {name: values[name] - getattr(true, name).value for name in names}
+    stated = {name: values[name] - reference[name] for name in names if name in reference}
     inside = {}
     for name in names:
         value = getattr(true, name).value
-        if found is not None and math.isfinite(error[name]):
-            measured = getattr(found, name)
-            inside[name] = bool(measured.low <= value <= measured.high)
+        if measured is not None and math.isfinite(error[name]):
+            interval = getattr(measured, name)
+            inside[name] = bool(interval.low <= value <= interval.high)
     return JumpErrors(
         player=true.player,
         number=true.number,
-        is_found=found is not None,
+        is_found=measured is not None,
         height_error_m={name: error[name] for name in HEIGHTS},
         event_error_frames={name: error[name] for name in EVENTS},
         stated_height_error_m={name: stated[name] for name in HEIGHTS if name in stated},
@@ -111,10 +111,10 @@ def _has_legs(motion: PlayersMotion) -> bool:
     return all(f"{part}_{side}" in motion.joints for part in ("hip", "knee", "ankle") for side in ("left", "right"))
 
 
-def _only(motion: PlayersMotion, players: Sequence[str]) -> PlayersMotion:
+def _select_players(motion: PlayersMotion, players: Sequence[str]) -> PlayersMotion:
     at = [motion.players.index(name) for name in players]
-    chosen = {name: getattr(motion, name)[:, at] for name in ("points", "covariance", "status", "score", "n_views")}
-    return replace(motion, players=tuple(players), **chosen)
+    columns = {name: getattr(motion, name)[:, at] for name in ("points", "covariance", "status", "score", "n_views")}
+    return replace(motion, players=tuple(players), **columns)
 
 
 def _overlap(one: Jump, other: Jump) -> bool:

@@ -1,4 +1,4 @@
-"""How far the tracked joints of several players are from where they really were."""
+"""Errors of the tracked joints of several players."""
 
 from __future__ import annotations
 
@@ -12,35 +12,34 @@ from scipy.stats import chi2
 
 from airborne.cameras import Rig, read_rig
 from airborne.errors import ResultError
-from airborne.evaluation.compare import matched, or_dash, span, without_nan
+from airborne.evaluation.compare import match_times, nan_to_none, or_dash, span
 from airborne.evaluation.jump_errors import JumpErrors, compare_jumps
-from airborne.evaluation.players_truth import read_known_jumps, read_players_truth
+from airborne.evaluation.players_truth import read_players_truth, read_reference_jumps
 from airborne.evaluation.success import Cover, success_cover
 from airborne.motion.players import PlayersMotion, read_players
 from airborne.tracking import Status
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _STRICT_M, _STRICTER_M, _AUC_TO_M = 0.10, 0.05, 0.20
 _GROUPS = {"hips": "hip", "knees": "knee", "ankles": "ankle", "feet": "foot"}
-_RODS = {"thigh": ("hip", "knee"), "shank": ("knee", "ankle")}
+_SEGMENTS = {"thigh": ("hip", "knee"), "shank": ("knee", "ankle")}
 _SIDES = ("left", "right")
-_CLEARLY = 2.0  # times: a swap of left and right must lower the error by this
+_SWAP_RATIO = 2.0  # factor by which a swap of left and right must lower the error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartErrors:
-    """Distances of one joint, or of a group, from the truth. Unknown places fail, but have no distance."""
+    """Distances of one joint, or of a group, from the truth. Missing estimates fail, but have no distance."""
 
-    n: int  # true places
-    n_unknown: int  # of them without an estimate
+    n: int  # true positions
+    n_unknown: int  # of these without an estimate
     mean_mm: float
     median_mm: float
     largest_mm: float
-    within_100mm: float  # share of all true places, like the next two
+    within_100mm: float  # share of all true positions, like the next two
     within_50mm: float
     auc_200mm: float  # mean success over the tolerances 0 to 200 mm
-    jitter_mm: float  # standard deviation of the error's second difference, all axes
+    jitter_mm: float  # sd of the error's second difference, all axes
     within_95: float  # share inside the 95 % region of the stated covariance; NaN where none is stated
 
 
@@ -48,18 +47,18 @@ class PartErrors:
 class PlayerErrors:
     """One player against the truth."""
 
-    n: int  # matched frames; likewise the next three, which sum to it
+    n: int  # matched frames, the sum of the next three
     n_tracked: int
     n_uncertain: int
     n_lost: int
-    parts: dict[str, PartErrors]  # by joint, then hips, knees, ankles, feet, all (of which the mean is the MPJPE)
-    pcp: float  # share of thighs and shanks whose ends are off by less than half a length on the mean; NaN without
-    swap_rate: dict[str, float]  # by group: frames in which left and right taken for each other fit twice as well
+    parts: dict[str, PartErrors]  # by joint, then hips, knees, ankles, feet, all (its mean is the MPJPE)
+    pcp: float  # share of thighs and shanks whose mean end error is below half their length; NaN without
+    swap_rate: dict[str, float]  # by group: share of frames in which left and right exchanged fit twice as well
     length_sd_mm: dict[str, float]  # of each estimated thigh and shank
-    n_losses: int  # runs of frames with the mean error over 100 mm, or nothing known
-    mean_recovery_s: float  # how long those last that end; NaN without
+    n_losses: int  # runs of frames with a mean error over 100 mm, or unknown
+    mean_recovery_s: float  # of the runs that end; NaN without
     longest_recovery_s: float
-    cover: Cover | None  # the paper's success; None without cameras
+    cover: Cover | None  # the paper's success measure; None without cameras
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,11 +71,11 @@ class PlayersComparison:
     largest_time_offset_s: float
     players: dict[str, PlayerErrors]
     jumps: tuple[JumpErrors, ...]
-    not_compared: tuple[str, ...]  # players without truth, and joints that only one of the two has
+    not_compared: tuple[str, ...]  # players without truth, and joints in only one of the two
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file; what is unknown is None."""
-        return without_nan(asdict(self))
+        return nan_to_none(asdict(self))
 
     def describe(self) -> str:
         """Return the numbers as short plain tables."""
@@ -85,7 +84,7 @@ class PlayersComparison:
             f"{1e3 * self.largest_time_offset_s:.1f} ms off"
         ]
         for name, errors in self.players.items():
-            lines += _table(name, errors)
+            lines += _error_lines(name, errors)
         lines += [jump.describe() for jump in self.jumps]
         if self.not_compared:
             lines.append(f"not compared: {', '.join(self.not_compared)}")
@@ -95,15 +94,14 @@ class PlayersComparison:
 def assess_players(folder: Path, truth: Path) -> PlayersComparison:
     """Compare the run of players in a folder with a truth table, and with the players.json beside it.
 
-    Raises ResultError where the folder holds no such run or the truth is of another recording.
+    Raises ResultError if the folder holds no such run or the truth is of another recording.
     """
     path = folder / "joints.csv"
     if not path.is_file():
-        raise ResultError(f"{folder} holds no run of players; expected joints.csv, as `airborne track` leaves it")
-    calibration = folder / "calib.toml"
-    rig = read_rig(calibration) if calibration.is_file() else None
-    known = read_known_jumps(truth.parent / "players.json")
-    return compare_players(read_players(path), read_players_truth(truth), rig=rig, known_jumps=known)
+        raise ResultError(f"{folder} holds no run of players; expected the joints.csv of `airborne track`")
+    rig = read_rig(folder / "calib.toml") if (folder / "calib.toml").is_file() else None
+    references = read_reference_jumps(truth.parent / "players.json")
+    return compare_players(read_players(path), read_players_truth(truth), rig=rig, reference_jumps=references)
 
 
 def compare_players(
@@ -112,14 +110,14 @@ def compare_players(
     *,
     rig: Rig | None = None,
     visible: NDArray[np.bool_] | None = None,
-    known_jumps: dict[str, dict[str, float]] | None = None,
+    reference_jumps: dict[str, dict[str, float]] | None = None,
 ) -> PlayersComparison:
-    """Compare players of the same names, joint by joint, frame by frame as `compare` matches them.
+    """Compare players of the same names, joint by joint, frame by frame, matched as in `compare_motion`.
 
-    With a rig the paper's success is judged too, `visible` (true frames, players of the truth, views, joints of the
-    truth) saying what is not hidden. Raises ResultError where no player, joint or time is common to both.
+    With a rig the paper's success measure is computed too; `visible` (true frames, true players, views, true joints)
+    marks what is not occluded. Raises ResultError if no player, joint or time is common to both.
     """
-    frames, rows, offset = matched(motion.time_s, truth.time_s)
+    frames, rows, offset = match_times(motion.time_s, truth.time_s)
     players = [name for name in motion.players if name in truth.players]
     joints = [name for name in motion.joints if name in truth.joints]
     if not players or not joints:
@@ -134,22 +132,22 @@ def compare_players(
         raise ResultError(
             f"no frame to compare: run {span(motion.time_s)}, truth {span(truth.time_s)}; give this recording's truth"
         )
-    here, there = [motion.joints.index(name) for name in joints], [truth.joints.index(name) for name in joints]
-    found = {}
+    columns, true_columns = ([each.joints.index(name) for name in joints] for each in (motion, truth))
+    errors = {}
     for name in players:
-        own, other = motion.players.index(name), truth.players.index(name)
-        shown = None if visible is None else visible[rows][:, other][:, :, there]
-        found[name] = _player_errors(
+        k, true_k = motion.players.index(name), truth.players.index(name)
+        is_visible = None if visible is None else visible[rows][:, true_k][:, :, true_columns]
+        errors[name] = _player_errors(
             _Pair(
                 joints=tuple(joints),
                 period_s=float(np.median(np.diff(motion.time_s))) if len(motion) > 1 else math.nan,
-                estimate=motion.points[frames][:, own][:, here],
-                covariance=motion.covariance[frames][:, own][:, here],
-                truth=truth.points[rows][:, other][:, there],
-                status=motion.status[frames, own],
+                estimate=motion.points[frames][:, k][:, columns],
+                covariance=motion.covariance[frames][:, k][:, columns],
+                truth=truth.points[rows][:, true_k][:, true_columns],
+                status=motion.status[frames, k],
             ),
             rig,
-            shown,
+            is_visible,
         )
     others = [name for name in (*motion.players, *motion.joints) if name not in (*truth.players, *truth.joints)]
     return PlayersComparison(
@@ -157,8 +155,8 @@ def compare_players(
         n_truth=len(truth),
         n_matched=len(frames),
         largest_time_offset_s=float(offset.max()),
-        players=found,
-        jumps=compare_jumps(motion, truth, players, known_jumps or {}),
+        players=errors,
+        jumps=compare_jumps(motion, truth, players, reference_jumps or {}),
         not_compared=tuple(others),
     )
 
@@ -179,7 +177,7 @@ class _Pair:
         return np.linalg.norm(self.estimate - self.truth, axis=-1)
 
     def columns(self, part: str) -> list[int]:
-        """Return left and right of a part, [] where one is missing."""
+        """Return the columns of a part, left and right; [] if one is missing."""
         names = [f"{part}_{side}" for side in _SIDES]
         return [self.joints.index(name) for name in names] if set(names) <= set(self.joints) else []
 
@@ -203,47 +201,47 @@ def _player_errors(pair: _Pair, rig: Rig | None, visible: NDArray[np.bool_] | No
         n_losses=len(losses),
         mean_recovery_s=float(np.mean(ended)) if ended else math.nan,
         longest_recovery_s=max(ended, default=math.nan),
-        cover=None if rig is None else success_cover(rig, pair.estimate, pair.truth, pair.joints, visible),
+        cover=None if rig is None else success_cover(rig, pair.estimate, pair.truth, pair.joints, visible=visible),
     )
 
 
 def _part_errors(pair: _Pair, columns: list[int]) -> PartErrors:
     has_truth = np.isfinite(pair.truth[:, columns]).all(axis=-1)
     distance = pair.distance[:, columns][has_truth]
-    known = distance[np.isfinite(distance)]
+    finite = distance[np.isfinite(distance)]
     error = pair.estimate[:, columns] - pair.truth[:, columns]
-    bend = np.diff(error, 2, axis=0)
-    bend = bend[np.isfinite(bend).all(axis=-1)]
+    jitter = np.diff(error, 2, axis=0)
+    jitter = jitter[np.isfinite(jitter).all(axis=-1)]
     n = max(len(distance), 1)
     return PartErrors(
         n=len(distance),
-        n_unknown=len(distance) - len(known),
-        mean_mm=1e3 * float(known.mean()) if len(known) else math.nan,
-        median_mm=1e3 * float(np.median(known)) if len(known) else math.nan,
-        largest_mm=1e3 * float(known.max()) if len(known) else math.nan,
-        within_100mm=float((known <= _STRICT_M).sum()) / n,
-        within_50mm=float((known <= _STRICTER_M).sum()) / n,
-        auc_200mm=float(np.maximum(1 - known / _AUC_TO_M, 0.0).sum()) / n,
-        jitter_mm=1e3 * float(bend.std()) if len(bend) else math.nan,
+        n_unknown=len(distance) - len(finite),
+        mean_mm=1e3 * float(finite.mean()) if len(finite) else math.nan,
+        median_mm=1e3 * float(np.median(finite)) if len(finite) else math.nan,
+        largest_mm=1e3 * float(finite.max()) if len(finite) else math.nan,
+        within_100mm=float((finite <= _STRICT_M).sum()) / n,
+        within_50mm=float((finite <= _STRICTER_M).sum()) / n,
+        auc_200mm=float(np.maximum(1 - finite / _AUC_TO_M, 0.0).sum()) / n,
+        jitter_mm=1e3 * float(jitter.std()) if len(jitter) else math.nan,
         within_95=_within_95(error, pair.covariance[:, columns]),
     )
 
 
 def _within_95(error: Array, covariance: Array) -> float:
-    known = np.isfinite(covariance).all(axis=(-2, -1)) & np.isfinite(error).all(axis=-1)
-    error, covariance = error[known], covariance[known]
-    sound = np.linalg.eigvalsh(covariance)[:, 0] > 0
-    if not sound.any():
+    is_known = np.isfinite(covariance).all(axis=(-2, -1)) & np.isfinite(error).all(axis=-1)
+    error, covariance = error[is_known], covariance[is_known]
+    is_definite = np.linalg.eigvalsh(covariance)[:, 0] > 0
+    if not is_definite.any():
         return math.nan
-    error, covariance = error[sound], covariance[sound]
+    error, covariance = error[is_definite], covariance[is_definite]
     squared = np.einsum("ni,ni->n", error, np.linalg.solve(covariance, error[..., None])[..., 0])
     return float(np.mean(squared <= chi2.ppf(0.95, 3)))
 
 
 def _pcp(pair: _Pair) -> float:
-    """Return the share of correct thighs and shanks, the ends' errors taken together (PCP 0.5)."""
+    """Return the share of correct thighs and shanks by the mean error of their ends (PCP 0.5)."""
     hits: list[NDArray[np.bool_]] = []
-    for upper, lower in _RODS.values():
+    for upper, lower in _SEGMENTS.values():
         for a, b in zip(pair.columns(upper), pair.columns(lower), strict=False):
             length = np.linalg.norm(pair.truth[:, a] - pair.truth[:, b], axis=-1)
             hits.append(((pair.distance[:, a] + pair.distance[:, b]) / 2 <= length / 2)[np.isfinite(length)])
@@ -253,29 +251,29 @@ def _pcp(pair: _Pair) -> float:
 def _swap_rate(pair: _Pair, columns: list[int]) -> float:
     crossed = np.linalg.norm(pair.estimate[:, columns[::-1]] - pair.truth[:, columns], axis=-1).sum(axis=1)
     straight = pair.distance[:, columns].sum(axis=1)
-    known = np.isfinite(straight)
-    return float(np.mean(_CLEARLY * crossed[known] < straight[known])) if known.any() else math.nan
+    is_known = np.isfinite(straight)
+    return float(np.mean(_SWAP_RATIO * crossed[is_known] < straight[is_known])) if is_known.any() else math.nan
 
 
 def _length_sds(pair: _Pair) -> dict[str, float]:
-    found = {}
-    for rod, (upper, lower) in _RODS.items():
+    sds = {}
+    for segment, (upper, lower) in _SEGMENTS.items():
         for side, a, b in zip(_SIDES, pair.columns(upper), pair.columns(lower), strict=False):
             length = np.linalg.norm(pair.estimate[:, a] - pair.estimate[:, b], axis=-1)
-            known = length[np.isfinite(length)]
-            found[f"{rod}_{side}"] = 1e3 * float(known.std()) if len(known) else math.nan
-    return found
+            finite = length[np.isfinite(length)]
+            sds[f"{segment}_{side}"] = 1e3 * float(finite.std()) if len(finite) else math.nan
+    return sds
 
 
 def _losses(pair: _Pair, columns: list[int]) -> list[tuple[int, bool]]:
-    """Return each run of failed frames: how many, and whether a good frame follows."""
+    """Return each run of failed frames: its length, and whether a good frame follows."""
     mean = pair.distance[:, columns].mean(axis=1)
     failed = np.concatenate([[False], ~(mean <= _STRICT_M), [False]])
     edges = np.flatnonzero(np.diff(failed.astype(int)))
     return [(int(b - a), bool(b < len(mean))) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _table(player: str, errors: PlayerErrors) -> list[str]:
+def _error_lines(player: str, errors: PlayerErrors) -> list[str]:
     lines = [
         f"{player}: {errors.n_tracked} tracked, {errors.n_uncertain} uncertain, {errors.n_lost} lost",
         f"  {'error [mm]':<14}{'mean':>8}{'median':>8}{'max':>8}{'<=100':>8}{'<=50':>8}{'AUC200':>8}{'jitter':>8}"
@@ -295,10 +293,8 @@ def _table(player: str, errors: PlayerErrors) -> list[str]:
         reach = ", ".join(f"{name} {metres:.3f}" for name, metres in errors.cover.tolerance_m.items())
         lines.append(f"  cover lets a part be off by [m]: {reach}")
     if errors.n_losses:
-        recovery = "not recovered"
-        if not math.isnan(errors.mean_recovery_s):
-            recovery = (
-                f"recovered after {errors.mean_recovery_s:.2f} s on the mean, {errors.longest_recovery_s:.2f} s at most"
-            )
+        mean_s, longest_s = errors.mean_recovery_s, errors.longest_recovery_s
+        recovery = f"recovered after {mean_s:.2f} s on the mean, {longest_s:.2f} s at most"
+        recovery = "not recovered" if math.isnan(mean_s) else recovery
         lines.append(f"  off by more than 100 mm {errors.n_losses} times; {recovery}")
     return lines

@@ -1,4 +1,4 @@
-"""The true paths of several players, and what is known of their jumps."""
+"""The true paths of several players, and reference numbers of their jumps."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _HEIGHTS = {
 def read_players_truth(path: Path) -> PlayersMotion:
     """Read a truth table with one row for each player and frame; `l_hip_x` becomes the x of `hip_left`.
 
-    Raises ResultError in one line where columns are missing or not every frame has every player.
+    Raises ResultError in one line if columns are missing or some frame lacks a player.
     """
     table = read_table(path, _EXPECTED)
     stems = [name.removesuffix("_x") for name in table.names if name.endswith("_x")]
@@ -36,9 +36,9 @@ def read_players_truth(path: Path) -> PlayersMotion:
     missing = [name for name in wanted if name not in table.names]
     if missing or not stems:
         raise ResultError(f"{path} has no column {missing[0] if missing else 'l_hip_x'}; expected {_EXPECTED}")
-    places, times_s = table.numbers([f"{stem}_{axis}" for stem in stems for axis in "xyz"]), table.times_s()
-    if np.isnan(places).all():
-        raise ResultError(f"{path} holds no place of any point; expected {_EXPECTED}")
+    positions, times_s = table.numbers([f"{stem}_{axis}" for stem in stems for axis in "xyz"]), table.times_s()
+    if np.isnan(positions).all():
+        raise ResultError(f"{path} holds no position of any point; expected {_EXPECTED}")
     frames, row = np.unique(table.whole_numbers("frame"), return_inverse=True)
     names = [cells[table.names.index("player")].strip() for cells in table.lines]
     players = tuple(dict.fromkeys(names))
@@ -46,13 +46,13 @@ def read_players_truth(path: Path) -> PlayersMotion:
     shape = len(frames), len(players)
     cell, count = np.unique(row * len(players) + column, return_counts=True)
     if len(cell) != shape[0] * shape[1] or (count > 1).any():
-        raise ResultError(f"{path} has not one row for each of {len(players)} players in every frame; mend it")
+        raise ResultError(f"{path} has not one row for each of {len(players)} players in every frame; correct it")
     time_s = np.empty(shape)
     points = np.empty((*shape, len(stems), 3))
     time_s[row, column] = times_s
-    points[row, column] = places.reshape(-1, len(stems), 3)
+    points[row, column] = positions.reshape(-1, len(stems), 3)
     if np.ptp(time_s, axis=1).max() > 0 or (np.diff(time_s[:, 0]) <= 0).any():
-        raise ResultError(f"{path}: time_s must be one number in each frame, and grow with the frames; mend it")
+        raise ResultError(f"{path}: time_s must be one number in each frame, and grow with the frames; correct it")
     return PlayersMotion(
         index=frames,
         time_s=time_s[:, 0],
@@ -67,27 +67,27 @@ def read_players_truth(path: Path) -> PlayersMotion:
     )
 
 
-def read_known_jumps(path: Path) -> dict[str, dict[str, float]]:
-    """Read what a players.json says of each player's jump, by the names of `Jump`; empty where there is no such file.
+def read_reference_jumps(path: Path) -> dict[str, dict[str, float]]:
+    """Read each player's reference numbers of the jump from players.json, named as in `Jump`; empty without the file.
 
-    Contact frames may have fractions. Raises ResultError where the file is no such list.
+    Contact frames may have fractions. Raises ResultError if the file is no such list.
     """
     if not path.is_file():
         return {}
     try:
         players = read_json(path)
-        found = {str(player["name"]): player["jump"] for player in players if player.get("jump")}
-        return {name: known_jump(jump) for name, jump in found.items()}
+        facts = {str(player["name"]): player["jump"] for player in players if player.get("jump")}
+        return {name: reference_jump(jump) for name, jump in facts.items()}
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError):
-        raise ResultError(f"{path} is no list of players with name and jump; write it so, or take it away") from None
+        raise ResultError(f"{path} is no list of players with name and jump; write it so, or remove it") from None
 
 
-def known_jump(jump: Mapping[str, float]) -> dict[str, float]:
-    """Return the numbers of our table of jumps that facts of a jump, as a generator states them, say."""
-    known = {name: float(jump[key]) for name, key in (_EVENTS | _HEIGHTS).items() if key in jump}
+def reference_jump(jump: Mapping[str, float]) -> dict[str, float]:
+    """Convert the facts of a jump, as a scene generator states them, to numbers of our jump table."""
+    reference = {name: float(jump[key]) for name, key in (_EVENTS | _HEIGHTS).items() if key in jump}
     if "flight_s" in jump:
-        known["flight_time_height_m"] = 9.81 * float(jump["flight_s"]) ** 2 / 8
-    return known
+        reference["flight_time_height_m"] = 9.81 * float(jump["flight_s"]) ** 2 / 8
+    return reference
 
 
 def _joint(stem: str) -> str:

@@ -1,4 +1,4 @@
-"""How well several runs, or several people, come to the same: within-moment deviation, reliability.
+"""Repeatability of several runs or operators: within-moment standard deviation, reliability.
 
 Source: Bland and Altman 1999, "Measuring agreement in method comparison studies", section on repeatability: the
 coefficient is 1.96 sqrt(2) times the within-subject standard deviation; 95 % of differences between two single
@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from airborne.evaluation.agreement import Series, Z, n_effective, plain_numbers, scaled
-from airborne.evaluation.icc import Reliability, mean_squares, reliability, standard_deviation
-from airborne.motion.jumps.jump import UNKNOWN, Measured
+from airborne.evaluation.agreement import Series, Z, effective_sample_size, plain_numbers, scale_measurement
+from airborne.evaluation.icc import Reliability, mean_squares, reliability, sd_with_interval
+from airborne.motion.jumps.jump import UNKNOWN, Measurement
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,28 +24,28 @@ class Repeatability:
     name: str
     unit: str
     n: int  # moments
-    n_ways: int  # runs or people
+    n_ways: int  # runs or operators
     n_effective: float
-    within_sd: Measured  # of one measurement, biases between the ways with it
-    coefficient: Measured  # 1.96 sqrt(2) times that
-    biases: tuple[float, ...]  # of each way from the mean of all
+    within_sd: Measurement  # of one measurement, including biases between the methods
+    coefficient: Measurement  # 1.96 sqrt(2) times that
+    biases: tuple[float, ...]  # of each method from the mean of all
     icc: Reliability
-    sem: Measured  # without the biases
-    mdc: Measured  # 1.96 sqrt(2) times that
+    sem: Measurement  # without the biases
+    mdc: Measurement  # 1.96 sqrt(2) times that
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file; what is unknown is None."""
         return plain_numbers(asdict(self))
 
 
-def repeatability(series: Series) -> Repeatability:
-    """Compare all ways with one another, none of them the reference."""
-    series = series.known()
+def analyse_repeatability(series: Series) -> Repeatability:
+    """Compare all methods with one another; none is the reference."""
+    series = series.drop_missing()
     n, k = series.values.shape
     within_sd, count, biases = UNKNOWN, float(n), tuple([math.nan] * k)
     if n > 1:
-        count = _count(series)
-        within_sd = standard_deviation(mean_squares(series.values)[3], count * (k - 1))
+        count = _effective_sample_size(series)
+        within_sd = sd_with_interval(mean_squares(series.values)[3], count * (k - 1))
         biases = tuple((series.values.mean(axis=0) - series.values.mean()).tolist())
     icc = reliability(series.values, count)
     return Repeatability(
@@ -55,20 +55,23 @@ def repeatability(series: Series) -> Repeatability:
         n_ways=k,
         n_effective=count,
         within_sd=within_sd,
-        coefficient=scaled(within_sd, Z * math.sqrt(2)),
+        coefficient=scale_measurement(within_sd, Z * math.sqrt(2)),
         biases=biases,
         icc=icc,
         sem=icc.sem,
-        mdc=scaled(icc.sem, Z * math.sqrt(2)),
+        mdc=scale_measurement(icc.sem, Z * math.sqrt(2)),
     )
 
 
-def _count(series: Series) -> float:
-    """Return the effective number of moments: the mean over the ways, each from its distance to the mean of all."""
-    rest = series.values - series.values.mean(axis=1, keepdims=True)
+def _effective_sample_size(series: Series) -> float:
+    """Return the effective number of moments: mean over the methods, each by its deviations from the mean of all."""
+    deviation = series.values - series.values.mean(axis=1, keepdims=True)
     names = dict.fromkeys(series.individual.tolist())
     return float(
         np.mean(
-            [sum(n_effective(rest[series.individual == name, way]) for name in names) for way in range(rest.shape[1])]
+            [
+                sum(effective_sample_size(deviation[series.individual == name, way]) for name in names)
+                for way in range(deviation.shape[1])
+            ]
         )
     )

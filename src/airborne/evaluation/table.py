@@ -1,4 +1,4 @@
-"""Tables of numbers under a header line, as truth and digitised points come."""
+"""Tables of numbers under a header line, such as truth and digitised points."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from airborne.errors import ResultError
 from airborne.io.text import read_csv
 
-_LARGEST = 1e15  # of any number in a table: a whole number is exact up to here
+_LARGEST = 1e15  # magnitude of any number in a table: whole numbers are exact up to here
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A comma-separated file: its column names, and its lines as text, with their numbers in the file."""
+    """A comma-separated file: column names, lines as text, and their line numbers."""
 
     path: Path
     names: list[str]
@@ -30,7 +30,7 @@ class Table:
         for row, cells in enumerate(self.lines):
             where = f"{self.path} line {self.line_numbers[row]}"
             if len(cells) != len(self.names):
-                raise ResultError(f"{where} has {len(cells)} cells, expected {len(self.names)}; mend it")
+                raise ResultError(f"{where} has {len(cells)} cells, expected {len(self.names)}; correct it")
             for k, (name, column) in enumerate(zip(names, columns, strict=True)):
                 text = cells[column].strip()
                 try:
@@ -38,7 +38,7 @@ class Table:
                 except ValueError:
                     values[row, k] = np.inf
                 if not abs(values[row, k]) <= _LARGEST and not np.isnan(values[row, k]):
-                    raise ResultError(f"{where}: {name[:60]} is '{text[:60]}', expected a number; mend it")
+                    raise ResultError(f"{where}: {name[:60]} is '{text[:60]}', expected a number; correct it")
         return values
 
     def times_s(self) -> NDArray[np.float64]:
@@ -54,12 +54,12 @@ class Table:
         values = self.numbers([name])[:, 0]
         for line, value in zip(self.line_numbers, values, strict=True):
             if value != np.round(value):
-                raise ResultError(f"{self.path} line {line}: {name} must be a whole number, as in 0, 1, 2; mend it")
+                raise ResultError(f"{self.path} line {line}: {name} must be a whole number, as in 0, 1, 2; correct it")
         return values.astype(np.int64)
 
 
 def read_table(path: Path, expected: str) -> Table:
-    """Read a table; `expected` says in the error what the file should have been. Raises ResultError."""
+    """Read a table; `expected` describes the right file for the error message. Raises ResultError."""
     rows = read_csv(path, f"expected {expected}", ResultError)
     if len(rows) < 2:
         raise ResultError(f"{path} has no lines of numbers; expected {expected}")

@@ -1,4 +1,4 @@
-"""The true motion of a body, where it is known."""
+"""The true motion of a body."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from airborne.errors import ResultError
 from airborne.evaluation.table import read_table
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _POSITION = ["x_m", "y_m", "z_m"]
 _ROTATION = [f"r{i}{j}" for i in range(3) for j in range(3)]
@@ -21,7 +20,7 @@ _NOT_ROTATION = 1e-3  # a table rounded to three digits is still a rotation
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Truth:
-    """Where the body's root really was."""
+    """The true poses of the body's root."""
 
     index: NDArray[np.int64]  # (n,) frame or field numbers
     time_s: Array  # (n,) increasing [s]
@@ -32,7 +31,7 @@ class Truth:
 def read_truth(path: Path) -> Truth:
     """Read a truth table: `frame` or `field`, `time_s`, position [m], world-from-root matrix row by row.
 
-    Raises ResultError in one line for a missing column or number, a matrix that is no rotation, or times that do not
+    Raises ResultError in one line for a missing column or number, a matrix that is not a rotation, or times that do not
     increase.
     """
     table = read_table(path, _EXPECTED)

@@ -1,4 +1,4 @@
-"""The variables that are compared: coordinates in mm, angles in degrees, each over time and of one individual."""
+"""The variables to compare: coordinates in mm, angles in degrees, each over time for one individual."""
 
 from __future__ import annotations
 
@@ -8,22 +8,21 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.errors import ResultError
 from airborne.evaluation.agreement import Series
-from airborne.evaluation.compare import matched, span
+from airborne.evaluation.compare import match_times, span
 from airborne.evaluation.joint_files import JointPaths, landmark_of
 from airborne.evaluation.jump_errors import HEIGHTS
 from airborne.evaluation.table import read_table
-from airborne.geometry.rotations import angles_from_matrix, geodesic, is_near_singular, matrix_from_angles, wrapped
+from airborne.geometry.rotations import angles_from_matrix, geodesic, is_near_singular, matrix_from_angles, wrap
 from airborne.motion import Motion, PlayersMotion, landmarks
-from airborne.motion.angles import ANGLES
+from airborne.motion.angles import ROOT_ANGLES
 from airborne.motion.jumps.jump import Jump
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-Key = tuple[str, str]  # name of the variable, and the individual
+_Key = tuple[str, str]  # names of the variable and the individual
 
 BODY = "body"
 _POOLED = {"mm": "all joints", "deg": "all turns"}
@@ -35,26 +34,26 @@ class Variables:
     """Variables of one source at its times; NaN where unknown."""
 
     time_s: Array  # (n,)
-    columns: dict[Key, Array]  # (n,) each, coordinates [mm] and angles [deg]
-    angles: frozenset[str]  # names of those that are angles and repeat every 360 degrees
+    columns: dict[_Key, Array]  # (n,) each, coordinates [mm] and angles [deg]
+    angles: frozenset[str]  # names of the angles, periodic in 360 degrees
 
     def __or__(self, other: Variables) -> Variables:
-        """Join the variables of one source at the same times."""
+        """Merge the variables of one source at the same times."""
         return Variables(self.time_s, self.columns | other.columns, self.angles | other.angles)
 
 
-def of_root(time_s: Array, position: Array, R: Array) -> Variables:
-    """Take positions (n, 3) [m] and orientations (n, 3, 3) of a root; somersault and twist unknown where singular."""
+def root_variables(time_s: Array, position: Array, R: Array) -> Variables:
+    """Return a root's position (n, 3) [m] and orientation (n, 3, 3) as variables; ambiguous angles are unknown."""
     radians = angles_from_matrix(R)
     singular = is_near_singular(radians)
     columns = {(axis, BODY): 1e3 * position[:, k] for k, axis in enumerate("xyz")}
-    for k, name in enumerate(ANGLES):
+    for k, name in enumerate(ROOT_ANGLES):
         columns[name, BODY] = np.rad2deg(np.where(singular & (name != "tilt"), np.nan, radians[:, k]))
-    return Variables(time_s, columns, frozenset(ANGLES))
+    return Variables(time_s, columns, frozenset(ROOT_ANGLES))
 
 
-def of_points(time_s: Array, points: Array, names: Sequence[str], individual: str = BODY) -> Variables:
-    """Take points (n, names, 3) [m] as variables such as `hip_left x`."""
+def point_variables(time_s: Array, points: Array, names: Sequence[str], individual: str = BODY) -> Variables:
+    """Return points (n, names, 3) [m] as variables such as `hip_left x`."""
     columns = {
         (f"{name} {axis}", individual): 1e3 * points[:, k, i]
         for k, name in enumerate(names)
@@ -63,43 +62,47 @@ def of_points(time_s: Array, points: Array, names: Sequence[str], individual: st
     return Variables(time_s, columns, frozenset())
 
 
-def of_joint_angles(time_s: Array, radians: Array, names: Sequence[str]) -> Variables:
-    """Take joint angles (n, joints, 3) [rad], as successive turns with y within a right angle; see `joint_angles`.
+def joint_angle_variables(time_s: Array, radians: Array, names: Sequence[str]) -> Variables:
+    """Return joint angles (n, joints, 3) [rad] as variables, y within +-90 degrees; see `joint_angles`.
 
-    x and z are unknown where they cannot be told apart.
+    x and z are unknown where they are ambiguous.
     """
     principal = angles_from_matrix(matrix_from_angles(radians))
     singular = is_near_singular(principal)
     columns = {}
     for k, name in enumerate(names):
         for i, axis in enumerate("xyz"):
-            hidden = singular[:, k] & (axis != "y")
-            columns[f"{name} turn {axis}", BODY] = np.rad2deg(np.where(hidden, np.nan, principal[:, k, i]))
+            is_ambiguous = singular[:, k] & (axis != "y")
+            columns[f"{name} turn {axis}", BODY] = np.rad2deg(np.where(is_ambiguous, np.nan, principal[:, k, i]))
     return Variables(time_s, columns, frozenset(name for name, _ in columns))
 
 
-def of_motion(motion: Motion, model: BodyModel) -> Variables:
-    """Take everything of one body: its root, its landmarks, and how its joints are turned."""
+def motion_variables(motion: Motion, model: BodyModel) -> Variables:
+    """Return all variables of one body: its root, landmarks and joint angles."""
     points, _ = landmarks(motion, model)
-    found = of_root(motion.time_s, motion.position, motion.R)
-    found |= of_points(motion.time_s, points, [landmark.name for landmark in model.landmarks])
-    return found | of_joint_angles(motion.time_s, motion.joint_angles, motion.joints) if motion.joints else found
+    variables = root_variables(motion.time_s, motion.position, motion.R)
+    variables |= point_variables(motion.time_s, points, [landmark.name for landmark in model.landmarks])
+    if motion.joints:
+        variables |= joint_angle_variables(motion.time_s, motion.joint_angles, motion.joints)
+    return variables
 
 
-def of_players(motion: PlayersMotion) -> Variables:
-    """Take the joints of every player."""
-    found = Variables(motion.time_s, {}, frozenset())
+def players_variables(motion: PlayersMotion) -> Variables:
+    """Return the joints of every player as variables."""
+    variables = Variables(motion.time_s, {}, frozenset())
     for k, player in enumerate(motion.players):
-        found |= of_points(motion.time_s, motion.points[:, k], motion.joints, player)
-    return found
+        variables |= point_variables(motion.time_s, motion.points[:, k], motion.joints, player)
+    return variables
 
 
-def of_joint_paths(paths: JointPaths, model: BodyModel) -> Variables:
-    """Take paths of joints, by the names of a body's landmarks; others are left out."""
-    known = {landmark.name for landmark in model.landmarks}
-    column = {name if name in known else landmark_of(name): k for k, name in reversed(list(enumerate(paths.names)))}
-    names = [name for name in column if name in known]
-    return of_points(paths.time_s, paths.points[:, [column[name] for name in names]], [str(name) for name in names])
+def joint_path_variables(paths: JointPaths, model: BodyModel) -> Variables:
+    """Return paths of joints as variables named by a body's landmarks; others are left out."""
+    names = {landmark.name for landmark in model.landmarks}
+    column = {name if name in names else landmark_of(name): k for k, name in reversed(list(enumerate(paths.names)))}
+    matched = [name for name in column if name in names]
+    return point_variables(
+        paths.time_s, paths.points[:, [column[name] for name in matched]], [str(name) for name in matched]
+    )
 
 
 def read_joint_angles(path: Path) -> Variables:
@@ -113,51 +116,51 @@ def read_joint_angles(path: Path) -> Variables:
     values = table.numbers(wanted)
     if not (np.diff(values[:, 0]) > 0).all():
         raise ResultError(f"{path}: time_s must grow from line to line; sort by time")
-    return of_joint_angles(values[:, 0], values[:, 1:].reshape(len(values), len(joints), 3), joints)
+    return joint_angle_variables(values[:, 0], values[:, 1:].reshape(len(values), len(joints), 3), joints)
 
 
-def turned_alike(motion: Motion, R: Array, time_s: Array, symmetries: Sequence[Array]) -> Array:
-    """Return a motion's orientations (n, 3, 3) turned by the one symmetry that suits another's `R` (m, 3, 3) best."""
-    frames, rows, _ = matched(motion.time_s, time_s)
-    alike = motion.R[:, None] @ np.stack(list(symmetries))
-    angle = geodesic(alike[frames], R[rows][:, None])
-    return alike[:, int(np.argmin(np.nansum(angle**2, axis=0)))]
+def align_symmetry(motion: Motion, R: Array, time_s: Array, symmetries: Sequence[Array]) -> Array:
+    """Return a motion's orientations (n, 3, 3) under the one symmetry that best matches a reference R (m, 3, 3)."""
+    frames, rows, _ = match_times(motion.time_s, time_s)
+    equivalent_R = motion.R[:, None] @ np.stack(list(symmetries))
+    angle = geodesic(equivalent_R[frames], R[rows][:, None])
+    return equivalent_R[:, int(np.argmin(np.nansum(angle**2, axis=0)))]
 
 
-def side_by_side(sources: Sequence[Variables], what: str) -> list[Series]:
-    """Put the variables that all sources have beside one another, at the times of the first that all have.
+def common_series(sources: Sequence[Variables], names_text: str) -> list[Series]:
+    """Return the variables that all sources share as series, at the times of the first that all share.
 
-    Angles lie within half a turn of the last source's. A variable of several players becomes one series. The
-    coordinates of all joints together, and their turns, become three more each, with the joints as individuals. Raises
-    ResultError where there is no time or no variable in common; `what` names the sources in it.
+    Angles are unwrapped to within 180 degrees of the last source's. A variable of several players becomes one series.
+    The coordinates of all joints, and their angles, are also pooled: three more series each, with joints as
+    individuals. Raises ResultError without a common time or variable; `names_text` names the sources in it.
     """
     first, rows = sources[0], [np.arange(len(sources[0].time_s))]
     for source in sources[1:]:
-        frames, theirs, _ = matched(first.time_s, source.time_s)
-        kept = np.isin(rows[0], frames)
-        rows = [each[kept] for each in rows] + [theirs[np.isin(frames, rows[0])]]
+        frames, theirs, _ = match_times(first.time_s, source.time_s)
+        is_common = np.isin(rows[0], frames)
+        rows = [each[is_common] for each in rows] + [theirs[np.isin(frames, rows[0])]]
     keys = [key for key in first.columns if all(key in source.columns for source in sources[1:])]
     if not len(rows[0]) or not keys:
         missing, spans = "time" if keys else "variable", ", ".join(span(source.time_s) for source in sources)
-        raise ResultError(f"{what} have no {missing} in common ({spans}); give those of one recording")
-    found: dict[str, list[Series]] = {}
+        raise ResultError(f"{names_text} have no {missing} in common ({spans}); give those of one recording")
+    series: dict[str, list[Series]] = {}
     for name, individual in keys:
         columns = [source.columns[name, individual][at] for source, at in zip(sources, rows, strict=True)]
         if name in first.angles:
             last = columns[-1]
-            columns = [last + np.rad2deg(wrapped(np.deg2rad(column - last))) for column in columns]
+            columns = [last + np.rad2deg(wrap(np.deg2rad(column - last))) for column in columns]
         unit = "deg" if name in first.angles else "mm"
         values = np.stack(columns, axis=1)
-        found.setdefault(name, []).append(Series(name, unit, values, np.full(len(values), individual)))
+        series.setdefault(name, []).append(Series(name, unit, values, np.full(len(values), individual)))
         joint, _, axis = name.rpartition(" ")
         if joint:
-            whose = joint if individual == BODY else f"{individual}, {joint}"
-            pooled = Series(f"{_POOLED[unit]} {axis}", unit, values, np.full(len(values), whose))
-            found.setdefault(pooled.name, []).append(pooled)
-    return [_together(parts) for parts in found.values()]
+            owner = joint if individual == BODY else f"{individual}, {joint}"
+            pooled = Series(f"{_POOLED[unit]} {axis}", unit, values, np.full(len(values), owner))
+            series.setdefault(pooled.name, []).append(pooled)
+    return [_concatenate(parts) for parts in series.values()]
 
 
-def _together(parts: Sequence[Series]) -> Series:
+def _concatenate(parts: Sequence[Series]) -> Series:
     return Series(
         parts[0].name,
         parts[0].unit,
@@ -166,20 +169,20 @@ def _together(parts: Sequence[Series]) -> Series:
     )
 
 
-def of_jumps(pairs: Sequence[tuple[Jump, Jump | None]]) -> list[Series]:
-    """Put measured and true jumps beside one another: heights [mm], times [ms]; each jump is an individual."""
-    found = []
+def jump_series(pairs: Sequence[tuple[Jump, Jump | None]]) -> list[Series]:
+    """Return measured and true jumps as series: heights [mm], times [ms]; each jump is an individual."""
+    series = []
     for name in (*HEIGHTS, "takeoff_s", "landing_s", "flight_s"):
         values = [
-            [math.nan if got is None else getattr(got, name).value, getattr(true, name).value] for true, got in pairs
+            [math.nan if jump is None else getattr(jump, name).value, getattr(true, name).value] for true, jump in pairs
         ]
         stem, _, unit = name.rpartition("_")
         who = np.array([f"{true.player} jump {true.number}" for true, _ in pairs], np.str_)
-        found.append(Series(f"jump {stem}", f"m{unit}", 1e3 * np.array(values).reshape(-1, 2), who))
-    return found
+        series.append(Series(f"jump {stem}", f"m{unit}", 1e3 * np.array(values).reshape(-1, 2), who))
+    return series
 
 
-def headline(series: Sequence[Series]) -> list[Series]:
-    """Return the variables that stand first: the root's and the pooled ones, and jumps."""
-    starts = (*"xyz", *ANGLES)
+def headline_series(series: Sequence[Series]) -> list[Series]:
+    """Return the headline variables: the root's, the pooled ones, and jumps."""
+    starts = (*"xyz", *ROOT_ANGLES)
     return [one for one in series if one.name in starts or one.name.startswith((*_POOLED.values(), "jump "))]

@@ -1,6 +1,6 @@
-"""Export: in come `Motion`, `Frames` with posed bodies, and a summary; out come what people open.
+"""Export: in come `Motion`, `Frames` with posed bodies, and a summary; out come files for people.
 
-Overlay videos of a body or of players, a sheet of what the cameras saw through the mask, figures, 3D model files,
+Overlay videos of a body or of players, a contact sheet of crops through the mask, figures, 3D model files,
 summary.json and a self-contained report.
 Knows no search and decides nothing.
 """
@@ -13,16 +13,16 @@ from airborne.export.players_overlay import PlayersOverlayVideos
 from airborne.export.players_report import players_warnings, write_players_report
 from airborne.export.report import write_report
 from airborne.export.sheet import ContactSheet
-from airborne.export.summary import headline, warnings, write_json
+from airborne.export.summary import body_warnings, headline, write_json
 
 __all__ = [
     "ContactSheet",
     "MatchingPicture",
     "OverlayVideos",
     "PlayersOverlayVideos",
+    "body_warnings",
     "headline",
     "players_warnings",
-    "warnings",
     "write_digitised",
     "write_errors",
     "write_figures",

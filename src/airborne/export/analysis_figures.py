@@ -9,26 +9,24 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from airborne.evaluation import Agreement, Series
 from airborne.export import panels
 from airborne.motion.smoothing import ResidualAnalysis
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _CHOSEN, _OTHER = "#d55e00", "#333333"
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#333333")
 
 
 def write_residuals(path: Path, analysis: ResidualAnalysis, used_hz: float | None = None) -> None:
-    """Draw what a Butterworth filter takes off, over its cut-off, with the line of noise and the cut-offs chosen.
+    """Draw the residual of a Butterworth filter over its cut-off, with the noise line and the cut-offs chosen.
 
-    `used_hz` is the cut-off that was used, where there was one.
+    `used_hz` is the cut-off that was applied, if any.
     """
     figure = Figure((panels.WIDTH_IN, 3.6), dpi=panels.DPI, layout="constrained")
     axes = figure.subplots()
-    _look(axes)
+    _style_axes(axes)
     start, slope = (1e3 * each for each in analysis.line)
     f, residual = analysis.cutoff_hz, 1e3 * analysis.residual
     axes.plot(f, residual, color=panels.LINE, label="residual, all joints and axes")
@@ -45,60 +43,60 @@ def write_residuals(path: Path, analysis: ResidualAnalysis, used_hz: float | Non
             axes.axvline(hz, color=colour, linestyle=style, linewidth=1.2, label=f"{label}: {hz:.1f} Hz")
     axes.set_xlim(0, f[-1])
     axes.set_xlabel("cut-off [Hz]", fontsize=panels.FONT_PT, color=panels.TEXT)
-    panels.name_panel(axes, "RMS residual [mm]")
+    panels.label_panel(axes, "RMS residual [mm]")
     axes.legend(fontsize=panels.FONT_PT - 1, frameon=False, labelcolor=panels.TEXT)
     figure.savefig(path)
 
 
-def write_bland_altman(path: Path, drawn: Sequence[tuple[Series, Agreement]]) -> None:
+def write_bland_altman(path: Path, variables: Sequence[tuple[Series, Agreement]]) -> None:
     """Draw differences over means, one panel a variable, with bias, limits of agreement and their 95 % intervals.
 
     Individuals differ in colour. Source: Bland and Altman 1986, 1999.
     """
-    figure, grid = _panels(drawn)
-    for axes, (series, row) in zip(grid, drawn, strict=False):
-        measured, reference = series.known().values.T
-        _points(axes, series.known(), (measured + reference) / 2, measured - reference)
-        for found, style in ((row.bias, "-"), (row.lower_limit, "--"), (row.upper_limit, "--")):
-            if np.isfinite(found.value):
-                axes.axhline(found.value, color=_OTHER, linestyle=style, linewidth=1.0)
-            if np.isfinite(found.low):
-                axes.axhspan(found.low, found.high, color=_OTHER, alpha=0.12, linewidth=0)
+    figure, grid = _panels(variables)
+    for axes, (series, row) in zip(grid, variables, strict=False):
+        measured, reference = series.drop_missing().values.T
+        _points(axes, series.drop_missing(), (measured + reference) / 2, measured - reference)
+        for estimate, style in ((row.bias, "-"), (row.lower_limit, "--"), (row.upper_limit, "--")):
+            if np.isfinite(estimate.value):
+                axes.axhline(estimate.value, color=_OTHER, linestyle=style, linewidth=1.0)
+            if np.isfinite(estimate.low):
+                axes.axhspan(estimate.low, estimate.high, color=_OTHER, alpha=0.12, linewidth=0)
         reach = [row.lower_limit.value, row.upper_limit.value, float(np.min(measured - reference))]
         span = np.nanmax([*reach, float(np.max(measured - reference))]) - np.nanmin(reach)
         middle = row.bias.value
         axes.set_ylim(middle - 0.75 * span, middle + 0.75 * span) if span > 0 else None
-        said = f"{row.bias.value:.3g} [{row.lower_limit.value:.3g}, {row.upper_limit.value:.3g}] {row.unit}"
-        axes.set_title(f"{row.name}\n{said}", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
+        title = f"{row.bias.value:.3g} [{row.lower_limit.value:.3g}, {row.upper_limit.value:.3g}] {row.unit}"
+        axes.set_title(f"{row.name}\n{title}", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
         axes.set_xlabel(f"mean [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
         axes.set_ylabel(f"difference [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
     figure.savefig(path)
 
 
-def write_identity(path: Path, drawn: Sequence[tuple[Series, Agreement]]) -> None:
+def write_identity(path: Path, variables: Sequence[tuple[Series, Agreement]]) -> None:
     """Draw measured over reference with the line of identity, one panel a variable."""
-    figure, grid = _panels(drawn)
-    for axes, (series, row) in zip(grid, drawn, strict=False):
-        measured, reference = series.known().values.T
+    figure, grid = _panels(variables)
+    for axes, (series, row) in zip(grid, variables, strict=False):
+        measured, reference = series.drop_missing().values.T
         ends = [float(min(measured.min(), reference.min())), float(max(measured.max(), reference.max()))]
         axes.plot(ends, ends, color=_OTHER, linewidth=0.8)
-        _points(axes, series.known(), reference, measured)
-        said = f"{row.name}\nICC(A,1) {row.icc.agreement.value:.4f}"
-        axes.set_title(said, fontsize=panels.FONT_PT - 1, color=panels.TEXT)
+        _points(axes, series.drop_missing(), reference, measured)
+        title = f"{row.name}\nICC(A,1) {row.icc.agreement.value:.4f}"
+        axes.set_title(title, fontsize=panels.FONT_PT - 1, color=panels.TEXT)
         axes.set_xlabel(f"reference [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
         axes.set_ylabel(f"measured [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
     figure.savefig(path)
 
 
-def _panels(drawn: Sequence[tuple[Series, Agreement]]) -> tuple[Figure, list[Axes]]:
-    n_columns = min(3, len(drawn))
-    n_rows = ceil(len(drawn) / n_columns)
+def _panels(variables: Sequence[tuple[Series, Agreement]]) -> tuple[Figure, list[Axes]]:
+    n_columns = min(3, len(variables))
+    n_rows = ceil(len(variables) / n_columns)
     size = panels.WIDTH_IN * n_columns / 3, 2.5 * n_rows
     figure = Figure(size, dpi=panels.DPI, layout="constrained")
     grid = figure.subplots(n_rows, n_columns, squeeze=False).ravel().tolist()
-    for axes in grid[: len(drawn)]:
-        _look(axes)
-    for axes in grid[len(drawn) :]:
+    for axes in grid[: len(variables)]:
+        _style_axes(axes)
+    for axes in grid[len(variables) :]:
         axes.set_axis_off()
     return figure, grid
 
@@ -111,7 +109,7 @@ def _points(axes: Axes, series: Series, x: Array, y: Array) -> None:
         axes.plot(x[own], y[own], "o", markersize=2.2, markeredgewidth=0, alpha=0.7, color=colour)
 
 
-def _look(axes: Axes) -> None:
+def _style_axes(axes: Axes) -> None:
     axes.tick_params(labelsize=panels.FONT_PT - 1, color=panels.TEXT, labelcolor=panels.TEXT)
     axes.grid(True, color=panels.FAINT, linewidth=0.6)
     axes.set_axisbelow(True)

@@ -8,12 +8,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body import BodyModel
-from airborne.export.takes import Take, part_paths, plain_names
-
-Array = NDArray[np.floating]
+from airborne.export.takes import Take, part_paths, portable_names
+from airborne.types import Array
 
 _CM = 100.0
 _Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # x, z, -y: at rest the body looks along z
@@ -27,7 +25,7 @@ def write_bvh(path: Path, take: Take) -> list[Path]:
     """
     stretches = take.stretches()
     paths = part_paths(path, len(stretches)) if stretches else []
-    angles = np.concatenate([take.turns[:, None], take.joint_angles], axis=1)
+    angles = np.concatenate([take.root_angles[:, None], take.joint_angles], axis=1)
     lines_above, order = _hierarchy(take.model)
     degrees = np.rad2deg(angles[:, order] * [1, -1, 1]).reshape(len(take), -1)
     values = np.concatenate([_CM * take.position @ _Y_UP.T, degrees], axis=1)
@@ -40,22 +38,22 @@ def write_bvh(path: Path, take: Take) -> list[Path]:
 
 
 def _hierarchy(model: BodyModel) -> tuple[list[str], list[int]]:
-    """Return the lines of the skeleton, and the segments in its order, each before what hangs on it."""
-    names = plain_names([segment.name for segment in model.segments])
+    """Return the lines of the skeleton, and the segments in depth-first order, each before its children."""
+    names = portable_names([segment.name for segment in model.segments])
     lines, order = ["HIERARCHY"], []
 
     def add(k: int, depth: int) -> None:
-        indent, segment, below = "\t" * depth, model.segments[k], np.flatnonzero(model.parents == k)
+        indent, segment, children = "\t" * depth, model.segments[k], np.flatnonzero(model.parents == k)
         order.append(k)
         lines.append(f"{indent}{'JOINT' if depth else 'ROOT'} {names[k]}")
         lines.append(f"{indent}{{")
-        lines.append(f"{indent}\tOFFSET {_place(segment.joint_m if depth else np.zeros(3))}")
-        places = "" if depth else "Xposition Yposition Zposition "
-        lines.append(f"{indent}\tCHANNELS {3 if depth else 6} {places}{_CHANNELS}")
-        for child in below:
+        lines.append(f"{indent}\tOFFSET {_offset(segment.joint_m if depth else np.zeros(3))}")
+        position = "" if depth else "Xposition Yposition Zposition "
+        lines.append(f"{indent}\tCHANNELS {3 if depth else 6} {position}{_CHANNELS}")
+        for child in children:
             add(int(child), depth + 1)
-        if not len(below):
-            lines.extend([f"{indent}\tEnd Site", f"{indent}\t{{", f"{indent}\t\tOFFSET {_tip(model, k)}"])
+        if not len(children):
+            lines.extend([f"{indent}\tEnd Site", f"{indent}\t{{", f"{indent}\t\tOFFSET {_end_site(model, k)}"])
             lines.append(f"{indent}\t}}")
         lines.append(f"{indent}}}")
 
@@ -63,13 +61,13 @@ def _hierarchy(model: BodyModel) -> tuple[list[str], list[int]]:
     return lines, order
 
 
-def _tip(model: BodyModel, k: int) -> str:
-    """Place the end of a last segment: its landmark farthest from the joint, or the middle of its first part."""
+def _end_site(model: BodyModel, k: int) -> str:
+    """Return the offset of a leaf's end site: its landmark farthest from the joint, or the middle of its first part."""
     segment = model.segments[k]
     own = [landmark.position_m for landmark in model.landmarks if landmark.segment == segment.name]
     middle = [segment.parts[0].segment_from_part.translation] if segment.parts else []
-    return _place(max([*own, *middle, np.zeros(3)], key=lambda place: float(np.linalg.norm(place))))
+    return _offset(max([*own, *middle, np.zeros(3)], key=lambda point: float(np.linalg.norm(point))))
 
 
-def _place(place_m: Array) -> str:
-    return " ".join(f"{x:.6f}" for x in _CM * (_Y_UP @ place_m) + 0.0)
+def _offset(offset_m: Array) -> str:
+    return " ".join(f"{x:.6f}" for x in _CM * (_Y_UP @ offset_m) + 0.0)

@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from airborne import __version__
 from airborne.errors import ResultError
 from airborne.export.takes import Take
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 LARGEST_RESIDUAL_MM = 100.0  # larger ones, and infinite ones, are written as this
 _BLOCK, _INTEL, _KEY = 512, 84, 0x50
 _LARGEST_WORD = 0xFFFF  # of the frame counts in the header
-_LARGEST_INTEGER = 32000  # of a coordinate, should the file be turned into one of integers
+_LARGEST_INTEGER = 32000  # of a coordinate, should the file be converted to integers
 _LABELS_A_PARAMETER = 255
 _MOST_BLOCKS = 255
 Value = str | list[str] | float | list[int]
@@ -54,7 +53,7 @@ def write_c3d(path: Path, takes: Sequence[Take]) -> None:
 
 
 def _scale_mm(points_mm: Array, sd_mm: Array) -> float:
-    """Return the step of the residuals; large enough for the largest one, and for coordinates as 16-bit integers."""
+    """Return the step of the residuals, large enough for the largest, and for coordinates as 16-bit integers."""
     largest = np.nanmax(np.abs(points_mm), initial=1.0)
     spread = min(np.nanmax(sd_mm, initial=0.0), LARGEST_RESIDUAL_MM)
     return float(np.float32(max(largest / _LARGEST_INTEGER, spread / 255)))
@@ -70,14 +69,14 @@ def _data(points_mm: Array, sd_mm: Array, scale_mm: float) -> NDArray[np.float32
     return data.astype("<f4")
 
 
-def _ends(take: Take) -> tuple[int, int]:
+def _frame_range(take: Take) -> tuple[int, int]:
     """Return the numbers of the first and the last frame."""
     last = int(take.frame[-1])
     return (int(take.frame[0]), last) if last <= _LARGEST_WORD else (1, len(take))
 
 
 def _header(take: Take, n_markers: int, scale_mm: float, data_block: int) -> bytes:
-    first, last = (min(frame, _LARGEST_WORD) for frame in _ends(take))
+    first, last = (min(frame, _LARGEST_WORD) for frame in _frame_range(take))
     words = struct.pack(
         "<BBHHHHHfHHf", 2, _KEY, n_markers, 0, first, last, 0, -scale_mm, data_block, 0, float(take.rate)
     )
@@ -87,7 +86,7 @@ def _header(take: Take, n_markers: int, scale_mm: float, data_block: int) -> byt
 def _parameters(takes: Sequence[Take], labels: list[str], scale_mm: float, *, data_block: int) -> bytes:
     """Lay out the parameter section in whole blocks."""
     take, rate = takes[0], float(takes[0].rate)
-    start, end = (list(struct.unpack("<HH", struct.pack("<I", frame))) for frame in _ends(take))
+    start, end = (list(struct.unpack("<HH", struct.pack("<I", frame))) for frame in _frame_range(take))
     groups: dict[str, tuple[str, dict[str, Value]]] = {
         "POINT": (
             "residual: standard deviation of the point",

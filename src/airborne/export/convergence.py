@@ -1,4 +1,4 @@
-"""Figures of an experiment made anew: how a score rises about the truth, and sequences of pictures side by side."""
+"""Figures of a repeated experiment: how a score rises about the truth, and sequences of images side by side."""
 
 from __future__ import annotations
 
@@ -9,20 +9,17 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from airborne.export import panels
-from airborne.export.palette import ESTIMATE_RGB, web
+from airborne.export.palette import ESTIMATE_RGB, hex_colour
+from airborne.types import Array, Image
 
-Array = NDArray[np.floating]
-Picture = NDArray[np.uint8]
-
-_LOOKS = (("-", web(ESTIMATE_RGB)), ("--", "#d55e00"))
+_LINE_STYLES = (("-", hex_colour(ESTIMATE_RGB)), ("--", "#d55e00"))
 _TITLE_PX, _GAP_PX, _FONT_SCALE = 18, 2, 0.42
 _GREY = (210, 210, 210)
 
 
-class Rise(NamedTuple):
+class ScoreCurve(NamedTuple):
     """A score over a variable's offset from its true value."""
 
     offset: Array  # (k,)
@@ -30,7 +27,9 @@ class Rise(NamedTuple):
     half_width: float  # how far the curve rises on both sides
 
 
-def write_convergence(path: Path, variables: Sequence[tuple[str, str]], rises: Mapping[str, Sequence[Rise]]) -> None:
+def write_convergence(
+    path: Path, variables: Sequence[tuple[str, str]], curves: Mapping[str, Sequence[ScoreCurve]]
+) -> None:
     """Draw the mean score over the poses, and its range, for each variable (name, unit); one line for each name.
 
     The bars at the bottom reach as far as the curves rise on both sides.
@@ -38,10 +37,10 @@ def write_convergence(path: Path, variables: Sequence[tuple[str, str]], rises: M
     """
     figure = Figure((panels.WIDTH_IN, 4.6), dpi=panels.DPI, layout="constrained")
     grid = figure.subplots(2, (len(variables) + 1) // 2, squeeze=False, sharey=True)
-    top = max(float(rise.scores.max()) for curves in rises.values() for rise in curves)
+    top = max(float(curve.scores.max()) for of_label in curves.values() for curve in of_label)
     for k, (axes, (name, unit)) in enumerate(zip(grid.ravel(), variables, strict=False)):
-        for row, ((style, colour), (label, curves)) in enumerate(zip(_LOOKS, rises.items(), strict=False)):
-            offset, scores, half = curves[k]
+        for row, ((style, colour), (label, of_label)) in enumerate(zip(_LINE_STYLES, curves.items(), strict=False)):
+            offset, scores, half = of_label[k]
             axes.fill_between(offset, scores.min(axis=0), scores.max(axis=0), color=colour, alpha=0.15, linewidth=0)
             axes.plot(offset, scores.mean(axis=0), style, color=colour, linewidth=1.2, label=label)
             axes.axvspan(-half, half, 0.02 * row, 0.02 * row + 0.015, color=colour, alpha=0.6, linewidth=0)
@@ -61,20 +60,20 @@ def write_convergence(path: Path, variables: Sequence[tuple[str, str]], rises: M
     figure.savefig(path)
 
 
-def write_sequences(path: Path, rows: Sequence[tuple[str, Sequence[Picture]]]) -> None:
-    """Lay rows of pictures (h, w, 3) RGB, all of one size, below each other, each row under its title; write a PNG.
+def write_sequences(path: Path, rows: Sequence[tuple[str, Sequence[Image]]]) -> None:
+    """Stack rows of images (h, w, 3) RGB, all of one size, each row under its title; write a PNG.
 
     Source: paper B, fig. 4.
     """
     height, width, _ = rows[0][1][0].shape
-    n = max(len(pictures) for _, pictures in rows)
+    n = max(len(images) for _, images in rows)
     sheet = np.zeros((len(rows) * (height + _TITLE_PX), n * (width + _GAP_PX) - _GAP_PX, 3), np.uint8)
-    for k, (title, pictures) in enumerate(rows):
+    for k, (title, images) in enumerate(rows):
         top = k * (height + _TITLE_PX)
         cv2.putText(
             sheet, title, (4, top + _TITLE_PX - 5), cv2.FONT_HERSHEY_SIMPLEX, _FONT_SCALE, _GREY, 1, cv2.LINE_AA
         )
-        for j, picture in enumerate(pictures):
+        for j, image in enumerate(images):
             left = j * (width + _GAP_PX)
-            sheet[top + _TITLE_PX : top + _TITLE_PX + height, left : left + width] = picture
+            sheet[top + _TITLE_PX : top + _TITLE_PX + height, left : left + width] = image
     path.write_bytes(cv2.imencode(".png", sheet[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes())

@@ -1,4 +1,4 @@
-"""One file of cameras or of points in pictures into another: told apart by content, with what got lost said."""
+"""Conversion of files of cameras or of image points: formats recognised by content, losses reported."""
 
 from __future__ import annotations
 
@@ -10,18 +10,24 @@ from pathlib import Path
 import numpy as np
 
 from airborne.cameras import Detections, Rig, read_detections, read_rig
-from airborne.cameras.detections import cameras_in, write_detections
-from airborne.cameras.files import UNITS, CalibrationFile, format_of_name, open_calibration, rig_of, write_rig
-from airborne.cameras.formats.dltdv import Digitisation, is_xypts, placed, read_digitisation, write_digitisation
-from airborne.cameras.formats.options import Given
-from airborne.cameras.units import odd_distances
+from airborne.cameras.detections import camera_names, write_detections
+from airborne.cameras.files import FORMAT_UNITS, CalibrationFile, build_rig, format_of_name, open_calibration, write_rig
+from airborne.cameras.formats.dltdv import (
+    Digitisation,
+    is_xypts,
+    read_digitisation,
+    triangulate_digitisation,
+    write_digitisation,
+)
+from airborne.cameras.formats.options import FileOptions
+from airborne.cameras.units import check_baselines
 from airborne.errors import AirborneError, CalibrationError
-from airborne.evaluation import Digitised, read_clicked_frames, write_clicked_frames
+from airborne.evaluation import DigitisedPoints, read_clicked_frames, write_clicked_frames
 from airborne.io.text import read_toml
 
-POINT_FORMATS = ("digitised", "dltdv", "npz", "openpose")
-FORMATS = (*UNITS, *POINT_FORMATS)
-LARGE = 0.01  # of a picture's longer side: a median residual beyond it comes from more than inexact clicks
+_POINT_FORMATS = ("digitised", "dltdv", "npz", "openpose")
+FORMATS = (*FORMAT_UNITS, *_POINT_FORMATS)
+_LARGE_RESIDUAL = 0.01  # of an image's longer side: a larger median residual has other causes than inexact clicks
 _MOST_NUMBERS = 20_000_000  # of a table of clicked points
 _PIXELS = frozenset({"--origin", "--pixel-base"})
 _NAMES = frozenset({"--cameras", "--calibration"})
@@ -34,40 +40,40 @@ _OTHERS = (
     ({"segment"}, "a body file"),
     ({"camera", "body"}, "a trial file, which names its calibration"),
     ({"camera"}, "a file of sources, by which `airborne calibrate` finds cameras"),
-)  # what stands in files and folders that hold neither cameras nor points in pictures
+)  # contents of files and folders that hold neither cameras nor image points
 _FROM: Mapping[str, frozenset[str]] = {
-    **dict.fromkeys(UNITS, frozenset({"--unit"})),
+    **dict.fromkeys(FORMAT_UNITS, frozenset({"--unit"})),
     "opencv": frozenset({"--unit", "--size"}),
     "dlt": frozenset({"--unit", "--size"}) | _PIXELS,
     "dltdv": frozenset({"--unit", "--size"}) | _PIXELS | _NAMES,
     "digitised": _NAMES,
     "npz": _NAMES,
     "openpose": _NAMES | {"--person"},
-}  # the options that say something about a file that is read
+}  # the options that apply to a file that is read
 _TO: Mapping[str, frozenset[str]] = {
     **dict.fromkeys(FORMATS, frozenset()),
     **{name: frozenset({"--to-unit"}) for name in ("aniposelib", "opencv", "easymocap")},
     "dlt": frozenset({"--to-unit", "--to-origin", "--to-pixel-base"}),
     "dltdv": frozenset({"--to-unit", "--to-origin", "--to-pixel-base", "--size", "--calibration"}),
-}  # and about a file that is written
+}  # and to a file that is written
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wishes:
-    """What the user says about the two files."""
+class ConversionOptions:
+    """What the user specifies about the two files."""
 
-    to: str | None = None  # one of FORMATS; None goes by the name of the file to write
-    source: Given = field(default_factory=Given)
-    target: Given = field(default_factory=Given)
+    to: str | None = None  # one of FORMATS; None: from the name of the file to write
+    source: FileOptions = field(default_factory=FileOptions)
+    target: FileOptions = field(default_factory=FileOptions)
     cameras: tuple[str, ...] = ()  # the names of the cameras of points
-    calibration: Path | None = None  # cameras by whom points are placed in the world
+    calibration: Path | None = None  # cameras that triangulate the points
     person: int | None = None  # of OpenPose's people
-    said: frozenset[str] = frozenset()  # the options that were given
+    given_options: frozenset[str] = frozenset()  # the options that were given
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conversion:
-    """What was done: a line each about what was read, what was written, what the new file does not hold, and doubts."""
+    """What was done: what was read, what was written, what the new file does not hold, and warnings, a line each."""
 
     read: str
     written: str
@@ -81,21 +87,21 @@ class Conversion:
         return "\n".join([f"read: {self.read}", f"written: {self.written}", *lost, *notes])
 
 
-def convert(source: Path, target: Path, wishes: Wishes) -> Conversion:
-    """Read one file and write the other. Raises AirborneError where one cannot be, or an option says nothing."""
+def convert(source: Path, target: Path, options: ConversionOptions) -> Conversion:
+    """Read one file and write the other. Raises AirborneError where one cannot be, or an option does not apply."""
     if source.exists() and target.exists() and source.samefile(target):
         raise AirborneError(f"{target} is the file that is read; give another name for what is written")
-    kind = _points_kind(source)
+    kind = _point_format(source)
     if kind is None:
-        return _convert_rig(_opened(source), target, wishes)
-    return _convert_points(source, kind, target, wishes)
+        return _convert_rig(_open_calibration(source), target, options)
+    return _convert_points(source, kind, target, options)
 
 
-def _opened(source: Path) -> CalibrationFile:
-    """Open a calibration. Raises AirborneError, saying what a file looks like that is none."""
-    found = _names_in(source)
+def _open_calibration(source: Path) -> CalibrationFile:
+    """Open a calibration. Raises AirborneError, saying what another file looks like."""
+    present = _names_in(source)
     for names, what in _OTHERS:
-        if names <= found:
+        if names <= present:
             raise AirborneError(f"{source} looks like {what}; convert takes {_EXPECTED}")
     try:
         return open_calibration(source)
@@ -104,7 +110,7 @@ def _opened(source: Path) -> CalibrationFile:
 
 
 def _names_in(source: Path) -> set[str]:
-    """Return a folder's files, a table's columns, or what stands at the top of a TOML file, but for cameras."""
+    """Return a folder's files, a table's columns, or the top-level keys of a TOML file, except cameras."""
     if source.is_dir():
         return {path.name for path in source.iterdir()}
     try:
@@ -115,33 +121,33 @@ def _names_in(source: Path) -> set[str]:
         return set(_first_line(source).split(","))
 
 
-def _convert_rig(file: CalibrationFile, target: Path, wishes: Wishes) -> Conversion:
-    to = wishes.to or format_of_name(target)
-    if to in POINT_FORMATS:
+def _convert_rig(file: CalibrationFile, target: Path, options: ConversionOptions) -> Conversion:
+    to = options.to or format_of_name(target)
+    if to in _POINT_FORMATS:
         raise AirborneError(
-            f"{file.where} holds cameras, which cannot be written as {to}; choose from {', '.join(UNITS)}"
+            f"{file.where} holds cameras, which cannot be written as {to}; choose from {', '.join(FORMAT_UNITS)}"
         )
-    _check_options(wishes, file.format, to)
-    rig = rig_of(file, wishes.source)
-    lost = write_rig(target, rig, format=to, unit=wishes.target.unit, pixels=wishes.target.pixels)
+    _check_options(options, file.format, to)
+    rig = build_rig(file, options.source)
+    lost = write_rig(target, rig, format=to, unit=options.target.unit, pixels=options.target.pixels)
     return Conversion(
         read=f"{file.where}, {file.format}, {len(rig)} cameras: {', '.join(rig.names)}",
-        written=f"{target}, {to}{_convention(to, wishes.target)}",
+        written=f"{target}, {to}{_convention(to, options.target)}",
         lost=lost,
-        notes=tuple(f"{finding.what}; is --unit {wishes.source.unit} right?" for finding in odd_distances(rig)),
+        notes=tuple(f"{finding.what}; is --unit {options.source.unit} right?" for finding in check_baselines(rig)),
     )
 
 
-def _convert_points(source: Path, kind: str, target: Path, wishes: Wishes) -> Conversion:
-    to = wishes.to or _points_format_of_name(target, source)
-    if to not in POINT_FORMATS:
-        raise AirborneError(f"{source} holds points in pictures, not cameras; write one of {', '.join(POINT_FORMATS)}")
-    _check_options(wishes, kind, to)
-    rig = read_rig(wishes.calibration) if wishes.calibration else None
-    read = _read_points(source, kind, wishes, rig)
-    spot = placed(read.points, rig) if rig else read
+def _convert_points(source: Path, kind: str, target: Path, options: ConversionOptions) -> Conversion:
+    to = options.to or _points_format_of_name(target, source)
+    if to not in _POINT_FORMATS:
+        raise AirborneError(f"{source} holds points in pictures, not cameras; write one of {', '.join(_POINT_FORMATS)}")
+    _check_options(options, kind, to)
+    rig = read_rig(options.calibration) if options.calibration else None
+    read = _read_points(source, kind, options, rig)
+    triangulated = triangulate_digitisation(read.points, rig) if rig else read
     if to == "dltdv":
-        written, lost = _write_dltdv(target, spot, wishes, rig)
+        written, lost = _write_dltdv(target, triangulated, options, rig)
     elif to == "digitised":
         written, lost = _write_digitised(target, read.points), ()
     else:
@@ -156,24 +162,24 @@ def _convert_points(source: Path, kind: str, target: Path, wishes: Wishes) -> Co
     notes = "".join(f"; {note}" for note in read.points.notes)
     return Conversion(
         read=f"{source}, {kind}, {counts}{notes}",
-        written=f"{written}, {to}{_convention(to, wishes.target)}",
+        written=f"{written}, {to}{_convention(to, options.target)}",
         lost=lost,
-        notes=_residual(spot, rig) if rig else (),
+        notes=_residual_note(triangulated, rig) if rig else (),
     )
 
 
-def _residual(digitisation: Digitisation, rig: Rig) -> tuple[str, ...]:
-    """Say how well the places that cameras give to points explain their pixels, where two cameras or more see any."""
+def _residual_note(digitisation: Digitisation, rig: Rig) -> tuple[str, ...]:
+    """Report the median reprojection residual of the triangulated points, where two cameras or more see any."""
     if digitisation.residual_px is None or not np.isfinite(digitisation.residual_px).any():
         return ()
     median_px = float(np.nanmedian(digitisation.residual_px))
-    is_large = median_px > LARGE * max(max(camera.size) for camera in rig)
-    doubt = "; this is large: are --origin, the order of --cameras and the frames right?" if is_large else ""
-    return (f"the points' places leave a median residual of {median_px:.2f} px{doubt}",)
+    is_large = median_px > _LARGE_RESIDUAL * max(max(camera.size) for camera in rig)
+    question = "; this is large: are --origin, the order of --cameras and the frames right?" if is_large else ""
+    return (f"the points' places leave a median residual of {median_px:.2f} px{question}",)
 
 
-def _points_kind(source: Path) -> str | None:
-    """Tell which kind of points a file holds; None for anything else."""
+def _point_format(source: Path) -> str | None:
+    """Recognise the format of image points in a file; None for anything else."""
     if source.is_dir():
         return "openpose" if any(source.glob("*/*.json")) and not any(source.glob("*.y*ml")) else None
     first = _first_line(source)
@@ -206,63 +212,68 @@ def _points_format_of_name(target: Path, source: Path) -> str:
     )
 
 
-def _check_options(wishes: Wishes, kind: str, to: str) -> None:
-    idle = sorted(wishes.said - _FROM[kind] - _TO.get(to, frozenset()))
-    if idle:
-        about = f"a {to} file to write" if idle[0].startswith("--to-") else f"a {kind} file to read"
-        raise AirborneError(f"{idle[0]} says nothing about {about}; leave it out")
+def _check_options(options: ConversionOptions, kind: str, to: str) -> None:
+    unused = sorted(options.given_options - _FROM[kind] - _TO.get(to, frozenset()))
+    if unused:
+        about = f"a {to} file to write" if unused[0].startswith("--to-") else f"a {kind} file to read"
+        raise AirborneError(f"{unused[0]} does not apply to {about}; leave it out")
 
 
-def _read_points(source: Path, kind: str, wishes: Wishes, rig: Rig | None) -> Digitisation:
-    names = wishes.cameras or (rig.names if rig else ())
+def _read_points(source: Path, kind: str, options: ConversionOptions, rig: Rig | None) -> Digitisation:
+    names = options.cameras or (rig.names if rig else ())
     if kind == "dltdv":
-        return read_digitisation(source, _with_sizes(wishes.source, rig), names)
+        return read_digitisation(source, _with_sizes(options.source, rig), names)
     if kind == "digitised":
         if not names:
             raise AirborneError(f"{source}: say which cameras its columns are of: --cameras cam1,cam2,...")
         return Digitisation(points=_by_frame(read_clicked_frames(source, names), names))
-    return Digitisation(points=read_detections(source, names or cameras_in(source), person=wishes.person))
+    return Digitisation(points=read_detections(source, names or camera_names(source), person=options.person))
 
 
-def _by_frame(digitised: Digitised, cameras: tuple[str, ...]) -> Detections:
-    """Put clicked points at their own frames, from 0."""
+def _by_frame(digitised: DigitisedPoints, cameras: tuple[str, ...]) -> Detections:
+    """Put clicked points into an array by frame number, from 0."""
     index = digitised.index
     is_huge = int(index.max()) * digitised.px[0].size > _MOST_NUMBERS
     if len(set(index.tolist())) < len(index) or index.min() < 0 or is_huge:
-        raise AirborneError(f"the frames of the clicked points go from {index.min()} to {index.max()}; mend them")
+        raise AirborneError(f"the frames of the clicked points go from {index.min()} to {index.max()}; correct them")
     px = np.full((index.max() + 1, *digitised.px.shape[1:]), np.nan)
     px[index] = digitised.px
-    return Detections.of_clicks(cameras, digitised.points, px)
+    return Detections.from_clicks(cameras, digitised.points, px)
 
 
 def _write_digitised(target: Path, points: Detections) -> str:
     rows = np.flatnonzero(points.visibility.any(axis=(1, 2)))
-    write_clicked_frames(target, Digitised(index=rows, points=points.points, px=points.px[rows]), points.cameras)
+    write_clicked_frames(target, DigitisedPoints(index=rows, points=points.points, px=points.px[rows]), points.cameras)
     return str(target)
 
 
-def _write_dltdv(target: Path, read: Digitisation, wishes: Wishes, rig: Rig | None) -> tuple[str, tuple[str, ...]]:
-    given = _with_sizes(replace(wishes.target, size=wishes.source.size), rig)
+def _write_dltdv(
+    target: Path, read: Digitisation, options: ConversionOptions, rig: Rig | None
+) -> tuple[str, tuple[str, ...]]:
+    given = _with_sizes(replace(options.target, size=options.source.size), rig)
     files = write_digitisation(target, read, given)
-    return ", ".join(map(str, files)), (*_renamed("pt", read.points.points), *_renamed("cam", read.points.cameras))
+    return ", ".join(map(str, files)), (
+        *_name_changes("pt", read.points.points),
+        *_name_changes("cam", read.points.cameras),
+    )
 
 
-def _renamed(stem: str, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Say that names become numbers."""
+def _name_changes(stem: str, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Report that names become numbers."""
     if names == tuple(f"{stem}{k}" for k in range(1, len(names) + 1)):
         return ()
     listed = ", ".join(names if len(names) < 6 else (*names[:3], "...", names[-1]))
     return (f"names: {stem}1 to {stem}{len(names)} for {listed}",)
 
 
-def _with_sizes(given: Given, rig: Rig | None) -> Given:
-    """Add the sizes of the rig's pictures where none were given."""
+def _with_sizes(given: FileOptions, rig: Rig | None) -> FileOptions:
+    """Add the image sizes of the rig where none are given."""
     return replace(given, size={camera.name: camera.size for camera in rig}) if rig and given.size is None else given
 
 
-def _convention(to: str, given: Given) -> str:
-    """Say in which unit and from where pixels are counted, where the format leaves a choice."""
+def _convention(to: str, given: FileOptions) -> str:
+    """Describe the unit and the pixel origin, where the format leaves a choice."""
     if to not in ("dlt", "dltdv"):
-        units = UNITS.get(to, ())
+        units = FORMAT_UNITS.get(to, ())
         return f", lengths in {given.unit or units[0]}" if len(units) > 1 else ""
     return f", lengths in {given.unit or 'm'}, pixels from the {given.pixels.corner}, the first is {given.pixels.base}"

@@ -18,23 +18,28 @@ from numpy.typing import NDArray
 from airborne.body import BodyModel
 from airborne.evaluation import DigitisedPoses, Truth
 from airborne.export import panels
-from airborne.export.palette import REFERENCE_RGB, web
-from airborne.geometry.rotations import angles_from_matrix, geodesic, unwrapped, wrapped
-from airborne.motion import Motion, angles, flight, has_inertias, joint_angles
+from airborne.export.palette import REFERENCE_RGB, hex_colour
+from airborne.geometry.rotations import angles_from_matrix, geodesic, unwrap, wrap
+from airborne.motion import Motion, has_inertias, joint_angles, measure_flight, root_angles
+from airborne.types import Array, Mask
 
-Array = NDArray[np.floating]
 Rows = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
-_AXIS_LOOKS = (("x", "-", "#0072b2"), ("y", "--", "#cc79a7"), ("z", ":", "#333333"))
-_CLICKED = {"linestyle": "", "marker": "o", "markersize": 4.5, "markerfacecolor": "none", "color": web(REFERENCE_RGB)}
+_AXIS_STYLES = (("x", "-", "#0072b2"), ("y", "--", "#cc79a7"), ("z", ":", "#333333"))
+_CLICKED = {
+    "linestyle": "",
+    "marker": "o",
+    "markersize": 4.5,
+    "markerfacecolor": "none",
+    "color": hex_colour(REFERENCE_RGB),
+}
 _FLEXION = {  # of a person: the segment that a joint turns, the joint, and the sign of its x angle in flexion
     "upper_arm": ("shoulder", -1.0),
     "forearm": ("elbow", -1.0),
     "thigh": ("hip", -1.0),
     "shank": ("knee", 1.0),
 }
-_MOST_JOINTS = 8  # of a body that is no person
+_MOST_JOINTS = 8  # of a body that is not a person
 
 
 def write_figures(
@@ -49,7 +54,7 @@ def write_figures(
     """Write every figure that the data allow into a run's folder.
 
     Always pose.png and score.png; joints.png and flight.png where the body has joints and masses; errors.png and
-    digitised.png where there is something to compare with. `symmetries` (3, 3) are the body's, the identity among them,
+    digitised.png where there is a reference. `symmetries` (3, 3) are the body's, the identity among them,
     as in `evaluation.compare`. Raises ResultError where the motion is another body's.
     """
     write_pose(folder / "pose.png", motion)
@@ -67,24 +72,24 @@ def write_figures(
 def write_pose(path: Path, motion: Motion) -> None:
     """Draw x, y, z [m] and somersault, tilt, twist [deg] over time with bands of two standard deviations.
 
-    Lost frames are gaps, shaded; frames in which some direction cannot be seen are hatched.
+    Lost frames are gaps, shaded; frames in which some direction is unobservable are hatched.
     """
-    table, singular, unseen = angles(motion), _singular(motion), _unseen(motion)
+    table, singular, unobservable = root_angles(motion), _singular(motion), _unobservable_frames(motion)
     figure, grid = panels.panel_figure(3, 2, row_in=1.75)
     for k, (axis, angle) in enumerate(zip("xyz", panels.ANGLES, strict=True)):
         left, right = grid[k]
         for axes, label, values, sd, mask in (
-            (left, f"{axis} [m]", motion.position[:, k], motion.position_sd[:, k], unseen[0]),
-            (right, f"{angle} [°]", table[angle].to_numpy(), table[f"{angle}_sd"].to_numpy(), unseen[1]),
+            (left, f"{axis} [m]", motion.position[:, k], motion.position_sd[:, k], unobservable[0]),
+            (right, f"{angle} [°]", table[angle].to_numpy(), table[f"{angle}_sd"].to_numpy(), unobservable[1]),
         ):
             panels.draw_band(axes, motion.time_s, values, sd)
             panels.draw_estimate(axes, motion, values)
-            panels.shade(axes, motion.time_s, mask, panels.UNSEEN)
-            panels.name_panel(axes, label)
+            panels.shade_spans(axes, motion.time_s, mask, panels.UNOBSERVABLE_STYLE)
+            panels.label_panel(axes, label)
         if angle != "tilt":
-            panels.shade(right, motion.time_s, singular, panels.SINGULAR)
-    handles = [*panels.unseen_handles(unseen[0] | unseen[1]), *panels.singular_handles(singular)]
-    panels.finish(figure, path, motion, [panels.band_handle("± 2 standard deviations"), *handles])
+            panels.shade_spans(right, motion.time_s, singular, panels.SINGULAR_STYLE)
+    handles = [*panels.unobservable_handles(unobservable[0] | unobservable[1]), *panels.singular_handles(singular)]
+    panels.save_figure(figure, path, motion, [panels.band_handle("± 2 standard deviations"), *handles])
 
 
 def write_score(path: Path, motion: Motion) -> None:
@@ -92,58 +97,61 @@ def write_score(path: Path, motion: Motion) -> None:
     figure, grid = panels.panel_figure(3, 1, row_in=1.6)
     (score,), (position,), (rotation,) = grid
     panels.draw_estimate(score, motion, motion.score)
-    panels.name_panel(score, "score [grey levels]")
+    panels.label_panel(score, "score [grey levels]")
     panels.begin_at_zero(score)
     for axes, sd, label in (
         (position, 1e3 * motion.position_sd, "position sd [mm]"),
         (rotation, np.rad2deg(motion.rotation_sd), "rotation sd [°]"),
     ):
-        for k, (name, style, colour) in enumerate(_AXIS_LOOKS):
+        for k, (name, style, colour) in enumerate(_AXIS_STYLES):
             finite = np.where(np.isfinite(sd[:, k]), sd[:, k], np.nan)
             axes.plot(motion.time_s, finite, style, marker=".", markersize=3, color=colour, label=f"world {name}")
-        panels.name_panel(axes, label)
+        panels.label_panel(axes, label)
         panels.shade_lost(axes, motion)
-        panels.shade(axes, motion.time_s, _is_unseen(sd), panels.UNSEEN)
+        panels.shade_spans(axes, motion.time_s, _is_unobservable(sd), panels.UNOBSERVABLE_STYLE)
         panels.begin_at_zero(axes)
     position.legend(fontsize=panels.FONT_PT - 1, frameon=False, ncols=3, labelcolor=panels.TEXT)
-    panels.finish(figure, path, motion, panels.unseen_handles(np.logical_or(*_unseen(motion))))
+    panels.save_figure(figure, path, motion, panels.unobservable_handles(np.logical_or(*_unobservable_frames(motion))))
 
 
 def write_joints_figure(path: Path, motion: Motion, model: BodyModel) -> None:
-    """Draw how the main joints are bent over time [deg], left beside right, with bands of two standard deviations.
+    """Draw the angles of the main joints over time [deg], left beside right, with bands of two standard deviations.
 
     Of a person shoulders, elbows, hips and knees: the x angle, with its sign such that flexion is positive. Of another
     body the x angles of its first joints. Raises ResultError where the motion is another body's.
     """
-    table, panes = joint_angles(motion, model), _panes(motion.joints)
-    hidden, singular = np.zeros((2, len(motion)), bool)
-    figure, grid = panels.panel_figure(-(-len(panes) // 2), 2, row_in=1.6)
+    table, joint_panels = joint_angles(motion, model), _joint_panels(motion.joints)
+    unobservable, singular = np.zeros((2, len(motion)), bool)
+    figure, grid = panels.panel_figure(-(-len(joint_panels) // 2), 2, row_in=1.6)
     cells = [axes for row in grid for axes in row]
-    for axes, (segment, label, sign) in zip(cells, panes, strict=False):
+    for axes, (segment, label, sign) in zip(cells, joint_panels, strict=False):
         of_joint = table.sel(joint=segment)
         values, sd = (of_joint[name].sel(axis="x").to_numpy() for name in ("angle", "angle_sd"))
-        is_hidden, is_singular = np.isinf(sd), of_joint["is_singular"].to_numpy() & motion.has_pose
+        is_unobservable, is_singular = np.isinf(sd), of_joint["is_singular"].to_numpy() & motion.has_pose
         panels.draw_band(axes, motion.time_s, sign * values, sd)
         panels.draw_estimate(axes, motion, sign * values)
-        panels.shade(axes, motion.time_s, is_hidden, panels.UNSEEN)
-        panels.shade(axes, motion.time_s, is_singular, panels.SINGULAR)
-        panels.name_panel(axes, f"{label} [°]")
-        hidden, singular = hidden | is_hidden, singular | is_singular
-    for axes in cells[len(panes) :]:
+        panels.shade_spans(axes, motion.time_s, is_unobservable, panels.UNOBSERVABLE_STYLE)
+        panels.shade_spans(axes, motion.time_s, is_singular, panels.SINGULAR_STYLE)
+        panels.label_panel(axes, f"{label} [°]")
+        unobservable, singular = unobservable | is_unobservable, singular | is_singular
+    for axes in cells[len(joint_panels) :]:
         axes.set_axis_off()
-    handles = [*panels.unseen_handles(hidden), *panels.singular_handles(singular, "y near ±90°: x and z mix")]
-    panels.finish(figure, path, motion, [panels.band_handle("± 2 standard deviations"), *handles])
+    handles = [
+        *panels.unobservable_handles(unobservable),
+        *panels.singular_handles(singular, "y near ±90°: x and z mix"),
+    ]
+    panels.save_figure(figure, path, motion, [panels.band_handle("± 2 standard deviations"), *handles])
 
 
-def _panes(joints: Sequence[str]) -> list[tuple[str, str, float]]:
+def _joint_panels(joints: Sequence[str]) -> list[tuple[str, str, float]]:
     """Choose the joints to draw: segment, label and sign of the x angle."""
     person = [
         (f"{segment}_{side}", f"{joint} {side}", sign)
         for segment, (joint, sign) in _FLEXION.items()
         for side in ("left", "right")
     ]
-    found = [pane for pane in person if pane[0] in joints]
-    return found or [(segment, f"{segment}, x", 1.0) for segment in joints[:_MOST_JOINTS]]
+    present = [panel for panel in person if panel[0] in joints]
+    return present or [(segment, f"{segment}, x", 1.0) for segment in joints[:_MOST_JOINTS]]
 
 
 def write_flight_figure(path: Path, motion: Motion, model: BodyModel) -> None:
@@ -151,39 +159,39 @@ def write_flight_figure(path: Path, motion: Motion, model: BodyModel) -> None:
 
     Raises BodyError where a segment has no inertia, ResultError where the motion is another body's.
     """
-    table = flight(motion, model)
+    table = measure_flight(motion, model)
     com, momentum = (
         [table[name].sel(space=axis).to_numpy() for name in (quantity, f"{quantity}_sd")]
         for quantity, axis in (("com", "z"), ("angular_momentum", list("xyz")))
     )
-    drawn = [("height of centre of mass [m]", *com)]
-    drawn += [(f"L about {axis} [kg m²/s]", momentum[0][:, k], momentum[1][:, k]) for k, axis in enumerate("xyz")]
+    curves = [("height of centre of mass [m]", *com)]
+    curves += [(f"L about {axis} [kg m²/s]", momentum[0][:, k], momentum[1][:, k]) for k, axis in enumerate("xyz")]
     figure, grid = panels.panel_figure(2, 2, row_in=2.1)
     cells = [axes for row in grid for axes in row]
-    for axes, (label, values, sd) in zip(cells, drawn, strict=True):
+    for axes, (label, values, sd) in zip(cells, curves, strict=True):
         panels.draw_band(axes, motion.time_s, values, sd)
         panels.draw_estimate(axes, motion, values)
-        panels.shade(axes, motion.time_s, np.isinf(sd), panels.UNSEEN)
-        panels.name_panel(axes, label)
+        panels.shade_spans(axes, motion.time_s, np.isinf(sd), panels.UNOBSERVABLE_STYLE)
+        panels.label_panel(axes, label)
     momenta = cells[1:]
     low, high = zip(*(axes.get_ylim() for axes in momenta), strict=True)
     for axes in momenta:  # one scale, so that the components can be compared
         axes.set_ylim(min(low), max(high))
-    panels.finish(figure, path, motion, [panels.band_handle("± 2 standard deviations")])
+    panels.save_figure(figure, path, motion, [panels.band_handle("± 2 standard deviations")])
 
 
 def write_errors(path: Path, motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> None:
     """Draw estimate minus truth, position [mm] and angles [deg], with bands of two standard deviations about zero.
 
-    A frame goes with the true pose nearest in time, if within half a frame. `symmetries` (3, 3) as in
-    `evaluation.compare`: the motion is shown turned by the one that suits the whole run best.
+    A frame is matched with the true pose nearest in time, if within half a frame. `symmetries` (3, 3) as in
+    `evaluation.compare`: the motion is aligned by the one that suits the whole run best.
     """
     rows, truth_rows = _nearest(motion.time_s, truth.time_s)
-    reference = _reference(motion, rows, truth.position[truth_rows], truth.R[truth_rows])
-    motion = _turned_alike(motion, reference, symmetries)
-    table, singular = angles(motion), _singular(motion)
+    reference = _align_rows(motion, rows, truth.position[truth_rows], truth.R[truth_rows])
+    motion = _align_by_symmetry(motion, reference, symmetries)
+    table, singular = root_angles(motion), _singular(motion)
     position_mm, angle_deg = _differences(motion, reference)
-    zero, unseen = np.zeros(len(motion)), _unseen(motion)
+    zero, unobservable = np.zeros(len(motion)), _unobservable_frames(motion)
     figure, grid = panels.panel_figure(2, 3, row_in=2.1)
     for k, (axis, angle) in enumerate(zip("xyz", panels.ANGLES, strict=True)):
         above, below = grid[0][k], grid[1][k]
@@ -191,27 +199,27 @@ def write_errors(path: Path, motion: Motion, truth: Truth, symmetries: Sequence[
         panels.draw_band(below, motion.time_s, zero, table[f"{angle}_sd"].to_numpy())
         _draw_error(above, motion, position_mm[:, k])
         _draw_error(below, motion, angle_deg[:, k])
-        panels.shade(above, motion.time_s, unseen[0], panels.UNSEEN)
-        panels.shade(below, motion.time_s, unseen[1], panels.UNSEEN)
-        panels.name_panel(above, f"error of {axis} [mm]")
-        panels.name_panel(below, f"error of {angle} [°]")
+        panels.shade_spans(above, motion.time_s, unobservable[0], panels.UNOBSERVABLE_STYLE)
+        panels.shade_spans(below, motion.time_s, unobservable[1], panels.UNOBSERVABLE_STYLE)
+        panels.label_panel(above, f"error of {axis} [mm]")
+        panels.label_panel(below, f"error of {angle} [°]")
         if angle != "tilt":
-            panels.shade(below, motion.time_s, singular, panels.SINGULAR)
-    handles = [*panels.unseen_handles(unseen[0] | unseen[1]), *panels.singular_handles(singular)]
-    panels.finish(figure, path, motion, [panels.band_handle("± 2 sd about zero"), *handles])
+            panels.shade_spans(below, motion.time_s, singular, panels.SINGULAR_STYLE)
+    handles = [*panels.unobservable_handles(unobservable[0] | unobservable[1]), *panels.singular_handles(singular)]
+    panels.save_figure(figure, path, motion, [panels.band_handle("± 2 sd about zero"), *handles])
 
 
 def write_digitised(path: Path, motion: Motion, poses: DigitisedPoses, symmetries: Sequence[Array]) -> None:
     """Draw the tracked pose with the poses from points clicked by hand, and their difference below.
 
-    Source: paper B, figs 9 and 10. Frames go together by number; `symmetries` as in `write_errors`.
+    Source: paper B, figs 9 and 10. Frames are matched by number; `symmetries` as in `write_errors`.
     """
     _, rows, pose_rows = np.intersect1d(motion.index, poses.index, return_indices=True)
-    reference = _reference(motion, rows, poses.position[pose_rows], poses.R[pose_rows])
-    motion = _turned_alike(motion, reference, symmetries)
-    table, singular = angles(motion), _singular(motion)
+    reference = _align_rows(motion, rows, poses.position[pose_rows], poses.R[pose_rows])
+    motion = _align_by_symmetry(motion, reference, symmetries)
+    table, singular = root_angles(motion), _singular(motion)
     tracked_deg = np.stack([table[name].to_numpy() for name in panels.ANGLES], axis=1)
-    clicked_deg = _same_turn(tracked_deg, np.rad2deg(unwrapped(angles_from_matrix(reference.R), motion.time_s)))
+    clicked_deg = _match_revolutions(tracked_deg, np.rad2deg(unwrap(angles_from_matrix(reference.R), motion.time_s)))
     position_mm, angle_deg = _differences(motion, reference)
     figure, grid = panels.panel_figure(4, 3, row_in=1.6)
     for k, (axis, angle) in enumerate(zip("xyz", panels.ANGLES, strict=True)):
@@ -221,27 +229,27 @@ def write_digitised(path: Path, motion: Motion, poses: DigitisedPoses, symmetrie
         ):
             panels.draw_estimate(grid[row][k], motion, tracked)
             grid[row][k].plot(motion.time_s, clicked, **_CLICKED)
-            panels.name_panel(grid[row][k], label)
+            panels.label_panel(grid[row][k], label)
             _draw_error(grid[row + 1][k], motion, difference)
-            panels.name_panel(grid[row + 1][k], f"difference [{'mm' if row == 0 else '°'}]")
+            panels.label_panel(grid[row + 1][k], f"difference [{'mm' if row == 0 else '°'}]")
         for row in (2, 3):
             if angle != "tilt":
-                panels.shade(grid[row][k], motion.time_s, singular, panels.SINGULAR)
+                panels.shade_spans(grid[row][k], motion.time_s, singular, panels.SINGULAR_STYLE)
     clicked_handle = Line2D([], [], **_CLICKED, label="digitised by hand")
-    panels.finish(figure, path, motion, [clicked_handle, *panels.singular_handles(singular)])
+    panels.save_figure(figure, path, motion, [clicked_handle, *panels.singular_handles(singular)])
 
 
 class _Reference(NamedTuple):
-    """Poses to compare with, one for each frame of the motion; NaN where there is none."""
+    """Reference poses, one for each frame of the motion; NaN where there is none."""
 
     position: Array  # (n, 3) [m]
     R: Array  # (n, 3, 3) world from root
 
 
-def _reference(motion: Motion, rows: Rows, position: Array, R: Array) -> _Reference:
-    spread = _Reference(np.full_like(motion.position, np.nan), np.full_like(motion.R, np.nan))
-    spread.position[rows], spread.R[rows] = position, R
-    return spread
+def _align_rows(motion: Motion, rows: Rows, position: Array, R: Array) -> _Reference:
+    reference = _Reference(np.full_like(motion.position, np.nan), np.full_like(motion.R, np.nan))
+    reference.position[rows], reference.R[rows] = position, R
+    return reference
 
 
 def _nearest(time_s: Array, reference_s: Array) -> tuple[Rows, Rows]:
@@ -252,37 +260,37 @@ def _nearest(time_s: Array, reference_s: Array) -> tuple[Rows, Rows]:
     return rows, nearest[rows]
 
 
-def _turned_alike(motion: Motion, reference: _Reference, symmetries: Sequence[Array]) -> Motion:
-    """Turn the whole motion by the symmetry of the body that brings it nearest to the reference."""
-    alike = motion.R[:, None] @ np.stack(list(symmetries))  # (n, symmetries, 3, 3)
-    angle = geodesic(alike, reference.R[:, None])
-    return replace(motion, R=alike[:, np.argmin(np.nansum(angle**2, axis=0))])
+def _align_by_symmetry(motion: Motion, reference: _Reference, symmetries: Sequence[Array]) -> Motion:
+    """Rotate the whole motion by the symmetry of the body that brings it nearest to the reference."""
+    symmetric = motion.R[:, None] @ np.stack(list(symmetries))  # (n, symmetries, 3, 3)
+    angle = geodesic(symmetric, reference.R[:, None])
+    return replace(motion, R=symmetric[:, np.argmin(np.nansum(angle**2, axis=0))])
 
 
 def _differences(motion: Motion, reference: _Reference) -> tuple[Array, Array]:
     """Motion minus reference: position (n, 3) [mm], somersault, tilt, twist (n, 3) [deg]."""
-    turn = wrapped(angles_from_matrix(motion.R) - angles_from_matrix(reference.R))
-    return 1e3 * (motion.position - reference.position), np.rad2deg(turn)
+    difference = wrap(angles_from_matrix(motion.R) - angles_from_matrix(reference.R))
+    return 1e3 * (motion.position - reference.position), np.rad2deg(difference)
 
 
-def _same_turn(tracked_deg: Array, reference_deg: Array) -> Array:
-    """Add whole turns to reference angles (n, 3) so that they lie by the tracked ones; where lost, by most of them."""
+def _match_revolutions(tracked_deg: Array, reference_deg: Array) -> Array:
+    """Add whole revolutions to reference angles (n, 3) to match the tracked ones; where lost, the median number."""
     turns = np.round((tracked_deg - reference_deg) / 360)
     is_known = np.asarray(np.isfinite(turns).all(axis=1))
-    usual = np.median(turns[is_known], axis=0) if is_known.any() else np.zeros(3)
-    return reference_deg + 360 * np.where(is_known[:, None], turns, np.round(usual))
+    median = np.median(turns[is_known], axis=0) if is_known.any() else np.zeros(3)
+    return reference_deg + 360 * np.where(is_known[:, None], turns, np.round(median))
 
 
 def _singular(motion: Motion) -> Mask:
-    return angles(motion)["is_singular"].to_numpy() & motion.has_pose
+    return root_angles(motion)["is_singular"].to_numpy() & motion.has_pose
 
 
-def _unseen(motion: Motion) -> tuple[Mask, Mask]:
-    """Say in which frames some direction of the position, and of the rotation, cannot be seen: (n,) each."""
-    return _is_unseen(motion.position_sd), _is_unseen(motion.rotation_sd)
+def _unobservable_frames(motion: Motion) -> tuple[Mask, Mask]:
+    """Say in which frames some direction of the position, and of the rotation, is unobservable: (n,) each."""
+    return _is_unobservable(motion.position_sd), _is_unobservable(motion.rotation_sd)
 
 
-def _is_unseen(sd: Array) -> Mask:
+def _is_unobservable(sd: Array) -> Mask:
     return np.asarray(np.isinf(sd).any(axis=1))
 
 

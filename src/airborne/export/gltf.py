@@ -1,7 +1,7 @@
 """glTF 2.0: bodies as trees of nodes with coloured meshes, still or moving.
 
-Source: Khronos Group, "glTF 2.0 Specification". y up, metres, seconds, linear colours; one node a segment, placed from
-its parent; the node `z_up` above them all turns our z up into y up.
+Source: Khronos Group, "glTF 2.0 Specification". y up, metres, seconds, linear colours; one node a segment, posed
+relative to its parent; the node `z_up` above them all rotates our z up into y up.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ from airborne.body import BodyModel, Part, PosedBody
 from airborne.export.part_meshes import part_colour, segment_mesh
 from airborne.export.takes import Take
 from airborne.rendering.srgb import light_from_srgb
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _FLOAT, _INDEX = 5126, 5125
 _VERTICES, _FACES = 34962, 34963
@@ -33,8 +32,8 @@ _Y_UP = Rotation.from_euler("x", -90, degrees=True).as_quat().tolist()
 _MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 
 
-def still(posed: PosedBody, *, is_binary: bool) -> bytes:
-    """Return the bytes of a body in its pose: of a .glb, or of a .gltf that holds its buffer."""
+def gltf_bytes(posed: PosedBody, *, is_binary: bool) -> bytes:
+    """Return the bytes of a body in its pose: of a .glb, or of a .gltf with its buffer embedded."""
     document = _Document()
     nodes = document.add_body(posed.model)
     for segment, (node, parent) in enumerate(zip(nodes, posed.model.parents, strict=True)):
@@ -48,32 +47,32 @@ def still(posed: PosedBody, *, is_binary: bool) -> bytes:
 def write_animation(path: Path, takes: Sequence[Take]) -> None:
     """Write the bodies of takes with the same frames as one animation (.glb) that begins at 0 s.
 
-    A body is hidden (scaled to nothing) from a frame without its whole pose to the next that has one, and not there at
-    all if it never has.
+    A body is hidden (scaled to nothing) from a frame without a complete pose to the next with one, and left out if it
+    never has one.
     """
     document = _Document()
     for take in takes:
-        known = take.has_pose
-        if not known.any():
+        has_pose = take.has_pose
+        if not has_pose.any():
             continue
         nodes = document.add_body(take.model, prefix=f"{take.name}:" if take.name else "")
         seconds = take.time_s - take.time_s[0]
-        times = document.accessor(seconds[known], bounds=True)
-        turns = np.concatenate([take.turns[:, None], take.joint_angles], axis=1)[known]
-        document.move(nodes[0], "translation", times, take.position[known])
+        times = document.accessor(seconds[has_pose], bounds=True)
+        angles = np.concatenate([take.root_angles[:, None], take.joint_angles], axis=1)[has_pose]
+        document.move(nodes[0], "translation", times, take.position[has_pose])
         for k, node in enumerate(nodes):
-            document.move(node, "rotation", times, _continuous(Rotation.from_euler("XYZ", turns[:, k]).as_quat()))
+            document.move(node, "rotation", times, _continuous(Rotation.from_euler("XYZ", angles[:, k]).as_quat()))
             document.nodes[node]["translation"] = take.model.segments[k].joint_m.tolist()
-        changes = np.flatnonzero(np.diff(known, prepend=~known[0]))
-        if not known.all():
-            sizes = np.repeat(known[changes, None].astype(float), 3, axis=1)
-            hiding = document.accessor(seconds[changes], bounds=True)
-            document.move(nodes[0], "scale", hiding, sizes, interpolation="STEP")
+        changes = np.flatnonzero(np.diff(has_pose, prepend=~has_pose[0]))
+        if not has_pose.all():
+            scales = np.repeat(has_pose[changes, None].astype(float), 3, axis=1)
+            change_times = document.accessor(seconds[changes], bounds=True)
+            document.move(nodes[0], "scale", change_times, scales, interpolation="STEP")
     path.write_bytes(document.binary())
 
 
 class _Document:
-    """A glTF asset in the making."""
+    """A glTF document under construction."""
 
     def __init__(self) -> None:
         self.nodes: list[dict[str, Any]] = [{"name": "z_up", "rotation": _Y_UP, "children": []}]
@@ -173,6 +172,6 @@ class _Document:
 
 
 def _continuous(quaternions: Array) -> Array:
-    """Give quaternions (n, 4) the signs by which each is nearest to the one before."""
+    """Choose the signs of quaternions (n, 4) so that each is nearest to the one before."""
     signs = np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0, -1.0, 1.0)
     return quaternions * np.cumprod(np.concatenate([[1.0], signs]))[:, None]

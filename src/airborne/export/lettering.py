@@ -1,4 +1,4 @@
-"""Smooth letters in pictures, from the outlines of the font that figures have too."""
+"""Antialiased text in images, from the outlines of the font of the figures."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Picture = NDArray[np.uint8]
+from airborne.types import Image
+
 Outline = NDArray[np.floating]
 
 _BITS = 4  # of a pixel, for smooth edges
@@ -16,7 +17,7 @@ _EM = 100.0
 
 
 def draw_text(
-    picture: Picture,
+    image: Image,
     text: str,
     at: tuple[float, float],
     *,
@@ -28,7 +29,7 @@ def draw_text(
     outlines = [outline * [size_px / _EM, -size_px / _EM] + at for outline in _outlines(text, bold)]
     if outlines:
         points = [np.rint(outline * (1 << _BITS)).astype(np.int32) for outline in outlines]
-        cv2.fillPoly(picture, points, rgb, cv2.LINE_AA, _BITS)  # holes: what two outlines enclose stays free
+        cv2.fillPoly(image, points, rgb, cv2.LINE_AA, _BITS)  # holes: what two outlines enclose stays free
 
 
 def text_width(text: str, *, size_px: float, bold: bool = False) -> float:

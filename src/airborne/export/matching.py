@@ -1,4 +1,4 @@
-"""matching.png: how a picture and the body drawn in it are compared, camera by camera (paper B, fig. 2)."""
+"""matching.png: how an image and the rendered body are compared, camera by camera (paper B, fig. 2)."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from matplotlib.figure import Figure
 
 from airborne.body import PosedBody
 from airborne.cameras import Camera, Rig
-from airborne.export.palette import TEXT_RGB, web
+from airborne.export.palette import TEXT_RGB, hex_colour
 from airborne.export.panels import FONT_PT, WIDTH_IN
-from airborne.export.sheet import DPI, draw_cell
-from airborne.export.views import Picture, close_up, seen_by, shapes_of
+from airborne.export.sheet import SHEET_DPI, draw_cell
+from airborne.export.views import cached_surface_arrays, crop_camera, resample_view
 from airborne.rendering import FLAT, mask_picture, match_picture, model_picture, render, through_mask
 from airborne.tracking import Status
+from airborne.types import Image
 from airborne.video import Frames, View
 
 TITLES = ("picture", "body", "mask", "through the mask", "match")
@@ -25,10 +26,10 @@ class MatchingPicture:
     """Draws the first frame in which the body was tracked; use it in a `with` block."""
 
     def __init__(self, path: Path, rig: Rig) -> None:
-        """Begin; one row for each camera of the rig, whose sizes are those of whole pictures."""
+        """Begin; one row for each camera of the rig, whose sizes are those of whole frames."""
         path.unlink(missing_ok=True)
         self._path = path
-        self._cameras = [camera.undistorted() for camera in rig]
+        self._cameras = [camera.without_distortion() for camera in rig]
         self._is_drawn = False
 
     def write(self, frames: Frames, posed: PosedBody | None, status: Status) -> None:
@@ -45,26 +46,32 @@ class MatchingPicture:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End; the picture is already written."""
+        """End; the figure is already written."""
 
 
-def _row(view: View | None, camera: Camera, posed: PosedBody) -> list[Picture | None]:
-    crop = close_up(camera, posed)
+def _row(view: View | None, camera: Camera, posed: PosedBody) -> list[Image | None]:
+    crop = crop_camera(camera, posed)
     if view is None or crop is None:
         return [None] * len(TITLES)
-    seen, drawn = seen_by(view, crop), render(shapes_of(posed.model), posed, crop, FLAT)
-    return [seen, model_picture(drawn), mask_picture(drawn), through_mask(seen, drawn), match_picture(seen, drawn)]
+    observed, rendering = resample_view(view, crop), render(cached_surface_arrays(posed.model), posed, crop, FLAT)
+    return [
+        observed,
+        model_picture(rendering),
+        mask_picture(rendering),
+        through_mask(observed, rendering),
+        match_picture(observed, rendering),
+    ]
 
 
-def _figure(rows: list[list[Picture | None]], names: list[str]) -> Figure:
+def _figure(rows: list[list[Image | None]], names: list[str]) -> Figure:
     cell_in = (WIDTH_IN - 0.5) / len(TITLES)
-    figure = Figure((WIDTH_IN, 0.4 + cell_in * len(rows)), dpi=DPI)
+    figure = Figure((WIDTH_IN, 0.4 + cell_in * len(rows)), dpi=SHEET_DPI)
     figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.02, wspace=0, hspace=0)
     grid = figure.subplots(len(rows), len(TITLES), squeeze=False)
     for axes, title in zip(grid[0], TITLES, strict=True):
-        axes.set_title(title, fontsize=FONT_PT - 1, color=web(TEXT_RGB))
+        axes.set_title(title, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
     for i, (row, name) in enumerate(zip(rows, names, strict=True)):
         for axes, cell in zip(grid[i], row, strict=True):
             draw_cell(axes, cell)
-        grid[i, 0].set_ylabel(name, fontsize=FONT_PT - 1, color=web(TEXT_RGB))
+        grid[i, 0].set_ylabel(name, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
     return figure

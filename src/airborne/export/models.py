@@ -6,30 +6,28 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 from trimesh.exchange.ply import export_ply
 from trimesh.visual import ColorVisuals
 
 from airborne.body import BodyModel, Part, Pose, PosedBody
 from airborne.errors import ResultError
-from airborne.export.gltf import still
+from airborne.export.gltf import gltf_bytes
 from airborne.export.part_meshes import part_colour, segment_mesh
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
+_SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
 
 
 def write_model(path: Path, body: PosedBody | BodyModel) -> None:
     """Write a body in its colours, posed, or as a model in its zero pose: .glb, .gltf, .obj or .ply; lengths in metres.
 
-    glTF has y up, as its standard demands, one node a segment, placed from its parent, and the parts in it; its colours
+    glTF has y up, as its standard demands, one node a segment, posed relative to its parent; its colours
     are linear. OBJ (with an .mtl beside it) and PLY have the world's z up and sRGB. Ellipsoids become facets; a part
     whose colour is still to be sampled is grey. Raises ResultError for another suffix, or where nothing can be written.
     """
-    if path.suffix.lower() not in SUFFIXES:
-        raise ResultError(f"{path.name}: no known kind of model file; end its name in {', '.join(SUFFIXES)}")
+    if path.suffix.lower() not in _SUFFIXES:
+        raise ResultError(f"{path.name}: not a known format of model files; end its name in {', '.join(_SUFFIXES)}")
     posed = body.with_pose(Pose(world_from_root=RigidTransform.identity())) if isinstance(body, BodyModel) else body
     write = {".glb": _gltf_files, ".gltf": _gltf_files, ".obj": _obj_files, ".ply": _ply_files}[path.suffix.lower()]
     try:
@@ -40,12 +38,12 @@ def write_model(path: Path, body: PosedBody | BodyModel) -> None:
 
 
 def _gltf_files(posed: PosedBody, path: Path) -> dict[str, bytes]:
-    return {path.name: still(posed, is_binary=path.suffix.lower() == ".glb")}
+    return {path.name: gltf_bytes(posed, is_binary=path.suffix.lower() == ".glb")}
 
 
 def _obj_files(posed: PosedBody, path: Path) -> dict[str, bytes]:
     lines, materials, first = [f"mtllib {path.stem}.mtl"], [], 1
-    for index, (part, mesh) in enumerate(_in_world(posed)):
+    for index, (part, mesh) in enumerate(_world_meshes(posed)):
         name = "_".join(f"{index} {part.name}".split())
         red, green, blue = part_colour(part) / 255
         materials += [f"newmtl {name}", f"Kd {red:.6f} {green:.6f} {blue:.6f}", "illum 1", ""]
@@ -62,7 +60,7 @@ def _obj_files(posed: PosedBody, path: Path) -> dict[str, bytes]:
 
 def _ply_files(posed: PosedBody, path: Path) -> dict[str, bytes]:
     meshes = []
-    for part, mesh in _in_world(posed):
+    for part, mesh in _world_meshes(posed):
         colours = np.tile([*np.rint(np.clip(part_colour(part), 0, 255)), 255], (len(mesh.vertices), 1)).astype(np.uint8)
         mesh.visual = ColorVisuals(mesh, vertex_colors=colours)
         meshes.append(mesh)
@@ -70,12 +68,12 @@ def _ply_files(posed: PosedBody, path: Path) -> dict[str, bytes]:
     return {path.name: export_ply(whole, vertex_normal=True)}
 
 
-def _in_world(posed: PosedBody) -> list[tuple[Part, trimesh.Trimesh]]:
-    found = []
+def _world_meshes(posed: PosedBody) -> list[tuple[Part, trimesh.Trimesh]]:
+    meshes = []
     for segment, R, t in zip(posed.model.segments, posed.R, posed.t, strict=True):
         for part in segment.parts:
-            found.append((part, segment_mesh(part).apply_transform(_matrix(R, t))))
-    return found
+            meshes.append((part, segment_mesh(part).apply_transform(_matrix(R, t))))
+    return meshes
 
 
 def _matrix(R: Array, t: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The pieces of a web page that needs nothing but itself: no script, no font, no file beside it."""
+"""The elements of a self-contained web page: no script, no font, no file beside it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-UNKNOWN = "not known"
+UNKNOWN_TEXT = "not known"
 _UNITS = {"_m": "m", "_mm": "mm", "_s": "s", "_hz": "1/s", "_px": "px", "_deg": "°", "_rev": "turns"}
 
 _STYLE = """
@@ -44,8 +44,8 @@ dd { margin: 0; }
 """
 
 
-def page(title: str, body: Iterable[str]) -> str:
-    """Return a whole page; `title` is plain text, the pieces of `body` are HTML."""
+def document(title: str, body: Iterable[str]) -> str:
+    """Return a whole page; `title` is plain text, the elements of `body` are HTML."""
     head = (
         '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'
         f"<title>{escape(title)}</title><style>{_STYLE}</style>"
@@ -75,12 +75,12 @@ def tile(value: str, name: str) -> str:
 
 
 def table(rows: Iterable[Sequence[Any]], header: Sequence[str] = ()) -> str:
-    """Return a table of values, each shown by `shown`; the first column names the row."""
+    """Return a table of values, each formatted by `format_value`; the first column names the row."""
     head = "".join(f"<th>{escape(name)}</th>" for name in header)
     lines = [f"<tr>{head}</tr>"] if header else []
     for first, *rest in rows:
-        cells = "".join(f"<td>{escape(shown(value))}</td>" for value in rest)
-        lines.append(f"<tr><th>{escape(shown(first))}</th>{cells}</tr>")
+        cells = "".join(f"<td>{escape(format_value(value))}</td>" for value in rest)
+        lines.append(f"<tr><th>{escape(format_value(first))}</th>{cells}</tr>")
     return "<table>" + "".join(lines) + "</table>"
 
 
@@ -89,7 +89,7 @@ def definitions(terms: Mapping[str, str]) -> str:
     return "<dl>" + "".join(f"<dt>{escape(t)}</dt><dd>{escape(m)}</dd>" for t, m in terms.items()) + "</dl>"
 
 
-def picture(path: Path, caption: str) -> str:
+def figure(path: Path, caption: str) -> str:
     """Return a PNG file, whole, as a figure with its caption."""
     data = base64.b64encode(path.read_bytes()).decode("ascii")
     text = escape(caption)
@@ -108,14 +108,14 @@ def settings(values: Mapping[str, Any]) -> str:
     return table((label(key), value) for key, value in values.items() if value is not None)
 
 
-def shown(value: Any) -> str:
+def format_value(value: Any) -> str:
     """Show a value of the summary as text: four digits for a fraction, None as "not known"."""
     if value is None:
-        return UNKNOWN
+        return UNKNOWN_TEXT
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, list):
-        return ", ".join(map(shown, value))
+        return ", ".join(map(format_value, value))
     return str(value)

@@ -1,4 +1,4 @@
-"""The colours of every picture of a run, told apart by colour-blind readers too (Okabe and Ito's set)."""
+"""The colours of all figures of a run, safe for colour-blind readers (Okabe and Ito's set)."""
 
 from __future__ import annotations
 
@@ -10,6 +10,6 @@ REFERENCE_RGB = (30, 30, 30)
 TEXT_RGB = (51, 51, 51)
 
 
-def web(rgb: tuple[int, int, int]) -> str:
+def hex_colour(rgb: tuple[int, int, int]) -> str:
     """Write a colour as `#rrggbb`."""
     return "#{:02x}{:02x}{:02x}".format(*rgb)

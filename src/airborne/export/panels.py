@@ -1,4 +1,4 @@
-"""What the figures of a run share: panels over time, error bands, and signs for what is lost or cannot be seen."""
+"""What the figures of a run share: panels over time, error bands, shading of what is lost or unobservable."""
 
 from __future__ import annotations
 
@@ -11,30 +11,27 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
-from airborne.export.palette import ESTIMATE_RGB, STATUS_RGB, TEXT_RGB, web
+from airborne.export.palette import ESTIMATE_RGB, STATUS_RGB, TEXT_RGB, hex_colour
 from airborne.motion import Motion
 from airborne.tracking import Status
-
-Array = NDArray[np.floating]
-Mask = NDArray[np.bool_]
+from airborne.types import Array, Mask
 
 WIDTH_IN = 7.6
 DPI = 150
 FONT_PT = 9
 _LEGEND_CHARACTERS = 85  # that fit into one row
 ANGLES = ("somersault", "tilt", "twist")
-TEXT, LINE, FAINT = web(TEXT_RGB), web(ESTIMATE_RGB), "#dddddd"
-MARKERS = {Status.TRACKED: "o", Status.UNCERTAIN: "D"}
-BAND = {"facecolor": LINE, "alpha": 0.25, "linewidth": 0}
-LOST = {"facecolor": "#cccccc", "edgecolor": "none", "alpha": 0.8}
-UNSEEN = {"facecolor": "none", "edgecolor": "#cc79a7", "hatch": "////", "linewidth": 0.0}
-SINGULAR = {"facecolor": "#cc79a7", "edgecolor": "none", "alpha": 0.18}
+TEXT, LINE, FAINT = hex_colour(TEXT_RGB), hex_colour(ESTIMATE_RGB), "#dddddd"
+_MARKERS = {Status.TRACKED: "o", Status.UNCERTAIN: "D"}
+_BAND_STYLE = {"facecolor": LINE, "alpha": 0.25, "linewidth": 0}
+LOST_STYLE = {"facecolor": "#cccccc", "edgecolor": "none", "alpha": 0.8}
+UNOBSERVABLE_STYLE = {"facecolor": "none", "edgecolor": "#cc79a7", "hatch": "////", "linewidth": 0.0}
+SINGULAR_STYLE = {"facecolor": "#cc79a7", "edgecolor": "none", "alpha": 0.18}
 
 
 def panel_figure(n_rows: int, n_columns: int, *, row_in: float) -> tuple[Figure, list[list[Axes]]]:
-    """Start a figure of report width with a grid of panels that share their time axis."""
+    """Create a figure of report width with a grid of panels that share their time axis."""
     figure = Figure((WIDTH_IN, n_rows * row_in + 0.7), dpi=DPI, layout="constrained")
     grid = figure.subplots(n_rows, n_columns, sharex=True, squeeze=False)
     for axes in grid.ravel():
@@ -48,50 +45,52 @@ def panel_figure(n_rows: int, n_columns: int, *, row_in: float) -> tuple[Figure,
     return figure, grid.tolist()
 
 
-def name_panel(axes: Axes, label: str) -> None:
-    """Label a panel's vertical axis; no offset is left to be added to its numbers."""
+def label_panel(axes: Axes, label: str) -> None:
+    """Label a panel's vertical axis, without an offset to be added to its numbers."""
     axes.set_ylabel(label, fontsize=FONT_PT, color=TEXT)
     axes.ticklabel_format(axis="y", useOffset=False, style="plain")
 
 
 def draw_estimate(axes: Axes, motion: Motion, values: Array) -> None:
-    """Draw values (n,) with a marker for each status; gaps are gaps, and lost frames are shaded."""
+    """Draw values (n,) with a marker for each status; gaps stay gaps, and lost frames are shaded."""
     axes.plot(motion.time_s, values, color=LINE, linewidth=1.0)
-    for status, marker in MARKERS.items():
-        is_it = motion.status == status.value
-        axes.plot(motion.time_s[is_it], values[is_it], marker, color=web(STATUS_RGB[status]), markersize=2.8)
+    for status, marker in _MARKERS.items():
+        has_status = motion.status == status.value
+        axes.plot(
+            motion.time_s[has_status], values[has_status], marker, color=hex_colour(STATUS_RGB[status]), markersize=2.8
+        )
     shade_lost(axes, motion)
 
 
 def shade_lost(axes: Axes, motion: Motion) -> None:
     """Shade the frames that were lost."""
-    shade(axes, motion.time_s, motion.status == Status.LOST.value, LOST)
+    shade_spans(axes, motion.time_s, motion.status == Status.LOST.value, LOST_STYLE)
 
 
-def shade(axes: Axes, time_s: Array, mask: Mask, look: dict) -> None:
-    """Shade the stretches of time (n,) where `mask` (n,) holds."""
-    for start_s, stop_s in _stretches(time_s, mask):
-        axes.axvspan(start_s, stop_s, zorder=0, **look)
+def shade_spans(axes: Axes, time_s: Array, mask: Mask, style: dict) -> None:
+    """Shade the intervals of time (n,) where `mask` (n,) is true."""
+    for start_s, stop_s in _intervals(time_s, mask):
+        axes.axvspan(start_s, stop_s, zorder=0, **style)
 
 
 def begin_at_zero(axes: Axes) -> None:
-    """Let the vertical axis of a panel, once drawn, run from zero to a little above its largest value."""
+    """Let the vertical axis of a plotted panel run from zero to a little above its largest value."""
     axes.update_datalim([(axes.dataLim.x0, 0.0)] if np.isfinite(axes.dataLim.x0) else [])
     axes.autoscale_view()
     axes.set_ylim(bottom=0)
 
 
-def finish(figure: Figure, path: Path, motion: Motion, extra: Sequence[Artist] = ()) -> None:
-    """Put the legend of what the figure shows on top and write the PNG."""
+def save_figure(figure: Figure, path: Path, motion: Motion, extra: Sequence[Artist] = ()) -> None:
+    """Add the legend on top and write the PNG."""
     counts = {status: motion.count(status) for status in Status}
     handles: list[Artist] = [
-        Line2D([], [], color=LINE, marker=marker, markerfacecolor=web(STATUS_RGB[status]), markeredgewidth=0,
+        Line2D([], [], color=LINE, marker=marker, markerfacecolor=hex_colour(STATUS_RGB[status]), markeredgewidth=0,
                markersize=4, label=f"{status} ({counts[status]})")
-        for status, marker in MARKERS.items()
+        for status, marker in _MARKERS.items()
         if counts[status]
     ]  # fmt: skip
     if counts[Status.LOST]:
-        handles.append(Patch(**LOST, label=f"lost ({counts[Status.LOST]})"))
+        handles.append(Patch(**LOST_STYLE, label=f"lost ({counts[Status.LOST]})"))
     handles += extra
     fits = sum(len(str(handle.get_label())) for handle in handles) <= _LEGEND_CHARACTERS
     figure.legend(
@@ -105,25 +104,29 @@ def finish(figure: Figure, path: Path, motion: Motion, extra: Sequence[Artist] =
 def draw_band(axes: Axes, time_s: Array, middle: Array, sd: Array) -> None:
     """Draw a band of two standard deviations (n,) about `middle` (n,); none where they are infinite or unknown."""
     spread = 2 * np.where(np.isfinite(sd), sd, np.nan)
-    axes.fill_between(time_s, middle - spread, middle + spread, **BAND)
+    axes.fill_between(time_s, middle - spread, middle + spread, **_BAND_STYLE)
 
 
 def band_handle(label: str) -> Patch:
     """Return the legend entry of `draw_band`."""
-    return Patch(**BAND, label=label)
+    return Patch(**_BAND_STYLE, label=label)
 
 
-def unseen_handles(unseen: Mask) -> list[Patch]:
-    """Return the legend entry of the stretches shaded as `UNSEEN`, if any."""
-    return [Patch(**UNSEEN, label="a direction cannot be seen (infinite deviation)")] if unseen.any() else []
+def unobservable_handles(unobservable: Mask) -> list[Patch]:
+    """Return the legend entry of the intervals shaded as unobservable, if any."""
+    return (
+        [Patch(**UNOBSERVABLE_STYLE, label="a direction cannot be seen (infinite deviation)")]
+        if unobservable.any()
+        else []
+    )
 
 
 def singular_handles(singular: Mask, label: str = "tilt near ±90°: somersault and twist mix") -> list[Patch]:
-    """Return the legend entry of the stretches shaded as `SINGULAR`, if any."""
-    return [Patch(**SINGULAR, label=label)] if singular.any() else []
+    """Return the legend entry of the intervals shaded as singular, if any."""
+    return [Patch(**SINGULAR_STYLE, label=label)] if singular.any() else []
 
 
-def _stretches(time_s: Array, mask: Mask) -> Iterator[tuple[float, float]]:
+def _intervals(time_s: Array, mask: Mask) -> Iterator[tuple[float, float]]:
     half_s = float(np.median(np.diff(time_s))) / 2 if len(time_s) > 1 else 0.5
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
     for first, stop in edges.reshape(-1, 2):

@@ -1,15 +1,13 @@
-"""The parts of bodies as triangles: what model files and animations are made of."""
+"""The parts of bodies as triangles: for model files and animations."""
 
 from __future__ import annotations
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
 from airborne.body import Box, Ellipsoid, Mesh, Part
-from airborne.body.splitting import between, split_at
-
-Array = NDArray[np.floating]
+from airborne.body.splitting import faces_between, split_at
+from airborne.types import Array
 
 _AROUND, _ALONG = 48, 32  # facets of an ellipsoid
 _UNSAMPLED = np.full(3, 128.0)  # sRGB, stands in for a colour not yet sampled
@@ -26,24 +24,24 @@ def part_mesh(part: Part) -> Mesh:
     for border in part.slab_m:
         if np.isfinite(border):
             mesh = split_at(mesh, mesh.vertices_m[:, 2] - border)
-    return between(mesh, mesh.vertices_m[:, 2], *part.slab_m)
+    return faces_between(mesh, mesh.vertices_m[:, 2], *part.slab_m)
 
 
 def _ellipsoid_mesh(shape: Ellipsoid) -> Mesh:
-    ball = trimesh.creation.uv_sphere(count=(_ALONG, _AROUND))
-    unit, faces = np.asarray(ball.vertices), np.asarray(ball.faces)
+    sphere = trimesh.creation.uv_sphere(count=(_ALONG, _AROUND))
+    unit, faces = np.asarray(sphere.vertices), np.asarray(sphere.faces)
     normals = unit / shape.semi_axes_m
     return Mesh(unit * shape.semi_axes_m, faces, normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
 def segment_mesh(part: Part) -> trimesh.Trimesh:
-    """Return a part's mesh in its segment's frame; each face of a flat one has its own corners, so that edges show."""
-    mesh, place = part_mesh(part), part.segment_from_part
+    """Return a part's mesh in its segment's frame; each face of a flat part has its own corners, for sharp edges."""
+    mesh, segment_from_part = part_mesh(part), part.segment_from_part
     if mesh.normals is None:
         vertices, faces = mesh.vertices_m[mesh.faces].reshape(-1, 3), np.arange(mesh.faces.size).reshape(-1, 3)
-        return trimesh.Trimesh(place.apply(vertices), faces, process=False)
-    normals = place.rotation.apply(mesh.normals)
-    return trimesh.Trimesh(place.apply(mesh.vertices_m), mesh.faces, vertex_normals=normals, process=False)
+        return trimesh.Trimesh(segment_from_part.apply(vertices), faces, process=False)
+    normals = segment_from_part.rotation.apply(mesh.normals)
+    return trimesh.Trimesh(segment_from_part.apply(mesh.vertices_m), mesh.faces, vertex_normals=normals, process=False)
 
 
 def part_colour(part: Part) -> Array:

@@ -10,60 +10,60 @@ from typing import Literal, Self
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body.legs import LEG_POINTS, RODS, SHANK_WIDTH_M, THIGH_WIDTH_M
 from airborne.cameras import Camera, Rig
 from airborne.export.broadcast import Heights, Jumper, draw_heights
 from airborne.export.lettering import draw_text
-from airborne.export.overlays import CameraVideos, draw_label, line_px, shown, time_label
+from airborne.export.overlays import CameraVideos, draw_label, line_px, time_label, view_image
 from airborne.export.palette import STATUS_RGB
-from airborne.export.views import Picture
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate, PlayerStart
+from airborne.types import Array, Image
 from airborne.video import Frames
 
-Array = NDArray[np.floating]
-Style = Literal["paper", "broadcast"]
+OverlayStyle = Literal["paper", "broadcast"]
 
-ROD_WIDTHS_M = (THIGH_WIDTH_M, THIGH_WIDTH_M, SHANK_WIDTH_M, SHANK_WIDTH_M)  # as RODS
+_ROD_WIDTHS_M = (THIGH_WIDTH_M, THIGH_WIDTH_M, SHANK_WIDTH_M, SHANK_WIDTH_M)  # as RODS
 GREEN_RGB = (0, 255, 0)  # the paper's
-NAME_SHARE = 1 / 45  # of the picture's height
+_NAME_SHARE = 1 / 45  # of the image's height
 _BITS = 4  # of a pixel, for smooth edges
 
 
 class PlayersOverlayVideos:
-    """One video per camera, written picture by picture; use it in a `with` block."""
+    """One video per camera, written frame by frame; use it in a `with` block."""
 
-    def __init__(self, folder: Path, rig: Rig, rate: Fraction, *, style: Style, starts: Sequence[PlayerStart]) -> None:
-        """Start the videos of the rig's cameras; heights count from where the feet are in `starts`.
+    def __init__(
+        self, folder: Path, rig: Rig, rate: Fraction, *, style: OverlayStyle, starts: Sequence[PlayerStart]
+    ) -> None:
+        """Start the videos of the rig's cameras; heights count from the feet in `starts`.
 
-        rate: pictures in a second. Raises VideoError where a file cannot be written.
+        rate: frames per second. Raises VideoError where a file cannot be written.
         """
         self._style = style
         self._heights = Heights(starts)
         self._videos = CameraVideos(folder, rig, rate)
 
     def write(self, frames: Frames, joints: Sequence[str], estimates: Sequence[PlayerEstimate]) -> None:
-        """Append what every camera saw at one time, with every player who is not lost drawn into it."""
-        known = {e.player: (_leg_points(joints, e), e.status) for e in estimates if e.status is not Status.LOST}
-        heights = self._heights.after(known)
+        """Append what every camera saw at one time, with every player drawn who is not lost."""
+        located = {e.player: (_leg_points(joints, e), e.status) for e in estimates if e.status is not Status.LOST}
+        heights = self._heights.update(located)
         jumpers = [
             Jumper(player, points, heights[player], is_sure=status is Status.TRACKED)
-            for player, (points, status) in known.items()
+            for player, (points, status) in located.items()
         ]
-        status = _worst(estimates)
-        pictures = []
+        status = _worst_status(estimates)
+        images = []
         for view, camera in zip(frames.views, self._videos.cameras, strict=True):
-            picture = shown(view, camera)
+            image = view_image(view, camera)
             if self._style == "broadcast":
-                draw_heights(picture, camera, jumpers if view is not None else [])
+                draw_heights(image, camera, jumpers if view is not None else [])
             else:
-                for player, (points, of_player) in known.items() if view is not None else ():
-                    _draw_rods(picture, camera, player, points, of_player)
-                draw_label(picture, time_label(frames, status), STATUS_RGB[status])
-            pictures.append(picture)
-        self._videos.write(pictures)
+                for player, (points, of_player) in located.items() if view is not None else ():
+                    _draw_rods(image, camera, player, points=points, status=of_player)
+                draw_label(image, time_label(frames, status), STATUS_RGB[status])
+            images.append(image)
+        self._videos.write(images)
 
     def __enter__(self) -> Self:
         return self
@@ -76,9 +76,9 @@ class PlayersOverlayVideos:
 
 
 def rectangle_px(camera: Camera, upper: Array, lower: Array, width_m: float) -> Array | None:
-    """Return the corners (4, 2) [px] of a rod's rectangle in a picture; None where an end is behind the camera.
+    """Return the corners (4, 2) [px] of a rod's rectangle in an image; None where an end is behind the camera.
 
-    Its axis joins the projected ends (3,) [m], its width is that of a ball of this size at the rod's middle.
+    Its axis joins the projected ends (3,) [m], its width is that of a sphere of this diameter at the rod's middle.
     """
     ends = camera.px_from_world(np.stack([upper, lower]))
     if not np.isfinite(ends).all():
@@ -91,18 +91,18 @@ def rectangle_px(camera: Camera, upper: Array, lower: Array, width_m: float) -> 
     return np.stack([ends[0] - half, ends[0] + half, ends[1] + half, ends[1] - half])
 
 
-def _draw_rods(picture: Picture, camera: Camera, player: str, points: Array, status: Status) -> None:
+def _draw_rods(image: Image, camera: Camera, player: str, *, points: Array, status: Status) -> None:
     rgb = GREEN_RGB if status is Status.TRACKED else STATUS_RGB[status]
     corners = [
-        rectangle_px(camera, points[a], points[b], width_m) for (a, b), width_m in zip(RODS, ROD_WIDTHS_M, strict=True)
+        rectangle_px(camera, points[a], points[b], width_m) for (a, b), width_m in zip(RODS, _ROD_WIDTHS_M, strict=True)
     ]
-    drawn = [np.rint(each * (1 << _BITS)).astype(np.int32) for each in corners if each is not None]
-    cv2.polylines(picture, drawn, True, rgb, max(line_px(picture) // 2, 1), cv2.LINE_AA, _BITS)
-    if drawn:
+    polygons = [np.rint(each * (1 << _BITS)).astype(np.int32) for each in corners if each is not None]
+    cv2.polylines(image, polygons, True, rgb, max(line_px(image) // 2, 1), cv2.LINE_AA, _BITS)
+    if polygons:
         highest = np.concatenate([each for each in corners if each is not None])
         x, y = highest[np.argmin(highest[:, 1])]
-        size_px = picture.shape[0] * NAME_SHARE
-        draw_text(picture, player, (x, y - size_px / 2), size_px=size_px, rgb=rgb)
+        size_px = image.shape[0] * _NAME_SHARE
+        draw_text(image, player, (x, y - size_px / 2), size_px=size_px, rgb=rgb)
 
 
 def _leg_points(joints: Sequence[str], estimate: PlayerEstimate) -> Array:
@@ -110,6 +110,6 @@ def _leg_points(joints: Sequence[str], estimate: PlayerEstimate) -> Array:
     return estimate.points[[joints.index(name) for name in LEG_POINTS]]
 
 
-def _worst(estimates: Sequence[PlayerEstimate]) -> Status:
-    found = {estimate.status for estimate in estimates}
-    return next(status for status in (Status.LOST, Status.UNCERTAIN, Status.TRACKED) if status in found)
+def _worst_status(estimates: Sequence[PlayerEstimate]) -> Status:
+    statuses = {estimate.status for estimate in estimates}
+    return next(status for status in (Status.LOST, Status.UNCERTAIN, Status.TRACKED) if status in statuses)

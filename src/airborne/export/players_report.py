@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 
 from airborne.export import page, panels
-from airborne.export.palette import STATUS_RGB, web
-from airborne.export.report import DEFINITIONS, records, status_bar
-from airborne.export.summary import plain
+from airborne.export.palette import STATUS_RGB, hex_colour
+from airborne.export.report import DEFINITIONS, records_table, status_bar
+from airborne.export.summary import json_ready
 from airborne.motion import PlayersMotion
 from airborne.tracking import Status
 
 FIGURE = "heights.png"
-PARTS = {"hip": "#0072b2", "knee": "#cc79a7", "ankle": "#009e73"}
-UNCERTAIN = {"facecolor": web(STATUS_RGB[Status.UNCERTAIN]), "edgecolor": "none", "alpha": 0.25}
+_JOINT_COLOURS = {"hip": "#0072b2", "knee": "#cc79a7", "ankle": "#009e73"}
+_UNCERTAIN_STYLE = {"facecolor": hex_colour(STATUS_RGB[Status.UNCERTAIN]), "edgecolor": "none", "alpha": 0.25}
 
-SHOWN = {  # columns of jumps.csv that the report shows: name, factor, digits
+_JUMP_QUANTITIES = {  # columns of jumps.csv that the report shows: name, factor, digits
     "feet": ("foot_height_m", 100.0, 1),
     "hips": ("hip_height_m", 100.0, 1),
     "flight time": ("flight_time_height_m", 100.0, 1),
@@ -28,15 +28,15 @@ SHOWN = {  # columns of jumps.csv that the report shows: name, factor, digits
     "landing [frame]": ("landing_frame", 1.0, 1),
     "flight [ms]": ("flight_s", 1000.0, 0),
 }
-JUMPS_SAY = (
+_JUMPS_CAPTION = (
     "Heights are in cm, each with its 95 % interval: of feet and hips over standing, and what flight time and take-off "
     "speed come to. jumps.csv has more."
 )
-FIGURE_SAYS = (
+_FIGURE_CAPTION = (
     "Height of the middle of both hips, knees and ankles over time, with two standard deviations; amber where "
     "uncertain, grey where lost."
 )
-MEANINGS = {
+_DEFINITIONS = {
     "World": DEFINITIONS["World"],
     "Status": DEFINITIONS["Status"],
     "Score": "Mean log-likelihood of the estimate, in nats; larger is better; for frames of a run, not methods.",
@@ -50,17 +50,17 @@ MEANINGS = {
 def write_players_report(folder: Path, summary: Mapping[str, Any], motion: PlayersMotion) -> Path:
     """Write heights.png and report.html into the folder of a run, and return the page's path.
 
-    `summary` is what goes into summary.json.
+    `summary` is the content of summary.json.
     """
     _write_heights(folder / FIGURE, motion)
     path = folder / "report.html"
-    summary = plain(summary)
-    path.write_text(page.page(summary["name"], _sections(folder, summary)), encoding="utf-8")
+    summary = json_ready(summary)
+    path.write_text(page.document(summary["name"], _sections(folder, summary)), encoding="utf-8")
     return path
 
 
 def players_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
-    """Say in plain sentences what the reader of a run of players must not miss."""
+    """Yield, in plain sentences, what the reader of a run of players must not miss."""
     n = summary["n_frames"]
     for name, player in summary["players"].items():
         if player["n_lost"] == n:
@@ -75,54 +75,54 @@ def players_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
                 f"{name}: {player['n_below_two_cameras']} of {n} frames rest on fewer than two cameras, so that depth "
                 "is a guess."
             )
-    yield from _dropped(summary)
+    yield from _drop_notes(summary)
 
 
-def players_in_short(summary: Mapping[str, Any]) -> Iterator[str]:
-    """Say in a line for each player how much is known, and what live tracking dropped."""
+def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a line for each player and jump, and the frames that live tracking dropped."""
     for name, player in summary["players"].items():
         counts = ", ".join(f"{player[f'n_{status}']} {status}" for status in Status)
         sd_mm = player["median_sd_mm"]
-        yield f"{name}: {counts}; median sd of a joint {page.UNKNOWN if sd_mm is None else f'{sd_mm:.0f} mm'}"
+        yield f"{name}: {counts}; median sd of a joint {page.UNKNOWN_TEXT if sd_mm is None else f'{sd_mm:.0f} mm'}"
     for jump in summary["jumps"]:
-        feet, flight = (_in_cm(jump, what) for what in ("feet", "flight time"))
-        doubt = f"; {jump['n_uncertain']} of its frames are uncertain" if jump["n_uncertain"] else ""
-        yield f"{jump['player']}, jump {jump['jump']}: feet {feet}, by flight time {flight} (95 % intervals){doubt}"
-    yield from _dropped(summary)
+        feet, flight = (_interval_cm(jump, what) for what in ("feet", "flight time"))
+        warning = f"; {jump['n_uncertain']} of its frames are uncertain" if jump["n_uncertain"] else ""
+        yield f"{jump['player']}, jump {jump['jump']}: feet {feet}, by flight time {flight} (95 % intervals){warning}"
+    yield from _drop_notes(summary)
 
 
-def _jumps(rows: list[Mapping[str, Any]]) -> str:
-    """Show every jump with its numbers, each with its 95 % interval."""
+def _jumps_table(rows: list[Mapping[str, Any]]) -> str:
+    """Return the table of all jumps, each number with its 95 % interval."""
     table = [
         {
             "player": row["player"],
             "jump": row["jump"],
             "status": row["status"],
-            **{name: _with_interval(row, *quantity) for name, quantity in SHOWN.items()},
+            **{name: _with_interval(row, *quantity) for name, quantity in _JUMP_QUANTITIES.items()},
             "uncertain frames": row["n_uncertain"],
         }
         for row in rows
     ]
-    return records(table) + page.bullets([JUMPS_SAY])
+    return records_table(table) + page.bullets([_JUMPS_CAPTION])
 
 
 def _with_interval(row: Mapping[str, Any], name: str, scale: float, digits: int) -> str:
     numbers = [row[name + end] for end in ("", "_low", "_high")]
     if any(number is None or not np.isfinite(number) for number in numbers):
-        return page.UNKNOWN
+        return page.UNKNOWN_TEXT
     middle, low, high = (f"{scale * number:.{digits}f}" for number in numbers)
     return f"{middle} ({low} to {high})"
 
 
-def _in_cm(row: Mapping[str, Any], what: str) -> str:
-    text = _with_interval(row, *SHOWN[what])
-    return text if text == page.UNKNOWN else f"{text} cm"
+def _interval_cm(row: Mapping[str, Any], what: str) -> str:
+    text = _with_interval(row, *_JUMP_QUANTITIES[what])
+    return text if text == page.UNKNOWN_TEXT else f"{text} cm"
 
 
-def _dropped(summary: Mapping[str, Any]) -> Iterator[str]:
+def _drop_notes(summary: Mapping[str, Any]) -> Iterator[str]:
     if live := summary.get("live"):
-        told = ", ".join(f"{c['name']} {c['n_dropped']} of {c['n_received']}" for c in live["cameras"])
-        yield f"live: frames dropped to keep up: {told}; delay {1e3 * live['median_delay_s']:.0f} ms (median)"
+        counts_by_camera = ", ".join(f"{c['name']} {c['n_dropped']} of {c['n_received']}" for c in live["cameras"])
+        yield f"live: frames dropped to keep up: {counts_by_camera}; delay {1e3 * live['median_delay_s']:.0f} ms (median)"
 
 
 def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
@@ -135,16 +135,16 @@ def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
         yield page.box("fine", "Every player was tracked in every frame.")
     if summary["events"]:
         yield page.heading("The recording") + page.bullets(summary["events"])
-    yield page.heading("Players") + records([{"player": name, **p} for name, p in summary["players"].items()])
+    yield page.heading("Players") + records_table([{"player": name, **p} for name, p in summary["players"].items()])
     if summary["jumps"]:
-        yield page.heading("Jumps") + _jumps(summary["jumps"])
+        yield page.heading("Jumps") + _jumps_table(summary["jumps"])
     yield page.heading("Heights")
-    yield page.picture(folder / FIGURE, FIGURE_SAYS)
+    yield page.figure(folder / FIGURE, _FIGURE_CAPTION)
     yield page.heading("Method") + page.settings(summary["method"])
-    yield page.heading("Cameras") + records(summary["cameras"])
+    yield page.heading("Cameras") + records_table(summary["cameras"])
     yield page.heading("What the numbers mean")
-    uncertainty = f"{MEANINGS['Uncertainty']} {summary['uncertainty']}"
-    yield page.definitions({**MEANINGS, "Uncertainty": uncertainty})
+    uncertainty = f"{_DEFINITIONS['Uncertainty']} {summary['uncertainty']}"
+    yield page.definitions({**_DEFINITIONS, "Uncertainty": uncertainty})
     for key, title in (("timings_s", "Time taken [s]"), ("versions", "Versions"), ("inputs", "Inputs (SHA-256)")):
         yield page.heading(title) + page.table(summary[key].items())
 
@@ -153,18 +153,20 @@ def _write_heights(path: Path, motion: PlayersMotion) -> None:
     """Draw the height of the middle of each player's hips, knees and ankles."""
     figure, grid = panels.panel_figure(len(motion.players), 1, row_in=2.2)
     for k, (player, (axes,)) in enumerate(zip(motion.players, grid, strict=True)):
-        for part, colour in PARTS.items():
+        for part, colour in _JOINT_COLOURS.items():
             pair = [motion.joints.index(f"{part}_{side}") for side in ("left", "right")]
             middle = motion.points[:, k, pair, 2].mean(axis=1)
-            spread = 2 * np.sqrt(motion.covariance[:, k, pair, 2, 2].mean(axis=1))
-            spread = np.where(np.isfinite(spread), spread, np.nan)
+            two_sd = 2 * np.sqrt(motion.covariance[:, k, pair, 2, 2].mean(axis=1))
+            two_sd = np.where(np.isfinite(two_sd), two_sd, np.nan)
             axes.plot(motion.time_s, middle, color=colour, linewidth=1.2, label=f"{part}s")
-            axes.fill_between(motion.time_s, middle - spread, middle + spread, color=colour, alpha=0.2, linewidth=0)
-        panels.shade(axes, motion.time_s, motion.status[:, k] == Status.LOST.value, panels.LOST)
-        panels.shade(axes, motion.time_s, motion.status[:, k] == Status.UNCERTAIN.value, UNCERTAIN)
-        panels.name_panel(axes, f"{player}: height [m]")
+            axes.fill_between(motion.time_s, middle - two_sd, middle + two_sd, color=colour, alpha=0.2, linewidth=0)
+        panels.shade_spans(axes, motion.time_s, motion.status[:, k] == Status.LOST.value, panels.LOST_STYLE)
+        panels.shade_spans(axes, motion.time_s, motion.status[:, k] == Status.UNCERTAIN.value, _UNCERTAIN_STYLE)
+        panels.label_panel(axes, f"{player}: height [m]")
         panels.begin_at_zero(axes)
     handles, labels = grid[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(PARTS), fontsize=panels.FONT_PT, frameon=False)
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=len(_JOINT_COLOURS), fontsize=panels.FONT_PT, frameon=False
+    )
     figure.align_ylabels()
     figure.savefig(path)

@@ -8,13 +8,13 @@ from typing import Any
 
 from airborne.errors import ResultError
 from airborne.export import page
-from airborne.export.palette import STATUS_RGB, web
-from airborne.export.summary import headline, plain, warnings
+from airborne.export.palette import STATUS_RGB, hex_colour
+from airborne.export.summary import body_warnings, headline, json_ready
 from airborne.motion import Motion
 from airborne.motion.flight.momentum_table import GRAVITY_M_S2
 from airborne.tracking import Status
 
-PICTURES = {  # titles and captions, in the order of the page
+_FIGURES = {  # titles and captions, in the order of the page
     "pose.png": (
         "The motion",
         "Position of the body's root in the world, and its somersault, tilt and twist, over time.",
@@ -74,13 +74,13 @@ DEFINITIONS = {
     ),
 }
 
-JOINT_ANGLES = (
+_JOINT_ANGLES = (
     "Successive turns about the moving x, y and z axes, parent from segment; a joint bears the name of the segment it "
     "turns. All are zero in a person standing upright, arms hanging, feet forward. What no picture shows, such as a "
     "round limb's turn about its own axis, stays as it was and has an infinite standard deviation."
 )
 
-UNCERTAINTY = (
+_UNCERTAINTY = (
     "Given as one standard deviation for each axis; bands in the figures are two. If errors are normal, 68% of them "
     "lie within one and 95% within two. Infinite means that the pictures do not show that direction."
 )
@@ -89,10 +89,10 @@ UNCERTAINTY = (
 def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
     """Write report.html into the folder of a run, and return its path.
 
-    `summary` is what `write_json` puts into summary.json: `name`, the numbers of `headline`, and where known
+    `summary` is what `write_json` writes into summary.json: `name`, the numbers of `headline`, and where known
 
     - `uncertainty`: in one or two sentences, which errors the standard deviations contain and which they do not
-    - `warnings`: sentences on what may be wrong with the result, beside those that the headline gives
+    - `warnings`: sentences on what may be wrong with the result, beside those of the headline
     - `events`: sentences on what happened to the recording
     - `method`, `timings_s` [s], `versions`, `inputs` (SHA-256 by file name): dictionaries of names and values
     - `cameras`: one dictionary for each camera, with `name` first
@@ -103,12 +103,12 @@ def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
     Units stand at the ends of keys (`_s`, `_px`, ...) and are shown as such. All text is escaped. Of the figures and
     the contact sheet, those in the folder are shown. Raises ResultError where a number of the headline is missing.
     """
-    summary = plain(summary)
+    summary = json_ready(summary)
     missing = sorted({"name", *headline(Motion.collect([]))} - set(summary))
     if missing:
         raise ResultError(f"the summary of {folder} has no {', '.join(missing[:3])}; track again")
     path = folder / "report.html"
-    path.write_text(page.page(summary["name"], _sections(folder, summary)), encoding="utf-8")
+    path.write_text(page.document(summary["name"], _sections(folder, summary)), encoding="utf-8")
     return path
 
 
@@ -116,7 +116,7 @@ def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
     yield page.heading(summary["name"], 1)
     yield status_bar(summary)
     yield page.box("tiles", "".join(page.tile(value, name) for value, name in _tiles(summary)))
-    alarms = [*warnings(summary), *summary.get("warnings", [])]
+    alarms = [*body_warnings(summary), *summary.get("warnings", [])]
     if alarms:
         yield page.box("warnings", "<b>Read this first</b>" + page.bullets(alarms))
     else:
@@ -128,19 +128,19 @@ def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
             yield page.heading(title) + _comparison(summary[key])
     if summary.get("joints"):
         yield page.heading("Against the paths of the joints") + _joint_comparison(summary["joints"])
-    for name, (title, caption) in PICTURES.items():
+    for name, (title, caption) in _FIGURES.items():
         if (folder / name).is_file():
-            yield page.heading(title) + page.picture(folder / name, caption)
+            yield page.heading(title) + page.figure(folder / name, caption)
         if name == "flight.png" and summary.get("flight"):
             yield _flight(summary["flight"])
     if summary.get("method"):
         yield page.heading("Method")
         yield page.settings(summary["method"])
     if summary.get("cameras"):
-        yield page.heading("Cameras") + records(summary["cameras"])
+        yield page.heading("Cameras") + records_table(summary["cameras"])
     yield page.heading("What the numbers mean")
-    of_joints = {"Joint angles": JOINT_ANGLES} if (folder / "joints.png").is_file() else {}
-    uncertainty = {"Uncertainty": f"{UNCERTAINTY} {summary.get('uncertainty', '')}"}
+    of_joints = {"Joint angles": _JOINT_ANGLES} if (folder / "joints.png").is_file() else {}
+    uncertainty = {"Uncertainty": f"{_UNCERTAINTY} {summary.get('uncertainty', '')}"}
     yield page.definitions({**DEFINITIONS, **of_joints, **uncertainty})
     for key, title in (("timings_s", "Time taken [s]"), ("versions", "Versions"), ("inputs", "Inputs (SHA-256)")):
         if summary.get(key):
@@ -148,8 +148,8 @@ def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
 
 
 def status_bar(head: Mapping[str, Any]) -> str:
-    """Show how many frames have which status."""
-    shares = [(head[f"n_{status}"], web(STATUS_RGB[status])) for status in Status]
+    """Return a bar of the number of frames with each status."""
+    shares = [(head[f"n_{status}"], hex_colour(STATUS_RGB[status])) for status in Status]
     bar = "".join(f'<div style="flex: {n} 0 0; background: {colour}"></div>' for n, colour in shares)
     counts = ", ".join(f"{head[f'n_{status}']} {status}" for status in Status)
     return page.box("bar", bar) + f"<p>{head['n_frames']} frames: {counts}</p>"
@@ -157,32 +157,32 @@ def status_bar(head: Mapping[str, Any]) -> str:
 
 def _tiles(head: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield _with_unit(head["duration_s"], "{:.3g} s"), f"at {_with_unit(head['rate_hz'], '{:.5g}')} frames a second"
-    yield _spread(head, "position", "mm"), "position, median standard deviation of an axis"
-    yield _spread(head, "rotation", "deg"), "orientation, median standard deviation about an axis"
+    yield _median_sd(head, "position", "mm"), "position, median standard deviation of an axis"
+    yield _median_sd(head, "rotation", "deg"), "orientation, median standard deviation about an axis"
     if head["n_rotation_unobservable"] == head["n_tracked"] + head["n_uncertain"] > 0:
         yield "cannot be seen", "turns: in every frame some direction of the orientation is hidden"
     else:
         yield _with_unit(head["somersault_rev"], "{:.2f} turns"), "somersault, first to last pose"
         yield _with_unit(head["twist_rev"], "{:.2f} turns"), "twist, first to last pose"
         low, high = head["tilt_range_deg"]
-        yield page.UNKNOWN if low is None else f"{low:.0f}° to {high:.0f}°".replace("-", "−"), "tilt"
+        yield page.UNKNOWN_TEXT if low is None else f"{low:.0f}° to {high:.0f}°".replace("-", "−"), "tilt"
     ranges = head["range_m"]
     yield (
-        page.UNKNOWN if ranges[0] is None else " · ".join(f"{r:.2f}" for r in ranges) + " m",
+        page.UNKNOWN_TEXT if ranges[0] is None else " · ".join(f"{r:.2f}" for r in ranges) + " m",
         "range of motion in x, y, z",
     )
     yield _with_unit(head["median_score"], "{:.1f}"), "median score in grey levels"
 
 
-def _spread(head: Mapping[str, Any], what: str, unit: str) -> str:
+def _median_sd(head: Mapping[str, Any], what: str, unit: str) -> str:
     value = head[f"median_{what}_sd_{unit}"]
     if value is None:
-        return "cannot be seen" if head[f"n_{what}_unobservable"] else page.UNKNOWN
+        return "cannot be seen" if head[f"n_{what}_unobservable"] else page.UNKNOWN_TEXT
     return f"± {value:.2g} mm" if unit == "mm" else f"± {value:.2g}°"
 
 
 def _with_unit(value: float | None, form: str) -> str:
-    return page.UNKNOWN if value is None else form.format(value).replace("-", "−")
+    return page.UNKNOWN_TEXT if value is None else form.format(value).replace("-", "−")
 
 
 def _comparison(comparison: Mapping[str, Any]) -> str:
@@ -228,9 +228,9 @@ def _joint_comparison(comparison: Mapping[str, Any]) -> str:
 
 
 def _flight(flight: Mapping[str, Any]) -> str:
-    mean, spread = flight["angular_momentum_kg_m2_s"], flight["angular_momentum_spread_kg_m2_s"]
+    mean, sd = flight["angular_momentum_kg_m2_s"], flight["angular_momentum_spread_kg_m2_s"]
     rows = [
-        (f"angular momentum about {axis} [kg m²/s]: mean, standard deviation over the frames", mean[k], spread[k])
+        (f"angular momentum about {axis} [kg m²/s]: mean, standard deviation over the frames", mean[k], sd[k])
         for k, axis in enumerate("xyz")
     ]
     rows.append(
@@ -244,8 +244,8 @@ def _flight(flight: Mapping[str, Any]) -> str:
     return page.table(rows)
 
 
-def records(records: Sequence[Mapping[str, Any]]) -> str:
-    """Show dictionaries as the rows of a table."""
-    keys = list(dict.fromkeys(key for record in records for key in record))
-    rows = [[record.get(key, "") for key in keys] for record in records]
-    return page.table(rows, [page.label(key) for key in keys])
+def records_table(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return dictionaries as the rows of a table."""
+    keys = list(dict.fromkeys(key for row in rows for key in row))
+    cells = [[row.get(key, "") for key in keys] for row in rows]
+    return page.table(cells, [page.label(key) for key in keys])

@@ -1,4 +1,4 @@
-"""through_mask.png: the pixels that the tracked body claims, camera by camera (paper B, figs 7 and 8)."""
+"""through_mask.png: crops seen through the mask of the tracked body, camera by camera (paper B, figs 7 and 8)."""
 
 from __future__ import annotations
 
@@ -13,52 +13,53 @@ from matplotlib.figure import Figure
 
 from airborne.body import PosedBody
 from airborne.cameras import Camera, Rig
-from airborne.export.palette import STATUS_RGB, TEXT_RGB, web
+from airborne.export.palette import STATUS_RGB, TEXT_RGB, hex_colour
 from airborne.export.panels import FONT_PT, WIDTH_IN
-from airborne.export.views import Picture, close_up, seen_by, shapes_of
+from airborne.export.views import cached_surface_arrays, crop_camera, resample_view
 from airborne.rendering import FLAT, render, through_mask
 from airborne.tracking import Status
+from airborne.types import Image
 from airborne.video import Frames, View
 
-N_COLUMNS = 8
-N_HELD = 32  # columns kept while reading; when full, every second one is dropped
-DPI = 200
+_N_COLUMNS = 8
+N_BUFFERED = 32  # columns buffered while tracking; when full, every second one is dropped
+SHEET_DPI = 200
 BACKGROUND_GREY = 205
 
 
 class _Column(NamedTuple):
     title: str
     colour: str
-    cells: list[Picture | None]  # one per camera
+    cells: list[Image | None]  # one per camera
 
 
 class ContactSheet:
-    """Collects crops round the body as frames go by, at one scale in metres; use it in a `with` block.
+    """Collects crops around the body while it is tracked, at one scale in metres; use it in a `with` block.
 
     Memory stays flat. The sheet is written at the end of the block: rows are cameras, columns up to eight evenly spaced
-    times; no file is left where the body was never found.
+    times; no file is written if the body was never found.
     """
 
     def __init__(self, path: Path, rig: Rig) -> None:
-        """Begin an empty sheet; one row for each camera of the rig, whose sizes are those of whole pictures."""
+        """Begin an empty sheet; one row for each camera of the rig, whose sizes are those of whole frames."""
         path.unlink(missing_ok=True)
         self._path = path
-        self._cameras = [camera.undistorted() for camera in rig]
+        self._cameras = [camera.without_distortion() for camera in rig]
         self._columns: list[_Column] = []
-        self._every, self._n_seen = 1, 0
+        self._every, self._n_offered = 1, 0
 
     def write(self, frames: Frames, posed: PosedBody | None, status: Status) -> None:
-        """Consider what every camera saw at one time; nothing is taken where the body is lost."""
+        """Add what every camera saw at one time, except where the body is lost."""
         if posed is None or status is Status.LOST:
             return
-        if self._n_seen % self._every == 0:
-            if len(self._columns) == N_HELD:
+        if self._n_offered % self._every == 0:
+            if len(self._columns) == N_BUFFERED:
                 self._columns, self._every = self._columns[::2], 2 * self._every
             title = f"frame {frames.index}\n{float(frames.time_s):.3f} s"
-            colour = web(STATUS_RGB[status] if status is not Status.TRACKED else TEXT_RGB)
+            colour = hex_colour(STATUS_RGB[status] if status is not Status.TRACKED else TEXT_RGB)
             cells = [_cell(view, camera, posed) for view, camera in zip(frames.views, self._cameras, strict=True)]
             self._columns.append(_Column(title, colour, cells))
-        self._n_seen += 1
+        self._n_offered += 1
 
     def __enter__(self) -> Self:
         return self
@@ -66,17 +67,17 @@ class ContactSheet:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Write the sheet; after an error too, with what was seen."""
+        """Write the sheet; after an error too, with what was collected."""
         n = len(self._columns)
         if n:
-            chosen = np.linspace(0, n - 1, min(n, N_COLUMNS)).round().astype(int)
+            selected = np.linspace(0, n - 1, min(n, _N_COLUMNS)).round().astype(int)
             names = [camera.name for camera in self._cameras]
-            _sheet_figure([self._columns[i] for i in chosen], names).savefig(self._path)
+            _sheet_figure([self._columns[i] for i in selected], names).savefig(self._path)
 
 
 def _sheet_figure(columns: Sequence[_Column], names: Sequence[str]) -> Figure:
-    cell_in = (WIDTH_IN - 0.5) / N_COLUMNS
-    figure = Figure((0.5 + cell_in * len(columns), 0.5 + cell_in * len(names)), dpi=DPI)
+    cell_in = (WIDTH_IN - 0.5) / _N_COLUMNS
+    figure = Figure((0.5 + cell_in * len(columns), 0.5 + cell_in * len(names)), dpi=SHEET_DPI)
     figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.02, wspace=0, hspace=0)
     grid = figure.subplots(len(names), len(columns), squeeze=False)
     for k, column in enumerate(columns):
@@ -84,22 +85,22 @@ def _sheet_figure(columns: Sequence[_Column], names: Sequence[str]) -> Figure:
         for i, cell in enumerate(column.cells):
             draw_cell(grid[i, k], cell)
     for axes, name in zip(grid[:, 0], names, strict=True):
-        axes.set_ylabel(name, fontsize=FONT_PT - 1, color=web(TEXT_RGB))
+        axes.set_ylabel(name, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
     return figure
 
 
-def _cell(view: View | None, camera: Camera, posed: PosedBody) -> Picture | None:
-    crop = close_up(camera, posed)
+def _cell(view: View | None, camera: Camera, posed: PosedBody) -> Image | None:
+    crop = crop_camera(camera, posed)
     if view is None or crop is None:
         return None
-    rendering = render(shapes_of(posed.model), posed, crop, FLAT)
-    picture = through_mask(seen_by(view, crop), rendering)
-    picture[~rendering.mask] = BACKGROUND_GREY
-    return picture
+    rendering = render(cached_surface_arrays(posed.model), posed, crop, FLAT)
+    image = through_mask(resample_view(view, crop), rendering)
+    image[~rendering.mask] = BACKGROUND_GREY
+    return image
 
 
-def draw_cell(axes: Axes, cell: Picture | None) -> None:
-    """Show a picture without axes, or say that there is none."""
+def draw_cell(axes: Axes, cell: Image | None) -> None:
+    """Show an image without axes, or say that there is none."""
     axes.set_xticks([])
     axes.set_yticks([])
     for spine in axes.spines.values():

@@ -1,4 +1,4 @@
-"""summary.json: what a run comes to, in one dictionary that the report prints too."""
+"""summary.json: the headline numbers of a run, in one dictionary that the report prints too."""
 
 from __future__ import annotations
 
@@ -10,30 +10,28 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airborne.motion import Motion, angles
+from airborne.motion import Motion, root_angles
 from airborne.tracking import Status
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 
 def headline(motion: Motion) -> dict[str, Any]:
-    """Reduce a motion to the numbers that stand first; what cannot be said is NaN or infinite.
+    """Reduce a motion to its headline numbers; unknown ones are NaN or infinite.
 
     - `n_frames`, `n_tracked`, `n_uncertain`, `n_lost`; `start_s`, `duration_s` (first to last frame), `rate_hz`
     - `median_score` [grey levels]
     - `median_position_sd_mm`, `median_rotation_sd_deg`: of each frame's root mean square over the three axes;
       infinite where most frames do not show some direction
     - `range_m`: largest minus smallest x, y, z; `tilt_range_deg`: smallest and largest
-    - `somersault_rev`, `twist_rev`: turns from the first to the last frame that has a pose
+    - `somersault_rev`, `twist_rev`: revolutions from the first to the last frame with a pose
     - `n_position_unobservable`, `n_rotation_unobservable`: frames with an infinite variance
     - `n_near_singular`: frames within 5 degrees of 90 degrees of tilt
-    - `has_gap`: lost frames lie between frames with a pose, so that whole turns may be miscounted
+    - `has_gap`: lost frames lie between frames with a pose, so that whole revolutions may be miscounted
     """
     has_pose = motion.has_pose
     rows = np.flatnonzero(has_pose)
-    table = angles(motion)
+    table = root_angles(motion)
     position_sd, rotation_sd = motion.position_sd[has_pose], motion.rotation_sd[has_pose]
     ends = motion.time_s[[0, -1]] if len(motion) else np.full(2, np.nan)
     tilt = table["tilt"].to_numpy()[has_pose]
@@ -49,9 +47,9 @@ def headline(motion: Motion) -> dict[str, Any]:
         "median_position_sd_mm": 1e3 * _median(_rms_over_axes(position_sd)),
         "median_rotation_sd_deg": math.degrees(_median(_rms_over_axes(rotation_sd))),
         "range_m": np.ptp(motion.position[has_pose], axis=0).tolist() if len(rows) else [math.nan] * 3,
-        "somersault_rev": _turns(table["somersault"].to_numpy()[rows]),
+        "somersault_rev": _revolutions(table["somersault"].to_numpy()[rows]),
         "tilt_range_deg": [float(tilt.min()), float(tilt.max())] if len(rows) else [math.nan] * 2,
-        "twist_rev": _turns(table["twist"].to_numpy()[rows]),
+        "twist_rev": _revolutions(table["twist"].to_numpy()[rows]),
         "n_position_unobservable": int(np.isinf(position_sd).any(axis=1).sum()),
         "n_rotation_unobservable": int(np.isinf(rotation_sd).any(axis=1).sum()),
         "n_near_singular": int(table["is_singular"].to_numpy()[rows].sum()),
@@ -59,8 +57,8 @@ def headline(motion: Motion) -> dict[str, Any]:
     }
 
 
-def warnings(head: Mapping[str, Any]) -> Iterator[str]:
-    """Say in plain sentences what the reader of a `headline` must not miss; nothing where every frame is sound."""
+def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
+    """Yield, in plain sentences, what the reader of a `headline` must not miss; nothing if every frame is tracked."""
     n, n_posed = head["n_frames"], head["n_tracked"] + head["n_uncertain"]
     if not n_posed:
         yield "The body was found in no frame: this run measured nothing."
@@ -90,20 +88,20 @@ def warnings(head: Mapping[str, Any]) -> Iterator[str]:
 
 def write_json(path: Path, values: Mapping[str, Any]) -> None:
     """Write a dictionary as JSON; NaN and infinite numbers become null. The file appears whole or not at all."""
-    text = json.dumps(plain(values), indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(json_ready(values), indent=2, ensure_ascii=False, allow_nan=False)
     unfinished = path.with_name(path.name + ".part")
     unfinished.write_text(text + "\n", encoding="utf-8")
     unfinished.replace(path)
 
 
-def plain(value: Any) -> Any:
-    """Turn arrays, fractions and paths into what JSON knows, all the way down; NaN and infinite become None."""
+def json_ready(value: Any) -> Any:
+    """Convert arrays, fractions and paths to JSON types, recursively; NaN and infinite become None."""
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): json_ready(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return [json_ready(item) for item in value]
     if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
+        return json_ready(value.tolist())
     if isinstance(value, Fraction):
         return float(value)
     if isinstance(value, Path):
@@ -116,9 +114,9 @@ def _rms_over_axes(sd: Array) -> Array:
 
 
 def _median(values: Array) -> float:
-    known = values[~np.isnan(values)]
-    return float(np.median(known)) if len(known) else math.nan
+    present = values[~np.isnan(values)]
+    return float(np.median(present)) if len(present) else math.nan
 
 
-def _turns(angle_deg: Array) -> float:
+def _revolutions(angle_deg: Array) -> float:
     return float(angle_deg[-1] - angle_deg[0]) / 360 if len(angle_deg) else math.nan

@@ -1,4 +1,4 @@
-"""Wide tables for spreadsheets and data frames: a row a frame, the unit in every column's name, deviations beside."""
+"""Wide tables for spreadsheets and data frames: one row per frame, units in the column names, standard deviations."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel
-from airborne.motion import Motion, PlayersMotion, angles, joint_angles
-from airborne.motion.angles import ANGLES
+from airborne.motion import Motion, PlayersMotion, joint_angles, root_angles
+from airborne.motion.angles import ROOT_ANGLES
 
 _CONVENTIONS = {"world": "metres, z up", "angles": "successive turns about moving x, y, z, running on over time"}
 
@@ -30,25 +30,25 @@ Columns = Mapping[str, Column]
 
 
 def body_columns(
-    motion: Motion, model: BodyModel, points: NDArray, sd: NDArray, com: tuple[NDArray, NDArray] | None
+    motion: Motion, model: BodyModel, points: NDArray, *, sd: NDArray, com: tuple[NDArray, NDArray] | None
 ) -> Columns:
-    """Lay out one body: the root's angles, its landmarks, its joints' angles, its centre of mass.
+    """Return the columns of one body: the root's angles, its landmarks, its joints' angles, its centre of mass.
 
-    points (n, landmarks, 3) and sd (n, landmarks) [m] as `landmarks` gives them; com, both (n, 3) [m], place and
-    deviations, as `flight` does, None where masses are unknown. Raises ResultError for another body's motion.
+    points (n, landmarks, 3) and sd (n, landmarks) [m] as `landmarks` gives them; com, both (n, 3) [m], position
+    and standard deviations, None where masses are unknown. Raises ResultError for another body's motion.
     """
     columns = {"frame": Column(motion.index), "time_s": Column(motion.time_s, "s"), "status": Column(motion.status)}
-    turns = angles(motion)
-    for name in ANGLES:
-        columns[f"{name}_deg"] = Column(turns[name].to_numpy(), "deg")
-        columns[f"{name}_deg_sd"] = Column(turns[f"{name}_sd"].to_numpy(), "deg")
-    columns |= _places([landmark.name for landmark in model.landmarks], points, sd)
+    root = root_angles(motion)
+    for name in ROOT_ANGLES:
+        columns[f"{name}_deg"] = Column(root[name].to_numpy(), "deg")
+        columns[f"{name}_deg_sd"] = Column(root[f"{name}_sd"].to_numpy(), "deg")
+    columns |= _point_columns([landmark.name for landmark in model.landmarks], points, sd)
     if motion.joints:
-        bent = joint_angles(motion, model)
+        angles_of = joint_angles(motion, model)
         for j, joint in enumerate(motion.joints):
             for k, axis in enumerate("xyz"):
-                columns[f"{joint}_{axis}_deg"] = Column(bent["angle"].to_numpy()[:, j, k], "deg")
-                columns[f"{joint}_{axis}_deg_sd"] = Column(bent["angle_sd"].to_numpy()[:, j, k], "deg")
+                columns[f"{joint}_{axis}_deg"] = Column(angles_of["angle"].to_numpy()[:, j, k], "deg")
+                columns[f"{joint}_{axis}_deg_sd"] = Column(angles_of["angle_sd"].to_numpy()[:, j, k], "deg")
     if com is not None:
         for k, axis in enumerate("xyz"):
             columns[f"com_{axis}_m"] = Column(com[0][:, k], "m")
@@ -57,7 +57,7 @@ def body_columns(
 
 
 def players_columns(motion: PlayersMotion) -> Columns:
-    """Lay out players: a row a player and frame, all joints side by side."""
+    """Return the columns of players: one row per frame and player, all joints side by side."""
     n, k = len(motion), len(motion.players)
     columns = {
         "player": Column(np.tile(motion.players, n)),
@@ -66,21 +66,21 @@ def players_columns(motion: PlayersMotion) -> Columns:
         "status": Column(motion.status.ravel()),
     }
     points, sd = motion.points.reshape(n * k, -1, 3), motion.sd.reshape(n * k, -1)
-    return columns | _places(motion.joints, points, sd)
+    return columns | _point_columns(motion.joints, points, sd)
 
 
 def write_csv(path: Path, columns: Columns) -> None:
-    """Write columns as CSV; floats read back to the last bit, the unknown is an empty cell."""
+    """Write columns as CSV; floats read back to the last bit, NaN is an empty cell."""
     options = pyarrow.csv.WriteOptions(quoting_style="needed")
     pyarrow.csv.write_csv(_table(columns), path, options)
 
 
 def write_parquet(path: Path, columns: Columns) -> None:
-    """Write columns as Parquet, units in the metadata; the unknown is null."""
+    """Write columns as Parquet, units in the metadata; NaN is null."""
     pq.write_table(_table(columns), path)
 
 
-def _places(names: list[str] | tuple[str, ...], points: NDArray, sd: NDArray) -> dict[str, Column]:
+def _point_columns(names: list[str] | tuple[str, ...], points: NDArray, sd: NDArray) -> dict[str, Column]:
     columns = {}
     for j, name in enumerate(names):
         columns |= {f"{name}_{axis}_m": Column(points[:, j, k], "m") for k, axis in enumerate("xyz")}

@@ -8,12 +8,12 @@ import numpy as np
 
 from airborne.export.takes import Take
 
-Y_UP = (1, 2, 0)  # TRC's x, y, z are the world's y, z, x
+_Y_UP = (1, 2, 0)  # TRC's x, y, z are the world's y, z, x
 _HEADER = "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames"
 
 
 def write_trc(path: Path, take: Take) -> None:
-    """Write a take's markers [m]; what is missing is a literal NaN, which OpenSim reads as missing too."""
+    """Write a take's markers [m]; missing values are a literal NaN, which OpenSim too reads as missing."""
     rate, n, n_markers = repr(float(take.rate)), len(take), len(take.markers)
     lines = [
         f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
@@ -23,7 +23,7 @@ def write_trc(path: Path, take: Take) -> None:
         "\t\t" + "\t".join(f"{axis}{k + 1}" for k in range(n_markers) for axis in "XYZ"),
         "",
     ]
-    values = take.points[..., Y_UP].reshape(n, -1)
+    values = take.points[..., _Y_UP].reshape(n, -1)
     values[~np.repeat(np.isfinite(take.points).all(axis=-1), 3, axis=1)] = np.nan
     for frame, time_s, row in zip(take.frame, take.time_s, values.tolist(), strict=True):
         cells = ("NaN" if x != x else f"{x:.7f}" for x in row)

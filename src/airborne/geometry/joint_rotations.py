@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numba import njit
 
-_LOCKED = 1e-8  # cosine of the middle angle below which the other two are one angle
+_GIMBAL_LOCK = 1e-8  # cosine of the middle angle below which the other two are one angle
 _SMALL = 1e-8  # of an angle or its sine
 
 
 @njit(cache=True, nogil=True)
-def turned(angles, turns):
+def compose_rotation_vectors(angles, rotation_vectors):
     """Return the angles (n, 3) [rad] of Rx Ry Rz exp(turn), on the branch near the old angles (n, 3).
 
     turns (n, 3) are rotation vectors [rad] in the turned axes.
@@ -20,7 +20,7 @@ def turned(angles, turns):
     out, R, T, product = np.empty_like(angles), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for j in range(len(angles)):
         _matrix(angles[j], R)
-        _exponential(turns[j], T)
+        _exponential(rotation_vectors[j], T)
         for a in range(3):
             for b in range(3):
                 product[a, b] = R[a, 0] * T[0, b] + R[a, 1] * T[1, b] + R[a, 2] * T[2, b]
@@ -29,7 +29,7 @@ def turned(angles, turns):
 
 
 @njit(cache=True, nogil=True)
-def turns_between(earlier, later):
+def rotation_vectors_between(earlier, later):
     """Return the rotation vectors (n, 3) that `turned` takes from angles earlier (n, 3) to later (n, 3) [rad]."""
     out, A, B, product = np.empty_like(earlier), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for j in range(len(earlier)):
@@ -93,12 +93,12 @@ def _logarithm(R, turn):
 def _angles_near(R, near, out):
     """Fill the angles of R on the branch nearest to `near` (3,); where y is +-90 degrees, x stays as it was."""
     cosine = math.hypot(R[1, 2], R[2, 2])
-    x = near[0] if cosine < _LOCKED else math.atan2(-R[1, 2], R[2, 2])
+    x = near[0] if cosine < _GIMBAL_LOCK else math.atan2(-R[1, 2], R[2, 2])
     y = math.atan2(R[0, 2], math.hypot(R[0, 0], R[0, 1]))
     c, s = math.cos(x), math.sin(x)
     z = math.atan2(c * R[1, 0] + s * R[2, 0], c * R[1, 1] + s * R[2, 1])
-    one0, one1, one2 = _wound(x, near[0]), _wound(y, near[1]), _wound(z, near[2])
-    two0, two1, two2 = _wound(x + math.pi, near[0]), _wound(math.pi - y, near[1]), _wound(z + math.pi, near[2])
+    one0, one1, one2 = _nearest_equivalent(x, near[0]), _nearest_equivalent(y, near[1]), _nearest_equivalent(z, near[2])
+    two0, two1, two2 = _nearest_equivalent(x + math.pi, near[0]), _nearest_equivalent(math.pi - y, near[1]), _nearest_equivalent(z + math.pi, near[2])
     first = (one0 - near[0]) ** 2 + (one1 - near[1]) ** 2 + (one2 - near[2]) ** 2
     second = (two0 - near[0]) ** 2 + (two1 - near[1]) ** 2 + (two2 - near[2]) ** 2
     if second < first:
@@ -108,6 +108,6 @@ def _angles_near(R, near, out):
 
 
 @njit(cache=True, nogil=True)
-def _wound(angle, near):
+def _nearest_equivalent(angle, near):
     """Return the angle, whole turns added, nearest to another."""
     return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))

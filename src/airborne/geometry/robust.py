@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
-
+from airborne.types import Array
 
 SD_OF_MEDIAN_DEVIATION = 1.4826  # of normal noise
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
+from airborne.types import Array
 
-SINGULAR_MARGIN_RAD = np.deg2rad(5.0)  # closer to +-90 degrees of tilt, errors grow over elevenfold
+_SINGULAR_MARGIN_RAD = np.deg2rad(5.0)  # closer to +-90 degrees of tilt, errors grow over elevenfold
 _RATE_ROWS = 5  # rows before a gap whose mean turning rate is carried across it
 
 
@@ -41,10 +41,10 @@ def angles_from_matrix(R: Array) -> Array:
 
 def is_near_singular(angles: Array) -> NDArray[np.bool_]:
     """Say where tilt is within 5 degrees of +-90, so that somersault and twist cannot be told apart: (...)."""
-    return np.abs(np.asarray(angles, float)[..., 1]) > np.pi / 2 - SINGULAR_MARGIN_RAD
+    return np.abs(np.asarray(angles, float)[..., 1]) > np.pi / 2 - _SINGULAR_MARGIN_RAD
 
 
-def unwrapped(angles: Array, time_s: Array) -> Array:
+def unwrap(angles: Array, time_s: Array) -> Array:
     """Add whole turns to somersault and twist (n, 3) [rad] so that they run on over time (n,) [s].
 
     Each row lands within half a turn of the row before. Over a gap (NaN rows) it lands within half a turn of where
@@ -84,6 +84,6 @@ def geodesic(A: Array, B: Array) -> Array:
     return np.arctan2(np.linalg.norm(axis, axis=-1), np.trace(relative, axis1=-2, axis2=-1) - 1)
 
 
-def wrapped(angle: Array) -> Array:
+def wrap(angle: Array) -> Array:
     """Bring angles to the half turn on either side of zero, [-pi, pi) [rad]."""
     return np.remainder(np.asarray(angle, float) + np.pi, 2 * np.pi) - np.pi

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
+from airborne.types import Array
 
-SMALLEST_EIGENVALUE_RATIO = 1e-12  # below it the rays are parallel to working precision
-N_STEPS = 6  # Gauss-Newton steps; each squares the error, and the linear start is within a few pixels
+_SMALLEST_EIGENVALUE_RATIO = 1e-12  # below it the rays are parallel to working precision
+_N_STEPS = 6  # Gauss-Newton steps; each squares the error, and the linear start is within a few pixels
 
 
 def px_from_points(P: Array, points: Array) -> Array:
@@ -31,7 +31,7 @@ def triangulate(P: Array, px: Array, weights: Array | None = None) -> Array:
     px = np.asarray(px, float)
     points = triangulate_linear(P, px)
     root = np.ones(px.shape[:-1]) if weights is None else np.sqrt(weights)
-    for _ in range(N_STEPS):
+    for _ in range(_N_STEPS):
         residual, jacobian = _residual_and_jacobian(P, points, px)
         jacobian = root[..., None, None] * jacobian
         gradient = np.einsum("...cik,...ci->...k", jacobian, root[..., None] * residual)
@@ -95,6 +95,6 @@ def _inverse(jacobian: Array) -> Array:
     information = np.einsum("...cij,...cik->...jk", jacobian, jacobian)
     is_finite = np.isfinite(information).all(axis=(-2, -1))[..., None, None]
     values, vectors = np.linalg.eigh(np.where(is_finite, information, 0.0))
-    is_regular = values[..., :1] > SMALLEST_EIGENVALUE_RATIO * values[..., -1:]
+    is_regular = values[..., :1] > _SMALLEST_EIGENVALUE_RATIO * values[..., -1:]
     scaled = vectors / np.where(is_regular, values, np.nan)[..., None, :]
     return scaled @ np.swapaxes(vectors, -1, -2)

@@ -13,7 +13,7 @@ from pathlib import Path
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-MOST_BYTES = 256_000_000
+_MOST_BYTES = 256_000_000
 
 _BROKEN = (zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, EOFError, KeyError, TypeError)
 _BROKEN += (NotImplementedError, RuntimeError, SyntaxError, MemoryError, OverflowError, AssertionError)
@@ -24,8 +24,8 @@ def read_arrays(path: Path) -> dict[str, NDArray]:
     try:
         with zipfile.ZipFile(path) as archive:
             members = [member for member in archive.infolist() if member.filename.endswith(".npy")]
-            if sum(member.file_size for member in members) > MOST_BYTES:
-                raise ValueError(f"its arrays take more than {MOST_BYTES // 1_000_000} MB")
+            if sum(member.file_size for member in members) > _MOST_BYTES:
+                raise ValueError(f"its arrays take more than {_MOST_BYTES // 1_000_000} MB")
             return {member.filename.removesuffix(".npy"): _array(archive, member) for member in members}
     except _BROKEN as error:
         raise ValueError(str(error)[:120]) from None

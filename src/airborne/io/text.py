@@ -9,32 +9,32 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-LARGEST_TOML_BYTES = 5_000_000
-LARGEST_JSON_BYTES = 50_000_000
-LARGEST_CSV_BYTES = 50_000_000
+_LARGEST_TOML_BYTES = 5_000_000
+_LARGEST_JSON_BYTES = 50_000_000
+_LARGEST_CSV_BYTES = 50_000_000
 
 _DEEP_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){64}""")  # a.a.a...: takes time in squares
 
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file. Raises OSError, or TOMLDecodeError for anything else, also where it is large or nested."""
-    if path.stat().st_size > LARGEST_TOML_BYTES:
-        raise tomllib.TOMLDecodeError(f"larger than {LARGEST_TOML_BYTES // 1_000_000} MB")
+    if path.stat().st_size > _LARGEST_TOML_BYTES:
+        raise tomllib.TOMLDecodeError(f"larger than {_LARGEST_TOML_BYTES // 1_000_000} MB")
     try:
-        return parsed_toml(path.read_text(encoding="utf-8-sig"))
+        return parse_toml(path.read_text(encoding="utf-8-sig"))
     except UnicodeDecodeError:
         raise tomllib.TOMLDecodeError("it is not a text file") from None
 
 
-def listed_keys(document: dict[str, Any]) -> str:
+def list_keys(document: dict[str, Any]) -> str:
     """Return what stands at the top of a document, for an error."""
     return ", ".join(key[:60] for key in [*document][:6]) or "nothing"
 
 
 def read_json(path: Path) -> Any:
     """Read a JSON file. Raises OSError, or ValueError for anything else, also where it is large or nested too deep."""
-    if path.stat().st_size > LARGEST_JSON_BYTES:
-        raise ValueError(f"larger than {LARGEST_JSON_BYTES // 1_000_000} MB")
+    if path.stat().st_size > _LARGEST_JSON_BYTES:
+        raise ValueError(f"larger than {_LARGEST_JSON_BYTES // 1_000_000} MB")
     try:
         return json.loads(path.read_text(encoding="utf-8-sig"))
     except RecursionError:
@@ -47,8 +47,8 @@ def read_csv(path: Path, expected: str, error: type[Exception]) -> list[tuple[in
     Raises `error`, saying in one line what was found and what is `expected`.
     """
     try:
-        if path.stat().st_size > LARGEST_CSV_BYTES:
-            raise error(f"{path} is larger than {LARGEST_CSV_BYTES // 1_000_000} MB; {expected}")
+        if path.stat().st_size > _LARGEST_CSV_BYTES:
+            raise error(f"{path} is larger than {_LARGEST_CSV_BYTES // 1_000_000} MB; {expected}")
         text = path.read_text(encoding="utf-8-sig")
     except OSError as failure:
         raise error(f"{path} cannot be read ({failure.strerror}); {expected}") from None
@@ -64,7 +64,7 @@ def read_csv(path: Path, expected: str, error: type[Exception]) -> list[tuple[in
     return [(line, row) for line, row in rows if any(row)]
 
 
-def parsed_toml(text: str) -> dict[str, Any]:
+def parse_toml(text: str) -> dict[str, Any]:
     """Parse TOML. Raises TOMLDecodeError, in place of whatever else the parser meets in odd files."""
     if _DEEP_KEY.search(text):
         raise tomllib.TOMLDecodeError("nested too deep")

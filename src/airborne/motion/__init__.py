@@ -1,16 +1,16 @@
-"""Motion: in come `Estimate`s, out come `Motion` and its tables.
+"""Motion: `Estimate`s come in; `Motion` and its tables go out.
 
-Writes and reads motion.csv as a run goes; at its end motion.parquet, angles.csv and joints.csv, and of bodies with
-joints and masses joint_angles.csv and flight.csv. Of several players it writes and reads joints.csv as a run goes, and
-measures their jumps: jumps.csv.
-Knows no camera, no image and no truth.
+Writes and reads motion.csv during a run; at its end writes motion.parquet, angles.csv and joints.csv, and for bodies
+with joints and masses joint_angles.csv and flight.csv. For several players it writes and reads joints.csv during the
+run and measures their jumps: jumps.csv.
+Independent of cameras, images and truth.
 """
 
-from airborne.motion.angles import angles
+from airborne.motion.angles import root_angles
 from airborne.motion.files import MotionWriter, read_estimates, read_motion
-from airborne.motion.flight.momentum_table import FlightSummary, flight, flight_summary, has_inertias
+from airborne.motion.flight.momentum_table import FlightSummary, flight_summary, has_inertias, measure_flight
 from airborne.motion.joints import joint_angles, landmarks
-from airborne.motion.jumps.heights import jumps
+from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.jump import Jump
 from airborne.motion.jumps.table import write_jumps
 from airborne.motion.motion import Motion, dataset
@@ -24,13 +24,13 @@ __all__ = [
     "MotionWriter",
     "PlayersMotion",
     "PlayersWriter",
-    "angles",
+    "root_angles",
     "dataset",
-    "flight",
+    "measure_flight",
     "flight_summary",
     "has_inertias",
     "joint_angles",
-    "jumps",
+    "measure_jumps",
     "landmarks",
     "read_estimates",
     "read_motion",

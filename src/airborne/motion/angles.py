@@ -4,30 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from airborne.geometry.rotations import angles_from_matrix, angles_from_world_rotation, is_near_singular, unwrapped
+from airborne.geometry.rotations import angles_from_matrix, angles_from_world_rotation, is_near_singular, unwrap
 from airborne.motion.motion import Motion
-from airborne.motion.uncertainty import deviation
+from airborne.motion.uncertainty import standard_deviation
 
-Array = NDArray[np.floating]
-
-ANGLES = ("somersault", "tilt", "twist")
+ROOT_ANGLES = ("somersault", "tilt", "twist")
 
 
-def angles(motion: Motion) -> xr.Dataset:
-    """Read somersault, tilt and twist [deg] off a motion, unwrapped over time, with standard deviations.
+def root_angles(motion: Motion) -> xr.Dataset:
+    """Compute somersault, tilt and twist [deg] of a motion, unwrapped over time, with standard deviations.
 
-    The deviations follow from the rotation's covariance to first order; NaN where that is unknown or infinite, and
-    near +-90 degrees of tilt, where `is_singular` says that somersault and twist cannot be told apart.
+    The standard deviations follow from the rotation's covariance to first order. They are NaN where that is unknown or
+    infinite, and near +-90 degrees of tilt (gimbal lock: `is_singular`), where somersault and twist are ambiguous.
     """
-    radians = unwrapped(angles_from_matrix(motion.R), motion.time_s)
+    radians = unwrap(angles_from_matrix(motion.R), motion.time_s)
     jacobian = angles_from_world_rotation(radians)
     covariance = motion.covariance[:, 3:6, 3:6]
     is_known = np.isfinite(covariance).all(axis=(-2, -1), keepdims=True)
-    sd = deviation(np.einsum("nij,njk,nik->ni", jacobian, np.where(is_known, covariance, np.nan), jacobian))
-    variables: dict = {name: ("time", np.rad2deg(radians[:, k]), {"units": "deg"}) for k, name in enumerate(ANGLES)}
-    variables |= {f"{name}_sd": ("time", np.rad2deg(sd[:, k]), {"units": "deg"}) for k, name in enumerate(ANGLES)}
+    sd = standard_deviation(np.einsum("nij,njk,nik->ni", jacobian, np.where(is_known, covariance, np.nan), jacobian))
+    variables: dict = {
+        name: ("time", np.rad2deg(radians[:, k]), {"units": "deg"}) for k, name in enumerate(ROOT_ANGLES)
+    }
+    variables |= {f"{name}_sd": ("time", np.rad2deg(sd[:, k]), {"units": "deg"}) for k, name in enumerate(ROOT_ANGLES)}
     variables["is_singular"] = ("time", is_near_singular(radians))
     coordinates = {"time": ("time", motion.time_s, {"units": "s"}), "frame": ("time", motion.index)}
     return xr.Dataset(variables, coordinates, {"history": ["angles: somersault, tilt, twist, unwrapped"]})

@@ -1,6 +1,6 @@
-"""covariance.bin: the whole covariance of a body with joints, beside the motion.csv that holds the root's.
+"""covariance.bin: the full covariance of a body with joints, beside the motion.csv that holds the root's.
 
-Rows of little-endian 64-bit floats, one for each row of motion.csv: the upper triangle, row by row, of the matrix
+Rows of little-endian 64-bit floats, one per row of motion.csv: the upper triangle, row by row, of the matrix
 (6 + 3 joints, 6 + 3 joints) of `Estimate`.
 """
 
@@ -11,31 +11,29 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.errors import ResultError
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-NAME = "covariance.bin"
+COVARIANCE_FILE = "covariance.bin"
 _FLOAT = np.dtype("<f8")
 
 
 class CovarianceWriter:
-    """Appends covariances; each is on the disk before `append` returns."""
+    """Appends covariances; each is on disk before `append` returns."""
 
-    def __init__(self, path: Path, kept: Sequence[Array], *, size: int) -> None:
-        """Begin a file that holds the covariances `kept` (size, size), leaving those it has as they are."""
-        n_kept = min(len(kept), path.stat().st_size // _row_bytes(size)) if path.is_file() else 0
+    def __init__(self, path: Path, covariances: Sequence[Array], *, size: int) -> None:
+        """Open a file for the given covariances (size, size); rows that it already has stay as they are."""
+        n_finished = min(len(covariances), path.stat().st_size // _row_bytes(size)) if path.is_file() else 0
         self._upper = np.triu_indices(size)
-        self._file = path.open("r+b" if n_kept else "wb")
-        self._file.truncate(n_kept * _row_bytes(size))
+        self._file = path.open("r+b" if n_finished else "wb")
+        self._file.truncate(n_finished * _row_bytes(size))
         self._file.seek(0, os.SEEK_END)
-        for covariance in kept[n_kept:]:
+        for covariance in covariances[n_finished:]:
             self.append(covariance)
 
     def append(self, covariance: Array) -> None:
-        """Write one covariance (size, size) and wait until the disk has it."""
+        """Write one covariance (size, size) and wait until it is on disk."""
         self._file.write(covariance[self._upper].astype(_FLOAT).tobytes())
         self._file.flush()
         os.fsync(self._file.fileno())
@@ -46,9 +44,9 @@ class CovarianceWriter:
 
 
 def read_covariances(path: Path, n: int, *, size: int) -> Array:
-    """Read the first n covariances (n, size, size); rows that the file does not have, or no file, are NaN.
+    """Read the first n covariances (n, size, size); rows missing from the file are NaN, all of them without a file.
 
-    Raises ResultError where the file is there and cannot be read.
+    Raises ResultError if the file exists and cannot be read.
     """
     covariances, upper = np.full((n, size, size), np.nan), np.triu_indices(size)
     if not path.is_file():
@@ -57,7 +55,7 @@ def read_covariances(path: Path, n: int, *, size: int) -> Array:
         with path.open("rb") as file:
             data = file.read(n * _row_bytes(size))
     except OSError as error:
-        raise ResultError(f"{path} cannot be read ({error.strerror}); mend it, or remove it to go on without") from None
+        raise ResultError(f"{path} cannot be read ({error.strerror}); repair it, or remove it to go without") from None
     n_whole = len(data) // _row_bytes(size)
     rows = np.frombuffer(data, _FLOAT, n_whole * len(upper[0])).reshape(n_whole, len(upper[0]))
     for covariance, row in zip(covariances, rows, strict=False):

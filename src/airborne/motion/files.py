@@ -1,6 +1,6 @@
-"""motion.csv: one row per finished frame, written as a run goes, read back to the last bit.
+"""motion.csv: one row per finished frame, written during a run, read back bit for bit.
 
-A body with joints has its whole covariance in covariance.bin beside it.
+A body with joints has its full covariance in covariance.bin beside it.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from airborne.body import Pose
 from airborne.errors import ResultError
-from airborne.motion.covariance_file import NAME as SIDECAR
-from airborne.motion.covariance_file import CovarianceWriter, read_covariances
+from airborne.motion.covariance_file import COVARIANCE_FILE, CovarianceWriter, read_covariances
 from airborne.motion.motion import Motion, rigid_transform
 from airborne.motion.tables import cell, motion_columns
 from airborne.tracking import Estimate, Status
@@ -29,32 +28,32 @@ _ROTATION = [f"r{i}{j}" for i in range(3) for j in range(3)]
 
 
 class MotionWriter:
-    """Appends estimates to motion.csv; each row is on the disk before the next frame is begun.
+    """Appends estimates to motion.csv; each row is on disk before the next frame begins.
 
     A killed run leaves whole rows and at most one torn last line, which `read_estimates` drops. For a body with joints
-    the whole covariance goes to covariance.bin in the same folder, before the row does.
+    the full covariance goes to covariance.bin in the same folder, before the row does.
     """
 
     def __init__(self, path: Path, joints: tuple[str, ...] = (), *, resume: bool = False) -> None:
-        """Start the file anew, or with `resume` keep its finished rows and cut a torn last line.
+        """Start a new file, or with `resume` keep the finished rows and cut off a torn last line.
 
-        `joints` are the names of the body's segments after the root. Raises ResultError where the file to resume is
-        not a motion of that body.
+        `joints` are the names of the body's segments after the root. Raises ResultError if the file to resume
+        holds the motion of another body.
         """
-        kept = _whole_lines(path) if resume and path.exists() else b""
-        found, estimates = _parse(path) if kept else (joints, [])
-        if found != joints:
+        finished = _whole_lines(path) if resume and path.exists() else b""
+        file_joints, estimates = _parse(path) if finished else (joints, [])
+        if file_joints != joints:
             listed = ", ".join(joints) or "none"
             raise ResultError(f"{path} was written for another body; joints here: {listed}; start in a new folder")
         self._joints = joints
         self._covariances = None
         if joints:
             past = Motion.collect(estimates, joints).covariance
-            self._covariances = CovarianceWriter(path.with_name(SIDECAR), list(past), size=past.shape[-1])
-        self._file = path.open("r+b" if kept else "wb")
-        self._file.truncate(len(kept))
-        self._file.seek(len(kept))
-        if not kept:
+            self._covariances = CovarianceWriter(path.with_name(COVARIANCE_FILE), list(past), size=past.shape[-1])
+        self._file = path.open("r+b" if finished else "wb")
+        self._file.truncate(len(finished))
+        self._file.seek(len(finished))
+        if not finished:
             self._write_line(_header(joints))
 
     def __enter__(self) -> MotionWriter:
@@ -66,7 +65,7 @@ class MotionWriter:
             self._covariances.close()
 
     def append(self, estimate: Estimate) -> None:
-        """Write one frame and wait until the disk has it."""
+        """Write one frame and wait until it is on disk."""
         motion = Motion.collect([estimate], self._joints)
         public = [cell(column[0]) for column in motion_columns(motion).values()]
         covariance = map(cell, motion.covariance[0][_UPPER])
@@ -84,15 +83,15 @@ class MotionWriter:
 def read_estimates(path: Path) -> list[Estimate]:
     """Read the estimates of motion.csv, with exactly the floats and times that were written.
 
-    A torn last line is dropped. A covariance comes back symmetric, from its upper triangle; what the joints add to it
-    is NaN where covariance.bin does not lie beside the file. Raises ResultError in one line for a file that is missing
-    or not a motion.csv, and for the covariance.bin of another run.
+    A torn last line is dropped. Covariances are made symmetric from their upper triangles; the joints' part is NaN
+    without covariance.bin beside the file. Raises ResultError in one line for a file that is missing or no motion.csv,
+    and for the covariance.bin of another run.
     """
     return _parse(path)[1]
 
 
 def read_motion(path: Path) -> Motion:
-    """Read motion.csv as a `Motion`; same rules as `read_estimates`."""
+    """Read motion.csv as a `Motion`; the rules are those of `read_estimates`."""
     joints, estimates = _parse(path)
     return Motion.collect(estimates, joints)
 
@@ -118,7 +117,9 @@ def _parse(path: Path) -> tuple[tuple[str, ...], list[Estimate]]:
         raise ResultError(f"{path} is not a text table ({error}); expected the motion.csv of a run") from error
     joints = _joints_of(path, rows[0] if rows else [])
     header, estimates = _header(joints), []
-    covariances = read_covariances(path.with_name(SIDECAR), len(rows[1:]) if joints else 0, size=6 + 3 * len(joints))
+    covariances = read_covariances(
+        path.with_name(COVARIANCE_FILE), len(rows[1:]) if joints else 0, size=6 + 3 * len(joints)
+    )
     for number, cells in enumerate(rows[1:], start=2):
         try:
             covariance = covariances[number - 2] if joints else None
@@ -128,7 +129,7 @@ def _parse(path: Path) -> tuple[tuple[str, ...], list[Estimate]]:
             estimates.append(estimate)
         except (ValueError, ZeroDivisionError) as error:
             reason = f"{len(cells)} cells, expected {len(header)}" if len(cells) != len(header) else error
-            raise ResultError(f"{path} line {number}: {reason}; mend the line or track again") from error
+            raise ResultError(f"{path} line {number}: {reason}; correct the line or track again") from error
     return joints, estimates
 
 
@@ -137,12 +138,12 @@ def _joints_of(path: Path, header: list[str]) -> tuple[str, ...]:
     joints = tuple(name.removesuffix("_x_rad") for name in header[len(fixed) :: 3])
     if header != _header(joints):
         missing = [name for name in fixed if name not in header]
-        found = f"has no column {', '.join(missing[:3])}" if missing else "has its columns in another order"
-        raise ResultError(f"{path} {found if header else 'is empty'}; expected the motion.csv of a run; track again")
+        problem = f"has no column {', '.join(missing[:3])}" if missing else "has its columns in another order"
+        raise ResultError(f"{path} {problem if header else 'is empty'}; expected the motion.csv of a run; track again")
     return joints
 
 
-def _estimate(row: dict[str, str], n_joints: int, whole: NDArray[np.float64] | None) -> Estimate:
+def _estimate(row: dict[str, str], n_joints: int, full: NDArray[np.float64] | None) -> Estimate:
     """Make an estimate from a row of motion.csv and, for a body with joints, its row of covariance.bin."""
     status = Status(row["status"])
     position = _numbers(row, ["x_m", "y_m", "z_m"])
@@ -150,11 +151,11 @@ def _estimate(row: dict[str, str], n_joints: int, whole: NDArray[np.float64] | N
     upper = _numbers(row, _COVARIANCE)
     covariance = np.empty((6, 6))
     covariance[_UPPER] = covariance.T[_UPPER] = upper
-    if whole is not None:
-        if not np.isnan(whole).all() and not np.array_equal(whole[:6, :6], covariance, equal_nan=True):
-            raise ValueError(f"{SIDECAR} holds another covariance, so it belongs to another run; remove it")
-        whole[:6, :6] = covariance
-        covariance = whole
+    if full is not None:
+        if not np.isnan(full).all() and not np.array_equal(full[:6, :6], covariance, equal_nan=True):
+            raise ValueError(f"{COVARIANCE_FILE} holds another covariance, so it belongs to another run; remove it")
+        full[:6, :6] = covariance
+        covariance = full
     pose = None
     if status is not Status.LOST:
         if not np.abs(R.T @ R - np.eye(3)).max() < 1e-6:
@@ -164,23 +165,23 @@ def _estimate(row: dict[str, str], n_joints: int, whole: NDArray[np.float64] | N
         angles = _numbers(row, list(row)[-3 * n_joints :] if n_joints else []).reshape(n_joints, 3)
         pose = Pose(world_from_root=rigid_transform(R, position), joint_angles=angles)
     return Estimate(
-        index=_whole(row["frame"]),
-        time_s=_exact(row["time_exact"]),
+        index=_whole_number(row["frame"]),
+        time_s=_exact_fraction(row["time_exact"]),
         status=status,
         score=_number(row["score"]),
         pose=pose,
         covariance=None if np.isnan(covariance).all() else covariance,
-        n_views=_whole(row["n_views"]),
+        n_views=_whole_number(row["n_views"]),
     )
 
 
-def _whole(text: str) -> int:
+def _whole_number(text: str) -> int:
     if not re.fullmatch(r"-?[0-9]{1,15}", text):
         raise ValueError(f"'{text[:40]}' is no whole number")
     return int(text)
 
 
-def _exact(text: str) -> Fraction:
+def _exact_fraction(text: str) -> Fraction:
     if not re.fullmatch(r"-?[0-9]{1,40}(/[0-9]{1,40})?", text):  # no exponents: 1e999999999 would take all memory
         raise ValueError(f"time_exact is '{text[:40]}', expected a fraction such as 1001/60000")
     return Fraction(text)

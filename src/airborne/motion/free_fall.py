@@ -1,8 +1,8 @@
-"""When a path leaves free fall: the likelihood of take-off and landing times, and of the parabola between them.
+"""Take-off and landing as the ends of free fall: likelihood of their times and of the parabola between them.
 
-Arrays in, arrays out. In flight the height is a parabola of -9.81 m/s2; in contact the floor pushes, so that it bends
-away upward. How it bends is left open: a push of 20 +- 10 m/s2 above free fall that changes within some 40 ms and dies
-away at the event, integrated twice, is a Gaussian process that is zero in flight.
+Arrays in, arrays out. In flight the height is a parabola of -9.81 m/s2; in contact the ground reaction force
+curves it upward. The force is a Gaussian process, zero in flight: 20 +- 10 m/s2 above free fall, with a correlation
+time of some 40 ms, fading at the event; integrated twice, it gives the height above the parabola.
 """
 
 from __future__ import annotations
@@ -11,103 +11,108 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 GRAVITY_M_S2 = 9.81
-SWAY_M, SWAY_S = 0.005, 0.15  # of a centre of mass that is made of the tracked joints alone, and how long it lasts
+SWAY_M, _SWAY_S = 0.005, 0.15  # of a centre of mass computed from the tracked joints alone, and its correlation time
 _PUSH_M_S2, _PUSH_SD_M_S2 = 20.0, 10.0  # mean force of a push-off about three body weights, as force plates show
 _PUSH_CHANGE_S, _PUSH_FADE_S = 0.04, 0.02
 _LONGEST_CONTACT_S = 0.6
 _STEP_S = 1 / 1200
 
 
-class Noise(NamedTuple):
-    """How a tracker errs: trackers err alike in frames near by."""
+class CorrelatedNoise(NamedTuple):
+    """A tracker's errors: part white, part an exponentially correlated (first-order Gauss-Markov) process."""
 
     white_share: float  # of the variance
-    fading_s: float  # time over which the rest fades
+    correlation_time_s: float  # of the remainder
 
 
-OF_ANYTHING = Noise(0.5, 0.1)  # joints, bodies, detections from anywhere
-# trackers of players change their errors by 1 to 2 % of the variance in a frame at 60 a second, by 11 to 14 % in five,
-# by 53 to 61 % in twenty: less white than this, and lasting longer; there is room for videos that jitter more
-OF_PLAYERS = Noise(0.1, 0.3)
+GENERIC_NOISE = CorrelatedNoise(0.5, 0.1)  # of any joints, bodies, detections
+# errors of the players' trackers change by 1 to 2 % of the variance from frame to frame at 60 fps, by 11 to 14 % over
+# five frames, by 53 to 61 % over twenty: less white and longer-lived than this, which leaves room for noisier videos
+PLAYER_NOISE = CorrelatedNoise(0.1, 0.3)
 
 
 @dataclass(frozen=True, slots=True)
-class Side:
-    """What one side of a flight says of the parabola (height, speed at the origin) for each time of its event.
+class SideLikelihood:
+    """Likelihood of the parabola x (height, speed at the origin) from one side of a flight, per event time.
 
-    In information form: log-likelihood = constant + information' x - x' precision x / 2.
+    In information form: log-likelihood = constant + information_vector' x - x' precision x / 2.
     """
 
     constant: Array  # (times,)
-    information: Array  # (times, 2)
+    information_vector: Array  # (times, 2)
     precision: Array  # (times, 2, 2)
 
 
-def noise_covariance(time_s: Array, variance: Array, *, noise: Noise = OF_PLAYERS, sway_m: float = 0.0) -> Array:
-    """Return covariances (..., n, n) of values tracked at times (..., n), of variances (..., n), as `noise` says.
+def noise_covariance(
+    time_s: Array, variance: Array, *, noise: CorrelatedNoise = PLAYER_NOISE, sway_m: float = 0.0
+) -> Array:
+    """Return covariances (..., n, n) of values tracked at times (..., n) with variances (..., n) under a noise model.
 
-    `sway_m` adds an error common to neighbouring times, of what the values stand for.
+    `sway_m` [m] is the standard deviation of a further error, correlated over 0.15 s.
     """
-    apart = np.abs(time_s[..., :, None] - time_s[..., None, :])
+    lag_s = np.abs(time_s[..., :, None] - time_s[..., None, :])
     sd = np.sqrt(variance)
-    alike = (1 - noise.white_share) * np.exp(-apart / noise.fading_s) + noise.white_share * np.eye(time_s.shape[-1])
-    found = sd[..., :, None] * sd[..., None, :] * alike
-    return found + sway_m**2 * np.exp(-apart / SWAY_S) if sway_m else found
+    correlation = (1 - noise.white_share) * np.exp(-lag_s / noise.correlation_time_s) + noise.white_share * np.eye(
+        time_s.shape[-1]
+    )
+    covariance = sd[..., :, None] * sd[..., None, :] * correlation
+    return covariance + sway_m**2 * np.exp(-lag_s / _SWAY_S) if sway_m else covariance
 
 
-def fallen(time_s: Array) -> Array:
-    """Return the height (n,) [m] that free fall takes from a body at rest at time 0."""
+def free_fall_height(time_s: Array) -> Array:
+    """Return the height (n,) [m] of free fall from rest at height 0, time 0."""
     return -GRAVITY_M_S2 / 2 * time_s**2
 
 
-def side(time_s: Array, height_m: Array, covariance: Array, events_s: Array, *, is_takeoff: bool) -> Side:
-    """Weigh the parabola against the heights on one side of a flight, for every candidate time of its event.
+def side_likelihood(
+    time_s: Array, height_m: Array, covariance: Array, events_s: Array, *, is_takeoff: bool
+) -> SideLikelihood:
+    """Compute the parabola's likelihood from the heights on one side of a flight, per candidate event time.
 
-    `time_s` (n,) and `events_s` (times,) count from the parabola's origin; heights (n,) and their covariance (n, n).
+    `time_s` (n,) and `events_s` (times,) are relative to the parabola's origin; heights (n,), covariance (n, n).
     """
     into_contact = (events_s[:, None] - time_s) if is_takeoff else (time_s - events_s[:, None])
-    bend, bases = _pushes(np.maximum(into_contact, 0.0))
+    displacement, bases = _push_displacements(np.maximum(into_contact, 0.0))
     L = np.linalg.cholesky(covariance + _PUSH_SD_M_S2**2 * bases @ np.swapaxes(bases, -1, -2))
     line = np.broadcast_to(np.stack([np.ones_like(time_s), time_s], axis=-1), (len(events_s), len(time_s), 2))
-    rest = (height_m - fallen(time_s) - bend)[..., None]
-    white_line, white_rest = np.linalg.solve(L, line), np.linalg.solve(L, rest)
+    residual = (height_m - free_fall_height(time_s) - displacement)[..., None]
+    white_line, white_residual = np.linalg.solve(L, line), np.linalg.solve(L, residual)
     log_det = 2 * np.log(np.diagonal(L, axis1=-2, axis2=-1)).sum(axis=-1)
-    return Side(
-        constant=-0.5 * (log_det + (white_rest[..., 0] ** 2).sum(axis=-1)),
-        information=(np.swapaxes(white_line, -1, -2) @ white_rest)[..., 0],
+    return SideLikelihood(
+        constant=-0.5 * (log_det + (white_residual[..., 0] ** 2).sum(axis=-1)),
+        information_vector=(np.swapaxes(white_line, -1, -2) @ white_residual)[..., 0],
         precision=np.swapaxes(white_line, -1, -2) @ white_line,
     )
 
 
-def joined(first: Side, second: Side) -> tuple[Array, Array, Array]:
-    """Join both sides: log-likelihood of (take-off, landing) (i, j), the parabola's mean (i, j, 2), covariance."""
-    information = first.information[:, None] + second.information
+def combine_sides(first: SideLikelihood, second: SideLikelihood) -> tuple[Array, Array, Array]:
+    """Combine both sides: log-likelihood of (take-off, landing) (i, j), the parabola's mean (i, j, 2), covariance."""
+    information_vector = first.information_vector[:, None] + second.information_vector
     precision = first.precision[:, None] + second.precision
     covariance = np.linalg.inv(precision)
-    mean = (covariance @ information[..., None])[..., 0]
-    fit = 0.5 * (information * mean).sum(axis=-1) - 0.5 * np.linalg.slogdet(precision)[1]
+    mean = (covariance @ information_vector[..., None])[..., 0]
+    fit = 0.5 * (information_vector * mean).sum(axis=-1) - 0.5 * np.linalg.slogdet(precision)[1]
     return first.constant[:, None] + second.constant + fit, mean, covariance
 
 
-def _pushes(into_contact_s: Array) -> tuple[Array, Array]:
-    """Return how far contact bends the path up (...) [m], on the mean and by each unit of its bases (..., k)."""
+def _push_displacements(into_contact_s: Array) -> tuple[Array, Array]:
+    """Return the height that contact adds to free fall (...) [m]: its mean, and per unit basis force (..., k)."""
     grid = np.arange(0.0, _LONGEST_CONTACT_S, _STEP_S)
     fade = 1 - np.exp(-grid / _PUSH_FADE_S)
     centres = np.arange(0.0, _LONGEST_CONTACT_S, _PUSH_CHANGE_S)
     bumps = np.exp(-0.5 * ((grid - centres[:, None]) / _PUSH_CHANGE_S) ** 2)
-    bumps /= np.sqrt((bumps**2).sum(axis=0).mean())  # the push then has the stated deviation
-    paths = _twice_integrated(np.vstack([_PUSH_M_S2 * fade, fade * bumps]))
+    bumps /= np.sqrt((bumps**2).sum(axis=0).mean())  # the force then has the stated standard deviation
+    paths = _integrate_twice(np.vstack([_PUSH_M_S2 * fade, fade * bumps]))
     at = np.minimum(into_contact_s, grid[-1])
-    found = np.stack([np.interp(at, grid, path) for path in paths])
-    return found[0], np.moveaxis(found[1:], 0, -1)
+    displacements = np.stack([np.interp(at, grid, path) for path in paths])
+    return displacements[0], np.moveaxis(displacements[1:], 0, -1)
 
 
-def _twice_integrated(force: Array) -> Array:
+def _integrate_twice(force: Array) -> Array:
     for _ in range(2):
         trapezia = (force[..., 1:] + force[..., :-1]) / 2 * _STEP_S
         force = np.concatenate([np.zeros((len(force), 1)), np.cumsum(trapezia, axis=-1)], axis=-1)

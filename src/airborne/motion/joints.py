@@ -1,4 +1,4 @@
-"""The joints of a body over time: where its landmarks are, and how its joints are bent."""
+"""The joints of a body over time: landmark positions and joint angles."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.body.chain import nearest_angles, point_jacobian
@@ -18,16 +17,15 @@ from airborne.geometry.rotations import (
     matrix_from_angles,
 )
 from airborne.motion.motion import Motion
-from airborne.motion.uncertainty import deviation, variances
-
-Array = NDArray[np.floating]
+from airborne.motion.uncertainty import propagate_variances, standard_deviation
+from airborne.types import Array
 
 
 def landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
-    """Place the body's landmarks: (n, landmarks, 3) world [m], and their standard deviations (n, landmarks) [m].
+    """Return the body's landmarks (n, landmarks, 3) world [m], and their sd (n, landmarks) [m].
 
-    The deviation is the root mean square over the axes, to first order, through every joint that moves the point:
-    infinite where an unseen direction moves it, NaN where unknown. Raises ResultError for another body's motion.
+    The standard deviation is the root mean square over the axes, to first order, through every joint that moves the
+    point: infinite where an unobserved direction moves it, NaN where unknown. Raises ResultError for another body.
     """
     require_body(motion, model)
     owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])
@@ -36,41 +34,43 @@ def landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
     for row in np.flatnonzero(motion.has_pose):
         posed = model.with_pose(motion.pose(row))
         points[row] = posed.landmarks
-        variance[row] = variances(point_jacobian(posed, owners, points[row]), motion.covariance[row])
-    return points, deviation(variance.mean(axis=-1))
+        variance[row] = propagate_variances(point_jacobian(posed, owners, points[row]), motion.covariance[row])
+    return points, standard_deviation(variance.mean(axis=-1))
 
 
 def continuous_angles(motion: Motion) -> Array:
     """Return the joint angles (n, joints, 3) [rad], each row on the branch nearest to the last known row before it."""
     angles = np.array(motion.joint_angles)
-    known = np.flatnonzero(motion.has_pose)
-    for before, row in pairwise(known):
+    rows = np.flatnonzero(motion.has_pose)
+    for before, row in pairwise(rows):
         angles[row] = nearest_angles(angles[row], angles[before])
     return angles
 
 
 def joint_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
-    """Read the joint angles off a motion [deg], continuous over time, with standard deviations.
+    """Compute the joint angles of a motion [deg], continuous over time, with standard deviations.
 
-    Successive turns about the moving x, y and z axes, parent from segment: R = Rx Ry Rz; a joint bears the name of the
-    segment that it turns. The deviations follow from the covariance to first order: infinite where an unseen turn moves
-    the angle, NaN where unknown, and within 5 degrees of y = +-90, where `is_singular` says that x and z cannot be told
-    apart. Raises ResultError for another body's motion.
+    Intrinsic x-y-z Cardan angles, parent from segment: R = Rx Ry Rz; a joint has the name of the segment that it
+    rotates. Standard deviations follow from the covariance to first order: infinite where an unobserved rotation moves
+    the angle, NaN where unknown, and within 5 degrees of y = +-90 (`is_singular`), where x and z are ambiguous.
+    Raises ResultError for another body's motion.
     """
     require_body(motion, model)
     radians = continuous_angles(motion)
     matrix = matrix_from_angles(radians)
-    principal = angles_from_matrix(matrix)  # y within a right angle; the other branch has the same deviations
-    by_own_turn = angles_from_world_rotation(principal) @ matrix
+    principal = angles_from_matrix(matrix)  # y within +-90 degrees; the other branch has the same sd
+    by_rotation_vector = angles_from_world_rotation(principal) @ matrix
     variance = np.full(radians.shape, np.nan)
     for row in np.flatnonzero(motion.has_pose):
         for joint in range(len(motion.joints)):
             block = slice(6 + 3 * joint, 9 + 3 * joint)
-            variance[row, joint] = variances(by_own_turn[row, joint], motion.covariance[row, block, block])
+            variance[row, joint] = propagate_variances(
+                by_rotation_vector[row, joint], motion.covariance[row, block, block]
+            )
     dimensions = ("time", "joint", "axis")
     variables = {
         "angle": (dimensions, np.rad2deg(radians), {"units": "deg", "order": "x, y, z, body-fixed"}),
-        "angle_sd": (dimensions, np.rad2deg(deviation(variance)), {"units": "deg"}),
+        "angle_sd": (dimensions, np.rad2deg(standard_deviation(variance)), {"units": "deg"}),
         "is_singular": (dimensions[:2], is_near_singular(principal)),
     }
     coordinates = {
@@ -86,5 +86,7 @@ def require_body(motion: Motion, model: BodyModel) -> None:
     """Raise ResultError where a motion is not of this body."""
     joints = tuple(segment.name for segment in model.segments[1:])
     if motion.joints != joints:
-        found, expected = (", ".join(names) or "none" for names in (motion.joints, joints))
-        raise ResultError(f"the motion has the joints {found}; body '{model.name}' has {expected}; give the run's body")
+        joints_text, expected = (", ".join(names) or "none" for names in (motion.joints, joints))
+        raise ResultError(
+            f"the motion has the joints {joints_text}; body '{model.name}' has {expected}; give the run's body"
+        )

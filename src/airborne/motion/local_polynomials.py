@@ -1,23 +1,22 @@
-"""Values between and around tracked times: polynomials near one time, with their covariances."""
+"""Local polynomials: values and slopes between and around tracked times, with their covariances."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.motion.free_fall import noise_covariance
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
+N_DRAWS = 1000  # from a posterior
 _NEAREST, _LEAST, _FARTHEST_S = 9, 5, 0.12
 
 
 def local_fits(time_s: Array, values: Array, variance: Array, at_s: Array) -> tuple[Array, Array]:
-    """Fit parabolas to the nine known values nearest to each of some times.
+    """Fit parabolas to the nine known values nearest to each of the given times.
 
     `time_s` (n,) in order; `values` and `variance` (n, k), NaN where unknown; `at_s` (m,). Returns value and slope
     there (m, 2, k) and their covariance (m, k, 2, 2). Only values within 0.12 s count. NaN where fewer than five are
-    known, or all lie on one side and the nearest is not the time's neighbour.
+    known, or where all lie on one side and the nearest is more than one frame away.
     """
     m, k = len(at_s), values.shape[1]
     fit, covariance = np.full((m, 2, k), np.nan), np.full((m, k, 2, 2), np.nan)
@@ -38,8 +37,8 @@ def local_fits(time_s: Array, values: Array, variance: Array, at_s: Array) -> tu
     is_known = (counts.sum(axis=1) >= _LEAST) & (first <= step) & (last >= -step)
     rows, u, counts = rows[is_known], u[is_known], counts[is_known]
     powers = (u / _FARTHEST_S)[..., None] ** np.arange(3) * counts[..., None]
-    turned = np.swapaxes(powers, 1, 2)
-    hat = np.linalg.solve(turned @ powers, turned)[:, :2] / np.array([[1.0], [_FARTHEST_S]])
+    transposed = np.swapaxes(powers, 1, 2)
+    hat = np.linalg.solve(transposed @ powers, transposed)[:, :2] / np.array([[1.0], [_FARTHEST_S]])
     fit[is_known] = hat @ values[rows]
     noise = noise_covariance(u[:, None], np.swapaxes(variance[rows], 1, 2))
     covariance[is_known] = hat[:, None] @ noise @ np.swapaxes(hat, 1, 2)[:, None]
@@ -47,22 +46,24 @@ def local_fits(time_s: Array, values: Array, variance: Array, at_s: Array) -> tu
 
 
 def peak_draws(
-    rng: np.random.Generator, time_s: Array, height_m: Array, variance: Array, *, bend: tuple[float, float, float]
+    rng: np.random.Generator,
+    time_s: Array,
+    height_m: Array,
+    variance: Array,
+    *,
+    acceleration_prior: tuple[float, float, float],
 ) -> Array:
-    """Draw the largest height of a path near time 0 from its posterior: (draws,) [m].
+    """Draw the peak height of a path near time 0 from its posterior: (draws,) [m].
 
-    A cubic is fitted to the heights (n,), known all of them, at `time_s` (n,) around the peak. `bend` is what is known
-    before: mean and deviation of the acceleration [m/s2], deviation of its change [m/s3].
+    A cubic is fitted to the heights (n,), all finite, at `time_s` (n,) around the peak. `acceleration_prior` holds the
+    mean and standard deviation of the acceleration [m/s2], and the standard deviation of the jerk [m/s3].
     """
-    mean_bend, bend_sd, change_sd = bend
+    mean, sd, jerk_sd = acceleration_prior
     terms = np.stack([np.ones_like(time_s), time_s, time_s**2 / 2, time_s**3 / 6], axis=-1)
     weight = np.linalg.inv(noise_covariance(time_s, variance))
-    prior = np.diag([0.0, 0.0, bend_sd**-2, change_sd**-2])
+    prior = np.diag([0.0, 0.0, sd**-2, jerk_sd**-2])
     covariance = np.linalg.inv(terms.T @ weight @ terms + prior)
-    mean = covariance @ (terms.T @ weight @ height_m + prior @ [0, 0, mean_bend, 0])
-    draws = rng.multivariate_normal(mean, covariance, N_DRAWS, method="cholesky")
+    coefficients = covariance @ (terms.T @ weight @ height_m + prior @ [0, 0, mean, 0])
+    draws = rng.multivariate_normal(coefficients, covariance, N_DRAWS, method="cholesky")
     grid = np.linspace(time_s[0], time_s[-1], 61)
     return np.asarray((draws @ np.stack([np.ones(61), grid, grid**2 / 2, grid**3 / 6])).max(axis=1))
-
-
-N_DRAWS = 1000

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
-from airborne.motion.uncertainty import deviation
+from airborne.motion.uncertainty import standard_deviation
 from airborne.tracking import Estimate, Status
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -22,8 +21,8 @@ class Motion:
     """The root's pose and its uncertainty over time; rows of lost frames are NaN.
 
     The covariance is that of `Estimate`: position [m], a rotation vector in world axes [rad], then for each joint a
-    rotation vector in its segment's own axes [rad]. A variance is infinite where the images do not show that direction,
-    NaN where it is unknown.
+    rotation vector in its segment's own axes [rad]. A variance is infinite where the images do not constrain that
+    direction, NaN where it is unknown.
     """
 
     index: NDArray[np.int64]  # (n,) frame or field numbers
@@ -41,7 +40,7 @@ class Motion:
     def collect(cls, estimates: Sequence[Estimate], joints: tuple[str, ...] = ()) -> Motion:
         """Stack the estimates of a run, in their order; `joints` names the rows of their poses' joint angles.
 
-        A covariance that holds the root alone, (6, 6), leaves that of the joints unknown.
+        A covariance of the root alone, (6, 6), leaves the joints' part unknown.
         """
         n, size = len(estimates), 6 + 3 * len(joints)
         position, R, covariance = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((n, size, size), np.nan)
@@ -52,8 +51,8 @@ class Motion:
                 position[row], R[row] = world_from_root[:3, 3], world_from_root[:3, :3]
                 joint_angles[row] = estimate.pose.joint_angles if estimate.pose.joint_angles.size else 0.0
             if estimate.covariance is not None:
-                known = len(estimate.covariance)
-                covariance[row, :known, :known] = estimate.covariance
+                m = len(estimate.covariance)
+                covariance[row, :m, :m] = estimate.covariance
         return cls(
             index=np.array([e.index for e in estimates], np.int64),
             time_s=np.array([float(e.time_s) for e in estimates], float),
@@ -78,7 +77,7 @@ class Motion:
 
     @property
     def has_pose(self) -> NDArray[np.bool_]:
-        """Which frames claim a pose: (n,)."""
+        """Which frames have a pose: (n,)."""
         return np.asarray(np.isfinite(self.position).all(axis=-1))
 
     @property
@@ -106,7 +105,7 @@ class Motion:
 
     @property
     def _sd(self) -> Array:
-        return deviation(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+        return standard_deviation(np.diagonal(self.covariance, axis1=-2, axis2=-1))
 
     def count(self, status: Status) -> int:
         """Count the frames of one status."""
@@ -114,7 +113,7 @@ class Motion:
 
 
 def rigid_transform(R: Array, position: Array) -> RigidTransform:
-    """Build the rigid map x -> R x + position, keeping every bit of R (3, 3), which must be a rotation."""
+    """Build the rigid transform x -> R x + position, keeping every bit of R (3, 3), which must be a rotation."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = R, position
     return RigidTransform(matrix, normalize=False)

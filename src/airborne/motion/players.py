@@ -1,4 +1,4 @@
-"""Several players' joints over time, and their table joints.csv: written as a run goes, read back exactly."""
+"""Several players' joints over time, and their table joints.csv: written during a run, read back exactly."""
 
 from __future__ import annotations
 
@@ -15,31 +15,30 @@ from pyarrow import csv
 
 from airborne.errors import ResultError
 from airborne.motion.tables import cell
-from airborne.motion.uncertainty import deviation
+from airborne.motion.uncertainty import standard_deviation
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _UPPER = np.triu_indices(3)
-_PLACE = ("x_m", "y_m", "z_m")
+_POSITION = ("x_m", "y_m", "z_m")
 _COVARIANCE = tuple(f"cov_{'xyz'[i]}{'xyz'[j]}_m2" for i, j in zip(*_UPPER, strict=True))
-COLUMNS = ("player", "frame", "time_s", "status", "joint", *_PLACE, "sd_m", *_COVARIANCE, "score", "n_views")
+PLAYERS_COLUMNS = ("player", "frame", "time_s", "status", "joint", *_POSITION, "sd_m", *_COVARIANCE, "score", "n_views")
 _TEXTS, _WHOLE = ("player", "status", "joint"), ("frame", "n_views")
 _EXPECTED = "expected the joints.csv of a run of players"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlayersMotion:
-    """Where the players' joints are over time, and how sure that is; what is lost or unknown is NaN."""
+    """The players' joints over time and their uncertainty; what is lost or unknown is NaN."""
 
     index: NDArray[np.int64]  # (n,) frame numbers
     time_s: Array  # (n,) [s]
-    rate: float  # frames in a second; NaN where there is only one
+    rate: float  # [frames/s]; NaN for a single frame
     players: tuple[str, ...]
     joints: tuple[str, ...]
     points: Array  # (n, players, joints, 3) [m], world
-    covariance: Array  # (n, players, joints, 3, 3) [m²], of each joint for itself
+    covariance: Array  # (n, players, joints, 3, 3) [m²], of each joint on its own
     status: NDArray[np.str_]  # (n, players) values of `Status`
     score: Array  # (n, players) mean log-likelihood [nat]
     n_views: NDArray[np.int64]  # (n, players)
@@ -48,9 +47,9 @@ class PlayersMotion:
     def collect(
         cls, steps: Sequence[Sequence[PlayerEstimate]], joints: tuple[str, ...], rate: float | None = None
     ) -> PlayersMotion:
-        """Stack the estimates of a run: at each time one of each player, in the same order.
+        """Stack the estimates of a run: at each time one per player, always in the same order.
 
-        The rate is that of the median step where none is given.
+        The rate, if not given, is that of the median time step.
         """
         n, players = len(steps), tuple(estimate.player for estimate in steps[0]) if steps else ()
         shape = (n, len(players))
@@ -76,7 +75,7 @@ class PlayersMotion:
     @property
     def sd(self) -> Array:
         """Standard deviations of the joints, the root mean square of their axes': (n, players, joints) [m]."""
-        return np.asarray(deviation(np.diagonal(self.covariance, axis1=-2, axis2=-1).mean(axis=-1)))
+        return np.asarray(standard_deviation(np.diagonal(self.covariance, axis1=-2, axis2=-1).mean(axis=-1)))
 
     def count(self, player: str, status: Status) -> int:
         """Count the frames in which a player has a status."""
@@ -84,20 +83,20 @@ class PlayersMotion:
 
 
 class PlayersWriter:
-    """Appends the players of one time to joints.csv; the rows have left the program before the next time is begun.
+    """Appends the players of one time to joints.csv; the rows are flushed before the next time begins.
 
-    A killed run leaves whole times and at most a torn last one, which `read_players` drops. With `resume` the rows
-    that are there stay, and what is appended must be what they say, until they end.
+    A killed run leaves whole times and at most a torn last one, which `read_players` drops. With `resume` the existing
+    rows stay, and what is appended must equal them until they end.
     """
 
     def __init__(self, path: Path, joints: tuple[str, ...], *, resume: bool = False) -> None:
-        """Start the file anew, or with `resume` go over its finished rows first."""
+        """Start a new file, or with `resume` compare with its finished rows first."""
         self.path = path
         self._joints = joints
-        self._n_kept_bytes = _whole_bytes(path) if resume and path.exists() else 0
-        self._file = path.open("r+b" if self._n_kept_bytes else "wb")
-        self._file.truncate(self._n_kept_bytes)
-        self._write(",".join(COLUMNS) + "\n", "its first line")
+        self._n_finished_bytes = _finished_bytes(path) if resume and path.exists() else 0
+        self._file = path.open("r+b" if self._n_finished_bytes else "wb")
+        self._file.truncate(self._n_finished_bytes)
+        self._write(",".join(PLAYERS_COLUMNS) + "\n", "its first line")
 
     def __enter__(self) -> PlayersWriter:
         return self
@@ -108,23 +107,23 @@ class PlayersWriter:
     def append(self, step: Sequence[PlayerEstimate]) -> None:
         """Write every player at one time.
 
-        Raises ResultError where the file to resume says another thing of that time.
+        Raises ResultError where the file to resume differs at that time.
         """
         self._write("".join(_lines(PlayersMotion.collect([step], self._joints))), f"frame {step[0].index}")
 
-    def _write(self, text: str, what: str) -> None:
-        data, place = text.encode(), self._file.tell()
-        if place < self._n_kept_bytes:
-            kept = self._file.read(len(data))
-            if kept == data[: len(kept)] and len(kept) == min(len(data), self._n_kept_bytes - place):
-                data = data[len(kept) :]  # of a time that is torn, only what is missing
+    def _write(self, text: str, name: str) -> None:
+        data, offset = text.encode(), self._file.tell()
+        if offset < self._n_finished_bytes:
+            existing = self._file.read(len(data))
+            if existing == data[: len(existing)] and len(existing) == min(len(data), self._n_finished_bytes - offset):
+                data = data[len(existing) :]  # of a torn time, only what is missing
             else:
                 raise ResultError(
-                    f"{self.path} has another {what} than this run finds, so it was made by another program or "
-                    "machine; track into a new folder"
+                    f"{self.path} differs from this run in {name}, so another program or machine wrote "
+                    "it; track into a new folder"
                 )
         if data:
-            self._file.seek(place + len(text.encode()) - len(data))
+            self._file.seek(offset + len(text.encode()) - len(data))
             self._file.write(data)
             self._file.flush()
 
@@ -133,9 +132,9 @@ def read_players(path: Path) -> PlayersMotion:
     """Read a joints.csv of several players, with exactly the floats that were written.
 
     The last time is dropped where some of its rows are missing. Raises ResultError in one line for a file that is
-    missing, is no joints.csv of players, or has no finished time.
+    missing, not a joints.csv of players, or without a finished time.
     """
-    n_bytes = _whole_bytes(path)
+    n_bytes = _finished_bytes(path)
     if not n_bytes:
         raise ResultError(f"{path} is empty; {_EXPECTED}; track again")
     table = _table(path, n_bytes)
@@ -150,7 +149,9 @@ def read_players(path: Path) -> PlayersMotion:
     table = table.slice(0, n * n_rows)
     _check_order(path, table, frame[: n * n_rows].reshape(n, n_rows), n_joints)
     numbers = {
-        name: table[name].to_numpy().reshape(n, len(players), n_joints) for name in COLUMNS if name not in _TEXTS
+        name: table[name].to_numpy().reshape(n, len(players), n_joints)
+        for name in PLAYERS_COLUMNS
+        if name not in _TEXTS
     }
     covariance = np.empty((n, len(players), n_joints, 3, 3))
     for name, i, j in zip(_COVARIANCE, *_UPPER, strict=True):
@@ -163,7 +164,7 @@ def read_players(path: Path) -> PlayersMotion:
         rate=_rate(time_s),
         players=players,
         joints=tuple(joints[:n_joints].tolist()),
-        points=np.stack([numbers[name] for name in _PLACE], axis=-1),
+        points=np.stack([numbers[name] for name in _POSITION], axis=-1),
         covariance=covariance,
         status=status.reshape(n, len(players)),
         score=numbers["score"][..., 0],
@@ -173,8 +174,10 @@ def read_players(path: Path) -> PlayersMotion:
 
 def write_players_parquet(path: Path, table_csv: Path) -> None:
     """Write the table of a joints.csv as Parquet, with its units in the metadata; empty cells become null."""
-    table = _table(table_csv, _whole_bytes(table_csv))
-    units = {"time_s": "s", "sd_m": "m", "score": "nat"} | dict.fromkeys(_PLACE, "m") | dict.fromkeys(_COVARIANCE, "m2")
+    table = _table(table_csv, _finished_bytes(table_csv))
+    units = (
+        {"time_s": "s", "sd_m": "m", "score": "nat"} | dict.fromkeys(_POSITION, "m") | dict.fromkeys(_COVARIANCE, "m2")
+    )
     fields = [field.with_metadata({"units": units.get(field.name, "1")}) for field in table.schema]
     conventions = {"world": "metres, z up", "cov": "of each joint for itself"}
     pq.write_table(table.cast(pa.schema(fields, metadata=conventions)), path)
@@ -193,8 +196,8 @@ def _lines(motion: PlayersMotion) -> list[str]:
     return lines
 
 
-def _whole_bytes(path: Path) -> int:
-    """Return where the last whole line ends."""
+def _finished_bytes(path: Path) -> int:
+    """Return the offset at which the last whole line ends."""
     try:
         with path.open("rb") as file:
             end = file.seek(0, 2)
@@ -207,27 +210,29 @@ def _whole_bytes(path: Path) -> int:
 
 def _table(path: Path, n_bytes: int) -> pa.Table:
     text, whole = pa.dictionary(pa.int32(), pa.string()), pa.int64()
-    types = {name: text if name in _TEXTS else whole if name in _WHOLE else pa.float64() for name in COLUMNS}
+    types = {name: text if name in _TEXTS else whole if name in _WHOLE else pa.float64() for name in PLAYERS_COLUMNS}
     with path.open("rb") as file:
         header = file.readline().decode(errors="replace").strip()
-    if header != ",".join(COLUMNS):
-        raise ResultError(f"{path} begins with '{header[:60]}'; {_EXPECTED}, which begins with '{COLUMNS[0]},...'")
+    if header != ",".join(PLAYERS_COLUMNS):
+        raise ResultError(
+            f"{path} begins with '{header[:60]}'; {_EXPECTED}, which begins with '{PLAYERS_COLUMNS[0]},...'"
+        )
     options = csv.ConvertOptions(column_types=types, null_values=[""], strings_can_be_null=False)
     try:
         with pa.memory_map(str(path)) as file:
             return csv.read_csv(pa.BufferReader(file.read_buffer(n_bytes)), convert_options=options)
     except pa.ArrowInvalid as error:
-        raise ResultError(f"{path}: {str(error).splitlines()[0][:200]}; mend the line or track again") from None
+        raise ResultError(f"{path}: {str(error).splitlines()[0][:200]}; correct the line or track again") from None
 
 
 def _check_order(path: Path, table: pa.Table, frame: NDArray[np.int64], n_joints: int) -> None:
-    """Raise ResultError where not every frame has the rows of the first one, in its order, in order of time."""
+    """Raise ResultError unless every frame has the rows of the first, in the same order, and time increases."""
     codes = (table[name].unify_dictionaries().combine_chunks().indices.to_numpy() for name in ("player", "joint"))
     tiled = [np.reshape(each, frame.shape) for each in codes]
     is_regular = all((each == each[0]).all() for each in tiled) and (frame == frame[:, :1]).all()
     n_names = len(set(tiled[0][0].tolist())) * n_joints
     if not is_regular or n_names != frame.shape[1] or (np.diff(frame[:, 0]) <= 0).any():
-        raise ResultError(f"{path}: some frame has other rows than the first one, or another order; track again")
+        raise ResultError(f"{path}: the rows of some frame, or their order, differ from the first frame's; track again")
 
 
 def _rate(time_s: Array) -> float:

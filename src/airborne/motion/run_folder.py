@@ -1,4 +1,4 @@
-"""The folder of a run, read back: which run lies there, and its motion."""
+"""Reading back the folder of a run: which run it holds, and its motion."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from airborne.motion.files import read_motion
 from airborne.motion.motion import Motion
 from airborne.motion.players import PlayersMotion, read_players
 
-RECORD = "run.json"
+RUN_RECORD = "run.json"
 
 
 def holds_players(folder: Path) -> bool:
-    """Say whether a folder holds a run of several players, finished or not."""
+    """Tell whether a folder holds a run of several players, finished or not."""
     return (folder / "joints.csv").is_file() and not (folder / "motion.csv").is_file()
 
 
-def body_run(folder: Path) -> tuple[Motion, BodyModel]:
+def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:
     """Return the motion and the body of the run in a folder, finished or not.
 
-    Raises ResultError where the folder holds none, the body is missing, or its record is damaged.
+    Raises ResultError if the folder holds none, the body is missing, or its record is damaged.
     """
     if not (folder / "motion.csv").is_file():
         raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
@@ -38,16 +38,16 @@ def body_run(folder: Path) -> tuple[Motion, BodyModel]:
     return motion, read_body(folder / "body.toml")
 
 
-def players_run(folder: Path) -> PlayersMotion:
-    """Return the motion of the run of players in a folder. Raises ResultError as `body_run` does."""
+def read_players_run(folder: Path) -> PlayersMotion:
+    """Return the motion of the run of players in a folder. Raises ResultError as `read_body_run` does."""
     check_record(folder)
     return read_players(folder / "joints.csv")
 
 
 def check_record(folder: Path) -> None:
-    """Raise ResultError where a folder's run.json is damaged; a run without one is known by its tables."""
-    if (folder / RECORD).exists():
-        read_record(folder / RECORD)
+    """Raise ResultError if a folder's run.json is damaged; a run without one is recognised by its tables."""
+    if (folder / RUN_RECORD).exists():
+        read_record(folder / RUN_RECORD)
 
 
 def read_record(path: Path) -> dict[str, Any]:
@@ -58,5 +58,5 @@ def read_record(path: Path) -> dict[str, Any]:
         record = None
     if not isinstance(record, dict):
         state = "damaged" if path.exists() else "missing"
-        raise ResultError(f"{path} is {state}, so it cannot be told whose run this is; track into another folder")
+        raise ResultError(f"{path} is {state}, so whose run this is cannot be determined; track into another folder")
     return record

@@ -10,8 +10,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel
-from airborne.motion.angles import ANGLES, angles
-from airborne.motion.flight.momentum_table import flight
+from airborne.motion.angles import ROOT_ANGLES, root_angles
+from airborne.motion.flight.momentum_table import measure_flight
 from airborne.motion.joints import joint_angles, landmarks
 from airborne.motion.motion import Motion
 
@@ -19,7 +19,7 @@ _UNITS = {"_m": "m", "_s": "s", "_deg": "deg", "_m_sd": "m", "_deg_sd": "deg"}
 
 
 def motion_columns(motion: Motion) -> dict[str, NDArray]:
-    """Lay a motion out as the columns of motion.csv and motion.parquet, each (n,); the unit is in the name."""
+    """Return a motion as the columns of motion.csv and motion.parquet, each (n,); units are in the names."""
     columns: dict[str, NDArray] = {
         "frame": motion.index,
         "time_s": motion.time_s,
@@ -47,19 +47,19 @@ def write_motion_parquet(path: Path, motion: Motion) -> None:
 
 
 def write_angles(path: Path, motion: Motion) -> None:
-    """Write angles.csv: frame, time_s, the three angles and their deviations in degrees, is_singular (0 or 1)."""
-    table = angles(motion)
+    """Write angles.csv: frame, time_s, the three angles and their sd in degrees, is_singular (0 or 1)."""
+    table = root_angles(motion)
     columns: dict[str, NDArray] = {"frame": motion.index, "time_s": motion.time_s}
-    columns |= {f"{name}_deg": table[name].to_numpy() for name in ANGLES}
-    columns |= {f"{name}_deg_sd": table[f"{name}_sd"].to_numpy() for name in ANGLES}
+    columns |= {f"{name}_deg": table[name].to_numpy() for name in ROOT_ANGLES}
+    columns |= {f"{name}_deg_sd": table[f"{name}_sd"].to_numpy() for name in ROOT_ANGLES}
     _write_csv(path, columns | {"is_singular": table["is_singular"].to_numpy().astype(int)})
 
 
 def write_joints(path: Path, motion: Motion, model: BodyModel) -> None:
     """Write joints.csv, long: one row per frame and landmark; empty cells where lost.
 
-    `sd_m` is the root mean square, over the three axes, of the standard deviations that the covariance gives to that
-    point through every joint that moves it; infinite where a direction that moves it is unseen.
+    `sd_m` is the root mean square, over the three axes, of the point's standard deviations, propagated from the
+    covariance through every joint that moves it; infinite where a direction that moves it is unobserved.
     """
     points, sd = landmarks(motion, model)
     names = np.array([landmark.name for landmark in model.landmarks])
@@ -70,7 +70,7 @@ def write_joints(path: Path, motion: Motion, model: BodyModel) -> None:
 def write_joint_angles(path: Path, motion: Motion, model: BodyModel) -> None:
     """Write joint_angles.csv, long: one row per frame and joint, named by its segment; degrees, and is_singular.
 
-    Raises ResultError where the motion is another body's.
+    Raises ResultError for another body's motion.
     """
     table = joint_angles(motion, model)
     columns = _long(motion, np.array(motion.joints, np.str_))
@@ -80,11 +80,11 @@ def write_joint_angles(path: Path, motion: Motion, model: BodyModel) -> None:
 
 
 def write_flight(path: Path, motion: Motion, model: BodyModel) -> None:
-    """Write flight.csv: the centre of mass, the angular momentum about it, the root's turns, each with its unit.
+    """Write flight.csv: the centre of mass, the angular momentum about it, the root's rotation, units in the names.
 
-    Raises BodyError where a segment has no inertia, ResultError where the motion is another body's.
+    Raises BodyError where a segment has no inertia, ResultError for another body's motion.
     """
-    table = flight(motion, model)
+    table = measure_flight(motion, model)
     columns: dict[str, NDArray] = {"frame": motion.index, "time_s": motion.time_s}
     for name, stem in (("com", "com_{}_m"), ("angular_momentum", "L_{}_kg_m2_s")):
         columns |= {stem.format(axis): table[name].sel(space=axis).to_numpy() for axis in "xyz"}
@@ -94,14 +94,14 @@ def write_flight(path: Path, motion: Motion, model: BodyModel) -> None:
 
 
 def cell(value: object) -> str:
-    """Write one value so that a float is read back to the last bit; NaN, the unknown, is an empty cell."""
+    """Format one value so that a float reads back bit for bit; NaN (unknown) is an empty cell."""
     if isinstance(value, float):
         return "" if value != value else float.__repr__(value)  # faster than isnan, and np.float64 has another repr
     return str(value)
 
 
 def _long(motion: Motion, names: NDArray[np.str_]) -> dict[str, NDArray]:
-    """Begin a table of one row per frame and joint."""
+    """Return the index columns of a table with one row per frame and joint."""
     return {
         "frame": np.repeat(motion.index, len(names)),
         "time_s": np.repeat(motion.time_s, len(names)),

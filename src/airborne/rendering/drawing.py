@@ -9,10 +9,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airborne.body import Geometry, PosedBody
+from airborne.body import PosedBody, SurfaceArrays
 from airborne.cameras import Camera
 from airborne.rendering.lights import Lights
-from airborne.rendering.packing import moved_view, packed_lights, packed_view
+from airborne.rendering.packing import pack_lights, pack_view, shift_view
 from airborne.rendering.rows import (
     BLOCK,
     BLUE,
@@ -22,14 +22,14 @@ from airborne.rendering.rows import (
     SHADE,
     SHAPE,
     W,
-    all_spans,
-    covered_blocks,
+    block_range,
     draw_row,
     f4,
     light_block,
+    list_spans,
     new_row,
 )
-from airborne.rendering.shapes import KERNEL, VIEW_K, new_shapes, place
+from airborne.rendering.shapes import KERNEL, VIEW_K, new_shapes, pose_shapes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +49,7 @@ class Rendering:
 
 
 def render(
-    geometry: Geometry,
+    geometry: SurfaceArrays,
     posed: PosedBody,
     camera: Camera,
     lights: Lights,
@@ -65,7 +65,7 @@ def render(
     width, height = camera.size
     x0, y0, x1, y1 = region or (0, 0, width, height)
     x0, y0, x1, y1 = max(x0, 0), max(y0, 0), min(x1, width), min(y1, height)
-    view = moved_view(packed_view(camera), x0, y0)
+    view = shift_view(pack_view(camera), x0, y0)
     size = (max(y1 - y0, 0), max(x1 - x0, 0))
     part, segment = np.full(size, -1, np.int16), np.full(size, -1, np.int16)
     inverse_depth, colour = np.zeros(size, np.float32), np.zeros((*size, 3), np.float32)
@@ -75,7 +75,7 @@ def render(
         posed.R,
         posed.t,
         view,
-        packed_lights(lights, camera),
+        pack_lights(lights, camera),
         np.float32(lights.ambient),
         part,
         segment,
@@ -89,8 +89,8 @@ def render(
 def draw_maps(shapes, geometry, R, t, view, lights, ambient, part, segment, inverse_depth, colour):
     """Draw on maps that hold background everywhere; see `Rendering` for them, `sum_hypotheses` for the rest."""
     height, width = part.shape
-    place(shapes, geometry, R, t)
-    row_start, row_stop, ends, curves = all_spans(shapes, geometry, view, width, height)
+    pose_shapes(shapes, geometry, R, t)
+    row_start, row_stop, ends, curves = list_spans(shapes, geometry, view, width, height)
     row = new_row(width)
     n_ellipsoids = len(geometry.ellipsoid_part)
     x_step, y_step = f4(view[VIEW_K]), f4(view[VIEW_K + 3])
@@ -98,7 +98,7 @@ def draw_maps(shapes, geometry, R, t, view, lights, ambient, part, segment, inve
         start, stop = row_start[v], row_stop[v]
         if stop == start:
             continue
-        first, last = covered_blocks(ends, start, stop)
+        first, last = block_range(ends, start, stop)
         draw_row(row, shapes.outline, shapes.surface, ends, curves, start, stop, v, first)
         for b in range(first, last + 1):
             u = b * LANES

@@ -1,7 +1,7 @@
-"""How much evidence a body's mask gathers: the wide search's fast score.
+"""Evidence summed over a body's mask: the fast score of the global search.
 
 A map holds each pixel's evidence for the body, such as log p(colour | body) - log p(colour | background) [nats]. Its
-sums along the image's columns are kept, so that a span of the mask costs two reads, however long it is.
+cumulative sums along the image's columns are stored, so that a span of the mask costs two reads, whatever its length.
 """
 
 from __future__ import annotations
@@ -13,15 +13,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airborne.body import Geometry
+from airborne.body import SurfaceArrays
 from airborne.cameras import Camera
-from airborne.rendering.packing import packed_view
-from airborne.rendering.reduction import reduced, reduced_camera
-from airborne.rendering.rows import all_spans
-from airborne.rendering.shapes import KERNEL, new_shapes, place
+from airborne.rendering.packing import pack_view
+from airborne.rendering.reduction import reduce_camera, reduce_image
+from airborne.rendering.rows import list_spans
+from airborne.rendering.shapes import KERNEL, new_shapes, pose_shapes
 from airborne.rendering.threads import in_threads
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,15 +35,15 @@ class EvidenceMaps:
 
 def evidence_maps(cameras: Sequence[Camera], maps: Sequence[Array], *, scale: int = 1) -> EvidenceMaps:
     """Sum the maps (h, w) of the cameras' images, reduced `scale` times by averaging; a reduced pixel counts once."""
-    small_maps = [reduced(np.asarray(plane, np.float32), scale) for plane in maps]
-    small_cameras = [reduced_camera(camera, scale) for camera in cameras]
+    small_maps = [reduce_image(np.asarray(plane, np.float32), scale) for plane in maps]
+    small_cameras = [reduce_camera(camera, scale) for camera in cameras]
     assert len(small_cameras) == len(small_maps), "one map a camera"
     columns = [np.zeros((plane.shape[1], plane.shape[0] + 1), np.float32) for plane in small_maps]
     for sums, plane in zip(columns, small_maps, strict=True):
         np.cumsum(plane.T, axis=1, dtype=np.float32, out=sums[:, 1:])
     offsets = np.cumsum([0] + [sums.size for sums in columns])
     return EvidenceMaps(
-        views=np.array([packed_view(camera, transposed=True) for camera in small_cameras]).reshape(-1, 18),
+        views=np.array([pack_view(camera, transposed=True) for camera in small_cameras]).reshape(-1, 18),
         sizes=np.array(
             [(c.size[1], c.size[0], at) for c, at in zip(small_cameras, offsets, strict=False)], np.int64
         ).reshape(-1, 3),
@@ -53,10 +52,10 @@ def evidence_maps(cameras: Sequence[Camera], maps: Sequence[Array], *, scale: in
     )
 
 
-def mask_evidence(geometry: Geometry, maps: EvidenceMaps, R: Array, t: Array, *, threads: int = 1) -> Array:
+def mask_evidence(geometry: SurfaceArrays, maps: EvidenceMaps, R: Array, t: Array, *, threads: int = 1) -> Array:
     """Sum each map over the body's mask, each pixel once: (n, views).
 
-    R (n, s, 3, 3), t (n, s, 3) [m] place the segments of n hypotheses in the world. The result is the same for any
+    R (n, s, 3, 3), t (n, s, 3) [m]: world from segment, of n hypotheses. The result is the same for any
     number of threads.
     """
     R, t = np.ascontiguousarray(R, float), np.ascontiguousarray(t, float)
@@ -72,12 +71,12 @@ def mask_evidence(geometry: Geometry, maps: EvidenceMaps, R: Array, t: Array, *,
 
 @njit(**KERNEL)
 def _sum_evidence(shapes, geometry, R, t, views, sizes, sums, out):
-    """Fill `out` (n, views); see `mask_evidence`. In each row the spans are taken from the left and joined."""
+    """Fill `out` (n, views); see `mask_evidence`. In each row the spans are sorted from the left and merged."""
     for h in range(len(R)):
-        place(shapes, geometry, R[h], t[h])
+        pose_shapes(shapes, geometry, R[h], t[h])
         for i in range(len(views)):
             width, height, offset = sizes[i, 0], sizes[i, 1], sizes[i, 2]
-            row_start, row_stop, ends, _ = all_spans(shapes, geometry, views[i], width, height)
+            row_start, row_stop, ends, _ = list_spans(shapes, geometry, views[i], width, height)
             total = 0.0
             for v in range(height):
                 start, stop = row_start[v], row_stop[v]

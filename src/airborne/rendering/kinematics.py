@@ -1,4 +1,4 @@
-"""Many poses of one body at once: the joints' angles to the segments' places, for searches over articulated poses."""
+"""Forward kinematics of many poses at once: joint angles to segment transforms, for searches over articulated poses."""
 
 from __future__ import annotations
 
@@ -6,19 +6,17 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.rendering.shapes import KERNEL
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 
+def pose_segments(model: BodyModel, root_R: Array, root_t: Array, joint_angles: Array) -> tuple[Array, Array]:
+    """Pose the segments of n hypotheses in the world: R (n, s, 3, 3), t (n, s, 3) [m].
 
-def place_segments(model: BodyModel, root_R: Array, root_t: Array, joint_angles: Array) -> tuple[Array, Array]:
-    """Place the segments of n poses in the world: R (n, s, 3, 3), t (n, s, 3) [m].
-
-    root_R (n, 3, 3), root_t (n, 3) [m] world from root; joint_angles (n, s - 1, 3) [rad], successive turns about the
-    moving x, y and z axes, in the order of the segments. The same as `BodyModel.with_pose`, for a batch.
+    root_R (n, 3, 3), root_t (n, 3) [m] world from root; joint_angles (n, s - 1, 3) [rad], successive rotations about
+    the moving x, y and z axes, in the order of the segments. The same as `BodyModel.with_pose`, for a batch.
     """
     n, s = len(root_R), len(model.segments)
     R, t = np.empty((n, s, 3, 3)), np.empty((n, s, 3))

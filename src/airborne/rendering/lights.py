@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.errors import TrialError
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,7 +25,7 @@ class Lamp:
     def __post_init__(self) -> None:
         if (self.direction is None) != (self.half_angle_rad is None):
             raise TrialError(
-                "a lamp has only one of direction and half angle; a spot light needs both, a point light none"
+                "a lamp has only one of direction and half angle; a spot light needs both, a point light neither"
             )
         if self.direction is not None and not np.linalg.norm(self.direction) > 0:
             raise TrialError("a spot light's direction has no length; give the way it shines, as x, y, z")

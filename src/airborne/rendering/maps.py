@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airborne.rendering.rows import BLOCK, LANES, NX, NY, NZ, SHAPE, W, all_spans, covered_blocks, draw_row, new_row
-from airborne.rendering.shapes import B_1, B_U, B_V, KERNEL, place
+from airborne.rendering.rows import BLOCK, LANES, NX, NY, NZ, SHAPE, W, block_range, draw_row, list_spans, new_row
+from airborne.rendering.shapes import B_1, B_U, B_V, KERNEL, pose_shapes
 
 
 def empty_maps(size: tuple[int, int]) -> tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.float32]]:
@@ -26,21 +26,21 @@ def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
 
     shapes: a workspace of `new_shapes(geometry)`; R (s, 3, 3), t (s, 3) [m] world from segment; view (18,) packed.
     part (h, w) int16: index into BodyModel.parts, -1 where there is none; inverse_depth (h, w) float32 [1/m], 0 where
-    there is none, and for an ellipsoid that of the plane in which its outline lies, because only the outline moves the
-    picture; normals (3, h, w) float32: outward unit normals in camera axes, left as they are where there is none.
+    there is none, and for an ellipsoid that of the plane in which its outline lies, because only the outline's motion
+    changes the image; normals (3, h, w) float32: outward unit normals in camera axes, unchanged where there is none.
     """
     height, width = part.shape
     part[:] = -1
     inverse_depth[:] = 0
-    place(shapes, geometry, R, t)
-    row_start, row_stop, ends, curves = all_spans(shapes, geometry, view, width, height)
+    pose_shapes(shapes, geometry, R, t)
+    row_start, row_stop, ends, curves = list_spans(shapes, geometry, view, width, height)
     row = new_row(width)
     n_ellipsoids = len(geometry.ellipsoid_part)
     for v in range(height):
         start, stop = row_start[v], row_stop[v]
         if stop == start:
             continue
-        first, last = covered_blocks(ends, start, stop)
+        first, last = block_range(ends, start, stop)
         draw_row(row, shapes.outline, shapes.surface, ends, curves, start, stop, v, first)
         for u in range(first * LANES, min((last + 1) * LANES, width)):
             at = (u // LANES - first) * BLOCK + u % LANES

@@ -15,10 +15,10 @@ _NO_CONE = -2.0  # below every cosine
 
 
 @lru_cache(maxsize=256)
-def packed_view(camera: Camera, *, transposed: bool = False) -> NDArray:
+def pack_view(camera: Camera, *, transposed: bool = False) -> NDArray:
     """Pack a camera: world to camera (R row by row, t), then the two rows of K^-1: (18,).
 
-    Transposed, rows and columns of the image change places, and with them the camera's x and y. Raises
+    Transposed, rows and columns of the image are swapped, and with them the camera's x and y. Raises
     CalibrationError for a camera with distortion, because straight lines are drawn straight.
     """
     if camera.is_distorted:
@@ -31,16 +31,16 @@ def packed_view(camera: Camera, *, transposed: bool = False) -> NDArray:
     return np.concatenate([camera_from_world[:, :3].ravel(), camera_from_world[:, 3], ray_from_px.ravel()])
 
 
-def moved_view(view: NDArray, x0: float, y0: float) -> NDArray:
+def shift_view(view: NDArray, x0: float, y0: float) -> NDArray:
     """Return the packed view (18,) of the image that begins at pixel (x0, y0) of this one."""
-    moved = view.copy()
-    moved[14] += view[12] * x0 + view[13] * y0
-    moved[17] += view[15] * x0 + view[16] * y0
-    return moved
+    shifted = view.copy()
+    shifted[14] += view[12] * x0 + view[13] * y0
+    shifted[17] += view[15] * x0 + view[16] * y0
+    return shifted
 
 
 @lru_cache(maxsize=256)
-def packed_lights(lights: Lights, camera: Camera, *, transposed: bool = False) -> NDArray[np.float32]:
+def pack_lights(lights: Lights, camera: Camera, *, transposed: bool = False) -> NDArray[np.float32]:
     """Pack the lamps for one camera: position, intensity, axis, cosine of the half angle, in camera axes: (l, 8)."""
     order = [1, 0, 2] if transposed else [0, 1, 2]
     rotation = camera.camera_from_world.rotation

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from airborne.cameras import Camera
 
-Image = TypeVar("Image", NDArray[np.uint8], NDArray[np.float32])
+Pixels = TypeVar("Pixels", NDArray[np.uint8], NDArray[np.float32])
 
 
-def reduced(image: Image, scale: int) -> Image:
+def reduce_image(image: Pixels, scale: int) -> Pixels:
     """Average squares of `scale` by `scale` pixels of an image (h, w, ...); rows and columns left over are cut off."""
     if scale == 1:
         return image
@@ -21,10 +21,10 @@ def reduced(image: Image, scale: int) -> Image:
     return cv2.resize(image[: height * scale, : width * scale], (width, height), interpolation=cv2.INTER_AREA)  # type: ignore[return-value]
 
 
-def reduced_camera(camera: Camera, scale: int) -> Camera:
+def reduce_camera(camera: Camera, scale: int) -> Camera:
     """Return the camera of the reduced image: its pixel (0, 0) is the middle of the first square."""
     if scale == 1:
         return camera
     width, height = camera.size
     middle = (scale - 1) / 2
-    return camera.resampled(scale=(scale, scale), offset=(middle, middle), size=(width // scale, height // scale))
+    return camera.resample(scale=(scale, scale), offset=(middle, middle), size=(width // scale, height // scale))

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airborne.body import Geometry, PosedBody
+from airborne.body import PosedBody, SurfaceArrays
 from airborne.cameras import Camera
 from airborne.rendering.drawing import Rendering
 from airborne.rendering.lights import Lamp, Lights
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 
-
-def render_reference(geometry: Geometry, posed: PosedBody, camera: Camera, lights: Lights) -> Rendering:
+def render_reference(geometry: SurfaceArrays, posed: PosedBody, camera: Camera, lights: Lights) -> Rendering:
     """Draw a body in one view by casting rays: float64 maps, seconds for a large view; see `render`."""
     width, height = camera.size
     u, v = np.meshgrid(np.arange(width), np.arange(height))
@@ -22,8 +20,8 @@ def render_reference(geometry: Geometry, posed: PosedBody, camera: Camera, light
     t = camera.camera_from_world.apply(posed.t)
     depth, shape = np.full((height, width), np.inf), np.full((height, width), -1)
     normals = np.zeros((height, width, 3))
-    hits = [_ellipsoid_hits(geometry, R, t, e, rays) for e in range(len(geometry.ellipsoid_segment))]
-    hits += [_polygon_hits(geometry, R, t, p, rays) for p in range(len(geometry.polygon_segment))]
+    hits = [_ellipsoid_hits(geometry, R, t, e=e, rays=rays) for e in range(len(geometry.ellipsoid_segment))]
+    hits += [_polygon_hits(geometry, R, t, p=p, rays=rays) for p in range(len(geometry.polygon_segment))]
     for index, (z, normal) in enumerate(hits):
         is_nearer = z < depth
         depth[is_nearer], shape[is_nearer] = z[is_nearer], index
@@ -46,7 +44,7 @@ def render_reference(geometry: Geometry, posed: PosedBody, camera: Camera, light
     )
 
 
-def _ellipsoid_hits(geometry: Geometry, R: Array, t: Array, e: int, rays: Array) -> tuple[Array, Array]:
+def _ellipsoid_hits(geometry: SurfaceArrays, R: Array, t: Array, *, e: int, rays: Array) -> tuple[Array, Array]:
     """Return each ray's depth [m] at the near surface, infinite where it misses, and the outward normals (h, w, 3)."""
     segment = geometry.ellipsoid_segment[e]
     centre = R[segment] @ geometry.ellipsoid_centre[e] + t[segment]
@@ -68,7 +66,7 @@ def _ellipsoid_hits(geometry: Geometry, R: Array, t: Array, e: int, rays: Array)
     return depth, normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
 
 
-def _polygon_hits(geometry: Geometry, R: Array, t: Array, p: int, rays: Array) -> tuple[Array, Array]:
+def _polygon_hits(geometry: SurfaceArrays, R: Array, t: Array, *, p: int, rays: Array) -> tuple[Array, Array]:
     """Return each ray's depth [m] at the polygon, infinite where it misses or sees its back, and normals to shade with.
 
     The normals are one, (3,), or of a smooth triangle (h, w, 3).

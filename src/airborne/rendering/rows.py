@@ -53,7 +53,7 @@ def new_row(width):
 
 
 @njit(**INNER)
-def count_rows(shapes, row_start):
+def _count_rows(shapes, row_start):
     """Fill `row_start` (height + 1,) with room for a shape's spans in each row; return the number of spans."""
     for v in range(len(row_start)):
         row_start[v] = 0
@@ -71,7 +71,7 @@ def count_rows(shapes, row_start):
 
 
 @njit(**INNER)
-def find_spans(shapes, geometry, width, row_start, row_stop, ends, curves):
+def _find_spans(shapes, geometry, width, row_start, row_stop, ends, curves):
     """List the pixels of every shape in every row.
 
     Row v's spans are `row_start[v]` to `row_stop[v] - 1`: `ends` (spans, 3) holds first pixel, last pixel, shape;
@@ -186,18 +186,18 @@ def _beyond(outline, height, v, middle, half):
 
 
 @njit(**INNER)
-def all_spans(shapes, geometry, view, width, height):
-    """Outline the placed shapes in a view and list their spans: row_start, row_stop, ends, curves of `find_spans`."""
+def list_spans(shapes, geometry, view, width, height):
+    """Outline the posed shapes in a view and list their spans: row_start, row_stop, ends, curves of `_find_spans`."""
     outline_all(shapes, geometry, view, width, height)
     row_start, row_stop = np.empty(height + 1, np.int64), np.empty(height, np.int64)
-    n_spans = count_rows(shapes, row_start)
+    n_spans = _count_rows(shapes, row_start)
     ends, curves = np.empty((n_spans, 3), np.int64), np.empty((n_spans, 2))
-    find_spans(shapes, geometry, width, row_start, row_stop, ends, curves)
+    _find_spans(shapes, geometry, width, row_start, row_stop, ends, curves)
     return row_start, row_stop, ends, curves
 
 
 @njit(**INNER)
-def covered_blocks(ends, start, stop):
+def block_range(ends, start, stop):
     """Return the first block that the spans `start` to `stop - 1` touch, and the last."""
     first, last = ends[start, 0], ends[start, 1]
     for i in range(start + 1, stop):

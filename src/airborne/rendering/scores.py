@@ -8,17 +8,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body import Geometry
+from airborne.body import SurfaceArrays
 from airborne.rendering.evidence import mask_evidence
 from airborne.rendering.shapes import new_shapes
 from airborne.rendering.sums import CHROMA_ERROR, COLOURED, CROSS, ERROR, MODEL, PIXELS, SUMS, sum_hypotheses
 from airborne.rendering.targets import Targets
 from airborne.rendering.threads import in_threads
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-GAINS = (0.5, 2.0)  # least and largest brightness that unknown light may give: a black body fits any dark wall
-MISSED_GREY = 64.0  # what a foreground pixel outside the mask counts, a channel: about a wrong colour's difference
+GAINS = (0.5, 2.0)  # bounds of the fitted gain: at gain zero a black body would fit any dark wall
+MISSED_GREY = 64.0  # cost of a foreground pixel outside the mask, per channel: about the difference of a wrong colour
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,17 +39,17 @@ RULES = {
 
 
 def score(
-    geometry: Geometry, targets: Targets, R: Array, t: Array, rule: ScoreRule = RULES["raw"], *, threads: int = 1
+    geometry: SurfaceArrays, targets: Targets, R: Array, t: Array, *, rule: ScoreRule = RULES["raw"], threads: int = 1
 ) -> Array:
-    """Score n hypotheses against the views: (n,) [grey levels], smaller is better, infinite where nothing is seen.
+    """Score n hypotheses against the views: (n,) [grey levels], smaller is better, infinite where no pixel is covered.
 
-    R (n, s, 3, 3), t (n, s, 3) [m] place the segments in the world. Raw: sqrt(sum |RGB_seen - RGB_model|^2 / 3 pixels)
-    over the model's mask, so a difference of d in each channel scores d. Normalised: the same of 255 RGB / (R + G + B),
+    R (n, s, 3, 3), t (n, s, 3) [m]: world from segment. Raw: sqrt(sum |RGB_observed - RGB_model|^2 / 3 pixels) over
+    the model's mask, so a difference of d in each channel scores d. Normalised: the same of 255 RGB / (R + G + B),
     dark pixels left out; it does not depend on the lights. The result is the same for any number of threads.
     """
     if rule.counts_missed:
-        assert targets.foreground is not None, "the rule counts missed foreground: give `targets` the evidence"
-    sums = measure(geometry, targets, R, t, with_chroma=rule.normalised > 0, threads=threads)
+        assert targets.foreground is not None, "the rule counts missed foreground: give `pack_targets` the evidence"
+    sums = colour_sums(geometry, targets, R, t, with_chroma=rule.normalised > 0, threads=threads)
     missed = None
     if rule.counts_missed and targets.foreground is not None:
         inside = mask_evidence(geometry, targets.foreground, R, t, threads=threads)
@@ -58,13 +57,13 @@ def score(
     return scores_from_sums(sums, rule, missed)
 
 
-def measure(
-    geometry: Geometry, targets: Targets, R: Array, t: Array, *, with_chroma: bool, threads: int = 1
+def colour_sums(
+    geometry: SurfaceArrays, targets: Targets, R: Array, t: Array, *, with_chroma: bool, threads: int = 1
 ) -> NDArray[np.float64]:
     """Sum over the mask of each hypothesis in each view: (n, views, SUMS), columns as named in `sums`.
 
-    With r = seen - model over the channels: pixels, sum r^2, sum r model, sum model^2; and with chroma the number of
-    coloured pixels and their sum of squared differences.
+    With r = observed - model over the channels: pixels, sum r^2, sum r model, sum model^2; with chroma also the
+    number of coloured pixels and their sum of squared differences.
     """
     R, t = np.ascontiguousarray(R, float), np.ascontiguousarray(t, float)
     out = np.empty((len(R), len(targets.views), SUMS))
@@ -91,7 +90,7 @@ def measure(
 def scores_from_sums(sums: Array, rule: ScoreRule, missed: Array | None = None) -> Array:
     """Turn sums (n, views, SUMS), and the missed pixels (n, views), into scores (n,) [grey levels].
 
-    The fitted gain is the least-squares a of |seen - a model|^2, kept within GAINS: |seen - a model|^2 is
+    The fitted gain is the least-squares a of |observed - a model|^2, kept within GAINS: |observed - a model|^2 is
     sum r^2 - (a - 1) (2 sum r model - (a - 1) sum model^2).
     """
     raw = sums[..., ERROR]
@@ -108,7 +107,7 @@ def scores_from_sums(sums: Array, rule: ScoreRule, missed: Array | None = None) 
 
 def _rms(error: Array, pixels: Array, rule: ScoreRule, missed: Array | None) -> Array:
     """Pool squared errors (n, views) over pixels or views; infinite where a hypothesis shows no pixel."""
-    is_seen = pixels.sum(axis=1) > 0
+    is_covered = pixels.sum(axis=1) > 0
     if missed is not None:
         error, pixels = error + 3 * MISSED_GREY**2 * missed, pixels + missed
     if rule.pool == "pixels":
@@ -117,4 +116,4 @@ def _rms(error: Array, pixels: Array, rule: ScoreRule, missed: Array | None) -> 
         counted = pixels > 0
         per_view = np.sqrt(error / np.maximum(3 * pixels, 1))
         rms = per_view.sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
-    return np.where(is_seen, rms, np.inf)
+    return np.where(is_covered, rms, np.inf)

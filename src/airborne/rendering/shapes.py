@@ -1,4 +1,4 @@
-"""Kernels that place a body's shapes in the world and outline them in one view, in float64.
+"""Kernels that pose a body's shapes in the world and outline them in one view, in float64.
 
 Every shape, ellipsoid or polygon, becomes one row of numbers for the same pixel loop (`rows.py`):
 
@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from airborne.body import Geometry
+from airborne.body import SurfaceArrays
 
 _COMMON: dict[str, Any] = {"nogil": True, "fastmath": True, "error_model": "numpy"}
 KERNEL = {**_COMMON, "cache": True}  # called from Python
@@ -34,12 +34,12 @@ INNER = {**_COMMON, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # cal
 _SEAM_PX = 1e-7  # polygons reach this far beyond their edges, so that no pixel falls between two of a mesh
 
 # columns of a packed view: world to camera (R row by row, t), then the two rows of K^-1
-VIEW_T, VIEW_K, VIEW_COLUMNS = 9, 12, 18
+_VIEW_T, VIEW_K, VIEW_COLUMNS = 9, 12, 18
 # columns of an outline (float64)
 B_U, B_V, B_1, MID_V, MID_1, HALF_1, HALF_V, HALF_VV, NORMAL = 0, 1, 2, 3, 4, 5, 6, 7, 8
-HEIGHT, CENTRE_HEIGHT, BEND, OUTLINE_COLUMNS = 17, 20, 21, 22  # a.K^-1, a.c and alpha, for slabs
+HEIGHT, CENTRE_HEIGHT, BEND, _OUTLINE_COLUMNS = 17, 20, 21, 22  # a.K^-1, a.c and alpha, for slabs
 # columns of a surface (float32): what the pixel loop holds fixed along a span
-ALPHA, W_STEP, N_STEP, G, COLOUR, ID, SURFACE_COLUMNS = 0, 1, 2, 5, 8, 11, 12
+ALPHA, W_STEP, N_STEP, G, COLOUR, ID, _SURFACE_COLUMNS = 0, 1, 2, 5, 8, 11, 12
 
 
 class Shapes(NamedTuple):
@@ -50,18 +50,18 @@ class Shapes(NamedTuple):
     corners: Any  # (c, 3) [m] world
     normals: Any  # (p, 3) world
     corner_normals: Any  # (c, 3) world, of smooth triangles
-    outline: Any  # (s, OUTLINE_COLUMNS)
-    surface: Any  # (s, SURFACE_COLUMNS) float32
-    rows: Any  # (s, 2) first and last row seen, last < first where none is
-    slab: Any  # (e, 2) heights between which an ellipsoid is seen, as shares of its third semi-axis
+    outline: Any  # (s, _OUTLINE_COLUMNS)
+    surface: Any  # (s, _SURFACE_COLUMNS) float32
+    rows: Any  # (s, 2) first and last row covered, last < first where there is none
+    slab: Any  # (e, 2) heights between which an ellipsoid exists, as shares of its third semi-axis
     is_cut: Any  # (e,) whether the slab leaves anything out
     edges: Any  # (c, 3) side (+1 lower bound, -1 upper bound, 0 a condition on the row), slope, offset
 
 
-def new_shapes(geometry: Geometry) -> Shapes:
+def new_shapes(geometry: SurfaceArrays) -> Shapes:
     """Allocate the workspace for a body and fill in what no pose changes."""
     e, p, c = len(geometry.ellipsoid_segment), len(geometry.polygon_segment), len(geometry.corners)
-    surface = np.zeros((e + p, SURFACE_COLUMNS), np.float32)
+    surface = np.zeros((e + p, _SURFACE_COLUMNS), np.float32)
     parts = np.concatenate([geometry.ellipsoid_part, geometry.polygon_part])
     surface[:, COLOUR : COLOUR + 3] = geometry.colours[parts]
     surface[:, ID] = np.arange(e + p)
@@ -72,7 +72,7 @@ def new_shapes(geometry: Geometry) -> Shapes:
         np.empty((c, 3)),
         np.empty((p, 3)),
         np.empty((c, 3)),
-        np.zeros((e + p, OUTLINE_COLUMNS)),
+        np.zeros((e + p, _OUTLINE_COLUMNS)),
         surface,
         np.empty((e + p, 2), np.int64),
         slab,
@@ -82,8 +82,8 @@ def new_shapes(geometry: Geometry) -> Shapes:
 
 
 @njit(**INNER)
-def place(shapes, geometry, R, t):
-    """Move the shapes to the world with the segments' R (s, 3, 3) and t (s, 3) [m]."""
+def pose_shapes(shapes, geometry, R, t):
+    """Pose the shapes in the world by the segments' R (s, 3, 3) and t (s, 3) [m]."""
     for e in range(len(geometry.ellipsoid_segment)):
         segment = geometry.ellipsoid_segment[e]
         for i in range(3):
@@ -94,7 +94,7 @@ def place(shapes, geometry, R, t):
                 length = geometry.ellipsoid_semi_axes[e, j]
                 shapes.axes[e, i, j] = (a * axes[0, j] + b * axes[1, j] + c * axes[2, j]) / length
     if len(geometry.corner_normals):
-        _place_corner_normals(shapes, geometry, R)
+        _pose_corner_normals(shapes, geometry, R)
     for p in range(len(geometry.polygon_segment)):
         segment = geometry.polygon_segment[p]
         for i in range(3):
@@ -107,8 +107,8 @@ def place(shapes, geometry, R, t):
 
 
 @njit(**INNER)
-def _place_corner_normals(shapes, geometry, R):
-    """Turn the corner normals of smooth triangles to the world."""
+def _pose_corner_normals(shapes, geometry, R):
+    """Rotate the corner normals of smooth triangles to the world."""
     for p in range(len(geometry.is_smooth)):
         if geometry.is_smooth[p]:
             segment = geometry.polygon_segment[p]
@@ -120,17 +120,17 @@ def _place_corner_normals(shapes, geometry, R):
 
 @njit(**INNER)
 def outline_all(shapes, geometry, view, width, height):
-    """Outline every placed shape in a view of `width` pixels a row and `height` rows."""
+    """Outline every posed shape in a view of `width` pixels a row and `height` rows."""
     n_ellipsoids = len(geometry.ellipsoid_segment)
     for s in range(len(shapes.rows)):
         if s < n_ellipsoids:
-            is_seen = _outline_ellipsoid(
+            is_visible = _outline_ellipsoid(
                 shapes.centre[s], shapes.axes[s], shapes.outline[s], shapes.surface[s], shapes.rows[s], view, height
             )
         else:
             p = s - n_ellipsoids
-            is_seen = _outline_polygon(shapes, s, p, geometry.start[p], geometry.start[p + 1], view, height)
-        if not is_seen:
+            is_visible = _outline_polygon(shapes, s, p, geometry.start[p], geometry.start[p + 1], view, height)
+        if not is_visible:
             shapes.rows[s, 0] = 0
             shapes.rows[s, 1] = -1
     if len(geometry.corner_normals):
@@ -138,7 +138,7 @@ def outline_all(shapes, geometry, view, width, height):
 
 
 @njit(**INNER)
-def _turned(view, x, y, z):
+def _rotate(view, x, y, z):
     return (
         view[0] * x + view[1] * y + view[2] * z,
         view[3] * x + view[4] * y + view[5] * z,
@@ -151,15 +151,15 @@ def _outline_ellipsoid(centre, axes, outline, surface, rows, view, height):
     """Outline one ellipsoid; False where it reaches the camera's plane, or no row meets it."""
     m00 = m01 = m02 = m11 = m12 = m22 = a = b = c = 0.0
     for j in range(3):
-        a, b, c = _turned(view, axes[0, j], axes[1, j], axes[2, j])
+        a, b, c = _rotate(view, axes[0, j], axes[1, j], axes[2, j])
         m00 += a * a
         m01 += a * b
         m02 += a * c
         m11 += b * b
         m12 += b * c
         m22 += c * c
-    cx, cy, cz = _turned(view, centre[0], centre[1], centre[2])
-    cx, cy, cz = cx + view[VIEW_T], cy + view[VIEW_T + 1], cz + view[VIEW_T + 2]
+    cx, cy, cz = _rotate(view, centre[0], centre[1], centre[2])
+    cx, cy, cz = cx + view[_VIEW_T], cy + view[_VIEW_T + 1], cz + view[_VIEW_T + 2]
     g0, g1, g2 = m00 * cx + m01 * cy + m02 * cz, m01 * cx + m11 * cy + m12 * cz, m02 * cx + m12 * cy + m22 * cz
     k = g0 * cx + g1 * cy + g2 * cz - 1
     if k <= 0 or cz <= 0:
@@ -202,7 +202,7 @@ def _outline_ellipsoid(centre, axes, outline, surface, rows, view, height):
 @njit(**INNER)
 def _outline_polygon(shapes, s, p, start, stop, view, height):
     """Outline one convex polygon; False where it faces away, or no row meets it."""
-    m0, m1, m2 = _turned(view, shapes.normals[p, 0], shapes.normals[p, 1], shapes.normals[p, 2])
+    m0, m1, m2 = _rotate(view, shapes.normals[p, 0], shapes.normals[p, 1], shapes.normals[p, 2])
     low, high, is_in_front, d = float(height), -1.0, True, 0.0
     for i in range(start, stop):
         x, y, z = _in_camera(view, shapes.corners[i])
@@ -260,19 +260,19 @@ def _shade_smoothly(shapes, geometry, view):
             x, y, z = _in_camera(view, shapes.corners[start + i])
             det = e0 * x + e1 * y + e2 * z
             a, b, c = (k00 * e0 + k10 * e1) / det, (k01 * e0 + k11 * e1) / det, (k02 * e0 + k12 * e1 + e2) / det
-            turned = _turned(view, normals[start + i, 0], normals[start + i, 1], normals[start + i, 2])
+            normal = _rotate(view, normals[start + i, 0], normals[start + i, 1], normals[start + i, 2])
             for j in range(3):
-                outline[NORMAL + 3 * j] += turned[j] * a
-                outline[NORMAL + 3 * j + 1] += turned[j] * b
-                outline[NORMAL + 3 * j + 2] += turned[j] * c
+                outline[NORMAL + 3 * j] += normal[j] * a
+                outline[NORMAL + 3 * j + 1] += normal[j] * b
+                outline[NORMAL + 3 * j + 2] += normal[j] * c
         for j in range(3):
             surface[N_STEP + j], surface[G + j] = outline[NORMAL + 3 * j], 0.0
 
 
 @njit(**INNER)
 def _in_camera(view, point):
-    x, y, z = _turned(view, point[0], point[1], point[2])
-    return x + view[VIEW_T], y + view[VIEW_T + 1], z + view[VIEW_T + 2]
+    x, y, z = _rotate(view, point[0], point[1], point[2])
+    return x + view[_VIEW_T], y + view[_VIEW_T + 1], z + view[_VIEW_T + 2]
 
 
 @njit(**INNER)

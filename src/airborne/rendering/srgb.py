@@ -1,11 +1,11 @@
-"""sRGB, as pictures store it, and linear light, as edges and exposures mix it. Source: IEC 61966-2-1."""
+"""sRGB, as image files store it, and linear light, as edges and exposures mix it. Source: IEC 61966-2-1."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _LEVELS = 1 << 14
 

@@ -13,16 +13,16 @@ from airborne.rendering.rows import (
     RED,
     SHADE,
     W,
-    all_spans,
-    covered_blocks,
+    block_range,
     draw_row,
     f4,
     light_block,
+    list_spans,
     new_row,
 )
-from airborne.rendering.shapes import INNER, KERNEL, VIEW_K, place
+from airborne.rendering.shapes import INNER, KERNEL, VIEW_K, pose_shapes
 
-DARK = 30.0  # a pixel whose R + G + B is below this has no colour to speak of
+_DARK_SUM = 30.0  # a pixel whose R + G + B is below this has no usable chromaticity
 
 # what is summed over the mask, r = observed - model over the three channels
 PIXELS, ERROR, CROSS, MODEL, COLOURED, CHROMA_ERROR, SUMS = 0, 1, 2, 3, 4, 5, 6
@@ -34,13 +34,13 @@ def _compare_row(row, n_blocks, lights, ambient, x, x_step, y, y_step, images, o
     for b in range(n_blocks):
         block = row[b * BLOCK : b * BLOCK + BLOCK]
         light_block(block, lights, x, x_step, y, y_step)
-        seen = images[offset + 3 * LANES * b : offset + 3 * LANES * (b + 1)]
+        observed = images[offset + 3 * LANES * b : offset + 3 * LANES * (b + 1)]
         for j in range(LANES):
             is_on = block[W + j] > f4(0)
             on = f4(1) if is_on else f4(0)
             light = ambient + block[SHADE + j] if is_on else f4(0)
             m0, m1, m2 = light * block[RED + j], light * block[GREEN + j], light * block[BLUE + j]
-            o0, o1, o2 = f4(seen[j]), f4(seen[LANES + j]), f4(seen[2 * LANES + j])
+            o0, o1, o2 = f4(observed[j]), f4(observed[LANES + j]), f4(observed[2 * LANES + j])
             r0, r1, r2 = o0 - m0, o1 - m1, o2 - m2
             totals[PIXELS * LANES + j] += on
             totals[ERROR * LANES + j] += on * (r0 * r0 + r1 * r1 + r2 * r2)
@@ -57,12 +57,12 @@ def _compare_chroma_row(row, n_blocks, images, offset, totals):
     """Add the differences in chromaticity, 255 RGB / (R + G + B), to `totals`; dark pixels and parts are left out."""
     for b in range(n_blocks):
         block = row[b * BLOCK : b * BLOCK + BLOCK]
-        seen = images[offset + 3 * LANES * b : offset + 3 * LANES * (b + 1)]
+        observed = images[offset + 3 * LANES * b : offset + 3 * LANES * (b + 1)]
         for j in range(LANES):
             m0, m1, m2 = block[RED + j], block[GREEN + j], block[BLUE + j]
-            o0, o1, o2 = f4(seen[j]), f4(seen[LANES + j]), f4(seen[2 * LANES + j])
+            o0, o1, o2 = f4(observed[j]), f4(observed[LANES + j]), f4(observed[2 * LANES + j])
             m_sum, o_sum = m0 + m1 + m2, o0 + o1 + o2
-            on = f4(1) if (block[W + j] > f4(0)) & (m_sum >= f4(DARK)) & (o_sum >= f4(DARK)) else f4(0)
+            on = f4(1) if (block[W + j] > f4(0)) & (m_sum >= f4(_DARK_SUM)) & (o_sum >= f4(_DARK_SUM)) else f4(0)
             m_scale, o_scale = f4(255) / max(m_sum, f4(1)), f4(255) / max(o_sum, f4(1))
             r0, r1, r2 = o0 * o_scale - m0 * m_scale, o1 * o_scale - m1 * m_scale, o2 * o_scale - m2 * m_scale
             totals[COLOURED * LANES + j] += on
@@ -79,11 +79,11 @@ def sum_hypotheses(shapes, geometry, R, t, views, sizes, lights, ambient, images
     row = new_row(_largest_width(sizes))
     totals = np.empty(SUMS * LANES, np.float32)
     for h in range(len(R)):
-        place(shapes, geometry, R[h], t[h])
+        pose_shapes(shapes, geometry, R[h], t[h])
         for i in range(len(views)):
             width, height, offset, view = sizes[i, 0], sizes[i, 1], sizes[i, 2], views[i]
             blocks = (width + LANES - 1) // LANES
-            row_start, row_stop, ends, curves = all_spans(shapes, geometry, view, width, height)
+            row_start, row_stop, ends, curves = list_spans(shapes, geometry, view, width, height)
             for k in range(SUMS * LANES):
                 totals[k] = 0
             x_step, y_step = f4(view[VIEW_K]), f4(view[VIEW_K + 3])
@@ -91,7 +91,7 @@ def sum_hypotheses(shapes, geometry, R, t, views, sizes, lights, ambient, images
                 start, stop = row_start[v], row_stop[v]
                 if stop == start:
                     continue
-                first, last = covered_blocks(ends, start, stop)
+                first, last = block_range(ends, start, stop)
                 draw_row(row, shapes.outline, shapes.surface, ends, curves, start, stop, v, first)
                 u, n_blocks, at = first * LANES, last - first + 1, offset + 3 * LANES * (v * blocks + first)
                 x = f4(view[VIEW_K] * u + view[VIEW_K + 1] * v + view[VIEW_K + 2])

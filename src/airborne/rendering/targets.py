@@ -1,4 +1,4 @@
-"""What the cameras saw, laid out for the kernels once a frame: transposed, in blocks of 16 pixels, padded."""
+"""The observed images, packed for the kernels once a frame: transposed, in blocks of 16 pixels, padded."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from airborne.rendering.evidence import EvidenceMaps, evidence_maps
 from airborne.rendering.lights import Lights
-from airborne.rendering.packing import packed_lights, packed_view
-from airborne.rendering.reduction import reduced, reduced_camera
+from airborne.rendering.packing import pack_lights, pack_view
+from airborne.rendering.reduction import reduce_camera, reduce_image
 from airborne.rendering.rows import LANES
 from airborne.rendering.shapes import KERNEL
 from airborne.video import View
@@ -20,7 +20,7 @@ from airborne.video import View
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
-    """The views that a hypothesis is compared with. A kernel's row is a column of the image."""
+    """The images that a hypothesis is compared with. A kernel's row is a column of the image."""
 
     views: NDArray[np.float64]  # (v, 18) packed cameras
     sizes: NDArray[np.int64]  # (v, 3) pixels a row, rows, offset in `images`
@@ -30,27 +30,27 @@ class Targets:
     foreground: EvidenceMaps | None  # 1 where a pixel looks like the body, 0 elsewhere
 
 
-def targets(
+def pack_targets(
     views: Sequence[View | None],
     lights: Lights,
     *,
     scale: int = 1,
     evidence: Sequence[NDArray[np.floating] | None] | None = None,
 ) -> Targets:
-    """Lay out the views that exist, reduced `scale` times (1, 2, 4) by averaging areas.
+    """Pack the views that exist, reduced `scale` times (1, 2, 4) by averaging areas.
 
     `evidence` (h, w), one map a view that exists, is each pixel's log-likelihood ratio of body against background
     [nats]: where it is above zero the pixel is foreground, which the rule "union" counts. Raises CalibrationError for a
     distorted camera.
     """
-    seen = [view for view in views if view is not None]
-    cameras = [reduced_camera(view.camera, scale) for view in seen]
+    present = [view for view in views if view is not None]
+    cameras = [reduce_camera(view.camera, scale) for view in present]
     blocks = [-(-camera.size[1] // LANES) for camera in cameras]
     lengths = [3 * LANES * n * camera.size[0] for n, camera in zip(blocks, cameras, strict=True)]
     offsets = np.concatenate([[0], np.cumsum(lengths, dtype=np.int64)])
     images = np.zeros(offsets[-1], np.uint8)
-    for view, camera, n, start, stop in zip(seen, cameras, blocks, offsets, offsets[1:], strict=False):
-        _lay_out(reduced(view.rgb, scale), images[start:stop].reshape(camera.size[0], n, 3, LANES))
+    for view, camera, n, start, stop in zip(present, cameras, blocks, offsets, offsets[1:], strict=False):
+        _pack_pixels(reduce_image(view.rgb, scale), images[start:stop].reshape(camera.size[0], n, 3, LANES))
     foreground = None
     if evidence is not None:
         masks = [
@@ -58,13 +58,13 @@ def targets(
             for view, e in zip(views, evidence, strict=True)
             if view is not None and e is not None
         ]
-        foreground = evidence_maps([view.camera for view in seen], masks, scale=scale)
+        foreground = evidence_maps([view.camera for view in present], masks, scale=scale)
     return Targets(
-        views=np.array([packed_view(camera, transposed=True) for camera in cameras]).reshape(-1, 18),
+        views=np.array([pack_view(camera, transposed=True) for camera in cameras]).reshape(-1, 18),
         sizes=np.array([(c.size[1], c.size[0], at) for c, at in zip(cameras, offsets, strict=False)], np.int64).reshape(
             -1, 3
         ),
-        lights=np.array([packed_lights(lights, camera, transposed=True) for camera in cameras], np.float32).reshape(
+        lights=np.array([pack_lights(lights, camera, transposed=True) for camera in cameras], np.float32).reshape(
             len(cameras), len(lights.lamps), 8
         ),
         ambient=np.float32(lights.ambient),
@@ -74,7 +74,7 @@ def targets(
 
 
 @njit(**KERNEL)
-def _lay_out(rgb, out):
+def _pack_pixels(rgb, out):
     """Copy rgb (h, w, 3) to `out` (w, blocks, 3, LANES)."""
     height, width, _ = rgb.shape
     for b in range((height + LANES - 1) // LANES):

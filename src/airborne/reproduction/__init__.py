@@ -1,22 +1,22 @@
-"""A paper's experiment made anew: in comes nothing but choices, out comes its table beside ours; reads no recording."""
+"""Reproductions of two papers' synthetic experiments: settings in, their tables beside ours out; no recordings."""
 
 from airborne.reproduction.block.experiment import reproduce_blockjump
-from airborne.reproduction.rigid.curves import Curve, convergence, half_width
+from airborne.reproduction.rigid.curves import Curve, half_width, score_curves
 from airborne.reproduction.rigid.experiment import reproduce_rigid
 from airborne.reproduction.rigid.sensitivity import CASES, Case
-from airborne.reproduction.rigid.somersaults import METHODS, Errors, Experiment, experiment, tracked
+from airborne.reproduction.rigid.somersaults import RIGID_METHODS, Errors, Experiment, make_experiment, track_experiment
 
 __all__ = [
     "CASES",
-    "METHODS",
+    "RIGID_METHODS",
     "Case",
     "Curve",
     "Errors",
     "Experiment",
-    "convergence",
-    "experiment",
     "half_width",
+    "make_experiment",
     "reproduce_blockjump",
     "reproduce_rigid",
-    "tracked",
+    "score_curves",
+    "track_experiment",
 ]

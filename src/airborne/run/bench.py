@@ -6,8 +6,8 @@ import time
 
 import numpy as np
 
-from airborne.body import geometry
-from airborne.rendering import FLAT, RULES, score, targets
+from airborne.body import surface_arrays
+from airborne.rendering import FLAT, RULES, pack_targets, score
 from airborne.run.body_tracking import open_trial
 from airborne.tracking.methods import tracker_of
 from airborne.tracking.tracker import step
@@ -17,22 +17,22 @@ from airborne.trial.file import read_trial
 
 def measure_speed() -> dict[str, float]:
     """Return medians: milliseconds for a field of three views, for each method; microseconds for one hypothesis."""
-    found = {}
+    speeds = {}
     for method in ("refined", "stepping", "simplex"):
-        found[f"{method}_ms_per_field"] = _tracking_ms(method)
-    found["score_us_per_hypothesis"] = _scoring_us()
-    return found
+        speeds[f"{method}_ms_per_field"] = _tracking_ms(method)
+    speeds["score_us_per_hypothesis"] = _scoring_us()
+    return speeds
 
 
 def _tracking_ms(method: str) -> float:
     trial = read_trial(example_trial("thrown_cross"), {"method": method})
     recording, _ = open_trial(trial)
     tracker = tracker_of(trial.settings, trial.model(), trial.start.pose)
-    seen = list(recording)
+    recorded = list(recording)
     times: list[float] = []
     for _ in range(2):  # the first round compiles
         state, times = tracker.init(), []
-        for frames in seen:
+        for frames in recorded:
             start = time.thread_time()
             state, _ = step(tracker, state, frames)
             times.append(time.thread_time() - start)
@@ -43,11 +43,11 @@ def _scoring_us(n: int = 200, rounds: int = 15) -> float:
     trial = read_trial(example_trial("thrown_cross"), {"method": "stepping"})
     model = trial.model()
     frames = next(iter(open_trial(trial)[0]))
-    posed, seen, flat = model.with_pose(trial.start.pose), targets(frames.views, FLAT), geometry(model)
+    posed, views, flat = model.with_pose(trial.start.pose), pack_targets(frames.views, FLAT), surface_arrays(model)
     R, t = np.repeat(posed.R[None], n, axis=0), np.repeat(posed.t[None], n, axis=0)
     times = []
     for _ in range(rounds):
         start = time.thread_time()
-        score(flat, seen, R, t, RULES["normalised"])
+        score(flat, views, R, t, rule=RULES["normalised"])
         times.append(time.thread_time() - start)
     return float(np.median(times) / n * 1e6)

@@ -1,6 +1,6 @@
-"""A finished run against what is known: the truth, paths of joints, points clicked by hand; other runs, other people.
+"""A finished run against references: the truth, paths of joints, points clicked by hand; other runs, other people.
 
-`assess` gives errors, `agree` says how well they agree: bias, limits of agreement, reliability, repeatability.
+`assess` gives errors; `evaluate_agreement` says how well they agree: bias, limits of agreement, ICC, repeatability.
 """
 
 from __future__ import annotations
@@ -24,44 +24,44 @@ from airborne.evaluation import (
     PlayersComparison,
     Repeatability,
     Series,
-    agreement,
+    analyse_agreement,
+    analyse_repeatability,
     assess_players,
-    compare,
     compare_digitised,
     compare_joints,
-    digitised_poses,
+    compare_motion,
+    fit_digitised_poses,
     read_digitised,
     read_joint_paths,
     read_players_truth,
     read_truth,
-    repeatability,
 )
-from airborne.evaluation.agreement_tables import write_agreements, write_repeats
+from airborne.evaluation.agreement_tables import write_agreements, write_repeatability
 from airborne.evaluation.agreement_text import agreement_table, methods_text, repeatability_table
-from airborne.evaluation.jump_errors import paired_jumps
+from airborne.evaluation.jump_errors import pair_jumps
 from airborne.evaluation.variables import (
     Variables,
-    headline,
-    of_joint_paths,
-    of_jumps,
-    of_motion,
-    of_players,
-    of_root,
+    align_symmetry,
+    common_series,
+    headline_series,
+    joint_path_variables,
+    jump_series,
+    motion_variables,
+    players_variables,
     read_joint_angles,
-    side_by_side,
-    turned_alike,
+    root_variables,
 )
 from airborne.export import write_figures, write_json, write_report
 from airborne.export.analysis_figures import write_bland_altman, write_identity
 from airborne.io.text import read_json
 from airborne.motion import Motion
-from airborne.motion.run_folder import body_run, check_record, holds_players, players_run
+from airborne.motion.run_folder import check_record, holds_players, read_body_run, read_players_run
 from airborne.run.opening import versions
 
-Found = Mapping[str, Comparison | DigitisedComparison | JointComparison | PlayersComparison]
+Comparisons = Mapping[str, Comparison | DigitisedComparison | JointComparison | PlayersComparison]
 
 
-def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Path | None = None) -> Found:
+def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Path | None = None) -> Comparisons:
     """Compare the run in a folder, and put the comparison into its summary; of one body into figures and report too.
 
     `joints` are paths of joints as `read_joint_paths` reads them. Raises ResultError where the folder holds no finished
@@ -73,39 +73,39 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
         raise ResultError(
             "nothing to compare with; give a truth.csv, --digitised, --joints, --joint-angles, or --repeat with a run"
         )
-    motion, model = body_run(folder)
-    alike = symmetries(model)
-    found: dict[str, Comparison | DigitisedComparison | JointComparison] = {}
+    motion, model = read_body_run(folder)
+    symmetry = symmetries(model)
+    comparisons: dict[str, Comparison | DigitisedComparison | JointComparison] = {}
     true_poses = clicked = None
     if truth is not None:
         true_poses = read_truth(truth)
-        found["truth"] = compare(motion, true_poses, alike)
+        comparisons["truth"] = compare_motion(motion, true_poses, symmetry)
     if digitised is not None:
         rig = read_rig(folder / "calib.toml")
-        clicked = digitised_poses(read_digitised(digitised, rig), rig, model)
-        found["digitised"] = compare_digitised(motion, clicked, alike)
+        clicked = fit_digitised_poses(read_digitised(digitised, rig), rig, model)
+        comparisons["digitised"] = compare_digitised(motion, clicked, symmetry)
     if joints is not None:
-        found["joints"] = compare_joints(motion, model, read_joint_paths(joints))
-    summary = _kept(folder, found)
+        comparisons["joints"] = compare_joints(motion, model, read_joint_paths(joints))
+    summary = _add_to_summary(folder, comparisons)
     if summary and (folder / "report.html").is_file():
-        write_figures(folder, motion, model, truth=true_poses, digitised=clicked, symmetries=alike)
+        write_figures(folder, motion, model, truth=true_poses, digitised=clicked, symmetries=symmetry)
         write_report(folder, summary)
-    return found
+    return comparisons
 
 
-def _assess_players(folder: Path, truth: Path | None, *, is_alone: bool) -> Found:
+def _assess_players(folder: Path, truth: Path | None, *, is_alone: bool) -> Comparisons:
     if truth is None or not is_alone:
         raise ResultError(
             f"{folder} holds a run of players, which is compared with a truth of players only; "
             "leave --digitised and --joints out and give a truth.csv"
         )
     check_record(folder)
-    found = {"truth": assess_players(folder, truth)}
-    _kept(folder, found)
-    return found
+    comparisons = {"truth": assess_players(folder, truth)}
+    _add_to_summary(folder, comparisons)
+    return comparisons
 
 
-def _kept(folder: Path, found: Found) -> dict:
+def _add_to_summary(folder: Path, comparisons: Comparisons) -> dict:
     """Put comparisons into the run's summary and return it; {} where the run has none."""
     path = folder / "summary.json"
     if not path.is_file():
@@ -113,21 +113,21 @@ def _kept(folder: Path, found: Found) -> dict:
     try:
         summary = read_json(path)
     except (OSError, ValueError) as error:
-        raise ResultError(f"{path} cannot be read ({str(error)[:120]}); mend it, or remove it") from None
+        raise ResultError(f"{path} cannot be read ({str(error)[:120]}); correct it, or remove it") from None
     if not isinstance(summary, dict):
-        raise ResultError(f"{path} holds no summary of a run; mend it, or remove it")
-    summary |= {name: comparison.to_dict() for name, comparison in found.items()}
+        raise ResultError(f"{path} holds no summary of a run; correct it, or remove it")
+    summary |= {name: comparison.to_dict() for name, comparison in comparisons.items()}
     write_json(path, summary)
     return summary
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Concord:
-    """How well things agree, by what the run was compared with; and repeatability, by what was repeated."""
+class AgreementReport:
+    """Agreement by reference that the run was compared with; repeatability by what was repeated."""
 
     agreements: dict[str, list[Agreement]]
     repeats: dict[str, list[Repeatability]]
-    headlines: frozenset[str]  # names of the variables that stand first
+    headlines: frozenset[str]  # names of the headline variables
     files: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
@@ -138,7 +138,7 @@ class Concord:
         }
 
     def describe(self) -> str:
-        """Return the variables that stand first as short plain tables."""
+        """Return the headline variables as short plain tables."""
         lines = []
         for name, rows in self.agreements.items():
             lines += [f"agreement with {name}", agreement_table([row for row in rows if row.name in self.headlines])]
@@ -147,7 +147,7 @@ class Concord:
         return "\n".join([*lines, f"wrote {', '.join(self.files)}"])
 
 
-def agree(
+def evaluate_agreement(
     folder: Path,
     truth: Path | None = None,
     digitised: Path | None = None,
@@ -157,7 +157,7 @@ def agree(
     repeats: Sequence[Path] = (),
     operators: Sequence[Path] = (),
     out: Path | None = None,
-) -> Concord:
+) -> AgreementReport:
     """Say how well the run in a folder agrees with references, and how well repetitions agree with one another.
 
     `repeats` are folders of other runs of the same trial; `operators` files of points that other people clicked in the
@@ -173,27 +173,37 @@ def agree(
             raise ResultError(f"{folder} holds a run of players; give a truth.csv of players, or other runs of it")
         references, repeated = _players_series(folder, truth, repeats)
     else:
-        references, repeated = _body_series(folder, truth, digitised, joints, joint_angles, repeats, operators)
-    agreements = {name: [agreement(one) for one in series] for name, series in references.items()}
-    repeatable = {name: [repeatability(one) for one in series] for name, series in repeated.items()}
+        references, repeated = _body_series(
+            folder,
+            truth,
+            digitised=digitised,
+            joints=joints,
+            joint_angles=joint_angles,
+            repeats=repeats,
+            operators=operators,
+        )
+    agreements = {name: [analyse_agreement(one) for one in series] for name, series in references.items()}
+    repeatable = {name: [analyse_repeatability(one) for one in series] for name, series in repeated.items()}
     out = folder if out is None else out
     out.mkdir(parents=True, exist_ok=True)
-    first = frozenset(one.name for series in (*references.values(), *repeated.values()) for one in headline(series))
+    first = frozenset(
+        one.name for series in (*references.values(), *repeated.values()) for one in headline_series(series)
+    )
     files = []
     if agreements:
         write_agreements(out / "agreement.csv", agreements)
         files.append("agreement.csv")
     if repeatable:
-        write_repeats(out / "repeatability.csv", repeatable)
+        write_repeatability(out / "repeatability.csv", repeatable)
         files.append("repeatability.csv")
     for name, series in references.items():
         word = name.split()[-1]
-        drawn = [
+        plotted = [
             (one, row) for one, row in zip(series, agreements[name], strict=True) if one.name in first and row.n > 1
         ]
-        if drawn:
-            write_bland_altman(out / f"agreement_{word}.png", drawn)
-            write_identity(out / f"identity_{word}.png", drawn)
+        if plotted:
+            write_bland_altman(out / f"agreement_{word}.png", plotted)
+            write_identity(out / f"identity_{word}.png", plotted)
             files += [f"agreement_{word}.png", f"identity_{word}.png"]
     text = methods_text(
         {name: [row for row in rows if row.name in first] for name, rows in agreements.items()},
@@ -201,82 +211,87 @@ def agree(
         versions(),
     )
     (out / "agreement_methods.txt").write_text(text, encoding="utf-8", newline="\n")
-    return Concord(agreements, repeatable, first, (*files, "agreement_methods.txt"))
+    return AgreementReport(agreements, repeatable, first, (*files, "agreement_methods.txt"))
 
 
 def _check_different(option: str, paths: Sequence[Path], wanted: str) -> None:
     """Raise ResultError where one file or folder is given twice."""
-    places = [path.resolve() for path in paths]
+    resolved = [path.resolve() for path in paths]
     for i, path in enumerate(paths):
-        if places[i] in places[:i]:
+        if resolved[i] in resolved[:i]:
             raise ResultError(f"{option} {path} would be compared with itself and agree perfectly; give {wanted}")
 
 
-Compared = dict[str, list[Series]]
+SeriesByReference = dict[str, list[Series]]
 
 
-def _players_series(folder: Path, truth: Path | None, repeats: Sequence[Path]) -> tuple[Compared, Compared]:
-    motion = players_run(folder)
-    own, references, repeated = of_players(motion), Compared(), Compared()
+def _players_series(
+    folder: Path, truth: Path | None, repeats: Sequence[Path]
+) -> tuple[SeriesByReference, SeriesByReference]:
+    motion = read_players_run(folder)
+    own, references, repeated = players_variables(motion), SeriesByReference(), SeriesByReference()
     if truth is not None:
         true = read_players_truth(truth)
         players = [name for name in motion.players if name in true.players]
-        series = side_by_side([own, of_players(true)], "the run and its truth")
-        pairs = paired_jumps(motion, true, players)
-        references["the truth"] = series + (of_jumps(pairs) if pairs else [])
+        series = common_series([own, players_variables(true)], "the run and its truth")
+        pairs = pair_jumps(motion, true, players)
+        references["the truth"] = series + (jump_series(pairs) if pairs else [])
     if repeats:
-        others = [of_players(players_run(other)) for other in repeats]
-        repeated["runs"] = side_by_side([own, *others], "the runs")
+        others = [players_variables(read_players_run(other)) for other in repeats]
+        repeated["runs"] = common_series([own, *others], "the runs")
     return references, repeated
 
 
 def _body_series(
     folder: Path,
     truth: Path | None,
+    *,
     digitised: Path | None,
     joints: Path | None,
     joint_angles: Path | None,
     repeats: Sequence[Path],
     operators: Sequence[Path],
-) -> tuple[Compared, Compared]:
-    motion, model = body_run(folder)
-    alike, references, repeated = symmetries(model), Compared(), Compared()
+) -> tuple[SeriesByReference, SeriesByReference]:
+    motion, model = read_body_run(folder)
+    symmetry, references, repeated = symmetries(model), SeriesByReference(), SeriesByReference()
     if truth is not None:
         true = read_truth(truth)
-        turned = turned_alike(motion, true.R, true.time_s, alike)
-        reference = of_root(true.time_s, true.position, true.R)
-        references["the truth"] = side_by_side(
-            [of_root(motion.time_s, motion.position, turned), reference], "the run and its truth"
+        aligned = align_symmetry(motion, true.R, true.time_s, symmetry)
+        reference = root_variables(true.time_s, true.position, true.R)
+        references["the truth"] = common_series(
+            [root_variables(motion.time_s, motion.position, aligned), reference], "the run and its truth"
         )
     if joints is not None:
-        paths = of_joint_paths(read_joint_paths(joints), model)
-        references["the joints"] = side_by_side([of_motion(motion, model), paths], "the run and the joints")
+        paths = joint_path_variables(read_joint_paths(joints), model)
+        references["the joints"] = common_series([motion_variables(motion, model), paths], "the run and the joints")
     if joint_angles is not None:
         true_angles = read_joint_angles(joint_angles)
-        references["the joint angles"] = side_by_side(
-            [of_motion(motion, model), true_angles], "the run and the joint angles"
+        references["the joint angles"] = common_series(
+            [motion_variables(motion, model), true_angles], "the run and the joint angles"
         )
     if digitised is not None:
         rig = read_rig(folder / "calib.toml")
-        clicked = [_clicked(path, rig, model, motion, alike) for path in (digitised, *operators)]
-        turned = of_root(motion.time_s, motion.position, clicked[0][1])
-        references["points digitised"] = side_by_side([turned, clicked[0][0]], "the run and the clicked points")
+        clicked = [
+            _clicked_poses(path, rig, model, motion=motion, symmetry=symmetry) for path in (digitised, *operators)
+        ]
+        tracked = root_variables(motion.time_s, motion.position, clicked[0][1])
+        references["points digitised"] = common_series([tracked, clicked[0][0]], "the run and the clicked points")
         if operators:
-            repeated["operators"] = side_by_side([each for each, _ in clicked], "the people's clicks")
+            repeated["operators"] = common_series([each for each, _ in clicked], "the people's clicks")
     if repeats:
-        others = [body_run(other)[0] for other in repeats]
-        same = [replace(each, R=turned_alike(each, motion.R, motion.time_s, alike)) for each in others]
-        repeated["runs"] = side_by_side([of_motion(each, model) for each in (motion, *same)], "the runs")
+        others = [read_body_run(other)[0] for other in repeats]
+        same = [replace(each, R=align_symmetry(each, motion.R, motion.time_s, symmetry)) for each in others]
+        repeated["runs"] = common_series([motion_variables(each, model) for each in (motion, *same)], "the runs")
     return references, repeated
 
 
-def _clicked(
-    path: Path, rig: Rig, model: BodyModel, motion: Motion, alike: Sequence[np.ndarray]
+def _clicked_poses(
+    path: Path, rig: Rig, model: BodyModel, *, motion: Motion, symmetry: Sequence[np.ndarray]
 ) -> tuple[Variables, np.ndarray]:
-    """Return one person's clicked poses at the motion's times, and the motion turned to look like them."""
-    poses = digitised_poses(read_digitised(path, rig), rig, model)
+    """Return one person's clicked poses at the motion's times, and the motion's R aligned with them by symmetry."""
+    poses = fit_digitised_poses(read_digitised(path, rig), rig, model)
     _, frames, rows = np.intersect1d(motion.index, poses.index, return_indices=True)
     if not len(frames):
         raise ResultError(f"{path} has no frame of this run; give the clicks of this recording")
     time_s, R = motion.time_s[frames], poses.R[rows]
-    return of_root(time_s, poses.position[rows], R), turned_alike(motion, R, time_s, alike)
+    return root_variables(time_s, poses.position[rows], R), align_symmetry(motion, R, time_s, symmetry)

@@ -1,4 +1,4 @@
-"""What every run begins with: a trial's videos and cameras, its identity, and the rules of its folder."""
+"""How every run begins: a trial's videos and cameras, its identity, and the rules of its folder."""
 
 from __future__ import annotations
 
@@ -18,40 +18,40 @@ from airborne.calibration.sources.control_points import read_control_points
 from airborne.cameras import Camera, Rig, read_rig
 from airborne.errors import ResultError, TrialError
 from airborne.export import write_json
-from airborne.motion.run_folder import RECORD, read_record
-from airborne.run.first_pose import mended_rig
-from airborne.tracking.methods import FIELDS_AS
+from airborne.motion.run_folder import RUN_RECORD, read_record
+from airborne.run.first_pose import resect_moved_cameras
+from airborne.tracking.methods import FIELD_MODES
 from airborne.trial.file import CameraTable, Trial
 from airborne.video import (
     LiveRecording,
     Recording,
     VideoFacts,
     VideoSource,
-    connected,
+    connect,
     inspect,
     live_recording,
     open_recording,
 )
 
-Progress = Callable[[int, int | None], None]  # frames done, frames expected
-
-OF_FILE = "the calibration comes from a file that does not say how good it is; the standard deviations take it as exact"
-_HASHED_BYTES = 8 << 20  # larger files are told apart by their first and last so many bytes and their length
+_EXACT_CALIBRATION = (
+    "the calibration comes from a file that does not say how good it is; the standard deviations take it as exact"
+)
+_HASHED_BYTES = 8 << 20  # larger files are identified by their first and last so many bytes and their length
 
 
 def open_trial(trial: Trial) -> tuple[Recording, Calibration | None]:
-    """Open a trial's videos with its cameras, fields as its method sees them; and the calibration, if one is made.
+    """Open a trial's videos with its cameras, fields as its method takes them; and the calibration, if one is made.
 
-    The pictures of players are converted only where somebody looks.
+    Images of players are decoded lazily: only the regions that are used.
     """
-    sources = [source_of(trial, camera) for camera in trial.camera]
+    sources = [video_source(trial, camera) for camera in trial.camera]
     facts = [inspect(source) for source in sources]
     rig, calibration, notes = _cameras_of(trial, facts)
     recording = open_recording(
         sources,
         rig,
         facts=facts,
-        fields_as="rows" if trial.has_players else FIELDS_AS[trial.settings.method],
+        fields_as="rows" if trial.has_players else FIELD_MODES[trial.settings.method],
         every=trial.track.every,
         start=trial.start.frame,
         stop=trial.track.stop,
@@ -65,10 +65,10 @@ def open_trial(trial: Trial) -> tuple[Recording, Calibration | None]:
 def open_live(
     trial: Trial, waiting: Callable[[], None] = lambda: None
 ) -> Iterator[tuple[LiveRecording, Calibration | None]]:
-    """Connect to a trial's live cameras and find where they are; `waiting` is called until all show something."""
-    with connected([source_of(trial, camera) for camera in trial.camera], waiting) as cameras:
+    """Connect to a trial's live cameras and find where they are; `waiting` is called until all deliver frames."""
+    with connect([video_source(trial, camera) for camera in trial.camera], waiting) as cameras:
         sizes = {camera.source.name: camera.facts.size for camera in cameras if camera.facts is not None}
-        rig, calibration = _calibrated(trial, sizes)
+        rig, calibration = _calibrated_cameras(trial, sizes)
         yield (
             live_recording(cameras, rig, every=trial.track.every, start=trial.start.frame, stop=trial.track.stop),
             calibration,
@@ -76,20 +76,20 @@ def open_live(
 
 
 def cameras_of(trial: Trial) -> tuple[Rig, Calibration | None]:
-    """Return the cameras of the trial's videos in its order, and the calibration if control points gave them."""
-    return _cameras_of(trial, [inspect(source_of(trial, camera)) for camera in trial.camera])[:2]
+    """Return the cameras of the trial's videos in its order, and the calibration if it was made from control points."""
+    return _cameras_of(trial, [inspect(video_source(trial, camera)) for camera in trial.camera])[:2]
 
 
 def _cameras_of(trial: Trial, facts: Sequence[VideoFacts]) -> tuple[Rig, Calibration | None, tuple[str, ...]]:
-    """Return also what mending said of them."""
+    """Return also the notes of the resection."""
     sizes = {camera.name: each.size for camera, each in zip(trial.camera, facts, strict=True)}
-    rig, calibration = _calibrated(trial, sizes)
-    rig, notes = mended_rig(trial, rig)
+    rig, calibration = _calibrated_cameras(trial, sizes)
+    rig, notes = resect_moved_cameras(trial, rig)
     return rig, calibration, notes
 
 
-def _calibrated(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[Rig, Calibration | None]:
-    """Return the cameras of pictures of these sizes (width, height) [px], as the calibration has them."""
+def _calibrated_cameras(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[Rig, Calibration | None]:
+    """Return the calibrated cameras of images of these sizes (width, height) [px]."""
     if trial.calibration.control_points is not None:
         points = read_control_points(trial.path(trial.calibration.control_points))
         missing = [name for name in sizes if name not in points.cameras]
@@ -101,45 +101,45 @@ def _calibrated(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[Rig, C
         calibration = calibrate(points.select(list(sizes)), sizes, method=trial.calibration.method)
         return calibration.rig, calibration
     rig = read_rig(trial.path(trial.calibration.file or ""))
-    return Rig(tuple(_as_saved(rig, camera, sizes[camera.name]) for camera in trial.camera)), None
+    return Rig(tuple(_camera_as_saved(rig, camera, sizes[camera.name]) for camera in trial.camera)), None
 
 
-def _as_saved(rig: Rig, table: CameraTable, size: tuple[int, int]) -> Camera:
+def _camera_as_saved(rig: Rig, table: CameraTable, size: tuple[int, int]) -> Camera:
     """Return a calibrated camera as the camera of its video's own pixels."""
-    wanted = table.calibrated_as or table.name
-    if wanted not in rig.names:
+    name = table.calibrated_as or table.name
+    if name not in rig.names:
         raise TrialError(
-            f"the calibration file has no camera '{wanted}'; it has: {', '.join(rig.names)}; say which of them the "
+            f"the calibration file has no camera '{name}'; it has: {', '.join(rig.names)}; say which of them the "
             "video is of: calibrated_as under [[camera]]"
         )
-    camera = replace(rig[wanted], name=table.name)
+    camera = replace(rig[name], name=table.name)
     du, dv = table.saved_offset_px
     if table.saved_scale == 1 and (du, dv) == (0, 0):
         return camera
-    return camera.resampled(scale=(table.saved_scale, table.saved_scale), offset=(du, dv), size=size)
+    return camera.resample(scale=(table.saved_scale, table.saved_scale), offset=(du, dv), size=size)
 
 
-def source_of(trial: Trial, camera: CameraTable) -> VideoSource:
+def video_source(trial: Trial, camera: CameraTable) -> VideoSource:
     """Return a camera's video."""
     return VideoSource(camera.name, trial.path(camera.video), camera.fields, camera.offset_s, camera.drift_ppm)
 
 
-def begin(folder: Path, identity: dict[str, Any], table: str, *, resume: bool) -> bool:
-    """Make a run's folder ready; say whether rows of its `table` lie there, to go on with.
+def prepare_folder(folder: Path, identity: dict[str, Any], table: str, *, resume: bool) -> bool:
+    """Prepare a run's folder; return whether it holds rows of its `table` from which to resume.
 
-    Raises ResultError for a folder that holds something else, or a run and no `resume`, or a run of other inputs.
+    Raises ResultError for a folder that holds something else, a run without `resume`, or a run of other inputs.
     """
-    found, record = folder / table, folder / RECORD
+    rows, record = folder / table, folder / RUN_RECORD
     folder.mkdir(parents=True, exist_ok=True)
-    if not record.exists() and not found.exists() and any(folder.iterdir()):
+    if not record.exists() and not rows.exists() and any(folder.iterdir()):
         raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
-    if found.exists() and not resume:
+    if rows.exists() and not resume:
         raise ResultError(f"{folder} already holds a run; give --resume to go on with it, or another folder")
-    if not found.exists():
+    if not rows.exists():
         write_json(record, identity)
         return False
-    known = read_record(record)
-    changed = [name for name in identity if known.get(name) != identity[name]]
+    recorded = read_record(record)
+    changed = [name for name in identity if recorded.get(name) != identity[name]]
     if changed:
         raise ResultError(f"{folder} holds another run (other {', other '.join(changed)}); track into another folder")
     return True
@@ -147,22 +147,26 @@ def begin(folder: Path, identity: dict[str, Any], table: str, *, resume: bool) -
 
 def holds_run_of(trial: Trial, folder: Path) -> bool:
     """Say whether a folder holds a run of exactly this trial, finished or not."""
-    record = folder / RECORD
-    return record.is_file() and read_record(record) == identity_of(trial)
+    record = folder / RUN_RECORD
+    return record.is_file() and read_record(record) == run_identity(trial)
 
 
-def identity_of(trial: Trial, *, live: bool = False) -> dict[str, Any]:
-    """Return what two runs share if one can go on where the other was stopped."""
-    settings = {"inputs": inputs_of(trial, live=live), "settings": trial.track.told, "version": __version__}
+def run_identity(trial: Trial, *, live: bool = False) -> dict[str, Any]:
+    """Return what two runs share if one can resume the other."""
+    settings = {
+        "inputs": input_hashes(trial, live=live),
+        "settings": trial.track.method_settings,
+        "version": __version__,
+    }
     return json.loads(json.dumps(settings))
 
 
-def past_the_end(trial: Trial) -> TrialError:
-    """Return what to raise where a recording has no picture to begin with."""
+def past_the_end_error(trial: Trial) -> TrialError:
+    """Return the error of a recording that ends before its first frame to track."""
     return TrialError(f"{trial.name}: there is no frame {trial.start.frame}; start.frame lies past the end")
 
 
-def circumstances(
+def provenance(
     trial: Trial, calibration: Calibration | None, recording: Recording | LiveRecording, inputs: dict[str, str]
 ) -> dict[str, Any]:
     """Return the end of every summary: warnings, events, method, cameras, versions, inputs."""
@@ -178,9 +182,9 @@ def circumstances(
         for camera in recording.rig
     ]
     return {
-        "warnings": [OF_FILE] if calibration is None else list(calibration.warnings),
+        "warnings": [_EXACT_CALIBRATION] if calibration is None else list(calibration.warnings),
         "events": recording.events,
-        "method": trial.track.told,
+        "method": trial.track.method_settings,
         "cameras": cameras,
         "versions": versions(),
         "inputs": inputs,
@@ -193,16 +197,16 @@ def versions() -> dict[str, str]:
     return {"airborne": __version__, "python": platform.python_version(), **{name: version(name) for name in packages}}
 
 
-def inputs_of(trial: Trial, *, live: bool = False) -> dict[str, str]:
-    """Return the SHA-256 of each input file, by the name that the trial gives it; live pictures have none."""
-    given = (
-        trial.body.given_file,
+def input_hashes(trial: Trial, *, live: bool = False) -> dict[str, str]:
+    """Return the SHA-256 of each input file, by the name that the trial gives it; live video has none."""
+    optional = (
+        trial.body.source_file,
         trial.calibration.file,
         trial.calibration.control_points,
         trial.track.torso,
-        *trial.start.given_files,
+        *trial.start.source_files,
     )
-    names = [*(camera.video for camera in trial.camera if not live), *(name for name in given if name)]
+    names = [*(camera.video for camera in trial.camera if not live), *(name for name in optional if name)]
     rest = [trial.start, trial.lights, trial.calibration, trial.body, *trial.camera]
     start = json.dumps([table and table.model_dump() for table in rest])
     hashes = {name: _sha256(trial.path(name)) for name in names}

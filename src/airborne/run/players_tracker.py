@@ -1,4 +1,4 @@
-"""The tracker of a trial's players: their starts checked against the cameras, torsos given or tracked, by method."""
+"""The tracker of a trial's players: its method, starts checked against the cameras, torsos from a table or tracked."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airborne.cameras import Rig, aimed
+from airborne.cameras import Rig, camera_looking_at
 from airborne.errors import TrialError
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.particle import GivenTorsos, LegsMethod, LegsSettings, legs_tracker
@@ -20,26 +19,24 @@ from airborne.tracking.players import PlayerStart, PlayersTracker
 from airborne.trial.file import Trial
 from airborne.video import Frames, View
 
-Array = NDArray[np.floating]
-
-_AWAY = np.array([0, -4.0, 0])  # of the made-up cameras [m]
+_AWAY = np.array([0, -4.0, 0])  # of the artificial cameras [m]
 _TORSO_COLUMNS = ("player", "frame", "x_m", "y_m", "z_m")
 _MOST_FRAMES = 1_000_000  # from the first to the last torso
 
 
 def players_tracker_of(trial: Trial, rig: Rig) -> PlayersTracker:
-    """Make the tracker of a trial's players, who are seen by `rig`.
+    """Make the tracker of a trial's players for the cameras `rig`.
 
-    Raises TrialError for a player whom no camera can see at the start, and for an unusable table of torsos.
+    Raises TrialError for a player whom no camera sees at the start, and for an unusable table of torsos.
     """
     starts = trial.players
     for start in starts:
-        _check_seen(trial, start, rig)
+        _check_visible(trial, start, rig)
     track = trial.track
     if track.method == "blocker":
         return Blocker(starts)
     torso = None if track.torso is None else read_torsos(trial.path(track.torso), starts, first=trial.start.frame)
-    chosen = {"n_particles": track.n_particles, "estimate": track.estimate}
+    optional = {"n_particles": track.n_particles, "estimate": track.estimate}
     settings = LegsSettings(
         method=cast(LegsMethod, track.method),
         seed=track.seed,
@@ -49,17 +46,17 @@ def players_tracker_of(trial: Trial, rig: Rig) -> PlayersTracker:
         torso_shift=track.torso_shift,
         resample=track.resample,
         resample_when=track.resample_when,
-        **{name: value for name, value in chosen.items() if value is not None},
+        **{name: value for name, value in optional.items() if value is not None},
     )
     return legs_tracker(settings, rig, starts, torso)
 
 
-def compile_for(trial: Trial) -> None:
-    """Take two steps on empty pictures, so that the tracker's kernels are compiled before live pictures come."""
-    at = np.mean([place for start in trial.players for place in start.joints_m.values()], axis=0)
+def compile_kernels(trial: Trial) -> None:
+    """Take two steps on empty images, so that the tracker's kernels are compiled before live frames arrive."""
+    at = np.mean([point for start in trial.players for point in start.joints_m.values()], axis=0)
     size = (640, 480)
     asides = zip(trial.camera, np.linspace([-1, 0, 0], [1, 0, 0], len(trial.camera)), strict=True)
-    cameras = [aimed(camera.name, at + aside + _AWAY, at + aside, 400.0, size) for camera, aside in asides]
+    cameras = [camera_looking_at(camera.name, at + aside + _AWAY, at + aside, 400.0, size) for camera, aside in asides]
     tracker, grey = players_tracker_of(trial, Rig(tuple(cameras))), np.full((size[1], size[0], 3), 128, np.uint8)
     state = tracker.init()
     for index in range(2):
@@ -70,11 +67,11 @@ def compile_for(trial: Trial) -> None:
 def read_torsos(path: Path, starts: Sequence[PlayerStart], *, first: int) -> GivenTorsos:
     """Read the torsos of all players and bystanders: a table `player,frame,x_m,y_m,z_m`, in any order of its rows.
 
-    Of a joints.csv, which has a column `joint` too, the rows of the torso are read. A frame without a row keeps the
-    torso of the one before. Raises TrialError where the table cannot be read or a player has no place at frame `first`.
+    Of a joints.csv, which also has a column `joint`, the rows of the torso are read. A frame without a row keeps the
+    torso of the frame before. Raises TrialError where the table cannot be read or a player has no row at frame `first`.
     """
     names = [start.name for start in starts]
-    places: dict[tuple[int, str], tuple[float, float, float]] = {}
+    torsos: dict[tuple[int, str], tuple[float, float, float]] = {}
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = csv.DictReader(file)
@@ -87,29 +84,29 @@ def read_torsos(path: Path, starts: Sequence[PlayerStart], *, first: int) -> Giv
                     frame = int(row["frame"])
                     if not abs(frame - first) <= _MOST_FRAMES:
                         raise ValueError(f"frame {str(frame)[:20]} lies far beyond the recording")
-                    places[frame, row["player"]] = (x, y, z)
+                    torsos[frame, row["player"]] = (x, y, z)
     except (OSError, UnicodeDecodeError, ValueError, TypeError, csv.Error) as error:
-        raise TrialError(f"{path.name}: not a table of torsos ({error}); mend it or leave `torso` out") from error
-    positions = np.full((max((frame for frame, _ in places), default=first) - first + 1, len(names), 3), np.nan)
-    for (frame, name), place in places.items():
+        raise TrialError(f"{path.name}: not a table of torsos ({error}); correct it or leave `torso` out") from error
+    positions = np.full((max((frame for frame, _ in torsos), default=first) - first + 1, len(names), 3), np.nan)
+    for (frame, name), torso in torsos.items():
         if frame >= first:
-            positions[frame - first, names.index(name)] = place
-    unknown = [name for name, place in zip(names, positions[0], strict=True) if not np.isfinite(place).all()]
-    if unknown:
-        raise TrialError(f"{path.name}: no torso of {', '.join(unknown)} at frame {first}, where tracking starts")
+            positions[frame - first, names.index(name)] = torso
+    missing = [name for name, torso in zip(names, positions[0], strict=True) if not np.isfinite(torso).all()]
+    if missing:
+        raise TrialError(f"{path.name}: no torso of {', '.join(missing)} at frame {first}, where tracking starts")
     return GivenTorsos(positions, first)
 
 
-def _check_seen(trial: Trial, start: PlayerStart, rig: Rig) -> None:
-    """Raise TrialError where no camera can see any point of a player; a bystander may be out of sight."""
+def _check_visible(trial: Trial, start: PlayerStart, rig: Rig) -> None:
+    """Raise TrialError where no camera sees any point of a player; a bystander may be out of sight."""
     if not start.has_legs:
         return
     points = np.array(list(start.joints_m.values()))
     for camera in rig:
-        px = camera.undistorted().px_from_world(points)
+        px = camera.without_distortion().px_from_world(points)
         if np.any(np.all((px >= -0.5) & (px <= np.array(camera.size) - 0.5), axis=-1)):
             return
     raise TrialError(
-        f"{trial.name}: player '{start.name}' lies in no camera's picture; joints_m are metres in the world of the "
+        f"{trial.name}: player '{start.name}' lies in no camera's image; joints_m are metres in the world of the "
         "calibration"
     )

@@ -17,20 +17,21 @@ from airborne.cameras import write_pose2sim
 from airborne.errors import ResultError
 from airborne.export import PlayersOverlayVideos, write_json, write_players_report
 from airborne.motion import PlayersMotion, PlayersWriter, read_players, write_players_parquet
-from airborne.motion.jumps.heights import jumps
-from airborne.motion.jumps.table import columns_of, write_jumps
-from airborne.run.opening import Progress, begin, circumstances, identity_of, open_live, open_trial, past_the_end
-from airborne.run.players_tracker import compile_for, players_tracker_of
+from airborne.motion.jumps.heights import measure_jumps
+from airborne.motion.jumps.table import jump_row, write_jumps
+from airborne.run.opening import open_live, open_trial, past_the_end_error, prepare_folder, provenance, run_identity
+from airborne.run.players_tracker import compile_kernels, players_tracker_of
 from airborne.tracking import Status
 from airborne.trial.file import Trial
+from airborne.types import Progress
 from airborne.video import LiveRecording, Outages, Recording
 
-TABLE = "joints.csv"
-UNCERTAINTY = (
+_TABLE = "joints.csv"
+_UNCERTAINTY = (
     "Standard deviations hold what the method itself leaves open, joint by joint. They do not hold joints that were "
     "set wrongly at the start, nor errors of the cameras' calibration or times."
 )
-TOO_SURE = (
+_OVERCONFIDENT = (
     "the standard deviations are only the spread of the particles of {method} and far too small: in trials with a "
     "known truth, their 95 % regions held 30 to 70 % of it"
 )
@@ -38,7 +39,7 @@ TOO_SURE = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayersRun:
-    """What a finished run of players leaves; the same lies in its folder."""
+    """The results of a finished run of players; its folder holds the same."""
 
     motion: PlayersMotion
     summary: dict[str, Any]
@@ -53,43 +54,43 @@ def track_players(
     pictures: bool = True,
     progress: Progress | None = None,
 ) -> PlayersRun:
-    """Track the players of a trial and leave the results in a folder.
+    """Track the players of a trial and write the results into a folder.
 
-    With `resume` a run that was killed is tracked again from its start, to the same result; the rows that are there
-    stay. `live` reads pipes, capture devices, or files at their own speed, drops pictures rather than fall behind, and
+    With `resume` a run that was killed is tracked again from its start, to the same result; existing rows
+    stay. `live` reads pipes, capture devices, or files at their own speed, drops frames rather than fall behind, and
     ends with them or with KeyboardInterrupt. `pictures=False` leaves out videos and report. Raises an AirborneError for
     input that cannot be used, and for a folder that holds another run.
     """
     if live and resume:
-        raise ResultError("a live run cannot be resumed: its pictures are gone; track into a new folder")
-    begun_s = time.monotonic()
+        raise ResultError("a live run cannot be resumed: its frames are gone; track into a new folder")
+    started_s = time.monotonic()
     with ExitStack() as stack:
         if live:
-            compile_for(trial)
+            compile_kernels(trial)
             waiting = (lambda: None) if progress is None else (lambda: progress(0, None))
             recording, calibration = stack.enter_context(open_live(trial, waiting))
         else:
             recording, calibration = open_trial(trial)
-        identity = identity_of(trial, live=live)
-        goes_on = begin(folder, identity, TABLE, resume=resume)
+        identity = run_identity(trial, live=live)
+        goes_on = prepare_folder(folder, identity, _TABLE, resume=resume)
         write_pose2sim(folder / "calib.toml", recording.rig)
         read_s = time.monotonic()
         delays_s = _track_frames(trial, recording, folder, resume=goes_on, pictures=pictures, progress=progress)
     tracked_s = time.monotonic()
-    motion = read_players(folder / TABLE)
-    write_players_parquet(folder / "joints.parquet", folder / TABLE)
-    found = jumps(motion)
-    write_jumps(folder / "jumps.csv", found)
-    summary = _summary(trial, calibration, recording, motion, identity["inputs"])
-    summary["jumps"] = [columns_of(jump) for jump in found]
+    motion = read_players(folder / _TABLE)
+    write_players_parquet(folder / "joints.parquet", folder / _TABLE)
+    found_jumps = measure_jumps(motion)
+    write_jumps(folder / "jumps.csv", found_jumps)
+    summary = _summary(trial, calibration, recording, motion=motion, inputs=identity["inputs"])
+    summary["jumps"] = [jump_row(jump) for jump in found_jumps]
     if isinstance(recording, LiveRecording):
         summary["live"] = {
-            "cameras": recording.dropped(),
+            "cameras": recording.image_counts(),
             "median_delay_s": float(np.median(delays_s)),
             "largest_delay_s": max(delays_s),
         }
     summary["timings_s"] = {
-        "opening": read_s - begun_s,
+        "opening": read_s - started_s,
         "tracking": tracked_s - read_s,
         "writing": time.monotonic() - tracked_s,
         "tracking_a_frame": (tracked_s - read_s) / len(motion),
@@ -109,32 +110,32 @@ def _track_frames(
     pictures: bool,
     progress: Progress | None,
 ) -> list[float]:
-    """Track every frame and write it as soon as it is found; return live pictures' delays until then [s]."""
+    """Track every frame and write its estimates at once; return the delays of live frames until then [s]."""
     delays_s, n_frames = [], 0
     with ExitStack() as stack:
         frames = stack.enter_context(closing(iter(recording)))
         first = next(frames, None)
         if first is None:
-            raise past_the_end(trial)
+            raise past_the_end_error(trial)
         tracker = players_tracker_of(trial, recording.rig)
-        writer = stack.enter_context(PlayersWriter(folder / TABLE, tracker.joints, resume=resume))
+        writer = stack.enter_context(PlayersWriter(folder / _TABLE, tracker.joints, resume=resume))
         artists = [stack.enter_context(artist) for artist in _artists(trial, folder, recording, pictures)]
         state, outages = tracker.init(), Outages(recording.rig.names)
         try:
-            for n_frames, seen in enumerate(chain([first], frames), start=1):
-                state, estimates = tracker.step(state, seen)
+            for n_frames, observed in enumerate(chain([first], frames), start=1):
+                state, estimates = tracker.step(state, observed)
                 writer.append(estimates)
                 if isinstance(recording, LiveRecording):
-                    delays_s.append(time.monotonic() - recording.arrived_s)
-                outages.add(seen)
+                    delays_s.append(time.monotonic() - recording.arrival_s)
+                outages.add(observed)
                 for artist in artists:
-                    artist.write(seen, tracker.joints, estimates)
+                    artist.write(observed, tracker.joints, estimates)
                 if progress is not None:
                     progress(n_frames, recording.n_frames)
         except KeyboardInterrupt:
             if not delays_s:  # only a live run ends like this
                 raise
-        recording.events.extend(outages.described())
+        recording.events.extend(outages.describe())
     return delays_s
 
 
@@ -151,13 +152,14 @@ def _summary(
     trial: Trial,
     calibration: Calibration | None,
     recording: Recording | LiveRecording,
+    *,
     motion: PlayersMotion,
     inputs: dict[str, str],
 ) -> dict[str, Any]:
     is_tracked, is_lost = (motion.status == status.value for status in (Status.TRACKED, Status.LOST))
-    shared = circumstances(trial, calibration, recording, inputs)
+    shared = provenance(trial, calibration, recording, inputs)
     if trial.track.method != "blocker":
-        shared["warnings"].append(TOO_SURE.format(method=trial.track.method))
+        shared["warnings"].append(_OVERCONFIDENT.format(method=trial.track.method))
     n_tracked, n_lost = int(is_tracked.all(axis=1).sum()), int(is_lost.all(axis=1).sum())
     return {
         "name": trial.name,
@@ -170,15 +172,15 @@ def _summary(
         "rate_hz": round(float(recording.rate), 6),
         "players": {name: _player(motion, k, len(recording.rig)) for k, name in enumerate(motion.players)},
         "bystanders": [start.name for start in trial.players if not start.has_legs],
-        "uncertainty": UNCERTAINTY,
+        "uncertainty": _UNCERTAINTY,
         **shared,
     }
 
 
 def _player(motion: PlayersMotion, k: int, n_cameras: int) -> dict[str, Any]:
-    """Reduce one player's motion to the numbers that stand first."""
-    known = motion.status[:, k] != Status.LOST.value
-    sd, score = motion.sd[known, k], motion.score[known, k]
+    """Reduce one player's motion to its headline numbers."""
+    is_found = motion.status[:, k] != Status.LOST.value
+    sd, score = motion.sd[is_found, k], motion.score[is_found, k]
     return {
         **{f"n_{status}": motion.count(motion.players[k], status) for status in Status},
         "median_sd_mm": 1e3 * float(np.nanmedian(sd)) if np.isfinite(sd).any() else None,

@@ -1,4 +1,4 @@
-"""A finished run made smooth: new tables beside the raw ones, and the figure that says which cut-off suits."""
+"""Smoothing a finished run: new tables beside the raw ones, and the figure of the residual analysis."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne import __version__
 from airborne.errors import ResultError
@@ -16,8 +15,8 @@ from airborne.export import write_json
 from airborne.export.analysis_figures import write_residuals
 from airborne.motion import landmarks
 from airborne.motion.flight.phases import Event, body_events, player_events
-from airborne.motion.run_folder import body_run, holds_players, players_run
-from airborne.motion.smoothing import ResidualAnalysis, is_even, residual_analysis
+from airborne.motion.run_folder import holds_players, read_body_run, read_players_run
+from airborne.motion.smoothing import ResidualAnalysis, is_evenly_sampled, residual_analysis
 from airborne.motion.smoothing.smoother import (
     Smoothing,
     smooth_joint_angles,
@@ -31,9 +30,8 @@ from airborne.motion.smoothing.tables import (
     write_smooth_joints,
     write_smooth_motion,
 )
+from airborne.types import Array, Progress
 
-Array = NDArray[np.floating]
-Progress = Callable[[int, int | None], None]
 Events = dict[str, tuple[Event, ...]]  # by player; of one body under ""
 
 MOTION, JOINTS, ANGLES = "smooth_motion.csv", "smooth_joints.csv", "smooth_joint_angles.csv"
@@ -42,9 +40,9 @@ EVENTS, FIGURE, RECORD = "smooth_events.csv", "residuals.png", "smooth.json"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SmoothRun:
-    """What was done, and what the folder now holds besides."""
+    """What was done, and the files that it added to the folder."""
 
-    how: Smoothing
+    smoothing: Smoothing
     events: Events
     analysis: ResidualAnalysis | None  # None where times are not even, or no stretch is long enough
     history: list[str]
@@ -52,22 +50,22 @@ class SmoothRun:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the numbers for a JSON file."""
-        found = self.analysis
+        analysis = self.analysis
         return {
-            "method": self.how.method,
-            "cutoff_hz": self.how.cutoff_hz,
-            "resample_hz": self.how.resample_hz,
-            "fill_s": self.how.fill_s,
+            "method": self.smoothing.method,
+            "cutoff_hz": self.smoothing.cutoff_hz,
+            "resample_hz": self.smoothing.resample_hz,
+            "fill_s": self.smoothing.fill_s,
             "events": {name: [event._asdict() for event in events] for name, events in self.events.items()},
             "history": self.history,
             "residual_analysis": None
-            if found is None
+            if analysis is None
             else {
-                "chosen_hz": found.chosen_hz,
-                "whitest_hz": found.whitest_hz,
-                "noise_mm": 1e3 * found.noise,
-                "cutoff_hz": found.cutoff_hz,
-                "residual_mm": 1e3 * found.residual,
+                "chosen_hz": analysis.chosen_hz,
+                "whitest_hz": analysis.whitest_hz,
+                "noise_mm": 1e3 * analysis.noise,
+                "cutoff_hz": analysis.cutoff_hz,
+                "residual_mm": 1e3 * analysis.residual,
             },
             "files": list(self.files),
             "version": __version__,
@@ -87,7 +85,7 @@ class SmoothRun:
 
 def smooth_run(
     folder: Path,
-    how: Smoothing,
+    smoothing: Smoothing,
     *,
     events_s: Sequence[float] | None = None,
     out: Path | None = None,
@@ -103,42 +101,42 @@ def smooth_run(
     events = _events(run, events_s)
     boundaries = {name: [event.time_s for event in each] for name, each in events.items()}
     analysis = None
-    if is_even(run.time_s):
+    if is_evenly_sampled(run.time_s):
         own = [boundaries[owner] for owner in run.owners]
         analysis = residual_analysis(run.time_s, run.paths, boundaries_s=own)
         analysis = analysis if analysis.n_values else None
-    if how.method == "butterworth" and how.cutoff_hz is None:
-        how = replace(how, cutoff_hz=_chosen(analysis))
+    if smoothing.method == "butterworth" and smoothing.cutoff_hz is None:
+        smoothing = replace(smoothing, cutoff_hz=_choose_cutoff(analysis))
     out = folder if out is None else out
     out.mkdir(parents=True, exist_ok=True)
-    history, files = run.write(out, how, events, progress)
+    history, files = run.write(out, smoothing, events, progress)
     if analysis is not None:
-        write_residuals(out / FIGURE, analysis, how.cutoff_hz)
+        write_residuals(out / FIGURE, analysis, smoothing.cutoff_hz)
         files = (*files, FIGURE)
-    result = SmoothRun(how, events, analysis, history, (*files, RECORD))
+    result = SmoothRun(smoothing, events, analysis, history, (*files, RECORD))
     write_json(out / RECORD, result.to_dict())
     return result
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Run:
-    """What smoothing needs to know of a run, be it of a body or of players."""
+    """What smoothing needs of a run, be it of a body or of players."""
 
     time_s: Array  # (n,)
     paths: Array  # (n, paths, 3) [m], those that the residual analysis looks at
-    owners: tuple[str, ...]  # whose each path is
+    owners: tuple[str, ...]  # of each path
     find: Callable[[], Events]
     write: Callable[[Path, Smoothing, Events, Progress | None], tuple[list[str], tuple[str, ...]]]
 
 
 def _players_run(folder: Path) -> _Run:
-    motion = players_run(folder)
+    motion = read_players_run(folder)
 
     def write(
-        out: Path, how: Smoothing, events: Events, progress: Progress | None
+        out: Path, smoothing: Smoothing, events: Events, progress: Progress | None
     ) -> tuple[list[str], tuple[str, ...]]:
         times = {name: [event.time_s for event in events[name]] for name in motion.players}
-        joints = smooth_players(motion, how, times, progress)
+        joints = smooth_players(motion, smoothing, times, progress)
         write_smooth_joints(out / JOINTS, joints)
         write_smooth_events(out / EVENTS, events, joints)
         return joints.attrs["history"], (JOINTS, EVENTS)
@@ -149,34 +147,34 @@ def _players_run(folder: Path) -> _Run:
 
 
 def _body_run(folder: Path) -> _Run:
-    motion, model = body_run(folder)
+    motion, model = read_body_run(folder)
 
     def write(
-        out: Path, how: Smoothing, events: Events, progress: Progress | None
+        out: Path, smoothing: Smoothing, events: Events, progress: Progress | None
     ) -> tuple[list[str], tuple[str, ...]]:
         times = [event.time_s for event in events[""]]
-        root = smooth_root(motion, how, times)
-        joints = smooth_landmarks(motion, model, how, times, progress)
+        root = smooth_root(motion, smoothing, times)
+        joints = smooth_landmarks(motion, model, smoothing, times, progress=progress)
         write_smooth_motion(out / MOTION, root)
         write_smooth_joints(out / JOINTS, joints)
         write_smooth_events(out / EVENTS, events, joints)
         if not motion.joints:
             return root.attrs["history"], (MOTION, JOINTS, EVENTS)
-        write_smooth_joint_angles(out / ANGLES, smooth_joint_angles(motion, model, how, times))
+        write_smooth_joint_angles(out / ANGLES, smooth_joint_angles(motion, model, smoothing, times))
         return root.attrs["history"], (MOTION, JOINTS, ANGLES, EVENTS)
 
     points, _ = landmarks(motion, model)
     return _Run(motion.time_s, points, ("",) * points.shape[1], lambda: {"": body_events(motion, model)}, write)
 
 
-def _events(run: _Run, given_s: Sequence[float] | None) -> Events:
-    if given_s is not None:
-        outside = [time for time in given_s if not run.time_s[0] < time < run.time_s[-1]]
+def _events(run: _Run, times_s: Sequence[float] | None) -> Events:
+    if times_s is not None:
+        outside = [time for time in times_s if not run.time_s[0] < time < run.time_s[-1]]
         if outside:
             raise ResultError(
                 f"no event can be at {outside[0]:g} s: the run goes from {run.time_s[0]:.3f} to {run.time_s[-1]:.3f} s"
             )
-        given = tuple(Event("given", time) for time in sorted(set(given_s)))
+        given = tuple(Event("given", time) for time in sorted(set(times_s)))
         return dict.fromkeys(run.owners, given)
     try:
         return run.find()
@@ -184,7 +182,7 @@ def _events(run: _Run, given_s: Sequence[float] | None) -> Events:
         raise ResultError(f"events cannot be found ({error}); say when they are, or that there are none") from None
 
 
-def _chosen(analysis: ResidualAnalysis | None) -> float:
+def _choose_cutoff(analysis: ResidualAnalysis | None) -> float:
     if analysis is None:
         raise ResultError("frames are not even in time, or too few, so that no cut-off can be chosen; give one in Hz")
     if not np.isfinite(analysis.chosen_hz):

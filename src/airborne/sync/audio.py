@@ -1,31 +1,29 @@
-"""Synchronisation by sound: the shift at which two cameras' microphones hear the same."""
+"""Synchronisation by sound: the shift at which two cameras' microphones hear the same (GCC-PHAT)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import av
 import numpy as np
 from av.audio.resampler import AudioResampler
 from av.error import FFmpegError
-from numpy.typing import NDArray
 from scipy.signal import butter, correlate, correlation_lags, sosfilt
 
 from airborne.errors import VideoError
 from airborne.geometry.robust import robust_sd
-from airborne.sync.offsets import Offsets, line_through
+from airborne.sync.offsets import Offsets, fit_line
+from airborne.types import Array, Progress
 from airborne.video.decoding import VideoSource
-
-Array = NDArray[np.floating]
 
 RATE_HZ = 8000
 _ENVELOPE_HZ = 500
 _WINDOW_S = 4.0
-_NEAR_S = 0.02  # the waveforms are matched this near to where the envelopes match
-_LEAST_ALIKE = 0.2  # correlation of the envelopes of two cameras that hear the same
-_CLEAR = 6.0  # robust sds by which a waveform's best shift stands out
-_SOUND_M_S = 343.0
-_LOUDEST = 12  # windows looked at
+_SEARCH_S = 0.02  # half width of the search with the waveforms, about the shift of the envelopes
+_LEAST_CORRELATION = 0.2  # of the envelopes of two cameras that hear the same
+_LEAST_PEAK_SDS = 6.0  # robust sds by which the peak of a phase transform must stand out
+_SPEED_OF_SOUND_M_S = 343.0
+_N_WINDOWS = 12  # windows compared, the loudest
 
 
 def offsets_by_sound(
@@ -33,38 +31,38 @@ def offsets_by_sound(
     *,
     microphones_apart_m: float = 0.0,
     with_drift: bool = False,
-    progress: Callable[[int, int | None], None] | None = None,
+    progress: Progress | None = None,
 ) -> Offsets:
     """Find the offsets that bring the cameras' sound together.
 
-    Envelopes find the shift, the waveforms of the loudest windows mend it (phase transform); their scatter gives the
-    sd. Sound takes 3 ms a metre: a source may be nearer to one camera by up to the distance between them,
+    The envelopes give a coarse shift, the waveforms of the loudest windows refine it (phase transform); their scatter
+    gives the sd. Sound takes 3 ms a metre: a source may be nearer to one camera by up to the distance between them,
     `microphones_apart_m`, which widens the sd as a uniform error does. Raises VideoError where a camera has no sound,
     or none that fits the first camera's.
     """
-    heard = []
+    sounds = []
     for number, source in enumerate(sources, start=1):
-        heard.append(sound_of(source))
+        sounds.append(read_sound(source))
         if progress is not None:
             progress(number, len(sources))
-    travel_s = microphones_apart_m / _SOUND_M_S / np.sqrt(3)
+    travel_s = microphones_apart_m / _SPEED_OF_SOUND_M_S / np.sqrt(3)
     rows = [(0.0, 0.0, 0.0, 0.0)]
-    for source, sound in zip(sources[1:], heard[1:], strict=True):
-        found = shift_between(heard[0], sound)
-        if found is None:
+    for source, sound in zip(sources[1:], sounds[1:], strict=True):
+        shift = shift_between(sounds[0], sound)
+        if shift is None:
             raise VideoError(
                 f"{source.name}: its sound does not fit that of {sources[0].name}; "
                 "clap near both, or synchronise by flash, motion or tracking"
             )
-        offset, sd, drift, drift_sd = line_through(*found, with_drift=with_drift)
+        offset, sd, drift, drift_sd = fit_line(*shift, with_drift=with_drift)
         rows.append((offset, float(np.hypot(sd, travel_s)), drift, drift_sd))
     notes = () if travel_s else ("sound takes 3 ms a metre, and how far the microphones are apart is not known",)
     names = tuple(source.name for source in sources)
-    return Offsets(names, *np.array(rows).T, how=f"by sound, {_loudest_s(heard):.1f} s of it", notes=notes)
+    return Offsets(names, *np.array(rows).T, how=f"by sound, {_shortest_s(sounds):.1f} s of it", notes=notes)
 
 
-def sound_of(source: VideoSource) -> Array:
-    """Read one camera's sound: (n,) at 8 kHz, from the time of its first picture on. Raises VideoError."""
+def read_sound(source: VideoSource) -> Array:
+    """Read one camera's sound: (n,) at 8 kHz, starting at its first image. Raises VideoError."""
     chunks = []
     try:
         with av.open(source.path) as container:
@@ -72,26 +70,26 @@ def sound_of(source: VideoSource) -> Array:
                 raise VideoError(
                     f"{source.name}: {source.path} has no sound; synchronise by flash, motion or tracking instead"
                 )
-            audio, begun_s = container.streams.audio[0], 0.0
+            audio, video_start_s = container.streams.audio[0], 0.0
             if container.streams.video:
                 video = container.streams.video[0]
-                begun_s = float((video.start_time or 0) * (video.time_base or 0))
+                video_start_s = float((video.start_time or 0) * (video.time_base or 0))
             resampler = AudioResampler("flt", "mono", RATE_HZ)
             first_s = None
             for frame in container.decode(audio):
                 first_s = float(frame.time or 0.0) if first_s is None else first_s
-                chunks += [part.to_ndarray().ravel() for part in resampler.resample(frame)]
-            chunks += [part.to_ndarray().ravel() for part in resampler.resample(None)]
+                chunks += [chunk.to_ndarray().ravel() for chunk in resampler.resample(frame)]
+            chunks += [chunk.to_ndarray().ravel() for chunk in resampler.resample(None)]
     except (FFmpegError, OSError, ValueError) as error:
-        said = getattr(error, "strerror", None) or error
-        raise VideoError(f"{source.name}: the sound of {source.path} cannot be read ({said}); convert it") from error
+        reason = getattr(error, "strerror", None) or error
+        raise VideoError(f"{source.name}: the sound of {source.path} cannot be read ({reason}); convert it") from error
     sound = np.nan_to_num(np.concatenate([np.zeros(0), *chunks]))
-    late = round(((first_s or 0.0) - begun_s) * RATE_HZ)
-    return np.concatenate([np.zeros(late), sound]) if late >= 0 else sound[-late:]
+    n_late = round(((first_s or 0.0) - video_start_s) * RATE_HZ)
+    return np.concatenate([np.zeros(n_late), sound]) if n_late >= 0 else sound[-n_late:]
 
 
 def shift_between(reference: Array, sound: Array) -> tuple[Array, Array, Array] | None:
-    """Find what to add to the second sound's times: at times (n,) [s] of its own, offsets (n,) and sds (n,) [s].
+    """Find what to add to the second sound's times: its own times (n,), offsets (n,) and their sds (n,) [s].
 
     None where no shift stands out.
     """
@@ -99,10 +97,12 @@ def shift_between(reference: Array, sound: Array) -> tuple[Array, Array, Array] 
     if min(len(a), len(b)) < _ENVELOPE_HZ // 4 or not (a.any() and b.any()):
         return None
     match = correlate(a, b, method="fft")
-    if match.max() < _LEAST_ALIKE * np.linalg.norm(a) * np.linalg.norm(b):
+    if match.max() < _LEAST_CORRELATION * np.linalg.norm(a) * np.linalg.norm(b):
         return None
     coarse_s = correlation_lags(len(a), len(b))[match.argmax()] / _ENVELOPE_HZ
-    rows = [row for start in _loud_windows(sound) if (row := _mended(reference, sound, start, coarse_s)) is not None]
+    rows = [
+        row for start in _loud_windows(sound) if (row := _refine_shift(reference, sound, start, coarse_s)) is not None
+    ]
     if not rows:
         return np.zeros(1), np.array([coarse_s]), np.array([1 / _ENVELOPE_HZ])
     time_s, offset_s = np.array(rows).T
@@ -111,7 +111,7 @@ def shift_between(reference: Array, sound: Array) -> tuple[Array, Array, Array] 
 
 
 def _envelope(sound: Array) -> Array:
-    """Return how suddenly it grows loud, at 500 Hz."""
+    """Return the onset envelope at 500 Hz: the rises of the log level, mean removed."""
     step = RATE_HZ // _ENVELOPE_HZ
     passed = sosfilt(butter(2, (300, 3400), "bandpass", fs=RATE_HZ, output="sos"), sound)
     power = np.asarray(passed)[: len(sound) // step * step].reshape(-1, step)
@@ -124,12 +124,12 @@ def _loud_windows(sound: Array) -> list[int]:
     n = round(_WINDOW_S * RATE_HZ)
     starts = np.arange(0, max(len(sound) - n // 2, 1), n // 2)
     loudness = [float(np.sum(sound[start : start + n] ** 2)) for start in starts]
-    return [int(starts[k]) for k in np.argsort(loudness)[::-1][:_LOUDEST] if loudness[k] > 0]
+    return [int(starts[k]) for k in np.argsort(loudness)[::-1][:_N_WINDOWS] if loudness[k] > 0]
 
 
-def _mended(reference: Array, sound: Array, start: int, coarse_s: float) -> tuple[float, float] | None:
-    """Match one window's waveform near the coarse shift: (time of its middle, offset) [s]."""
-    n, near = round(_WINDOW_S * RATE_HZ), round(_NEAR_S * RATE_HZ)
+def _refine_shift(reference: Array, sound: Array, start: int, coarse_s: float) -> tuple[float, float] | None:
+    """Match one window's waveform by phase transform near the coarse shift: (time of its middle, offset) [s]."""
+    n, near = round(_WINDOW_S * RATE_HZ), round(_SEARCH_S * RATE_HZ)
     part, at = sound[start : start + n], start + round(coarse_s * RATE_HZ)
     other = reference[max(at, 0) : max(at + n, 0)]
     if len(part) < n // 4 or len(other) < n // 4:
@@ -139,7 +139,7 @@ def _mended(reference: Array, sound: Array, start: int, coarse_s: float) -> tupl
     match = np.fft.irfft(cross / (np.abs(cross) + 1e-9 * np.abs(cross).max() + 1e-30), size)
     match = np.concatenate([match[-near:], match[: near + 1]])
     k = int(match.argmax())
-    if not 0 < k < len(match) - 1 or match[k] < _CLEAR * robust_sd(match):
+    if not 0 < k < len(match) - 1 or match[k] < _LEAST_PEAK_SDS * robust_sd(match):
         return None
     before, top, after = match[k - 1 : k + 2]
     between = 0.5 * (before - after) / (before - 2 * top + after)
@@ -147,5 +147,5 @@ def _mended(reference: Array, sound: Array, start: int, coarse_s: float) -> tupl
     return (start + len(part) / 2) / RATE_HZ, shift
 
 
-def _loudest_s(heard: Sequence[Array]) -> float:
-    return min(len(each) for each in heard) / RATE_HZ
+def _shortest_s(sounds: Sequence[Array]) -> float:
+    return min(len(each) for each in sounds) / RATE_HZ

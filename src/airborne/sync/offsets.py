@@ -1,4 +1,4 @@
-"""What synchronisation finds."""
+"""The result of synchronisation: offsets and drifts of cameras."""
 
 from __future__ import annotations
 
@@ -7,21 +7,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
+from airborne.types import Array, Progress
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Offsets:
-    """What to add to the times of each camera's pictures, `offset + drift * time`; NaN where it was not found."""
+    """What to add to the times of each camera's images, `offset + drift * time`; NaN where unknown."""
 
     names: tuple[str, ...]
     offset_s: Array  # (c,)
     offset_sd_s: Array  # (c,)
-    drift: Array  # (c,) [s/s]; zeros where it was not asked for
+    drift: Array  # (c,) [s/s]; zeros where not estimated
     drift_sd: Array  # (c,)
-    how: str  # what they were found from
+    how: str  # by which method, of what data
     notes: tuple[str, ...] = ()  # what the user should know, one line each
 
     def to_dict(self) -> dict[str, Any]:
@@ -35,17 +34,17 @@ class Offsets:
         return {"how": self.how, "cameras": cameras, "notes": list(self.notes)}
 
     def describe(self) -> str:
-        """Say one line a camera."""
+        """Describe the method, then each camera in a line."""
         lines = [self.how]
         for name, offset, sd, drift, drift_sd in zip(
             self.names, self.offset_s, self.offset_sd_s, self.drift, self.drift_sd, strict=True
         ):
-            told = f"{name}: offset {1000 * offset:+.2f} ms (sd {1000 * sd:.2f})"
-            lines.append(told + (f", drift {1e6 * drift:+.1f} ppm (sd {1e6 * drift_sd:.1f})" if drift else ""))
+            line = f"{name}: offset {1000 * offset:+.2f} ms (sd {1000 * sd:.2f})"
+            lines.append(line + (f", drift {1e6 * drift:+.1f} ppm (sd {1e6 * drift_sd:.1f})" if drift else ""))
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
 
 
-def line_through(time_s: Array, offset_s: Array, sd_s: Array, *, with_drift: bool) -> tuple[float, float, float, float]:
+def fit_line(time_s: Array, offset_s: Array, sd_s: Array, *, with_drift: bool) -> tuple[float, float, float, float]:
     """Fit `offset + drift * time` to offsets (n,) measured at times (n,): offset, its sd, drift, its sd.
 
     Scatter beyond the stated sds (n,) widens the result. Without drift, or from a single moment, drift is 0.
@@ -61,14 +60,14 @@ def line_through(time_s: Array, offset_s: Array, sd_s: Array, *, with_drift: boo
     return float(solution[0]), float(sd[0]), *((float(solution[1]), float(sd[1])) if len(solution) > 1 else (0.0, 0.0))
 
 
-def counting(progress: Callable[[int, int | None], None] | None) -> Callable[[], None]:
-    """Return what is called after every picture: it tells how many these are."""
-    done = 0
+def image_counter(progress: Progress | None) -> Callable[[], None]:
+    """Return a function to call after every image, which reports the number of calls."""
+    n = 0
 
-    def told() -> None:
-        nonlocal done
-        done += 1
+    def count() -> None:
+        nonlocal n
+        n += 1
         if progress is not None:
-            progress(done, None)
+            progress(n, None)
 
-    return told
+    return count

@@ -1,47 +1,47 @@
-"""From the curvature of a score to a covariance that says what the pictures do not show."""
+"""From the curvature of a score to a covariance that says what the images do not show."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
+from airborne.types import Array
 
-SHIFT_SD_PX = 0.12  # of a full frame: light and edges that are not quite as modelled may displace a picture by this
-LEVER_M = 0.3  # the length that makes metres and radians comparable
+SHIFT_SD_PX = 0.12  # of a full frame: light and edges that are not quite as modelled may displace an image by this
+_LEVER_M = 0.3  # the length that makes metres and radians comparable
 _MOST_SWEEPS = 30
-_UNSEEN_SD_M = 0.15  # a direction known less well than this, at the lever's length, is not known
+_UNOBSERVED_SD_M = 0.15  # a direction with a larger sd than this, at the lever's length, counts as unobserved
 
 
-def covariance_of(curvature: Array, *, noise: float, spread: Array | None = None) -> Array:
+def covariance_of(curvature: Array, *, noise: float, score_covariance: Array | None = None) -> Array:
     """Return the covariance (d, d) of a position (3,) [m] and rotation vectors [rad].
 
-    curvature (d, d): half the second derivative of the summed squares; noise: their variance, already multiplied by how
-    many pixels share it. `spread` (d, d) is the sum of g g' over patches of the pictures, g the gradient: along each
+    curvature (d, d): half the Hessian of the summed squares; noise: their variance, already multiplied by how many
+    pixels share it. `score_covariance` (d, d) is the sum of g g' over image patches, g the gradient: along each
     principal direction the larger of two variances holds, that of independent noise and that of the patches (the
     sandwich estimate), which also counts wrong light and wrong shape. A direction with an sd above 0.15 m, or above
-    0.5 rad, counts as not seen: what it touches has an infinite variance.
+    0.5 rad, counts as unobserved: what it touches has an infinite variance.
     """
-    scale = np.where(np.arange(len(curvature)) < 3, 1, 1 / LEVER_M)
-    steepness, directions = principal(curvature * np.outer(scale, scale))
+    scale = np.where(np.arange(len(curvature)) < 3, 1, 1 / _LEVER_M)
+    steepness, directions = eigen_decomposition(curvature * np.outer(scale, scale))
     steepness = np.maximum(steepness, 1e-12 * max(steepness.max(), 1e-12))
     variance = noise / steepness
-    if spread is not None:
-        variance = np.maximum(variance, _along(directions, spread * np.outer(scale, scale)) / steepness**2)
-    seen = variance < _UNSEEN_SD_M**2
-    covariance = _composed(directions, np.where(seen, variance, 0.0)) * np.outer(scale, scale)
-    hidden = np.any(np.abs(directions[:, ~seen]) > 0.1, axis=1)
-    covariance[hidden] = covariance[:, hidden] = 0
-    covariance[hidden, hidden] = np.inf
+    if score_covariance is not None:
+        forms = _quadratic_forms(directions, score_covariance * np.outer(scale, scale))
+        variance = np.maximum(variance, forms / steepness**2)
+    observed = variance < _UNOBSERVED_SD_M**2
+    covariance = _compose(directions, np.where(observed, variance, 0.0)) * np.outer(scale, scale)
+    unobserved = np.any(np.abs(directions[:, ~observed]) > 0.1, axis=1)
+    covariance[unobserved] = covariance[:, unobserved] = 0
+    covariance[unobserved, unobserved] = np.inf
     return (covariance + covariance.T) / 2
 
 
 @njit(cache=True, nogil=True)
-def principal(matrix):
+def eigen_decomposition(matrix):
     """Return the eigenvalues (d,) and the eigenvectors (d, d), as columns, of a symmetric matrix, in no order.
 
-    Jacobi's rotations: for matrices of this size as fast as LAPACK, and the same to the last bit in every process,
+    By Jacobi's rotations: for matrices of this size as fast as LAPACK, and the same to the last bit in every process,
     however many threads a linear algebra library may run.
     """
     A, V = matrix.copy(), np.eye(len(matrix))
@@ -72,8 +72,8 @@ def principal(matrix):
 
 
 @njit(cache=True, nogil=True)
-def _along(directions, matrix):
-    """Return what a symmetric matrix (d, d) is along each direction, a column of (d, d): (d,)."""
+def _quadratic_forms(directions, matrix):
+    """Return v' M v of a symmetric matrix M (d, d) for each direction v, a column of (d, d): (d,)."""
     d = len(matrix)
     out = np.zeros(d)
     for j in range(d):
@@ -84,7 +84,7 @@ def _along(directions, matrix):
 
 
 @njit(cache=True, nogil=True)
-def _composed(directions, values):
+def _compose(directions, values):
     """Return the matrix (d, d) with these eigenvectors, as columns, and eigenvalues (d,)."""
     d = len(values)
     out = np.zeros((d, d))

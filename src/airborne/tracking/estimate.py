@@ -1,4 +1,4 @@
-"""What tracking says of one time."""
+"""The estimate of a body's pose at one time."""
 
 from __future__ import annotations
 
@@ -7,11 +7,9 @@ from enum import StrEnum
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body import Pose
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 
 class Status(StrEnum):
@@ -19,7 +17,7 @@ class Status(StrEnum):
 
     TRACKED = "tracked"
     UNCERTAIN = "uncertain"
-    LOST = "lost"  # nothing is claimed: the pose is None
+    LOST = "lost"  # no estimate: the pose is None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,9 +36,9 @@ class Estimate:
     score: float  # RMS colour difference inside the mask [grey levels]; NaN when lost
     pose: Pose | None
     covariance: Array | None
-    n_views: int  # cameras that had an image and saw the body
+    n_views: int  # cameras with an image that shows the body
 
 
-def lost(index: int, time_s: Fraction) -> Estimate:
-    """Say that the body was not found."""
+def lost_estimate(index: int, time_s: Fraction) -> Estimate:
+    """Return the estimate of a frame in which the body was not found."""
     return Estimate(index=index, time_s=time_s, status=Status.LOST, score=np.nan, pose=None, covariance=None, n_views=0)

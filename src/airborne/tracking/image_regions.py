@@ -1,4 +1,4 @@
-"""Which part of each view to look at."""
+"""Regions of interest: the part of each view that holds the body."""
 
 from __future__ import annotations
 
@@ -9,29 +9,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.appearance.model import Region
-from airborne.body import Geometry, PosedBody
-from airborne.rendering.packing import moved_view, packed_view
+from airborne.body import PosedBody, SurfaceArrays
+from airborne.rendering.packing import pack_view, shift_view
 from airborne.video import Frames, View
 
 _ROUND_TO_PX = 8  # regions are whole multiples of the coarsest reduction
 
 
-def regions_round(bodies: Sequence[PosedBody], geometry: Geometry, frames: Frames, margin_px: float) -> list[Region]:
-    """Cut out the part of every view that holds the posed bodies and a margin; views that see none are left out."""
-    points = np.concatenate([outermost_points(body, geometry) for body in bodies])
-    found = [_region(view, points, margin_px) for view in frames.views if view is not None]
-    return [region for region in found if region is not None]
+def crop_regions(
+    bodies: Sequence[PosedBody], geometry: SurfaceArrays, frames: Frames, margin_px: float
+) -> list[Region]:
+    """Cut out the part of every view that holds the posed bodies and a margin; views that show none are left out."""
+    points = np.concatenate([bounding_points(body, geometry) for body in bodies])
+    regions = [_region(view, points, margin_px) for view in frames.views if view is not None]
+    return [region for region in regions if region is not None]
 
 
-def reduced(frames: Frames, body: PosedBody, most_px_per_m: float) -> Frames:
-    """Average the pictures in squares of whole pixels until none shows the body larger than so many pixels a metre.
+def reduce_frames(frames: Frames, body: PosedBody, most_px_per_m: float) -> Frames:
+    """Average the images over squares of pixels until none shows the body at more than `most_px_per_m`.
 
-    `body` says where it is, about; it must be the same for all frames of a recording.
+    `body` gives its rough position; it must be the same for all frames of a recording.
     """
-    return Frames(frames.index, frames.time_s, tuple(_reduced(view, body, most_px_per_m) for view in frames.views))
+    return Frames(frames.index, frames.time_s, tuple(_reduce_view(view, body, most_px_per_m) for view in frames.views))
 
 
-def _reduced(view: View | None, body: PosedBody, most_px_per_m: float) -> View | None:
+def _reduce_view(view: View | None, body: PosedBody, most_px_per_m: float) -> View | None:
     if view is None:
         return None
     depth_m = max(float(view.camera.camera_from_world.apply(body.t[0])[2]), 0.1)
@@ -41,13 +43,13 @@ def _reduced(view: View | None, body: PosedBody, most_px_per_m: float) -> View |
     width, height = view.camera.size[0] // n, view.camera.size[1] // n
     rgb = cv2.resize(view.rgb[: n * height, : n * width], (width, height), interpolation=cv2.INTER_AREA)
     middle = (n - 1) / 2
-    camera = view.camera.resampled(scale=(n, n), offset=(middle, middle), size=(width, height))
-    return View(camera, np.asarray(rgb, np.uint8), view.late_s)
+    camera = view.camera.resample(scale=(n, n), offset=(middle, middle), size=(width, height))
+    return View(camera, np.asarray(rgb, np.uint8), view.delay_s)
 
 
-def share_in_pictures(body: PosedBody, geometry: Geometry, frames: Frames) -> float:
-    """Return the largest share of the body, by its outermost points, that lies inside one view's picture."""
-    points = outermost_points(body, geometry)
+def share_in_view(body: PosedBody, geometry: SurfaceArrays, frames: Frames) -> float:
+    """Return the largest share of the body, by its outermost points, that lies inside one view's image."""
+    points = bounding_points(body, geometry)
     shares = [0.0]
     for view in frames.views:
         if view is not None:
@@ -57,20 +59,20 @@ def share_in_pictures(body: PosedBody, geometry: Geometry, frames: Frames) -> fl
     return max(shares)
 
 
-def outermost_points(body: PosedBody, geometry: Geometry) -> NDArray:
-    """Return world points (n, 3) [m] whose hull holds the body: corners, and the boxes round the ellipsoids."""
+def bounding_points(body: PosedBody, geometry: SurfaceArrays) -> NDArray:
+    """Return world points (n, 3) [m] whose hull holds the body: corners, and the boxes around the ellipsoids."""
     segments = geometry.polygon_segment.repeat(np.diff(geometry.start))
     corners = np.einsum("nij,nj->ni", body.R[segments], geometry.corners) + body.t[segments]
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8)
     boxes = (geometry.ellipsoid_axes * geometry.ellipsoid_semi_axes[:, None]) @ signs
     local = geometry.ellipsoid_centre[:, None] + boxes.transpose(0, 2, 1)
     owner = geometry.ellipsoid_segment
-    round_ellipsoids = np.einsum("nij,nkj->nki", body.R[owner], local) + body.t[owner][:, None]
-    return np.concatenate([corners, round_ellipsoids.reshape(-1, 3)])
+    box_corners = np.einsum("nij,nkj->nki", body.R[owner], local) + body.t[owner][:, None]
+    return np.concatenate([corners, box_corners.reshape(-1, 3)])
 
 
 def _region(view: View, points: NDArray, margin_px: float) -> Region | None:
-    camera, packed = view.camera, packed_view(view.camera)
+    camera, packed = view.camera, pack_view(view.camera)
     xyz = points @ packed[:9].reshape(3, 3).T + packed[9:12]
     xyz = xyz[xyz[:, 2] > 0]
     if not len(xyz):
@@ -84,12 +86,12 @@ def _region(view: View, points: NDArray, margin_px: float) -> Region | None:
     if min(width, height) < 2 * _ROUND_TO_PX:
         return None
     x0, y0 = int(low[0]), int(low[1])
-    own = camera.resampled(scale=(1, 1), offset=(x0, y0), size=(int(width), int(height)))
+    own = camera.resample(scale=(1, 1), offset=(x0, y0), size=(int(width), int(height)))
     return Region(
         camera=own,
         corner=(x0, y0),
         rgb=np.ascontiguousarray(view.rgb[y0 : y0 + height, x0 : x0 + width]),
-        picture=view.rgb,
+        view_rgb=view.rgb,
         source=(camera.name, camera.K.tobytes()),
-        packed=moved_view(packed, x0, y0),
+        packed_view=shift_view(packed, x0, y0),
     )

@@ -1,4 +1,4 @@
-"""The methods by name."""
+"""The tracking methods by name."""
 
 from __future__ import annotations
 
@@ -9,24 +9,23 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body import BodyModel, Pose, geometry
+from airborne.body import BodyModel, Pose, surface_arrays
 from airborne.body.colours import with_sampled_colours
 from airborne.rendering import FLAT, RULES, Lights, render
 from airborne.tracking import predictors
 from airborne.tracking.direct_search.stepping import VRule
-from airborne.tracking.direct_search.trackers import Direct, Search, simplex_search, stepping_search
-from airborne.tracking.model_based.refined import Refined
-from airborne.tracking.time_offsets import InTime
+from airborne.tracking.direct_search.trackers import DirectTracker, Search, simplex_search, stepping_search
+from airborne.tracking.model_based.refined import RefinedTracker
+from airborne.tracking.time_offsets import CompensatedTracker
 from airborne.tracking.tracker import Tracker
 from airborne.video import Frames
 
-Array = NDArray[np.floating]
 Method = Literal["refined", "joint", "hierarchical", "stepping", "simplex"]
 Prediction = Literal["smooth", "ballistic", "none"]
-Colour = Literal["raw", "normalised", "blend", "union"]
+ColourRule = Literal["raw", "normalised", "blend", "union"]
 
-# stepping and simplex see what paper B saw: full frames whose missing rows are interpolated
-FIELDS_AS: dict[Method, Literal["rows", "interpolated"]] = {
+# stepping and simplex get what paper B had: full frames whose missing rows are interpolated
+FIELD_MODES: dict[Method, Literal["rows", "interpolated"]] = {
     "refined": "rows",
     "joint": "rows",
     "hierarchical": "rows",
@@ -38,27 +37,27 @@ _SIMPLEX_SIZE = np.array([0.03] * 3 + [0.06] * 3)  # [m], [rad]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """What a method may be told; for stepping and simplex the defaults are paper B's for video."""
+    """The settings of a method; for stepping and simplex the defaults are paper B's for video."""
 
     method: Method = "refined"
     prediction: Prediction = "smooth"
-    colour: Colour = "normalised"
+    colour: ColourRule = "normalised"
     v_rule: VRule = "v_sym"
     loops: Sequence[tuple[float, float]] = ()  # stepping: a step in position [m] and in angle [rad] for each loop
-    scale: Literal[1, 2, 4] = 1  # stepping, simplex: reduction of the pictures
+    scale: Literal[1, 2, 4] = 1  # stepping, simplex: reduction of the images
     lights: Lights | None = None  # None: unknown
-    is_light_exact: bool = False  # else only stepping and simplex look at it; the others fit the light
+    is_light_exact: bool = False  # else only stepping and simplex use `lights`; the others fit the light
     fixed_shape: bool = False  # joints stay as they are at the start; stepping and simplex never move them
 
 
 def tracker_of(settings: Settings, model: BodyModel, start: Pose) -> Tracker:
-    """Make the tracker of a method; it takes views that are late to be so."""
-    return InTime(_tracker_of(settings, model, start))
+    """Make the tracker of a method, with the time offsets of late views compensated."""
+    return CompensatedTracker(_tracker_of(settings, model, start))
 
 
 def _tracker_of(settings: Settings, model: BodyModel, start: Pose) -> Tracker:
     if settings.method in ("refined", "joint", "hierarchical"):
-        return Refined(
+        return RefinedTracker(
             model,
             start,
             prediction=settings.prediction,
@@ -69,12 +68,20 @@ def _tracker_of(settings: Settings, model: BodyModel, start: Pose) -> Tracker:
     predict: Callable = {
         "smooth": predictors.linear,
         "ballistic": predictors.ballistic,
-        "none": predictors.stay,
+        "none": predictors.constant,
     }[settings.prediction]
     rule = RULES[settings.colour]
     if settings.lights is None:  # brightness means little: fit it, and let "union" compare hues
         rule = replace(rule, fits_gain=True, normalised=1.0 if settings.colour == "union" else rule.normalised)
-    return Direct(model, start, _search(settings), rule, settings.lights or FLAT, scale=settings.scale, predict=predict)
+    return DirectTracker(
+        model,
+        start,
+        _search(settings),
+        rule=rule,
+        lights=settings.lights or FLAT,
+        scale=settings.scale,
+        predict=predict,
+    )
 
 
 def _search(settings: Settings) -> Search:
@@ -83,15 +90,15 @@ def _search(settings: Settings) -> Search:
     return stepping_search([np.repeat(steps, 3) for steps in settings.loops], settings.v_rule)
 
 
-def sampled(model: BodyModel, start: Pose, frames: Frames) -> BodyModel:
+def sample_body_colours(model: BodyModel, start: Pose, frames: Frames) -> BodyModel:
     """Give parts with `colour = "sample"` the colour that the first frames show at the first pose."""
     if not model.needs_colours:
         return model
-    posed, flat = model.with_pose(start), geometry(model)
-    seen: list[list[NDArray[np.uint8]]] = [[np.zeros((0, 3), np.uint8)] for _ in model.parts]
+    posed, flat = model.with_pose(start), surface_arrays(model)
+    pixels_of_part: list[list[NDArray[np.uint8]]] = [[np.zeros((0, 3), np.uint8)] for _ in model.parts]
     for view in frames.views:
         if view is not None:
             part = render(flat, posed, view.camera, FLAT).part
-            for index, pixels in enumerate(seen):
+            for index, pixels in enumerate(pixels_of_part):
                 pixels.append(view.rgb[part == index])
-    return with_sampled_colours(model, [np.concatenate(pixels) for pixels in seen])
+    return with_sampled_colours(model, [np.concatenate(pixels) for pixels in pixels_of_part])

@@ -1,4 +1,4 @@
-"""What tracking says of several players at one time, and what every tracker of players is."""
+"""The estimates of several players at one time, and the protocol of their trackers."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ from fractions import Fraction
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.tracking.estimate import Status
+from airborne.types import Array
 from airborne.video import Frames
-
-Array = NDArray[np.floating]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,11 +37,11 @@ class PlayerEstimate:
     points: Array  # (joints, 3) [m], world
     covariance: Array  # (joints, 3, 3) [m²], of each joint for itself
     score: float  # mean log-likelihood of the estimate [nat]; NaN when lost
-    n_views: int  # cameras that were looked at and not hidden
+    n_views: int  # cameras that were used and in which the player was not occluded
 
 
-def lost_player(player: str, frames: Frames, n_joints: int) -> PlayerEstimate:
-    """Say that a player was not found."""
+def lost_player_estimate(player: str, frames: Frames, n_joints: int) -> PlayerEstimate:
+    """Return the estimate of a player who was not found."""
     return PlayerEstimate(
         player=player,
         index=frames.index,
@@ -57,7 +55,7 @@ def lost_player(player: str, frames: Frames, n_joints: int) -> PlayerEstimate:
 
 
 class PlayersTracker(Protocol):
-    """Tracks all its players together. Everything random comes from a seed, so that a run can be made again."""
+    """Tracks all its players together. Everything random comes from a seed, so that a run can be repeated."""
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What every tracker is: a first state, and a step from one state and one time's frames to the next."""
+"""The protocol of trackers: a first state, and a step from one state and one time's frames to the next."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from airborne.video import Frames
 
 
 class Tracker(Protocol):
-    """A tracker holds its settings; what it learns on the way lives in the state it returns."""
+    """A tracker holds its settings; what it learns is in the states it returns."""
 
     def init(self) -> Any:
         """Return the state before the first frame."""
@@ -20,7 +20,7 @@ class Tracker(Protocol):
         ...
 
     def learn(self, state: Any, frames: Frames, estimate: Estimate) -> Any:
-        """Return the state after the frames, given where the body was found: a run is resumed by learning alone."""
+        """Return the state after the frames, given their estimate: a run is resumed by learning alone."""
         ...
 
 

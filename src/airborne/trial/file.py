@@ -15,17 +15,17 @@ from airborne.body import SAMPLED, BodyModel, Pose, human18, human18_from_measur
 from airborne.body.files import read_body
 from airborne.errors import TrialError, one_line
 from airborne.geometry.rotations import matrix_from_angles
-from airborne.io.text import listed_keys, read_toml
+from airborne.io.text import list_keys, read_toml
 from airborne.rendering import Lamp, Lights
 from airborne.tracking.direct_search.stepping import VRule
-from airborne.tracking.methods import Colour, Method, Prediction, Settings
+from airborne.tracking.methods import ColourRule, Method, Prediction, Settings
 from airborne.tracking.players import PlayerStart
 from airborne.trial.players import STRICT, PlayerTable, Vector
 
-Steps = list[Annotated[float, Field(gt=0)]]
+StepSizes = list[Annotated[float, Field(gt=0)]]
 PlayersMethod = Literal["blocker", "block-jump", "mixture", "framework"]
 
-PLAYERS_METHODS: tuple[str, ...] = get_args(PlayersMethod)
+_PLAYERS_METHODS: tuple[str, ...] = get_args(PlayersMethod)
 
 
 class _Strict(BaseModel):
@@ -39,8 +39,8 @@ class CameraTable(_Strict):
     video: str
     fields: Literal["progressive", "top-first", "bottom-first", "auto"] = "progressive"
     offset_s: float = 0.0  # added to this camera's times
-    offset_sd_s: float = Field(0.0, ge=0)  # how well that is known
-    drift_ppm: float = Field(0.0, gt=-1e4, lt=1e4)  # by how much its clock is slow, in millionths
+    offset_sd_s: float = Field(0.0, ge=0)  # its standard deviation
+    drift_ppm: float = Field(0.0, gt=-1e4, lt=1e4)  # by how much its clock runs slow, in parts per million
     calibrated_as: str | None = None  # the camera's name in the calibration file, where it differs
     saved_scale: float = Field(1.0, gt=0)  # calibration px = saved_scale * video px + saved_offset_px
     saved_offset_px: Annotated[list[float], Field(min_length=2, max_length=2)] = [0.0, 0.0]
@@ -52,17 +52,17 @@ class CalibrationTable(_Strict):
     file: str | None = None
     control_points: str | None = None
     method: Literal["lm", "annealing"] = "lm"
-    mend: list[str] = []  # cameras to place anew, by the detections of [start]
+    mend: list[str] = []  # cameras to re-resect from the detections of [start]
 
     @model_validator(mode="after")
-    def _one_source(self) -> CalibrationTable:
+    def _check_source(self) -> CalibrationTable:
         if (self.file is None) == (self.control_points is None):
             raise ValueError('give file = "..." or control_points = "...", one of them')
         return self
 
 
 class BodyTable(_Strict):
-    """Which body: a body file, a person of a stature and a mass, a measured person, or players' legs."""
+    """Which body: a body file, a person of given stature and mass, a measured person, or players' legs."""
 
     file: str | None = None
     preset: Literal["human18", "legs"] | None = None
@@ -71,7 +71,7 @@ class BodyTable(_Strict):
     measurements: str | None = None
 
     @model_validator(mode="after")
-    def _one_way(self) -> BodyTable:
+    def _check_body(self) -> BodyTable:
         if sum(value is not None for value in (self.file, self.preset, self.measurements)) != 1:
             raise ValueError(
                 'give file = "...", preset = "human18" or measurements = "...", one of them; '
@@ -85,13 +85,13 @@ class BodyTable(_Strict):
         return self
 
     @property
-    def given_file(self) -> str | None:
-        """The file that the body comes from, if it comes from one."""
+    def source_file(self) -> str | None:
+        """The file that defines the body, if there is one."""
         return self.file or self.measurements
 
 
 class StartTable(_Strict):
-    """The first pose: set by hand, or from places of the body's landmarks; or of several players."""
+    """The first pose: set by hand, or found from positions of the body's landmarks; or those of several players."""
 
     frame: Annotated[int, Field(ge=0)] = 0
     position_m: Vector | None = None
@@ -99,14 +99,14 @@ class StartTable(_Strict):
     quaternion_xyzw: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
     somersault_tilt_twist_deg: Vector | None = None
     joint_angles_deg: dict[str, Vector] = {}  # segment -> x, y, z
-    joints_m: dict[str, Vector] | str | None = None  # landmark -> place, or a table of them
+    joints_m: dict[str, Vector] | str | None = None  # landmark -> position, or a table of them
     points_px: str | None = None  # a table of clicked points
     detections: str | None = None  # .npz, or a folder of folders of OpenPose JSON
     detections_cameras: dict[str, str] = {}  # camera -> its array or folder
     player: list[PlayerTable] = []
 
     @model_validator(mode="after")
-    def _one_way(self) -> StartTable:
+    def _check_start(self) -> StartTable:
         by_hand = {"position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg"}
         ways = [self.joints_m, self.points_px, self.detections]
         given = sum(value is not None for value in ways) + bool(by_hand & self.model_fields_set) + bool(self.player)
@@ -143,17 +143,17 @@ class StartTable(_Strict):
     def pose(self) -> Pose:
         """The start as set by hand, joints straight.
 
-        Raises TrialError where it needs the body or the cameras: then `airborne.start.first_pose` finds it.
+        Raises TrialError where it depends on the body or the cameras: then `airborne.run.first_pose` finds it.
         """
         if self.position_m is None or self.joint_angles_deg:
-            raise TrialError("this start needs the body and the cameras; use airborne.start.first_pose")
+            raise TrialError("this start needs the body and the cameras; use airborne.run.first_pose")
         return Pose(world_from_root=self.world_from_root)
 
     @property
     def world_from_root(self) -> RigidTransform:
-        """Where the root is, as set by hand; raises TrialError where it is not."""
+        """The root's pose as set by hand; raises TrialError where it is not set."""
         if self.position_m is None:
-            raise TrialError("the root's place is not set by hand; use airborne.start.first_pose")
+            raise TrialError("the root's position is not set by hand; use airborne.run.first_pose")
         if self.rotation_matrix is not None:
             rotation = Rotation.from_matrix(self.rotation_matrix)
         elif self.quaternion_xyzw is not None:
@@ -164,8 +164,8 @@ class StartTable(_Strict):
         return RigidTransform.from_components(self.position_m, rotation)
 
     @property
-    def given_files(self) -> list[str]:
-        """The files and folders that the start comes from."""
+    def source_files(self) -> list[str]:
+        """The files and folders that define the start."""
         joints = self.joints_m if isinstance(self.joints_m, str) else None
         return [name for name in (joints, self.points_px, self.detections) if name is not None]
 
@@ -174,12 +174,12 @@ class LampTable(_Strict):
     """A lamp: a point light, or with a direction and a half angle a spot light."""
 
     position_m: Vector
-    intensity: float = Field(ge=0)  # what a matt surface facing it gets, as a share of its colour
+    intensity: float = Field(ge=0)  # irradiance of a matt surface facing it, as a share of its colour
     direction: Vector | None = None
     half_angle_deg: float | None = Field(None, gt=0, lt=90)
 
     @model_validator(mode="after")
-    def _both_or_none(self) -> LampTable:
+    def _check_spot(self) -> LampTable:
         if (self.direction is None) != (self.half_angle_deg is None) or self.direction == [0, 0, 0]:
             raise ValueError("a spot light needs a direction with a length and half_angle_deg; a point light neither")
         return self
@@ -189,7 +189,7 @@ class LightsTable(_Strict):
     """Measured lights; without this table the light is unknown."""
 
     ambient: float = Field(ge=0)
-    is_exact: bool = False  # drawn pictures: their light is exactly this, so that every method looks at it
+    is_exact: bool = False  # rendered images: their light is exactly this, so that every method uses it
     lamp: list[LampTable] = []
 
     @property
@@ -205,47 +205,47 @@ class TrackTable(_Strict):
     every: Annotated[int, Field(ge=1)] = 1  # track every n-th frame or field
     stop: Annotated[int, Field(ge=1)] | None = None  # one past the last frame or field
     prediction: Prediction = "smooth"
-    fixed_shape: bool = False  # joints stay as they are at the start; stepping and simplex never move them
-    colour: Colour = "normalised"  # stepping and simplex: paper B's score
+    fixed_shape: bool = False  # joint angles stay those of the start; stepping and simplex never change them
+    colour: ColourRule = "normalised"  # stepping and simplex: paper B's score
     v_rule: VRule = "v_sym"  # stepping
-    steps_mm: Steps = [50, 30, 20, 10, 10, 5, 5]  # stepping: one loop each
-    steps_deg: Steps = [5, 3, 2, 1, 1, 0.5, 0.5]
-    scale: Literal[1, 2, 4] = 1  # stepping and simplex: reduction of the pictures
+    steps_mm: StepSizes = [50, 30, 20, 10, 10, 5, 5]  # stepping: one loop each
+    steps_deg: StepSizes = [5, 3, 2, 1, 1, 0.5, 0.5]
+    scale: Literal[1, 2, 4] = 1  # stepping and simplex: reduction of the images
     n_particles: Annotated[int, Field(ge=50, le=100_000)] | None = None  # particle filters; None: the method's own
-    seed: Annotated[int, Field(ge=0)] = 0  # particle filters: of everything random
+    seed: Annotated[int, Field(ge=0)] = 0  # particle filters: seed of the random numbers
     swing: Literal["literal", "consistent"] = "literal"  # block-jump: how rods swing
     estimate: Literal["max", "mean", "top10_mean"] | None = None  # particle filters; None: the method's own
     views: Literal["all", "visible", "robust"] = "all"  # particle filters: which cameras count
     tempered: bool = False  # particle filters: a softer comparison of histograms, the more cameras
-    torso_shift: bool = False  # particle filters: everything moves along with the torso
+    torso_shift: bool = False  # particle filters: the whole body moves along with the torso
     resample: Literal["systematic", "stratified", "residual", "multinomial"] = "systematic"  # particle filters
     resample_when: Literal["always", "ess"] = "always"  # particle filters
     torso: str | None = None  # particle filters: a table of torsos; None: they are tracked
     overlay: Literal["paper", "broadcast"] = "paper"  # legs: what the overlay videos show
 
     @model_validator(mode="after")
-    def _equal_loops(self) -> TrackTable:
+    def _check_steps(self) -> TrackTable:
         if len(self.steps_mm) != len(self.steps_deg) or not self.steps_mm:
-            raise ValueError("steps_mm and steps_deg need one number a loop each, equally many")
+            raise ValueError("steps_mm and steps_deg need one number each for every loop, equally many")
         return self
 
     @property
-    def told(self) -> dict[str, Any]:
+    def method_settings(self) -> dict[str, Any]:
         """The settings that the method may read."""
         settings = self.model_dump()
-        if self.method not in PLAYERS_METHODS:
-            others = _OF_LEGS
+        if self.method not in _PLAYERS_METHODS:
+            excluded = _LEGS_SETTINGS
         else:
-            others = (*_OF_BODIES, *(_OF_FILTERS if self.method == "blocker" else ()))
-        return {name: value for name, value in settings.items() if name not in others}
+            excluded = (*_BODY_SETTINGS, *(_FILTER_SETTINGS if self.method == "blocker" else ()))
+        return {name: value for name, value in settings.items() if name not in excluded}
 
 
-_OF_FILTERS = (
+_FILTER_SETTINGS = (
     *("n_particles", "seed", "swing", "estimate", "views", "tempered"),
     *("torso_shift", "resample", "resample_when", "torso"),
 )
-_OF_LEGS = (*_OF_FILTERS, "overlay")
-_OF_BODIES = ("prediction", "fixed_shape", "colour", "v_rule", "steps_mm", "steps_deg", "scale")
+_LEGS_SETTINGS = (*_FILTER_SETTINGS, "overlay")
+_BODY_SETTINGS = ("prediction", "fixed_shape", "colour", "v_rule", "steps_mm", "steps_deg", "scale")
 
 
 class Trial(_Strict):
@@ -261,33 +261,35 @@ class Trial(_Strict):
 
     @model_validator(mode="before")
     @classmethod
-    def _legs_have_their_method(cls, table: Any) -> Any:
+    def _default_players_method(cls, table: Any) -> Any:
         match table:
             case {"body": {"preset": "legs"}, **rest}:
                 track = rest.get("track", {})
-                return {**table, "track": {"method": PLAYERS_METHODS[0], **track}} if isinstance(track, dict) else table
+                return (
+                    {**table, "track": {"method": _PLAYERS_METHODS[0], **track}} if isinstance(track, dict) else table
+                )
         return table
 
     @model_validator(mode="after")
-    def _players_go_together(self) -> Trial:
+    def _check_players(self) -> Trial:
         is_legs, method = self.body.preset == "legs", self.track.method
         if is_legs and not self.start.player:
             raise ValueError('body preset "legs" needs [[start.player]] tables: where every player is at the start')
         if self.start.player and not is_legs:
             raise ValueError('[[start.player]] goes with body preset = "legs"')
-        if is_legs != (method in PLAYERS_METHODS):
-            known = PLAYERS_METHODS if is_legs else get_args(Method)
+        if is_legs != (method in _PLAYERS_METHODS):
+            methods = _PLAYERS_METHODS if is_legs else get_args(Method)
             body = 'preset "legs"' if is_legs else "this body"
-            raise ValueError(f"track.method = '{method}' does not go with {body}; use one of: {', '.join(known)}")
-        strange = sorted(self.track.model_fields_set & {*(_OF_BODIES if is_legs else _OF_LEGS)})
+            raise ValueError(f"track.method = '{method}' does not go with {body}; use one of: {', '.join(methods)}")
+        unread = sorted(self.track.model_fields_set & {*(_BODY_SETTINGS if is_legs else _LEGS_SETTINGS)})
         if is_legs and self.lights is not None:
-            strange.append("[lights]")
-        if strange:
-            raise ValueError(f"{', '.join(strange)} under [track]: not read by method '{method}'; remove it")
+            unread.append("[lights]")
+        if unread:
+            raise ValueError(f"{', '.join(unread)} under [track]: not read by method '{method}'; remove it")
         return self
 
     @model_validator(mode="after")
-    def _saved_needs_a_file(self) -> Trial:
+    def _check_saved_pixels(self) -> Trial:
         for camera in self.camera:
             if self.calibration.file is None and camera.model_fields_set & {
                 "calibrated_as",
@@ -301,7 +303,7 @@ class Trial(_Strict):
         return self
 
     @model_validator(mode="after")
-    def _mending_needs_detections(self) -> Trial:
+    def _check_mend(self) -> Trial:
         names = [camera.name for camera in self.camera]
         unknown = [name for name in self.calibration.mend if name not in names]
         if unknown:
@@ -321,13 +323,13 @@ class Trial(_Strict):
     def players(self) -> tuple[PlayerStart, ...]:
         """Where every player and bystander starts."""
         return tuple(
-            PlayerStart(name=player.name, joints_m={name: np.array(place) for name, place in player.joints_m.items()})
+            PlayerStart(name=player.name, joints_m={name: np.array(point) for name, point in player.joints_m.items()})
             for player in self.start.player
         )
 
     @property
     def settings(self) -> Settings:
-        """What the tracking method of one body is told."""
+        """The settings of the tracking method of one body."""
         track = self.track
         steps = zip(track.steps_mm, track.steps_deg, strict=True)
         return Settings(
@@ -365,39 +367,39 @@ class Trial(_Strict):
 def read_trial(path: Path, track: dict[str, Any] | None = None, cameras: Sequence[str] | None = None) -> Trial:
     """Read a trial file; raises TrialError, naming the file and what is wrong, for anything unusable.
 
-    `track` replaces entries of its [track] table, as options of `airborne track` do; `cameras` keeps only the named
-    cameras.
+    `track` replaces entries of its [track] table, as options of `airborne track` do; `cameras` selects cameras by
+    name.
     """
     try:
-        trial = _validated(read_toml(path), track or {}, path.name)
+        trial = _validate(read_toml(path), track or {}, path.name)
     except OSError as error:
         raise TrialError(f"{path}: cannot be read ({error.strerror}); give the path of a trial's TOML file") from error
     except tomllib.TOMLDecodeError as error:
         raise TrialError(f"{path.name}: not a TOML file: {error}; expected a trial's TOML") from error
     trial._folder = path.parent
     _check(path, trial)
-    return trial if cameras is None else _only(path, trial, cameras)
+    return trial if cameras is None else _select_cameras(path, trial, cameras)
 
 
-def _validated(table: dict[str, Any], changes: dict[str, Any], where: str) -> Trial:
-    """Return the trial of a table with changes to its settings; errors name these where they are what is wrong."""
+def _validate(table: dict[str, Any], changes: dict[str, Any], where: str) -> Trial:
+    """Return the trial of a table with changes to its settings; an error names the changes where they cause it."""
     heads = ("[[camera]]", "[calibration]", "[body]", "[start]")
     missing = [head for head in heads if head.strip("[]") not in table]
     if len(missing) > 1:
-        raise TrialError(f"{where}: no trial file, as {', '.join(missing)} are missing (found {listed_keys(table)})")
+        raise TrialError(f"{where}: no trial file, as {', '.join(missing)} are missing (found {list_keys(table)})")
     settings = table.get("track", {})
     changed = {**table, "track": {**settings, **changes} if isinstance(settings, dict) else settings}
     try:
         return Trial.model_validate(changed)
     except ValidationError as error:
-        said = one_line(error)
+        reason = one_line(error)
     if changes:
         try:
             Trial.model_validate(table)
             where = " ".join(f"--{name} {value}" for name, value in changes.items())
         except ValidationError:
             pass
-    raise TrialError(f"{where}: {said}")
+    raise TrialError(f"{where}: {reason}")
 
 
 def _check(path: Path, trial: Trial) -> None:
@@ -405,7 +407,13 @@ def _check(path: Path, trial: Trial) -> None:
     if len(set(names)) != len(names):
         raise TrialError(f"{path.name}: two cameras share a name: {', '.join(names)}; give each its own")
     calibration, body = trial.calibration, trial.body
-    files = [body.given_file, calibration.file, calibration.control_points, trial.track.torso, *trial.start.given_files]
+    files = [
+        body.source_file,
+        calibration.file,
+        calibration.control_points,
+        trial.track.torso,
+        *trial.start.source_files,
+    ]
     for name in files:
         if name is not None and not (
             trial.path(name).is_file() or (name == trial.start.detections and trial.path(name).is_dir())
@@ -413,14 +421,14 @@ def _check(path: Path, trial: Trial) -> None:
             raise TrialError(f"{path.name}: {name} not found beside it")
 
 
-def _only(path: Path, trial: Trial, cameras: Sequence[str]) -> Trial:
-    known = {camera.name: camera for camera in trial.camera}
-    unknown = [name for name in cameras if name not in known]
+def _select_cameras(path: Path, trial: Trial, cameras: Sequence[str]) -> Trial:
+    by_name = {camera.name: camera for camera in trial.camera}
+    unknown = [name for name in cameras if name not in by_name]
     if unknown:
-        raise TrialError(f"{path.name}: no camera {', '.join(unknown)}; it has: {', '.join(known)}")
+        raise TrialError(f"{path.name}: no camera {', '.join(unknown)}; it has: {', '.join(by_name)}")
     mend = [name for name in trial.calibration.mend if name in cameras]
     calibration = trial.calibration.model_copy(update={"mend": mend})
-    return trial.model_copy(update={"camera": [known[name] for name in cameras], "calibration": calibration})
+    return trial.model_copy(update={"camera": [by_name[name] for name in cameras], "calibration": calibration})
 
 
 def _lamp(table: LampTable) -> Lamp:

@@ -1,4 +1,4 @@
-"""Parts of decoded frames to sRGB, without converting the rest: colours as `airborne.video.pixels` has them."""
+"""Crops of decoded frames to sRGB, without converting the rest: the same colours as `airborne.video.pixels` gives."""
 
 from __future__ import annotations
 
@@ -11,62 +11,63 @@ from av.video.reformatter import ColorRange, Colorspace
 from numba import njit
 from numpy.typing import NDArray
 
-from airborne.video.frames import Box
-from airborne.video.pixels import UNSPECIFIED, Image, matrix_for, rgb_from_frame, stored_rows
+from airborne.types import Image
+from airborne.video.frames import PixelBox
+from airborne.video.pixels import UNSPECIFIED_MATRIX, matrix_for, plane_rows, rgb_from_frame
 
-ROWS_A_CHROMA = {"yuv420p": 2, "yuvj420p": 2, "yuv422p": 1, "yuvj422p": 1}  # planar, 8 bits, half as wide in colour
-LUMA_WEIGHTS = {  # red's and blue's share of the luma: BT.709, and BT.601 under its two tags
+_ROWS_PER_CHROMA = {"yuv420p": 2, "yuvj420p": 2, "yuv422p": 1, "yuvj422p": 1}  # planar, 8 bits, chroma at half width
+_LUMA_WEIGHTS = {  # red's and blue's share of the luma: BT.709, and BT.601 under its two tags
     Colorspace.ITU709: (0.2126, 0.0722),
     Colorspace.ITU601: (0.299, 0.114),
     6: (0.299, 0.114),
 }
-SITINGS = ((0, 2), (1, 1))  # quarters of the neighbour's chroma: at even and at odd places
-PROBE_PX = 32
+_SITINGS = ((0, 2), (1, 1))  # quarters of the neighbour's chroma: in even and in odd columns or rows
+_PROBE_PX = 32
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Colours:
-    """How one kind of frame turns into sRGB."""
+class ColourConversion:
+    """How frames of one format convert to sRGB."""
 
     scale: NDArray[np.float32]  # (6,) black; factors of luma, red by V, green by U and by V, blue by U
-    siting_x: tuple[int, int]  # of SITINGS
+    siting_x: tuple[int, int]  # of _SITINGS
     siting_y: tuple[int, int]
-    rows_a_chroma: int  # rows of luma to one of chroma
+    rows_per_chroma: int  # rows of luma per row of chroma
 
 
-def colours_of(frame: av.VideoFrame, *, short_side: int) -> Colours | None:
-    """Find how the parts of frames like this one turn into sRGB; None where only a whole frame can be converted.
+def conversion_of(frame: av.VideoFrame, *, short_side: int) -> ColourConversion | None:
+    """Find how crops of frames of this format convert to sRGB; None where only a whole frame can be converted.
 
-    A frame does not say where its chroma lies, so a small frame of its kind is converted whole, as `rgb_from_frame`
-    does it; parts come out equal within one grey level. short_side [px]: that of the recording.
+    A frame does not state its chroma siting, so each siting is tried on a small frame of the same format and compared
+    with `rgb_from_frame`; crops come out equal within one grey level. short_side [px]: that of the recording.
     """
-    rows_a_chroma = ROWS_A_CHROMA.get(frame.format.name)
-    matrix = matrix_for(short_side) if frame.colorspace == UNSPECIFIED else frame.colorspace
-    if rows_a_chroma is None or matrix not in LUMA_WEIGHTS:
+    rows_per_chroma = _ROWS_PER_CHROMA.get(frame.format.name)
+    matrix = matrix_for(short_side) if frame.colorspace == UNSPECIFIED_MATRIX else frame.colorspace
+    if rows_per_chroma is None or matrix not in _LUMA_WEIGHTS:
         return None
     is_full = frame.color_range == ColorRange.JPEG or frame.format.name.startswith("yuvj")
-    scale = _scale(*LUMA_WEIGHTS[matrix], is_full=is_full)
-    probe = frame.reformat(width=PROBE_PX, height=PROBE_PX, threads=1)  # with all that the frame says of itself
+    scale = _scale(*_LUMA_WEIGHTS[matrix], is_full=is_full)
+    probe = frame.reformat(width=_PROBE_PX, height=_PROBE_PX, threads=1)  # keeps the frame's own tags
     rng = np.random.default_rng(0)
     for plane in probe.planes:
-        rows = stored_rows(plane)
+        rows = plane_rows(plane)
         rows[:] = rng.integers(64, 192, rows.shape)
     expected = rgb_from_frame(probe, short_side=short_side).astype(int)
-    for siting_x, siting_y in product(SITINGS, SITINGS):
-        colours = Colours(scale, siting_x, siting_y, rows_a_chroma)
-        found = rgb_from_part(probe, colours, (0, 0, PROBE_PX, PROBE_PX))
-        if np.abs(found - expected).max() <= 1:
-            return colours
+    for siting_x, siting_y in product(_SITINGS, _SITINGS):
+        conversion = ColourConversion(scale, siting_x, siting_y, rows_per_chroma)
+        converted = rgb_from_part(probe, conversion, (0, 0, _PROBE_PX, _PROBE_PX))
+        if np.abs(converted - expected).max() <= 1:
+            return conversion
     return None
 
 
-def rgb_from_part(frame: av.VideoFrame, colours: Colours, box: Box) -> Image:
-    """Convert the part of a frame in a box that lies in it to sRGB: (y1 - y0, x1 - x0, 3)."""
+def rgb_from_part(frame: av.VideoFrame, conversion: ColourConversion, box: PixelBox) -> Image:
+    """Convert the part of a frame inside a box to sRGB: (y1 - y0, x1 - x0, 3); the box lies within the frame."""
     x0, y0, x1, y1 = box
     rgb = np.empty((y1 - y0, x1 - x0, 3), np.uint8)
-    y, u, v = (np.ascontiguousarray(stored_rows(plane)) for plane in frame.planes)
-    sitings = (colours.siting_x, colours.siting_y)
-    _convert(y, u, v, frame.planes[1].width, colours.scale, sitings, colours.rows_a_chroma, x0, y0, rgb)
+    y, u, v = (np.ascontiguousarray(plane_rows(plane)) for plane in frame.planes)
+    sitings = (conversion.siting_x, conversion.siting_y)
+    _convert(y, u, v, frame.planes[1].width, conversion.scale, sitings, conversion.rows_per_chroma, x0, y0, rgb)
     return rgb
 
 
@@ -85,12 +86,12 @@ def _convert(
     chroma_width: int,
     scale: NDArray[np.float32],
     sitings: tuple[tuple[int, int], tuple[int, int]],
-    rows_a_chroma: int,
+    rows_per_chroma: int,
     x0: int,
     y0: int,
     rgb: NDArray[np.uint8],
 ) -> None:
-    """Fill rgb (h, w, 3) with the part that begins at x0, y0 of planes whose rows may be padded."""
+    """Fill rgb (h, w, 3) with the part from x0, y0 of planes whose rows may be padded."""
     black, k_y, k_rv, k_gu, k_gv, k_bu = scale
     height, width = rgb.shape[:2]
     half, low, high = np.float32(0.5), np.float32(0), np.float32(255)
@@ -100,9 +101,9 @@ def _convert(
     chroma_u, chroma_v = np.empty(2 * n, np.float32), np.empty(2 * n, np.float32)
     red, green, blue = np.empty(width, np.uint8), np.empty(width, np.uint8), np.empty(width, np.uint8)
     for row in range(height):
-        a, b, share = _rows_around(y0 + row, u.shape[0], sitings[1], rows_a_chroma)
-        _spread(u[a], u[b], share, sitings[0], first, chroma_width, mixed, chroma_u)
-        _spread(v[a], v[b], share, sitings[0], first, chroma_width, mixed, chroma_v)
+        a, b, share = _chroma_rows(y0 + row, u.shape[0], sitings[1], rows_per_chroma)
+        _interpolate_chroma(u[a], u[b], share, sitings[0], first, chroma_width, mixed, chroma_u)
+        _interpolate_chroma(v[a], v[b], share, sitings[0], first, chroma_width, mixed, chroma_v)
         of_u, of_v = chroma_u[x0 % 2 : x0 % 2 + width], chroma_v[x0 % 2 : x0 % 2 + width]
         luma = y[y0 + row, x0 : x0 + width]
         for i in range(width):
@@ -115,16 +116,16 @@ def _convert(
 
 
 @njit(nogil=True, cache=True)
-def _rows_around(row: int, n: int, siting: tuple[int, int], rows_a_chroma: int) -> tuple[int, int, np.float32]:
+def _chroma_rows(row: int, n: int, siting: tuple[int, int], rows_per_chroma: int) -> tuple[int, int, np.float32]:
     """Return the two rows of chroma around a row of luma, and the second one's share."""
-    if rows_a_chroma == 1:
+    if rows_per_chroma == 1:
         return row, row, np.float32(0)
     j, is_odd = row // 2, row % 2
     return j, min(max(j + 2 * is_odd - 1, 0), n - 1), np.float32(siting[is_odd] / 4)
 
 
 @njit(nogil=True, cache=True)
-def _spread(
+def _interpolate_chroma(
     near: NDArray[np.uint8],
     far: NDArray[np.uint8],
     share: np.float32,
@@ -136,7 +137,7 @@ def _spread(
 ) -> None:
     """Interpolate the chroma of two rows, zero for grey, to every pixel from column 2 first on: chroma (2 n,).
 
-    mixed (n + 2,) is room to work in.
+    mixed (n + 2,) is a work buffer.
     """
     rest, grey = np.float32(1) - share, np.float32(128)
     n = len(mixed) - 2

@@ -1,4 +1,4 @@
-"""One camera's file: what it is, and its pictures in order of time, each decoded once."""
+"""One camera's file: its properties, and its images in order of time, each decoded once."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from av.filter import Graph
 from av.video.stream import VideoStream
 
 from airborne.errors import VideoError
-from airborne.video.pixels import Image, field_frame, rgb_from_frame
+from airborne.types import Image
+from airborne.video.pixels import field_frame, rgb_from_frame
 
-Fields = Literal["progressive", "top-first", "bottom-first"]
-FieldsWanted = Literal["progressive", "top-first", "bottom-first", "auto"]
+FieldOrder = Literal["progressive", "top-first", "bottom-first"]
+FieldOrderOption = Literal["progressive", "top-first", "bottom-first", "auto"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,32 +30,32 @@ class VideoSource:
 
     name: str  # the camera's name
     path: Path
-    fields: FieldsWanted = "progressive"
+    fields: FieldOrderOption = "progressive"
     offset_s: Fraction | float = 0  # added to this camera's times [s]
     drift_ppm: Fraction | float = 0  # by how much its clock is slow, in millionths
 
     def __post_init__(self) -> None:
-        if self.fields not in get_args(FieldsWanted):
-            known = ", ".join(get_args(FieldsWanted))
-            raise VideoError(f"{self.name}: fields = '{self.fields}' is not known; use one of: {known}")
+        if self.fields not in get_args(FieldOrderOption):
+            allowed = ", ".join(get_args(FieldOrderOption))
+            raise VideoError(f"{self.name}: fields = '{self.fields}' is unknown; use one of: {allowed}")
 
-    def on_clock(self, time_s: Fraction) -> Fraction:
-        """Return a time since the file's first picture on the trial's clock [s].
+    def trial_time(self, time_s: Fraction) -> Fraction:
+        """Convert a time since the file's first image to the trial's clock [s].
 
-        Offset and drift are taken as the decimal numbers that were written, not as their nearest binary ones.
+        Offset and drift are taken as the decimals written in the trial file, not as their nearest binary numbers.
         """
         return Fraction(str(self.offset_s)) + time_s * (1 + Fraction(str(self.drift_ppm)) / 1_000_000)
 
 
 @dataclass(frozen=True, slots=True)
 class VideoFacts:
-    """What a video file says of itself, and how it will be read."""
+    """What a video file states, and how it will be read."""
 
     size: tuple[int, int]  # (width, height) as shown, after any rotation [px]
     frame_rate: Fraction  # [1/s]; two fields count as one frame
-    duration_s: Fraction | None  # None where the file does not say
-    flagged: Fields  # what the stream's own flags say
-    fields: Fields  # how it is read
+    duration_s: Fraction | None  # None where the file does not state it
+    flagged_order: FieldOrder  # by the stream's own flags
+    fields: FieldOrder  # how it is read
     rotation_deg: int  # anticlockwise quarter turns that the file asks for
 
     @property
@@ -74,37 +75,37 @@ class VideoFacts:
         return (height, width) if self.rotation_deg % 180 else (width, height)
 
 
-class Picture(NamedTuple):
+class DecodedImage(NamedTuple):
     """One image, still in the file's own colours."""
 
-    time_s: Fraction  # since the file's first picture [s]
+    time_s: Fraction  # since the file's first image [s]
     frame: av.VideoFrame
     parity: int | None  # of the field; None for a whole frame
 
 
 def inspect(source: VideoSource) -> VideoFacts:
-    """Open a file, look at its first picture and close it again.
+    """Open a file, decode its first image and close it again.
 
-    Raises VideoError, in one line, where there is no readable video, or fields are asked of a rotated one.
+    Raises VideoError, in one line, where there is no readable video, or where a rotated one is to be read by fields.
     """
-    with _opened(source) as (container, stream):
-        frame = next((picture for _, picture in sound_frames(container, stream, size=None)), None)
+    with _open(source) as (container, stream):
+        frame = next((image for _, image in intact_frames(container, stream, size=None)), None)
         if frame is None:
             raise VideoError(f"{source.name}: no picture of {source.path} can be decoded; copy or convert it again")
         return facts_of(source, container, stream, frame)
 
 
 def facts_of(source: VideoSource, container: InputContainer, stream: VideoStream, frame: av.VideoFrame) -> VideoFacts:
-    """Return what an opened video says of itself, given its first picture.
+    """Return what an open video states, given its first image.
 
-    Raises VideoError where it states no frame rate, or fields are asked of a rotated one.
+    Raises VideoError where it states no frame rate, or where a rotated one is to be read by fields.
     """
     rate = stream.average_rate or stream.guessed_rate
     if not rate:
         raise VideoError(f"{source.name}: {source.path} states no frame rate; convert it to a constant rate")
     if frame.rotation % 90:
-        raise VideoError(f"{source.name}: {source.path} asks to be turned by {frame.rotation}°; only quarter turns")
-    flagged = _flagged_fields(stream, frame)
+        raise VideoError(f"{source.name}: {source.path} is tagged as rotated by {frame.rotation}°; only quarter turns")
+    flagged = _field_order(stream, frame)
     fields = flagged if source.fields == "auto" else source.fields
     if fields != "progressive" and frame.rotation:
         raise VideoError(f"{source.name}: {source.path} is both interlaced and rotated; remove its rotation tag")
@@ -113,35 +114,35 @@ def facts_of(source: VideoSource, container: InputContainer, stream: VideoStream
         size=(height, width) if frame.rotation % 180 else (width, height),
         frame_rate=_exact_rate(rate),
         duration_s=_duration_s(container, stream),
-        flagged=flagged,
+        flagged_order=flagged,
         fields=fields,
         rotation_deg=frame.rotation % 360,
     )
 
 
-def pictures(source: VideoSource, facts: VideoFacts) -> Generator[Picture]:
-    """Decode a file from its start; pictures come in order of time, fields at their own times.
+def decode(source: VideoSource, facts: VideoFacts) -> Generator[DecodedImage]:
+    """Decode a file from its start: images in order of time, fields at their own times.
 
-    Time 0 is the first picture's stamp. A stamp is exact: `pts * time_base`, put on the multiples of the frame's
-    duration where it lies within the stamp's own resolution of one. Damaged pictures are left out, and after a damaged
-    key frame all pictures up to the next one. Decoding runs on one thread, so that damage never depends on the machine.
+    Time 0 is the first image's stamp. A stamp is exact: `pts * time_base`, snapped to a multiple of the frame's
+    duration where it lies within the stamp's own resolution of one. Damaged images are left out, and after a damaged
+    key frame all images up to the next one. Decoding runs on one thread, so that damage never depends on the machine.
     """
-    with _opened(source) as (container, stream):
+    with _open(source) as (container, stream):
         tick = stream.time_base or Fraction(1, 1_000_000)
-        for n_ticks, frame in sound_frames(container, stream, size=facts.stored_size):
-            time_s = on_grid(n_ticks * tick, facts.frame_rate, tick)
+        for n_ticks, frame in intact_frames(container, stream, size=facts.stored_size):
+            time_s = snap_to_grid(n_ticks * tick, facts.frame_rate, tick)
             for j, parity in enumerate(facts.parities):
-                yield Picture(time_s + j / facts.image_rate, frame, parity)
+                yield DecodedImage(time_s + j / facts.image_rate, frame, parity)
 
 
-def rgb_from_picture(picture: Picture, facts: VideoFacts) -> Image:
-    """Convert a picture to sRGB (h, w, 3), a field with its own rows only."""
-    frame = picture.frame if picture.parity is None else field_frame(picture.frame, picture.parity)
+def rgb_from_decoded(image: DecodedImage, facts: VideoFacts) -> Image:
+    """Convert an image to sRGB (h, w, 3), a field with its own rows only."""
+    frame = image.frame if image.parity is None else field_frame(image.frame, image.parity)
     return rgb_from_frame(frame, short_side=min(facts.size), rotation_deg=facts.rotation_deg)
 
 
 @contextmanager
-def _opened(source: VideoSource) -> Iterator[tuple[InputContainer, VideoStream]]:
+def _open(source: VideoSource) -> Iterator[tuple[InputContainer, VideoStream]]:
     path = Path(source.path)
     if not path.exists():
         raise VideoError(f"{source.name}: video {path} not found; check its path")
@@ -166,14 +167,14 @@ def _opened(source: VideoSource) -> Iterator[tuple[InputContainer, VideoStream]]
         yield container, stream
 
 
-def sound_frames(
+def intact_frames(
     container: InputContainer, stream: VideoStream, *, size: tuple[int, int] | None
 ) -> Iterator[tuple[int, av.VideoFrame]]:
-    """Yield (ticks since the first picture, frame) for every frame that is whole, and of `size` if given."""
+    """Yield (ticks since the first image, frame) for every intact frame, of `size` if given."""
     first, last, step = None, None, 1
-    first_stamp = None  # of the packets, which tells when a damaged beginning would have been shown
+    first_stamp = None  # of the packets: when a damaged beginning would have been shown
     is_damaged = False
-    key_stamps: set[int] = set()  # key frames sent to the decoder that have not come out whole
+    key_stamps: set[int] = set()  # key frames sent to the decoder that have not come out intact
     for packet in _packets(container, stream):
         if packet.pts is not None and not packet.is_discard:
             first_stamp = packet.pts if first_stamp is None else min(first_stamp, packet.pts)
@@ -210,13 +211,13 @@ def _packets(container: InputContainer, stream: VideoStream) -> Iterator[av.Pack
 
 
 def _exact_rate(rate: Fraction) -> Fraction:
-    """Return n · 1000/1001 where a container could store that rate only nearly (Matroska has 19001/317 for 59.94)."""
+    """Return n · 1000/1001 where a container stores that rate only approximately (Matroska has 19001/317 for 59.94)."""
     broadcast = Fraction(round(rate * 1001 / 1000) * 1000, 1001)
     return broadcast if abs(broadcast - rate) < rate / 1_000_000 else rate
 
 
-def on_grid(time_s: Fraction, rate: Fraction, tick: Fraction) -> Fraction:
-    """Put a stamp on the multiples of the frame's duration where it lies within its own resolution of one."""
+def snap_to_grid(time_s: Fraction, rate: Fraction, tick: Fraction) -> Fraction:
+    """Snap a stamp to a multiple of the frame's duration where it lies within its own resolution of one."""
     nearest = round(time_s * rate) / rate
     return nearest if abs(nearest - time_s) <= tick else time_s
 
@@ -227,8 +228,8 @@ def _duration_s(container: InputContainer, stream: VideoStream) -> Fraction | No
     return Fraction(container.duration, av.time_base) if container.duration else None
 
 
-def _flagged_fields(stream: VideoStream, frame: av.VideoFrame) -> Fields:
-    """Ask the decoded frame for its field order; the codec's own note of it is wrong for some bottom-first files."""
+def _field_order(stream: VideoStream, frame: av.VideoFrame) -> FieldOrder:
+    """Read the field order off the decoded frame; the codec's own tag is wrong for some bottom-first files."""
     if not frame.interlaced_frame:
         return "progressive"
     graph = Graph()

@@ -7,23 +7,22 @@ from fractions import Fraction
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.cameras import Camera
+from airborne.types import Image
 
-Image = NDArray[np.uint8]
-Box = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]; the ends are outside
+PixelBox = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]; the ends are outside
 
 
-class Pixels(Protocol):
-    """A picture that is not turned into sRGB before somebody looks."""
+class LazyImage(Protocol):
+    """An image that is converted to sRGB only when it is read."""
 
     def whole(self) -> Image:
-        """Return the picture: (h, w, 3) sRGB."""
+        """Return the image: (h, w, 3) sRGB."""
         ...
 
-    def crop(self, box: Box) -> Image:
-        """Return the part of the picture in a box that lies in it."""
+    def crop(self, box: PixelBox) -> Image:
+        """Return the part of the image in a box that lies in it."""
         ...
 
 
@@ -31,22 +30,22 @@ class Pixels(Protocol):
 class View:
     """One image and the camera of exactly that image (a field's camera has half the rows)."""
 
-    camera: Camera  # without distortion: the image has been straightened where the lens bends
-    picture: Image | Pixels  # (h, w, 3) sRGB, or what gives it
-    late_s: float = 0.0  # how much later it was taken than the time of its `Frames` [s]
+    camera: Camera  # without distortion: the image is undistorted
+    image: Image | LazyImage  # (h, w, 3) sRGB, converted or not yet
+    delay_s: float = 0.0  # how much later it was taken than the time of its `Frames` [s]
 
     @property
     def rgb(self) -> Image:
-        """The whole picture: (h, w, 3) sRGB."""
-        return self.picture if isinstance(self.picture, np.ndarray) else self.picture.whole()
+        """The whole image: (h, w, 3) sRGB."""
+        return self.image if isinstance(self.image, np.ndarray) else self.image.whole()
 
-    def crop(self, box: Box) -> Image:
-        """Return the part (y1 - y0, x1 - x0, 3) of the picture in a box (x0, y0, x1, y1) [px] that lies in it.
+    def crop(self, box: PixelBox) -> Image:
+        """Return the part (y1 - y0, x1 - x0, 3) of the image in a box (x0, y0, x1, y1) [px] that lies in it.
 
-        Only that part is converted where the picture still is as it was decoded; within one grey level of `rgb`.
+        Of an image that is not converted yet, only that part is; within one grey level of `rgb`.
         """
         x0, y0, x1, y1 = box
-        return self.picture[y0:y1, x0:x1] if isinstance(self.picture, np.ndarray) else self.picture.crop(box)
+        return self.image[y0:y1, x0:x1] if isinstance(self.image, np.ndarray) else self.image.crop(box)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

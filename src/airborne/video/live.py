@@ -1,4 +1,4 @@
-"""Live pictures as a stream of `Frames`: the newest of each camera, matched in time; what comes too late is dropped."""
+"""Live images as a stream of `Frames`: the newest of each camera, matched in time; what arrives too late is dropped."""
 
 from __future__ import annotations
 
@@ -12,104 +12,104 @@ from threading import Condition, Event, Thread
 
 from airborne.cameras import Rig
 from airborne.errors import VideoError
-from airborne.video.decoding import Picture, VideoFacts, VideoSource, facts_of, on_grid, sound_frames
+from airborne.video.decoding import DecodedImage, VideoFacts, VideoSource, facts_of, intact_frames, snap_to_grid
 from airborne.video.frames import Frames, View
-from airborne.video.lazy import KnownColours, kept_view
+from airborne.video.lazy import ConversionCache, lazy_view
 from airborne.video.recording import check_sizes
-from airborne.video.sources import LOOK_S, Kind, kind_of, opened_live
-from airborne.video.undistortion import Lens, lens_of
+from airborne.video.sources import POLL_S, SourceKind, kind_of, open_live
+from airborne.video.undistortion import Undistortion, undistortion_of
 
-N_KEPT = 16  # newest pictures of a camera that wait to be matched
-PATIENCE_S, PATIENCE_PERIODS = 0.25, N_KEPT - 4  # how long a picture waits for those of the other cameras, at most
+_BUFFER_LENGTH = 16  # images of a camera that wait to be matched, the newest
+_LONGEST_WAIT_S, _LONGEST_WAIT_PERIODS = 0.25, _BUFFER_LENGTH - 4  # of an image, for those of the other cameras
 _MICRO = 1_000_000
 
 
 @dataclass(slots=True, eq=False)
-class _Arrived:
-    picture: Picture
-    at_s: float  # monotonic clock, when it was decoded
+class _Arrival:
+    image: DecodedImage
+    decoded_s: float  # when, on the monotonic clock
 
 
 @dataclass(slots=True, eq=False)
 class LiveCamera:
-    """One camera: a thread that decodes all that comes and keeps the newest pictures."""
+    """One camera: a thread that decodes whatever arrives and keeps the newest images."""
 
     source: VideoSource
-    kind: Kind
-    news: Condition  # shared by all cameras; guards everything below
-    go: Event  # set when pictures begin to count
+    kind: SourceKind
+    changed: Condition  # shared by all cameras; guards everything below
+    begin: Event  # set when images start to count
     stop: Event
     facts: VideoFacts | None = None
     error: VideoError | None = None
     has_ended: bool = False
-    is_away: bool = False  # it was waited for in vain, and has not come since
+    is_away: bool = False  # waited for in vain, and nothing has come since
     n_received: int = 0
     n_used: int = 0
-    waiting: deque[_Arrived] = field(default_factory=lambda: deque(maxlen=N_KEPT))
+    buffer: deque[_Arrival] = field(default_factory=lambda: deque(maxlen=_BUFFER_LENGTH))
 
     def run(self) -> None:
-        """Read to the end; what goes wrong is kept for who waits."""
+        """Read to the end; an error is stored for the waiting thread."""
         try:
             self._read()
         except VideoError as error:
-            with self.news:
+            with self.changed:
                 self.error = error
         finally:
-            with self.news:
+            with self.changed:
                 self.has_ended = True
-                self.news.notify_all()
+                self.changed.notify_all()
 
     def _read(self) -> None:
-        with opened_live(self.source, self.stop) as (container, stream):
+        with open_live(self.source, self.stop) as (container, stream):
             tick = stream.time_base or Fraction(1, _MICRO)
-            begun_s = 0.0
-            for n_ticks, frame in sound_frames(container, stream, size=None):
+            start_s = 0.0
+            for n_ticks, frame in intact_frames(container, stream, size=None):
                 if self.n_received == 1:
-                    while not self.go.wait(LOOK_S) and not self.stop.is_set():
+                    while not self.begin.wait(POLL_S) and not self.stop.is_set():
                         pass
-                    begun_s = time.monotonic()
+                    start_s = time.monotonic()
                 if self.stop.is_set():
                     return
                 facts = self.facts or facts_of(self.source, container, stream, frame)
-                stamp_s = on_grid(n_ticks * tick, facts.frame_rate, tick)
+                stamp_s = snap_to_grid(n_ticks * tick, facts.frame_rate, tick)
                 if self.kind == "file" and self.n_received:
-                    self.stop.wait(max(begun_s + float(stamp_s) - time.monotonic(), 0))
+                    self.stop.wait(max(start_s + float(stamp_s) - time.monotonic(), 0))
                 now_s = time.monotonic()
                 if self.kind == "device" and self.n_received:
-                    stamp_s = Fraction(round((now_s - begun_s) * _MICRO), _MICRO) + 1 / facts.frame_rate
-                self._keep(Picture(self.source.on_clock(stamp_s), frame, None), facts, now_s)
+                    stamp_s = Fraction(round((now_s - start_s) * _MICRO), _MICRO) + 1 / facts.frame_rate
+                self._keep(DecodedImage(self.source.trial_time(stamp_s), frame, None), facts, now_s)
         if self.facts is None and not self.stop.is_set():
             raise VideoError(f"{self.source.name}: no picture came from {self.source.path}; check what sends them")
 
-    def _keep(self, picture: Picture, facts: VideoFacts, now_s: float) -> None:
-        with self.news:
+    def _keep(self, image: DecodedImage, facts: VideoFacts, now_s: float) -> None:
+        with self.changed:
             self.facts = facts
             self.n_received += 1
             self.is_away = False
-            self.waiting.append(_Arrived(picture, now_s))
-            self.news.notify_all()
+            self.buffer.append(_Arrival(image, now_s))
+            self.changed.notify_all()
 
-    def nearest(self, time_s: Fraction, half_s: Fraction) -> _Arrived | None:
-        """Return the waiting picture nearest to a time, if within half a period."""
-        near = min(self.waiting, key=lambda arrived: abs(arrived.picture.time_s - time_s), default=None)
-        return near if near is not None and abs(near.picture.time_s - time_s) <= half_s else None
+    def nearest(self, time_s: Fraction, half_s: Fraction) -> _Arrival | None:
+        """Return the waiting image nearest to a time, if within half a period."""
+        near = min(self.buffer, key=lambda arrival: abs(arrival.image.time_s - time_s), default=None)
+        return near if near is not None and abs(near.image.time_s - time_s) <= half_s else None
 
-    def may_still_show(self, time_s: Fraction, half_s: Fraction) -> bool:
-        """Whether a picture of a time can still come."""
-        newest_s = self.waiting[-1].picture.time_s if self.waiting else None
+    def may_still_deliver(self, time_s: Fraction, half_s: Fraction) -> bool:
+        """Whether an image of a time can still arrive."""
+        newest_s = self.buffer[-1].image.time_s if self.buffer else None
         return not (self.has_ended or self.is_away) and (newest_s is None or newest_s < time_s - half_s)
 
 
 @dataclass(slots=True, eq=False)
 class LiveRecording:
-    """The pictures of several live cameras; iterating yields `Frames` of the newest time that can be had.
+    """The images of several live cameras; iterating yields `Frames` of the newest complete time.
 
-    The first camera is the clock while its pictures come, then the next one. Another camera gives the picture nearest
-    in time, if within half of the clock's period. Times are the stamps of files and pipes, counted from each one's
-    first picture, and for capture devices the moments at which pictures arrive. A time whose pictures are not all there
-    waits for a quarter of a second at most; then that camera is away until it comes back. Whatever is older than what
-    was yielded is dropped. After the first pictures the cameras are held until more is asked for, so that whoever
-    prepares at the first ones misses nothing of a file.
+    The first camera is the clock while it delivers, then the next one. Every other camera contributes its nearest
+    image, if within half of the clock's period. Times are the stamps of files and pipes, counted from each one's
+    first image, and for capture devices the moments of arrival. A time whose images are incomplete waits for a
+    quarter of a second at most; the missing camera then counts as away until it comes back. Whatever is older than
+    the last frames is dropped. After the first images the cameras pause until more is asked for, so that preparing
+    on the first ones misses nothing of a file.
     """
 
     cameras: Sequence[LiveCamera]
@@ -118,7 +118,7 @@ class LiveRecording:
     start: int = 0
     stop: int | None = None
     events: list[str] = field(default_factory=list)  # what the user should know, one line each
-    arrived_s: float = 0.0  # monotonic clock: when the newest picture of the last frames had been decoded
+    arrival_s: float = 0.0  # monotonic clock: when the newest image of the last frames was decoded
 
     @property
     def rate(self) -> Fraction:
@@ -127,12 +127,12 @@ class LiveRecording:
 
     @property
     def n_frames(self) -> None:
-        """How many frames to expect: nobody knows."""
+        """How many frames to expect: unknown."""
         return None
 
-    def dropped(self) -> list[dict[str, str | int]]:
-        """Return for each camera its name and how many pictures came, were used and were dropped."""
-        with self.cameras[0].news:
+    def image_counts(self) -> list[dict[str, str | int]]:
+        """Return each camera's name and how many images were received, used and dropped."""
+        with self.cameras[0].changed:
             return [
                 {
                     "name": camera.source.name,
@@ -144,67 +144,69 @@ class LiveRecording:
             ]
 
     def __iter__(self) -> Generator[Frames]:
-        lenses = [lens_of(camera) for camera in self.rig]
-        known = [KnownColours(min(self._facts(k).size)) for k in range(len(self.cameras))]
+        undistortions = [undistortion_of(camera) for camera in self.rig]
+        conversions = [ConversionCache(min(self._facts(k).size)) for k in range(len(self.cameras))]
         period_s = 1 / self._facts(0).image_rate
-        first_s, last_s, last_index = self.cameras[0].source.on_clock(Fraction(0)), None, -1
-        while (found := self._next(last_s, period_s)) is not None:
-            last_s, arrived = found
+        first_s, last_s, last_index = self.cameras[0].source.trial_time(Fraction(0)), None, -1
+        while (following := self._next(last_s, period_s)) is not None:
+            last_s, arrivals = following
             index = max(round((last_s - first_s) / period_s), last_index + 1)
             if self.stop is not None and index >= self.stop:
                 break
             if index >= self.start and (index - self.start) % self.every == 0:
                 last_index = index
-                self.arrived_s = max(each.at_s for each in arrived if each is not None)
-                views = (self._view(k, each, lenses[k], known[k]) for k, each in enumerate(arrived))
+                self.arrival_s = max(each.decoded_s for each in arrivals if each is not None)
+                views = (self._view(k, each, undistortions[k], conversions[k]) for k, each in enumerate(arrivals))
                 yield Frames(index, last_s, tuple(views))
-            self.cameras[0].go.set()
+            self.cameras[0].begin.set()
         self._note_ends()
 
     def _facts(self, k: int) -> VideoFacts:
         facts = self.cameras[k].facts
-        assert facts is not None, "known since it was connected"
+        assert facts is not None, "set once the camera is connected"
         return facts
 
-    def _view(self, k: int, arrived: _Arrived | None, lens: Lens, known: KnownColours) -> View | None:
-        return None if arrived is None else kept_view(arrived.picture, self._facts(k), lens, known)
+    def _view(
+        self, k: int, arrival: _Arrival | None, undistortion: Undistortion, conversions: ConversionCache
+    ) -> View | None:
+        return None if arrival is None else lazy_view(arrival.image, self._facts(k), undistortion, conversions)
 
-    def _next(self, last_s: Fraction | None, period_s: Fraction) -> tuple[Fraction, list[_Arrived | None]] | None:
-        """Wait for the newest time after `last_s` that can be had, and take its pictures; None at the end."""
+    def _next(self, last_s: Fraction | None, period_s: Fraction) -> tuple[Fraction, list[_Arrival | None]] | None:
+        """Wait for the newest complete time after `last_s`, and take its images; None at the end."""
         half_s = period_s / 2
-        news = self.cameras[0].news
-        with news:
+        changed = self.cameras[0].changed
+        with changed:
             while True:
                 fresh = [
-                    arrived
+                    arrival
                     for camera in self.cameras
-                    for arrived in reversed(camera.waiting)
-                    if last_s is None or arrived.picture.time_s > last_s + half_s
+                    for arrival in reversed(camera.buffer)
+                    if last_s is None or arrival.image.time_s > last_s + half_s
                 ]
-                for arrived in fresh:
-                    if self._is_ready(arrived, half_s):
-                        return arrived.picture.time_s, self._take(arrived.picture.time_s, half_s)
+                for arrival in fresh:
+                    if self._is_ready(arrival, half_s):
+                        return arrival.image.time_s, self._take(arrival.image.time_s, half_s)
                 if not fresh and all(camera.has_ended for camera in self.cameras):
                     return None
-                news.wait(float(half_s) if fresh else LOOK_S)
+                changed.wait(float(half_s) if fresh else POLL_S)
 
-    def _is_ready(self, arrived: _Arrived, half_s: Fraction) -> bool:
-        """Say whether no camera need be waited for; one that was waited for long enough counts as away."""
-        late = [camera for camera in self.cameras if camera.may_still_show(arrived.picture.time_s, half_s)]
-        if late and time.monotonic() - arrived.at_s > min(PATIENCE_S, PATIENCE_PERIODS * 2 * half_s):
+    def _is_ready(self, arrival: _Arrival, half_s: Fraction) -> bool:
+        """Say whether no camera has to be waited for; one that is too late counts as away."""
+        late = [camera for camera in self.cameras if camera.may_still_deliver(arrival.image.time_s, half_s)]
+        if late and time.monotonic() - arrival.decoded_s > min(_LONGEST_WAIT_S, _LONGEST_WAIT_PERIODS * 2 * half_s):
             for camera in late:
                 camera.is_away = True
             return True
         return not late
 
-    def _take(self, time_s: Fraction, half_s: Fraction) -> list[_Arrived | None]:
-        """Take every camera's picture of a time out of what waits, and drop what is older."""
-        taken = [camera.nearest(time_s, half_s) for camera in self.cameras]
-        for camera, arrived in zip(self.cameras, taken, strict=True):
-            camera.n_used += arrived is not None
-            while camera.waiting and camera.waiting[0].picture.time_s <= time_s + half_s:
-                camera.waiting.popleft()
-        return taken
+    def _take(self, time_s: Fraction, half_s: Fraction) -> list[_Arrival | None]:
+        """Take every camera's image of a time out of its buffer, and drop what is older."""
+        nearest = [camera.nearest(time_s, half_s) for camera in self.cameras]
+        for camera, arrival in zip(self.cameras, nearest, strict=True):
+            camera.n_used += arrival is not None
+            while camera.buffer and camera.buffer[0].image.time_s <= time_s + half_s:
+                camera.buffer.popleft()
+        return nearest
 
     def _note_ends(self) -> None:
         for camera in self.cameras:
@@ -213,13 +215,13 @@ class LiveRecording:
 
 
 @contextmanager
-def connected(
-    sources: Sequence[VideoSource], waiting: Callable[[], None] = lambda: None
+def connect(
+    sources: Sequence[VideoSource], on_wait: Callable[[], None] = lambda: None
 ) -> Iterator[tuple[LiveCamera, ...]]:
-    """Connect to live sources and wait for the first picture of each; `waiting` is called now and then meanwhile.
+    """Connect to live sources and wait for the first image of each; `on_wait` is called now and then meanwhile.
 
-    Raises VideoError where a source is nothing that gives pictures, two read from one pipe or device, or fields
-    are asked for.
+    Raises VideoError where a source gives no images, where two read from one pipe or device, or where one is to be
+    read by fields.
     """
     interlaced = [source.name for source in sources if source.fields not in ("progressive", "auto")]
     if interlaced:
@@ -228,19 +230,19 @@ def connected(
     twice = [path for path in paths if paths.count(path) > 1 and kind_of(sources[paths.index(path)]) != "file"]
     if twice:
         raise VideoError(f"two cameras read from {twice[0]}; give each a pipe or device of its own")
-    news, go, stop = Condition(), Event(), Event()
-    cameras = tuple(LiveCamera(source, kind_of(source), news, go, stop) for source in sources)
+    changed, begin, stop = Condition(), Event(), Event()
+    cameras = tuple(LiveCamera(source, kind_of(source), changed, begin, stop) for source in sources)
     threads = [Thread(target=camera.run, name=f"live {camera.source.name}", daemon=True) for camera in cameras]
     try:
         for thread in threads:
             thread.start()
-        with news:
+        with changed:
             while any(camera.facts is None for camera in cameras):
                 failed = next((camera.error for camera in cameras if camera.error is not None), None)
                 if failed is not None:
                     raise failed
-                news.wait(LOOK_S)
-                waiting()
+                changed.wait(POLL_S)
+                on_wait()
         yield cameras
     finally:
         stop.set()

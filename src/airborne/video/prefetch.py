@@ -1,4 +1,4 @@
-"""Work that runs ahead of its use, in a thread of its own."""
+"""Prefetching: items prepared ahead of their use, in a thread of their own."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
-N_AHEAD = 4  # items kept ready: enough to hide the time of one, few enough to stay small
+_N_AHEAD = 4  # items ready: enough to hide the time of one, few enough to stay small
 
 
-def ahead(items: Generator[T]) -> Generator[T]:
+def read_ahead(items: Generator[T]) -> Generator[T]:
     """Yield the items unchanged and in order, while a thread prepares the next few.
 
     An error is raised where its item would have come. Closing this generator ends the thread and closes `items`.
@@ -20,7 +20,7 @@ def ahead(items: Generator[T]) -> Generator[T]:
     end = object()
     thread = ThreadPoolExecutor(1)
     try:
-        waiting = deque(thread.submit(next, items, end) for _ in range(N_AHEAD))
+        waiting = deque(thread.submit(next, items, end) for _ in range(_N_AHEAD))
         while (item := waiting.popleft().result()) is not end:
             waiting.append(thread.submit(next, items, end))
             yield item  # pyright: ignore[reportReturnType]

@@ -7,17 +7,17 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from itertools import repeat
+from functools import partial
 from typing import Literal, get_args
 
 from airborne.cameras import Camera, Rig
 from airborne.errors import VideoError
-from airborne.video.decoding import Picture, VideoFacts, VideoSource, inspect, pictures, rgb_from_picture
+from airborne.video.decoding import DecodedImage, VideoFacts, VideoSource, decode, inspect, rgb_from_decoded
 from airborne.video.fields import fill_rows
 from airborne.video.frames import Frames, View
-from airborne.video.lazy import KnownColours, kept_view
-from airborne.video.prefetch import ahead
-from airborne.video.undistortion import Lens, lens_of
+from airborne.video.lazy import ConversionCache, lazy_view
+from airborne.video.prefetch import read_ahead
+from airborne.video.undistortion import Undistortion, undistortion_of
 
 FieldsAs = Literal["rows", "interpolated"]
 
@@ -27,8 +27,8 @@ class Recording:
     """The videos of one trial; iterating decodes them from the start and yields `Frames`.
 
     The first camera is the clock: index and time are those of its frames (or fields), continued at its rate over
-    pictures that it lost and past its end, until every camera has ended. Another camera gives the picture nearest in
-    time, if within half of the clock's period, else None; its `View` says how late it was taken.
+    images that it lost and past its end, until every camera has ended. Another camera gives the image nearest in
+    time, if within half of the clock's period, else None; its `View` states the delay.
     """
 
     sources: tuple[VideoSource, ...]  # in the rig's order
@@ -48,71 +48,72 @@ class Recording:
 
     @property
     def n_frames(self) -> int | None:
-        """How many `Frames` to expect by what the files promise; None where the clock's file does not say."""
-        ends = [s.on_clock(f.duration_s) for s, f in zip(self.sources, self.facts, strict=True) if f.duration_s]
+        """How many `Frames` to expect by the files' stated durations; None where the clock's file states none."""
+        ends = [s.trial_time(f.duration_s) for s, f in zip(self.sources, self.facts, strict=True) if f.duration_s]
         if self.facts[0].duration_s is None:
             return None
-        n = round((max(ends) - self.sources[0].on_clock(Fraction(0))) * self.facts[0].image_rate)
+        n = round((max(ends) - self.sources[0].trial_time(Fraction(0))) * self.facts[0].image_rate)
         return len(range(self.start, n if self.stop is None else min(n, self.stop), self.every))
 
     def __iter__(self) -> Generator[Frames]:
         period_s = 1 / self.facts[0].image_rate
-        lenses = [self._lenses(camera, facts) for camera, facts in zip(self.rig, self.facts, strict=True)]
+        undistortions = [self._undistortions(camera, facts) for camera, facts in zip(self.rig, self.facts, strict=True)]
         with ExitStack() as open_files:
             cursors = [
-                _Cursor(open_files.enter_context(closing(self._timed(source, facts))), half_s=period_s / 2)
+                _Cursor(open_files.enter_context(closing(self._decode_on_clock(source, facts))), half_s=period_s / 2)
                 for source, facts in zip(self.sources, self.facts, strict=True)
             ]
             # nothing is converted yet in a lazy recording: threads would only wait for a core
             parallel = map if self.is_lazy else open_files.enter_context(ThreadPoolExecutor(len(cursors))).map
-            known = [KnownColours(min(facts.size)) for facts in self.facts]
-            times = _clock(cursors, start_s=self.sources[0].on_clock(Fraction(0)), period_s=period_s)
+            conversions = [ConversionCache(min(facts.size)) for facts in self.facts]
+            times = _clock(cursors, start_s=self.sources[0].trial_time(Fraction(0)), period_s=period_s)
             for index, time_s in enumerate(times):
                 if self.stop is not None and index >= self.stop:
                     return
-                seen = [cursor.picture_at(time_s) for cursor in cursors]
+                images = [cursor.image_at(time_s) for cursor in cursors]
                 if index >= self.start and (index - self.start) % self.every == 0:
-                    views = parallel(self._view, seen, repeat(time_s), self.facts, lenses, known)
+                    views = parallel(partial(self._view, time_s=time_s), images, self.facts, undistortions, conversions)
                     yield Frames(index, time_s, tuple(views))
 
-    def _lenses(self, camera: Camera, facts: VideoFacts) -> dict[int | None, Lens]:
-        """Return the lens of each kind of image that the file gives: whole (None), top field (0), bottom field (1)."""
+    def _undistortions(self, camera: Camera, facts: VideoFacts) -> dict[int | None, Undistortion]:
+        """Return the undistortion of each kind of image in the file: whole (None), top field (0), bottom field (1)."""
         is_whole = facts.fields == "progressive" or self.fields_as == "interpolated"
-        return {parity: lens_of(camera if is_whole else camera.field(parity or 0)) for parity in facts.parities}
+        return {parity: undistortion_of(camera if is_whole else camera.field(parity or 0)) for parity in facts.parities}
 
     def _view(
         self,
-        picture: Picture | None,
-        time_s: Fraction,
+        image: DecodedImage | None,
         facts: VideoFacts,
-        lenses: dict[int | None, Lens],
-        known: KnownColours,
+        undistortions: dict[int | None, Undistortion],
+        conversions: ConversionCache,
+        *,
+        time_s: Fraction,
     ) -> View | None:
-        if picture is None:
+        if image is None:
             return None
-        late_s = float(picture.time_s - time_s)
+        delay_s = float(image.time_s - time_s)
         if self.is_lazy:
-            return replace(kept_view(picture, facts, lenses[picture.parity], known), late_s=late_s)
-        rgb = rgb_from_picture(picture, facts)
-        if picture.parity is not None and self.fields_as == "interpolated":
-            rgb = fill_rows(rgb, picture.parity, facts.size[1])
-        return replace(lenses[picture.parity].view(rgb), late_s=late_s)
+            return replace(lazy_view(image, facts, undistortions[image.parity], conversions), delay_s=delay_s)
+        rgb = rgb_from_decoded(image, facts)
+        if image.parity is not None and self.fields_as == "interpolated":
+            rgb = fill_rows(rgb, image.parity, facts.size[1])
+        return replace(undistortions[image.parity].view(rgb), delay_s=delay_s)
 
-    def _timed(self, source: VideoSource, facts: VideoFacts) -> Generator[Picture]:
-        """Yield a camera's pictures on the trial's clock, and note every gap and an early end."""
+    def _decode_on_clock(self, source: VideoSource, facts: VideoFacts) -> Generator[DecodedImage]:
+        """Yield a camera's images on the trial's clock, and note every gap and an early end."""
         period_s = 1 / facts.image_rate
-        expected_s = source.on_clock(Fraction(0))
-        with closing(ahead(pictures(source, facts))) as stream:
-            for picture in stream:
-                time_s = source.on_clock(picture.time_s)
+        expected_s = source.trial_time(Fraction(0))
+        with closing(read_ahead(decode(source, facts))) as stream:
+            for image in stream:
+                time_s = source.trial_time(image.time_s)
                 if time_s > expected_s + period_s / 2:
                     self._note(
                         f"{source.name}: no picture from {float(expected_s):.3f} s to {float(time_s):.3f} s (damaged "
                         "or missing); pictures after it may carry damage up to the next key frame"
                     )
-                yield picture._replace(time_s=time_s)
+                yield image._replace(time_s=time_s)
                 expected_s = time_s + period_s
-        end_s = source.on_clock(facts.duration_s or Fraction(0))
+        end_s = source.trial_time(facts.duration_s or Fraction(0))
         if facts.duration_s and expected_s < end_s - period_s / 2:
             self._note(
                 f"{source.name}: the pictures end at {float(expected_s):.3f} s; the file promises {float(end_s):.3f} s"
@@ -134,44 +135,44 @@ def open_recording(
     lazy: bool = False,
     facts: Sequence[VideoFacts] | None = None,
 ) -> Recording:
-    """Check the cameras' videos against the calibration and return their `Recording`; only first pictures are decoded.
+    """Check the cameras' videos against the calibration and return their `Recording`; only first images are decoded.
 
     Each camera of the rig has one source of the same name; the rig's first camera is the clock. `fields_as` says what
     becomes of the fields of interlaced files: "rows" keeps the field's own rows with a camera of that half-height
     image; "interpolated" keeps the full height and fills the missing rows from their neighbours (rigid-body tracking
     paper), with the camera unchanged. Of the clock's images `start, start + every, ...` below `stop` are read. With
-    `lazy` a picture is converted only where somebody looks: `View.crop`; it goes with "rows". `facts` are what
-    `inspect` found in the sources, where it has been asked before.
+    `lazy` only the parts of an image that are read (`View.crop`) are converted; it needs "rows". `facts` are what
+    `inspect` returned for the sources, where it has been called before.
 
     Raises VideoError where a file cannot be read, a size differs from the calibration's, or names do not match.
     """
     if fields_as not in get_args(FieldsAs):
-        raise VideoError(f"fields_as = '{fields_as}' is not known; use one of: {', '.join(get_args(FieldsAs))}")
+        raise VideoError(f"fields_as = '{fields_as}' is unknown; use one of: {', '.join(get_args(FieldsAs))}")
     if every < 1 or start < 0 or (stop is not None and stop <= start):
         raise VideoError(f"every = {every}, start = {start}, stop = {stop}; expected every >= 1 and 0 <= start < stop")
     if lazy and fields_as != "rows":
         raise VideoError('a lazy recording reads fields as their own rows; use fields_as = "rows"')
     by_name = {source.name: k for k, source in enumerate(sources)}
     if len(by_name) != len(sources) or set(by_name) != set(rig.names):
-        given = ", ".join(source.name for source in sources) or "none"
+        names = ", ".join(source.name for source in sources) or "none"
         raise VideoError(
-            f"videos are given for {given}; the calibration has {', '.join(rig.names)}; give each one video"
+            f"videos are given for {names}; the calibration has {', '.join(rig.names)}; give each one video"
         )
     ordered = tuple(sources[by_name[name]] for name in rig.names)
-    found = tuple(facts[by_name[name]] if facts else inspect(sources[by_name[name]]) for name in rig.names)
-    check_sizes(ordered, rig, found)
-    recording = Recording(ordered, found, rig, fields_as, every, start, stop, lazy)
-    recording.events.extend(_notes(ordered, found))
+    ordered_facts = tuple(facts[by_name[name]] if facts else inspect(sources[by_name[name]]) for name in rig.names)
+    check_sizes(ordered, rig, ordered_facts)
+    recording = Recording(ordered, ordered_facts, rig, fields_as, every, start, stop, lazy)
+    recording.events.extend(_notes(ordered, ordered_facts))
     return recording
 
 
 def check_sizes(sources: Sequence[VideoSource], rig: Rig, facts: Sequence[VideoFacts]) -> None:
-    """Raise VideoError where a video's pictures have another size than its camera's in the calibration."""
+    """Raise VideoError where the size of a video's images differs from its camera's in the calibration."""
     for source, camera, fact in zip(sources, rig, facts, strict=True):
         if fact.size != tuple(camera.size):
-            found, expected = ("×".join(map(str, size)) for size in (fact.size, camera.size))
+            actual, expected = ("×".join(map(str, size)) for size in (fact.size, camera.size))
             raise VideoError(
-                f"{source.name}: {source.path} is {found} px, but the calibration's camera is {expected} px; "
+                f"{source.name}: {source.path} is {actual} px, but the calibration's camera is {expected} px; "
                 "give the video that was calibrated, or the calibration of this size"
             )
 
@@ -179,34 +180,34 @@ def check_sizes(sources: Sequence[VideoSource], rig: Rig, facts: Sequence[VideoF
 def _notes(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> Iterator[str]:
     for source, fact in zip(sources, facts, strict=True):
         if source.fields == "auto":
-            yield f"{source.name}: the file's flags say {fact.flagged}"
-        elif fact.flagged != fact.fields:
-            yield f"{source.name}: read as {fact.fields}, though the file's flags say {fact.flagged}"
+            yield f"{source.name}: the file's flags say {fact.flagged_order}"
+        elif fact.flagged_order != fact.fields:
+            yield f"{source.name}: read as {fact.fields}, though the file's flags say {fact.flagged_order}"
 
 
 class _Cursor:
-    """One camera's pictures, passed through once, with the one ahead known."""
+    """One camera's images, read once in order, with the next one always at hand."""
 
-    def __init__(self, pictures: Iterator[Picture], *, half_s: Fraction) -> None:
-        self._pictures = pictures
+    def __init__(self, images: Iterator[DecodedImage], *, half_s: Fraction) -> None:
+        self._pictures = images
         self._half_s = half_s  # half of the clock's period
-        self._current: Picture | None = None
-        self._next = next(pictures, None)
+        self._current: DecodedImage | None = None
+        self._next = next(images, None)
 
-    def picture_at(self, time_s: Fraction) -> Picture | None:
-        """Return the picture nearest to a time, if within half a period; times never go back, a tie takes the later."""
+    def image_at(self, time_s: Fraction) -> DecodedImage | None:
+        """Return the image nearest to a time, if within half a period; times never go back, a tie takes the later."""
         self._advance(time_s)
         if self._current and -self._half_s < self._current.time_s - time_s <= self._half_s:
             return self._current
         return None
 
     def time_after(self, time_s: Fraction) -> Fraction | None:
-        """Return the time of the first picture after a time that was asked for; None at the end."""
-        known = (picture for picture in (self._current, self._next) if picture)
-        return next((picture.time_s for picture in known if picture.time_s > time_s), None)
+        """Return the time of the first image after a time that was asked for; None at the end."""
+        images = (image for image in (self._current, self._next) if image)
+        return next((image.time_s for image in images if image.time_s > time_s), None)
 
     def is_over(self, time_s: Fraction) -> bool:
-        """Whether no picture is left for a time or any later one; times never go back."""
+        """Whether no image is left for a time or any later one; times never go back."""
         self._advance(time_s)
         return self._next is None and (self._current is None or self._current.time_s <= time_s - self._half_s)
 

@@ -1,4 +1,4 @@
-"""Opening live pictures: pipes, capture devices, and files played at their own speed."""
+"""Live sources: pipes, capture devices, and files played at their own speed."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from av.video.stream import VideoStream
 from airborne.errors import VideoError
 from airborne.video.decoding import VideoSource
 
-Kind = Literal["file", "pipe", "device"]
+SourceKind = Literal["file", "pipe", "device"]
 
-STDIN = "-"
-LOOK_S = 0.1  # how often a waiting reader looks whether it should stop
-_PROBE = {"probesize": "1000000", "analyzeduration": "500000"}  # begin soon
+_STDIN = "-"
+POLL_S = 0.1  # how often a waiting reader checks whether it should stop
+_PROBE = {"probesize": "1000000", "analyzeduration": "500000"}  # start early
 
 
-def kind_of(source: VideoSource) -> Kind:
-    """Say what a live source is; raises VideoError where there is nothing."""
+def kind_of(source: VideoSource) -> SourceKind:
+    """Return the kind of a live source; raises VideoError where there is none."""
     path = Path(source.path)
-    if path.name == STDIN or path.is_fifo():
+    if path.name == _STDIN or path.is_fifo():
         return "pipe"
     if path.is_char_device():
         return "device"
@@ -39,10 +39,10 @@ def kind_of(source: VideoSource) -> Kind:
 
 
 @contextmanager
-def opened_live(source: VideoSource, stop: Event) -> Iterator[tuple[InputContainer, VideoStream]]:
+def open_live(source: VideoSource, stop: Event) -> Iterator[tuple[InputContainer, VideoStream]]:
     """Open a live source and yield its container and video stream; reading ends early once `stop` is set.
 
-    Raises VideoError where there are no pictures.
+    Raises VideoError where there are no images.
     """
     kind = kind_of(source)
     pipe = None
@@ -57,9 +57,9 @@ def opened_live(source: VideoSource, stop: Event) -> Iterator[tuple[InputContain
     except (FFmpegError, OSError, ValueError) as error:
         if pipe is not None:
             pipe.close()
-        said = getattr(error, "strerror", None) or error
+        reason = getattr(error, "strerror", None) or error
         raise VideoError(
-            f"{source.name}: no pictures come from {source.path} ({said}); check what sends them"
+            f"{source.name}: no pictures come from {source.path} ({reason}); check what sends them"
         ) from error
     try:
         with container:
@@ -74,10 +74,10 @@ def opened_live(source: VideoSource, stop: Event) -> Iterator[tuple[InputContain
 
 
 class _Pipe:
-    """A pipe, or the standard input, that FFmpeg reads from and that can be left at any time."""
+    """A pipe, or the standard input, that FFmpeg reads and that can be abandoned at any time."""
 
     def __init__(self, source: VideoSource, stop: Event) -> None:
-        is_stdin = Path(source.path).name == STDIN
+        is_stdin = Path(source.path).name == _STDIN
         self._stop = stop
         self._file = sys.stdin.fileno() if is_stdin else os.open(source.path, os.O_RDONLY | os.O_NONBLOCK)
         self._is_own = not is_stdin
@@ -85,14 +85,14 @@ class _Pipe:
         self._poll.register(self._file, select.POLLIN | select.POLLHUP)
 
     def read(self, n: int) -> bytes:
-        """Wait for up to n bytes; none at the end, and once told to stop."""
+        """Wait for up to n bytes; none at the end, and once `stop` is set."""
         while not self._stop.is_set():
-            if self._poll.poll(LOOK_S * 1000):
+            if self._poll.poll(POLL_S * 1000):
                 return os.read(self._file, n)
         return b""
 
     def close(self) -> None:
-        """Let the writer know that nobody reads any more."""
+        """Close our end, so that the writer notices."""
         if self._is_own:
             os.close(self._file)
             self._is_own = False

@@ -15,27 +15,28 @@ from av.filter import Graph
 from av.video.reformatter import ColorRange, Colorspace
 
 from airborne.errors import VideoError
-from airborne.video.decoding import Fields
-from airborne.video.pixels import Image, frame_from_rgb, matrix_for, woven_frame
+from airborne.types import Image
+from airborne.video.decoding import FieldOrder
+from airborne.video.pixels import frame_from_rgb, matrix_for, weave_frame
 
-N_THREADS = 4  # fixed, for the encoder's output depends on it
-FRAGMENTED = {"movflags": "frag_keyframe+empty_moov+default_base_moof", "flush_packets": "1"}
-BT709, SMPTE170M = 1, 6  # colour matrix tags
-CODED_FIELD_ORDER = {"top-first": 2, "bottom-first": 3}  # FFmpeg's AV_FIELD_TT, AV_FIELD_BB
+_N_THREADS = 4  # fixed: the encoder's output depends on it
+_FRAGMENTED = {"movflags": "frag_keyframe+empty_moov+default_base_moof", "flush_packets": "1"}
+_BT709, _SMPTE170M = 1, 6  # colour matrix tags
+_CODED_FIELD_ORDER = {"top-first": 2, "bottom-first": 3}  # FFmpeg's AV_FIELD_TT, AV_FIELD_BB
 
 
 class VideoWriter:
-    """Writes an MP4 (H.264, 4:2:0) picture by picture; use it in a `with` block.
+    """Writes an MP4 (H.264, 4:2:0) image by image, in a `with` block.
 
-    The file is written in fragments of about a second, so that what a killed run left can be played. An odd width or
+    The file is written in fragments of about a second, so that what a killed run wrote can be played. An odd width or
     height is made even by repeating the last column or row. A file of `fields` "top-first" or "bottom-first" takes
-    woven pictures (see `weave`), is encoded field by field and flagged so; its height is a multiple of four.
+    woven images (see `weave`), is encoded field by field and flagged so; its height is a multiple of four.
     """
 
     def __init__(
-        self, path: Path, *, size: tuple[int, int], rate: Fraction, fields: Fields = "progressive", crf: int = 18
+        self, path: Path, *, size: tuple[int, int], rate: Fraction, fields: FieldOrder = "progressive", crf: int = 18
     ) -> None:
-        """Start a file of pictures of `size` (width, height) [px] at `rate` [1/s]; `crf` 0 is lossless, 51 worst.
+        """Start a file of images of `size` (width, height) [px] at `rate` [1/s]; `crf` 0 is lossless, 51 worst.
 
         Raises VideoError where the file cannot be written or the height does not suit the fields.
         """
@@ -46,19 +47,19 @@ class VideoWriter:
             )
         self.path, self.size = path, size
         self._time_base = 1 / Fraction(rate)
-        self._container = av.open(path, "w", format="mp4", options=FRAGMENTED)
+        self._container = av.open(path, "w", format="mp4", options=_FRAGMENTED)
         self._stream = self._container.add_stream("libx264", rate=rate, options={"crf": str(crf), "bf": "0"})
         codec = self._stream.codec_context
         codec.width, codec.height, codec.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
         codec.gop_size = round(rate) or 1
-        codec.thread_count = N_THREADS
-        codec.colorspace = BT709 if matrix_for(min(size)) == Colorspace.ITU709 else SMPTE170M
+        codec.thread_count = _N_THREADS
+        codec.colorspace = _BT709 if matrix_for(min(size)) == Colorspace.ITU709 else _SMPTE170M
         codec.color_range = ColorRange.MPEG
-        self._flagged: Graph | None = None
+        self._field_filter: Graph | None = None
         if fields != "progressive":
             codec.flags |= Flags.interlaced_dct | Flags.interlaced_me
-            codec.field_order = CODED_FIELD_ORDER[fields]
-            self._flagged = _flagging_graph(codec, "tff" if fields == "top-first" else "bff", self._time_base)
+            codec.field_order = _CODED_FIELD_ORDER[fields]
+            self._field_filter = _field_filter_graph(codec, "tff" if fields == "top-first" else "bff", self._time_base)
         try:
             self._container.start_encoding()
         except (FFmpegError, OSError) as error:
@@ -66,22 +67,22 @@ class VideoWriter:
         self._n_written = 0
 
     def write(self, rgb: Image) -> None:
-        """Append a picture (h, w, 3) sRGB; raises VideoError where its size is not the file's."""
+        """Append an image (h, w, 3) sRGB; raises VideoError where its size is not the file's."""
         width, height = self.size
         if rgb.shape != (height, width, 3):
-            found = "×".join(map(str, rgb.shape))
-            raise VideoError(f"{self.path}: a picture of {found} was given, expected {height}×{width}×3")
+            actual = "×".join(map(str, rgb.shape))
+            raise VideoError(f"{self.path}: a picture of {actual} was given, expected {height}×{width}×3")
         even = np.pad(rgb, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
         side = min(self.size)
-        if self._flagged is None:
+        if self._field_filter is None:
             frame = frame_from_rgb(even, short_side=side)
         else:
-            frame = woven_frame(*(frame_from_rgb(even[parity::2], short_side=side) for parity in (0, 1)))
+            frame = weave_frame(*(frame_from_rgb(even[parity::2], short_side=side) for parity in (0, 1)))
         frame.pts, frame.time_base = self._n_written, self._time_base
         self._n_written += 1
-        if self._flagged is not None:
-            self._flagged.vpush(frame)
-            frame = self._flagged.vpull()
+        if self._field_filter is not None:
+            self._field_filter.vpush(frame)
+            frame = self._field_filter.vpull()
         self._container.mux(self._stream.encode(frame))
 
     def __enter__(self) -> Self:
@@ -95,8 +96,8 @@ class VideoWriter:
         self._container.close()
 
 
-def _flagging_graph(codec: av.VideoCodecContext, order: str, time_base: Fraction) -> Graph:
-    """Return a filter that marks frames as interlaced, which PyAV's frames cannot say of themselves."""
+def _field_filter_graph(codec: av.VideoCodecContext, order: str, time_base: Fraction) -> Graph:
+    """Return a filter that flags frames as interlaced; PyAV cannot set this flag."""
     graph = Graph()
     source = graph.add_buffer(width=codec.width, height=codec.height, format=codec.format, time_base=time_base)
     graph.link_nodes(source, graph.add("setfield", order), graph.add("buffersink")).configure()

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.bundle import HELD, Freedom, Lags, Lengths, Prior, adjust
+from airborne.calibration.bundle import ALL_FIXED, FreeParameters, ObservationLags, Lengths, CameraPrior, adjust
 from airborne.calibration.initial.chaining import board_source
-from airborne.calibration.intrinsics.physical import MODELS, Pinhole, fit_pinhole
+from airborne.calibration.intrinsics.physical import PINHOLE_MODELS, Pinhole, fit_pinhole
 from airborne.cameras import Rig
 from airborne.errors import CalibrationError
 from tests.support.rigs import BROWN, FISHEYE, MIDDLE, apart, boards, ring, seen_board, seen_points, shaken
 from tests.support.tolerances import SOLVED
 
-ALL = Freedom(principal_point=True, n_terms=5)
+ALL = FreeParameters(principal_point=True, n_terms=5)
 
 
 def board_of(rng, rig, n=40, noise_px=0.3):
@@ -28,9 +28,9 @@ def test_without_noise_the_rig_is_found(lens, distortion, n_terms):
     rng = np.random.default_rng(0)
     rig = ring(4, distortion=distortion, lens=lens)
     source = board_of(rng, rig, n=60, noise_px=0.0)
-    found = adjust(shaken(rng, rig), [source], Freedom(principal_point=True, n_terms=n_terms))
-    assert found.is_settled
-    assert found.is_frame_free
+    found = adjust(shaken(rng, rig), [source], FreeParameters(principal_point=True, n_terms=n_terms))
+    assert found.has_converged
+    assert found.is_gauge_free
     assert found.rms_px() < 1e-3
     np.testing.assert_allclose(apart(found.rig), apart(rig), atol=SOLVED)
     for camera, true in zip(found.rig, rig, strict=True):
@@ -42,9 +42,9 @@ def test_one_lens_is_that_of_opencv():
     rig = Rig((ring(1).cameras[0],))
     places = boards(rng, 60)
     views = seen_board(rng, rig, places)
-    own = views.of(0)
-    corners = [views.board.corners[s.corner].astype(np.float32) for s in own.sightings[0]]
-    px = [s.px.astype(np.float32)[:, None] for s in own.sightings[0]]
+    own = views.of_camera(0)
+    corners = [views.board.corners[s.corner].astype(np.float32) for s in own.detections[0]]
+    px = [s.px.astype(np.float32)[:, None] for s in own.detections[0]]
     flags = cv2.CALIB_FIX_ASPECT_RATIO | cv2.CALIB_USE_INTRINSIC_GUESS
     K = rig.cameras[0].K.copy()
     rms, K, distortion, *_ = cv2.calibrateCamera(corners, px, rig.cameras[0].size, K, np.zeros(5), flags=flags)
@@ -63,9 +63,9 @@ def test_two_cameras_are_those_of_opencv():
     rig = Rig((first, second))
     places = boards(rng, 60)
     views = seen_board(rng, rig, places)
-    both = [m for m in range(60) if len(views.sightings[0][m].corner) == len(views.sightings[1][m].corner) == 30]
-    views = views.only(both)
-    px = [[s.px.astype(np.float32)[:, None] for s in row] for row in views.sightings]
+    both = [m for m in range(60) if len(views.detections[0][m].corner) == len(views.detections[1][m].corner) == 30]
+    views = views.select_moments(both)
+    px = [[s.px.astype(np.float32)[:, None] for s in row] for row in views.detections]
     corners = [views.board.corners.astype(np.float32)] * len(both)
     lenses = [(c.K.copy(), c.distortion.copy()) for c in rig]
     *_, R, t, _, _ = cv2.stereoCalibrate(
@@ -74,7 +74,7 @@ def test_two_cameras_are_those_of_opencv():
     found = adjust(
         rig,
         [board_source(views, places[both])],
-        {"cam0": HELD, "beside": Freedom(focal=False)},
+        {"cam0": ALL_FIXED, "beside": FreeParameters(focal=False)},
         loss="squares",
     )
     relative = found.rig.cameras[1].camera_from_world * found.rig.cameras[0].camera_from_world.inv()
@@ -89,12 +89,12 @@ def test_one_camera_by_known_points_is_that_of_the_control_points_fit():
     source = seen_points(rng, Rig((camera,)), points)
     place = camera.camera_from_world
     start = Pinhole(place.rotation.as_matrix(), camera.centre, camera.K[0, 0], camera.K[:2, 2])
-    expected = fit_pinhole(start, MODELS[-1], points[source.point], source.px)
-    found = adjust(Rig((camera,)), [source], Freedom(principal_point=True, n_terms=1), loss="squares")
+    expected = fit_pinhole(start, PINHOLE_MODELS[-1], points[source.point], source.px)
+    found = adjust(Rig((camera,)), [source], FreeParameters(principal_point=True, n_terms=1), loss="squares")
     np.testing.assert_allclose(found.rig.cameras[0].centre, expected.centre, atol=1e-4)
     np.testing.assert_allclose(found.rig.cameras[0].K[:2, 2], expected.principal_point, atol=0.02)
     assert found.rig.cameras[0].distortion[0] == pytest.approx(expected.k1, abs=1e-4)
-    assert not found.is_frame_free
+    assert not found.is_gauge_free
 
 
 def test_errors_lie_within_two_standard_deviations_as_often_as_they_should():
@@ -108,7 +108,7 @@ def test_errors_lie_within_two_standard_deviations_as_often_as_they_should():
             seen_points(rng, rig, points, noise_px=0.5, name="survey"),
             seen_points(rng, rig, free, noise_px=2.0, name="person", is_free=np.ones(40, bool)),
         ]
-        found = adjust(rig, sources, Freedom())
+        found = adjust(rig, sources, FreeParameters())
         centres = np.stack([c.centre for c in found.rig]) - np.stack([c.centre for c in rig])
         focals = np.array([c.K[0, 0] - t.K[0, 0] for c, t in zip(found.rig, rig, strict=True)])
         off = np.abs(np.column_stack([centres, focals]) / found.camera_sd[:, 3:7])
@@ -123,7 +123,7 @@ def test_each_sources_noise_is_found():
     points = rng.uniform(-0.8, 0.8, (150, 3)) + MIDDLE
     sharp = seen_points(rng, rig, points, noise_px=0.2, name="survey")
     blurred = seen_points(rng, rig, points, noise_px=4.0, name="person", is_free=np.ones(150, bool))
-    found = adjust(rig, [sharp, blurred], Freedom(n_terms=2))
+    found = adjust(rig, [sharp, blurred], FreeParameters(n_terms=2))
     assert found.noise_px == pytest.approx((0.2, 4.0), rel=0.1)
 
 
@@ -134,11 +134,11 @@ def test_wrong_places_hardly_matter():
     px = source.px.copy()
     wrong = rng.random(len(px)) < 0.08
     px[wrong] += rng.uniform(-60, 60, (wrong.sum(), 2))
-    clean = adjust(rig, [source], Freedom(n_terms=4))
-    found = adjust(rig, [replace(source, px=px)], Freedom(n_terms=4))
+    clean = adjust(rig, [source], FreeParameters(n_terms=4))
+    found = adjust(rig, [replace(source, px=px)], FreeParameters(n_terms=4))
     assert np.abs(apart(found.rig) - apart(rig)).max() < 2 * np.abs(apart(clean.rig) - apart(rig)).max() + 2e-3
     assert np.median(found.weight[0][wrong]) < 0.02
-    squares = adjust(rig, [replace(source, px=px)], Freedom(n_terms=4), loss="squares")
+    squares = adjust(rig, [replace(source, px=px)], FreeParameters(n_terms=4), loss="squares")
     assert np.abs(apart(squares.rig) - apart(rig)).max() > 3 * np.abs(apart(found.rig) - apart(rig)).max()
 
 
@@ -159,9 +159,9 @@ def test_cameras_that_look_late_are_found_out():
     rig = Rig(tuple(replace(c, camera_from_world=s * c.camera_from_world) for c, s in zip(rig, shifted, strict=True)))
     views = seen_board(rng, rig, places(times), noise_px=0.2, moving=[places(times + late) for late in late_s])
     source = board_source(views, places(times))
-    lags = Lags(group=source.camera * 40 + source.moments, time_s=times, sd_s=0.05)
-    exact = adjust(rig, [source], Freedom(focal=False))
-    loose = adjust(rig, [replace(source, lags=lags)], Freedom(focal=False))
+    lags = ObservationLags(group=source.camera * 40 + source.moments, time_s=times, sd_s=0.05)
+    exact = adjust(rig, [source], FreeParameters(focal=False))
+    loose = adjust(rig, [replace(source, lags=lags)], FreeParameters(focal=False))
     assert exact.rms_px() > 3 * loose.rms_px()
     medians = np.array([np.median(loose.lag_s[0][source.camera == i]) for i in range(3)])
     np.testing.assert_allclose(medians - medians.mean(), late_s, atol=0.004)
@@ -173,10 +173,10 @@ def test_cameras_that_share_a_focal_length_get_one():
     rig = ring(3)
     source = board_of(rng, rig)
     start = shaken(rng, rig)
-    found = adjust(start, [source], Freedom(shares_focal="all", n_terms=1))
+    found = adjust(start, [source], FreeParameters(shares_focal="all", n_terms=1))
     change = [camera.K[0, 0] - begun.K[0, 0] for camera, begun in zip(found.rig, start, strict=True)]
     assert np.ptp(change) < 1e-9
-    held = adjust(start, [source], Freedom(focal=False))
+    held = adjust(start, [source], FreeParameters(focal=False))
     assert all(a.K[0, 0] == b.K[0, 0] for a, b in zip(held.rig, start, strict=True))
     assert not held.camera_sd[:, 6:].any()
 
@@ -201,7 +201,7 @@ def test_the_length_of_a_wand_is_the_scale():
             for c in rig
         )
     )
-    found = adjust(grown, [replace(source, lengths=lengths)], Freedom())
+    found = adjust(grown, [replace(source, lengths=lengths)], FreeParameters())
     np.testing.assert_allclose(apart(found.rig), apart(rig), rtol=0.01)
 
 
@@ -213,8 +213,8 @@ def test_errors_in_common_make_the_standard_deviations_larger():
     steady = rng.normal(0, 2.0, (20, 3, 2))
     px = source.px + steady[source.point % 20, source.camera]
     cluster = source.point % 20 * 3 + source.camera
-    single = adjust(rig, [replace(source, px=px)], Freedom())
-    clustered = adjust(rig, [replace(source, px=px, cluster=cluster)], Freedom())
+    single = adjust(rig, [replace(source, px=px)], FreeParameters())
+    clustered = adjust(rig, [replace(source, px=px, cluster=cluster)], FreeParameters())
     ratio = clustered.camera_sd[:, :7] / single.camera_sd[:, :7]
     assert ratio.min() > 0.99
     assert np.median(ratio) > 1.8  # ten looks at the same point are worth one: about 3
@@ -227,17 +227,17 @@ def test_what_is_known_beforehand_counts():
     start = shaken(rng, rig, shift_m=0.0, turn_rad=0.0, focal_px=30.0)
     sd = np.full((3, 15), np.inf)
     sd[:, 6] = 1e-3
-    held = adjust(start, [source], Freedom(n_terms=2), prior=Prior(sd=sd))
+    held = adjust(start, [source], FreeParameters(n_terms=2), prior=CameraPrior(sd=sd))
     np.testing.assert_allclose([c.K[0, 0] for c in held.rig], [c.K[0, 0] for c in start], atol=0.05)
 
 
 def test_moving_the_world_changes_no_pixel():
     rng = np.random.default_rng(12)
     rig = ring(3)
-    found = adjust(rig, [board_of(rng, rig, n=30)], Freedom(n_terms=2))
+    found = adjust(rig, [board_of(rng, rig, n=30)], FreeParameters(n_terms=2))
     move = RigidTransform.from_components([1.0, 2.0, 3.0], Rotation.from_rotvec([0.3, -0.2, 0.9]))
-    moved_rig, moved = found.moved(move)
-    again = adjust(moved_rig, moved, HELD)
+    moved_rig, moved = found.transform(move)
+    again = adjust(moved_rig, moved, ALL_FIXED)
     np.testing.assert_allclose(again.residual_px[0], found.residual_px[0], atol=5e-3)
     np.testing.assert_allclose(moved_rig.cameras[0].centre, move.apply(found.rig.cameras[0].centre), atol=1e-12)
 
@@ -250,4 +250,4 @@ def test_nothing_seen_is_refused():
     with pytest.raises(CalibrationError, match="no point is seen by enough cameras"):
         adjust(rig, [alone])
     with pytest.raises(CalibrationError, match="camera 'cam1'"):
-        adjust(rig, [seen_points(np.random.default_rng(0), rig, np.zeros((5, 3)))], {"cam0": Freedom()})
+        adjust(rig, [seen_points(np.random.default_rng(0), rig, np.zeros((5, 3)))], {"cam0": FreeParameters()})

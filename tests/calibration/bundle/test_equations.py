@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from airborne.calibration.bundle import Freedom, Lags, Lengths, Source
+from airborne.calibration.bundle import FreeParameters, ObservationLags, Lengths, Source
 from airborne.calibration.bundle.equations import (
-    free_frame,
+    gauge_directions,
     length_residual_m,
     normal_equations,
     residual_px,
-    slopes_of,
+    jacobian_of,
 )
-from airborne.calibration.bundle.problem import state_of, stepped, task_of
+from airborne.calibration.bundle.problem import initial_state, apply_step, build_problem
 from airborne.calibration.initial.chaining import board_source
 from tests.support.rigs import MIDDLE, boards, ring, seen_board, seen_points
 
@@ -23,25 +23,25 @@ def everything(rng):
     places = boards(rng, 8)
     board = board_source(seen_board(rng, rig, places), places)
     group = 8 * board.camera + board.moments
-    board = replace(board, lags=Lags(group=group, time_s=np.arange(8) / 10, sd_s=0.02))
+    board = replace(board, lags=ObservationLags(group=group, time_s=np.arange(8) / 10, sd_s=0.02))
     points = rng.uniform(-0.5, 0.5, (10, 3)) + MIDDLE
     lengths = Lengths(first=np.arange(5), second=np.arange(5, 10), length_m=np.full(5, 0.5))
     free = replace(seen_points(rng, rig, points, is_free=np.ones(10, bool)), lengths=lengths)
     floor = np.repeat([[True, True, False]], 4, axis=0)
     known = seen_points(rng, rig, points[:4], name="known", is_free=floor)
-    return rig, (board, free, known), Freedom(principal_point=True, n_terms=5, shares_focal="all")
+    return rig, (board, free, known), FreeParameters(principal_point=True, n_terms=5, shares_focal="all")
 
 
 def test_slopes_are_those_of_differences():
     rng = np.random.default_rng(1)
     rig, sources, freedom = everything(rng)
-    task = task_of(rig, sources, dict.fromkeys(rig.names, freedom))
-    state = state_of(rig, sources, task)
+    task = build_problem(rig, sources, dict.fromkeys(rig.names, freedom))
+    state = initial_state(rig, sources, task)
     state = replace(state, lags=rng.normal(0, 0.01, len(state.lags)))
-    slopes = slopes_of(task, state)
+    slopes = jacobian_of(task, state)
 
     def rows(step, others):
-        moved = stepped(task, state, step, others)
+        moved = apply_step(task, state, step, others)
         return np.concatenate([-residual_px(task, moved).ravel(), -length_residual_m(task, moved), moved.lags])
 
     for count, found, place in (
@@ -60,15 +60,15 @@ def test_elimination_solves_the_same_equations():
     rng = np.random.default_rng(2)
     rig, sources, _ = everything(rng)
     sources = (*sources, seen_points(rng, rig, rng.uniform(-0.5, 0.5, (20, 3)) + MIDDLE, name="survey"))
-    task = task_of(rig, sources, dict.fromkeys(rig.names, Freedom()))
-    state = state_of(rig, sources, task)
-    slopes = slopes_of(task, state)
+    task = build_problem(rig, sources, dict.fromkeys(rig.names, FreeParameters()))
+    state = initial_state(rig, sources, task)
+    slopes = jacobian_of(task, state)
     n_rows = slopes.by_camera.shape[0]
     weights, residuals = rng.uniform(0.5, 2, n_rows), rng.standard_normal(n_rows)
     normal = normal_equations(slopes, weights, residuals)
-    reduced, side, factors, back = normal.reduced(0.0)
+    reduced, side, factors, back = normal.reduce(0.0)
     camera = np.linalg.solve(reduced, side)
-    other = factors.solve(normal.other_side) - back @ camera
+    other = factors.solve(normal.other_rhs) - back @ camera
     J = np.column_stack([slopes.by_camera.toarray(), slopes.by_other.toarray()])
     root = np.sqrt(weights)[:, None]
     expected = np.linalg.lstsq(root * J, root[:, 0] * residuals, rcond=None)[0]
@@ -76,12 +76,12 @@ def test_elimination_solves_the_same_equations():
 
 
 def frame_of(rig, sources, freedom):
-    task = task_of(rig, sources, freedom)
-    state = state_of(rig, sources, task)
-    slopes = slopes_of(task, state)
+    task = build_problem(rig, sources, freedom)
+    state = initial_state(rig, sources, task)
+    slopes = jacobian_of(task, state)
     weights = np.concatenate([np.ones(2 * len(task.px)), 1 / task.length_sd_m**2, 1 / task.lag_sd_s**2])
     normal = normal_equations(slopes, weights, np.zeros(len(weights)))
-    return free_frame(task, state, normal, normal.reduced(0.0)[0]).shape[1]
+    return gauge_directions(task, state, normal, normal.reduce(0.0)[0]).shape[1]
 
 
 def test_the_world_is_as_free_as_the_sources_leave_it():
@@ -90,11 +90,11 @@ def test_the_world_is_as_free_as_the_sources_leave_it():
     points = rng.uniform(-0.5, 0.5, (30, 3)) + MIDDLE
     loose = seen_points(rng, rig, points, is_free=np.ones(30, bool))
     lengths = Lengths(first=np.array([0]), second=np.array([1]), length_m=np.array([0.5]))
-    all_free = dict.fromkeys(rig.names, Freedom())
+    all_free = dict.fromkeys(rig.names, FreeParameters())
     assert frame_of(rig, [loose], all_free) == 7
     assert frame_of(rig, [replace(loose, lengths=lengths)], all_free) == 6
     assert frame_of(rig, [seen_points(rng, rig, points)], all_free) == 0
-    one_held = all_free | {"cam0": Freedom(place=False)}
+    one_held = all_free | {"cam0": FreeParameters(extrinsics=False)}
     assert frame_of(rig, [loose], one_held) == 1  # only the scale, about the held camera
     places = boards(rng, 20)
     board = board_source(seen_board(rng, rig, places), places)
@@ -113,6 +113,6 @@ def test_points_that_too_few_cameras_see_are_left_out():
         points=np.array([[0, 0, 1.0], [0.1, 0, 1.0]]),
         is_free=np.ones(2, bool),
     )
-    task = task_of(rig, [source], dict.fromkeys(rig.names, Freedom()))
+    task = build_problem(rig, [source], dict.fromkeys(rig.names, FreeParameters()))
     assert task.is_used.tolist() == [True, True, False]
     assert task.n_other_columns == 3

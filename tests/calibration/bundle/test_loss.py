@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.calibration.bundle.loss import cost_of, normality, scale_of, weight_of
+from airborne.calibration.bundle.loss import robust_cost, loss_constants, robust_scale, robust_weight
 from tests.support.tolerances import sampled
 
 LOSSES = ["cauchy", "huber", "squares"]
@@ -12,27 +12,27 @@ LOSSES = ["cauchy", "huber", "squares"]
 @pytest.mark.parametrize("loss", LOSSES)
 def test_the_weight_is_the_slope_of_the_cost(loss):
     s = np.linspace(0.1, 40, 50)
-    slope = (cost_of(loss, s + 1e-6) - cost_of(loss, s - 1e-6)) / 2e-6
-    np.testing.assert_allclose(weight_of(loss, s), slope, atol=1e-6)
+    slope = (robust_cost(loss, s + 1e-6) - robust_cost(loss, s - 1e-6)) / 2e-6
+    np.testing.assert_allclose(robust_weight(loss, s), slope, atol=1e-6)
 
 
 @pytest.mark.parametrize("loss", LOSSES)
 def test_the_scale_of_normal_errors_is_their_standard_deviation(loss):
     n = 20_000
     s = np.sum((2.5 * np.random.default_rng(0).standard_normal((n, 2))) ** 2, axis=1)
-    assert scale_of(loss, s) == pytest.approx(2.5, rel=sampled(n))
+    assert robust_scale(loss, s) == pytest.approx(2.5, rel=sampled(n))
 
 
 def test_a_tenth_of_wild_errors_hardly_changes_the_scale():
     rng = np.random.default_rng(1)
     s = np.sum(rng.standard_normal((5000, 2)) ** 2, axis=1)
     s[:500] *= 1e4
-    assert scale_of("cauchy", s) < 1.45
-    assert scale_of("squares", s) > 20
+    assert robust_scale("cauchy", s) < 1.45
+    assert robust_scale("squares", s) > 20
 
 
 def test_squares_need_no_correction():
-    assert normality("squares") == pytest.approx((1.0, 1.0, 1.0), rel=1e-3)
+    assert loss_constants("squares") == pytest.approx((1.0, 1.0, 1.0), rel=1e-3)
 
 
 @pytest.mark.parametrize("loss", LOSSES)
@@ -41,7 +41,7 @@ def test_the_variance_is_that_of_many_means(loss):
     errors = rng.standard_normal((runs, n, 2))
     place = np.zeros((runs, 1, 2))
     for _ in range(30):
-        weight = weight_of(loss, np.sum((errors - place) ** 2, axis=2))[..., None]
+        weight = robust_weight(loss, np.sum((errors - place) ** 2, axis=2))[..., None]
         place = np.sum(weight * errors, axis=1, keepdims=True) / np.sum(weight, axis=1, keepdims=True)
-    told = normality(loss).variance / np.mean(np.sum(weight, axis=1))
+    told = loss_constants(loss).variance / np.mean(np.sum(weight, axis=1))
     assert np.var(place) == pytest.approx(told, rel=2 * sampled(2 * runs))

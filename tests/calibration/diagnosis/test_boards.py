@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.diagnosis.boards import wrong_board
+from airborne.calibration.diagnosis.boards import check_board_print
 from airborne.calibration.sources.boards import Board, read_board
-from airborne.cameras import aimed
+from airborne.cameras import camera_looking_at
 from tests.support.board_prints import photographed
 
 CHARUCO = Board(kind="charuco", columns=5, rows=4, square_m=0.1, marker_m=0.07, dictionary="DICT_5X5_50")
 CHESS = Board(kind="chessboard", columns=7, rows=4, square_m=0.08)
-CAMERA = aimed("cam", [0, -1.2, 0], [0, 0, 0], 480, (560, 400))
+CAMERA = camera_looking_at("cam", [0, -1.2, 0], [0, 0, 0], 480, (560, 400))
 
 
 def pictures(board, n=3):
@@ -29,7 +29,7 @@ def pictures(board, n=3):
 
 
 def sentence(described, shown):
-    found = wrong_board(described, shown, "cam1")
+    found = check_board_print(described, shown, "cam1")
     assert len(found) == 1
     assert found[0].cameras == ("cam1",)
     assert "\n" not in found[0].sentence
@@ -40,7 +40,7 @@ def sentence(described, shown):
     "board", [CHARUCO, CHESS, replace(CHARUCO, is_inverted=True), replace(CHARUCO, is_legacy=True)]
 )
 def test_the_right_board_is_not_doubted(board):
-    assert wrong_board(board, pictures(board), "cam1") == []
+    assert check_board_print(board, pictures(board), "cam1") == []
 
 
 def test_another_dictionary_is_named():
@@ -84,7 +84,7 @@ def test_nothing_in_the_pictures_is_told_as_that():
     empty = [np.full((400, 560), 90, np.uint8)] * 3
     assert "found in 0 of 3 pictures, with 0 of its 12 corners at most" in sentence(CHARUCO, empty)
     assert "no other board is either" in sentence(CHESS, empty)
-    assert wrong_board(CHARUCO, [], "cam1") == []
+    assert check_board_print(CHARUCO, [], "cam1") == []
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +98,7 @@ def real(shared_data):
 
 
 def test_a_real_board_is_not_doubted(real):
-    assert wrong_board(*real, "cam_1") == []
+    assert check_board_print(*real, "cam_1") == []
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def test_points_in_one_plane_are_refused(points, sizes):
 
 def test_points_near_one_plane_are_doubted(points, sizes):
     front = clicked(points, "cam1", lambda px: np.where(points.world[:, 1:2] < 0, px, np.nan))
-    ratio = flatness(points.world[front.seen_by("cam1")])
+    ratio = flatness(points.world[front.is_seen_by("cam1")])
     assert 0.01 < ratio < 0.1
     assert f"nearly flat (thickness / extent {ratio:.3f})" in " ".join(warnings_of(front, sizes, "cam1"))
 

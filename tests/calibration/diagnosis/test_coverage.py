@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from airborne.calibration.diagnosis.coverage import clustered_views, few_views, missing_bridges, untilted_views
+from airborne.calibration.diagnosis.coverage import check_coverage, check_view_count, check_links, check_tilts
 
 NAMES = ("cam1", "cam2", "cam3", "cam4")
 SIZE = (1920, 1080)
 
 
 def test_few_views_are_counted():
-    assert few_views("cam1", 8) == []
-    assert few_views("cam1", 1)[0].sentence.startswith("cam1 shows the board in 1 picture, expected 8: film it longer")
+    assert check_view_count("cam1", 8) == []
+    assert check_view_count("cam1", 1)[0].sentence.startswith("cam1 shows the board in 1 picture, expected 8: film it longer")
 
 
 def test_points_all_over_the_picture_are_enough():
     px = np.random.default_rng(0).uniform((0, 0), SIZE, (200, 2))
-    assert clustered_views("cam1", px, SIZE) == []
+    assert check_coverage("cam1", px, SIZE) == []
 
 
 @pytest.mark.parametrize(
@@ -29,20 +29,20 @@ def test_points_all_over_the_picture_are_enough():
 )
 def test_where_points_are_missing_is_named(low, high, where):
     px = np.random.default_rng(0).uniform(low, high, (200, 2))
-    [found] = clustered_views("cam1", px, SIZE)
+    [found] = check_coverage("cam1", px, SIZE)
     assert where in found.sentence
     assert "% of its picture" in found.sentence
 
 
 def test_a_few_clicks_are_not_blamed_for_leaving_the_picture_empty():
-    assert clustered_views("cam1", np.full((20, 2), 500.0), SIZE) == []
-    assert clustered_views("cam1", np.full((200, 2), np.nan), SIZE) == []
+    assert check_coverage("cam1", np.full((20, 2), 500.0), SIZE) == []
+    assert check_coverage("cam1", np.full((200, 2), np.nan), SIZE) == []
 
 
 def test_a_board_that_always_faces_the_camera_is_told():
     rng = np.random.default_rng(1)
-    assert untilted_views("cam1", np.radians(rng.uniform(0, 45, 30))) == []
-    [found] = untilted_views("cam1", np.radians(rng.uniform(0, 9, 30)))
+    assert check_tilts("cam1", np.radians(rng.uniform(0, 45, 30))) == []
+    [found] = check_tilts("cam1", np.radians(rng.uniform(0, 9, 30)))
     assert "turned away by 8 degrees at most" in found.sentence
 
 
@@ -54,18 +54,18 @@ def shared(*pairs):
 
 
 def test_cameras_that_are_chained_are_not_doubted():
-    assert missing_bridges(NAMES, shared((0, 1, 20), (1, 2, 9), (2, 3, 40))) == []
+    assert check_links(NAMES, shared((0, 1, 20), (1, 2, 9), (2, 3, 40))) == []
 
 
 def test_the_missing_bridge_is_named():
-    [found] = missing_bridges(NAMES, shared((0, 1, 20), (1, 2, 2), (2, 3, 40)))
+    [found] = check_links(NAMES, shared((0, 1, 20), (1, 2, 2), (2, 3, 40)))
     assert found.cameras == ("cam3", "cam4")
     assert "cam3 and cam4 and cam1 and cam2 share 2 moments" in found.sentence
     assert "where cam2 and cam3 both see it" in found.sentence
 
 
 def test_every_camera_apart_gets_its_sentence():
-    found = missing_bridges(NAMES, shared((0, 1, 20)))
+    found = check_links(NAMES, shared((0, 1, 20)))
     assert [each.cameras for each in found] == [("cam3",), ("cam4",)]
     assert "cam3 and cam1 and cam2 share 0 moments" in found[0].sentence
     assert "where one and another both see it" in found[0].sentence

@@ -7,11 +7,11 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.diagnosis.images import (
-    below_floor,
-    mirrored_picture,
-    odd_size,
-    swapped_files,
-    turned_pictures,
+    check_floor,
+    check_mirroring,
+    check_image_size,
+    check_swapped_files,
+    check_roll,
 )
 from airborne.cameras import Rig
 from tests.support import wand_waving as waving
@@ -36,9 +36,9 @@ def changed(k, camera):
 @pytest.mark.parametrize("stray_share", [0.0, 0.1])
 def test_a_mirrored_picture_is_told_from_a_sound_one(k, stray_share):
     points, px = points_and_px(stray_share=stray_share)
-    assert mirrored_picture("cam", waving.SIZE, points, px[:, k]) == []
+    assert check_mirroring("cam", waving.SIZE, points, px[:, k]) == []
     mirrored = px[:, k] * [-1, 1] + [waving.SIZE[0] - 1, 0]
-    [found] = mirrored_picture("cam", waving.SIZE, points, mirrored)
+    [found] = check_mirroring("cam", waving.SIZE, points, mirrored)
     assert "cam fits what the other cameras see" in found.sentence
     assert "only as in a mirror" in found.sentence
 
@@ -46,13 +46,13 @@ def test_a_mirrored_picture_is_told_from_a_sound_one(k, stray_share):
 def test_pixels_that_fit_nothing_are_not_called_mirrored():
     points, px = points_and_px()
     shuffled = np.random.default_rng(1).permutation(px[:, 0])
-    assert mirrored_picture("cam", waving.SIZE, points, shuffled) == []
-    assert mirrored_picture("cam", waving.SIZE, points[:10], px[:10, 0] * [-1, 1]) == []
+    assert check_mirroring("cam", waving.SIZE, points, shuffled) == []
+    assert check_mirroring("cam", waving.SIZE, points[:10], px[:10, 0] * [-1, 1]) == []
 
 
 @pytest.mark.parametrize("up", [None, UP])
 def test_level_cameras_are_not_doubted(up):
-    assert turned_pictures(RIG, up) == []
+    assert check_roll(RIG, up) == []
 
 
 @pytest.mark.parametrize("up", [None, UP])
@@ -60,7 +60,7 @@ def test_level_cameras_are_not_doubted(up):
 def test_a_turned_camera_is_named_with_its_turn(up, degrees):
     turn = RigidTransform.from_rotation(Rotation.from_euler("z", degrees, degrees=True))
     rig = changed(2, replace(RIG["cam3"], camera_from_world=turn * RIG["cam3"].camera_from_world))
-    [found] = turned_pictures(rig, up)
+    [found] = check_roll(rig, up)
     assert found.cameras == ("cam3",)
     told = float(found.sentence.split("turned by ")[1].split(" degrees")[0])
     assert abs((told - degrees + 180) % 360 - 180) < 6
@@ -69,7 +69,7 @@ def test_a_turned_camera_is_named_with_its_turn(up, degrees):
 def test_two_cameras_alone_cannot_tell_which_is_turned():
     turn = RigidTransform.from_rotation(Rotation.from_euler("z", 180, degrees=True))
     pair = Rig((RIG["cam1"], replace(RIG["cam2"], camera_from_world=turn * RIG["cam2"].camera_from_world)))
-    assert turned_pictures(pair) == []
+    assert check_roll(pair) == []
 
 
 @pytest.mark.parametrize(
@@ -81,16 +81,16 @@ def test_two_cameras_alone_cannot_tell_which_is_turned():
     ],
 )
 def test_another_size_is_explained(size, said):
-    [found] = odd_size("cam1", waving.SIZE, size)
+    [found] = check_image_size("cam1", waving.SIZE, size)
     assert said in found.sentence
-    assert odd_size("cam1", size, size) == []
+    assert check_image_size("cam1", size, size) == []
 
 
 @pytest.mark.parametrize("order", [[0, 2, 1, 3], [3, 1, 2, 0]])
 def test_swapped_files_are_named(order):
     _, px = points_and_px(stray_share=0.05)
-    assert swapped_files(RIG, px) == []
-    [found] = swapped_files(RIG, px[:, order])
+    assert check_swapped_files(RIG, px) == []
+    [found] = check_swapped_files(RIG, px[:, order])
     names = tuple(f"cam{i + 1}" for i, k in enumerate(order) if i != k)
     assert found.cameras == names
     assert f"the files of {names[0]} and {names[1]} are swapped" in found.sentence
@@ -100,12 +100,12 @@ def test_a_wrong_rig_is_not_called_a_swap():
     _, px = points_and_px()
     turn = RigidTransform.from_rotation(Rotation.from_euler("y", 5, degrees=True))
     rig = changed(1, replace(RIG["cam2"], camera_from_world=turn * RIG["cam2"].camera_from_world))
-    assert swapped_files(rig, px) == []
+    assert check_swapped_files(rig, px) == []
 
 
 def test_a_camera_below_the_floor_is_named():
-    assert below_floor(RIG) == []
+    assert check_floor(RIG) == []
     down = RigidTransform.from_translation([0, 0, 8.0])
     low = replace(RIG["cam1"], camera_from_world=RIG["cam1"].camera_from_world * down)
-    [found] = below_floor(changed(0, low))
+    [found] = check_floor(changed(0, low))
     assert found.sentence.startswith("cam1 comes out below the floor, at z = -5.0 m")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.bundle import Freedom, adjust
-from airborne.calibration.diagnosis.moved_cameras import moved_cameras
+from airborne.calibration.bundle import FreeParameters, adjust
+from airborne.calibration.diagnosis.moved_cameras import check_moved_cameras
 from airborne.calibration.sources.wand import wand_source
 from airborne.cameras import Rig
 from tests.support import wand_waving as waving
@@ -29,13 +29,13 @@ def knocked(seed, moment, names=("cam2",), degrees=0.5):
 
 
 def test_cameras_that_stand_still_are_not_doubted():
-    assert moved_cameras(RIG, knocked(0, N), TIMES_S) == []
+    assert check_moved_cameras(RIG, knocked(0, N), TIMES_S) == []
 
 
 @pytest.mark.parametrize("name", ["cam1", "cam4"])
 @pytest.mark.parametrize("moment", [60, 140])
 def test_the_camera_the_time_and_the_way_are_told(name, moment):
-    [found] = moved_cameras(RIG, knocked(1, moment, (name,)), TIMES_S)
+    [found] = check_moved_cameras(RIG, knocked(1, moment, (name,)), TIMES_S)
     assert found.cameras == (name,)
     assert f"between {TIMES_S[moment - 1]:.2f} s and {TIMES_S[moment]:.2f} s" in found.sentence
     turned = float(found.sentence.split("turned by ")[1].split(" ")[0])
@@ -46,8 +46,8 @@ def test_the_camera_the_time_and_the_way_are_told(name, moment):
 def test_it_is_told_from_a_calibration_with_the_moved_camera_too():
     px = knocked(2, 100, ("cam3",))
     tracks = waving.WandTracks(cameras=RIG.names, px=px, lengths_m={(0, 1): 1.0})
-    spoiled = adjust(RIG, [wand_source(RIG, tracks)], Freedom(focal=False)).rig
-    [found] = moved_cameras(spoiled, px)
+    spoiled = adjust(RIG, [wand_source(RIG, tracks)], FreeParameters(focal=False)).rig
+    [found] = check_moved_cameras(spoiled, px)
     assert found.cameras == ("cam3",)
     assert "between frame 99 and frame 100" in found.sentence
 
@@ -56,14 +56,14 @@ def test_two_that_move_apart_in_time_are_both_named():
     first, second = knocked(3, 70, ("cam1",)), knocked(3, 130, ("cam4",))
     px = first.copy()
     px[:, :, 3] = second[:, :, 3]
-    assert {found.cameras for found in moved_cameras(RIG, px, TIMES_S)} == {("cam1",), ("cam4",)}
+    assert {found.cameras for found in check_moved_cameras(RIG, px, TIMES_S)} == {("cam1",), ("cam4",)}
 
 
 def test_a_shake_below_the_noise_is_not_told():
-    assert moved_cameras(RIG, knocked(4, 100, degrees=0.01), TIMES_S) == []
+    assert check_moved_cameras(RIG, knocked(4, 100, degrees=0.01), TIMES_S) == []
 
 
 def test_two_cameras_or_nothing_seen_tell_nothing():
     px = knocked(5, 100)
-    assert moved_cameras(RIG.select(["cam1", "cam2"]), px[:, :, :2]) == []
-    assert moved_cameras(RIG, np.full_like(px, np.nan)) == []
+    assert check_moved_cameras(RIG.select(["cam1", "cam2"]), px[:, :, :2]) == []
+    assert check_moved_cameras(RIG, np.full_like(px, np.nan)) == []

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airborne.calibration.bundle import Freedom, adjust
-from airborne.calibration.initial.wand import wand_start
+from airborne.calibration.bundle import FreeParameters, adjust
+from airborne.calibration.initial.wand import initial_rig_from_wand
 from airborne.calibration.sources.wand import wand_source
 from airborne.errors import CalibrationError
 from tests.support import wand_waving as waving
@@ -16,7 +16,7 @@ from tests.support import wand_waving as waving
 @pytest.mark.parametrize("stray_share", [0.0, 0.25])
 def test_cameras_are_placed_without_knowing_their_focal_lengths(focals_px, stray_share):
     rng, rig = np.random.default_rng(1), waving.hall(focals_px)
-    start = wand_start(waving.tracks(rng, rig, 300, stray_share=stray_share), waving.SIZES)
+    start = initial_rig_from_wand(waving.tracks(rng, rig, 300, stray_share=stray_share), waving.SIZES)
     assert start.names == rig.names
     assert waving.misplaced_m(rig, start).max() < 0.2  # of some 20 m between them
     assert np.abs(waving.focal_errors(rig, start)).max() < 0.025
@@ -26,8 +26,8 @@ def test_cameras_are_placed_without_knowing_their_focal_lengths(focals_px, stray
 def test_the_adjustment_then_finds_them_as_well_as_it_says(lengths_m):
     rng, rig = np.random.default_rng(4), waving.hall(k1=-0.1)
     tracks = waving.tracks(rng, rig, 400, lengths_m=lengths_m, stray_share=0.1)
-    start = wand_start(tracks, waving.SIZES)
-    found = adjust(start, [wand_source(start, tracks)], Freedom(n_terms=1))
+    start = initial_rig_from_wand(tracks, waving.SIZES)
+    found = adjust(start, [wand_source(start, tracks)], FreeParameters(n_terms=1))
     source = found.sources[0]
     lengths = np.linalg.norm(source.points[source.lengths.first] - source.points[source.lengths.second], axis=1)
     sd_m = np.linalg.norm(found.camera_sd[:, 3:6], axis=1)
@@ -41,11 +41,11 @@ def test_the_adjustment_then_finds_them_as_well_as_it_says(lengths_m):
 def test_with_known_lenses_cameras_are_found_within_millimetres():
     rng, rig = np.random.default_rng(5), waving.hall(k1=-0.2)
     tracks = waving.tracks(rng, rig, 400, stray_share=0.1)
-    start = wand_start(tracks, waving.SIZES, {camera.name: camera for camera in rig})
+    start = initial_rig_from_wand(tracks, waving.SIZES, {camera.name: camera for camera in rig})
     assert all(np.array_equal(camera.K, rig[camera.name].K) for camera in start)
     assert all(np.array_equal(camera.distortion, rig[camera.name].distortion) for camera in start)
     assert waving.misplaced_m(rig, start).max() < 0.2
-    found = adjust(start, [wand_source(start, tracks)], Freedom(focal=False))
+    found = adjust(start, [wand_source(start, tracks)], FreeParameters(focal=False))
     sd_m = np.linalg.norm(found.camera_sd[:, 3:6], axis=1)
     assert (waving.misplaced_m(rig, found.rig) < 3 * sd_m).all()
     assert sd_m.max() < 0.004
@@ -54,7 +54,7 @@ def test_with_known_lenses_cameras_are_found_within_millimetres():
 def test_the_same_tracks_give_the_same_cameras():
     rng, rig = np.random.default_rng(6), waving.hall()
     tracks = waving.tracks(rng, rig, 100, stray_share=0.1)
-    one, other = (wand_start(tracks, waving.SIZES) for _ in range(2))
+    one, other = (initial_rig_from_wand(tracks, waving.SIZES) for _ in range(2))
     assert all(np.array_equal(a.centre, b.centre) for a, b in zip(one, other, strict=True))
 
 
@@ -67,15 +67,15 @@ def test_a_camera_that_shares_nothing_with_the_others_is_named():
     with pytest.raises(
         CalibrationError, match=r"does not tie cam4 to cam1, cam2, cam3: .* in 0 frames at most; at least 10"
     ):
-        wand_start(replace(tracks, px=px), waving.SIZES)
+        initial_rig_from_wand(replace(tracks, px=px), waving.SIZES)
 
 
 def test_a_wand_seen_in_a_few_frames_is_refused():
     tracks = waving.tracks(np.random.default_rng(11), waving.hall(), 9)
     with pytest.raises(CalibrationError, match="in 9 frames at most; at least 10 are needed"):
-        wand_start(tracks, waving.SIZES)
+        initial_rig_from_wand(tracks, waving.SIZES)
     with pytest.raises(CalibrationError, match="only cam1 saw the wand"):
-        wand_start(tracks.select(["cam1"]), waving.SIZES)
+        initial_rig_from_wand(tracks.select(["cam1"]), waving.SIZES)
 
 
 def test_cameras_are_chained_where_only_neighbours_share_views():
@@ -84,7 +84,7 @@ def test_cameras_are_chained_where_only_neighbours_share_views():
     px = tracks.px.copy()
     for k, shown in enumerate([(0, 150), (0, 300), (150, 450), (300, 450)]):
         px[: shown[0], :, k] = px[shown[1] :, :, k] = np.nan
-    assert waving.misplaced_m(rig, wand_start(replace(tracks, px=px), waving.SIZES)).max() < 0.6
+    assert waving.misplaced_m(rig, initial_rig_from_wand(replace(tracks, px=px), waving.SIZES)).max() < 0.6
 
 
 @pytest.mark.parametrize("mirrored", [0, 2])
@@ -94,7 +94,7 @@ def test_a_mirrored_camera_is_named(mirrored):
     px = tracks.px.copy()
     px[:, :, mirrored, 0] = waving.SIZE[0] - 1 - px[:, :, mirrored, 0]
     with pytest.raises(CalibrationError, match=rf"cam{mirrored + 1} fits .* only as in a mirror"):
-        wand_start(replace(tracks, px=px), waving.SIZES)
+        initial_rig_from_wand(replace(tracks, px=px), waving.SIZES)
 
 
 def test_two_cameras_out_of_step_are_refused():
@@ -103,4 +103,4 @@ def test_two_cameras_out_of_step_are_refused():
     px = tracks.px.copy()
     px[:, :, 1] = np.roll(px[:, :, 1], 10, axis=0)
     with pytest.raises(CalibrationError, match=r"does not tie cam2 to cam1|the wand's length varies"):
-        wand_start(replace(tracks, px=px), waving.SIZES)
+        initial_rig_from_wand(replace(tracks, px=px), waving.SIZES)

@@ -2,15 +2,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from airborne.calibration.intrinsics.model_selection import choose, leave_one_out, supported
-from airborne.calibration.intrinsics.physical import MODELS, SEVEN_PARAMETERS, fit_pinhole
+from airborne.calibration.intrinsics.model_selection import choose_simplest, leave_one_out, supported_models
+from airborne.calibration.intrinsics.physical import PINHOLE_MODELS, SEVEN_PARAMETERS, fit_pinhole
 from tests.calibration.intrinsics.test_physical import STRAIGHT, TRUTH, WORLD
 from tests.support.tolerances import ROUNDTRIP
 
 
 def solutions_of(truth, sd_px=0.5, seed=0):
     px = truth.px_from_world(WORLD) + np.random.default_rng(seed).normal(0, sd_px, (len(WORLD), 2))
-    return [leave_one_out(fit_pinhole(STRAIGHT, m, WORLD, px), m, WORLD, px) for m in MODELS]
+    return [leave_one_out(fit_pinhole(STRAIGHT, m, WORLD, px), m, WORLD, px) for m in PINHOLE_MODELS]
 
 
 def test_a_held_out_point_has_no_say():
@@ -27,18 +27,18 @@ def test_held_out_errors_exceed_residuals():
 
 
 def test_a_plain_camera_gets_the_plain_model():
-    assert choose(solutions_of(STRAIGHT)).model == SEVEN_PARAMETERS
+    assert choose_simplest(solutions_of(STRAIGHT)).model == SEVEN_PARAMETERS
 
 
 def test_a_bending_lens_gets_its_distortion_term():
-    assert choose(solutions_of(TRUTH)).model.frees_k1
+    assert choose_simplest(solutions_of(TRUTH)).model.frees_k1
 
 
 def test_an_axis_off_the_middle_gets_its_principal_point():
     off = replace(STRAIGHT, principal_point=np.add(STRAIGHT.principal_point, [60, -40]))
-    assert choose(solutions_of(off)).model.frees_principal_point
+    assert choose_simplest(solutions_of(off)).model.frees_principal_point
 
 
 def test_few_points_support_few_numbers():
-    assert [model.n_parameters for model in supported(MODELS, 6)] == [7, 8, 9]
-    assert [model.n_parameters for model in supported(MODELS, 7)] == [7, 8, 9, 10]
+    assert [model.n_parameters for model in supported_models(PINHOLE_MODELS, 6)] == [7, 8, 9]
+    assert [model.n_parameters for model in supported_models(PINHOLE_MODELS, 7)] == [7, 8, 9, 10]

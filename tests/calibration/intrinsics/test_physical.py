@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from airborne.calibration.intrinsics.physical import (
-    MODELS,
+    PINHOLE_MODELS,
     SEVEN_PARAMETERS,
     Pinhole,
     anneal_pinhole,
@@ -32,7 +32,7 @@ def distance(a, b):
 def test_a_pinhole_projects_as_the_camera_it_becomes():
     assert np.allclose(TRUTH.px_from_world(WORLD), CAMERA.px_from_world(WORLD), atol=1e3 * EXACT)
     assert np.allclose(TRUTH.P, CAMERA.P, atol=1e4 * EXACT)
-    assert np.allclose(TRUTH.undistorted_px(TRUTH.px_from_world(WORLD)), STRAIGHT.px_from_world(WORLD))
+    assert np.allclose(TRUTH.undistort_px(TRUTH.px_from_world(WORLD)), STRAIGHT.px_from_world(WORLD))
 
 
 def test_exact_points_give_the_camera_back_from_afar():
@@ -42,20 +42,20 @@ def test_exact_points_give_the_camera_back_from_afar():
 
 def test_the_full_model_finds_principal_point_and_distortion():
     truth = Pinhole(TRUTH.R, TRUTH.centre, 1000.0, np.add(TRUTH.principal_point, [15, -10]), -0.1)
-    found = fit_pinhole(far_from(TRUTH), MODELS[-1], WORLD, truth.px_from_world(WORLD))
+    found = fit_pinhole(far_from(TRUTH), PINHOLE_MODELS[-1], WORLD, truth.px_from_world(WORLD))
     assert distance(found, truth) < SOLVED
     assert np.allclose(found.principal_point, truth.principal_point, atol=SOLVED)
     assert found.k1 == pytest.approx(-0.1, abs=SOLVED)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", PINHOLE_MODELS)
 def test_every_free_number_has_a_name_and_moves_the_picture(model):
     names = parameter_names(model)
     assert len(names) == model.n_parameters
     for i in range(len(names)):
         step = np.zeros(len(names))
         step[i] = 1e-3
-        assert np.any(TRUTH.moved(model, step).px_from_world(WORLD) != TRUTH.px_from_world(WORLD)), names[i]
+        assert np.any(TRUTH.apply_step(model, step).px_from_world(WORLD) != TRUTH.px_from_world(WORLD)), names[i]
 
 
 def test_the_standard_deviations_are_those_of_many_fits():

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.sources.boards import Board, as_printed, board_from_table, detector_of, read_board
-from airborne.cameras import aimed
+from airborne.calibration.sources.boards import Board, match_print, board_from_table, board_detector, read_board
+from airborne.cameras import camera_looking_at
 from airborne.errors import CalibrationError
 from tests.support.board_prints import photographed
 
 CHARUCO = Board(kind="charuco", columns=5, rows=4, square_m=0.1, marker_m=0.075, dictionary="DICT_4X4_50")
 CHESS = Board(kind="chessboard", columns=7, rows=4, square_m=0.08)
-CAMERA = aimed("cam", [0, -1.2, 0], [0, 0, 0], 800, (960, 640))
+CAMERA = camera_looking_at("cam", [0, -1.2, 0], [0, 0, 0], 800, (960, 640))
 FACING = Rotation.from_euler("x", -90, degrees=True)  # the board's z along the camera's
 
 
@@ -30,7 +30,7 @@ def test_corners_are_where_the_board_has_them(board, turn_deg):
     place = facing(turn_deg)
     middle = place.apply(board.corners.mean(axis=0))
     place = RigidTransform.from_translation(-middle) * place
-    sighting = detector_of(board)(photographed(board, CAMERA, place))
+    sighting = board_detector(board)(photographed(board, CAMERA, place))
     expected = CAMERA.px_from_world(place.apply(board.corners))
     assert len(sighting.corner) >= 0.7 * len(board.corners)
     off = np.linalg.norm(sighting.px - expected[sighting.corner], axis=1)
@@ -41,15 +41,15 @@ def test_corners_are_where_the_board_has_them(board, turn_deg):
 def test_a_picture_without_the_board_shows_nothing():
     grey = np.random.default_rng(0).integers(0, 255, (200, 300), dtype=np.uint8)
     for board in (CHARUCO, CHESS):
-        assert len(detector_of(board)(grey).corner) == 0
+        assert len(board_detector(board)(grey).corner) == 0
 
 
 def test_a_board_printed_otherwise_is_told():
     picture = photographed(replace(CHARUCO, is_inverted=True, is_legacy=True), CAMERA, facing((10, 10, 10)))
-    board, notes = as_printed(CHARUCO, [picture])
+    board, notes = match_print(CHARUCO, [picture])
     assert board == replace(CHARUCO, is_inverted=True, is_legacy=True)
     assert len(notes) == 1 and "inverted = true and legacy = true" in notes[0]
-    same, notes = as_printed(CHARUCO, [photographed(CHARUCO, CAMERA, facing())])
+    same, notes = match_print(CHARUCO, [photographed(CHARUCO, CAMERA, facing())])
     assert same == CHARUCO and notes == ()
 
 
@@ -99,4 +99,4 @@ def test_a_board_that_cannot_be_is_refused_in_one_line(change, said):
 def test_too_many_markers_for_the_dictionary_are_refused():
     board = replace(CHARUCO, columns=12, rows=12)
     with pytest.raises(CalibrationError, match="72 markers"):
-        detector_of(board)
+        board_detector(board)

@@ -19,7 +19,7 @@ def test_blank_pixels_are_points_not_seen(tmp_path):
     assert points.cameras == ("a", "b")
     assert np.array_equal(points.world, [[0, 1, 2], [3, 4, 5]])
     assert np.array_equal(points.px, [[[10, 20], [30, 40]], [[np.nan, np.nan], [50, 60]]], equal_nan=True)
-    assert points.seen_by("a").tolist() == [True, False]
+    assert points.is_seen_by("a").tolist() == [True, False]
 
 
 @pytest.mark.parametrize("change", ["\ufeff{}", "{}\n\n,,,,,,,\n"])

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from airborne.calibration.sources.control_points import read_control_points
-from airborne.calibration.sources.court import court_points, nearest_names
+from airborne.calibration.sources.court import court_points, closest_names
 from airborne.errors import CalibrationError
 from airborne.synthetic.block.court import COURT_M
 
 
 def place(name, net="men"):
-    return court_points(net)[name].place_m
+    return court_points(net)[name].position_m
 
 
 def test_the_court_reaches_to_the_outer_edges_of_its_lines():
@@ -43,9 +43,9 @@ def test_left_and_right_near_and_far_are_mirror_images():
     known = court_points("men")
     for name, point in known.items():
         other = known[name.replace("left", "LEFT").replace("right", "left").replace("LEFT", "right")]
-        assert np.allclose(point.place_m * [-1, 1, 1], other.place_m)
+        assert np.allclose(point.position_m * [-1, 1, 1], other.position_m)
         if "near" in name:
-            assert np.allclose(point.place_m * [1, -1, 1], known[name.replace("near", "far")].place_m)
+            assert np.allclose(point.position_m * [1, -1, 1], known[name.replace("near", "far")].position_m)
 
 
 def test_every_coordinate_states_how_exactly_it_is_known():
@@ -57,7 +57,7 @@ def test_a_table_of_names_needs_no_coordinates(tmp_path):
     points = read_control_points(tmp_path / "court.csv", court_points("women"))
     assert np.array_equal(points.world, [place("corner_near_left_outer"), place("net_left_top", "women")])
     assert points.sd_m[0].tolist() == [0.01, 0.01, 0.01]
-    assert points.seen_by("a").tolist() == [True, False]
+    assert points.is_seen_by("a").tolist() == [True, False]
 
 
 def test_own_surveyed_points_stand_beside_the_courts(tmp_path):
@@ -77,7 +77,7 @@ def test_an_unknown_name_is_answered_with_the_nearest(tmp_path):
     (tmp_path / "court.csv").write_text("point,a_u,a_v\ncorner_near_left,10,20\n")
     with pytest.raises(CalibrationError, match=r"'corner_near_left' .* nearest names: corner_near_left_"):
         read_control_points(tmp_path / "court.csv", court_points("men"))
-    assert nearest_names("Net_top_left", court_points("men")).split(", ")[0].startswith("net_")
+    assert closest_names("Net_top_left", court_points("men")).split(", ")[0].startswith("net_")
 
 
 def test_half_a_place_is_refused(tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.sources.person import median_reprojection_px, onto, person_source, refine
+from airborne.calibration.sources.person import median_reprojection_px, align_rigs, person_source, refine_rig
 from airborne.cameras import Rig
 from tests.support.people_seen import four_cameras, knocked, seen, walking
 from tests.support.rigs import apart
@@ -15,8 +15,8 @@ from tests.support.rigs import apart
 def test_the_wrong_camera_is_named_and_all_agree_better():
     rig = four_cameras()
     detections = seen(rig, walking(30), sd_px=1.0)
-    found = refine(knocked(rig, "side"), detections)
-    assert [mending.camera.name for mending in found.mended] == ["side"]
+    found = refine_rig(knocked(rig, "side"), detections)
+    assert [mending.camera.name for mending in found.resections] == ["side"]
     assert found.after_px < 0.4 * found.before_px
     np.testing.assert_allclose(apart(found.rig), apart(rig), atol=0.03)
     for camera in found.rig:  # where the mended one stands along its line of sight is hardly told
@@ -26,7 +26,7 @@ def test_the_wrong_camera_is_named_and_all_agree_better():
 
 def test_lenses_stay_unless_freed():
     rig = four_cameras()
-    found = refine(rig, seen(rig, walking(30)))
+    found = refine_rig(rig, seen(rig, walking(30)))
     for camera, before in zip(found.rig, rig, strict=True):
         np.testing.assert_array_equal(camera.K, before.K)
 
@@ -56,7 +56,7 @@ def test_a_rig_is_brought_back_onto_another(scale):
             for c in rig
         )
     )
-    back, found = onto(moved, rig, rig.names)
+    back, found = align_rigs(moved, rig, rig.names)
     assert found == pytest.approx(1 / scale)
     for camera in moved:
         np.testing.assert_allclose(back.apply(camera.centre * found), rig[camera.name].centre, atol=1e-9)

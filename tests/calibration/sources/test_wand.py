@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from airborne.calibration.bundle import Freedom, adjust
+from airborne.calibration.bundle import FreeParameters, adjust
 from airborne.calibration.sources.wand import WandTracks, read_wand, wand_source
-from airborne.cameras import PixelCount
-from airborne.cameras.formats.options import Given
+from airborne.cameras import PixelConvention
+from airborne.cameras.formats.options import FileOptions
 from airborne.errors import CalibrationError
 from tests.support import wand_waving as waving
 from tests.support.tolerances import ROUNDTRIP
@@ -30,7 +30,7 @@ def xypts(px):
 
 
 def test_rows_of_frame_marker_and_camera_are_put_in_their_places(tmp_path):
-    tracks = read_wand(written(tmp_path, TIDY), NAMES, Given(), [0.5])
+    tracks = read_wand(written(tmp_path, TIDY), NAMES, FileOptions(), [0.5])
     assert tracks.px.shape == (2, 2, 2, 2)
     assert tracks.px[0].tolist()[0] == [[10, 20], [11, 21]]
     assert tracks.px[0, 1, 0].tolist() == [12, 22]
@@ -41,14 +41,14 @@ def test_rows_of_frame_marker_and_camera_are_put_in_their_places(tmp_path):
 
 def test_dltdv_tables_give_our_pixels(tmp_path):
     px = waving.tracks(np.random.default_rng(0), waving.hall(), 20, lengths_m=(0.6, 0.4)).px
-    tracks = read_wand(written(tmp_path, xypts(px)), tuple(waving.SIZES), Given(), [0.6, 0.4])
+    tracks = read_wand(written(tmp_path, xypts(px)), tuple(waving.SIZES), FileOptions(), [0.6, 0.4])
     assert np.allclose(tracks.px, px, atol=ROUNDTRIP, equal_nan=True)
     assert tracks.lengths_m == {(0, 1): 0.6, (1, 2): 0.4}
 
 
 def test_pixels_from_the_lower_left_are_turned_over(tmp_path):
     px = np.full((1, 2, 1, 2), 5.0)
-    given = Given(size={"cam1": (100, 50)}, pixels=PixelCount("lower-left", 1))
+    given = FileOptions(size={"cam1": (100, 50)}, pixels=PixelConvention("lower-left", 1))
     tracks = read_wand(written(tmp_path, xypts(px)), ("cam1",), given, [1.0])
     assert tracks.px[0, 0, 0].tolist() == [5.0, 50 - 6]
 
@@ -69,22 +69,22 @@ def test_pixels_from_the_lower_left_are_turned_over(tmp_path):
 )
 def test_a_table_that_is_wrong_is_refused_in_one_line(tmp_path, text, said):
     with pytest.raises(CalibrationError, match=said) as error:
-        read_wand(written(tmp_path, text), NAMES, Given(), [0.5])
+        read_wand(written(tmp_path, text), NAMES, FileOptions(), [0.5])
     assert "\n" not in str(error.value)
 
 
 def test_a_file_that_is_no_text_or_not_there_is_refused(tmp_path):
     (tmp_path / "x.csv").write_bytes(b"\xff\xfe\x00\x01")
     with pytest.raises(CalibrationError, match="not a text file"):
-        read_wand(tmp_path / "x.csv", NAMES, Given(), [0.5])
+        read_wand(tmp_path / "x.csv", NAMES, FileOptions(), [0.5])
     with pytest.raises(CalibrationError, match="cannot be read"):
-        read_wand(tmp_path / "no.csv", NAMES, Given(), [0.5])
+        read_wand(tmp_path / "no.csv", NAMES, FileOptions(), [0.5])
 
 
 def test_other_points_beside_the_wand_are_refused(tmp_path):
     px = np.full((1, 4, 1, 2), 5.0)
     with pytest.raises(CalibrationError, match="holds 4 markers; expected 2, one more than lengths"):
-        read_wand(written(tmp_path, xypts(px)), ("cam1",), Given(), [1.0])
+        read_wand(written(tmp_path, xypts(px)), ("cam1",), FileOptions(), [1.0])
 
 
 @pytest.mark.parametrize(
@@ -124,9 +124,9 @@ def test_the_length_gives_the_scale():
     rng, rig = np.random.default_rng(3), waving.hall()
     tracks = waving.tracks(rng, rig, 80)
     half = WandTracks(cameras=tracks.cameras, px=tracks.px, lengths_m={(0, 1): 0.5})
-    spread = adjust(rig, [wand_source(rig, tracks)], Freedom()).rig
-    small, _ = adjust(spread, [wand_source(rig, tracks)], Freedom()).moved(spread["cam1"].camera_from_world, 0.5)
-    narrow = adjust(small, [wand_source(small, half)], Freedom()).rig
+    spread = adjust(rig, [wand_source(rig, tracks)], FreeParameters()).rig
+    small, _ = adjust(spread, [wand_source(rig, tracks)], FreeParameters()).transform(spread["cam1"].camera_from_world, 0.5)
+    narrow = adjust(small, [wand_source(small, half)], FreeParameters()).rig
     ratio = np.linalg.norm(narrow["cam1"].centre - narrow["cam3"].centre) / np.linalg.norm(
         spread["cam1"].centre - spread["cam3"].centre
     )

@@ -10,8 +10,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.calibration.world_frame.alignment import (
     frame_of_gravity,
     frame_of_three_points,
-    gravity_of,
-    merged_starts,
+    estimate_gravity,
+    merge_rigs,
 )
 from airborne.cameras import Rig
 from airborne.errors import CalibrationError
@@ -53,7 +53,7 @@ def test_up_is_found_within_its_standard_deviation_and_strays_do_not_matter():
         throw = thrown(rng)
         throw[7] += 1.0 * (k % 2)
         throw[20:22] = np.nan
-        gravity = gravity_of(TIMES_S, [throw])
+        gravity = estimate_gravity(TIMES_S, [throw])
         tilts.append(np.linalg.norm(np.cross(gravity.up, up)) / np.sqrt(2))  # in one direction
         sds.append(gravity.tilt_sd_rad)
         magnitudes.append((gravity.magnitude - 9.81) / gravity.magnitude_sd)
@@ -65,14 +65,14 @@ def test_two_throws_tell_up_better_than_one():
     rng = np.random.default_rng(1)
     other = Rotation.from_rotvec([0, 0, 2.0])
     throws = [thrown(rng), thrown(rng, turn=OLD_FROM_NEW.rotation * other)]
-    both, one = gravity_of(TIMES_S, throws), gravity_of(TIMES_S, throws[:1])
+    both, one = estimate_gravity(TIMES_S, throws), estimate_gravity(TIMES_S, throws[:1])
     assert both.n_throws == 2
     assert both.tilt_sd_rad < one.tilt_sd_rad
 
 
 def test_the_fall_checks_the_scale():
     rng = np.random.default_rng(2)
-    sound, doubled = (gravity_of(TIMES_S, [thrown(rng, noise_m=0.002, scale=scale)]) for scale in (1.0, 2.0))
+    sound, doubled = (estimate_gravity(TIMES_S, [thrown(rng, noise_m=0.002, scale=scale)]) for scale in (1.0, 2.0))
     assert "lengths come out" not in sound.describe()
     assert doubled.magnitude / sound.magnitude == pytest.approx(2.0, rel=5e-3)
     assert re.search(r"lengths come out as (1\.99|2\.00)\d of the truth or times as 0\.70\d of it", doubled.describe())
@@ -80,11 +80,11 @@ def test_the_fall_checks_the_scale():
 
 def test_a_throw_too_short_is_refused():
     with pytest.raises(CalibrationError, match=r"seen for 0\.10 s at most; 0\.29 s and 6 places are needed"):
-        gravity_of(TIMES_S[:6], [thrown(np.random.default_rng(3))[:6]])
+        estimate_gravity(TIMES_S[:6], [thrown(np.random.default_rng(3))[:6]])
 
 
 def test_the_frame_of_gravity_has_z_up_and_x_level():
-    gravity = gravity_of(TIMES_S, [thrown(np.random.default_rng(4), noise_m=1e-9)])
+    gravity = estimate_gravity(TIMES_S, [thrown(np.random.default_rng(4), noise_m=1e-9)])
     corners = OLD_FROM_NEW.apply([[0, 0, 0], [3, 0, 1.0]])
     found = frame_of_gravity(gravity, *corners)
     assert np.abs((found * OLD_FROM_NEW).as_matrix() - np.eye(4)).max() < 1e-6
@@ -99,7 +99,7 @@ def moved(rig, new_from_old):
 @pytest.mark.parametrize("shared", [["cam2"], ["cam1", "cam2"], ["cam1", "cam2", "cam3"]])
 def test_starts_join_through_the_cameras_that_both_hold(shared):
     rig = waving.hall()
-    joined = merged_starts([rig.select(["cam1", "cam2", "cam3"]), moved(rig.select([*shared, "cam4"]), OLD_FROM_NEW)])
+    joined = merge_rigs([rig.select(["cam1", "cam2", "cam3"]), moved(rig.select([*shared, "cam4"]), OLD_FROM_NEW)])
     assert set(joined.names) == set(rig.names)
     assert all(np.allclose(joined[name].centre, rig[name].centre) for name in rig.names)
 
@@ -111,10 +111,10 @@ def test_starts_join_one_after_the_other_in_any_order():
         moved(rig.select(["cam3", "cam4"]), OLD_FROM_NEW),
         rig.select(["cam2", "cam3"]),
     ]
-    assert all(np.allclose(camera.centre, rig[camera.name].centre) for camera in merged_starts(parts))
+    assert all(np.allclose(camera.centre, rig[camera.name].centre) for camera in merge_rigs(parts))
 
 
 def test_starts_without_a_common_camera_are_refused_by_name():
     rig = waving.hall()
     with pytest.raises(CalibrationError, match="nothing ties cam3, cam4 to cam1, cam2"):
-        merged_starts([rig.select(["cam1", "cam2"]), rig.select(["cam3", "cam4"])])
+        merge_rigs([rig.select(["cam1", "cam2"]), rig.select(["cam3", "cam4"])])

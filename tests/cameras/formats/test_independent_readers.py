@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from airborne.cameras import PixelCount, Rig, read_rig, write_rig
+from airborne.cameras import PixelConvention, Rig, read_rig, write_rig
 from airborne.errors import CalibrationError
 from tests.cameras.formats.test_round_trips import FISHEYE_LENS, fisheye_rig
 from tests.support.cameras import LENS, three_cameras
@@ -241,7 +241,7 @@ def test_an_old_vicon_file_has_its_distortion_in_the_older_attribute(tmp_path):
 def test_dlt_formula_by_hand_gives_our_pixels(tmp_path, corner, base):
     """`u = (L1 X + L2 Y + L3 Z + L4) / (L9 X + L10 Y + L11 Z + 1)`, v with L5 to L8."""
     rig = three_cameras()
-    write_rig(tmp_path / "dltCoefs.csv", rig, pixels=PixelCount(corner, base), unit="mm")
+    write_rig(tmp_path / "dltCoefs.csv", rig, pixels=PixelConvention(corner, base), unit="mm")
     coefficients = np.loadtxt(tmp_path / "dltCoefs.csv", delimiter=",")
     assert coefficients.shape == (11, 3)
     x, y, z = 1e3 * POINTS.T
@@ -257,10 +257,10 @@ def test_dlt_formula_by_hand_gives_our_pixels(tmp_path, corner, base):
 @pytest.mark.parametrize("corner", ["upper-left", "lower-left"])
 def test_the_wrong_corner_is_told_from_cameras_that_look_away(tmp_path, corner):
     other = {"upper-left": "lower-left", "lower-left": "upper-left"}[corner]
-    write_rig(tmp_path / "dltCoefs.csv", three_cameras(), pixels=PixelCount(corner))
+    write_rig(tmp_path / "dltCoefs.csv", three_cameras(), pixels=PixelConvention(corner))
     told = f"from the {other} the cameras look away from each other; is it --origin {corner}"
     with pytest.raises(CalibrationError, match=told):
-        read_rig(tmp_path / "dltCoefs.csv", size=(768, 576), pixels=PixelCount(other))
+        read_rig(tmp_path / "dltCoefs.csv", size=(768, 576), pixels=PixelConvention(other))
 
 
 def test_fisheye_cameras_are_those_of_opencv():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.cameras import Detections, read_detections
-from airborne.cameras.detections import cameras_in, write_detections
+from airborne.cameras.detections import camera_names, write_detections
 from airborne.errors import CalibrationError
 from tests.support.people_seen import four_cameras, seen, walking
 
@@ -30,7 +30,7 @@ def crowd(folder, *people):
 def test_detections_come_back(tmp_path, as_folder):
     path = tmp_path / "pose"
     write_detections(path, some(), as_folder=as_folder)
-    assert sorted(cameras_in(path)) == sorted(some().cameras)
+    assert sorted(camera_names(path)) == sorted(some().cameras)
     back = read_detections(path, some().cameras)
     np.testing.assert_array_equal(back.px, some().px)
     np.testing.assert_array_equal(back.visibility, some().visibility)
@@ -67,6 +67,6 @@ def test_a_frame_far_away_takes_no_memory(tmp_path):
 
 
 def test_clicked_points_are_no_networks(tmp_path):
-    points = Detections.of_clicks(("a",), ("toe",), np.zeros((2, 1, 1, 2)))
+    points = Detections.from_clicks(("a",), ("toe",), np.zeros((2, 1, 1, 2)))
     with pytest.raises(CalibrationError, match=r"1 points \(toe, ...\) are not a pose network's"):
         write_detections(tmp_path / "d.npz", points)

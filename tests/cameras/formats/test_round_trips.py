@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from airborne.cameras import PixelCount, Rig, read_rig, write_rig
+from airborne.cameras import PixelConvention, Rig, read_rig, write_rig
 from airborne.errors import CalibrationError
 from tests.support.cameras import LENS, three_cameras
 from tests.support.format_rigs import PLAIN_NAMES, assert_same, rigs
@@ -16,7 +16,7 @@ FEW = settings(
     max_examples=25, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 BROWN = ("pinhole", "four", "brown")
-PIXELS = st.builds(PixelCount, st.sampled_from(["upper-left", "lower-left"]), st.sampled_from([0, 1]))
+PIXELS = st.builds(PixelConvention, st.sampled_from(["upper-left", "lower-left"]), st.sampled_from([0, 1]))
 FISHEYE_LENS = np.array([0.05, -0.01, 0.002, -0.0003])
 
 
@@ -103,7 +103,7 @@ def test_what_a_format_loses_is_said(tmp_path):
     dlt = write_rig(tmp_path / "rig.csv", skewed)
     assert vicon == ("tangential distortion of left, right, side", "skew of left")
     corners = np.array([[0, 0], [767, 0], [0, 575], [767, 575]])
-    moved = np.linalg.norm(rig["right"].distorted_px(corners) - corners, axis=1).max()
+    moved = np.linalg.norm(rig["right"].distort_px(corners) - corners, axis=1).max()
     assert f"right (up to {moved:.1f} px)" in dlt[-1]
     assert "straighten pixels first" in dlt[-1]
 

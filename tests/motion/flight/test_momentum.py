@@ -8,8 +8,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import BodyModel, Inertia, Pose, Segment
 from airborne.body.human import human18
 from airborne.motion import flight_summary
-from airborne.motion.flight.momentum import angular_momentum, centre_of_mass, momenta
-from airborne.synthetic.flight.articulated import Takeoff, fly_articulated, moves
+from airborne.motion.flight.momentum import angular_momenta, angular_momentum, centre_of_mass
+from airborne.synthetic.flight.articulated import Takeoff, fly_articulated, joint_motion
 from tests.support.motions import figure, motion_of, shaken, small_covariance, swinging
 from tests.support.tolerances import EXACT, ROUNDTRIP, SOLVED, sampled
 
@@ -69,7 +69,7 @@ def test_centre_of_mass_is_that_of_the_particles():
 def test_momentum_is_that_of_the_particles():
     step = 1e-4
     poses = swinging(MODEL, 0.2 + step * np.arange(-2, 3))
-    found, _ = momenta(motion_of(MODEL, poses, rate_hz=10_000), MODEL)
+    found, _ = angular_momenta(motion_of(MODEL, poses, rate_hz=10_000), MODEL)
     expected = momentum_of_particles(MODEL, poses[1:4], step)
     np.testing.assert_allclose(found[2], expected, rtol=1e-5)
 
@@ -80,7 +80,7 @@ def test_momentum_of_a_steady_turn_is_inertia_times_rate_at_any_frame_rate():
         Pose(world_from_root=RigidTransform.from_components([0, k, 0], Rotation.from_rotvec([rate * k / 25, 0, 0])))
         for k in range(7)
     ]
-    found, _ = momenta(motion_of(model, poses, rate_hz=25), model)
+    found, _ = angular_momenta(motion_of(model, poses, rate_hz=25), model)
     np.testing.assert_allclose(found, np.tile([90.0, 0, 0], (7, 1)), atol=100 * ROUNDTRIP)
 
 
@@ -89,9 +89,9 @@ def test_momentum_of_a_free_twisting_somersault_is_constant():
     tumbling = spun(model, momentum, 0.8, 41)
     turned = tumbling[0].world_from_root.rotation.inv() * tumbling[-1].world_from_root.rotation
     assert turned.magnitude() > 1
-    found, _ = momenta(motion_of(model, tumbling, rate_hz=50), model)
+    found, _ = angular_momenta(motion_of(model, tumbling, rate_hz=50), model)
     np.testing.assert_allclose(found[2:-2], np.tile(momentum, (37, 1)), atol=0.01 * 85)
-    finer, _ = momenta(motion_of(model, spun(model, momentum, 0.8, 161), rate_hz=200), model)
+    finer, _ = angular_momenta(motion_of(model, spun(model, momentum, 0.8, 161), rate_hz=200), model)
     np.testing.assert_allclose(finer[2:-2], np.tile(momentum, (157, 1)), atol=0.01 * 85 / 16)
 
 
@@ -101,9 +101,9 @@ def test_measured_momentum_of_a_simulated_flight_with_moving_arms_is_the_simulat
     angles = np.zeros((2, len(model.segments) - 1, 3))
     angles[:, arms, 1] = [[-2.0, 1.2], [-0.2, 0.2]]
     start = Takeoff(centre=np.ones(3), velocity=np.array([0, -1.0, 3]), R=np.eye(3), angular_momentum=momentum)
-    flown = fly_articulated(model, start, moves(np.array([0.05, 0.3]), angles), np.arange(21) / 50)
+    flown = fly_articulated(model, start, joint_motion(np.array([0.05, 0.3]), angles), np.arange(21) / 50)
     motion = motion_of(model, [flown.pose(k) for k in range(21)])
-    np.testing.assert_allclose(momenta(motion, model)[0], np.tile(momentum, (21, 1)), atol=0.01 * 60)
+    np.testing.assert_allclose(angular_momenta(motion, model)[0], np.tile(momentum, (21, 1)), atol=0.01 * 60)
     summary = flight_summary(motion, model)
     assert summary.fitted_gravity_m_s2 == pytest.approx(9.81, abs=SOLVED)
     assert summary.ballistic_rms_mm < 1e3 * ROUNDTRIP
@@ -113,8 +113,10 @@ def test_momentum_turns_with_the_world_and_forgets_where_it_is():
     world = RigidTransform.from_components([3.0, -2.0, 1.0], Rotation.from_rotvec([0.3, 1.0, -0.4]))
     poses = swinging(MODEL, np.arange(6) / 50)
     moved = [Pose(world_from_root=world * pose.world_from_root, joint_angles=pose.joint_angles) for pose in poses]
-    found, _ = momenta(motion_of(MODEL, poses), MODEL)
-    np.testing.assert_allclose(momenta(motion_of(MODEL, moved), MODEL)[0], world.rotation.apply(found), atol=ROUNDTRIP)
+    found, _ = angular_momenta(motion_of(MODEL, poses), MODEL)
+    np.testing.assert_allclose(
+        angular_momenta(motion_of(MODEL, moved), MODEL)[0], world.rotation.apply(found), atol=ROUNDTRIP
+    )
 
 
 def test_momentum_is_linear_in_the_rates():
@@ -128,21 +130,23 @@ def test_momentum_is_linear_in_the_rates():
 def test_momentum_deviations_are_those_of_sampled_poses():
     rng, covariance, n = np.random.default_rng(4), small_covariance(MODEL, sd=3e-3), 300
     poses = swinging(MODEL, np.arange(6) / 50)
-    _, variance = momenta(motion_of(MODEL, poses, covariance=covariance), MODEL)
-    drawn = [momenta(motion_of(MODEL, [shaken(rng, pose, covariance) for pose in poses]), MODEL)[0] for _ in range(n)]
+    _, variance = angular_momenta(motion_of(MODEL, poses, covariance=covariance), MODEL)
+    drawn = [
+        angular_momenta(motion_of(MODEL, [shaken(rng, pose, covariance) for pose in poses]), MODEL)[0] for _ in range(n)
+    ]
     np.testing.assert_allclose(np.sqrt(variance), np.std(drawn, axis=0), rtol=sampled(n))  # at the ends and inside
 
 
 def test_momentum_never_reaches_across_a_lost_frame():
     poses = swinging(MODEL, np.arange(9) / 50)
-    found, _ = momenta(motion_of(MODEL, poses, lost=[4]), MODEL)
-    first, _ = momenta(motion_of(MODEL, poses[:4]), MODEL)
+    found, _ = angular_momenta(motion_of(MODEL, poses, lost=[4]), MODEL)
+    first, _ = angular_momenta(motion_of(MODEL, poses[:4]), MODEL)
     np.testing.assert_allclose(found[:4], first, atol=EXACT * 1e3)
     assert np.isnan(found[4]).all()
 
 
 def test_single_frame_between_lost_ones_has_no_momentum():
-    found, variance = momenta(motion_of(MODEL, swinging(MODEL, np.arange(3) / 50), lost=[0, 2]), MODEL)
+    found, variance = angular_momenta(motion_of(MODEL, swinging(MODEL, np.arange(3) / 50), lost=[0, 2]), MODEL)
     assert np.isnan(found).all()
     assert np.isnan(variance).all()
 
@@ -150,7 +154,7 @@ def test_single_frame_between_lost_ones_has_no_momentum():
 def test_two_frames_give_the_mean_rate_between_them():
     model = plank()
     poses = [Pose(world_from_root=RigidTransform.from_rotation(Rotation.from_rotvec([0, a, 0]))) for a in (0.0, 0.2)]
-    found, _ = momenta(motion_of(model, poses, rate_hz=50), model)
+    found, _ = angular_momenta(motion_of(model, poses, rate_hz=50), model)
     np.testing.assert_allclose(found, np.tile([0, 105.0, 0], (2, 1)), atol=100 * ROUNDTRIP)
 
 
@@ -158,8 +162,8 @@ def test_a_joint_that_jumps_right_round_breaks_the_fit_off():
     poses = swinging(MODEL, np.arange(8) / 50)
     for pose in poses[4:]:
         pose.joint_angles[0, 2] += 2.8
-    found, _ = momenta(motion_of(MODEL, poses), MODEL)
-    before, _ = momenta(motion_of(MODEL, poses[:4]), MODEL)
+    found, _ = angular_momenta(motion_of(MODEL, poses), MODEL)
+    before, _ = angular_momenta(motion_of(MODEL, poses[:4]), MODEL)
     np.testing.assert_allclose(found[:4], before, atol=0.02 * np.linalg.norm(before[0]))
 
 
@@ -170,13 +174,13 @@ def test_unseen_turn_of_a_joint_widens_the_momentum_and_does_not_hide_it():
     wide[6, 6] = np.inf
     poses = swinging(MODEL, np.arange(5) / 50)
     narrow_sd, wide_sd = (
-        np.sqrt(momenta(motion_of(MODEL, poses, covariance=each), MODEL)[1]) for each in (covariance, wide)
+        np.sqrt(angular_momenta(motion_of(MODEL, poses, covariance=each), MODEL)[1]) for each in (covariance, wide)
     )
     assert np.isfinite(wide_sd).all()
     assert (wide_sd > 10 * narrow_sd).any()
 
 
 def test_unknown_covariance_is_an_unknown_deviation():
-    value, variance = momenta(motion_of(MODEL, swinging(MODEL, np.arange(5) / 50), covariance=np.eye(6)), MODEL)
+    value, variance = angular_momenta(motion_of(MODEL, swinging(MODEL, np.arange(5) / 50), covariance=np.eye(6)), MODEL)
     assert np.isfinite(value).all()
     assert np.isnan(variance).all()

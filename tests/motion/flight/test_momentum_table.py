@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
 from airborne.errors import BodyError, ResultError
-from airborne.motion import flight, flight_summary, has_inertias, write_flight
+from airborne.motion import flight_summary, has_inertias, measure_flight, write_flight
 from airborne.motion.flight.momentum import centre_of_mass
 from tests.support.motions import figure, motion_of, shaken, small_covariance, swinging
 from tests.support.tolerances import EXACT, ROUNDTRIP, sampled
@@ -30,14 +30,14 @@ def falling(gravity=9.81, turns=1.25):
         turn = Rotation.from_rotvec([2 * np.pi * turns * t / TIMES[-1], 0, 0])
         still = Pose(world_from_root=RigidTransform.from_rotation(turn), joint_angles=np.full((4, 3), 0.2))
         com, _ = centre_of_mass(MODEL.with_pose(still))
-        poses.append(still.moved(np.array([t, 0, 3 * t - gravity * t**2 / 2]) - com, np.zeros(3)))
+        poses.append(still.move(np.array([t, 0, 3 * t - gravity * t**2 / 2]) - com, np.zeros(3)))
     return poses
 
 
 def test_centre_of_mass_deviations_are_those_of_sampled_poses():
     rng, covariance, n = np.random.default_rng(1), small_covariance(MODEL), 1000
     (pose,) = swinging(MODEL, [0.1])
-    table = flight(motion_of(MODEL, [pose], covariance=covariance), MODEL)
+    table = measure_flight(motion_of(MODEL, [pose], covariance=covariance), MODEL)
     drawn = [centre_of_mass(MODEL.with_pose(shaken(rng, pose, covariance)))[0] for _ in range(n)]
     np.testing.assert_allclose(table["com_sd"][0], np.std(drawn, axis=0), rtol=sampled(n))
     assert np.isnan(table["angular_momentum"][0]).all()
@@ -79,7 +79,7 @@ def test_table_has_a_unit_in_every_column_and_empty_cells_where_lost(tmp_path):
     assert list(rows[0]) == COLUMNS.split(",")
     assert all(rows[5][name] == "" for name in COLUMNS.split(",")[2:])
     assert all(rows[4][name] != "" for name in COLUMNS.split(","))
-    table = flight(motion, MODEL)
+    table = measure_flight(motion, MODEL)
     assert float(rows[7]["com_z_m"]) == pytest.approx(float(table["com"][7, 2]), abs=EXACT)
     assert float(rows[7]["L_x_kg_m2_s_sd"]) == pytest.approx(float(table["angular_momentum_sd"][7, 0]), rel=EXACT)
     assert float(rows[7]["somersault_rev"]) == pytest.approx(1.25 * 7 / 20, abs=ROUNDTRIP)
@@ -93,10 +93,10 @@ def test_body_without_all_its_masses_is_refused_in_one_line():
     assert has_inertias(MODEL)
     assert not has_inertias(weightless)
     with pytest.raises(BodyError, match="no mass for arm; give every segment its inertia"):
-        flight(motion_of(MODEL, falling()), weightless)
+        measure_flight(motion_of(MODEL, falling()), weightless)
 
 
 def test_motion_of_another_body_is_refused():
     other = replace(MODEL, segments=MODEL.segments[:3], landmarks=MODEL.landmarks[:3])
     with pytest.raises(ResultError, match="give the run's body"):
-        flight(motion_of(MODEL, falling()), other)
+        measure_flight(motion_of(MODEL, falling()), other)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
 from airborne.motion import Motion
-from airborne.motion.flight.phases import ballistic_point, body_events, free_falls, player_events
+from airborne.motion.flight.phases import ballistic_point, body_events, find_flight_events, player_events
 from tests.support.jumping import Jumper, players_motion
 from tests.support.jumping import motion_of as jump_of
 from tests.support.motions import figure, motion_of, somersault
@@ -24,7 +24,7 @@ def hips(jumper, seed, sd_m):
 @pytest.mark.parametrize("seed", range(4))
 def test_a_jump_has_one_takeoff_and_one_landing(seed):
     jumper = Jumper()
-    found = free_falls(*hips(jumper, seed, 0.005))
+    found = find_flight_events(*hips(jumper, seed, 0.005))
     assert [event.name for event in found] == ["take-off", "landing"]
     assert found[0].time_s == pytest.approx(jumper.takeoff_s, abs=0.025)
     assert found[1].time_s == pytest.approx(jumper.landing_s, abs=0.04)
@@ -34,7 +34,7 @@ def test_two_jumps_have_two_of_each():
     one = Jumper(duration_s=2.5)
     _, height, variance = hips(one, 0, 0.004)
     both = np.concatenate([height, height])
-    found = free_falls(np.arange(len(both)) / one.rate, both, np.concatenate([variance, variance]))
+    found = find_flight_events(np.arange(len(both)) / one.rate, both, np.concatenate([variance, variance]))
     assert [event.name for event in found] == ["take-off", "landing"] * 2
     assert found[2].time_s - found[0].time_s == pytest.approx(2.5, abs=0.02)
 
@@ -42,18 +42,18 @@ def test_two_jumps_have_two_of_each():
 def test_who_stands_or_walks_or_squats_does_not_fly():
     t, rng = np.arange(180) / 60, np.random.default_rng(1)
     for height in (np.full(180, 0.9), 0.9 + 0.03 * np.sin(12 * t), 0.7 + 0.2 * np.cos(4 * t)):
-        assert free_falls(t, height + 0.004 * rng.normal(size=180), np.full(180, 0.004**2)) == ()
+        assert find_flight_events(t, height + 0.004 * rng.normal(size=180), np.full(180, 0.004**2)) == ()
 
 
 def test_a_recording_that_is_all_flight_has_no_event():
     t, rng = np.arange(50) / 50, np.random.default_rng(2)
     height = 1 + 4.5 * t - G / 2 * t**2 + 0.004 * rng.normal(size=50)
-    assert free_falls(t, height, np.full(50, 0.004**2)) == ()
+    assert find_flight_events(t, height, np.full(50, 0.004**2)) == ()
 
 
 @pytest.mark.parametrize("n", [0, 1, 7])
 def test_too_little_shows_nothing(n):
-    assert free_falls(np.arange(n) / 60, np.ones(n), np.ones(n)) == ()
+    assert find_flight_events(np.arange(n) / 60, np.ones(n), np.ones(n)) == ()
 
 
 def test_where_the_mass_of_a_spinning_body_is_follows_from_its_fall():

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from airborne.errors import ResultError
-from airborne.motion.free_fall import fallen, noise_covariance
-from airborne.motion.jumps.heights import jumps
+from airborne.motion.free_fall import free_fall_height, noise_covariance
+from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.standing_posture import leg_lengths
-from airborne.motion.jumps.table import describe
+from airborne.motion.jumps.table import describe_jumps
 from airborne.motion.local_polynomials import local_fits
 from tests.support.jumping import FLAT_M, HEEL_M, LEG_M, SHARE, G, Jumper, leg_track, motion_of, noise, players_motion
 from tests.support.tolerances import ROUNDTRIP
@@ -21,7 +21,7 @@ HEIGHTS = ("foot_height_m", "hip_height_m", "flight_time_height_m", "takeoff_spe
 
 
 def only(motion):
-    (jump,) = jumps(motion)
+    (jump,) = measure_jumps(motion)
     return jump
 
 
@@ -85,7 +85,7 @@ def test_time_over_the_level_is_that_of_the_parabola_above_it(clean):
 
 
 def only_level(level_m):
-    (jump,) = jumps(motion_of(CLEAN), block_level_m=level_m)
+    (jump,) = measure_jumps(motion_of(CLEAN), block_level_m=level_m)
     return jump
 
 
@@ -99,7 +99,7 @@ def test_nothing_changes_when_the_jump_is_elsewhere_or_later():
     assert there.takeoff_s.value == pytest.approx(here.takeoff_s.value + 7.0, abs=REDRAWN)
     assert there.takeoff_frame.value == pytest.approx(here.takeoff_frame.value, abs=60 * REDRAWN)
     for k, shift in enumerate((3.0, -2.0)):
-        assert there.takeoff_place_m[k].value == pytest.approx(here.takeoff_place_m[k].value + shift, abs=REDRAWN)
+        assert there.takeoff_position_m[k].value == pytest.approx(here.takeoff_position_m[k].value + shift, abs=REDRAWN)
 
 
 def test_rises_do_not_change_when_the_floor_is_higher():
@@ -153,21 +153,21 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say_and_errors_are_smal
 def test_who_stands_does_not_jump():
     points = np.repeat(CLEAN.points()[:1, None, :6], 90, axis=0)
     points = points + 0.02 * noise(np.random.default_rng(8), points.shape)
-    assert jumps(players_motion(np.arange(90) / 60, points, sd_m=0.02)) == ()
+    assert measure_jumps(players_motion(np.arange(90) / 60, points, sd_m=0.02)) == ()
 
 
 def test_who_is_carried_up_at_rest_does_not_jump():
     points = np.repeat(CLEAN.points()[:1, None, :6], 150, axis=0)
     lift = 0.4 * np.clip((np.arange(150) / 60 - 0.8) / 0.3, 0, 1)
     points[..., 2] += lift[:, None, None]
-    assert jumps(players_motion(np.arange(150) / 60, points, sd_m=0.01)) == ()
+    assert measure_jumps(players_motion(np.arange(150) / 60, points, sd_m=0.01)) == ()
 
 
 def test_two_jumps_are_told_apart():
     first, second = Jumper(takeoff_s=1.0), Jumper(takeoff_s=1.2, speed_m_s=2.6)
     points = np.concatenate([first.points(), second.points()])[:, None, :6]
     motion = players_motion(np.arange(len(points)) / 60, points)
-    one, two = jumps(motion)
+    one, two = measure_jumps(motion)
     assert (one.number, two.number) == (1, 2)
     assert one.takeoff_s.value == pytest.approx(1.0, abs=1 / 60)
     assert two.takeoff_s.value == pytest.approx(2.5 + 1.2, abs=1 / 60)
@@ -177,7 +177,7 @@ def test_two_jumps_are_told_apart():
 def test_players_come_in_their_order_each_with_its_own_jump():
     low, high = Jumper(speed_m_s=2.5), Jumper(takeoff_s=1.2)
     points = np.stack([high.points(), low.points()], axis=1)[:, :, :6]
-    found = jumps(players_motion(CLEAN.time_s, points, players=("high", "low")))
+    found = measure_jumps(players_motion(CLEAN.time_s, points, players=("high", "low")))
     assert [jump.player for jump in found] == ["high", "low"]
     assert found[0].foot_height_m.value > found[1].foot_height_m.value
 
@@ -290,7 +290,7 @@ def test_uncertain_frames_of_the_flight_are_counted_and_those_of_the_floor_are_n
     status[at : at + 4] = status[0] = "uncertain"
     jump = only(replace(motion, status=status))
     assert (only(motion).n_uncertain, jump.n_uncertain) == (0, 4)
-    assert "4 frames of the flight are uncertain" in describe([jump])
+    assert "4 frames of the flight are uncertain" in describe_jumps([jump])
 
 
 def test_a_covariance_that_is_not_given_counts_as_20_mm():
@@ -314,18 +314,18 @@ def test_a_joint_that_leaps_away_and_back_counts_as_unknown():
 def test_a_motion_without_legs_is_refused_by_name():
     motion = motion_of(CLEAN)
     with pytest.raises(ResultError, match="lacks ankle_right"):
-        jumps(replace(motion, joints=(*motion.joints[:5], "head")))
+        measure_jumps(replace(motion, joints=(*motion.joints[:5], "head")))
 
 
 def test_a_motion_of_one_frame_or_none_known_has_no_jump():
     motion = motion_of(CLEAN)
-    assert jumps(without(motion, slice(None))) == ()
-    assert jumps(players_motion(CLEAN.time_s[:1], CLEAN.points()[:1, None, :6])) == ()
+    assert measure_jumps(without(motion, slice(None))) == ()
+    assert measure_jumps(players_motion(CLEAN.time_s[:1], CLEAN.points()[:1, None, :6])) == ()
 
 
 def test_local_fits_are_exact_on_parabolas_and_unknown_outside_the_data():
     time_s = np.arange(12) / 60
-    values = np.column_stack([1.0 + 2 * time_s + fallen(time_s), 3 - time_s])
+    values = np.column_stack([1.0 + 2 * time_s + free_fall_height(time_s), 3 - time_s])
     at_s = np.array([0.0871, 0.3, 0.1])
     fit, covariance = local_fits(time_s, values, np.full_like(values, 1e-4), at_s)
     for k in (0, 2):

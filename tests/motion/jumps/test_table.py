@@ -5,8 +5,8 @@ import csv
 import numpy as np
 import pytest
 
-from airborne.motion.jumps.heights import jumps
-from airborne.motion.jumps.table import describe, write_jumps
+from airborne.motion.jumps.heights import measure_jumps
+from airborne.motion.jumps.table import describe_jumps, write_jumps
 from tests.support.jumping import Jumper, motion_of, players_motion
 
 CLEAN = Jumper()
@@ -14,13 +14,13 @@ CLEAN = Jumper()
 
 @pytest.fixture(scope="module")
 def whole():
-    return jumps(motion_of(CLEAN))
+    return measure_jumps(motion_of(CLEAN))
 
 
 @pytest.fixture(scope="module")
 def cut():
     n = round(60 * (CLEAN.takeoff_s + 0.4))
-    return jumps(players_motion(np.arange(n) / 60, CLEAN.points()[:n, None, :6]))
+    return measure_jumps(players_motion(np.arange(n) / 60, CLEAN.points()[:n, None, :6]))
 
 
 def rows_of(path):
@@ -33,7 +33,7 @@ def test_table_reads_back_to_the_last_bit(whole, tmp_path):
     (row,) = rows_of(tmp_path / "jumps.csv")
     assert (row["player"], row["jump"], row["status"]) == ("one", "1", "whole")
     assert tuple(float(row[f"foot_height_m{end}"]) for end in ("", "_low", "_high")) == tuple(whole[0].foot_height_m)
-    assert float(row["landing_y_m"]) == whole[0].landing_place_m[1].value
+    assert float(row["landing_y_m"]) == whole[0].landing_position_m[1].value
     assert row["standing_source"] == "stance"
     assert int(row["standing_first_frame"]) == whole[0].standing.frames[0]
 
@@ -52,11 +52,11 @@ def test_no_jump_leaves_a_table_with_its_first_line_alone(whole, tmp_path):
     none, one = ((tmp_path / name).read_text().splitlines() for name in ("none.csv", "one.csv"))
     assert none == one[:1]
     assert len(one) == 2
-    assert describe(()) == "no jump found"
+    assert describe_jumps(()) == "no jump found"
 
 
 def test_text_shows_every_definition_in_centimetres_and_says_what_is_missing(whole, cut):
-    text = describe(whole + cut)
+    text = describe_jumps(whole + cut)
     height = whole[0].foot_height_m
     assert f"{100 * height.value:.1f} +-{50 * (height.high - height.low):.1f}" in text
     for title in ("feet over standing", "hips over standing", "by flight time", "by take-off speed"):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.motion.smoothing import crossings, highest
+from airborne.motion.smoothing import crossings, parabolic_peak
 from tests.support.tolerances import ROUNDTRIP
 
 T = np.arange(50) / 50
@@ -28,12 +28,12 @@ def test_nothing_is_passed_across_an_unknown_frame():
 
 
 def test_the_top_of_a_parabola_is_exact_between_frames():
-    assert highest(T, 2 - 9.81 / 2 * (T - 0.4567) ** 2) == pytest.approx((0.4567, 2.0), abs=ROUNDTRIP)
+    assert parabolic_peak(T, 2 - 9.81 / 2 * (T - 0.4567) ** 2) == pytest.approx((0.4567, 2.0), abs=ROUNDTRIP)
 
 
 def test_at_an_end_or_beside_a_gap_the_frame_itself_counts():
-    assert highest(T, T) == (0.98, 0.98)
+    assert parabolic_peak(T, T) == (0.98, 0.98)
     path = -((T - 0.5) ** 2)
     path[26] = np.nan
-    assert highest(T, path) == (0.5, 0.0)
-    assert np.isnan(highest(T, np.full(50, np.nan))).all()
+    assert parabolic_peak(T, path) == (0.5, 0.0)
+    assert np.isnan(parabolic_peak(T, np.full(50, np.nan))).all()

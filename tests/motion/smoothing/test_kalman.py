@@ -4,9 +4,16 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from airborne.motion.free_fall import OF_ANYTHING, noise_covariance
-from airborne.motion.smoothing import kalman
-from airborne.motion.smoothing.kalman import PRIOR_SD, filtered, likeliest_density, noise_of, rts, steps_of
+from airborne.motion.free_fall import GENERIC_NOISE, noise_covariance
+from airborne.motion.smoothing import kalman_smoother
+from airborne.motion.smoothing.kalman import (
+    PRIOR_SD,
+    kalman_filter,
+    maximum_likelihood_density,
+    measurement_noise,
+    rts_smoother,
+    state_space_model,
+)
 from tests.support.tolerances import ROUNDTRIP
 
 RATE = 60.0
@@ -28,7 +35,7 @@ def dense(t, z, variance, density):
         means.append(F @ means[-1])
     seen = np.flatnonzero(np.isfinite(z))
     mean, at = np.concatenate(means), 3 * seen
-    S = K[np.ix_(at, at)] + noise_covariance(t[seen], variance[seen], noise=OF_ANYTHING)
+    S = K[np.ix_(at, at)] + noise_covariance(t[seen], variance[seen], noise=GENERIC_NOISE)
     gain = np.linalg.solve(S, K[at]).T
     evidence = multivariate_normal(mean[at], S).logpdf(z[seen])
     return mean + gain @ (z[seen] - mean[at]), K - gain @ K[at], evidence
@@ -47,30 +54,30 @@ def test_mean_covariance_and_likelihood_are_those_of_a_dense_solve():
     t, z, variance = problem()
     for density in (10.0, 1e4):
         mean, K, evidence = dense(t, z, variance, density)
-        steps = steps_of(t, z[:, None], noise_of(variance[:, None, None]), density)
-        found, P = rts(steps, z[:, None])
+        steps = state_space_model(t, z[:, None], measurement_noise(variance[:, None, None]), density)
+        found, P = rts_smoother(steps, z[:, None])
         period = np.median(np.diff(t))
         scale = period ** -np.arange(3)
         assert found[:, :3] * scale == pytest.approx(mean.reshape(-1, 3), rel=1e-5, abs=1e-6)
         sd = np.sqrt(np.diagonal(P, axis1=1, axis2=2)[:, :3]) * scale
         assert sd == pytest.approx(np.sqrt(np.diag(K)).reshape(-1, 3), rel=1e-5)
-        assert filtered(steps, z[:, None])[-1] == pytest.approx(evidence, rel=1e-6)
+        assert kalman_filter(steps, z[:, None])[-1] == pytest.approx(evidence, rel=1e-6)
 
 
 def test_axes_that_do_not_share_noise_are_smoothed_as_if_alone():
     t, z, variance = problem()
-    both, own = np.stack([z, z], axis=1), noise_of(variance[:, None, None])
-    shared = noise_of(variance[:, None, None] * np.eye(2))
-    density = likeliest_density(t, z[:, None], own)
-    assert likeliest_density(t, both, shared) == pytest.approx(density, rel=0.1)
-    alone = rts(steps_of(t, z[:, None], own, density), z[:, None])[0]
-    together = rts(steps_of(t, both, shared, density), both)[0]
+    both, own = np.stack([z, z], axis=1), measurement_noise(variance[:, None, None])
+    shared = measurement_noise(variance[:, None, None] * np.eye(2))
+    density = maximum_likelihood_density(t, z[:, None], own)
+    assert maximum_likelihood_density(t, both, shared) == pytest.approx(density, rel=0.1)
+    alone = rts_smoother(state_space_model(t, z[:, None], own, density), z[:, None])[0]
+    together = rts_smoother(state_space_model(t, both, shared, density), both)[0]
     assert together[:, :4:2] == pytest.approx(alone[:, :2], abs=ROUNDTRIP)
 
 
 def test_the_strength_of_the_jerk_is_the_likeliest():
     t, z, variance = problem()
-    density = likeliest_density(t, z[:, None], noise_of(variance[:, None, None]))
+    density = maximum_likelihood_density(t, z[:, None], measurement_noise(variance[:, None, None]))
     costs = [-dense(t, z, variance, factor * density)[2] for factor in (0.5, 1.0, 2.0)]
     assert costs[1] == min(costs)
 
@@ -78,9 +85,9 @@ def test_the_strength_of_the_jerk_is_the_likeliest():
 def test_free_fall_is_recovered_inside_a_flight():
     rng, t = np.random.default_rng(3), np.arange(36) / RATE
     sd = 0.005
-    noise = np.linalg.cholesky(noise_covariance(t, np.full(36, sd**2), noise=OF_ANYTHING)) @ rng.normal(size=(36, 3))
+    noise = np.linalg.cholesky(noise_covariance(t, np.full(36, sd**2), noise=GENERIC_NOISE)) @ rng.normal(size=(36, 3))
     fall = np.stack([0.5 * t, 0 * t, 1 + 3 * t - 9.81 / 2 * t**2], axis=1)
-    found = kalman(t, fall + noise, np.broadcast_to(sd**2 * np.eye(3), (36, 3, 3)))
+    found = kalman_smoother(t, fall + noise, np.broadcast_to(sd**2 * np.eye(3), (36, 3, 3)))
     assert found.acceleration[:, 2].mean() == pytest.approx(-9.81, abs=3 * found.acceleration_sd[:, 2].mean())
     assert abs(found.acceleration[:, 2].mean() + 9.81) < 0.5
     assert found.velocity[:, 2] == pytest.approx(3 - 9.81 * t, abs=0.15)
@@ -91,13 +98,13 @@ def test_deviations_are_honest_for_paths_as_the_model_has_them():
     t, T, sd = np.arange(n) / RATE, 1 / RATE, 0.01
     F = np.array([[1, T, T * T / 2], [0, 1, T], [0, 0, 1]])
     Q = 2e3 * np.array([[T**5 / 20, T**4 / 8, T**3 / 6], [T**4 / 8, T**3 / 3, T**2 / 2], [T**3 / 6, T**2 / 2, T]])
-    root, noise = np.linalg.cholesky(Q), np.linalg.cholesky(noise_covariance(t, np.full(n, sd**2), noise=OF_ANYTHING))
+    root, noise = np.linalg.cholesky(Q), np.linalg.cholesky(noise_covariance(t, np.full(n, sd**2), noise=GENERIC_NOISE))
     for _ in range(40):
         states = [np.array([0.0, 1.0, -5.0])]
         for _ in range(n - 1):
             states.append(F @ states[-1] + root @ rng.normal(size=3))
         truth = np.array(states)
-        found = kalman(t, (truth[:, 0] + noise @ rng.normal(size=n))[:, None], np.full((n, 1, 1), sd**2))
+        found = kalman_smoother(t, (truth[:, 0] + noise @ rng.normal(size=n))[:, None], np.full((n, 1, 1), sd**2))
         ratios["value"].append((found.value[:, 0] - truth[:, 0]) / found.value_sd[:, 0])
         ratios["velocity"].append((found.velocity[:, 0] - truth[:, 1]) / found.velocity_sd[:, 0])
     for ratio in ratios.values():
@@ -110,7 +117,7 @@ def test_a_direction_that_nothing_shows_rests_on_the_others():
     covariance[5] = np.diag([np.inf, variance[5]])
     values = np.stack([z, z], axis=1)
     values[5, 0] += 3.0
-    found = kalman(t, values, covariance)
+    found = kalman_smoother(t, values, covariance)
     assert found.value[5, 0] == pytest.approx(np.sin(8 * t[5]), abs=0.05)
     assert found.value_sd[5, 0] > found.value_sd[5, 1]
 
@@ -121,8 +128,10 @@ def test_rows_without_a_covariance_do_not_count_and_none_at_all_is_unknown():
     covariance[5] = np.nan
     spoilt = z.copy()
     spoilt[5] += 100.0
-    assert np.array_equal(kalman(t, z[:, None], covariance).value, kalman(t, spoilt[:, None], covariance).value)
-    assert np.isnan(kalman(t, z[:, None], np.full((25, 1, 1), np.nan)).value).all()
+    assert np.array_equal(
+        kalman_smoother(t, z[:, None], covariance).value, kalman_smoother(t, spoilt[:, None], covariance).value
+    )
+    assert np.isnan(kalman_smoother(t, z[:, None], np.full((25, 1, 1), np.nan)).value).all()
 
 
 def test_a_covariance_that_rounding_made_negative_still_counts():
@@ -130,4 +139,4 @@ def test_a_covariance_that_rounding_made_negative_still_counts():
     values = np.stack([z, z], axis=1)
     flat = variance[:, None, None] * np.ones((2, 2)) - 1e-14 * np.eye(2)
     assert np.linalg.eigvalsh(flat).min() < 0
-    assert np.isfinite(kalman(t, values, flat).value).all()
+    assert np.isfinite(kalman_smoother(t, values, flat).value).all()

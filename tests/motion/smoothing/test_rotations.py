@@ -7,14 +7,24 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from airborne.geometry.rotations import geodesic
-from airborne.motion.smoothing import butterworth, continuous_quaternions, kalman, smooth_rotations, spline
+from airborne.motion.smoothing import (
+    butterworth_smoother,
+    continuous_quaternions,
+    kalman_smoother,
+    smooth_rotations,
+    spline_smoother,
+)
 from tests.support.tolerances import EXACT
 
 RATE = 60.0
 N = 60
 T = np.arange(N) / RATE
 SPIN = np.array([9.0, 1.0, 3.0])  # about a fixed axis [rad/s]: a turn and a half
-METHODS = {"butterworth": partial(butterworth, cutoff_hz=10), "spline": spline, "kalman": kalman}
+METHODS = {
+    "butterworth": partial(butterworth_smoother, cutoff_hz=10),
+    "spline": spline_smoother,
+    "kalman": kalman_smoother,
+}
 
 
 def spinning(sd=0.0, seed=0):

@@ -13,18 +13,18 @@ from airborne.errors import TrialError
 from airborne.synthetic import (
     DIFFICULTIES,
     Difficulty,
+    block_frames,
     block_scene,
-    frames_of,
-    joints_of,
-    jump_facts,
-    starts_of,
+    jump_truth,
+    noisy_starts,
     torso_input,
+    true_joints,
     write_block,
 )
 from airborne.synthetic.block.margins import gap_m, margins_of
-from airborne.synthetic.block.pictures import _merged
-from airborne.synthetic.block.players import taken_room
-from airborne.synthetic.block.rig import hall_rig, miscalibrated
+from airborne.synthetic.block.pictures import _merge
+from airborne.synthetic.block.players import occupied_volume
+from airborne.synthetic.block.rig import hall_rig, perturb_calibration
 from airborne.synthetic.block.scene import paper_lengths
 from airborne.trial.file import read_trial
 from airborne.video import inspect
@@ -50,7 +50,7 @@ def shortened(scene, n_frames, *, scale=3):
             )
         )
 
-    return replace(scene, n_frames=n_frames, rig=small(scene.rig), calibrated=small(scene.calibrated))
+    return replace(scene, n_frames=n_frames, rig=small(scene.rig), calibrated_rig=small(scene.calibrated_rig))
 
 
 def test_scene_has_blockers_a_spiker_decoys_and_three_mates(scene):
@@ -64,35 +64,35 @@ def test_scene_has_blockers_a_spiker_decoys_and_three_mates(scene):
 
 def test_every_player_keeps_to_floor_net_and_joints(scene):
     for player in scene.players:
-        margins = margins_of(player.course.person, player.poses(scene.times_s), side=player.side)
+        margins = margins_of(player.movement.person, player.poses(scene.times_s), side=player.side)
         assert margins.floor_m > -ROUNDTRIP
         assert margins.net_m > 0.02
         assert margins.limits_rad > 0
 
 
 def test_no_two_players_touch(scene):
-    rooms = [taken_room(player, scene.n_frames / 60) for player in scene.players]
+    rooms = [occupied_volume(player, scene.n_frames / 60) for player in scene.players]
     gaps = [gap_m(a, b) for i, a in enumerate(rooms) for b in rooms[i + 1 :]]
     assert min(gaps) >= 0.03 - 1e-9
 
 
 def test_neighbours_stand_as_close_as_blockers_do(scene):
-    hips = [joints_of(player, np.array([player.takeoff_s]))["torso"][0, 0] for player in scene.blockers]
+    hips = [true_joints(player, np.array([player.takeoff_s]))["torso"][0, 0] for player in scene.blockers]
     assert 0.5 < abs(hips[1] - hips[0]) < 1.1
     assert abs(scene.blockers[1].takeoff_s - scene.blockers[0].takeoff_s) <= 0.08
 
 
 def test_jumps_lie_within_the_recording_and_their_facts_agree_with_the_motion(scene):
     for player in scene.blockers:
-        facts = jump_facts(player, 60.0)
+        facts = jump_truth(player, 60.0)
         assert 0.1 < facts["last_contact_s"] < facts["first_contact_s"] < scene.n_frames / 60
         assert facts["last_contact_frame"] == pytest.approx(60 * facts["last_contact_s"])
         assert 0.30 <= facts["com_rise_from_takeoff_m"] <= 0.62
         t = np.linspace(0, scene.n_frames / 60, 800)
-        lowest = np.min([joints_of(player, t)[name][:, 2] for name in ("toe_left", "toe_right")], axis=0)
+        lowest = np.min([true_joints(player, t)[name][:, 2] for name in ("toe_left", "toe_right")], axis=0)
         is_up = (t > facts["last_contact_s"] + 0.02) & (t < facts["first_contact_s"] - 0.02)
         assert lowest[is_up].min() > 0.005
-        ankles = joints_of(player, t)
+        ankles = true_joints(player, t)
         peak = (ankles["ankle_left"] + ankles["ankle_right"])[:, 2].max() / 2
         assert facts["ankle_apex_m"] == pytest.approx(peak, abs=1e-3)
         assert facts["hip_rise_over_standing_m"] > facts["com_rise_from_takeoff_m"] - 0.1
@@ -102,10 +102,10 @@ def test_seed_makes_the_scene_and_the_frame_rate_only_says_how_often_one_looks(s
     fast = block_scene(4, n_blockers=2, difficulty=Difficulty(frame_rate=120))
     assert fast.n_frames == 164
     for player, same in zip(scene.players, fast.players, strict=True):
-        knees = [joints_of(player, scene.times_s)["knee_left"], joints_of(same, fast.times_s[::2])["knee_left"]]
+        knees = [true_joints(player, scene.times_s)["knee_left"], true_joints(same, fast.times_s[::2])["knee_left"]]
         np.testing.assert_allclose(knees[0], knees[1], atol=ROUNDTRIP)
     other = block_scene(5, n_frames=70)
-    places = [joints_of(s.blockers[0], np.zeros(1))["torso"] for s in (scene, other)]
+    places = [true_joints(s.blockers[0], np.zeros(1))["torso"] for s in (scene, other)]
     assert np.abs(places[0] - places[1]).max() > 0.01
 
 
@@ -119,7 +119,7 @@ def test_paper_has_22_sequences_of_1798_frames_five_with_several_blockers():
 
 def test_torso_input_has_the_noise_asked_for(scene):
     noisy = torso_input(scene)
-    true = np.stack([joints_of(player, scene.times_s)["torso"] for player in scene.players], axis=1)
+    true = np.stack([true_joints(player, scene.times_s)["torso"] for player in scene.players], axis=1)
     error = noisy - true
     n = error.size
     assert noisy.shape == (82, len(scene.players), 3)
@@ -129,10 +129,10 @@ def test_torso_input_has_the_noise_asked_for(scene):
 
 
 def test_start_is_the_truth_and_a_hands_error(scene):
-    starts = starts_of(scene)
+    starts = noisy_starts(scene)
     errors = []
     for player in scene.players:
-        true = joints_of(player, np.zeros(1))
+        true = true_joints(player, np.zeros(1))
         joints = starts[player.name]
         assert ("knee_left" in joints) == (player.role == "blocker")
         errors += [joints[name] - true[name][0] for name in joints]
@@ -146,10 +146,10 @@ def test_calibration_is_off_by_what_was_asked():
     off = [
         told.px_from_world(middle) - camera.px_from_world(middle)
         for _ in range(25)
-        for told, camera in zip(miscalibrated(rng, true, 2.0), true, strict=True)
+        for told, camera in zip(perturb_calibration(rng, true, 2.0), true, strict=True)
     ]
     assert np.std(off) == pytest.approx(2.0, rel=3 / np.sqrt(2 * np.size(off)) + 0.02)
-    exact = miscalibrated(rng, true, 0.0)
+    exact = perturb_calibration(rng, true, 0.0)
     np.testing.assert_allclose(exact.P, true.P, atol=1e-9)
 
 
@@ -188,14 +188,16 @@ def test_impossible_scenes_are_refused():
 def test_pictures_show_the_players_where_they_are(scene):
     small = shortened(replace(scene, difficulty=replace(scene.difficulty, noise_sd=1.0, gain_spread=0.0)), 31)
     wanted = {0: None, 30: None}
-    for frames in frames_of(small):
+    for frames in block_frames(small):
         if frames.index in wanted:
             wanted[frames.index] = frames
     red = 0
     for index, frames in wanted.items():
         for camera, view in zip(small.rig, frames.views, strict=True):
             for player in small.blockers:
-                u, v = np.round(camera.px_from_world(joints_of(player, np.array([index / 60]))["torso"][0])).astype(int)
+                u, v = np.round(camera.px_from_world(true_joints(player, np.array([index / 60]))["torso"][0])).astype(
+                    int
+                )
                 r, g, b = view.rgb[v, u].astype(int)
                 red += r > 1.5 * g and r > 1.5 * b
     assert red >= 9  # of 12; another player may stand in the way
@@ -205,9 +207,9 @@ def test_pictures_show_the_players_where_they_are(scene):
 
 def test_frames_are_the_same_each_time_and_carry_the_told_cameras(scene):
     small = shortened(scene, 2, scale=4)
-    one, two = (list(frames_of(small)) for _ in range(2))
+    one, two = (list(block_frames(small)) for _ in range(2))
     for a, b in zip(one, two, strict=True):
-        for x, y, camera in zip(a.views, b.views, small.calibrated, strict=True):
+        for x, y, camera in zip(a.views, b.views, small.calibrated_rig, strict=True):
             np.testing.assert_array_equal(x.rgb, y.rgb)
             assert x.camera is camera
     assert [frames.time_s for frames in one] == [0, 1 / small.rate]
@@ -215,7 +217,7 @@ def test_frames_are_the_same_each_time_and_carry_the_told_cameras(scene):
 
 def test_only_what_is_near_players_is_drawn_anew(scene):
     small = shortened(replace(scene, difficulty=replace(scene.difficulty, noise_sd=0.0, jpeg_quality=0)), 3)
-    frames = list(frames_of(small))
+    frames = list(block_frames(small))
     for view, next_view in zip(frames[0].views, frames[2].views, strict=True):
         is_same = np.all(view.rgb == next_view.rgb, axis=2)
         assert 0.8 < is_same.mean() < 1.0
@@ -223,7 +225,7 @@ def test_only_what_is_near_players_is_drawn_anew(scene):
 
 def test_boxes_that_meet_become_one():
     boxes = [np.array(box) for box in ((0, 0, 10, 10), (30, 0, 40, 10), (8, 5, 31, 7), (50, 50, 60, 60), (5, 5, 5, 9))]
-    assert sorted(_merged(boxes)) == [(0, 0, 40, 10), (50, 50, 60, 60)]
+    assert sorted(_merge(boxes)) == [(0, 0, 40, 10), (50, 50, 60, 60)]
 
 
 def test_written_trial_is_whole_and_reads_back(scene, tmp_path):
@@ -237,7 +239,7 @@ def test_written_trial_is_whole_and_reads_back(scene, tmp_path):
     assert [table["name"] for table in tables] == [player.name for player in scene.players]
     assert set(tables[0]["joints_m"]) == {"torso", *JOINTS, "foot_left", "foot_right"}
     assert set(tables[-1]["joints_m"]) == {"torso"}
-    np.testing.assert_allclose(read_rig(folder / "calib.toml").P, small.calibrated.P, atol=1e-6)
+    np.testing.assert_allclose(read_rig(folder / "calib.toml").P, small.calibrated_rig.P, atol=1e-6)
     np.testing.assert_allclose(read_rig(folder / "calib_true.toml").P, small.rig.P, atol=1e-6)
     facts = inspect(VideoSource("cam1", folder / "cam1.mp4"))
     assert facts.size == small.rig["cam1"].size
@@ -245,7 +247,7 @@ def test_written_trial_is_whole_and_reads_back(scene, tmp_path):
         rows = list(csv.DictReader(file))
     assert len(rows) == 3 * len(scene.players)
     knee = [float(rows[-1][f"r_knee_{axis}"]) for axis in "xyz"]
-    true = joints_of(scene.players[-1], small.times_s)["knee_right"][2]
+    true = true_joints(scene.players[-1], small.times_s)["knee_right"][2]
     np.testing.assert_allclose(knee, true, atol=1e-6)
     players = json.loads((folder / "players.json").read_text())
     assert [player["jumps"] for player in players] == [player.takeoff_s is not None for player in scene.players]

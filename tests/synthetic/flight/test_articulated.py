@@ -11,15 +11,15 @@ from airborne.errors import BodyError
 from airborne.geometry.rotations import geodesic
 from airborne.synthetic.flight.articulated import (
     Takeoff,
+    constant_joints,
     fly_articulated,
-    mass_as_bent,
-    moves,
-    slowed,
-    still,
-    together,
-    with_shape_held,
+    joint_motion,
+    mass_at_angles,
+    scale_time,
+    sum_motions,
+    with_fixed_joints,
 )
-from airborne.synthetic.flight.rigid import GRAVITY_M_S2, Launch, Mass, fly
+from airborne.synthetic.flight.rigid import GRAVITY_M_S2, Launch, MassProperties, fly
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
 TIMES = np.arange(0, 0.61, 0.05)
@@ -70,9 +70,9 @@ def takeoff(**changes):
 
 def bending():
     """Three moves, one after another and one across them; breaks at 0.05, 0.11, 0.2, 0.33 and 0.47 s."""
-    first = moves(np.array([0.05, 0.2, 0.33]), np.array([STRAIGHT, BENT, 0.3 * BENT]))
-    across = moves(np.array([0.11, 0.47]), np.array([STRAIGHT, np.tile([-0.7, 0.2, 0.5], (4, 1))]))
-    return together([first, across])
+    first = joint_motion(np.array([0.05, 0.2, 0.33]), np.array([STRAIGHT, BENT, 0.3 * BENT]))
+    across = joint_motion(np.array([0.11, 0.47]), np.array([STRAIGHT, np.tile([-0.7, 0.2, 0.5], (4, 1))]))
+    return sum_motions([first, across])
 
 
 def momenta(model, flight, half_s):
@@ -114,7 +114,7 @@ def test_momentum_of_a_gymnast_stays_the_same_too():
     model, half = human18(1.66, 58.0), 0.02
     rng = np.random.default_rng(5)
     lowest, highest = np.clip(np.moveaxis(model.limits_rad, -1, 0), -1, 1)
-    joints = moves(np.array([0.0, 0.3]), rng.uniform(lowest, highest, (2, 17, 3)))
+    joints = joint_motion(np.array([0.0, 0.3]), rng.uniform(lowest, highest, (2, 17, 3)))
     given = takeoff(angular_momentum=np.array([70.0, 5.0, -3.0]))
     flight = fly_articulated(model, given, joints, 0.15 + half * NODES)
     np.testing.assert_allclose(momenta(model, flight, half)[1], given.angular_momentum, atol=70e-9)
@@ -139,8 +139,8 @@ def test_second_difference_of_the_centre_of_mass_of_the_segments_is_gravity():
 
 
 def test_body_that_holds_its_shape_flies_as_the_stiff_body_of_that_shape():
-    flight = fly_articulated(BODY, takeoff(), still(BENT), np.array([0.3, -0.2, 0.0, 0.5, 0.3]))
-    mass = mass_as_bent(BODY, BENT)
+    flight = fly_articulated(BODY, takeoff(), constant_joints(BENT), np.array([0.3, -0.2, 0.0, 0.5, 0.3]))
+    mass = mass_at_angles(BODY, BENT)
     w = np.linalg.solve(mass.inertia, takeoff().R.T @ takeoff().angular_momentum)
     launch = Launch(centre=takeoff().centre, velocity=takeoff().velocity, R=takeoff().R, angular_velocity=w)
     rigid = fly(mass, launch, flight.time_s)
@@ -160,7 +160,7 @@ def test_top_nods_at_the_rate_of_its_angular_momentum_over_its_transverse_inerti
     )
     R, w = takeoff().R, np.array([1.5, 0.0, 12.0])
     L = R @ np.diag([A, A, C]) @ w
-    flight = fly_articulated(top, takeoff(angular_momentum=L), still(np.zeros((0, 3))), TIMES)
+    flight = fly_articulated(top, takeoff(angular_momentum=L), constant_joints(np.zeros((0, 3))), TIMES)
     precession = Rotation.from_rotvec(TIMES[:, None] * L / A).as_matrix()
     np.testing.assert_allclose(flight.R[:, :, 2], precession @ R[:, 2], atol=ROUNDTRIP)
     spin = (1 - C / A) * 12.0
@@ -170,13 +170,13 @@ def test_top_nods_at_the_rate_of_its_angular_momentum_over_its_transverse_inerti
 def test_body_without_momentum_turns_against_its_arms_and_comes_back_with_them():
     joint = np.zeros((4, 3))
     joint[[0, 2], 1] = -1.2  # both arms turn backward about y
-    joints = moves(np.array([0.1, 0.3, 0.5]), np.array([STRAIGHT, joint, STRAIGHT]))
+    joints = joint_motion(np.array([0.1, 0.3, 0.5]), np.array([STRAIGHT, joint, STRAIGHT]))
     start = takeoff(angular_momentum=np.zeros(3), R=np.eye(3))
     flight = fly_articulated(BODY, start, joints, np.array([0.05, 0.2, 0.3, 0.6]))
     turned = Rotation.from_matrix(flight.R).as_rotvec()
     np.testing.assert_allclose(flight.R[[0, 3]], np.broadcast_to(np.eye(3), (2, 3, 3)), atol=ROUNDTRIP)
     assert turned[2, 1] > turned[1, 1] > 0.01  # the trunk turns forward
-    flight = fly_articulated(BODY, start, slowed(joints, 7.0), np.array([2.1]))
+    flight = fly_articulated(BODY, start, scale_time(joints, 7.0), np.array([2.1]))
     np.testing.assert_allclose(Rotation.from_matrix(flight.R).as_rotvec(), turned[[2]], atol=ROUNDTRIP)
 
 
@@ -191,16 +191,18 @@ def test_rotations_follow_the_angular_velocity_whatever_the_order_of_the_times()
 
 
 def test_short_move_late_in_a_flight_without_turning_is_not_missed():
-    joints = moves(np.array([5.0, 5.02]), np.array([STRAIGHT, BENT]))
+    joints = joint_motion(np.array([5.0, 5.02]), np.array([STRAIGHT, BENT]))
     start = takeoff(angular_momentum=np.zeros(3))
     flight = fly_articulated(BODY, start, joints, np.array([4.9, 6.0]))
-    early = fly_articulated(BODY, start, moves(np.array([0.0, 0.02]), np.array([STRAIGHT, BENT])), np.array([1.0]))
+    early = fly_articulated(
+        BODY, start, joint_motion(np.array([0.0, 0.02]), np.array([STRAIGHT, BENT])), np.array([1.0])
+    )
     np.testing.assert_allclose(flight.R[1], early.R[0], atol=ROUNDTRIP)
     assert geodesic(flight.R[1], flight.R[0]) > 0.05
 
 
 def test_moves_rest_at_their_ends_with_a_continuous_acceleration():
-    joints = moves(np.array([0.1, 0.3, 0.6]), np.array([STRAIGHT, BENT, -BENT]))
+    joints = joint_motion(np.array([0.1, 0.3, 0.6]), np.array([STRAIGHT, BENT, -BENT]))
     np.testing.assert_allclose(joints([0.1, 0.3, 0.6]), [STRAIGHT, BENT, -BENT], atol=EXACT)
     for order in (1, 2):
         np.testing.assert_allclose(joints([0.1, 0.3, 0.6], order), 0, atol=1e-9)
@@ -209,34 +211,36 @@ def test_moves_rest_at_their_ends_with_a_continuous_acceleration():
 
 
 def test_motions_together_are_their_sum_at_every_time_of_either():
-    a = moves(np.array([0.0, 0.4]), np.array([STRAIGHT, BENT]))
-    b = moves(np.array([0.3, 0.5, 0.9]), np.array([STRAIGHT, -BENT, BENT]))
+    a = joint_motion(np.array([0.0, 0.4]), np.array([STRAIGHT, BENT]))
+    b = joint_motion(np.array([0.3, 0.5, 0.9]), np.array([STRAIGHT, -BENT, BENT]))
     t = np.linspace(0, 0.9, 50)
     expected = a(np.minimum(t, 0.4)) + b(np.maximum(t, 0.3))
-    np.testing.assert_allclose(together([a, b])(t), expected, atol=EXACT)
-    np.testing.assert_allclose(together([a, b])(t, 1), a(np.minimum(t, 0.4), 1) + b(np.maximum(t, 0.3), 1), atol=1e-11)
+    np.testing.assert_allclose(sum_motions([a, b])(t), expected, atol=EXACT)
+    np.testing.assert_allclose(
+        sum_motions([a, b])(t, 1), a(np.minimum(t, 0.4), 1) + b(np.maximum(t, 0.3), 1), atol=1e-11
+    )
 
 
 def test_slowed_flight_with_less_momentum_passes_the_same_orientations():
     quick = fly_articulated(BODY, takeoff(), bending(), TIMES)
     weak = takeoff(angular_momentum=takeoff().angular_momentum / 3)
-    slow = fly_articulated(BODY, weak, slowed(bending(), 3.0), 3 * TIMES)
+    slow = fly_articulated(BODY, weak, scale_time(bending(), 3.0), 3 * TIMES)
     np.testing.assert_allclose(slow.R, quick.R, atol=ROUNDTRIP)
     np.testing.assert_allclose(slow.joint_angles, quick.joint_angles, atol=EXACT)
 
 
 def test_shape_held_keeps_the_root_where_it_was_and_the_joints_as_told():
     flight = fly_articulated(BODY, takeoff(), bending(), TIMES)
-    held = with_shape_held(BODY, flight, BENT)
+    held = with_fixed_joints(BODY, flight, BENT)
     np.testing.assert_array_equal(held.R, flight.R)
     np.testing.assert_array_equal(held.position, flight.position)
     np.testing.assert_array_equal(held.pose(7).joint_angles, BENT)
-    np.testing.assert_allclose(held.centre, flight.position + flight.R @ mass_as_bent(BODY, BENT).centre, atol=EXACT)
+    np.testing.assert_allclose(held.centre, flight.position + flight.R @ mass_at_angles(BODY, BENT).centre, atol=EXACT)
     assert np.isnan(held.angular_momentum).all()
 
 
 def test_mass_of_a_straight_body_is_the_sum_of_its_segments():
-    found = mass_as_bent(BODY, STRAIGHT)
+    found = mass_at_angles(BODY, STRAIGHT)
     origins = {None: np.zeros(3)}
     places, tensors, masses = [], [], []
     for s in BODY.segments:
@@ -247,7 +251,7 @@ def test_mass_of_a_straight_body_is_the_sum_of_its_segments():
     centre = np.average(places, axis=0, weights=masses)
     arms = np.array(places) - centre
     inertia = sum(J + m * (d @ d * np.eye(3) - np.outer(d, d)) for J, m, d in zip(tensors, masses, arms, strict=True))
-    assert isinstance(found, Mass)
+    assert isinstance(found, MassProperties)
     assert found.mass_kg == pytest.approx(sum(masses), rel=EXACT)
     np.testing.assert_allclose(found.centre, centre, atol=EXACT)
     np.testing.assert_allclose(found.inertia, inertia, atol=EXACT)
@@ -256,7 +260,7 @@ def test_mass_of_a_straight_body_is_the_sum_of_its_segments():
 def test_body_with_a_segment_without_inertia_is_refused_by_name():
     weightless = replace(BODY, segments=(*BODY.segments[:-1], replace(BODY.segments[-1], inertia=None)))
     with pytest.raises(BodyError, match="segment 'leg' has no inertia"):
-        fly_articulated(weightless, takeoff(), still(STRAIGHT), TIMES)
+        fly_articulated(weightless, takeoff(), constant_joints(STRAIGHT), TIMES)
 
 
 def test_mujoco_flies_a_somersault_to_the_same_landing():

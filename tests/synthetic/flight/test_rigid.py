@@ -8,7 +8,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Ellipsoid, Part, Segment
 from airborne.errors import BodyError
-from airborne.synthetic.flight.rigid import GRAVITY_M_S2, Launch, Mass, fly, mass_of
+from airborne.synthetic.flight.rigid import GRAVITY_M_S2, Launch, MassProperties, fly, mass_properties
 from airborne.synthetic.throw.scene import thrown_cross
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
@@ -26,7 +26,7 @@ def thrown(**changes):
 
 
 def cross_mass():
-    return mass_of(thrown_cross().body, 500.0)
+    return mass_properties(thrown_cross().body, 500.0)
 
 
 def body(*parts):
@@ -55,7 +55,7 @@ def test_energy_of_the_turning_stays_the_same():
 
 def test_top_precesses_at_the_rate_of_its_angular_momentum_over_its_transverse_inertia():
     A, C = 0.3, 0.1
-    mass = Mass(2.0, np.zeros(3), np.diag([A, A, C]))
+    mass = MassProperties(2.0, np.zeros(3), np.diag([A, A, C]))
     flight = fly(mass, thrown(angular_velocity=np.array([1.5, 0.0, 12.0])), TIMES)
     momentum = flight.R[0] @ mass.inertia @ flight.angular_velocity[0]
     precession = Rotation.from_rotvec(TIMES[:, None] * momentum / A).as_matrix()
@@ -104,9 +104,9 @@ def test_flight_is_the_same_in_any_order_of_times_and_runs_backward():
 
 def test_box_cut_in_two_has_the_mass_of_the_whole():
     turn = Rotation.from_euler("Z", 30, degrees=True)
-    whole = mass_of(body(part(Box(np.array([0.2, 0.6, 0.1])), turn=turn)), 400.0)
+    whole = mass_properties(body(part(Box(np.array([0.2, 0.6, 0.1])), turn=turn)), 400.0)
     half = Box(np.array([0.2, 0.3, 0.1]))
-    halves = mass_of(
+    halves = mass_properties(
         body(part(half, turn.apply([0, 0.15, 0]), turn), part(half, turn.apply([0, -0.15, 0]), turn)), 400.0
     )
     assert whole.mass_kg == pytest.approx(400 * 0.012, rel=EXACT)
@@ -121,4 +121,4 @@ def test_cross_has_its_centre_of_mass_between_its_bars():
 
 def test_body_with_a_part_that_is_no_box_is_refused_by_name():
     with pytest.raises(BodyError, match="'part' is no box"):
-        mass_of(body(part(Ellipsoid(np.ones(3)))), 500.0)
+        mass_properties(body(part(Ellipsoid(np.ones(3)))), 500.0)

@@ -15,12 +15,12 @@ from airborne.body.files import read_body
 from airborne.cameras import Rig, read_rig
 from airborne.errors import BodyError, TrialError
 from airborne.evaluation.truth import read_truth
-from airborne.geometry.rotations import angles_from_matrix, geodesic, matrix_from_angles, unwrapped
-from airborne.synthetic import frames, half_twist, ranges, somersault, write_trial
-from airborne.synthetic.flight.articulated import still
-from airborne.synthetic.flight.somersault import MASS_KG, PAPER, STATURE_M
+from airborne.geometry.rotations import angles_from_matrix, geodesic, matrix_from_angles, unwrap
+from airborne.synthetic import half_twist, pose_ranges, scene_frames, somersault_scene, write_trial
+from airborne.synthetic.flight.articulated import constant_joints
+from airborne.synthetic.flight.somersault import MASS_KG, PAPER_RANGES, STATURE_M
 from airborne.synthetic.throw.measurements import start_pose
-from airborne.synthetic.throw.pictures import background, linear_picture
+from airborne.synthetic.throw.pictures import background, linear_image
 from airborne.trial.file import read_trial
 from airborne.video import open_recording
 from airborne.video.decoding import VideoSource
@@ -48,11 +48,11 @@ def joint(flight, name):
 
 
 def test_ranges_of_the_poses_are_those_of_the_paper():
-    found = ranges(flown(somersault("paper", target="ellipsoids")))
+    found = pose_ranges(flown(somersault_scene("paper", target="ellipsoids")))
     for name in ("forward_m", "lateral_m", "somersault_rad", "tilt_rad", "twist_rad"):
-        assert getattr(found, name) == pytest.approx(getattr(PAPER, name), rel=SOLVED), name
+        assert getattr(found, name) == pytest.approx(getattr(PAPER_RANGES, name), rel=SOLVED), name
     assert found.vertical_m == pytest.approx(0.79, abs=0.002)  # durations are whole milliseconds
-    assert (PAPER.vertical_m, PAPER.forward_m, PAPER.lateral_m) == (0.79, 1.0, 0.01)
+    assert (PAPER_RANGES.vertical_m, PAPER_RANGES.forward_m, PAPER_RANGES.lateral_m) == (0.79, 1.0, 0.01)
 
 
 def test_ranges_are_read_off_places_and_unwrapped_angles():
@@ -60,7 +60,7 @@ def test_ranges_are_read_off_places_and_unwrapped_angles():
     angles = np.linspace([0, 0, 0], [7.0, -0.2, -4.0], 11)
     places = np.linspace([0.1, 0.2, 0.3], [0.4, -0.7, 0.3], 11)
     places[4, 2] = 0.8
-    found = ranges(replace(flight, R=matrix_from_angles(angles), position=places))
+    found = pose_ranges(replace(flight, R=matrix_from_angles(angles), position=places))
     assert (found.somersault_rad, found.tilt_rad, found.twist_rad) == pytest.approx((7.0, 0.2, 4.0), abs=ROUNDTRIP)
     assert (found.lateral_m, found.forward_m, found.vertical_m) == pytest.approx((0.3, 0.9, 0.5), abs=ROUNDTRIP)
 
@@ -69,7 +69,7 @@ def test_ranges_are_read_off_places_and_unwrapped_angles():
 def test_gymnast_flies_forward_lands_upright_with_the_back_turned_and_obeys_the_laws(has_pike):
     skill = half_twist(MODEL, has_pike=has_pike)
     flight = skill(skill.poses_s)
-    angles = unwrapped(angles_from_matrix(flight.R), flight.time_s)
+    angles = unwrap(angles_from_matrix(flight.R), flight.time_s)
     np.testing.assert_allclose(angles[-1, [0, 2]], [2 * np.pi, np.pi], rtol=SOLVED)
     assert flight.position[-1, 1] - flight.position[0, 1] == pytest.approx(-1.0, abs=0.02)  # toward -y, as faced first
     assert flight.R[0, 1, 1] == pytest.approx(1.0, abs=EXACT)
@@ -84,7 +84,7 @@ def test_gymnast_flies_forward_lands_upright_with_the_back_turned_and_obeys_the_
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_joints_stay_within_their_limits_and_arms_between_down_and_up(preset):
-    flight = flown(somersault(preset, target="ellipsoids"))
+    flight = flown(somersault_scene(preset, target="ellipsoids"))
     lowest, highest = np.moveaxis(MODEL.limits_rad, -1, 0)
     assert np.all(flight.joint_angles >= lowest)
     assert np.all(flight.joint_angles <= highest)
@@ -93,7 +93,7 @@ def test_joints_stay_within_their_limits_and_arms_between_down_and_up(preset):
 
 
 def test_arms_swing_by_equal_angles_and_only_a_pike_bends_the_rest():
-    arms, pike = (flown(somersault(preset, target="ellipsoids")) for preset in ("moving-arms", "pike"))
+    arms, pike = (flown(somersault_scene(preset, target="ellipsoids")) for preset in ("moving-arms", "pike"))
     left, right = joint(arms, "upper_arm_left")[:, 1], joint(arms, "upper_arm_right")[:, 1]
     np.testing.assert_allclose(left + np.pi / 2, right - np.pi / 2, atol=EXACT)  # left up, right down
     assert np.ptp(left) > 0.3
@@ -104,7 +104,7 @@ def test_arms_swing_by_equal_angles_and_only_a_pike_bends_the_rest():
 
 
 def test_paper_holds_the_first_shape_along_the_path_of_the_moving_arms():
-    scene, moving = (somersault(preset, target="ellipsoids") for preset in ("paper", "moving-arms"))
+    scene, moving = (somersault_scene(preset, target="ellipsoids") for preset in ("paper", "moving-arms"))
     held, times = flown(scene), np.array([float(scene.time_s(i)) for i in range(11)])
     true = moving.flight(times)
     np.testing.assert_array_equal(held.R, true.R)
@@ -114,7 +114,7 @@ def test_paper_holds_the_first_shape_along_the_path_of_the_moving_arms():
 
 
 def test_presets_last_the_whole_flight_at_their_rates():
-    paper, arms = (somersault(preset, target="ellipsoids") for preset in ("paper", "moving-arms"))
+    paper, arms = (somersault_scene(preset, target="ellipsoids") for preset in ("paper", "moving-arms"))
     duration = half_twist(MODEL).duration_s
     assert float(paper.time_s(10)) == pytest.approx(duration, abs=ROUNDTRIP)
     assert (paper.n_pictures, arms.rate) == (11, Fraction(50))
@@ -123,9 +123,9 @@ def test_presets_last_the_whole_flight_at_their_rates():
 
 @pytest.mark.parametrize(("preset", "target"), [("paper", "skin"), ("pike", "ellipsoids")])
 def test_whole_flight_is_in_view_and_the_person_large(preset, target):
-    scene = smaller(somersault(preset, target=target), 2)
+    scene = smaller(somersault_scene(preset, target=target), 2)
     tallest = dict.fromkeys(scene.rig.names, 0)
-    for recorded in frames(scene):
+    for recorded in scene_frames(scene):
         for view in recorded.views:
             body = view.rgb.any(axis=2)
             rows = np.flatnonzero(body.any(axis=1))
@@ -138,14 +138,14 @@ def test_whole_flight_is_in_view_and_the_person_large(preset, target):
 
 
 def test_cameras_look_from_the_front_the_side_and_the_top():
-    axes = {c.name: c.camera_from_world.rotation.as_matrix()[2] for c in somersault(target="ellipsoids").rig}
+    axes = {c.name: c.camera_from_world.rotation.as_matrix()[2] for c in somersault_scene(target="ellipsoids").rig}
     for name, direction in (("front", [0, 1, 0]), ("side", [-1, 0, 0]), ("top", [0, 0, -1])):
         assert axes[name] @ direction > 0.99
 
 
 def test_skin_and_ellipsoids_are_two_surfaces_of_one_flight():
-    skin, plain = (smaller(somersault(target=target)) for target in ("skin", "ellipsoids"))
-    for a, b in zip(frames(skin), frames(plain), strict=True):
+    skin, plain = (smaller(somersault_scene(target=target)) for target in ("skin", "ellipsoids"))
+    for a, b in zip(scene_frames(skin), scene_frames(plain), strict=True):
         for x, y in zip(a.views, b.views, strict=True):
             one, two = x.rgb.any(axis=2), y.rgb.any(axis=2)
             assert 0.6 < np.count_nonzero(one & two) / np.count_nonzero(one | two) < 1
@@ -154,10 +154,10 @@ def test_skin_and_ellipsoids_are_two_surfaces_of_one_flight():
 
 def test_frames_of_the_gym_are_the_same_again_and_other_seeds_make_another_gym():
     scene, other = (
-        replace(smaller(somersault("moving-arms", target="ellipsoids", style="gym", seed=s)), n_pictures=1)
+        replace(smaller(somersault_scene("moving-arms", target="ellipsoids", style="gym", seed=s)), n_pictures=1)
         for s in (3, 4)
     )
-    (first,), (again,), (another,) = list(frames(scene)), list(frames(scene)), list(frames(other))
+    (first,), (again,), (another,) = list(scene_frames(scene)), list(scene_frames(scene)), list(scene_frames(other))
     for x, y, z in zip(first.views, again.views, another.views, strict=True):
         np.testing.assert_array_equal(x.rgb, y.rgb)
         assert np.mean(np.abs(x.rgb.astype(int) - z.rgb)) > 5
@@ -165,7 +165,7 @@ def test_frames_of_the_gym_are_the_same_again_and_other_seeds_make_another_gym()
 
 
 def test_skin_in_the_gym_throws_the_shadow_of_its_ellipsoids():
-    scenes = [smaller(somersault(target=t, style="gym")) for t in ("skin", "ellipsoids")]
+    scenes = [smaller(somersault_scene(target=t, style="gym")) for t in ("skin", "ellipsoids")]
     darkened = []
     for scene in scenes:
         camera = scene.rig["top"]
@@ -173,7 +173,7 @@ def test_skin_in_the_gym_throws_the_shadow_of_its_ellipsoids():
         backdrop = background(empty, camera)
         lit = backdrop.ambient + backdrop.spots.sum(axis=0)
         posed = [scene.body.with_pose(scene.flight(np.zeros(1)).pose(0))]
-        light = linear_picture(empty, backdrop, posed)
+        light = linear_image(empty, backdrop, posed)
         low = (backdrop.points[..., 2] < 0.05) & np.all(light < 0.9 * lit, axis=2)
         darkened.append(low)
     both = np.count_nonzero(darkened[0] & darkened[1])
@@ -184,7 +184,7 @@ def test_skin_in_the_gym_throws_the_shadow_of_its_ellipsoids():
 def test_choice_that_is_not_known_is_refused_with_what_is():
     for wrong, known in (({"preset": "tuck"}, "moving-arms"), ({"target": "mesh"}, "skin"), ({"style": "hd"}, "exact")):
         with pytest.raises(TrialError, match=f"is not known; choose .*{known}"):
-            somersault(**wrong)
+            somersault_scene(**wrong)
 
 
 def test_body_whose_arms_weigh_nothing_cannot_twist():
@@ -201,7 +201,7 @@ def test_body_whose_arms_weigh_nothing_cannot_twist():
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     folder, told = tmp_path_factory.mktemp("somersault"), []
-    scene = replace(smaller(somersault("pike", target="ellipsoids", seed=2)), n_pictures=6)
+    scene = replace(smaller(somersault_scene("pike", target="ellipsoids", seed=2)), n_pictures=6)
     write_trial(scene, folder, progress=lambda done, total: told.append((done, total)))
     return scene, folder, told
 
@@ -252,7 +252,7 @@ def test_trial_starts_off_by_the_errors_of_the_scene_and_within_the_limits(writt
 
 
 def test_shape_is_known_at_the_start_where_it_is_held():
-    scene = somersault("paper", target="ellipsoids")
+    scene = somersault_scene("paper", target="ellipsoids")
     np.testing.assert_allclose(start_pose(scene).joint_angles, flown(scene).joint_angles[0], atol=ROUNDTRIP)
 
 
@@ -260,7 +260,7 @@ def test_videos_hold_the_exact_pictures_nearly(written):
     scene, folder, _ = written
     sources = [VideoSource(c.name, folder / f"{c.name}.mp4", fields="progressive") for c in scene.rig]
     read = list(open_recording(sources, read_rig(folder / "calib_true.toml")))
-    for a, b in zip(frames(scene), read, strict=True):
+    for a, b in zip(scene_frames(scene), read, strict=True):
         assert a.time_s == b.time_s
         for x, y in zip(a.views, b.views, strict=True):
             grey = np.abs(x.rgb.mean(axis=2) - y.rgb.mean(axis=2))
@@ -290,12 +290,12 @@ def test_folder_with_something_in_it_is_refused_before_anything_is_solved(tmp_pa
     from airborne.synthetic import write_somersault
 
     (tmp_path / "notes.txt").write_text("mine")
-    monkeypatch.setattr("airborne.synthetic.throw.writing.somersault", lambda *_, **__: pytest.fail("solved"))
+    monkeypatch.setattr("airborne.synthetic.throw.writing.somersault_scene", lambda *_, **__: pytest.fail("solved"))
     with pytest.raises(TrialError, match="is not empty"):
         write_somersault(tmp_path)
 
 
 def test_still_joints_give_no_half_twist():
     skill = half_twist(MODEL)
-    stiff = replace(skill, joints=still(skill.joints(skill.joints.x[0])))
-    assert ranges(stiff(skill.poses_s)).twist_rad < 1e-3
+    stiff = replace(skill, joints=constant_joints(skill.joints(skill.joints.x[0])))
+    assert pose_ranges(stiff(skill.poses_s)).twist_rad < 1e-3

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from airborne.body import Pose, geometry
+from airborne.body import Pose, surface_arrays
 from airborne.rendering import Lamp, Lights, render
-from airborne.synthetic import frames
+from airborne.synthetic import scene_frames
 from tests.support.synthetic import small_scene
 from tests.support.tolerances import sampled
 
@@ -22,12 +22,12 @@ def exact_scene(**changes):
 
 def drawn(scene, index, number=0):
     posed = scene.body.with_pose(scene.flight(np.array([float(scene.time_s(index))])).pose(0))
-    return render(geometry(scene.body), posed, scene.rig.cameras[number], LIGHTS)
+    return render(surface_arrays(scene.body), posed, scene.rig.cameras[number], LIGHTS)
 
 
 def test_pixels_are_the_rendering_rounded_on_black():
     scene = exact_scene()
-    for recorded in frames(scene):
+    for recorded in scene_frames(scene):
         for number, view in enumerate(recorded.views):
             rendering = drawn(scene, recorded.index, number)
             assert np.abs(view.rgb - np.clip(rendering.colour, 0, 255)).max() <= 0.5 + 1e-3
@@ -37,17 +37,17 @@ def test_pixels_are_the_rendering_rounded_on_black():
 
 def test_surroundings_are_drawn_in_the_same_light_behind_the_body():
     scene = exact_scene(surroundings=small_scene().surroundings)
-    black = list(frames(replace(scene, surroundings=None)))
+    black = list(scene_frames(replace(scene, surroundings=None)))
     still = scene.surroundings.with_pose(Pose(world_from_root=RigidTransform.identity()))
-    hall = render(geometry(scene.surroundings), still, scene.rig["cam2"], LIGHTS).colour
-    for a, b in zip(frames(scene), black, strict=True):
+    hall = render(surface_arrays(scene.surroundings), still, scene.rig["cam2"], LIGHTS).colour
+    for a, b in zip(scene_frames(scene), black, strict=True):
         mask = drawn(scene, a.index, 1).mask
         np.testing.assert_array_equal(a.views[1].rgb[mask], b.views[1].rgb[mask])
         assert np.abs(a.views[1].rgb[~mask] - np.clip(hall[~mask], 0, 255)).max() <= 0.5 + 1e-3
 
 
 def test_fields_are_drawn_by_their_own_cameras():
-    whole, fields = (list(frames(exact_scene(is_interlaced=is_woven))) for is_woven in (False, True))
+    whole, fields = (list(scene_frames(exact_scene(is_interlaced=is_woven))) for is_woven in (False, True))
     for frame, field in zip(whole, fields, strict=True):
         for full, half in zip(frame.views, field.views, strict=True):
             rows = full.rgb[field.index % 2 :: 2].astype(int)
@@ -56,8 +56,8 @@ def test_fields_are_drawn_by_their_own_cameras():
 
 def test_noise_has_the_stated_spread_is_repeated_and_differs_between_cameras():
     scene = exact_scene(noise_sd=5.0, lights=Lights(0.6), surroundings=small_scene().surroundings)
-    noisy, again = (next(iter(frames(scene))) for _ in range(2))
-    clean = next(iter(frames(replace(scene, noise_sd=0.0))))
+    noisy, again = (next(iter(scene_frames(scene))) for _ in range(2))
+    clean = next(iter(scene_frames(replace(scene, noise_sd=0.0))))
     errors = []
     for a, b, c in zip(noisy.views, again.views, clean.views, strict=True):
         np.testing.assert_array_equal(a.rgb, b.rgb)

@@ -6,7 +6,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Ellipsoid, Part, Pose, Segment
 from airborne.rendering.srgb import light_from_srgb, srgb_from_light
-from airborne.synthetic.throw.light import Ambient, Spot, balls_of, boxes_of, is_lit, spot_light
+from airborne.synthetic.throw.light import Ambient, Spot, boxes_of, ellipsoids_of, is_lit, spot_irradiance
 from tests.support.tolerances import EXACT
 
 UP = np.array([[0.0, 0.0, 1.0]])
@@ -21,13 +21,13 @@ def box(centre, size, turn_rad=0.0):
 
 
 def test_light_falls_off_with_the_square_of_the_distance():
-    light = spot_light(SPOT, np.array([[0, 0, 0.0], [0, 0, 2.0]]), np.repeat(UP, 2, axis=0))
+    light = spot_irradiance(SPOT, np.array([[0, 0, 0.0], [0, 0, 2.0]]), np.repeat(UP, 2, axis=0))
     np.testing.assert_allclose(light[:, 0], [8 / 16, 8 / 4], rtol=EXACT)
 
 
 def test_light_goes_with_the_cosine_and_backs_stay_dark():
     tilted = np.array([[0, np.sin(1.0), np.cos(1.0)], [0, 0, -1]])
-    light = spot_light(SPOT, np.zeros((2, 3)), tilted)
+    light = spot_irradiance(SPOT, np.zeros((2, 3)), tilted)
     np.testing.assert_allclose(light[:, 1], [0.5 * np.cos(1.0), 0], atol=EXACT)
 
 
@@ -36,7 +36,7 @@ def test_cone_is_full_inside_dark_outside_and_never_brightens_outward():
     points = np.column_stack([radius, 0 * radius, 0 * radius])
     facing = SPOT.position - points
     normals = facing / np.linalg.norm(facing, axis=1, keepdims=True)
-    power = spot_light(SPOT, points, normals)[:, 0] * np.sum(facing**2, axis=1)
+    power = spot_irradiance(SPOT, points, normals)[:, 0] * np.sum(facing**2, axis=1)
     angle = np.arctan(radius / 4)
     np.testing.assert_allclose(power[angle < 0.7 * 0.5], 8.0, rtol=EXACT)
     np.testing.assert_array_equal(power[angle > 0.5], 0)
@@ -66,7 +66,7 @@ def test_box_shadows_neither_itself_nor_what_lies_before_it():
 def test_ambient_light_is_the_mean_on_upright_surfaces():
     ambient = Ambient(np.array([0.3, 0.3, 0.4]), np.array([0.1, 0.1, 0.2]))
     normals = np.array([[0, 0, 1.0], [0, 0, -1.0], [1.0, 0, 0]])
-    np.testing.assert_allclose(ambient.on(normals)[:, 2], [0.4, 0.2, 0.3], atol=EXACT)
+    np.testing.assert_allclose(ambient.irradiance(normals)[:, 2], [0.4, 0.2, 0.3], atol=EXACT)
 
 
 def test_colours_come_back_from_linear_light():
@@ -102,7 +102,7 @@ def test_shadow_of_an_ellipsoid_is_where_the_ray_comes_nearer_to_its_centre_than
         np.array([0.2, 0.35, 0.5]),
         np.array([0.3, 0.1, 2]),
     )
-    lit = is_lit(points, np.repeat(UP, 4000, axis=0), SPOT, NO_BOXES, balls_of(ball(centre, semi_axes, turn)))
+    lit = is_lit(points, np.repeat(UP, 4000, axis=0), SPOT, NO_BOXES, ellipsoids_of(ball(centre, semi_axes, turn)))
     start, end = (turn.inv().apply(p - centre) / semi_axes for p in (points, SPOT.position[None]))
     way = end - start
     nearest = start - np.sum(start * way, axis=1, keepdims=True) / np.sum(way**2, axis=1, keepdims=True) * way
@@ -113,7 +113,7 @@ def test_shadow_of_an_ellipsoid_is_where_the_ray_comes_nearer_to_its_centre_than
 
 
 def test_ball_darkens_no_point_inside_it_before_it_or_beside_the_way():
-    balls = balls_of(ball((0, 0, 1), (0.5, 0.5, 0.5)))
+    balls = ellipsoids_of(ball((0, 0, 1), (0.5, 0.5, 0.5)))
     points = np.array([[0, 0, 1.0], [0.1, 0, 1.3], [0, 0, 3.0], [1.5, 0, 1.0], [0, 0, 0.0]])
     lit = is_lit(points, np.repeat(UP, 5, axis=0), SPOT, NO_BOXES, balls)
     np.testing.assert_array_equal(lit, [True, True, True, True, False])
@@ -131,4 +131,4 @@ def test_two_parts_cut_from_one_ellipsoid_block_light_as_one():
         )
         for parts in ((whole,), halves)
     ]
-    np.testing.assert_array_equal(balls_of(posed[0]), balls_of(posed[1]))
+    np.testing.assert_array_equal(ellipsoids_of(posed[0]), ellipsoids_of(posed[1]))

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from airborne.body import BodyModel, Ellipsoid, Part, Segment, geometry
+from airborne.body import BodyModel, Ellipsoid, Part, Segment, surface_arrays
 from airborne.rendering.srgb import light_from_srgb
-from airborne.synthetic import frames, thrown_cross
-from airborne.synthetic.throw.pictures import background, linear_picture, surface
+from airborne.synthetic import scene_frames, thrown_cross
+from airborne.synthetic.throw.pictures import background, linear_image, visible_surface
 from tests.support.synthetic import small_scene
 from tests.support.tolerances import sampled
 
@@ -35,8 +35,8 @@ def posed_at(scene, times):
 
 def test_same_scene_gives_the_same_pixels_and_another_seed_does_not():
     scene = small_scene(n_pictures=2)
-    first, again = (list(frames(scene)) for _ in range(2))
-    other = list(frames(replace(scene, seed=4)))
+    first, again = (list(scene_frames(scene)) for _ in range(2))
+    other = list(scene_frames(replace(scene, seed=4)))
     for a, b, c in zip(first, again, other, strict=True):
         for x, y, z in zip(a.views, b.views, c.views, strict=True):
             np.testing.assert_array_equal(x.rgb, y.rgb)
@@ -46,14 +46,14 @@ def test_same_scene_gives_the_same_pixels_and_another_seed_does_not():
 def test_one_camera_alone_sees_what_it_sees_among_others():
     scene = small_scene(n_pictures=2)
     alone = replace(scene, rig=scene.rig.select(["cam1"]))
-    for all_views, one_view in zip(frames(scene), frames(alone), strict=True):
+    for all_views, one_view in zip(scene_frames(scene), scene_frames(alone), strict=True):
         np.testing.assert_array_equal(all_views.views[0].rgb, one_view.views[0].rgb)
 
 
 def test_fields_have_their_own_rows_cameras_and_times():
     scene = small_scene(noise_sd=0.0)
-    whole = list(frames(replace(scene, is_interlaced=False)))
-    fields = list(frames(scene))
+    whole = list(scene_frames(replace(scene, is_interlaced=False)))
+    fields = list(scene_frames(scene))
     assert [f.time_s * 50 for f in fields] == [0, 1, 2, 3]
     for frame, field in zip(whole, fields, strict=True):
         for full, half, camera in zip(frame.views, field.views, scene.rig, strict=True):
@@ -64,20 +64,20 @@ def test_fields_have_their_own_rows_cameras_and_times():
 
 def test_fields_fill_whole_frames_where_the_truth_covers_an_odd_number():
     assert thrown_cross("side-somersault").n_pictures == 39
-    assert thrown_cross("side-somersault").n_shown == 40
-    assert len(list(frames(small_scene(n_pictures=3)))) == 4
+    assert thrown_cross("side-somersault").n_recorded == 40
+    assert len(list(scene_frames(small_scene(n_pictures=3)))) == 4
 
 
 def test_body_lies_in_the_picture_where_its_finely_drawn_mask_lies():
     scene = dark_room(small_scene(blur_px=0.0))
     camera = scene.rig["cam2"]
     posed = posed_at(scene, [0.1])
-    light = linear_picture(scene, background(scene, camera), posed)
+    light = linear_image(scene, background(scene, camera), posed)
     n = 10
-    fine = camera.resampled(
+    fine = camera.resample(
         scale=(1 / n, 1 / n), offset=((1 / n - 1) / 2,) * 2, size=(n * camera.size[0], n * camera.size[1])
     )
-    mask = surface(geometry(scene.body), posed[0], fine).mask
+    mask = visible_surface(surface_arrays(scene.body), posed[0], fine).mask
     v, u = np.nonzero(mask)
     expected = np.array([u.mean(), v.mean()]) / n + (1 / n - 1) / 2
     np.testing.assert_allclose(centroid(light), expected, atol=0.03)
@@ -88,8 +88,8 @@ def test_body_lies_in_the_picture_where_its_finely_drawn_mask_lies():
 def test_exposure_is_centred_on_the_time_of_the_picture():
     scene = dark_room(small_scene(blur_px=0.0, noise_sd=0.0, exposure_s=0.03, is_interlaced=False, n_pictures=2))
     camera = scene.rig["cam1"]
-    short = linear_picture(scene, background(scene, camera), posed_at(scene, [0.02]))
-    long = light_from_srgb(list(frames(scene))[1].views[0].rgb)
+    short = linear_image(scene, background(scene, camera), posed_at(scene, [0.02]))
+    long = light_from_srgb(list(scene_frames(scene))[1].views[0].rgb)
     np.testing.assert_allclose(centroid(long), centroid(short), atol=0.2)
     assert np.count_nonzero(long[..., 1] > 0.02) > 1.3 * np.count_nonzero(short[..., 1] > 0.02)
 
@@ -97,7 +97,7 @@ def test_exposure_is_centred_on_the_time_of_the_picture():
 def test_surface_points_project_to_their_pixels_and_lie_on_the_body():
     scene = small_scene()
     camera, posed = scene.rig["cam3"], posed_at(scene, [0.2])[0]
-    seen = surface(geometry(scene.body), posed, camera)
+    seen = visible_surface(surface_arrays(scene.body), posed, camera)
     v, u = np.nonzero(seen.mask)
     np.testing.assert_allclose(camera.px_from_world(seen.points), np.column_stack([u, v]), atol=1e-3)
     in_body = np.abs((seen.points - posed.t[0]) @ posed.R[0])
@@ -112,8 +112,8 @@ def test_faces_differ_in_brightness_and_some_are_saturated_and_some_dark():
     reds = []
     for i in range(0, 34, 4):
         posed = posed_at(scene, [i / 50])
-        mask = surface(geometry(scene.body), posed[0], camera).mask
-        reds.append(linear_picture(scene, backdrop, posed)[mask][:, 0])
+        mask = visible_surface(surface_arrays(scene.body), posed[0], camera).mask
+        reds.append(linear_image(scene, backdrop, posed)[mask][:, 0])
     reds = np.concatenate(reds)
     assert np.mean(reds > 0.96) > 0.02  # 250 of 255
     assert np.mean(reds < 0.35) > 0.05
@@ -127,8 +127,8 @@ def test_body_casts_a_shadow_that_moves():
     shadows = []
     for time in (0.0, 0.3):
         posed = posed_at(scene, [time])
-        light = linear_picture(replace(scene, blur_px=0.0), backdrop, posed)
-        is_dark = (light < 0.9 * lit).all(axis=-1) & ~surface(geometry(scene.body), posed[0], camera).mask
+        light = linear_image(replace(scene, blur_px=0.0), backdrop, posed)
+        is_dark = (light < 0.9 * lit).all(axis=-1) & ~visible_surface(surface_arrays(scene.body), posed[0], camera).mask
         shadows.append(is_dark)
     assert all(np.count_nonzero(shadow) > 50 for shadow in shadows)
     assert np.count_nonzero(shadows[0] & shadows[1]) < 0.5 * np.count_nonzero(shadows[0])
@@ -137,7 +137,7 @@ def test_body_casts_a_shadow_that_moves():
 def test_noise_has_the_stated_spread():
     scene = small_scene(n_pictures=2, is_interlaced=False, spots=(), noise_sd=6.0)
     quiet = replace(scene, noise_sd=0.0)
-    for noisy, clean in zip(frames(scene), frames(quiet), strict=True):
+    for noisy, clean in zip(scene_frames(scene), scene_frames(quiet), strict=True):
         for a, b in zip(noisy.views, clean.views, strict=True):
             mid = (b.rgb > 40) & (b.rgb < 215)
             error = (a.rgb.astype(float) - b.rgb)[mid]
@@ -157,7 +157,7 @@ def test_surface_points_of_an_ellipsoid_lie_on_it():
     ball = BodyModel("ball", (Segment("ball", None, np.zeros(3), (part,)),))
     scene = small_scene()
     posed = ball.with_pose(scene.flight(np.array([0.1])).pose(0))
-    seen = surface(geometry(ball), posed, scene.rig["cam1"])
+    seen = visible_surface(surface_arrays(ball), posed, scene.rig["cam1"])
     inside = (seen.points - posed.t[0]) @ posed.R[0] / semi_axes
     np.testing.assert_allclose(np.linalg.norm(inside, axis=1), 1.0, atol=1e-4)
     facing = np.einsum("ni,ni->n", seen.normals, (inside / semi_axes) @ posed.R[0].T)
@@ -168,10 +168,10 @@ def test_surroundings_that_are_not_there_are_black_and_the_body_is_as_before_oth
     scene = small_scene(scale=2, blur_px=0.0, spots=())
     camera, posed = scene.rig["cam1"], posed_at(scene, [0.1])
     alone = replace(scene, surroundings=None)
-    mask = surface(geometry(scene.body), posed[0], camera).mask
-    light = linear_picture(alone, background(alone, camera), posed)
+    mask = visible_surface(surface_arrays(scene.body), posed[0], camera).mask
+    light = linear_image(alone, background(alone, camera), posed)
     inside, outside = (cv2.erode(m.astype(np.uint8), np.ones((3, 3))) > 0 for m in (mask, ~mask))
     assert np.all(light[outside] == 0)
-    before = linear_picture(scene, background(scene, camera), posed)
+    before = linear_image(scene, background(scene, camera), posed)
     np.testing.assert_allclose(light[inside], before[inside], atol=1e-6)
     assert np.count_nonzero(inside) > 100

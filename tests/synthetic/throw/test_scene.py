@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from airborne.body import geometry
+from airborne.body import surface_arrays
 from airborne.errors import TrialError
 from airborne.synthetic import thrown_cross
-from airborne.synthetic.flight.rigid import mass_of
-from airborne.synthetic.throw.measurements import control_points, digitised, start_pose
+from airborne.synthetic.flight.rigid import mass_properties
+from airborne.synthetic.throw.measurements import control_points, digitise, start_pose
 from tests.support.tolerances import EXACT
 
 PRESETS = ("side-somersault", "half-twist")
@@ -19,7 +19,7 @@ def flown(scene):
 
 def share_along_momentum(scene, axis):
     """Return the cosine between a body axis and the angular momentum at the first and the last field."""
-    mass, flight = mass_of(scene.body, scene.flight.density_kg_m3), flown(scene)
+    mass, flight = mass_properties(scene.body, scene.flight.density_kg_m3), flown(scene)
     momentum = flight.R[0] @ mass.inertia @ flight.angular_velocity[0]
     return flight.R[[0, -1], :, axis] @ momentum / np.linalg.norm(momentum)
 
@@ -45,7 +45,7 @@ def test_side_somersault_keeps_the_plane_of_the_bars_and_turns_once(seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_body_stays_in_every_picture_above_the_floor_and_before_the_clutter(preset, seed):
     scene = thrown_cross(preset, seed=seed)
-    flight, corners = flown(scene), geometry(scene.body).corners
+    flight, corners = flown(scene), surface_arrays(scene.body).corners
     world = np.einsum("nij,cj->nci", flight.R, corners) + flight.position[:, None]
     for camera in scene.rig:
         px = camera.px_from_world(world)
@@ -63,7 +63,7 @@ def test_fields_and_rate_are_those_of_the_paper():
 def test_seed_varies_the_throw_and_the_background():
     one, two = thrown_cross(seed=1), thrown_cross(seed=2)
     assert np.abs(one.flight.launch.angular_velocity - two.flight.launch.angular_velocity).max() > 1e-3
-    assert np.abs(geometry(one.surroundings).corners - geometry(two.surroundings).corners).max() > 0.1
+    assert np.abs(surface_arrays(one.surroundings).corners - surface_arrays(two.surroundings).corners).max() > 0.1
 
 
 def test_start_is_off_by_what_the_scene_states():
@@ -81,7 +81,7 @@ def test_clicks_scatter_about_the_points_they_show():
     assert len(error) > 110
     assert error.std() == pytest.approx(0.5, rel=0.2)
     flight = flown(scene)
-    ends = digitised(scene, flight)
+    ends = digitise(scene, flight)
     assert list(ends) == ["long_minus", "long_plus", "short_minus", "short_plus"]
     world = flight.R @ np.array([0.3, 0.18, 0]) + flight.position
     px = np.stack([camera.px_from_world(world) for camera in scene.rig], axis=1)

@@ -11,9 +11,9 @@ from airborne.calibration.from_points import calibrate
 from airborne.calibration.sources.control_points import read_control_points
 from airborne.cameras import read_rig
 from airborne.errors import TrialError
-from airborne.evaluation.digitised import digitised_poses, read_digitised
+from airborne.evaluation.digitised import fit_digitised_poses, read_digitised
 from airborne.evaluation.truth import read_truth
-from airborne.synthetic import frames, thrown_cross, write_thrown_cross, write_trial
+from airborne.synthetic import scene_frames, thrown_cross, write_thrown_cross, write_trial
 from airborne.synthetic.throw.measurements import control_points
 from airborne.trial.file import read_trial
 from airborne.video import inspect, open_recording
@@ -34,8 +34,8 @@ def test_videos_hold_the_fields_that_were_drawn(written):
     rig = read_rig(folder / "calib_true.toml")
     trial = read_trial(folder / "trial.toml")
     sources = [VideoSource(c.name, trial.path(c.video), fields=c.fields) for c in trial.camera]
-    assert {inspect(source).flagged for source in sources} == {"top-first"}
-    drawn = list(frames(scene))
+    assert {inspect(source).flagged_order for source in sources} == {"top-first"}
+    drawn = list(scene_frames(scene))
     read = list(open_recording(sources, rig, fields_as="rows"))
     assert [f.time_s for f in read] == [f.time_s for f in drawn] == [Fraction(i, 50) for i in range(4)]
     for a, b in zip(drawn, read, strict=True):
@@ -76,7 +76,7 @@ def test_control_points_are_read_back_as_clicked(written):
 def test_clicked_ends_give_the_pose_to_what_clicks_allow(written):
     scene, folder, _ = written
     rig, body = read_rig(folder / "calib_true.toml"), read_body(folder / "cross.toml")
-    poses = digitised_poses(read_digitised(folder / "digitised.csv", rig), rig, body)
+    poses = fit_digitised_poses(read_digitised(folder / "digitised.csv", rig), rig, body)
     error = poses.position - scene.flight(np.arange(4) / 50).position
     assert 1e-4 < np.abs(error).max() < 0.1  # 1.2 px of a small picture are 2.5 cm
 

@@ -1,4 +1,4 @@
-"""One clip that several tests look at."""
+"""A clip that several tests share."""
 
 import pytest
 

@@ -6,9 +6,9 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras import Camera
-from airborne.tracking.capsules.evidence import evidence
-from airborne.tracking.capsules.outlines import BEHIND, labels, outline, project
-from airborne.tracking.capsules.spans import running_sums
+from airborne.tracking.capsules.evidence import capsule_evidence
+from airborne.tracking.capsules.outlines import BEHIND_M, draw_labels, outline, project
+from airborne.tracking.capsules.spans import cumulative_sums
 from tests.support.tolerances import SOLVED
 
 W, H, FINE = 64, 56, 32  # of the maps [px], and points a pixel along a row
@@ -33,7 +33,7 @@ def is_tangent_on_either_side(a, b):
 
 
 def random_pairs(n, seed=0):
-    """Pairs of discs in the picture: apart, overlapping, one above the other, side by side."""
+    """Pairs of discs in the image: apart, overlapping, one above the other, side by side."""
     rng = np.random.default_rng(seed)
     for i in range(n):
         a, b = np.column_stack([rng.uniform(16, 40, (2, 2)), rng.uniform(1, 8, 2)])
@@ -100,9 +100,9 @@ def test_outline_begins_in_the_row_it_is_asked_for():
 
 def camera(width=W, height=H, focal_px=120.0):
     K = np.array([[focal_px, 0, (width - 1) / 2], [0, focal_px, (height - 1) / 2], [0, 0, 1.0]])
-    turn = Rotation.from_euler("xyz", [0.2, -0.3, 0.1])
+    rotation = Rotation.from_euler("xyz", [0.2, -0.3, 0.1])
     return Camera(
-        name="c", K=K, size=(width, height), camera_from_world=RigidTransform.from_components([0.1, 0, 4.0], turn)
+        name="c", K=K, size=(width, height), camera_from_world=RigidTransform.from_components([0.1, 0, 4.0], rotation)
     )
 
 
@@ -119,14 +119,14 @@ def test_projected_centres_are_the_cameras_and_radii_shrink_with_depth():
     np.testing.assert_allclose(depth, z.mean(axis=1))
     ends[2, 1] = seen_by.camera_from_world.inv().apply([0, 0, -1.0])
     project(ends, radii, packed, discs, depth)
-    assert depth[2] == BEHIND
+    assert depth[2] == BEHIND_M
     assert np.all(np.isfinite(discs))
 
 
-def test_running_sums_are_numpys():
+def test_cumulative_sums_are_numpys():
     maps = np.random.default_rng(1).normal(size=(3, 5, 7)).astype(np.float32)
     out = np.full((3, 5, 8), np.nan, np.float32)
-    running_sums(maps, out)
+    cumulative_sums(maps, out)
     np.testing.assert_allclose(out[..., 1:], np.cumsum(maps, axis=-1), atol=1e-5)
     assert not out[..., 0].any()
 
@@ -135,7 +135,7 @@ LEG = np.array([[[24.0, 10.0, 7.0], [30.0, 28.0, 5.0]], [[30.0, 28.0, 5.0], [26.
 OTHER_LEG = np.array([[[34.0, 12.0, 6.5], [27.0, 27.0, 4.5]], [[27.0, 27.0, 4.5], [36.0, 45.0, 3.0]]])
 DISCS = np.concatenate([LEG, OTHER_LEG])
 DEPTH = np.array([4.2, 4.0, 4.1, 4.3])
-KINDS = np.array([[0, 1], [1, 2], [0, 1], [1, 2]], np.int64)
+CLASSES = np.array([[0, 1], [1, 2], [0, 1], [1, 2]], np.int64)
 SHARE = np.array([0.4, 0.6, 0.4, 0.6])
 
 
@@ -146,14 +146,14 @@ def noise(seed, blur=4.0, k=3):
     return (maps / maps.std() + 0.5).astype(np.float32)
 
 
-def summed(discs, maps, share=SHARE, depth=DEPTH, kinds=KINDS, origin=(0.0, 0.0)):
+def summed(discs, maps, share=SHARE, depth=DEPTH, classes=CLASSES, origin=(0.0, 0.0)):
     """Owned (n, 2, 2), gradient (n, 7) and curvature (n, 7, 7) of maps (k, h, w) under the discs."""
     n, (k, h, w) = len(discs), maps.shape
     sums = np.empty((k, h, w + 1), np.float32)
-    running_sums(maps, sums)
+    cumulative_sums(maps, sums)
     owned, gradient, curvature = np.empty((n, 2, 2)), np.empty((n, 7)), np.empty((n, 7, 7))
     work = np.empty((n, 2, h)), np.empty((n, 2, h), np.int64), np.empty((n, 2, 7))
-    evidence(discs, depth, kinds, share, sums, np.ones(k), np.array(origin), work, owned, gradient, curvature)
+    capsule_evidence(discs, depth, classes, share, sums, np.ones(k), np.array(origin), work, owned, gradient, curvature)
     return owned, gradient, curvature
 
 
@@ -161,22 +161,22 @@ def owners(discs, share=SHARE, depth=DEPTH, shape=(H, W)):
     """Who owns each of FINE points a pixel along the rows: (h, FINE w), twice the capsule + 1 in its second part."""
     h, w = shape
     x = (np.arange(FINE * w) + 0.5) / FINE - 0.5
-    found = np.full((h, FINE * w), -1)
+    owner = np.full((h, FINE * w), -1)
     for i in np.argsort(-np.asarray(depth)):
         low, high = hull(*discs[i], np.arange(h))[:, :, None]
         axis = discs[i, 1, :2] - discs[i, 0, :2]
         border = discs[i, 0, :2] + share[i] * axis
         is_second = (x - border[0]) * axis[0] + (np.arange(h)[:, None] - border[1]) * axis[1] > 0
         inside = (x >= low) & (x <= high)
-        found[inside] = (2 * i + is_second)[inside]
-    return found
+        owner[inside] = (2 * i + is_second)[inside]
+    return owner
 
 
-def by_points(discs, maps, share=SHARE, depth=DEPTH, kinds=KINDS):
-    """What `evidence` should find, (n, 2, 2), by looking at every point."""
+def by_points(discs, maps, share=SHARE, depth=DEPTH, classes=CLASSES):
+    """What `capsule_evidence` should return, (n, 2, 2), by testing every point."""
     owner = owners(discs, share, depth, maps.shape[1:])
     fine = np.repeat(maps, FINE, axis=2)
-    parts = [(fine[kinds.ravel()[p]][owner == p], owner == p) for p in range(2 * len(discs))]
+    parts = [(fine[classes.ravel()[p]][owner == p], owner == p) for p in range(2 * len(discs))]
     return np.array([[each.sum(), there.sum()] for each, there in parts]).reshape(-1, 2, 2) / FINE
 
 
@@ -206,8 +206,8 @@ def test_no_pixel_counts_twice(seed):
     discs = np.stack([rng.uniform([15, 12, 2], [48, 44, 7], (n, 3)) for _ in range(2)], axis=1)
     discs = np.array([each for each in discs if is_tangent_on_either_side(*each)])
     depth, share = rng.uniform(3, 5, len(discs)), rng.uniform(0.2, 0.8, len(discs))
-    kinds = rng.integers(0, 3, (len(discs), 2))
-    owned, _, _ = summed(discs, linear(0, 0, 1.0), share, depth, kinds)
+    classes = rng.integers(0, 3, (len(discs), 2))
+    owned, _, _ = summed(discs, linear(0, 0, 1.0), share, depth, classes)
     rows = np.arange(-0.5, H - 0.5, 1 / 16) + 1 / 32
     low, high = np.array([hull(*each, rows) for each in discs]).swapaxes(0, 1)[..., None]
     x = (np.arange(FINE * W) + 0.5) / FINE - 0.5
@@ -218,10 +218,10 @@ def test_no_pixel_counts_twice(seed):
 def test_nearer_capsule_owns_what_both_cover():
     back, front = np.array([[30.0, 15.0, 6.0], [30.0, 40.0, 6.0]]), np.array([[20.0, 25.0, 4.0], [42.0, 31.0, 4.0]])
     discs, share = np.array([back, front]), np.ones(2)
-    alone = [summed(each[None], linear(0, 0, 1.0), np.ones(1), np.ones(1), KINDS[:1])[0] for each in discs]
+    alone = [summed(each[None], linear(0, 0, 1.0), np.ones(1), np.ones(1), CLASSES[:1])[0] for each in discs]
     whole = [each[0, :, 1].sum() for each in alone]
     for depth in ([5.0, 4.0], [4.0, 5.0]):
-        owned, _, _ = summed(discs, linear(0, 0, 1.0), share, np.array(depth), KINDS[:2])
+        owned, _, _ = summed(discs, linear(0, 0, 1.0), share, np.array(depth), CLASSES[:2])
         near = int(np.argmin(depth))
         assert owned[near, :, 1].sum() == pytest.approx(whole[near], abs=1e-3)
         assert owned[1 - near, :, 1].sum() < whole[1 - near] - 50
@@ -229,16 +229,16 @@ def test_nearer_capsule_owns_what_both_cover():
 
 def test_capsule_behind_the_camera_owns_nothing():
     depth = DEPTH.copy()
-    depth[1] = BEHIND
+    depth[1] = BEHIND_M
     owned, gradient, curvature = summed(DISCS, noise(1), depth=depth)
     left = np.array([0, 2, 3])
-    others = summed(DISCS[left], noise(1), SHARE[left], DEPTH[left], KINDS[left])
+    others = summed(DISCS[left], noise(1), SHARE[left], DEPTH[left], CLASSES[left])
     assert not owned[1].any() and not gradient[1].any() and not curvature[1].any()
     for part, other in zip((owned, gradient, curvature), others, strict=True):
         np.testing.assert_allclose(part[left], other, atol=SOLVED)
 
 
-def test_a_region_is_the_same_as_the_whole_picture():
+def test_a_region_is_the_same_as_the_whole_image():
     maps = noise(2)
     whole = summed(DISCS, maps)
     part = summed(DISCS, np.ascontiguousarray(maps[:, 1:54, 9:55]), origin=(9.0, 1.0))
@@ -259,7 +259,7 @@ def test_what_lies_outside_the_region_counts_nothing():
 def differences(discs, maps, step=0.5):
     """Central differences of the total by every number of every disc [px], and by the shares: (n, 7)."""
     n = len(discs)
-    found = np.empty((n, 7))
+    derivatives = np.empty((n, 7))
     for i in range(n):
         for p in range(7):
             length = 1.0 if p < 6 else np.linalg.norm(discs[i, 1, :2] - discs[i, 0, :2])
@@ -270,15 +270,15 @@ def differences(discs, maps, step=0.5):
                     moved[i].reshape(-1)[p] += sign * step
                 else:
                     share[i] += sign * step / length
-                totals.append(summed(moved, maps, share, DEPTH[:n], KINDS[:n])[0][..., 0].sum())
-            found[i, p] = (totals[0] - totals[1]) / (2 * step / length)
-    return found
+                totals.append(summed(moved, maps, share, DEPTH[:n], CLASSES[:n])[0][..., 0].sum())
+            derivatives[i, p] = (totals[0] - totals[1]) / (2 * step / length)
+    return derivatives
 
 
 def gradients(discs, seeds=range(10, 16)):
     """Our gradients and the differences over some maps: (2, maps, n, 7)."""
     n = len(discs)
-    ours = [summed(discs, noise(seed), SHARE[:n], DEPTH[:n], KINDS[:n])[1] for seed in seeds]
+    ours = [summed(discs, noise(seed), SHARE[:n], DEPTH[:n], CLASSES[:n])[1] for seed in seeds]
     return np.array([ours, [differences(discs, noise(seed)) for seed in seeds]])
 
 
@@ -306,24 +306,24 @@ def test_the_sum_under_a_level_capsule_is_no_staircase(tilt):
     areas = []
     for y in np.linspace(20, 21, 11):
         capsule = np.array([[[18.0, y, 4.0], [42.0, y + tilt, 4.0]]])
-        areas.append(summed(capsule, linear(0, 0, 1.0), SHARE[:1], DEPTH[:1], KINDS[:1])[0][..., 0].sum())
+        areas.append(summed(capsule, linear(0, 0, 1.0), SHARE[:1], DEPTH[:1], CLASSES[:1])[0][..., 0].sum())
     length = np.hypot(24, tilt)
     np.testing.assert_allclose(areas, 8 * length + 16 * np.pi, rtol=0.015)  # rows alone: 11 %
 
 
 def test_a_level_capsule_takes_from_what_lies_behind_it():
     front, behind = [[16.0, 30.4, 4.0], [44.0, 30.7, 4.0]], [[30.0, 14.0, 7.0], [30.0, 46.0, 7.0]]
-    owned, gradient, _ = summed(np.array([front, behind]), linear(0, 0, 1.0), SHARE[:2], DEPTH[[1, 3]], KINDS[:2])
-    alone, _, _ = summed(np.array([front]), linear(0, 0, 1.0), SHARE[:1], DEPTH[[1]], KINDS[:1])
-    whole, _, _ = summed(np.array([behind]), linear(0, 0, 1.0), SHARE[1:2], DEPTH[[3]], KINDS[1:2])
+    owned, gradient, _ = summed(np.array([front, behind]), linear(0, 0, 1.0), SHARE[:2], DEPTH[[1, 3]], CLASSES[:2])
+    alone, _, _ = summed(np.array([front]), linear(0, 0, 1.0), SHARE[:1], DEPTH[[1]], CLASSES[:1])
+    whole, _, _ = summed(np.array([behind]), linear(0, 0, 1.0), SHARE[1:2], DEPTH[[3]], CLASSES[1:2])
     assert owned[0, :, 1].sum() == pytest.approx(alone[0, :, 1].sum(), abs=1e-6)
     assert owned[1, :, 1].sum() == pytest.approx(whole[0, :, 1].sum() - 14 * 8, rel=0.01)
     assert gradient[0, [2, 5]].sum() == pytest.approx(2 * 28 + 8 * np.pi - 2 * 14, rel=0.03)  # nothing where it covers
 
 
-def test_gradient_by_the_share_is_nothing_where_the_border_is_hidden():
-    hidden, front = np.array([[30.0, 12.0, 4.0], [30.0, 44.0, 4.0]]), np.array([[30.0, 20.0, 8.0], [30.0, 36.0, 8.0]])
-    discs, share = np.array([front, hidden]), np.array([1.0, 0.5])
+def test_gradient_by_the_share_is_nothing_where_the_border_is_occluded():
+    occluded, front = np.array([[30.0, 12.0, 4.0], [30.0, 44.0, 4.0]]), np.array([[30.0, 20.0, 8.0], [30.0, 36.0, 8.0]])
+    discs, share = np.array([front, occluded]), np.array([1.0, 0.5])
     _, gradient, _ = summed(discs, noise(3), share, np.array([4.0, 5.0]), np.array([[2, 2], [0, 1]]))
     assert gradient[1, 6] == pytest.approx(0, abs=1e-6)
 
@@ -332,10 +332,10 @@ def test_sums_without_a_gradient_are_the_same():
     maps = noise(5)
     owned, _, _ = summed(DISCS, maps)
     sums = np.empty((3, H, W + 1), np.float32)
-    running_sums(maps, sums)
+    cumulative_sums(maps, sums)
     again, work = np.empty_like(owned), (np.empty((4, 2, H)), np.empty((4, 2, H), np.int64), np.empty((4, 2, 7)))
-    evidence(
-        DISCS, DEPTH, KINDS, SHARE, sums, np.ones(3), np.zeros(2), work, again, np.empty((0, 7)), np.empty((0, 7, 7))
+    capsule_evidence(
+        DISCS, DEPTH, CLASSES, SHARE, sums, np.ones(3), np.zeros(2), work, again, np.empty((0, 7)), np.empty((0, 7, 7))
     )
     np.testing.assert_array_equal(owned, again)
 
@@ -350,12 +350,12 @@ def test_curvature_is_symmetric_and_never_negative():
 
 def test_drawn_labels_cover_what_the_evidence_owns():
     out = np.empty((H, W), np.int8)
-    labels(DISCS, DEPTH, KINDS, SHARE, out)
+    draw_labels(DISCS, DEPTH, CLASSES, SHARE, out)
     owned, _, _ = summed(DISCS, linear(0, 0, 1.0))
-    for kind in range(3):
-        area = owned[..., 1][np.equal(KINDS, kind)].sum()
-        assert np.count_nonzero(out == kind) == pytest.approx(area, rel=0.05)
+    for surface_class in range(3):
+        area = owned[..., 1][np.equal(CLASSES, surface_class)].sum()
+        assert np.count_nonzero(out == surface_class) == pytest.approx(area, rel=0.05)
     assert np.count_nonzero(out >= 0) == pytest.approx(owned[..., 1].sum(), rel=0.015)
     owner = owners(DISCS)[:, FINE // 2 :: FINE]
-    agree = out == np.append(KINDS.ravel(), -1)[owner]
+    agree = out == np.append(CLASSES.ravel(), -1)[owner]
     assert agree.mean() > 0.998

@@ -12,29 +12,29 @@ ALONE = range(8, 16)
 
 
 @pytest.fixture(scope="module")
-def found(hall):
+def estimates(hall):
     alone = replace(hall, is_without=lambda index, number: number != 1 and index in ALONE)
     return tracked(alone, range(22))[0]
 
 
-def test_it_is_uncertain_while_one_camera_is_left_and_never_hidden(found):
+def test_it_is_uncertain_while_one_camera_is_left_and_never_hidden(estimates):
     expected = [Status.UNCERTAIN if index in ALONE else Status.TRACKED for index in range(22)]
-    assert statuses(found) == expected
-    assert [each.n_views for each in found] == [1 if index in ALONE else 3 for index in range(22)]
-    assert all(np.isfinite(each.points).all() for each in found)
+    assert statuses(estimates) == expected
+    assert [each.n_views for each in estimates] == [1 if index in ALONE else 3 for index in range(22)]
+    assert all(np.isfinite(each.points).all() for each in estimates)
 
 
-def test_the_region_grows_to_hold_the_truth(hall, found):
-    assert share_within(hall, found[8:16]) >= 0.8
-    variance = [np.trace(each.covariance[:6].mean(axis=0)) for each in found]
+def test_the_region_grows_to_hold_the_truth(hall, estimates):
+    assert share_within(hall, estimates[8:16]) >= 0.8
+    variance = [np.trace(each.covariance[:6].mean(axis=0)) for each in estimates]
     assert np.all(np.diff(variance[7:11]) > 0)  # until as much is gained as lost
     assert min(variance[11:16]) > 2 * variance[7]
 
 
-def test_a_player_is_followed_again_when_the_others_are_back(hall, found):
-    assert np.median(errors_mm(hall, found)[18:]) < 25
+def test_a_player_is_followed_again_when_the_others_are_back(hall, estimates):
+    assert np.median(errors_mm(hall, estimates)[18:]) < 25
 
 
 def test_one_camera_from_the_start_is_never_certain(hall):
-    [found] = tracked(replace(hall, is_without=lambda index, number: number != 1), range(4))
-    assert set(statuses(found)) == {Status.UNCERTAIN}
+    [estimates] = tracked(replace(hall, is_without=lambda index, number: number != 1), range(4))
+    assert set(statuses(estimates)) == {Status.UNCERTAIN}

@@ -1,4 +1,4 @@
-"""What a jumper's surfaces look like: in any light, and with borders that stay where the clothes end."""
+"""The colours of a jumper's surfaces: in any light, and with borders that stay where the clothes end."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,9 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras import Camera
 from airborne.tracking.capsules.equations import NOBODY
-from airborne.tracking.capsules.jumper import KINDS, N_DOF, SHIRT, SHOE, SHORTS, SKIN
-from airborne.tracking.capsules.surface_colours import Drawings, drawn, learned, renewed
-from airborne.tracking.capsules.views import Region
+from airborne.tracking.capsules.jumper import N_DOF, SHIRT, SHOE, SHORTS, SKIN, SURFACE_CLASSES
+from airborne.tracking.capsules.surface_colours import ClassImages, class_image, learn_colours, update_colours
+from airborne.tracking.capsules.views import PlayerRegion
 from tests.support.jumping_scenes import LENGTHS, RADII
 
 AWAY_M, FOCAL_PX, SIDE_PX = 10.0, 2000.0, 400
@@ -31,7 +31,7 @@ def leaning(lean_rad):
 
 def hem_m(state, y_sign):
     """How high the lowest shirt is over the origin, on the mean of the body's inner half."""
-    part = drawn(state, looking(y_sign), 1.0)[:, SIDE_PX // 2 - 15 : SIDE_PX // 2 + 16]
+    part = class_image(state, looking(y_sign), 1.0)[:, SIDE_PX // 2 - 15 : SIDE_PX // 2 + 16]
     lowest = SIDE_PX - 1 - np.argmax((part == SHIRT)[::-1], axis=0)
     assert np.all(np.take_along_axis(part, lowest[None] + 1, axis=0) == SHORTS)
     return (SIDE_PX / 2 - lowest.mean()) * AWAY_M / FOCAL_PX
@@ -48,16 +48,16 @@ def coloured(colour, n=40):
     rgb[10:30, 10:30] = colour
     part = np.full((n, n), -1, np.int8)
     part[10:30, 10:30] = SKIN
-    region = Region(0, looking(1), (0, 0, n, n), rgb)
-    return learned([region], [Drawings(part, part, part)], 1, np.ones((1, len(KINDS)), bool))
+    region = PlayerRegion(0, looking(1), (0, 0, n, n), rgb)
+    return learn_colours([region], [ClassImages(part, part, part)], 1, np.ones((1, len(SURFACE_CLASSES)), bool))
 
 
-def evidence_of(colours, colour, kind=SKIN):
+def evidence_of(colours, colour, surface_class=SKIN):
     r, g, b = np.asarray(colour, int) >> 3
-    return colours.table(0).evidence[r << 10 | g << 5 | b, kind]
+    return colours.table(0).evidence[r << 10 | g << 5 | b, surface_class]
 
 
-def test_a_surface_is_known_again_in_more_and_in_less_light():
+def test_a_surface_is_recognised_in_more_and_in_less_light():
     colours = coloured((180, 140, 110))
     for light in (0.85, 1.0, 1.15):
         assert evidence_of(colours, (np.array([180, 140, 110]) * light).astype(int)) > 3
@@ -71,43 +71,43 @@ SOLE, GREEN = (90, 200, 190), np.array([(60, 200, 60)], np.uint8)
 
 
 def dressed(shoe, others=NOBODY):
-    """A picture of one who stands before a blue wall, in shoes of a colour; others are green."""
+    """An image of a player before a blue wall, in shoes of a colour; others are green."""
     worn = np.concatenate([WORN, GREEN])
     worn[SHOE] = shoe
-    shown = drawn(STANDING, looking(1), 1.0, others)
-    return Region(0, looking(1), (0, 0, SIDE_PX, SIDE_PX), worn[np.choose(shown + 1, [5, 0, 1, 2, 3, 4, 6])])
+    classes = class_image(STANDING, looking(1), 1.0, others)
+    return PlayerRegion(0, looking(1), (0, 0, SIDE_PX, SIDE_PX), worn[np.choose(classes + 1, [5, 0, 1, 2, 3, 4, 6])])
 
 
 def at_first():
     region = dressed(WORN[SHOE])
-    part, around = drawn(STANDING, looking(1), 0.6), drawn(STANDING, looking(1), 1.25)
-    return learned([region], [Drawings(part, part, around)], 1, np.ones((1, len(KINDS)), bool))
+    part, around = class_image(STANDING, looking(1), 0.6), class_image(STANDING, looking(1), 1.25)
+    return learn_colours([region], [ClassImages(part, part, around)], 1, np.ones((1, len(SURFACE_CLASSES)), bool))
 
 
-def test_shoes_are_known_by_their_soles_once_these_were_seen():
+def test_shoes_are_recognised_by_their_soles_once_learned():
     colours = at_first()
     assert evidence_of(colours, SOLE, SHOE) < 1
-    later = renewed(colours, STANDING, [dressed(SOLE)], NOBODY)
+    later = update_colours(colours, STANDING, [dressed(SOLE)], NOBODY)
     assert evidence_of(later, SOLE, SHOE) > 3
     assert evidence_of(later, WORN[SHOE], SHOE) > 3
-    np.testing.assert_array_equal(later.kinds[: SKIN + 1], colours.kinds[: SKIN + 1])
+    np.testing.assert_array_equal(later.distributions[: SKIN + 1], colours.distributions[: SKIN + 1])
     for _ in range(50):
-        later = renewed(later, STANDING, [dressed(SOLE)], NOBODY)
-    assert evidence_of(later, WORN[SHOE], SHOE) > 3  # what they were at first is never forgotten
+        later = update_colours(later, STANDING, [dressed(SOLE)], NOBODY)
+    assert evidence_of(later, WORN[SHOE], SHOE) > 3  # the first frame's colours are never forgotten
 
 
-def test_nothing_is_learned_of_shoes_that_are_hidden():
+def test_nothing_is_learned_of_occluded_shoes():
     colours = at_first()
-    colours.hidden[0, SHOE] = 0.9
-    later = renewed(colours, STANDING, [dressed(SOLE)], NOBODY)
-    np.testing.assert_array_equal(later.kinds[SHOE], colours.kinds[SHOE])
+    colours.occlusion[0, SHOE] = 0.9
+    later = update_colours(colours, STANDING, [dressed(SOLE)], NOBODY)
+    np.testing.assert_array_equal(later.distributions[SHOE], colours.distributions[SHOE])
 
 
 def test_nothing_is_learned_of_another_players_leg_in_front():
     feet = np.array([[[0.3, 0.5, 0.08], [-0.3, 0.5, 0.08]]])
     others = feet, np.full((1, 2), 0.3)
     assert np.count_nonzero(dressed(WORN[SHOE], others).rgb == GREEN) > 1000
-    later = renewed(at_first(), STANDING, [dressed(WORN[SHOE], others)], others)
+    later = update_colours(at_first(), STANDING, [dressed(WORN[SHOE], others)], others)
     assert evidence_of(later, GREEN[0], SHOE) < 1
-    unaware = renewed(at_first(), STANDING, [dressed(WORN[SHOE], others)], NOBODY)
+    unaware = update_colours(at_first(), STANDING, [dressed(WORN[SHOE], others)], NOBODY)
     assert evidence_of(unaware, GREEN[0], SHOE) > 3

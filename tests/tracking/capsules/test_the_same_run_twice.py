@@ -1,4 +1,4 @@
-"""A run is a function of its pictures and its start."""
+"""A run is a function of its images and its start."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def far_apart():
 
 
 @pytest.fixture(scope="module")
-def found(far_apart):
+def estimates(far_apart):
     return tracked(far_apart, range(N))
 
 
@@ -26,20 +26,20 @@ def assert_equal(estimates, others):
         assert (each.status, each.score, each.n_views) == (other.status, other.score, other.n_views)
 
 
-def test_the_same_run_twice_is_equal_to_the_last_bit(far_apart, found):
-    for each, other in zip(found, tracked(far_apart, range(N)), strict=True):
+def test_the_same_run_twice_is_equal_to_the_last_bit(far_apart, estimates):
+    for each, other in zip(estimates, tracked(far_apart, range(N)), strict=True):
         assert_equal(each, other)
 
 
-def test_the_order_of_players_does_not_matter(far_apart, found):
-    anna, ben = found
+def test_the_order_of_players_does_not_matter(far_apart, estimates):
+    anna, ben = estimates
     ben_first, anna_second = tracked(far_apart, range(N), far_apart.starts()[::-1])
     assert_equal(anna, anna_second)
     assert_equal(ben, ben_first)
 
 
-def test_a_player_far_away_does_not_matter(far_apart, found):
-    anna, _ = found
+def test_a_player_far_away_does_not_matter(far_apart, estimates):
+    anna, _ = estimates
     [alone] = tracked(far_apart, range(N), far_apart.starts()[:1])
     assert_equal(anna, alone)
 

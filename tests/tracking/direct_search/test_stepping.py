@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.tracking.direct_search.stepping import stepping, v_literal
+from airborne.tracking.direct_search.stepping import minimise_by_stepping, v_literal
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
 RULES = ("v_literal", "v_sym")
@@ -16,7 +16,7 @@ def vee(minimum):
 
 
 def on_a_line(minimum, v_rule, score=vee, start=0.0):
-    best, evaluations = stepping(score(minimum), np.array([start]), [np.ones(1)], v_rule=v_rule)
+    best, evaluations = minimise_by_stepping(score(minimum), np.array([start]), [np.ones(1)], v_rule=v_rule)
     return best[0], evaluations
 
 
@@ -24,8 +24,8 @@ def on_a_line(minimum, v_rule, score=vee, start=0.0):
 @pytest.mark.parametrize("way", [1, -1])
 def test_minimum_on_the_far_side_of_the_lowest_point_is_found_exactly(v_rule, way):
     for beyond in (0.0, 0.1, 0.3, 0.49):
-        found, _ = on_a_line(way * (4 + beyond), v_rule)
-        np.testing.assert_allclose(found, way * (4 + beyond), atol=ROUNDTRIP)
+        best, _ = on_a_line(way * (4 + beyond), v_rule)
+        np.testing.assert_allclose(best, way * (4 + beyond), atol=ROUNDTRIP)
 
 
 @pytest.mark.parametrize("way", [1, -1])
@@ -38,8 +38,8 @@ def test_minimum_on_the_near_side_is_found_by_v_sym_and_missed_by_the_papers_rul
 @pytest.mark.parametrize("v_rule", RULES)
 def test_minimum_within_a_step_of_the_start_is_found_or_no_worse_than_the_start(v_rule):
     for minimum in np.linspace(-0.49, 0.49, 21):
-        found, _ = on_a_line(minimum, v_rule)
-        assert abs(found - minimum) <= (ROUNDTRIP if v_rule == "v_sym" else abs(minimum) + ROUNDTRIP)
+        best, _ = on_a_line(minimum, v_rule)
+        assert abs(best - minimum) <= (ROUNDTRIP if v_rule == "v_sym" else abs(minimum) + ROUNDTRIP)
 
 
 def test_papers_rule_errs_by_a_fifth_of_a_step_over_all_offsets():
@@ -60,27 +60,27 @@ def test_crossing_of_two_lines_is_bounded_by_the_neighbours():
 def test_all_variables_are_found_in_shrinking_loops(v_rule):
     minimum = np.array([0.123, -0.087, 0.31, 0.2, -0.15, 0.05])
     loops = [np.full(6, size) for size in (0.05, 0.03, 0.02, 0.01, 0.01, 0.005)]
-    best, evaluations = stepping(vee(minimum), np.zeros(6), loops, v_rule=v_rule)
+    best, evaluations = minimise_by_stepping(vee(minimum), np.zeros(6), loops, v_rule=v_rule)
     np.testing.assert_allclose(best, minimum, atol=0.0026)
     assert evaluations < 20 * 36
 
 
 def test_parabola_is_found_within_half_a_step():
-    found, _ = on_a_line(7.3, "v_sym", lambda m: lambda x: ((x - m) ** 2).sum(axis=1))
-    assert abs(found - 7.3) < 0.5
+    best, _ = on_a_line(7.3, "v_sym", lambda m: lambda x: ((x - m) ** 2).sum(axis=1))
+    assert abs(best - 7.3) < 0.5
 
 
 @pytest.mark.parametrize("v_rule", RULES)
 @pytest.mark.parametrize("minimum", [0.2, 3.4, -17.7, 1e9])
 def test_evaluations_are_bounded_counted_and_never_repeated(v_rule, minimum):
-    asked = []
+    evaluated = []
 
     def score(x):
-        asked.extend(x[:, 0].tolist())
+        evaluated.extend(x[:, 0].tolist())
         return vee(minimum)(x)
 
-    _, evaluations = stepping(score, np.zeros(1), [np.ones(1)], v_rule=v_rule)
-    assert len(asked) == len(set(asked)) == evaluations
+    _, evaluations = minimise_by_stepping(score, np.zeros(1), [np.ones(1)], v_rule=v_rule)
+    assert len(evaluated) == len(set(evaluated)) == evaluations
     assert evaluations <= min(abs(minimum) + 6, MOST_A_VARIABLE)
 
 
@@ -90,12 +90,14 @@ def test_search_passes_one_bump_and_stops_at_the_second():
     def score(x):
         return np.array([heights.get(round(k), 20.0) for k in x[:, 0]])
 
-    best, _ = stepping(score, np.zeros(1), [np.ones(1)], v_rule="v_literal")
+    best, _ = minimise_by_stepping(score, np.zeros(1), [np.ones(1)], v_rule="v_literal")
     assert 3 <= best[0] <= 5
 
 
 def test_variable_without_a_step_stays():
-    best, evaluations = stepping(vee(np.array([1.0, 1.0])), np.zeros(2), [np.array([0.0, 1.0])], v_rule="v_sym")
+    best, evaluations = minimise_by_stepping(
+        vee(np.array([1.0, 1.0])), np.zeros(2), [np.array([0.0, 1.0])], v_rule="v_sym"
+    )
     np.testing.assert_allclose(best, [0, 1], atol=ROUNDTRIP)
     assert evaluations < 10
 
@@ -103,31 +105,31 @@ def test_variable_without_a_step_stays():
 @pytest.mark.parametrize("v_rule", RULES)
 @pytest.mark.parametrize("wall", [0.5, 1.5, 2.5, 3.5])
 @pytest.mark.parametrize("way", [1, -1])
-def test_place_where_nothing_is_seen_is_no_place_to_go(v_rule, wall, way):
+def test_infinite_scores_are_never_entered(v_rule, wall, way):
     def score(x):
         return np.where(way * x[:, 0] > wall, np.inf, np.abs(x[:, 0] - way * 2))
 
-    best, _ = stepping(score, np.zeros(1), [np.ones(1)], v_rule=v_rule)
+    best, _ = minimise_by_stepping(score, np.zeros(1), [np.ones(1)], v_rule=v_rule)
     assert np.isfinite(best).all()
     assert np.isfinite(score(best[None])).all()
 
 
 @pytest.mark.parametrize("v_rule", RULES)
 def test_score_without_slope_leaves_the_start(v_rule):
-    best, _ = stepping(lambda x: np.full(len(x), 5.0), np.full(2, 0.5), [np.ones(2)], v_rule=v_rule)
+    best, _ = minimise_by_stepping(lambda x: np.full(len(x), 5.0), np.full(2, 0.5), [np.ones(2)], v_rule=v_rule)
     np.testing.assert_array_equal(best, 0.5)
 
 
 def test_start_is_left_as_it_was():
     start = np.zeros(1)
-    stepping(vee(5.0), start, [np.ones(1)], v_rule="v_sym")
+    minimise_by_stepping(vee(5.0), start, [np.ones(1)], v_rule="v_sym")
     assert start[0] == 0
 
 
 @pytest.mark.parametrize("v_rule", RULES)
 def test_search_sets_out_toward_the_lower_neighbour_and_past_one_rise(v_rule):
     heights = {-1: 9.5, 0: 9.0, 1: 9.2, 2: 6.0, 3: 5.0, 4: 6.0, 5: 7.0}
-    best, _ = stepping(
+    best, _ = minimise_by_stepping(
         lambda x: np.array([heights.get(round(k), 20.0) for k in x[:, 0]]), np.zeros(1), [np.ones(1)], v_rule=v_rule
     )
     assert best[0] == pytest.approx(3, abs=1)
@@ -138,19 +140,19 @@ def test_minimum_beside_the_start_is_found_exactly_by_the_papers_rule_on_either_
         np.testing.assert_allclose(on_a_line(minimum, "v_literal")[0], minimum, atol=ROUNDTRIP)
 
 
-def test_variables_are_set_in_the_order_asked_for():
-    asked = []
+def test_variables_are_set_in_the_order_given():
+    evaluated = []
 
     def score(x):
-        asked.append(int(np.flatnonzero(x[0] != start)[0]) if (x[0] != start).any() else None)
+        evaluated.append(int(np.flatnonzero(x[0] != start)[0]) if (x[0] != start).any() else None)
         return np.zeros(1)
 
     start = np.zeros(3)
-    stepping(score, start, [np.ones(3)], v_rule="v_sym", order=(2, 0, 1))
-    named = [variable for variable in asked if variable is not None]
+    minimise_by_stepping(score, start, [np.ones(3)], v_rule="v_sym", order=(2, 0, 1))
+    named = [variable for variable in evaluated if variable is not None]
     assert list(dict.fromkeys(named)) == [2, 0, 1]
 
 
 def test_order_without_a_variable_leaves_it():
-    best, _ = stepping(vee(np.array([1.0, 1.0])), np.zeros(2), [np.ones(2)], v_rule="v_sym", order=(1,))
+    best, _ = minimise_by_stepping(vee(np.array([1.0, 1.0])), np.zeros(2), [np.ones(2)], v_rule="v_sym", order=(1,))
     np.testing.assert_allclose(best, [0, 1], atol=ROUNDTRIP)

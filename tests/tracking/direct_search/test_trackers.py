@@ -7,7 +7,7 @@ import pytest
 
 from airborne.rendering import FLAT, RULES
 from airborne.tracking import Status, predictors
-from airborne.tracking.direct_search.trackers import Direct, stepping_search
+from airborne.tracking.direct_search.trackers import DirectTracker, stepping_search
 from airborne.tracking.methods import Settings, tracker_of
 from airborne.video import Frames, View
 from tests.support.scenes import CROSS, Scene, statuses, track, worst
@@ -33,7 +33,7 @@ def test_search_stays_with_the_body_whatever_the_colour_rule(method, colour, mos
         assert method == "stepping" or np.all(variance[:3] < 0.01**2)  # stepping may end beside the minimum
 
 
-def test_reduced_pictures_are_good_enough():
+def test_reduced_images_are_good_enough():
     settings = Settings(method="simplex", scale=2)
     assert worst(SCENE, track(SCENE, range(2), tracker_of(settings, CROSS, SCENE.start())))[0] < 8
 
@@ -42,15 +42,22 @@ def test_reduced_pictures_are_good_enough():
 def test_run_without_a_sense_of_loss_goes_on_from_where_it_ended(notices_loss):
     search = stepping_search([np.repeat(steps, 3) for steps in LOOPS], "v_literal", (3, 4, 5, 2, 1, 0))
     start = SCENE.start()
-    tracker = Direct(
-        CROSS, start, search, RULES["normalised"], FLAT, scale=1, predict=predictors.stay, notices_loss=notices_loss
+    tracker = DirectTracker(
+        CROSS,
+        start,
+        search,
+        rule=RULES["normalised"],
+        lights=FLAT,
+        scale=1,
+        predict=predictors.constant,
+        notices_loss=notices_loss,
     )
     (frames,) = [SCENE.frames(0)]
     wall = tuple(View(view.camera, 255 - view.rgb) for view in frames.views if view is not None)
     other = Frames(1, Fraction(1, 50), wall)
     state = tracker.init()
     state = tracker.learn(state, frames, tracker.search(state, frames))
-    found = tracker.search(state, other)
-    assert (found.status is Status.LOST) == notices_loss
-    later = tracker.learn(state, other, found)
+    estimate = tracker.search(state, other)
+    assert (estimate.status is Status.LOST) == notices_loss
+    later = tracker.learn(state, other, estimate)
     assert (len(later.past) == 1) == notices_loss

@@ -1,4 +1,4 @@
-"""The Gauss-Newton kernels against blurs by SciPy and against pictures of the moved body."""
+"""The Gauss-Newton kernels against blurs by SciPy and against images of the moved body."""
 
 from typing import NamedTuple
 
@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import correlate1d, gaussian_filter
 
-from airborne.appearance.lighting import TERMS, TO_LIGHT, light_planes
-from airborne.body.chain import moved_pose
+from airborne.appearance.lighting import LIGHT_FROM_SRGB, LIGHT_TERMS, light_planes
+from airborne.body.chain import move_pose
 from airborne.rendering.maps import empty_maps
-from airborne.tracking.image_regions import regions_round
+from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, root_only
 from airborne.tracking.model_based.normal_equations import (
     RADIUS_PX,
@@ -18,12 +18,12 @@ from airborne.tracking.model_based.normal_equations import (
     blur,
     find_owners,
     gaussian_taps,
+    mask_window,
     new_blocks,
     photometric_equations,
     silhouette_equations,
-    window_of,
 )
-from airborne.tracking.model_based.render_model import Synthesis
+from airborne.tracking.model_based.render_model import RenderModel
 from tests.support.scenes import FIGURE, Scene, standing
 
 SINGLE = 1e-5  # float32
@@ -43,18 +43,20 @@ def test_taps_sum_to_one_and_fall_off_as_a_gaussian(sigma):
 
 
 def test_blur_is_scipys_along_each_axis_with_its_own_taps():
-    seen, out = planes(), np.empty((3, 30, 41), np.float32)
+    observation, out = planes(), np.empty((3, 30, 41), np.float32)
     taps_u, taps_v = gaussian_taps(1.2), gaussian_taps(0.6)
-    blur(seen, taps_u, taps_v, out)
+    blur(observation, taps_u, taps_v, out)
     both = [np.concatenate([taps[:0:-1], taps]) for taps in (taps_u, taps_v)]
-    expected = correlate1d(correlate1d(seen, both[0], axis=2, mode="nearest"), both[1], axis=1, mode="nearest")
+    expected = correlate1d(correlate1d(observation, both[0], axis=2, mode="nearest"), both[1], axis=1, mode="nearest")
     np.testing.assert_allclose(out, expected, atol=SINGLE)
 
 
 def test_blur_is_scipys_gaussian():
-    seen, out = planes(shape=(1, 20, 25)), np.empty((1, 20, 25), np.float32)
-    blur(seen, gaussian_taps(1.2), gaussian_taps(1.2), out)
-    np.testing.assert_allclose(out[0], gaussian_filter(seen[0], 1.2, mode="nearest", radius=RADIUS_PX), atol=SINGLE)
+    observation, out = planes(shape=(1, 20, 25)), np.empty((1, 20, 25), np.float32)
+    blur(observation, gaussian_taps(1.2), gaussian_taps(1.2), out)
+    np.testing.assert_allclose(
+        out[0], gaussian_filter(observation[0], 1.2, mode="nearest", radius=RADIUS_PX), atol=SINGLE
+    )
 
 
 def test_blur_leaves_an_even_plane_alone():
@@ -65,70 +67,68 @@ def test_blur_leaves_an_even_plane_alone():
 
 def test_window_holds_the_mask_and_the_blurs_reach_and_stops_at_the_edge():
     part = np.full((60, 80), -1, np.int16)
-    assert window_of(part) == (0, 0, 0, 0)
+    assert mask_window(part) == (0, 0, 0, 0)
     part[30, 40] = 0
-    x0, y0, x1, y1 = window_of(part)
+    x0, y0, x1, y1 = mask_window(part)
     assert (40 - x0, x1 - 41, 30 - y0, y1 - 31) == (RADIUS_PX + 3,) * 4
     part[0, 79] = part[59, 0] = 1
-    assert window_of(part) == (0, 0, 80, 60)
+    assert mask_window(part) == (0, 0, 80, 60)
 
 
-class Filmed:
-    """One noiseless picture of a body, from the first camera; the equations of poses near it."""
+class SingleView:
+    """One noiseless image of a body, from the first camera; the equations of poses near it."""
 
-    def __init__(self, scene, freedom=root_only):
+    def __init__(self, scene, dofs=root_only):
         frames = scene.frames(0)
-        self.truth, self.freedom = scene.start(), freedom(scene.model)
-        self._synthesis = Synthesis.of(scene.model)
-        self._region = regions_round([self.place(self.truth)], self._synthesis.geometry, frames, 32)[0]
+        self.truth, self.dofs = scene.start(), dofs(scene.model)
+        self._render_model = RenderModel.of(scene.model)
+        self._region = crop_regions([self.with_pose(self.truth)], self._render_model.geometry, frames, 32)[0]
         self._observed = np.empty((3, *self._region.rgb.shape[:2]), np.float32)
-        light_planes(self._region.rgb, TO_LIGHT, self._observed)
+        light_planes(self._region.rgb, LIGHT_FROM_SRGB, self._observed)
         background = self._region.crop(scene.backgrounds[0]).transpose(2, 0, 1)
-        self._scene = np.ascontiguousarray(background, np.float32)
-        self._light = np.zeros((3, TERMS), np.float32)
+        self._background = np.ascontiguousarray(background, np.float32)
+        self._light = np.zeros((3, LIGHT_TERMS), np.float32)
         self._light[:, 0] = 1
-        self.photometric(self.truth, rounds=5)
+        self.photometric(self.truth, iterations=5)
 
-    def place(self, pose):
-        return self._synthesis.place(pose)
+    def with_pose(self, pose):
+        return self._render_model.with_pose(pose)
 
-    def moved(self, motion):
-        return moved_pose(self.truth, motion)
+    def moved(self, delta):
+        return move_pose(self.truth, delta)
 
-    def photometric(self, pose, rounds=0, clip=NO_CLIP):
+    def photometric(self, pose, iterations=0, clip=NO_CLIP):
         """The equations and the squared residual; the light stays as it was fitted at the truth."""
-        synthesis, seen = (
-            self._synthesis,
-            (self._observed, self._scene, np.ones(self._region.rgb.shape[:2], np.float32)),
-        )
-        body, place, through, maps = self._common(pose, clip)
-        paint = synthesis.albedo, synthesis.is_faceted
-        sums, blocks = Sums.zero(len(synthesis.model.segments)), self._blocks()
+        render_model, certainty = self._render_model, np.ones(self._region.rgb.shape[:2], np.float32)
+        observation = self._observed, self._background, certainty
+        body, projection, comparison, maps = self._common(pose, clip)
+        paint = render_model.albedo, render_model.is_faceted
+        sums, blocks = Sums.zero(len(render_model.model.segments)), self._blocks()
         _, total, _ = photometric_equations(
-            body, place, seen, through, maps, paint, self._light, rounds, sums, blocks
+            body, projection, observation, comparison, maps, paint, self._light, iterations, sums, blocks
         )  # fmt: skip
-        return self._mapped(pose, sums), total
+        return self._map_to_dofs(pose, sums), total
 
     def silhouette(self, pose):
         """The equations against the true mask, as probabilities."""
-        mask = (self._synthesis.parts(self.place(self.truth), self._region) >= 0).astype(np.float32)
-        body, place, through, maps = self._common(pose, 0.5)
-        seen = mask[None], np.zeros((1, *mask.shape), np.float32), np.ones_like(mask)
-        sums, blocks = Sums.zero(len(self._synthesis.model.segments)), self._blocks()
-        silhouette_equations(body, place, seen, through, maps, sums, blocks)
-        return self._mapped(pose, sums)
+        mask = (self._render_model.draw_parts(self.with_pose(self.truth), self._region) >= 0).astype(np.float32)
+        body, projection, comparison, maps = self._common(pose, 0.5)
+        observation = mask[None], np.zeros((1, *mask.shape), np.float32), np.ones_like(mask)
+        sums, blocks = Sums.zero(len(self._render_model.model.segments)), self._blocks()
+        silhouette_equations(body, projection, observation, comparison, maps, sums, blocks)
+        return self._map_to_dofs(pose, sums)
 
     def _common(self, pose, clip):
-        posed, region, taps = self.place(pose), self._region, gaussian_taps(1.2)
-        place = posed.R, posed.t, region.packed, region.camera.K, posed.t[0]
+        posed, region, taps = self.with_pose(pose), self._region, gaussian_taps(1.2)
+        projection = posed.R, posed.t, region.packed_view, region.camera.K, posed.t[0]
         window = (0, 0, *region.camera.size)
-        return self._synthesis.body, place, (window, taps, taps, clip), empty_maps(region.camera.size)
+        return self._render_model.body, projection, (window, taps, taps, clip), empty_maps(region.camera.size)
 
     def _blocks(self):
-        return new_blocks(*self._region.camera.size, len(self._synthesis.model.segments))
+        return new_blocks(*self._region.camera.size, len(self._render_model.model.segments))
 
-    def _mapped(self, pose, sums):
-        J = self._synthesis.jacobian(self.place(pose), self.freedom)
+    def _map_to_dofs(self, pose, sums):
+        J = self._render_model.jacobian(self.with_pose(pose), self.dofs)
         return Equations(np.einsum("sia,sij,sjb->ab", J, sums.curvature, J), np.einsum("sia,si->a", J, sums.g))
 
 
@@ -138,39 +138,39 @@ class Equations(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def filmed():
-    return Filmed(Scene(noise_grey=0.0))
+def single_view():
+    return SingleView(Scene(noise_grey=0.0))
 
 
 @pytest.fixture(scope="module")
-def filmed_figure():
-    return Filmed(Scene(FIGURE, standing, noise_grey=0.0), all_joints)
+def figure_view():
+    return SingleView(Scene(FIGURE, standing, noise_grey=0.0), all_joints)
 
 
 def offsets(n, size, seed=0):
-    """Motions (n, 6) of `size` steps."""
+    """Deltas (n, 6) of `size` steps."""
     directions = np.random.default_rng(seed).normal(size=(n, 6))
     return size * STEP * directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
-def test_curvature_predicts_how_the_picture_changes_when_the_body_moves(filmed):
-    """E(d) = d' A d, E the squared difference of the blurred pictures, against pictures drawn at d."""
-    sums, at_truth = filmed.photometric(filmed.truth)
+def test_curvature_predicts_how_the_image_changes_when_the_body_moves(single_view):
+    """E(d) = d' A d, E the squared difference of the blurred images, against images rendered at d."""
+    sums, at_truth = single_view.photometric(single_view.truth)
     ratios = []
     for d in offsets(24, 3.0):
-        both_ways = [filmed.photometric(filmed.moved(sign * d))[1] - at_truth for sign in (1, -1)]
+        both_ways = [single_view.photometric(single_view.moved(sign * d))[1] - at_truth for sign in (1, -1)]
         ratios.append(np.mean(both_ways) / (d @ sums.curvature @ d))
     np.testing.assert_allclose(np.median(ratios), 1, atol=0.06)
     assert 0.7 < min(ratios) < max(ratios) < 1.6
 
 
-def test_gradient_is_minus_half_the_slope_of_the_squared_residual(filmed):
+def test_gradient_is_minus_half_the_slope_of_the_squared_residual(single_view):
     got, expected = [], []
     for d in offsets(12, 4.0, seed=1):
-        pose = filmed.moved(d)
-        got.append(filmed.photometric(pose)[0].g * STEP)
+        pose = single_view.moved(d)
+        got.append(single_view.photometric(pose)[0].g * STEP)
         ends = [
-            [filmed.photometric(moved_pose(pose, sign * step))[1] for sign in (1, -1)] for step in np.diag(2 * STEP)
+            [single_view.photometric(move_pose(pose, sign * step))[1] for sign in (1, -1)] for step in np.diag(2 * STEP)
         ]
         expected.append([-(up - down) / 8 for up, down in ends])  # over 4 STEP, halved, times STEP
     got, expected = np.array(got), np.array(expected)
@@ -179,11 +179,11 @@ def test_gradient_is_minus_half_the_slope_of_the_squared_residual(filmed):
 
 
 @pytest.mark.parametrize("kind", ["photometric", "silhouette"])
-def test_step_goes_back_to_where_the_body_is(filmed, kind):
+def test_step_goes_back_to_where_the_body_is(single_view, kind):
     left = []
     for d in offsets(12, 2.0, seed=2):
-        pose = filmed.moved(d)
-        sums = filmed.silhouette(pose) if kind == "silhouette" else filmed.photometric(pose)[0]
+        pose = single_view.moved(d)
+        sums = single_view.silhouette(pose) if kind == "silhouette" else single_view.photometric(pose)[0]
         stiff = sums.curvature + np.diag(1e-3 * np.trace(sums.curvature * np.outer(STEP, STEP)) / STEP**2)
         step = np.linalg.solve(stiff, sums.g)
         after = (d + step) / STEP
@@ -191,30 +191,30 @@ def test_step_goes_back_to_where_the_body_is(filmed, kind):
     assert np.median(left) < 0.25
 
 
-def test_far_residuals_weigh_less(filmed):
-    pose = filmed.moved(offsets(1, 4.0)[0])
-    _, full = filmed.photometric(pose)
-    _, clipped = filmed.photometric(pose, clip=0.1)
+def test_large_residuals_weigh_less(single_view):
+    pose = single_view.moved(offsets(1, 4.0)[0])
+    _, full = single_view.photometric(pose)
+    _, clipped = single_view.photometric(pose, clip=0.1)
     assert clipped < 0.8 * full
 
 
-def test_body_outside_the_picture_adds_nothing(filmed):
-    equations, total = filmed.photometric(filmed.moved(np.array([50.0, 0, 0, 0, 0, 0])))
+def test_body_outside_the_image_adds_nothing(single_view):
+    equations, total = single_view.photometric(single_view.moved(np.array([50.0, 0, 0, 0, 0, 0])))
     assert total == 0
     assert not any(np.any(array) for array in equations)
 
 
 @pytest.mark.parametrize("joint", range(1, len(FIGURE.segments)))
-def test_gradient_along_every_joint_is_the_slope_of_the_squared_residual(filmed_figure, joint):
-    """Away from the truth by 4 degrees about each axis in turn; a turn that the picture does not show has no slope."""
+def test_gradient_along_every_joint_is_the_slope_of_the_squared_residual(figure_view, joint):
+    """Off the truth by 4 degrees about each axis in turn; a rotation that the image does not show has no slope."""
     got, expected = [], []
     for axis in range(3):
         for sign in (1, -1):
             step = np.zeros(6 + 3 * (len(FIGURE.segments) - 1))
             step[3 + 3 * joint + axis] = np.radians(4.0) * sign
-            pose = filmed_figure.moved(step)
-            got.append(filmed_figure.photometric(pose)[0].g @ step)
-            ends = [filmed_figure.photometric(moved_pose(pose, way * step / 4))[1] for way in (1, -1)]
+            pose = figure_view.moved(step)
+            got.append(figure_view.photometric(pose)[0].g @ step)
+            ends = [figure_view.photometric(move_pose(pose, way * step / 4))[1] for way in (1, -1)]
             expected.append(-(ends[0] - ends[1]) / (2 * 2 / 4))
     got, expected = np.array(got), np.array(expected)
     assert np.corrcoef(got, expected)[0, 1] > 0.95
@@ -225,7 +225,7 @@ def test_an_edge_moves_with_what_is_in_front():
     part = np.full((9, 12), -1, np.int16)
     part[:, 3:], part[:, 7:] = 0, 1
     nearness = np.select([part == 0, part == 1], [0.2, 0.25]).astype(np.float32)  # part 1 is nearer
-    owner, found = np.empty((9, 12), np.int16), np.empty((9, 12), np.float32)
-    find_owners(part, nearness, np.array([4, 5], np.int16), 0, 0, owner, found)
+    owner, owner_nearness = np.empty((9, 12), np.int16), np.empty((9, 12), np.float32)
+    find_owners(part, nearness, np.array([4, 5], np.int16), 0, 0, owner, owner_nearness)
     np.testing.assert_array_equal(owner[4], np.repeat([4, 5], [7 - REACH_PX, 5 + REACH_PX]))
-    np.testing.assert_allclose(found[4], np.where(owner[4] == 5, 0.25, 0.2), atol=SINGLE)
+    np.testing.assert_allclose(owner_nearness[4], np.where(owner[4] == 5, 0.25, 0.2), atol=SINGLE)

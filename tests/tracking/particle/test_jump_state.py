@@ -1,4 +1,4 @@
-"""Rising and falling are told from the torso's last heights."""
+"""Rising and falling are detected from the torso's last heights."""
 
 import numpy as np
 import pytest
@@ -10,9 +10,9 @@ TIMES_S = np.arange(7) / 60
 
 @pytest.mark.parametrize("speed_m_s, share", [(3.0, 0.75), (-3.0, 0.25), (0.3, 0.5), (-0.3, 0.5), (0.0, 0.5)])
 def test_a_steady_speed_is_found_and_sets_the_share_above(speed_m_s, share):
-    found = vertical_speed(TIMES_S, 1 + speed_m_s * TIMES_S)
-    assert found == pytest.approx(speed_m_s, abs=1e-9)
-    assert share_above(found) == share
+    speed = vertical_speed(TIMES_S, 1 + speed_m_s * TIMES_S)
+    assert speed == pytest.approx(speed_m_s, abs=1e-9)
+    assert share_above(speed) == share
 
 
 def test_only_the_last_seven_frames_count():
@@ -20,10 +20,10 @@ def test_only_the_last_seven_frames_count():
     assert vertical_speed(np.arange(27) / 60, heights) == pytest.approx(0, abs=1e-9)
 
 
-def test_noise_of_two_centimetres_is_known_to_a_quarter_of_a_metre_a_second():
+def test_two_centimetres_of_noise_give_a_quarter_of_a_metre_a_second():
     rng = np.random.default_rng(0)
-    found = [vertical_speed(TIMES_S, rng.normal(1, 0.02, 7)) for _ in range(4000)]
-    assert np.std(found) == pytest.approx(0.23, abs=0.01)
+    speed = [vertical_speed(TIMES_S, rng.normal(1, 0.02, 7)) for _ in range(4000)]
+    assert np.std(speed) == pytest.approx(0.23, abs=0.01)
 
 
 @pytest.mark.parametrize("n", [0, 1, 2])

@@ -1,4 +1,4 @@
-"""The three filters of the block-jump paper on small drawn scenes: they follow, they say when they cannot."""
+"""The three filters of the block-jump paper on small rendered scenes: they track, and report where they cannot."""
 
 from functools import cache
 
@@ -15,12 +15,12 @@ from tests.support.courts import BLUE, RED, RIG, Court, Player, errors_m, jump, 
 METHODS = ("framework", "mixture", "block-jump")
 EVERY = pytest.mark.parametrize("method", METHODS)
 N = 20
-FEW = 400  # particles: enough for the drawn scenes
+FEW = 400  # particles: enough for the rendered scenes
 COURT = Court()
 
 
 def settings(method="block-jump", **more):
-    """Few particles on rods that keep their lengths, unless told: as printed, equation 12 errs more in these scenes."""
+    """Few particles on rods that keep their lengths, by default: as printed, equation 12 errs more in these scenes."""
     return LegsSettings(**({"method": method, "n_particles": FEW, "swing": "consistent"} | more))
 
 
@@ -31,7 +31,7 @@ def test_what_the_paper_prints_is_the_default():
 
 
 def statuses(estimates):
-    return [str(found[0].status) for found in estimates]
+    return [str(estimate[0].status) for estimate in estimates]
 
 
 @cache
@@ -54,10 +54,10 @@ def test_a_jump_is_followed_by_the_block_jump_filter_with_its_own_torsos():
 
 @EVERY
 def test_the_first_frame_is_the_start_itself(method):
-    found = track(COURT, 1, settings(method))[0][0]
-    assert np.array_equal(found.points, COURT.players[0].points(0))
-    assert found.status == "tracked"
-    assert found.n_views == 3
+    estimate = track(COURT, 1, settings(method))[0][0]
+    assert np.array_equal(estimate.points, COURT.players[0].points(0))
+    assert estimate.status == "tracked"
+    assert estimate.n_views == 3
 
 
 @EVERY
@@ -65,8 +65,10 @@ def test_the_first_frame_is_the_start_itself(method):
 def test_a_camera_that_goes_blind_is_left_out_and_counted(method, state):
     court = Court(state=lambda i, name: state if name == "left" and i >= 4 else "fine")
     estimates = track(court, 8, settings(method))
-    assert [found[0].n_views for found in estimates] == [3] * 4 + [2] * 4
-    assert all(np.isfinite(found[0].points).all() and np.isfinite(found[0].covariance).all() for found in estimates)
+    assert [estimate[0].n_views for estimate in estimates] == [3] * 4 + [2] * 4
+    assert all(
+        np.isfinite(estimate[0].points).all() and np.isfinite(estimate[0].covariance).all() for estimate in estimates
+    )
 
 
 @EVERY
@@ -75,9 +77,9 @@ def test_a_player_is_lost_while_no_camera_shows_him_and_found_again(method, stat
     court = Court(players=(Player("one"),), state=lambda i, name: state if 3 <= i < 6 else "fine")
     estimates = track(court, 12, settings(method))
     assert statuses(estimates)[3:6] == ["lost"] * 3
-    for found in (found[0] for found in estimates[3:6]):
-        assert np.isnan(found.points).all() and np.isnan(found.covariance).all() and np.isnan(found.score)
-        assert found.n_views == 0
+    for player in (step[0] for step in estimates[3:6]):
+        assert np.isnan(player.points).all() and np.isnan(player.covariance).all() and np.isnan(player.score)
+        assert player.n_views == 0
     assert "lost" not in statuses(estimates)[:3] + statuses(estimates)[6:]
     if method == "block-jump":
         assert errors_m(court, estimates[9:]).mean() < 0.08
@@ -98,7 +100,7 @@ def test_a_player_outside_a_cameras_picture_is_not_looked_for_there():
 def test_a_dark_first_frame_for_one_camera_borrows_its_colours_from_the_others():
     court = Court(state=lambda i, name: "dark" if name == "left" and i == 0 else "fine")
     estimates = track(court, N, settings())
-    assert [found[0].n_views for found in estimates] == [2] + [3] * (N - 1)
+    assert [estimate[0].n_views for estimate in estimates] == [2] + [3] * (N - 1)
     assert errors_m(court, estimates).mean() < 0.05
 
 
@@ -135,7 +137,7 @@ def neighbours():
 def test_two_neighbours_are_tracked_together_each_with_his_own_legs(views):
     court = Court(players=neighbours())
     estimates = track(court, 14, settings(views=views))
-    assert [found.player for found in estimates[-1]] == ["one", "two"]
+    assert [estimate.player for estimate in estimates[-1]] == ["one", "two"]
     assert np.median(errors_m(court, estimates)) < 0.08
     assert errors_m(court, estimates).max() < 0.35
 
@@ -151,8 +153,8 @@ def test_a_player_is_the_same_whoever_else_has_legs():
 def test_only_a_camera_with_somebody_in_front_is_left_out_of_the_visible_form():
     mate = Player("mate", (0.0, -2.0), BLUE, has_legs=False)  # between the camera behind and the player
     court = Court(players=(Player("one"), mate))
-    seen = {views: track(court, 4, settings(views=views))[-1][0].n_views for views in ("all", "visible")}
-    assert seen == {"all": 3, "visible": 2}
+    n_views = {views: track(court, 4, settings(views=views))[-1][0].n_views for views in ("all", "visible")}
+    assert n_views == {"all": 3, "visible": 2}
 
 
 @pytest.mark.parametrize(
@@ -175,7 +177,7 @@ def test_every_choice_changes_the_result_and_follows_the_jump(more):
 
 def test_the_covariance_is_of_the_size_of_the_errors():
     estimates = jumper()[1:]
-    sd_m = np.sqrt([np.trace(found[0].covariance, axis1=1, axis2=2) for found in estimates])
+    sd_m = np.sqrt([np.trace(estimate[0].covariance, axis1=1, axis2=2) for estimate in estimates])
     assert 0.5 < np.sqrt(np.mean(errors_m(COURT, estimates)[:, 0] ** 2) / np.mean(sd_m**2)) < 2
 
 

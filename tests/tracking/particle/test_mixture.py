@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from airborne.tracking.particle.mixture import combination
-from airborne.tracking.particle.situation import TOP
+from airborne.tracking.particle.mixture import estimate_combination
+from airborne.tracking.particle.situation import N_TOP
 from tests.support.tolerances import ROUNDTRIP
 
 KH, KL, KR = 4, 5, 6
@@ -33,27 +33,27 @@ def weights_of(log_weights):
 def test_the_estimate_is_that_of_all_combinations(how):
     *parts, log_weights = candidates()
     points, weights = bodies(*parts), weights_of(log_weights)
-    n = {"max": 1, "mean": len(weights), "top10_mean": TOP}[how]
+    n = {"max": 1, "mean": len(weights), "top10_mean": N_TOP}[how]
     best = np.argsort(-weights)[:n]
     expected = np.average(points[best], axis=0, weights=weights[best])
-    assert np.allclose(combination(*parts, log_weights, how).points, expected, atol=ROUNDTRIP)
+    assert np.allclose(estimate_combination(*parts, log_weights, rule=how).points, expected, atol=ROUNDTRIP)
 
 
 @pytest.mark.parametrize("how", ["max", "mean"])
 def test_the_covariance_is_that_of_all_combinations_about_the_estimate(how):
     *parts, log_weights = candidates(1)
     points, weights = bodies(*parts), weights_of(log_weights)
-    found = combination(*parts, log_weights, how)
-    away = points - found.points
+    estimate = estimate_combination(*parts, log_weights, rule=how)
+    away = points - estimate.points
     expected = np.einsum("n,nji,njk->jik", weights, away, away)
-    assert np.allclose(found.covariance, expected, atol=ROUNDTRIP)
+    assert np.allclose(estimate.covariance, expected, atol=ROUNDTRIP)
 
 
 def test_one_sure_combination_has_no_spread():
     *parts, log_weights = candidates(2)
     log_weights[1, 2, 3] = 1e4
-    found = combination(*parts, log_weights, "max")
-    assert np.array_equal(found.points[:2], parts[0][1])
-    assert np.array_equal(found.points[[2, 4]], parts[1][2])
-    assert np.array_equal(found.points[[3, 5]], parts[2][3])
-    assert not found.covariance.any()
+    estimate = estimate_combination(*parts, log_weights, rule="max")
+    assert np.array_equal(estimate.points[:2], parts[0][1])
+    assert np.array_equal(estimate.points[[2, 4]], parts[1][2])
+    assert np.array_equal(estimate.points[[3, 5]], parts[2][3])
+    assert not estimate.covariance.any()

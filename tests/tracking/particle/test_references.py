@@ -1,14 +1,14 @@
-"""What is read of the pictures, and what is learned from the first of them."""
+"""The image regions, and what is learned from the first of them."""
 
 import numpy as np
 import pytest
 
 from airborne.appearance.hue_saturation import OUTSIDE, hsv_bins
-from airborne.tracking.particle.image_regions import LEARNING_MARGIN_M, in_picture, region_of, regions_of
-from airborne.tracking.particle.observations import look_at
+from airborne.tracking.particle.image_regions import LEARNING_MARGIN_M, is_in_image, region_of, regions_of
+from airborne.tracking.particle.observations import observe
 from airborne.tracking.particle.parts import N_PARTS, PARTS, PELVIS, SHANKS, SHOES, ends_of
 from airborne.tracking.particle.parts import SKIN as SKIN_CLASS
-from airborne.tracking.particle.references import learn
+from airborne.tracking.particle.references import learn_references
 from tests.support.courts import FLOOR, SIZE, SKIN, Court, Player
 from tests.support.courts import SHORTS as SHORTS_RGB
 
@@ -23,7 +23,7 @@ def learned(used=ALL, leave_out=None, ends=ENDS, **more):
     regions = regions_of(COURT.frames(0), POINTS, LEARNING_MARGIN_M)
     if leave_out is not None:
         regions[leave_out] = None
-    return learn(regions, ends, PARTS, used=used, **more)
+    return learn_references(regions, ends, PARTS, used=used, **more)
 
 
 def bin_of(rgb):
@@ -40,19 +40,19 @@ def test_a_region_holds_all_points_and_is_where_it_says():
 
 
 @pytest.mark.parametrize("state", ["none", "dark"])
-def test_without_a_picture_or_in_the_dark_there_is_no_region(state):
+def test_without_an_image_or_in_the_dark_there_is_no_region(state):
     blind = Court(players=COURT.players, state=lambda index, name: state)
     assert regions_of(blind.frames(0), POINTS) == [None] * 3
 
 
-@pytest.mark.parametrize("away", [(80.0, 0.0, 0.0), (0.0, -30.0, 0.0)], ids=["beside the picture", "behind the camera"])
-def test_points_that_the_picture_does_not_show_have_no_region(away):
+@pytest.mark.parametrize("away", [(80.0, 0.0, 0.0), (0.0, -30.0, 0.0)], ids=["beside the image", "behind the camera"])
+def test_points_that_the_image_does_not_show_have_no_region(away):
     behind = COURT.frames(0).views[2]
     assert region_of(behind, POINTS + away) is None
-    assert not in_picture(COURT.frames(0), POINTS + away)[2]
+    assert not is_in_image(COURT.frames(0), POINTS + away)[2]
 
 
-def test_one_far_hypothesis_does_not_make_the_region_the_whole_picture():
+def test_one_far_hypothesis_does_not_make_the_region_the_whole_image():
     behind = COURT.frames(0).views[2]
     region = region_of(behind, np.concatenate([POINTS, [[3.0, 0.0, 1.0]]]))
     assert region.rgb.shape[1] < SIZE[0] / 2
@@ -71,13 +71,13 @@ def test_the_background_shows_neither_skin_nor_shoes():
     assert references.parts.classes[list(SHANKS)].tolist() == [SKIN_CLASS] * 2
 
 
-def test_a_camera_without_a_region_borrows_what_the_others_saw():
+def test_a_camera_without_a_region_borrows_what_the_others_show():
     roots = learned(leave_out=0).roots
     counts = (learned().roots ** 2)[1:].mean(axis=0)
     assert np.allclose(roots[0] ** 2, counts, atol=1e-5)
 
 
-def test_a_part_hidden_in_one_camera_borrows_and_one_hidden_in_all_is_learned_from_all():
+def test_a_part_occluded_in_one_camera_borrows_and_one_occluded_in_all_is_learned_from_all():
     used = ALL.copy()
     used[0, 1] = used[1] = False
     roots, plain = learned(used).roots, learned().roots
@@ -86,7 +86,7 @@ def test_a_part_hidden_in_one_camera_borrows_and_one_hidden_in_all_is_learned_fr
     assert np.array_equal(roots[:, 2:], plain[:, 2:])
 
 
-def test_colours_of_the_surroundings_can_be_left_out():
+def test_colours_of_the_background_can_be_left_out():
     beside = ENDS + np.array([0.06, 0, 0])  # half on the legs, half on the floor
     plain, dropped = (learned(ends=beside, drops_background=drops).roots for drops in (False, True))
     floor = hsv_bins(np.array(FLOOR))
@@ -96,9 +96,9 @@ def test_colours_of_the_surroundings_can_be_left_out():
 
 
 def test_the_first_frame_is_likelier_than_a_body_a_hands_width_away():
-    look = look_at(learned(), regions_of(COURT.frames(0), POINTS, LEARNING_MARGIN_M), ALL)
+    observation = observe(learned(), regions_of(COURT.frames(0), POINTS, LEARNING_MARGIN_M), ALL)
     bodies = np.stack([POINTS, POINTS + OUT, POINTS + UP, POINTS - UP])
-    here, *elsewhere = look.log_likelihood(ends_of(bodies), range(N_PARTS)).sum(axis=-1)
+    here, *elsewhere = observation.log_likelihood(ends_of(bodies), range(N_PARTS)).sum(axis=-1)
     assert here > max(elsewhere) + 1
 
 
@@ -107,6 +107,6 @@ def test_a_view_that_a_part_does_not_use_does_not_change_its_score():
     used = ALL.copy()
     used[3, 2] = False
     references, away = learned(), ENDS[None] + OUT / 2
-    some, all_ = (look_at(references, regions, u).log_likelihood(away, range(N_PARTS))[0] for u in (used, ALL))
+    some, all_ = (observe(references, regions, u).log_likelihood(away, range(N_PARTS))[0] for u in (used, ALL))
     assert some[3] != all_[3]
     assert np.array_equal(np.delete(some, 3), np.delete(all_, 3))

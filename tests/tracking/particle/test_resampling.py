@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.tracking.particle.resampling import SCHEMES, effective_sample_size, normalised
+from airborne.tracking.particle.resampling import SCHEMES, effective_sample_size, normalise
 from tests.support.tolerances import EXACT, sampled
 
 WEIGHTS = np.array([0.02, 0.3, 0.0, 0.18, 0.4, 0.1])
@@ -55,8 +55,8 @@ def test_equal_weights_keep_every_particle_where_the_scheme_is_balanced(scheme):
 
 @EVERY
 @pytest.mark.parametrize("weights", [np.full(5, -np.inf), np.full(5, np.nan)])
-def test_weights_that_say_nothing_count_as_equal(scheme, weights):
-    log_weights, log_sum, says_something = normalised(weights)
+def test_uninformative_weights_count_as_equal(scheme, weights):
+    log_weights, log_sum, says_something = normalise(weights)
     assert np.allclose(np.exp(log_weights), 0.2, atol=EXACT)
     assert log_sum == -np.inf
     assert not says_something
@@ -71,7 +71,7 @@ def test_weights_that_say_nothing_count_as_equal(scheme, weights):
     "weights", [[np.nan, 0.0, -np.inf], [np.inf, 3.0, 0.0], [-1e300, -1e305, -np.inf], [1e300, 0, 1]]
 )
 def test_hopeless_weights_give_no_nan(scheme, weights):
-    log_weights, _, says_something = normalised(np.array(weights, float))
+    log_weights, _, says_something = normalise(np.array(weights, float))
     assert np.isclose(np.exp(log_weights).sum(), 1)
     assert says_something
     assert (SCHEMES[scheme](np.random.default_rng(0), np.array(weights, float), 9) == np.argmax(log_weights)).all()
@@ -79,7 +79,7 @@ def test_hopeless_weights_give_no_nan(scheme, weights):
 
 def test_weights_of_any_size_are_normalised_exactly():
     log_weights = logs(WEIGHTS) - 7000
-    scaled, log_sum, _ = normalised(log_weights)
+    scaled, log_sum, _ = normalise(log_weights)
     assert np.allclose(np.exp(scaled), WEIGHTS, atol=1e-9)
     assert log_sum == pytest.approx(-7000)
 
@@ -96,9 +96,9 @@ def test_the_particles_package_draws_the_same_from_the_same_numbers():
     rng = np.random.default_rng(5)
     weights = rng.random(200) ** 4
     weights /= weights.sum()
-    places = (np.arange(300) + np.random.default_rng(6).random()) / 300
+    points = (np.arange(300) + np.random.default_rng(6).random()) / 300
     ours = SCHEMES["systematic"](np.random.default_rng(6), np.log(weights), 300)
-    assert np.array_equal(ours, theirs.inverse_cdf(places, weights))
+    assert np.array_equal(ours, theirs.inverse_cdf(points, weights))
 
 
 @EVERY

@@ -1,10 +1,18 @@
-"""The kernel that reads rods says what plain NumPy says."""
+"""The kernel that compares rods agrees with plain NumPy."""
 
 import numpy as np
 import pytest
 
-from airborne.appearance.hue_saturation import BINS, OUTSIDE, root_shares
-from airborne.tracking.particle.rods import ACROSS, ALONG, CLASS_SHIFT, SAMPLES, count_rods, read_rods, rod_corners
+from airborne.appearance.hue_saturation import HSV_BINS, OUTSIDE, root_histograms
+from airborne.tracking.particle.rods import (
+    CLASS_SHIFT,
+    N_ACROSS,
+    N_ALONG,
+    N_SAMPLES,
+    compare_rods,
+    count_rods,
+    rod_corners,
+)
 
 FOCAL_PX = 500.0
 PROJECTION = np.array([[FOCAL_PX, 0, 60, 0], [0, FOCAL_PX, 40, 0], [0, 0, 1, 0.0]])
@@ -24,14 +32,14 @@ def plain_samples(codes, ends, width_m):
     a, b = px_of(ends[0]), px_of(ends[1])
     along = (b - a) / np.linalg.norm(b - a)
     across = np.array([-along[1], along[0]]) * FOCAL_PX * width_m / ends[:, 2].mean()
-    found = []
-    for i in range(ALONG):
-        for j in range(ACROSS):
-            at = a + (b - a) * (i + 0.5) / ALONG + across * ((j + 0.5) / ACROSS - 0.5) - CORNER
+    samples = []
+    for i in range(N_ALONG):
+        for j in range(N_ACROSS):
+            at = a + (b - a) * (i + 0.5) / N_ALONG + across * ((j + 0.5) / N_ACROSS - 0.5) - CORNER
             x, y = np.floor(at + 0.5).astype(int)
             inside = 0 <= x < codes.shape[1] and 0 <= y < codes.shape[0]
-            found.append(int(codes[y, x]) if inside else OUTSIDE)
-    return np.array(found)
+            samples.append(int(codes[y, x]) if inside else OUTSIDE)
+    return np.array(samples)
 
 
 def plain(codes, ends, roots):
@@ -40,10 +48,10 @@ def plain(codes, ends, roots):
         for r, rod in enumerate(rods):
             if (rod[:, 2] <= 0).any():
                 continue
-            found = plain_samples(codes, rod, WIDTHS_M[r])
-            counts = np.bincount(found & 255, minlength=BINS + 1)
-            overlap[i, r] = np.sum(np.sqrt(counts / SAMPLES) * roots[r])
-            share[i, r] = np.mean(((found >> CLASS_SHIFT) & CLASSES[r]) != 0)
+            samples = plain_samples(codes, rod, WIDTHS_M[r])
+            counts = np.bincount(samples & 255, minlength=HSV_BINS + 1)
+            overlap[i, r] = np.sum(np.sqrt(counts / N_SAMPLES) * roots[r])
+            share[i, r] = np.mean(((samples >> CLASS_SHIFT) & CLASSES[r]) != 0)
     return overlap, share
 
 
@@ -52,12 +60,12 @@ def scene(seed=0, n=60):
     bins, bits = rng.integers(0, 8, (2, 80, 100))
     codes = (12 * bins + (bits << CLASS_SHIFT)).astype(np.uint16)
     ends = rng.normal([0.1, 0.1, 5], [0.4, 0.4, 0.5], (n, 2, 2, 3))
-    return codes, ends, root_shares(rng.random((2, BINS + 1)))
+    return codes, ends, root_histograms(rng.random((2, HSV_BINS + 1)))
 
 
 def kernel(codes, ends, roots, widths_m=WIDTHS_M):
     overlap, share = np.full((2, *ends.shape[:2]), np.nan, np.float32)
-    read_rods(codes, CORNER, PROJECTION, FOCAL_PX, ends, widths_m, roots, CLASSES, overlap, share)
+    compare_rods(codes, CORNER, PROJECTION, FOCAL_PX, ends, widths_m, roots, CLASSES, overlap, share)
     return overlap, share
 
 
@@ -68,16 +76,16 @@ def test_the_kernel_agrees_with_plain_numpy():
     same = np.abs(overlap - expected_overlap) < SINGLE
     assert same.mean() > 0.97, "a sample may fall on the edge of two pixels"
     assert np.allclose(overlap, expected_overlap, atol=0.05)
-    assert np.allclose(share, expected_share, atol=2 / SAMPLES + 1e-6)
+    assert np.allclose(share, expected_share, atol=2 / N_SAMPLES + 1e-6)
 
 
 def test_a_rod_overlaps_fully_with_its_own_histogram():
     codes, ends, _ = scene()
     rods = ends[0]
-    counts = np.zeros((2, BINS + 1))
+    counts = np.zeros((2, HSV_BINS + 1))
     count_rods(codes, CORNER, PROJECTION, FOCAL_PX, rods, WIDTHS_M, counts)
-    assert np.array_equal(counts.sum(axis=1), [SAMPLES, SAMPLES])
-    overlap, _ = kernel(codes, ends[:1], root_shares(counts))
+    assert np.array_equal(counts.sum(axis=1), [N_SAMPLES, N_SAMPLES])
+    overlap, _ = kernel(codes, ends[:1], root_histograms(counts))
     assert overlap == pytest.approx(1, abs=1e-4)
 
 
@@ -98,7 +106,7 @@ def test_rods_far_outside_belong_to_no_class_and_give_no_nan(centre):
     assert not share.any()
 
 
-def test_a_rod_seen_end_on_is_still_read():
+def test_a_rod_viewed_end_on_is_still_compared():
     codes, _, roots = scene(n=1)
     end = np.array([0.0, 0.0, 5.0])
     overlap, share = kernel(codes, np.tile(end, (1, 2, 2, 1)), roots)

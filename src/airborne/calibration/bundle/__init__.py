@@ -23,7 +23,7 @@ Without known world points the world frame is free: it stays, as a whole, where 
 scale unless a target or a length gives it. Move the result with `Adjusted.moved` afterwards.
 """
 
-from airborne.calibration.bundle.adjustment import Adjusted, adjust
-from airborne.calibration.bundle.source import HELD, Freedom, Lags, Lengths, Prior, Source
+from airborne.calibration.bundle.adjustment import Adjustment, adjust
+from airborne.calibration.bundle.source import ALL_FIXED, FreeParameters, ObservationLags, Lengths, CameraPrior, Source
 
-__all__ = ["HELD", "Adjusted", "Freedom", "Lags", "Lengths", "Prior", "Source", "adjust"]
+__all__ = ["ALL_FIXED", "Adjustment", "FreeParameters", "ObservationLags", "Lengths", "CameraPrior", "Source", "adjust"]

@@ -14,41 +14,39 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from airborne.calibration.bundle.equations import (
-    Normal,
-    Slopes,
-    free_frame,
+    NormalEquations,
+    Jacobian,
+    gauge_directions,
     length_residual_m,
     normal_equations,
     residual_px,
-    slopes_of,
-    turned_from,
+    jacobian_of,
+    rotation_vectors_from,
 )
-from airborne.calibration.bundle.loss import BEHIND, Loss, cost_of, scale_of, weight_of
-from airborne.calibration.bundle.problem import State, Task, rig_of, sources_of, state_of, stepped, task_of, with_paths
-from airborne.calibration.bundle.source import Freedom, Prior, Source
-from airborne.calibration.bundle.uncertainty import frame_kept, redundancies, uncertainty
+from airborne.calibration.bundle.loss import BEHIND_CAMERA, Loss, robust_cost, robust_scale, robust_weight
+from airborne.calibration.bundle.problem import State, Problem, rig_from_state, sources_from_state, initial_state, apply_step, build_problem, with_target_paths
+from airborne.calibration.bundle.source import FreeParameters, CameraPrior, Source
+from airborne.calibration.bundle.uncertainty import gauge_fixed_inverse, redundancies, estimate_uncertainty
 from airborne.cameras.camera import Rig
 from airborne.errors import CalibrationError
+from airborne.types import Array, Ints
 
-Array = NDArray[np.floating]
-Ints = NDArray[np.integer]
-
-MOST_STEPS, MOST_SCALINGS = 200, 12
-SETTLED = 1e-5  # of the cost, or this much alone: a step that promises less is the last
-SAME_NOISE = 0.01
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-12, 1e8
-LEAST_SCALE = 1e-6
-FEWEST_LEFT = 8  # numbers more than were fitted; fewer do not show that the noise is smaller than was said
+_MOST_STEPS, _MOST_SCALINGS = 200, 12
+_CONVERGED = 1e-5  # of the cost, or this much alone: a step that promises less is the last
+_SAME_NOISE = 0.01
+_FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-12, 1e8
+_LEAST_SCALE = 1e-6
+_LEAST_REDUNDANCY = 8  # numbers more than were fitted; fewer do not show that the noise is smaller than was said
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Adjusted:
+class Adjustment:
     """Cameras, points and targets that fit all sources best, and how far to trust them."""
 
     rig: Rig
     sources: tuple[Source, ...]  # as given, points and targets where they were found
-    freedom: Mapping[str, Freedom]
-    prior: Prior | None
+    free: Mapping[str, FreeParameters]
+    prior: CameraPrior | None
     residual_px: tuple[Array, ...]  # by source (n, 2), measured minus projected [px]; NaN: the point was left out
     weight: tuple[Array, ...]  # by source (n,), 1 for what fits, near 0 for what does not
     noise_px: tuple[float, ...]  # by source: the standard deviation found of a coordinate with sd_px 1 [px]
@@ -56,8 +54,8 @@ class Adjusted:
     covariance: Array  # of the free numbers of the cameras
     lag_s: tuple[Array, ...]  # by source: each observation's lag (n,) [s]
     columns: Ints  # (cameras, 15): where each number stands in the covariance; -1 where held
-    is_frame_free: bool  # nothing fixes the world: standard deviations are those within the rig
-    is_settled: bool  # False: stopped after the most steps
+    is_gauge_free: bool  # nothing fixes the world: standard deviations are those within the rig
+    has_converged: bool  # False: stopped after the most steps
 
     def rms_px(self, *, source: int | None = None, camera: int | None = None) -> float:
         """Return the RMS distance of a source's, a camera's or all observations [px], each with its robust weight 1."""
@@ -69,52 +67,52 @@ class Adjusted:
         squares = np.concatenate([np.zeros(0), *rows])
         return float(np.sqrt(np.nanmean(squares))) if np.isfinite(squares).any() else float("nan")
 
-    def with_noise_known(self) -> tuple[Source, ...]:
+    def with_estimated_noise(self) -> tuple[Source, ...]:
         """Return the sources with the noise that was found as known, so that a part of them is fitted alike."""
         return tuple(
             replace(source, sd_px=np.asarray(source.sd_px) * noise, sd_is_known=True)
             for source, noise in zip(self.sources, self.noise_px, strict=True)
         )
 
-    def moved(self, new_from_old: RigidTransform, scale: float = 1.0) -> tuple[Rig, tuple[Source, ...]]:
+    def transform(self, new_from_old: RigidTransform, scale: float = 1.0) -> tuple[Rig, tuple[Source, ...]]:
         """Return the rig and the sources in another world, first grown by a scale, then moved."""
-        rig = Rig(tuple(_moved_camera(camera, new_from_old, scale) for camera in self.rig))
-        return rig, tuple(_moved_source(source, new_from_old, scale) for source in self.sources)
+        rig = Rig(tuple(_transform_camera(camera, new_from_old, scale) for camera in self.rig))
+        return rig, tuple(_transform_source(source, new_from_old, scale) for source in self.sources)
 
 
 def adjust(
     rig: Rig,
     sources: Sequence[Source],
-    freedom: Mapping[str, Freedom] | Freedom | None = None,
+    free: Mapping[str, FreeParameters] | FreeParameters | None = None,
     *,
-    prior: Prior | None = None,
+    prior: CameraPrior | None = None,
     loss: Loss = "cauchy",
     progress: Callable[[int, float], None] | None = None,
-) -> Adjusted:
+) -> Adjustment:
     """Find cameras, free points and targets from all sources at once, beginning from `rig` and the sources' starts.
 
     freedom: what may change, for all cameras or by name (default `Freedom()`). prior: what is known of the cameras
     beforehand. progress is told the step's number and the cost. Raises CalibrationError where nothing is measured.
     """
-    freedoms = _by_camera(rig, freedom if freedom is not None else Freedom())
-    task = task_of(rig, sources, freedoms)
-    state = state_of(rig, sources, task)
+    freedoms = _free_by_camera(rig, free if free is not None else FreeParameters())
+    task = build_problem(rig, sources, freedoms)
+    state = initial_state(rig, sources, task)
     if not task.is_used.any():
         raise CalibrationError("nothing to adjust: no point is seen by enough cameras")
-    search = _Search(task, state, prior, loss, progress)
-    state, noise, is_settled = search.run(_known(sources))
-    fit = search.fit_at(state, noise)
-    found = uncertainty(task, state, fit.normal, fit.slopes, weights=fit.row_weights, residuals=fit.rows, loss=loss)
+    search = _LevenbergMarquardt(task, state, prior, loss, progress)
+    state, noise, is_settled = search.run(_is_noise_known(sources))
+    fit = search.linearise(state, noise)
+    found = estimate_uncertainty(task, state, fit.normal, fit.jacobian, weights=fit.row_weights, residuals=fit.rows, loss=loss)
     residuals = np.where(task.is_used[:, None], fit.residual, np.nan)
     rows = [task.source == i for i in range(len(sources))]
-    adjusted = rig_of(rig, state)
+    adjusted = rig_from_state(rig, state)
     cameras = tuple(
-        replace(c, shift_sd_px=float(s)) for c, s in zip(adjusted, found.shift_sd_px(task, fit.slopes), strict=True)
+        replace(c, shift_sd_px=float(s)) for c, s in zip(adjusted, found.shift_sd_px(task, fit.jacobian), strict=True)
     )
-    return Adjusted(
+    return Adjustment(
         rig=Rig(cameras),
-        sources=sources_of(sources, state),
-        freedom=freedoms,
+        sources=sources_from_state(sources, state),
+        free=freedoms,
         prior=prior,
         residual_px=tuple(residuals[r] for r in rows),
         weight=tuple(fit.weight[r] for r in rows),
@@ -123,21 +121,21 @@ def adjust(
         covariance=found.covariance,
         lag_s=tuple(np.append(state.lags, 0.0)[task.lag[r]] for r in rows),
         columns=task.camera_columns,
-        is_frame_free=found.is_frame_free,
-        is_settled=is_settled,
+        is_gauge_free=found.is_gauge_free,
+        has_converged=is_settled,
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Fit:
+class _Linearisation:
     """The equations at one state."""
 
     residual: Array  # (n, 2) [px]
     weight: Array  # (n,)
     row_weights: Array
     rows: Array  # residuals by row
-    slopes: Slopes
-    normal: Normal
+    jacobian: Jacobian
+    normal: NormalEquations
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,12 +147,12 @@ class _Noise:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Search:
+class _LevenbergMarquardt:
     """The descent of one task."""
 
-    task: Task
+    problem: Problem
     start: State
-    prior: Prior | None
+    prior: CameraPrior | None
     loss: Loss
     progress: Callable[[int, float], None] | None
 
@@ -162,41 +160,41 @@ class _Search:
         """Return the best state, the sources' noise, and whether the search came to rest."""
         state, n_steps = self.start, 0
         noise = self._noise(state, _Noise(np.ones(len(known)), np.ones(len(known))), known, None)
-        for _ in range(MOST_SCALINGS):
-            state, n_steps = self._descend(with_paths(self.task, state), noise, n_steps)
-            fit = self.fit_at(state, noise)
-            redundancy = redundancies(self.task, state, fit.normal, fit.slopes, weights=fit.row_weights)
+        for _ in range(_MOST_SCALINGS):
+            state, n_steps = self._descend(with_target_paths(self.problem, state), noise, n_steps)
+            fit = self.linearise(state, noise)
+            redundancy = redundancies(self.problem, state, fit.normal, fit.jacobian, weights=fit.row_weights)
             new = self._noise(state, noise, known, redundancy)
             change = (
                 np.abs(new.scale / noise.scale - 1).max(initial=0),
                 np.abs(new.effect / noise.effect - 1).max(initial=0),
             )
             noise = new
-            if max(change) < SAME_NOISE or n_steps >= MOST_STEPS:
-                return state, noise, n_steps < MOST_STEPS
-        return state, noise, n_steps < MOST_STEPS
+            if max(change) < _SAME_NOISE or n_steps >= _MOST_STEPS:
+                return state, noise, n_steps < _MOST_STEPS
+        return state, noise, n_steps < _MOST_STEPS
 
-    def fit_at(self, state: State, noise: _Noise) -> _Fit:
+    def linearise(self, state: State, noise: _Noise) -> _Linearisation:
         """Return the weighted equations at a state."""
-        task = self.task
+        task = self.problem
         residual, s = self._squares(state, noise.scale)
         variance = (task.sd_px * noise.scale[task.source]) ** 2 * noise.effect[task.source]
-        weight = np.where(task.is_used & np.isfinite(residual[:, 0]), weight_of(self.loss, s), 0.0)
+        weight = np.where(task.is_used & np.isfinite(residual[:, 0]), robust_weight(self.loss, s), 0.0)
         row_weights = np.concatenate([np.repeat(weight / variance, 2), 1 / task.length_sd_m**2, 1 / task.lag_sd_s**2])
         rows = np.concatenate([np.nan_to_num(residual).ravel(), length_residual_m(task, state), -state.lags])
-        slopes = slopes_of(task, state)
+        slopes = jacobian_of(task, state)
         normal = normal_equations(slopes, row_weights, rows)
-        return _Fit(residual, weight, row_weights, rows, slopes, self._with_prior(normal, state))
+        return _Linearisation(residual, weight, row_weights, rows, slopes, self._with_prior(normal, state))
 
     def _descend(self, state: State, noise: _Noise, n_steps: int) -> tuple[State, int]:
-        damping, growth, cost = FIRST_DAMPING, 2.0, self._cost(state, noise)
-        while n_steps < MOST_STEPS:
-            normal = self.fit_at(state, noise).normal
-            while damping < MOST_DAMPING:
-                step, other_step, promised = _step(self.task, state, normal, damping)
-                if promised <= SETTLED * (1 + SETTLED * cost):
+        damping, growth, cost = _FIRST_DAMPING, 2.0, self._cost(state, noise)
+        while n_steps < _MOST_STEPS:
+            normal = self.linearise(state, noise).normal
+            while damping < _MOST_DAMPING:
+                step, other_step, promised = _step(self.problem, state, normal, damping)
+                if promised <= _CONVERGED * (1 + _CONVERGED * cost):
                     return state, n_steps
-                tried = stepped(self.task, state, step, other_step)
+                tried = apply_step(self.problem, state, step, other_step)
                 new = self._cost(tried, noise)
                 n_steps += 1
                 if np.isfinite(new) and new < cost:
@@ -206,23 +204,23 @@ class _Search:
                 return state, n_steps
             gain = (cost - new) / promised
             state, cost, growth = tried, new, 2.0
-            damping = max(damping * max(1 / 10, 1 - (2 * min(gain, 1.0) - 1) ** 3), LEAST_DAMPING)
+            damping = max(damping * max(1 / 10, 1 - (2 * min(gain, 1.0) - 1) ** 3), _LEAST_DAMPING)
             if self.progress is not None:
                 self.progress(n_steps, cost)
         return state, n_steps
 
     def _squares(self, state: State, scales: Array) -> tuple[Array, Array]:
         """Return the residuals (n, 2) [px] and their squared distances in standard deviations (n,)."""
-        task = self.task
+        task = self.problem
         residual = residual_px(task, state)
         s = np.sum(residual**2, axis=1) / (task.sd_px * scales[task.source]) ** 2
-        return residual, np.where(task.is_used, np.where(np.isfinite(s), s, BEHIND), 0.0)
+        return residual, np.where(task.is_used, np.where(np.isfinite(s), s, BEHIND_CAMERA), 0.0)
 
     def _cost(self, state: State, noise: _Noise) -> float:
         _, s = self._squares(state, noise.scale)
-        lengths = np.sum((length_residual_m(self.task, state) / self.task.length_sd_m) ** 2)
-        lags = np.sum((state.lags / self.task.lag_sd_s) ** 2)
-        pixels = np.sum(cost_of(self.loss, s) / noise.effect[self.task.source])
+        lengths = np.sum((length_residual_m(self.problem, state) / self.problem.length_sd_m) ** 2)
+        lags = np.sum((state.lags / self.problem.lag_sd_s) ** 2)
+        pixels = np.sum(robust_cost(self.loss, s) / noise.effect[self.problem.source])
         return float(pixels + lengths + lags + self._prior_cost(state)) / 2
 
     def _noise(self, state: State, noise: _Noise, known: NDArray[np.bool_], redundancy: Array | None) -> _Noise:
@@ -230,48 +228,48 @@ class _Search:
         residual, s = self._squares(state, np.ones(len(known)))
         scale, effect = noise.scale.copy(), noise.effect.copy()
         for i in range(len(known)):
-            rows = (self.task.source == i) & self.task.is_used
+            rows = (self.problem.source == i) & self.problem.is_used
             if rows.any() and not known[i]:
                 shrunk = 1.0 if redundancy is None else redundancy[i] / (2 * rows.sum())  # by what was fitted
-                least = 1.0 if redundancy is not None and redundancy[i] < FEWEST_LEFT else LEAST_SCALE
-                scale[i] = max(scale_of(self.loss, s[rows] / shrunk), least)
+                least = 1.0 if redundancy is not None and redundancy[i] < _LEAST_REDUNDANCY else _LEAST_SCALE
+                scale[i] = max(robust_scale(self.loss, s[rows] / shrunk), least)
             if rows.any() and redundancy is not None:
-                weight = weight_of(self.loss, s[rows] / scale[i] ** 2) / self.task.sd_px[rows] ** 2
-                effect[i] = _design_effect(weight[:, None] * np.nan_to_num(residual[rows]), self.task.cluster[rows])
+                weight = robust_weight(self.loss, s[rows] / scale[i] ** 2) / self.problem.sd_px[rows] ** 2
+                effect[i] = _design_effect(weight[:, None] * np.nan_to_num(residual[rows]), self.problem.cluster[rows])
         return _Noise(scale, effect)
 
     def _prior_residual(self, state: State) -> Array:
-        turn = turned_from(self.start.R, state.R)
-        change = [turn, state.centre - self.start.centre, state.inner - self.start.inner]
+        turn = rotation_vectors_from(self.start.R, state.R)
+        change = [turn, state.centre - self.start.centre, state.intrinsics - self.start.intrinsics]
         return np.concatenate(change, axis=1)
 
     def _prior_cost(self, state: State) -> float:
         if self.prior is None:
             return 0.0
-        is_free = self.task.camera_columns >= 0
+        is_free = self.problem.camera_columns >= 0
         return float(np.sum((self._prior_residual(state) / self.prior.sd)[is_free] ** 2))
 
-    def _with_prior(self, normal: Normal, state: State) -> Normal:
+    def _with_prior(self, normal: NormalEquations, state: State) -> NormalEquations:
         if self.prior is None:
             return normal
-        columns, weight = self.task.camera_columns, 1 / self.prior.sd**2
+        columns, weight = self.problem.camera_columns, 1 / self.prior.sd**2
         is_free = columns >= 0
-        cameras, side = normal.cameras.copy(), normal.camera_side.copy()
+        cameras, side = normal.cameras.copy(), normal.camera_rhs.copy()
         np.add.at(cameras, (columns[is_free], columns[is_free]), weight[is_free])
         np.add.at(side, columns[is_free], -(weight * self._prior_residual(state))[is_free])
         return replace(normal, cameras=cameras, camera_side=side)
 
 
-def _step(task: Task, state: State, normal: Normal, damping: float) -> tuple[Array, Array, float]:
+def _step(task: Problem, state: State, normal: NormalEquations, damping: float) -> tuple[Array, Array, float]:
     """Return the step of the cameras, of the others, and by how much the cost should fall."""
-    reduced, side, factors, back = normal.reduced(damping)
+    reduced, side, factors, back = normal.reduce(damping)
     step = np.zeros(0)
     if len(reduced):
-        step = frame_kept(reduced, free_frame(task, state, normal, reduced)) @ side
+        step = gauge_fixed_inverse(reduced, gauge_directions(task, state, normal, reduced)) @ side
     other = np.zeros(0)
     if factors is not None:
-        other = factors.solve(normal.other_side) - back @ step
-    promised = normal.camera_side @ step + normal.other_side @ other
+        other = factors.solve(normal.other_rhs) - back @ step
+    promised = normal.camera_rhs @ step + normal.other_rhs @ other
     promised -= (step @ normal.cameras @ step + other @ (normal.others @ other)) / 2 + step @ normal.coupling @ other
     return step, other, float(promised)
 
@@ -287,8 +285,8 @@ def _design_effect(scores: Array, cluster: Ints) -> float:
     return max(float(np.sum(sums**2)) / total, 1.0)
 
 
-def _by_camera(rig: Rig, freedom: Mapping[str, Freedom] | Freedom) -> dict[str, Freedom]:
-    if isinstance(freedom, Freedom):
+def _free_by_camera(rig: Rig, freedom: Mapping[str, FreeParameters] | FreeParameters) -> dict[str, FreeParameters]:
+    if isinstance(freedom, FreeParameters):
         return dict.fromkeys(rig.names, freedom)
     missing = [name for name in rig.names if name not in freedom]
     if missing:
@@ -296,17 +294,17 @@ def _by_camera(rig: Rig, freedom: Mapping[str, Freedom] | Freedom) -> dict[str, 
     return {name: freedom[name] for name in rig.names}
 
 
-def _known(sources: Sequence[Source]) -> NDArray[np.bool_]:
+def _is_noise_known(sources: Sequence[Source]) -> NDArray[np.bool_]:
     return np.array([source.sd_is_known for source in sources], bool)
 
 
-def _moved_camera(camera, new_from_old: RigidTransform, scale: float):
+def _transform_camera(camera, new_from_old: RigidTransform, scale: float):
     place = camera.camera_from_world
     grown = RigidTransform.from_components(place.translation * scale, place.rotation)
     return replace(camera, camera_from_world=grown * new_from_old.inv())
 
 
-def _moved_source(source: Source, new_from_old: RigidTransform, scale: float) -> Source:
+def _transform_source(source: Source, new_from_old: RigidTransform, scale: float) -> Source:
     targets = source.world_from_target
     if targets is not None:
         grown = RigidTransform.from_components(targets.translation * scale, targets.rotation)

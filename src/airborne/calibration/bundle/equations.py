@@ -5,23 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial.transform import Rotation
 
-from airborne.calibration.bundle.lenses import N_NUMBERS, cross_matrices, projected, projected_with_slopes
-from airborne.calibration.bundle.problem import State, Task
+from airborne.calibration.bundle.lenses import N_PARAMETERS, cross_matrices, project, project_with_jacobian
+from airborne.calibration.bundle.problem import State, Problem
+from airborne.types import Array, Ints
 
-Array = NDArray[np.floating]
-Ints = NDArray[np.integer]
-
-LOOSE = 1e-9  # of what a camera's own pixels resist: less is rounding
-EDGE = 1e-13  # of a diagonal: keeps what no observation tells from dividing by zero
+_GAUGE_TOLERANCE = 1e-9  # of what a camera's own pixels resist: less is rounding
+_RIDGE = 1e-13  # of a diagonal: keeps what no observation tells from dividing by zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Slopes:
+class Jacobian:
     """Derivatives, two rows an observation, then one a length, then one a lag; not weighted."""
 
     by_camera: csr_array  # (rows, camera columns)
@@ -29,38 +26,38 @@ class Slopes:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Normal:
+class NormalEquations:
     """The normal equations: cameras, others, and what couples them."""
 
     cameras: Array  # (c, c)
     coupling: Array  # (c, o)
     others: csc_array  # (o, o)
-    camera_side: Array  # (c,), minus the gradient
-    other_side: Array  # (o,)
+    camera_rhs: Array  # (c,), minus the gradient
+    other_rhs: Array  # (o,)
 
-    def reduced(self, damping: float) -> tuple[Array, Array, SuperLU | None, Array]:
+    def reduce(self, damping: float) -> tuple[Array, Array, SuperLU | None, Array]:
         """Eliminate the others: the cameras' matrix and side, the others' factors, and `others^-1 coupling^T`."""
         cameras = self.cameras + damping * np.diag(np.diag(self.cameras))
-        if not len(self.other_side):
-            return cameras, self.camera_side, None, np.zeros((0, len(cameras)))
+        if not len(self.other_rhs):
+            return cameras, self.camera_rhs, None, np.zeros((0, len(cameras)))
         diagonal = self.others.diagonal()
         factors = splu(
-            csc_array(self.others + diags_array(diagonal * (damping + EDGE) + 1e-30)),
+            csc_array(self.others + diags_array(diagonal * (damping + _RIDGE) + 1e-30)),
             permc_spec="NATURAL",
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )
         back = factors.solve(np.ascontiguousarray(self.coupling.T))
-        return cameras - self.coupling @ back, self.camera_side - back.T @ self.other_side, factors, back
+        return cameras - self.coupling @ back, self.camera_rhs - back.T @ self.other_rhs, factors, back
 
 
-def world_points(task: Task, state: State) -> Array:
+def world_points(task: Problem, state: State) -> Array:
     """Return where in the world every observed point is, when it is looked at: (n, 3) [m]."""
-    world, arm, motion = _placed(task, state)
+    world, arm, motion = _points_at_moments(task, state)
     return world + np.cross(motion[:, :3], arm) + motion[:, 3:]
 
 
-def _placed(task: Task, state: State) -> tuple[Array, Array, Array]:
+def _points_at_moments(task: Problem, state: State) -> tuple[Array, Array, Array]:
     """Return points (n, 3) at their moments, their arms from their targets' origins, and the motion (n, 6) since.
 
     The motion is a small turn and a shift; arms and motions are 0 for points that are on no target.
@@ -76,30 +73,30 @@ def _placed(task: Task, state: State) -> tuple[Array, Array, Array]:
     return world, arm, motion
 
 
-def residual_px(task: Task, state: State) -> Array:
+def residual_px(task: Problem, state: State) -> Array:
     """Return measured minus projected pixels (n, 2) [px]; NaN behind the camera."""
     i = task.camera
-    return task.px - projected(
-        state.R[i], state.centre[i], state.inner[i], task.is_fisheye[i], world_points(task, state)
+    return task.px - project(
+        state.R[i], state.centre[i], state.intrinsics[i], task.is_fisheye[i], world_points(task, state)
     )
 
 
-def length_residual_m(task: Task, state: State) -> Array:
+def length_residual_m(task: Problem, state: State) -> Array:
     """Return known minus found lengths (k,) [m]."""
     ends = state.points[task.length_ends]
     return task.length_m - np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)
 
 
-def slopes_of(task: Task, state: State) -> Slopes:
+def jacobian_of(task: Problem, state: State) -> Jacobian:
     """Return the derivatives of the projections and lengths to the free numbers."""
     i, n, k = task.camera, len(task.px), len(task.length_m)
     n_rows = 2 * n + k + len(task.lag_sd_s)
-    world, arm, motion = _placed(task, state)
+    world, arm, motion = _points_at_moments(task, state)
     world = world + np.cross(motion[:, :3], arm) + motion[:, 3:]
-    _, by_camera, by_world = projected_with_slopes(
-        state.R[i], state.centre[i], state.inner[i], task.is_fisheye[i], world
+    _, by_camera, by_world = project_with_jacobian(
+        state.R[i], state.centre[i], state.intrinsics[i], task.is_fisheye[i], world
     )
-    by_camera[:, :, 7] *= _ratio(task, state)[i, None]
+    by_camera[:, :, 7] *= _focal_ratio(task, state)[i, None]
     entries = [_entries(by_camera, np.broadcast_to(task.camera_columns[i][:, None], by_camera.shape), np.arange(n))]
     cameras = _matrix(entries, n_rows, task.n_camera_columns)
     others = []
@@ -128,36 +125,36 @@ def slopes_of(task: Task, state: State) -> Slopes:
         rows = np.repeat(2 * n + np.arange(k)[:, None], 3, axis=1)
         for values, end in ((-along, 0), (along, 1)):
             others.append((values, rows, task.point_columns[task.length_ends[:, end]]))
-    return Slopes(cameras, _matrix(others, n_rows, task.n_other_columns))
+    return Jacobian(cameras, _matrix(others, n_rows, task.n_other_columns))
 
 
-def normal_equations(slopes: Slopes, row_weights: Array, residuals: Array) -> Normal:
+def normal_equations(slopes: Jacobian, row_weights: Array, residuals: Array) -> NormalEquations:
     """Return the normal equations of rows with weights (rows,) and residuals (rows,), 0 where nothing is known."""
-    weighted = _scaled(slopes.by_camera, row_weights)
-    weighted_others = _scaled(slopes.by_other, row_weights)
-    return Normal(
+    weighted = _scale_rows(slopes.by_camera, row_weights)
+    weighted_others = _scale_rows(slopes.by_other, row_weights)
+    return NormalEquations(
         cameras=(slopes.by_camera.T @ weighted).toarray(),
         coupling=(weighted.T @ slopes.by_other).toarray(),
         others=csc_array(slopes.by_other.T @ weighted_others),
-        camera_side=weighted.T @ residuals,
-        other_side=weighted_others.T @ residuals,
+        camera_rhs=weighted.T @ residuals,
+        other_rhs=weighted_others.T @ residuals,
     )
 
 
-def _scaled(rows: csr_array, weights: Array) -> csr_array:
+def _scale_rows(rows: csr_array, weights: Array) -> csr_array:
     """Return every row times its weight."""
     data = rows.data * np.repeat(weights, np.diff(rows.indptr))
     return csr_array((data, rows.indices, rows.indptr), shape=rows.shape)
 
 
-def free_frame(task: Task, state: State, normal: Normal, reduced: Array) -> Array:
+def gauge_directions(task: Problem, state: State, normal: NormalEquations, reduced: Array) -> Array:
     """Return the directions (camera columns, k) in which the rig moves or grows as a whole and nothing is measured.
 
     Of the seven small similarities of the world those are kept that move no held number and that the reduced normal
     equations (camera columns squared) do not resist; the columns are orthonormal.
     """
     n = len(state.R)
-    generators = np.zeros((n, N_NUMBERS, 7))
+    generators = np.zeros((n, N_PARAMETERS, 7))
     about = state.centre - state.centre.mean(axis=0)
     generators[:, 3:6, :3] = np.eye(3)
     generators[:, :3, 3:6] = -state.R
@@ -178,20 +175,20 @@ def free_frame(task: Task, state: State, normal: Normal, reduced: Array) -> Arra
     stiff = np.sqrt(np.maximum(np.diag(normal.cameras), 1e-30))
     scaled, _ = np.linalg.qr(stiff[:, None] * moved)
     resistance, turn = np.linalg.eigh(scaled.T @ (reduced / stiff[:, None] / stiff) @ scaled)
-    loose = (scaled @ turn)[:, resistance < LOOSE] / stiff[:, None]
+    loose = (scaled @ turn)[:, resistance < _GAUGE_TOLERANCE] / stiff[:, None]
     return np.linalg.qr(loose)[0] if loose.shape[1] else loose
 
 
-def turned_from(start: Array, now: Array) -> Array:
+def rotation_vectors_from(start: Array, now: Array) -> Array:
     """Return the rotation vectors (n, 3) [rad] by which matrices moved on, about the camera's own axes."""
     return Rotation.from_matrix(now @ np.swapaxes(start, 1, 2)).as_rotvec()
 
 
-def _ratio(task: Task, state: State) -> Array:
+def _focal_ratio(task: Problem, state: State) -> Array:
     """Return fy / fx where they share a column, else 1: (cameras,)."""
     columns = task.camera_columns
     is_square = (columns[:, 6] >= 0) & (columns[:, 6] == columns[:, 7])
-    return np.where(is_square, state.inner[:, 1] / state.inner[:, 0], 1.0)
+    return np.where(is_square, state.intrinsics[:, 1] / state.intrinsics[:, 0], 1.0)
 
 
 def _entries(values: Array, columns: Ints, observation: Ints) -> tuple[Array, Ints, Ints]:

@@ -6,29 +6,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.cameras.distortion import distort, distort_fisheye
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-N_NUMBERS = 15  # of a camera: turn (3) [rad], centre (3) [m], fx, fy, cx, cy [px], five lens terms
-NUMBERS = (
+N_PARAMETERS = 15  # of a camera: turn (3) [rad], centre (3) [m], fx, fy, cx, cy [px], five lens terms
+CAMERA_PARAMETERS = (
     *("turn_x_rad", "turn_y_rad", "turn_z_rad", "x_m", "y_m", "z_m"),
     *("fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"),
 )
-FISHEYE_NUMBERS = (*NUMBERS[:10], "k1", "k2", "k3", "k4", "")
-NEAREST_M = 1e-9  # what lies no further in front of a camera is behind it
+FISHEYE_PARAMETERS = (*CAMERA_PARAMETERS[:10], "k1", "k2", "k3", "k4", "")
+_NEAREST_DEPTH_M = 1e-9  # what lies no further in front of a camera is behind it
 
 
-def projected(R: Array, centre: Array, inner: Array, is_fisheye: NDArray[np.bool_], world: Array) -> Array:
+def project(R: Array, centre: Array, inner: Array, is_fisheye: NDArray[np.bool_], world: Array) -> Array:
     """Project one world point a row: (n, 2) [px]; NaN behind the camera.
 
     R (n, 3, 3) camera from world, centre (n, 3) [m], inner (n, 9) fx, fy, cx, cy and lens terms, world (n, 3) [m].
     """
     xyz = np.einsum("nij,nj->ni", R, world - centre)
-    z = np.where(xyz[:, 2:] > NEAREST_M, xyz[:, 2:], np.nan)
-    return inner[:, :2] * _bent(xyz[:, :2] / z, inner[:, 4:], is_fisheye) + inner[:, 2:4]
+    z = np.where(xyz[:, 2:] > _NEAREST_DEPTH_M, xyz[:, 2:], np.nan)
+    return inner[:, :2] * _distort(xyz[:, :2] / z, inner[:, 4:], is_fisheye) + inner[:, 2:4]
 
 
-def projected_with_slopes(
+def project_with_jacobian(
     R: Array, centre: Array, inner: Array, is_fisheye: NDArray[np.bool_], world: Array
 ) -> tuple[Array, Array, Array]:
     """Return pixels (n, 2) and their derivatives to the camera's numbers (n, 2, 15) and the point (n, 2, 3).
@@ -37,17 +36,17 @@ def projected_with_slopes(
     `R <- exp(turn) R`, and steps of the others. Behind the camera the pixels are NaN and the derivatives 0.
     """
     xyz = np.einsum("nij,nj->ni", R, world - centre)
-    is_seen = xyz[:, 2] > NEAREST_M
+    is_seen = xyz[:, 2] > _NEAREST_DEPTH_M
     z = np.where(is_seen, xyz[:, 2], 1.0)
     xy = np.where(is_seen[:, None], xyz[:, :2], 0.0) / z[:, None]
-    bent = _bent(xy, inner[:, 4:], is_fisheye)
-    bend, by_terms = _lens_slopes(xy, inner[:, 4:], is_fisheye)
+    bent = _distort(xy, inner[:, 4:], is_fisheye)
+    bend, by_terms = _lens_jacobian(xy, inner[:, 4:], is_fisheye)
     to_plane = np.zeros((len(xy), 2, 3))  # d xy / d xyz
     to_plane[:, 0, 0] = to_plane[:, 1, 1] = 1 / z
     to_plane[:, :, 2] = -xy / z[:, None]
     by_xyz = inner[:, :2, None] * (bend @ to_plane)
     by_world = by_xyz @ R
-    slopes = np.zeros((len(xy), 2, N_NUMBERS))
+    slopes = np.zeros((len(xy), 2, N_PARAMETERS))
     slopes[:, :, :3] = -by_xyz @ cross_matrices(xyz)
     slopes[:, :, 3:6] = -by_world
     slopes[:, [0, 1], [6, 7]] = bent
@@ -64,22 +63,22 @@ def cross_matrices(v: Array) -> Array:
     return m - np.swapaxes(m, 1, 2)
 
 
-def _bent(xy: Array, terms: Array, is_fisheye: NDArray[np.bool_]) -> Array:
+def _distort(xy: Array, terms: Array, is_fisheye: NDArray[np.bool_]) -> Array:
     out = distort(xy, terms.T)
     if is_fisheye.any():
         out[is_fisheye] = distort_fisheye(xy[is_fisheye], terms[is_fisheye, :4].T)
     return out
 
 
-def _lens_slopes(xy: Array, terms: Array, is_fisheye: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _lens_jacobian(xy: Array, terms: Array, is_fisheye: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Return the derivatives of the bent points to the straight ones (n, 2, 2) and to the terms (n, 2, 5)."""
-    bend, by_terms = _brown_slopes(xy, terms)
+    bend, by_terms = _brown_jacobian(xy, terms)
     if is_fisheye.any():
-        bend[is_fisheye], by_terms[is_fisheye] = _fisheye_slopes(xy[is_fisheye], terms[is_fisheye])
+        bend[is_fisheye], by_terms[is_fisheye] = _fisheye_jacobian(xy[is_fisheye], terms[is_fisheye])
     return bend, by_terms
 
 
-def _brown_slopes(xy: Array, terms: Array) -> tuple[Array, Array]:
+def _brown_jacobian(xy: Array, terms: Array) -> tuple[Array, Array]:
     k1, k2, p1, p2, k3 = terms.T
     x, y = xy.T
     r2 = x * x + y * y
@@ -94,7 +93,7 @@ def _brown_slopes(xy: Array, terms: Array) -> tuple[Array, Array]:
     return bend, np.stack([by_x, by_y], axis=1)
 
 
-def _fisheye_slopes(xy: Array, terms: Array) -> tuple[Array, Array]:
+def _fisheye_jacobian(xy: Array, terms: Array) -> tuple[Array, Array]:
     r = np.maximum(np.hypot(xy[:, 0], xy[:, 1]), 1e-8)
     angle = np.arctan(r)
     powers = angle[:, None] ** np.array([3, 5, 7, 9])

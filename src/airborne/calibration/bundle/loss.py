@@ -6,35 +6,35 @@ from functools import cache
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
+from airborne.types import Array
+
 Loss = Literal["cauchy", "huber", "squares"]
 
-CAUCHY, HUBER = 2.4, 1.5  # standard deviations beyond which a residual counts less; 95 % efficient for normal errors
-N_QUANTILES = 100_000
-BEHIND = 1e4  # squared distance, in standard deviations, of what lies behind its camera
+_CAUCHY, _HUBER = 2.4, 1.5  # standard deviations beyond which a residual counts less; 95 % efficient for normal errors
+_N_QUANTILES = 100_000
+BEHIND_CAMERA = 1e4  # squared distance, in standard deviations, of what lies behind its camera
 
 
-def cost_of(loss: Loss, s: Array) -> Array:
+def robust_cost(loss: Loss, s: Array) -> Array:
     """Return the loss of squared distances s, in standard deviations."""
     if loss == "cauchy":
-        return CAUCHY**2 * np.log1p(s / CAUCHY**2)
+        return _CAUCHY**2 * np.log1p(s / _CAUCHY**2)
     if loss == "huber":
-        return np.where(s <= HUBER**2, s, 2 * HUBER * np.sqrt(s) - HUBER**2)
+        return np.where(s <= _HUBER**2, s, 2 * _HUBER * np.sqrt(s) - _HUBER**2)
     return s
 
 
-def weight_of(loss: Loss, s: Array) -> Array:
+def robust_weight(loss: Loss, s: Array) -> Array:
     """Return the derivative of the loss: 1 for small distances, falling with them."""
     if loss == "cauchy":
-        return 1 / (1 + s / CAUCHY**2)
+        return 1 / (1 + s / _CAUCHY**2)
     if loss == "huber":
-        return np.minimum(1.0, HUBER / np.sqrt(np.maximum(s, 1e-12)))
+        return np.minimum(1.0, _HUBER / np.sqrt(np.maximum(s, 1e-12)))
     return np.ones_like(s)
 
 
-class Normality(NamedTuple):
+class LossConstants(NamedTuple):
     """What a loss makes of normal errors in two directions."""
 
     scale: float  # mean of weight times squared coordinate, in variances
@@ -43,33 +43,33 @@ class Normality(NamedTuple):
 
 
 @cache
-def normality(loss: Loss) -> Normality:
+def loss_constants(loss: Loss) -> LossConstants:
     """Return the constants of a loss, over the quantiles of the squared distance of two normal coordinates.
 
     With influence `psi = w r`: variance `E[psi^2] / E[psi']^2` (Huber 1964), and E[w] for the weights in the
     information.
     """
-    s = -2 * np.log1p(-(np.arange(N_QUANTILES) + 0.5) / N_QUANTILES)
-    w = weight_of(loss, s)
+    s = -2 * np.log1p(-(np.arange(_N_QUANTILES) + 0.5) / _N_QUANTILES)
+    w = robust_weight(loss, s)
     above, below = s + 1e-5 * (1 + s), np.maximum(s - 1e-5 * (1 + s), 0)
-    slope = (weight_of(loss, above) - weight_of(loss, below)) / (above - below)
+    slope = (robust_weight(loss, above) - robust_weight(loss, below)) / (above - below)
     mean_w, influence, sharpness = np.mean(w), np.mean(w * w * s) / 2, np.mean(w + s * slope)
-    return Normality(
+    return LossConstants(
         scale=float(np.mean(w * s) / 2),
         variance=float(mean_w * influence / sharpness**2),
         clustered=float((mean_w / sharpness) ** 2),
     )
 
 
-def scale_of(loss: Loss, s: Array) -> float:
+def robust_scale(loss: Loss, s: Array) -> float:
     """Return by how much standard deviations are too small: s (n,) squared distances, in them.
 
     Solves `mean(w(s / k^2) s / k^2) = E` for k, E as two normal coordinates have it, begun from the median.
     """
-    expected = 2 * normality(loss).scale * len(s)
+    expected = 2 * loss_constants(loss).scale * len(s)
     k2 = max(float(np.median(s)) / (2 * np.log(2)), 1e-12)
     for _ in range(100):
-        new = max(float(np.sum(weight_of(loss, s / k2) * s)) / expected, 1e-12)
+        new = max(float(np.sum(robust_weight(loss, s / k2) * s)) / expected, 1e-12)
         if abs(new / k2 - 1) < 1e-6:
             break
         k2 = new

@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.bundle.lenses import N_NUMBERS
-from airborne.calibration.bundle.source import Freedom, Source
+from airborne.calibration.bundle.lenses import N_PARAMETERS
+from airborne.calibration.bundle.source import FreeParameters, Source
 from airborne.cameras.camera import Camera, Rig
-
-Array = NDArray[np.floating]
-Ints = NDArray[np.integer]
+from airborne.types import Array, Ints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,7 +21,7 @@ class State:
 
     R: Array  # (cameras, 3, 3) camera from world
     centre: Array  # (cameras, 3) [m]
-    inner: Array  # (cameras, 9) fx, fy, cx, cy [px], lens terms
+    intrinsics: Array  # (cameras, 9) fx, fy, cx, cy [px], lens terms
     target_R: Array  # (m, 3, 3) world from target
     target_t: Array  # (m, 3) [m]
     points: Array  # (p, 3) [m], in the world or in a target's axes
@@ -32,7 +30,7 @@ class State:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Task:
+class Problem:
     """What is measured, all sources after each other, and which numbers are free.
 
     A camera's columns count from 0; those of targets and points, which are eliminated, count from 0 again. -1: held.
@@ -72,19 +70,19 @@ class Task:
         return len(self.source_of_column)
 
 
-def task_of(rig: Rig, sources: Sequence[Source], freedom: Mapping[str, Freedom]) -> Task:
+def build_problem(rig: Rig, sources: Sequence[Source], freedom: Mapping[str, FreeParameters]) -> Problem:
     """Return everything that is measured, with a number for everything that is free."""
     moments = np.cumsum([0, *(source.n_moments for source in sources)])
     points = np.cumsum([0, *(len(source.points) for source in sources)])
-    moment = _joined([np.where(s.moments < 0, -1, s.moments + m) for s, m in zip(sources, moments, strict=False)])
-    point = _joined([s.point + p for s, p in zip(sources, points, strict=False)])
-    camera = _joined([s.camera for s in sources])
+    moment = _concatenate([np.where(s.moments < 0, -1, s.moments + m) for s, m in zip(sources, moments, strict=False)])
+    point = _concatenate([s.point + p for s, p in zip(sources, points, strict=False)])
+    camera = _concatenate([s.camera for s in sources])
     lengths = [(i, s.lengths, points[i]) for i, s in enumerate(sources) if s.lengths is not None]
     ends = [np.stack([x.first, x.second], axis=1) + p for _, x, p in lengths]
     length_ends = np.concatenate([np.zeros((0, 2), int), *ends])
     free = np.concatenate([np.zeros((0, 3), bool), *(s.free_coordinates for s in sources)])
-    free &= _is_tied(free, camera, moment, point, length_ends)[:, None]
-    held = np.concatenate([np.zeros(0, bool), *(s.held_targets for s in sources)])
+    free &= _is_determined(free, camera, moment, point, length_ends)[:, None]
+    held = np.concatenate([np.zeros(0, bool), *(s.fixed_targets for s in sources)])
     target_columns, point_columns, n_others = _other_columns(held, free, moment)
     lag, lag_sd_s, lag_source = _lags(sources)
     source_of_column = np.concatenate([np.zeros(n_others, int), lag_source])
@@ -94,7 +92,7 @@ def task_of(rig: Rig, sources: Sequence[Source], freedom: Mapping[str, Freedom])
             source_of_column[own[own >= 0]] = i
     is_free_point = np.concatenate([np.zeros(0, bool), *(s.free_coordinates.any(axis=1) for s in sources)])
     lost = (is_free_point & (point_columns < 0).all(axis=1))[point]
-    return Task(
+    return Problem(
         is_fisheye=np.array([c.lens == "fisheye" for c in rig]),
         camera=camera,
         moment=moment,
@@ -120,13 +118,13 @@ def task_of(rig: Rig, sources: Sequence[Source], freedom: Mapping[str, Freedom])
     )
 
 
-def state_of(rig: Rig, sources: Sequence[Source], task: Task) -> State:
+def initial_state(rig: Rig, sources: Sequence[Source], task: Problem) -> State:
     """Return the start as arrays."""
     targets = [s.world_from_target for s in sources if s.world_from_target is not None]
     state = State(
         R=np.stack([c.camera_from_world.rotation.as_matrix() for c in rig]),
         centre=np.stack([c.centre for c in rig]),
-        inner=np.stack(
+        intrinsics=np.stack(
             [
                 [c.K[0, 0], c.K[1, 1], c.K[0, 2], c.K[1, 2], *np.pad(c.distortion, (0, 5 - len(c.distortion)))]
                 for c in rig
@@ -138,10 +136,10 @@ def state_of(rig: Rig, sources: Sequence[Source], task: Task) -> State:
         lags=np.zeros(len(task.lag_sd_s)),
         target_paths=np.zeros((len(task.time_s), 2, 6)),
     )
-    return with_paths(task, state)
+    return with_target_paths(task, state)
 
 
-def with_paths(task: Task, state: State) -> State:
+def with_target_paths(task: Problem, state: State) -> State:
     """Return the state with each target's way about its moment: the parabola through the moments before and after.
 
     A straight line where only one neighbour has been seen, standstill where none or where nobody asks for lags.
@@ -161,28 +159,28 @@ def with_paths(task: Task, state: State) -> State:
     return replace(state, target_paths=paths)
 
 
-def stepped(task: Task, state: State, step: Array, other_step: Array) -> State:
+def apply_step(task: Problem, state: State, step: Array, other_step: Array) -> State:
     """Return the state after a step of the cameras' columns and one of the others'."""
-    change = _spread(step, task.camera_columns)
-    target, point = _spread(other_step, task.target_columns), _spread(other_step, task.point_columns)
+    change = _step_of(step, task.camera_columns)
+    target, point = _step_of(other_step, task.target_columns), _step_of(other_step, task.point_columns)
     return replace(
         state,
         R=Rotation.from_rotvec(change[:, :3]).as_matrix() @ state.R,
         centre=state.centre + change[:, 3:6],
-        inner=state.inner + _square(state, change[:, 6:], task.camera_columns),
+        inner=state.intrinsics + _keep_focal_ratio(state, change[:, 6:], task.camera_columns),
         target_R=Rotation.from_rotvec(target[:, :3]).as_matrix() @ state.target_R if len(target) else state.target_R,
         target_t=state.target_t + target[:, 3:],
         points=state.points + point,
-        lags=state.lags + _spread(other_step, task.lag_columns),
+        lags=state.lags + _step_of(other_step, task.lag_columns),
     )
 
 
-def rig_of(rig: Rig, state: State) -> Rig:
+def rig_from_state(rig: Rig, state: State) -> Rig:
     """Return the cameras with the state's numbers."""
     return Rig(tuple(_camera(camera, state, i) for i, camera in enumerate(rig)))
 
 
-def sources_of(sources: Sequence[Source], state: State) -> tuple[Source, ...]:
+def sources_from_state(sources: Sequence[Source], state: State) -> tuple[Source, ...]:
     """Return the sources with their points and targets where the state has them."""
     done, m, p = [], 0, 0
     for source in sources:
@@ -197,7 +195,7 @@ def sources_of(sources: Sequence[Source], state: State) -> tuple[Source, ...]:
 
 
 def _camera(camera: Camera, state: State, i: int) -> Camera:
-    fx, fy, cx, cy, *terms = state.inner[i]
+    fx, fy, cx, cy, *terms = state.intrinsics[i]
     R = state.R[i]
     return replace(
         camera,
@@ -207,31 +205,31 @@ def _camera(camera: Camera, state: State, i: int) -> Camera:
     )
 
 
-def _joined(columns: Sequence[Ints]) -> Ints:
+def _concatenate(columns: Sequence[Ints]) -> Ints:
     return np.concatenate([np.zeros(0, int), *columns])
 
 
-def _spread(step: Array, columns: Ints) -> Array:
+def _step_of(step: Array, columns: Ints) -> Array:
     """Return each number's step, 0 where it is held; the shape is that of columns."""
     return np.append(step, 0.0)[columns]
 
 
-def _square(state: State, change: Array, columns: Ints) -> Array:
+def _keep_focal_ratio(state: State, change: Array, columns: Ints) -> Array:
     """Keep the ratio of the focal lengths where they share a column; change (cameras, 9)."""
     is_square = (columns[:, 6] >= 0) & (columns[:, 6] == columns[:, 7])
-    ratio = state.inner[:, 1] / state.inner[:, 0]
+    ratio = state.intrinsics[:, 1] / state.intrinsics[:, 0]
     change = change.copy()
     change[:, 1] = np.where(is_square, change[:, 0] * ratio, change[:, 1])
     return change
 
 
-def _camera_columns(rig: Rig, freedom: Mapping[str, Freedom]) -> Ints:
-    columns = np.full((len(rig), N_NUMBERS), -1)
+def _camera_columns(rig: Rig, freedom: Mapping[str, FreeParameters]) -> Ints:
+    columns = np.full((len(rig), N_PARAMETERS), -1)
     shared: dict[str, int] = {}
     n = 0
     for row, camera in zip(columns, rig, strict=True):
         own = freedom[camera.name]
-        for number in own.numbers(camera.lens):
+        for number in own.parameters(camera.lens):
             if number in (6, 7) and own.shares_focal:
                 key = f"{own.shares_focal} {number}"
                 if key in shared:
@@ -240,12 +238,12 @@ def _camera_columns(rig: Rig, freedom: Mapping[str, Freedom]) -> Ints:
                 shared[key] = n
             row[number] = n
             n += 1
-        if own.focal and own.square:
+        if own.focal and own.square_pixels:
             row[7] = row[6]
     return columns
 
 
-def _is_tied(free: NDArray[np.bool_], camera: Ints, moment: Ints, point: Ints, ends: Ints) -> NDArray[np.bool_]:
+def _is_determined(free: NDArray[np.bool_], camera: Ints, moment: Ints, point: Ints, ends: Ints) -> NDArray[np.bool_]:
     """Say which points (p,) can be found: each view tells two coordinates, each length one."""
     pairs = np.unique(np.stack([point[moment < 0], camera[moment < 0]], axis=1), axis=0)
     n_views = np.bincount(pairs[:, 0], minlength=len(free))
@@ -271,7 +269,7 @@ def _clusters(sources: Sequence[Source]) -> Ints:
         _, own = np.unique(source.cluster, return_inverse=True)
         found.append(own + n)
         n += int(own.max(initial=-1)) + 1
-    return _joined(found)
+    return _concatenate(found)
 
 
 def _lags(sources: Sequence[Source]) -> tuple[Ints, Array, Ints]:
@@ -287,7 +285,7 @@ def _lags(sources: Sequence[Source]) -> tuple[Ints, Array, Ints]:
             sds.append(np.full(len(groups), source.lags.sd_s))
             owners.append(np.full(len(groups), i))
         found.append(own)
-    return _joined(found), np.concatenate(sds), np.concatenate(owners)
+    return _concatenate(found), np.concatenate(sds), np.concatenate(owners)
 
 
 def _times(source: Source) -> Array:

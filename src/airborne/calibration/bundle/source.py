@@ -10,37 +10,35 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from airborne.errors import CalibrationError
-
-Array = NDArray[np.floating]
-Ints = NDArray[np.integer]
+from airborne.types import Array, Ints
 
 _TERMS = {0: (), 1: (0,), 2: (0, 1), 3: (0, 1, 4), 4: (0, 1, 2, 3), 5: (0, 1, 2, 3, 4)}  # how many -> which
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Freedom:
+class FreeParameters:
     """Which numbers of a camera are found; the others keep the values of the start."""
 
-    place: bool = True  # position and orientation
+    extrinsics: bool = True  # position and orientation
     focal: bool = True
     shares_focal: str = ""  # cameras with the same word here have one focal length in common
-    square: bool = True  # both focal lengths change alike
+    square_pixels: bool = True  # both focal lengths change alike
     principal_point: bool = False
     n_terms: int = 0  # lens terms: k1 | k1 k2 | k1 k2 k3 | k1 k2 p1 p2 | all five; of a fisheye the first n of four
 
-    def numbers(self, lens: Literal["brown", "fisheye"] = "brown") -> tuple[int, ...]:
+    def parameters(self, lens: Literal["brown", "fisheye"] = "brown") -> tuple[int, ...]:
         """Return which of a camera's 15 numbers (see `lenses.NUMBERS`) are free, fy not beside a square fx."""
         terms = _TERMS[self.n_terms] if lens == "brown" else tuple(range(min(self.n_terms, 4)))
         return (
-            *(range(6) if self.place else ()),
+            *(range(6) if self.extrinsics else ()),
             *((6,) if self.focal else ()),
-            *((7,) if self.focal and not self.square else ()),
+            *((7,) if self.focal and not self.square_pixels else ()),
             *((8, 9) if self.principal_point else ()),
             *(10 + term for term in terms),
         )
 
 
-HELD = Freedom(place=False, focal=False)
+ALL_FIXED = FreeParameters(extrinsics=False, focal=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,7 +52,7 @@ class Lengths:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Lags:
+class ObservationLags:
     """Cameras that do not look at the same instant: each group of observations of moving targets has its own lag.
 
     A target's velocity comes from its places at the moments before and after.
@@ -81,12 +79,12 @@ class Source:
     is_free: NDArray[np.bool_] | None = None  # (p,) or each coordinate (p, 3); None: all points are known
     moment: Ints | None = None  # (n,) rows of world_from_target, -1 for points in the world; None: all in the world
     world_from_target: RigidTransform | None = None  # (m,), the start of every target
-    is_held: NDArray[np.bool_] | None = None  # (m,) targets that stay as they start; None: none
+    is_fixed: NDArray[np.bool_] | None = None  # (m,) targets that stay as they start; None: none
     sd_px: float | Array = 1.0  # of a coordinate, of all or each (n,) [px]
     sd_is_known: bool = False  # False: sd_px is scaled to the residuals
     cluster: Ints | None = None  # (n,) observations of one cluster share errors; None: every error is its own
     lengths: Lengths | None = None
-    lags: Lags | None = None
+    lags: ObservationLags | None = None
 
     def __post_init__(self) -> None:
         n, p, m = len(self.px), len(self.points), self.n_moments
@@ -96,7 +94,7 @@ class Source:
         if n and (self.point.max() >= p or self.moments.max() >= m or not np.isfinite(self.px).all()):
             raise CalibrationError(f"source '{self.name}': a point or moment is not there, or a pixel is no number")
 
-    def only(self, rows: NDArray[np.bool_]) -> Source:
+    def select(self, rows: NDArray[np.bool_]) -> Source:
         """Return the source with some of its observations (n,); points and targets keep their numbers."""
         lags, sd_px = self.lags, np.asarray(self.sd_px)
         return replace(
@@ -129,13 +127,13 @@ class Source:
         return np.repeat(free[:, None], 3, axis=1) if free.ndim == 1 else free
 
     @property
-    def held_targets(self) -> NDArray[np.bool_]:
+    def fixed_targets(self) -> NDArray[np.bool_]:
         """Which targets stay as they start: (m,)."""
-        return np.zeros(self.n_moments, bool) if self.is_held is None else np.asarray(self.is_held, bool)
+        return np.zeros(self.n_moments, bool) if self.is_fixed is None else np.asarray(self.is_fixed, bool)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Prior:
+class CameraPrior:
     """What is known of the cameras beforehand: their numbers at the start, each with a standard deviation."""
 
     sd: Array  # (cameras, 15), in the units of `lenses.NUMBERS`; inf: nothing is known

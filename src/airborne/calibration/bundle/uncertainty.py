@@ -5,19 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU
 
-from airborne.calibration.bundle.equations import Normal, Slopes, free_frame
-from airborne.calibration.bundle.loss import Loss, normality
-from airborne.calibration.bundle.problem import State, Task
+from airborne.calibration.bundle.equations import NormalEquations, Jacobian, gauge_directions
+from airborne.calibration.bundle.loss import Loss, loss_constants
+from airborne.calibration.bundle.problem import State, Problem
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-MOST_AT_ONCE = 200  # rows whose share is found together
-FEWEST_CLUSTERS = 8  # fewer say nothing about a spread
+_MOST_ROWS_AT_ONCE = 200  # rows whose share is found together
+_FEWEST_CLUSTERS = 8  # fewer say nothing about a spread
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,14 +23,14 @@ class Uncertainty:
     """What the fit leaves open."""
 
     covariance: Array  # (camera columns, camera columns)
-    is_frame_free: bool
+    is_gauge_free: bool
 
     @property
     def sd(self) -> Array:
         """Standard deviations of the camera columns."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
-    def shift_sd_px(self, task: Task, slopes: Slopes) -> Array:
+    def shift_sd_px(self, task: Problem, slopes: Jacobian) -> Array:
         """Return how far each camera's numbers leave a projected point open, in one direction: (cameras,) [px].
 
         RMS over the observations of the camera.
@@ -45,7 +43,7 @@ class Uncertainty:
         return np.array([np.sqrt(max(shift.mean(), 0.0)) if len(shift) else 0.0 for shift in shifts])
 
 
-def frame_kept(reduced: Array, frame: Array) -> Array:
+def gauge_fixed_inverse(reduced: Array, frame: Array) -> Array:
     """Return the inverse of reduced camera equations where the rig as a whole does not move along `frame`.
 
     `(S + k F F^T)^-1 - F F^T / k` with orthonormal F, S F = 0; by Cholesky with the diagonal scaled to 1.
@@ -63,7 +61,7 @@ def frame_kept(reduced: Array, frame: Array) -> Array:
     return inverse / size[:, None] / size - frame @ frame.T / k
 
 
-def redundancies(task: Task, state: State, normal: Normal, slopes: Slopes, *, weights: Array) -> Array:
+def redundancies(task: Problem, state: State, normal: NormalEquations, slopes: Jacobian, *, weights: Array) -> Array:
     """Return by source how many more pixel coordinates are measured than they give numbers: (sources,).
 
     A number that several sources tell of, or a length or lag beside the pixels, is shared out by what each says of it.
@@ -71,8 +69,8 @@ def redundancies(task: Task, state: State, normal: Normal, slopes: Slopes, *, we
     n = 2 * len(task.px)
     source_of_row = np.concatenate([np.repeat(task.source, 2), task.length_source, task.lag_source])
     n_sources = int(source_of_row.max(initial=0)) + 1
-    reduced, _, factors, back = normal.reduced(0.0)
-    inverse = frame_kept(reduced, free_frame(task, state, normal, reduced)) if len(reduced) else reduced
+    reduced, _, factors, back = normal.reduce(0.0)
+    inverse = gauge_fixed_inverse(reduced, gauge_directions(task, state, normal, reduced)) if len(reduced) else reduced
     left = np.zeros(n_sources)
     told = weights[n:] * _leverages(slopes.by_other[n:], factors, back, inverse)
     for i in range(n_sources):
@@ -89,30 +87,30 @@ def _leverages(rows: csr_array, factors: SuperLU | None, back: Array, inverse: A
     if factors is None or not len(back) or not rows.indptr[-1]:
         return np.zeros(len(rows.indptr) - 1)
     found = []
-    for first in range(0, len(rows.indptr) - 1, MOST_AT_ONCE):
-        some = rows[first : first + MOST_AT_ONCE]
+    for first in range(0, len(rows.indptr) - 1, _MOST_ROWS_AT_ONCE):
+        some = rows[first : first + _MOST_ROWS_AT_ONCE]
         dense = some.toarray()
         through = np.asarray(some @ back)
         found.append(np.einsum("ko,ok->k", dense, factors.solve(dense.T)) + np.sum(through @ inverse * through, axis=1))
     return np.concatenate(found)
 
 
-def uncertainty(
-    task: Task, state: State, normal: Normal, slopes: Slopes, *, weights: Array, residuals: Array, loss: Loss
+def estimate_uncertainty(
+    task: Problem, state: State, normal: NormalEquations, slopes: Jacobian, *, weights: Array, residuals: Array, loss: Loss
 ) -> Uncertainty:
     """Return the covariance of the cameras' numbers.
 
     The larger of two for each number: errors that are all independent, and errors that clusters have in common (the
     sandwich of the clusters' scores; Liang and Zeger 1986), which counts clusters instead of observations.
     """
-    reduced, _, _, back = normal.reduced(0.0)
+    reduced, _, _, back = normal.reduce(0.0)
     if not len(reduced):
         return Uncertainty(np.zeros((0, 0)), False)
-    frame = free_frame(task, state, normal, reduced)
-    inverse = frame_kept(reduced, frame)
-    covariance = normality(loss).variance * inverse
+    frame = gauge_directions(task, state, normal, reduced)
+    inverse = gauge_fixed_inverse(reduced, frame)
+    covariance = loss_constants(loss).variance * inverse
     n_clusters = int(task.cluster.max(initial=-1)) + 1
-    if n_clusters >= FEWEST_CLUSTERS:
+    if n_clusters >= _FEWEST_CLUSTERS:
         n = 2 * len(task.px)
         effect = slopes.by_camera[:n].toarray() - np.asarray(slopes.by_other[:n] @ back)
         score = ((weights * residuals)[:n, None] * effect).reshape(-1, 2, effect.shape[1]).sum(axis=1)
@@ -122,7 +120,7 @@ def uncertainty(
         np.add.at(sums, groups, score)
         n_used = 2 * task.is_used.sum()
         few = n_clusters / (n_clusters - 1) * n_used / max(n_used - task.n_other_columns - len(reduced), 1)
-        spread = normality(loss).clustered * few * inverse @ (sums.T @ sums) @ inverse
+        spread = loss_constants(loss).clustered * few * inverse @ (sums.T @ sums) @ inverse
         wider = np.sqrt(np.maximum(np.diag(spread) / np.maximum(np.diag(covariance), 1e-300), 1.0))
         covariance = wider[:, None] * covariance * wider
     return Uncertainty(covariance, bool(frame.shape[1]))

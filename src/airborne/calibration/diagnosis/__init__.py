@@ -9,8 +9,8 @@ from airborne.calibration.diagnosis.control_points import (
     decompose_cameras,
     flatness,
     warnings_about,
-    wrong_points,
+    find_outliers,
 )
 from airborne.cameras.finding import Finding
 
-__all__ = ["Finding", "check_points", "decompose_cameras", "flatness", "warnings_about", "wrong_points"]
+__all__ = ["Finding", "check_points", "decompose_cameras", "flatness", "warnings_about", "find_outliers"]

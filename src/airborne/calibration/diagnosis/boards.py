@@ -9,22 +9,20 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.calibration.sources.boards import DICTIONARIES, Board, detector_of
-from airborne.cameras.finding import Finding, listed
+from airborne.calibration.sources.boards import DICTIONARIES, Board, board_detector
+from airborne.cameras.finding import Finding, join_names
+from airborne.types import Array, Image
 
-Array = NDArray[np.floating]
-Picture = NDArray[np.uint8]
-
-MOST_PICTURES, MOST_SEARCHED = 12, 6  # spread over those given; the latter are searched for every kind of marker
-SEEN_WELL = 0.3  # share of the pictures, and of the corners in them, at which the board is as described
-FEWEST_MARKERS = 4  # in a picture that tells a layout
-FEWEST_PICTURES = 2
-CLEARLY = 2.0  # times as many markers make another dictionary the right one
-WIDEST, MOST_COMPARED = 15, 3  # columns or rows that are tried, pictures that they are tried on
-STRAIGHT_PX = 5.0  # how far a marker's middle may lie off its place on the board
-FITTING = 0.8  # share of the markers that must lie there
-RATIO_OFF = 0.12  # relative difference of the markers' size; blur makes them seem smaller
-CHESS_SIZE = (3, 3)  # inner corners of the least board looked for
+_MOST_PICTURES, _MOST_SEARCHED = 12, 6  # spread over those given; the latter are searched for every kind of marker
+_DETECTED_SHARE = 0.3  # share of the pictures, and of the corners in them, at which the board is as described
+_FEWEST_MARKERS = 4  # in a picture that tells a layout
+_FEWEST_PICTURES = 2
+_CLEAR_RATIO = 2.0  # times as many markers make another dictionary the right one
+_WIDEST, _MOST_COMPARED = 15, 3  # columns or rows that are tried, pictures that they are tried on
+_STRAIGHT_PX = 5.0  # how far a marker's middle may lie off its place on the board
+_FITTING_SHARE = 0.8  # share of the markers that must lie there
+_RATIO_OFF = 0.12  # relative difference of the markers' size; blur makes them seem smaller
+_CHESS_SIZE = (3, 3)  # inner corners of the least board looked for
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +33,7 @@ class _Markers:
     px: Array  # (n, 4, 2) [px], clockwise from the top left
 
 
-def wrong_board(board: Board, pictures: Sequence[Picture], camera: str = "") -> list[Finding]:
+def check_board_print(board: Board, pictures: Sequence[Image], camera: str = "") -> list[Finding]:
     """Say what of a board's description does not match its print, by grey pictures (h, w); nothing where it is found.
 
     Of a charuco board: the dictionary, printed in reverse, mirrored pictures, columns and rows, the markers' size. Of a
@@ -43,27 +41,27 @@ def wrong_board(board: Board, pictures: Sequence[Picture], camera: str = "") -> 
     """
     if not len(pictures):
         return []
-    chosen = [pictures[i] for i in np.unique(np.linspace(0, len(pictures) - 1, MOST_PICTURES).astype(int))]
+    chosen = [pictures[i] for i in np.unique(np.linspace(0, len(pictures) - 1, _MOST_PICTURES).astype(int))]
     where = f"{camera}: " if camera else ""
     counts = _corner_counts(board, chosen)
-    n_corners = board.inner[0] * board.inner[1]
+    n_corners = board.inner_size[0] * board.inner_size[1]
     shown = [count for count in counts if count]
     if board.kind == "chessboard":
-        return [] if len(shown) >= max(SEEN_WELL * len(chosen), 1) else _wrong_chessboard(board, chosen, where, camera)
-    is_found = len(shown) >= SEEN_WELL * len(chosen) and bool(np.median(shown) >= SEEN_WELL * n_corners)
+        return [] if len(shown) >= max(_DETECTED_SHARE * len(chosen), 1) else _wrong_chessboard(board, chosen, where, camera)
+    is_found = len(shown) >= _DETECTED_SHARE * len(chosen) and bool(np.median(shown) >= _DETECTED_SHARE * n_corners)
     found = list(_wrong_charuco(board, chosen, where, camera, is_found=is_found))
     if found or is_found:
         return found
-    return [_unseen(board, chosen, counts, where, camera)]
+    return [_not_detected(board, chosen, counts, where, camera)]
 
 
-def _corner_counts(board: Board, pictures: Sequence[Picture]) -> list[int]:
-    detect = detector_of(board)
+def _corner_counts(board: Board, pictures: Sequence[Image]) -> list[int]:
+    detect = board_detector(board)
     return [len(detect(picture).corner) for picture in pictures]
 
 
-def _unseen(board: Board, pictures: Sequence[Picture], counts: Sequence[int], where: str, camera: str) -> Finding:
-    n_shown, n_corners = sum(count > 0 for count in counts), board.inner[0] * board.inner[1]
+def _not_detected(board: Board, pictures: Sequence[Image], counts: Sequence[int], where: str, camera: str) -> Finding:
+    n_shown, n_corners = sum(count > 0 for count in counts), board.inner_size[0] * board.inner_size[1]
     return Finding(
         kind="board",
         what=(
@@ -76,15 +74,15 @@ def _unseen(board: Board, pictures: Sequence[Picture], counts: Sequence[int], wh
 
 
 def _wrong_charuco(
-    board: Board, pictures: Sequence[Picture], where: str, camera: str, *, is_found: bool
+    board: Board, pictures: Sequence[Image], where: str, camera: str, *, is_found: bool
 ) -> Iterator[Finding]:
     about = (camera,) if camera else ()
     if not is_found:
-        few = pictures[:: max(len(pictures) // MOST_SEARCHED, 1)]
-        n_here = _count(_all_markers(few, board.dictionary, board.is_inverted))
+        few = pictures[:: max(len(pictures) // _MOST_SEARCHED, 1)]
+        n_here = _n_markers(_all_markers(few, board.dictionary, board.is_inverted))
         mirrored = [np.ascontiguousarray(picture[:, ::-1]) for picture in few]
-        n_mirrored = _count(_all_markers(mirrored, board.dictionary, board.is_inverted))
-        if n_mirrored >= CLEARLY * max(n_here, FEWEST_MARKERS):
+        n_mirrored = _n_markers(_all_markers(mirrored, board.dictionary, board.is_inverted))
+        if n_mirrored >= _CLEAR_RATIO * max(n_here, _FEWEST_MARKERS):
             yield Finding(
                 kind="mirrored",
                 what=f"{where}{n_here} of the board's markers are seen, {n_mirrored} once the pictures are mirrored",
@@ -92,9 +90,9 @@ def _wrong_charuco(
                 cameras=about,
             )
             return
-        is_own_seen = n_here >= FEWEST_MARKERS * len(few)
+        is_own_seen = n_here >= _FEWEST_MARKERS * len(few)
         dictionary, is_inverted, n_there = ("", False, 0) if is_own_seen else _likeliest_print(board, few)
-        if n_there >= CLEARLY * max(n_here, FEWEST_MARKERS):
+        if n_there >= _CLEAR_RATIO * max(n_here, _FEWEST_MARKERS):
             yield _other_print(board, dictionary, is_inverted, where, about, (n_here, n_there))
             board = replace(board, dictionary=dictionary, is_inverted=is_inverted)
     yield from _wrong_layout(board, _all_markers(pictures, board.dictionary, board.is_inverted), where, about)
@@ -107,21 +105,21 @@ def _other_print(
     settings += [f"inverted = {str(is_inverted).lower()}"] * (is_inverted != board.is_inverted)
     return Finding(
         kind="board",
-        what=f"{where}{counts[0]} markers are seen as the board is described, {counts[1]} with {listed(settings)}",
-        advice=f"the print is another one; set {listed(settings)}",
+        what=f"{where}{counts[0]} markers are seen as the board is described, {counts[1]} with {join_names(settings)}",
+        advice=f"the print is another one; set {join_names(settings)}",
         cameras=about,
     )
 
 
 def _wrong_layout(board: Board, seen: Sequence[_Markers], where: str, about: tuple[str, ...]) -> Iterator[Finding]:
-    told = [markers for markers in seen if len(markers.ids) >= FEWEST_MARKERS]
-    if len(told) < FEWEST_PICTURES:
+    told = [markers for markers in seen if len(markers.ids) >= _FEWEST_MARKERS]
+    if len(told) < _FEWEST_PICTURES:
         return
-    fit = _fit(board, told)
-    if fit < FITTING:
-        clearest = sorted(told, key=lambda markers: -len(markers.ids))[:MOST_COMPARED]
-        best = max(_layouts(board, told), key=lambda other: _fit(other, clearest), default=board)
-        if _fit(best, told) >= FITTING:
+    fit = _layout_fit(board, told)
+    if fit < _FITTING_SHARE:
+        clearest = sorted(told, key=lambda markers: -len(markers.ids))[:_MOST_COMPARED]
+        best = max(_layouts(board, told), key=lambda other: _layout_fit(other, clearest), default=board)
+        if _layout_fit(best, told) >= _FITTING_SHARE:
             said = f"{board.columns} columns and {board.rows} rows"
             print_ = f"columns = {best.columns} and rows = {best.rows}"
             legacy = f", legacy = {str(best.is_legacy).lower()}" if best.is_legacy != board.is_legacy else ""
@@ -130,7 +128,7 @@ def _wrong_layout(board: Board, seen: Sequence[_Markers], where: str, about: tup
                 kind="board",
                 what=(
                     f"{where}{fit:.0%} of the markers lie where a board of {said} has them, "
-                    f"{_fit(best, told):.0%} with {print_}{legacy}"
+                    f"{_layout_fit(best, told):.0%} with {print_}{legacy}"
                 ),
                 advice=(
                     f"{'columns and rows are exchanged; ' if swapped else ''}count the squares of the print and set "
@@ -141,7 +139,7 @@ def _wrong_layout(board: Board, seen: Sequence[_Markers], where: str, about: tup
             board = best
     ratio = _marker_ratio(board, told)
     stated = board.marker_m / board.square_m
-    if np.isfinite(ratio) and abs(ratio / stated - 1) > RATIO_OFF:
+    if np.isfinite(ratio) and abs(ratio / stated - 1) > _RATIO_OFF:
         yield Finding(
             kind="board",
             what=f"{where}markers are {ratio:.2f} of a square in the pictures, {stated:.2f} as described",
@@ -150,7 +148,7 @@ def _wrong_layout(board: Board, seen: Sequence[_Markers], where: str, about: tup
         )
 
 
-def _markers(picture: Picture, dictionary: str) -> _Markers:
+def _detect_markers(picture: Image, dictionary: str) -> _Markers:
     finder = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary)))
     corners, ids, _ = finder.detectMarkers(picture)
     if ids is None:
@@ -158,50 +156,50 @@ def _markers(picture: Picture, dictionary: str) -> _Markers:
     return _Markers(np.asarray(ids, int).ravel(), np.asarray(corners, float).reshape(-1, 4, 2))
 
 
-def _count(seen: Sequence[_Markers]) -> int:
+def _n_markers(seen: Sequence[_Markers]) -> int:
     return sum(len(markers.ids) for markers in seen)
 
 
-def _all_markers(pictures: Sequence[Picture], dictionary: str, is_inverted: bool) -> list[_Markers]:
+def _all_markers(pictures: Sequence[Image], dictionary: str, is_inverted: bool) -> list[_Markers]:
     """Return every picture's markers without those of numbers that only one picture shows: chance finds."""
-    seen = [_markers(255 - picture if is_inverted else picture, dictionary) for picture in pictures]
+    seen = [_detect_markers(255 - picture if is_inverted else picture, dictionary) for picture in pictures]
     ids, counts = np.unique(np.concatenate([markers.ids for markers in seen]), return_counts=True)
-    often = ids[counts >= FEWEST_PICTURES]
+    often = ids[counts >= _FEWEST_PICTURES]
     kept = [np.isin(markers.ids, often) for markers in seen]
     return [_Markers(markers.ids[keep], markers.px[keep]) for markers, keep in zip(seen, kept, strict=True)]
 
 
-def _likeliest_print(board: Board, pictures: Sequence[Picture]) -> tuple[str, bool, int]:
+def _likeliest_print(board: Board, pictures: Sequence[Image]) -> tuple[str, bool, int]:
     """Return the dictionary of which most markers are seen, whether in reverse, and how many.
 
     Of a family that only differs in its number of markers the largest is searched, the least that holds all named.
     """
-    families = {name.rsplit("_", 1)[0]: name for name in sorted(DICTIONARIES, key=_size_of)}
+    families = {name.rsplit("_", 1)[0]: name for name in sorted(DICTIONARIES, key=_dictionary_size)}
     kinds = [(name, inverted) for name in families.values() for inverted in (board.is_inverted, not board.is_inverted)]
     found = {kind: _all_markers(pictures, *kind) for kind in kinds}
-    best, is_inverted = max(kinds, key=lambda kind: _count(found[kind]))
+    best, is_inverted = max(kinds, key=lambda kind: _n_markers(found[kind]))
     seen = found[best, is_inverted]
-    if sum(len(markers.ids) >= FEWEST_MARKERS for markers in seen) < FEWEST_PICTURES:
+    if sum(len(markers.ids) >= _FEWEST_MARKERS for markers in seen) < _FEWEST_PICTURES:
         return board.dictionary, board.is_inverted, 0
     last = max(int(markers.ids.max(initial=0)) for markers in seen)
-    if best.rsplit("_", 1)[0] == board.dictionary.rsplit("_", 1)[0] and _size_of(board.dictionary) > last:
-        return board.dictionary, is_inverted, _count(seen)
+    if best.rsplit("_", 1)[0] == board.dictionary.rsplit("_", 1)[0] and _dictionary_size(board.dictionary) > last:
+        return board.dictionary, is_inverted, _n_markers(seen)
     family = [name for name in DICTIONARIES if name.rsplit("_", 1)[0] == best.rsplit("_", 1)[0]]
-    return next(name for name in sorted(family, key=_size_of) if _size_of(name) > last), is_inverted, _count(seen)
+    return next(name for name in sorted(family, key=_dictionary_size) if _dictionary_size(name) > last), is_inverted, _n_markers(seen)
 
 
-def _size_of(dictionary: str) -> int:
+def _dictionary_size(dictionary: str) -> int:
     return len(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary)).bytesList)
 
 
 def _layouts(board: Board, told: Sequence[_Markers]) -> Iterator[Board]:
     """Yield boards of other columns and rows that have all markers seen; a row more or less changes nothing else."""
     last = max(int(markers.ids.max()) for markers in told)
-    for columns in range(2, WIDEST + 1):
+    for columns in range(2, _WIDEST + 1):
         fewest_rows = max(2, int(np.ceil(2 * (last + 1) / columns)))
         for rows in {fewest_rows, fewest_rows + 1, board.rows, board.columns}:
             for is_legacy in {board.is_legacy, not board.is_legacy}:
-                if 2 <= rows <= WIDEST and columns * rows // 2 > last:
+                if 2 <= rows <= _WIDEST and columns * rows // 2 > last:
                     yield replace(board, columns=columns, rows=rows, is_legacy=is_legacy)
 
 
@@ -223,20 +221,20 @@ def _plane_fits(board: Board, told: Sequence[_Markers]) -> Iterator[tuple[Array,
     plane = _plane_corners(board)
     for markers in told:
         known = markers.ids < len(plane)
-        if known.sum() >= FEWEST_MARKERS:
+        if known.sum() >= _FEWEST_MARKERS:
             there, px = plane[markers.ids[known]], markers.px[known]
-            H, _ = cv2.findHomography(there.reshape(-1, 2), px.reshape(-1, 2), cv2.RANSAC, STRAIGHT_PX, maxIters=200)
+            H, _ = cv2.findHomography(there.reshape(-1, 2), px.reshape(-1, 2), cv2.RANSAC, _STRAIGHT_PX, maxIters=200)
             if H is not None and abs(np.linalg.det(H)) > 1e-12:
                 yield np.asarray(H, float), there, px
 
 
-def _fit(board: Board, told: Sequence[_Markers]) -> float:
+def _layout_fit(board: Board, told: Sequence[_Markers]) -> float:
     """Return the share of the markers that lie where the board's layout has them."""
     near = 0
     for H, there, px in _plane_fits(board, told):
         middles = cv2.perspectiveTransform(there.mean(axis=1)[:, None], H)[:, 0]
-        near += int((np.linalg.norm(middles - px.mean(axis=1), axis=1) < STRAIGHT_PX).sum())
-    return near / _count(told)
+        near += int((np.linalg.norm(middles - px.mean(axis=1), axis=1) < _STRAIGHT_PX).sum())
+    return near / _n_markers(told)
 
 
 def _marker_ratio(board: Board, told: Sequence[_Markers]) -> float:
@@ -251,22 +249,22 @@ def _marker_ratio(board: Board, told: Sequence[_Markers]) -> float:
     return float(np.median(np.concatenate(sides))) if sides else float("nan")
 
 
-def _wrong_chessboard(board: Board, pictures: Sequence[Picture], where: str, camera: str) -> list[Finding]:
+def _wrong_chessboard(board: Board, pictures: Sequence[Image], where: str, camera: str) -> list[Finding]:
     """Look for chessboards of any size, parts of boards among them, and take the size that most pictures show whole."""
     flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_LARGER
     sizes = set()
-    for picture in pictures[:: max(len(pictures) // MOST_SEARCHED, 1)]:
-        is_found, _, meta = cv2.findChessboardCornersSBWithMeta(picture, CHESS_SIZE, flags)
+    for picture in pictures[:: max(len(pictures) // _MOST_SEARCHED, 1)]:
+        is_found, _, meta = cv2.findChessboardCornersSBWithMeta(picture, _CHESS_SIZE, flags)
         if is_found and meta is not None:
             sizes.add((min(meta.shape[:2]), max(meta.shape[:2])))
     counts = {
         size: sum(bool(count) for count in _corner_counts(replace(board, columns=size[0], rows=size[1]), pictures))
-        for size in sizes - {(min(board.inner), max(board.inner))}
+        for size in sizes - {(min(board.inner_size), max(board.inner_size))}
     }
     short, long = max(counts, key=lambda size: (counts[size], size), default=(0, 0))
     n_seen = counts.get((short, long), 0)
-    if n_seen < FEWEST_PICTURES:
-        return [_unseen(board, pictures, _corner_counts(board, pictures), where, camera)]
+    if n_seen < _FEWEST_PICTURES:
+        return [_not_detected(board, pictures, _corner_counts(board, pictures), where, camera)]
     columns, rows = (long, short) if board.columns >= board.rows else (short, long)
     squares = (columns + 1, rows + 1) == (board.columns, board.rows)
     return [

@@ -7,35 +7,34 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.cameras.finding import Finding, listed
+from airborne.cameras.finding import Finding, join_names
 from airborne.geometry.robust import SD_OF_MEDIAN_DEVIATION
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-SAME = 0.1  # of a period: two times closer than this are one
-GAP = 1.5  # periods: further apart, a picture is missing
-NAMED = 3  # pictures told by their number; of more only how many
-FEWEST = 5  # times that tell a period
-READOUT_S, READOUT_SDS, READOUT_PX = 0.002, 5.0, 0.3  # a readout is told that is longer, surer, shifts more
-MOST_READOUT_S = 0.1
+_SAME_TIME = 0.1  # of a period: two times closer than this are one
+_GAP = 1.5  # periods: further apart, a picture is missing
+_NAMED = 3  # pictures told by their number; of more only how many
+_FEWEST_TIMES = 5  # times that tell a period
+_READOUT_S, _READOUT_SDS, _READOUT_PX = 0.002, 5.0, 0.3  # a readout is told that is longer, surer, shifts more
+_MOST_READOUT_S = 0.1
 
 
-def odd_times(camera: str, times_s: Array) -> list[Finding]:
+def check_times(camera: str, times_s: Array) -> list[Finding]:
     """Say where a camera's time stamps (n,) [s], in the order of its pictures, go back, repeat or leave one out."""
     times_s = np.asarray(times_s, float)
-    if len(times_s) < FEWEST:
+    if len(times_s) < _FEWEST_TIMES:
         return []
-    return list(_odd_steps(camera, times_s, "time stamps", period=None))
+    return list(_check_steps(camera, times_s, "time stamps", period=None))
 
 
-def odd_counter(camera: str, counts: NDArray[np.integer]) -> list[Finding]:
+def check_counter(camera: str, counts: NDArray[np.integer]) -> list[Finding]:
     """Say where a camera's own picture counter (n,), in the order of its pictures, rolls over, repeats or jumps."""
-    if len(counts) < FEWEST:
+    if len(counts) < _FEWEST_TIMES:
         return []
-    return list(_odd_steps(camera, counts.astype(float), "picture numbers", period=1.0))
+    return list(_check_steps(camera, counts.astype(float), "picture numbers", period=1.0))
 
 
-def unequal_counts(n_pictures: Mapping[str, int], n_least: int = 1) -> list[Finding]:
+def check_image_counts(n_pictures: Mapping[str, int], n_least: int = 1) -> list[Finding]:
     """Say which videos have another number of pictures than most; n_least: a difference that counts."""
     values, how_often = np.unique(list(n_pictures.values()), return_counts=True)
     if len(values) < 2:
@@ -44,8 +43,8 @@ def unequal_counts(n_pictures: Mapping[str, int], n_least: int = 1) -> list[Find
     odd = {name: n for name, n in n_pictures.items() if abs(n - usual) >= n_least}
     if not odd:
         return []
-    told = listed([f"{name} has {n}" for name, n in odd.items()])
-    others = listed([name for name in n_pictures if name not in odd])
+    told = join_names([f"{name} has {n}" for name, n in odd.items()])
+    others = join_names([name for name in n_pictures if name not in odd])
     return [
         Finding(
             kind="clock",
@@ -59,14 +58,14 @@ def unequal_counts(n_pictures: Mapping[str, int], n_least: int = 1) -> list[Find
     ]
 
 
-def _odd_steps(camera: str, values: Array, what: str, *, period: float | None) -> Iterator[Finding]:
+def _check_steps(camera: str, values: Array, what: str, *, period: float | None) -> Iterator[Finding]:
     steps = np.diff(values)
     period = period or (float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0)
     if period <= 0:
         yield _finding(camera, f"its {what} never go forward", "they are no times; leave them out and give the rate")
         return
-    back, same = np.flatnonzero(steps < -SAME * period), np.flatnonzero(np.abs(steps) <= SAME * period)
-    gaps = np.flatnonzero(steps > GAP * period)
+    back, same = np.flatnonzero(steps < -_SAME_TIME * period), np.flatnonzero(np.abs(steps) <= _SAME_TIME * period)
+    gaps = np.flatnonzero(steps > _GAP * period)
     if len(back):
         yield _finding(
             camera,
@@ -90,8 +89,8 @@ def _odd_steps(camera: str, values: Array, what: str, *, period: float | None) -
 
 def _at(rows: NDArray[np.integer]) -> str:
     """Say after which pictures, counted from 0."""
-    shown = ", ".join(str(row) for row in rows[:NAMED])
-    more = f" and {len(rows) - NAMED} more" if len(rows) > NAMED else ""
+    shown = ", ".join(str(row) for row in rows[:_NAMED])
+    more = f" and {len(rows) - _NAMED} more" if len(rows) > _NAMED else ""
     return f"after picture{'s' * (len(rows) > 1)} {shown}{more}"
 
 
@@ -99,7 +98,7 @@ def _finding(camera: str, what: str, advice: str) -> Finding:
     return Finding(kind="clock", what=f"{camera}: {what}", advice=advice, cameras=(camera,))
 
 
-def rolling_shutter(
+def check_rolling_shutter(
     camera: str, residual_px: Array, velocity_px_per_s: Array, row_px: Array, height_px: int
 ) -> list[Finding]:
     """Say whether a camera reads its rows one after another: moving points are then seen late, the lower the later.
@@ -109,7 +108,7 @@ def rolling_shutter(
     """
     known = np.isfinite(np.column_stack([residual_px, velocity_px_per_s, row_px])).all(axis=1)
     r, v = residual_px[known], velocity_px_per_s[known]
-    if known.sum() < 10 * FEWEST or not v.any():
+    if known.sum() < 10 * _FEWEST_TIMES or not v.any():
         return []
     depth = row_px[known] / height_px - 0.5
     A, b = np.column_stack([v.ravel(), (v * depth[:, None]).ravel()]), r.ravel()
@@ -125,7 +124,7 @@ def rolling_shutter(
         return []
     sd = scale * float(np.sqrt(np.linalg.inv(information)[1, 1]))
     shift_px = x[1] / 2 * float(np.median(np.linalg.norm(v, axis=1)))
-    if not (READOUT_S < x[1] < MOST_READOUT_S and x[1] > READOUT_SDS * sd and shift_px > READOUT_PX):
+    if not (_READOUT_S < x[1] < _MOST_READOUT_S and x[1] > _READOUT_SDS * sd and shift_px > _READOUT_PX):
         return []
     return [
         Finding(

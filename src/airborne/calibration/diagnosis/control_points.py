@@ -5,25 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from airborne.calibration.intrinsics.model_selection import Solution, leave_one_out
 from airborne.calibration.intrinsics.physical import fit_pinhole
 from airborne.calibration.sources.control_points import ControlPoints
-from airborne.cameras.dlt import N_POINTS, Decomposition, decompose, fit_dlt
+from airborne.cameras.dlt import FEWEST_DLT_POINTS, Decomposition, decompose, fit_dlt
 from airborne.errors import CalibrationError
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-FLAT_ERROR, FLAT_WARNING = 0.01, 0.1  # thickness over extent of the points that one camera sees
-LARGEST_EXTENT_M, LARGE_EXTENT_M = 500.0, 100.0
-ROUGH_FIT_PX = 3.0  # careful clicks give about one pixel
-OFF_CENTRE = 0.15  # of the picture's diagonal
-NOT_SQUARE = 0.03
-ROLLED = np.radians(60)
-CHANCE = 1e-4  # of calling a good set of points wrong
-MAX_WRONG_POINTS = 3
+_FLAT_ERROR, _FLAT_WARNING = 0.01, 0.1  # thickness over extent of the points that one camera sees
+_LARGEST_EXTENT_M, _LARGE_EXTENT_M = 500.0, 100.0
+_ROUGH_FIT_PX = 3.0  # careful clicks give about one pixel
+_OFF_CENTRE = 0.15  # of the picture's diagonal
+_NOT_SQUARE = 0.03
+_MOST_ROLL = np.radians(60)
+_SIGNIFICANCE = 1e-4  # of calling a good set of points wrong
+_MOST_OUTLIERS = 3
 
 
 def check_points(points: ControlPoints, sizes: Mapping[str, tuple[int, int]]) -> None:
@@ -32,22 +30,22 @@ def check_points(points: ControlPoints, sizes: Mapping[str, tuple[int, int]]) ->
     if missing:
         raise CalibrationError(f"no picture size for camera '{missing[0]}'; sizes are given for: {', '.join(sizes)}")
     extent = np.linalg.norm(np.ptp(points.world, axis=0))
-    if extent > LARGEST_EXTENT_M:
+    if extent > _LARGEST_EXTENT_M:
         raise CalibrationError(
             f"the control points span {extent:.0f} m, expected a scene in metres: divide by 1000 if they are in mm"
         )
     for camera in points.cameras:
-        seen = points.seen_by(camera)
-        if seen.sum() < N_POINTS:
+        seen = points.is_seen_by(camera)
+        if seen.sum() < FEWEST_DLT_POINTS:
             raise CalibrationError(
-                f"camera '{camera}' sees {seen.sum()} control points, at least {N_POINTS} are needed: click more"
+                f"camera '{camera}' sees {seen.sum()} control points, at least {FEWEST_DLT_POINTS} are needed: click more"
             )
         _check_inside(points, camera, sizes[camera])
         ratio = flatness(points.world[seen])
-        if ratio < FLAT_ERROR:
+        if ratio < _FLAT_ERROR:
             raise CalibrationError(
                 f"the control points of camera '{camera}' lie in one plane (thickness / extent {ratio:.4f}, "
-                f"at least {FLAT_ERROR} is needed): add points off that plane"
+                f"at least {_FLAT_ERROR} is needed): add points off that plane"
             )
 
 
@@ -79,7 +77,7 @@ def decompose_cameras(points: ControlPoints) -> dict[str, Decomposition]:
     """Return every camera's DLT decomposition; raise CalibrationError where one is mirrored."""
     found = {}
     for i, camera in enumerate(points.cameras):
-        seen = points.seen_by(camera)
+        seen = points.is_seen_by(camera)
         found[camera] = decompose(fit_dlt(points.world[seen], points.px[seen, i]))
     mirrored = [camera for camera, decomposition in found.items() if decomposition.is_mirrored]
     if mirrored and len(mirrored) == len(found):
@@ -104,20 +102,20 @@ def warnings_about(
     """Return plain sentences about what makes the calibration doubtful; empty when nothing does."""
     warnings = []
     extent = np.linalg.norm(np.ptp(points.world, axis=0))
-    if extent > LARGE_EXTENT_M:
+    if extent > _LARGE_EXTENT_M:
         warnings.append(f"the control points span {extent:.0f} m: are they in metres?")
-    wrong = {camera: wrong_points(solutions[camera]) for camera in points.cameras}
-    warnings += _about_wrong_points(points, wrong)
+    wrong = {camera: find_outliers(solutions[camera]) for camera in points.cameras}
+    warnings += _outlier_warnings(points, wrong)
     for camera in points.cameras:
-        warnings += _about_picture(camera, sizes[camera], decompositions[camera])
+        warnings += _image_warnings(camera, sizes[camera], decompositions[camera])
         ratio = flatness(solutions[camera].world)
-        if ratio < FLAT_WARNING:
+        if ratio < _FLAT_WARNING:
             warnings.append(
                 f"the control points of camera '{camera}' are nearly flat (thickness / extent {ratio:.3f}): "
                 "depth and focal length are poorly told apart; spread them more"
             )
         rms = np.sqrt(np.mean(np.sum(solutions[camera].residual_px ** 2, axis=1)))
-        if rms > ROUGH_FIT_PX and len(wrong[camera]) in (0, MAX_WRONG_POINTS):  # else the named points explain it
+        if rms > _ROUGH_FIT_PX and len(wrong[camera]) in (0, _MOST_OUTLIERS):  # else the named points explain it
             warnings.append(
                 f"camera '{camera}' fits its control points only to {rms:.1f} px (careful clicks give about 1): "
                 "check its points, their coordinates and the picture size"
@@ -125,27 +123,27 @@ def warnings_about(
     return tuple(warnings)
 
 
-def _about_picture(camera: str, size: tuple[int, int], decomposition: Decomposition) -> list[str]:
+def _image_warnings(camera: str, size: tuple[int, int], decomposition: Decomposition) -> list[str]:
     warnings = []
     K, R = decomposition.K, decomposition.R
     middle = (np.array(size) - 1) / 2
-    if np.linalg.norm(K[:2, 2] - middle) > OFF_CENTRE * np.hypot(*size):
+    if np.linalg.norm(K[:2, 2] - middle) > _OFF_CENTRE * np.hypot(*size):
         warnings.append(
             f"camera '{camera}' looks through pixel ({K[0, 2]:.0f}, {K[1, 2]:.0f}), expected near the middle "
             f"({middle[0]:.0f}, {middle[1]:.0f}): is {size[0]}×{size[1]} its size, or is the picture cropped?"
         )
-    if abs(K[0, 0] / K[1, 1] - 1) > NOT_SQUARE:
+    if abs(K[0, 0] / K[1, 1] - 1) > _NOT_SQUARE:
         warnings.append(
             f"camera '{camera}' seems to have pixels that are not square (focal lengths {K[0, 0]:.0f} and "
             f"{K[1, 1]:.0f} px): resample its picture to square pixels"
         )
     level = np.hypot(R[2, 0], R[2, 1])
-    if level > 0.5 and -R[1, 2] / level < np.cos(ROLLED):
+    if level > 0.5 and -R[1, 2] / level < np.cos(_MOST_ROLL):
         warnings.append(f"camera '{camera}' comes out on its side or upside down: is world z up?")
     return warnings
 
 
-def wrong_points(solution: Solution) -> dict[int, float]:
+def find_outliers(solution: Solution) -> dict[int, float]:
     """Return the points that do not belong: index among the camera's points -> held-out error [px], worst first.
 
     A point is called wrong when leaving it out lowers the sum of squares by more than chance allows: an F test with 2
@@ -153,30 +151,30 @@ def wrong_points(solution: Solution) -> dict[int, float]:
     """
     found: dict[int, float] = {}
     index = np.arange(len(solution.world))
-    while len(found) < MAX_WRONG_POINTS:
+    while len(found) < _MOST_OUTLIERS:
         dof = 2 * (len(index) - 1) - solution.model.n_parameters
         if dof < 2:
             return found
         total = np.sum(solution.residual_px**2)
-        others = solution.px - np.array([pinhole.px_from_world(solution.world) for pinhole in solution.held_out])
+        others = solution.px - np.array([pinhole.px_from_world(solution.world) for pinhole in solution.refits])
         without = np.sum(others**2, axis=(1, 2)) - np.sum(solution.held_out_px**2, axis=1)
         worst = int(np.argmin(without))
         statistic = (total - without[worst]) / 2 / max(without[worst] / dof, 1e-12)
-        if fdtrc(2, dof, statistic) * len(index) > CHANCE:
+        if fdtrc(2, dof, statistic) * len(index) > _SIGNIFICANCE:
             return found
         found[int(index[worst])] = float(np.linalg.norm(solution.held_out_px[worst]))
         keep = np.arange(len(index)) != worst
         index = index[keep]
         world, px = solution.world[keep], solution.px[keep]
-        pinhole = fit_pinhole(solution.held_out[worst], solution.model, world, px)
+        pinhole = fit_pinhole(solution.refits[worst], solution.model, world, px)
         solution = leave_one_out(pinhole, solution.model, world, px)
     return found
 
 
-def _about_wrong_points(points: ControlPoints, wrong: Mapping[str, Mapping[int, float]]) -> list[str]:
+def _outlier_warnings(points: ControlPoints, wrong: Mapping[str, Mapping[int, float]]) -> list[str]:
     errors: dict[str, dict[str, float]] = {}
     for camera, found in wrong.items():
-        names = np.array(points.names)[points.seen_by(camera)]
+        names = np.array(points.names)[points.is_seen_by(camera)]
         for i, error in found.items():
             errors.setdefault(str(names[i]), {})[camera] = error
     warnings = []

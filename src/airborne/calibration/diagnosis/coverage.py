@@ -5,50 +5,48 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from airborne.cameras.finding import Finding, listed
+from airborne.cameras.finding import Finding, join_names
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-FEWEST_VIEWS = 8  # of a board, for a lens
-CELLS = (6, 4)  # of the picture, across and down
-COVERED = 0.25  # share of them that should show something
-EMPTY = 0.15  # of the cells of a third or a quarter of the picture: below it that part is named
-TILTED = np.radians(20)  # a board should be turned this far away from facing the camera now and then
-TILTED_SHARE = 0.9  # quantile of the tilts that must reach it
-FEWEST_POINTS = 60  # that could fill a picture
-FEWEST_SHARED = 5  # moments that tie two cameras
+_FEWEST_VIEWS = 8  # of a board, for a lens
+_CELLS = (6, 4)  # of the picture, across and down
+_LEAST_COVERAGE = 0.25  # share of them that should show something
+_EMPTY = 0.15  # of the cells of a third or a quarter of the picture: below it that part is named
+_LEAST_TILT = np.radians(20)  # a board should be turned this far away from facing the camera now and then
+_TILTED_SHARE = 0.9  # quantile of the tilts that must reach it
+_FEWEST_POINTS = 60  # that could fill a picture
+_FEWEST_SHARED = 5  # moments that tie two cameras
 
 
-def few_views(camera: str, n_views: int) -> list[Finding]:
+def check_view_count(camera: str, n_views: int) -> list[Finding]:
     """Say where too few pictures show the board."""
-    if n_views >= FEWEST_VIEWS:
+    if n_views >= _FEWEST_VIEWS:
         return []
     return [
         Finding(
             kind="coverage",
-            what=f"{camera} shows the board in {n_views} picture{'s' * (n_views != 1)}, expected {FEWEST_VIEWS}",
+            what=f"{camera} shows the board in {n_views} picture{'s' * (n_views != 1)}, expected {_FEWEST_VIEWS}",
             advice="film it longer, in all parts of the picture, near and far",
             cameras=(camera,),
         )
     ]
 
 
-def clustered_views(camera: str, px: Array, size: tuple[int, int]) -> list[Finding]:
+def check_coverage(camera: str, px: Array, size: tuple[int, int]) -> list[Finding]:
     """Say where points (n, 2) [px] leave much of a picture (width, height) empty; a few clicks cannot fill one."""
     px = px[np.isfinite(px).all(axis=1)]
-    if len(px) < FEWEST_POINTS:
+    if len(px) < _FEWEST_POINTS:
         return []
-    cell = np.clip((px / size * CELLS).astype(int), 0, np.array(CELLS) - 1)
-    filled = np.zeros(CELLS, bool)
+    cell = np.clip((px / size * _CELLS).astype(int), 0, np.array(_CELLS) - 1)
+    filled = np.zeros(_CELLS, bool)
     filled[cell[:, 0], cell[:, 1]] = True
-    if filled.mean() >= COVERED:
+    if filled.mean() >= _LEAST_COVERAGE:
         return []
     parts = {"left": filled[:2], "right": filled[-2:], "upper": filled[:, :1], "lower": filled[:, -1:]}
-    empty = [name for name, part in parts.items() if part.mean() < EMPTY]
-    borders = "near its borders" if len(empty) == len(parts) else f"in its {listed(empty)} part{'s' * (len(empty) > 1)}"
+    empty = [name for name, part in parts.items() if part.mean() < _EMPTY]
+    borders = "near its borders" if len(empty) == len(parts) else f"in its {join_names(empty)} part{'s' * (len(empty) > 1)}"
     where = f", hardly any {borders}" if empty else ""
     return [
         Finding(
@@ -60,9 +58,9 @@ def clustered_views(camera: str, px: Array, size: tuple[int, int]) -> list[Findi
     ]
 
 
-def untilted_views(camera: str, tilts_rad: Array) -> list[Finding]:
+def check_tilts(camera: str, tilts_rad: Array) -> list[Finding]:
     """Say where a board nearly always faces the camera; tilts (n,) from facing it [rad]."""
-    if len(tilts_rad) < FEWEST_VIEWS or np.quantile(tilts_rad, TILTED_SHARE) >= TILTED:
+    if len(tilts_rad) < _FEWEST_VIEWS or np.quantile(tilts_rad, _TILTED_SHARE) >= _LEAST_TILT:
         return []
     return [
         Finding(
@@ -74,13 +72,13 @@ def untilted_views(camera: str, tilts_rad: Array) -> list[Finding]:
     ]
 
 
-def missing_bridges(names: Sequence[str], n_shared: Array, what: str = "moments") -> list[Finding]:
+def check_links(names: Sequence[str], n_shared: Array, what: str = "moments") -> list[Finding]:
     """Say which cameras are not tied to the others; n_shared (cameras, cameras) counts what two see at once."""
-    n_groups, group = connected_components(np.asarray(n_shared) >= FEWEST_SHARED, directed=False)
-    return list(_bridges(names, np.asarray(n_shared), group, n_groups, what)) if n_groups > 1 else []
+    n_groups, group = connected_components(np.asarray(n_shared) >= _FEWEST_SHARED, directed=False)
+    return list(_missing_links(names, np.asarray(n_shared), group, n_groups, what)) if n_groups > 1 else []
 
 
-def _bridges(names: Sequence[str], n_shared: Array, group: Array, n_groups: int, what: str) -> Iterator[Finding]:
+def _missing_links(names: Sequence[str], n_shared: Array, group: Array, n_groups: int, what: str) -> Iterator[Finding]:
     main = int(np.argmax(np.bincount(group)))
     for other in (g for g in range(n_groups) if g != main):
         here, there = np.flatnonzero(group == main), np.flatnonzero(group == other)
@@ -92,8 +90,8 @@ def _bridges(names: Sequence[str], n_shared: Array, group: Array, n_groups: int,
         yield Finding(
             kind="bridge",
             what=(
-                f"{listed(apart)} and {listed([names[int(k)] for k in here])} share {most} {what}, "
-                f"expected {FEWEST_SHARED} or more between two of them{nearest}"
+                f"{join_names(apart)} and {join_names([names[int(k)] for k in here])} share {most} {what}, "
+                f"expected {_FEWEST_SHARED} or more between two of them{nearest}"
             ),
             advice=f"film board or wand where {a if most else 'one'} and {b if most else 'another'} both see it",
             cameras=apart,

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.calibration.diagnosis.boards import wrong_board
-from airborne.calibration.diagnosis.clocks import odd_counter, odd_times
-from airborne.calibration.initial.chaining import FEWEST_VIEWS, Views
+from airborne.calibration.diagnosis.boards import check_board_print
+from airborne.calibration.diagnosis.clocks import check_counter, check_times
+from airborne.calibration.initial.chaining import FEWEST_LENS_VIEWS, Views
 from airborne.cameras.finding import Finding
 from airborne.errors import CalibrationError
 
@@ -22,17 +22,17 @@ def check_board(views: Views, samples: Mapping[str, Sequence[Grey]]) -> tuple[Fi
     Raises CalibrationError, with the reason, where a camera shows the board too seldom for anything.
     """
     found: list[Finding] = []
-    for name, row in zip(views.cameras, views.sightings, strict=True):
-        own = wrong_board(views.board, samples[name], name)
-        if own and sum(len(sighting.corner) > 0 for sighting in row) < FEWEST_VIEWS:
+    for name, row in zip(views.cameras, views.detections, strict=True):
+        own = check_board_print(views.board, samples[name], name)
+        if own and sum(len(sighting.corner) > 0 for sighting in row) < FEWEST_LENS_VIEWS:
             raise CalibrationError(own[0].sentence)
         found += own
     return tuple(found)
 
 
-def check_stamps(camera: str, rows: Sequence[Mapping[str, str]]) -> Iterator[Finding]:
+def check_time_stamps(camera: str, rows: Sequence[Mapping[str, str]]) -> Iterator[Finding]:
     """Yield what is odd about a camera's rows of a table of time stamps, in the order of the moments."""
-    yield from odd_times(camera, np.array([float(row["frame_time"]) for row in rows]))
+    yield from check_times(camera, np.array([float(row["frame_time"]) for row in rows]))
     numbers = [row.get("frame_index") or "" for row in rows]
     if all(number.isdigit() for number in numbers):
-        yield from odd_counter(camera, np.array([int(number) for number in numbers]))
+        yield from check_counter(camera, np.array([int(number) for number in numbers]))

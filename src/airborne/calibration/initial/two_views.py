@@ -12,14 +12,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
+from airborne.types import Array
 
-N_POINTS = 8  # the fewest that a fundamental matrix is looked for in
-CONFIDENCE, MOST_TRIES = 0.9999, 5000
+_FEWEST_POINTS = 8  # the fewest that a fundamental matrix is looked for in
+_CONFIDENCE, _MOST_TRIES = 0.9999, 5000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Epipolar:
+class EpipolarGeometry:
     """The fundamental matrix of two pictures and the points that keep to it."""
 
     F: Array  # (3, 3)
@@ -27,7 +27,7 @@ class Epipolar:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RelativePlace:
+class RelativePose:
     """Where camera b stands in camera a's axes, as long as the distance between them is 1."""
 
     R: Array  # (3, 3), b from a
@@ -37,28 +37,28 @@ class RelativePlace:
     parallax_rad: float  # median angle between the two rays to a point [rad]
 
 
-def epipolar(px_a: Array, px_b: Array, *, limit_px: float) -> Epipolar | None:
+def fit_epipolar_geometry(px_a: Array, px_b: Array, *, limit_px: float) -> EpipolarGeometry | None:
     """Return what most of the pixels (n, 2) of two pictures agree on to limit_px [px]; None where nothing is found.
 
     Both without distortion and without NaN. Points in one plane, or all on one line, have no single answer.
     """
-    if len(px_a) < N_POINTS:
+    if len(px_a) < _FEWEST_POINTS:
         return None
-    F, mask = cv2.findFundamentalMat(px_a, px_b, cv2.USAC_MAGSAC, limit_px, CONFIDENCE, MOST_TRIES)
+    F, mask = cv2.findFundamentalMat(px_a, px_b, cv2.USAC_MAGSAC, limit_px, _CONFIDENCE, _MOST_TRIES)
     if F is None or F.shape != (3, 3) or not np.all(np.isfinite(F)):
         return None
-    return Epipolar(F.astype(float), mask.ravel().astype(bool))
+    return EpipolarGeometry(F.astype(float), mask.ravel().astype(bool))
 
 
-def relative_place(F: Array, K_a: Array, K_b: Array, px_a: Array, px_b: Array) -> RelativePlace:
+def relative_pose(F: Array, K_a: Array, K_b: Array, px_a: Array, px_b: Array) -> RelativePose:
     """Return the place of camera b that puts most of the points (n, 2) [px] in front of both cameras."""
     R_1, R_2, t = (np.asarray(part, float) for part in cv2.decomposeEssentialMat(K_b.T @ F @ K_a))
     rays_a, rays_b = _rays(px_a, K_a), _rays(px_b, K_b)
-    candidates = [_place(R, sign * t.ravel(), rays_a, rays_b) for R in (R_1, R_2) for sign in (1.0, -1.0)]
+    candidates = [_triangulate_midpoints(R, sign * t.ravel(), rays_a, rays_b) for R in (R_1, R_2) for sign in (1.0, -1.0)]
     return max(candidates, key=lambda place: place.front_share)
 
 
-def _place(R: Array, t: Array, rays_a: Array, rays_b: Array) -> RelativePlace:
+def _triangulate_midpoints(R: Array, t: Array, rays_a: Array, rays_b: Array) -> RelativePose:
     """Put every point in the middle of where its two rays pass each other."""
     along = rays_b @ R  # b's rays in a's axes
     centre = -t @ R
@@ -69,7 +69,7 @@ def _place(R: Array, t: Array, rays_a: Array, rays_b: Array) -> RelativePlace:
     points = (depth_a[:, None] * rays_a + centre + depth_b[:, None] * along) / 2
     is_front = (depth_a > 0) & (depth_b > 0)
     parallax = np.arccos(np.clip(cosine[is_front], -1, 1)) if is_front.any() else np.zeros(1)
-    return RelativePlace(R, t, points, float(np.mean(is_front)), float(np.median(parallax)))
+    return RelativePose(R, t, points, float(np.mean(is_front)), float(np.median(parallax)))
 
 
 def _rays(px: Array, K: Array) -> Array:

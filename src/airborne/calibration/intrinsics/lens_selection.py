@@ -8,30 +8,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.calibration.bundle import HELD, Adjusted, Freedom, adjust
-from airborne.calibration.initial.chaining import Views, board_source, lens_start
+from airborne.calibration.bundle import ALL_FIXED, Adjustment, FreeParameters, adjust
+from airborne.calibration.initial.chaining import Views, board_source, initial_lens
 from airborne.cameras.camera import Camera, Lens, Rig
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-FREEDOMS: dict[Lens, tuple[tuple[str, Freedom], ...]] = {
+LENS_MODELS: dict[Lens, tuple[tuple[str, FreeParameters], ...]] = {
     "brown": (
-        ("focal", Freedom(place=False)),
-        ("focal + k1", Freedom(place=False, n_terms=1)),
-        ("focal + k1 k2", Freedom(place=False, n_terms=2)),
-        ("focal + principal point + k1 k2", Freedom(place=False, principal_point=True, n_terms=2)),
-        ("focal + principal point + k1 k2 p1 p2 k3", Freedom(place=False, principal_point=True, n_terms=5)),
+        ("focal", FreeParameters(extrinsics=False)),
+        ("focal + k1", FreeParameters(extrinsics=False, n_terms=1)),
+        ("focal + k1 k2", FreeParameters(extrinsics=False, n_terms=2)),
+        ("focal + principal point + k1 k2", FreeParameters(extrinsics=False, principal_point=True, n_terms=2)),
+        ("focal + principal point + k1 k2 p1 p2 k3", FreeParameters(extrinsics=False, principal_point=True, n_terms=5)),
     ),
     "fisheye": (
-        ("focal", Freedom(place=False)),
-        ("focal + k1 k2", Freedom(place=False, n_terms=2)),
-        ("focal + principal point + k1 k2", Freedom(place=False, principal_point=True, n_terms=2)),
-        ("focal + principal point + k1 to k4", Freedom(place=False, principal_point=True, n_terms=4)),
+        ("focal", FreeParameters(extrinsics=False)),
+        ("focal + k1 k2", FreeParameters(extrinsics=False, n_terms=2)),
+        ("focal + principal point + k1 k2", FreeParameters(extrinsics=False, principal_point=True, n_terms=2)),
+        ("focal + principal point + k1 to k4", FreeParameters(extrinsics=False, principal_point=True, n_terms=4)),
     ),
 }
-N_FOLDS = 3
+_N_FOLDS = 3
 MOST_VIEWS = 30  # pictures that decide; more take longer and change nothing
-FEWEST_TO_CHOOSE = 9  # pictures; with fewer the focal length and k1 are found and nothing is chosen
+_FEWEST_TO_CHOOSE = 9  # pictures; with fewer the focal length and k1 are found and nothing is chosen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,7 +39,7 @@ class LensFit:
 
     camera: Camera
     model: str  # what is free, in words
-    freedom: Freedom
+    free: FreeParameters
     n_views: int
     rms_px: float
     held_out_rms_px: dict[str, float]  # by model, over the views left out: RMS of a view's corners, mean over views
@@ -54,48 +53,48 @@ def choose_lens(
     As well: the mean over the pictures of the difference to the best is within its own standard error.
     Raises CalibrationError where too few pictures show the board.
     """
-    row = views.sightings[0]
-    views = views.only(np.unique(np.linspace(0, len(row) - 1, min(len(row), MOST_VIEWS)).astype(int)))
-    camera, boards = lens_start(views, size, lens=lens)
+    row = views.detections[0]
+    views = views.select_moments(np.unique(np.linspace(0, len(row) - 1, min(len(row), MOST_VIEWS)).astype(int)))
+    camera, boards = initial_lens(views, size, lens=lens)
     n = views.n_moments
-    fold = np.arange(n) % N_FOLDS
+    fold = np.arange(n) % _N_FOLDS
     scores, fits = {}, {}
-    models = FREEDOMS[lens] if n >= FEWEST_TO_CHOOSE else FREEDOMS[lens][1:2]
+    models = LENS_MODELS[lens] if n >= _FEWEST_TO_CHOOSE else LENS_MODELS[lens][1:2]
     for name, freedom in models:
         fit = adjust(Rig((camera,)), [board_source(views, boards)], freedom)
         camera, boards = fit.rig.cameras[0], fit.sources[0].world_from_target or boards
         fits[name] = fit
-        if n >= FEWEST_TO_CHOOSE:
-            scores[name] = _held_out(fit, fold)
+        if n >= _FEWEST_TO_CHOOSE:
+            scores[name] = _cross_validate(fit, fold)
         if progress is not None:
             progress()
-    chosen = _simplest(scores) if scores else models[0][0]
+    chosen = _choose_simplest(scores) if scores else models[0][0]
     fit = fits[chosen]
     return LensFit(
         camera=fit.rig.cameras[0],
         model=chosen,
-        freedom=replace(dict(models)[chosen], place=True),
+        free=replace(dict(models)[chosen], place=True),
         n_views=len(row),
         rms_px=fit.rms_px(),
         held_out_rms_px={name: float(np.mean(score)) for name, score in scores.items()},
     )
 
 
-def _held_out(fit: Adjusted, fold: NDArray[np.integer]) -> Array:
+def _cross_validate(fit: Adjustment, fold: NDArray[np.integer]) -> Array:
     """Return each view's RMS [px] by a lens fitted to the other folds; the board's place comes from the view."""
-    (source,) = fit.with_noise_known()
+    (source,) = fit.with_estimated_noise()
     score = np.zeros(len(fold))
-    for k in range(N_FOLDS):
+    for k in range(_N_FOLDS):
         is_left = fold[source.moments] == k
-        fitted = adjust(fit.rig, [source.only(~is_left)], fit.freedom)
-        out = source.only(is_left)
-        squares = np.sum(adjust(fitted.rig, [out], HELD).residual_px[0] ** 2, axis=1)
+        fitted = adjust(fit.rig, [source.select(~is_left)], fit.free)
+        out = source.select(is_left)
+        squares = np.sum(adjust(fitted.rig, [out], ALL_FIXED).residual_px[0] ** 2, axis=1)
         for m in np.flatnonzero(fold == k):
             score[m] = np.sqrt(np.nanmean(squares[out.moments == m]))
     return score
 
 
-def _simplest(scores: dict[str, Array]) -> str:
+def _choose_simplest(scores: dict[str, Array]) -> str:
     """Return the first model that is not clearly worse than the best."""
     best = min(scores.values(), key=np.median)
     for name, score in scores.items():

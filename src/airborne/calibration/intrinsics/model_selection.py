@@ -6,20 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airborne.calibration.intrinsics.physical import Model, Pinhole, fit_pinhole
-
-Array = NDArray[np.floating]
+from airborne.calibration.intrinsics.physical import PinholeModel, Pinhole, fit_pinhole
+from airborne.types import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
     """One camera fitted to all its points, and once more without each of them."""
 
-    model: Model
+    model: PinholeModel
     pinhole: Pinhole
-    held_out: tuple[Pinhole, ...]  # (n,), fitted without point i
+    refits: tuple[Pinhole, ...]  # (n,), fitted without point i
     world: Array  # (n, 3) [m]
     px: Array  # (n, 2) [px]
 
@@ -37,22 +35,22 @@ class Solution:
     @property
     def held_out_px(self) -> Array:
         """The same for the camera that has not seen the point (n, 2) [px]."""
-        return self.px - np.array([p.px_from_world(x) for p, x in zip(self.held_out, self.world, strict=True)])
+        return self.px - np.array([p.px_from_world(x) for p, x in zip(self.refits, self.world, strict=True)])
 
 
-def leave_one_out(pinhole: Pinhole, model: Model, world: Array, px: Array) -> Solution:
+def leave_one_out(pinhole: Pinhole, model: PinholeModel, world: Array, px: Array) -> Solution:
     """Return the solution of a fitted pinhole: refits by least squares without each point, starting from it."""
     keep = ~np.eye(len(world), dtype=bool)
     refits = tuple(fit_pinhole(pinhole, model, world[k], px[k]) for k in keep)
     return Solution(model, pinhole, refits, world, px)
 
 
-def supported(models: Sequence[Model], n_points: int) -> list[Model]:
+def supported_models(models: Sequence[PinholeModel], n_points: int) -> list[PinholeModel]:
     """Return the models whose free numbers are fewer than the coordinates that remain without one point."""
     return [model for model in models if model.n_parameters < 2 * (n_points - 1)]
 
 
-def choose(solutions: Sequence[Solution]) -> Solution:
+def choose_simplest(solutions: Sequence[Solution]) -> Solution:
     """Return the first (simplest) solution that is not clearly worse than the best on held-out points.
 
     Clearly: the mean difference of squared held-out errors, point by point, exceeds its own standard error.

@@ -6,22 +6,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import dual_annealing, least_squares
 from scipy.spatial.transform import Rotation
 
 from airborne.cameras.distortion import distort, undistort
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-ANNEALING_BOUNDS = np.array(
+_ANNEALING_BOUNDS = np.array(
     [*[np.radians(10)] * 3, *[0.5] * 3, 0.2]
 )  # turn [rad], shift [m], share of the focal length
-ANNEALING_ROUNDS = 100
+_ANNEALING_ROUNDS = 100
 
 
 @dataclass(frozen=True, slots=True)
-class Model:
+class PinholeModel:
     """Which numbers of a physical camera are free beside position (3), orientation (3) and focal length."""
 
     name: str
@@ -34,14 +32,14 @@ class Model:
         return 7 + 2 * self.frees_principal_point + self.frees_k1
 
 
-SEVEN_PARAMETERS = Model("7 parameters")
-MODELS = (
+SEVEN_PARAMETERS = PinholeModel("7 parameters")
+PINHOLE_MODELS = (
     SEVEN_PARAMETERS,
-    Model("7 + k1", frees_k1=True),
-    Model("7 + principal point", frees_principal_point=True),
-    Model("7 + principal point + k1", frees_principal_point=True, frees_k1=True),
+    PinholeModel("7 + k1", frees_k1=True),
+    PinholeModel("7 + principal point", frees_principal_point=True),
+    PinholeModel("7 + principal point + k1", frees_principal_point=True, frees_k1=True),
 )
-PARAMETERS = ("turn_x_rad", "turn_y_rad", "turn_z_rad", "x_m", "y_m", "z_m", "focal_px", "u0_px", "v0_px", "k1")
+_PARAMETERS = ("turn_x_rad", "turn_y_rad", "turn_z_rad", "x_m", "y_m", "z_m", "focal_px", "u0_px", "v0_px", "k1")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,12 +69,12 @@ class Pinhole:
         xy = xyz[..., :2] / xyz[..., 2:]
         return self.focal_px * distort(xy, np.array([self.k1])) + self.principal_point
 
-    def undistorted_px(self, px: Array) -> Array:
+    def undistort_px(self, px: Array) -> Array:
         """Take the distortion out of pixels (..., 2) [px]."""
         xy = (px - self.principal_point) / self.focal_px
         return self.focal_px * undistort(xy, np.array([self.k1])) + self.principal_point
 
-    def moved(self, model: Model, step: Array) -> Pinhole:
+    def apply_step(self, model: PinholeModel, step: Array) -> Pinhole:
         """Return the camera with the model's free numbers changed by step (n_parameters,).
 
         The order is that of `PARAMETERS`, without those the model fixes; the turn is a rotation vector about the
@@ -91,16 +89,16 @@ class Pinhole:
         )
 
 
-def parameter_names(model: Model) -> tuple[str, ...]:
+def parameter_names(model: PinholeModel) -> tuple[str, ...]:
     """Return the names, with units, of the numbers that the model frees, in the order of `Pinhole.moved`."""
-    return PARAMETERS[:7] + PARAMETERS[7:9] * model.frees_principal_point + PARAMETERS[9:] * model.frees_k1
+    return _PARAMETERS[:7] + _PARAMETERS[7:9] * model.frees_principal_point + _PARAMETERS[9:] * model.frees_k1
 
 
-def fit_pinhole(start: Pinhole, model: Model, world: Array, px: Array) -> Pinhole:
+def fit_pinhole(start: Pinhole, model: PinholeModel, world: Array, px: Array) -> Pinhole:
     """Return the camera near start that projects world (n, 3) [m] closest to px (n, 2) [px], by Levenberg-Marquardt."""
     residual = _residual_of_step(start, model, world, px)
     solution = least_squares(residual, np.zeros(model.n_parameters), method="lm", x_scale="jac", xtol=1e-10, ftol=1e-10)
-    return start.moved(model, solution.x)
+    return start.apply_step(model, solution.x)
 
 
 def anneal_pinhole(start: Pinhole, world: Array, px: Array, *, seed: int) -> Pinhole:
@@ -109,17 +107,17 @@ def anneal_pinhole(start: Pinhole, world: Array, px: Array, *, seed: int) -> Pin
     The constrained optimisation of paper B (section on the wooden cross); its height angle is `2 atan(h / 2f)`.
     The sum of squares is searched over a box scaled to +-1; the same seed gives the same camera.
     """
-    scale = ANNEALING_BOUNDS * np.array([1, 1, 1, 1, 1, 1, start.focal_px])
+    scale = _ANNEALING_BOUNDS * np.array([1, 1, 1, 1, 1, 1, start.focal_px])
     residual = _residual_of_step(start, SEVEN_PARAMETERS, world, px)
 
     def log_cost(unit_step: Array) -> float:
         return float(np.log(np.mean(residual(unit_step * scale) ** 2) + 1e-12))  # the log flattens the far walls
 
-    solution = dual_annealing(log_cost, [(-1.0, 1.0)] * 7, maxiter=ANNEALING_ROUNDS, rng=np.random.default_rng(seed))
-    return start.moved(SEVEN_PARAMETERS, solution.x * scale)
+    solution = dual_annealing(log_cost, [(-1.0, 1.0)] * 7, maxiter=_ANNEALING_ROUNDS, rng=np.random.default_rng(seed))
+    return start.apply_step(SEVEN_PARAMETERS, solution.x * scale)
 
 
-def parameter_sd(pinhole: Pinhole, model: Model, world: Array, px: Array) -> Array:
+def parameter_sd(pinhole: Pinhole, model: PinholeModel, world: Array, px: Array) -> Array:
     """Return the standard deviations (n_parameters,) of a fitted camera's free numbers, from the Jacobian.
 
     `sqrt(diag((J^T J)^-1) s^2)` with `s^2 = |residual|^2 / (2 n - n_parameters)`.
@@ -137,5 +135,5 @@ def parameter_sd(pinhole: Pinhole, model: Model, world: Array, px: Array) -> Arr
     return np.sqrt(variance * np.diag(np.linalg.pinv(jacobian / scale) @ np.linalg.pinv(jacobian / scale).T)) / scale
 
 
-def _residual_of_step(start: Pinhole, model: Model, world: Array, px: Array) -> Callable[[Array], Array]:
-    return lambda step: (start.moved(model, step).px_from_world(world) - px).ravel()
+def _residual_of_step(start: Pinhole, model: PinholeModel, world: Array, px: Array) -> Callable[[Array], Array]:
+    return lambda step: (start.apply_step(model, step).px_from_world(world) - px).ravel()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,29 +13,29 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.calibration.diagnosis.clocks import unequal_counts
-from airborne.calibration.diagnosis.inputs import check_board, check_stamps
+from airborne.calibration.diagnosis.clocks import check_image_counts
+from airborne.calibration.diagnosis.inputs import check_board, check_time_stamps
 from airborne.calibration.initial.chaining import Views
-from airborne.calibration.sources.boards import NOTHING, Board, Sighting, as_printed, detector_of
+from airborne.calibration.sources.boards import NO_CORNERS, Board, DetectedCorners, match_print, board_detector
 from airborne.calibration.sources.files import CameraSource, Sources
 from airborne.cameras.finding import Finding
 from airborne.errors import CalibrationError
+from airborne.types import Array, Progress
 from airborne.video import VideoSource, inspect
-from airborne.video.decoding import pictures, rgb_from_picture
+from airborne.video.decoding import decode, rgb_from_decoded
 
 Grey = NDArray[np.uint8]
-Array = NDArray[np.floating]
-Told = Callable[[int, int | None], None]
+Progress = Progress
 
-MOST_MOMENTS = 240  # that the board is looked for at, spread over a recording
-PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
-LARGEST_PICTURE_BYTES = 200_000_000
-SAMPLES = 12  # pictures of a camera that tell how the board was printed
-ODD_PICTURES = 2  # more or fewer than the other cameras' are told
+_MOST_MOMENTS = 240  # that the board is looked for at, spread over a recording
+_IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+_LARGEST_PICTURE_BYTES = 200_000_000
+_N_SAMPLES = 12  # pictures of a camera that tell how the board was printed
+_ODD_PICTURES = 2  # more or fewer than the other cameras' are told
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class BoardDetections:
     """What the cameras saw of the board together."""
 
     views: Views
@@ -46,7 +46,7 @@ class Seen:
     findings: tuple[Finding, ...]
 
 
-def look(sources: Sources, board: Board, told: Told) -> Seen:
+def detect_boards(sources: Sources, board: Board, progress: Progress) -> BoardDetections:
     """Find the board in all cameras' recordings; raises VideoError or CalibrationError for what cannot be read."""
     cameras = [camera for camera in sources.camera if camera.video or camera.pictures]
     if not cameras:
@@ -54,7 +54,7 @@ def look(sources: Sources, board: Board, told: Told) -> Seen:
     if all(camera.video for camera in cameras):
         moments, time_s, odd = _moments(sources, cameras)
     elif all(camera.pictures for camera in cameras):
-        counts = [len(_picture_paths(sources, camera.pictures or "")) for camera in cameras]
+        counts = [len(_image_paths(sources, camera.pictures or "")) for camera in cameras]
         if len(cameras) > 1 and len(set(counts)) > 1:
             said = ", ".join(f"{camera.name} {n}" for camera, n in zip(cameras, counts, strict=True))
             raise CalibrationError(
@@ -64,61 +64,61 @@ def look(sources: Sources, board: Board, told: Told) -> Seen:
         moments, time_s, odd = [{i: i for i in range(n)} for n in counts], None, ()
     else:
         raise CalibrationError("some cameras have a video and some pictures; give the same kind for all")
-    samples = {camera.name: _samples(sources, camera) for camera in cameras}
-    board, notes = as_printed(board, [grey for own in samples.values() for grey in own])
+    samples = {camera.name: _sample_images(sources, camera) for camera in cameras}
+    board, notes = match_print(board, [grey for own in samples.values() for grey in own])
     total = sum(len(own) for own in moments)
     n_moments = max(max(own.values(), default=-1) for own in moments) + 1
     rows, sizes, examples, done = [], {}, {}, 0
     for camera, own in zip(cameras, moments, strict=True):
-        row, best = [NOTHING] * n_moments, -1
-        detect = detector_of(board)
-        for index, grey in _greys(sources, camera, own):
+        row, best = [NO_CORNERS] * n_moments, -1
+        detect = board_detector(board)
+        for index, grey in _read_grey_images(sources, camera, own):
             sizes.setdefault(camera.name, (grey.shape[1], grey.shape[0]))
             row[own[index]] = sighting = detect(grey)
             if len(sighting.corner) > best:
                 examples[camera.name], best = grey, len(sighting.corner)
             done += 1
-            told(done, total)
+            progress(done, total)
         rows.append(tuple(row))
     views = Views(board, tuple(camera.name for camera in cameras), tuple(rows))
-    return Seen(views, time_s, sizes, examples, notes, (*odd, *check_board(views, samples)))
+    return BoardDetections(views, time_s, sizes, examples, notes, (*odd, *check_board(views, samples)))
 
 
-def look_alone(sources: Sources, camera: CameraSource, board: Board, told: Told) -> Views | None:
+def detect_lens_board(sources: Sources, camera: CameraSource, board: Board, progress: Progress) -> Views | None:
     """Find the board in the recording for one camera's lens, if there is one."""
     name = camera.lens_video or camera.lens_pictures
     if name is None:
         return None
     alone = camera.model_copy(update={"video": camera.lens_video, "pictures": camera.lens_pictures})
-    detect = detector_of(board)
-    found: list[Sighting] = []
-    n = _count(sources, alone) or MOST_MOMENTS
-    wanted = range(0, n, math.ceil(n / MOST_MOMENTS))
-    for _, grey in _greys(sources, alone, wanted):
+    detect = board_detector(board)
+    found: list[DetectedCorners] = []
+    n = _n_images(sources, alone) or _MOST_MOMENTS
+    wanted = range(0, n, math.ceil(n / _MOST_MOMENTS))
+    for _, grey in _read_grey_images(sources, alone, wanted):
         found.append(detect(grey))
-        told(len(found), len(wanted))
+        progress(len(found), len(wanted))
     views = Views(board, (camera.name,), (tuple(found),))
     if not any(len(sighting.corner) for sighting in found):
-        check_board(views, {camera.name: _samples(sources, alone)})
-    return views.of(0)
+        check_board(views, {camera.name: _sample_images(sources, alone)})
+    return views.of_camera(0)
 
 
-def first_picture(sources: Sources, camera: CameraSource) -> Grey | None:
+def first_image(sources: Sources, camera: CameraSource) -> Grey | None:
     """Return the first picture of a camera's recording, if it has one."""
     if not (camera.video or camera.pictures):
         return None
-    return next((grey for _, grey in _greys(sources, camera, range(1))), None)
+    return next((grey for _, grey in _read_grey_images(sources, camera, range(1))), None)
 
 
-def size_of(sources: Sources, camera: CameraSource) -> tuple[int, int] | None:
+def image_size(sources: Sources, camera: CameraSource) -> tuple[int, int] | None:
     """Return a camera's picture size (width, height) [px], where anything tells it."""
     if camera.size is not None:
         return camera.size[0], camera.size[1]
     if camera.video is not None:
         return inspect(VideoSource(camera.name, sources.path(camera.video))).size
     if camera.pictures is not None or camera.lens_pictures is not None:
-        path = _picture_paths(sources, camera.pictures or camera.lens_pictures or "")[0]
-        grey = _read_grey(path)
+        path = _image_paths(sources, camera.pictures or camera.lens_pictures or "")[0]
+        grey = _read_grey_image(path)
         return grey.shape[1], grey.shape[0]
     if camera.lens_video is not None:
         return inspect(VideoSource(camera.name, sources.path(camera.lens_video))).size
@@ -130,12 +130,12 @@ def _moments(
 ) -> tuple[list[dict[int, int]], Array, tuple[Finding, ...]]:
     """Return by camera which of its frames belongs to which moment, the moments' times, and what is odd about them."""
     if sources.board is not None and sources.board.timestamps is not None:
-        return _stamped(sources.path(sources.board.timestamps), cameras)
+        return _moments_by_time_stamps(sources.path(sources.board.timestamps), cameras)
     facts = [inspect(VideoSource(c.name, sources.path(c.video or ""))) for c in cameras]
     rate = float(facts[0].frame_rate)
     ends = [float(f.duration_s) + c.offset_s for f, c in zip(facts, cameras, strict=True) if f.duration_s]
-    n = max(1, round((max(ends, default=MOST_MOMENTS / rate) - cameras[0].offset_s) * rate))
-    stride = max(1, math.ceil(n / MOST_MOMENTS))
+    n = max(1, round((max(ends, default=_MOST_MOMENTS / rate) - cameras[0].offset_s) * rate))
+    stride = max(1, math.ceil(n / _MOST_MOMENTS))
     index = np.arange(0, n, stride)
     time_s = index / rate + cameras[0].offset_s
     found = []
@@ -146,11 +146,11 @@ def _moments(
         found.append({int(f): m for m, f in enumerate(frames) if is_there[m]})
     if len({fact.frame_rate for fact in facts}) > 1 or any(camera.offset_s for camera in cameras):
         return found, time_s, ()
-    counts = {c.name: _count(sources, c) or 0 for c in cameras}
-    return found, time_s, tuple(unequal_counts(counts, ODD_PICTURES))
+    counts = {c.name: _n_images(sources, c) or 0 for c in cameras}
+    return found, time_s, tuple(check_image_counts(counts, _ODD_PICTURES))
 
 
-def _stamped(path: Path, cameras: Sequence[CameraSource]) -> tuple[list[dict[int, int]], Array, tuple[Finding, ...]]:
+def _moments_by_time_stamps(path: Path, cameras: Sequence[CameraSource]) -> tuple[list[dict[int, int]], Array, tuple[Finding, ...]]:
     """Read a table sync_index,cam_id,frame_time: the n-th row of a camera, by time, is its video's n-th frame."""
     expected = "expected the columns sync_index,cam_id,frame_time"
     try:
@@ -172,7 +172,7 @@ def _stamped(path: Path, cameras: Sequence[CameraSource]) -> tuple[list[dict[int
         if key is None:
             raise CalibrationError(f"{path} has no rows of camera '{camera.name}'; its cam_id are: {', '.join(ids)}")
         told = sorted((r for r in table if r["cam_id"].strip() == key), key=lambda r: int(r["sync_index"]))
-        odd += check_stamps(camera.name, told)
+        odd += check_time_stamps(camera.name, told)
         own = sorted((row for row in rows if row[1] == key), key=lambda row: row[2])
         found.append({n: moment[row[0]] for n, row in enumerate(own)})
     return found, time_s - time_s[0], tuple(odd)
@@ -183,49 +183,49 @@ def _stamp_id(name: str, ids: set[str]) -> str | None:
     return name if name in ids else number[1] if number and number[1] in ids else None
 
 
-def _samples(sources: Sources, camera: CameraSource) -> list[Grey]:
-    n = _count(sources, camera) or SAMPLES
-    wanted = set(np.linspace(0, max(n - 1, 0), SAMPLES).astype(int).tolist())
-    return [grey for _, grey in _greys(sources, camera, wanted)]
+def _sample_images(sources: Sources, camera: CameraSource) -> list[Grey]:
+    n = _n_images(sources, camera) or _N_SAMPLES
+    wanted = set(np.linspace(0, max(n - 1, 0), _N_SAMPLES).astype(int).tolist())
+    return [grey for _, grey in _read_grey_images(sources, camera, wanted)]
 
 
-def _count(sources: Sources, camera: CameraSource) -> int | None:
+def _n_images(sources: Sources, camera: CameraSource) -> int | None:
     if camera.pictures is not None:
-        return len(_picture_paths(sources, camera.pictures))
+        return len(_image_paths(sources, camera.pictures))
     facts = inspect(VideoSource(camera.name, sources.path(camera.video or "")))
     return None if facts.duration_s is None else round(facts.duration_s * facts.frame_rate)
 
 
-def _greys(sources: Sources, camera: CameraSource, wanted: Container[int]) -> Iterator[tuple[int, Grey]]:
+def _read_grey_images(sources: Sources, camera: CameraSource, wanted: Container[int]) -> Iterator[tuple[int, Grey]]:
     """Yield the wanted pictures of a recording in grey, with their numbers."""
     if camera.pictures is not None:
-        for index, path in enumerate(_picture_paths(sources, camera.pictures)):
+        for index, path in enumerate(_image_paths(sources, camera.pictures)):
             if index in wanted:
-                yield index, _read_grey(path)
+                yield index, _read_grey_image(path)
         return
     source = VideoSource(camera.name, sources.path(camera.video or ""))
     facts = inspect(source)
-    for picture in pictures(source, facts):
+    for picture in decode(source, facts):
         index = round(picture.time_s * facts.frame_rate)
         if index in wanted:
-            grey = cv2.cvtColor(rgb_from_picture(picture, facts), cv2.COLOR_RGB2GRAY)
+            grey = cv2.cvtColor(rgb_from_decoded(picture, facts), cv2.COLOR_RGB2GRAY)
             yield index, np.asarray(grey, np.uint8)
 
 
-def _picture_paths(sources: Sources, pattern: str) -> list[Path]:
+def _image_paths(sources: Sources, pattern: str) -> list[Path]:
     given = sources.path(pattern)
     if given.is_dir():
-        found = sorted(path for path in given.iterdir() if path.suffix.lower() in PICTURES)
+        found = sorted(path for path in given.iterdir() if path.suffix.lower() in _IMAGE_SUFFIXES)
     else:
-        found = sorted(path for path in given.parent.glob(given.name) if path.suffix.lower() in PICTURES)
+        found = sorted(path for path in given.parent.glob(given.name) if path.suffix.lower() in _IMAGE_SUFFIXES)
     if not found:
         raise CalibrationError(f"no pictures at {given}; give a folder or a pattern such as left/*.png")
     return found
 
 
-def _read_grey(path: Path) -> Grey:
-    if path.stat().st_size > LARGEST_PICTURE_BYTES:
-        raise CalibrationError(f"{path} is larger than {LARGEST_PICTURE_BYTES // 10**6} MB; is it a picture?")
+def _read_grey_image(path: Path) -> Grey:
+    if path.stat().st_size > _LARGEST_PICTURE_BYTES:
+        raise CalibrationError(f"{path} is larger than {_LARGEST_PICTURE_BYTES // 10**6} MB; is it a picture?")
     try:
         grey = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_GRAYSCALE)
     except cv2.error:

@@ -16,13 +16,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from airborne.errors import CalibrationError, one_line
 from airborne.io.text import read_toml
+from airborne.types import Array, Ints
 
-Array = NDArray[np.floating]
-Ints = NDArray[np.integer]
-
-FEWEST_CORNERS = 6  # of a view that says where the board is
-THINNEST = 0.05  # width over length of the corners seen: on one line they leave the board free to turn
-ENOUGH = 2  # corners a picture, on average: the board is printed as described
+_FEWEST_CORNERS = 6  # of a view that says where the board is
+_THINNEST = 0.05  # width over length of the corners seen: on one line they leave the board free to turn
+_ENOUGH_CORNERS = 2  # corners a picture, on average: the board is printed as described
 DICTIONARIES = tuple(sorted(name for name in dir(cv2.aruco) if re.match(r"DICT_[0-9A]", name)))
 
 
@@ -42,12 +40,12 @@ class Board:
     @property
     def corners(self) -> Array:
         """The inner corners (n, 3) [m], row by row."""
-        nx, ny = self.inner
+        nx, ny = self.inner_size
         grid = np.stack(np.meshgrid(np.arange(nx), np.arange(ny)), axis=-1).reshape(-1, 2) * self.square_m
         return np.column_stack([grid, np.zeros(len(grid))])
 
     @property
-    def inner(self) -> tuple[int, int]:
+    def inner_size(self) -> tuple[int, int]:
         """How many inner corners a row and a column have."""
         return (self.columns - 1, self.rows - 1) if self.kind == "charuco" else (self.columns, self.rows)
 
@@ -58,7 +56,7 @@ class Board:
 
     def neighbours(self) -> Ints:
         """Return the pairs of corners one square apart: (k, 2)."""
-        nx, ny = self.inner
+        nx, ny = self.inner_size
         index = np.arange(nx * ny).reshape(ny, nx)
         across = np.stack([index[:, :-1].ravel(), index[:, 1:].ravel()], axis=1)
         down = np.stack([index[:-1].ravel(), index[1:].ravel()], axis=1)
@@ -129,33 +127,33 @@ def board_from_table(table: dict, where: str) -> Board:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sighting:
+class DetectedCorners:
     """The corners that one picture shows."""
 
     corner: Ints  # (n,) rows of the board's corners
     px: Array  # (n, 2) [px]
 
 
-NOTHING = Sighting(np.zeros(0, int), np.zeros((0, 2)))
-Detector = Callable[[NDArray[np.uint8]], Sighting]
+NO_CORNERS = DetectedCorners(np.zeros(0, int), np.zeros((0, 2)))
+Detector = Callable[[NDArray[np.uint8]], DetectedCorners]
 
 
-def detector_of(board: Board) -> Detector:
+def board_detector(board: Board) -> Detector:
     """Return what finds the board in a grey picture (h, w): too few corners, or all on a line, count as none."""
     find = _charuco_finder(board) if board.kind == "charuco" else _chessboard_finder(board)
     corners = board.corners[:, :2]
 
-    def detect(grey: NDArray[np.uint8]) -> Sighting:
+    def detect(grey: NDArray[np.uint8]) -> DetectedCorners:
         sighting = find(255 - grey if board.is_inverted else grey)
-        if len(sighting.corner) < FEWEST_CORNERS:
-            return NOTHING
+        if len(sighting.corner) < _FEWEST_CORNERS:
+            return NO_CORNERS
         spread = np.linalg.svd(corners[sighting.corner] - corners[sighting.corner].mean(axis=0), compute_uv=False)
-        return sighting if spread[1] > THINNEST * spread[0] else NOTHING
+        return sighting if spread[1] > _THINNEST * spread[0] else NO_CORNERS
 
     return detect
 
 
-def as_printed(board: Board, pictures: Sequence[NDArray[np.uint8]]) -> tuple[Board, tuple[str, ...]]:
+def match_print(board: Board, pictures: Sequence[NDArray[np.uint8]]) -> tuple[Board, tuple[str, ...]]:
     """Return the board with the pattern (legacy or not, inverted or not) that shows most corners in some pictures.
 
     The notes tell what differs from what was said; where nothing is found at all the board stays as it is.
@@ -165,7 +163,7 @@ def as_printed(board: Board, pictures: Sequence[NDArray[np.uint8]]) -> tuple[Boa
     said = (board.is_inverted, board.is_legacy)
     counts = {said: _n_corners(board, pictures)}
     kinds = [(inverted, legacy) for inverted in (False, True) for legacy in {False, board.rows % 2 == 0}]
-    for inverted, legacy in kinds if counts[said] < ENOUGH * len(pictures) else ():
+    for inverted, legacy in kinds if counts[said] < _ENOUGH_CORNERS * len(pictures) else ():
         if (inverted, legacy) not in counts:
             counts[inverted, legacy] = _n_corners(replace(board, is_inverted=inverted, is_legacy=legacy), pictures)
     best = max(counts, key=counts.__getitem__)
@@ -179,7 +177,7 @@ def as_printed(board: Board, pictures: Sequence[NDArray[np.uint8]]) -> tuple[Boa
 
 
 def _n_corners(board: Board, pictures: Sequence[NDArray[np.uint8]]) -> int:
-    detect = detector_of(board)
+    detect = board_detector(board)
     return sum(len(detect(picture).corner) for picture in pictures)
 
 
@@ -195,11 +193,11 @@ def _charuco_finder(board: Board) -> Detector:
     pattern.setLegacyPattern(board.is_legacy)
     finder = cv2.aruco.CharucoDetector(pattern)
 
-    def find(grey: NDArray[np.uint8]) -> Sighting:
+    def find(grey: NDArray[np.uint8]) -> DetectedCorners:
         px, ids, _, _ = finder.detectBoard(grey)
         if ids is None:
-            return NOTHING
-        return Sighting(np.asarray(ids, int).ravel(), np.asarray(px, float).reshape(-1, 2))
+            return NO_CORNERS
+        return DetectedCorners(np.asarray(ids, int).ravel(), np.asarray(px, float).reshape(-1, 2))
 
     return find
 
@@ -208,13 +206,13 @@ def _chessboard_finder(board: Board) -> Detector:
     nx, ny = board.columns, board.rows
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 30, 1e-3)
 
-    def find(grey: NDArray[np.uint8]) -> Sighting:
+    def find(grey: NDArray[np.uint8]) -> DetectedCorners:
         is_found, px = cv2.findChessboardCornersSB(grey, (nx, ny), flags=cv2.CALIB_CB_NORMALIZE_IMAGE)
         if not is_found:
             quick = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
             is_found, px = cv2.findChessboardCorners(grey, (nx, ny), flags=quick)
             if not is_found:
-                return NOTHING
+                return NO_CORNERS
             half = _half_a_square(np.asarray(px, float).reshape(ny, nx, 2))
             px = cv2.cornerSubPix(grey, px, (half, half), (-1, -1), criteria)
         grid = np.asarray(px, float).reshape(ny, nx, 2)
@@ -222,7 +220,7 @@ def _chessboard_finder(board: Board) -> Detector:
             grid = grid[:, ::-1]  # seen from the front, rows go down where columns go right
         if not board.is_ambiguous and _brightness(grey, grid[:2, :2]) > _brightness(grey, grid[-2:, -2:]):
             grid = grid[::-1, ::-1]  # the first square is the dark one
-        return Sighting(np.arange(nx * ny), grid.reshape(-1, 2))
+        return DetectedCorners(np.arange(nx * ny), grid.reshape(-1, 2))
 
     return find
 

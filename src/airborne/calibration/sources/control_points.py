@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.calibration.sources.court import ScenePoint, nearest_names
+from airborne.calibration.sources.court import ScenePoint, closest_names
 from airborne.errors import CalibrationError
 from airborne.io.text import read_csv
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-WORLD_COLUMNS = ("x_m", "y_m", "z_m")
-EXPECTED = "expected point,x_m,y_m,z_m,cam1_u,cam1_v,..."
+_WORLD_COLUMNS = ("x_m", "y_m", "z_m")
+_EXPECTED = "expected point,x_m,y_m,z_m,cam1_u,cam1_v,..."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,7 +28,7 @@ class ControlPoints:
     px: Array  # (n, cameras, 2) [px]
     sd_m: Array | None = None  # (n, 3) how exactly each coordinate is known [m]; None: exactly
 
-    def seen_by(self, camera: str) -> NDArray[np.bool_]:
+    def is_seen_by(self, camera: str) -> NDArray[np.bool_]:
         """Say which points the named camera sees: (n,)."""
         return ~np.isnan(self.px[:, self.cameras.index(camera), 0])
 
@@ -60,7 +59,7 @@ def read_control_points(path: str | Path, known: dict[str, ScenePoint] | None = 
         if name in names:
             raise CalibrationError(f"{path}: point '{name}' stands in rows {names[name]} and {line}; remove one")
         names[name] = line
-    places = [_place(path, line, {c: row[column[c]] for c in column}, known or {}) for line, row in rows]
+    places = [_scene_point(path, line, {c: row[column[c]] for c in column}, known or {}) for line, row in rows]
     if known and not any(place is known.get(name) for name, place in zip(names, places, strict=True)):
         raise CalibrationError(
             f"{path}: not one point has its place from the court, as all have coordinates of their own; "
@@ -74,31 +73,31 @@ def read_control_points(path: str | Path, known: dict[str, ScenePoint] | None = 
     )
     return ControlPoints(
         names=tuple(names),
-        world=np.array([place.place_m for place in places]),
+        world=np.array([place.position_m for place in places]),
         cameras=cameras,
         px=px,
         sd_m=np.array([place.sd_m for place in places]) if known else None,
     )
 
 
-def _place(path: Path, line: int, row: Mapping[str, str], known: dict[str, ScenePoint]) -> ScenePoint:
+def _scene_point(path: Path, line: int, row: Mapping[str, str], known: dict[str, ScenePoint]) -> ScenePoint:
     """Return a row's own coordinates; where it has none, those of the known point of its name."""
-    if not known or any(row.get(c, "").lower() not in ("", "nan") for c in WORLD_COLUMNS):
-        place = np.array([_number(path, line, c, row.get(c, "")) for c in WORLD_COLUMNS])
+    if not known or any(row.get(c, "").lower() not in ("", "nan") for c in _WORLD_COLUMNS):
+        place = np.array([_number(path, line, c, row.get(c, "")) for c in _WORLD_COLUMNS])
         return ScenePoint(place, np.zeros(3))
     if row["point"] not in known:
         raise CalibrationError(
             f"{path}, row {line}: point '{row['point']}' has no x_m, y_m, z_m and is none of the court's; "
-            f"nearest names: {nearest_names(row['point'], known)}"
+            f"nearest names: {closest_names(row['point'], known)}"
         )
     return known[row["point"]]
 
 
 def _read_rows(path: Path) -> list:
     """Return the header and (line number, row) for every row that is not empty."""
-    rows = read_csv(path, EXPECTED, CalibrationError)
+    rows = read_csv(path, _EXPECTED, CalibrationError)
     if not rows:
-        raise CalibrationError(f"{path} is empty; {EXPECTED}")
+        raise CalibrationError(f"{path} is empty; {_EXPECTED}")
     if len(rows) == 1:
         raise CalibrationError(f"{path} has a header but no points; add a row for each control point")
     return [rows[0][1], *rows[1:]]
@@ -109,13 +108,13 @@ def _check_header(path: Path, header: Sequence[str], *, needs_world: bool) -> tu
     twice = sorted({name for name in header if header.count(name) > 1})
     if twice:
         raise CalibrationError(f"{path}: column '{twice[0]}' stands twice in the header; name each column once")
-    missing = [name for name in ("point", *WORLD_COLUMNS) if name not in header and (needs_world or name == "point")]
+    missing = [name for name in ("point", *_WORLD_COLUMNS) if name not in header and (needs_world or name == "point")]
     if missing:
-        raise CalibrationError(f"{path}: no column {', '.join(missing)}; found {','.join(header)[:80]}; {EXPECTED}")
-    others = [name for name in header if name not in ("point", *WORLD_COLUMNS)]
+        raise CalibrationError(f"{path}: no column {', '.join(missing)}; found {','.join(header)[:80]}; {_EXPECTED}")
+    others = [name for name in header if name not in ("point", *_WORLD_COLUMNS)]
     strange = [name for name in others if len(name) < 3 or name[-2:] not in ("_u", "_v")]
     if strange:
-        raise CalibrationError(f"{path}: column '{strange[0]}' is not <camera>_u or <camera>_v; {EXPECTED}")
+        raise CalibrationError(f"{path}: column '{strange[0]}' is not <camera>_u or <camera>_v; {_EXPECTED}")
     cameras = tuple(dict.fromkeys(name[:-2] for name in others))
     if not cameras:
         raise CalibrationError(f"{path}: no camera columns; add <camera>_u and <camera>_v for each camera")

@@ -9,10 +9,10 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
 from airborne.errors import CalibrationError, one_line
-from airborne.io.text import listed_keys, read_toml
+from airborne.io.text import list_keys, read_toml
 
 Positive = Annotated[float, Field(gt=0)]
-Pixels = Literal["upper-left-1", "upper-left-0", "lower-left-1", "lower-left-0"]
+PixelConventionName = Literal["upper-left-1", "upper-left-0", "lower-left-1", "lower-left-0"]
 
 
 class _Strict(BaseModel):
@@ -83,7 +83,7 @@ class WandSource(_Strict):
     file: str
     length_m: Positive | None = None
     lengths_m: list[Positive] | None = None
-    pixels: Pixels = "upper-left-1"
+    pixels: PixelConventionName = "upper-left-1"
     cameras: list[str] | None = None  # whose columns the file has, in order; all cameras where it does not say
 
     @model_validator(mode="after")
@@ -111,7 +111,7 @@ class WorldTable(_Strict):
     in_xy: str | None = None
     throw: str | None = None  # tracks of a thrown thing: DLTdv's xypts
     rate_hz: Positive | None = None  # of the throw
-    pixels: Pixels = "upper-left-1"
+    pixels: PixelConventionName = "upper-left-1"
 
     @model_validator(mode="after")
     def _whole(self) -> WorldTable:
@@ -142,9 +142,9 @@ class Sources(_Strict):
         names = self.names
         if len(set(names)) < len(names):
             raise ValueError(f"two cameras share a name: {', '.join(names)}; give each its own")
-        if self.detections is not None and self.start is None and len(self.given) < 2:
+        if self.detections is not None and self.start is None and len(self.kinds) < 2:
             raise ValueError('detections refine cameras that are known: give [start] file = "..." or another source')
-        if not self.given:
+        if not self.kinds:
             raise ValueError("no source: add [board], [control_points], [court], [wand] or [detections]")
         return self
 
@@ -154,7 +154,7 @@ class Sources(_Strict):
         return [camera.name for camera in self.camera]
 
     @property
-    def given(self) -> list[str]:
+    def kinds(self) -> list[str]:
         """The kinds of evidence that are given."""
         kinds = ("board", "control_points", "court", "wand", "detections")
         return [kind for kind in kinds if getattr(self, kind) is not None]
@@ -184,7 +184,7 @@ def sources_from(document: dict, folder: Path, where: str) -> Sources:
     if "camera" not in document or "body" in document:
         raise CalibrationError(
             f"{where} is no file of sources: expected [[camera]] and [board], [control_points], [court], [wand] or "
-            f"[detections] (found {listed_keys(document)})"
+            f"[detections] (found {list_keys(document)})"
         )
     try:
         sources = Sources.model_validate(document)

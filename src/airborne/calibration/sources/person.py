@@ -11,53 +11,51 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.bundle import Adjusted, Freedom, Prior, Source, adjust
-from airborne.calibration.initial.resection import LEAST_VISIBILITY, WRONG_PX, Mending, disagreeing, mend, sampled
+from airborne.calibration.bundle import Adjustment, FreeParameters, CameraPrior, Source, adjust
+from airborne.calibration.initial.resection import LEAST_RESECTION_VISIBILITY, MISPLACED_PX, Resection, find_misplaced_cameras, resect_cameras, sample_moments
 from airborne.cameras.camera import Rig
-from airborne.cameras.consensus import agreed_points
+from airborne.cameras.consensus import triangulate_consensus
 from airborne.cameras.detections import Detections
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-GIVEN_PX = WRONG_PX / 2  # how far, one standard deviation, a camera may be off that was not found wrong
+_CALIBRATION_SD_PX = MISPLACED_PX / 2  # how far, one standard deviation, a camera may be off that was not found wrong
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Refined:
+class RigRefinement:
     """A rig that agrees better with what it sees."""
 
     rig: Rig
-    mended: tuple[Mending, ...]  # cameras that were clearly elsewhere, placed anew first
-    adjusted: Adjusted
+    resections: tuple[Resection, ...]  # cameras that were clearly elsewhere, placed anew first
+    adjustment: Adjustment
     before_px: float  # median distance of all detections from their triangulated points [px]
     after_px: float
 
 
-def refine(rig: Rig, detections: Detections, freedom: Freedom | None = None) -> Refined:
+def refine_rig(rig: Rig, detections: Detections, free: FreeParameters | None = None) -> RigRefinement:
     """Name and mend the cameras that are clearly wrong, then adjust the places of all; lenses stay unless freed.
 
     detections: one moment a row. Raises CalibrationError where too little is seen.
     """
     seen = detections.select(rig.names)
-    wrong = disagreeing(rig, seen)
-    start, _ = mend(rig, seen, [m.camera.name for m in wrong]) if wrong else (rig, ())
+    wrong = find_misplaced_cameras(rig, seen)
+    start, _ = resect_cameras(rig, seen, [m.camera.name for m in wrong]) if wrong else (rig, ())
     trusted = [name for name in rig.names if name not in {m.camera.name for m in wrong}]
     source = person_source(start, seen)
-    prior = given_prior(start, trusted, source.points)
-    adjusted = adjust(start, [source], freedom or Freedom(focal=False), prior=prior)
-    return Refined(
+    prior = calibration_prior(start, trusted, source.points)
+    adjusted = adjust(start, [source], free or FreeParameters(focal=False), prior=prior)
+    return RigRefinement(
         rig=adjusted.rig,
-        mended=wrong,
-        adjusted=adjusted,
+        resections=wrong,
+        adjustment=adjusted,
         before_px=median_reprojection_px(rig, seen),
         after_px=median_reprojection_px(adjusted.rig, seen),
     )
 
 
-def given_prior(rig: Rig, trusted: Sequence[str], points: Array) -> Prior:
+def calibration_prior(rig: Rig, trusted: Sequence[str], points: Array) -> CameraPrior:
     """Return what a calibration is worth that its cameras were not found wrong in: GIVEN_PX at points (n, 3) [m].
 
     Half of it by each camera's place and half by its direction; nothing is known of cameras that are not trusted, and
@@ -67,16 +65,16 @@ def given_prior(rig: Rig, trusted: Sequence[str], points: Array) -> Prior:
     middle = np.median(points, axis=0)
     for row, camera in zip(sd, rig, strict=True):
         if camera.name in trusted:
-            angle_rad = GIVEN_PX / camera.K[0, 0]
+            angle_rad = _CALIBRATION_SD_PX / camera.K[0, 0]
             row[:3] = angle_rad / np.sqrt(2)
             row[3:6] = angle_rad / np.sqrt(2) * np.linalg.norm(camera.centre - middle)
-    return Prior(sd=sd)
+    return CameraPrior(sd=sd)
 
 
 def person_source(rig: Rig, detections: Detections, *, name: str = "detections") -> Source:
     """Return sure detections that the cameras agree on as free points; starts are triangulated with the rig."""
-    sure = sampled(detections).surer_than(LEAST_VISIBILITY).select(rig.names)
-    agreed = agreed_points(rig, sure.px, sure.visibility)
+    sure = sample_moments(detections).above_visibility(LEAST_RESECTION_VISIBILITY).select(rig.names)
+    agreed = triangulate_consensus(rig, sure.px, sure.visibility)
     n_points, n_cameras = sure.px.shape[1:3]
     points = agreed.points.reshape(-1, 3)
     is_known = np.asarray(np.isfinite(points).all(axis=1))
@@ -100,7 +98,7 @@ def median_reprojection_px(rig: Rig, detections: Detections) -> float:
     return float(np.nanmedian(np.linalg.norm(projected - detections.px, axis=-1)))
 
 
-def onto(rig: Rig, wanted: Rig, names: Sequence[str], *, scaled: bool = True) -> tuple[RigidTransform, float]:
+def align_rigs(rig: Rig, wanted: Rig, names: Sequence[str], *, fits_scale: bool = True) -> tuple[RigidTransform, float]:
     """Return the move, and the scale before it, that bring the named cameras nearest to where `wanted` has them.
 
     Directions settle the turn (Markley's mean), places the scale and the shift; the scale is 1 unless `scaled`.
@@ -111,5 +109,5 @@ def onto(rig: Rig, wanted: Rig, names: Sequence[str], *, scaled: bool = True) ->
     there = np.stack([wanted[name].centre for name in names])
     spread, target = turn.apply(here - here.mean(axis=0)), there - there.mean(axis=0)
     size = float(np.sum(spread**2))
-    scale = float(np.sum(spread * target)) / size if scaled and size > 0 else 1.0
+    scale = float(np.sum(spread * target)) / size if fits_scale and size > 0 else 1.0
     return RigidTransform.from_components(there.mean(axis=0) - turn.apply(here.mean(axis=0)) * scale, turn), scale

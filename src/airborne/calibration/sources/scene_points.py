@@ -11,25 +11,23 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.bundle.source import Lengths, Source
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras.camera import Camera, Rig
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-N_POINTS = 4  # the fewest that place a camera
-FOCAL_RATIOS = np.geomspace(0.4, 5.0, 14)  # focal length over the picture's longer side
-SCALE_PX = 3.0  # residuals much beyond this count ever less
-FAR_M = 1000.0  # an anchor stands so far off that its distance changes with one coordinate only
-EXACT_SD_M = 1e-6
-FAR_OFF = 5.0  # by which a logarithm of the focal length never changes
+_N_POINTS = 4  # the fewest that place a camera
+_FOCAL_RATIOS = np.geomspace(0.4, 5.0, 14)  # focal length over the picture's longer side
+_SCALE_PX = 3.0  # residuals much beyond this count ever less
+_FAR_M = 1000.0  # an anchor stands so far off that its distance changes with one coordinate only
+_EXACT_SD_M = 1e-6
+_LARGEST_LOG_CHANGE = 5.0  # by which a logarithm of the focal length never changes
 
 
-def scene_start(
+def initial_rig_from_points(
     points: ControlPoints, sizes: Mapping[str, tuple[int, int]], lenses: Mapping[str, Camera] | None = None
 ) -> Rig:
     """Place every camera that sees four known points or more, roughly: a start for the adjustment.
@@ -39,11 +37,11 @@ def scene_start(
     """
     found = []
     for i, name in enumerate(points.cameras):
-        seen = points.seen_by(name)
-        if seen.sum() >= N_POINTS:
+        seen = points.is_seen_by(name)
+        if seen.sum() >= _N_POINTS:
             lens = (lenses or {}).get(name)
-            guesses = [lens] if lens is not None else _guesses(name, sizes[name])
-            found.append(_placed(guesses, points.world[seen], points.px[seen, i], is_lens_known=lens is not None))
+            guesses = [lens] if lens is not None else _focal_guesses(name, sizes[name])
+            found.append(_best_camera(guesses, points.world[seen], points.px[seen, i], is_lens_known=lens is not None))
     return Rig(tuple(camera for camera in found if camera is not None))
 
 
@@ -57,13 +55,13 @@ def scene_source(rig_names: Sequence[str], points: ControlPoints, *, name: str) 
     kept, number = np.unique(row, return_inverse=True)  # points that no camera sees say nothing
     world = points.world[kept]
     sd_m = np.zeros(world.shape) if points.sd_m is None else points.sd_m[kept]
-    is_free = sd_m > EXACT_SD_M
+    is_free = sd_m > _EXACT_SD_M
     point, axis = np.nonzero(is_free)
-    anchors = world[point] + FAR_M * np.eye(3)[axis]
+    anchors = world[point] + _FAR_M * np.eye(3)[axis]
     ties = Lengths(
         first=point,
         second=len(world) + np.arange(len(point)),
-        length_m=np.full(len(point), FAR_M),
+        length_m=np.full(len(point), _FAR_M),
         sd_m=sd_m[point, axis],
     )
     return Source(
@@ -77,9 +75,9 @@ def scene_source(rig_names: Sequence[str], points: ControlPoints, *, name: str) 
     )
 
 
-def _guesses(name: str, size: tuple[int, int]) -> list[Camera]:
+def _focal_guesses(name: str, size: tuple[int, int]) -> list[Camera]:
     middle = (np.array(size) - 1) / 2
-    focals = FOCAL_RATIOS * max(size)
+    focals = _FOCAL_RATIOS * max(size)
     return [
         Camera(
             name=name,
@@ -91,25 +89,25 @@ def _guesses(name: str, size: tuple[int, int]) -> list[Camera]:
     ]
 
 
-def _placed(guesses: Sequence[Camera], world: Array, px: Array, *, is_lens_known: bool) -> Camera | None:
+def _best_camera(guesses: Sequence[Camera], world: Array, px: Array, *, is_lens_known: bool) -> Camera | None:
     """Return the guess, placed and polished, with which most of the points (n, 3) [m] lie near their pixels (n, 2)."""
-    placed = [camera for guess in guesses for camera in _places(guess, world, px)]
+    placed = [camera for guess in guesses for camera in _resect_by_points(guess, world, px)]
     if not placed:
         return None
     best = sorted(placed, key=lambda camera: _misfit(camera, world, px))[:3]
-    polished = [_polished(camera, world, px, is_focal_free=not is_lens_known) for camera in best]
+    polished = [_refine_camera(camera, world, px, is_focal_free=not is_lens_known) for camera in best]
     return min(polished, key=lambda camera: _misfit(camera, world, px))
 
 
-def _places(camera: Camera, world: Array, px: Array) -> Iterator[Camera]:
-    straight = camera.undistorted_px(px)
+def _resect_by_points(camera: Camera, world: Array, px: Array) -> Iterator[Camera]:
+    straight = camera.undistort_px(px)
     is_usable = np.isfinite(straight).all(axis=1)
-    if is_usable.sum() < N_POINTS:
+    if is_usable.sum() < _N_POINTS:
         return
     xyz, uv = world[is_usable], straight[is_usable]
     cv2.setRNGSeed(0)
     tries = [cv2.solvePnPGeneric(xyz, uv, camera.K, None, flags=cv2.SOLVEPNP_SQPNP)[1:3]]
-    if len(xyz) > N_POINTS:
+    if len(xyz) > _N_POINTS:
         limit = 0.01 * max(camera.size)
         found, turn, t, _ = cv2.solvePnPRansac(
             xyz, uv, camera.K, None, reprojectionError=limit, iterationsCount=200, flags=cv2.SOLVEPNP_SQPNP
@@ -124,26 +122,26 @@ def _places(camera: Camera, world: Array, px: Array) -> Iterator[Camera]:
 
 def _misfit(camera: Camera, world: Array, px: Array) -> float:
     """Return the robust mean (Cauchy) of the squared distances; points behind the camera count as far off."""
-    return float(np.mean(np.log1p(np.sum((_residual(camera, world, px) / SCALE_PX) ** 2, axis=1))))
+    return float(np.mean(np.log1p(np.sum((_residual(camera, world, px) / _SCALE_PX) ** 2, axis=1))))
 
 
 def _residual(camera: Camera, world: Array, px: Array) -> Array:
     return np.nan_to_num(px - camera.px_from_world(world), nan=float(max(camera.size)))
 
 
-def _polished(camera: Camera, world: Array, px: Array, *, is_focal_free: bool) -> Camera:
+def _refine_camera(camera: Camera, world: Array, px: Array, *, is_focal_free: bool) -> Camera:
     """Fit the place, and the focal length where it is free, by robust least squares."""
 
     def moved(step: Array) -> Camera:
         turn = RigidTransform.from_components(step[3:6], Rotation.from_rotvec(step[:3]))
         K = camera.K.copy()
-        K[[0, 1], [0, 1]] *= np.exp(np.clip(step[6], -FAR_OFF, FAR_OFF)) if is_focal_free else 1.0
+        K[[0, 1], [0, 1]] *= np.exp(np.clip(step[6], -_LARGEST_LOG_CHANGE, _LARGEST_LOG_CHANGE)) if is_focal_free else 1.0
         return replace(camera, K=K, camera_from_world=turn * camera.camera_from_world)
 
     free = 7 if is_focal_free and 2 * len(world) >= 7 else 6
 
     def residual(step: Array) -> Array:
-        return (_residual(moved(np.append(step, 0.0)), world, px) / SCALE_PX).ravel()
+        return (_residual(moved(np.append(step, 0.0)), world, px) / _SCALE_PX).ravel()
 
     fit = least_squares(residual, np.zeros(free), loss="cauchy", x_scale="jac", max_nfev=100)
     return min((camera, moved(np.append(fit.x, 0.0))), key=lambda each: _misfit(each, world, px))

@@ -11,20 +11,19 @@ from numpy.typing import NDArray
 
 from airborne.calibration.bundle.source import Lengths, Source
 from airborne.cameras.camera import Rig
-from airborne.cameras.consensus import agreed_points
+from airborne.cameras.consensus import triangulate_consensus
 from airborne.cameras.formats.dltdv import is_xypts, read_xypts
-from airborne.cameras.formats.options import Given
+from airborne.cameras.formats.options import FileOptions
 from airborne.errors import CalibrationError
 from airborne.io.text import read_csv
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-LENGTH_SD_M = 5e-4  # how well a wand's length is usually measured
+_LENGTH_SD_M = 5e-4  # how well a wand's length is usually measured
 LENGTH_RANGE_M = (0.02, 20.0)  # no wand is shorter or longer
-LENGTH_SHARE = 0.15  # a wand that comes out further off its length is not the wand
-MOST_MARKERS = 20
-COLUMNS = {"frame", "marker", "camera", "u_px", "v_px"}
-EXPECTED = "expected frame,marker,camera,u_px,v_px or DLTdv's pt1_cam1_U,pt1_cam1_V,pt1_cam2_U,..."
+_LENGTH_SHARE = 0.15  # a wand that comes out further off its length is not the wand
+_MOST_MARKERS = 20
+_COLUMNS = {"frame", "marker", "camera", "u_px", "v_px"}
+_EXPECTED = "expected frame,marker,camera,u_px,v_px or DLTdv's pt1_cam1_U,pt1_cam1_V,pt1_cam2_U,..."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,7 +33,7 @@ class WandTracks:
     cameras: tuple[str, ...]
     px: Array  # (frames, markers, cameras, 2) [px]
     lengths_m: Mapping[tuple[int, int], float]  # between two markers, counted from 0 [m]
-    sd_m: float = LENGTH_SD_M  # of each length [m]
+    sd_m: float = _LENGTH_SD_M  # of each length [m]
 
     def __post_init__(self) -> None:
         n = self.px.shape[1]
@@ -57,14 +56,14 @@ class WandTracks:
         return replace(self, cameras=tuple(cameras), px=self.px[:, :, columns])
 
 
-def read_wand(path: Path, cameras: Sequence[str], given: Given, lengths_m: Sequence[float]) -> WandTracks:
+def read_wand(path: Path, cameras: Sequence[str], given: FileOptions, lengths_m: Sequence[float]) -> WandTracks:
     """Read a wand's tracks: DLTdv's or easyWand's `xypts.csv`, or a table `frame,marker,camera,u_px,v_px`.
 
     cameras name the first's columns, in their order; `given` says where its pixels count from. The other has markers
     from 1 and our own pixels. lengths_m are those between marker 1 and 2, 2 and 3, and so on [m]. Raises
     CalibrationError.
     """
-    rows = read_csv(path, EXPECTED, CalibrationError)
+    rows = read_csv(path, _EXPECTED, CalibrationError)
     header = ",".join(rows[0][1]) if rows else ""
     px = read_xypts(path, given, cameras).px if is_xypts(header) else _tracks(path, rows, cameras)
     if px.shape[1] != len(lengths_m) + 1:
@@ -79,8 +78,8 @@ def read_wand(path: Path, cameras: Sequence[str], given: Given, lengths_m: Seque
 def _tracks(path: Path, rows: Sequence[tuple[int, list[str]]], cameras: Sequence[str]) -> Array:
     """Sort rows of one frame, marker and camera, in any order: (frames, markers, cameras, 2) [px], NaN elsewhere."""
     (_, header), *rows = rows or [(1, [])]
-    if not rows or not set(header) >= COLUMNS:
-        raise CalibrationError(f"{path}: found {','.join(header)[:80] or 'nothing'}; {EXPECTED}")
+    if not rows or not set(header) >= _COLUMNS:
+        raise CalibrationError(f"{path}: found {','.join(header)[:80] or 'nothing'}; {_EXPECTED}")
     places: dict[tuple[int, int, int], tuple[float, float]] = {}
     for line, cells in rows:
         if len(cells) != len(header):
@@ -104,8 +103,8 @@ def _row(
         u, v = (float(row[key] or "nan") for key in ("u_px", "v_px"))
     except ValueError:
         raise CalibrationError(f"{where}: expected whole numbers for frame and marker, pixels or blanks else") from None
-    if not 1 <= marker <= MOST_MARKERS:
-        raise CalibrationError(f"{where}: marker {marker}; count the wand's markers from 1 to {MOST_MARKERS} at most")
+    if not 1 <= marker <= _MOST_MARKERS:
+        raise CalibrationError(f"{where}: marker {marker}; count the wand's markers from 1 to {_MOST_MARKERS} at most")
     camera = row["camera"]
     if camera not in cameras:
         raise CalibrationError(f"{where}: camera '{camera}' is not one of {', '.join(cameras)}")
@@ -122,8 +121,8 @@ def wand_source(rig: Rig, tracks: WandTracks) -> Source:
     """
     tracks = tracks.select([name for name in rig.names if name in tracks.cameras])
     rows = np.array([rig.names.index(name) for name in tracks.cameras])
-    agreed = agreed_points(rig.select(tracks.cameras), tracks.px, np.ones(tracks.px.shape[:-1]))
-    is_known = np.isfinite(agreed.points[..., 0]) & ~_is_astray(tracks, agreed.points)
+    agreed = triangulate_consensus(rig.select(tracks.cameras), tracks.px, np.ones(tracks.px.shape[:-1]))
+    is_known = np.isfinite(agreed.points[..., 0]) & ~_has_wrong_length(tracks, agreed.points)
     number = np.full(is_known.shape, -1)
     number[is_known] = np.arange(is_known.sum())
     frame, marker, column = np.nonzero(agreed.is_used & is_known[..., None])
@@ -139,12 +138,12 @@ def wand_source(rig: Rig, tracks: WandTracks) -> Source:
     )
 
 
-def _is_astray(tracks: WandTracks, points: Array) -> NDArray[np.bool_]:
+def _has_wrong_length(tracks: WandTracks, points: Array) -> NDArray[np.bool_]:
     """Say which markers (frames, markers) are at a wrong distance from another; points (frames, markers, 3) [m]."""
     astray = np.zeros(points.shape[:2], bool)
     for (a, b), length_m in tracks.lengths_m.items():
         found = np.linalg.norm(points[:, a] - points[:, b], axis=-1)
-        is_off = np.abs(found / length_m - 1) > LENGTH_SHARE  # NaN compares as right
+        is_off = np.abs(found / length_m - 1) > _LENGTH_SHARE  # NaN compares as right
         astray[:, a] |= is_off
         astray[:, b] |= is_off
     return astray

@@ -9,21 +9,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras.camera import Rig
 from airborne.errors import CalibrationError
 from airborne.geometry.robust import SD_OF_MEDIAN_DEVIATION
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-STANDARD_GRAVITY = 9.80665  # [m/s^2]
-NEAREST_M = 0.05  # points that are to fix an axis stand further apart than this
-LEAST_ANGLE = np.radians(5)  # between the axis and the third point
-FEWEST_TIMES = 6  # of a throw
-SHORTEST_FALL_M = 0.1  # a throw whose path is bent less says little about down
+_STANDARD_GRAVITY = 9.80665  # [m/s^2]
+_NEAREST_M = 0.05  # points that are to fix an axis stand further apart than this
+_LEAST_ANGLE = np.radians(5)  # between the axis and the third point
+_FEWEST_TIMES = 6  # of a throw
+_SHORTEST_FALL_M = 0.1  # a throw whose path is bent less says little about down
 
 
 def frame_of_three_points(origin: Array, along_x: Array, in_xy: Array) -> RigidTransform:
@@ -35,12 +33,12 @@ def frame_of_three_points(origin: Array, along_x: Array, in_xy: Array) -> RigidT
     lengths = np.linalg.norm(x), np.linalg.norm(side)
     if not np.all(np.isfinite([*x, *side])):
         raise CalibrationError("a point of the world's frame was not found: two cameras at least must see each of them")
-    if min(lengths) < NEAREST_M:
+    if min(lengths) < _NEAREST_M:
         raise CalibrationError(
-            f"points of the world's frame stand {min(lengths):.3f} m apart; choose some more than {NEAREST_M} m apart"
+            f"points of the world's frame stand {min(lengths):.3f} m apart; choose some more than {_NEAREST_M} m apart"
         )
     z = np.cross(x, side)
-    if np.linalg.norm(z) < np.sin(LEAST_ANGLE) * lengths[0] * lengths[1]:
+    if np.linalg.norm(z) < np.sin(_LEAST_ANGLE) * lengths[0] * lengths[1]:
         raise CalibrationError(
             "the world's origin, its point along x and its third point nearly stand on one line; choose another third"
         )
@@ -59,13 +57,13 @@ class Gravity:
 
     def describe(self) -> str:
         """Say in one line what was found and whether length and time fit together."""
-        ratio = self.magnitude / STANDARD_GRAVITY
-        off = abs(self.magnitude - STANDARD_GRAVITY)
+        ratio = self.magnitude / _STANDARD_GRAVITY
+        off = abs(self.magnitude - _STANDARD_GRAVITY)
         said = (
             f"up from {self.n_throws} throw{'s' * (self.n_throws > 1)}: known to {np.degrees(self.tilt_sd_rad):.2f} "
             f"degrees; the fall is {self.magnitude:.2f} m/s2 (sd {self.magnitude_sd:.2f}), expected 9.81"
         )
-        if off <= max(3 * self.magnitude_sd, 0.01 * STANDARD_GRAVITY):
+        if off <= max(3 * self.magnitude_sd, 0.01 * _STANDARD_GRAVITY):
             return said
         return (
             f"{said}, so lengths come out as {ratio:.3f} of the truth or times as {ratio**-0.5:.3f} of it; check the "
@@ -73,7 +71,7 @@ class Gravity:
         )
 
 
-def gravity_of(times_s: Array, throws: Sequence[Array]) -> Gravity:
+def estimate_gravity(times_s: Array, throws: Sequence[Array]) -> Gravity:
     """Find up from bodies in free flight: parabolas with one common acceleration, fitted robustly.
 
     times_s (t,) [s], throws: each (t, 3) [m] in the old world, NaN where not seen or not in the air; a ball is good, of
@@ -81,12 +79,12 @@ def gravity_of(times_s: Array, throws: Sequence[Array]) -> Gravity:
     """
     times_s = np.asarray(times_s, float)
     flights = [(times_s[seen], throw[seen]) for throw in throws if (seen := np.isfinite(throw).all(axis=1)).any()]
-    flights = [(t - t.mean(), x) for t, x in flights if len(t) >= FEWEST_TIMES]
+    flights = [(t - t.mean(), x) for t, x in flights if len(t) >= _FEWEST_TIMES]
     longest = max((float(np.ptp(t)) for t, _ in flights), default=0.0)
-    if STANDARD_GRAVITY * longest**2 / 8 < SHORTEST_FALL_M:
+    if _STANDARD_GRAVITY * longest**2 / 8 < _SHORTEST_FALL_M:
         raise CalibrationError(
-            f"the throw is seen for {longest:.2f} s at most; {np.sqrt(8 * SHORTEST_FALL_M / STANDARD_GRAVITY):.2f} s "
-            f"and {FEWEST_TIMES} places are needed to tell which way is up: throw higher"
+            f"the throw is seen for {longest:.2f} s at most; {np.sqrt(8 * _SHORTEST_FALL_M / _STANDARD_GRAVITY):.2f} s "
+            f"and {_FEWEST_TIMES} places are needed to tell which way is up: throw higher"
         )
     g, covariance = _common_acceleration(flights)
     magnitude = float(np.linalg.norm(g))
@@ -100,14 +98,14 @@ def frame_of_gravity(gravity: Gravity, origin: Array, along_x: Array) -> RigidTr
     """Return new_from_old of the world with z up, this origin, and x toward a second point (3,) [m] seen from above."""
     x = np.asarray(along_x - origin, float)
     level = x - (x @ gravity.up) * gravity.up
-    if not np.isfinite(level).all() or np.linalg.norm(level) < NEAREST_M:
+    if not np.isfinite(level).all() or np.linalg.norm(level) < _NEAREST_M:
         raise CalibrationError(
             "the world's point along x stands right above or below its origin, or was not found; choose another"
         )
     return _frame(np.asarray(origin, float), level / np.linalg.norm(level), gravity.up)
 
 
-def merged_starts(rigs: Sequence[Rig]) -> Rig:
+def merge_rigs(rigs: Sequence[Rig]) -> Rig:
     """Join starts that different sources gave: the first rig's world stays, the others are moved onto it, one by one.
 
     Two rigs join through cameras that both hold: by one camera's place and direction or, where there are more, by the
@@ -124,7 +122,7 @@ def merged_starts(rigs: Sequence[Rig]) -> Rig:
                 f"nothing ties {', '.join(most.names)} to {', '.join(known)}: let one camera at least take part in "
                 "both sources (board, wand, court, points)"
             )
-        new_from_old = _onto([known[name].camera_from_world for name in shared], most.select(shared))
+        new_from_old = _align_rig([known[name].camera_from_world for name in shared], most.select(shared))
         for camera in most:
             moved = replace(camera, camera_from_world=camera.camera_from_world * new_from_old.inv())
             known.setdefault(camera.name, moved)
@@ -132,7 +130,7 @@ def merged_starts(rigs: Sequence[Rig]) -> Rig:
     return Rig(tuple(known.values()))
 
 
-def _onto(wanted: Sequence[RigidTransform], rig: Rig) -> RigidTransform:
+def _align_rig(wanted: Sequence[RigidTransform], rig: Rig) -> RigidTransform:
     """Return new_from_old that brings the rig's cameras to where they are wanted."""
     answers = [place.inv() * camera.camera_from_world for place, camera in zip(wanted, rig, strict=True)]
     turn = Rotation.concatenate([answer.rotation for answer in answers]).mean()

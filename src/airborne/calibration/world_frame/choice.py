@@ -6,71 +6,68 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.bundle import Adjusted
-from airborne.calibration.initial.values import Inputs, pixel_count
-from airborne.calibration.sources.person import onto
-from airborne.calibration.world_frame.alignment import frame_of_gravity, frame_of_three_points, gravity_of
+from airborne.calibration.bundle import Adjustment
+from airborne.calibration.initial.values import Inputs, pixel_convention
+from airborne.calibration.sources.person import align_rigs
+from airborne.calibration.world_frame.alignment import frame_of_gravity, frame_of_three_points, estimate_gravity
 from airborne.cameras.clicks import read_clicks
-from airborne.cameras.consensus import agreed_points
+from airborne.cameras.consensus import triangulate_consensus
 from airborne.cameras.formats.dltdv import read_xypts
-from airborne.cameras.formats.options import Given
+from airborne.cameras.formats.options import FileOptions
 from airborne.errors import CalibrationError
 
-Array = NDArray[np.floating]
-
-STAYS = RigidTransform.from_components(np.zeros(3), Rotation.identity())
-FACE_UP = Rotation.from_matrix(np.diag([1.0, -1.0, -1.0]))  # the board's z goes into the paper, the world's up from it
+_IDENTITY = RigidTransform.from_components(np.zeros(3), Rotation.identity())
+_FACE_UP = Rotation.from_matrix(np.diag([1.0, -1.0, -1.0]))  # the board's z goes into the paper, the world's up from it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Framed:
+class WorldFrame:
     """Where the world is to be, and what defines it."""
 
-    new_from_old: RigidTransform = STAYS
+    new_from_old: RigidTransform = _IDENTITY
     scale: float = 1.0
-    said: str = ""
-    held_moment: int | None = None  # of the board, which stays where it is
-    held_camera: str | None = None
-    stays: bool = False  # the adjustment has been in this world already
+    description: str = ""
+    fixed_moment: int | None = None  # of the board, which stays where it is
+    fixed_camera: str | None = None
+    is_unchanged: bool = False  # the adjustment has been in this world already
 
 
-def framed(inputs: Inputs, adjusted: Adjusted, wrong: Sequence[str]) -> Framed:
+def choose_world_frame(inputs: Inputs, adjusted: Adjustment, wrong: Sequence[str]) -> WorldFrame:
     """Find the world's frame as asked; `wrong` cameras do not say where the calibration before was.
 
     Raises CalibrationError where what is asked for is not there.
     """
     table = inputs.sources.world
     if table.points is not None:
-        return _by_points(inputs, adjusted)
-    if table.frame == "board" or (table.frame == "auto" and _only_board(inputs)):
-        return _by_board(inputs, adjusted)
+        return _frame_by_points(inputs, adjusted)
+    if table.frame == "board" or (table.frame == "auto" and _has_only_board(inputs)):
+        return _frame_by_board(inputs, adjusted)
     if adjusted.prior is not None and table.frame in ("auto", "start"):
-        return Framed(said=f"as {_start_file(inputs)} has it, scale and all", stays=True)
-    if table.frame == "start" or (table.frame == "auto" and inputs.given is not None and not inputs.points):
-        return _by_start(inputs, adjusted, wrong)
+        return WorldFrame(description=f"as {_start_file(inputs)} has it, scale and all", is_unchanged=True)
+    if table.frame == "start" or (table.frame == "auto" and inputs.start_rig is not None and not inputs.points):
+        return _frame_by_start(inputs, adjusted, wrong)
     if table.frame == "auto" and inputs.points:
-        return Framed(said=f"that of the {' and the '.join(inputs.points)}", stays=True)
+        return WorldFrame(description=f"that of the {' and the '.join(inputs.points)}", is_unchanged=True)
     first = adjusted.rig.cameras[0]
     said = f"the origin is camera {first.name}, z is where it looks: give [world] for z up"
-    return Framed(new_from_old=first.camera_from_world, said=said, held_camera=first.name)
+    return WorldFrame(new_from_old=first.camera_from_world, description=said, fixed_camera=first.name)
 
 
 def _start_file(inputs: Inputs) -> str:
     return "" if inputs.sources.start is None else inputs.sources.start.file
 
 
-def _only_board(inputs: Inputs) -> bool:
-    return inputs.seen is not None and inputs.given is None and not inputs.points
+def _has_only_board(inputs: Inputs) -> bool:
+    return inputs.board_detections is not None and inputs.start_rig is None and not inputs.points
 
 
-def _by_board(inputs: Inputs, adjusted: Adjusted) -> Framed:
-    if inputs.seen is None:
+def _frame_by_board(inputs: Inputs, adjusted: Adjustment) -> WorldFrame:
+    if inputs.board_detections is None:
         raise CalibrationError('[world] frame = "board" needs a board that the cameras see together')
     source = next(source for source in adjusted.sources if source.name == "board")
-    n_corners = inputs.seen.views.n_corners
+    n_corners = inputs.board_detections.views.n_corners
     moment = inputs.sources.world.moment
     if moment is None:
         moment = int(np.argmax(n_corners.sum(axis=0)))
@@ -78,31 +75,31 @@ def _by_board(inputs: Inputs, adjusted: Adjusted) -> Framed:
         raise CalibrationError(f"[world] moment = {moment}: no camera sees the board then; choose another")
     if source.world_from_target is None:
         raise CalibrationError("the board was not found")
-    turn = RigidTransform.from_rotation(FACE_UP)
-    return Framed(
+    turn = RigidTransform.from_rotation(_FACE_UP)
+    return WorldFrame(
         new_from_old=turn * source.world_from_target[moment].inv(),
-        said=f"the board at moment {moment}: origin its first corner, x along a row, z out of its face",
-        held_moment=moment,
+        description=f"the board at moment {moment}: origin its first corner, x along a row, z out of its face",
+        fixed_moment=moment,
     )
 
 
-def _by_start(inputs: Inputs, adjusted: Adjusted, wrong: Sequence[str]) -> Framed:
-    if inputs.given is None:
+def _frame_by_start(inputs: Inputs, adjusted: Adjustment, wrong: Sequence[str]) -> WorldFrame:
+    if inputs.start_rig is None:
         raise CalibrationError('[world] frame = "start" needs [start] file = "..."')
-    trusted = [name for name in inputs.given.names if name not in wrong]
-    move, scale = onto(adjusted.rig, inputs.given, trusted)
-    has_scale = bool({"board", "wand"} & set(inputs.sources.given))
+    trusted = [name for name in inputs.start_rig.names if name not in wrong]
+    move, scale = align_rigs(adjusted.rig, inputs.start_rig, trusted)
+    has_scale = bool({"board", "wand"} & set(inputs.sources.kinds))
     if has_scale:
-        move, scale = onto(adjusted.rig, inputs.given, trusted, scaled=False)
+        move, scale = align_rigs(adjusted.rig, inputs.start_rig, trusted, fits_scale=False)
     said = f"as {_start_file(inputs)} has it, by {', '.join(trusted)}"
-    return Framed(new_from_old=move, scale=scale, said=said if has_scale else f"{said}, its scale kept")
+    return WorldFrame(new_from_old=move, scale=scale, description=said if has_scale else f"{said}, its scale kept")
 
 
-def _by_points(inputs: Inputs, adjusted: Adjusted) -> Framed:
+def _frame_by_points(inputs: Inputs, adjusted: Adjustment) -> WorldFrame:
     """Set the frame by clicked points, the third of them or a throw telling the plane."""
     table, rig = inputs.sources.world, adjusted.rig
     names, px = read_clicks(inputs.sources.path(table.points or ""), rig.names)
-    places = dict(zip(names, agreed_points(rig, px, np.ones(px.shape[:-1])).points, strict=True))
+    places = dict(zip(names, triangulate_consensus(rig, px, np.ones(px.shape[:-1])).points, strict=True))
     wanted = [name for name in (table.origin, table.along_x, table.in_xy) if name is not None]
     for name in wanted:
         if name not in places or not np.isfinite(places[name]).all():
@@ -113,13 +110,13 @@ def _by_points(inputs: Inputs, adjusted: Adjusted) -> Framed:
     origin, along_x = places[wanted[0]], places[wanted[1]]
     if table.throw is None:
         said = f"origin {wanted[0]}, x toward {wanted[1]}, {wanted[2]} in the plane of x and y"
-        return Framed(new_from_old=frame_of_three_points(origin, along_x, places[wanted[2]]), said=said)
+        return WorldFrame(new_from_old=frame_of_three_points(origin, along_x, places[wanted[2]]), description=said)
     sizes = {camera.name: camera.size for camera in rig}
     tracks = read_xypts(
-        inputs.sources.path(table.throw), Given(size=sizes, pixels=pixel_count(table.pixels)), rig.names
+        inputs.sources.path(table.throw), FileOptions(size=sizes, pixels=pixel_convention(table.pixels)), rig.names
     )
-    agreed = agreed_points(rig, tracks.px, np.ones(tracks.px.shape[:-1])).points
+    agreed = triangulate_consensus(rig, tracks.px, np.ones(tracks.px.shape[:-1])).points
     times_s = np.arange(len(agreed)) / (table.rate_hz or 1.0)
-    gravity = gravity_of(times_s, list(np.swapaxes(agreed, 0, 1)))
+    gravity = estimate_gravity(times_s, list(np.swapaxes(agreed, 0, 1)))
     said = f"{gravity.describe()}; origin {wanted[0]}, x toward {wanted[1]}"
-    return Framed(new_from_old=frame_of_gravity(gravity, origin, along_x), said=said)
+    return WorldFrame(new_from_old=frame_of_gravity(gravity, origin, along_x), description=said)

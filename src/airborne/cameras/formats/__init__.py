@@ -4,6 +4,6 @@ In come a file's text and what the file does not say about itself (`Given`); out
 text, with sentences on what the format cannot hold. Which file is which is told in `cameras/files.py`.
 """
 
-from airborne.cameras.formats.options import Given, PixelCount, Size, Unit
+from airborne.cameras.formats.options import FileOptions, PixelConvention, Size, Unit
 
-__all__ = ["Given", "PixelCount", "Size", "Unit"]
+__all__ = ["FileOptions", "PixelConvention", "Size", "Unit"]

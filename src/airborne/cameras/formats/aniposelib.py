@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from airborne.cameras.camera import Rig
 from airborne.cameras.formats.options import METRES, Unit
-from airborne.cameras.formats.toml import table_lines, toml
+from airborne.cameras.formats.toml import table_lines, toml_value
 
 
 def aniposelib_text(rig: Rig, unit: Unit = "m") -> str:
@@ -14,8 +14,8 @@ def aniposelib_text(rig: Rig, unit: Unit = "m") -> str:
     for number, camera in enumerate(rig):
         lines += [
             f"[cam_{number:0{digits}}]",
-            f"name = {toml(camera.name)}",
-            f"size = {toml(list(camera.size))}",
+            f"name = {toml_value(camera.name)}",
+            f"size = {toml_value(list(camera.size))}",
             *table_lines(camera, n_terms=4 if camera.lens == "fisheye" else 5, metres=METRES[unit]),
             "",
         ]

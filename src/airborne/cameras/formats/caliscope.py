@@ -8,17 +8,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from airborne.cameras.camera import Rig
-from airborne.cameras.formats.options import Given
-from airborne.cameras.formats.toml import camera_from_table, table_lines, toml
+from airborne.cameras.formats.options import FileOptions
+from airborne.cameras.formats.toml import camera_from_table, table_lines, toml_value
 from airborne.errors import CalibrationError
 
-ABSENT = (None, "null")
+_ABSENT = (None, "null")
 
 
-def rig_from_caliscope(document: dict, where: str, given: Given) -> Rig:
+def rig_from_caliscope(document: dict, where: str, given: FileOptions) -> Rig:
     """Return the cameras that have a place, named cam_<number> as Caliscope names their videos."""
     tables = {key: table for key, table in document["cameras"].items() if isinstance(table, dict)}
-    placed = {key: table for key, table in tables.items() if table.get("rotation") not in ABSENT}
+    placed = {key: table for key, table in tables.items() if table.get("rotation") not in _ABSENT}
     if not placed:
         raise CalibrationError(f"{where}: none of its {len(tables)} cameras has a place; calibrate their extrinsics")
     metres = given.metres("m")
@@ -37,7 +37,7 @@ def caliscope_text(rig: Rig, errors_px: Mapping[str, float] | None = None) -> st
         lines += [
             f"[cameras.{number}]",
             f"cam_id = {number}",
-            f"size = {toml(list(camera.size))}",
+            f"size = {toml_value(list(camera.size))}",
             "rotation_count = 0",
             *([f"error = {float(errors_px[camera.name])!r}"] if errors_px else []),
             *table_lines(camera, n_terms=4 if camera.lens == "fisheye" else 5),
@@ -56,7 +56,7 @@ def caliscope_numbers(rig: Rig) -> list[int]:
     return list(range(len(rig)))
 
 
-def caliscope_loses(rig: Rig) -> tuple[str, ...]:
+def caliscope_losses(rig: Rig) -> tuple[str, ...]:
     """Say what a Caliscope file cannot hold."""
     pairs = zip(rig.names, caliscope_numbers(rig), strict=True)
     renamed = [f"{name} is {number}" for name, number in pairs if name != f"cam_{number}"]

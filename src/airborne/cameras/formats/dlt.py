@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.cameras.camera import Camera, Rig
-from airborne.cameras.dlt import coefficients, decompose_with_skew
-from airborne.cameras.formats.options import METRES, Given, PixelCount, Unit
-from airborne.cameras.formats.parsing import LARGEST, build, whole_size
-from airborne.cameras.formats.xml import number
+from airborne.cameras.dlt import dlt_coefficients, decompose_with_skew
+from airborne.cameras.formats.options import METRES, FileOptions, PixelConvention, Unit
+from airborne.cameras.formats.parsing import LARGEST_NUMBER, build_camera, parse_size
+from airborne.cameras.formats.xml import parse_number
 from airborne.errors import CalibrationError
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-N_ROWS = 11
-NO_CAMERA = "these coefficients are no camera's; give the table that DLTdv wrote"
-SMALLEST_AXIS = 1e-12  # of the largest: below, the three axes lie in a plane
-SMALLEST_DEPTH = 1e-6  # of the camera's distance: nearer to its plane the world's origin has no depth to divide by
+_N_ROWS = 11
+_NO_CAMERA = "these coefficients are no camera's; give the table that DLTdv wrote"
+_SMALLEST_AXIS = 1e-12  # of the largest: below, the three axes lie in a plane
+_SMALLEST_DEPTH = 1e-6  # of the camera's distance: nearer to its plane the world's origin has no depth to divide by
 
 
 def is_dlt(text: str) -> bool:
     """Whether a text begins as a table of bare numbers."""
     first = next((line for line in text.splitlines() if line.strip()), "")
-    return bool(first) and all(np.isfinite(number(cell)) for cell in _cells(first))
+    return bool(first) and all(np.isfinite(parse_number(cell)) for cell in _cells(first))
 
 
-def rig_from_dlt(text: str, where: str, given: Given) -> Rig:
+def rig_from_dlt(text: str, where: str, given: FileOptions) -> Rig:
     """Return the cameras cam1, cam2, ... of a table of coefficients, metres unless given otherwise.
 
     `u = (L1 X + L2 Y + L3 Z + L4) / (L9 X + L10 Y + L11 Z + 1)`, v with L5 to L8, in pixels as `given.pixels` counts
@@ -35,56 +33,56 @@ def rig_from_dlt(text: str, where: str, given: Given) -> Rig:
     """
     rows = [_cells(line) for line in text.splitlines() if line.strip()]
     widths = {len(row) for row in rows}
-    if len(rows) != N_ROWS or len(widths) != 1:
+    if len(rows) != _N_ROWS or len(widths) != 1:
         found = f"{len(rows)} rows of {' or '.join(map(str, sorted(widths)[:3]))} numbers"
         raise CalibrationError(f"{where}: {found}; expected 11 rows, one column a camera")
-    L = np.array([[number(cell) for cell in row] for row in rows])
-    if not np.all(np.abs(L) <= LARGEST):
+    L = np.array([[parse_number(cell) for cell in row] for row in rows])
+    if not np.all(np.abs(L) <= LARGEST_NUMBER):
         raise CalibrationError(f"{where}: a coefficient is not a number, or too large; expected 11 rows of numbers")
     rig = Rig(tuple(_camera(f"{where}, column {k + 1}", f"cam{k + 1}", L[:, k], given) for k in range(L.shape[1])))
     _check_view(rig, where, given.pixels)
     return rig
 
 
-def dlt_text(rig: Rig, pixels: PixelCount, unit: Unit = "m") -> str:
+def dlt_text(rig: Rig, pixels: PixelConvention, unit: Unit = "m") -> str:
     """Return a table of coefficients, 17 digits each. Raises CalibrationError where a camera has none."""
     columns = []
     for camera in rig:
         P = pixels.theirs_from_ours(camera.size[1]) @ camera.P @ np.diag([*[METRES[unit]] * 3, 1.0])
         if camera.lens == "fisheye":
             raise CalibrationError(f"camera '{camera.name}' has a fisheye lens, which DLT coefficients cannot hold")
-        if abs(P[2, 3]) <= SMALLEST_DEPTH * np.linalg.norm(camera.centre):
+        if abs(P[2, 3]) <= _SMALLEST_DEPTH * np.linalg.norm(camera.centre):
             raise CalibrationError(
                 f"camera '{camera.name}' has the world's origin beside it, where DLT coefficients divide by zero; "
                 "move the origin"
             )
-        columns.append(coefficients(P))
+        columns.append(dlt_coefficients(P))
     return "".join(",".join(f"{value:.17g}" for value in row) + "\n" for row in np.transpose(columns))
 
 
-def dlt_loses(rig: Rig) -> tuple[str, ...]:
+def dlt_losses(rig: Rig) -> tuple[str, ...]:
     """Say what DLT coefficients cannot hold: names, picture sizes, and distortion, with what it moves at most."""
     notes = [f"names: cam1, cam2, ... for {', '.join(rig.names)}", "picture sizes"]
     bent = [f"{camera.name} (up to {_corner_shift_px(camera):.1f} px)" for camera in rig if camera.is_distorted]
     return (*notes, f"lens distortion of {', '.join(bent)}: straighten pixels first") if bent else tuple(notes)
 
 
-def _camera(where: str, name: str, L: Array, given: Given) -> Camera:
-    size = whole_size(where, given.size_of(name, where))
+def _camera(where: str, name: str, L: Array, given: FileOptions) -> Camera:
+    size = parse_size(where, given.size_of(name, where))
     to_ours = np.linalg.inv(given.pixels.theirs_from_ours(size[1]))
     P = to_ours @ np.append(L, 1.0).reshape(3, 4)
     P[:, :3] /= given.metres("m")
     length = np.linalg.norm(P[:, :3])
-    if length == 0 or np.linalg.svd(P[:, :3] / length, compute_uv=False)[-1] < SMALLEST_AXIS:
-        raise CalibrationError(f"{where}: {NO_CAMERA}")
+    if length == 0 or np.linalg.svd(P[:, :3] / length, compute_uv=False)[-1] < _SMALLEST_AXIS:
+        raise CalibrationError(f"{where}: {_NO_CAMERA}")
     found = decompose_with_skew(P)
-    if not (np.all(np.abs(found.K) <= LARGEST) and np.all(np.abs(found.centre) <= LARGEST)):
-        raise CalibrationError(f"{where}: {NO_CAMERA}")
+    if not (np.all(np.abs(found.K) <= LARGEST_NUMBER) and np.all(np.abs(found.centre) <= LARGEST_NUMBER)):
+        raise CalibrationError(f"{where}: {_NO_CAMERA}")
     translation = -found.R @ found.centre
-    return build(where, name, K=found.K, size=size, rotation=found.R, translation=translation, distortion=np.zeros(5))
+    return build_camera(where, name, K=found.K, size=size, rotation=found.R, translation=translation, distortion=np.zeros(5))
 
 
-def _check_view(rig: Rig, where: str, pixels: PixelCount) -> None:
+def _check_view(rig: Rig, where: str, pixels: PixelConvention) -> None:
     """Refuse cameras that all have the place nearest to their lines of sight behind them."""
     if len(rig) < 2:
         return
@@ -103,7 +101,7 @@ def _check_view(rig: Rig, where: str, pixels: PixelCount) -> None:
 def _corner_shift_px(camera: Camera) -> float:
     width, height = camera.size
     corners = np.array([[u, v] for u in (0, width - 1) for v in (0, height - 1)], float)
-    return float(np.linalg.norm(camera.distorted_px(corners) - corners, axis=1).max())
+    return float(np.linalg.norm(camera.distort_px(corners) - corners, axis=1).max())
 
 
 def _cells(line: str) -> list[str]:

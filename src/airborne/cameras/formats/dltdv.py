@@ -11,19 +11,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.cameras.camera import Rig
 from airborne.cameras.detections import Detections
-from airborne.cameras.formats.options import Given
+from airborne.cameras.formats.options import FileOptions
 from airborne.errors import CalibrationError
 from airborne.io.text import read_csv
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-COLUMN = re.compile(r"(.+)_cam_?(\d{1,4})_([uvxyUVXY])")  # DLTdv pt1_cam1_X, Argus track_cam_1_x
-EXPECTED = "expected DLTdv's table pt1_cam1_U,pt1_cam1_V,pt1_cam2_U,..."
-DEGREES_OF_FREEDOM = 3  # that a place in space takes from the 2 numbers of each camera
+_COLUMN = re.compile(r"(.+)_cam_?(\d{1,4})_([uvxyUVXY])")  # DLTdv pt1_cam1_X, Argus track_cam_1_x
+_EXPECTED = "expected DLTdv's table pt1_cam1_U,pt1_cam1_V,pt1_cam2_U,..."
+_DEGREES_OF_FREEDOM = 3  # that a place in space takes from the 2 numbers of each camera
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,10 +38,10 @@ class Digitisation:
 def is_xypts(header: str) -> bool:
     """Whether a table's first line is that of DLTdv's pixels."""
     names = [name.strip().strip('"') for name in header.split(",")]
-    return len(names) > 1 and all(COLUMN.fullmatch(name) for name in names)
+    return len(names) > 1 and all(_COLUMN.fullmatch(name) for name in names)
 
 
-def read_digitisation(path: Path, given: Given, cameras: Sequence[str] | None = None) -> Digitisation:
+def read_digitisation(path: Path, given: FileOptions, cameras: Sequence[str] | None = None) -> Digitisation:
     """Read `<prefix>xypts.csv` and its siblings that are there; lengths are metres unless given otherwise.
 
     Cameras are named cam1, cam2, ... unless named here. Raises CalibrationError.
@@ -65,22 +63,22 @@ def read_digitisation(path: Path, given: Given, cameras: Sequence[str] | None = 
     metres = given.metres("m")
     return Digitisation(
         points=points,
-        world=_scaled(found.get("xyzpts"), metres),
+        world=_scale(found.get("xyzpts"), metres),
         residual_px=found.get("xyzres"),
         offset_frames=found.get("offsets"),
-        interval=_scaled(found.get("xyzCI"), metres),
+        interval=_scale(found.get("xyzCI"), metres),
     )
 
 
-def read_xypts(path: Path, given: Given, cameras: Sequence[str] | None = None) -> Detections:
+def read_xypts(path: Path, given: FileOptions, cameras: Sequence[str] | None = None) -> Detections:
     """Read `xypts.csv`, pixels as `given.pixels` counts them; from below sizes are needed. Raises CalibrationError."""
     header, values = _read_table(path)
-    keys = [key for name in header if (key := _key(name)) is not None]
+    keys = [key for name in header if (key := _parse_column(name)) is not None]
     if not header or len(keys) < len(header):
-        raise CalibrationError(f"{path}: found the columns {','.join(header)[:80] or 'none'}; {EXPECTED}")
+        raise CalibrationError(f"{path}: found the columns {','.join(header)[:80] or 'none'}; {_EXPECTED}")
     names, numbers = list(dict.fromkeys(key[0] for key in keys)), sorted({key[1] for key in keys})
     if len(set(keys)) < len(keys) or len(keys) != 2 * len(names) * len(numbers):
-        raise CalibrationError(f"{path}: not every point has one U and one V in every camera; {EXPECTED}")
+        raise CalibrationError(f"{path}: not every point has one U and one V in every camera; {_EXPECTED}")
     called = list(cameras or [f"cam{number}" for number in numbers])
     if len(called) != len(numbers) or len(set(called)) != len(called):
         raise CalibrationError(f"{path} has {len(numbers)} cameras; name as many, each once: found {', '.join(called)}")
@@ -89,10 +87,10 @@ def read_xypts(path: Path, given: Given, cameras: Sequence[str] | None = None) -
         px[:, names.index(name), numbers.index(number), "uv".index(axis)] = values[:, column]
     for k, camera in enumerate(called):
         px[:, :, k] = given.pixels.ours(px[:, :, k], _height(given, camera, str(path)))
-    return Detections.of_clicks(called, names, px)
+    return Detections.from_clicks(called, names, px)
 
 
-def write_digitisation(path: Path, digitisation: Digitisation, given: Given) -> tuple[Path, ...]:
+def write_digitisation(path: Path, digitisation: Digitisation, given: FileOptions) -> tuple[Path, ...]:
     """Write `<prefix>xypts.csv` and the siblings that are known; returns what was written. 17 digits; NaN is NaN.
 
     Points are named pt1, pt2, ... as DLTdv does. Raises CalibrationError for a name that does not end in xypts.csv, and
@@ -108,10 +106,10 @@ def write_digitisation(path: Path, digitisation: Digitisation, given: Given) -> 
     written = [_write_table(path, header, np.stack(px, axis=2))]
     places, scale = [f"pt{p}_{axis}" for p in numbers for axis in "XYZ"], 1 / given.metres("m")
     siblings = {
-        "xyzpts": (places, _scaled(digitisation.world, scale)),
+        "xyzpts": (places, _scale(digitisation.world, scale)),
         "xyzres": ([f"pt{p}_dltres" for p in numbers], digitisation.residual_px),
         "offsets": ([f"cam{c}_offset" for c in cameras], digitisation.offset_frames),
-        "xyzCI": ([f"{place}+-CI" for place in places], _scaled(digitisation.interval, scale)),
+        "xyzCI": ([f"{place}+-CI" for place in places], _scale(digitisation.interval, scale)),
     }
     stem = path.name.removesuffix("xypts.csv")
     for sibling, (names, values) in siblings.items():
@@ -120,7 +118,7 @@ def write_digitisation(path: Path, digitisation: Digitisation, given: Given) -> 
     return tuple(written)
 
 
-def placed(points: Detections, rig: Rig) -> Digitisation:
+def triangulate_digitisation(points: Detections, rig: Rig) -> Digitisation:
     """Triangulate digitised points with the cameras of the same names; as DLTdv does, with residuals and no offsets.
 
     The residual is `sqrt(sum e² / (2 n - 3))` over the n cameras that see a point, e their pixel errors.
@@ -129,31 +127,31 @@ def placed(points: Detections, rig: Rig) -> Digitisation:
     world = rig.points_from_px(points.px)
     error = np.stack([camera.px_from_world(world) for camera in rig], axis=2) - points.px
     n = np.isfinite(error).all(axis=-1).sum(axis=-1)
-    freedom = np.where(n > 1, 2 * n - DEGREES_OF_FREEDOM, 1)
+    freedom = np.where(n > 1, 2 * n - _DEGREES_OF_FREEDOM, 1)
     residual = np.where(n > 1, np.sqrt(np.nansum(error**2, axis=(2, 3)) / freedom), np.nan)
     return Digitisation(
         points=points, world=world, residual_px=residual, offset_frames=np.zeros((len(points.px), len(rig)))
     )
 
 
-def _key(column: str) -> tuple[str, int, str] | None:
+def _parse_column(column: str) -> tuple[str, int, str] | None:
     """Return a column's point, number of the camera and axis."""
-    found = COLUMN.fullmatch(column)
+    found = _COLUMN.fullmatch(column)
     return (found[1], int(found[2]), "u" if found[3] in "uUxX" else "v") if found else None
 
 
-def _height(given: Given, camera: str, where: str) -> int:
+def _height(given: FileOptions, camera: str, where: str) -> int:
     """Return a picture's height [px]; any will do where pixels count from above."""
     return 0 if given.pixels.corner == "upper-left" else given.size_of(camera, where)[1]
 
 
-def _scaled(values: Array | None, scale: float) -> Array | None:
+def _scale(values: Array | None, scale: float) -> Array | None:
     return None if values is None else scale * values
 
 
 def _read_table(path: Path) -> tuple[list[str], Array]:
     """Return the header and the numbers (rows, columns); blank cells are NaN."""
-    rows = read_csv(path, EXPECTED, CalibrationError)
+    rows = read_csv(path, _EXPECTED, CalibrationError)
     header = rows[0][1] if rows else []
     values = np.full((max(len(rows) - 1, 0), len(header)), np.nan)
     for number, (line, row) in enumerate(rows[1:]):

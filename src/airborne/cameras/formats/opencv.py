@@ -6,40 +6,38 @@ import re
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.cameras.camera import Camera, Rig
-from airborne.cameras.formats.options import METRES, Given, Size, Unit
-from airborne.cameras.formats.parsing import build, numbers, refuse_fisheye, terms
+from airborne.cameras.formats.options import METRES, FileOptions, Size, Unit
+from airborne.cameras.formats.parsing import build_camera, parse_array, refuse_fisheye, distortion_terms
 from airborne.errors import CalibrationError
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-EXPECTED = "expected OpenCV's YAML with K_<camera>, dist_<camera>, R_<camera>, T_<camera>"
-HEADER = "%YAML:1.0\n---\n"
-BLOCK = re.compile(r"^(?=[^\s#%:-][^:\n]*:)", re.MULTILINE)  # where a node begins
-FIELD = re.compile(r"^[ \t]+(rows|cols|sizes|data)[ \t]*:\s*(\[[^\]]*\]|\S+)", re.MULTILINE)
-KEY = re.compile(r"[A-Za-z0-9_-]+")  # what OpenCV allows in a key, behind K_
+_EXPECTED = "expected OpenCV's YAML with K_<camera>, dist_<camera>, R_<camera>, T_<camera>"
+_HEADER = "%YAML:1.0\n---\n"
+_BLOCK = re.compile(r"^(?=[^\s#%:-][^:\n]*:)", re.MULTILINE)  # where a node begins
+_FIELD = re.compile(r"^[ \t]+(rows|cols|sizes|data)[ \t]*:\s*(\[[^\]]*\]|\S+)", re.MULTILINE)
+_KEY = re.compile(r"[A-Za-z0-9_-]+")  # what OpenCV allows in a key, behind K_
 
 
-def document_of(text: str, where: str) -> dict[str, Any]:
+def parse_opencv(text: str, where: str) -> dict[str, Any]:
     """Return an OpenCV YAML file's nodes, numbers still as text: a scalar, a list, or a matrix's fields.
 
     Of YAML only what OpenCV writes is understood, which is read in one pass. Raises CalibrationError.
     """
-    blocks = (block.partition(":") for block in BLOCK.split(text))
-    document = {key.strip(): _node_of(rest) for key, colon, rest in blocks if colon and not key.startswith("%")}
+    blocks = (block.partition(":") for block in _BLOCK.split(text))
+    document = {key.strip(): _parse_node(rest) for key, colon, rest in blocks if colon and not key.startswith("%")}
     if not document:
-        raise CalibrationError(f"{where} has no cameras; {EXPECTED}")
+        raise CalibrationError(f"{where} has no cameras; {_EXPECTED}")
     return document
 
 
-def halves_of(document: dict[str, Any]) -> set[str]:
+def halves_in(document: dict[str, Any]) -> set[str]:
     """Say which halves of a calibration the nodes hold: intrinsics (K_), extrinsics (T_)."""
     return {key[:2] for key in document if isinstance(key, str) and key[:2] in ("K_", "T_")}
 
 
-def rig_from_opencv(document: dict[str, Any], where: str, given: Given) -> Rig:
+def rig_from_opencv(document: dict[str, Any], where: str, given: FileOptions) -> Rig:
     """Return the rig of one file's nodes, or of two files' together; metres unless given otherwise.
 
     `Rot_<camera>` is the rotation as a matrix, `R_<camera>` as a Rodrigues vector (or a matrix). Picture sizes stand in
@@ -54,27 +52,27 @@ def rig_from_opencv(document: dict[str, Any], where: str, given: Given) -> Rig:
     if names and not any(f"K_{name}" in document for name in names):  # Pose2Sim numbers what it lists by name
         keys = {name: str(number) for number, name in enumerate(names, 1)}
     if not names:
-        raise CalibrationError(f"{where} has no cameras; {EXPECTED}")
+        raise CalibrationError(f"{where} has no cameras; {_EXPECTED}")
     return Rig(tuple(_camera(document, where, name, keys[name], given) for name in names))
 
 
 def opencv_text(rig: Rig, unit: Unit = "m") -> str:
     """Return everything in one file, lengths in the unit. Raises CalibrationError for a fisheye lens."""
-    return HEADER + _names(rig) + "".join(_intrinsics(camera) + _extrinsics(camera, unit) for camera in rig)
+    return _HEADER + _names(rig) + "".join(_intrinsics(camera) + _extrinsics(camera, unit) for camera in rig)
 
 
 def easymocap_texts(rig: Rig, unit: Unit = "m") -> dict[str, str]:
     """Return EasyMocap's two files, by name. Raises CalibrationError for a fisheye lens."""
     return {
-        "intri.yml": HEADER + _names(rig) + "".join(map(_intrinsics, rig)),
-        "extri.yml": HEADER + _names(rig) + "".join(_extrinsics(camera, unit) for camera in rig),
+        "intri.yml": _HEADER + _names(rig) + "".join(map(_intrinsics, rig)),
+        "extri.yml": _HEADER + _names(rig) + "".join(_extrinsics(camera, unit) for camera in rig),
     }
 
 
-def _node_of(text: str) -> Any:
+def _parse_node(text: str) -> Any:
     text = text.strip()
     if "data:" in text:
-        fields = dict(FIELD.findall(text))
+        fields = dict(_FIELD.findall(text))
         return {key: _items(value) if value.startswith("[") else value for key, value in fields.items()}
     if text.startswith("["):
         return _items(text)
@@ -89,9 +87,9 @@ def _items(text: str) -> list[str]:
     return [item.strip().strip("\"'") for item in inner.split(",")] if inner else []
 
 
-def _camera(document: dict[str, Any], where: str, name: str, key: str, given: Given) -> Camera:
+def _camera(document: dict[str, Any], where: str, name: str, key: str, given: FileOptions) -> Camera:
     where = f"{where}, camera '{name[:60]}'"
-    return build(
+    return build_camera(
         where,
         name,
         K=_matrix(document, where, f"K_{key}", (3, 3)),
@@ -102,9 +100,9 @@ def _camera(document: dict[str, Any], where: str, name: str, key: str, given: Gi
     )
 
 
-def _size(document: dict[str, Any], where: str, name: str, key: str, given: Given) -> Size | Array:
+def _size(document: dict[str, Any], where: str, name: str, key: str, given: FileOptions) -> Size | Array:
     if f"W_{key}" in document and f"H_{key}" in document:
-        return np.array([numbers(where, f"{side}_{key}", document[f"{side}_{key}"], ()) for side in "WH"])
+        return np.array([parse_array(where, f"{side}_{key}", document[f"{side}_{key}"], ()) for side in "WH"])
     return given.size_of(name, where)
 
 
@@ -125,14 +123,14 @@ def _matrix(document: dict[str, Any], where: str, key: str, *shapes: tuple[int, 
     found = "×".join(str(side)[:9] for side in sides) if isinstance(sides, list) else "nothing"
     for rows, cols in shapes:
         if found == f"{rows}×{cols}" or (found == f"{rows}" and cols == 1):
-            return numbers(where, key, node.get("data"), (rows * cols,)).reshape(rows, cols)
+            return parse_array(where, key, node.get("data"), (rows * cols,)).reshape(rows, cols)
     raise CalibrationError(f"{where}: {key} is {found}, expected " + " or ".join(f"{a}×{b}" for a, b in shapes))
 
 
 def _names(rig: Rig) -> str:
     for camera in rig:
         refuse_fisheye(camera, "OpenCV's YAML")
-        if not KEY.fullmatch(camera.name):
+        if not _KEY.fullmatch(camera.name):
             raise CalibrationError(
                 f"camera '{camera.name}' cannot be a key of OpenCV's YAML; rename it with letters, digits, _ and -"
             )
@@ -141,7 +139,7 @@ def _names(rig: Rig) -> str:
 
 def _intrinsics(camera: Camera) -> str:
     name, (width, height) = camera.name, camera.size
-    K, dist = camera.K, np.array([terms(camera, 5)])
+    K, dist = camera.K, np.array([distortion_terms(camera, 5)])
     return _node(f"K_{name}", K) + _node(f"dist_{name}", dist) + f"H_{name}: {height}\nW_{name}: {width}\n"
 
 

@@ -7,16 +7,14 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.errors import CalibrationError
 from airborne.io.text import read_json
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-LARGEST_FILE_BYTES = 5_000_000  # a picture of a thousand people
-MOST_NUMBERS = 10_000_000  # frames times points
-ALIKE = 0.8  # of the surest person's confidence: a second one this sure makes the choice a guess
+_LARGEST_FILE_BYTES = 5_000_000  # a picture of a thousand people
+_MOST_NUMBERS = 10_000_000  # frames times points
+_AMBIGUOUS_SHARE = 0.8  # of the surest person's confidence: a second one this sure makes the choice a guess
 
 
 def camera_folders(path: Path) -> dict[str, Path]:
@@ -41,7 +39,7 @@ def read_folder(folder: Path, person: int | None = None) -> tuple[Array, int]:
     for frame, path in files.items():
         people = _people(path)
         n_people = max(n_people, len(people))
-        chosen = _chosen(people, person, path)
+        chosen = _choose_person(people, person, path)
         if chosen is not None and frame is not None:
             found[frame] = chosen
     if not found:
@@ -50,7 +48,7 @@ def read_folder(folder: Path, person: int | None = None) -> tuple[Array, int]:
     if len(counts) > 1:
         raise CalibrationError(f"{folder}: people of {sorted(counts)} points; expected one list of points throughout")
     n_points = counts.pop()
-    if last * n_points > MOST_NUMBERS:
+    if last * n_points > _MOST_NUMBERS:
         raise CalibrationError(f"{folder}: a file is of frame {last}; expected the frame's number at the names' end")
     table = np.full((last + 1, n_points, 3), np.nan)
     for frame, one in found.items():
@@ -77,13 +75,13 @@ def number_at_end(name: str) -> int | None:
     return int(found[1]) if found else None
 
 
-def _chosen(people: list[Array], person: int | None, path: Path) -> Array | None:
+def _choose_person(people: list[Array], person: int | None, path: Path) -> Array | None:
     if person is not None:
         return people[person] if 0 <= person < len(people) else None
     if not people:
         return None
     *_, second, first = sorted([0.0, *(float(one[:, 2].sum()) for one in people)])
-    if second > ALIKE * first:
+    if second > _AMBIGUOUS_SHARE * first:
         raise CalibrationError(
             f"{path}: two of {len(people)} people are detected about equally surely; say which one: "
             "airborne convert FOLDER detections.npz --person 0 (0 is the first of each file)"
@@ -94,7 +92,7 @@ def _chosen(people: list[Array], person: int | None, path: Path) -> Array | None
 def _people(path: Path) -> list[Array]:
     """Read the people (points, 3) of one OpenPose file."""
     try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
+        if path.stat().st_size > _LARGEST_FILE_BYTES:
             raise CalibrationError(f"{path} is larger than any picture's detections ({path.stat().st_size} bytes)")
         document = read_json(path)
         people = [np.array(person["pose_keypoints_2d"], float).reshape(-1, 3) for person in document["people"]]

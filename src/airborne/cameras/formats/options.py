@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.errors import CalibrationError
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 Size = tuple[int, int]  # (width, height) [px]
 Unit = Literal["m", "mm"]
 Corner = Literal["upper-left", "lower-left"]
@@ -20,7 +19,7 @@ METRES: dict[Unit, float] = {"m": 1.0, "mm": 1e-3}
 
 
 @dataclass(frozen=True, slots=True)
-class PixelCount:
+class PixelConvention:
     """Where a tool counts pixels from: the corner, and the number of the first pixel's centre.
 
     DLTdv 8 counts from the upper left and from 1; DLTdv 7 and older, easyWand and Argus from the lower left.
@@ -47,12 +46,12 @@ class PixelCount:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Given:
+class FileOptions:
     """What the user says about a file."""
 
     unit: Unit | None = None  # of lengths; None: what the format defines
     size: Size | Mapping[str, Size] | None = None  # of all pictures, or by camera [px]
-    pixels: PixelCount = PixelCount()
+    pixels: PixelConvention = PixelConvention()
 
     def metres(self, default: Unit) -> float:
         """Return how many metres one of the file's lengths is."""

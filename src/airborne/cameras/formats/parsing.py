@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras.camera import Camera
 from airborne.cameras.formats.options import Size
 from airborne.errors import CalibrationError
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-LARGEST = 1e9  # of any number in a calibration: metres, millimetres or pixels
-LARGEST_SIZE_PX = 65_535
-ROTATION_TOLERANCE = 1e-3  # how far nine numbers may be from a rotation
-N_TERMS = {"brown": 5, "fisheye": 4}
+LARGEST_NUMBER = 1e9  # of any number in a calibration: metres, millimetres or pixels
+_LARGEST_SIZE_PX = 65_535
+_ROTATION_TOLERANCE = 1e-3  # how far nine numbers may be from a rotation
+_N_TERMS = {"brown": 5, "fisheye": 4}
 
 
-def numbers(where: str, name: str, given: object, *shapes: tuple[int, ...]) -> Array:
+def parse_array(where: str, name: str, given: object, *shapes: tuple[int, ...]) -> Array:
     """Return what a file gives as an array of finite numbers with one of the shapes; raises CalibrationError."""
     expected = " or ".join("×".join(map(str, shape)) for shape in shapes)
     if given is None:
@@ -27,12 +26,12 @@ def numbers(where: str, name: str, given: object, *shapes: tuple[int, ...]) -> A
         values = np.array(given, float)
     except (TypeError, ValueError, OverflowError, RecursionError):
         values = np.array(np.nan)
-    if values.shape not in shapes or not np.all(np.abs(values) <= LARGEST):
+    if values.shape not in shapes or not np.all(np.abs(values) <= LARGEST_NUMBER):
         raise CalibrationError(f"{where}: {name} = {_short(given)}, expected {expected} numbers")
     return values
 
 
-def build(
+def build_camera(
     where: str,
     name: str,
     *,
@@ -51,27 +50,27 @@ def build(
     if not (K[0, 0] > 0 and K[1, 1] > 0 and K[1, 0] == 0 and np.array_equal(K[2], [0, 0, 1])):
         raise CalibrationError(f"{where}: matrix is not [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with positive fx and fy")
     lens = "fisheye" if is_fisheye else "brown"
-    if len(distortion) > N_TERMS[lens]:
-        raise CalibrationError(f"{where}: {len(distortion)} distortion terms; a {lens} lens has {N_TERMS[lens]}")
+    if len(distortion) > _N_TERMS[lens]:
+        raise CalibrationError(f"{where}: {len(distortion)} distortion terms; a {lens} lens has {_N_TERMS[lens]}")
     return Camera(
         name=name,
         K=K,
-        size=whole_size(where, size),
+        size=parse_size(where, size),
         camera_from_world=RigidTransform.from_components(translation, _rotation(where, rotation)),
-        distortion=np.pad(distortion, (0, N_TERMS[lens] - len(distortion))),
+        distortion=np.pad(distortion, (0, _N_TERMS[lens] - len(distortion))),
         lens=lens,
     )
 
 
-def whole_size(where: str, size: ArrayLike) -> Size:
+def parse_size(where: str, size: ArrayLike) -> Size:
     """Return (width, height) [px]; raises CalibrationError where they are no whole numbers of pixels."""
     values = np.asarray(size, float)
-    if not (np.all(values >= 1) and np.all(values <= LARGEST_SIZE_PX) and np.array_equal(values, np.round(values))):
+    if not (np.all(values >= 1) and np.all(values <= _LARGEST_SIZE_PX) and np.array_equal(values, np.round(values))):
         raise CalibrationError(f"{where}: size = {values.tolist()}, expected width and height in whole pixels")
     return int(values[0]), int(values[1])
 
 
-def terms(camera: Camera, n: int) -> list[float]:
+def distortion_terms(camera: Camera, n: int) -> list[float]:
     """Return the camera's distortion in n terms, zeros where it has fewer."""
     return np.pad(camera.distortion, (0, max(n - len(camera.distortion), 0)))[:n].tolist()
 
@@ -88,7 +87,7 @@ def refuse_fisheye(camera: Camera, name_of_format: str) -> None:
 def _rotation(where: str, given: Array) -> Rotation:
     if given.shape == (3,):
         return Rotation.from_rotvec(given)
-    if np.abs(given @ given.T - np.eye(3)).max() > ROTATION_TOLERANCE or np.linalg.det(given) < 0:
+    if np.abs(given @ given.T - np.eye(3)).max() > _ROTATION_TOLERANCE or np.linalg.det(given) < 0:
         raise CalibrationError(f"{where}: the rotation is not one: its rows are not at right angles, or it mirrors")
     return Rotation.from_matrix(given)
 

@@ -6,24 +6,24 @@ import math
 from collections.abc import Mapping
 
 from airborne.cameras.camera import Rig
-from airborne.cameras.formats.options import Given
-from airborne.cameras.formats.toml import camera_from_table, has_fifth_term, table_lines, toml, toml_key
+from airborne.cameras.formats.options import FileOptions
+from airborne.cameras.formats.toml import camera_from_table, has_fifth_term, table_lines, toml_value, toml_key
 from airborne.errors import CalibrationError
-from airborne.io.text import listed_keys
+from airborne.io.text import list_keys
 
-OF_A_CAMERA = {"matrix", "rotation", "translation"}
-NOT_CAMERAS = ("metadata", "capture_volume", "charuco", "checkerboard")
+_CAMERA_KEYS = {"matrix", "rotation", "translation"}
+_NOT_CAMERAS = ("metadata", "capture_volume", "charuco", "checkerboard")
 
 
-def rig_from_tables(document: dict, where: str, given: Given) -> Rig:
+def rig_from_tables(document: dict, where: str, given: FileOptions) -> Rig:
     """Return the rig of the tables at the top level, in their order; a camera is named by its `name`, else by its key.
 
     Metres unless given otherwise: the file does not say, and a board in millimetres makes it millimetres.
     """
-    tables = {key: table for key, table in document.items() if key not in NOT_CAMERAS and isinstance(table, dict)}
-    if not any(OF_A_CAMERA & table.keys() for table in tables.values()):
+    tables = {key: table for key, table in document.items() if key not in _NOT_CAMERAS and isinstance(table, dict)}
+    if not any(_CAMERA_KEYS & table.keys() for table in tables.values()):
         raise CalibrationError(
-            f"{where} has no cameras (found {listed_keys(document)}); "
+            f"{where} has no cameras (found {list_keys(document)}); "
             "expected a table such as [cam1] with matrix, rotation, ..."
         )
     metres = given.metres("m")
@@ -41,8 +41,8 @@ def pose2sim_text(rig: Rig, errors_px: Mapping[str, float] | None = None) -> str
     for camera in rig:
         lines += [
             f"[{toml_key(camera.name)}]",
-            f"name = {toml(camera.name)}",
-            f"size = {toml([float(length) for length in camera.size])}",
+            f"name = {toml_value(camera.name)}",
+            f"size = {toml_value([float(length) for length in camera.size])}",
             *table_lines(camera, n_terms=5 if has_fifth_term(camera) else 4),
             *([f"error = {float(errors_px[camera.name])!r}"] if errors_px else []),
             "",

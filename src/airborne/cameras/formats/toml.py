@@ -8,10 +8,10 @@ import re
 import numpy as np
 
 from airborne.cameras.camera import Camera
-from airborne.cameras.formats.parsing import build, numbers, terms, whole_size
+from airborne.cameras.formats.parsing import build_camera, parse_array, distortion_terms, parse_size
 
-ROTATIONS = ((3,), (3, 3))
-TERMS = {False: ((4,), (5,)), True: ((4,),)}  # by whether the lens is a fisheye
+_ROTATION_SHAPES = ((3,), (3, 3))
+_TERM_SHAPES = {False: ((4,), (5,)), True: ((4,),)}  # by whether the lens is a fisheye
 
 
 def camera_from_table(where: str, name: str, table: dict, metres: float) -> Camera:
@@ -20,14 +20,14 @@ def camera_from_table(where: str, name: str, table: dict, metres: float) -> Came
     terms_given = table.get("distortions")
     if isinstance(terms_given, list) and len(terms_given) == 1:  # OpenCV returns them as a row
         terms_given = terms_given[0]
-    return build(
+    return build_camera(
         where,
         name,
-        K=numbers(where, "matrix", table.get("matrix"), (3, 3)),
-        size=whole_size(where, numbers(where, "size", table.get("size"), (2,))),
-        rotation=numbers(where, "rotation", table.get("rotation"), *ROTATIONS),
-        translation=metres * numbers(where, "translation", table.get("translation"), (3,)),
-        distortion=numbers(where, "distortions", terms_given, *TERMS[is_fisheye]),
+        K=parse_array(where, "matrix", table.get("matrix"), (3, 3)),
+        size=parse_size(where, parse_array(where, "size", table.get("size"), (2,))),
+        rotation=parse_array(where, "rotation", table.get("rotation"), *_ROTATION_SHAPES),
+        translation=metres * parse_array(where, "translation", table.get("translation"), (3,)),
+        distortion=parse_array(where, "distortions", terms_given, *_TERM_SHAPES[is_fisheye]),
         is_fisheye=is_fisheye,
     )
 
@@ -36,24 +36,24 @@ def table_lines(camera: Camera, *, n_terms: int, metres: float = 1.0) -> list[st
     """Return a camera's lines of a table: matrix to fisheye; lengths are divided by metres."""
     place = camera.camera_from_world
     return [
-        f"matrix = {toml(camera.K.tolist())}",
-        f"distortions = {toml(terms(camera, n_terms))}",
-        f"rotation = {toml(place.rotation.as_rotvec().tolist())}",
-        f"translation = {toml((place.translation / metres).tolist())}",
+        f"matrix = {toml_value(camera.K.tolist())}",
+        f"distortions = {toml_value(distortion_terms(camera, n_terms))}",
+        f"rotation = {toml_value(place.rotation.as_rotvec().tolist())}",
+        f"translation = {toml_value((place.translation / metres).tolist())}",
         f"fisheye = {'true' if camera.lens == 'fisheye' else 'false'}",
     ]
 
 
-def toml(value: object) -> str:
+def toml_value(value: object) -> str:
     """Return a list, number or string as TOML."""
     if isinstance(value, list):
-        return "[" + ", ".join(map(toml, value)) + "]"
+        return "[" + ", ".join(map(toml_value, value)) + "]"
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
 
 
 def toml_key(name: str) -> str:
     """Return a name as the key of a table, quoted where it must be."""
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml(name)
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml_value(name)
 
 
 def has_fifth_term(camera: Camera) -> bool:

@@ -8,15 +8,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from airborne.cameras.camera import Camera, Rig
-from airborne.cameras.formats.options import Given
-from airborne.cameras.formats.parsing import build, numbers, refuse_fisheye, whole_size
+from airborne.cameras.formats.options import FileOptions
+from airborne.cameras.formats.parsing import build_camera, parse_array, refuse_fisheye, parse_size
 from airborne.cameras.formats.xml import attribute_numbers, xml_text
 from airborne.errors import CalibrationError
 
-QUATERNION_TOLERANCE = 1e-3  # how far four numbers may be from unit length
+_QUATERNION_TOLERANCE = 1e-3  # how far four numbers may be from unit length
 
 
-def rig_from_vicon(root: ElementTree.Element, where: str, given: Given) -> Rig:
+def rig_from_vicon(root: ElementTree.Element, where: str, given: FileOptions) -> Rig:
     """Return the cameras that have a key frame, named by their DEVICEID.
 
     `x_camera = R (x - C)`: ORIENTATION is R, camera from world, as a quaternion x, y, z, w; POSITION is C in mm.
@@ -34,13 +34,13 @@ def vicon_text(rig: Rig) -> str:
     root = ElementTree.Element("Cameras", {"SOURCE": "airborne", "VERSION": "1"})
     for number, camera in enumerate(rig, 1):
         refuse_fisheye(camera, "a Vicon file")
-        element = ElementTree.SubElement(root, "Camera", _about(camera, number))
+        element = ElementTree.SubElement(root, "Camera", _attributes(camera, number))
         keys = ElementTree.SubElement(element, "KeyFrames")
         ElementTree.SubElement(keys, "KeyFrame", _key_frame(camera))
     return xml_text(root)
 
 
-def vicon_loses(rig: Rig) -> tuple[str, ...]:
+def vicon_losses(rig: Rig) -> tuple[str, ...]:
     """Say what a Vicon file cannot hold: tangential distortion and skew."""
     bent = [camera.name for camera in rig if np.any(camera.distortion[2:4])]
     skewed = [camera.name for camera in rig if camera.K[0, 1]]
@@ -48,7 +48,7 @@ def vicon_loses(rig: Rig) -> tuple[str, ...]:
     return notes + ((f"skew of {', '.join(skewed)}",) if skewed else ())
 
 
-def _about(camera: Camera, number: int) -> dict[str, str]:
+def _attributes(camera: Camera, number: int) -> dict[str, str]:
     width, height = camera.size
     video = {"DISPLAY_TYPE": "VideoInputDevice", "TYPE": "VideoInputDevice", "SKEW": "0"}
     aspect = repr(float(camera.K[0, 0] / camera.K[1, 1]))
@@ -76,7 +76,7 @@ def _text(values) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def _camera(where: str, number: int, element: ElementTree.Element, given: Given) -> Camera:
+def _camera(where: str, number: int, element: ElementTree.Element, given: FileOptions) -> Camera:
     name = element.get("DEVICEID") or element.get("USERID") or f"camera {number}"
     where = f"{where}, camera '{name[:60]}'"
     frame = element.find("KeyFrames/KeyFrame")
@@ -89,16 +89,16 @@ def _camera(where: str, number: int, element: ElementTree.Element, given: Given)
         raise CalibrationError(f"{where}: SKEW is not 0, whose meaning Vicon does not publish; calibrate it anew")
     u0, v0 = _list(where, frame, "PRINCIPAL_POINT", 2)
     quaternion = _list(where, frame, "ORIENTATION", 4)
-    if abs(np.linalg.norm(quaternion) - 1) > QUATERNION_TOLERANCE:
+    if abs(np.linalg.norm(quaternion) - 1) > _QUATERNION_TOLERANCE:
         raise CalibrationError(f"{where}: ORIENTATION is not a unit quaternion; export the calibration again")
     rotation = Rotation.from_quat(quaternion)
     centre = given.metres("mm") * _list(where, frame, "POSITION", 3)
     k1, k2, k3 = _radial(where, frame)
-    return build(
+    return build_camera(
         where,
         name,
         K=np.array([[focal, 0, u0], [0, focal / aspect, v0], [0, 0, 1]]),
-        size=whole_size(where, _list(where, element, "SENSOR_SIZE", 2)),
+        size=parse_size(where, _list(where, element, "SENSOR_SIZE", 2)),
         rotation=rotation.as_matrix(),
         translation=-rotation.apply(centre),
         distortion=np.array([k1, k2, 0, 0, k3]),
@@ -109,10 +109,10 @@ def _radial(where: str, frame: ElementTree.Element) -> np.ndarray:
     """Return k1, k2, k3: of the newer model, else of the older, which has no k3."""
     fields = (frame.get("VICON_RADIAL2") or "").split()[3:]
     name = "VICON_RADIAL2" if fields else "VICON_RADIAL"
-    found = numbers(where, name, fields or (frame.get(name) or "0 0").split(), (2,), (3,))
+    found = parse_array(where, name, fields or (frame.get(name) or "0 0").split(), (2,), (3,))
     return np.pad(found, (0, 3 - len(found)))
 
 
 def _list(where: str, element: ElementTree.Element, name: str, n: int) -> np.ndarray:
     text = element.get(name)
-    return numbers(where, name, None if text is None else text.split(), (n,))
+    return parse_array(where, name, None if text is None else text.split(), (n,))

@@ -6,11 +6,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from airborne.cameras.formats.parsing import LARGEST
+from airborne.cameras.formats.parsing import LARGEST_NUMBER
 from airborne.errors import CalibrationError
 
 
-def root_of(text: str, where: str) -> ElementTree.Element:
+def parse_xml(text: str, where: str) -> ElementTree.Element:
     """Return the document's root element. Raises CalibrationError, also for a document type or entities."""
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise CalibrationError(f"{where} declares a document type or entities; no calibration does: export it again")
@@ -25,15 +25,15 @@ def attribute_numbers(where: str, element: ElementTree.Element, attributes: str)
     values = []
     for attribute in attributes.split():
         text = element.get(attribute)
-        value = number(text)
-        if not abs(value) <= LARGEST:
+        value = parse_number(text)
+        if not abs(value) <= LARGEST_NUMBER:
             found = "is missing" if text is None else f"is '{text[:60]}'"
             raise CalibrationError(f"{where}: {attribute} of <{element.tag}> {found}, expected a number")
         values.append(value)
     return values
 
 
-def number(text: str | None) -> float:
+def parse_number(text: str | None) -> float:
     """Return the number that a text is; NaN where it is none."""
     try:
         return float(text) if text is not None else np.nan

@@ -1,1 +1,1 @@
-"""Flight of a body: centre of mass, angular momentum, and when it leaves the floor."""
+"""Flight of a body: centre of mass, angular momentum, take-off and landing."""

@@ -1,7 +1,7 @@
 """Centre of mass and angular momentum of a jointed body, with their uncertainty.
 
-Rates come from a parabola fitted to each joint's turns over a few frames. They are turns only: a translation of the
-whole body has no part in the angular momentum about its centre of mass.
+Angular velocities come from a parabola fitted to each joint's rotations over a few frames. Rotations suffice: a
+translation of the whole body does not change the angular momentum about its centre of mass.
 """
 
 from __future__ import annotations
@@ -16,19 +16,18 @@ from airborne.body import BodyModel, PosedBody
 from airborne.body.chain import point_jacobian
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.motion.motion import Motion
-from airborne.motion.uncertainty import variances
+from airborne.motion.uncertainty import propagate_variances
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-WINDOW = 5  # frames to a fitted parabola: less noise than two, and no lag
-UNSEEN_TURN_RAD = 2 * np.pi / np.sqrt(12)  # standard deviation of a turn that may be anywhere in the circle
-_LONGEST_TURN_RAD = 2.0  # frames turned further from the middle one are left out of a fit
+WINDOW = 5  # frames per fitted parabola: less noise than two, and no lag
+_UNOBSERVED_ROTATION_SD_RAD = 2 * np.pi / np.sqrt(12)  # standard deviation of an angle uniform over the circle
+_LARGEST_ROTATION_RAD = 2.0  # frames rotated further from the middle one are left out of a fit
 _STEP_RAD = 1e-5
-_SAME_PERIOD = 1.5  # times further apart than so many periods are a gap
+_SAME_PERIOD = 1.5  # times more than so many periods apart are a gap
 
 
 def centre_of_mass(posed: PosedBody) -> tuple[Array, Array]:
-    """Return the centre of mass (3,) world [m], and its Jacobian (3, 6 + 3 joints) by the motion vector."""
+    """Return the centre of mass (3,) world [m], and its Jacobian (3, 6 + 3 joints) by the twist vector."""
     inertias = [segment.inertia for segment in posed.model.segments if segment.inertia is not None]
     mass = np.array([inertia.mass_kg for inertia in inertias])
     local = np.array([inertia.centre_m for inertia in inertias])
@@ -40,79 +39,79 @@ def centre_of_mass(posed: PosedBody) -> tuple[Array, Array]:
 def angular_momentum(model: BodyModel, R: Array, rates: Array) -> Array:
     """Return the angular momentum (..., 3) [kg m^2/s] about the centre of mass, world axes.
 
-    R (..., segments, 3, 3) is world from segment; rates (..., segments, 3) [rad/s] in each segment's own axes, of the
-    root against the world, of the others against their parents.
+    R (..., segments, 3, 3) is world from segment; rates (..., segments, 3) [rad/s] are angular velocities in each
+    segment's own axes: of the root relative to the world, of the others relative to their parents.
     """
     shape = np.broadcast_shapes(R.shape[:-3], rates.shape[:-2])
-    turning = np.empty((*shape, len(model.segments), 3))
-    place, velocity = np.zeros_like(turning), np.zeros_like(turning)  # of the origins, against the root's
+    omega = np.empty((*shape, len(model.segments), 3))
+    position, velocity = np.zeros_like(omega), np.zeros_like(omega)  # of the origins, relative to the root's
     own = np.einsum("...sij,...sj->...si", R, rates)
-    turning[..., 0, :] = own[..., 0, :]
+    omega[..., 0, :] = own[..., 0, :]
     for k, parent in enumerate(model.parents[1:], start=1):
         arm = R[..., parent, :, :] @ model.segments[k].joint_m
-        turning[..., k, :] = turning[..., parent, :] + own[..., k, :]
-        place[..., k, :] = place[..., parent, :] + arm
-        velocity[..., k, :] = velocity[..., parent, :] + np.cross(turning[..., parent, :], arm)
+        omega[..., k, :] = omega[..., parent, :] + own[..., k, :]
+        position[..., k, :] = position[..., parent, :] + arm
+        velocity[..., k, :] = velocity[..., parent, :] + np.cross(omega[..., parent, :], arm)
     inertias = [segment.inertia for segment in model.segments if segment.inertia is not None]
     mass = np.array([inertia.mass_kg for inertia in inertias])[:, None]
     arm = np.einsum("...sij,sj->...si", R, np.array([inertia.centre_m for inertia in inertias]))
-    place, velocity = place + arm, velocity + np.cross(turning, arm)
-    place = place - np.sum(mass * place, axis=-2, keepdims=True) / mass.sum()
+    position, velocity = position + arm, velocity + np.cross(omega, arm)
+    position = position - np.sum(mass * position, axis=-2, keepdims=True) / mass.sum()
     tensor = np.array([inertia.tensor_kg_m2 for inertia in inertias])
-    spin = np.einsum("...sij,sjk,...slk,...sl->...si", R, tensor, R, turning, optimize=True)
-    return np.sum(spin + mass * np.cross(place, velocity), axis=-2)
+    spin = np.einsum("...sij,sjk,...slk,...sl->...si", R, tensor, R, omega, optimize=True)
+    return np.sum(spin + mass * np.cross(position, velocity), axis=-2)
 
 
-def momenta(motion: Motion, model: BodyModel, window: int = WINDOW) -> tuple[Array, Array]:
+def angular_momenta(motion: Motion, model: BodyModel, window: int = WINDOW) -> tuple[Array, Array]:
     """Return the angular momentum about the centre of mass (n, 3) [kg m^2/s], world axes, and its variances (n, 3).
 
-    Rates at a frame are the slopes, at its time, of parabolas through the turns of the `window` nearest frames of the
-    same unbroken stretch: the frames on both sides, fewer on one side near an end (of two frames, a line; of one, NaN).
-    Lost frames, missing times and turns of over 2 rad break a fit off. The variances are of first order, in the poses
-    of all frames of the fit, whose errors count as independent of one another.
+    Angular velocities at a frame are the slopes, at its time, of parabolas through the rotations of the `window`
+    nearest frames of the same unbroken stretch, shifted inward near its ends (two frames: a line; one: NaN). Lost
+    frames, missing times and rotations over 2 rad end a fit. The variances are of first order in the poses of all
+    frames of the fit, whose errors are taken as independent.
     """
-    turns = np.concatenate([motion.R[:, None], matrix_from_angles(motion.joint_angles)], axis=1)
+    rotations = np.concatenate([motion.R[:, None], matrix_from_angles(motion.joint_angles)], axis=1)
     value, variance = np.full((2, len(motion), 3), np.nan)
     for stretch in _stretches(motion):
         for row in stretch:
-            rates = _rates(turns, motion.time_s, row, _window(stretch, row, window))
+            rates = _angular_velocities(rotations, motion.time_s, row, _window(stretch, row, window))
             if rates is None:
                 continue
             R = model.with_pose(motion.pose(row)).R
             value[row] = angular_momentum(model, R, rates.value)
             if np.isnan(motion.covariance[rates.rows, 3:, 3:]).all(axis=(1, 2)).any():
-                continue  # a frame of which nothing is known
-            found = np.zeros(3)
+                continue  # a frame without any covariance
+            total = np.zeros(3)
             for other, gradient in _gradients(model, R, rates, row):
-                gradient[:, :3] = gradient[:, :3] @ motion.R[other].T  # the root's errors are given in world axes
-                found = found + variances(gradient, with_bounded_turns(motion.covariance[other])[3:, 3:])
-            variance[row] = found
+                gradient[:, :3] = gradient[:, :3] @ motion.R[other].T  # the root's errors are in world axes
+                total = total + propagate_variances(gradient, bound_rotation_variance(motion.covariance[other])[3:, 3:])
+            variance[row] = total
     return value, variance
 
 
-def with_bounded_turns(covariance: Array) -> Array:
-    """Return a covariance (d, d) in which an unseen turn is anywhere in the full circle, not infinitely far off."""
-    is_unseen = np.isinf(np.diagonal(covariance))
-    is_unseen[:3] = False
-    bounded = np.where(is_unseen[:, None] | is_unseen, 0.0, covariance)
-    return bounded + np.diag(np.where(is_unseen, UNSEEN_TURN_RAD**2, 0.0))
+def bound_rotation_variance(covariance: Array) -> Array:
+    """Return a covariance (d, d) in which unobserved rotations have a uniform circle's variance, not infinity."""
+    is_unobserved = np.isinf(np.diagonal(covariance))
+    is_unobserved[:3] = False
+    bounded = np.where(is_unobserved[:, None] | is_unobserved, 0.0, covariance)
+    return bounded + np.diag(np.where(is_unobserved, _UNOBSERVED_ROTATION_SD_RAD**2, 0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Rates:
-    """Turning rates at one frame: the weighted sum of the turns to its neighbours."""
+class _AngularVelocities:
+    """Angular velocities at one frame: weighted sums of the rotation vectors to its neighbours."""
 
     value: Array  # (segments, 3) [rad/s], own axes
     rows: NDArray[np.intp]  # (m,) the frames of the fit
     weights: Array  # (m,) [1/s]
-    turns: Array  # (m, segments, 3) rotation vectors from the frame to those frames, own axes [rad]
+    rotation_vectors: Array  # (m, segments, 3) from the frame to those frames, own axes [rad]
 
 
-def _rates(turns: Array, time_s: Array, row: int, rows: NDArray[np.intp]) -> _Rates | None:
-    """Fit the rates at one frame; None where it has no neighbour to fit."""
-    relative = np.swapaxes(turns[row], -1, -2) @ turns[rows]
+def _angular_velocities(rotations: Array, time_s: Array, row: int, rows: NDArray[np.intp]) -> _AngularVelocities | None:
+    """Fit the angular velocities at one frame; None where it has no neighbour to fit."""
+    relative = np.swapaxes(rotations[row], -1, -2) @ rotations[rows]
     vectors = Rotation.from_matrix(relative.reshape(-1, 3, 3)).as_rotvec().reshape(len(rows), -1, 3)
-    is_near = np.linalg.norm(vectors, axis=-1).max(axis=-1) < _LONGEST_TURN_RAD
+    is_near = np.linalg.norm(vectors, axis=-1).max(axis=-1) < _LARGEST_ROTATION_RAD
     here = int(np.flatnonzero(rows == row)[0])
     far = np.flatnonzero(~is_near)
     first, stop = max((k + 1 for k in far if k < here), default=0), min((k for k in far if k > here), default=len(rows))
@@ -120,43 +119,45 @@ def _rates(turns: Array, time_s: Array, row: int, rows: NDArray[np.intp]) -> _Ra
     if len(rows) < 2:
         return None
     offset = time_s[rows] - time_s[row]
-    scale = np.ptp(offset)  # keeps the powers of one size
+    scale = np.ptp(offset)  # keeps the powers of similar size
     weights = np.linalg.pinv(np.vander(offset / scale, min(3, len(rows)), increasing=True))[1] / scale
-    return _Rates(np.tensordot(weights, vectors, axes=1), rows, weights, vectors)
+    return _AngularVelocities(np.tensordot(weights, vectors, axes=1), rows, weights, vectors)
 
 
-def _gradients(model: BodyModel, R: Array, rates: _Rates, row: int):
-    """Yield each frame of a fit with the momentum's gradient (3, 3 segments) by its turns, each in its own axes."""
+def _gradients(model: BodyModel, R: Array, rates: _AngularVelocities, row: int):
+    """Yield each frame of a fit with the momentum's gradient (3, 3 segments) by its rotations, own axes."""
     n = len(R)
     unit = np.eye(3 * n).reshape(-1, n, 3)
     by_rate = angular_momentum(model, R, unit).T  # (3, 3 segments); linear in the rates
-    by_pose = _by_pose(model, R, rates.value)
-    for other, weight, vectors in zip(rates.rows, rates.weights, rates.turns, strict=True):
+    by_pose = _pose_gradient(model, R, rates.value)
+    for other, weight, vectors in zip(rates.rows, rates.weights, rates.rotation_vectors, strict=True):
         if other == row:
             continue
-        right = _inverse_jacobian(vectors)  # of log(A exp(m)) by m, at log A = vectors; of log(exp(m) A) transposed
+        right = _inverse_right_jacobian(
+            vectors
+        )  # of log(A exp(m)) by m, at log A = vectors; of log(exp(m) A) transposed
         blocks = weight * by_rate.reshape(3, n, 3)
         by_pose = by_pose - np.einsum("isj,skj->isk", blocks, right).reshape(3, -1)
         yield other, np.einsum("isj,sjk->isk", blocks, right).reshape(3, -1)
     yield row, by_pose
 
 
-def _by_pose(model: BodyModel, R: Array, rates: Array) -> Array:
-    """Differentiate the momentum by the turns of the frame itself, its rates held: (3, 3 segments), own axes."""
+def _pose_gradient(model: BodyModel, R: Array, rates: Array) -> Array:
+    """Differentiate the momentum by the frame's own rotations at fixed rates: (3, 3 segments), own axes."""
     n = len(R)
     is_carried = np.eye(n, dtype=bool)
     for segment, parent in enumerate(model.parents[1:], start=1):
         is_carried[segment] |= is_carried[parent]
     axes = np.swapaxes(R, -1, -2).reshape(-1, 3)  # (3 segments, 3): each segment's x, y, z in the world
-    moved = [
-        angular_momentum(model, np.where(np.repeat(is_carried.T, 3, axis=0)[..., None, None], turn @ R, R), rates)
-        for turn in (Rotation.from_rotvec(sign * _STEP_RAD * axes).as_matrix()[:, None] for sign in (1, -1))
+    rotated = [
+        angular_momentum(model, np.where(np.repeat(is_carried.T, 3, axis=0)[..., None, None], step @ R, R), rates)
+        for step in (Rotation.from_rotvec(sign * _STEP_RAD * axes).as_matrix()[:, None] for sign in (1, -1))
     ]
-    return (moved[0] - moved[1]).T / (2 * _STEP_RAD)
+    return (rotated[0] - rotated[1]).T / (2 * _STEP_RAD)
 
 
-def _inverse_jacobian(vectors: Array) -> Array:
-    """Differentiate log(exp(vector) exp(m)) by m at 0: (..., 3, 3), for rotation vectors (..., 3) shorter than pi."""
+def _inverse_right_jacobian(vectors: Array) -> Array:
+    """Inverse right Jacobian of SO(3): log(exp(v) exp(m)) by m at 0, (..., 3, 3), for v (..., 3) shorter than pi."""
     angle = np.linalg.norm(vectors, axis=-1)
     safe = np.where(angle < 1e-3, 1.0, angle)
     c = np.where(angle < 1e-3, 1 / 12 + angle**2 / 720, 1 / safe**2 - 1 / (2 * safe * np.tan(safe / 2)))

@@ -1,4 +1,4 @@
-"""A body in flight: its centre of mass, its angular momentum, its turns; and what the whole flight comes to."""
+"""A body in flight: centre of mass, angular momentum and rotation over time, and a summary of the flight."""
 
 from __future__ import annotations
 
@@ -6,17 +6,16 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.errors import BodyError
-from airborne.motion.angles import angles
-from airborne.motion.flight.momentum import WINDOW, centre_of_mass, momenta, with_bounded_turns
+from airborne.motion.angles import root_angles
+from airborne.motion.flight.momentum import WINDOW, angular_momenta, bound_rotation_variance, centre_of_mass
 from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
-from airborne.motion.uncertainty import deviation, variances
+from airborne.motion.uncertainty import propagate_variances, standard_deviation
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 Triple = tuple[float, float, float]
 
 GRAVITY_M_S2 = 9.81  # world z points up
@@ -24,10 +23,10 @@ GRAVITY_M_S2 = 9.81  # world z points up
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightSummary:
-    """What all frames with a pose come to; NaN where there are too few.
+    """Summary of all frames with a pose; NaN where there are too few.
 
-    In free flight the angular momentum is constant, gravity is 9.81 m/s2 and the centre of mass keeps to a parabola:
-    how far the numbers are from that is a check of the measurement, or says that the body is not in flight.
+    In free flight the angular momentum is constant and the centre of mass follows a parabola of 9.81 m/s2: departures
+    from that check the measurement, or show that the body is not in flight.
     """
 
     n_poses: int
@@ -36,8 +35,8 @@ class FlightSummary:
     tilt_range_deg: tuple[float, float]
     angular_momentum_kg_m2_s: Triple  # mean over the frames, world axes, about the centre of mass
     angular_momentum_spread_kg_m2_s: Triple  # standard deviation over the frames
-    fitted_gravity_m_s2: float  # downward acceleration of the parabola that suits the centre of mass best
-    ballistic_rms_mm: float  # distance of the centre of mass from the best parabola of 9.81 m/s2
+    fitted_gravity_m_s2: float  # downward acceleration of the best-fitting parabola of the centre of mass
+    ballistic_rms_mm: float  # of the centre of mass from the best parabola of 9.81 m/s2
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file."""
@@ -45,19 +44,19 @@ class FlightSummary:
 
 
 def has_inertias(model: BodyModel) -> bool:
-    """Say whether every segment of a body has a mass."""
+    """Tell whether every segment of a body has a mass."""
     return all(segment.inertia is not None for segment in model.segments)
 
 
-def flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr.Dataset:
+def measure_flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr.Dataset:
     """Measure a body in flight, frame by frame, with standard deviations to first order.
 
     - `com` (time, space) [m]: the centre of mass in the world
-    - `angular_momentum` (time, space) [kg m2/s]: about the centre of mass, world axes; rates are slopes of parabolas
-      over `window` frames, never across a lost frame (see `momenta`)
-    - `somersault`, `twist` [rev] and `tilt` [deg] of the root, as `angles` has them
+    - `angular_momentum` (time, space) [kg m2/s]: about the centre of mass, world axes; rates are slopes of
+      parabolas over `window` frames, never across a lost frame (see `angular_momenta`)
+    - `somersault`, `twist` [rev] and `tilt` [deg] of the root, as in `root_angles`
 
-    A turn that the images do not show counts here as anywhere in the full circle. Raises BodyError where a segment has
+    A rotation that the images do not constrain counts as uniform over the circle. Raises BodyError where a segment has
     no inertia, ResultError for another body's motion.
     """
     require_body(motion, model)
@@ -67,18 +66,18 @@ def flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr.Dataset
     com, variance = np.full((2, len(motion), 3), np.nan)
     for row in np.flatnonzero(motion.has_pose):
         com[row], jacobian = centre_of_mass(model.with_pose(motion.pose(row)))
-        variance[row] = variances(jacobian, with_bounded_turns(motion.covariance[row]))
-    momentum, momentum_variance = momenta(motion, model, window)
-    turns = angles(motion)
-    about, units = ("time", "space"), "kg m2/s"
+        variance[row] = propagate_variances(jacobian, bound_rotation_variance(motion.covariance[row]))
+    momentum, momentum_variance = angular_momenta(motion, model, window)
+    angles = root_angles(motion)
+    axes, units = ("time", "space"), "kg m2/s"
     variables = {
-        "com": (about, com, {"units": "m", "frame": "world"}),
-        "com_sd": (about, deviation(variance), {"units": "m", "frame": "world"}),
-        "angular_momentum": (about, momentum, {"units": units, "frame": "world", "about": "centre of mass"}),
-        "angular_momentum_sd": (about, deviation(momentum_variance), {"units": units, "frame": "world"}),
-        "somersault": ("time", turns["somersault"].to_numpy() / 360, {"units": "rev"}),
-        "twist": ("time", turns["twist"].to_numpy() / 360, {"units": "rev"}),
-        "tilt": ("time", turns["tilt"].to_numpy(), {"units": "deg"}),
+        "com": (axes, com, {"units": "m", "frame": "world"}),
+        "com_sd": (axes, standard_deviation(variance), {"units": "m", "frame": "world"}),
+        "angular_momentum": (axes, momentum, {"units": units, "frame": "world", "about": "centre of mass"}),
+        "angular_momentum_sd": (axes, standard_deviation(momentum_variance), {"units": units, "frame": "world"}),
+        "somersault": ("time", angles["somersault"].to_numpy() / 360, {"units": "rev"}),
+        "twist": ("time", angles["twist"].to_numpy() / 360, {"units": "rev"}),
+        "tilt": ("time", angles["tilt"].to_numpy(), {"units": "deg"}),
     }
     coordinates = {
         "time": ("time", motion.time_s, {"units": "s"}),
@@ -90,12 +89,12 @@ def flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr.Dataset
 
 
 def flight_summary(motion: Motion, model: BodyModel, window: int = WINDOW) -> FlightSummary:
-    """Reduce a flight to its headline numbers. Raises as `flight` does."""
-    table = flight(motion, model, window)
+    """Reduce a flight to its headline numbers. Raises as `measure_flight` does."""
+    table = measure_flight(motion, model, window)
     rows = np.flatnonzero(motion.has_pose)
     momentum = table["angular_momentum"].to_numpy()
     momentum = momentum[np.isfinite(momentum).all(axis=-1)]
-    gravity, rms = _ballistic(motion.time_s[rows], table["com"].to_numpy()[rows])
+    gravity, rms = _fit_parabola(motion.time_s[rows], table["com"].to_numpy()[rows])
     tilt = table["tilt"].to_numpy()[rows]
     return FlightSummary(
         n_poses=len(rows),
@@ -111,15 +110,15 @@ def flight_summary(motion: Motion, model: BodyModel, window: int = WINDOW) -> Fl
     )
 
 
-def _ballistic(time_s: Array, com: Array) -> tuple[float, float]:
-    """Return the downward acceleration that suits a path (n, 3) best, and its distance from a free fall, RMS [m]."""
+def _fit_parabola(time_s: Array, com: Array) -> tuple[float, float]:
+    """Return the best-fitting downward acceleration of a path (n, 3), and the RMS residual of free fall [m]."""
     if len(time_s) < 4:
         return np.nan, np.nan
     t = time_s - time_s.mean()
     gravity = -2 * float(np.polynomial.Polynomial.fit(t, com[:, 2], 2).convert().coef[2])
-    fallen = com + [0, 0, 0.5 * GRAVITY_M_S2] * t[:, None] ** 2
+    without_gravity = com + [0, 0, 0.5 * GRAVITY_M_S2] * t[:, None] ** 2
     line = np.vander(t, 2)
-    residual = fallen - line @ np.linalg.lstsq(line, fallen, rcond=None)[0]
+    residual = without_gravity - line @ np.linalg.lstsq(line, without_gravity, rcond=None)[0]
     return gravity, float(np.sqrt(np.mean(np.sum(residual**2, axis=-1))))
 
 

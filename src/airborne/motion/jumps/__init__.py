@@ -1,1 +1,1 @@
-"""Jumps of players: legs over time in, heights in four definitions and their events out."""
+"""Jumps of players: leg tracks come in; jump heights by several definitions and events go out."""

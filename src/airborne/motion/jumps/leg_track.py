@@ -1,4 +1,4 @@
-"""One player's legs as a jump needs them: hips to balls of the feet, and the centre of mass that they stand for."""
+"""One player's legs for the analysis of jumps: hips to forefeet, and an approximate centre of mass."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from airborne.body.legs import LEG_POINTS
 from airborne.errors import ResultError
 from airborne.motion.players import PlayersMotion
 from airborne.tracking import Status
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-UNKNOWN_SD_M = 0.02  # of a joint whose covariance is not given
-_LEAP_M = 0.05  # beyond noise
-_MASS = {"hip": 0.6782 + 0.2832 * 0.5905, "knee": 0.2832 * 0.4095 + 0.0866 * 0.5605, "ankle": 0.0866 * 0.4395 + 0.0274}
+_UNKNOWN_SD_M = 0.02  # of a joint without a covariance
+_LEAP_M = 0.05  # beyond the noise
+_MASS_SHARES = {
+    "hip": 0.6782 + 0.2832 * 0.5905,
+    "knee": 0.2832 * 0.4095 + 0.0866 * 0.5605,
+    "ankle": 0.0866 * 0.4395 + 0.0274,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -26,11 +29,11 @@ class LegTrack:
     player: str
     index: NDArray[np.int64]  # (n,) frame numbers
     time_s: Array  # (n,)
-    is_uncertain: NDArray[np.bool_]  # (n,) the tracker's own word
+    is_uncertain: NDArray[np.bool_]  # (n,) according to the tracker
     hips: Array  # (n, 2, 3)
     knees: Array  # (n, 2, 3)
     ankles: Array  # (n, 2, 3)
-    balls: Array | None  # (n, 2, 3), of the feet
+    forefeet: Array | None  # (n, 2, 3) balls of the feet
     wrists: Array | None  # (n, 2, 3)
     variances: dict[str, Array]  # "hips", ... -> (n, 2, 3)
 
@@ -41,38 +44,37 @@ class LegTrack:
 
     @property
     def mid_hips(self) -> tuple[Array, Array]:
-        """The middle of the hips (n, 3), and its variance."""
+        """The mid-hips (n, 3), with their variance."""
         return self.hips.mean(axis=1), self.variances["hips"].mean(axis=1) / 2
 
     @property
     def mid_ankles(self) -> tuple[Array, Array]:
-        """The middle of the ankles (n, 3), and its variance."""
+        """The mid-ankles (n, 3), with their variance."""
         return self.ankles.mean(axis=1), self.variances["ankles"].mean(axis=1) / 2
 
     @property
     def centre_of_mass_height(self) -> tuple[Array, Array]:
         """Height of the centre of mass up to a constant (n,) [m], and its variance.
 
-        The trunk, arms and head ride on the hips; the legs have their own masses (de Leva's for men).
+        Trunk, arms and head move with the hips; segment masses are de Leva's (1996) for men.
         """
         parts = {"hip": (self.hips, "hips"), "knee": (self.knees, "knees"), "ankle": (self.ankles, "ankles")}
-        height = sum(_MASS[name] * points[:, :, 2].mean(axis=1) for name, (points, _) in parts.items())
+        height = sum(_MASS_SHARES[name] * points[:, :, 2].mean(axis=1) for name, (points, _) in parts.items())
         variance = sum(
-            _MASS[name] ** 2 * self.variances[key][:, :, 2].mean(axis=1) / 2 for name, (_, key) in parts.items()
+            _MASS_SHARES[name] ** 2 * self.variances[key][:, :, 2].mean(axis=1) / 2 for name, (_, key) in parts.items()
         )
         return np.asarray(height), np.asarray(variance)
 
-    def scaled(self, factor: float) -> LegTrack:
+    def scale_variances(self, factor: float) -> LegTrack:
         """Return the same paths with all variances times a factor."""
         return replace(self, variances={name: factor * variance for name, variance in self.variances.items()})
 
 
-def leg_track(motion: PlayersMotion, player: str) -> LegTrack:
-    """Take one player's legs out of a motion. A covariance that is not given counts as 20 mm an axis.
+def extract_legs(motion: PlayersMotion, player: str) -> LegTrack:
+    """Extract one player's legs from a motion. A missing covariance counts as an sd of 20 mm per axis.
 
-    A place that lies 5 sd and 0.05 m from the median of the five frames about it counts as unknown: a joint does not
-    leap away and back.
-    Raises ResultError where the motion has no such player, or lacks hips, knees or ankles.
+    A position more than 5 sd + 0.05 m from the median of the five frames about it is an outlier and counts as unknown.
+    Raises ResultError if the motion has no such player, or lacks hips, knees or ankles.
     """
     if player not in motion.players:
         raise ResultError(f"no player '{player}'; the motion has: {', '.join(motion.players)}")
@@ -86,10 +88,10 @@ def leg_track(motion: PlayersMotion, player: str) -> LegTrack:
         if all(name in motion.joints for name in names):
             at = [motion.joints.index(name) for name in names]
             variance = np.diagonal(motion.covariance[:, who][:, at], axis1=-2, axis2=-1)
-            sound = np.isfinite(variance) & (variance > 0)
-            variance = np.where(sound, variance, UNKNOWN_SD_M**2)
-            parts[part] = _without_spikes(motion.points[:, who][:, at], variance), variance
-    keys = {"hip": "hips", "knee": "knees", "ankle": "ankles", "foot": "balls", "wrist": "wrists"}
+            is_stated = np.isfinite(variance) & (variance > 0)
+            variance = np.where(is_stated, variance, _UNKNOWN_SD_M**2)
+            parts[part] = _remove_spikes(motion.points[:, who][:, at], variance), variance
+    keys = {"hip": "hips", "knee": "knees", "ankle": "ankles", "foot": "forefeet", "wrist": "wrists"}
     return LegTrack(
         player=player,
         index=motion.index,
@@ -98,17 +100,17 @@ def leg_track(motion: PlayersMotion, player: str) -> LegTrack:
         hips=parts["hip"][0],
         knees=parts["knee"][0],
         ankles=parts["ankle"][0],
-        balls=parts["foot"][0] if "foot" in parts else None,
+        forefeet=parts["foot"][0] if "foot" in parts else None,
         wrists=parts["wrist"][0] if "wrist" in parts else None,
         variances={keys[part]: variance for part, (_, variance) in parts.items()},
     )
 
 
-def _without_spikes(points: Array, variance: Array) -> Array:
-    """Return paths (n, sides, 3) with NaN for the places that leap away from their neighbours and back."""
+def _remove_spikes(points: Array, variance: Array) -> Array:
+    """Return paths (n, sides, 3) with outliers from their neighbours set to NaN."""
     if len(points) < 5:
         return points
-    windows = np.lib.stride_tricks.sliding_window_view(points, 5, axis=0)  # only whole, wholly known windows judge
+    windows = np.lib.stride_tricks.sliding_window_view(points, 5, axis=0)  # only full windows without NaN can tell
     middle = np.pad(np.median(windows, axis=-1), ((2, 2), (0, 0), (0, 0)), constant_values=np.nan)
-    leaps = np.any(np.abs(points - middle) > 5 * np.sqrt(variance) + _LEAP_M, axis=-1, keepdims=True)
-    return np.where(leaps, np.nan, points)
+    is_spike = np.any(np.abs(points - middle) > 5 * np.sqrt(variance) + _LEAP_M, axis=-1, keepdims=True)
+    return np.where(is_spike, np.nan, points)

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from airborne.motion.jumps.jump import Jump, Measured
+from airborne.motion.jumps.jump import Jump, Measurement
 from airborne.motion.tables import cell
 
-_MEASURED = (
+_MEASUREMENTS = (
     "takeoff_s",
     "landing_s",
     "takeoff_frame",
@@ -28,7 +28,7 @@ _MEASURED = (
     "foot_peak_speed_m_s",
     "reach_m",
 )
-_PLACES = ("takeoff_place_m", "landing_place_m")
+_POSITIONS = ("takeoff_position_m", "landing_position_m")
 _HEIGHTS = {
     "foot_height_m": "feet over standing",
     "hip_height_m": "hips over standing",
@@ -38,30 +38,33 @@ _HEIGHTS = {
 }
 
 
-def _names() -> tuple[str, ...]:
-    measured = [*_MEASURED, *(f"{place.removesuffix('_place_m')}_{axis}_m" for place in _PLACES for axis in "xy")]
+def _column_names() -> tuple[str, ...]:
+    measured = [
+        *_MEASUREMENTS,
+        *(f"{name.removesuffix('_position_m')}_{axis}_m" for name in _POSITIONS for axis in "xy"),
+    ]
     measured += ["standing_hips_m", "standing_ankles_m"]
     numbers = [column for name in measured for column in (name, f"{name}_low", f"{name}_high")]
-    stand = ["standing_source", "standing_first_frame", "standing_last_frame"]
-    return ("player", "jump", "status", *numbers, *stand, "block_level_m", "noise_scale", "n_lost", "n_uncertain")
+    posture = ["standing_source", "standing_first_frame", "standing_last_frame"]
+    return ("player", "jump", "status", *numbers, *posture, "block_level_m", "noise_scale", "n_lost", "n_uncertain")
 
 
-COLUMNS = _names()
+JUMP_COLUMNS = _column_names()
 
 
-def columns_of(jump: Jump) -> dict[str, str | int | float]:
-    """Return one row of jumps.csv: every number with the ends of its 95 % interval; NaN where unknown."""
+def jump_row(jump: Jump) -> dict[str, str | int | float]:
+    """Return one row of jumps.csv: every number with its 95 % interval; NaN where unknown."""
     row: dict[str, str | int | float] = {"player": jump.player, "jump": jump.number, "status": jump.status}
-    for name in _MEASURED:
-        row |= _three(name, getattr(jump, name))
-    for name in _PLACES:
-        stem = name.removesuffix("_place_m")
+    for name in _MEASUREMENTS:
+        row |= _with_interval(name, getattr(jump, name))
+    for name in _POSITIONS:
+        stem = name.removesuffix("_position_m")
         for axis, measured in zip("xy", getattr(jump, name), strict=True):
-            row |= _three(f"{stem}_{axis}_m", measured)
-    stand = jump.standing
-    row |= _three("standing_hips_m", stand.hips_m) | _three("standing_ankles_m", stand.ankles_m)
-    first, last = stand.frames or (np.nan, np.nan)
-    row |= {"standing_source": stand.source, "standing_first_frame": first, "standing_last_frame": last}
+            row |= _with_interval(f"{stem}_{axis}_m", measured)
+    posture = jump.standing
+    row |= _with_interval("standing_hips_m", posture.hips_m) | _with_interval("standing_ankles_m", posture.ankles_m)
+    first, last = posture.frames or (np.nan, np.nan)
+    row |= {"standing_source": posture.source, "standing_first_frame": first, "standing_last_frame": last}
     row |= {"block_level_m": jump.block_level_m, "noise_scale": jump.noise_scale}
     return row | {"n_lost": jump.n_lost, "n_uncertain": jump.n_uncertain}
 
@@ -69,14 +72,14 @@ def columns_of(jump: Jump) -> dict[str, str | int | float]:
 def write_jumps(path: Path, jumps: Sequence[Jump]) -> None:
     """Write jumps.csv, one row a jump: each number with `_low` and `_high`, its 95 % interval; empty where unknown.
 
-    Without jumps the file holds its first line alone.
+    Without jumps the file holds only its header.
     """
-    lines = [",".join(COLUMNS)]
-    lines += [",".join(_text(value) for value in columns_of(jump).values()) for jump in jumps]
+    lines = [",".join(JUMP_COLUMNS)]
+    lines += [",".join(_text(value) for value in jump_row(jump).values()) for jump in jumps]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
-def describe(jumps: Sequence[Jump]) -> str:
+def describe_jumps(jumps: Sequence[Jump]) -> str:
     """Return the jumps as a short plain table: heights in cm with half their 95 % intervals."""
     if not jumps:
         return "no jump found"
@@ -91,23 +94,23 @@ def describe(jumps: Sequence[Jump]) -> str:
     lines.append(_line("standing from", [jump.standing.source for jump in jumps], width))
     for jump, name in zip(jumps, names, strict=True):
         if jump.status != "whole":
-            lines.append(f"{name}: {_WHY[jump.status]}; numbers that need it are left out")
+            lines.append(f"{name}: {_STATUS_TEXTS[jump.status]}; numbers that need it are left out")
         if jump.n_lost:
             lines.append(f"{name}: hips or ankles unknown in {jump.n_lost} frames of the flight")
         if jump.n_uncertain:
-            lines.append(f"{name}: {jump.n_uncertain} frames of the flight are uncertain; look at them before use")
+            lines.append(f"{name}: {jump.n_uncertain} frames of the flight are uncertain; check them before use")
     lines.append("after +-: half of the 95 % interval")
     return "\n".join(lines)
 
 
-_WHY = {
+_STATUS_TEXTS = {
     "no take-off": "the take-off is not seen",
     "no landing": "the landing is not seen",
     "neither": "neither take-off nor landing is seen",
 }
 
 
-def _three(name: str, measured: Measured) -> dict[str, str | int | float]:
+def _with_interval(name: str, measured: Measurement) -> dict[str, str | int | float]:
     return {name: measured.value, f"{name}_low": measured.low, f"{name}_high": measured.high}
 
 
@@ -119,7 +122,7 @@ def _line(title: str, cells: Sequence[str], width: int) -> str:
     return f"  {title:<20}" + "".join(f"{text:>{width}}" for text in cells)
 
 
-def _plus_minus(measured: Measured, scale: float, digits: int) -> str:
+def _plus_minus(measured: Measurement, scale: float, digits: int) -> str:
     if not np.isfinite(measured.value):
         return "-"
     half = scale * (measured.high - measured.low) / 2

@@ -1,34 +1,40 @@
-"""Signals: in come paths over time with their covariances, out come smooth ones, derivatives, events, cut-offs.
+"""Smoothing: paths over time and their covariances come in; smooth paths, derivatives, events, cut-offs go out.
 
-Arrays in, arrays out; nothing reaches across a boundary between segments or a gap that is not to be filled.
-Knows no body, no player and no file.
+Arrays in, arrays out; no smoothing across boundaries between segments or across gaps that are not filled.
+Independent of bodies, players and files.
 """
 
-from airborne.motion.smoothing.boundaries import crossings, highest
-from airborne.motion.smoothing.butterworth import butterworth, correction, is_even, low_pass, pass_cutoff_hz
-from airborne.motion.smoothing.kalman import kalman
+from airborne.motion.smoothing.boundaries import crossings, parabolic_peak
+from airborne.motion.smoothing.butterworth import (
+    butterworth_smoother,
+    cutoff_correction,
+    is_evenly_sampled,
+    low_pass,
+    pass_cutoff_hz,
+)
+from airborne.motion.smoothing.kalman import kalman_smoother
 from airborne.motion.smoothing.residuals import ResidualAnalysis, residual_analysis
 from airborne.motion.smoothing.rotations import SmoothedRotations, continuous_quaternions, smooth_rotations
-from airborne.motion.smoothing.segments import Pieces, Smoothed, Smoother, in_stretches
-from airborne.motion.smoothing.splines import spline
+from airborne.motion.smoothing.segments import SmoothedPaths, SmoothedSegments, Smoother, smooth_stretches
+from airborne.motion.smoothing.splines import spline_smoother
 
 __all__ = [
-    "Pieces",
+    "SmoothedSegments",
     "ResidualAnalysis",
-    "Smoothed",
+    "SmoothedPaths",
     "SmoothedRotations",
     "Smoother",
-    "butterworth",
+    "butterworth_smoother",
     "continuous_quaternions",
-    "correction",
+    "cutoff_correction",
     "crossings",
-    "highest",
-    "in_stretches",
-    "is_even",
-    "kalman",
+    "parabolic_peak",
+    "smooth_stretches",
+    "is_evenly_sampled",
+    "kalman_smoother",
     "low_pass",
     "pass_cutoff_hz",
     "residual_analysis",
     "smooth_rotations",
-    "spline",
+    "spline_smoother",
 ]

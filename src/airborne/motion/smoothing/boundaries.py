@@ -1,25 +1,24 @@
-"""Events of one path over time, to a fraction of a frame: when it passes a level, where it is highest."""
+"""Events of one path over time, to a fraction of a frame: crossings of a level, the peak."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 
 def crossings(time_s: Array, values: Array, level: float, *, rising: bool = True) -> Array:
-    """Return when a path (n,) passes a level upward, or downward [s]: on the line between two known frames."""
+    """Return when a path (n,) crosses a level upward or downward [s], by linear interpolation of known frames."""
     above = (values - level) if rising else (level - values)
     before = np.flatnonzero((above[:-1] < 0) & (above[1:] >= 0))
     share = above[before] / (above[before] - above[before + 1])
     return time_s[before] + share * (time_s[before + 1] - time_s[before])
 
 
-def highest(time_s: Array, values: Array) -> tuple[float, float]:
-    """Return when a path (n,) is highest [s], and how high: the top of the parabola through the three frames there.
+def parabolic_peak(time_s: Array, values: Array) -> tuple[float, float]:
+    """Return time [s] and height of the peak of a path (n,): the apex of the parabola through the three highest frames.
 
-    The frame itself where it is the first or last known one, or its neighbours are unknown; NaN where nothing is known.
+    The highest frame itself if it is the first or last, or a neighbour is unknown; NaN where nothing is known.
     """
     if not np.isfinite(values).any():
         return np.nan, np.nan

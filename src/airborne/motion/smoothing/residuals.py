@@ -1,10 +1,10 @@
-"""Which cut-off: what a filter takes off a path, for many cut-offs, and what that says of noise.
+"""Choice of the cut-off: the residuals of a low-pass filter over many cut-offs, and the noise they reveal.
 
-Winter's residual analysis: noise alone leaves residuals that fall in a line with the cut-off; where that line, carried
-on to 0 Hz, meets the axis is the noise's size, and the cut-off whose residual is as large lets through as much noise as
-it takes off the motion. Source: Winter, "Biomechanics and Motor Control of Human Movement", section on the choice of
-cut-off frequency; Wells and Winter 1980. Beside it the cut-off whose residuals are most like white noise: Challis 1999,
-"A procedure for the automatic determination of filter cutoff frequency for the processing of biomechanical data".
+Winter's residual analysis: residuals of noise alone fall linearly with the cut-off; the line's intercept at 0 Hz is
+the noise's RMS, and the cut-off whose residual equals it passes as much noise as it removes signal. Source: Winter,
+"Biomechanics and Motor Control of Human Movement", section on the choice of cut-off frequency; Wells and Winter 1980.
+Besides it, the cut-off whose residuals are closest to white noise: Challis 1999, "A procedure for the automatic
+determination of filter cutoff frequency for the processing of biomechanical data".
 """
 
 from __future__ import annotations
@@ -13,31 +13,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.motion.smoothing.butterworth import low_pass
-from airborne.motion.smoothing.segments import known_rows, stretches
+from airborne.motion.smoothing.segments import finite_rows, stretches
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-LINE = (0.3, 0.6)  # of half the rate: where the residuals are taken for noise alone
+LINE = (0.3, 0.6)  # of half the rate: where residuals are taken as pure noise
 _LARGEST = 0.9  # of half the rate
 _N_CUTOFFS = 60
 _LONGEST_LAG = 10  # frames
-_SHORTEST = 12  # frames of a stretch that can tell
+_SHORTEST = 12  # frames of a usable stretch
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualAnalysis:
-    """Residuals over cut-offs, and the cut-offs that follow; NaN where nothing can be said."""
+    """Residuals over cut-offs, and the cut-offs chosen from them; NaN where undetermined."""
 
     cutoff_hz: Array  # (m,) tried
     residual: Array  # (m,) RMS, in the paths' unit
     whiteness: Array  # (m,) sum of squared autocorrelations of the residuals at lags 1 to 10, mean over the paths
-    line: tuple[float, float]  # residual of noise alone: at 0 Hz, and its change a Hz
+    line: tuple[float, float]  # residual of noise alone: at 0 Hz, and its slope per Hz
     chosen_hz: float  # by the residuals (Winter)
     whitest_hz: float  # by their autocorrelation (Challis)
-    n_values: int  # on which all this rests
+    n_values: int  # that were analysed
 
     @property
     def noise(self) -> float:
@@ -48,7 +46,7 @@ class ResidualAnalysis:
 def residual_analysis(
     time_s: Array, paths: Array, *, boundaries_s: Sequence[Sequence[float]] = ((),)
 ) -> ResidualAnalysis:
-    """Analyse evenly sampled paths (n, paths, axes) together, each in stretches as `in_stretches` makes them.
+    """Analyse evenly sampled paths (n, paths, axes) together, each in stretches as in `smooth_stretches`.
 
     `boundaries_s` are those of each path, or one for all. Only stretches of twelve known frames or more count.
     """
@@ -58,13 +56,13 @@ def residual_analysis(
     for k in range(paths.shape[1]):
         own = boundaries_s[k] if len(boundaries_s) > 1 else boundaries_s[0]
         segment = np.searchsorted(np.sort(np.asarray(own, float)), time_s, side="right")
-        for rows in stretches(time_s, known_rows(paths[:, k]), segment, 0.0):
+        for rows in stretches(time_s, finite_rows(paths[:, k]), segment, 0.0):
             values = paths[rows, k]
             if len(values) < _SHORTEST:
                 continue
-            rest = np.stack([values - low_pass(values, cutoff_hz=float(f), rate_hz=rate_hz) for f in cutoff_hz])
-            squared += (rest**2).sum(axis=(1, 2))
-            white += _autocorrelation(rest).sum(axis=-1)
+            residuals = np.stack([values - low_pass(values, cutoff_hz=float(f), rate_hz=rate_hz) for f in cutoff_hz])
+            squared += (residuals**2).sum(axis=(1, 2))
+            white += _autocorrelation(residuals).sum(axis=-1)
             n, n_stretches = n + values.size, n_stretches + values.shape[1]
     if not n:
         unknown = np.full(_N_CUTOFFS, np.nan)
@@ -77,7 +75,7 @@ def residual_analysis(
         residual=residual,
         whiteness=whiteness,
         line=line,
-        chosen_hz=_meeting(cutoff_hz, residual, line[0]),
+        chosen_hz=_crossing_hz(cutoff_hz, residual, line[0]),
         whitest_hz=float(cutoff_hz[int(np.argmin(whiteness))]),
         n_values=n,
     )
@@ -90,7 +88,7 @@ def _noise_line(cutoff_hz: Array, residual: Array, rate_hz: float) -> tuple[floa
     return float(start), float(slope)
 
 
-def _meeting(cutoff_hz: Array, residual: Array, level: float) -> float:
+def _crossing_hz(cutoff_hz: Array, residual: Array, level: float) -> float:
     """Return the largest cut-off below which the residual is above a level; NaN where it never is."""
     above = np.flatnonzero(residual > level)
     if not len(above) or above[-1] + 1 == len(residual):
@@ -100,9 +98,9 @@ def _meeting(cutoff_hz: Array, residual: Array, level: float) -> float:
     return float(cutoff_hz[k] + share * (cutoff_hz[k + 1] - cutoff_hz[k]))
 
 
-def _autocorrelation(rest: Array) -> Array:
+def _autocorrelation(residuals: Array) -> Array:
     """Return the sums of squared autocorrelations (m, axes) of residuals (m, n, axes); 0 for residuals of zero."""
-    power = (rest**2).sum(axis=1)
-    lags = range(1, min(_LONGEST_LAG, rest.shape[1] // 2) + 1)
-    products = np.stack([(rest[:, lag:] * rest[:, :-lag]).sum(axis=1) for lag in lags])
+    power = (residuals**2).sum(axis=1)
+    lags = range(1, min(_LONGEST_LAG, residuals.shape[1] // 2) + 1)
+    products = np.stack([(residuals[:, lag:] * residuals[:, :-lag]).sum(axis=1) for lag in lags])
     return ((products / np.where(power > 0, power, np.inf)) ** 2).sum(axis=0)

@@ -1,8 +1,8 @@
-"""Smooth motions: positions, orientations and joints with their velocities and accelerations, as labelled arrays."""
+"""Smoothed motions: positions, orientations and joints with velocities and accelerations, as labelled arrays."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
 from itertools import pairwise
@@ -15,31 +15,29 @@ from numpy.typing import NDArray
 from airborne.body import BodyModel
 from airborne.body.chain import nearest_angles
 from airborne.errors import ResultError
-from airborne.geometry.rotations import angles_from_matrix, is_near_singular, matrix_from_angles, unwrapped
-from airborne.motion.angles import ANGLES
-from airborne.motion.flight.momentum_table import flight, has_inertias
+from airborne.geometry.rotations import angles_from_matrix, is_near_singular, matrix_from_angles, unwrap
+from airborne.motion.angles import ROOT_ANGLES
+from airborne.motion.flight.momentum_table import has_inertias, measure_flight
 from airborne.motion.joints import landmarks, require_body
 from airborne.motion.motion import Motion
 from airborne.motion.players import PlayersMotion
 from airborne.motion.smoothing import (
-    Pieces,
-    Smoothed,
+    SmoothedPaths,
     SmoothedRotations,
+    SmoothedSegments,
     Smoother,
-    butterworth,
+    butterworth_smoother,
     continuous_quaternions,
-    in_stretches,
-    kalman,
+    kalman_smoother,
     smooth_rotations,
-    spline,
+    smooth_stretches,
+    spline_smoother,
 )
+from airborne.types import Array, Progress
 
-Array = NDArray[np.floating]
-Progress = Callable[[int, int | None], None]
-
-MOST_FILL_S = 0.5
+_LONGEST_FILL_S = 0.5
 CENTRE_OF_MASS = "centre_of_mass"
-_ABOUT = {
+_DESCRIPTIONS = {
     "butterworth": "zero-lag Butterworth low-pass, second order forward and back, -3 dB of both at {cutoff:g} Hz",
     "spline": "cubic smoothing spline by generalised cross-validation, weighted by 1 / variance",
     "kalman": "Kalman smoother, white jerk of likeliest strength, the tracker's covariances",
@@ -53,108 +51,126 @@ _FILLED_BY = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Smoothing:
-    """How to smooth. Gaps up to `fill_s` [s] are filled; none by default.
+    """A smoothing method and its settings. Gaps up to `fill_s` [s] are filled; none by default.
 
-    Raises ResultError for a gap that is too long to be filled, and for another method with a cut-off.
+    Raises ResultError for gaps too long to fill, and for a cut-off with another method.
     """
 
     method: Literal["butterworth", "spline", "kalman"]
-    cutoff_hz: float | None = None  # of the Butterworth filter; None where it is still to be chosen
-    resample_hz: float | None = None  # of the Butterworth filter, where times are not even
+    cutoff_hz: float | None = None  # of the Butterworth filter; None if still to be chosen
+    resample_hz: float | None = None  # of the Butterworth filter, for uneven times
     fill_s: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0 <= self.fill_s <= MOST_FILL_S:
+        if not 0 <= self.fill_s <= _LONGEST_FILL_S:
             raise ResultError(
-                f"gaps of {self.fill_s:g} s cannot be filled; give 0 to {MOST_FILL_S:g} s: what moves in between is "
-                "not known"
+                f"gaps of {self.fill_s:g} s cannot be filled; give 0 to {_LONGEST_FILL_S:g} s: "
+                "the motion in between is unknown"
             )
         if self.method != "butterworth" and not (self.cutoff_hz is self.resample_hz is None):
             raise ResultError(f"cut-off and resampling belong to a Butterworth filter; leave them out of {self.method}")
 
     def smoother(self) -> Smoother:
-        """Return what smooths one stretch. Raises ResultError for a Butterworth filter without a cut-off."""
+        """Return the smoother of one stretch. Raises ResultError for a Butterworth filter without a cut-off."""
         if self.method == "butterworth":
             if self.cutoff_hz is None:
-                raise ResultError("a Butterworth filter needs a cut-off in Hz; give one, as 6")
-            return partial(butterworth, cutoff_hz=self.cutoff_hz, resample_hz=self.resample_hz)
-        return spline if self.method == "spline" else kalman
+                raise ResultError("a Butterworth filter needs a cut-off in Hz; give one, such as 6")
+            return partial(butterworth_smoother, cutoff_hz=self.cutoff_hz, resample_hz=self.resample_hz)
+        return spline_smoother if self.method == "spline" else kalman_smoother
 
     def history(self, boundaries_s: Sequence[float] | Mapping[str, Sequence[float]]) -> list[str]:
-        """Say what was done, one operation a line."""
-        said = _ABOUT[self.method].format(cutoff=self.cutoff_hz)
+        """Describe what was done, one operation per line."""
+        text = _DESCRIPTIONS[self.method].format(cutoff=self.cutoff_hz)
         if self.resample_hz is not None:
-            said += f", on a cubic spline through the values sampled at {self.resample_hz:g} Hz"
+            text += f", on a cubic spline through the values sampled at {self.resample_hz:g} Hz"
         fill = f"gaps up to {self.fill_s:g} s filled by {_FILLED_BY[self.method]}" if self.fill_s else "no gap filled"
         spans = boundaries_s if isinstance(boundaries_s, Mapping) else {"": boundaries_s}
-        cuts = [f"{name} {_listed(times)}".strip() for name, times in spans.items()]
-        return [f"smoothing: {said}", fill, f"segments end at {'; '.join(cuts)}"]
+        cuts = [f"{name} {_list_times(times)}".strip() for name, times in spans.items()]
+        return [f"smoothing: {text}", fill, f"segments end at {'; '.join(cuts)}"]
 
 
-def smooth_root(motion: Motion, how: Smoothing, boundaries_s: Sequence[float]) -> xr.Dataset:
+def smooth_root(motion: Motion, smoothing: Smoothing, boundaries_s: Sequence[float]) -> xr.Dataset:
     """Smooth a body's root: position, velocity, acceleration; orientation, angular velocity and acceleration.
 
     The position is smoothed with the position's covariance, the orientation with the mean variance of its rotation
-    vector; angular velocities are in world axes. Somersault, tilt and twist are read off the smooth orientation.
+    vector; angular velocities are in world axes. Somersault, tilt and twist are those of the smooth orientation.
     """
-    _require_covariances(how, motion.position, motion.covariance[:, :3, :3])
-    place = in_stretches(
-        how.smoother(),
+    _require_covariances(smoothing, motion.position, motion.covariance[:, :3, :3])
+    position = smooth_stretches(
+        smoothing.smoother(),
         motion.time_s,
         motion.position,
         motion.covariance[:, :3, :3],
         boundaries_s=boundaries_s,
-        fill_s=how.fill_s,
+        fill_s=smoothing.fill_s,
     )
-    turn = smooth_rotations(
-        how.smoother(),
+    rotation = smooth_rotations(
+        smoothing.smoother(),
         motion.time_s,
         motion.R,
         _mean_variance(motion.covariance[:, 3:6, 3:6]),
         boundaries_s=boundaries_s,
-        fill_s=how.fill_s,
+        fill_s=smoothing.fill_s,
     )
-    space, radians = ("time", "space"), unwrapped(angles_from_matrix(turn.R), motion.time_s)
-    quaternion = continuous_quaternions(turn.R)
-    variables: dict = _of_place(place, space)
+    space, radians = ("time", "space"), unwrap(angles_from_matrix(rotation.R), motion.time_s)
+    quaternion = continuous_quaternions(rotation.R)
+    variables: dict = _position_variables(position, space)
     variables |= {"quaternion": (("time", "component"), quaternion, {"units": "1", "map": "world_from_root"})}
-    variables |= _of_turn(turn, space)
-    variables |= {name: ("time", np.rad2deg(radians[:, k]), {"units": "deg"}) for k, name in enumerate(ANGLES)}
+    variables |= _rotation_variables(rotation, space)
+    variables |= {name: ("time", np.rad2deg(radians[:, k]), {"units": "deg"}) for k, name in enumerate(ROOT_ANGLES)}
     variables |= {
         "is_singular": ("time", is_near_singular(radians)),
         "status": ("time", motion.status),
-        "segment": ("time", place.segment),
-        "is_filled": ("time", place.is_filled),
+        "segment": ("time", position.segment),
+        "is_filled": ("time", position.is_filled),
     }
-    coordinates = _times(motion.time_s, motion.index) | {"space": list("xyz"), "component": list("xyzw")}
-    return xr.Dataset(variables, coordinates, {"history": how.history(boundaries_s)})
+    coordinates = _coordinates(motion.time_s, motion.index) | {"space": list("xyz"), "component": list("xyzw")}
+    return xr.Dataset(variables, coordinates, {"history": smoothing.history(boundaries_s)})
 
 
 def smooth_landmarks(
-    motion: Motion, model: BodyModel, how: Smoothing, boundaries_s: Sequence[float], progress: Progress | None = None
+    motion: Motion,
+    model: BodyModel,
+    smoothing: Smoothing,
+    boundaries_s: Sequence[float],
+    *,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Smooth the paths of a body's landmarks, and of its centre of mass where it has masses: (time, joint, space).
 
-    Each with its own standard deviation, alike along all axes. Raises ResultError for another body's motion.
+    Each landmark has its own standard deviation, the same along all axes. Raises ResultError for another body's motion.
     """
     points, sd = landmarks(motion, model)
     names = [landmark.name for landmark in model.landmarks]
     covariance = np.where(np.eye(3, dtype=bool), sd[..., None, None] ** 2, 0.0)
     if has_inertias(model):
-        table = flight(motion, model)
+        table = measure_flight(motion, model)
         com, com_sd = (table[name].transpose("time", "space").to_numpy() for name in ("com", "com_sd"))
         points = np.concatenate([points, com[:, None]], axis=1)
         diagonal = np.where(np.eye(3, dtype=bool), com_sd[:, None, :] ** 2, 0.0)
         covariance, names = np.concatenate([covariance, diagonal[:, None]], axis=1), [*names, CENTRE_OF_MASS]
-    found = _smooth_points(motion.time_s, points, covariance, how, [boundaries_s] * len(names), progress)
-    coordinates = _times(motion.time_s, motion.index) | {"joint": names, "space": list("xyz")}
-    return xr.Dataset(_of_place(found, ("time", "joint", "space")), coordinates, {"history": how.history(boundaries_s)})
+    paths = _smooth_points(
+        motion.time_s,
+        points,
+        covariance,
+        smoothing=smoothing,
+        boundaries_s=[boundaries_s] * len(names),
+        progress=progress,
+    )
+    coordinates = _coordinates(motion.time_s, motion.index) | {"joint": names, "space": list("xyz")}
+    return xr.Dataset(
+        _position_variables(paths, ("time", "joint", "space")),
+        coordinates,
+        {"history": smoothing.history(boundaries_s)},
+    )
 
 
-def smooth_joint_angles(motion: Motion, model: BodyModel, how: Smoothing, boundaries_s: Sequence[float]) -> xr.Dataset:
-    """Smooth how a body's joints are turned, as rotations: (time, joint, axis).
+def smooth_joint_angles(
+    motion: Motion, model: BodyModel, smoothing: Smoothing, boundaries_s: Sequence[float]
+) -> xr.Dataset:
+    """Smooth a body's joint rotations: (time, joint, axis).
 
-    `angle` [deg] is read off them, continuous over time; `velocity` [deg/s] is the angular one in the parent's axes.
+    `angle` [deg] follows from them, continuous over time; `velocity` [deg/s] is the angular one in the parent's axes.
     Raises ResultError for another body's motion.
     """
     require_body(motion, model)
@@ -164,16 +180,16 @@ def smooth_joint_angles(motion: Motion, model: BodyModel, how: Smoothing, bounda
     is_filled = np.zeros((n, n_joints), bool)
     for k in range(n_joints):
         block = slice(6 + 3 * k, 9 + 3 * k)
-        turn = smooth_rotations(
-            how.smoother(),
+        rotation = smooth_rotations(
+            smoothing.smoother(),
             motion.time_s,
             matrix_from_angles(motion.joint_angles[:, k]),
             _mean_variance(motion.covariance[:, block, block]),
             boundaries_s=boundaries_s,
-            fill_s=how.fill_s,
+            fill_s=smoothing.fill_s,
         )
-        angle[:, k], velocity[:, k] = _continuous(angles_from_matrix(turn.R)), turn.velocity
-        sd[:, k], velocity_sd[:, k], is_filled[:, k] = turn.sd, turn.velocity_sd, turn.is_filled
+        angle[:, k], velocity[:, k] = _continuous(angles_from_matrix(rotation.R)), rotation.velocity
+        sd[:, k], velocity_sd[:, k], is_filled[:, k] = rotation.sd, rotation.velocity_sd, rotation.is_filled
     axes = ("time", "joint", "axis")
     variables = {
         "angle": (axes, np.rad2deg(angle), {"units": "deg", "order": "x, y, z, body-fixed"}),
@@ -183,94 +199,99 @@ def smooth_joint_angles(motion: Motion, model: BodyModel, how: Smoothing, bounda
         "is_singular": (axes[:2], is_near_singular(angles_from_matrix(matrix_from_angles(angle)))),
         "is_filled": (axes[:2], is_filled),
     }
-    coordinates = _times(motion.time_s, motion.index) | {"joint": list(motion.joints), "axis": list("xyz")}
-    return xr.Dataset(variables, coordinates, {"history": how.history(boundaries_s)})
+    coordinates = _coordinates(motion.time_s, motion.index) | {"joint": list(motion.joints), "axis": list("xyz")}
+    return xr.Dataset(variables, coordinates, {"history": smoothing.history(boundaries_s)})
 
 
 def smooth_players(
     motion: PlayersMotion,
-    how: Smoothing,
+    smoothing: Smoothing,
     boundaries_s: Mapping[str, Sequence[float]],
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Smooth the joints of several players, each with its covariances and its player's segments.
 
-    (time, player, joint, space), as `smooth_landmarks`.
+    Returns (time, player, joint, space), as `smooth_landmarks` does.
     """
     n, n_players, n_joints = motion.points.shape[:3]
     own = [boundaries_s[name] for name in motion.players for _ in motion.joints]
-    found = _smooth_points(
+    paths = _smooth_points(
         motion.time_s,
         motion.points.reshape(n, -1, 3),
         motion.covariance.reshape(n, -1, 3, 3),
-        how,
-        own,
-        progress,
+        smoothing=smoothing,
+        boundaries_s=own,
+        progress=progress,
     )
     shape = (n, n_players, n_joints)
-    found = Pieces(
-        Smoothed(*(getattr(found.smoothed, field.name).reshape(*shape, 3) for field in fields(Smoothed))),
-        found.segment.reshape(shape),
-        found.is_filled.reshape(shape),
+    paths = SmoothedSegments(
+        SmoothedPaths(*(getattr(paths.paths, field.name).reshape(*shape, 3) for field in fields(SmoothedPaths))),
+        paths.segment.reshape(shape),
+        paths.is_filled.reshape(shape),
     )
-    coordinates = _times(motion.time_s, motion.index) | {
+    coordinates = _coordinates(motion.time_s, motion.index) | {
         "player": list(motion.players),
         "joint": list(motion.joints),
         "space": list("xyz"),
     }
-    variables = _of_place(found, ("time", "player", "joint", "space"))
-    return xr.Dataset(variables, coordinates, {"history": how.history(boundaries_s)})
+    variables = _position_variables(paths, ("time", "player", "joint", "space"))
+    return xr.Dataset(variables, coordinates, {"history": smoothing.history(boundaries_s)})
 
 
 def _smooth_points(
     time_s: Array,
     points: Array,
     covariance: Array,
-    how: Smoothing,
+    *,
+    smoothing: Smoothing,
     boundaries_s: Sequence[Sequence[float]],
     progress: Progress | None,
-) -> Pieces:
-    """Smooth points (n, p, 3) one after another; the pieces have their axes too."""
-    _require_covariances(how, points, covariance)
-    smooth, found = how.smoother(), []
+) -> SmoothedSegments:
+    """Smooth points (n, p, 3) one after another; the result has the same axes."""
+    _require_covariances(smoothing, points, covariance)
+    smooth, parts = smoothing.smoother(), []
     for k, own in enumerate(boundaries_s):
-        found.append(in_stretches(smooth, time_s, points[:, k], covariance[:, k], boundaries_s=own, fill_s=how.fill_s))
+        parts.append(
+            smooth_stretches(smooth, time_s, points[:, k], covariance[:, k], boundaries_s=own, fill_s=smoothing.fill_s)
+        )
         if progress is not None:
             progress(k + 1, len(boundaries_s))
-    stacked = (np.stack([getattr(one.smoothed, field.name) for one in found], axis=1) for field in fields(Smoothed))
-    return Pieces(
-        Smoothed(*stacked), np.stack([one.segment for one in found], 1), np.stack([one.is_filled for one in found], 1)
+    stacked = (np.stack([getattr(one.paths, field.name) for one in parts], axis=1) for field in fields(SmoothedPaths))
+    return SmoothedSegments(
+        SmoothedPaths(*stacked),
+        np.stack([one.segment for one in parts], 1),
+        np.stack([one.is_filled for one in parts], 1),
     )
 
 
-def _require_covariances(how: Smoothing, values: Array, covariance: Array) -> None:
-    """Raise ResultError where a Kalman smoother has something to smooth and nothing says how sure it is."""
-    if how.method == "kalman" and np.isfinite(values).any() and not np.isfinite(covariance).any():
+def _require_covariances(smoothing: Smoothing, values: Array, covariance: Array) -> None:
+    """Raise ResultError where a Kalman smoother has values to smooth but no covariances."""
+    if smoothing.method == "kalman" and np.isfinite(values).any() and not np.isfinite(covariance).any():
         raise ResultError("the run states no covariances, which the Kalman smoother needs; use a spline or Butterworth")
 
 
-def _of_place(found: Pieces, axes: tuple[str, ...]) -> dict:
+def _position_variables(segments: SmoothedSegments, axes: tuple[str, ...]) -> dict:
     units = {"value": ("position", "m"), "velocity": ("velocity", "m/s"), "acceleration": ("acceleration", "m/s2")}
     variables: dict = {}
     for field, (name, unit) in units.items():
-        variables[name] = (axes, getattr(found.smoothed, field), {"units": unit, "frame": "world"})
-        variables[f"{name}_sd"] = (axes, getattr(found.smoothed, f"{field}_sd"), {"units": unit, "frame": "world"})
+        variables[name] = (axes, getattr(segments.paths, field), {"units": unit, "frame": "world"})
+        variables[f"{name}_sd"] = (axes, getattr(segments.paths, f"{field}_sd"), {"units": unit, "frame": "world"})
     if len(axes) > 2:
-        variables |= {"segment": (axes[:-1], found.segment), "is_filled": (axes[:-1], found.is_filled)}
+        variables |= {"segment": (axes[:-1], segments.segment), "is_filled": (axes[:-1], segments.is_filled)}
     return variables
 
 
-def _of_turn(found: SmoothedRotations, axes: tuple[str, str]) -> dict:
+def _rotation_variables(rotations: SmoothedRotations, axes: tuple[str, str]) -> dict:
     return {
-        "rotation_sd": ("time", found.sd, {"units": "rad"}),
-        "angular_velocity": (axes, found.velocity, {"units": "rad/s", "frame": "world"}),
-        "angular_velocity_sd": ("time", found.velocity_sd, {"units": "rad/s"}),
-        "angular_acceleration": (axes, found.acceleration, {"units": "rad/s2", "frame": "world"}),
-        "angular_acceleration_sd": ("time", found.acceleration_sd, {"units": "rad/s2"}),
+        "rotation_sd": ("time", rotations.sd, {"units": "rad"}),
+        "angular_velocity": (axes, rotations.velocity, {"units": "rad/s", "frame": "world"}),
+        "angular_velocity_sd": ("time", rotations.velocity_sd, {"units": "rad/s"}),
+        "angular_acceleration": (axes, rotations.acceleration, {"units": "rad/s2", "frame": "world"}),
+        "angular_acceleration_sd": ("time", rotations.acceleration_sd, {"units": "rad/s2"}),
     }
 
 
-def _times(time_s: Array, index: NDArray[np.int64]) -> dict:
+def _coordinates(time_s: Array, index: NDArray[np.int64]) -> dict:
     return {"time": ("time", time_s, {"units": "s"}), "frame": ("time", index)}
 
 
@@ -281,11 +302,11 @@ def _mean_variance(covariance: Array) -> Array:
 
 def _continuous(radians: Array) -> Array:
     """Return joint angles (n, 3), each row on the branch nearest to the last known one before it."""
-    found = np.array(radians)
-    for before, row in pairwise(np.flatnonzero(np.isfinite(found).all(axis=1))):
-        found[row] = nearest_angles(found[row], found[before])
-    return found
+    angles = np.array(radians)
+    for before, row in pairwise(np.flatnonzero(np.isfinite(angles).all(axis=1))):
+        angles[row] = nearest_angles(angles[row], angles[before])
+    return angles
 
 
-def _listed(times_s: Sequence[float]) -> str:
+def _list_times(times_s: Sequence[float]) -> str:
     return ", ".join(f"{time:.4f} s" for time in times_s) or "no event"

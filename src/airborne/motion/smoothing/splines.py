@@ -1,4 +1,4 @@
-"""Cubic smoothing splines whose smoothness is chosen by generalised cross-validation.
+"""Cubic smoothing splines, their penalty chosen by generalised cross-validation.
 
 Source: Wahba 1990, "Spline Models for Observational Data", chapter 4; Woltring 1985, "On optimal smoothing and
 derivative estimation from noisy displacement data in biomechanics". The spline is SciPy's.
@@ -7,58 +7,56 @@ derivative estimation from noisy displacement data in biomechanics". The spline 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_smoothing_spline
 
-from airborne.motion.smoothing.propagation import Operator, applied
-from airborne.motion.smoothing.segments import Smoothed
+from airborne.motion.smoothing.propagation import Operator, apply_operator
+from airborne.motion.smoothing.segments import SmoothedPaths
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-_UNIT_FRAMES = 4.0  # SciPy looks for a penalty between 0 and n: in this unit of time those of usual motions lie there
+_UNIT_FRAMES = 4.0  # unit of time: SciPy searches penalties from 0 to n, which suits usual motions in this unit
 _WIDER = 4.0
 _MOST_TRIES = 6
 _AT_THE_END = 0.98
 
 
-def spline(time_s: Array, values: Array, covariance: Array) -> Smoothed:
+def spline_smoother(time_s: Array, values: Array, covariance: Array) -> SmoothedPaths:
     """Smooth one stretch (n, k) with a cubic spline for each path, weighted by 1 / variance; see `Smoother`.
 
-    Paths with an unknown or infinite variance anywhere are not weighted. The penalty is that of the least generalised
-    cross-validation score, which takes the noise for white; missing rows are read off the spline. Its second derivative
-    is zero at both ends, whatever the motion does: there the acceleration is left unknown. The deviations take the
-    penalty as given.
+    Paths with an unknown or infinite variance anywhere are not weighted. The penalty minimises the generalised
+    cross-validation score, which assumes white noise; missing rows are evaluated from the spline. Its second derivative
+    is zero at both ends whatever the motion, so the acceleration is left unknown there. Standard deviations are
+    conditional on the penalty.
     """
     is_known = np.isfinite(values).all(axis=1)
     variance = np.diagonal(covariance, axis1=1, axis2=2)
     parts = []
     for k in range(values.shape[1]):
         one = slice(k, k + 1)
-        operator = _fitted(time_s[is_known], values[is_known, k], _weights(variance[is_known, k]))
-        parts.append(applied(operator, time_s, values[:, one], covariance[:, one, one]))
+        operator = _fit_operator(time_s[is_known], values[is_known, k], _weights(variance[is_known, k]))
+        parts.append(apply_operator(operator, time_s, values[:, one], covariance[:, one, one]))
     for part in parts:
         part.acceleration[[0, -1]] = part.acceleration_sd[[0, -1]] = np.nan
-    return Smoothed(*(np.hstack([getattr(part, name) for part in parts]) for name in Smoothed.__slots__))
+    return SmoothedPaths(*(np.hstack([getattr(part, name) for part in parts]) for name in SmoothedPaths.__slots__))
 
 
-def penalty_of(at: Array, values: Array, weights: Array, found: BSpline) -> float:
-    """Return the penalty that led to a smoothing spline, from what it must satisfy at its knots.
+def smoothing_penalty(at: Array, values: Array, weights: Array, spline: BSpline) -> float:
+    """Return the penalty of a smoothing spline from its optimality condition.
 
-    There, penalty times the jump of the third derivative is weight times residual.
+    At each knot, penalty times the jump of the third derivative equals weight times residual.
     """
     middles = (at[1:] + at[:-1]) / 2
-    third = np.concatenate([[0.0], found(middles, 3), [0.0]])
+    third = np.concatenate([[0.0], spline(middles, 3), [0.0]])
     jumps = np.diff(third)
-    return float((weights * (values - found(at))) @ jumps / max(float(jumps @ jumps), 1e-300))
+    return float((weights * (values - spline(at))) @ jumps / max(float(jumps @ jumps), 1e-300))
 
 
-def _fitted(all_s: Array, values: Array, weights: Array) -> Operator:
+def _fit_operator(all_s: Array, values: Array, weights: Array) -> Operator:
     unit_s = _UNIT_FRAMES * float(np.median(np.diff(all_s)))
     start_s, scale = float(all_s[0]), max(float(np.ptp(values)), 1e-12)
     for _ in range(_MOST_TRIES):
         at = (all_s - start_s) / unit_s
-        found = make_smoothing_spline(at, values / scale, weights)
-        penalty = max(penalty_of(at, values / scale, weights, found), 0.0)
+        spline = make_smoothing_spline(at, values / scale, weights)
+        penalty = max(smoothing_penalty(at, values / scale, weights, spline), 0.0)
         if penalty < _AT_THE_END * len(at):
             break
         unit_s *= _WIDER
@@ -73,7 +71,7 @@ def _fitted(all_s: Array, values: Array, weights: Array) -> Operator:
 
 
 def _weights(variance: Array) -> Array:
-    """Return weights with a mean of one; all alike where a variance is not known."""
+    """Return weights with a mean of one; uniform where a variance is unknown."""
     if not (np.isfinite(variance) & (variance > 0)).all():
         return np.ones_like(variance)
     return (1 / variance) / np.mean(1 / variance)

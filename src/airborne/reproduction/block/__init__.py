@@ -1,1 +1,1 @@
-"""The block-jump paper made anew: its sequences, methods and Table I beside better methods."""
+"""The block-jump paper reproduced: its sequences, methods and Table I beside better methods."""

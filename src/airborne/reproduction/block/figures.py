@@ -1,51 +1,45 @@
-"""Figures of the block-jump paper made anew: success of each part, the worst sequence over time, the particle sweep."""
+"""Figures of the reproduced block-jump paper: success of each part, the worst sequences over time, the sweep."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from airborne.export import panels
-from airborne.reproduction.block.plan import METHODS, PAPER, PARTS
-from airborne.reproduction.block.summary import by_sequence, success
-
-Array = NDArray[np.floating]
-Summary = Mapping[str, Any]
-Record = Mapping[str, Any]
+from airborne.reproduction.block.plan import BLOCK_METHODS, PAPER_PARTS, PAPER_SUCCESS
+from airborne.reproduction.block.summary import Record, Summary, by_sequence, success
 
 _COLOURS = {"framework": "#999999", "mixture": "#e69f00", "block-jump": "#0072b2", "blocker": "#009e73"}
 _TITLES = ("left hip", "right hip", "left knee", "right knee", "left foot", "right foot")
 _LEAST_MM = 3.0
 
 
-def write_figures(folder: Path, summary: Summary, records: Sequence[Record]) -> None:
+def write_block_figures(folder: Path, summary: Summary, records: Sequence[Record]) -> None:
     """Write success.png, worst.png and, where there is a sweep, sweep.png."""
     _write_success(folder / "success.png", summary)
     _write_worst(folder / "worst.png", [r for r in records if r["n_particles"] in (0, summary["n_particles"])])
-    if any(found["success"] for found in summary["sweep"]):
+    if any(row["success"] for row in summary["sweep"]):
         _write_sweep(folder / "sweep.png", summary)
 
 
 def _write_success(path: Path, summary: Summary) -> None:
-    """Bars for each part and method, the paper's numbers as black strokes over them."""
+    """Draw bars for each part and method, with the paper's numbers as black lines."""
     figure, axes = _axes(panels.WIDTH_IN, 3.0)
-    width = 0.8 / len(METHODS)
-    at = np.arange(len(PARTS))
-    for k, name in enumerate(METHODS):
-        found = summary["rows"][name]["success"]
-        x = at + (k - (len(METHODS) - 1) / 2) * width
-        sd = 100 * np.nan_to_num(np.asarray(found["sd"], float))
-        axes.bar(x, 100 * np.asarray(found["mean"]), width, color=_COLOURS[name], label=name)
-        axes.errorbar(x, 100 * np.asarray(found["mean"]), sd, linestyle="", color=panels.TEXT, linewidth=0.8)
-        if name in PAPER:
+    width = 0.8 / len(BLOCK_METHODS)
+    at = np.arange(len(PAPER_PARTS))
+    for k, name in enumerate(BLOCK_METHODS):
+        rate = summary["rows"][name]["success"]
+        x = at + (k - (len(BLOCK_METHODS) - 1) / 2) * width
+        sd = 100 * np.nan_to_num(np.asarray(rate["sd"], float))
+        axes.bar(x, 100 * np.asarray(rate["mean"]), width, color=_COLOURS[name], label=name)
+        axes.errorbar(x, 100 * np.asarray(rate["mean"]), sd, linestyle="", color=panels.TEXT, linewidth=0.8)
+        if name in PAPER_SUCCESS:
             label = "the paper's" if k == 0 else ""
-            axes.hlines(PAPER[name], x - width / 2, x + width / 2, color="black", linewidth=2, label=label)
+            axes.hlines(PAPER_SUCCESS[name], x - width / 2, x + width / 2, color="black", linewidth=2, label=label)
     axes.set_xticks(at, _TITLES)
     axes.set_ylabel("success [%]", fontsize=panels.FONT_PT, color=panels.TEXT)
     axes.set_ylim(0, 103)
@@ -53,13 +47,13 @@ def _write_success(path: Path, summary: Summary) -> None:
 
 
 def _write_worst(path: Path, records: Sequence[Record]) -> None:
-    """Mean error over the seeds, players and parts in the sequences that block-jump and blocker track worst."""
+    """Draw the mean error over parts, by run and player, in the sequences that block-jump and blocker track worst."""
     figure = Figure((panels.WIDTH_IN, 4.6), dpi=panels.DPI, layout="constrained")
-    for axes, judge in zip(figure.subplots(2, 1), ("block-jump", "blocker"), strict=True):
-        _styled(axes)
-        own = by_sequence(r for r in records if r["row"] == judge)
+    for axes, tracker in zip(figure.subplots(2, 1), ("block-jump", "blocker"), strict=True):
+        _style(axes)
+        own = by_sequence(r for r in records if r["row"] == tracker)
         worst = min(own, key=lambda number: (float(success(own[number]).min()), number))
-        for name in METHODS:
+        for name in BLOCK_METHODS:
             each = [r for r in records if r["row"] == name and r["sequence"] == worst]
             errors = np.stack([r["error_mm"].mean(axis=1) for r in each])
             for error in errors:
@@ -70,7 +64,7 @@ def _write_worst(path: Path, records: Sequence[Record]) -> None:
         axes.axhline(100, color="black", linewidth=0.6, linestyle=":")
         axes.set_yscale("log")
         axes.set_title(
-            f"sequence {worst}, the worst of {judge}", fontsize=panels.FONT_PT, color=panels.TEXT, loc="left"
+            f"sequence {worst}, the worst of {tracker}", fontsize=panels.FONT_PT, color=panels.TEXT, loc="left"
         )
         axes.set_ylabel("mean error [mm]", fontsize=panels.FONT_PT, color=panels.TEXT)
     axes.set_xlabel("time [s]", fontsize=panels.FONT_PT, color=panels.TEXT)
@@ -79,14 +73,14 @@ def _write_worst(path: Path, records: Sequence[Record]) -> None:
 
 def _write_sweep(path: Path, summary: Summary) -> None:
     figure, axes = _axes(panels.WIDTH_IN * 0.6, 2.8)
-    found = [one for one in summary["sweep"] if one["success"]]
-    counts = [one["n_particles"] for one in found]
+    rows = [row for row in summary["sweep"] if row["success"]]
+    counts = [row["n_particles"] for row in rows]
     for part, colour, columns in (
         ("hips", "#0072b2", (0, 1)),
         ("knees", "#e69f00", (2, 3)),
         ("feet", "#009e73", (4, 5)),
     ):
-        mean = [100 * np.mean([one["success"]["mean"][k] for k in columns]) for one in found]
+        mean = [100 * np.mean([row["success"]["mean"][k] for k in columns]) for row in rows]
         axes.plot(counts, mean, "o-", color=colour, label=part)
     axes.set_xscale("log")
     axes.set_xticks(counts, [str(count) for count in counts])
@@ -99,11 +93,11 @@ def _write_sweep(path: Path, summary: Summary) -> None:
 def _axes(width_in: float, height_in: float) -> tuple[Figure, Axes]:
     figure = Figure((width_in, height_in), dpi=panels.DPI, layout="constrained")
     axes = figure.subplots()
-    _styled(axes)
+    _style(axes)
     return figure, axes
 
 
-def _styled(axes: Axes) -> None:
+def _style(axes: Axes) -> None:
     axes.tick_params(labelsize=panels.FONT_PT - 1, color=panels.TEXT, labelcolor=panels.TEXT)
     axes.grid(True, color=panels.FAINT, linewidth=0.6)
     axes.set_axisbelow(True)

@@ -1,4 +1,4 @@
-"""What is tracked for the block-jump paper's Table I: its sequences, methods and seeds, and its own numbers."""
+"""What is tracked for the block-jump paper's Table I: sequences, methods and seeds; and the paper's numbers."""
 
 from __future__ import annotations
 
@@ -11,24 +11,31 @@ from airborne.synthetic import BlockScene, block_scene
 from airborne.synthetic.block.scene import paper_lengths
 from airborne.tracking.particle.swing import Swing
 
-MethodName = Literal["framework", "mixture", "block-jump", "blocker"]
-FILTERS: tuple[MethodName, ...] = ("framework", "mixture", "block-jump")
-METHODS: tuple[MethodName, ...] = (*FILTERS, "blocker")
-PARTS = ("hip_left", "hip_right", "knee_left", "knee_right", "ankle_left", "ankle_right")  # the paper's feet: ankles
-PAPER: dict[str, tuple[float, ...]] = {  # success in percent, as PARTS
+BlockMethod = Literal["framework", "mixture", "block-jump", "blocker"]
+_FILTERS: tuple[BlockMethod, ...] = ("framework", "mixture", "block-jump")
+BLOCK_METHODS: tuple[BlockMethod, ...] = (*_FILTERS, "blocker")
+PAPER_PARTS = (
+    "hip_left",
+    "hip_right",
+    "knee_left",
+    "knee_right",
+    "ankle_left",
+    "ankle_right",
+)  # the paper's feet: ankles
+PAPER_SUCCESS: dict[str, tuple[float, ...]] = {  # success in percent, as PARTS
     "framework": (84.8, 82.6, 66.3, 65.9, 67.1, 66.9),
     "mixture": (94.7, 95.1, 81.7, 76.8, 78.4, 80.6),
     "block-jump": (97.7, 98.5, 91.4, 92.2, 93.9, 93.8),
 }
-FAILS_BELOW = 0.8  # success of any part, from which on a sequence counts as failed
+FAILS_BELOW = 0.8  # success of any part, below which a sequence counts as failed
 _SCENES = 0  # which draw of the 22 sequences
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
-    """One tracker with one seed. The seed also moves the joints that are set by hand, for every method alike."""
+class BlockRun:
+    """One tracker with one seed. The seed also perturbs the hand-set joints, alike for every method."""
 
-    method: MethodName
+    method: BlockMethod
     seed: int
     n_particles: int = 0  # 0: the method has none
     torsos: Literal["tracked", "given"] = "tracked"  # given: the truth with noise
@@ -43,20 +50,20 @@ class Run:
 
     @property
     def key(self) -> str:
-        """A name that no other run has."""
-        mended = "-consistent" if self.swing == "consistent" else ""
-        return f"{self.method}{mended}-{self.torsos}-{self.n_particles}-{self.seed}"
+        """A unique name."""
+        variant = "-consistent" if self.swing == "consistent" else ""
+        return f"{self.method}{variant}-{self.torsos}-{self.n_particles}-{self.seed}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Take:
+class BlockTake:
     """One sequence and who tracks it."""
 
     number: int  # of the paper's 22, from 0
     scene_seed: int
     n_blockers: int
     n_frames: int
-    runs: tuple[Run, ...]
+    runs: tuple[BlockRun, ...]
 
     def scene(self) -> BlockScene:
         """Draw the scene; takes seconds."""
@@ -65,7 +72,7 @@ class Take:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """How much is done."""
+    """The extent of the reproduction."""
 
     numbers: tuple[int, ...]  # which of the 22 sequences
     n_seeds: int
@@ -79,11 +86,11 @@ class Plan:
         """Return the plan for a JSON file."""
         return asdict(self)
 
-    def takes(self) -> list[Take]:
-        """Return the sequences; those with most work stand first."""
+    def takes(self) -> list[BlockTake]:
+        """Return the sequences; those with most work come first."""
         n_frames, n_blockers = paper_lengths(np.random.default_rng([_SCENES, 20]))
         takes = [
-            Take(
+            BlockTake(
                 number=k,
                 scene_seed=1000 * (_SCENES + 1) + k,
                 n_blockers=int(n_blockers[k]),
@@ -94,19 +101,19 @@ class Plan:
         ]
         return sorted(takes, key=lambda take: (-take.n_blockers * len(take.runs) * take.n_frames, take.number))
 
-    def _table_runs(self) -> list[Run]:
+    def _table_runs(self) -> list[BlockRun]:
         seeds, count = range(self.n_seeds), self.n_particles
-        runs = [Run(method=method, seed=seed, n_particles=count) for method in FILTERS for seed in seeds]
-        runs += [Run(method="blocker", seed=seed) for seed in seeds]
+        runs = [BlockRun(method=method, seed=seed, n_particles=count) for method in _FILTERS for seed in seeds]
+        runs += [BlockRun(method="blocker", seed=seed) for seed in seeds]
         if self.has_variants:
-            runs += [Run(method="block-jump", seed=seed, n_particles=count, torsos="given") for seed in seeds]
-            runs += [Run(method="block-jump", seed=seed, n_particles=count, swing="consistent") for seed in seeds]
+            runs += [BlockRun(method="block-jump", seed=seed, n_particles=count, torsos="given") for seed in seeds]
+            runs += [BlockRun(method="block-jump", seed=seed, n_particles=count, swing="consistent") for seed in seeds]
         return runs
 
-    def _sweep_runs(self) -> list[Run]:
+    def _sweep_runs(self) -> list[BlockRun]:
         counts = [count for count in self.sweep if count != self.n_particles]
         return [
-            Run(method="block-jump", seed=seed, n_particles=count)
+            BlockRun(method="block-jump", seed=seed, n_particles=count)
             for count in counts
             for seed in range(self.n_sweep_seeds)
         ]

@@ -1,19 +1,18 @@
-"""The tables of the block-jump paper made anew, as Markdown and as rows of a CSV file."""
+"""The tables of the reproduced block-jump paper, as Markdown and as rows of a CSV file."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from airborne.evaluation.jump_errors import EVENTS, HEIGHTS
 from airborne.reproduction.block.causes import TORSO_OFF_M
-from airborne.reproduction.block.plan import PAPER, PARTS
+from airborne.reproduction.block.plan import PAPER_PARTS, PAPER_SUCCESS
+from airborne.reproduction.block.summary import Summary
 
-Summary = Mapping[str, Any]
 CSV_HEADER = ("row", "part", "paper_percent", "success_percent", "sd_over_seeds", "tolerance_m", "touching_percent",
               "mean_mm", "median_mm", "within_100mm_percent", "within_50mm_percent", "within_95_percent")  # fmt: skip
-_TOLERANCES = {"success": "tolerance_m", "touching": "touching_tolerance_m"}  # of what stands beside the paper's
+_TOLERANCES = {"success": "tolerance_m", "touching": "touching_tolerance_m"}  # of what is compared with the paper's
 _TITLES = ("hips left", "right", "knees left", "right", "feet left", "right")
 _HEIGHT_TITLES = ("feet", "hips", "flight time", "take-off speed", "hips from take-off")
 
@@ -32,7 +31,7 @@ def markdown(summary: Summary) -> str:
         ("Share of all joints, percent:", _shares(summary)),
         ("Jumps against the scenes' own facts, mean absolute error (mean):", _jumps(summary)),
         ("Particles of `block-jump`:", _sweep(summary)),
-        ("Sequences with a part under 80 %:", _failed(summary)),
+        ("Sequences with a part under 80 %:", _failures(summary)),
     ]
     return "\n\n".join(f"{title}\n\n{table}" for title, table in tables if table) + "\n"
 
@@ -45,17 +44,17 @@ def success_table(summary: Summary) -> str:
 def csv_rows(summary: Summary) -> list[list[str]]:
     """Return a row for each method and part, as CSV_HEADER."""
     rows = []
-    for name, found in summary["rows"].items():
-        for k, part in enumerate(PARTS):
+    for name, row in summary["rows"].items():
+        for k, part in enumerate(PAPER_PARTS):
             numbers = [
-                PAPER[name][k] if name in PAPER else math.nan,
-                100 * found["success"]["mean"][k],
-                100 * found["success"]["sd"][k],
+                PAPER_SUCCESS[name][k] if name in PAPER_SUCCESS else math.nan,
+                100 * row["success"]["mean"][k],
+                100 * row["success"]["sd"][k],
                 summary["tolerance_m"][k],
-                100 * found["touching"]["mean"][k],
-                found["mean_mm"]["mean"][k],
-                found["median_mm"][k],
-                *(100 * found[key][k] for key in ("within_100mm", "within_50mm", "within_95")),
+                100 * row["touching"]["mean"][k],
+                row["mean_mm"]["mean"][k],
+                row["median_mm"][k],
+                *(100 * row[key][k] for key in ("within_100mm", "within_50mm", "within_95")),
             ]
             rows.append([name, part, *(f"{value:.5g}" if math.isfinite(value) else "" for value in numbers)])
     return rows
@@ -72,12 +71,12 @@ def _first_line(summary: Summary) -> str:
 
 def _success(summary: Summary, key: str) -> str:
     lines = []
-    for name, found in summary["rows"].items():
-        if found[key] is None:
+    for name, row in summary["rows"].items():
+        if row[key] is None:
             continue
-        if name in PAPER and key in _TOLERANCES:
-            lines.append([f"paper's `{name}`", *(f"{value:.1f}" for value in PAPER[name])])
-        cells = [_with_sd(100 * m, 100 * s) for m, s in zip(found[key]["mean"], found[key]["sd"], strict=True)]
+        if name in PAPER_SUCCESS and key in _TOLERANCES:
+            lines.append([f"paper's `{name}`", *(f"{value:.1f}" for value in PAPER_SUCCESS[name])])
+        cells = [_with_sd(100 * m, 100 * s) for m, s in zip(row[key]["mean"], row[key]["sd"], strict=True)]
         lines.append([_code(name), *cells])
     if not lines:
         return ""
@@ -88,8 +87,8 @@ def _success(summary: Summary, key: str) -> str:
 
 def _strict(summary: Summary) -> str:
     lines = []
-    for name, found in summary["rows"].items():
-        of_parts = zip(found["mean_mm"]["mean"], found["mean_mm"]["sd"], found["median_mm"], strict=True)
+    for name, row in summary["rows"].items():
+        of_parts = zip(row["mean_mm"]["mean"], row["mean_mm"]["sd"], row["median_mm"], strict=True)
         lines.append(
             [_code(name), *(f"{_with_sd(mean, sd, 0)} / {_number(median, 0)}" for mean, sd, median in of_parts)]
         )
@@ -100,10 +99,10 @@ def _shares(summary: Summary) -> str:
     titles = ("", "<= 0.10 m", "<= 0.05 m", "in the stated 95 %", "knees swapped", "feet swapped",
               "limbs correct (PCP 0.5)", "frames lost", "uncertain", "CPU ms per frame and player")  # fmt: skip
     lines = []
-    for name, found in summary["rows"].items():
-        means = [sum(found[key]) / len(PARTS) for key in ("within_100mm", "within_50mm", "within_95")]
-        shares = [*means, *(found[key] for key in ("swaps_knees", "swaps_feet", "limbs_correct", "lost", "uncertain"))]
-        ms = found["ms_per_frame"] + (summary["torso"]["ms_per_frame"] if _tracks_torsos(name) else 0.0)
+    for name, row in summary["rows"].items():
+        means = [sum(row[key]) / len(PAPER_PARTS) for key in ("within_100mm", "within_50mm", "within_95")]
+        shares = [*means, *(row[key] for key in ("swaps_knees", "swaps_feet", "limbs_correct", "lost", "uncertain"))]
+        ms = row["ms_per_frame"] + (summary["torso"]["ms_per_frame"] if _tracks_torsos(name) else 0.0)
         lines.append([_code(name), *(_number(100 * share, 1) for share in shares), _number(ms, 1)])
     torso = summary["torso"]
     note = (
@@ -122,35 +121,35 @@ def _jumps(summary: Summary) -> str:
     titles = ("", "found", *(f"{title} [mm]" for title in _HEIGHT_TITLES), "take-off [frames]", "landing [frames]",
               "heights in their 95 %")  # fmt: skip
     lines = []
-    for name, found in summary["jumps"].items():
-        heights = [_error(found[key], 1e3, 0) for key in HEIGHTS]
-        events = [_error(found[key], 1.0, 2) for key in EVENTS]
-        held = [found[key]["within_95"] for key in HEIGHTS if math.isfinite(found[key]["within_95"])]
-        inside = f"{100 * sum(held) / len(held):.0f} %" if held else "-"
-        lines.append([_code(name), f"{found['n_found']} of {found['n']}", *heights, *events, inside])
+    for name, row in summary["jumps"].items():
+        heights = [_error(row[key], 1e3, 0) for key in HEIGHTS]
+        events = [_error(row[key], 1.0, 2) for key in EVENTS]
+        coverage = [row[key]["within_95"] for key in HEIGHTS if math.isfinite(row[key]["within_95"])]
+        in_95 = f"{100 * sum(coverage) / len(coverage):.0f} %" if coverage else "-"
+        lines.append([_code(name), f"{row['n_found']} of {row['n']}", *heights, *events, in_95])
     return _table(titles, lines)
 
 
 def _sweep(summary: Summary) -> str:
     lines = []
-    for found in summary["sweep"]:
-        if found["success"] is None:
+    for row in summary["sweep"]:
+        if row["success"] is None:
             continue
-        cells = [
-            _with_sd(100 * m, 100 * s) for m, s in zip(*(found["success"][k] for k in ("mean", "sd")), strict=True)
-        ]
-        lines.append([str(found["n_particles"]), *cells, f"{found['ms_per_frame']:.1f}"])
+        cells = [_with_sd(100 * m, 100 * s) for m, s in zip(*(row["success"][k] for k in ("mean", "sd")), strict=True)]
+        lines.append([str(row["n_particles"]), *cells, f"{row['ms_per_frame']:.1f}"])
     return _table(("particles", *_TITLES, "ms"), lines) if lines else ""
 
 
-def _failed(summary: Summary) -> str:
+def _failures(summary: Summary) -> str:
     lines = []
-    for name, found in summary["failed"].items():
-        for one in found:
-            causes = ", ".join(f"{cause} {100 * share:.0f} %" for cause, share in one["causes"].items())
-            first = "-" if one["first_frame_off"] is None else str(one["first_frame_off"])
-            worst = f"{one['worst_part'].replace('_', ' ')} {100 * one['worst_success']:.0f} %"
-            lines.append([_code(name), str(one["sequence"]), str(one["n_blockers"]), worst, first, causes or "-"])
+    for name, failures in summary["failed"].items():
+        for failure in failures:
+            causes = ", ".join(f"{cause} {100 * share:.0f} %" for cause, share in failure["causes"].items())
+            first = "-" if failure["first_frame_off"] is None else str(failure["first_frame_off"])
+            worst = f"{failure['worst_part'].replace('_', ' ')} {100 * failure['worst_success']:.0f} %"
+            lines.append(
+                [_code(name), str(failure["sequence"]), str(failure["n_blockers"]), worst, first, causes or "-"]
+            )
     titles = ("", "sequence", "blockers", "worst part", "off from frame", "parts off by over 0.10 m, by cause")
     return _table(titles, lines) if lines else "None."
 
@@ -173,7 +172,7 @@ def _number(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else "-"
 
 
-def _error(found: Mapping[str, float], scale: float, digits: int) -> str:
-    if not found["n"]:
+def _error(error: Mapping[str, float], scale: float, digits: int) -> str:
+    if not error["n"]:
         return "-"
-    return f"{scale * found['mean_absolute']:.{digits}f} ({scale * found['mean']:+.{digits}f})"
+    return f"{scale * error['mean_absolute']:.{digits}f} ({scale * error['mean']:+.{digits}f})"

@@ -1,4 +1,4 @@
-"""Sequences over processes: each is written as soon as it is finished; a run goes on with those that are missing."""
+"""Sequences in parallel processes: each is written as soon as it is finished; a run resumes with the missing ones."""
 
 from __future__ import annotations
 
@@ -15,16 +15,15 @@ from typing import Any
 import cv2
 
 from airborne.reproduction.block.measures import write_take
-from airborne.reproduction.block.plan import Take
+from airborne.reproduction.block.plan import BlockTake
 from airborne.reproduction.block.tracking import track_scene
+from airborne.types import Progress
 
-Progress = Callable[[int, int], None]  # frames done, frames in all
-
-_LOOK_S = 0.2  # how often the processes are heard
+_POLL_S = 0.2  # polling interval of the processes
 
 
 class _Stopped(Exception):
-    """The program was told to stop."""
+    """The program is to stop."""
 
 
 def n_cores() -> int:
@@ -33,7 +32,7 @@ def n_cores() -> int:
 
 
 def do_takes(
-    folder: Path, takes: Sequence[Take], *, n_processes: int = 1, progress: Progress | None = None
+    folder: Path, takes: Sequence[BlockTake], *, n_processes: int = 1, progress: Progress | None = None
 ) -> list[Path]:
     """Track the sequences that have no file in the folder yet; return the files of all, in the order of the takes.
 
@@ -64,60 +63,60 @@ class _Counter:
             self._progress(self._done, self._total)
 
 
-def _do_take(path: Path, take: Take, progress: Callable[[], None]) -> None:
+def _do_take(path: Path, take: BlockTake, progress: Callable[[], None]) -> None:
     scene = take.scene()
     write_take(path, take, scene, track_scene(scene, take.runs, progress))
 
 
-def _in_processes(missing: Sequence[tuple[Path, Take]], n: int, done: _Counter) -> None:
+def _in_processes(missing: Sequence[tuple[Path, BlockTake]], n: int, done: _Counter) -> None:
     context = get_context("spawn")
     frames, stop = context.Value("q", 0), context.Event()
-    with ProcessPoolExecutor(n, context, _prepare, (frames, stop)) as pool:
-        futures = [pool.submit(_do_take_apart, path, take) for path, take in missing]
+    with ProcessPoolExecutor(n, context, _init_worker, (frames, stop)) as pool:
+        futures = [pool.submit(_do_take_in_worker, path, take) for path, take in missing]
         try:
-            _listen(futures, frames, done)
+            _report_frames(futures, frames, done)
         finally:
             stop.set()
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _listen(futures: Sequence[Future[None]], frames: Any, done: _Counter) -> None:
-    """Count frames until all is finished; what goes wrong in a process is raised here at once."""
-    left, told = set(futures), 0
+def _report_frames(futures: Sequence[Future[None]], frames: Any, done: _Counter) -> None:
+    """Report frames until all is finished; an exception in a process is raised here at once."""
+    left, n_reported = set(futures), 0
     while left:
-        finished, left = wait(left, timeout=_LOOK_S)
-        while told < frames.value:
-            told += 1
+        finished, left = wait(left, timeout=_POLL_S)
+        while n_reported < frames.value:
+            n_reported += 1
             done()
         for future in finished:
             future.result()
 
 
 class _Shared:
-    """What a process has from the one that started it, as long as it lives; only `_prepare` sets it."""
+    """What a worker process shares with its parent; only `_init_worker` sets it."""
 
     frames: Any  # how many are done, by all processes
     stop: Any  # an event
 
 
-def _prepare(frames: Any, stop: Any) -> None:
-    """Make a process leave stopping to the one that started it, end with that one, and use one core."""
+def _init_worker(frames: Any, stop: Any) -> None:
+    """Make a worker ignore Ctrl-C, which the parent handles, end with its parent, and use one core."""
     _Shared.frames, _Shared.stop = frames, stop
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     cv2.setNumThreads(1)
     parent = parent_process()
-    assert parent is not None, "a process that was started by another"
+    assert parent is not None, "a worker process has a parent"
     Thread(target=lambda: (until_ready([parent.sentinel]), os._exit(1)), daemon=True).start()
 
 
-def _do_take_apart(path: Path, take: Take) -> None:
-    def tell() -> None:
+def _do_take_in_worker(path: Path, take: BlockTake) -> None:
+    def count_frame() -> None:
         with _Shared.frames.get_lock():
             _Shared.frames.value += 1
         if _Shared.stop.is_set():
             raise _Stopped
 
     try:
-        _do_take(path, take, tell)
+        _do_take(path, take, count_frame)
     except _Stopped:
         return

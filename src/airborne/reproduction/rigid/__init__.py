@@ -1,1 +1,1 @@
-"""The rigid-body paper made anew: its somersaults, curves and sensitivities beside better methods."""
+"""The rigid-body paper reproduced: its somersaults, curves and sensitivities beside better methods."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,45 +12,43 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body import Pose, geometry
+from airborne.body import Pose, surface_arrays
 from airborne.cameras import Camera
 from airborne.errors import ResultError
 from airborne.export import write_json
-from airborne.export.convergence import Rise, write_convergence, write_sequences
+from airborne.export.convergence import ScoreCurve, write_convergence, write_sequences
 from airborne.rendering import model_picture, render
-from airborne.reproduction.rigid.curves import Curve, convergence
+from airborne.reproduction.rigid.curves import Curve, score_curves
 from airborne.reproduction.rigid.sensitivity import CASES, Case, run_case
 from airborne.reproduction.rigid.somersaults import (
-    METHODS,
     PAPER_LARGEST,
     PAPER_RMS,
-    UNITS,
+    RIGID_METHODS,
+    VARIABLE_UNITS,
     VARIABLES,
     Errors,
     Experiment,
-    MethodName,
-    experiment,
-    tracked,
+    RigidMethod,
+    make_experiment,
+    track_experiment,
 )
 from airborne.synthetic.flight.somersault import N_POSES, Target
+from airborne.types import Progress
 
-Array = NDArray[np.floating]
-Progress = Callable[[int, int], None]  # poses done, poses in all
-
-_CROP_M, _THUMBNAIL_PX = 2.4, 120  # of a picture of fig. 4
+_CROP_M, _THUMBNAIL_PX = 2.4, 120  # of an image of fig. 4
 _CURVES: tuple[tuple[str, Target], ...] = (("ellipsoids on ellipsoids", "ellipsoids"), ("ellipsoids on NURBS", "skin"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Plan:
-    """How much is done."""
+    """The extent of the reproduction."""
 
     persons: tuple[int, ...]
-    methods: tuple[MethodName, ...]
+    methods: tuple[RigidMethod, ...]
     n_poses: int
     n_curve_poses: int
     cases: tuple[Case, ...]
-    case_methods: tuple[MethodName, ...]
+    case_methods: tuple[RigidMethod, ...]
 
     @property
     def runs(self) -> list[tuple[Target, int]]:
@@ -59,14 +57,14 @@ class _Plan:
 
     @property
     def n_steps(self) -> int:
-        """Poses to be worked on."""
+        """Number of poses to be tracked or scored."""
         table = len(self.runs) * len(self.methods)
         return self.n_poses * (table + len(self.cases) * len(self.case_methods)) + 2 * self.n_curve_poses
 
 
 _FULL = _Plan(
     persons=(0, 1, 2),
-    methods=METHODS,
+    methods=RIGID_METHODS,
     n_poses=N_POSES,
     n_curve_poses=N_POSES,
     cases=CASES,
@@ -80,11 +78,11 @@ _QUICK = _Plan(
     cases=CASES[1:2],
     case_methods=("faithful",),
 )
-_Runs = dict[tuple[Target, int, MethodName], Errors]
+_Runs = dict[tuple[Target, int, RigidMethod], Errors]
 
 
 def reproduce_rigid(output: Path, *, quick: bool = False, progress: Progress | None = None) -> dict[str, Any]:
-    """Make paper B's synthetic experiment anew; return what summary.json holds.
+    """Reproduce paper B's synthetic experiment; return experiment summary.json holds.
 
     Into `output`, each file as soon as it is finished: table.csv, figure4.png, convergence.csv, convergence.png,
     sensitivity.csv, summary.json. Quick: fewer poses, methods and cases. Raises ResultError where the folder holds
@@ -97,21 +95,21 @@ def reproduce_rigid(output: Path, *, quick: bool = False, progress: Progress | N
     output.mkdir(parents=True, exist_ok=True)
     plan = _QUICK if quick else _FULL
     done = _Counter(plan.n_steps, progress)
-    experiments = {run: experiment(run[0], person=run[1], n_poses=plan.n_poses) for run in plan.runs}
+    experiments = {run: make_experiment(run[0], person=run[1], n_poses=plan.n_poses) for run in plan.runs}
     runs, first = _table(plan, experiments, output, done)
-    plain = experiments["skin", plan.persons[0]]
-    write_sequences(output / "figure4.png", _figure4(plain, first))
+    unperturbed = experiments["skin", plan.persons[0]]
+    write_sequences(output / "figure4.png", _figure4(unperturbed, first))
     widths = _curves(plan, output, done)
-    cases = _sensitivity(plan, plain, runs, output, done)
+    cases = _sensitivity(plan, unperturbed, runs=runs, output=output, done=done)
     summary = {
         "is_quick": quick,
         "n_poses": plan.n_poses,
         "persons": list(plan.persons),
         "variables": list(VARIABLES),
-        "units": list(UNITS),
+        "units": list(VARIABLE_UNITS),
         "paper": {"rms": list(PAPER_RMS), "largest": list(PAPER_LARGEST)},
         "skin": {method: _over_persons(runs, plan.persons, method) for method in plan.methods},
-        "ellipsoids": {method: _plain([runs["ellipsoids", 0, method]]) for method in plan.methods},
+        "ellipsoids": {method: _statistics([runs["ellipsoids", 0, method]]) for method in plan.methods},
         "basin_half_width": widths,
         "sensitivity": cases,
     }
@@ -119,16 +117,18 @@ def reproduce_rigid(output: Path, *, quick: bool = False, progress: Progress | N
     return summary
 
 
-def describe(summary: Mapping[str, Any]) -> str:
+def describe_rigid(summary: Mapping[str, Any]) -> str:
     """Return the table as text: RMS errors, and the largest in brackets."""
     columns = {"paper B": summary["paper"]}
-    columns |= {f"{method}, NURBS": found for method, found in summary["skin"].items()}
-    columns |= {f"{method}, ellipsoids": found for method, found in summary["ellipsoids"].items()}
+    columns |= {f"{method}, NURBS": row for method, row in summary["skin"].items()}
+    columns |= {f"{method}, ellipsoids": row for method, row in summary["ellipsoids"].items()}
     lines = [f"RMS (largest) of {summary['n_poses']} poses, mean over {len(summary['persons'])} NURBS bodies"]
-    lines.append(" " * 22 + "".join(f"{f'{name} [{unit}]':>22}" for name, unit in zip(VARIABLES, UNITS, strict=True)))
-    for name, found in columns.items():
-        cells = [f"{rms:.3g} ({largest:.3g})" for rms, largest in zip(found["rms"], found["largest"], strict=True)]
-        lost = f"  {found['n_lost']} lost" if found.get("n_lost") else ""
+    lines.append(
+        " " * 22 + "".join(f"{f'{name} [{unit}]':>22}" for name, unit in zip(VARIABLES, VARIABLE_UNITS, strict=True))
+    )
+    for name, row in columns.items():
+        cells = [f"{rms:.3g} ({largest:.3g})" for rms, largest in zip(row["rms"], row["largest"], strict=True)]
+        lost = f"  {row['n_lost']} lost" if row.get("n_lost") else ""
         lines.append(f"{name:<22}" + "".join(f"{cell:>22}" for cell in cells) + lost)
     return "\n".join(lines)
 
@@ -148,16 +148,16 @@ class _Counter:
 def _table(
     plan: _Plan, experiments: Mapping[tuple[Target, int], Experiment], output: Path, done: _Counter
 ) -> tuple[_Runs, list[Pose | None]]:
-    """Track everything; return the errors, and the poses that the paper's method found on the first skin."""
+    """Track everything; return the errors, and the paper's method's poses on the first skin."""
     runs: _Runs = {}
     first: list[Pose | None] = []
     for target, person in plan.runs:
         for method in plan.methods:
-            runs[target, person, method], found = tracked(experiments[target, person], method, progress=done)
-            first = first or found
+            runs[target, person, method], poses = track_experiment(experiments[target, person], method, progress=done)
+            first = first or poses
     rows = []
     for (target, person, method), errors in runs.items():
-        for k, (name, unit) in enumerate(zip(VARIABLES, UNITS, strict=True)):
+        for k, (name, unit) in enumerate(zip(VARIABLES, VARIABLE_UNITS, strict=True)):
             values = (PAPER_RMS[k], errors.rms[k], PAPER_LARGEST[k], errors.largest[k])
             rows.append([target, person, method, name, unit, *map(_number, values), len(errors.values), errors.n_lost])
     header = "target person method variable unit paper_rms rms paper_largest largest n_poses n_lost"
@@ -169,11 +169,11 @@ def _curves(plan: _Plan, output: Path, done: _Counter) -> dict[str, Any]:
     """Write figs 5 and 6; return the basins' half-widths."""
     curves: dict[str, list[Curve]] = {}
     for name, target in _CURVES:
-        curves[name] = convergence(experiment(target, n_poses=plan.n_curve_poses), done)
+        curves[name] = score_curves(make_experiment(target, n_poses=plan.n_curve_poses), done)
     rows = [
-        [name, VARIABLES[curve.variable], UNITS[curve.variable], _number(x), *map(_number, summed)]
-        for name, found in curves.items()
-        for curve in found
+        [name, VARIABLES[curve.variable], VARIABLE_UNITS[curve.variable], _number(x), *map(_number, summed)]
+        for name, group in curves.items()
+        for curve in group
         for x, summed in zip(
             curve.offset,
             np.stack([curve.scores.mean(0), curve.scores.min(0), curve.scores.max(0)], axis=1),
@@ -183,44 +183,44 @@ def _curves(plan: _Plan, output: Path, done: _Counter) -> dict[str, Any]:
     _write_csv(output / "convergence.csv", ["bodies", "variable", "unit", "offset", "score", "least", "largest"], rows)
     write_convergence(
         output / "convergence.png",
-        list(zip(VARIABLES, UNITS, strict=True)),
+        list(zip(VARIABLES, VARIABLE_UNITS, strict=True)),
         {
-            name: [Rise(one.offset, one.scores, float(np.median(one.half_widths))) for one in found]
-            for name, found in curves.items()
+            name: [ScoreCurve(curve.offset, curve.scores, float(np.median(curve.half_widths))) for curve in group]
+            for name, group in curves.items()
         },
     )
     return {
         name: {
-            "median": [float(np.median(one.half_widths)) for one in found],
-            "least": [float(one.half_widths.min()) for one in found],
+            "median": [float(np.median(curve.half_widths)) for curve in group],
+            "least": [float(curve.half_widths.min()) for curve in group],
         }
-        for name, found in curves.items()
+        for name, group in curves.items()
     }
 
 
-def _sensitivity(plan: _Plan, plain: Experiment, runs: _Runs, output: Path, done: _Counter) -> dict[str, Any]:
-    """Track with one thing wrong at a time; the first row of each method has nothing wrong."""
-    found: dict[str, dict[str, Any]] = {}
+def _sensitivity(plan: _Plan, unperturbed: Experiment, *, runs: _Runs, output: Path, done: _Counter) -> dict[str, Any]:
+    """Track with one perturbation at a time; the first row of each method has none."""
+    statistics: dict[str, dict[str, Any]] = {}
     rows = []
     for method in plan.case_methods:
         cases = {"nothing wrong": runs["skin", plan.persons[0], method]}
-        cases |= {case.name: run_case(case, plain, method, done) for case in plan.cases}
-        found[method] = {name: _plain([errors]) for name, errors in cases.items()}
+        cases |= {case.name: run_case(case, unperturbed, method, done) for case in plan.cases}
+        statistics[method] = {name: _statistics([errors]) for name, errors in cases.items()}
         rows += [
             [name, method, variable, unit, _number(errors.rms[k]), _number(errors.largest[k]), errors.n_lost]
             for name, errors in cases.items()
-            for k, (variable, unit) in enumerate(zip(VARIABLES, UNITS, strict=True))
+            for k, (variable, unit) in enumerate(zip(VARIABLES, VARIABLE_UNITS, strict=True))
         ]
     _write_csv(output / "sensitivity.csv", ["case", "method", "variable", "unit", "rms", "largest", "n_lost"], rows)
-    return found
+    return statistics
 
 
-def _over_persons(runs: _Runs, persons: Sequence[int], method: MethodName) -> dict[str, Any]:
+def _over_persons(runs: _Runs, persons: Sequence[int], method: RigidMethod) -> dict[str, Any]:
     each = [runs["skin", person, method] for person in persons]
-    return _plain(each) | {"rms_of_each": [errors.rms.tolist() for errors in each]}
+    return _statistics(each) | {"rms_of_each": [errors.rms.tolist() for errors in each]}
 
 
-def _plain(each: Sequence[Errors]) -> dict[str, Any]:
+def _statistics(each: Sequence[Errors]) -> dict[str, Any]:
     """Return the mean RMS over runs, the largest error of all, and how many poses were lost."""
     return {
         "rms": np.mean([errors.rms for errors in each], axis=0).tolist(),
@@ -229,25 +229,25 @@ def _plain(each: Sequence[Errors]) -> dict[str, Any]:
     }
 
 
-def _figure4(what: Experiment, found: Sequence[Pose | None]) -> list[tuple[str, list[NDArray[np.uint8]]]]:
-    """Cut target and tracked body from the front's and the side's pictures, each about the true root."""
-    flat, rows = geometry(what.model), []
+def _figure4(experiment: Experiment, estimates: Sequence[Pose | None]) -> list[tuple[str, list[NDArray[np.uint8]]]]:
+    """Crop target and tracked body from the front's and the side's images, each around the true root."""
+    flat, rows = surface_arrays(experiment.model), []
     for number, name in enumerate(("front", "side")):
         targets, models = [], []
-        for frame, true, pose in zip(what.frames, what.poses, found, strict=True):
+        for frame, true, pose in zip(experiment.frames, experiment.poses, estimates, strict=True):
             view = frame.views[number]
             assert view is not None
-            targets.append(_cut(view.rgb, view.camera, true))
-            drawn = np.zeros_like(view.rgb)
+            targets.append(_crop(view.rgb, view.camera, true))
+            rendered = np.zeros_like(view.rgb)
             if pose is not None:
-                drawn = model_picture(render(flat, what.model.with_pose(pose), view.camera, what.lights))
-            models.append(_cut(drawn, view.camera, true))
+                rendered = model_picture(render(flat, experiment.model.with_pose(pose), view.camera, experiment.lights))
+            models.append(_crop(rendered, view.camera, true))
         rows += [(f"target, {name}", targets), (f"tracked, {name}", models)]
     return rows
 
 
-def _cut(rgb: NDArray[np.uint8], camera: Camera, pose: Pose) -> NDArray[np.uint8]:
-    """Cut a square of `_CROP_M` about a body, and reduce it."""
+def _crop(rgb: NDArray[np.uint8], camera: Camera, pose: Pose) -> NDArray[np.uint8]:
+    """Crop a square of `_CROP_M` around a body, and reduce it."""
     root = pose.world_from_root.translation
     depth = float(camera.camera_from_world.apply(root)[2])
     half = round(_CROP_M / 2 * camera.K[0, 0] / depth)

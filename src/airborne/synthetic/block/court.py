@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from airborne.cameras import Camera
 from airborne.synthetic.block.margins import NET_TOP_M
+from airborne.types import Array, Image
 
-Array = NDArray[np.floating]
-Picture = NDArray[np.uint8]
 Colour = Sequence[float] | Array  # (3,) sRGB
 
-COURT_M, ATTACK_M, LINE_M = (9.0, 18.0), 3.0, 0.05  # x and y of the court, attack line from the net, width of lines
+COURT_M, _ATTACK_M, _LINE_M = (9.0, 18.0), 3.0, 0.05  # x and y of the court, attack line from the net, width of lines
 _NET_M = (4.75, 1.0, 0.10)  # half length, depth, mesh
 _ANTENNA_M = 0.80  # above the tape
 _ORANGE, _BLUE, _WHITE, _WALL = (211, 143, 86), (118, 139, 160), (238, 238, 234), (92, 92, 99)
@@ -33,11 +32,11 @@ _CORD_COVER, _TAPE_COVER = 120, 250  # of 255
 class Layer(NamedTuple):
     """Something in front: colour (h, w, 3) sRGB, and cover (h, w), 0 to 255."""
 
-    colour: Picture
-    cover: Picture
+    colour: Image
+    alpha: Image
 
 
-def hall_picture(rng: np.random.Generator, camera: Camera, things: Sequence[tuple[Array, Colour]]) -> Picture:
+def hall_picture(rng: np.random.Generator, camera: Camera, things: Sequence[tuple[Array, Colour]]) -> Image:
     """Draw everything that stands still but the net: (h, w, 3) sRGB. `things` are those of `clutter`."""
     width, height = camera.size
     picture = np.full((height, width, 3), _WALL, np.uint8)
@@ -57,37 +56,41 @@ def net_layer(camera: Camera) -> Layer:
     half, depth, mesh = _NET_M
     top, bottom = NET_TOP_M, NET_TOP_M - depth
     for x in np.arange(-half, half + mesh / 2, mesh):
-        _line(cover, camera, [[x, 0, bottom], [x, 0, top]], (_CORD_COVER,))
+        _draw_line(cover, camera, [[x, 0, bottom], [x, 0, top]], (_CORD_COVER,))
     for z in np.arange(bottom, top + mesh / 2, mesh):
-        _line(cover, camera, [[-half, 0, z], [half, 0, z]], (_CORD_COVER,))
+        _draw_line(cover, camera, [[-half, 0, z], [half, 0, z]], (_CORD_COVER,))
     for corners, own in [*_tapes(half, top, bottom), *_antennae(top, bottom), *_poles()]:
         _fill(colour, camera, corners, own)
         _fill(cover, camera, corners, (_TAPE_COVER,))
     return Layer(colour, cover)
 
 
-def clutter(rng: np.random.Generator) -> list[tuple[Array, Colour]]:
+def draw_clutter(rng: np.random.Generator) -> list[tuple[Array, Colour]]:
     """Draw what stands behind the court, upright and flat: steps, spectators, boards, boxes on the floor."""
     things: list[tuple[Array, Colour]] = []
     for row in range(7):
         y, z = 14.0 + 0.9 * row, 0.5 + 0.45 * row
-        things.append((_upright(0.0, y, z - 0.5, 19.0 - 0.8 * row, 0.5), (112 - 3 * row, 111 - 3 * row, 114 - 3 * row)))
+        things.append(
+            (_upright_rectangle(0.0, y, z - 0.5, 19.0 - 0.8 * row, 0.5), (112 - 3 * row, 111 - 3 * row, 114 - 3 * row))
+        )
         for x in np.arange(-9.0 + 0.4 * row, 9.0 - 0.4 * row, 0.62):
             if rng.random() < 0.45:
                 cloth = _CLOTHES[rng.integers(len(_CLOTHES))] * rng.uniform(0.7, 1.0)
                 x += rng.normal(0, 0.06)
-                things.append((_upright(x, y + 0.02, z, 0.44, 0.55), cloth))
-                things.append((_upright(x, y + 0.01, z + 0.55, 0.2, 0.26), _SKIN * rng.uniform(0.6, 1.05)))
+                things.append((_upright_rectangle(x, y + 0.02, z, 0.44, 0.55), cloth))
+                things.append((_upright_rectangle(x, y + 0.01, z + 0.55, 0.2, 0.26), _SKIN * rng.uniform(0.6, 1.05)))
     for x in np.arange(-11.0, 11.1, 2.0):
-        things.append((_upright(x, 12.0, 0.0, 1.96, 0.9), _CLOTHES[rng.integers(len(_CLOTHES))]))
+        things.append((_upright_rectangle(x, 12.0, 0.0, 1.96, 0.9), _CLOTHES[rng.integers(len(_CLOTHES))]))
     for side in (-1, 1):
         for y in np.arange(-1.0, 11.1, 2.0):
-            board = _upright(0.0, 0.0, 0.0, 1.96, 0.9)[:, [1, 0, 2]] + [side * 9.6, y, 0]
+            board = _upright_rectangle(0.0, 0.0, 0.0, 1.96, 0.9)[:, [1, 0, 2]] + [side * 9.6, y, 0]
             things.append((board, _CLOTHES[rng.integers(len(_CLOTHES))] * 0.85))
         for _ in range(5):
             x, y = side * rng.uniform(6.2, 9.0), rng.uniform(-4.0, 9.0)
             size = rng.uniform((0.4, 0.25), (0.8, 0.6))
-            things.append((_upright(x, y, 0.0, *size), _CLOTHES[rng.integers(len(_CLOTHES))] * rng.uniform(0.7, 1.0)))
+            things.append(
+                (_upright_rectangle(x, y, 0.0, *size), _CLOTHES[rng.integers(len(_CLOTHES))] * rng.uniform(0.7, 1.0))
+            )
     return things
 
 
@@ -98,54 +101,54 @@ def _walls() -> Iterator[tuple[Array, Colour]]:
 
 
 def _floor() -> Iterator[tuple[Array, Colour]]:
-    yield _flat(0.0, 2.0, 30.0, 44.0), _BLUE
-    (wide, long), line = COURT_M, LINE_M
-    yield _flat(0.0, 0.0, wide, long), _ORANGE
-    for y in (-long / 2, -ATTACK_M, 0.0, ATTACK_M, long / 2):
-        yield _flat(0.0, y, wide, line), _WHITE
+    yield _floor_rectangle(0.0, 2.0, 30.0, 44.0), _BLUE
+    (wide, long), line = COURT_M, _LINE_M
+    yield _floor_rectangle(0.0, 0.0, wide, long), _ORANGE
+    for y in (-long / 2, -_ATTACK_M, 0.0, _ATTACK_M, long / 2):
+        yield _floor_rectangle(0.0, y, wide, line), _WHITE
     for x in (-wide / 2, wide / 2):
-        yield _flat(x, 0.0, line, long), _WHITE
+        yield _floor_rectangle(x, 0.0, line, long), _WHITE
 
 
 def _tapes(half: float, top: float, bottom: float) -> Iterator[tuple[Array, Colour]]:
-    yield _upright(0.0, 0.0, top - 0.07, 2 * half, 0.07), _TAPE
-    yield _upright(0.0, 0.0, bottom, 2 * half, 0.05), _TAPE
+    yield _upright_rectangle(0.0, 0.0, top - 0.07, 2 * half, 0.07), _TAPE
+    yield _upright_rectangle(0.0, 0.0, bottom, 2 * half, 0.05), _TAPE
 
 
 def _antennae(top: float, bottom: float) -> Iterator[tuple[Array, Colour]]:
     for x in (-COURT_M[0] / 2, COURT_M[0] / 2):
-        yield _upright(x, 0.0, bottom, 0.05, top - bottom), _TAPE
+        yield _upright_rectangle(x, 0.0, bottom, 0.05, top - bottom), _TAPE
         for k in range(8):
             height = _ANTENNA_M / 8
-            yield _upright(x, 0.0, top + k * height, 0.02, height), (_TAPE, (196, 44, 44))[k % 2]
+            yield _upright_rectangle(x, 0.0, top + k * height, 0.02, height), (_TAPE, (196, 44, 44))[k % 2]
 
 
 def _poles() -> Iterator[tuple[Array, Colour]]:
     for x in (-5.3, 5.3):
-        yield _upright(x, 0.0, 0.0, 0.12, 2.55), _POLE
+        yield _upright_rectangle(x, 0.0, 0.0, 0.12, 2.55), _POLE
 
 
-def _flat(x: float, y: float, wide: float, long: float) -> Array:
+def _floor_rectangle(x: float, y: float, wide: float, long: float) -> Array:
     return np.array([[x + a * wide / 2, y + b * long / 2, 0.0] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
 
 
-def _upright(x: float, y: float, z: float, wide: float, high: float) -> Array:
+def _upright_rectangle(x: float, y: float, z: float, wide: float, high: float) -> Array:
     return np.array([[x + a * wide / 2, y, z + b * high] for a, b in ((-1, 0), (1, 0), (1, 1), (-1, 1))])
 
 
-def _fill(picture: Picture, camera: Camera, corners: Array, colour: Colour) -> None:
-    px = _projected(camera, corners, is_closed=True)
+def _fill(picture: Image, camera: Camera, corners: Array, colour: Colour) -> None:
+    px = _project(camera, corners, is_closed=True)
     if len(px) > 2:
         cv2.fillConvexPoly(picture, px, [float(c) for c in colour], cv2.LINE_AA, _SUB)
 
 
-def _line(picture: Picture, camera: Camera, ends: Sequence[Sequence[float]], colour: Colour) -> None:
-    px = _projected(camera, np.array(ends, float), is_closed=False)
+def _draw_line(picture: Image, camera: Camera, ends: Sequence[Sequence[float]], colour: Colour) -> None:
+    px = _project(camera, np.array(ends, float), is_closed=False)
     if len(px) == 2:
         cv2.line(picture, px[0].tolist(), px[1].tolist(), [float(c) for c in colour], 1, cv2.LINE_AA, _SUB)
 
 
-def _projected(camera: Camera, corners: Array, *, is_closed: bool) -> NDArray[np.int32]:
+def _project(camera: Camera, corners: Array, *, is_closed: bool) -> NDArray[np.int32]:
     """Project a polygon or a line after cutting off what is behind the camera: in cv2's fractions of pixels."""
     xyz = camera.camera_from_world.apply(corners)
     kept = []

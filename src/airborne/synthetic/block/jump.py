@@ -5,28 +5,34 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
 from airborne.body import BodyModel
-from airborne.synthetic.block.motion import Course, Flight, Manner, Stand, flowing, legs_at_edge, quintic
+from airborne.synthetic.block.motion import (
+    FlightPhase,
+    Movement,
+    StancePhase,
+    UpperBody,
+    leg_derivatives,
+    monotone_curve,
+    quintic,
+)
 from airborne.synthetic.block.plan import (
-    AHEAD_LOW_M,
-    AHEAD_M,
-    AHEAD_TAKEOFF_M,
+    CENTRE_AHEAD_LOW_M,
+    CENTRE_AHEAD_M,
+    CENTRE_AHEAD_TAKEOFF_M,
     TAKEOFF_PITCH,
     TOUCH_PITCH,
     JumpPlan,
-    levels_of,
+    centre_heights,
 )
-from airborne.synthetic.block.posture import Person, person_of
-from airborne.synthetic.block.steps import Step, approach_steps, body_turn, foot_of, middles, stance
+from airborne.synthetic.block.posture import Person, measure_person
+from airborne.synthetic.block.steps import Step, approach_steps, body_yaw, feet_midpoints, foot_path, foot_placements
 from airborne.synthetic.flight.rigid import GRAVITY_M_S2
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _G = float(-GRAVITY_M_S2[2])
-_BOTTOMS_M_S2 = np.arange(4.0, 22.0, 3.0)  # upward, of the centre of mass where it is lowest
+_BOTTOM_ACCELERATIONS_M_S2 = np.arange(4.0, 22.0, 3.0)  # upward, of the centre of mass where it is lowest
 _HEELS_LEFT = (-0.09, np.radians(13.0), 2.5, 30.0)  # heels on their way up [s, rad, rad/s, rad/s^2]
 _HEELS_DOWN_S = 0.1  # after touch-down
 _FOLLOW_S, _PREPARE_S = 0.045, 0.04  # legs come to rest after take-off, and move to meet the floor
@@ -36,7 +42,7 @@ _PLANTED = 0.4  # share of the way down when the last step of the approach lands
 _RECOVERY_S = 0.5
 
 
-class Times(NamedTuple):
+class KeyTimes(NamedTuple):
     """The moments of a jump, take-off at 0 [s]."""
 
     crouch: float  # going down begins
@@ -46,34 +52,34 @@ class Times(NamedTuple):
     end: float
 
 
-def jump(model: BodyModel, plan: JumpPlan) -> Course:
+def build_jump(model: BodyModel, plan: JumpPlan) -> Movement:
     """Build a jump of a `human18`; its poses hold NaN where the legs cannot reach as planned.
 
     The durations of push-off and landing are those with the least greatest acceleration of the centre of mass.
     """
-    person = person_of(model)
-    levels = levels_of(person, plan)
+    person = measure_person(model)
+    levels = centre_heights(person, plan)
     velocity = np.append(plan.drift_m_s, np.sqrt(2 * _G * plan.rise_m))
     duration = float((velocity[2] + np.sqrt(velocity[2] ** 2 + 2 * _G * (levels.takeoff - levels.touch))) / _G)
     landing = velocity + GRAVITY_M_S2 * duration
-    push_s, pushing = _smoothest(levels.takeoff - levels.bottom, velocity[2])
-    yield_s, yielding = _smoothest(levels.touch - levels.low, -landing[2])
+    push_s, pushing = _least_peak_acceleration(levels.takeoff - levels.bottom, velocity[2])
+    yield_s, yielding = _least_peak_acceleration(levels.touch - levels.low, -landing[2])
     low_s = duration + yield_s
     crouch_s = -push_s - plan.crouch_s
 
-    feet = stance(plan.place, plan.yaw, plan.width_m)
-    first = feet - [plan.way_m, 0.0, 0.0]
+    feet = foot_placements(plan.position, plan.yaw, plan.width_m)
+    first = feet - [plan.approach_m, 0.0, 0.0]
     steps = approach_steps(plan.approach, first, feet, crouch_s + _PLANTED * plan.crouch_s)
-    times = Times(crouch_s, -push_s, duration, low_s, low_s + _RECOVERY_S)
+    times = KeyTimes(crouch_s, -push_s, duration, low_s, low_s + _RECOVERY_S)
 
-    takeoff = np.append(plan.place + AHEAD_TAKEOFF_M * plan.forward, levels.takeoff)
+    takeoff = np.append(plan.position + CENTRE_AHEAD_TAKEOFF_M * plan.forward, levels.takeoff)
     touch = takeoff + velocity * duration + GRAVITY_M_S2 * duration**2 / 2
     landed = touch[:2] - plan.touch_offset_m
     heels_up = [(-push_s, 0.0, 0.0, 0.0), _HEELS_LEFT, (0.0, *TAKEOFF_PITCH)]
     heels_down = [(duration, *TOUCH_PITCH), (duration + _HEELS_DOWN_S, 0.0, 0.0, 0.0)]
-    manner = _manner(person, plan, times, steps)
-    before = Stand(
-        _over_before(plan, times, middles(first, steps), takeoff[:2]),
+    upper_body = _upper_body(person, plan, times, steps)
+    before = StancePhase(
+        _path_to_takeoff(plan, times, feet_midpoints(first, steps), takeoff[:2]),
         quintic(
             [
                 (times.crouch, levels.ready, 0.0, 0.0),
@@ -81,14 +87,14 @@ def jump(model: BodyModel, plan: JumpPlan) -> Course:
                 (0.0, levels.takeoff, velocity[2], -_G),
             ]
         ),
-        tuple(foot_of(side, first[side], steps, heels_up) for side in (0, 1)),
+        tuple(foot_path(side, first[side], steps, heels_up) for side in (0, 1)),
     )
-    places = stance(landed, plan.yaw, plan.width_m)
-    after = Stand(
+    places = foot_placements(landed, plan.yaw, plan.width_m)
+    after = StancePhase(
         quintic(
             [
                 (duration, touch[:2], plan.drift_m_s, 0.0),
-                (times.low, landed + AHEAD_LOW_M * plan.forward, 0.0, 0.0),
+                (times.low, landed + CENTRE_AHEAD_LOW_M * plan.forward, 0.0, 0.0),
             ]
         ),
         quintic(
@@ -98,13 +104,13 @@ def jump(model: BodyModel, plan: JumpPlan) -> Course:
                 (times.end, levels.end, 0.0, 0.0),
             ]
         ),
-        tuple(foot_of(side, places[side], [], heels_down) for side in (0, 1)),
+        tuple(foot_path(side, places[side], [], heels_down) for side in (0, 1)),
     )
-    legs = _legs_in_flight(person, plan, manner, before, after, duration)
-    return Course(person, manner, before, Flight(takeoff, velocity, duration, legs), after)
+    legs = _legs_in_flight(person, plan, upper_body, before, after, duration)
+    return Movement(person, upper_body, before, FlightPhase(takeoff, velocity, duration, legs), after)
 
 
-def _smoothest(distance_m: float, speed_m_s: float) -> tuple[float, float]:
+def _least_peak_acceleration(distance_m: float, speed_m_s: float) -> tuple[float, float]:
     """Return how to go from rest at the bottom to the flight's edge so that the greatest acceleration is least.
 
     The time [s] and the upward acceleration at the bottom [m/s^2]; the way never goes below the bottom.
@@ -113,7 +119,7 @@ def _smoothest(distance_m: float, speed_m_s: float) -> tuple[float, float]:
     ends = np.array([[0, 0, 0, 1, 1, 1], [0, 0, 0, 3, 4, 5], [0, 0, 0, 6, 12, 20]]).T  # of s^k and its derivatives at 1
     best = (np.inf, 0.0, 0.0)
     for time_s in np.linspace(1.2, 2.6, 29) * distance_m / speed_m_s:
-        for bottom in _BOTTOMS_M_S2:
+        for bottom in _BOTTOM_ACCELERATIONS_M_S2:
             start = np.array([0.0, 0.0, bottom * time_s**2 / 2])
             left = np.array([distance_m, speed_m_s * time_s, -_G * time_s**2]) - start[2] * np.array([1, 2, 2])
             rise = np.concatenate([start, np.linalg.solve(ends[3:].T, left)])
@@ -123,19 +129,19 @@ def _smoothest(distance_m: float, speed_m_s: float) -> tuple[float, float]:
     return best[1:]
 
 
-def _over_before(plan: JumpPlan, times: Times, way: list[tuple[float, Array]], takeoff: Array) -> PPoly:
+def _path_to_takeoff(plan: JumpPlan, times: KeyTimes, way: list[tuple[float, Array]], takeoff: Array) -> PPoly:
     """Return the way of the centre of mass over the floor (2,) to take-off: with the feet, then up and away."""
-    near = AHEAD_M * plan.forward
-    bottom = plan.place + AHEAD_LOW_M * plan.forward + 0.4 * times.bottom * plan.drift_m_s
+    near = CENTRE_AHEAD_M * plan.forward
+    bottom = plan.position + CENTRE_AHEAD_LOW_M * plan.forward + 0.4 * times.bottom * plan.drift_m_s
     moments = [(t, middle + near) for t, middle in way if t < times.bottom - 0.5 * plan.crouch_s]
     moments += [(times.bottom, bottom), (0.0, takeoff)]
-    walked = flowing([t for t, _ in moments], [place for _, place in moments])
+    walked = monotone_curve([t for t, _ in moments], [place for _, place in moments])
     rates = [*walked([t for t, _ in moments[:-1]], 1), plan.drift_m_s]
     return quintic([(t, place, rate, 0.0) for (t, place), rate in zip(moments, rates, strict=True)])
 
 
-def _manner(person: Person, plan: JumpPlan, times: Times, steps: list[Step]) -> Manner:
-    holds, apex = plan.holds, times.touch / 2
+def _upper_body(person: Person, plan: JumpPlan, times: KeyTimes, steps: list[Step]) -> UpperBody:
+    holds, apex = plan.key_postures, times.touch / 2
     moments = {
         "ready": times.crouch,
         "bottom": times.bottom,
@@ -145,7 +151,7 @@ def _manner(person: Person, plan: JumpPlan, times: Times, steps: list[Step]) -> 
         "low": times.low,
         "end": times.end,
     }
-    pitch = flowing(list(moments.values()), [np.radians(holds[name].pitch) for name in moments])
+    pitch = monotone_curve(list(moments.values()), [np.radians(holds[name].pitch) for name in moments])
     angles = {name: hold.angles(person) for name, hold in holds.items()}
     is_arm = np.array([s.name.startswith(("upper_arm", "forearm", "hand")) for s in person.model.segments[1:]])
     arm_moments = [
@@ -159,20 +165,20 @@ def _manner(person: Person, plan: JumpPlan, times: Times, steps: list[Step]) -> 
         (times.low, "low"),
         (times.end, "end"),
     ]
-    return Manner(
-        yaw=body_turn(plan.yaw, steps),
+    return UpperBody(
+        yaw=body_yaw(plan.yaw, steps),
         pitch=pitch,
-        trunk=flowing(list(moments.values()), [angles[name] * ~is_arm[:, None] for name in moments]),
-        arms=flowing([t for t, _ in arm_moments], [angles[name] * is_arm[:, None] for _, name in arm_moments]),
+        trunk=monotone_curve(list(moments.values()), [angles[name] * ~is_arm[:, None] for name in moments]),
+        arms=monotone_curve([t for t, _ in arm_moments], [angles[name] * is_arm[:, None] for _, name in arm_moments]),
     )
 
 
 def _legs_in_flight(
-    person: Person, plan: JumpPlan, manner: Manner, before: Stand, after: Stand, duration: float
+    person: Person, plan: JumpPlan, upper_body: UpperBody, before: StancePhase, after: StancePhase, duration: float
 ) -> PPoly:
     """Return the angles (6, 3) of hip, knee and ankle, left first: they leave and meet the floor as the feet do."""
-    first, rate, double = legs_at_edge(person, manner, before, 0.0, toward=-1)
-    last, last_rate, last_double = legs_at_edge(person, manner, after, duration, toward=1)
+    first, rate, double = leg_derivatives(person, upper_body, before, 0.0, toward=-1)
+    last, last_rate, last_double = leg_derivatives(person, upper_body, after, duration, toward=1)
     follow = first + rate * _FOLLOW_S / 2 + double * _FOLLOW_S**2 / 12  # the gentlest way to rest
     ankles = np.arange(2, 6, 3)
     follow[ankles, 0] = np.minimum(follow[ankles, 0], _POINTED_RAD)

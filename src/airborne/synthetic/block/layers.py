@@ -11,7 +11,7 @@ _KERNEL: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy",
 
 
 @njit(**_KERNEL)
-def shade(patch, x0, y0, floor_from_px, blobs, boxes, tint):
+def cast_shadows(patch, x0, y0, floor_from_px, blobs, boxes, tint):
     """Darken the floor in a patch (h, w, 3), whose top left is the pixel x0, y0, under blobs (k, 4).
 
     A blob is x, y, radius [m] and depth: it takes `depth` times `tint` (3,) of the light away at its middle,
@@ -34,7 +34,7 @@ def shade(patch, x0, y0, floor_from_px, blobs, boxes, tint):
 
 
 @njit(**_KERNEL)
-def lay(patch, x0, y0, colour, part):
+def composite(patch, x0, y0, colour, part):
     """Lay a body on a patch at its pixel x0, y0: colour (h, 2 w, 3) and part (h, 2 w) hold two samples a pixel.
 
     `part` is below 0 where there is no body.
@@ -51,7 +51,7 @@ def lay(patch, x0, y0, colour, part):
 
 
 @njit(**_KERNEL)
-def cover(patch, colour, amount):
+def blend_layer(patch, colour, amount):
     """Put a layer (h, w, 3) of cover `amount` (h, w), 0 to 255, in front of a patch."""
     height, width, _ = patch.shape
     for v in range(height):

@@ -8,12 +8,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ellipeinc
 
 from airborne.geometry.rotations import angles_from_matrix
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _STRAIGHT = 0.99995  # a leg reaches at most this share of its length
 
@@ -28,7 +26,7 @@ class LegSizes(NamedTuple):
     foot_half_height_m: float
 
 
-def turn(axis: int, angle: Array) -> Array:
+def axis_rotation(axis: int, angle: Array) -> Array:
     """Return the rotations (n, 3, 3) about the axis 0, 1 or 2 by the angles (n,) [rad]."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
     R = np.zeros((len(angle), 3, 3))
@@ -39,7 +37,7 @@ def turn(axis: int, angle: Array) -> Array:
     return R
 
 
-def rolled_foot(sizes: LegSizes, place: Array, pitch: Array, lift_m: Array) -> tuple[Array, Array]:
+def roll_foot(sizes: LegSizes, place: Array, pitch: Array, lift_m: Array) -> tuple[Array, Array]:
     """Return where the ankle is (n, 3) [m] and how the foot stands (n, 3, 3), world from foot.
 
     `place` (n, 3) holds x, y [m] of the foot's middle while the sole is level, and its turn about z [rad]; at 0 the
@@ -55,7 +53,7 @@ def rolled_foot(sizes: LegSizes, place: Array, pitch: Array, lift_m: Array) -> t
     centre = np.column_stack(
         [place[:, 0] + np.sin(yaw) * ahead, place[:, 1] - np.cos(yaw) * ahead, np.asarray(height + lift_m)]
     )
-    R = turn(2, yaw) @ turn(0, pitch)
+    R = axis_rotation(2, yaw) @ axis_rotation(0, pitch)
     return centre - R @ sizes.foot_centre_m, R
 
 
@@ -74,7 +72,7 @@ def leg_angles(sizes: LegSizes, R_pelvis: Array, hip: Array, ankle: Array, R_foo
     twist = _yaw_of(R_foot) - _yaw_of(R_pelvis)
     twist = (twist + np.pi) % (2 * np.pi) - np.pi
     straight = np.column_stack([np.zeros_like(bend), b * np.sin(bend), -a - b * np.cos(bend)])
-    turned = np.einsum("nij,nj->ni", turn(2, twist), straight)
+    turned = np.einsum("nij,nj->ni", axis_rotation(2, twist), straight)
     across = np.hypot(turned[:, 0], turned[:, 2])
     side = np.arctan2(turned[:, 0], -turned[:, 2]) - np.arcsin(np.clip(way[:, 0] / across, -1, 1))
     down = np.cos(side) * turned[:, 2] - np.sin(side) * turned[:, 0]
@@ -82,7 +80,9 @@ def leg_angles(sizes: LegSizes, R_pelvis: Array, hip: Array, ankle: Array, R_foo
     swing = np.arctan2(way[:, 2], way[:, 1]) - np.arctan2(down, turned[:, 1])
     swing = (swing + np.pi) % (2 * np.pi) - np.pi
     knee = np.column_stack([bend, np.zeros_like(bend), np.zeros_like(bend)])
-    R_shank = R_pelvis @ turn(0, swing) @ turn(1, side) @ turn(2, twist) @ turn(0, bend)
+    R_shank = (
+        R_pelvis @ axis_rotation(0, swing) @ axis_rotation(1, side) @ axis_rotation(2, twist) @ axis_rotation(0, bend)
+    )
     foot = angles_from_matrix(np.swapaxes(R_shank, 1, 2) @ R_foot)
     return np.stack([np.column_stack([swing, side, twist]), knee, foot], axis=1), short
 

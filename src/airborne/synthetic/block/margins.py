@@ -6,12 +6,10 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airborne.body import geometry
+from airborne.body import surface_arrays
 from airborne.synthetic.block.posture import Person, Poses
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 NET_TOP_M = 2.43
 _NET_CLEAR_M = 0.03  # hands pass this far above the tape
@@ -55,8 +53,8 @@ class Capsules(NamedTuple):
 
 def margins_of(person: Person, poses: Poses, *, side: float) -> Margins:
     """Measure n poses; `side` is -1 for players on y < 0, +1 for their opponents."""
-    R, t = person.placed(poses)
-    flat = geometry(person.model)
+    R, t = person.pose_segments(poses)
+    flat = surface_arrays(person.model)
     owner = flat.ellipsoid_segment
     axes = R[:, owner] @ (flat.ellipsoid_axes * flat.ellipsoid_semi_axes[:, None, :])  # (n, e, 3, 3)
     centre = np.einsum("neij,ej->nei", R[:, owner], flat.ellipsoid_centre) + t[:, owner]
@@ -78,11 +76,11 @@ def capsules_of(person: Person, poses: Poses, stature_m: float) -> Capsules:
 def gap_m(one: Capsules, other: Capsules) -> float:
     """Return the least distance [m] between the surfaces of two players' capsules at n times; below 0 they overlap."""
     (a, b, r), (c, d, s) = one, other
-    apart = _between(a[:, :, None], b[:, :, None], c[:, None], d[:, None])
+    apart = _segment_distances(a[:, :, None], b[:, :, None], c[:, None], d[:, None])
     return float((apart - r[:, None] - s[None, :]).min())
 
 
-def _between(a: Array, b: Array, c: Array, d: Array) -> Array:
+def _segment_distances(a: Array, b: Array, c: Array, d: Array) -> Array:
     """Return the distances between the segments a-b and c-d (..., 3), broadcast: (...).
 
     The nearest points of two lines, each cut to its segment in turn, then the other one's answer to that.

@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BPoly, PchipInterpolator, PPoly
 
-from airborne.synthetic.block.legs import rolled_foot, turn
-from airborne.synthetic.block.posture import Feet, Person, Poses, standing
+from airborne.synthetic.block.legs import axis_rotation, roll_foot
+from airborne.synthetic.block.posture import Feet, Person, Poses, solve_stance
 from airborne.synthetic.flight.rigid import GRAVITY_M_S2
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 Knot = tuple[float, Any, Any, Any]  # time [s], value, its rate and the rate's rate
 
 _STEP_S, _STEPS = 0.002, 6  # of the look back over the legs at take-off, and ahead at landing
@@ -26,12 +25,12 @@ def quintic(knots: Sequence[Knot]) -> PPoly:
     return PPoly.from_bernstein_basis(BPoly.from_derivatives([k[0] for k in knots], np.stack(values)))
 
 
-def resting(time_s: Sequence[float], values: Sequence[object]) -> PPoly:
+def minimum_jerk(time_s: Sequence[float], values: Sequence[object]) -> PPoly:
     """Join values at rest by the quintics of least jerk."""
     return quintic([(t, value, 0.0, 0.0) for t, value in zip(time_s, values, strict=True)])
 
 
-def flowing(time_s: Sequence[float], values: Sequence[object]) -> PPoly:
+def monotone_curve(time_s: Sequence[float], values: Sequence[object]) -> PPoly:
     """Join values by quintics that pass without a stop where the values go on the same way, and rest at the ends."""
     stacked = np.stack([np.asarray(value, float) for value in values])
     rates = PchipInterpolator(time_s, stacked)(time_s, 1)
@@ -39,28 +38,28 @@ def flowing(time_s: Sequence[float], values: Sequence[object]) -> PPoly:
     return quintic([(t, value, rate, 0.0) for t, value, rate in zip(time_s, stacked, rates, strict=True)])
 
 
-def at(curve: PPoly, time_s: Array) -> Array:
+def evaluate_clamped(curve: PPoly, time_s: Array) -> Array:
     """Return a curve's values (n, ...) at times (n,) [s]; before and after its knots it keeps its ends."""
     return curve(np.clip(time_s, curve.x[0], curve.x[-1]))
 
 
-class Foot(NamedTuple):
+class FootPath(NamedTuple):
     """One foot's way over the floor; see `rolled_foot`."""
 
-    place: PPoly  # (3,) x, y [m] and the turn about z [rad]
+    placement: PPoly  # (3,) x, y [m] and the turn about z [rad]
     lift: PPoly  # [m]
     pitch: PPoly  # [rad]
 
 
-class Stand(NamedTuple):
+class StancePhase(NamedTuple):
     """A time on the floor; the centre of mass goes its way whatever the feet do."""
 
-    over: PPoly  # (2,) x, y of the centre of mass [m]
-    height: PPoly  # z of the centre of mass [m]
-    feet: tuple[Foot, ...]  # left, right
+    centre_xy: PPoly  # (2,) x, y of the centre of mass [m]
+    centre_z: PPoly  # z of the centre of mass [m]
+    feet: tuple[FootPath, ...]  # left, right
 
 
-class Manner(NamedTuple):
+class UpperBody(NamedTuple):
     """How root, trunk, head and arms are held; the legs follow."""
 
     yaw: PPoly  # of the root about z [rad]
@@ -69,7 +68,7 @@ class Manner(NamedTuple):
     arms: PPoly  # (17, 3)
 
 
-class Flight(NamedTuple):
+class FlightPhase(NamedTuple):
     """A time in the air: a parabola of the centre of mass, from take-off at time 0."""
 
     centre: Array  # (3,) of mass at take-off, world [m]
@@ -84,26 +83,26 @@ class Flight(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Course:
+class Movement:
     """A person's motion; a jumper leaves the floor at time 0."""
 
     person: Person
-    manner: Manner
-    before: Stand
-    flight: Flight | None = None
-    after: Stand | None = None
+    upper_body: UpperBody
+    before: StancePhase
+    flight: FlightPhase | None = None
+    after: StancePhase | None = None
 
     def __call__(self, time_s: Array) -> Poses:
         """Return the poses at the times (n,) [s]; before its first and after its last knot the person stands still."""
         time_s = np.asarray(time_s, float)
         flight, after = self.flight, self.after
         if flight is None or after is None:
-            return stand_poses(self.person, self.manner, self.before, time_s)
+            return stance_poses(self.person, self.upper_body, self.before, time_s)
         is_up = (time_s > 0) & (time_s < flight.duration_s)
         phases = [
-            (time_s <= 0, lambda t: stand_poses(self.person, self.manner, self.before, t)),
+            (time_s <= 0, lambda t: stance_poses(self.person, self.upper_body, self.before, t)),
             (is_up, self._flying),
-            (time_s >= flight.duration_s, lambda t: stand_poses(self.person, self.manner, after, t)),
+            (time_s >= flight.duration_s, lambda t: stance_poses(self.person, self.upper_body, after, t)),
         ]
         n, joints = len(time_s), len(self.person.model.segments) - 1
         found = Poses(np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, joints, 3)))
@@ -115,13 +114,13 @@ class Course:
 
     def _flying(self, time_s: Array) -> Poses:
         assert self.flight is not None
-        R, angles = manner_at(self.manner, time_s)
+        R, angles = upper_body_at(self.upper_body, time_s)
         angles[:, self.person.joints.ravel()] = self.flight.legs(time_s)
         own = self.person.centre_of_mass(Poses(R, np.zeros((len(time_s), 3)), angles))
         return Poses(R, self.flight.centre_at(time_s) - own, angles)
 
 
-def moved(course: Course, way: Array) -> Course:
+def translate(course: Movement, way: Array) -> Movement:
     """Return the same motion at another place on the floor, `way` (2,) [m] from the old one."""
 
     def shifted(curve: PPoly) -> PPoly:
@@ -129,9 +128,9 @@ def moved(course: Course, way: Array) -> Course:
         c[-1, :, :2] += way
         return PPoly(c, curve.x)
 
-    def stood(stand: Stand) -> Stand:
-        feet = tuple(foot._replace(place=shifted(foot.place)) for foot in stand.feet)
-        return stand._replace(over=shifted(stand.over), feet=feet)
+    def stood(stand: StancePhase) -> StancePhase:
+        feet = tuple(foot._replace(placement=shifted(foot.placement)) for foot in stand.feet)
+        return stand._replace(centre_xy=shifted(stand.centre_xy), feet=feet)
 
     flight, after = course.flight, course.after
     return replace(
@@ -142,30 +141,45 @@ def moved(course: Course, way: Array) -> Course:
     )
 
 
-def manner_at(manner: Manner, time_s: Array) -> tuple[Array, Array]:
+def upper_body_at(upper_body: UpperBody, time_s: Array) -> tuple[Array, Array]:
     """Return the root's R (n, 3, 3) and the joint angles (n, 17, 3), legs straight, at the times (n,) [s]."""
-    yaw, pitch = at(manner.yaw, time_s), at(manner.pitch, time_s)
-    return turn(2, yaw) @ turn(0, pitch), at(manner.trunk, time_s) + at(manner.arms, time_s)
+    yaw, pitch = evaluate_clamped(upper_body.yaw, time_s), evaluate_clamped(upper_body.pitch, time_s)
+    return axis_rotation(2, yaw) @ axis_rotation(0, pitch), evaluate_clamped(
+        upper_body.trunk, time_s
+    ) + evaluate_clamped(upper_body.arms, time_s)
 
 
-def stand_poses(person: Person, manner: Manner, stand: Stand, time_s: Array) -> Poses:
+def stance_poses(person: Person, upper_body: UpperBody, stand: StancePhase, time_s: Array) -> Poses:
     """Return the poses of a time on the floor at the times (n,) [s]."""
-    R, angles = manner_at(manner, time_s)
+    R, angles = upper_body_at(upper_body, time_s)
     feet = [
-        rolled_foot(person.leg, at(foot.place, time_s), at(foot.pitch, time_s), at(foot.lift, time_s))
+        roll_foot(
+            person.leg,
+            evaluate_clamped(foot.placement, time_s),
+            evaluate_clamped(foot.pitch, time_s),
+            evaluate_clamped(foot.lift, time_s),
+        )
         for foot in stand.feet
     ]
     both = Feet(np.stack([ankle for ankle, _ in feet]), np.stack([turned for _, turned in feet]))
-    return standing(person, R, angles, both, np.column_stack([at(stand.over, time_s), at(stand.height, time_s)]))
+    return solve_stance(
+        person,
+        R,
+        angles,
+        both,
+        np.column_stack([evaluate_clamped(stand.centre_xy, time_s), evaluate_clamped(stand.centre_z, time_s)]),
+    )
 
 
-def legs_at_edge(person: Person, manner: Manner, stand: Stand, time_s: float, *, toward: int) -> tuple[Array, ...]:
+def leg_derivatives(
+    person: Person, upper_body: UpperBody, stand: StancePhase, time_s: float, *, toward: int
+) -> tuple[Array, ...]:
     """Return the legs' angles, rates and accelerations, (6, 3) each, at a stand's first or last moment.
 
     `toward` is -1 to look back from its last moment, +1 to look ahead from its first.
     """
     steps = toward * np.arange(_STEPS)
-    angles = stand_poses(person, manner, stand, time_s + _STEP_S * steps).joint_angles[:, person.joints.ravel()]
+    angles = stance_poses(person, upper_body, stand, time_s + _STEP_S * steps).joint_angles[:, person.joints.ravel()]
     coefficients = np.linalg.solve(np.vander(steps.astype(float), increasing=True), angles.reshape(_STEPS, -1))
     shape = angles.shape[1:]
     value, rate, double = (coefficients[k].reshape(shape) / _STEP_S**k for k in range(3))

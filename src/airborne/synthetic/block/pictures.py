@@ -11,22 +11,21 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body import Geometry, PosedBody, geometry
+from airborne.body import PosedBody, SurfaceArrays, surface_arrays
 from airborne.cameras import Camera
 from airborne.rendering import Lamp, Lights, render
 from airborne.rendering.shapes import new_shapes
-from airborne.synthetic.block.court import Layer, clutter, hall_picture, net_layer
-from airborne.synthetic.block.layers import cover, expose, lay, shade
+from airborne.synthetic.block.court import Layer, draw_clutter, hall_picture, net_layer
+from airborne.synthetic.block.layers import blend_layer, cast_shadows, composite, expose
 from airborne.synthetic.block.players import Player
 from airborne.synthetic.block.scene import BlockScene
+from airborne.types import Array, Image
 from airborne.video import Frames, View
 
-Array = NDArray[np.floating]
-Picture = NDArray[np.uint8]
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]
 Boxes = NDArray[np.int64]  # (..., 4) of them
 
-LIGHTS = Lights(0.50, (Lamp(np.array([-5.0, -9.0, 10.0]), 0.36), Lamp(np.array([6.0, -4.0, 10.0]), 0.34)))
+HALL_LIGHTS = Lights(0.50, (Lamp(np.array([-5.0, -9.0, 10.0]), 0.36), Lamp(np.array([6.0, -4.0, 10.0]), 0.34)))
 _SHADOW_TINT = np.array([0.85, 1.0, 1.02])  # how much of each colour's light is missing: what is left is like skin
 _LEAN = np.array([0.12, 0.10])  # a shadow's way over the floor for each metre of height
 _CASTERS = (  # of shadows: landmark, its height over the floor as one stands, radius [m], share of the depth
@@ -37,7 +36,7 @@ _CASTERS = (  # of shadows: landmark, its height over the floor as one stands, r
 _SQUARE = np.array([[x, y] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
 _BODY_MARGIN_M = 0.13  # a body reaches no further than this from its landmarks
 _BLOCK_PX = 16  # of JPEG: patches begin and end where its blocks do
-_N_PLATES = 4  # recordings of the still hall that frames take turns in
+_N_BACKGROUNDS = 4  # recordings of the still hall that frames take turns in
 _POOL_MARGIN_PX = 256
 
 
@@ -45,15 +44,15 @@ class Drawable(NamedTuple):
     """A player over all n frames, ready to be drawn."""
 
     player: Player
-    flat: Geometry
+    flat: SurfaceArrays
     shapes: Any  # workspace of the renderer
     R: Array  # (n, s, 3, 3) world from segment
     t: Array  # (n, s, 3) [m]
     landmarks: Array  # (n, k, 3) [m]
-    blobs: Array  # (n, 3, 4) shadows: x, y, radius [m], depth
+    shadows: Array  # (n, 3, 4) shadows: x, y, radius [m], depth
 
 
-class Places(NamedTuple):
+class ImageBounds(NamedTuple):
     """Where a player is in one camera's pictures, over all n frames; boxes are x0, y0, x1, y1 [px]."""
 
     depth_m: Array  # (n,)
@@ -63,69 +62,70 @@ class Places(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Studio:
+class CameraSetup:
     """One camera, what it sees of the still hall, and where it sees the players."""
 
     camera: Camera  # the true one
-    told: Camera  # as calibrated
-    bare: Picture  # (h, w, 3) without the net
+    calibrated: Camera  # as calibrated
+    background: Image  # (h, w, 3) without the net
     net: Layer
     gain: Array  # (3,)
-    plates: list[Picture]  # the hall with the net, as recorded
+    recorded_backgrounds: list[Image]  # the hall with the net, as recorded
     floor_from_px: Array  # (3, 3)
-    places: list[Places]  # of the drawables
+    bounds: list[ImageBounds]  # of the drawables
 
 
-def frames_of(scene: BlockScene) -> Iterator[Frames]:
+def block_frames(scene: BlockScene) -> Iterator[Frames]:
     """Record a scene frame by frame, in memory; the views' cameras are the calibrated ones.
 
     The same scene gives the same pixels.
     """
     rng = np.random.default_rng([scene.seed, 22])
-    things, pool = clutter(rng), _noise_pool(rng, scene)
+    things, pool = draw_clutter(rng), _noise_pool(rng, scene)
     drawables = [_drawable(player, scene) for player in scene.players]
-    studios = [
-        _studio(rng, scene, told.name, things=things, pool=pool, drawables=drawables) for told in scene.calibrated
+    setups = [
+        _camera_setup(rng, scene, camera.name, things=things, pool=pool, drawables=drawables)
+        for camera in scene.calibrated_rig
     ]
     for index in range(scene.n_frames):
         rng = np.random.default_rng([scene.seed, 23, index])
         pictures = [
-            _picture(rng, studio, drawables, pool, index=index, quality=scene.difficulty.jpeg_quality)
-            for studio in studios
+            _draw_image(rng, setup, drawables, pool, index=index, quality=scene.difficulty.jpeg_quality)
+            for setup in setups
         ]
-        views = tuple(View(studio.told, rgb) for studio, rgb in zip(studios, pictures, strict=True))
+        views = tuple(View(setup.calibrated, rgb) for setup, rgb in zip(setups, pictures, strict=True))
         yield Frames(index, Fraction(index) / scene.rate, views)
 
 
-def _picture(
+def _draw_image(
     rng: np.random.Generator,
-    studio: Studio,
+    setup: CameraSetup,
     drawables: list[Drawable],
     pool: NDArray[np.int8],
     *,
     index: int,
     quality: int,
-) -> Picture:
+) -> Image:
     """Draw one camera's picture of a frame (h, w, 3), as recorded and compressed."""
-    recorded = studio.plates[int(rng.integers(len(studio.plates)))].copy()
-    seen = sorted(zip(drawables, studio.places, strict=True), key=lambda each: -each[1].depth_m[index])
-    for box in _merged([places.patch[index] for _, places in seen]):
+    recorded = setup.recorded_backgrounds[int(rng.integers(len(setup.recorded_backgrounds)))].copy()
+    seen = sorted(zip(drawables, setup.bounds, strict=True), key=lambda each: -each[1].depth_m[index])
+    for box in _merge([places.patch[index] for _, places in seen]):
         x0, y0, x1, y1 = box
-        patch = studio.bare[y0:y1, x0:x1].astype(np.float32)
-        inside = [each for each in seen if _meet(tuple(each[1].patch[index]), box)]
+        patch = setup.background[y0:y1, x0:x1].astype(np.float32)
+        inside = [each for each in seen if _overlap(tuple(each[1].patch[index]), box)]
         for drawable, places in inside:
-            blobs, boxes = drawable.blobs[index], places.shadows[index]
-            shade(patch, x0, y0, studio.floor_from_px, blobs, boxes, _SHADOW_TINT)
+            shadows, boxes = drawable.shadows[index], places.shadows[index]
+            cast_shadows(patch, x0, y0, setup.floor_from_px, shadows, boxes, _SHADOW_TINT)
         for drawable, places in (each for each in inside if each[0].player.side > 0):
-            _lay_body(patch, box, studio.camera, drawable, places, index=index)
-        cover(patch, studio.net.colour[y0:y1, x0:x1], studio.net.cover[y0:y1, x0:x1])
+            _composite_body(patch, box, setup.camera, drawable, places, index=index)
+        blend_layer(patch, setup.net.colour[y0:y1, x0:x1], setup.net.alpha[y0:y1, x0:x1])
         for drawable, places in (each for each in inside if each[0].player.side < 0):
-            _lay_body(patch, box, studio.camera, drawable, places, index=index)
-        recorded[y0:y1, x0:x1] = _recorded(rng, patch, studio.gain, pool, quality)
+            _composite_body(patch, box, setup.camera, drawable, places, index=index)
+        recorded[y0:y1, x0:x1] = _record(rng, patch, setup.gain, pool, quality)
     return recorded
 
 
-def _studio(
+def _camera_setup(
     rng: np.random.Generator,
     scene: BlockScene,
     name: str,
@@ -133,21 +133,23 @@ def _studio(
     things: list,
     pool: NDArray[np.int8],
     drawables: list[Drawable],
-) -> Studio:
+) -> CameraSetup:
     camera, spread = scene.rig[name], scene.difficulty.gain_spread
     gain = rng.uniform(1 - spread, 1 + spread) * (1 + 0.5 * spread * rng.uniform(-1, 1, 3) * [1, 0, 1])
-    bare, net = hall_picture(rng, camera, things), net_layer(camera)
-    with_net = bare.astype(np.float32)
-    cover(with_net, net.colour, net.cover)
-    return Studio(
+    background, net = hall_picture(rng, camera, things), net_layer(camera)
+    with_net = background.astype(np.float32)
+    blend_layer(with_net, net.colour, net.alpha)
+    return CameraSetup(
         camera=camera,
-        told=scene.calibrated[name],
-        bare=bare,
+        calibrated=scene.calibrated_rig[name],
+        background=background,
         net=net,
         gain=gain,
-        plates=[_recorded(rng, with_net, gain, pool, scene.difficulty.jpeg_quality) for _ in range(_N_PLATES)],
+        recorded_backgrounds=[
+            _record(rng, with_net, gain, pool, scene.difficulty.jpeg_quality) for _ in range(_N_BACKGROUNDS)
+        ],
         floor_from_px=np.linalg.inv(camera.P[:, [0, 1, 3]]),
-        places=[_places(camera, drawable) for drawable in drawables],
+        bounds=[_image_bounds(camera, drawable) for drawable in drawables],
     )
 
 
@@ -160,9 +162,9 @@ def _noise_pool(rng: np.random.Generator, scene: BlockScene) -> NDArray[np.int8]
 
 
 def _drawable(player: Player, scene: BlockScene) -> Drawable:
-    person, poses = player.course.person, player.poses(scene.times_s)
-    R, t = person.placed(poses)
-    flat, marks = geometry(player.body), person.landmarks(poses)
+    person, poses = player.movement.person, player.poses(scene.times_s)
+    R, t = person.pose_segments(poses)
+    flat, marks = surface_arrays(player.body), person.landmarks(poses)
     shadows = []
     for name, bottom_m, radius_m, share in _CASTERS:
         rise = np.clip(marks[name][:, 2] - bottom_m, 0, None)
@@ -174,18 +176,18 @@ def _drawable(player: Player, scene: BlockScene) -> Drawable:
     )
 
 
-def _places(camera: Camera, each: Drawable) -> Places:
+def _image_bounds(camera: Camera, each: Drawable) -> ImageBounds:
     """Find a player and his shadows in all of a camera's pictures."""
     depth = camera.camera_from_world.apply(each.t[:, 0])[:, 2]
     margin = (_BODY_MARGIN_M * camera.K[0, 0] / np.maximum(depth - 0.5, 0.5))[:, None]
     body = camera.px_from_world(each.landmarks)
-    corners = each.blobs[:, :, None, :2] + each.blobs[:, :, None, 2:3] * _SQUARE
+    corners = each.shadows[:, :, None, :2] + each.shadows[:, :, None, 2:3] * _SQUARE
     shadow = camera.px_from_world(np.concatenate([corners, np.zeros_like(corners[..., :1])], axis=-1))
     body_box = _boxes(camera, body.min(axis=1) - margin, body.max(axis=1) + margin)
     shadow_box = _boxes(camera, shadow.min(axis=2), shadow.max(axis=2))
     all_boxes = np.concatenate([body_box[:, None], shadow_box], axis=1)
     low, high = all_boxes[..., :2].min(axis=1), all_boxes[..., 2:].max(axis=1)
-    return Places(depth, body_box, shadow_box, _boxes(camera, low, high, step=_BLOCK_PX))
+    return ImageBounds(depth, body_box, shadow_box, _boxes(camera, low, high, step=_BLOCK_PX))
 
 
 def _boxes(camera: Camera, low: Array, high: Array, step: int = 1) -> Boxes:
@@ -194,16 +196,16 @@ def _boxes(camera: Camera, low: Array, high: Array, step: int = 1) -> Boxes:
     return np.clip(rounded, 0, [*camera.size, *camera.size]).astype(np.int64)
 
 
-def _meet(a: Box, b: Box) -> bool:
+def _overlap(a: Box, b: Box) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def _merged(boxes: list[NDArray[np.int64]]) -> list[Box]:
+def _merge(boxes: list[NDArray[np.int64]]) -> list[Box]:
     """Join boxes that meet until none do; empty ones are left out."""
     found: list[Box] = []
     for x0, y0, x1, y1 in (map(int, each) for each in boxes if each[2] > each[0] and each[3] > each[1]):
         box = (x0, y0, x1, y1)
-        while touching := next((other for other in found if _meet(box, other)), None):
+        while touching := next((other for other in found if _overlap(box, other)), None):
             found.remove(touching)
             a, b = box, touching
             box = (min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3]))
@@ -211,22 +213,22 @@ def _merged(boxes: list[NDArray[np.int64]]) -> list[Box]:
     return found
 
 
-def _lay_body(
-    patch: NDArray[np.float32], box: Box, camera: Camera, each: Drawable, places: Places, *, index: int
+def _composite_body(
+    patch: NDArray[np.float32], box: Box, camera: Camera, each: Drawable, places: ImageBounds, *, index: int
 ) -> None:
     """Draw a body on what is behind it, with two samples a pixel side by side: limbs hang or stand, mostly."""
     x0, y0, x1, y1 = (int(c) for c in places.body[index])
     if x1 <= x0 or y1 <= y0:
         return
-    sampled = camera.resampled(scale=(0.5, 1.0), offset=(x0 - 0.25, y0), size=(2 * (x1 - x0), y1 - y0))
+    sampled = camera.resample(scale=(0.5, 1.0), offset=(x0 - 0.25, y0), size=(2 * (x1 - x0), y1 - y0))
     posed = PosedBody(each.player.body, each.R[index], each.t[index])
-    drawn = render(each.flat, posed, sampled, LIGHTS, shapes=each.shapes)
-    lay(patch, x0 - box[0], y0 - box[1], drawn.colour, drawn.part)
+    drawn = render(each.flat, posed, sampled, HALL_LIGHTS, shapes=each.shapes)
+    composite(patch, x0 - box[0], y0 - box[1], drawn.colour, drawn.part)
 
 
-def _recorded(
+def _record(
     rng: np.random.Generator, patch: NDArray[np.float32], gain: Array, pool: NDArray[np.int8], quality: int
-) -> Picture:
+) -> Image:
     """Return a patch (h, w, 3) as the sensor and the compression leave it."""
     height, width, _ = patch.shape
     v, u = (int(rng.integers(size - own + 1)) for size, own in zip(pool.shape[:2], (height, width), strict=True))

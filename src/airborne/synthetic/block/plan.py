@@ -6,24 +6,26 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airborne.synthetic.block.legs import rolled_foot, turn
-from airborne.synthetic.block.posture import Feet, Person, posture, standing
-from airborne.synthetic.block.steps import Approach, stance
+from airborne.synthetic.block.legs import axis_rotation, roll_foot
+from airborne.synthetic.block.posture import Feet, Person, solve_stance, upper_body_angles
+from airborne.synthetic.block.steps import Approach, foot_placements
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 Arms = Literal["block", "attack", "low"]
 
 TAKEOFF_PITCH = (np.radians(35.0), 13.0, -60.0)  # of the feet [rad, rad/s, rad/s^2]
 TOUCH_PITCH = (np.radians(26.0), -11.0, 0.0)
-AHEAD_M, AHEAD_LOW_M = 0.02, -0.01  # of the centre of mass before the feet's middle: standing, at its lowest
-AHEAD_TAKEOFF_M, AHEAD_TOUCH_M = 0.085, 0.05
+CENTRE_AHEAD_M, CENTRE_AHEAD_LOW_M = (
+    0.02,
+    -0.01,
+)  # of the centre of mass before the feet's middle: standing, at its lowest
+CENTRE_AHEAD_TAKEOFF_M, _CENTRE_AHEAD_TOUCH_M = 0.085, 0.05
 _HEIGHTS_PER_REACH, _N_HEIGHTS = (0.75, 1.5), 48  # of the centre of mass, tried, over a leg's length
-_MET_S = 0.1  # feet land ahead of a drifting body by what it goes in this time
+_DRIFT_LEAD_S = 0.1  # feet land ahead of a drifting body by what it goes in this time
 
 
-class Hold(NamedTuple):
+class KeyPosture(NamedTuple):
     """How pelvis, trunk, head and arms are held, in degrees; see `posture`."""
 
     pitch: float  # of the pelvis, forward
@@ -31,14 +33,16 @@ class Hold(NamedTuple):
     head: float
     arms: tuple[float, float]
     elbows: tuple[float, float]
-    apart: float = 8.0
+    abduction: float = 8.0
 
     def angles(self, person: Person) -> Array:
         """Return the joint angles (17, 3) [rad], legs straight."""
-        return posture(person, trunk=self.trunk, head=self.head, arms=self.arms, elbows=self.elbows, apart=self.apart)
+        return upper_body_angles(
+            person, trunk=self.trunk, head=self.head, arms=self.arms, elbows=self.elbows, abduction=self.abduction
+        )
 
 
-READY = Hold(15, 14, -16, (35, 35), (120, 120))
+READY = KeyPosture(15, 14, -16, (35, 35), (120, 120))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,11 +50,11 @@ class JumpPlan:
     """What a jump is made of; angles in degrees, of knees how far they are bent."""
 
     rise_m: float  # of the centre of mass after take-off
-    place: Array  # (2,) x, y of the feet's middle at take-off [m]
+    position: Array  # (2,) x, y of the feet's middle at take-off [m]
     yaw: float  # turn about z: 0 faces -y, pi faces +y [rad]
     drift_m_s: Array  # (2,) horizontal velocity in flight
     approach: Approach = "static"
-    way_m: float = 0.0  # of the approach, along x
+    approach_m: float = 0.0  # of the approach, along x
     crouch_s: float = 0.32
     width_m: float = 0.36  # between the feet
     knee_ready: float = 38.0
@@ -72,40 +76,40 @@ class JumpPlan:
     @property
     def touch_offset_m(self) -> Array:
         """Where the centre of mass is at touch-down, seen from the middle of the feet: (2,) [m]."""
-        return AHEAD_TOUCH_M * self.forward - _MET_S * self.drift_m_s
+        return _CENTRE_AHEAD_TOUCH_M * self.forward - _DRIFT_LEAD_S * self.drift_m_s
 
     @property
-    def holds(self) -> dict[str, Hold]:
+    def key_postures(self) -> dict[str, KeyPosture]:
         """How the body is held at the key moments."""
         up = 178.0 - self.tilt
         swing = {
             "block": (
-                Hold(36, 24, -32, (35, 35), (125, 125)),
-                Hold(6, 4, -18, (115, 115), (85, 85)),
-                Hold(9, 8, -8, (up, up), (6, 6), 6),
+                KeyPosture(36, 24, -32, (35, 35), (125, 125)),
+                KeyPosture(6, 4, -18, (115, 115), (85, 85)),
+                KeyPosture(9, 8, -8, (up, up), (6, 6), 6),
             ),
             "attack": (
-                Hold(38, 24, -30, (-45, -45), (15, 15)),
-                Hold(4, 0, -20, (125, 120), (20, 70)),
-                Hold(8, 6, -12, (110, up), (25, 15), 14),
+                KeyPosture(38, 24, -30, (-45, -45), (15, 15)),
+                KeyPosture(4, 0, -20, (125, 120), (20, 70)),
+                KeyPosture(8, 6, -12, (110, up), (25, 15), 14),
             ),
             "low": (
-                Hold(34, 22, -28, (10, 10), (60, 60), 14),
-                Hold(6, 4, -12, (45, 45), (60, 60), 14),
-                Hold(8, 6, -10, (60, 60), (50, 50), 18),
+                KeyPosture(34, 22, -28, (10, 10), (60, 60), 14),
+                KeyPosture(6, 4, -12, (45, 45), (60, 60), 14),
+                KeyPosture(8, 6, -10, (60, 60), (50, 50), 18),
             ),
         }[self.arms]
         return {
             "ready": READY,
             **dict(zip(("bottom", "takeoff", "peak"), swing, strict=True)),
-            "fold": Hold(12, 9, -10, (100, 100), (120, 120), 12),
-            "touch": Hold(14, 10, -10, (35, 35), (125, 125), 14),
-            "low": Hold(30, 20, -24, (10, 10), (110, 110), 18),
-            "end": Hold(13, 12, -14, (25, 25), (105, 105), 12),
+            "fold": KeyPosture(12, 9, -10, (100, 100), (120, 120), 12),
+            "touch": KeyPosture(14, 10, -10, (35, 35), (125, 125), 14),
+            "low": KeyPosture(30, 20, -24, (10, 10), (110, 110), 18),
+            "end": KeyPosture(13, 12, -14, (25, 25), (105, 105), 12),
         }
 
 
-class Levels(NamedTuple):
+class CentreHeights(NamedTuple):
     """Heights of the centre of mass [m]."""
 
     ready: float
@@ -116,28 +120,28 @@ class Levels(NamedTuple):
     end: float
 
 
-def levels_of(person: Person, plan: JumpPlan) -> Levels:
+def centre_heights(person: Person, plan: JumpPlan) -> CentreHeights:
     """Find how high the centre of mass is at the key moments, from how far the knees are bent."""
-    near, holds = AHEAD_M * plan.forward, plan.holds
+    near, holds = CENTRE_AHEAD_M * plan.forward, plan.key_postures
 
     def height(hold: str, knee: float, offset: Array = near, pitch: float = 0.0) -> float:
-        places = stance(plan.place, plan.yaw, plan.width_m)
-        return height_where(
-            person, holds[hold], places, over=plan.place + offset, yaw=plan.yaw, knee=np.radians(knee), pitch=pitch
+        places = foot_placements(plan.position, plan.yaw, plan.width_m)
+        return centre_height(
+            person, holds[hold], places, over=plan.position + offset, yaw=plan.yaw, knee=np.radians(knee), pitch=pitch
         )
 
-    return Levels(
+    return CentreHeights(
         ready=height("ready", plan.knee_ready),
-        bottom=height("bottom", plan.knee_crouch, AHEAD_LOW_M * plan.forward),
-        takeoff=height("takeoff", plan.knee_takeoff, AHEAD_TAKEOFF_M * plan.forward, TAKEOFF_PITCH[0]),
+        bottom=height("bottom", plan.knee_crouch, CENTRE_AHEAD_LOW_M * plan.forward),
+        takeoff=height("takeoff", plan.knee_takeoff, CENTRE_AHEAD_TAKEOFF_M * plan.forward, TAKEOFF_PITCH[0]),
         touch=height("touch", plan.knee_touch, plan.touch_offset_m, TOUCH_PITCH[0]),
-        low=height("low", plan.knee_landing, AHEAD_LOW_M * plan.forward),
+        low=height("low", plan.knee_landing, CENTRE_AHEAD_LOW_M * plan.forward),
         end=height("end", plan.knee_ready),
     )
 
 
-def height_where(
-    person: Person, hold: Hold, places: Array, *, over: Array, yaw: float, knee: float, pitch: float = 0.0
+def centre_height(
+    person: Person, hold: KeyPosture, places: Array, *, over: Array, yaw: float, knee: float, pitch: float = 0.0
 ) -> float:
     """Return the height of the centre of mass [m] at which the knees are bent by `knee` [rad] on the mean.
 
@@ -146,14 +150,14 @@ def height_where(
     reach = person.leg.thigh_m + person.leg.shank_m
     heights = np.linspace(*_HEIGHTS_PER_REACH, _N_HEIGHTS) * reach
     alike = np.ones(_N_HEIGHTS)
-    R = turn(2, yaw * alike) @ turn(0, np.radians(hold.pitch) * alike)
+    R = axis_rotation(2, yaw * alike) @ axis_rotation(0, np.radians(hold.pitch) * alike)
     ankles, turns = zip(
-        *(rolled_foot(person.leg, np.tile(place, (_N_HEIGHTS, 1)), pitch * alike, 0 * alike) for place in places),
+        *(roll_foot(person.leg, np.tile(place, (_N_HEIGHTS, 1)), pitch * alike, 0 * alike) for place in places),
         strict=True,
     )
     centres = np.column_stack([np.tile(over, (_N_HEIGHTS, 1)), heights])
     angles = np.tile(hold.angles(person), (_N_HEIGHTS, 1, 1))
-    poses = standing(person, R, angles, Feet(np.stack(ankles), np.stack(turns)), centres)
+    poses = solve_stance(person, R, angles, Feet(np.stack(ankles), np.stack(turns)), centres)
     bent = poses.joint_angles[:, person.knees, 0].mean(axis=1)
     can_stand = np.isfinite(bent)
     return float(np.interp(-knee, -bent[can_stand], heights[can_stand]))

@@ -7,26 +7,29 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Outfit, human18
 from airborne.errors import TrialError
-from airborne.synthetic.block.jump import jump
+from airborne.synthetic.block.jump import build_jump
 from airborne.synthetic.block.margins import Capsules, capsules_of, margins_of
-from airborne.synthetic.block.motion import Course, moved
-from airborne.synthetic.block.plan import Hold, JumpPlan
+from airborne.synthetic.block.motion import Movement, translate
+from airborne.synthetic.block.plan import JumpPlan, KeyPosture
 from airborne.synthetic.block.posture import Poses
 from airborne.synthetic.block.steps import Approach
 from airborne.synthetic.block.waiting import WaitPlan, wait
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 Role = Literal["blocker", "team mate", "opponent"]
 
 CLEARANCE_M = 0.03  # between two players, and to the net
 _ROUNDING_M = 1e-9
 _CHECK_S = 0.02  # from one check of a motion to the next
-_HARDEST_M_S2 = 30.0  # acceleration of the centre of mass by the legs
-_WAYS_M: dict[Approach, tuple[float, float]] = {"static": (0.0, 0.0), "shuffle": (0.35, 1.1), "crossover": (0.8, 1.1)}
+_LARGEST_ACCELERATION_M_S2 = 30.0  # acceleration of the centre of mass by the legs
+_APPROACHES_M: dict[Approach, tuple[float, float]] = {
+    "static": (0.0, 0.0),
+    "shuffle": (0.35, 1.1),
+    "crossover": (0.8, 1.1),
+}
 _SKINS = np.array([[206, 160, 130], [188, 140, 110], [214, 172, 146], [150, 108, 84], [196, 152, 118]], float)
 _HAIRS = ((38, 30, 25), (22, 22, 22), (90, 66, 44), (150, 121, 80))
 _SHOES = ((222, 222, 218), (203, 69, 63), (226, 196, 64), (60, 64, 72))
@@ -43,7 +46,7 @@ class Player:
     stature_m: float
     outfit: Outfit
     body: BodyModel  # a human18
-    course: Course
+    movement: Movement
     takeoff_s: float | None  # on the scene's clock; None: does not jump
 
     @property
@@ -54,19 +57,19 @@ class Player:
     @property
     def touch_s(self) -> float | None:
         """When the player touches the floor again, on the scene's clock."""
-        flight = self.course.flight
+        flight = self.movement.flight
         return None if flight is None or self.takeoff_s is None else self.takeoff_s + flight.duration_s
 
     def poses(self, time_s: Array) -> Poses:
         """Return the poses at the scene's times (n,) [s]."""
-        return self.course(np.asarray(time_s, float) - (self.takeoff_s or 0.0))
+        return self.movement(np.asarray(time_s, float) - (self.takeoff_s or 0.0))
 
-    def moved(self, way: Array) -> Player:
+    def translate(self, way: Array) -> Player:
         """Return the player with the same motion `way` (2,) [m] further."""
-        return replace(self, course=moved(self.course, way))
+        return replace(self, movement=translate(self.movement, way))
 
 
-def someone(rng: np.random.Generator, *, is_opponent: bool, similarity: float) -> tuple[float, Outfit, BodyModel]:
+def draw_person(rng: np.random.Generator, *, is_opponent: bool, similarity: float) -> tuple[float, Outfit, BodyModel]:
     """Draw a player's stature [m], clothes and body.
 
     `similarity` 1 gives opponents the legs' colours of the blockers' team, 0 all their own.
@@ -93,7 +96,7 @@ def someone(rng: np.random.Generator, *, is_opponent: bool, similarity: float) -
     return stature, outfit, human18(round(stature, 3), round(mass, 1), outfit=outfit)
 
 
-def blocker(
+def draw_blocker(
     rng: np.random.Generator,
     name: str,
     x: float,
@@ -104,16 +107,16 @@ def blocker(
     lasts_s: float,
 ) -> Player:
     """Draw a blocker who takes off near x [m] at a time, from an approach along x in a direction of +1 or -1."""
-    stature, outfit, body = someone(rng, is_opponent=False, similarity=1.0)
+    stature, outfit, body = draw_person(rng, is_opponent=False, similarity=1.0)
     rise = float(np.clip(rng.normal(0.47, 0.06), 0.30, 0.62))
-    low, high = _WAYS_M[approach]
+    low, high = _APPROACHES_M[approach]
     plan = JumpPlan(
         rise_m=rise,
-        place=np.array([x, rng.uniform(-0.75, -0.64)]),
+        position=np.array([x, rng.uniform(-0.75, -0.64)]),
         yaw=float(np.pi + rng.normal(0, 0.06)),
         drift_m_s=np.array([direction * rng.uniform(-0.05, 0.4), rng.uniform(0.0, 0.12)]),
         approach=approach,
-        way_m=float(direction * rng.uniform(low, high)),
+        approach_m=float(direction * rng.uniform(low, high)),
         knee_ready=float(rng.uniform(34, 42) + (12 if approach == "crossover" else 0)),
         knee_crouch=float(78 + 55 * (rise - 0.3) + rng.uniform(0, 5)),
         knee_landing=float(rng.uniform(74, 85)),
@@ -124,17 +127,17 @@ def blocker(
         tilt=float(rng.uniform(14, 26)),
     )
     made = partial(Player, name=name, role="blocker", stature_m=stature, outfit=outfit, body=body, takeoff_s=takeoff_s)
-    return _clear_of_net(made(course=jump(body, plan)), lasts_s)
+    return _move_clear_of_net(made(movement=build_jump(body, plan)), lasts_s)
 
 
-def attacker(
+def draw_attacker(
     rng: np.random.Generator, name: str, x: float, *, takeoff_s: float, similarity: float, lasts_s: float
 ) -> Player:
     """Draw an opponent who jumps for a spike near x [m]."""
-    stature, outfit, body = someone(rng, is_opponent=True, similarity=similarity)
+    stature, outfit, body = draw_person(rng, is_opponent=True, similarity=similarity)
     plan = JumpPlan(
         rise_m=float(np.clip(rng.normal(0.66, 0.04), 0.55, 0.71)),
-        place=np.array([x, rng.uniform(1.1, 1.4)]),
+        position=np.array([x, rng.uniform(1.1, 1.4)]),
         yaw=float(rng.normal(0, 0.1)),
         drift_m_s=np.array([rng.uniform(-0.2, 0.2), rng.uniform(-0.3, -0.1)]),
         knee_ready=50.0,
@@ -144,44 +147,48 @@ def attacker(
         arms="attack",
     )
     made = partial(Player, name=name, role="opponent", stature_m=stature, outfit=outfit, body=body, takeoff_s=takeoff_s)
-    return _clear_of_net(made(course=jump(body, plan)), lasts_s)
+    return _move_clear_of_net(made(movement=build_jump(body, plan)), lasts_s)
 
 
-def bystander(
-    rng: np.random.Generator, name: str, place: Array, *, is_opponent: bool, similarity: float, lasts_s: float
+def draw_bystander(
+    rng: np.random.Generator, name: str, position: Array, *, is_opponent: bool, similarity: float, lasts_s: float
 ) -> Player:
     """Draw a player who stays on the floor at `place` (2,) [m]; some shuffle there."""
-    stature, outfit, body = someone(rng, is_opponent=is_opponent, similarity=similarity)
+    stature, outfit, body = draw_person(rng, is_opponent=is_opponent, similarity=similarity)
     reach, bend = rng.uniform(15, 60), rng.uniform(30, 100)
     plan = WaitPlan(
-        place=place,
+        position=position,
         yaw=float((0.0 if is_opponent else np.pi) + rng.normal(0, 0.35)),
         knee=float(rng.uniform(25, 62)),
         width_m=float(rng.uniform(0.35, 0.55)),
-        way_m=float(rng.choice([0.0, rng.uniform(-0.7, 0.7)])),
+        approach_m=float(rng.choice([0.0, rng.uniform(-0.7, 0.7)])),
         arrival_s=float(rng.uniform(0.3, 0.8) * lasts_s),
         lasts_s=lasts_s,
-        hold=Hold(rng.uniform(12, 28), rng.uniform(8, 22), -20.0, (reach, reach), (bend, bend), rng.uniform(8, 25)),
+        hold=KeyPosture(
+            rng.uniform(12, 28), rng.uniform(8, 22), -20.0, (reach, reach), (bend, bend), rng.uniform(8, 25)
+        ),
     )
     role: Role = "opponent" if is_opponent else "team mate"
-    course = wait(rng, body, plan)
-    player = Player(name=name, role=role, stature_m=stature, outfit=outfit, body=body, course=course, takeoff_s=None)
-    return _clear_of_net(player, lasts_s)
+    movement = wait(rng, body, plan)
+    player = Player(
+        name=name, role=role, stature_m=stature, outfit=outfit, body=body, movement=movement, takeoff_s=None
+    )
+    return _move_clear_of_net(player, lasts_s)
 
 
-def _clear_of_net(player: Player, lasts_s: float) -> Player:
+def _move_clear_of_net(player: Player, lasts_s: float) -> Player:
     """Return the player far enough from the net; raises TrialError for a motion that no body can make."""
-    time_s, height = check_times(lasts_s), player.course.before.height
-    margins = margins_of(player.course.person, player.poses(time_s), side=player.side)
-    hardest = np.abs(height(np.linspace(height.x[0], height.x[-1], 200), 2)).max()
-    if not (margins.floor_m > -_ROUNDING_M and margins.limits_rad > 0 and hardest < _HARDEST_M_S2):
+    time_s, centre_z = check_times(lasts_s), player.movement.before.centre_z
+    margins = margins_of(player.movement.person, player.poses(time_s), side=player.side)
+    hardest = np.abs(centre_z(np.linspace(centre_z.x[0], centre_z.x[-1], 200), 2)).max()
+    if not (margins.floor_m > -_ROUNDING_M and margins.limits_rad > 0 and hardest < _LARGEST_ACCELERATION_M_S2):
         raise TrialError(f"{player.name}: the motion drawn is more than a body can do; use another seed")
-    return player.moved(np.array([0.0, player.side * max(CLEARANCE_M - margins.net_m, 0.0)]))
+    return player.translate(np.array([0.0, player.side * max(CLEARANCE_M - margins.net_m, 0.0)]))
 
 
-def taken_room(player: Player, lasts_s: float) -> Capsules:
+def occupied_volume(player: Player, lasts_s: float) -> Capsules:
     """Return the room that a player takes while a recording lasts."""
-    return capsules_of(player.course.person, player.poses(check_times(lasts_s)), player.stature_m)
+    return capsules_of(player.movement.person, player.poses(check_times(lasts_s)), player.stature_m)
 
 
 def check_times(lasts_s: float) -> Array:

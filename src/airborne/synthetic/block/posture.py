@@ -12,14 +12,13 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Ellipsoid, Pose
 from airborne.body.inertia import segment_inertias
-from airborne.rendering import place_segments
+from airborne.rendering import pose_segments
 from airborne.synthetic.block.legs import LegSizes, leg_angles
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-SIDES = ("left", "right")
-_MOST_ROUNDS, _SOLVED_M, _TOO_SHORT_M = 60, 1e-13, 1e-6
-_BOLDNESS = 1.2  # the centre of mass follows the root by a part of its way
+_SIDES = ("left", "right")
+_MOST_ITERATIONS, _TOLERANCE_M, _TOO_SHORT_M = 60, 1e-13, 1e-6
+_OVER_RELAXATION = 1.2  # the centre of mass follows the root by a part of its way
 
 
 class Poses(NamedTuple):
@@ -58,23 +57,23 @@ class Person:
         """The rows of both knees among the joints: (2,)."""
         return self.joints[:, 1]
 
-    def placed(self, poses: Poses) -> tuple[Array, Array]:
+    def pose_segments(self, poses: Poses) -> tuple[Array, Array]:
         """Return R (n, s, 3, 3) and t (n, s, 3) of the segments, world from segment."""
-        return place_segments(self.model, poses.root_R, poses.root_t, poses.joint_angles)
+        return pose_segments(self.model, poses.root_R, poses.root_t, poses.joint_angles)
 
     def centre_of_mass(self, poses: Poses) -> Array:
         """Return where the centre of mass is: (n, 3) world [m]."""
-        R, t = self.placed(poses)
+        R, t = self.pose_segments(poses)
         return np.einsum(
             "s,nsi->ni", self.mass_kg / self.mass_kg.sum(), np.einsum("nsij,sj->nsi", R, self.centre_m) + t
         )
 
     def landmarks(self, poses: Poses) -> dict[str, Array]:
         """Return the body's landmarks and the tips of the toes, `toe_left` and `toe_right`: (n, 3) world [m] each."""
-        R, t = self.placed(poses)
+        R, t = self.pose_segments(poses)
         local = {mark.name: (mark.segment, mark.position_m) for mark in self.model.landmarks}
         tip = self.leg.foot_centre_m - [0, self.leg.foot_half_length_m, 0]
-        local |= {f"toe_{side}": (f"foot_{side}", tip) for side in SIDES}
+        local |= {f"toe_{side}": (f"foot_{side}", tip) for side in _SIDES}
         found = {}
         for name, (segment, place) in local.items():
             k = self.model.index_of(segment)
@@ -83,7 +82,7 @@ class Person:
 
 
 @lru_cache(maxsize=64)
-def person_of(model: BodyModel) -> Person:
+def measure_person(model: BodyModel) -> Person:
     """Measure a `human18`."""
     mass, centres, _ = segment_inertias(model)
     segment = {each.name: each for each in model.segments}
@@ -96,12 +95,12 @@ def person_of(model: BodyModel) -> Person:
         foot_half_length_m=float(foot.shape.semi_axes_m[1]),
         foot_half_height_m=float(foot.shape.semi_axes_m[2]),
     )
-    hips = np.array([segment[f"thigh_{side}"].joint_m for side in SIDES])
-    joints = np.array([[model.index_of(f"{k}_{side}") - 1 for k in ("thigh", "shank", "foot")] for side in SIDES])
+    hips = np.array([segment[f"thigh_{side}"].joint_m for side in _SIDES])
+    joints = np.array([[model.index_of(f"{k}_{side}") - 1 for k in ("thigh", "shank", "foot")] for side in _SIDES])
     return Person(model, mass, centres, leg, hips, joints)
 
 
-def standing(person: Person, root_R: Array, joint_angles: Array, feet: Feet, centre: Array) -> Poses:
+def solve_stance(person: Person, root_R: Array, joint_angles: Array, feet: Feet, centre: Array) -> Poses:
     """Put the root where legs from the hips to the feet bring the centre of mass to `centre` (n, 3) [m].
 
     `joint_angles` (n, 17, 3) are those of all other joints; the legs' are found. NaN where a leg is too short.
@@ -110,29 +109,29 @@ def standing(person: Person, root_R: Array, joint_angles: Array, feet: Feet, cen
     R_pelvis, hips = np.concatenate([root_R, root_R]), np.concatenate([root_R @ hip for hip in person.hips_m])
     ankles, R_feet = feet.ankle.reshape(2 * n, 3), feet.R.reshape(2 * n, 3, 3)
     short = np.zeros(2 * n)
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MOST_ITERATIONS):
         legs, short = leg_angles(person.leg, R_pelvis, hips + np.concatenate([root, root]), ankles, R_feet)
         angles[:, person.joints[0]], angles[:, person.joints[1]] = legs[:n], legs[n:]
         off = centre - person.centre_of_mass(Poses(root_R, root, angles))
-        if np.abs(off).max(initial=0.0) < _SOLVED_M:
+        if np.abs(off).max(initial=0.0) < _TOLERANCE_M:
             break
-        root = root + _BOLDNESS * off
+        root = root + _OVER_RELAXATION * off
     angles[np.any(short.reshape(2, n) > _TOO_SHORT_M, axis=0)] = np.nan
     return Poses(root_R, root, angles)
 
 
-def posture(
+def upper_body_angles(
     person: Person,
     *,
     trunk: float = 0.0,
     head: float = 0.0,
     arms: tuple[float, float] = (0.0, 0.0),
     elbows: tuple[float, float] = (10.0, 10.0),
-    apart: float = 8.0,
+    abduction: float = 8.0,
 ) -> Array:
     """Return joint angles (17, 3) [rad] of a bent trunk and of arms raised forward, the left first; all in degrees.
 
-    `apart` is how far the arms go outward. The legs stay straight.
+    `abduction` is how far the arms go outward. The legs stay straight.
     """
     angles = np.zeros((len(person.model.segments) - 1, 3))
 
@@ -142,7 +141,7 @@ def posture(
     put("torso", 0.6 * trunk)
     put("chest", 0.4 * trunk)
     put("head", head)
-    for side, sign, arm, elbow in zip(SIDES, (-1, 1), arms, elbows, strict=True):
-        put(f"upper_arm_{side}", -arm, sign * apart)
+    for side, sign, arm, elbow in zip(_SIDES, (-1, 1), arms, elbows, strict=True):
+        put(f"upper_arm_{side}", -arm, sign * abduction)
         put(f"forearm_{side}", -elbow)
     return np.radians(angles)

@@ -5,51 +5,48 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.cameras import Camera, Rig, aimed
+from airborne.cameras import Camera, Rig, camera_looking_at
 from airborne.errors import TrialError
 
-Array = NDArray[np.floating]
-
 SIZE = (1920, 1080)  # [px]
-_AIM = np.array([0.0, -0.7, 1.6])
-_PLACES = np.array(  # [m]; the block-jump paper's three first
+_TARGET_M = np.array([0.0, -0.7, 1.6])
+_POSITIONS_M = np.array(  # [m]; the block-jump paper's three first
     [[-7.0, -13.0, 4.5], [7.0, -13.0, 4.5], [0.0, -15.0, 5.0], [-10.5, -5.0, 4.0], [10.5, -5.0, 4.0], [3.0, -13.5, 7.0]]
 )
-_PLACED_SD_M, _AIMED_SD_M = 0.15, 0.05
+_POSITION_SD_M, _TARGET_SD_M = 0.15, 0.05
 _FOCAL_PX = (1600.0, 1720.0)
 
 
 def hall_rig(rng: np.random.Generator, n_cameras: int) -> Rig:
     """Place 2 to 6 cameras; two are the corners'. Raises TrialError for other numbers."""
-    if not 2 <= n_cameras <= len(_PLACES):
-        raise TrialError(f"{n_cameras} cameras were asked for; give 2 to {len(_PLACES)}")
+    if not 2 <= n_cameras <= len(_POSITIONS_M):
+        raise TrialError(f"{n_cameras} cameras were asked for; give 2 to {len(_POSITIONS_M)}")
     return Rig(
         tuple(
-            aimed(
+            camera_looking_at(
                 f"cam{k + 1}",
-                place + rng.normal(0, _PLACED_SD_M, 3),
-                _AIM + rng.normal(0, _AIMED_SD_M, 3),
+                place + rng.normal(0, _POSITION_SD_M, 3),
+                _TARGET_M + rng.normal(0, _TARGET_SD_M, 3),
                 rng.uniform(*_FOCAL_PX),
                 SIZE,
             )
-            for k, place in enumerate(_PLACES[:n_cameras])
+            for k, place in enumerate(_POSITIONS_M[:n_cameras])
         )
     )
 
 
-def miscalibrated(rng: np.random.Generator, rig: Rig, error_px: float) -> Rig:
+def perturb_calibration(rng: np.random.Generator, rig: Rig, error_px: float) -> Rig:
     """Return the cameras as a calibration finds them: turned about their centres.
 
     The middle of the picture is off by a normal deviate of sd `error_px` to the right, and another down; the picture
     is turned so that its corners are off by as much again.
     """
-    return Rig(tuple(_turned(rng, camera, error_px) for camera in rig))
+    return Rig(tuple(_perturb_rotation(rng, camera, error_px) for camera in rig))
 
 
-def _turned(rng: np.random.Generator, camera: Camera, error_px: float) -> Camera:
+def _perturb_rotation(rng: np.random.Generator, camera: Camera, error_px: float) -> Camera:
     focal, corner = camera.K[0, 0], float(np.hypot(*camera.size)) / 2
     off = Rotation.from_rotvec(rng.normal(0, 1, 3) * error_px / np.array([focal, focal, corner]))
     turn = RigidTransform.from_components(np.zeros(3), off)

@@ -13,13 +13,19 @@ from numpy.typing import NDArray
 from airborne.cameras import Rig
 from airborne.errors import TrialError
 from airborne.synthetic.block.margins import Capsules, gap_m
-from airborne.synthetic.block.players import CLEARANCE_M, Player, attacker, blocker, bystander, taken_room
-from airborne.synthetic.block.rig import hall_rig, miscalibrated
+from airborne.synthetic.block.players import (
+    CLEARANCE_M,
+    Player,
+    draw_attacker,
+    draw_blocker,
+    draw_bystander,
+    occupied_volume,
+)
+from airborne.synthetic.block.rig import hall_rig, perturb_calibration
 from airborne.synthetic.block.steps import Approach
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-FRAME_RATES = (30, 60, 120)
+_FRAME_RATES = (30, 60, 120)
 _PAPER_FRAMES, _PAPER_SCENES = 1798, 22
 _PAPER_TEAMS = (2, 2, 2, 3, 3)  # blockers, where there are several
 _MEAN_FRAMES, _FEWEST_FRAMES = 82, 70
@@ -28,7 +34,7 @@ _SPACING_M, _WIDER_M = (0.62, 0.80), 0.04
 _NEAR_M = 2.5  # players further apart at the start cannot touch
 _TRIES = 200
 _FLIGHT_S = 0.66  # about
-_PLACE_M = (-2.6, 2.6)  # of the block along the net
+_POSITION_RANGE_M = (-2.6, 2.6)  # of the block along the net
 _OUT_OF_WAY_M = 0.7
 _APPROACHES: tuple[Approach, ...] = ("static", "shuffle", "crossover")
 
@@ -53,7 +59,7 @@ class Difficulty:
         for name in ("colour_similarity", "occlusion", "shadow"):
             if not 0 <= getattr(self, name) <= 1:
                 raise TrialError(f"{name} is {getattr(self, name):g}; expected 0 to 1")
-        if self.frame_rate not in FRAME_RATES:
+        if self.frame_rate not in _FRAME_RATES:
             raise TrialError(f"frame_rate is {self.frame_rate}; choose 30, 60 or 120")
         for name in ("calibration_error_px", "torso_noise_m", "start_noise_m", "noise_sd", "gain_spread"):
             if getattr(self, name) < 0:
@@ -62,9 +68,9 @@ class Difficulty:
             raise TrialError(f"jpeg_quality is {self.jpeg_quality}; expected 1 to 100, or 0 for none")
 
 
-EASY = Difficulty(colour_similarity=0.0, occlusion=0.0, calibration_error_px=0.0, noise_sd=2.0, gain_spread=0.03)
-HARD = Difficulty(colour_similarity=1.0, occlusion=0.8, calibration_error_px=1.5, noise_sd=4.0, shadow=0.5)
-DIFFICULTIES = {"easy": EASY, "default": Difficulty(), "hard": HARD}
+_EASY = Difficulty(colour_similarity=0.0, occlusion=0.0, calibration_error_px=0.0, noise_sd=2.0, gain_spread=0.03)
+_HARD = Difficulty(colour_similarity=1.0, occlusion=0.8, calibration_error_px=1.5, noise_sd=4.0, shadow=0.5)
+DIFFICULTIES = {"easy": _EASY, "default": Difficulty(), "hard": _HARD}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,7 +80,7 @@ class BlockScene:
     name: str
     seed: int  # of everything random
     rig: Rig  # the true cameras
-    calibrated: Rig  # the cameras as they are told
+    calibrated_rig: Rig  # the cameras as they are told
     players: tuple[Player, ...]  # blockers first
     n_frames: int
     difficulty: Difficulty = field(default_factory=Difficulty)
@@ -114,15 +120,15 @@ def block_scene(
         raise TrialError(f"{n_frames} frames are too few for a jump; give at least {_FEWEST_FRAMES / 60:.2f} s")
     rng = np.random.default_rng([seed, 21])
     rig = hall_rig(rng, difficulty.n_cameras)
-    calibrated = miscalibrated(rng, rig, difficulty.calibration_error_px)
+    calibrated_rig = perturb_calibration(rng, rig, difficulty.calibration_error_px)
     lasts_s = n_frames / difficulty.frame_rate
-    blockers = _block(rng, n_blockers, lasts_s)
-    players = _with_others(rng, blockers, rig, lasts_s, difficulty)
+    blockers = _draw_block(rng, n_blockers, lasts_s)
+    players = _add_others(rng, blockers, rig, lasts_s, difficulty)
     return BlockScene(
         name=f"block jump {seed}",
         seed=seed,
         rig=rig,
-        calibrated=calibrated,
+        calibrated_rig=calibrated_rig,
         players=players,
         n_frames=n_frames,
         difficulty=difficulty,
@@ -150,60 +156,60 @@ def paper_lengths(rng: np.random.Generator) -> tuple[NDArray[np.integer], NDArra
     return counts, n_blockers
 
 
-def _block(rng: np.random.Generator, n_blockers: int, lasts_s: float) -> list[Player]:
+def _draw_block(rng: np.random.Generator, n_blockers: int, lasts_s: float) -> list[Player]:
     """Draw blockers side by side, as near to each other as bodies allow; they come the same way."""
     first_s = float(rng.uniform(0.5, 0.62)) * (lasts_s - _FLIGHT_S)
     approach = _APPROACHES[rng.choice(3, p=[0.4, 0.4, 0.2])]
     direction = float(rng.choice([-1.0, 1.0]))
-    x = float(rng.uniform(*_PLACE_M)) - 0.35 * (n_blockers - 1)
+    x = float(rng.uniform(*_POSITION_RANGE_M)) - 0.35 * (n_blockers - 1)
     found: list[Player] = []
     for k in range(n_blockers):
         takeoff_s = first_s + (float(rng.uniform(0, _SPREAD_S)) if k else 0.0)
-        player = _drawn(
-            lambda name=f"blocker{k + 1}", place=x, takeoff_s=takeoff_s: blocker(
+        player = _draw_until(
+            lambda name=f"blocker{k + 1}", place=x, takeoff_s=takeoff_s: draw_blocker(
                 rng, name, place, takeoff_s=takeoff_s, approach=approach, direction=direction, lasts_s=lasts_s
             )
         )
-        while found and gap_m(taken_room(player, lasts_s), taken_room(found[-1], lasts_s)) < CLEARANCE_M:
-            player = player.moved(np.array([_WIDER_M, 0.0]))
+        while found and gap_m(occupied_volume(player, lasts_s), occupied_volume(found[-1], lasts_s)) < CLEARANCE_M:
+            player = player.translate(np.array([_WIDER_M, 0.0]))
             x += _WIDER_M
         found.append(player)
         x += float(rng.uniform(*_SPACING_M))
     return found
 
 
-def _with_others(
+def _add_others(
     rng: np.random.Generator, blockers: list[Player], rig: Rig, lasts_s: float, difficulty: Difficulty
 ) -> tuple[Player, ...]:
     """Add a spiker, one or two decoys and three team mates, each where there is room."""
     players = list(blockers)
     similarity = difficulty.colour_similarity
-    spot = np.mean([_place(player) for player in blockers], axis=0)
+    spot = np.mean([_position(player) for player in blockers], axis=0)
     hit_s = float(np.mean([player.takeoff_s or 0.0 for player in blockers])) - float(rng.uniform(0.02, 0.15))
 
     def spiker() -> Player:
-        x = spot[0] + _beside(rng, difficulty.occlusion)
-        return attacker(rng, "spiker", x, takeoff_s=hit_s, similarity=similarity, lasts_s=lasts_s)
+        x = spot[0] + _lateral_offset(rng, difficulty.occlusion)
+        return draw_attacker(rng, "spiker", x, takeoff_s=hit_s, similarity=similarity, lasts_s=lasts_s)
 
     def decoy(name: str) -> Player:
-        place = np.array([spot[0] + _beside(rng, difficulty.occlusion), rng.uniform(0.7, 1.6)])
-        return bystander(rng, name, place, is_opponent=True, similarity=similarity, lasts_s=lasts_s)
+        place = np.array([spot[0] + _lateral_offset(rng, difficulty.occlusion), rng.uniform(0.7, 1.6)])
+        return draw_bystander(rng, name, place, is_opponent=True, similarity=similarity, lasts_s=lasts_s)
 
     def mate(name: str) -> Player:
-        place = _in_defence(rng, spot, rig, difficulty.occlusion)
-        return bystander(rng, name, place, is_opponent=False, similarity=similarity, lasts_s=lasts_s)
+        place = _defence_position(rng, spot, rig, difficulty.occlusion)
+        return draw_bystander(rng, name, place, is_opponent=False, similarity=similarity, lasts_s=lasts_s)
 
     draws = [spiker, *(partial(decoy, f"opponent{k}") for k in range(2, 3 + int(rng.integers(1, 3))))]
     draws += [partial(mate, f"mate{k}") for k in (1, 2, 3)]
-    rooms = [taken_room(player, lasts_s) for player in players]
+    rooms = [occupied_volume(player, lasts_s) for player in players]
     for draw in draws:
-        player = _drawn(draw, lambda drawn: _has_room(taken_room(drawn, lasts_s), rooms))
+        player = _draw_until(draw, lambda drawn: _has_room(occupied_volume(drawn, lasts_s), rooms))
         players.append(player)
-        rooms.append(taken_room(player, lasts_s))
+        rooms.append(occupied_volume(player, lasts_s))
     return tuple(players)
 
 
-def _drawn(draw: Callable[[], Player], is_good: Callable[[Player], bool] = lambda _: True) -> Player:
+def _draw_until(draw: Callable[[], Player], is_good: Callable[[Player], bool] = lambda _: True) -> Player:
     """Draw until a player can do what was drawn and is where he may be."""
     for _ in range(_TRIES):
         try:
@@ -222,19 +228,19 @@ def _has_room(room: Capsules, others: Sequence[Capsules]) -> bool:
     return all(gap_m(room, other) >= CLEARANCE_M for other in near)
 
 
-def _place(player: Player) -> Array:
+def _position(player: Player) -> Array:
     """Return where a player is when things happen: (2,) [m]."""
     return player.poses(np.array([player.takeoff_s or 0.0])).root_t[0, :2]
 
 
-def _beside(rng: np.random.Generator, occlusion: float) -> float:
+def _lateral_offset(rng: np.random.Generator, occlusion: float) -> float:
     """Draw how far along the net an opponent is from the block [m]: behind it, or off to a side."""
     if rng.random() < occlusion:
         return float(rng.uniform(-0.35, 0.35))
     return float(rng.choice([-1.0, 1.0]) * rng.uniform(0.8, 2.4))
 
 
-def _in_defence(rng: np.random.Generator, spot: Array, rig: Rig, occlusion: float) -> Array:
+def _defence_position(rng: np.random.Generator, spot: Array, rig: Rig, occlusion: float) -> Array:
     """Draw where a team mate stands (2,) [m]: in the way of one of the cameras, or out of the way of all."""
     centres = np.array([camera.centre[:2] for camera in rig])
     rays = (centres - spot) / np.linalg.norm(centres - spot, axis=1, keepdims=True)

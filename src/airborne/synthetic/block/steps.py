@@ -6,22 +6,21 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
-from airborne.synthetic.block.motion import Foot, Knot, quintic, resting
+from airborne.synthetic.block.motion import FootPath, Knot, minimum_jerk, quintic
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 Approach = Literal["static", "shuffle", "crossover"]
 
 STEP_S = 0.2  # a foot's time off the floor
 _LIFT_M = 0.07
-_PEEL_S, _PEEL_RAD = 0.1, np.radians(22.0)  # before a step the heel rises
+_HEEL_RISE_S, _HEEL_RISE_RAD = 0.1, np.radians(22.0)  # before a step the heel rises
 _LONG_S = 100.0  # beyond any recording
 _LONGEST_SHUFFLE_M = 0.38  # of one pair of steps
 _TURN_RAD = np.radians(45.0)  # of body and feet on the way of a crossover
 _CROSS_M = 0.12  # by which the crossing foot passes in front of the other
-_HURRY = 0.9  # the second foot leaves when this share of the first one's step is done
+_STEP_OVERLAP = 0.9  # the second foot leaves when this share of the first one's step is done
 
 
 class Step(NamedTuple):
@@ -29,11 +28,11 @@ class Step(NamedTuple):
 
     side: int  # 0 left, 1 right
     start_s: float
-    place: Array  # (3,) x, y [m] and turn about z [rad], where it lands
-    turned: float = 0.0  # how far the body is turned from the net then [rad]
+    placement: Array  # (3,) x, y [m] and turn about z [rad], where it lands
+    body_yaw: float = 0.0  # how far the body is turned from the net then [rad]
 
 
-def stance(middle: Array, yaw: float, width_m: float, toes_out_rad: float = 0.12) -> Array:
+def foot_placements(middle: Array, yaw: float, width_m: float, toes_out_rad: float = 0.12) -> Array:
     """Return the places (2, 3) of feet, left first, side by side about `middle` (2,) [m]."""
     left = np.array([np.cos(yaw), np.sin(yaw)])
     places = [np.append(middle + sign * width_m / 2 * left, yaw + sign * toes_out_rad) for sign in (1, -1)]
@@ -57,7 +56,7 @@ def approach_steps(approach: Approach, first: Array, last: Array, end_s: float) 
 
 
 def _shuffle(first: Array, last: Array, lead: int, end_s: float, pairs: int) -> list[Step]:
-    pause = _HURRY * STEP_S
+    pause = _STEP_OVERLAP * STEP_S
     start = end_s - ((2 * pairs - 1) * pause + STEP_S)
     steps = []
     for k in range(2 * pairs):
@@ -68,7 +67,7 @@ def _shuffle(first: Array, last: Array, lead: int, end_s: float, pairs: int) -> 
 
 
 def _crossover(first: Array, last: Array, lead: int, end_s: float) -> list[Step]:
-    pause = _HURRY * STEP_S
+    pause = _STEP_OVERLAP * STEP_S
     start = end_s - (3 * pause + STEP_S)
     trail = 1 - lead
     turned = _TURN_RAD if lead == 0 else -_TURN_RAD
@@ -83,37 +82,41 @@ def _crossover(first: Array, last: Array, lead: int, end_s: float) -> list[Step]
     ]
 
 
-def foot_of(side: int, first: Array, steps: list[Step], pitch: Sequence[Knot] = ()) -> Foot:
+def foot_path(side: int, first: Array, steps: list[Step], pitch: Sequence[Knot] = ()) -> FootPath:
     """Return one foot's way from its place (3,) by its own steps; heels rise to step off, then as `pitch` says."""
     times, places, lifts, heels = [-_LONG_S], [first], [(-_LONG_S, 0.0)], [(-_LONG_S, 0.0)]
     for step in (each for each in steps if each.side == side):
         start, end = step.start_s, step.start_s + STEP_S
         times += [start, end]
-        places += [places[-1], step.place]
+        places += [places[-1], step.placement]
         lifts += [(start, 0.0), ((start + end) / 2, _LIFT_M), (end, 0.0)]
-        heels += [(start - _PEEL_S, 0.0), (start + _PEEL_S / 2, _PEEL_RAD), (end - _PEEL_S / 4, 0.0)]
+        heels += [
+            (start - _HEEL_RISE_S, 0.0),
+            (start + _HEEL_RISE_S / 2, _HEEL_RISE_RAD),
+            (end - _HEEL_RISE_S / 4, 0.0),
+        ]
     still = [(_LONG_S, places[-1])] if len(times) == 1 else []
     pitched = [*((t, angle, 0.0, 0.0) for t, angle in heels), *(pitch or [(_LONG_S, 0.0, 0.0, 0.0)])]
-    return Foot(
-        resting([*times, *(t for t, _ in still)], [*places, *(place for _, place in still)]),
-        resting(*zip(*lifts, (_LONG_S, 0.0), strict=True)),
+    return FootPath(
+        minimum_jerk([*times, *(t for t, _ in still)], [*places, *(place for _, place in still)]),
+        minimum_jerk(*zip(*lifts, (_LONG_S, 0.0), strict=True)),
         quintic(pitched),
     )
 
 
-def middles(first: Array, steps: list[Step]) -> list[tuple[float, Array]]:
+def feet_midpoints(first: Array, steps: list[Step]) -> list[tuple[float, Array]]:
     """Return where the middle of the feet is (2,) [m] as each step lands, and before the first."""
     places = np.array(first)
     found = [(steps[0].start_s if steps else -_LONG_S, places[:, :2].mean(axis=0))]
     for step in steps:
-        places[step.side] = step.place
+        places[step.side] = step.placement
         found.append((step.start_s + STEP_S, places[:, :2].mean(axis=0)))
     return found
 
 
-def body_turn(yaw: float, steps: list[Step]) -> PPoly:
+def body_yaw(yaw: float, steps: list[Step]) -> PPoly:
     """Return the body's turn about z [rad] along the steps; `yaw` faces the net."""
     if not steps:
-        return resting([0.0, 1.0], [yaw, yaw])
+        return minimum_jerk([0.0, 1.0], [yaw, yaw])
     times = [steps[0].start_s, *(step.start_s + STEP_S for step in steps)]
-    return resting(times, [yaw, *(yaw + step.turned for step in steps)])
+    return minimum_jerk(times, [yaw, *(yaw + step.body_yaw for step in steps)])

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.synthetic.block.players import Player
 from airborne.synthetic.block.scene import BlockScene
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 TRUTH_JOINTS = {  # column of the truth, landmark
     f"{side[0]}_{joint}": f"{joint}_{side}"
@@ -21,18 +19,18 @@ _CORRELATION = 0.8  # of the torso's error from frame to frame
 _FINE_HZ = 2000.0
 
 
-def joints_of(player: Player, time_s: Array) -> dict[str, Array]:
+def true_joints(player: Player, time_s: Array) -> dict[str, Array]:
     """Return a player's true joints at the scene's times (n,) [s]: (n, 3) world [m] each.
 
     Names as `hip_left`; `foot_left` is the ball, `toe_left` the tip, `head` the head's middle, and `torso` the mean of
     hips and shoulders.
     """
-    marks = player.course.person.landmarks(player.poses(time_s))
+    marks = player.movement.person.landmarks(player.poses(time_s))
     found = {name: marks[name] for name in TRUTH_JOINTS.values()}
     return found | {"torso": np.mean([marks[name] for name in _TORSO_OF], axis=0)}
 
 
-def starts_of(scene: BlockScene) -> dict[str, dict[str, Array]]:
+def noisy_starts(scene: BlockScene) -> dict[str, dict[str, Array]]:
     """Return what is set by hand in the first frame: player -> joint -> (3,) [m], blockers first.
 
     Blockers have their torso, hips, knees, ankles and feet, the others their torso only; each coordinate is off by a
@@ -41,7 +39,7 @@ def starts_of(scene: BlockScene) -> dict[str, dict[str, Array]]:
     rng = np.random.default_rng([scene.seed, 24])
     found = {}
     for player in scene.players:
-        true = joints_of(player, np.zeros(1))
+        true = true_joints(player, np.zeros(1))
         names = ("torso", *_START_JOINTS) if player.role == "blocker" else ("torso",)
         found[player.name] = {name: true[name][0] + rng.normal(0, scene.difficulty.start_noise_m, 3) for name in names}
     return found
@@ -53,24 +51,24 @@ def torso_input(scene: BlockScene) -> Array:
     The truth with an error of sd `torso_noise_m` for each coordinate, correlated by 0.8 from frame to frame.
     """
     rng = np.random.default_rng([scene.seed, 25])
-    true = np.stack([joints_of(player, scene.times_s)["torso"] for player in scene.players], axis=1)
+    true = np.stack([true_joints(player, scene.times_s)["torso"] for player in scene.players], axis=1)
     error = rng.normal(0, scene.difficulty.torso_noise_m, true.shape)
     for k in range(1, len(error)):
         error[k] = _CORRELATION * error[k - 1] + np.sqrt(1 - _CORRELATION**2) * error[k]
     return true + error
 
 
-def jump_facts(player: Player, rate_hz: float) -> dict[str, float]:
+def jump_truth(player: Player, rate_hz: float) -> dict[str, float]:
     """Return what is true of a player's jump; frames are fractions, counted from the recording's first [frame].
 
     Rises of hips and feet (ankles) are from the upright stand on level soles to the peak.
     """
-    flight = player.course.flight
+    flight = player.movement.flight
     assert flight is not None and player.takeoff_s is not None and player.touch_s is not None, "a jumper"
-    leg = player.course.person.leg
+    leg = player.movement.person.leg
     sole = leg.foot_half_height_m - leg.foot_centre_m[2]
     hips_standing = leg.thigh_m + leg.shank_m + sole
-    joints = joints_of(player, np.linspace(player.takeoff_s, player.touch_s, round(flight.duration_s * _FINE_HZ)))
+    joints = true_joints(player, np.linspace(player.takeoff_s, player.touch_s, round(flight.duration_s * _FINE_HZ)))
     hips = (joints["hip_left"] + joints["hip_right"])[:, 2] / 2
     ankles = (joints["ankle_left"] + joints["ankle_right"])[:, 2] / 2
     rise_s = float(flight.velocity[2]) / 9.81

@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.cameras import write_pose2sim
-from airborne.synthetic.block.pictures import frames_of
+from airborne.synthetic.block.pictures import block_frames
 from airborne.synthetic.block.players import Player
 from airborne.synthetic.block.scene import BlockScene
-from airborne.synthetic.block.truth import TRUTH_JOINTS, joints_of, jump_facts, starts_of
-from airborne.synthetic.throw.writing import require_room
+from airborne.synthetic.block.truth import TRUTH_JOINTS, jump_truth, noisy_starts, true_joints
+from airborne.synthetic.throw.writing import require_empty
+from airborne.types import Array, Progress
 from airborne.video import VideoWriter
-
-Array = NDArray[np.floating]
-Progress = Callable[[int, int], None]  # frames done, frames in all
 
 _CRF = 20
 _TRUTH_NAMES = {**{landmark: column for column, landmark in TRUTH_JOINTS.items()}, "torso": "torso"}
@@ -35,15 +31,15 @@ def write_block(folder: Path, scene: BlockScene, *, overwrite: bool = False, pro
     truth of the jumps). `progress` is told after every frame. Raises TrialError for a folder that holds anything,
     unless `overwrite`: then files of these names are replaced.
     """
-    require_room(folder, overwrite)
+    require_empty(folder, overwrite)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "trial.toml").unlink(missing_ok=True)
-    starts = starts_of(scene)
-    write_pose2sim(folder / "calib.toml", scene.calibrated)
+    starts = noisy_starts(scene)
+    write_pose2sim(folder / "calib.toml", scene.calibrated_rig)
     if scene.difficulty.calibration_error_px > 0:
         write_pose2sim(folder / "calib_true.toml", scene.rig)
     _write_json(folder / "first_frame.json", _first_frame(scene, starts))
-    _write_json(folder / "players.json", [_about(player, scene) for player in scene.players])
+    _write_json(folder / "players.json", [_player_record(player, scene) for player in scene.players])
     _write_truth(folder / "truth.csv", scene)
     _write_videos(folder, scene, progress)
     (folder / "trial.toml").write_text(block_toml(scene, starts), encoding="utf-8")
@@ -79,7 +75,7 @@ def _first_frame(scene: BlockScene, starts: dict[str, dict[str, Array]]) -> dict
     }
 
 
-def _about(player: Player, scene: BlockScene) -> dict:
+def _player_record(player: Player, scene: BlockScene) -> dict:
     clothes = ("skin", "hair", "shorts", "shirt", "socks", "shoes")
     colours = {name: np.round(getattr(player.outfit, name)).astype(int).tolist() for name in clothes}
     found = {
@@ -90,12 +86,12 @@ def _about(player: Player, scene: BlockScene) -> dict:
         "jumps": player.takeoff_s is not None,
         "colours_srgb": colours,
     }
-    return found | ({} if player.takeoff_s is None else {"jump": jump_facts(player, float(scene.rate))})
+    return found | ({} if player.takeoff_s is None else {"jump": jump_truth(player, float(scene.rate))})
 
 
 def _write_truth(path: Path, scene: BlockScene) -> None:
     columns = [*TRUTH_JOINTS, "torso"]
-    places = [joints_of(player, scene.times_s) for player in scene.players]
+    places = [true_joints(player, scene.times_s) for player in scene.players]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["frame", "time_s", "player", *(f"{name}_{axis}" for name in columns for axis in "xyz")])
@@ -112,7 +108,7 @@ def _write_videos(folder: Path, scene: BlockScene, progress: Progress | None) ->
             for camera in scene.rig
         ]
         uncompressed = replace(scene, difficulty=replace(scene.difficulty, jpeg_quality=0))
-        for frames in frames_of(uncompressed):
+        for frames in block_frames(uncompressed):
             for writer, view in zip(writers, frames.views, strict=True):
                 if view is not None:
                     writer.write(view.rgb)

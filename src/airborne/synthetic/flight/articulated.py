@@ -1,7 +1,7 @@
 """Free flight of a body that moves its joints: constant angular momentum, a parabola for the centre of mass.
 
-In the root's frame, about the centre of mass: I(q) w + h(q, q') = R^T L, and R' = R [w]x. L stays the same in the
-world, I is the inertia of the body as it is bent, and h the momentum of the joints' motion with the root held still.
+In the root's frame, about the centre of mass: I(q) w + h(q, q') = R^T L, and R' = R [w]x. L is constant in the
+world, I is the inertia of the body in its pose, and h the momentum of the joints' motion with the root fixed.
 Source: Yeadon, Atha & Hales 1990, J. Biomech. 23, 85-89 (angle-driven simulation of aerial movement).
 """
 
@@ -19,16 +19,16 @@ from scipy.spatial.transform import Rotation
 
 from airborne.body import BodyModel
 from airborne.errors import BodyError
-from airborne.rendering import place_segments
-from airborne.synthetic.flight.rigid import GRAVITY_M_S2, Flight, Mass
+from airborne.rendering import pose_segments
+from airborne.synthetic.flight.rigid import GRAVITY_M_S2, MassProperties, SampledFlight
+from airborne.types import Array
 
-Array = NDArray[np.floating]
 Rate = Callable[[float, Array], Array]  # time and state to the state's rate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Takeoff:
-    """How a body that can bend flies at time 0."""
+    """The state of an articulated body at time 0."""
 
     centre: Array  # (3,) centre of mass, world [m]
     velocity: Array  # (3,) of the centre of mass, world [m/s]
@@ -36,20 +36,20 @@ class Takeoff:
     angular_momentum: Array  # (3,) about the centre of mass, world [kg m^2/s]
 
 
-class Shape(NamedTuple):
-    """How the mass of n bent bodies lies and moves, in the root's frame, with the root held still."""
+class MassDistribution(NamedTuple):
+    """The mass of n posed bodies and its motion, in the root's frame, with the root fixed."""
 
     centre: Array  # (n, 3) centre of mass [m]
     inertia: Array  # (n, 3, 3) about the centre of mass [kg m^2]
     momentum: Array  # (n, 3) angular, of the joints' motion about the centre of mass [kg m^2/s]
 
 
-def still(joint_angles: Array) -> PPoly:
-    """Return the motion of joints that stay at the angles (joints, 3) [rad]."""
+def constant_joints(joint_angles: Array) -> PPoly:
+    """Return the motion of joints with constant angles (joints, 3) [rad]."""
     return PPoly(np.asarray(joint_angles, float)[None, None], [0.0, 1.0])
 
 
-def moves(time_s: Array, joint_angles: Array) -> PPoly:
+def joint_motion(time_s: Array, joint_angles: Array) -> PPoly:
     """Return the motion of joints that rest at the angles (n, joints, 3) [rad] at the times (n,), increasing [s].
 
     From rest to rest each angle goes by the quintic of least jerk, so that its acceleration is continuous.
@@ -59,29 +59,29 @@ def moves(time_s: Array, joint_angles: Array) -> PPoly:
     return PPoly.from_bernstein_basis(BPoly.from_derivatives(np.asarray(time_s, float), at_rest))
 
 
-def together(motions: Sequence[PPoly]) -> PPoly:
-    """Return the sum of the joints' motions; each keeps its ends outside its own times. At most quintics."""
+def sum_motions(motions: Sequence[PPoly]) -> PPoly:
+    """Return the sum of joint motions; each is constant outside its own times. At most quintics."""
     times = np.unique(np.concatenate([motion.x for motion in motions]))
-    derivatives = [sum(_clamped(motion, times, order) for motion in motions) for order in range(3)]
+    derivatives = [sum(_derivative(motion, times, order) for motion in motions) for order in range(3)]
     return PPoly.from_bernstein_basis(BPoly.from_derivatives(times, np.stack(derivatives, axis=1)))
 
 
-def slowed(motion: PPoly, factor: float) -> PPoly:
-    """Return the joints' motion with `factor` times the time for everything."""
+def scale_time(motion: PPoly, factor: float) -> PPoly:
+    """Return the joints' motion with times multiplied by `factor`."""
     powers = np.arange(len(motion.c))[::-1].reshape(-1, *[1] * (motion.c.ndim - 1))
     return PPoly(motion.c / float(factor) ** powers, motion.x * factor)
 
 
-def mass_as_bent(model: BodyModel, joint_angles: Array) -> Mass:
+def mass_at_angles(model: BodyModel, joint_angles: Array) -> MassProperties:
     """Add up a body's segments, its joints at the angles (joints, 3) [rad]; BodyError where an inertia is missing."""
     angles = np.asarray(joint_angles, float)[None]
-    shape = _Segments.of(model).shape(angles, np.zeros_like(angles))
-    return Mass(float(_Segments.of(model).mass_kg.sum()), shape.centre[0], shape.inertia[0])
+    shape = _Segments.of(model).mass_distribution(angles, np.zeros_like(angles))
+    return MassProperties(float(_Segments.of(model).mass_kg.sum()), shape.centre[0], shape.inertia[0])
 
 
 def fly_articulated(
     model: BodyModel, takeoff: Takeoff, joints: PPoly, time_s: Array, *, tolerance: float = 1e-12
-) -> Flight:
+) -> SampledFlight:
     """Fly a body without air or torque, and sample it at the times (n,) [s], in any order, before or after take-off.
 
     `joints` gives the joint angles (joints, 3) [rad] at a time, twice differentiable within its breaks; outside them
@@ -95,19 +95,19 @@ def fly_articulated(
 
     start = Rotation.from_matrix(takeoff.R).as_quat()
     quaternions = np.tile(start, (len(time_s), 1))
-    for chosen in (time_s > 0, time_s < 0):
-        times, back = np.unique(time_s[chosen], return_inverse=True)
+    for selected in (time_s > 0, time_s < 0):
+        times, back = np.unique(time_s[selected], return_inverse=True)
         if len(times):
             order = slice(None, None, 1 if times[-1] > 0 else -1)
-            quaternions[chosen] = _solved(turning, start, joints.x, times[order], tolerance)[order][back]
+            quaternions[selected] = _integrate(turning, start, joints.x, times[order], tolerance)[order][back]
     R = Rotation.from_quat(quaternions).as_matrix()
     angles, rates = _state(joints, time_s)
     t = time_s[:, None]
     centre = takeoff.centre + takeoff.velocity * t + GRAVITY_M_S2 * t**2 / 2
-    shape = segments.shape(angles, rates)
+    shape = segments.mass_distribution(angles, rates)
     w = segments.angular_velocity(R, takeoff, angles, rates)
     spin = np.einsum("nij,nj->ni", shape.inertia, w) + shape.momentum
-    return Flight(
+    return SampledFlight(
         time_s=time_s,
         position=centre - np.einsum("nij,nj->ni", R, shape.centre),
         R=R,
@@ -118,12 +118,12 @@ def fly_articulated(
     )
 
 
-def with_shape_held(model: BodyModel, flight: Flight, joint_angles: Array) -> Flight:
-    """Return the flight with the root as it is and the joints held at the angles (joints, 3) [rad] (paper B, "Method").
+def with_fixed_joints(model: BodyModel, flight: SampledFlight, joint_angles: Array) -> SampledFlight:
+    """Return the flight with the root as it is and the joints fixed at the angles (joints, 3) [rad] (paper B, "Method").
 
     Such a body has another centre of mass than the one that flew, and its angular momentum is not constant: NaN.
     """
-    mass = mass_as_bent(model, joint_angles)
+    mass = mass_at_angles(model, joint_angles)
     return replace(
         flight,
         joint_angles=np.broadcast_to(joint_angles, flight.joint_angles.shape),
@@ -144,7 +144,7 @@ class _Segments:
 
     @classmethod
     def of(cls, model: BodyModel) -> _Segments:
-        """Lay out a body's inertias; raises BodyError where one is missing."""
+        """Collect a body's inertias; raises BodyError where one is missing."""
         inertias = []
         for segment in model.segments:
             if segment.inertia is None:
@@ -165,49 +165,49 @@ class _Segments:
             is_carried,
         )
 
-    def shape(self, angles: Array, rates: Array) -> Shape:
+    def mass_distribution(self, angles: Array, rates: Array) -> MassDistribution:
         """Sum up n bodies with joint angles and rates (n, j, 3) [rad, rad/s]."""
         n, parents = len(angles), self.model.parents[1:]
-        R, t = place_segments(self.model, np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3)), angles)
+        R, t = pose_segments(self.model, np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3)), angles)
         turning = np.einsum("nkij,nkj->nki", R[:, parents], _rates_in_parent(angles, rates))
         w = self.is_carried @ turning  # (n, s, 3)
         v = self.is_carried @ _cross(w[:, parents], t[:, 1:] - t[:, parents])  # of the segments' origins
         arm = np.einsum("nsij,sj->nsi", R, self.centre_m)
         share = self.mass_kg / self.mass_kg.sum()
-        place, speed = t + arm, v + _cross(w, arm)
-        centre = share @ place
-        d, d_rate = place - centre[:, None], speed - (share @ speed)[:, None]
+        position, velocity = t + arm, v + _cross(w, arm)
+        centre = share @ position
+        d, d_rate = position - centre[:, None], velocity - (share @ velocity)[:, None]
         own = R @ self.tensor_kg_m2 @ np.swapaxes(R, -1, -2)  # (n, s, 3, 3)
-        spread = np.einsum("nsk,nsk->ns", d, d)[..., None, None] * np.eye(3) - d[..., :, None] * d[..., None, :]
-        inertia = np.sum(own + self.mass_kg[:, None, None] * spread, axis=1)
+        steiner = np.einsum("nsk,nsk->ns", d, d)[..., None, None] * np.eye(3) - d[..., :, None] * d[..., None, :]
+        inertia = np.sum(own + self.mass_kg[:, None, None] * steiner, axis=1)
         momentum = np.einsum("nsij,nsj->ni", own, w) + self.mass_kg @ _cross(d, d_rate)
-        return Shape(centre, inertia, momentum)
+        return MassDistribution(centre, inertia, momentum)
 
     def angular_velocity(self, R: Array, takeoff: Takeoff, angles: Array, rates: Array) -> Array:
         """Return the root's angular velocity (n, 3) in its own frame [rad/s], from R (n, 3, 3) world from root."""
-        shape = self.shape(angles, rates)
+        shape = self.mass_distribution(angles, rates)
         own = np.einsum("...ji,j->...i", R, takeoff.angular_momentum) - shape.momentum
         return np.linalg.solve(shape.inertia, own[..., None])[..., 0]
 
 
-def _solved(turning: Rate, start: Array, breaks: Array, times: Array, tolerance: float) -> Array:
+def _integrate(turning: Rate, start: Array, breaks: Array, times: Array, tolerance: float) -> Array:
     """Integrate quaternions from time 0 to the times (n,), which all lie on one side of it, nearest first: (n, 4).
 
-    One stretch between breaks after another: a long step would miss a short move.
+    Integrated from break to break: a long step would miss a short movement.
     """
-    found = np.empty((len(times), 4))
-    for begin, end, chosen in _stretches(breaks, times):
-        at = times[chosen]
+    quaternions = np.empty((len(times), 4))
+    for begin, end, selected in _intervals(breaks, times):
+        at = times[selected]
         to_end = [] if len(at) and at[-1] == end else [end]
         at = np.append(at, to_end)
         solved = solve_ivp(turning, (begin, end), start, "DOP853", at, rtol=tolerance, atol=tolerance).y.T
         start = solved[-1] / np.linalg.norm(solved[-1])
-        found[chosen] = solved[: len(solved) - len(to_end)]
-    return found
+        quaternions[selected] = solved[: len(solved) - len(to_end)]
+    return quaternions
 
 
-def _stretches(breaks: Array, times: Array) -> Iterator[tuple[float, float, NDArray[np.bool_]]]:
-    """Cut the way from 0 to the last of the times at the breaks: begin, end, and which times lie on it."""
+def _intervals(breaks: Array, times: Array) -> Iterator[tuple[float, float, NDArray[np.bool_]]]:
+    """Cut the interval from 0 to the last of the times at the breaks: begin, end, and which times lie in it."""
     far, sign = times[-1], np.sign(times[-1])
     ends = np.sort(sign * np.append(breaks[(sign * breaks > 0) & (sign * breaks < sign * far)], far))
     begin = 0.0
@@ -218,11 +218,11 @@ def _stretches(breaks: Array, times: Array) -> Iterator[tuple[float, float, NDAr
 
 def _state(joints: PPoly, time_s: Array) -> tuple[Array, Array]:
     """Return joint angles and rates (n, j, 3) [rad, rad/s] at the times (n,) [s]."""
-    return _clamped(joints, time_s, 0), _clamped(joints, time_s, 1)
+    return _derivative(joints, time_s, 0), _derivative(joints, time_s, 1)
 
 
-def _clamped(joints: PPoly, time_s: Array, order: int) -> Array:
-    """Return a derivative (n, j, 3) of the joints' angles; outside the breaks they rest."""
+def _derivative(joints: PPoly, time_s: Array, order: int) -> Array:
+    """Return a derivative (n, j, 3) of the joints' angles; outside the breaks they are constant."""
     values = joints(np.clip(time_s, joints.x[0], joints.x[-1]), order)
     is_inside = (time_s >= joints.x[0]) & (time_s <= joints.x[-1])
     return values if order == 0 else np.where(is_inside[:, None, None], values, 0.0)
@@ -256,7 +256,7 @@ def _matrix(q: Array) -> Array:
 
 
 def _quaternion_rate(q: Array, w: Array) -> Array:
-    """Return q' = q (w, 0) / 2 for an angular velocity (3,) in the turning frame."""
+    """Return q' = q (w, 0) / 2 for an angular velocity (3,) in the rotating frame."""
     x, y, z, s = q
     a, b, c = w
     return 0.5 * np.array([s * a + y * c - z * b, s * b + z * a - x * c, s * c + x * b - y * a, -x * a - y * b - z * c])

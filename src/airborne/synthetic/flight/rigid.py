@@ -1,26 +1,24 @@
-"""Free flight of a rigid body: Euler's equations for the turning, a parabola for the centre of mass."""
+"""Free flight of a rigid body: Euler's equations for the rotation, a parabola for the centre of mass."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Pose
 from airborne.errors import BodyError
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 GRAVITY_M_S2 = np.array([0.0, 0.0, -9.81])
 _RELATIVE, _ABSOLUTE = 1e-11, 1e-12  # tolerances of the integration
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mass:
-    """How a rigid body's mass is spread, in the root's frame."""
+class MassProperties:
+    """Mass, centre of mass and inertia of a rigid body, in the root's frame."""
 
     mass_kg: float
     centre: Array  # (3,) centre of mass [m]
@@ -29,7 +27,7 @@ class Mass:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Launch:
-    """How a body flies at time 0."""
+    """The state of a rigid body at time 0."""
 
     centre: Array  # (3,) centre of mass, world [m]
     velocity: Array  # (3,) of the centre of mass, world [m/s]
@@ -38,7 +36,7 @@ class Launch:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Flight:
+class SampledFlight:
     """A sampled flight; `position` is the root's origin, which need not be the centre of mass."""
 
     time_s: Array  # (n,) [s]
@@ -46,7 +44,7 @@ class Flight:
     R: Array  # (n, 3, 3) world from root
     centre: Array  # (n, 3) centre of mass, world [m]
     angular_velocity: Array  # (n, 3) of the root, in its own frame [rad/s]
-    joint_angles: Array  # (n, joints, 3) [rad]; no joints where the body flew stiff and straight
+    joint_angles: Array  # (n, joints, 3) [rad]; no joints for a rigid body
     angular_momentum: Array  # (n, 3) about the centre of mass, world [kg m^2/s]; NaN where not known
 
     def pose(self, i: int) -> Pose:
@@ -55,7 +53,7 @@ class Flight:
         return Pose(world_from_root=root, joint_angles=self.joint_angles[i])
 
 
-def mass_of(model: BodyModel, density_kg_m3: float) -> Mass:
+def mass_properties(model: BodyModel, density_kg_m3: float) -> MassProperties:
     """Add up a body's boxes, joints straight, at one density [kg/m^3]; where boxes overlap, the wood counts twice.
 
     Raises BodyError for a part that is not a box.
@@ -65,23 +63,23 @@ def mass_of(model: BodyModel, density_kg_m3: float) -> Mass:
     for segment, R, t in zip(model.segments, posed.R, posed.t, strict=True):
         for part in segment.parts:
             if not isinstance(part.shape, Box):
-                raise BodyError(f"part '{part.name}' is no box; a body in free flight is made of boxes only")
+                raise BodyError(f"part '{part.name}' is not a box; a rigid body in free flight is made of boxes only")
             x2, y2, z2 = np.square(part.shape.size_m)
             mass = density_kg_m3 * float(np.prod(part.shape.size_m))
-            turn = R @ part.segment_from_part.rotation.as_matrix()
+            rotation = R @ part.segment_from_part.rotation.as_matrix()
             masses.append(mass)
             centres.append(R @ part.segment_from_part.translation + t)
-            inertias.append(turn @ np.diag([y2 + z2, x2 + z2, x2 + y2]) @ turn.T * mass / 12)
+            inertias.append(rotation @ np.diag([y2 + z2, x2 + z2, x2 + y2]) @ rotation.T * mass / 12)
     total = sum(masses)
     centre = np.average(centres, axis=0, weights=masses)
     inertia = np.zeros((3, 3))
-    for mass, place, own in zip(masses, centres, inertias, strict=True):
-        d = place - centre
+    for mass, position, own in zip(masses, centres, inertias, strict=True):
+        d = position - centre
         inertia += own + mass * (d @ d * np.eye(3) - np.outer(d, d))
-    return Mass(total, centre, inertia)
+    return MassProperties(total, centre, inertia)
 
 
-def fly(mass: Mass, launch: Launch, time_s: Array) -> Flight:
+def fly(mass: MassProperties, launch: Launch, time_s: Array) -> SampledFlight:
     """Fly a body without air or torque, and sample it at the times (n,) [s], in any order, before or after launch.
 
     Euler: I w' = (I w) x w in the root's frame, and q' = q (w, 0) / 2.
@@ -96,18 +94,18 @@ def fly(mass: Mass, launch: Launch, time_s: Array) -> Flight:
         return np.append(turning, to_inverse @ np.cross(mass.inertia @ w, w))
 
     states = np.tile(start, (len(time_s), 1))
-    for chosen in (time_s > 0, time_s < 0):
-        times, back = np.unique(time_s[chosen], return_inverse=True)
+    for selected in (time_s > 0, time_s < 0):
+        times, back = np.unique(time_s[selected], return_inverse=True)
         if len(times):
             far = times[np.argmax(np.abs(times))]
             order = slice(None, None, 1 if far > 0 else -1)
             solved = solve_ivp(rate, (0.0, far), start, "DOP853", times[order], rtol=_RELATIVE, atol=_ABSOLUTE)
-            states[chosen] = solved.y.T[order][back]
+            states[selected] = solved.y.T[order][back]
     R = Rotation.from_quat(states[:, :4]).as_matrix()
     t = time_s[:, None]
     centre = launch.centre + launch.velocity * t + GRAVITY_M_S2 * t**2 / 2
     w = states[:, 4:]
-    return Flight(
+    return SampledFlight(
         time_s=time_s,
         position=centre - R @ mass.centre,
         R=R,

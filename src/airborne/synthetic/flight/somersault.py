@@ -8,35 +8,34 @@ from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Pose, human18
-from airborne.body.outfits import in_flat_colours
+from airborne.body.outfits import with_flat_colours
 from airborne.body.skin import skin_of
-from airborne.cameras import Rig, aimed
+from airborne.cameras import Rig, camera_looking_at
 from airborne.errors import BodyError, TrialError
-from airborne.geometry.rotations import angles_from_matrix, unwrapped
+from airborne.geometry.rotations import angles_from_matrix, unwrap
 from airborne.rendering import Lamp, Lights
 from airborne.synthetic.flight.articulated import (
     Takeoff,
     fly_articulated,
-    mass_as_bent,
-    moves,
-    slowed,
-    together,
-    with_shape_held,
+    joint_motion,
+    mass_at_angles,
+    scale_time,
+    sum_motions,
+    with_fixed_joints,
 )
-from airborne.synthetic.flight.rigid import GRAVITY_M_S2, Flight
+from airborne.synthetic.flight.rigid import GRAVITY_M_S2, SampledFlight
 from airborne.synthetic.throw.scene import HALL_AMBIENT, PICTURE_SIZE, Scene, hall_spots
 from airborne.synthetic.throw.surroundings import gym
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-Preset = Literal["paper", "moving-arms", "pike"]
+SomersaultPreset = Literal["paper", "moving-arms", "pike"]
 Target = Literal["skin", "ellipsoids"]
-Style = Literal["exact", "gym"]
+PictureStyle = Literal["exact", "gym"]
 
 STATURE_M, MASS_KG = 1.66, 58.0
 N_POSES = 11  # of the paper's sequence
@@ -47,10 +46,10 @@ _CAMERAS = {  # position, target [m], focal length [px]
     "top": ((0.6, 0.0, 7.2), (0.0, 0.0, 1.5), 1230.0),
 }
 _CLEARANCE_M = 0.05  # of the lowest landmark above the floor at take-off
-_SWING = (0.08, 0.33)  # when the arms swing, as shares of the flight
+_SWING = (0.08, 0.33)  # start and end of the arm swing, as shares of the flight
 _POINTED_RAD = np.radians(35.0)  # the feet, throughout
-_ELBOWS_RAD = np.radians(145.0)  # bent the most
-_PIKE = (0.08, 0.34, 0.56, 0.88)  # when the body begins to bend, is bent, begins to stretch, is stretched
+_ELBOWS_RAD = np.radians(145.0)  # largest flexion
+_PIKE = (0.08, 0.34, 0.56, 0.88)  # shares of the flight: begin and end of flexion, of extension
 _PIKE_DEG = {  # about x
     "torso": 14.0,
     "chest": 8.0,
@@ -60,13 +59,13 @@ _PIKE_DEG = {  # about x
     "shank_left": 30.0,
     "shank_right": 30.0,
 }
-_SOLVED = 1e-3  # what is left of the ranges, as a share of each
-_QUICK = 1e-8  # tolerance of the integration while solving
+_LARGEST_RESIDUAL = 1e-3  # of the ranges, as a share of each
+_COARSE_TOLERANCE = 1e-8  # tolerance of the integration during the search
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ranges:
-    """How much each number of the root's pose varies over a movement (paper B, table 1)."""
+class PoseRanges:
+    """The range of each component of the root's pose over a movement (paper B, table 1)."""
 
     vertical_m: float
     forward_m: float
@@ -76,7 +75,7 @@ class Ranges:
     twist_rad: float
 
 
-PAPER = Ranges(
+PAPER_RANGES = PoseRanges(
     vertical_m=0.79,
     forward_m=1.0,
     lateral_m=0.01,
@@ -88,18 +87,18 @@ PAPER = Ranges(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Skill:
-    """A flight of a person, with the arms' and other joints' motion that make it."""
+    """A flight of a person, with the motion of the arms and other joints that produces it."""
 
     model: BodyModel
     takeoff: Takeoff
     joints: PPoly  # joint angles (joints, 3) [rad] over time [s]
     duration_s: float
-    is_held: bool = False  # drawn in the shape of take-off, with the root where the true flight has it
+    is_rigid: bool = False  # rendered in the shape at take-off, with the root of the true flight
 
-    def __call__(self, time_s: Array) -> Flight:
+    def __call__(self, time_s: Array) -> SampledFlight:
         """Return the motion at the times (n,) [s]."""
         flight = fly_articulated(self.model, self.takeoff, self.joints, time_s)
-        return with_shape_held(self.model, flight, self.joints(self.joints.x[0])) if self.is_held else flight
+        return with_fixed_joints(self.model, flight, self.joints(self.joints.x[0])) if self.is_rigid else flight
 
     @property
     def poses_s(self) -> Array:
@@ -107,12 +106,12 @@ class Skill:
         return np.linspace(0, self.duration_s, N_POSES)
 
 
-def ranges(flight: Flight) -> Ranges:
-    """Return how far a flight's root goes and turns: along z, y and x, and in its three angles, over its samples."""
+def pose_ranges(flight: SampledFlight) -> PoseRanges:
+    """Return the ranges of a flight's root over its samples: along z, y and x, and of its three angles."""
     lateral, forward, vertical = np.ptp(flight.position, axis=0)
-    turned = np.ptp(unwrapped(angles_from_matrix(flight.R), flight.time_s), axis=0)
-    values = (vertical, forward, lateral, *turned)
-    return Ranges(**{field.name: float(value) for field, value in zip(fields(Ranges), values, strict=True)})
+    angles = np.ptp(unwrap(angles_from_matrix(flight.R), flight.time_s), axis=0)
+    values = (vertical, forward, lateral, *angles)
+    return PoseRanges(**{field.name: float(value) for field, value in zip(fields(PoseRanges), values, strict=True)})
 
 
 @lru_cache(maxsize=8)
@@ -120,35 +119,44 @@ def half_twist(model: BodyModel, *, has_pike: bool = False) -> Skill:
     """Find a forward somersault with half a twist for a body like `human18`, with the ranges of paper B's.
 
     The upper arms, at right angles to the trunk, swing once in the frontal plane, left up and right down by the same
-    angle: that tilts the body, and the tilt makes it twist. The momentum, the swing and how far the elbows are bent
+    angle: that tilts the body, and the tilt makes it twist. The momentum, the swing and the flexion of the elbows
     give somersault, tilt and twist; duration and speed, which the paper does not print, give the distances. With a
-    pike, hips, knees, trunk and neck bend and stretch too; the elbows stay as without, and the tilt is what it takes.
+    pike, hips, knees, trunk and neck flex and extend too; the elbows stay as without, and the tilt is free.
     Raises BodyError where no swing does it. Source: paper B, table 1; Yeadon, Atha & Hales 1990.
     """
-    swing = _solved(model, np.array([7.3, 0.53, 1.36]), has_pike=False)
+    swing = _solve_swing(model, np.array([7.3, 0.53, 1.36]), has_pike=False)
     if has_pike:
-        swing = _solved(model, swing, has_pike=True)
-    skill = _in_a_second(model, swing, has_pike=has_pike)
-    return _sent(skill, skill(skill.poses_s))
+        swing = _solve_swing(model, swing, has_pike=True)
+    skill = _unit_skill(model, swing, has_pike=has_pike)
+    return _launch(skill, skill(skill.poses_s))
 
 
-def somersault(
-    preset: Preset = "paper", *, target: Target = "skin", style: Style = "exact", seed: int = 0, clutter: int = 14
+def somersault_scene(
+    preset: SomersaultPreset = "paper",
+    *,
+    target: Target = "skin",
+    style: PictureStyle = "exact",
+    seed: int = 0,
+    clutter: int = 14,
 ) -> Scene:
     """Return a half-twisting somersault seen by three cameras, front, side and top, 768 x 576.
 
-    "paper": 11 poses of one shape, one colour a segment, as paper B has it; "moving-arms": 50 frames/s, and the arms
-    that make the twist move; "pike": hips, knees and trunk too. The body drawn is a smooth skin or the tracker's own
-    ellipsoids. "exact" pictures are drawn in the tracker's light, on black; those of the "gym" are what cameras in a
-    hall would record. The seed varies the start, the noise, the lamps and the background, where `clutter` boxes stand
+    "paper": 11 poses of one shape, one colour a segment, as paper B has it; "moving-arms": 50 frames/s, with the arm
+    movements that cause the twist; "pike": hips, knees and trunk too. The rendered body is a smooth skin or the tracker's own
+    ellipsoids. "exact" images are rendered in the tracker's light, on black; those of the "gym" are as cameras in a
+    hall record them. The seed varies the start, the noise, the lamps and the background, where `clutter` boxes stand
     along either wall.
     Raises TrialError for an unknown choice. Source: paper B, "Method".
     """
-    for value, known, name in ((preset, Preset, "preset"), (target, Target, "target"), (style, Style, "style")):
-        if value not in get_args(known):
-            raise TrialError(f"{name} '{value}' is not known; choose {' or '.join(get_args(known))}")
+    for value, choices, name in (
+        (preset, SomersaultPreset, "preset"),
+        (target, Target, "target"),
+        (style, PictureStyle, "style"),
+    ):
+        if value not in get_args(choices):
+            raise TrialError(f"{name} '{value}' is not known; choose {' or '.join(get_args(choices))}")
     model = human18(STATURE_M, MASS_KG)
-    skill = replace(half_twist(model, has_pike=preset == "pike"), is_held=preset == "paper")
+    skill = replace(half_twist(model, has_pike=preset == "pike"), is_rigid=preset == "paper")
     if preset == "paper":
         model = _in_flat_colours(model)
     duration = Fraction(round(1000 * skill.duration_s), 1000)
@@ -156,7 +164,7 @@ def somersault(
     scene = Scene(
         name=f"half-twisting somersault, {preset}, {target}, {style}",
         seed=seed,
-        rig=Rig(tuple(aimed(name, *place, PICTURE_SIZE) for name, place in _CAMERAS.items())),
+        rig=Rig(tuple(camera_looking_at(name, *view, PICTURE_SIZE) for name, view in _CAMERAS.items())),
         body=skin_of(model) if target == "skin" else model,
         flight=skill,
         surroundings=None,
@@ -186,47 +194,47 @@ def somersault(
 
 @lru_cache(maxsize=8)
 def _in_flat_colours(model: BodyModel) -> BodyModel:
-    return in_flat_colours(model)
+    return with_flat_colours(model)
 
 
-def _solved(model: BodyModel, start: Array, *, has_pike: bool) -> Array:
-    """Find a swing (see `_in_a_second`) from one near it; with a pike, of the same elbows and whatever tilt."""
-    n = 2 if has_pike else 3  # numbers to find, and to meet
+def _solve_swing(model: BodyModel, start: Array, *, has_pike: bool) -> Array:
+    """Find a swing (see `_in_a_second`) from one near it; with a pike, with the same elbows and any tilt."""
+    n = 2 if has_pike else 3  # number of unknowns and of conditions
 
     def errors(x: Array) -> Array:
-        skill = _in_a_second(model, np.append(x, start[n:]), has_pike=has_pike)
-        flight = fly_articulated(model, skill.takeoff, skill.joints, skill.poses_s, tolerance=_QUICK)
-        angles = unwrapped(angles_from_matrix(flight.R), flight.time_s)
-        found = np.array([angles[-1, 0], angles[-1, 2], np.ptp(angles[:, 1])])
-        return (found / (PAPER.somersault_rad, PAPER.twist_rad, PAPER.tilt_rad) - 1)[:n]
+        skill = _unit_skill(model, np.append(x, start[n:]), has_pike=has_pike)
+        flight = fly_articulated(model, skill.takeoff, skill.joints, skill.poses_s, tolerance=_COARSE_TOLERANCE)
+        angles = unwrap(angles_from_matrix(flight.R), flight.time_s)
+        reached = np.array([angles[-1, 0], angles[-1, 2], np.ptp(angles[:, 1])])
+        return (reached / (PAPER_RANGES.somersault_rad, PAPER_RANGES.twist_rad, PAPER_RANGES.tilt_rad) - 1)[:n]
 
     bounds = np.array([[2.0, 20.0], [0.0, np.pi / 2], [0.0, _ELBOWS_RAD]])[:n].T
-    solved = least_squares(errors, start[:n], bounds=tuple(bounds), diff_step=1e-4, xtol=1e-10)
-    if np.abs(solved.fun).max() > _SOLVED:
+    solution = least_squares(errors, start[:n], bounds=tuple(bounds), diff_step=1e-4, xtol=1e-10)
+    if np.abs(solution.fun).max() > _LARGEST_RESIDUAL:
         raise BodyError(
             f"no swing of the arms gives body '{model.name}' half a twist in one somersault; it needs arms and masses "
             "like those of human18"
         )
-    return np.append(solved.x, start[n:])
+    return np.append(solution.x, start[n:])
 
 
-def _in_a_second(model: BodyModel, swing: Array, *, has_pike: bool) -> Skill:
-    """Return a flight of one second without speed at take-off; with twice the momentum it turns alike in half the time.
+def _unit_skill(model: BodyModel, swing: Array, *, has_pike: bool) -> Skill:
+    """Return a flight of one second at zero take-off velocity; twice the momentum rotates alike in half the time.
 
     swing (3,): momentum as angular velocity of the upright body [rad/s], and [rad] how far the arms go up or down and
-    the elbows are bent.
+    the elbows are flexed.
     """
-    held = _bent(model, {"foot_left": _POINTED_RAD, "foot_right": _POINTED_RAD}, 0)
-    held += _bent(model, {"forearm_left": -swing[2], "forearm_right": -swing[2]}, 0)
+    static = _joint_angles(model, {"foot_left": _POINTED_RAD, "foot_right": _POINTED_RAD}, 0)
+    static += _joint_angles(model, {"forearm_left": -swing[2], "forearm_right": -swing[2]}, 0)
     arms = [
-        held + _bent(model, {"upper_arm_left": -np.pi / 2 - angle, "upper_arm_right": np.pi / 2 - angle}, 1)
+        static + _joint_angles(model, {"upper_arm_left": -np.pi / 2 - angle, "upper_arm_right": np.pi / 2 - angle}, 1)
         for angle in (0.0, swing[1])
     ]
-    joints = moves(np.array(_SWING), np.array(arms))
+    joints = joint_motion(np.array(_SWING), np.array(arms))
     if has_pike:
-        pike = _bent(model, {name: np.radians(angle) for name, angle in _PIKE_DEG.items()}, 0)
-        joints = together([joints, moves(np.array(_PIKE), np.array([0 * pike, pike, pike, 0 * pike]))])
-    upright = mass_as_bent(model, np.zeros_like(held)).inertia[0, 0]
+        pike = _joint_angles(model, {name: np.radians(angle) for name, angle in _PIKE_DEG.items()}, 0)
+        joints = sum_motions([joints, joint_motion(np.array(_PIKE), np.array([0 * pike, pike, pike, 0 * pike]))])
+    upright = mass_at_angles(model, np.zeros_like(static)).inertia[0, 0]
     takeoff = Takeoff(
         centre=np.zeros(3),
         velocity=np.zeros(3),
@@ -236,8 +244,8 @@ def _in_a_second(model: BodyModel, swing: Array, *, has_pike: bool) -> Skill:
     return Skill(model=model, takeoff=takeoff, joints=joints, duration_s=1.0)
 
 
-def _sent(skill: Skill, flight: Flight) -> Skill:
-    """Give a flight of one second its duration, to whole milliseconds, its speed and its place.
+def _launch(skill: Skill, flight: SampledFlight) -> Skill:
+    """Give a flight of one second its duration, in whole milliseconds, velocity and position.
 
     The flight is that of the paper's poses. Take-off and landing have the root at one height; the middle is x = y = 0.
     """
@@ -245,12 +253,12 @@ def _sent(skill: Skill, flight: Flight) -> Skill:
     about = flight.position - flight.centre  # of the root about the centre of mass, whatever the duration
 
     def path(x: Array) -> Array:
-        """Return the root's places for distances along x and -y [m] and a duration [s]; take-off is at `about[0]`."""
+        """Return the root's positions for distances along x and -y [m] and a duration [s]; take-off is at `about[0]`."""
         rise = g * x[2] ** 2 / 2 * (time - time**2) - time * (about[-1, 2] - about[0, 2])
         return about + np.column_stack([x[0] * time, -x[1] * time, rise])
 
     def errors(x: Array) -> Array:
-        return np.ptp(path(x), axis=0) - (PAPER.lateral_m, PAPER.forward_m, PAPER.vertical_m)
+        return np.ptp(path(x), axis=0) - (PAPER_RANGES.lateral_m, PAPER_RANGES.forward_m, PAPER_RANGES.vertical_m)
 
     bounds = ([-0.1, 0.5, 0.3], [0.1, 1.5, 1.5])
     lateral, forward, duration = least_squares(errors, [0.0, 1.0, 0.85], bounds=bounds).x
@@ -265,10 +273,10 @@ def _sent(skill: Skill, flight: Flight) -> Skill:
         R=np.eye(3),
         angular_momentum=skill.takeoff.angular_momentum / duration,
     )
-    return replace(skill, takeoff=takeoff, duration_s=duration, joints=slowed(skill.joints, duration))
+    return replace(skill, takeoff=takeoff, duration_s=duration, joints=scale_time(skill.joints, duration))
 
 
-def _bent(model: BodyModel, angles_rad: dict[str, float], axis: int) -> Array:
+def _joint_angles(model: BodyModel, angles_rad: dict[str, float], axis: int) -> Array:
     """Return joint angles (joints, 3) [rad]: those of the named segments about one axis, the others zero."""
     angles = np.zeros((len(model.segments) - 1, 3))
     for name, angle in angles_rad.items():

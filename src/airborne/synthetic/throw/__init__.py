@@ -1,1 +1,1 @@
-"""Scenes of a body in a gym: light, pictures, what a person would measure there, and the trial that is written."""
+"""Scenes of a body in a gym: light, images, simulated measurements, and the trial that is written."""

@@ -1,4 +1,4 @@
-"""Pictures in the tracker's own light, one colour for each pixel's centre (paper B, "Method": identical light)."""
+"""Images in the tracker's own light, one colour for each pixel's centre (paper B, "Method": identical light)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from airborne.body import Pose, geometry
+from airborne.body import Pose, surface_arrays
 from airborne.cameras import Camera
 from airborne.rendering import Lights, render
 from airborne.rendering.shapes import new_shapes
@@ -17,25 +17,25 @@ from airborne.video import Frames, View
 
 
 def exact_frames(scene: Scene, lights: Lights) -> Iterator[Frames]:
-    """Draw the scene picture by picture: no smooth edges, blur, exposure or shadows; noise is even and has no colour.
+    """Render the scene frame by frame: no antialiasing, blur, exposure or shadows; noise is white, alike in all colours.
 
-    The surroundings are drawn in the same light; where there are none, pictures are black.
+    The surroundings are rendered in the same light; where there are none, images are black.
     """
-    flat = geometry(scene.body)
-    shapes = new_shapes(flat)
+    surface = surface_arrays(scene.body)
+    shapes = new_shapes(surface)
     cameras = [[camera.field(p) for p in (0, 1)] if scene.is_interlaced else [camera] for camera in scene.rig]
     backdrops = [[_backdrop(scene, camera, lights) for camera in own] for own in cameras]
-    flight = scene.flight(np.array([float(scene.time_s(i)) for i in range(scene.n_shown)]))
-    for index in range(scene.n_shown):
+    flight = scene.flight(np.array([float(scene.time_s(i)) for i in range(scene.n_recorded)]))
+    for index in range(scene.n_recorded):
         posed = scene.body.with_pose(flight.pose(index))
         parity = scene.parity(index) if scene.is_interlaced else 0
         views = []
         for number, (camera, backdrop) in enumerate(zip(cameras, backdrops, strict=True)):
-            drawn = render(flat, posed, camera[parity], lights, shapes=shapes)
-            light = np.where(drawn.mask[..., None], drawn.colour, backdrop[parity])
+            rendering = render(surface, posed, camera[parity], lights, shapes=shapes)
+            light = np.where(rendering.mask[..., None], rendering.colour, backdrop[parity])
             rng = np.random.default_rng([scene.seed, 2, number, index])
             noise = scene.noise_sd * rng.standard_normal(light.shape, np.float32) if scene.noise_sd > 0 else 0.0
-            views.append(View(camera[parity], _rounded(light + noise)))
+            views.append(View(camera[parity], _quantise(light + noise)))
         yield Frames(index, scene.time_s(index), tuple(views))
 
 
@@ -44,9 +44,9 @@ def _backdrop(scene: Scene, camera: Camera, lights: Lights) -> NDArray[np.float3
     width, height = camera.size
     if scene.surroundings is None:
         return np.zeros((height, width, 3), np.float32)
-    still = scene.surroundings.with_pose(Pose(world_from_root=RigidTransform.identity()))
-    return np.asarray(render(geometry(scene.surroundings), still, camera, lights).colour, np.float32)
+    posed = scene.surroundings.with_pose(Pose(world_from_root=RigidTransform.identity()))
+    return np.asarray(render(surface_arrays(scene.surroundings), posed, camera, lights).colour, np.float32)
 
 
-def _rounded(light: NDArray) -> NDArray[np.uint8]:
+def _quantise(light: NDArray) -> NDArray[np.uint8]:
     return np.clip(np.rint(light), 0, 255).astype(np.uint8)

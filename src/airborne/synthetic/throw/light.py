@@ -1,4 +1,4 @@
-"""Spot lights, and what they give to a surface: linear light, where 1 is the brightest that a camera records."""
+"""Spot lights and their irradiance on surfaces, in linear light, where 1 is the brightest that a camera records."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airborne.body import Box, Ellipsoid, Part, PosedBody
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-_CLEARANCE_M = 1e-3  # a surface is no obstacle to itself
+_CLEARANCE_M = 1e-3  # a surface does not occlude itself
 _CORE = (
-    0.93  # share of an ellipsoid's size that blocks light: a smooth skin lies partly inside the ellipsoid it is over
+    0.93  # share of an ellipsoid's size that blocks light: a smooth skin lies partly inside its ellipsoid
 )
 _NOTHING = np.zeros((0, 3, 4))
 
@@ -32,22 +31,22 @@ class Spot:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ambient:
-    """Light from everywhere: surfaces facing up get the one, those facing down the other, upright ones the mean."""
+    """Ambient light: surfaces facing up get `from_above`, those facing down `from_below`, upright ones the mean."""
 
     from_above: Array  # (3,) linear RGB
     from_below: Array  # (3,) linear RGB
 
-    def on(self, normals: Array) -> Array:
-        """Return the light on surfaces with the world normals (n, 3): (n, 3)."""
+    def irradiance(self, normals: Array) -> Array:
+        """Return the irradiance of surfaces with the world normals (n, 3): (n, 3)."""
         upward = (1 + normals[:, 2:]) / 2
         return upward * self.from_above + (1 - upward) * self.from_below
 
 
-DARK = Ambient(np.zeros(3), np.zeros(3))
+NO_AMBIENT = Ambient(np.zeros(3), np.zeros(3))
 
 
-def spot_light(spot: Spot, points: Array, normals: Array) -> Array:
-    """Return the light (n, 3) of a spot that nothing blocks, on matt surfaces at the world points (n, 3) [m]."""
+def spot_irradiance(spot: Spot, points: Array, normals: Array) -> Array:
+    """Return the irradiance (n, 3) of an unoccluded spot on matt surfaces at the world points (n, 3) [m]."""
     ray = spot.position - points
     distance = np.linalg.norm(ray, axis=1)
     axis = spot.target - spot.position
@@ -62,56 +61,59 @@ def boxes_of(*bodies: PosedBody) -> Array:
     """Return the boxes of bodies as maps (b, 3, 4) from the world to a cube from -1 to 1; no other shapes."""
     maps = []
     for posed in bodies:
-        for part, turn, place in _placed(posed):
+        for part, rotation, position in _parts_in_world(posed):
             if isinstance(part.shape, Box):
-                maps.append(_to_unit(2 * turn.T / part.shape.size_m[:, None], place))
+                maps.append(_to_unit(2 * rotation.T / part.shape.size_m[:, None], position))
     return np.array(maps).reshape(-1, 3, 4)
 
 
-def balls_of(*bodies: PosedBody) -> Array:
-    """Return the cores of bodies' ellipsoids, 0.93 of their size, as maps (e, 3, 4) from the world to the unit ball.
+def ellipsoids_of(*bodies: PosedBody) -> Array:
+    """Return the cores of bodies' ellipsoids, 0.93 of their size, as maps (e, 3, 4) from the world to the unit sphere.
 
-    Ellipsoids that are cut count as whole ones.
+    Cut ellipsoids count as whole ones.
     """
     maps = []
     for posed in bodies:
-        for part, turn, place in _placed(posed):
+        for part, rotation, position in _parts_in_world(posed):
             if isinstance(part.shape, Ellipsoid):
-                maps.append(_to_unit(turn.T / (_CORE * part.shape.semi_axes_m[:, None]), place))
+                maps.append(_to_unit(rotation.T / (_CORE * part.shape.semi_axes_m[:, None]), position))
     return np.unique(np.array(maps).reshape(-1, 3, 4), axis=0)
 
 
-def is_lit(points: Array, normals: Array, spot: Spot, boxes: Array, balls: Array = _NOTHING) -> NDArray[np.bool_]:
-    """Say which world points (n, 3) [m] see the spot past the boxes of `boxes_of` and balls of `balls_of`: (n,).
+def is_lit(
+    points: Array, normals: Array, spot: Spot, boxes: Array, *, ellipsoids: Array = _NOTHING
+) -> NDArray[np.bool_]:
+    """Say which world points (n, 3) [m] are lit past the boxes of `boxes_of` and ellipsoids of `ellipsoids_of`: (n,).
 
-    A ball does not darken points inside it.
+    An ellipsoid does not shade points inside it.
     """
     out = np.empty(len(points), np.bool_)
     start, target = points + _CLEARANCE_M * normals, np.asarray(spot.position, float)
-    _see(start, target, boxes, out)
-    if len(balls):
-        _see_past_balls(start, target, balls, out)
+    _trace_boxes(start, target, boxes, out)
+    if len(ellipsoids):
+        _trace_ellipsoids(start, target, ellipsoids, out)
     return out
 
 
-def _placed(posed: PosedBody) -> Iterator[tuple[Part, Array, Array]]:
-    """Give every part with its turn (3, 3) and place (3,) [m] in the world."""
+def _parts_in_world(posed: PosedBody) -> Iterator[tuple[Part, Array, Array]]:
+    """Yield every part with its rotation (3, 3) and position (3,) [m] in the world."""
     for segment, R, t in zip(posed.model.segments, posed.R, posed.t, strict=True):
         for part in segment.parts:
-            place = part.segment_from_part
-            yield part, R @ place.rotation.as_matrix(), R @ place.translation + t
+            segment_from_part = part.segment_from_part
+            rotation = R @ segment_from_part.rotation.as_matrix()
+            yield part, rotation, R @ segment_from_part.translation + t
 
 
-def _to_unit(unit_from_world: Array, place: Array) -> Array:
-    return np.column_stack([unit_from_world, -unit_from_world @ place])
+def _to_unit(unit_from_world: Array, position: Array) -> Array:
+    return np.column_stack([unit_from_world, -unit_from_world @ position])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _see(points, target, boxes, out):
+def _trace_boxes(points, target, boxes, out):
     for i in range(len(points)):
         out[i] = True
         for b in range(len(boxes)):
-            enter, leave = 0.0, 1.0  # the part of the way from point to target that lies within all slabs so far
+            enter, leave = 0.0, 1.0  # the part of the ray from point to target that lies within all slabs so far
             for k in range(3):
                 from_, to = boxes[b, k, 3], boxes[b, k, 3]
                 for j in range(3):
@@ -132,23 +134,23 @@ def _see(points, target, boxes, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _see_past_balls(points, target, balls, out):
-    ends = np.empty((len(balls), 3))  # the target, as each ball sees it
-    for e in range(len(balls)):
+def _trace_ellipsoids(points, target, ellipsoids, out):
+    ends = np.empty((len(ellipsoids), 3))  # the target, in the frame of each ellipsoid
+    for e in range(len(ellipsoids)):
         for k in range(3):
-            ends[e, k] = balls[e, k, 3]
+            ends[e, k] = ellipsoids[e, k, 3]
             for j in range(3):
-                ends[e, k] += balls[e, k, j] * target[j]
+                ends[e, k] += ellipsoids[e, k, j] * target[j]
     for i in range(len(points)):
         if not out[i]:
             continue
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        for e in range(len(balls)):
-            inside, along, way = -1.0, 0.0, 0.0  # |p|^2 - 1, p.d and |d|^2 of the point p and the way d to the target
+        for e in range(len(ellipsoids)):
+            inside, along, length2 = -1.0, 0.0, 0.0  # |p|^2 - 1, p.d and |d|^2 of the point p and the ray d to the target
             for k in range(3):
-                p = balls[e, k, 0] * x + balls[e, k, 1] * y + balls[e, k, 2] * z + balls[e, k, 3]
+                p = ellipsoids[e, k, 0] * x + ellipsoids[e, k, 1] * y + ellipsoids[e, k, 2] * z + ellipsoids[e, k, 3]
                 d = ends[e, k] - p
-                inside, along, way = inside + p * p, along + p * d, way + d * d
-            if inside > 0 and along < 0 and -along < way and along * along > way * inside:
+                inside, along, length2 = inside + p * p, along + p * d, length2 + d * d
+            if inside > 0 and along < 0 and -along < length2 and along * along > length2 * inside:
                 out[i] = False
                 break

@@ -1,4 +1,4 @@
-"""What a person would measure in a scene: control points, clicked points, the first pose, the lamps."""
+"""Simulated measurements in a scene: control points, clicked points, the first pose, the lamps."""
 
 from __future__ import annotations
 
@@ -6,21 +6,19 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from airborne.body import Box, Pose
-from airborne.body.chain import moved_pose
+from airborne.body.chain import move_pose
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras import Rig
-from airborne.synthetic.flight.rigid import Flight
+from airborne.synthetic.flight.rigid import SampledFlight
 from airborne.synthetic.throw.scene import Scene
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-_FRAME_M = ((-1.0, 0.0, 1.0), (-0.7, 0.7), (0.6, 1.35, 2.05, 2.8))  # places along x, y, z of the control points
-_PLACED_SD_M = 0.015  # of the points about the frame's places
-_SPOT_SD_M, _POWER_SD = 0.05, 0.15  # errors of the lamps' measured places and nominal powers
+_FRAME_M = ((-1.0, 0.0, 1.0), (-0.7, 0.7), (0.6, 1.35, 2.05, 2.8))  # positions of the control points along x, y, z
+_POINT_SD_M = 0.015  # of the points about the frame's nodes
+_SPOT_SD_M, _POWER_SD = 0.05, 0.15  # errors of the lamps' measured positions and nominal powers
 _WATT = 50.0  # nominal power of a lamp that gives the light 1 at 1 m
 
 
@@ -30,17 +28,17 @@ def control_points(scene: Scene) -> ControlPoints:
     NaN where a point lies outside a camera's image.
     """
     rng = np.random.default_rng([scene.seed, 3])
-    places = np.array(list(product(*_FRAME_M)))
-    world = np.round(places + rng.normal(0, _PLACED_SD_M, places.shape), 4)  # to be written with 4 decimals
-    px = _clicked(scene.rig, world, scene.click_sd_px, rng)
+    nodes = np.array(list(product(*_FRAME_M)))
+    world = np.round(nodes + rng.normal(0, _POINT_SD_M, nodes.shape), 4)  # written with 4 decimals
+    px = _click(scene.rig, world, scene.click_sd_px, rng)
     names = tuple(f"P{i:02d}" for i in range(1, len(world) + 1))
     return ControlPoints(names=names, world=world, cameras=scene.rig.names, px=px)
 
 
-def digitised(scene: Scene, flight: Flight) -> dict[str, Array]:
-    """Return the ends of every box's longest axis, clicked with the scene's `digitising_sd_px`, hidden or not.
+def digitise(scene: Scene, flight: SampledFlight) -> dict[str, Array]:
+    """Return the ends of every box's longest axis, clicked with the scene's `digitising_sd_px`, occluded or not.
 
-    Named by what stands before the first "_" of the part's name, `<stem>_minus` and `<stem>_plus`: (n, cameras, 2)
+    Named by the stem before the first "_" of the part's name, `<stem>_minus` and `<stem>_plus`: (n, cameras, 2)
     [px] each, NaN where an end lies outside a camera's image.
     """
     rng = np.random.default_rng([scene.seed, 4])
@@ -53,9 +51,7 @@ def digitised(scene: Scene, flight: Flight) -> dict[str, Array]:
                 for name, end in (("minus", -half), ("plus", half)):
                     on_body = R @ part.segment_from_part.apply(end) + t
                     world = flight.R @ on_body + flight.position
-                    points[f"{part.name.split('_')[0]}_{name}"] = _clicked(
-                        scene.rig, world, scene.digitising_sd_px, rng
-                    )
+                    points[f"{part.name.split('_')[0]}_{name}"] = _click(scene.rig, world, scene.digitising_sd_px, rng)
     return points
 
 
@@ -67,16 +63,16 @@ def start_pose(scene: Scene) -> Pose:
     rng = np.random.default_rng([scene.seed, 5])
     offset, axis = (direction / np.linalg.norm(direction) for direction in rng.normal(size=(2, 3)))
     true = scene.flight(np.zeros(1)).pose(0)
-    turns = rng.normal(size=true.joint_angles.shape)
-    turns = scene.start_joint_error_rad * turns / np.linalg.norm(turns, axis=1, keepdims=True)
-    motion = np.concatenate([scene.start_error_m * offset, scene.start_error_rad * axis, turns.ravel()])
-    pose = moved_pose(true, motion)
+    rotations = rng.normal(size=true.joint_angles.shape)
+    rotations = scene.start_joint_error_rad * rotations / np.linalg.norm(rotations, axis=1, keepdims=True)
+    delta = np.concatenate([scene.start_error_m * offset, scene.start_error_rad * axis, rotations.ravel()])
+    pose = move_pose(true, delta)
     lowest, highest = np.moveaxis(scene.model.limits_rad, -1, 0)
     return replace(pose, joint_angles=np.clip(pose.joint_angles, lowest, highest))
 
 
 def lights_table(scene: Scene) -> dict:
-    """Return the lamps as they would be measured, for a JSON file: places off by 50 mm sd, powers by 15 %."""
+    """Return the lamps as measured, for a JSON file: positions off by 50 mm sd, powers by 15 %."""
     rng = np.random.default_rng([scene.seed, 6])
     spots = [
         {
@@ -88,7 +84,7 @@ def lights_table(scene: Scene) -> dict:
     return {"spotlights": spots, "note": "measured positions; powers are nominal"}
 
 
-def _clicked(rig: Rig, points: Array, sd_px: float, rng: np.random.Generator) -> Array:
+def _click(rig: Rig, points: Array, sd_px: float, rng: np.random.Generator) -> Array:
     """Project points (n, 3) and click them: (n, cameras, 2) [px], NaN outside the image."""
     px = np.stack([camera.px_from_world(points) for camera in rig], axis=1)
     px = px + rng.normal(0, sd_px, px.shape)

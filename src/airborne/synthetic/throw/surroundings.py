@@ -1,14 +1,12 @@
-"""A gym hall: boarded floor, three walls, and boxes, mats and panels that make the background busy."""
+"""A gym hall: boarded floor, three walls, and boxes, mats and panels as background clutter."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Part, Segment
-
-Array = NDArray[np.floating]
+from airborne.types import Array
 
 _WALLS = {  # centre, size [m], sRGB
     "wall_back": ((0.0, 3.55, 3.0), (9.2, 0.1, 6.0), (142, 144, 151)),
@@ -31,7 +29,7 @@ _COLOURS = np.array(
     ],
     float,
 )
-_FRONT_M = 1.6  # clutter stands behind this y, and the flight before it
+_FRONT_M = 1.6  # clutter stands behind this y, the flight is before it
 
 
 def gym(rng: np.random.Generator, *, clutter: int) -> BodyModel:
@@ -47,11 +45,11 @@ def gym(rng: np.random.Generator, *, clutter: int) -> BodyModel:
         size = rng.uniform((0.3, 0.3, 0.25), (0.9, 0.8, 0.9))
         bottom = rng.choice([0.0, 0.0, rng.uniform(0.2, 1.8)])
         centre = (rng.uniform(-3.9, 3.9), rng.uniform(_FRONT_M + 0.6, 2.9), bottom + size[2] / 2)
-        parts.append(_part(f"box_{i}", centre, size, _colour(rng, i), turn_rad=rng.uniform(-0.6, 0.6)))
+        parts.append(_part(f"box_{i}", centre, size, _colour(rng, i), yaw_rad=rng.uniform(-0.6, 0.6)))
     for i in range(clutter // 3):
         size = np.append(rng.uniform((0.5, 0.4), (1.2, 0.9)), 0.02 + 0.004 * i)  # no two tops in one plane
         centre = (rng.uniform(-1.8, 1.8), rng.uniform(-1.6, 1.4), size[2] / 2)
-        parts.append(_part(f"mat_{i}", centre, size, 0.8 * _colour(rng, i), turn_rad=rng.uniform(-0.8, 0.8)))
+        parts.append(_part(f"mat_{i}", centre, size, 0.8 * _colour(rng, i), yaw_rad=rng.uniform(-0.8, 0.8)))
     return BodyModel("gym", (Segment("gym", None, np.zeros(3), tuple(parts)),))
 
 
@@ -59,6 +57,6 @@ def _colour(rng: np.random.Generator, i: int) -> Array:
     return np.clip(_COLOURS[i % len(_COLOURS)] * rng.uniform(0.75, 1.05), 0, 255)
 
 
-def _part(name: str, centre, size, colour, *, turn_rad: float = 0.0) -> Part:
-    place = RigidTransform.from_components(centre, Rotation.from_euler("Z", turn_rad))
-    return Part(name, Box(np.array(size, float)), place, np.array(colour, float))
+def _part(name: str, centre, size, colour, *, yaw_rad: float = 0.0) -> Part:
+    segment_from_part = RigidTransform.from_components(centre, Rotation.from_euler("Z", yaw_rad))
+    return Part(name, Box(np.array(size, float)), segment_from_part, np.array(colour, float))

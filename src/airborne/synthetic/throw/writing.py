@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -14,15 +14,13 @@ from numpy.typing import NDArray
 from airborne.body.files import write_body
 from airborne.cameras import write_pose2sim
 from airborne.errors import TrialError
-from airborne.synthetic.flight.rigid import Flight
-from airborne.synthetic.flight.somersault import Preset as SomersaultPreset
-from airborne.synthetic.flight.somersault import Skill, Style, Target, somersault
-from airborne.synthetic.throw.measurements import control_points, digitised, lights_table, start_pose
-from airborne.synthetic.throw.pictures import frames
-from airborne.synthetic.throw.scene import Preset, Scene, thrown_cross
+from airborne.synthetic.flight.rigid import SampledFlight
+from airborne.synthetic.flight.somersault import PictureStyle, Skill, SomersaultPreset, Target, somersault_scene
+from airborne.synthetic.throw.measurements import control_points, digitise, lights_table, start_pose
+from airborne.synthetic.throw.pictures import scene_frames
+from airborne.synthetic.throw.scene import Scene, ThrowPreset, thrown_cross
+from airborne.types import Progress
 from airborne.video import VideoWriter, weave
-
-Progress = Callable[[int, int], None]  # pictures done, pictures in all
 
 _CRF, _NEAR_LOSSLESS_CRF = 16, 2
 
@@ -30,7 +28,7 @@ _CRF, _NEAR_LOSSLESS_CRF = 16, 2
 def write_thrown_cross(
     folder: Path,
     *,
-    preset: Preset = "half-twist",
+    preset: ThrowPreset = "half-twist",
     seed: int = 0,
     overwrite: bool = False,
     progress: Progress | None = None,
@@ -44,14 +42,14 @@ def write_somersault(
     *,
     preset: SomersaultPreset = "paper",
     target: Target = "skin",
-    style: Style = "exact",
+    style: PictureStyle = "exact",
     seed: int = 0,
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> None:
     """Write a trial of a `somersault` preset; see `write_trial`."""
-    require_room(folder, overwrite)
-    scene = somersault(preset, target=target, style=style, seed=seed)
+    require_empty(folder, overwrite)
+    scene = somersault_scene(preset, target=target, style=style, seed=seed)
     write_trial(scene, folder, overwrite=overwrite, progress=progress)
 
 
@@ -61,15 +59,15 @@ def write_trial(scene: Scene, folder: Path, *, overwrite: bool = False, progress
     `<camera>.mp4`, `calib_true.toml` (exact), the body's file, `truth.csv` (the root's pose in every picture) and
     `trial.toml` (with a hand-set start). Of a surveyed scene also `control_points.csv` (surveyed exactly, clicked),
     `digitised.csv` (clicked) and `lights.json` (roughly measured); of a body with joints `truth_joints.csv` (its
-    landmarks) and `truth_angles.csv`. `progress` is told after every picture how many of how many are done. Raises
+    landmarks) and `truth_angles.csv`. `progress` is called after every image. Raises
     TrialError for a folder that holds anything, unless `overwrite`: then files of these names are replaced.
     """
-    require_room(folder, overwrite)
+    require_empty(folder, overwrite)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "trial.toml").unlink(missing_ok=True)
     flight = scene.flight(np.array([float(scene.time_s(i)) for i in range(scene.n_pictures)]))
     write_pose2sim(folder / "calib_true.toml", scene.rig)
-    write_body(folder / _body_name(scene), scene.model)
+    write_body(folder / _body_file_name(scene), scene.model)
     if scene.is_surveyed:
         _write_control_points(folder / "control_points.csv", scene)
         _write_digitised(folder / "digitised.csv", scene, flight)
@@ -82,7 +80,7 @@ def write_trial(scene: Scene, folder: Path, *, overwrite: bool = False, progress
     (folder / "trial.toml").write_text(trial_toml(scene), encoding="utf-8")
 
 
-def require_room(folder: Path, overwrite: bool) -> None:
+def require_empty(folder: Path, overwrite: bool) -> None:
     """Raise TrialError for a file, and for a folder that holds anything, unless it may be overwritten."""
     if folder.exists() and not folder.is_dir():
         raise TrialError(f"{folder} is a file; give a folder for the trial")
@@ -103,20 +101,20 @@ def trial_toml(scene: Scene) -> str:
         calibration if scene.is_surveyed else 'file = "calib_true.toml"                  # exact',
         "",
         "[body]",
-        f"file = {json.dumps(_body_name(scene))}",
+        f"file = {json.dumps(_body_file_name(scene))}",
         *_lights_lines(scene),
         *_start_lines(scene),
         "",
         "[track]",
         'method = "refined"',
         f"stop = {scene.n_pictures}",
-        *(["fixed_shape = true"] if isinstance(scene.flight, Skill) and scene.flight.is_held else []),
+        *(["fixed_shape = true"] if isinstance(scene.flight, Skill) and scene.flight.is_rigid else []),
     ]
     return "\n".join(lines) + "\n"
 
 
 def _lights_lines(scene: Scene) -> list[str]:
-    """Tell the lights where the pictures were drawn in the tracker's own."""
+    """Return the [lights] table where the images were rendered in the tracker's own light."""
     if scene.lights is None:
         return []
     lines = ["", "[lights]", "is_exact = true", f"ambient = {scene.lights.ambient}"]
@@ -157,7 +155,7 @@ def _write_videos(folder: Path, scene: Scene, progress: Progress | None) -> None
             for camera in scene.rig
         ]
         tops: list[NDArray[np.uint8]] = []
-        for recorded in frames(scene):
+        for recorded in scene_frames(scene):
             pictures = [view.rgb for view in recorded.views if view is not None]
             if scene.is_interlaced and scene.parity(recorded.index) == 0:
                 tops = pictures
@@ -166,7 +164,7 @@ def _write_videos(folder: Path, scene: Scene, progress: Progress | None) -> None
                 for writer, picture in zip(writers, whole, strict=True):
                     writer.write(picture)
             if progress is not None:
-                progress(recorded.index + 1, scene.n_shown)
+                progress(recorded.index + 1, scene.n_recorded)
 
 
 def _write_control_points(path: Path, scene: Scene) -> None:
@@ -179,29 +177,29 @@ def _write_control_points(path: Path, scene: Scene) -> None:
     _write_csv(path, header, rows)
 
 
-def _write_digitised(path: Path, scene: Scene, flight: Flight) -> None:
-    points = digitised(scene, flight)
+def _write_digitised(path: Path, scene: Scene, flight: SampledFlight) -> None:
+    points = digitise(scene, flight)
     header = [f"{point}_{camera}_{axis}" for point in points for camera in scene.rig.names for axis in "uv"]
     values = np.concatenate([px.reshape(len(px), -1) for px in points.values()], axis=1)
     _write_csv(path, [_index_name(scene), *header], [[i, *map(_pixel, row)] for i, row in enumerate(values)])
 
 
-def _write_truth(path: Path, scene: Scene, flight: Flight) -> None:
+def _write_truth(path: Path, scene: Scene, flight: SampledFlight) -> None:
     header = [_index_name(scene), "time_s", "x_m", "y_m", "z_m", *(f"r{i}{j}" for i in range(3) for j in range(3))]
     values = np.column_stack([flight.time_s, flight.position, flight.R.reshape(-1, 9)])
     _write_csv(path, header, [[i, *map(repr, row.tolist())] for i, row in enumerate(values)])
 
 
-def _write_landmarks(path: Path, scene: Scene, flight: Flight) -> None:
+def _write_landmarks(path: Path, scene: Scene, flight: SampledFlight) -> None:
     rows = [
-        [i, repr(float(time)), landmark.name, *map(repr, place.tolist())]
+        [i, repr(float(time)), landmark.name, *map(repr, point.tolist())]
         for i, time in enumerate(flight.time_s)
-        for landmark, place in zip(scene.model.landmarks, scene.model.with_pose(flight.pose(i)).landmarks, strict=True)
+        for landmark, point in zip(scene.model.landmarks, scene.model.with_pose(flight.pose(i)).landmarks, strict=True)
     ]
     _write_csv(path, [_index_name(scene), "time_s", "joint", "x_m", "y_m", "z_m"], rows)
 
 
-def _write_angles(path: Path, scene: Scene, flight: Flight) -> None:
+def _write_angles(path: Path, scene: Scene, flight: SampledFlight) -> None:
     joints = [f"{segment.name}_{axis}_rad" for segment in scene.model.segments[1:] for axis in "xyz"]
     values = np.column_stack([flight.time_s, flight.joint_angles.reshape(len(flight.time_s), -1)])
     _write_csv(
@@ -222,7 +220,7 @@ def _index_name(scene: Scene) -> str:
     return "field" if scene.is_interlaced else "frame"
 
 
-def _body_name(scene: Scene) -> str:
+def _body_file_name(scene: Scene) -> str:
     return "body.toml" if _has_joints(scene) else f"{scene.model.segments[0].name}.toml"
 
 

@@ -1,8 +1,8 @@
-"""Evidence under the outline of tapered capsules: one pose of a person in one picture, without visiting its pixels.
+"""Evidence under the outline of tapered capsules: one pose of a person in one image, without visiting its pixels.
 
-The sum of a map under a capsule is that of its spans. Where capsules overlap, the nearer one owns the pixels. How the
-sum changes as the discs move is read off at the ends of the spans: only there, and at the border between a capsule's
-two maps, pixels change hands.
+The sum of a map under a capsule is that of its spans. Where capsules overlap, the nearer one owns the pixels. The
+derivatives of the sum by the discs come from the ends of the spans: only there, and at the border between a capsule's
+two maps, pixels change owner.
 """
 
 from __future__ import annotations
@@ -10,32 +10,32 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from airborne.tracking.capsules.outlines import BEHIND, border_in_row, outline, part_at
+from airborne.tracking.capsules.outlines import BEHIND_M, border_in_row, outline, part_at
 from airborne.tracking.capsules.spans import (
     EXACT,
     INLINE,
     MOST_SPANS,
     add_span,
-    claim,
+    border_sum_at,
+    border_value_at,
     contrast_at,
-    map_at,
-    read_mixed,
+    merge_span,
     value_at,
     value_between,
 )
 
 _BORDER_SAMPLES = 5
-_LEVEL = 2.0  # tangents that run this much further across than down are gone along column by column, not row by row
+_LEVEL_RATIO = 2.0  # tangents that run this much further across than down are integrated over columns, not rows
 
 
 @njit(**EXACT)
-def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, gradient, curvature):
-    """Add up maps under the capsules, and how the sum changes as their discs move.
+def capsule_evidence(discs, depth, classes, share, sums, contrast, origin, work, out, gradient, curvature):
+    """Sum maps under the capsules, and differentiate the sum by their discs.
 
-    discs (n, 2, 3) and depth (n,) as `project` gives them, in the pixels of the maps; kinds (n, 2) the map at either
+    discs (n, 2, 3) and depth (n,) as `project` gives them, in the pixels of the maps; classes (n, 2) the map at either
     end of each capsule and share (n,) how far along its axis the first one reaches; sums (k, h, w + 1) running sums of
     the maps over a region whose first pixel is origin (x, y); contrast (k,) by how much each map falls across an edge
-    of what it shows. What lies outside the region counts nothing. work is x (n, 2, h), pieces (n, 2, h) and tangents
+    of what it shows. What lies outside the region counts as 0. work is x (n, 2, h), pieces (n, 2, h) and tangents
     (n, 2, 7). Fills out (n, 2, 2), the sum and the area [px] that each capsule owns of its first and its second map;
     and of the first m capsules the gradient (m, 7) and the curvature (m, 7, 7), which is what maps have that fall by
     their contrast within a pixel of every edge, by (x, y, radius) of both discs and the share.
@@ -48,7 +48,7 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
     top, bottom = h, 0
     x, pieces, tangents = work
     for i in range(n):
-        if depth[i] < BEHIND:
+        if depth[i] < BEHIND_M:
             first[i], last[i] = outline(discs[i, 0], discs[i, 1], origin[1], x[i], pieces[i], tangents[i])
             if last[i] > first[i]:
                 top, bottom = min(top, first[i]), max(bottom, last[i])
@@ -67,8 +67,8 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
             cut, weight, split = border_in_row(discs[i], share[i], y, 0.5 * (a + b) + ox)
             cut -= ox
             border = cut, weight, split
-            map_0, map_1 = sums[kinds[i, 0], row], sums[kinds[i, 1], row]
-            at, from_k = a, -1  # walk through what nearer capsules have left free
+            map_0, map_1 = sums[classes[i, 0], row], sums[classes[i, 1], row]
+            at, from_k = a, -1  # the gaps that nearer capsules have left
             for k in range(taken + 1):
                 if k < taken and taken_x[k, 1] <= at:
                     continue
@@ -80,26 +80,26 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
                         who, side = (i, 0) if from_k < 0 else (taken_by[from_k, 1], 1)
                         if at > least and who < n_moving:
                             edge = who, pieces[who, side, row], y, side, at, ox
-                            pull = -1.0, contrast_at(contrast, kinds[i, 0], kinds[i, 1], at, border)
-                            _pull(discs, tangents, edge, map_0, map_1, border, pull, gradient, curvature)
+                            gain = -1.0, contrast_at(contrast, classes[i, 0], classes[i, 1], at, border)
+                            _add_edge(discs, tangents, edge, map_0, map_1, border, gain, gradient, curvature)
                         who, side = (i, 1) if is_open else (taken_by[k, 0], 0)
                         if end < most and who < n_moving:
                             edge = who, pieces[who, side, row], y, side, end, ox
-                            pull = 1.0, contrast_at(contrast, kinds[i, 0], kinds[i, 1], end, border)
-                            _pull(discs, tangents, edge, map_0, map_1, border, pull, gradient, curvature)
+                            gain = 1.0, contrast_at(contrast, classes[i, 0], classes[i, 1], end, border)
+                            _add_edge(discs, tangents, edge, map_0, map_1, border, gain, gradient, curvature)
                 if is_open:
                     break
                 at, from_k = max(at, taken_x[k, 1]), k
-            taken = claim(taken_x, taken_by, taken, a, b, i)
+            taken = merge_span(taken_x, taken_by, taken, a, b, i)
     for i in range(n):
         if last[i] <= first[i]:
             continue
         nearer = order, i, first, last, x
-        _go_along_level(discs, share, tangents[i], kinds, sums, contrast, nearer, origin, out, gradient, curvature)
-        if i < n_moving and kinds[i, 0] != kinds[i, 1]:
-            sums_of = sums[kinds[i, 0]], sums[kinds[i, 1]]
-            between = 0.5 * (contrast[kinds[i, 0]] + contrast[kinds[i, 1]])
-            _pull_border(discs[i], share[i], sums_of, between, nearer, origin, gradient[i], curvature[i])
+        _add_level_edges(discs, share, tangents[i], classes, sums, contrast, nearer, origin, out, gradient, curvature)
+        if i < n_moving and classes[i, 0] != classes[i, 1]:
+            sums_of = sums[classes[i, 0]], sums[classes[i, 1]]
+            between = 0.5 * (contrast[classes[i, 0]] + contrast[classes[i, 1]])
+            _add_border(discs[i], share[i], sums_of, between, nearer, origin, gradient[i], curvature[i])
     for i in range(n_moving):
         for p in range(6):
             for q in range(p):
@@ -107,64 +107,63 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
 
 
 @njit(**INLINE)
-def _stretch(top, bottom, y):
-    """Return what of a stretch of heights counts for the row at y: half way to its neighbours, or to the end."""
+def _row_interval(top, bottom, y):
+    """Return which part of a height interval counts for the row at y: half way to its neighbours, or to the end."""
     return top if y - 1 < top else y - 0.5, bottom if y + 1 > bottom else y + 0.5
 
 
 @njit(**INLINE)
-def _motion(discs, tangents, who, piece, y, outward):
-    """Say how an end of a span of capsule `who` moves: (x0, x1, t, by_y, by_r).
+def _edge_derivative(discs, tangents, who, piece, y, outward):
+    """Differentiate an end of a span of capsule `who` by its discs: (x0, x1, t, by_y, by_r).
 
     It moves along with x of the discs, by_y times y and by_r times their radius: 1 - t of disc a and t of disc b. Over
-    the height that counts for the row the outline runs over a stretch (x0, x1): a flat edge gains and loses pixels all
-    along it.
+    the height that counts for the row the outline runs from x0 to x1: a flat edge gains and loses pixels all along it.
     """
     if piece >= 2:
         k = piece - 2
         ax, ay, by = tangents[who, k, 0], tangents[who, k, 1], tangents[who, k, 2]
         slope, nx, ny = tangents[who, k, 3], tangents[who, k, 4], tangents[who, k, 5]
-        top, bottom = _stretch(min(ay, by), max(ay, by), y)
+        top, bottom = _row_interval(min(ay, by), max(ay, by), y)
         run = slope * (bottom - top)
         t = min(max((0.5 * (top + bottom) - ay) / (by - ay), 0.0), 1.0) if abs(by - ay) > 1e-9 else 0.5
         along = nx - run * ny  # what a larger radius does
         return ax + slope * (top - ay), ax + slope * (bottom - ay), t, -run, along
     cx, cy, r = discs[who, piece, 0], discs[who, piece, 1], discs[who, piece, 2]
-    top, bottom = _stretch(cy - r, cy + r, y)
+    top, bottom = _row_interval(cy - r, cy + r, y)
     top, bottom = min(max(top - cy, -r), r), min(max(bottom - cy, -r), r)
     h_top, h_bottom = np.sqrt(max(r * r - top * top, 0.0)), np.sqrt(max(r * r - bottom * bottom, 0.0))
-    turn = outward * r * (np.arcsin(bottom / r) - np.arcsin(top / r))
-    return cx + outward * h_top, cx + outward * h_bottom, float(piece), -outward * (h_bottom - h_top), turn
+    by_r = outward * r * (np.arcsin(bottom / r) - np.arcsin(top / r))
+    return cx + outward * h_top, cx + outward * h_bottom, float(piece), -outward * (h_bottom - h_top), by_r
 
 
 @njit(**INLINE)
-def _pull(discs, tangents, edge, map_0, map_1, border, pull, gradient, curvature):
-    """Add what the end of a span gains when its capsule's discs move: `pull` is its sign and the contrast there.
+def _add_edge(discs, tangents, edge, map_0, map_1, border, gain, gradient, curvature):
+    """Add the derivatives at the end of a span by its capsule's discs: `gain` is its sign and the contrast there.
 
-    A flat edge gains all along the stretch that it runs over within the row. Level ones are left to `_go_along_level`.
+    A flat edge gains all along the interval that it covers within the row. Level ones are left to `_add_level_edges`.
     """
     who, piece, y, side, at, ox = edge
     if piece >= 2 and _is_level(tangents[who, piece - 2]):
         return
     cut, weight, split = border
-    sign, contrast = pull
-    x0, x1, t, by_y, by_r = _motion(discs, tangents, who, piece, y, 2.0 * side - 1.0)
+    sign, contrast = gain
+    x0, x1, t, by_y, by_r = _edge_derivative(discs, tangents, who, piece, y, 2.0 * side - 1.0)
     last = np.float32(len(map_0) - 2.0)
     left = min(max(np.float32(min(x0, x1)) - ox, np.float32(0)), last)
     right = min(max(np.float32(max(x0, x1)) - ox, np.float32(0)), last)
     if right - left > 1:
-        inside = read_mixed(map_0, map_1, right, cut, weight, split) - read_mixed(
+        inside = border_sum_at(map_0, map_1, right, cut, weight, split) - border_sum_at(
             map_0, map_1, left, cut, weight, split
         )
         value = sign * inside / (right - left)
     else:
-        value = sign * map_at(map_0, map_1, at, cut, weight, split)
-    _add(1.0, by_y, by_r, t, value, contrast / np.sqrt(1 + by_y * by_y), gradient[who], curvature[who])
+        value = sign * border_value_at(map_0, map_1, at, cut, weight, split)
+    _accumulate(1.0, by_y, by_r, t, value, contrast / np.sqrt(1 + by_y * by_y), gradient[who], curvature[who])
 
 
 @njit(**INLINE)
-def _add(by_x, by_y, by_r, t, value, facing, gradient, curvature):
-    """Add an edge that moves by_x, by_y, by_r times as x, y, radius: 1 - t of disc a, t of b; `value` is its gain."""
+def _accumulate(by_x, by_y, by_r, t, value, facing, gradient, curvature):
+    """Add an edge with derivatives by_x, by_y, by_r by x, y, radius: 1 - t of disc a, t of b; `value`: its gain."""
     of_a, of_b, by = 1 - t, t, (by_x, by_y, by_r)
     if of_a > 0:
         for p in range(3):
@@ -184,16 +183,16 @@ def _add(by_x, by_y, by_r, t, value, facing, gradient, curvature):
 
 @njit(**INLINE)
 def _is_level(tangent):
-    """Say whether a tangent runs across rather than down; False where there is none."""
-    return abs(tangent[6] - tangent[0]) > _LEVEL * abs(tangent[2] - tangent[1])
+    """Return whether a tangent runs across rather than down; False where there is none."""
+    return abs(tangent[6] - tangent[0]) > _LEVEL_RATIO * abs(tangent[2] - tangent[1])
 
 
 @njit(**EXACT)
-def _go_along_level(discs, share, tangents, kinds, sums, contrast, nearer, origin, out, gradient, curvature):
-    """Make the sums along the level tangents of a capsule exact, column by column, and add what these gain in moving.
+def _add_level_edges(discs, share, tangents, classes, sums, contrast, nearer, origin, out, gradient, curvature):
+    """Correct the sums along a capsule's level tangents column by column, and add their derivatives.
 
-    Rows meet such an edge once or not at all, and count whole: its sum would be a staircase. What it gains in moving
-    out is the map there, less that of what lies behind; where a nearer capsule lies over it, it gains nothing.
+    Rows meet such an edge once or not at all, and count whole: its sum would be a staircase. Its derivative outward is
+    the map there, less that of what lies behind; where a nearer capsule covers it, it is 0.
     """
     order, i, first, last, x = nearer
     _, h, w = sums.shape
@@ -212,32 +211,32 @@ def _go_along_level(discs, share, tangents, kinds, sums, contrast, nearer, origi
                 t, step = t_0 + (s + 0.5) / n * (t_1 - t_0), abs((t_1 - t_0) * (bx - ax)) / n
                 u, height = ax + t * (bx - ax), ay + t * (by - ay)
                 column, y, row = u - origin[0], height + origin[1], int(np.floor(height + 0.5))
-                if not 0 <= column < w - 2 or _is_hidden(nearer, u, row):
+                if not 0 <= column < w - 2 or _is_occluded(nearer, u, row):
                     continue
                 rows_end = np.floor(height) + 0.5 if ny > 0 else np.ceil(height) - 0.5
                 missed = step * outward * (height - rows_end)  # of the area
                 half = part_at(discs[i], share[i], u, y)
-                value, facing = value_between(sums[kinds[i, half]], column, height, above), contrast[kinds[i, half]]
+                value, facing = value_between(sums[classes[i, half]], column, height, above), contrast[classes[i, half]]
                 out[i, half, 0] += missed * value
                 out[i, half, 1] += missed
                 is_behind = False
                 for j in order:
                     if is_behind and first[j] <= row < last[j] and x[j, 0, row] <= u <= x[j, 1, row]:
                         half = part_at(discs[j], share[j], u, y)
-                        lost = value_between(sums[kinds[j, half]], column, height, above)
+                        lost = value_between(sums[classes[j, half]], column, height, above)
                         out[j, half, 0] -= missed * lost
                         out[j, half, 1] -= missed
-                        value, facing = value - lost, facing + contrast[kinds[j, half]]
+                        value, facing = value - lost, facing + contrast[classes[j, half]]
                         break
                     is_behind = is_behind or j == i
                 if i < len(gradient):
                     facing *= step / np.sqrt(1 + m * m)
-                    _add(-m, 1.0, 1 / ny, t, outward * step * value, facing, gradient[i], curvature[i])
+                    _accumulate(-m, 1.0, 1 / ny, t, outward * step * value, facing, gradient[i], curvature[i])
 
 
 @njit(**EXACT)
-def _is_hidden(nearer, u, row):
-    """Say whether a nearer capsule lies over a place of a row."""
+def _is_occluded(nearer, u, row):
+    """Return whether a nearer capsule covers a point of a row."""
     order, i, first, last, x = nearer
     for j in order:
         if j == i:
@@ -248,8 +247,8 @@ def _is_hidden(nearer, u, row):
 
 
 @njit(**EXACT)
-def _pull_border(disc, share, maps, contrast, nearer, origin, gradient, curvature):
-    """Add what a border across a capsule gains when it moves along the axis."""
+def _add_border(disc, share, maps, contrast, nearer, origin, gradient, curvature):
+    """Add the derivatives of the border across a capsule as it moves along the axis."""
     ux, uy = disc[1, 0] - disc[0, 0], disc[1, 1] - disc[0, 1]
     length = np.sqrt(ux * ux + uy * uy)
     if length < 1 or not 0 < share < 1:
@@ -263,7 +262,7 @@ def _pull_border(disc, share, maps, contrast, nearer, origin, gradient, curvatur
     for i in range(_BORDER_SAMPLES):
         offset = radius * ((2 * i + 1) / _BORDER_SAMPLES - 1)
         x, row = cx - offset * uy, int(np.floor(cy + offset * ux + 0.5))
-        if not (0 <= row < h and 0 <= x < w - 2) or _is_hidden(nearer, x + origin[0], row):
+        if not (0 <= row < h and 0 <= x < w - 2) or _is_occluded(nearer, x + origin[0], row):
             continue
         value = (value_at(maps[0][row], x) - value_at(maps[1][row], x)) * step
         along = (ux * (1 - share), uy * (1 - share), 0.0, ux * share, uy * share, 0.0, length)

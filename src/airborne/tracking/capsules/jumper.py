@@ -11,24 +11,21 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from airborne.body.legs import LEG_POINTS
-
-Array = NDArray[np.floating]
 
 N_DOF = 18
 JOINTS = (*LEG_POINTS, "foot_left", "foot_right", "torso")
 SHIRT, SHORTS, SKIN, SOCK, SHOE = range(5)
-KINDS = ("shirt", "shorts", "skin", "socks", "shoes")
+SURFACE_CLASSES = ("shirt", "shorts", "skin", "socks", "shoes")
 # columns of the lengths
 WAIST, SHORTS_END, SOCK_END, TRUNK, PELVIS, THIGH, SHANK, FOOT, SOLE = range(9)
 # columns of the radii
 R_CHEST, R_WAIST, R_HIP, R_KNEE, R_ANKLE, R_FOOT, CHEST_OUT, HIP_OUT = range(8)
-_HEEL = 0.35  # how far the heel reaches behind the ankle, over how far the ball lies before it
-BALL_HEIGHT_M = 0.03  # of the ball of the foot over the floor in standing
+_HEEL = 0.35  # heel behind the ankle, over the ball of the foot before it
+FOOT_HEIGHT_M = 0.03  # of the ball of the foot over the floor in standing
 _MEAN_REACH = np.pi / 4  # of a half disc below its middle, over its radius
-_TOE = 1.25  # how far the toes reach, likewise
+_TOE = 1.25  # toes before the ankle, likewise
 _ANYWHERE = (-np.inf, np.inf)
 _LEG_LIMITS_DEG = ((-125, 35), (-45, 25), (-40, 60), (0, 145), (-35, 50))  # hip x, y, z, knee, ankle, of the left leg
 LIMITS_RAD = np.radians(  # (18, 2) least and greatest; the right leg mirrors y and z
@@ -40,7 +37,7 @@ LIMITS_RAD = np.radians(  # (18, 2) least and greatest; the right leg mirrors y 
 _KERNEL: dict[str, Any] = {"nogil": True, "error_model": "numpy", "cache": True}
 
 
-# the two kinds and the leg (0 trunk, 1 left, 2 right) of each capsule
+# the two surface classes and the leg (0 trunk, 1 left, 2 right) of each capsule
 CAPSULES = np.array(
     [(SHIRT, SHIRT, 0), (SHIRT, SHIRT, 0), (SHORTS, SHIRT, 0), (SHORTS, SHIRT, 0)]
     + [(a, b, leg) for leg in (1, 2) for a, b in ((SHORTS, SKIN), (SKIN, SOCK), (SHOE, SHOE))],
@@ -49,8 +46,8 @@ CAPSULES = np.array(
 
 
 @njit(**_KERNEL)
-def _turn(R, axis, angle, out):
-    """Fill out (3, 3) with R times a turn about one of its axes."""
+def _rotate(R, axis, angle, out):
+    """Fill out (3, 3) with R times a rotation about one of its axes."""
     c, s = np.cos(angle), np.sin(angle)
     j, k = (axis + 1) % 3, (axis + 2) % 3
     for i in range(3):
@@ -60,19 +57,19 @@ def _turn(R, axis, angle, out):
 
 
 @njit(**_KERNEL)
-def place(pose, lengths, radii, points, ends, balls):
-    """Place a jumper: pose (18,), lengths (9,), radii (8,) [m].
+def pose_capsules(pose, lengths, radii, points, ends, end_radii):
+    """Pose a jumper: pose (18,), lengths (9,), radii (8,) [m].
 
     Fills points (9, 3), the JOINTS, and the capsules' ends (10, 2, 3) and radii (10, 2), all world [m].
     """
     R, Q = np.zeros((3, 3)), np.empty((3, 3))
     R[0, 0] = R[1, 1] = R[2, 2] = 1
-    _turn(R, 2, pose[3], Q)
-    _turn(Q, 1, pose[4], R)
+    _rotate(R, 2, pose[3], Q)
+    _rotate(Q, 1, pose[4], R)
     pelvis, trunk = np.empty((3, 3)), np.empty((3, 3))
-    _turn(R, 0, pose[5], pelvis)
-    _turn(pelvis, 0, pose[6], R)
-    _turn(R, 1, pose[7], trunk)
+    _rotate(R, 0, pose[5], pelvis)
+    _rotate(pelvis, 0, pose[6], R)
+    _rotate(R, 1, pose[7], trunk)
     for i in range(3):
         middle = pose[i]
         waist = middle + lengths[WAIST] * pelvis[i, 2]
@@ -86,20 +83,20 @@ def place(pose, lengths, radii, points, ends, balls):
             ends[2 + side, 0, i] = middle + sign * radii[HIP_OUT] * pelvis[i, 0]
             ends[2 + side, 1, i] = waist + sign * radii[HIP_OUT] * pelvis[i, 0]
     for side in range(2):
-        balls[side, 0], balls[side, 1] = radii[R_WAIST], radii[R_CHEST]
-        balls[2 + side, 0], balls[2 + side, 1] = radii[R_HIP], radii[R_WAIST]
-        _place_leg(pose, lengths, radii, side, pelvis, points, ends, balls)
+        end_radii[side, 0], end_radii[side, 1] = radii[R_WAIST], radii[R_CHEST]
+        end_radii[2 + side, 0], end_radii[2 + side, 1] = radii[R_HIP], radii[R_WAIST]
+        _pose_leg(pose, lengths, radii, side, pelvis, points, ends, end_radii)
 
 
 @njit(**_KERNEL)
-def _place_leg(pose, lengths, radii, side, pelvis, points, ends, balls):
+def _pose_leg(pose, lengths, radii, side, pelvis, points, ends, end_radii):
     first, c = 8 + 5 * side, 4 + 3 * side
     R, thigh, shank = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    _turn(pelvis, 0, pose[first], thigh)
-    _turn(thigh, 1, pose[first + 1], R)
-    _turn(R, 2, pose[first + 2], thigh)
-    _turn(thigh, 0, pose[first + 3], shank)
-    _turn(shank, 0, pose[first + 4], R)
+    _rotate(pelvis, 0, pose[first], thigh)
+    _rotate(thigh, 1, pose[first + 1], R)
+    _rotate(R, 2, pose[first + 2], thigh)
+    _rotate(thigh, 0, pose[first + 3], shank)
+    _rotate(shank, 0, pose[first + 4], R)
     for i in range(3):
         hip = points[side, i]
         knee = hip - lengths[THIGH] * thigh[i, 2]
@@ -108,20 +105,20 @@ def _place_leg(pose, lengths, radii, side, pelvis, points, ends, balls):
         points[2 + side, i], points[4 + side, i], points[6 + side, i] = knee, ankle, sole - lengths[FOOT] * R[i, 1]
         ends[c, 0, i], ends[c, 1, i] = hip, knee
         ends[c + 1, 0, i], ends[c + 1, 1, i] = knee, ankle
-        lift = (radii[R_FOOT] - BALL_HEIGHT_M) * R[i, 2]
+        lift = (radii[R_FOOT] - FOOT_HEIGHT_M) * R[i, 2]
         ends[c + 2, 0, i] = sole + _HEEL * lengths[FOOT] * R[i, 1] + lift
         ends[c + 2, 1, i] = sole - _TOE * lengths[FOOT] * R[i, 1] + lift
-    balls[c, 0], balls[c, 1] = radii[R_HIP], radii[R_KNEE]
-    balls[c + 1, 0], balls[c + 1, 1] = radii[R_KNEE], radii[R_ANKLE]
-    balls[c + 2, 0] = balls[c + 2, 1] = radii[R_FOOT]
+    end_radii[c, 0], end_radii[c, 1] = radii[R_HIP], radii[R_KNEE]
+    end_radii[c + 1, 0], end_radii[c + 1, 1] = radii[R_KNEE], radii[R_ANKLE]
+    end_radii[c + 2, 0] = end_radii[c + 2, 1] = radii[R_FOOT]
 
 
 @njit(**_KERNEL)
-def shares(lengths, radii, out):
-    """Fill out (10,) with how far along its axis the first kind of each capsule reaches.
+def border_shares(lengths, radii, out):
+    """Fill out (10,) with how far along its axis the first class of each capsule reaches.
 
-    Shorts reach up to where the round end of the trunk hangs down to on the mean: which of pelvis and trunk is nearer
-    to a camera, as it turns out in leaning over, then moves no border.
+    Shorts reach up to the mean lower end of the trunk's hemisphere: then the border does not move as pelvis or trunk
+    becomes the nearer one to a camera in leaning over.
     """
     out[:] = 1
     for side in range(2):

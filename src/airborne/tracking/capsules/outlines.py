@@ -1,6 +1,6 @@
-"""Tapered capsules in a picture: the hull of two balls is seen as the hull of two discs, a span in each row.
+"""Tapered capsules in an image: the hull of two spheres projects to the hull of two discs, a span in each row.
 
-Along its axis a capsule may change from one kind to another (shorts to skin), at a share of the axis.
+Along its axis a capsule may change from one surface class to another (shorts to skin), at a share of the axis.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from numba import njit
 
 from airborne.tracking.capsules.spans import EXACT, INLINE
 
-BEHIND = 1e9  # depth of what is not in front of the camera [m]
+BEHIND_M = 1e9  # depth of what is not in front of the camera [m]
 
 
 @njit(**EXACT)
@@ -22,7 +22,7 @@ def project(ends, radii, camera, discs, depth):
     """
     f = camera[3, 0]
     for i in range(len(ends)):
-        nearest, mean = BEHIND, 0.0
+        nearest, mean = BEHIND_M, 0.0
         for e in range(2):
             x, y, z = ends[i, e, 0], ends[i, e, 1], ends[i, e, 2]
             w = camera[2, 0] * x + camera[2, 1] * y + camera[2, 2] * z + camera[2, 3]
@@ -32,14 +32,14 @@ def project(ends, radii, camera, discs, depth):
             discs[i, e, 0] = (camera[0, 0] * x + camera[0, 1] * y + camera[0, 2] * z + camera[0, 3]) / w
             discs[i, e, 1] = (camera[1, 0] * x + camera[1, 1] * y + camera[1, 2] * z + camera[1, 3]) / w
             discs[i, e, 2] = f * radii[i, e] / w
-        depth[i] = mean if nearest > 0.1 else BEHIND
+        depth[i] = mean if nearest > 0.1 else BEHIND_M
 
 
 @njit(**EXACT)
 def outline(disc_a, disc_b, y_first, x, pieces, tangents):
     """Outline the hull of two discs (x, y, radius) [px] in rows at y_first, y_first + 1, ...
 
-    Fills x (2, rows), where it begins and ends in each row; pieces (2, rows), of what that end is: disc a (0), disc b
+    Fills x (2, rows), where it begins and ends in each row; pieces (2, rows), what that end lies on: disc a (0), disc b
     (1), or one of the common tangents (2, 3); and tangents (2, 7), NaN where there are none: where each touches disc a
     (x, y), y of disc b, its slope, its normal (x, y), x of disc b. Returns the first and one past the last row met.
     """
@@ -49,7 +49,7 @@ def outline(disc_a, disc_b, y_first, x, pieces, tangents):
     bottom = max(disc_a[1] + disc_a[2], disc_b[1] + disc_b[2])
     first = int(min(max(np.ceil(top - y_first), 0.0), n))
     last = int(min(max(np.floor(bottom - y_first) + 1, first), n))
-    x[0, first:last], x[1, first:last] = BEHIND, -BEHIND
+    x[0, first:last], x[1, first:last] = BEHIND_M, -BEHIND_M
     for k in range(2):
         disc = disc_a if k == 0 else disc_b
         start = int(min(max(np.ceil(disc[1] - disc[2] - y_first), first), last))
@@ -87,7 +87,7 @@ def outline(disc_a, disc_b, y_first, x, pieces, tangents):
 
 @njit(**INLINE)
 def border_in_row(disc, share, y, x_middle):
-    """Say where a row meets the border across a capsule, at a share of its axis: (x, weight, split).
+    """Return where a row meets the border across a capsule, at a share of its axis: (x, weight, split).
 
     split is 0 where the border lies along the row: then `weight` of the row belongs to the first map; else 1 where the
     first map lies left of x, -1 where it lies right.
@@ -105,23 +105,23 @@ def border_in_row(disc, share, y, x_middle):
 
 @njit(**INLINE)
 def part_at(disc, share, u, y):
-    """Say which of a capsule's two kinds lies at a place."""
+    """Return which of a capsule's two classes lies at a point."""
     ux, uy = disc[1, 0] - disc[0, 0], disc[1, 1] - disc[0, 1]
     cx, cy = disc[0, 0] + share * ux, disc[0, 1] + share * uy
     return 0 if share >= 1 or (u - cx) * ux + (y - cy) * uy < 0 else 1
 
 
 @njit(**EXACT)
-def labels(discs, depth, kinds, share, out):
-    """Fill out (h, w) with the kind of the nearest capsule at each pixel, -1 where there is none; see `evidence`."""
+def draw_labels(discs, depth, classes, share, out):
+    """Fill out (h, w) with the class of the nearest capsule at each pixel, -1 where none; see `capsule_evidence`."""
     h, w = out.shape
     out[:] = -1
     x, pieces, tangents = np.empty((2, h)), np.empty((2, h), np.int64), np.empty((2, 7))
     order = np.argsort(-depth)
     for i in order:
-        if depth[i] >= BEHIND:
+        if depth[i] >= BEHIND_M:
             continue
         first, last = outline(discs[i, 0], discs[i, 1], 0.0, x, pieces, tangents)
         for y in range(first, last):
             for u in range(max(int(np.ceil(x[0, y])), 0), min(int(np.floor(x[1, y])), w - 1) + 1):
-                out[y, u] = kinds[i, part_at(discs[i], share[i], u, y)]
+                out[y, u] = classes[i, part_at(discs[i], share[i], u, y)]

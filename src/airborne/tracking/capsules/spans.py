@@ -1,6 +1,6 @@
-"""Spans of rows over maps that are kept as running sums: the sum over a span costs two reads, however long it is.
+"""Spans of rows over maps stored as cumulative sums: the sum over a span costs two reads, however long it is.
 
-Where a row crosses from one map to another, `cut`, `weight` and `split` say how, as `capsules.border_in_row` does.
+Where a row crosses from one map to another, `cut`, `weight` and `split` say how, as `outlines.border_in_row` returns.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from numba import njit
 
 # no fast maths: sums keep their order, so that a run is the same to the last bit however the code was compiled
 EXACT: dict[str, Any] = {"nogil": True, "error_model": "numpy", "cache": True}
-INLINE: dict[str, Any] = {**EXACT, "inline": "always"}  # what is called for every span: handing arrays over costs more
+INLINE: dict[str, Any] = {**EXACT, "inline": "always"}  # for what is called for every span: passing arrays costs more
 
-MOST_SPANS = 64  # separate ones in one row
+MOST_SPANS = 64  # disjoint ones in one row
 
 
 @njit(**EXACT)
-def running_sums(maps, out):
+def cumulative_sums(maps, out):
     """Fill out (k, h, w + 1) with the sums of maps (k, h, w) over all pixels to the left of each pixel's left side."""
     k, h, w = maps.shape
     for c in range(k):
@@ -31,15 +31,15 @@ def running_sums(maps, out):
 
 
 @njit(**INLINE)
-def read(row, x):
-    """Read running sums between pixels: pixel i reaches from i - 0.5 to i + 0.5."""
+def sum_at(row, x):
+    """Interpolate cumulative sums between pixels: pixel i reaches from i - 0.5 to i + 0.5."""
     i = int(x + np.float32(0.5))
     return row[i] + (x + np.float32(0.5) - i) * (row[i + 1] - row[i])
 
 
 @njit(**INLINE)
 def value_at(row, x):
-    """Read the map itself from its running sums: linear between the pixels' middles."""
+    """Interpolate the map itself from its cumulative sums: linear between pixel centres."""
     i = int(x)
     f = x - i
     return (1 - f) * (row[i + 1] - row[i]) + f * (row[i + 2] - row[i + 1])
@@ -47,77 +47,77 @@ def value_at(row, x):
 
 @njit(**INLINE)
 def value_between(sums, x, y, above):
-    """Read a map between its rows, of which `above` is the upper one."""
+    """Interpolate a map between its rows, of which `above` is the upper one."""
     return (above + 1 - y) * value_at(sums[above], x) + (y - above) * value_at(sums[above + 1], x)
 
 
 @njit(**INLINE)
-def read_mixed(map_0, map_1, x, cut, weight, split):
-    """Read the running sums of the maps that hold left of x, up to a constant."""
+def border_sum_at(map_0, map_1, x, cut, weight, split):
+    """Interpolate the cumulative sums of the maps that apply left of x, up to a constant."""
     if split == 0:
-        return weight * read(map_0, x) + (1 - weight) * read(map_1, x)
+        return weight * sum_at(map_0, x) + (1 - weight) * sum_at(map_1, x)
     on_left, on_right = (map_0, map_1) if split > 0 else (map_1, map_0)
     middle = min(max(np.float32(cut), np.float32(0)), np.float32(len(map_0) - 2.0))
     if x <= middle:
-        return read(on_left, x)
-    return read(on_left, middle) + read(on_right, x) - read(on_right, middle)
+        return sum_at(on_left, x)
+    return sum_at(on_left, middle) + sum_at(on_right, x) - sum_at(on_right, middle)
 
 
 @njit(**INLINE)
-def map_at(map_0, map_1, edge, cut, weight, split):
-    """Read the map that holds at an edge of a span."""
+def border_value_at(map_0, map_1, edge, cut, weight, split):
+    """Interpolate the map that applies at an edge of a span."""
     if split == 0:
         return weight * value_at(map_0, edge) + (1 - weight) * value_at(map_1, edge)
     return value_at(map_0, edge) if (edge < cut) == (split > 0) else value_at(map_1, edge)
 
 
 @njit(**INLINE)
-def contrast_at(contrast, kind_0, kind_1, edge, border):
-    """Read the contrast of the map that holds at an edge of a span."""
+def contrast_at(contrast, class_0, class_1, edge, border):
+    """Return the contrast of the map that applies at an edge of a span."""
     cut, weight, split = border
     if split == 0:
-        return weight * contrast[kind_0] + (1 - weight) * contrast[kind_1]
-    return contrast[kind_0] if (edge < cut) == (split > 0) else contrast[kind_1]
+        return weight * contrast[class_0] + (1 - weight) * contrast[class_1]
+    return contrast[class_0] if (edge < cut) == (split > 0) else contrast[class_1]
 
 
 @njit(**INLINE)
 def add_span(map_0, map_1, at, end, cut, weight, split, out):
-    """Add the sums and the areas from `at` to `end` of a row of running sums to out (2, 2)."""
+    """Add the sums and the areas from `at` to `end` of a row of cumulative sums to out (2, 2)."""
     if split == 0:
         if weight > 0:
-            out[0, 0] += weight * (read(map_0, end) - read(map_0, at))
+            out[0, 0] += weight * (sum_at(map_0, end) - sum_at(map_0, at))
             out[0, 1] += weight * (end - at)
         if weight < 1:
-            out[1, 0] += (1 - weight) * (read(map_1, end) - read(map_1, at))
+            out[1, 0] += (1 - weight) * (sum_at(map_1, end) - sum_at(map_1, at))
             out[1, 1] += (1 - weight) * (end - at)
         return
     middle = min(max(np.float32(cut), at), end)
     i, j = (0, 1) if split > 0 else (1, 0)
     on_left, on_right = (map_0, map_1) if split > 0 else (map_1, map_0)
-    out[i, 0] += read(on_left, middle) - read(on_left, at)
+    out[i, 0] += sum_at(on_left, middle) - sum_at(on_left, at)
     out[i, 1] += middle - at
-    out[j, 0] += read(on_right, end) - read(on_right, middle)
+    out[j, 0] += sum_at(on_right, end) - sum_at(on_right, middle)
     out[j, 1] += end - middle
 
 
 @njit(**INLINE)
-def claim(taken_x, taken_by, taken, a, b, owner):
-    """Join a span to the ordered, separate ones taken so far, each end with its owner; return how many there are."""
-    left_by, right_by, kept = owner, owner, 0
+def merge_span(taken_x, taken_by, taken, a, b, owner):
+    """Merge a span into the ordered, disjoint ones taken so far, each end with its owner; return their number."""
+    left_by, right_by, n = owner, owner, 0
     for k in range(taken):
         if taken_x[k, 1] < a or taken_x[k, 0] > b:
-            taken_x[kept], taken_by[kept] = taken_x[k], taken_by[k]
-            kept += 1
+            taken_x[n], taken_by[n] = taken_x[k], taken_by[k]
+            n += 1
             continue
         if taken_x[k, 0] <= a:
             a, left_by = taken_x[k, 0], taken_by[k, 0]
         if taken_x[k, 1] >= b:
             b, right_by = taken_x[k, 1], taken_by[k, 1]
-    if kept == MOST_SPANS:
-        return kept
-    k = kept
+    if n == MOST_SPANS:
+        return n
+    k = n
     while k > 0 and taken_x[k - 1, 0] > a:
         taken_x[k], taken_by[k] = taken_x[k - 1], taken_by[k - 1]
         k -= 1
     taken_x[k, 0], taken_x[k, 1], taken_by[k, 0], taken_by[k, 1] = a, b, left_by, right_by
-    return kept + 1
+    return n + 1

@@ -1,4 +1,4 @@
-"""What a player's shirt, shorts, skin, socks and shoes look like, learned from a posed jumper and its background."""
+"""Colours of a player's shirt, shorts, skin, socks and shoes, learned from a posed jumper and its background."""
 
 from __future__ import annotations
 
@@ -9,34 +9,33 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.appearance.foreground import BINS, count_colours
-from airborne.appearance.surface_classes import ratio_table
+from airborne.appearance.foreground import BINS_PER_CHANNEL, count_colours
+from airborne.appearance.surface_classes import log_ratio_table
 from airborne.cameras import Camera
-from airborne.tracking.capsules.equations import N_CAPSULES, N_LENGTHS, N_POINTS, NOBODY, kinds_with, placed
-from airborne.tracking.capsules.jumper import KINDS, N_DOF, SHOE, SKIN, SOCK
-from airborne.tracking.capsules.outlines import labels, project
-from airborne.tracking.capsules.views import Region, Table, packed
+from airborne.tracking.capsules.equations import N_CAPSULES, N_LENGTHS, N_POINTS, NOBODY, classes_with, pose_state
+from airborne.tracking.capsules.jumper import N_DOF, SHOE, SKIN, SOCK, SURFACE_CLASSES
+from airborne.tracking.capsules.outlines import draw_labels, project
+from airborne.tracking.capsules.views import EvidenceTable, PlayerRegion, pack_camera
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-CORE, AROUND = 0.6, 1.25  # pixels under thinner capsules are the player's; outside thicker ones they are not
-LEAST_HIDDEN, MOST_HIDDEN = 0.05, 0.9
-_AT_EVEN = 0.5  # hidden where a kind's evidence is nothing; not at all where it is as usual
-_LEAST_USUAL = 0.3  # [nat]
-_IN_SIGHT = (0.1, 0.4)  # the most that a kind is hidden in the view that sees it best, and in the next
-_LEAST_PX = 20  # of a kind in a view to judge it by
+_CORE, _AROUND = 0.6, 1.25  # of the thickness: inside _CORE is the player, outside _AROUND the background
+_LEAST_OCCLUSION, _MOST_OCCLUSION = 0.05, 0.9
+_AT_EVEN = 0.5  # occlusion of a class whose evidence is 0; 0 where the evidence is as expected
+_LEAST_EXPECTED = 0.3  # [nat]
+_MOST_IN_BEST = (0.1, 0.4)  # upper bounds of a class's occlusion in the view that shows it best, and in the next
+_LEAST_PX = 20  # of a class in a view, to judge its occlusion
 _ROUNDS = 6
-BRIGHTNESS_SD = 0.10  # of the logarithm of sRGB values: about a fifth more or less light, as a surface turns
-_LIGHTNESS = np.linspace(-1.5, 1.5, 15)  # in these; so many that no bin between is left out
+BRIGHTNESS_SD = 0.10  # of the logarithm of sRGB values: about a fifth more or less light, as a surface rotates
+_LIGHTNESS = np.linspace(-1.5, 1.5, 15)  # in units of the sd; dense enough to reach every bin
 _LIGHTS, _LIGHT_WEIGHTS = np.exp(BRIGHTNESS_SD * _LIGHTNESS), np.exp(-(_LIGHTNESS**2) / 2)
 _THICKNESSES = slice(N_DOF + N_LENGTHS, N_DOF + N_LENGTHS + 6)  # the radii among a state
-RENEWED_S = 0.2  # how often socks and shoes are looked at anew: in the air they show other sides than on the floor
-_RENEWING, _AS_FIRST = 0.35, 0.5  # share that is new each time; of it, what they looked like at first
-_FREE = 0.3  # views in which they are hidden less teach
+COLOUR_UPDATE_S = 0.2  # period of relearning socks and shoes: in the air they show other sides than on the floor
+_UPDATE_RATE, _FIRST_WEIGHT = 0.35, 0.5  # of each update; in it, of the first frame's colours
+_MOST_OCCLUDED = 0.3  # in a view to learn from
 
 
-class Drawings(NamedTuple):
-    """Which kind each pixel of a region shows, -1 where none: (h, w), of thin, true and thick capsules."""
+class ClassImages(NamedTuple):
+    """The class of each pixel of a region, -1 where none: (h, w), of thin, true and thick capsules."""
 
     core: NDArray[np.int8]
     whole: NDArray[np.int8]
@@ -44,163 +43,170 @@ class Drawings(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Colours:
-    """Colour probabilities, 32 bins a channel, and how likely each camera's view of each kind is covered."""
+class SurfaceColours:
+    """Colour distributions, 32 bins a channel, and the probability of occlusion of each class in each camera."""
 
-    kinds: NDArray[np.float32]  # (5, 32, 32, 32)
+    distributions: NDArray[np.float32]  # (5, 32, 32, 32)
     first: NDArray[np.float32]  # (5, 32, 32, 32) as the first frame shows them
     background: NDArray[np.float32]  # (cameras, 32, 32, 32)
-    hidden: Array  # (cameras, 5)
+    occlusion: Array  # (cameras, 5)
 
-    def table(self, view: int, hidden: Array | None = None) -> Table:
-        """Return a camera's table of evidence, as it is or for another hidden (5,)."""
-        n = len(KINDS)
-        chosen: Array = self.hidden[view] if hidden is None else hidden
-        evidence = ratio_table(self.kinds, self.background[view], chosen)
-        usual = np.einsum("kc,ck->k", self.kinds.reshape(n, -1), evidence[:, :n])
-        return Table(chosen, evidence, usual, usual - self.background[view].ravel() @ evidence[:, :n])
+    def table(self, view: int, occlusion: Array | None = None) -> EvidenceTable:
+        """Return a camera's table of evidence, for its own or another occlusion (5,)."""
+        n = len(SURFACE_CLASSES)
+        assumed: Array = self.occlusion[view] if occlusion is None else occlusion
+        evidence = log_ratio_table(self.distributions, self.background[view], assumed)
+        expected = np.einsum("kc,ck->k", self.distributions.reshape(n, -1), evidence[:, :n])
+        return EvidenceTable(assumed, evidence, expected, expected - self.background[view].ravel() @ evidence[:, :n])
 
 
-def drawn(state: Array, camera: Camera, thickness: float, others: tuple[Array, Array] = NOBODY) -> NDArray[np.int8]:
-    """Draw which kind each pixel of a camera's picture shows: (h, w), -1 where none, 5 where one of the others is."""
+def class_image(
+    state: Array, camera: Camera, thickness: float, others: tuple[Array, Array] = NOBODY
+) -> NDArray[np.int8]:
+    """Draw the class of each pixel of a camera's image: (h, w), -1 where none, 5 where one of the others is."""
     state = state.copy()
     state[_THICKNESSES] *= thickness
-    other_ends, other_balls = others
+    other_ends, other_radii = others
     n = N_CAPSULES + len(other_ends)
-    ends, balls, share = np.empty((n, 2, 3)), np.empty((n, 2)), np.ones(n)
-    ends[N_CAPSULES:], balls[N_CAPSULES:] = other_ends, other_balls
+    ends, end_radii, share = np.empty((n, 2, 3)), np.empty((n, 2)), np.ones(n)
+    ends[N_CAPSULES:], end_radii[N_CAPSULES:] = other_ends, other_radii
     discs, depth = np.empty((n, 2, 3)), np.empty(n)
-    placed(state, np.empty((N_POINTS, 3)), ends, balls, share)
-    project(ends, balls, packed(camera), discs, depth)
+    pose_state(state, np.empty((N_POINTS, 3)), ends, end_radii, share)
+    project(ends, end_radii, pack_camera(camera), discs, depth)
     out = np.empty(camera.size[::-1], np.int8)
-    labels(discs, depth, kinds_with(others), share, out)
+    draw_labels(discs, depth, classes_with(others), share, out)
     return out
 
 
-def learned(
-    regions: Sequence[Region], drawings: Sequence[Drawings], n_cameras: int, used: NDArray[np.bool_]
-) -> Colours:
-    """Learn from one player, drawn in each region: used (cameras, 5) says which camera's view of which kind counts.
+def learn_colours(
+    regions: Sequence[PlayerRegion], images: Sequence[ClassImages], n_cameras: int, used: NDArray[np.bool_]
+) -> SurfaceColours:
+    """Learn from one player, drawn in each region: used (cameras, 5) masks which camera counts for which class.
 
-    A colour counts as it was seen and, less, brighter and darker: a surface turns in the light, and one frame shows
-    few of its pixels. What a kind's pixels share with the background, or with the kind above or below it on the body,
+    A colour also counts, with less weight, brighter and darker: a surface rotates in the light, and one frame shows few
+    of its pixels. A colour that a class shares with the background, or with the class above or below it on the body,
     goes to the one that has more of it.
     """
-    counts = np.zeros((len(KINDS), BINS, BINS, BINS), np.float32)
-    background = np.zeros((n_cameras, BINS, BINS, BINS), np.float32)
-    for region, (core, _, around) in zip(regions, drawings, strict=True):
+    counts = np.zeros((len(SURFACE_CLASSES), BINS_PER_CHANNEL, BINS_PER_CHANNEL, BINS_PER_CHANNEL), np.float32)
+    background = np.zeros((n_cameras, BINS_PER_CHANNEL, BINS_PER_CHANNEL, BINS_PER_CHANNEL), np.float32)
+    for region, (core, _, around) in zip(regions, images, strict=True):
         count_colours(region.rgb, around < 0, 1, background[region.view])
-        for kind in range(len(KINDS)):
-            if used[region.view, kind]:
-                count_colours(region.rgb, core == kind, 1, counts[kind])
+        for i in range(len(SURFACE_CLASSES)):
+            if used[region.view, i]:
+                count_colours(region.rgb, core == i, 1, counts[i])
     background /= np.maximum(background.sum(axis=(1, 2, 3), keepdims=True), 1)
-    raw = _normalised(_in_all_lights(counts).reshape(len(KINDS), -1))
+    raw = _normalise(_augment_brightness(counts).reshape(len(SURFACE_CLASSES), -1))
     around_all = background.sum(axis=0).ravel() / max(len(regions), 1)
-    kinds = _shared_out(raw, around_all).reshape(counts.shape).astype(np.float32)
-    return Colours(kinds, kinds, background, np.zeros((n_cameras, len(KINDS))))
+    distributions = _separate_classes(raw, around_all).reshape(counts.shape).astype(np.float32)
+    return SurfaceColours(distributions, distributions, background, np.zeros((n_cameras, len(SURFACE_CLASSES))))
 
 
-def renewed(colours: Colours, state: Array, regions: Sequence[Region], others: tuple[Array, Array]) -> Colours:
-    """Take in what socks and shoes look like now, in the views in which they are in sight.
+def update_colours(
+    colours: SurfaceColours, state: Array, regions: Sequence[PlayerRegion], others: tuple[Array, Array]
+) -> SurfaceColours:
+    """Update the colours of socks and shoes from the views in which they are visible.
 
-    state (35,) is where the player was found, others as `fit` takes them.
+    state (35,) is the player's estimate, others as in `fit_jumper`.
     """
-    counts = np.zeros((1 + SHOE - SKIN, BINS, BINS, BINS), np.float32)
+    counts = np.zeros((1 + SHOE - SKIN, BINS_PER_CHANNEL, BINS_PER_CHANNEL, BINS_PER_CHANNEL), np.float32)
     for region in regions:
-        core = drawn(state, region.full, CORE, others)
-        for kind, count in enumerate(counts, SKIN):
-            if colours.hidden[region.view, kind] < _FREE:
-                count_colours(region.rgb, core == kind, 1, count)
-    raw = _normalised(_in_all_lights(counts).reshape(len(counts), -1))
+        core = class_image(state, region.region_camera, _CORE, others)
+        for i, count in enumerate(counts, SKIN):
+            if colours.occlusion[region.view, i] < _MOST_OCCLUDED:
+                count_colours(region.rgb, core == i, 1, count)
+    raw = _normalise(_augment_brightness(counts).reshape(len(counts), -1))
     cells = np.flatnonzero(raw.any(axis=0))
-    new = _shared_out(raw[:, cells], colours.background.reshape(-1, raw.shape[1])[:, cells].mean(axis=0))
-    kinds = colours.kinds.copy()
-    for kind in (SOCK, SHOE):
-        if counts[kind - SKIN].sum() > _LEAST_PX:
-            target = _AS_FIRST * colours.first[kind].ravel()
-            target[cells] += (1 - _AS_FIRST) * new[kind - SKIN]
-            kinds[kind] += _RENEWING * (target.reshape(kinds[kind].shape) - kinds[kind])
-    return replace(colours, kinds=kinds)
+    new = _separate_classes(raw[:, cells], colours.background.reshape(-1, raw.shape[1])[:, cells].mean(axis=0))
+    distributions = colours.distributions.copy()
+    for i in (SOCK, SHOE):
+        if counts[i - SKIN].sum() > _LEAST_PX:
+            target = _FIRST_WEIGHT * colours.first[i].ravel()
+            target[cells] += (1 - _FIRST_WEIGHT) * new[i - SKIN]
+            distributions[i] += _UPDATE_RATE * (target.reshape(distributions[i].shape) - distributions[i])
+    return replace(colours, distributions=distributions)
 
 
-def _shared_out(raw: Array, around: Array) -> Array:
-    """Give what kinds (k, n) share with the background (n,), or with the kind beside them, to the one with more."""
-    kinds = raw
+def _separate_classes(raw: Array, around: Array) -> Array:
+    """Assign colours that classes (k, n) share with the background (n,), or with adjacent classes, to one of them."""
+    distributions = raw
     for _ in range(_ROUNDS):
-        beside = kinds + around + 1e-9
-        beside[1:] += kinds[:-1]
-        beside[:-1] += kinds[1:]
-        kinds = _normalised(raw * kinds / beside)
-    return kinds
+        competing = distributions + around + 1e-9
+        competing[1:] += distributions[:-1]
+        competing[:-1] += distributions[1:]
+        distributions = _normalise(raw * distributions / competing)
+    return distributions
 
 
-def seen_through(state: Array, regions: Sequence[Region], n_cameras: int, others: tuple[Array, Array]) -> Colours:
-    """Learn as `learned` does, from the views in which nothing stands before the player; say which these are.
+def learn_unoccluded(
+    state: Array, regions: Sequence[PlayerRegion], n_cameras: int, others: tuple[Array, Array]
+) -> SurfaceColours:
+    """Learn as `learn_colours` does, from the views in which the player is not occluded, and estimate the occlusion.
 
-    A view's kind is judged by the colours that the other views give it. others as `fit` takes them.
+    A class in one view is judged by its colours in the other views. others as in `fit_jumper`.
     """
-    used = np.zeros((n_cameras, len(KINDS)), bool)
+    used = np.zeros((n_cameras, len(SURFACE_CLASSES)), bool)
     used[[region.view for region in regions]] = True
-    hidden = np.full(used.shape, LEAST_HIDDEN)
-    drawings = [
-        Drawings(
-            core=drawn(state, region.full, CORE, others),
-            whole=drawn(state, region.full, 1.0, others),
-            around=drawn(state, region.full, AROUND),
+    occlusion = np.full(used.shape, _LEAST_OCCLUSION)
+    images = [
+        ClassImages(
+            core=class_image(state, region.region_camera, _CORE, others),
+            whole=class_image(state, region.region_camera, 1.0, others),
+            around=class_image(state, region.region_camera, _AROUND),
         )
         for region in regions
     ]
     if len(regions) > 2:
-        for region, drawing in zip(regions, drawings, strict=True):
+        for region, image in zip(regions, images, strict=True):
             elsewhere = used.copy()
             elsewhere[region.view] = False
-            colours = learned(regions, drawings, n_cameras, elsewhere)
-            hidden[region.view] = hidden_by(*_mean_evidence(drawing.whole, region, colours))
-        agreeing = used & (hidden < _AT_EVEN)
+            colours = learn_colours(regions, images, n_cameras, elsewhere)
+            occlusion[region.view] = occlusion_chance(*_mean_evidence(image.whole, region, colours))
+        agreeing = used & (occlusion < _AT_EVEN)
         used = np.where(agreeing.any(axis=0), agreeing, used)
-    return replace(learned(regions, drawings, n_cameras, used), hidden=hidden)
+    return replace(learn_colours(regions, images, n_cameras, used), occlusion=occlusion)
 
 
-def hidden_by(evidence: Array, usual: Array) -> Array:
-    """Return the chance to be covered, of kinds whose pixels have this mean evidence; NaN: as if it were 0 [nat].
+def occlusion_chance(evidence: Array, expected: Array) -> Array:
+    """Return the probability of occlusion of classes whose pixels have this mean evidence [nat]; NaN counts as 0.
 
-    `usual` is what they have when nothing covers them.
+    `expected` is their evidence without occlusion.
     """
-    share = np.nan_to_num(evidence) / np.maximum(usual, _LEAST_USUAL)
-    return np.clip(_AT_EVEN * (1 - share), LEAST_HIDDEN, MOST_HIDDEN)
+    share = np.nan_to_num(evidence) / np.maximum(expected, _LEAST_EXPECTED)
+    return np.clip(_AT_EVEN * (1 - share), _LEAST_OCCLUSION, _MOST_OCCLUSION)
 
 
-def not_everywhere(hidden: Array, views: Sequence[int]) -> Array:
-    """Return hidden (cameras, 5) with each kind in sight of two views: where all disagree, the pose is wrong."""
-    hidden = hidden.copy()
-    for kind in range(hidden.shape[1]):
-        best = np.argsort(hidden[views, kind], kind="stable")[: len(_IN_SIGHT)]
-        for view, most in zip(np.array(views)[best], _IN_SIGHT, strict=False):
-            hidden[view, kind] = min(hidden[view, kind], most)
-    return hidden
+def limit_occlusion(occlusion: Array, views: Sequence[int]) -> Array:
+    """Return occlusion (cameras, 5) with each class visible in two views: if all disagree, the pose is wrong."""
+    occlusion = occlusion.copy()
+    for i in range(occlusion.shape[1]):
+        best = np.argsort(occlusion[views, i], kind="stable")[: len(_MOST_IN_BEST)]
+        for view, most in zip(np.array(views)[best], _MOST_IN_BEST, strict=False):
+            occlusion[view, i] = min(occlusion[view, i], most)
+    return occlusion
 
 
-def _mean_evidence(part: NDArray[np.int8], region: Region, colours: Colours) -> tuple[Array, Array]:
-    """Return the mean evidence of each kind's pixels in a region (5,) [nat], NaN where too few are drawn; and usual."""
-    table = colours.table(region.view, np.full(len(KINDS), LEAST_HIDDEN))
+def _mean_evidence(part: NDArray[np.int8], region: PlayerRegion, colours: SurfaceColours) -> tuple[Array, Array]:
+    """Return the mean evidence of each class's pixels in a region (5,) [nat], NaN for too few; and the expected one."""
+    table = colours.table(region.view, np.full(len(SURFACE_CLASSES), _LEAST_OCCLUSION))
     cells = region.rgb.astype(np.int64) >> 3
     cells = (cells[..., 0] << 10) | (cells[..., 1] << 5) | cells[..., 2]
-    found = np.full(len(KINDS), np.nan)
-    for kind in range(len(KINDS)):
-        chosen = part == kind
-        if np.count_nonzero(chosen) > _LEAST_PX:
-            found[kind] = table.evidence[cells[chosen], kind].mean()
-    return found, table.usual
+    mean_evidence = np.full(len(SURFACE_CLASSES), np.nan)
+    for i in range(len(SURFACE_CLASSES)):
+        mask = part == i
+        if np.count_nonzero(mask) > _LEAST_PX:
+            mean_evidence[i] = table.evidence[cells[mask], i].mean()
+    return mean_evidence, table.expected
 
 
-def _in_all_lights(counts: NDArray[np.float32]) -> Array:
-    """Spread counts (k, 32, 32, 32) of colours over what they are in more and in less light."""
-    kind, *cell = np.nonzero(counts)
-    lit = np.minimum(_LIGHTS[:, None, None] * (np.array(cell) + 0.5), BINS - 1).astype(int)  # (lights, 3, n)
-    to = np.ravel_multi_index((np.broadcast_to(kind, lit[:, 0].shape), *np.moveaxis(lit, 1, 0)), counts.shape)
-    weights = _LIGHT_WEIGHTS[:, None] * counts[kind, *cell]
+def _augment_brightness(counts: NDArray[np.float32]) -> Array:
+    """Spread colour counts (k, 32, 32, 32) over the same colours in more and in less light."""
+    i, *cell = np.nonzero(counts)
+    lit = np.minimum(_LIGHTS[:, None, None] * (np.array(cell) + 0.5), BINS_PER_CHANNEL - 1)  # (lights, 3, n)
+    lit = lit.astype(int)
+    to = np.ravel_multi_index((np.broadcast_to(i, lit[:, 0].shape), *np.moveaxis(lit, 1, 0)), counts.shape)
+    weights = _LIGHT_WEIGHTS[:, None] * counts[i, *cell]
     return np.asarray(np.bincount(to.ravel(), weights.ravel(), counts.size), float).reshape(counts.shape)
 
 
-def _normalised(counts: Array) -> Array:
+def _normalise(counts: Array) -> Array:
     return counts / np.maximum(counts.sum(axis=1, keepdims=True), 1e-9)

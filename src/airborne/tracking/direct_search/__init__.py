@@ -1,1 +1,1 @@
-"""Trackers that only ask for a score: paper B's stepping, and the simplex."""
+"""Trackers that only evaluate a score: paper B's stepping, and the simplex."""

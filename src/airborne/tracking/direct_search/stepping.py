@@ -1,6 +1,6 @@
 """Paper B's downhill stepping: one variable at a time, in loops of shrinking steps, ended by the V rule.
 
-Works on any score (n, d) -> (n,); knows no body and no picture.
+A coordinate descent on any score (n, d) -> (n,); knows no body and no image.
 """
 
 from __future__ import annotations
@@ -9,23 +9,23 @@ from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
-Score = Callable[[Array], Array]
+from airborne.types import Array
+
+Objective = Callable[[Array], Array]  # (n, d) -> (n,)
 VRule = Literal["v_literal", "v_sym"]
 
-_MOST_STEPS = 40  # in one direction; a score that falls for ever has lost the body
+_MOST_STEPS = 40  # in one direction; a score that never rises has lost the body
 
 
-def stepping(
-    score: Score, start: Array, loops: Sequence[Array], *, v_rule: VRule, order: Sequence[int] | None = None
+def minimise_by_stepping(
+    score: Objective, start: Array, loops: Sequence[Array], *, v_rule: VRule, order: Sequence[int] | None = None
 ) -> tuple[Array, int]:
     """Minimise from start (d,), one loop over the variables for each row of steps (d,); return (best, evaluations).
 
     Paper B, "Method": a variable is stepped downhill until the score has risen twice in a row, then set by the V rule.
     Downhill is toward the lower neighbour. `order` is that of the variables in a loop, which the paper does not print;
-    without, as they stand.
+    by default they come in their own order.
     """
     x, evaluations = np.array(start, float), 0
     for steps in loops:
@@ -35,7 +35,7 @@ def stepping(
                 continue
             line = _Line(score, x, variable, step)
             x[variable] += step * _minimum_on_line(line, v_rule)
-            evaluations += len(line.known)
+            evaluations += len(line.values)
     return x, evaluations
 
 
@@ -54,16 +54,16 @@ def v_literal(before: float, lowest: float, after: float, last: float) -> float:
 class _Line:
     """The score along one variable, at whole numbers of steps; nothing is evaluated twice."""
 
-    def __init__(self, score: Score, x: Array, variable: int, step: float) -> None:
+    def __init__(self, score: Objective, x: Array, variable: int, step: float) -> None:
         self._score, self._x, self._variable, self._step = score, x, variable, step
-        self.known: dict[int, float] = {}
+        self.values: dict[int, float] = {}
 
     def __call__(self, k: int) -> float:
-        if k not in self.known:
+        if k not in self.values:
             x = self._x.copy()
             x[self._variable] += k * self._step
-            self.known[k] = float(self._score(x[None])[0])
-        return self.known[k]
+            self.values[k] = float(self._score(x[None])[0])
+        return self.values[k]
 
 
 def _minimum_on_line(line: _Line, v_rule: VRule) -> float:

@@ -1,4 +1,4 @@
-"""Trackers that only ask for a score: `stepping` (paper B's own search) and `simplex` (paper B's suggestion).
+"""Trackers that only evaluate a score: `stepping` (paper B's own search) and `simplex` (paper B's suggestion).
 
 A pose is a vector of six numbers: x, y, z [m], somersault, tilt, twist [rad]; joints stay as they are at the start.
 """
@@ -11,38 +11,35 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.appearance.model import Appearance
-from airborne.body import BodyModel, Pose, PosedBody, geometry
+from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
 from airborne.cameras import Camera
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
-from airborne.rendering import FLAT, Lights, ScoreRule, Targets, measure, render, score, targets
-from airborne.rendering.packing import moved_view
+from airborne.rendering import FLAT, Lights, ScoreRule, Targets, colour_sums, pack_targets, render, score
+from airborne.rendering.packing import shift_view
 from airborne.rendering.sums import PIXELS
 from airborne.tracking.covariance import SHIFT_SD_PX, covariance_of
-from airborne.tracking.direct_search.stepping import VRule, stepping
-from airborne.tracking.estimate import Estimate, Status, lost
-from airborne.tracking.image_regions import regions_round
+from airborne.tracking.direct_search.stepping import Objective, VRule, minimise_by_stepping
+from airborne.tracking.estimate import Estimate, Status, lost_estimate
+from airborne.tracking.image_regions import crop_regions
+from airborne.types import Array
 from airborne.video import Frames
-
-Array = NDArray[np.floating]
-Objective = Callable[[Array], Array]  # (n, 6) -> (n,)
 
 
 class Search(NamedTuple):
-    """A way to minimise, and how far from the minimum it may stop."""
+    """A minimiser, and how far from the minimum it may stop."""
 
     run: Callable[[Objective, Array], Array]  # objective, start (6,) -> best (6,)
     resolution: Array  # (6,) standard deviations [m, rad]
 
 
 _UNCERTAIN_RATIO, _LOST_RATIO = 1.6, 2.5  # of a frame's score to the median of those tracked
-_REMEMBERED, _REMEMBERED_SCORES = 2, 25
-_PROBE = np.array([0.004] * 3 + [0.012] * 3)  # [m], [rad]: the differences that give the curvature
-_SHARED_NOISE_PX = 8  # this many pixels have one pixel's worth of independent noise: compression, interpolated rows
+_HISTORY, _SCORE_HISTORY = 2, 25
+_PROBE = np.array([0.004] * 3 + [0.012] * 3)  # [m], [rad]: steps of the finite differences
+_SHARED_NOISE_PX = 8  # this many pixels share one pixel's independent noise: compression, interpolated rows
 _MARGIN_PX = 40
 _V_RULE_SD = 0.2  # of the last step: the RMS error of the V rule as printed
 
@@ -50,13 +47,13 @@ _V_RULE_SD = 0.2  # of the last step: the RMS error of the V rule as printed
 def stepping_search(loops: Sequence[Array], v_rule: VRule, order: Sequence[int] | None = None) -> Search:
     """Search by paper B's stepping; loops: steps (6,) [m, rad] for each loop; order: of the variables in a loop."""
     return Search(
-        lambda objective, start: stepping(objective, start, loops, v_rule=v_rule, order=order)[0],
+        lambda objective, start: minimise_by_stepping(objective, start, loops, v_rule=v_rule, order=order)[0],
         _V_RULE_SD * np.asarray(loops[-1]),
     )
 
 
 def simplex_search(size: Array) -> Search:
-    """Search by Nelder and Mead's simplex, all variables at once, started `size` (6,) [m, rad] wide, and once more."""
+    """Search by Nelder and Mead's simplex of first edges `size` (6,) [m, rad], then once more from a smaller one."""
 
     def run(objective: Objective, start: Array) -> Array:
         best = start
@@ -78,7 +75,7 @@ class DirectState:
     appearance: Appearance = field(default_factory=Appearance)
 
 
-class Direct:
+class DirectTracker:
     """Track by minimising a colour difference inside the mask, from a prediction, with any search.
 
     With `notices_loss` False, as in paper B, a frame counts as tracked whatever its score, and the next starts from it.
@@ -89,14 +86,14 @@ class Direct:
         model: BodyModel,
         start: Pose,
         search: Search,
+        *,
         rule: ScoreRule,
         lights: Lights,
-        *,
         scale: int,
         predict: Callable,
         notices_loss: bool = True,
     ) -> None:
-        self._model, self._geometry = model, geometry(model)
+        self._model, self._geometry = model, surface_arrays(model)
         self._start, self._search, self._rule, self._lights = start, search, rule, lights
         self._scale, self._predict, self._notices_loss = scale, predict, notices_loss
         self._at_origin = model.with_pose(replace(start, world_from_root=RigidTransform.identity()))
@@ -106,19 +103,19 @@ class Direct:
         return DirectState()
 
     def search(self, state: DirectState, frames: Frames) -> Estimate:
-        """Find the body in the frames."""
+        """Find the body in the frames, without learning from them."""
         start = self._predict(state.past, frames.time_s) if state.past else self._start
-        seen, cameras = self._targets(state, start, frames)
-        if not len(seen.views) or not np.isfinite(self._objective(seen)(_vector(start)[None])[0]):
-            return lost(frames.index, frames.time_s)
-        objective = self._objective(seen)
+        observed, cameras = self._targets(state, start, frames)
+        if not len(observed.views) or not np.isfinite(self._objective(observed)(_vector(start)[None])[0]):
+            return lost_estimate(frames.index, frames.time_s)
+        objective = self._objective(observed)
         best = self._search.run(objective, _vector(start))
         value = float(objective(best[None])[0])
-        sums = measure(self._geometry, seen, *self._placed(best[None]), with_chroma=False)
+        sums = colour_sums(self._geometry, observed, *self._pose_segments(best[None]), with_chroma=False)
         pixels = sums[0, :, PIXELS]
         status = _status(value, state.scores if self._notices_loss else ())
         if status is Status.LOST:
-            return lost(frames.index, frames.time_s)
+            return lost_estimate(frames.index, frames.time_s)
         pose = _pose(best, self._start)
         return Estimate(
             index=frames.index,
@@ -126,56 +123,58 @@ class Direct:
             status=status,
             score=value,
             pose=pose,
-            covariance=self._covariance(seen, cameras, pose, value, float(pixels.sum())),
+            covariance=self._covariance(observed, cameras, pose, value=value, pixels=float(pixels.sum())),
             n_views=int(np.count_nonzero(pixels)),
         )
 
     def learn(self, state: DirectState, frames: Frames, estimate: Estimate) -> DirectState:
-        """Return the state after the frames, given where the body was found."""
+        """Return the state after the frames, given their estimate."""
         if estimate.pose is None:
             return state
         if self._rule.counts_missed and estimate.status is Status.TRACKED:
             self._learn_colours(state.appearance, estimate.pose, frames)
-        past = (*state.past, (frames.time_s, estimate.pose))[-_REMEMBERED:]
+        past = (*state.past, (frames.time_s, estimate.pose))[-_HISTORY:]
         scores = state.scores
         if estimate.status is Status.TRACKED:
-            scores = (*scores, estimate.score)[-_REMEMBERED_SCORES:]
+            scores = (*scores, estimate.score)[-_SCORE_HISTORY:]
         return DirectState(past, scores, state.appearance)
 
-    def _objective(self, seen: Targets) -> Objective:
-        return lambda vectors: score(self._geometry, seen, *self._placed(vectors), self._rule)
+    def _objective(self, observed: Targets) -> Objective:
+        return lambda vectors: score(self._geometry, observed, *self._pose_segments(vectors), rule=self._rule)
 
-    def _placed(self, vectors: Array) -> tuple[Array, Array]:
-        """Place the segments for vectors (n, 6): R (n, s, 3, 3), t (n, s, 3)."""
-        turns = matrix_from_angles(vectors[:, 3:])[:, None]
-        return turns @ self._at_origin.R, (turns @ self._at_origin.t[..., None])[..., 0] + vectors[:, None, :3]
+    def _pose_segments(self, vectors: Array) -> tuple[Array, Array]:
+        """Pose the segments by vectors (n, 6): R (n, s, 3, 3), t (n, s, 3)."""
+        rotations = matrix_from_angles(vectors[:, 3:])[:, None]
+        return rotations @ self._at_origin.R, (rotations @ self._at_origin.t[..., None])[..., 0] + vectors[:, None, :3]
 
     def _targets(self, state: DirectState, start: Pose, frames: Frames) -> tuple[Targets, list[Camera]]:
-        """Lay out the views to compare with; "union" needs those whose colours are known."""
+        """Pack the views to compare with; "union" uses those whose colours have been learned."""
         if not self._rule.counts_missed:
             views = [view for view in frames.views if view is not None]
-            return targets(views, self._lights, scale=self._scale), [view.camera for view in views]
+            return pack_targets(views, self._lights, scale=self._scale), [view.camera for view in views]
         appearance = state.appearance
         if not state.past:
             appearance = Appearance()
             self._learn_colours(appearance, start, frames)
-        regions = regions_round([self._model.with_pose(start)], self._geometry, frames, _MARGIN_PX)
-        known = {region.camera.name: region for region in regions if appearance.knows(region)}
-        views = [view for view in frames.views if view is not None and view.camera.name in known]
+        regions = crop_regions([self._model.with_pose(start)], self._geometry, frames, _MARGIN_PX)
+        region_of = {region.camera.name: region for region in regions if appearance.has_colours(region)}
+        views = [view for view in frames.views if view is not None and view.camera.name in region_of]
         maps = []
         for view in views:
-            region, whole = known[view.camera.name], np.full(view.rgb.shape[:2], -1, np.float32)
+            region, whole = region_of[view.camera.name], np.full(view.rgb.shape[:2], -1, np.float32)
             region.crop(whole)[:] = appearance.posterior(region) - 0.5
             maps.append(whole)
-        laid_out = targets(views, self._lights, scale=self._scale, evidence=maps or None)
-        return laid_out, [view.camera for view in views]
+        packed = pack_targets(views, self._lights, scale=self._scale, evidence=maps or None)
+        return packed, [view.camera for view in views]
 
     def _learn_colours(self, appearance: Appearance, pose: Pose, frames: Frames) -> None:
         posed = self._model.with_pose(pose)
-        for region in regions_round([posed], self._geometry, frames, _MARGIN_PX):
+        for region in crop_regions([posed], self._geometry, frames, _MARGIN_PX):
             appearance.learn_colours(region, render(self._geometry, posed, region.camera, FLAT).mask)
 
-    def _covariance(self, seen: Targets, cameras: Sequence[Camera], pose: Pose, value: float, pixels: float) -> Array:
+    def _covariance(
+        self, observed: Targets, cameras: Sequence[Camera], pose: Pose, *, value: float, pixels: float
+    ) -> Array:
         """Return the covariance of position and world rotation from the curvature of the squared score.
 
         n |r|^2 / (2 s^2) is the log-likelihood of n independent pixels; s^2 is the score's own square.
@@ -183,41 +182,43 @@ class Direct:
         posed = self._model.with_pose(pose)
         rows, columns = np.triu_indices(6)
         i, j = np.eye(6)[rows] * _PROBE, np.eye(6)[columns] * _PROBE
-        squared = self._squared(seen, posed, np.concatenate([i + j, i - j, j - i, -i - j])).reshape(4, -1)
-        gradient = self._gradient(seen, posed)
-        if not (np.isfinite(squared).all() and np.isfinite(gradient).all()):  # at the pictures' edge
-            return self._whole(np.diag(np.full(6, np.inf)))
+        squared = self._squared_scores(observed, posed, np.concatenate([i + j, i - j, j - i, -i - j])).reshape(4, -1)
+        gradient = self._gradient(observed, posed)
+        if not (np.isfinite(squared).all() and np.isfinite(gradient).all()):  # at the images' edge
+            return self._embed(np.diag(np.full(6, np.inf)))
         curvature = np.zeros((6, 6))
         second = (squared[0] - squared[1] - squared[2] + squared[3]) / (4 * _PROBE[rows] * _PROBE[columns])
         curvature[rows, columns] = curvature[columns, rows] = second
-        spread = np.zeros((6, 6))
+        score_covariance = np.zeros((6, 6))
         for number, camera in enumerate(cameras):
             sd_px = np.hypot(SHIFT_SD_PX, camera.shift_sd_px) / self._scale
             for x0, y0 in ((sd_px, 0), (0, sd_px)):
-                views = seen.views.copy()
-                views[number] = moved_view(views[number], x0, y0)
-                change = np.nan_to_num(self._gradient(replace(seen, views=views), posed) - gradient)
-                spread += np.outer(change, change)
+                views = observed.views.copy()
+                views[number] = shift_view(views[number], x0, y0)
+                change = np.nan_to_num(self._gradient(replace(observed, views=views), posed) - gradient)
+                score_covariance += np.outer(change, change)
         likelihood = pixels / (2 * max(value, 1e-3) ** 2)
         shared = max(_SHARED_NOISE_PX / self._scale**2, 1)
-        covariance = covariance_of(curvature * likelihood, noise=shared, spread=spread * likelihood**2)
-        return self._whole(covariance + np.diag(self._search.resolution**2))
+        covariance = covariance_of(
+            curvature * likelihood, noise=shared, score_covariance=score_covariance * likelihood**2
+        )
+        return self._embed(covariance + np.diag(self._search.resolution**2))
 
-    def _whole(self, covariance: Array) -> Array:
-        """Widen the covariance of the root (6, 6) by the joints, which do not move."""
+    def _embed(self, covariance: Array) -> Array:
+        """Embed the covariance of the root (6, 6) in that of all degrees of freedom; the joints do not move."""
         n_joints = len(self._model.segments) - 1
         return np.pad(covariance, (0, 3 * n_joints))
 
-    def _gradient(self, seen: Targets, posed: PosedBody) -> Array:
+    def _gradient(self, observed: Targets, posed: PosedBody) -> Array:
         steps = np.diag(_PROBE)
-        squared = self._squared(seen, posed, np.concatenate([steps, -steps])).reshape(2, 6)
+        squared = self._squared_scores(observed, posed, np.concatenate([steps, -steps])).reshape(2, 6)
         return (squared[0] - squared[1]) / (2 * _PROBE)
 
-    def _squared(self, seen: Targets, posed: PosedBody, motions: Array) -> Array:
-        """Return the squared score (n,) of a body moved by motions (n, 6)."""
-        moved = [posed.moved(motion) for motion in motions]
+    def _squared_scores(self, observed: Targets, posed: PosedBody, deltas: Array) -> Array:
+        """Return the squared score (n,) of a body moved by deltas (n, 6)."""
+        moved = [posed.move(delta) for delta in deltas]
         R, t = np.stack([p.R for p in moved]), np.stack([p.t for p in moved])
-        return score(self._geometry, seen, R, t, self._rule) ** 2
+        return score(self._geometry, observed, R, t, rule=self._rule) ** 2
 
 
 def _status(value: float, scores: Sequence[float]) -> Status:
@@ -228,8 +229,8 @@ def _status(value: float, scores: Sequence[float]) -> Status:
 
 
 def _vector(pose: Pose) -> Array:
-    place = pose.world_from_root
-    return np.concatenate([place.translation, angles_from_matrix(place.rotation.as_matrix())])
+    root = pose.world_from_root
+    return np.concatenate([root.translation, angles_from_matrix(root.rotation.as_matrix())])
 
 
 def _pose(vector: Array, start: Pose) -> Pose:

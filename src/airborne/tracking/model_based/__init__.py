@@ -1,1 +1,1 @@
-"""`refined` and its kin: the drawn body is compared with the pictures and moved by Gauss-Newton steps."""
+"""`refined`, `hierarchical`, `joint`: the rendered body is compared with the images and moved by Gauss-Newton steps."""

@@ -1,7 +1,7 @@
-"""Which of a body's degrees of freedom a fit may change, what is known of them beforehand, and one step of the fit.
+"""The degrees of freedom that a fit may change, their prior, and one step of the fit.
 
-A motion is a vector (6 + 3 joints,), see `body.chain`. The normal equations of the segments are mapped through the
-chain: H = sum J' A J, so that the pixels cost the same for 6 degrees of freedom as for 57.
+A delta is a vector (6 + 3 joints,), a small change of pose, see `body.chain`. The normal equations of the segments are
+mapped through the chain: H = sum J' A J, so that the pixels cost the same for 6 degrees of freedom as for 57.
 """
 
 from __future__ import annotations
@@ -12,60 +12,59 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose, PosedBody
-from airborne.body.chain import motion_between, moved_pose, segment_jacobians
-from airborne.geometry.joint_rotations import turned
+from airborne.body.chain import delta_between, move_pose, segment_jacobians
+from airborne.geometry.joint_rotations import compose_rotation_vectors
 from airborne.geometry.rotations import angles_from_world_rotation, matrix_from_angles
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-_LIMIT_SD_RAD = np.radians(0.5)  # how firmly a joint that has reached its limit is held there
-_ANYWHERE_SD = 1.5  # [m, rad]
-_DAMPING_SD_M, _DAMPING_SD_RAD = 0.5, 1.0  # keep what the pictures do not show where it is
+_LIMIT_SD_RAD = np.radians(0.5)  # sd with which a joint that has reached its limit is held there
+_WIDE_SD = 1.5  # [m, rad]
+_DAMPING_SD_M, _DAMPING_SD_RAD = 0.5, 1.0  # hold what the images do not show
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Prior:
-    """Where a pose is expected to be; and limited joints are near the zero pose, within half their range."""
+class PosePrior:
+    """A Gaussian about an expected pose; limited joints also have sds of half their range about the zero pose."""
 
     expected: Pose
     sd: Array  # (6 + 3 joints,) [m, rad]
 
-    def loosened(self, columns: NDArray[np.integer]) -> Prior:
-        """Return the prior that says little of some degrees of freedom."""
+    def widen(self, columns: NDArray[np.integer]) -> PosePrior:
+        """Return the prior with a wide sd for some degrees of freedom."""
         sd = self.sd.copy()
-        sd[columns] = _ANYWHERE_SD
+        sd[columns] = _WIDE_SD
         return replace(self, sd=sd)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Freedom:
+class DegreesOfFreedom:
     """The degrees of freedom that a fit may change."""
 
     model: BodyModel
-    columns: NDArray[np.int64]  # (d,) indices into a motion
+    columns: NDArray[np.int64]  # (d,) indices into a delta
 
     @property
     def _damping(self) -> Array:
-        """Inverse variances (d,) of a step, that hold back what the pictures do not show."""
+        """Inverse variances (d,) of a step, that hold what the images do not show."""
         return 1 / np.where(self.columns < 3, _DAMPING_SD_M, _DAMPING_SD_RAD) ** 2
 
     def jacobian(self, posed: PosedBody, origin: Array) -> Array:
         """Return how the segments move, about `origin`, with these degrees of freedom: (segments, 6, d)."""
         return segment_jacobians(posed, origin)[..., self.columns]
 
-    def whole(self, motion: Array) -> Array:
-        """Return a motion (d,) as a whole one (6 + 3 joints,), which is zero elsewhere."""
+    def embed(self, delta: Array) -> Array:
+        """Return a delta (d,) as a whole one (6 + 3 joints,), which is zero elsewhere."""
         full = np.zeros(6 + 3 * (len(self.model.segments) - 1))
-        full[self.columns] = motion
+        full[self.columns] = delta
         return full
 
-    def moved(self, pose: Pose, motion: Array) -> Pose:
-        """Move a pose by (d,) [m, rad], no joint beyond its limits."""
-        moved = moved_pose(pose, self.whole(motion))
-        return within_limits(self.model, moved)
+    def update(self, pose: Pose, delta: Array) -> Pose:
+        """Move a pose by a delta (d,) [m, rad], no joint beyond its limits."""
+        moved = move_pose(pose, self.embed(delta))
+        return clamp_to_limits(self.model, moved)
 
-    def step(self, pose: Pose, H: Array, g: Array, prior: Prior | None = None) -> Array:
-        """Return the motion (d,) that solves H motion = g with the prior, joints held at their limits.
+    def solve_step(self, pose: Pose, H: Array, g: Array, prior: PosePrior | None = None) -> Array:
+        """Return the delta (d,) that solves H delta = g with the prior, joints held at their limits.
 
         H (d, d), g (d,) in units of the noise's variance.
         """
@@ -73,28 +72,28 @@ class Freedom:
         if prior is not None:
             precision = 1 / prior.sd[self.columns] ** 2
             H[np.diag_indices(len(g))] += precision
-            g -= precision * motion_between(prior.expected, pose)[self.columns]
-            rows, away = self.from_rest(pose)
+            g -= precision * delta_between(prior.expected, pose)[self.columns]
+            rows, away = self.rest_residuals(pose)
             H, g = H + rows.T @ rows, g - rows.T @ away
-        motion = np.linalg.solve(H, g)
+        delta = np.linalg.solve(H, g)
         for _ in range(3):
-            rows, targets = self._limits_met(pose, motion)
+            rows, targets = self._active_limits(pose, delta)
             if not len(rows):
-                return motion
+                return delta
             weight = 1 / _LIMIT_SD_RAD**2
             H, g = H + weight * rows.T @ rows, g + weight * rows.T @ targets
-            motion = np.linalg.solve(H, g)
-        return motion
+            delta = np.linalg.solve(H, g)
+        return delta
 
-    def prior_cost(self, pose: Pose, prior: Prior | None) -> float:
-        """Return half the squared distance to what is expected, in sds."""
+    def prior_cost(self, pose: Pose, prior: PosePrior | None) -> float:
+        """Return minus the log prior: half the squared distance to the expected pose, in sds."""
         if prior is None:
             return 0.0
-        away = motion_between(prior.expected, pose)[self.columns] / prior.sd[self.columns]
-        rest = self.from_rest(pose)[1]
+        away = delta_between(prior.expected, pose)[self.columns] / prior.sd[self.columns]
+        rest = self.rest_residuals(pose)[1]
         return 0.5 * float(away @ away + rest @ rest)
 
-    def from_rest(self, pose: Pose) -> tuple[Array, Array]:
+    def rest_residuals(self, pose: Pose) -> tuple[Array, Array]:
         """Return how far limited joint angles are from the zero pose, in sds: rows (k, d), values (k,)."""
         limits = self.model.limits_rad
         half = (limits[..., 1] - limits[..., 0]) / 2
@@ -109,13 +108,13 @@ class Freedom:
         away = pose.joint_angles - np.clip(0.0, limits[..., 0], limits[..., 1])
         return rows[:, self.columns], away[joints, axes] / sd
 
-    def _limits_met(self, pose: Pose, motion: Array) -> tuple[Array, Array]:
-        """Return rows (k, d) and targets (k,) [rad] of the joint angles that the motion would take past a limit."""
+    def _active_limits(self, pose: Pose, delta: Array) -> tuple[Array, Array]:
+        """Return rows (k, d) and targets (k,) [rad] of the joint angles that the delta would take past a limit."""
         limits = self.model.limits_rad
         nothing = np.zeros((0, len(self.columns))), np.zeros(0)
         if not np.isfinite(limits).any():
             return nothing
-        after = turned(pose.joint_angles, self.whole(motion)[6:].reshape(-1, 3))
+        after = compose_rotation_vectors(pose.joint_angles, self.embed(delta)[6:].reshape(-1, 3))
         bound = np.clip(after, limits[..., 0], limits[..., 1])
         joints, axes = np.nonzero(np.abs(after - bound) > 1e-6)
         if not len(joints):
@@ -125,33 +124,33 @@ class Freedom:
         for row, (joint, axis) in enumerate(zip(joints, axes, strict=True)):
             rows[row, 6 + 3 * joint : 9 + 3 * joint] = by_own_rotation[row, axis]
         targets = bound[joints, axes] - pose.joint_angles[joints, axes]
-        known = np.isfinite(rows).all(axis=1)
-        return rows[known][:, self.columns], targets[known]
+        is_regular = np.isfinite(rows).all(axis=1)
+        return rows[is_regular][:, self.columns], targets[is_regular]
 
 
-def within_limits(model: BodyModel, pose: Pose) -> Pose:
-    """Return the pose with every joint angle within its limits."""
+def clamp_to_limits(model: BodyModel, pose: Pose) -> Pose:
+    """Return the pose with every joint angle clamped to its limits."""
     if not pose.joint_angles.size:
         return pose
     return replace(pose, joint_angles=np.clip(pose.joint_angles, *np.moveaxis(model.limits_rad, -1, 0)))
 
 
-def root_only(model: BodyModel) -> Freedom:
+def root_only(model: BodyModel) -> DegreesOfFreedom:
     """Free the root: the body moves in one piece."""
-    return Freedom(model, np.arange(6))
+    return DegreesOfFreedom(model, np.arange(6))
 
 
-def all_joints(model: BodyModel) -> Freedom:
+def all_joints(model: BodyModel) -> DegreesOfFreedom:
     """Free everything."""
-    return Freedom(model, np.arange(6 + 3 * (len(model.segments) - 1)))
+    return DegreesOfFreedom(model, np.arange(6 + 3 * (len(model.segments) - 1)))
 
 
-def outward(model: BodyModel) -> list[Freedom]:
-    """Free the trunk first, then what hangs on it, then outward (paper B, "Discussion"): one `Freedom` a stage."""
+def proximal_to_distal(model: BodyModel) -> list[DegreesOfFreedom]:
+    """Free the trunk first, then what hangs on it, then distally (paper B, "Discussion"): one set a stage."""
     distance = _distance_from_trunk(model)
     columns = np.arange(6 + 3 * (len(model.segments) - 1))
     of_segment = np.concatenate([np.zeros(6, int), np.arange(1, len(model.segments)).repeat(3)])
-    return [Freedom(model, columns[distance[of_segment] <= stage]) for stage in range(distance.max() + 1)]
+    return [DegreesOfFreedom(model, columns[distance[of_segment] <= stage]) for stage in range(distance.max() + 1)]
 
 
 def limb_of_segment(model: BodyModel) -> NDArray[np.int64]:
@@ -162,13 +161,13 @@ def limb_of_segment(model: BodyModel) -> NDArray[np.int64]:
     return limb
 
 
-def only(model: BodyModel, segments: NDArray[np.integer]) -> Freedom:
+def joints_of(model: BodyModel, segments: NDArray[np.integer]) -> DegreesOfFreedom:
     """Free the joints of some segments."""
-    return Freedom(model, (3 + 3 * np.asarray(segments)[:, None] + np.arange(3)).ravel())
+    return DegreesOfFreedom(model, (3 + 3 * np.asarray(segments)[:, None] + np.arange(3)).ravel())
 
 
 def _distance_from_trunk(model: BodyModel) -> NDArray[np.int64]:
-    """Count the joints from each segment to the trunk: what several chains hang on, and all between: (segments,)."""
+    """Count the joints from each segment to the trunk, the segments that several chains hang on: (segments,)."""
     parents = model.parents
     is_trunk = np.bincount(parents[1:], minlength=len(parents)) > 1
     is_trunk[0] = True
@@ -182,5 +181,5 @@ def _distance_from_trunk(model: BodyModel) -> NDArray[np.int64]:
 
 
 def _angles_by_own_rotation(angles: Array) -> Array:
-    """Differentiate joint angles (n, 3) by a rotation vector in the segment's own axes: (n, 3, 3); NaN near +-90."""
+    """Differentiate joint angles (n, 3) by a rotation vector in the segment's own axes: (n, 3, 3); NaN near +-90°."""
     return angles_from_world_rotation(angles) @ matrix_from_angles(angles)

@@ -1,8 +1,8 @@
-"""Gauss-Newton by synthesis: the pose moves until its picture agrees with every camera's at once.
+"""Gauss-Newton by analysis-by-synthesis: the pose changes until its rendering agrees with the images of all cameras.
 
-Far out, the blurred mask is fitted to the blurred probability of each pixel to be body, on reduced pictures
-(`fit_silhouettes`). Close in, the composite of the lit body over the empty scene is fitted to the picture itself
-(`fit_pictures`), which is not pulled toward bright edges as any classification is.
+Far out, the blurred mask is fitted to the blurred probability of each pixel to be body, on reduced images
+(`fit_silhouettes`). Close in, the composite of the lit body over the background is fitted to the image itself
+(`fit_images`), which is not biased toward bright edges as any classification is.
 """
 
 from __future__ import annotations
@@ -11,64 +11,69 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.appearance.model import Appearance, Region
 from airborne.body import Pose, PosedBody
 from airborne.tracking.covariance import covariance_of
-from airborne.tracking.model_based.degrees_of_freedom import Freedom, Prior
+from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, PosePrior
 from airborne.tracking.model_based.normal_equations import (
     Sums,
+    add_score_covariance,
     gaussian_taps,
-    lit_equations,
-    mapped,
+    known_light_equations,
+    map_equations,
     new_blocks,
     photometric_equations,
     silhouette_equations,
-    spread_of,
 )
-from airborne.tracking.model_based.render_model import Laid, Synthesis, outlined, pictured, shifts_px
+from airborne.tracking.model_based.render_model import (
+    RenderModel,
+    ViewBuffers,
+    image_buffers,
+    shift_sds_px,
+    silhouette_buffers,
+)
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-Levels = Sequence[tuple[int, int]]
+PyramidLevels = Sequence[tuple[int, int]]
 
-# reduction of the picture, iterations
+# reduction of the image, iterations
 FAR, NEAR, CLOSE = ((8, 5), (4, 4), (2, 3)), ((4, 2), (2, 2)), ((2, 2),)
-_COARSE_SIGMA_PX = 1.2  # of the reduced picture
+_COARSE_SIGMA_PX = 1.2  # of the reduced image
 _FINE_SIGMA_PX = 1.2  # of a full frame
-_CLIP = 0.1  # linear light, 0..1: a residual this large counts a quarter
-_CLIP_LIT = 0.5  # the same in exact light, where no shadow or highlight has to be left out
-_CLIP_MASK = 0.5  # the same of a mask
-_OVERSTEP = 1.6  # robust weights and refitted light make each step about this much too short
+_CLIP = 0.1  # linear light, 0..1: a residual this large has a quarter of the weight
+_CLIP_LIT = 0.5  # the same under known lights, where no shadow or highlight has to be left out
+_CLIP_MASK = 0.5  # the same, of a mask
+_OVERSTEP = 1.6  # robust weights and the refitted light make each step too short by about this factor
 _MOST_STEPS = 12
-_MOST_STEPS_STIFF = 30  # of a body in one piece: its steps are cheap, and a far start may need them
-_SETTLED = 1 / 3  # squared length of the last step, in sds of the pose, for each degree of freedom
-SHAPE_SD_M = 0.007  # a person's segment is not quite where the ellipsoid that fits its picture is
+_MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
+_CONVERGED = 1 / 3  # squared length of the last step, in sds of the pose, for each degree of freedom
+SHAPE_SD_M = 0.007  # model error: how far a person's segment lies from the ellipsoid that fits its image
 _SHORTER = 0.4
-_SLACK = 1e-3  # of the objective: refitted light makes it waver
+_SLACK = 1e-3  # of the objective: the refitted light makes it fluctuate
 
 
 @dataclass(frozen=True, slots=True)
-class Evaluation:
+class PoseEquations:
     """The normal equations at one pose, mapped to the free degrees of freedom."""
 
     pose: Pose
     A: Array  # (d, d)
     g: Array  # (d,)
     J: Array  # (segments, 6, d)
-    patches: Sequence[Array]  # (n, segments, 6) gradients that vary together: of blocks, of shifted pictures
+    patches: Sequence[Array]  # (n, segments, 6) gradients that vary together: of blocks, of shifted images
     cost: float  # robust squared residual
     noise: float  # mean square of the weighted residual, times how many pixels share it
 
     def covariance(self) -> Array:
         """Return the covariance (d, d) of the free degrees of freedom."""
-        spread = np.zeros_like(self.A)
+        score_covariance = np.zeros_like(self.A)
         for each in self.patches:
-            spread_of(np.ascontiguousarray(each), self.J, spread)
-        return covariance_of(self.A, noise=self.noise, spread=spread)
+            add_score_covariance(np.ascontiguousarray(each), self.J, score_covariance)
+        return covariance_of(self.A, noise=self.noise, score_covariance=score_covariance)
 
     def objective(self, noise: float, prior_cost: float) -> float:
-        """Return minus the log-likelihood and the prior's, for a given variance of the noise."""
+        """Return minus the log-posterior, for a given variance of the noise."""
         return 0.5 * self.cost / noise + prior_cost
 
 
@@ -77,153 +82,187 @@ class Fit:
     """Where a fit ended."""
 
     pose: Pose
-    freedom: Freedom
-    evaluation: Evaluation  # before the last step
+    dofs: DegreesOfFreedom
+    equations: PoseEquations  # before the last step
     rms_light: float  # blurred residual, linear light 0..1
     steps: int
 
     @property
     def covariance(self) -> Array:
-        """Of position [m] and turns [rad], (6 + 3 joints,) squared; infinite where the pictures show nothing."""
-        covariance = self.evaluation.covariance()
-        whole = np.zeros((len(self.freedom.whole(covariance[0])),) * 2)
-        whole[np.ix_(self.freedom.columns, self.freedom.columns)] = covariance
+        """Of position [m] and rotation vectors [rad], (6 + 3 joints,) squared; infinite where unobserved."""
+        covariance = self.equations.covariance()
+        whole = np.zeros((len(self.dofs.embed(covariance[0])),) * 2)
+        whole[np.ix_(self.dofs.columns, self.dofs.columns)] = covariance
         return whole
 
 
 def fit_silhouettes(
-    synthesis: Synthesis,
+    render_model: RenderModel,
     pose: Pose,
     regions: Sequence[Region],
     posteriors: Sequence[Array],
-    levels: Levels,
-    freedom: Freedom,
-    prior: Prior | None = None,
+    *,
+    levels: PyramidLevels,
+    dofs: DegreesOfFreedom,
+    prior: PosePrior | None = None,
 ) -> Pose:
     """Move the body until its masks agree with the posteriors (h, w) of the regions, from coarse to fine."""
     taps = gaussian_taps(_COARSE_SIGMA_PX)
     correlated = 4 * np.pi * _COARSE_SIGMA_PX**2
     for reduction, steps in levels:
-        posed = synthesis.place(pose)
-        views = [outlined(synthesis, posed, *each, reduction) for each in zip(regions, posteriors, strict=True)]
-        views = [view for view in views if view.is_seen]
+        posed = render_model.with_pose(pose)
+        views = [
+            silhouette_buffers(render_model, posed, region, posterior=posterior, reduction=reduction)
+            for region, posterior in zip(regions, posteriors, strict=True)
+        ]
+        views = [view for view in views if view.is_visible]
 
-        def evaluate(pose: Pose, _: int, views: list[Laid] = views) -> Evaluation:
-            posed, n = synthesis.place(pose), len(synthesis.model.segments)
+        def evaluate(pose: Pose, _: int, views: list[ViewBuffers] = views) -> PoseEquations:
+            posed, n = render_model.with_pose(pose), len(render_model.model.segments)
             sums, totals, blocks = Sums.zero(n), np.zeros(3), []
             for view in views:
                 blocks.append(_blocks(view, n))
-                through = view.window, taps, taps, _CLIP_MASK
-                args = synthesis.body, _place(posed, view), view.seen, through, view.maps, sums, blocks[-1]
-                totals += np.array(silhouette_equations(*args))
-            return _mapped(synthesis, freedom, pose, posed, sums, blocks, [], totals, correlated)
+                comparison = view.window, taps, taps, _CLIP_MASK
+                args = render_model.body, _projection(posed, view), view.observation, comparison, view.maps
+                totals += np.array(silhouette_equations(*args, sums, blocks[-1]))
+            return _map_to_dofs(
+                render_model,
+                dofs,
+                pose,
+                posed,
+                sums=sums,
+                blocks=blocks,
+                shifted=[],
+                totals=totals,
+                correlated=correlated,
+            )
 
-        pose = _descend(evaluate, freedom, pose, prior, most_steps=steps, overstep=1.0).pose
+        pose = _descend(evaluate, dofs, pose, prior, most_steps=steps, overstep=1.0).pose
     return pose
 
 
-def fit_pictures(
-    synthesis: Synthesis,
+def fit_images(
+    render_model: RenderModel,
     poses: Sequence[Pose],
     regions: Sequence[Region],
     appearance: Appearance,
-    freedom: Freedom,
-    prior: Prior | None = None,
+    *,
+    dofs: DegreesOfFreedom,
+    prior: PosePrior | None = None,
 ) -> Fit:
-    """Move the body until the composite of body and empty scene agrees with the pictures; say how sure that is.
+    """Move the body until the composite of body and background agrees with the images; return its covariance too.
 
-    From several poses, the one is kept that ends in the best agreement with pictures and prior.
+    Of several starts, the one that ends in the best agreement with images and prior is returned.
     """
-    evaluate, correlated = _comparison(synthesis, poses, regions, appearance, freedom)
-    most_steps = _MOST_STEPS_STIFF if len(freedom.columns) <= 6 else _MOST_STEPS
+    evaluate, correlated = _image_evaluator(render_model, poses, regions, appearance, dofs=dofs)
+    most_steps = _MOST_STEPS_STIFF if len(dofs.columns) <= 6 else _MOST_STEPS
     ends = [
-        _descend(evaluate, freedom, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, settled=_SETTLED)
+        _descend(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, tolerance=_CONVERGED)
         for pose in poses
     ]
-    noise = min(end.evaluation.noise for end in ends)
-    last = min(ends, key=lambda end: end.evaluation.objective(noise, freedom.prior_cost(end.evaluation.pose, prior)))
-    return Fit(last.pose, freedom, last.evaluation, (last.evaluation.noise / correlated) ** 0.5, last.steps)
+    noise = min(end.equations.noise for end in ends)
+    best = min(ends, key=lambda end: end.equations.objective(noise, dofs.prior_cost(end.equations.pose, prior)))
+    return Fit(best.pose, dofs, best.equations, (best.equations.noise / correlated) ** 0.5, best.steps)
 
 
-def evaluate_pictures(
-    synthesis: Synthesis, pose: Pose, regions: Sequence[Region], appearance: Appearance, freedom: Freedom
-) -> Evaluation:
-    """Return what the pictures say of one pose, without moving it."""
-    evaluate, _ = _comparison(synthesis, [pose], regions, appearance, freedom)
+def linearise_images(
+    render_model: RenderModel, pose: Pose, regions: Sequence[Region], appearance: Appearance, *, dofs: DegreesOfFreedom
+) -> PoseEquations:
+    """Return the normal equations of the images at one pose, without moving it."""
+    evaluate, _ = _image_evaluator(render_model, [pose], regions, appearance, dofs=dofs)
     return evaluate(pose, 1)
 
 
-def _comparison(
-    synthesis: Synthesis, poses: Sequence[Pose], regions: Sequence[Region], appearance: Appearance, freedom: Freedom
-) -> tuple[Callable[[Pose, int], Evaluation], float]:
-    """Return what compares poses near the given ones with the pictures, and how many pixels share their noise."""
-    bodies = [synthesis.place(pose) for pose in poses]
-    laid_out = [(pictured(synthesis, bodies, region, appearance), region) for region in regions]
-    laid_out = [(view, region) for view, region in laid_out if view.is_seen]
-    rows_sigma_px = [max(_FINE_SIGMA_PX * region.aspect, 0.5) for _, region in laid_out]
+def _image_evaluator(
+    render_model: RenderModel,
+    poses: Sequence[Pose],
+    regions: Sequence[Region],
+    appearance: Appearance,
+    *,
+    dofs: DegreesOfFreedom,
+) -> tuple[Callable[[Pose, int], PoseEquations], float]:
+    """Return the normal equations as a function of poses near the given ones, and how many pixels share their noise."""
+    bodies = [render_model.with_pose(pose) for pose in poses]
+    views_and_regions = [(image_buffers(render_model, bodies, region, appearance), region) for region in regions]
+    views_and_regions = [(view, region) for view, region in views_and_regions if view.is_visible]
+    rows_sigma_px = [max(_FINE_SIGMA_PX * region.aspect, 0.5) for _, region in views_and_regions]
     taps = [(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma)) for sigma in rows_sigma_px]
     correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px or [_FINE_SIGMA_PX]))
-    shifts = [shifts_px(region) for _, region in laid_out]
+    shifts = [shift_sds_px(region) for _, region in views_and_regions]
 
-    def evaluate(pose: Pose, step: int) -> Evaluation:
-        posed, n = synthesis.place(pose), len(synthesis.model.segments)
+    def evaluate(pose: Pose, step: int) -> PoseEquations:
+        posed, n = render_model.with_pose(pose), len(render_model.model.segments)
         sums, totals, blocks, shifted = Sums.zero(n), np.zeros(3), [], []
-        for (view, _), (taps_u, taps_v), shift in zip(laid_out, taps, shifts, strict=True):
+        for (view, _), each_taps, shift in zip(views_and_regions, taps, shifts, strict=True):
             sums.B[:] = 0
             blocks.append(_blocks(view, n))
-            totals += _compare(synthesis, posed, view, (taps_u, taps_v), 3 if step == 1 else 1, sums, blocks[-1])
+            iterations = 3 if step == 1 else 1
+            totals += _add_image_equations(
+                render_model, posed, view, taps=each_taps, iterations=iterations, sums=sums, blocks=blocks[-1]
+            )
             shifted.append(np.moveaxis(sums.B * shift, 2, 0))
-            if len(freedom.columns) > 6:
-                shifted.append(_shape_errors(sums.B, posed, view))
-        return _mapped(synthesis, freedom, pose, posed, sums, blocks, shifted, totals, correlated)
+            if len(dofs.columns) > 6:
+                shifted.append(_shape_error_gradients(sums.B, posed, view))
+        return _map_to_dofs(
+            render_model,
+            dofs,
+            pose,
+            posed,
+            sums=sums,
+            blocks=blocks,
+            shifted=shifted,
+            totals=totals,
+            correlated=correlated,
+        )
 
     return evaluate, correlated
 
 
-def _compare(
-    synthesis: Synthesis,
+def _add_image_equations(
+    render_model: RenderModel,
     posed: PosedBody,
-    view: Laid,
+    view: ViewBuffers,
+    *,
     taps: tuple[Array, Array],
-    rounds: int,
+    iterations: int,
     sums: Sums,
     blocks: Array,
 ) -> Array:
     """Add one view's equations; return the cost, the weighted squared residual and the weight."""
-    through = view.window, *taps, _CLIP if synthesis.lights is None else _CLIP_LIT
-    args = synthesis.body, _place(posed, view), view.seen, through, view.maps
-    if synthesis.lights is None:
-        paint = synthesis.albedo, synthesis.is_faceted
-        return np.array(photometric_equations(*args, paint, view.light, rounds, sums, blocks))
+    comparison = view.window, *taps, _CLIP if render_model.lights is None else _CLIP_LIT
+    args = render_model.body, _projection(posed, view), view.observation, comparison, view.maps
+    if render_model.lights is None:
+        paint = render_model.albedo, render_model.is_faceted
+        return np.array(photometric_equations(*args, paint, view.light, iterations, sums, blocks))
     size = view.maps[0].shape
-    drawn = (
+    workspace = (
         np.empty(size, np.int16),
         np.empty(size, np.int16),
         np.empty(size, np.float32),
         np.empty((*size, 3), np.float32),
     )
     lamps, ambient = view.light
-    return np.array(lit_equations(*args, drawn, synthesis.is_faceted, lamps, ambient, sums, blocks))
+    return np.array(known_light_equations(*args, workspace, render_model.is_faceted, lamps, ambient, sums, blocks))
 
 
-def _shape_errors(B: Array, posed: PosedBody, view: Laid) -> Array:
-    """Return what it does to the gradient that a person's segments are not ellipsoids: (2 segments, segments, 6).
+def _shape_error_gradients(B: Array, posed: PosedBody, view: ViewBuffers) -> Array:
+    """Return the gradients' error because a person's segments are not ellipsoids: (2 segments, segments, 6).
 
-    Each segment's picture may lie beside the drawn one by SHAPE_SD_M, right or down, in each view by itself.
+    Each segment's image may lie beside the rendered one by SHAPE_SD_M, right or down, in each view independently.
     """
     n = len(B)
-    depth_m = posed.t @ view.packed[6:9] + view.packed[11]
+    depth_m = posed.t @ view.packed_view[6:9] + view.packed_view[11]
     sd_px = SHAPE_SD_M * np.array([view.K[0, 0], view.K[1, 1]]) / np.maximum(depth_m, 0.1)[:, None]  # (segments, 2)
     rows = np.zeros((n, 2, n, 6))
     rows[np.arange(n), :, np.arange(n)] = np.swapaxes(B[..., :2], 1, 2) * sd_px[..., None]
     return rows.reshape(2 * n, n, 6)
 
 
-def _place(posed: PosedBody, view: Laid) -> tuple:
-    return posed.R, posed.t, view.packed, view.K, posed.t[0]
+def _projection(posed: PosedBody, view: ViewBuffers) -> tuple:
+    return posed.R, posed.t, view.packed_view, view.K, posed.t[0]
 
 
-def _blocks(view: Laid, n_segments: int) -> Array:
+def _blocks(view: ViewBuffers, n_segments: int) -> Array:
     x0, y0, x1, y1 = view.window
     return new_blocks(x1 - x0, y1 - y0, n_segments)
 
@@ -231,57 +270,58 @@ def _blocks(view: Laid, n_segments: int) -> Array:
 @dataclass(frozen=True, slots=True)
 class _Descent:
     pose: Pose  # after the last step
-    evaluation: Evaluation  # before it
+    equations: PoseEquations  # before it
     steps: int
 
 
 def _descend(
-    evaluate: Callable[[Pose, int], Evaluation],
-    freedom: Freedom,
+    evaluate: Callable[[Pose, int], PoseEquations],
+    dofs: DegreesOfFreedom,
     pose: Pose,
-    prior: Prior | None,
+    prior: PosePrior | None,
     *,
     most_steps: int,
     overstep: float,
-    settled: float = 0.0,
+    tolerance: float = 0.0,
 ) -> _Descent:
-    """Step downhill; a step after which the pictures agree less is taken back and shortened."""
-    best, motion, share, objective = None, np.zeros(0), overstep, np.inf
+    """Step downhill; a step that increases the objective is taken back and shortened."""
+    best, delta, share, objective = None, np.zeros(0), overstep, np.inf
     for step in range(1, most_steps + 1):
-        tried = evaluate(pose, step)
-        noise = max(tried.noise if best is None else best.noise, 1e-9)
-        reached = tried.objective(noise, freedom.prior_cost(pose, prior))
-        if best is not None and reached > objective * (1 + _SLACK):
+        trial = evaluate(pose, step)
+        noise = max(trial.noise if best is None else best.noise, 1e-9)
+        value = trial.objective(noise, dofs.prior_cost(pose, prior))
+        if best is not None and value > objective * (1 + _SLACK):
             share *= _SHORTER
-            pose = freedom.moved(best.pose, share * motion)
+            pose = dofs.update(best.pose, share * delta)
             continue
-        best, share, noise = tried, overstep, max(tried.noise, 1e-9)
-        objective = best.objective(noise, freedom.prior_cost(pose, prior))
-        motion = freedom.step(best.pose, best.A / noise, best.g / noise, prior)
-        pose = freedom.moved(best.pose, share * motion)
-        if motion @ best.A @ motion <= settled * len(motion) * noise:
+        best, share, noise = trial, overstep, max(trial.noise, 1e-9)
+        objective = best.objective(noise, dofs.prior_cost(pose, prior))
+        delta = dofs.solve_step(best.pose, best.A / noise, best.g / noise, prior)
+        pose = dofs.update(best.pose, share * delta)
+        if delta @ best.A @ delta <= tolerance * len(delta) * noise:
             break
     assert best is not None
     return _Descent(pose if share == overstep else best.pose, best, step)
 
 
-def _mapped(
-    synthesis: Synthesis,
-    freedom: Freedom,
+def _map_to_dofs(
+    render_model: RenderModel,
+    dofs: DegreesOfFreedom,
     pose: Pose,
     posed: PosedBody,
+    *,
     sums: Sums,
     blocks: Sequence[Array],
     shifted: Sequence[Array],
     totals: Array,
     correlated: float,
-) -> Evaluation:
+) -> PoseEquations:
     """Map the segments' equations through the chain of joints."""
-    J = np.ascontiguousarray(synthesis.jacobian(posed, freedom))
+    J = np.ascontiguousarray(render_model.jacobian(posed, dofs))
     d = J.shape[-1]
     A, g = np.zeros((d, d)), np.zeros(d)
-    mapped(sums.curvature, sums.g, J, A, g)
+    map_equations(sums.curvature, sums.g, J, A, g)
     cost, total, weight = totals
     noise = correlated * (total / weight if weight > 0 else 1.0)
     rows = [each.reshape(-1, *J.shape[:2]) for each in blocks] + list(shifted)
-    return Evaluation(pose, A, g, J, rows, float(cost), float(noise))
+    return PoseEquations(pose, A, g, J, rows, float(cost), float(noise))

@@ -1,39 +1,38 @@
-"""Left taken for right: poses whose limbs have changed sides, and whether one is what was to be expected."""
+"""Left-right swaps: poses with the limbs of one side exchanged for the other's, and whether one was to be expected."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
 from airborne.body.chain import joint_angles_of
-from airborne.tracking.model_based.degrees_of_freedom import within_limits
-
-Array = NDArray[np.floating]
+from airborne.tracking.model_based.degrees_of_freedom import clamp_to_limits
+from airborne.types import Array
 
 _LEFT, _RIGHT = "_left", "_right"
 _LIKELIER_M = 0.05  # mean distance of the limbs' joints by which a swapped pose must be nearer
 
 
-def swapped(model: BodyModel, pose: Pose) -> list[Pose]:
-    """Return the pose with each pair of limbs swapped: every segment turned as its twin of the other side is.
+def swap_limbs(model: BodyModel, pose: Pose) -> list[Pose]:
+    """Return the pose with each pair of limbs swapped: every segment takes its counterpart's orientation.
 
     A pair is what hangs on the trunk by segments named `<name>_left` and `<name>_right`.
     """
     R = model.with_pose(pose).R
     poses = []
     for limb in _limbs(model):
-        turned = R.copy()
-        turned[[i for i, _ in limb]], turned[[j for _, j in limb]] = R[[j for _, j in limb]], R[[i for i, _ in limb]]
-        angles = joint_angles_of(model, turned, near=_mirrored(pose.joint_angles, limb))
-        poses.append(within_limits(model, replace(pose, joint_angles=angles)))
+        R_swapped = R.copy()
+        left, right = [i for i, _ in limb], [j for _, j in limb]
+        R_swapped[left], R_swapped[right] = R[right], R[left]
+        angles = joint_angles_of(model, R_swapped, near=_mirror_angles(pose.joint_angles, limb))
+        poses.append(clamp_to_limits(model, replace(pose, joint_angles=angles)))
     return poses
 
 
 def is_nearer(model: BodyModel, pose: Pose, other: Pose, expected: Pose) -> bool:
-    """Say whether a pose's joints lie nearer to where they are expected than another's, by 50 mm in the mean."""
+    """Return whether a pose's joints are nearer than another's to the expected ones, by 50 mm in the mean."""
     here, there, middle = (model.with_pose(each).t for each in (pose, other, expected))
     moved = np.linalg.norm(here - there, axis=1) > 1e-3
     if not moved.any():
@@ -48,15 +47,15 @@ def _limbs(model: BodyModel) -> list[list[tuple[int, int]]]:
     limbs: dict[int, list[tuple[int, int]]] = {}
     root_of: dict[int, int] = {}
     for left, name in enumerate(names):
-        twin = name.removesuffix(_LEFT) + _RIGHT
-        if not name.endswith(_LEFT) or twin not in names:
+        counterpart = name.removesuffix(_LEFT) + _RIGHT
+        if not name.endswith(_LEFT) or counterpart not in names:
             continue
         root_of[left] = root_of.get(int(model.parents[left]), left)
-        limbs.setdefault(root_of[left], []).append((left, names.index(twin)))
+        limbs.setdefault(root_of[left], []).append((left, names.index(counterpart)))
     return list(limbs.values())
 
 
-def _mirrored(angles: Array, limb: list[tuple[int, int]]) -> Array:
+def _mirror_angles(angles: Array, limb: list[tuple[int, int]]) -> Array:
     """Return joint angles (joints, 3) with those of the limbs swapped, y and z mirrored."""
     mirrored = angles.copy()
     for left, right in limb:

@@ -1,8 +1,8 @@
-"""Pictures mixed from two moments, as converters of frame rates make them: how much of each moment they show.
+"""Blended frames, as frame-rate converters make them from two instants: how much of each instant they show.
 
-A tracker takes one of the two half-transparent bodies for the body. Here the body is drawn at many moments about the
-picture's own, and what of each is in the picture is found by least squares over all pictures of a camera. Mixing is
-taken to be done in the file's own values, as converters do. Arrays but for `moment_equations`.
+A tracker takes one of the two half-transparent bodies for the body. Here the body is rendered at many instants around
+the frame's own, and each one's share is estimated by least squares over all frames of a camera. Blending is assumed to
+act on the file's own values, as converters do. Arrays but for `blend_equations`.
 """
 
 from __future__ import annotations
@@ -12,62 +12,60 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from airborne.appearance.model import Appearance, Region
 from airborne.body import PosedBody
-from airborne.tracking.model_based.render_model import Synthesis
-
-Array = NDArray[np.floating]
+from airborne.tracking.model_based.render_model import RenderModel
+from airborne.types import Array
 
 _SIGMA_PX = 2.0  # of a full frame
 _RIDGE = 1e-9  # of the mean curvature
-_GROUPS = 8  # left out in turn for the sd
-_BESIDE = 0.05  # a larger share beside the moment that shows most, and its neighbours, is another body
+_GROUPS = 8  # left out in turn, for the jackknife
+_SECOND_BODY = 0.05  # a larger share outside the largest one and its neighbours is a second body
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blend:
-    """How much of the body at m moments is in a camera's pictures; NaN where it never was seen."""
+    """The shares of the body at m instants in a camera's frames; NaN where it was never visible."""
 
-    lag_s: Array  # (m,) of the moments, after the pictures' times
+    lag_s: Array  # (m,) of the instants after the frames' times
     share: Array  # (m,) sums to 1
     centre_s: float  # mean lag, weighted by the shares
     sd_s: float  # of the centre
 
     @property
     def is_mixed(self) -> bool:
-        """Whether the pictures show two bodies, more than a step of the moments apart."""
+        """Whether the frames show two bodies, more than one step of the instants apart."""
         if not np.isfinite(self.centre_s):
             return False
         top = int(self.share.argmax())
-        return float(self.share[max(top - 1, 0) : top + 2].sum()) < 1 - _BESIDE
+        return float(self.share[max(top - 1, 0) : top + 2].sum()) < 1 - _SECOND_BODY
 
 
-def moment_equations(
-    synthesis: Synthesis, appearance: Appearance, region: Region, bodies: Sequence[PosedBody]
+def blend_equations(
+    render_model: RenderModel, appearance: Appearance, region: Region, bodies: Sequence[PosedBody]
 ) -> tuple[Array, Array]:
-    """Return the normal equations (m, m), (m,) of how much of each of m placed bodies a region's picture shows.
+    """Return the normal equations (m, m), (m,) for the shares of m posed bodies in a region's image.
 
-    The bodies are painted in their own colours, unlit: a brightness that is off changes all shares alike.
+    The bodies have their own colours, unlit: a wrong brightness scales all shares alike.
     """
-    mean, _, looks = appearance.scene(region)
-    is_known = (looks > 0)[..., None]
-    drawn = []
+    mean, _, n_observations = appearance.background_model(region)
+    is_learned = (n_observations > 0)[..., None]
+    differences = []
     for posed in bodies:
-        part = synthesis.parts(posed, region)
-        colours = synthesis.geometry.colours[np.maximum(part, 0)]
-        drawn.append(_smooth(np.where(is_known & (part >= 0)[..., None], colours - mean, 0), region.aspect))
-    seen = _smooth(np.where(is_known, region.rgb - mean, 0), region.aspect)
-    rows = np.stack(drawn)
-    return rows @ rows.T, rows @ seen
+        part = render_model.draw_parts(posed, region)
+        colours = render_model.geometry.colours[np.maximum(part, 0)]
+        differences.append(_smooth(np.where(is_learned & (part >= 0)[..., None], colours - mean, 0), region.aspect))
+    observed = _smooth(np.where(is_learned, region.rgb - mean, 0), region.aspect)
+    rows = np.stack(differences)
+    return rows @ rows.T, rows @ observed
 
 
 def blend_of(lag_s: Array, A: Array, b: Array) -> Blend:
-    """Find the shares of the moments lag_s (m,) from the equations (n, m, m), (n, m) of n pictures, one after another.
+    """Estimate the shares of the instants lag_s (m,) from the equations (n, m, m), (n, m) of n frames in order.
 
-    The centre's sd is the jackknife's over stretches of the pictures.
+    The centre's sd is the jackknife's over groups of successive frames.
     """
     unknown = Blend(lag_s, np.full(len(lag_s), np.nan), np.nan, np.nan)
     if len(A) < _GROUPS:

@@ -1,11 +1,11 @@
-"""Gauss-Newton kernels: how a blurred synthetic picture would change if the body moved, against what the camera saw.
+"""Gauss-Newton kernels: residuals between blurred observed and rendered images, and their derivatives by the pose.
 
-Arrays in, arrays out, in tuples: `body` is shapes, geometry and the segment of each part; `place` is R (s, 3, 3),
-t (s, 3) [m], the packed view (18,), its intrinsics K and the origin (3,) [m] of all motions; `seen` is the observed
-planes (c, H, W), those of the empty scene that the body moves in front of, and each pixel's certainty (H, W) in (0, 1],
-which scales its weight; `through` is the window x0, y0, x1, y1 of the picture (H, W) that is compared, the taps of the
-blur along rows and columns, and the residual at which a pixel's weight has fallen to a quarter; `maps` is the workspace
-of `surface_maps`. Planes are float32; (h, w) is the size of the window.
+Arrays in, arrays out, in tuples: `body` is shapes, geometry and the segment of each part; `projection` is R (s, 3, 3),
+t (s, 3) [m], the packed view (18,), its intrinsics K and the origin (3,) [m] of all twists; `observation` is the
+observed planes (c, H, W), those of the background, and each pixel's certainty (H, W), the factor 0..1 of its weight;
+`comparison` is the window x0, y0, x1, y1 of the image (H, W) that is compared, the taps of the blur along rows and
+columns, and the residual at which a pixel's weight has fallen to a quarter; `maps` is the workspace of `surface_maps`.
+Planes are float32; (h, w) is the size of the window.
 """
 
 from __future__ import annotations
@@ -15,31 +15,31 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from airborne.appearance.lighting import fit_light, light_up, paint_evenly
+from airborne.appearance.lighting import fit_light, flatten_shading, shade_body
 from airborne.rendering.drawing import draw_maps
 from airborne.rendering.maps import surface_maps
 from airborne.rendering.shapes import KERNEL
 
-BLOCK_PX = 16  # residuals this close are not independent: the side of a block of the covariance's sandwich
-RADIUS_PX = 4  # reach of the blur: three sds of the widest one used
-REACH_PX = 3  # an edge is felt this far away: most of the blur's weight
-_PAD_PX = RADIUS_PX + 3  # beyond it, the blurred mask is nothing
-_EDGE = 0.01  # blurred coverage below which a pixel says nothing of the body
+BLOCK_PX = 16  # residuals this close are correlated: the side of a block of the covariance's sandwich
+RADIUS_PX = 4  # radius of the blur: three sds of the widest one used
+REACH_PX = 3  # an edge matters this far away: most of the blur's weight
+_PAD_PX = RADIUS_PX + 3  # beyond it, the blurred mask is zero
+_EDGE = 0.01  # blurred coverage below which a pixel is not used
 
 
 class Sums(NamedTuple):
-    """Normal equations of the rigid motion (6,) of each of s segments, summed over pixels: A motion = g.
+    """Normal equations of the twist (6,) of each of s segments, summed over pixels: A twist = g.
 
-    A pixel belongs to one segment, so nothing couples two of them but the chain of joints, which is not known here.
+    A pixel belongs to one segment, so only the chain of joints couples two of them: see `map_equations`.
     """
 
     A: Any  # (s, 6, 6) curvature; the lower triangles are filled
     g: Any  # (s, 6) gradient
-    B: Any  # (s, 6, 3) what a picture shifted right or down by a pixel, or an outline a pixel fatter, does to g
+    B: Any  # (s, 6, 3) change of g by an image shifted right or down by a pixel, or an outline a pixel wider
 
     @classmethod
     def zero(cls, n_segments: int) -> Sums:
-        """Begin with nothing."""
+        """Return sums of zero."""
         return cls(np.zeros((n_segments, 6, 6)), np.zeros((n_segments, 6)), np.zeros((n_segments, 6, 3)))
 
     @property
@@ -49,7 +49,7 @@ class Sums(NamedTuple):
 
 
 def new_blocks(width: int, height: int, n_segments: int) -> np.ndarray:
-    """Allocate the gradients of each block of a picture, segment by segment: (rows, columns, s, 6)."""
+    """Allocate the gradients of each block of an image, segment by segment: (rows, columns, s, 6)."""
     return np.zeros((height // BLOCK_PX + 1, width // BLOCK_PX + 1, n_segments, 6))
 
 
@@ -97,8 +97,8 @@ def blur(planes, taps_u, taps_v, out):
 
 
 @njit(**KERNEL)
-def window_of(part):
-    """Return the padded window (x0, y0, x1, y1) round the body's pixels; (0, 0, 0, 0) where there is none."""
+def mask_window(part):
+    """Return the padded window (x0, y0, x1, y1) around the body's pixels; (0, 0, 0, 0) where there is none."""
     h, w = part.shape
     x0, y0, x1, y1 = w, h, -1, -1
     for y in range(h):
@@ -113,10 +113,10 @@ def window_of(part):
 
 @njit(**KERNEL)
 def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
-    """Say which segment moves each pixel's edges: of those with an edge within REACH_PX the one nearest to the camera.
+    """Assign each pixel to the segment whose edge moves it: of those within REACH_PX, the one nearest to the camera.
 
-    An outline moves with the surface in front of it, never with what it hides. part, inverse_depth (H, W) maps of a
-    region; owner (h, w) segment or -1, nearness (h, w) its inverse depth near there [1/m], both of the window at
+    An occluding contour moves with the surface in front, never with the one behind. part, inverse_depth (H, W) maps of
+    a region; owner (h, w) segment or -1, nearness (h, w) its inverse depth near there [1/m], both of the window at
     (x0, y0).
     """
     h, w = owner.shape
@@ -143,7 +143,7 @@ def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
 
 @njit(**KERNEL)
 def _is_front_edge(part, inverse_depth, segment_of_part, v, u):
-    """Say whether a pixel of the body borders on another segment behind it, or on the background."""
+    """Return whether a pixel of the body borders on a segment behind it, or on the background."""
     height, width = part.shape
     own, near = segment_of_part[part[v, u]], inverse_depth[v, u]
     for dv, du in ((0, -1), (0, 1), (-1, 0), (1, 0)):
@@ -156,17 +156,17 @@ def _is_front_edge(part, inverse_depth, segment_of_part, v, u):
 
 
 @njit(**KERNEL)
-def accumulate(residual, shape, coverage, owner, nearness, place, seen, through, sums, blocks):
-    """Add one view's normal equations for the rigid motion of each segment about the origin: A motion = g.
+def _accumulate(residual, shape, coverage, owner, nearness, projection, observation, comparison, sums, blocks):
+    """Add one view's normal equations for the twist of each segment about the origin: A twist = g.
 
     residual, shape (c, h, w): blurred observed minus rendered, and the blurred colours of the body on black; coverage
-    (h, w) blurred alike; owner, nearness (h, w) as `find_owners` has them. A motion is a translation [m] and a rotation
+    (h, w) blurred alike; owner, nearness (h, w) as `find_owners` has them. A twist is a translation [m] and a rotation
     vector [rad] in world axes. Adds to `sums`, and to `blocks` of `new_blocks` the gradients block by block. Returns
     (robust squared residual of the whole window, weighted squared residual, weight), the last two where there is body.
     """
-    _, _, view, K, origin = place
-    _, scene, certainty = seen
-    window, _, _, clip = through
+    _, _, view, K, origin = projection
+    _, background, certainty = observation
+    window, _, _, clip = comparison
     A, g, B = sums
     c, h, w = residual.shape
     x0, y0 = window[0], window[1]
@@ -192,7 +192,7 @@ def accumulate(residual, shape, coverage, owner, nearness, place, seen, through,
             mx = 0.5 * (coverage[y, x + 1] - coverage[y, x - 1])
             my = 0.5 * (coverage[y + 1, x] - coverage[y - 1, x])
             for k in range(c):
-                behind = scene[k, y + y0, x + x0]  # the body uncovers it where it leaves
+                behind = background[k, y + y0, x + x0]  # uncovered where the body leaves
                 gx = 0.5 * (shape[k, y, x + 1] - shape[k, y, x - 1]) - behind * mx
                 gy = 0.5 * (shape[k, y + 1, x] - shape[k, y - 1, x]) - behind * my
                 r = residual[k, y, x]
@@ -226,7 +226,7 @@ def accumulate(residual, shape, coverage, owner, nearness, place, seen, through,
             block = blocks[y // BLOCK_PX, x // BLOCK_PX, e]
             A_e, B_e = A[e], B[e]
             for i in range(6):
-                # a body that moves by du takes its picture along: the picture changes by -gradient du
+                # a body that moves by du takes its image along: the image changes by -gradient du
                 block[i] -= sx * a[i] + sy * b[i]
                 ai = sxx * a[i] + sxy * b[i]
                 bi = sxy * a[i] + syy * b[i]
@@ -244,71 +244,77 @@ def accumulate(residual, shape, coverage, owner, nearness, place, seen, through,
 
 
 @njit(**KERNEL)
-def silhouette_equations(body, place, seen, through, maps, sums, blocks):
-    """Add one view's normal equations of `blurred posterior - blurred mask`; see `accumulate`.
+def silhouette_equations(body, projection, observation, comparison, maps, sums, blocks):
+    """Add one view's normal equations of `blurred posterior - blurred mask`; see `_accumulate`.
 
-    The plane observed is the posterior (1, H, W), the probability of each pixel to be body, and the scene is black.
+    The observed plane is the posterior (1, H, W), each pixel's probability to be body; the background is black.
     """
-    posterior, _, _ = seen
-    window, taps_u, taps_v, _ = through
-    owner, nearness = _draw(body, place, maps, window)
+    posterior, _, _ = observation
+    window, taps_u, taps_v, _ = comparison
+    owner, nearness = _draw(body, projection, maps, window)
     x0, y0, x1, y1 = window
     residual = np.empty((1, y1 - y0, x1 - x0), np.float32)
     blur(posterior[:, y0:y1, x0:x1], taps_u, taps_v, residual)
-    coverage = _blurred_mask(maps[0], through)
+    coverage = _mask_coverage(maps[0], comparison)
     shape = np.empty_like(residual)
     for y in range(y1 - y0):
         for x in range(x1 - x0):
             shape[0, y, x] = np.float32(0.5) * (residual[0, y, x] + coverage[0, y, x])
             residual[0, y, x] -= coverage[0, y, x]
-    return accumulate(residual, shape, coverage[0], owner, nearness, place, seen, through, sums, blocks)
+    return _accumulate(residual, shape, coverage[0], owner, nearness, projection, observation, comparison, sums, blocks)
 
 
 @njit(**KERNEL)
-def photometric_equations(body, place, seen, through, maps, paint, light, rounds, sums, blocks):
-    """Add one view's normal equations of `blurred observed - blurred composite`, in linear light; see `accumulate`.
+def photometric_equations(body, projection, observation, comparison, maps, paint, light, iterations, sums, blocks):
+    """Add one view's normal equations of `blurred observed - blurred composite`, in linear light; see `_accumulate`.
 
-    paint: albedo (parts, 3) linear and is_faceted (parts,), see `paint_evenly`; light (3, TERMS) the view's fitted
-    light, refitted in place by `rounds` robust rounds.
+    paint: albedo (parts, 3) linear and is_faceted (parts,), see `flatten_shading`; light (3, LIGHT_TERMS) the view's
+    fitted light, refitted in place by `iterations` of reweighting.
     """
-    observed, _, _ = seen
+    observed, _, _ = observation
     albedo, is_faceted = paint
-    window, _, _, _ = through
-    owner, nearness = _draw(body, place, maps, window)
+    window, _, _, _ = comparison
+    owner, nearness = _draw(body, projection, maps, window)
     part, _, normals = maps
     x0, y0, x1, y1 = window
-    fit_light(observed, part, normals, albedo, light, rounds, x0, y0, x1, y1)
+    fit_light(observed, part, normals, albedo, light, iterations, x0, y0, x1, y1)
     lit = np.zeros((3, y1 - y0, x1 - x0), np.float32)
-    light_up(part, normals, albedo, light, x0, y0, lit)
-    return _of_composite(lit, is_faceted, part, owner, nearness, place, seen, through, sums, blocks)
+    shade_body(part, normals, albedo, light, x0, y0, lit)
+    return _composite_equations(
+        lit, is_faceted, part, owner, nearness, projection, observation, comparison, sums, blocks
+    )
 
 
 @njit(**KERNEL)
-def lit_equations(body, place, seen, through, maps, drawn, is_faceted, lamps, ambient, sums, blocks):
+def known_light_equations(
+    body, projection, observation, comparison, maps, workspace, is_faceted, lamps, ambient, sums, blocks
+):
     """Add one view's normal equations under known lights, in shares of full sRGB; see `photometric_equations`.
 
-    lamps (l, 8), ambient as `draw_maps` takes them; drawn: workspace (part, segment, inverse_depth, colour).
+    lamps (l, 8), ambient as `draw_maps` takes them; workspace: maps (part, segment, inverse_depth, colour).
     """
-    window, _, _, _ = through
-    owner, nearness = _draw(body, place, maps, window)
-    R, t, view, _, _ = place
-    colour = drawn[3]
+    window, _, _, _ = comparison
+    owner, nearness = _draw(body, projection, maps, window)
+    R, t, view, _, _ = projection
+    colour = workspace[3]
     colour[:] = 0
-    draw_maps(body[0], body[1], R, t, view, lamps, ambient, drawn[0], drawn[1], drawn[2], colour)
+    draw_maps(body[0], body[1], R, t, view, lamps, ambient, workspace[0], workspace[1], workspace[2], colour)
     x0, y0, x1, y1 = window
     lit = np.empty((3, y1 - y0, x1 - x0), np.float32)
     for k in range(3):
         for y in range(y1 - y0):
             for x in range(x1 - x0):
                 lit[k, y, x] = min(colour[y + y0, x + x0, k] * np.float32(1 / 255), np.float32(1))
-    return _of_composite(lit, is_faceted, maps[0], owner, nearness, place, seen, through, sums, blocks)
+    return _composite_equations(
+        lit, is_faceted, maps[0], owner, nearness, projection, observation, comparison, sums, blocks
+    )
 
 
 @njit(**KERNEL)
-def _draw(body, place, maps, window):
-    """Draw the maps of a view; return who owns each pixel of the window, and how near that is."""
+def _draw(body, projection, maps, window):
+    """Draw the maps of a view; return the segment that owns each pixel of the window, and its inverse depth."""
     shapes, geometry, segment_of_part = body
-    R, t, view, _, _ = place
+    R, t, view, _, _ = projection
     part, inverse_depth, normals = maps
     surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals)
     x0, y0, x1, y1 = window
@@ -318,8 +324,8 @@ def _draw(body, place, maps, window):
 
 
 @njit(**KERNEL)
-def _blurred_mask(part, through):
-    window, taps_u, taps_v, _ = through
+def _mask_coverage(part, comparison):
+    window, taps_u, taps_v, _ = comparison
     x0, y0, x1, y1 = window
     mask, coverage = np.empty((1, y1 - y0, x1 - x0), np.float32), np.empty((1, y1 - y0, x1 - x0), np.float32)
     for y in range(y1 - y0):
@@ -330,30 +336,30 @@ def _blurred_mask(part, through):
 
 
 @njit(**KERNEL)
-def _of_composite(lit, is_faceted, part, owner, nearness, place, seen, through, sums, blocks):
-    """Compare the picture with the lit body (3, h, w) before the scene."""
-    observed, scene, _ = seen
-    window, taps_u, taps_v, _ = through
+def _composite_equations(lit, is_faceted, part, owner, nearness, projection, observation, comparison, sums, blocks):
+    """Compare the image with the lit body (3, h, w) in front of the background."""
+    observed, background, _ = observation
+    window, taps_u, taps_v, _ = comparison
     x0, y0, _, _ = window
     sharp, residual = np.empty_like(lit), np.empty_like(lit)
     for k in range(3):
         for y in range(lit.shape[1]):
             for x in range(lit.shape[2]):
-                shown = lit[k, y, x] if part[y + y0, x + x0] >= 0 else scene[k, y + y0, x + x0]
-                sharp[k, y, x] = observed[k, y + y0, x + x0] - shown
+                rendered = lit[k, y, x] if part[y + y0, x + x0] >= 0 else background[k, y + y0, x + x0]
+                sharp[k, y, x] = observed[k, y + y0, x + x0] - rendered
     blur(sharp, taps_u, taps_v, residual)
-    coverage = _blurred_mask(part, through)
-    paint_evenly(part, is_faceted, x0, y0, lit)
+    coverage = _mask_coverage(part, comparison)
+    flatten_shading(part, is_faceted, x0, y0, lit)
     shape = sharp
     blur(lit, taps_u, taps_v, shape)
-    return accumulate(residual, shape, coverage[0], owner, nearness, place, seen, through, sums, blocks)
+    return _accumulate(residual, shape, coverage[0], owner, nearness, projection, observation, comparison, sums, blocks)
 
 
 @njit(**KERNEL)
-def mapped(A, g, jacobians, H, gradient):
-    """Add the segments' equations, A (s, 6, 6) and g (s, 6), mapped by jacobians (s, 6, d), to H (d, d) and (d,).
+def map_equations(A, g, jacobians, H, gradient):
+    """Add the segments' equations, A (s, 6, 6) and g (s, 6), mapped by the jacobians (s, 6, d), to H (d, d) and (d,).
 
-    Segments that no pixel shows cost nothing, and neither do degrees of freedom that do not move a segment.
+    Segments without visible pixels are skipped, and so are degrees of freedom that do not move a segment.
     """
     d = len(gradient)
     for e in range(len(A)):
@@ -381,7 +387,7 @@ def mapped(A, g, jacobians, H, gradient):
 
 
 @njit(**KERNEL)
-def spread_of(blocks, jacobians, S):
+def add_score_covariance(blocks, jacobians, S):
     """Add to S (d, d) the sum of G G' over the blocks (n, s, 6), G a block's gradient mapped by jacobians (s, 6, d)."""
     d = len(S)
     G = np.empty(d)

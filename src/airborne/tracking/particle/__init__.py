@@ -1,6 +1,6 @@
-"""Particle filters of legs: in come `Frames`, players set by hand and their torsos, out come six points of each.
+"""Particle filters of legs: `Frames`, hand-set players and torsos in; six points per player out.
 
-The three methods of the block-jump paper's Table I. Array kernels (`resampling`, `swing`, `jump_state`) know no nouns.
+The three methods of the block-jump paper's Table I. `resampling`, `swing` and `jump_state` are functions of arrays.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from airborne.cameras import Rig
 from airborne.errors import TrialError
 from airborne.tracking.particle.block_jump import BlockJump
 from airborne.tracking.particle.framework import Framework
-from airborne.tracking.particle.mixture import Gaussian, Mixture
+from airborne.tracking.particle.mixture import Mixture, RandomWalk
 from airborne.tracking.particle.settings import LegsMethod, LegsSettings
 from airborne.tracking.particle.situation import Filter
 from airborne.tracking.particle.torso import GivenTorsos, TorsoInput, TorsoTracker, start_torso, torso_tracker
@@ -38,9 +38,9 @@ def legs_tracker(
 ) -> LegsTracker:
     """Make the tracker of one of the block-jump paper's methods.
 
-    starts: players with a torso and all LEG_POINTS are tracked; those with a torso only are bystanders. torso gives the
-    torsos of all of them, in this order; None tracks them in the pictures.
-    Raises TrialError where nobody has legs or a torso is missing, BodyError where legs are incomplete or no person's.
+    starts: players with a torso and all LEG_POINTS are tracked; those with only a torso are bystanders. torso supplies
+    the torsos of all players, in this order; None tracks them in the images. Raises TrialError if no player has legs or
+    a torso is missing, BodyError if legs are incomplete or implausible.
     """
     torsos = [start_torso(start) for start in starts]
     players = []
@@ -58,4 +58,4 @@ def legs_tracker(
 def _filter(settings: LegsSettings) -> Filter:
     if settings.method == "framework":
         return Framework(settings)
-    return Mixture(settings, Gaussian() if settings.method == "mixture" else BlockJump(settings.swing))
+    return Mixture(settings, RandomWalk() if settings.method == "mixture" else BlockJump(settings.swing))

@@ -1,4 +1,4 @@
-"""Pictures read near a player, and how like their references the parts of a hypothesis look there (equation 6)."""
+"""Image regions around a player, and how similar a hypothesis' parts are to their references there (equation 6)."""
 
 from __future__ import annotations
 
@@ -9,49 +9,54 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.appearance.hue_saturation import look_up
-from airborne.tracking.particle.image_regions import Region
+from airborne.tracking.particle.image_regions import ImageRegion
 from airborne.tracking.particle.references import References
-from airborne.tracking.particle.rods import read_rods
-from airborne.tracking.particle.view_likelihood import STIFFNESS, detection, over_views, recognition, unless_hidden
-
-Array = NDArray[np.floating]
+from airborne.tracking.particle.rods import compare_rods
+from airborne.tracking.particle.view_likelihood import (
+    STIFFNESS,
+    combine_views,
+    detection,
+    mix_with_background,
+    recognition,
+)
+from airborne.types import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
-    """One player's regions at one time, as codes, with the references to compare them with."""
+class Observation:
+    """One player's image regions at one time, as codes, with the references to compare them to."""
 
     references: References
-    regions: tuple[Region | None, ...]
+    regions: tuple[ImageRegion | None, ...]
     codes: tuple[NDArray[np.uint16] | None, ...]
     used: NDArray[np.bool_]  # (parts, views): which cameras count for a part
     stiffness: float = STIFFNESS
-    may_be_hidden: bool = False  # the robust form
+    is_robust: bool = False  # to occlusion
 
     @property
     def n_views(self) -> int:
-        """How many cameras count for any part."""
+        """Number of cameras that count for any part."""
         return int(self.used.any(axis=0).sum())
 
     def log_likelihood(self, ends: Array, parts: Sequence[int]) -> Array:
-        """Return equation 6 of every rod, ends (n, k, 2, 3) [m] of the k given parts: (n, k) [nat]."""
+        """Return equation 6 of every rod: ends (n, k, 2, 3) [m] of k parts -> (n, k) [nat]."""
         parts = list(parts)
-        overlap, share = self.read(ends, parts)
+        overlap, share = self.compare(ends, parts)
         detected, recognised = detection(overlap, self.stiffness), recognition(share)
-        if self.may_be_hidden:
+        if self.is_robust:
             background = self.references.background_overlap[:, parts].T, self.references.background_share[:, parts].T
-            detected = unless_hidden(detected, detection(background[0], self.stiffness))
-            recognised = unless_hidden(recognised, recognition(background[1]))
-        return over_views(detected, recognised, self.used[parts])
+            detected = mix_with_background(detected, detection(background[0], self.stiffness))
+            recognised = mix_with_background(recognised, recognition(background[1]))
+        return combine_views(detected, recognised, self.used[parts])
 
-    def read(self, ends: Array, parts: Sequence[int]) -> tuple[Array, Array]:
-        """Return overlap and share of every rod in every view: (n, k, views); zeros where nothing was seen."""
+    def compare(self, ends: Array, parts: Sequence[int]) -> tuple[Array, Array]:
+        """Return overlap and share of every rod in every view: (n, k, views); zeros without an image."""
         n, k = ends.shape[:2]
         overlap, share = np.zeros((2, len(self.codes), n, k), np.float32)
         ends = np.ascontiguousarray(ends, float)
         for v, (codes, region) in enumerate(zip(self.codes, self.regions, strict=True)):
             if codes is not None and region is not None:
-                read_rods(
+                compare_rods(
                     codes,
                     region.corner,
                     region.projection,
@@ -66,19 +71,19 @@ class Look:
         return np.moveaxis(overlap, 0, -1), np.moveaxis(share, 0, -1)
 
 
-def look_at(
+def observe(
     references: References,
-    regions: Sequence[Region | None],
+    regions: Sequence[ImageRegion | None],
     used: NDArray[np.bool_],
     *,
     tempered: bool = False,
-    may_be_hidden: bool = False,
-) -> Look:
-    """Turn the regions into codes, where any part uses them; `used` (parts, views) counts only where a region is."""
+    is_robust: bool = False,
+) -> Observation:
+    """Encode the regions that any part uses; `used` (parts, views) is cleared where there is no region."""
     codes = tuple(
         look_up(region.rgb, references.tables[v]) if region is not None and used[:, v].any() else None
         for v, region in enumerate(regions)
     )
     used = used & np.array([code is not None for code in codes])
     stiffness = STIFFNESS / np.sqrt(max(used.any(axis=0).sum(), 1)) if tempered else STIFFNESS
-    return Look(references, tuple(regions), codes, used, float(stiffness), may_be_hidden)
+    return Observation(references, tuple(regions), codes, used, float(stiffness), is_robust)

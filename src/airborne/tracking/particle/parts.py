@@ -1,29 +1,27 @@
-"""The parts of the legs that the pictures are read at: half pelvis, thigh, shank and shoe of both sides."""
+"""The parts of the legs that are compared with the images: half pelvis, thigh, shank and shoe of both sides."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body.legs import RODS, SHANK_WIDTH_M, THIGH_WIDTH_M
 from airborne.tracking.particle.references import Parts
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-PELVIS, THIGHS, SHANKS, SHOES = (0, 1), (2, 3), (4, 5), (6, 7)  # left, right
+PELVIS, SHANKS, SHOES = (0, 1), (4, 5), (6, 7)  # left, right; 2 and 3 are the thighs
 N_PARTS = 8
 
-SHORTS_WIDTH_M = 0.20
-SHOE_HEIGHT_M, SHOE_LENGTH_M = 0.10, 0.28  # of the upright box that hangs at the ankle: a shoe's heading is unknown
-WIDTHS_M = np.repeat([SHORTS_WIDTH_M, THIGH_WIDTH_M, SHANK_WIDTH_M, SHOE_LENGTH_M], 2)
+_SHORTS_WIDTH_M = 0.20
+_SHOE_HEIGHT_M, _SHOE_LENGTH_M = 0.10, 0.28  # of an upright box below the ankle: a shoe's heading is unknown
+WIDTHS_M = np.repeat([_SHORTS_WIDTH_M, THIGH_WIDTH_M, SHANK_WIDTH_M, _SHOE_LENGTH_M], 2)
 
-SHORTS, SKIN, SHOE = 1, 2, 4  # classes of colours, as bits
+SHORTS, SKIN, SHOE = 1, 2, 4  # colour classes, as bits
 CLASSES = np.repeat([SHORTS, SHORTS | SKIN, SKIN, SHOE], 2)
 PARTS = Parts(WIDTHS_M, CLASSES.astype(np.int64), (PELVIS, SHANKS, SHOES))
 
 
 def leg_parts(side: int) -> tuple[int, int]:
-    """Return the parts that the filter of one shank reads: shank and shoe; side 0 is left."""
+    """Return the parts that the filter of one shank observes: shank and shoe; side 0 is left."""
     return SHANKS[side], SHOES[side]
 
 
@@ -35,7 +33,7 @@ def hip_ends(hips: Array) -> Array:
 
 def leg_ends(leg: Array) -> Array:
     """Return the rods of one shank and its shoe: leg (n, 2, 3), knee and ankle -> (n, 2, 2, 3)."""
-    sole = leg[:, 1] - [0, 0, SHOE_HEIGHT_M]
+    sole = leg[:, 1] - [0, 0, _SHOE_HEIGHT_M]
     return np.stack([leg, np.stack([leg[:, 1], sole], axis=1)], axis=1)
 
 

@@ -1,7 +1,7 @@
-"""Resampling: in come the log-weights of n particles, out come the indices of those that go on.
+"""Resampling: log-weights of particles in, indices of the survivors out.
 
-Every scheme is `(rng, log_weights, n) -> index (n,)`, ascending, and draws particle i n w_i times on average. Weights
-that say nothing (all -inf, or NaN) count as equal.
+Every scheme is `(rng, log_weights, n) -> index (n,)`, ascending, and draws particle i on average n w_i times.
+Uninformative weights (all -inf, or NaN) count as equal.
 """
 
 from __future__ import annotations
@@ -12,61 +12,62 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
+from airborne.types import Array
+
 Scheme = Literal["systematic", "stratified", "residual", "multinomial"]
-Resample = Callable[[np.random.Generator, Array, int], NDArray[np.intp]]
+Resampler = Callable[[np.random.Generator, Array, int], NDArray[np.intp]]
 
 
-def normalised(log_weights: Array) -> tuple[Array, float, bool]:
-    """Scale weights to sum 1: log-weights (n,), the log of their sum, and whether they said anything at all.
+def normalise(log_weights: Array) -> tuple[Array, float, bool]:
+    """Normalise weights to sum 1: return log-weights (n,), the log of their sum, and whether they are informative.
 
-    NaN counts as -inf. Where every weight is zero the weights come out equal, the log of the sum is -inf, and the
-    flag is False.
+    NaN counts as -inf. If every weight is zero, the weights become equal, the log of their sum is -inf, and the flag
+    is False.
     """
     log_weights = np.where(np.isnan(log_weights), -np.inf, log_weights)
     most = log_weights.max()
     if not np.isfinite(most):
         if most == np.inf:
-            return normalised(np.where(log_weights == np.inf, 0.0, -np.inf))
+            return normalise(np.where(log_weights == np.inf, 0.0, -np.inf))
         return np.full(len(log_weights), -np.log(len(log_weights))), -np.inf, False
     log_sum = float(most + np.log(np.sum(np.exp(log_weights - most))))
     return log_weights - log_sum, log_sum, True
 
 
 def effective_sample_size(log_weights: Array) -> float:
-    """Return 1 / sum w²: how many equal weights would be worth as much; n where no weight says anything."""
-    return float(1 / np.sum(np.exp(2 * normalised(log_weights)[0])))
+    """Return 1 / sum w²; n for uninformative weights."""
+    return float(1 / np.sum(np.exp(2 * normalise(log_weights)[0])))
 
 
 def multinomial(rng: np.random.Generator, log_weights: Array, n: int) -> NDArray[np.intp]:
-    """Draw n times, each for itself."""
-    return _at(np.sort(rng.random(n)), log_weights)
+    """Draw n times independently."""
+    return _invert(np.sort(rng.random(n)), log_weights)
 
 
 def stratified(rng: np.random.Generator, log_weights: Array, n: int) -> NDArray[np.intp]:
     """Draw once in each of n equal strata."""
-    return _at((np.arange(n) + rng.random(n)) / n, log_weights)
+    return _invert((np.arange(n) + rng.random(n)) / n, log_weights)
 
 
 def systematic(rng: np.random.Generator, log_weights: Array, n: int) -> NDArray[np.intp]:
-    """Draw n times at equal distances, from one random number."""
-    return _at((np.arange(n) + rng.random()) / n, log_weights)
+    """Draw at n equal spacings from one random offset."""
+    return _invert((np.arange(n) + rng.random()) / n, log_weights)
 
 
 def residual(rng: np.random.Generator, log_weights: Array, n: int) -> NDArray[np.intp]:
-    """Take floor(n w) copies of each, and draw the rest from what is left over."""
-    shares = n * np.exp(normalised(log_weights)[0])
+    """Take floor(n w) copies of each particle, and draw the rest from the remainders."""
+    shares = n * np.exp(normalise(log_weights)[0])
     copies = np.floor(shares + 1e-9).astype(int)  # a share of 3 - 1e-16 is 3
-    kept = np.repeat(np.arange(len(shares)), copies)
-    missing = n - len(kept)
+    copied = np.repeat(np.arange(len(shares)), copies)
+    missing = n - len(copied)
     if missing <= 0:
-        return kept[:n]
+        return copied[:n]
     with np.errstate(divide="ignore"):
-        left_over = np.log(np.maximum(shares - copies, 0.0))
-    return np.sort(np.concatenate([kept, multinomial(rng, left_over, missing)]))
+        log_remainders = np.log(np.maximum(shares - copies, 0.0))
+    return np.sort(np.concatenate([copied, multinomial(rng, log_remainders, missing)]))
 
 
-SCHEMES: dict[Scheme, Resample] = {
+SCHEMES: dict[Scheme, Resampler] = {
     "systematic": systematic,
     "stratified": stratified,
     "residual": residual,
@@ -74,9 +75,9 @@ SCHEMES: dict[Scheme, Resample] = {
 }
 
 
-def _at(places: Array, log_weights: Array) -> NDArray[np.intp]:
-    """Return whose share of the unit interval each place (n,) lies in."""
-    edges = np.cumsum(np.exp(normalised(log_weights)[0]))
+def _invert(points: Array, log_weights: Array) -> NDArray[np.intp]:
+    """Invert the cumulative distribution at points (n,) of the unit interval."""
+    edges = np.cumsum(np.exp(normalise(log_weights)[0]))
     edges /= edges[-1]
     last = np.searchsorted(edges, edges[-1])  # the last particle that has a weight
-    return np.minimum(np.searchsorted(edges, places, side="right"), last)
+    return np.minimum(np.searchsorted(edges, points, side="right"), last)

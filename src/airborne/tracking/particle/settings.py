@@ -1,4 +1,4 @@
-"""What the particle filters of legs may be told."""
+"""Settings of the particle filters of legs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from airborne.errors import TrialError
-from airborne.tracking.particle.bootstrap import When
+from airborne.tracking.particle.bootstrap import ResampleWhen
 from airborne.tracking.particle.resampling import Scheme
 from airborne.tracking.particle.swing import Swing
 
@@ -14,19 +14,19 @@ LegsMethod = Literal["framework", "mixture", "block-jump"]
 EstimateAs = Literal["max", "mean", "top10_mean"]
 ViewsAs = Literal["all", "visible", "robust"]
 
-LEAST_PARTICLES = 50
+_LEAST_PARTICLES = 50
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LegsSettings:
     """The block-jump paper's three filters (its Table I), and the choices that it leaves open.
 
-    Every method looks at the pictures for `n_particles` hypotheses of a player a frame: "framework" has them all in one
+    Every method compares `n_particles` hypotheses per player and frame with the images: "framework" has them all in one
     filter; the others take a fifth for the hips and two fifths for each leg.
 
     `estimate` is the best combination ("max", the paper's), the weighted mean of all, or of the ten best. `views`:
-    "all" (the paper's); "visible" leaves out cameras in which another tracked player stands before a part; "robust"
-    gives every camera a chance of one tenth to show something else. `tempered` divides the stiffness of the histograms'
+    "all" (the paper's); "visible" leaves out cameras in which another player occludes a part; "robust" mixes in a
+    probability of one tenth that a camera shows something else. `tempered` divides the stiffness of the histograms'
     comparison by the root of the number of cameras. `torso_shift` moves everything along with the torso before it is
     moved at random (not in the paper).
     """
@@ -40,11 +40,11 @@ class LegsSettings:
     tempered: bool = False
     torso_shift: bool = False
     resample: Scheme = "systematic"
-    resample_when: When = "always"
+    resample_when: ResampleWhen = "always"
 
     def __post_init__(self) -> None:
-        if self.n_particles < LEAST_PARTICLES:
-            raise TrialError(f"n_particles = {self.n_particles}; a filter of legs needs at least {LEAST_PARTICLES}")
+        if self.n_particles < _LEAST_PARTICLES:
+            raise TrialError(f"n_particles = {self.n_particles}; a filter of legs needs at least {_LEAST_PARTICLES}")
         if self.seed < 0:
             raise TrialError(f"seed = {self.seed}; give 0 or a positive whole number")
 

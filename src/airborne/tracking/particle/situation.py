@@ -1,4 +1,4 @@
-"""What a filter of one player's legs knows before it looks, and what it says after."""
+"""The input and the output of one player's filter at one time, and what filters share."""
 
 from __future__ import annotations
 
@@ -6,84 +6,82 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body.legs import Legs
 from airborne.tracking.particle.bootstrap import Particles
-from airborne.tracking.particle.observations import Look
+from airborne.tracking.particle.observations import Observation
 from airborne.tracking.particle.settings import EstimateAs
+from airborne.types import Array
 
-Array = NDArray[np.floating]
-
-FASTEST_M_S = {"hips": 3.5, "knees": 4.5, "ankles": 7.0}
-GAUSSIAN_Z_SD_M = 0.05  # of the random walk, each frame
-TOP = 10  # combinations in the mean "top10_mean"
+_MAX_SPEED_M_S = {"hips": 3.5, "knees": 4.5, "ankles": 7.0}
+_RANDOM_WALK_Z_SD_M = 0.05  # of the random walk, each frame
+N_TOP = 10  # combinations in the mean "top10_mean"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Situation:
-    """One player at one time, before the pictures are looked at."""
+    """One player at one time, before the images are observed."""
 
     legs: Legs
     previous: Array  # (6, 3) the last estimate, as LEG_POINTS [m]
     torso: Array  # (3,)
     torso_before: Array  # (3,) at the last frame
-    shift: Array  # (3,) by which everything is moved along; zero if only random steps are taken
+    shift: Array  # (3,) added to all points before the random step; may be zero
     others: Array  # (k, 3) other players' torsos
     dt_s: float
-    share_above: float  # of particles to draw above their reference
+    share_above: float  # of particles to draw above their reference point
     is_airborne: bool
 
-    def most_m(self, joint: str) -> float:
-        """Return how far "hips", "knees" or "ankles" can go in x and y since the last frame [m]."""
-        return FASTEST_M_S[joint] * self.dt_s
+    def max_step_m(self, joint: str) -> float:
+        """Return rule far "hips", "knees" or "ankles" can move in x and y since the last frame [m]."""
+        return _MAX_SPEED_M_S[joint] * self.dt_s
 
 
-class Found(NamedTuple):
-    """What one frame says of one player."""
+class LegsEstimate(NamedTuple):
+    """One player's estimate at one time."""
 
     points: Array  # (6, 3) [m]
     covariance: Array  # (6, 3, 3) [m²], about the points
 
 
 class Filter(Protocol):
-    """A filter of one player's legs; what it believes goes from frame to frame."""
+    """A filter of one player's legs; its particles pass from frame to frame."""
 
-    def begin(self, points: Array) -> Any:
-        """Return the belief that the legs are at points (6, 3)."""
+    def init(self, points: Array) -> Any:
+        """Return particles concentrated at points (6, 3)."""
         ...
 
-    def move(self, rng: np.random.Generator, belief: Any, now: Situation) -> Any:
+    def predict(self, rng: np.random.Generator, particles: Any, now: Situation) -> Any:
         """Resample, and predict this frame's particles."""
         ...
 
-    def cloud(self, belief: Any) -> Array:
-        """Return all points of all particles (n, 3): what has to be seen."""
+    def all_points(self, particles: Any) -> Array:
+        """Return all points of all particles (n, 3): the region of interest."""
         ...
 
-    def weigh(self, belief: Any, look: Look, now: Situation) -> tuple[Any, Found]:
-        """Weigh the particles with the pictures."""
+    def update(self, particles: Any, observation: Observation, now: Situation) -> tuple[Any, LegsEstimate]:
+        """Reweight the particles by the observation, and estimate the points."""
         ...
 
 
-def walk(rng: np.random.Generator, points: Array, most_m: Array, shift: Array) -> Array:
-    """Move points (n, joints, 3) at random, as a Gaussian of sd most_m / 2 (joints,) in x and y and 0.05 m in z."""
-    sd = np.stack([most_m / 2, most_m / 2, np.full_like(most_m, GAUSSIAN_Z_SD_M)], axis=-1)
+def random_walk(rng: np.random.Generator, points: Array, max_step_m: Array, shift: Array) -> Array:
+    """Add Gaussian steps to points (n, joints, 3): sd max_step_m / 2 (joints,) in x and y, 0.05 m in z."""
+    sd = np.stack([max_step_m / 2, max_step_m / 2, np.full_like(max_step_m, _RANDOM_WALK_Z_SD_M)], axis=-1)
     return points + shift + sd * rng.standard_normal(points.shape)
 
 
-def chosen(particles: Particles, how: EstimateAs) -> Array:
-    """Return one value (...) of particles (n, ...): the likeliest, the mean, or the mean of the ten likeliest."""
-    if how == "max":
+def point_estimate(particles: Particles, rule: EstimateAs) -> Array:
+    """Return one value (...) of particles (n, ...): the best, the mean, or the mean of the ten best."""
+    if rule == "max":
         return particles.values[np.argmax(particles.log_weights)]
-    if how == "mean":
+    if rule == "mean":
         return particles.mean
-    top = np.argsort(-particles.log_weights, kind="stable")[:TOP]
+    top = np.argsort(-particles.log_weights, kind="stable")[:N_TOP]
     weights = np.exp(particles.log_weights[top] - particles.log_weights[top[0]])
     return np.tensordot(weights / weights.sum(), particles.values[top], 1)
 
 
-def spread(values: Array, weights: Array, about: Array) -> Array:
+def second_moments(values: Array, weights: Array, about: Array) -> Array:
     """Return the weighted second moments of points (n, joints, 3) about (joints, 3): (joints, 3, 3)."""
     away = values - about
     return np.einsum("n,nji,njk->jik", weights, away, away)

@@ -1,0 +1,14 @@
+"""Types that every room shares; shapes, units and frames stand beside each use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating]
+Ints = NDArray[np.integer]
+Mask = NDArray[np.bool_]
+Image = NDArray[np.uint8]  # (h, w, 3) sRGB, or (h, w) grey
+Progress = Callable[[int, int | None], None]  # steps done, steps expected or None where nobody knows

@@ -1,0 +1,96 @@
+"""A limb that is misplaced by 90 degrees covers pixels unlike the body; it is detected by them and found again."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airborne.appearance.model import Appearance
+from airborne.body import Pose
+from airborne.tracking.image_regions import crop_regions
+from airborne.tracking.model_based.degrees_of_freedom import clamp_to_limits, limb_of_segment
+from airborne.tracking.model_based.global_search import region_evidence
+from airborne.tracking.model_based.misplaced_limbs import find_misplaced_limbs, search_limb
+from airborne.tracking.model_based.render_model import RenderModel
+from tests.support.people import HUMAN, mean_errors_mm, person, tracker
+from tests.support.scenes import statuses, track
+
+SCENE = person()
+FOLDS = {
+    "upper_arm_left": (0, -np.pi / 2, 0),
+    "upper_arm_right": (-np.pi / 2, 0, 0),
+    "thigh_right": (-np.pi / 2, 0, 0),
+}
+FOREARM = {"forearm_right": (-np.pi / 2, 0, 0)}
+
+
+def fold(pose: Pose, name: str, turn) -> Pose:
+    angles = pose.joint_angles.copy()
+    angles[HUMAN.index_of(name) - 1] += turn
+    return clamp_to_limits(HUMAN, replace(pose, joint_angles=angles))
+
+
+class LearnedFrame:
+    """The second frame, with colours and background models learned from the true poses."""
+
+    def __init__(self):
+        self.render_model, self.truth, self.frames = RenderModel.of(HUMAN), SCENE.start(1), SCENE.frames(1)
+        self._appearance = Appearance()
+        for index in (0, 1):
+            body = self.render_model.with_pose(SCENE.start(index))
+            for region in crop_regions([body], self.render_model.geometry, SCENE.frames(index), 32):
+                mask = self.render_model.draw_parts(body, region) >= 0
+                self._appearance.learn_colours(region, mask)
+                self._appearance.learn_background(region, mask)
+
+    def views(self, pose):
+        """The regions that hold the truth and a pose, and their posteriors."""
+        bodies = [self.render_model.with_pose(each) for each in (pose, self.truth)]
+        regions = crop_regions(bodies, self.render_model.geometry, self.frames, 32)
+        return regions, [self._appearance.posterior(region) for region in regions]
+
+    def off_mm(self, pose, limb):
+        """How far the limb's joints are from the truth, at most."""
+        estimated, true = HUMAN.with_pose(pose).t[limb], HUMAN.with_pose(self.truth).t[limb]
+        return 1000 * float(np.linalg.norm(estimated - true, axis=1).max())
+
+
+@pytest.fixture(scope="module")
+def frame():
+    return LearnedFrame()
+
+
+def limb_with(name):
+    limbs = limb_of_segment(HUMAN)
+    return np.flatnonzero(limbs == limbs[HUMAN.index_of(name)])
+
+
+def test_no_limb_of_the_true_pose_is_misplaced(frame):
+    assert find_misplaced_limbs(frame.render_model, frame.truth, *frame.views(frame.truth)) == []
+
+
+@pytest.mark.parametrize(("name", "turn"), [*FOLDS.items(), *FOREARM.items()])
+def test_limb_that_is_folded_wrong_is_misplaced_and_no_other(frame, name, turn):
+    wrong = fold(frame.truth, name, turn)
+    (limb,) = find_misplaced_limbs(frame.render_model, wrong, *frame.views(wrong))
+    np.testing.assert_array_equal(limb, limb_with(name))
+
+
+@pytest.mark.parametrize("name", FOLDS)
+def test_search_for_a_limb_brings_it_near_and_moves_nothing_else(frame, name):
+    wrong, limb = fold(frame.truth, name, FOLDS[name]), limb_with(name)
+    poses = search_limb(frame.render_model, [wrong], limb, region_evidence(*frame.views(wrong)))
+    assert frame.off_mm(wrong, limb) > 450
+    assert frame.off_mm(poses[0], limb) < 130
+    others = np.setdiff1d(np.arange(len(HUMAN.segments)), limb)
+    low, high = np.moveaxis(HUMAN.limits_rad, -1, 0)
+    for pose in poses:
+        np.testing.assert_array_equal(HUMAN.with_pose(pose).t[others], HUMAN.with_pose(wrong).t[others])
+        assert np.all((low <= pose.joint_angles) & (pose.joint_angles <= high))
+
+
+@pytest.mark.parametrize("name", ["upper_arm_left", "thigh_right", "forearm_right"])
+def test_start_with_one_limb_folded_wrong_is_put_right_in_the_first_frame(name):
+    estimates = track(SCENE, range(1), tracker(SCENE, fold(SCENE.start(), name, (FOLDS | FOREARM)[name])))
+    assert statuses(estimates) == ["tracked"]
+    assert mean_errors_mm(SCENE, estimates).max() < 5
