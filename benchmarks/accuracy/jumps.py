@@ -1,6 +1,6 @@
 """Jumps of noisy joints against synthetic jumps' exact facts: `python benchmarks/accuracy/jumps.py`.
 
-No pictures: the true joints of eight scenes with noise as the players' trackers have it (`motion.contact.OF_PLAYERS`),
+No images: the true joints of eight scenes with noise like the players' trackers' (`motion.free_fall.PLAYER_NOISE`),
 in every joint and axis by itself.
 """
 

@@ -56,7 +56,7 @@ def test_one_camera_alone_is_calibrated_the_same_but_measures_nothing(points, si
 def test_residuals_stand_at_their_points(points, calibration):
     for i, (camera, fit) in enumerate(zip(calibration.rig, calibration.fits, strict=True)):
         assert np.allclose(fit.residual_px, points.px[:, i] - camera.px_from_world(points.world), equal_nan=True)
-        assert np.array_equal(np.isnan(fit.m_per_px), ~points.seen_by(fit.name))
+        assert np.array_equal(np.isnan(fit.m_per_px), ~points.is_seen_by(fit.name))
         assert fit.rms_m == pytest.approx(fit.rms_px * np.nanmean(fit.m_per_px), rel=0.1)
 
 

@@ -57,16 +57,16 @@ def test_a_board_alone_gives_the_rig_in_metres(by_board):
     np.testing.assert_allclose(apart(by_board.rig), apart(RIG), rtol=0.01)
     for camera, true in zip(by_board.rig, RIG, strict=True):
         assert camera.K[0, 0] == pytest.approx(true.K[0, 0], rel=0.01)
-    assert by_board.adjusted.rms_px() < 0.5
+    assert by_board.adjustment.rms_px() < 0.5
     assert np.nanmedian(by_board.held_out_px["board"]) < 0.5
 
 
 def test_the_world_is_the_board_at_one_moment_with_z_out_of_its_face(by_board):
-    source = by_board.adjusted.sources[0]
-    held = int(np.flatnonzero(source.is_held)[0])
+    source = by_board.adjustment.sources[0]
+    held = int(np.flatnonzero(source.is_fixed)[0])
     np.testing.assert_allclose(source.world_from_target[held].translation, 0, atol=1e-9)
     assert all(camera.centre[2] > 0.5 for camera in by_board.rig)
-    assert not by_board.adjusted.is_frame_free
+    assert not by_board.adjustment.is_gauge_free
     assert f"moment {held}" in by_board.world
 
 

@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration import calibrate_from, read_sources
-from airborne.calibration.report import describe_calibration, calibration_to_dict
+from airborne.calibration.report import calibration_to_dict, describe_calibration
 from airborne.cameras import read_rig, write_pose2sim
 from airborne.errors import CalibrationError
 from tests.support import wand_waving as waving

@@ -1,7 +1,7 @@
 import cv2
 import numpy as np
 
-from airborne.cameras.dlt import dlt_coefficients, compose, decompose, decompose_with_skew, fit_dlt
+from airborne.cameras.dlt import compose, decompose, decompose_with_skew, dlt_coefficients, fit_dlt
 from tests.support.cameras import camera_at, scattered
 from tests.support.tolerances import ROUNDTRIP
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airborne.evaluation import Series, analyse_agreement
-from airborne.evaluation.agreement import Z, effective_sample_size, limits_of_agreement, variance_components
+from airborne.evaluation.agreement import Z, effective_number, limits_of_agreement, variance_components
 from tests.support.tolerances import ROUNDTRIP, sampled
 
 
@@ -54,8 +54,8 @@ def test_intervals_of_bias_and_limits_hold_the_truth_in_95_of_100():
     for _ in range(400):
         own = [0.5 + rng.normal() + 0.7 * rng.normal(size=8) for _ in range(10)]
         who = np.repeat([f"player {k}" for k in range(10)], 8)
-        found = analyse_agreement(series(np.concatenate(own), who))
-        held.append([found.bias.low < 0.5 < found.bias.high, found.upper_limit.low < true < found.upper_limit.high])
+        result = analyse_agreement(series(np.concatenate(own), who))
+        held.append([result.bias.low < 0.5 < result.bias.high, result.upper_limit.low < true < result.upper_limit.high])
     shares = np.mean(held, axis=0)
     assert shares.min() > 0.92 and shares.max() < 0.99  # short series count as a little fewer than they are
 
@@ -63,7 +63,7 @@ def test_intervals_of_bias_and_limits_hold_the_truth_in_95_of_100():
 @pytest.mark.parametrize("keep", [0.0, 0.5, 0.8])
 def test_frames_that_err_alike_count_as_fewer(keep):
     rng = np.random.default_rng(4)
-    counts = [effective_sample_size(fading(rng, 400, keep)) for _ in range(60)]
+    counts = [effective_number(fading(rng, 400, keep)) for _ in range(60)]
     assert np.mean(counts) == pytest.approx(400 * (1 - keep) / (1 + keep), rel=0.2)
     assert max(counts) <= 400
 
@@ -89,13 +89,13 @@ def test_individuals_with_their_own_bias_widen_the_limits_and_the_interval_of_th
 
 def test_errors_come_with_their_range_and_reliability():
     rng = np.random.default_rng(17)
-    found = analyse_agreement(series(1.0 + rng.normal(size=400)))
-    assert found.rmse.value == pytest.approx(2**0.5, rel=0.1)
-    assert found.rmse.low < 2**0.5 < found.rmse.high
-    assert found.nrmse_percent.value == pytest.approx(found.rmse.value / found.range * 100)
-    assert found.sem.value == pytest.approx(1 / 2**0.5, rel=3 * sampled(400))
-    assert found.mdc.value == pytest.approx(1.959964 * 2**0.5 * found.sem.value)
-    assert found.icc.consistency.value > found.icc.agreement.value > 0.99
+    result = analyse_agreement(series(1.0 + rng.normal(size=400)))
+    assert result.rmse.value == pytest.approx(2**0.5, rel=0.1)
+    assert result.rmse.low < 2**0.5 < result.rmse.high
+    assert result.nrmse_percent.value == pytest.approx(result.rmse.value / result.range * 100)
+    assert result.sem.value == pytest.approx(1 / 2**0.5, rel=3 * sampled(400))
+    assert result.mdc.value == pytest.approx(1.959964 * 2**0.5 * result.sem.value)
+    assert result.icc.consistency.value > result.icc.agreement.value > 0.99
 
 
 def test_moments_without_a_number_are_left_out():
@@ -111,16 +111,16 @@ def test_moments_without_a_number_are_left_out():
 
 @pytest.mark.parametrize("n", [0, 1, 2])
 def test_hardly_any_moment_gives_what_it_can(n):
-    found = analyse_agreement(series(np.arange(float(n)) + 2.0, reference=np.zeros(n)))
-    assert found.n == n
-    assert np.isnan(found.bias.value) == (n == 0)
-    assert np.isnan(found.upper_limit.value) == (n < 2)
-    assert np.isnan(found.nrmse_percent.value)
+    result = analyse_agreement(series(np.arange(float(n)) + 2.0, reference=np.zeros(n)))
+    assert result.n == n
+    assert np.isnan(result.bias.value) == (n == 0)
+    assert np.isnan(result.upper_limit.value) == (n < 2)
+    assert np.isnan(result.nrmse_percent.value)
 
 
 def test_of_single_measurements_of_several_individuals_the_limits_are_the_usual_ones():
     rng = np.random.default_rng(9)
     difference = rng.normal(size=12)
-    found = analyse_agreement(series(difference, [f"jump {k}" for k in range(12)]))
-    assert found.upper_limit.value - found.bias.value == pytest.approx(1.959964 * difference.std(ddof=1), rel=1e-6)
-    assert np.isnan(found.within_sd)
+    result = analyse_agreement(series(difference, [f"jump {k}" for k in range(12)]))
+    assert result.upper_limit.value - result.bias.value == pytest.approx(1.959964 * difference.std(ddof=1), rel=1e-6)
+    assert np.isnan(result.within_sd)

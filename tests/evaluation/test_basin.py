@@ -69,8 +69,8 @@ def test_wilson_interval_has_its_published_values():
 
 def test_wilson_interval_holds_the_true_rate_as_often_as_it_says():
     n_runs, rate = 2000, 0.9
-    found = np.random.default_rng(3).binomial(50, rate, size=n_runs)
-    intervals = [Basin(50, int(k)).interval for k in found]
+    result = np.random.default_rng(3).binomial(50, rate, size=n_runs)
+    intervals = [Basin(50, int(k)).interval for k in result]
     share = np.mean([low <= rate <= high for low, high in intervals])
     assert share == pytest.approx(0.95, abs=0.03)
 

@@ -41,7 +41,7 @@ def test_one_bad_frame_is_the_largest_error_and_its_share_of_the_rms():
     assert result.position.rms_mm[1] == pytest.approx(40 / np.sqrt(40))
 
 
-def test_turn_about_the_somersault_axis_is_a_somersault_error_only():
+def test_rotation_about_the_somersault_axis_is_a_somersault_error_only():
     result = compare_motion(turned(motion_of(flight()), np.tile([np.deg2rad(2), 0, 0], (40, 1))), flight(), IDENTITY)
     np.testing.assert_allclose(result.raw.rms_deg, [2, 0, 0], atol=ROUNDTRIP)
     assert result.raw.geodesic_rms_deg == pytest.approx(2)
@@ -53,7 +53,7 @@ def test_angle_errors_do_not_jump_where_the_angles_wrap():
     np.testing.assert_allclose(result.raw.largest_deg, [12, 0, 0], atol=ROUNDTRIP)
 
 
-def test_whole_run_seen_flipped_is_wrong_raw_and_right_modulo_symmetry():
+def test_whole_run_flipped_is_wrong_raw_and_right_modulo_symmetry():
     motion = motion_of(flight())
     result = compare_motion(replace(motion, R=motion.R @ HALF_TURN[1]), flight(), HALF_TURN)
     assert result.raw.geodesic_rms_deg == pytest.approx(180)
@@ -113,7 +113,7 @@ def test_motion_lost_throughout_or_empty_is_refused():
         compare_motion(rows(motion_of(flight()), slice(0, 0)), flight(), IDENTITY)
 
 
-def test_honest_deviations_hold_the_normal_share_of_the_errors():
+def test_correct_deviations_contain_the_normal_share_of_the_errors():
     n, rng = 3000, np.random.default_rng(5)
     truth = flight(n)
     sd = np.array([1e-3, 2e-3, 3e-3, 0.01, 0.02, 0.005])

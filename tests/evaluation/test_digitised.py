@@ -42,7 +42,7 @@ def test_points_of_the_cross_are_the_ends_of_its_bars():
     np.testing.assert_array_equal(body_points(cross(), ENDS), expected)
 
 
-def test_points_follow_turned_parts_on_jointed_segments():
+def test_points_follow_rotated_parts_on_jointed_segments():
     turn = RigidTransform.from_components([0, 0, 0.1], Rotation.from_euler("X", 90, degrees=True))
     arm = Part("arm", Box(np.array([0.1, 0.4, 0.1])), turn, None)
     trunk = Part("trunk", Ellipsoid(np.ones(3)), RigidTransform.identity(), None)

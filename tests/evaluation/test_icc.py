@@ -41,8 +41,8 @@ def test_a_bias_between_the_ways_costs_agreement_and_no_consistency():
 def test_intervals_hold_the_truth_in_95_of_100():
     rng, held = np.random.default_rng(1), []
     for _ in range(400):
-        found = reliability(2.0 * rng.normal(size=(15, 1)) + rng.normal(size=(15, 3)))
-        held.append([low <= 0.8 <= high for _, low, high in (found.one_way, found.agreement, found.consistency)])
+        result = reliability(2.0 * rng.normal(size=(15, 1)) + rng.normal(size=(15, 3)))
+        held.append([low <= 0.8 <= high for _, low, high in (result.one_way, result.agreement, result.consistency)])
     assert np.mean(held, axis=0) == pytest.approx([0.95] * 3, abs=0.03)
 
 
@@ -53,7 +53,7 @@ def test_fewer_effective_targets_widen_the_intervals_alone():
 
 
 @pytest.mark.parametrize("ratings", [np.zeros((0, 2)), np.zeros((1, 2)), np.zeros((9, 1)), np.ones((9, 2))])
-def test_what_cannot_be_said_is_unknown(ratings):
+def test_what_is_undetermined_is_unknown(ratings):
     assert np.isnan(reliability(ratings).agreement.value)
 
 

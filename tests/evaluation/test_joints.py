@@ -34,20 +34,20 @@ def paths(motion=None, names=MARKS, error_m=0.0, shift_s=0.0):
 
 
 def test_a_motion_against_itself_has_no_errors():
-    found = compare_joints(run(), MODEL, paths())
-    assert found.whole.mean_mm == 0
-    assert found.whole.n == 30 * 5
-    assert list(found.joints) == list(MARKS)
-    assert (found.n_matched, found.n_tracked, found.better_shift_s, found.not_compared) == (30, 30, 0, ())
+    result = compare_joints(run(), MODEL, paths())
+    assert result.whole.mean_mm == 0
+    assert result.whole.n == 30 * 5
+    assert list(result.joints) == list(MARKS)
+    assert (result.n_matched, result.n_tracked, result.better_shift_s, result.not_compared) == (30, 30, 0, ())
 
 
 def test_a_shift_of_the_world_is_the_bias_and_goes_with_it():
-    found = compare_joints(run(), MODEL, paths(error_m=np.array([-0.003, 0.0, 0.004])))
-    assert found.whole.mean_mm == pytest.approx(5.0, abs=1e3 * ROUNDTRIP)
-    assert found.joints["head"].rms_mm == pytest.approx(5.0, abs=1e3 * ROUNDTRIP)
-    np.testing.assert_allclose(found.whole.bias_mm, [3.0, 0.0, -4.0], atol=1e3 * ROUNDTRIP)
-    assert found.whole.mean_without_bias_mm == pytest.approx(0, abs=1e3 * ROUNDTRIP)
-    assert found.whole.mean_without_offset_mm > 0.1  # the segments turn under it
+    result = compare_joints(run(), MODEL, paths(error_m=np.array([-0.003, 0.0, 0.004])))
+    assert result.whole.mean_mm == pytest.approx(5.0, abs=1e3 * ROUNDTRIP)
+    assert result.joints["head"].rms_mm == pytest.approx(5.0, abs=1e3 * ROUNDTRIP)
+    np.testing.assert_allclose(result.whole.bias_mm, [3.0, 0.0, -4.0], atol=1e3 * ROUNDTRIP)
+    assert result.whole.mean_without_bias_mm == pytest.approx(0, abs=1e3 * ROUNDTRIP)
+    assert result.whole.mean_without_offset_mm > 0.1  # the segments turn under it
 
 
 def test_another_definition_of_a_joint_is_an_offset_in_its_segment_and_goes_with_it():
@@ -56,73 +56,73 @@ def test_another_definition_of_a_joint_is_an_offset_in_its_segment_and_goes_with
         MODEL, landmarks=tuple(replace(mark, position_m=mark.position_m - offset) for mark in MODEL.landmarks)
     )
     points, _ = landmarks(run(), other)
-    found = compare_joints(run(), MODEL, JointPaths(names=MARKS, time_s=TIMES, points=points))
-    np.testing.assert_allclose(found.joints["wrist_left"].offset_mm, 1e3 * offset, atol=1e3 * ROUNDTRIP)
-    assert found.whole.mean_mm == pytest.approx(1e3 * np.linalg.norm(offset), abs=1e3 * ROUNDTRIP)
-    assert found.whole.mean_without_offset_mm == pytest.approx(0, abs=1e3 * ROUNDTRIP)
-    assert found.whole.mean_without_bias_mm > 0.1
-    assert found.whole.offset_mm is None
+    result = compare_joints(run(), MODEL, JointPaths(names=MARKS, time_s=TIMES, points=points))
+    np.testing.assert_allclose(result.joints["wrist_left"].offset_mm, 1e3 * offset, atol=1e3 * ROUNDTRIP)
+    assert result.whole.mean_mm == pytest.approx(1e3 * np.linalg.norm(offset), abs=1e3 * ROUNDTRIP)
+    assert result.whole.mean_without_offset_mm == pytest.approx(0, abs=1e3 * ROUNDTRIP)
+    assert result.whole.mean_without_bias_mm > 0.1
+    assert result.whole.offset_mm is None
 
 
 def test_errors_of_one_landmark_are_its_own():
     reference = paths()
     reference.points[:, 1, 0] += 0.01 * (-1.0) ** np.arange(30)
-    found = compare_joints(run(), MODEL, reference)
-    assert found.joints["head"].mean_mm == pytest.approx(10, abs=1e3 * ROUNDTRIP)
-    assert found.joints["head"].largest_mm == pytest.approx(10, abs=1e3 * ROUNDTRIP)
-    assert found.joints["pelvis"].mean_mm == 0
-    assert found.whole.mean_mm == pytest.approx(10 / 5, abs=1e3 * ROUNDTRIP)
-    assert found.whole.rms_mm == pytest.approx(10 / 5**0.5, abs=1e3 * ROUNDTRIP)
+    result = compare_joints(run(), MODEL, reference)
+    assert result.joints["head"].mean_mm == pytest.approx(10, abs=1e3 * ROUNDTRIP)
+    assert result.joints["head"].largest_mm == pytest.approx(10, abs=1e3 * ROUNDTRIP)
+    assert result.joints["pelvis"].mean_mm == 0
+    assert result.whole.mean_mm == pytest.approx(10 / 5, abs=1e3 * ROUNDTRIP)
+    assert result.whole.rms_mm == pytest.approx(10 / 5**0.5, abs=1e3 * ROUNDTRIP)
 
 
-def test_lost_frames_are_counted_and_uncertain_ones_told_apart():
+def test_lost_frames_are_counted_and_uncertain_ones_separately():
     motion = run(lost=[3, 4])
     status = motion.status.astype("<U9")
     status[7] = Status.UNCERTAIN.value
     reference = paths()
     reference.points[7] += 0.05
-    found = compare_joints(replace(motion, status=status), MODEL, reference)
-    assert (found.n_matched, found.n_tracked, found.n_uncertain, found.n_lost) == (30, 27, 1, 2)
-    assert found.whole.n == 28 * 5
-    assert found.whole.mean_mm > 1
-    assert found.tracked is not None
-    assert found.tracked.mean_mm == 0
+    result = compare_joints(replace(motion, status=status), MODEL, reference)
+    assert (result.n_matched, result.n_tracked, result.n_uncertain, result.n_lost) == (30, 27, 1, 2)
+    assert result.whole.n == 28 * 5
+    assert result.whole.mean_mm > 1
+    assert result.tracked is not None
+    assert result.tracked.mean_mm == 0
 
 
 def test_missing_points_of_the_reference_are_left_out():
     reference = paths()
     reference.points[:, 2] = np.nan
     reference.points[5:10, 0, 1] = np.nan
-    found = compare_joints(run(), MODEL, reference)
-    assert found.joints["pelvis"].n == 25
-    assert "elbow_left" not in found.joints
-    assert found.not_compared == ("elbow_left",)
+    result = compare_joints(run(), MODEL, reference)
+    assert result.joints["pelvis"].n == 25
+    assert "elbow_left" not in result.joints
+    assert result.not_compared == ("elbow_left",)
 
 
-def test_a_reference_whose_clock_is_off_by_a_frame_is_told():
-    found = compare_joints(run(), MODEL, paths(shift_s=1 / 60))
-    assert found.better_shift_s == pytest.approx(-1 / 60, abs=ROUNDTRIP)
-    assert found.better_mean_without_offset_mm == pytest.approx(0, abs=1e3 * ROUNDTRIP)
-    assert "-16.7 ms" in found.describe()
+def test_a_reference_whose_clock_is_off_by_a_frame_is_reported():
+    result = compare_joints(run(), MODEL, paths(shift_s=1 / 60))
+    assert result.better_shift_s == pytest.approx(-1 / 60, abs=ROUNDTRIP)
+    assert result.better_mean_without_offset_mm == pytest.approx(0, abs=1e3 * ROUNDTRIP)
+    assert "-16.7 ms" in result.describe()
 
 
-def test_honest_deviations_hold_two_thirds_of_the_errors():
+def test_correct_deviations_contain_two_thirds_of_the_errors():
     covariance, rng = small_covariance(MODEL, sd=5e-3), np.random.default_rng(0)
     motion = run(covariance=covariance)
     points, sd = landmarks(motion, MODEL)
     noisy = points + sd[..., None] * rng.normal(size=points.shape)
-    found = compare_joints(motion, MODEL, JointPaths(names=MARKS, time_s=TIMES, points=noisy)).calibration
-    assert found.n == 30 * 5 * 3
-    assert found.within_1sd == pytest.approx(0.683, abs=sampled(found.n))
-    assert found.within_2sd == pytest.approx(0.954, abs=sampled(found.n))
+    result = compare_joints(motion, MODEL, JointPaths(names=MARKS, time_s=TIMES, points=noisy)).calibration
+    assert result.n == 30 * 5 * 3
+    assert result.within_1sd == pytest.approx(0.683, abs=sampled(result.n))
+    assert result.within_2sd == pytest.approx(0.954, abs=sampled(result.n))
 
 
 def test_numbers_go_to_json_without_nan():
-    found = compare_joints(run(), MODEL, replace(paths(), time_s=TIMES[:1], points=paths().points[:1]))
-    values = found.to_dict()
+    result = compare_joints(run(), MODEL, replace(paths(), time_s=TIMES[:1], points=paths().points[:1]))
+    values = result.to_dict()
     assert values["whole"]["mean_without_offset_mm"] is None
     assert values["joints"]["head"]["mean_mm"] == 0
-    assert "pelvis" in found.describe()
+    assert "pelvis" in result.describe()
 
 
 @pytest.mark.parametrize(
@@ -156,10 +156,10 @@ def test_markers_of_pose_networks_have_their_landmarks(marker, landmark):
 def test_markers_go_with_landmarks_and_the_others_are_named():
     reference = paths(names=("Hip", "Head", "LElbow", "Nose", "RKnee"))
     reference.points[:, 3] += 1.0
-    found = compare_joints(run(), MODEL, reference)
-    assert set(found.joints) == {"pelvis", "head", "elbow_left", "knee_right"}
-    assert found.not_compared == ("Nose", "wrist_left")
-    assert found.whole.mean_mm == 0
+    result = compare_joints(run(), MODEL, reference)
+    assert set(result.joints) == {"pelvis", "head", "elbow_left", "knee_right"}
+    assert result.not_compared == ("Nose", "wrist_left")
+    assert result.whole.mean_mm == 0
 
 
 def test_reference_of_other_joints_or_another_time_is_refused():
@@ -175,10 +175,10 @@ def test_reference_of_other_joints_or_another_time_is_refused():
 
 def test_joints_of_a_run_are_read_back_as_paths(tmp_path):
     write_joints(tmp_path / "joints.csv", run(lost=[2]), MODEL)
-    found = read_joint_paths(tmp_path / "joints.csv")
-    assert found.names == MARKS
-    np.testing.assert_array_equal(found.time_s, TIMES)
-    np.testing.assert_array_equal(found.points, landmarks(run(lost=[2]), MODEL)[0])
+    result = read_joint_paths(tmp_path / "joints.csv")
+    assert result.names == MARKS
+    np.testing.assert_array_equal(result.time_s, TIMES)
+    np.testing.assert_array_equal(result.points, landmarks(run(lost=[2]), MODEL)[0])
 
 
 TRC = (
@@ -200,22 +200,22 @@ def written(tmp_path, name, text):
 
 def test_trc_points_come_in_metres_with_z_up(tmp_path):
     for text in (TRC, TRC.replace("\n", "\r\n"), TRC.replace("\t\n\n", "\n")):
-        found = read_joint_paths(written(tmp_path, "a.TRC", text))
-        assert found.names == ("RHip", "LHip")
-        np.testing.assert_array_equal(found.time_s, [0.0, 0.02])
-        np.testing.assert_allclose(found.points[0, 0], [0.02, 0.1, 0.9], atol=ROUNDTRIP)
-        np.testing.assert_allclose(found.points[1, 1], [0.003, 0.001, 0.002], atol=ROUNDTRIP)
-        assert np.isnan(found.points[0, 1]).all()
+        result = read_joint_paths(written(tmp_path, "a.TRC", text))
+        assert result.names == ("RHip", "LHip")
+        np.testing.assert_array_equal(result.time_s, [0.0, 0.02])
+        np.testing.assert_allclose(result.points[0, 0], [0.02, 0.1, 0.9], atol=ROUNDTRIP)
+        np.testing.assert_allclose(result.points[1, 1], [0.003, 0.001, 0.002], atol=ROUNDTRIP)
+        assert np.isnan(result.points[0, 1]).all()
 
 
 LONG = "frame,time_s,joint,x_m,y_m,z_m\n0,0.0,head,1,2,3\n0,0.0,pelvis,1,2,2\n1,0.02,pelvis,1,2,2.5\n"
 
 
 def test_long_table_has_gaps_where_a_joint_has_no_line(tmp_path):
-    found = read_joint_paths(written(tmp_path, "truth_joints.csv", LONG))
-    assert found.names == ("head", "pelvis")
-    np.testing.assert_array_equal(found.points[:, 1], [[1, 2, 2], [1, 2, 2.5]])
-    assert np.isnan(found.points[1, 0]).all()
+    result = read_joint_paths(written(tmp_path, "truth_joints.csv", LONG))
+    assert result.names == ("head", "pelvis")
+    np.testing.assert_array_equal(result.points[:, 1], [[1, 2, 2], [1, 2, 2.5]])
+    assert np.isnan(result.points[1, 0]).all()
 
 
 @pytest.mark.parametrize(
@@ -228,8 +228,8 @@ def test_long_table_has_gaps_where_a_joint_has_no_line(tmp_path):
         ("t.csv", LONG.replace("0.02", "0.0"), "pelvis 2 times at 0 s"),
         ("t.csv", "player,time_s,joint,x_m,y_m,z_m\na,0,head,1,2,3\nb,0,head,1,2,3\n", "holds 2 players"),
         ("t.csv", "", "no lines of numbers"),
-        ("t.trc", "", "does not begin as a TRC"),
-        ("t.trc", LONG, "does not begin as a TRC"),
+        ("t.trc", "", "does not begin like a TRC"),
+        ("t.trc", LONG, "does not begin like a TRC"),
         ("t.trc", TRC.replace("\tmm\t", "\tinch\t"), "Units is 'inch'"),
         ("t.trc", TRC.replace("905", "high"), "line 8: a cell is not a number"),
         ("t.trc", TRC.replace("\t0.02\t", "\t0.0\t"), "line 8: its time is not after"),
@@ -258,7 +258,7 @@ def test_file_that_is_no_text_is_refused(tmp_path):
 
 
 def test_paths_of_a_real_recording_are_read(shared_data):
-    found = read_joint_paths(shared_data("balance") / "Pose2Sim_markers.trc")
-    assert found.points.shape == (100, 21, 3)
-    assert 0.8 < np.nanmean(found.points[:, found.names.index("RHip"), 2]) < 1.1  # a standing man's hip, z up
-    assert len({landmark_of(name) for name in found.names} - {None}) == 16
+    result = read_joint_paths(shared_data("balance") / "Pose2Sim_markers.trc")
+    assert result.points.shape == (100, 21, 3)
+    assert 0.8 < np.nanmean(result.points[:, result.names.index("RHip"), 2]) < 1.1  # a standing man's hip, z up
+    assert len({landmark_of(name) for name in result.names} - {None}) == 16

@@ -24,18 +24,18 @@ TRUTH = motion_of(JUMPER)
 STILL = players_motion(np.arange(40) / 60, np.repeat(JUMPER.points()[:1, None, :6], 40, axis=0))
 
 
-def compared(estimate, truth=STILL, **kwargs):
+def compare_with_truth(estimate, truth=STILL, **kwargs):
     return compare_players(estimate, truth, **kwargs).players["one"]
 
 
-def moved(rows, columns, by_m, motion=STILL):
+def shift_joints(rows, columns, by_m, motion=STILL):
     points = motion.points.copy()
     points[rows, 0, columns] += by_m
     return replace(motion, points=points)
 
 
 def test_no_error_where_the_estimate_is_the_truth():
-    errors = compared(STILL)
+    errors = compare_with_truth(STILL)
     whole = errors.parts["all"]
     assert (whole.mean_mm, whole.largest_mm, whole.jitter_mm) == (0.0, 0.0, 0.0)
     assert (whole.within_50mm, whole.auc_200mm, whole.within_95, errors.pcp) == (1.0, 1.0, 1.0, 1.0)
@@ -44,7 +44,7 @@ def test_no_error_where_the_estimate_is_the_truth():
 
 
 def test_a_known_error_of_one_joint_is_its_mean_and_that_of_its_group_half():
-    errors = compared(moved(slice(None), 4, [0.06, 0.0, 0.08]))
+    errors = compare_with_truth(shift_joints(slice(None), 4, [0.06, 0.0, 0.08]))
     assert errors.parts["ankle_left"].mean_mm == pytest.approx(100.0, rel=ROUNDTRIP)
     assert errors.parts["ankles"].mean_mm == pytest.approx(50.0, rel=ROUNDTRIP)
     assert errors.parts["ankle_left"].auc_200mm == pytest.approx(0.5, rel=ROUNDTRIP)
@@ -52,10 +52,10 @@ def test_a_known_error_of_one_joint_is_its_mean_and_that_of_its_group_half():
     assert errors.parts["all"].mean_mm == pytest.approx(100 / 6, rel=ROUNDTRIP)
 
 
-def test_strict_success_counts_unknown_places_as_failed():
+def test_strict_success_counts_missing_estimates_as_failed():
     points = STILL.points.copy()
     points[:10, 0, 2] = np.nan
-    knee = compared(replace(STILL, points=points)).parts["knee_left"]
+    knee = compare_with_truth(replace(STILL, points=points)).parts["knee_left"]
     assert (knee.n, knee.n_unknown, knee.mean_mm) == (40, 10, 0.0)
     assert knee.within_100mm == knee.within_50mm == knee.auc_200mm == 0.75
 
@@ -64,45 +64,47 @@ def test_swapped_sides_are_counted_and_near_misses_are_not():
     points = STILL.points.copy()
     points[:8, 0, [4, 5]] = points[:8, 0, [5, 4]]
     points[20:, 0, 4, 0] += 0.02
-    assert compared(replace(STILL, points=points)).swap_rate == {"hips": 0.0, "knees": 0.0, "ankles": 0.2}
+    assert compare_with_truth(replace(STILL, points=points)).swap_rate == {"hips": 0.0, "knees": 0.0, "ankles": 0.2}
 
 
 def test_limbs_are_correct_up_to_half_their_length_on_the_mean():
     length = float(np.linalg.norm(STILL.points[0, 0, 2] - STILL.points[0, 0, 4]))
-    assert compared(moved(slice(None), 4, [0.99 * length, 0, 0])).pcp == 1.0
-    assert compared(moved(slice(None), 4, [1.01 * length, 0, 0])).pcp == 0.75
+    assert compare_with_truth(shift_joints(slice(None), 4, [0.99 * length, 0, 0])).pcp == 1.0
+    assert compare_with_truth(shift_joints(slice(None), 4, [1.01 * length, 0, 0])).pcp == 0.75
 
 
 def test_recovery_is_the_time_until_the_error_is_small_again():
-    errors = compared(moved(slice(10, 16), slice(None), [0.2, 0, 0]))
+    errors = compare_with_truth(shift_joints(slice(10, 16), slice(None), [0.2, 0, 0]))
     assert errors.n_losses == 1
     assert errors.mean_recovery_s == pytest.approx(6 / 60, rel=ROUNDTRIP)
-    assert np.isnan(compared(moved(slice(30, 40), slice(None), [0.2, 0, 0])).mean_recovery_s), "never recovered"
+    assert np.isnan(compare_with_truth(shift_joints(slice(30, 40), slice(None), [0.2, 0, 0])).mean_recovery_s), (
+        "never recovered"
+    )
 
 
 def test_jitter_of_white_noise_is_the_root_of_six_times_its_deviation():
     rng = np.random.default_rng(0)
     long = players_motion(np.arange(400) / 60, np.repeat(STILL.points[:1], 400, axis=0))
     shaken = replace(long, points=long.points + 0.01 * rng.standard_normal(long.points.shape))
-    assert compared(shaken, long).parts["all"].jitter_mm == pytest.approx(10 * np.sqrt(6), rel=0.05)
+    assert compare_with_truth(shaken, long).parts["all"].jitter_mm == pytest.approx(10 * np.sqrt(6), rel=0.05)
 
 
-def test_honest_covariances_hold_95_percent_and_boasting_ones_fewer():
+def test_correct_covariances_contain_95_percent_and_too_small_ones_fewer():
     rng = np.random.default_rng(1)
     long = players_motion(np.arange(200) / 60, np.repeat(STILL.points[:1], 200, axis=0))
     points = long.points + 0.02 * rng.standard_normal(long.points.shape)
     honest = replace(long, points=points, covariance=np.broadcast_to(4e-4 * np.eye(3), long.covariance.shape))
-    assert compared(honest, long).parts["all"].within_95 == pytest.approx(0.95, abs=sampled(200 * 6))
+    assert compare_with_truth(honest, long).parts["all"].within_95 == pytest.approx(0.95, abs=sampled(200 * 6))
     boast = replace(honest, covariance=honest.covariance / 4)
-    assert compared(boast, long).parts["all"].within_95 < 0.7
+    assert compare_with_truth(boast, long).parts["all"].within_95 < 0.7
     unknown = replace(honest, covariance=np.full_like(honest.covariance, np.nan))
-    assert np.isnan(compared(unknown, long).parts["all"].within_95)
+    assert np.isnan(compare_with_truth(unknown, long).parts["all"].within_95)
 
 
-def test_length_of_a_rod_that_changes_is_seen():
+def test_changing_segment_length_is_detected():
     points = STILL.points.copy()
     points[::2, 0, 4, 2] -= 0.02
-    lengths = compared(replace(STILL, points=points)).length_sd_mm
+    lengths = compare_with_truth(replace(STILL, points=points)).length_sd_mm
     assert lengths["thigh_left"] == pytest.approx(0.0, abs=ROUNDTRIP)
     assert lengths["shank_left"] == pytest.approx(10.0, rel=0.1)
 
@@ -122,7 +124,7 @@ def test_jumps_are_compared_in_every_definition():
     assert json.loads(json.dumps(comparison.to_dict(), allow_nan=False))["n_matched"] == len(TRUTH)
 
 
-def test_a_jump_that_was_not_found_is_said():
+def test_a_jump_that_was_not_found_is_reported():
     flat = replace(TRUTH, points=np.repeat(TRUTH.points[:1], len(TRUTH), axis=0))
     (jump,) = compare_players(flat, TRUTH).jumps
     assert not jump.is_found
@@ -150,7 +152,7 @@ def test_other_recordings_are_refused_in_one_line():
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path):
-    with pytest.raises(ResultError, match=r"holds no run of players; expected joints\.csv"):
+    with pytest.raises(ResultError, match=r"holds no run of players; expected the joints\.csv"):
         assess_players(tmp_path, tmp_path / "truth.csv")
 
 
@@ -167,11 +169,11 @@ def test_a_run_in_a_folder_is_compared_with_a_truth_table_and_its_stated_jumps(t
         for k, t in enumerate(motion.time_s)
     ]
     (tmp_path / "truth.csv").write_text("\n".join([",".join(header), *lines]) + "\n")
-    found = assess_players(tmp_path, tmp_path / "truth.csv")
-    assert found.n_matched == len(motion)
-    assert found.players["one"].parts["all"].mean_mm == pytest.approx(5.0, rel=1e-6)
-    assert found.players["one"].cover is None, "no cameras in the folder"
-    assert found.jumps == ()
+    result = assess_players(tmp_path, tmp_path / "truth.csv")
+    assert result.n_matched == len(motion)
+    assert result.players["one"].parts["all"].mean_mm == pytest.approx(5.0, rel=1e-6)
+    assert result.players["one"].cover is None, "no cameras in the folder"
+    assert result.jumps == ()
 
 
 def estimate_at(motion, row):
@@ -200,16 +202,16 @@ def test_truth_is_read_by_player_and_frame_in_any_order(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("lines", "said"),
+    ("lines", "message"),
     [
         (["0,0,a,1,2,3", "1,0.1,b,1,2,3"], "not one row for each of 2 players"),
         (["0,0,a,1,2,3", "0,0.1,b,1,2,3"], "time_s must be one number in each frame"),
         (["0,0,a,1,2,3", "1,,a,1,2,3"], "line 3 has no time_s"),
-        (["0,0,a,,nan,", "1,0.1,a,,,"], "holds no place of any point"),
+        (["0,0,a,,nan,", "1,0.1,a,,,"], "holds no position of any point"),
     ],
 )
-def test_broken_truth_is_refused_in_one_line(tmp_path, lines, said):
-    with pytest.raises(ResultError, match=said):
+def test_broken_truth_is_refused_in_one_line(tmp_path, lines, message):
+    with pytest.raises(ResultError, match=message):
         read_players_truth(truth_file(tmp_path / "truth.csv", lines))
 
 
@@ -273,7 +275,7 @@ def test_cover_leaves_frames_out_that_fewer_than_two_cameras_show(rig):
     assert np.isnan(success_cover(rig, truth, truth, LEG_POINTS, visible=visible).rate["hip_left"])
 
 
-def test_unknown_places_and_errors_along_one_ray_cover_nothing(rig):
+def test_missing_estimates_and_errors_along_one_ray_cover_nothing(rig):
     truth = STILL.points[:, 0]
     estimate = truth.copy()
     estimate[:, 4] = np.nan

@@ -24,34 +24,34 @@ def root(angle_deg, t=T):
     return root_variables(t, np.zeros((len(t), 3)), R)
 
 
-def named(series):
+def by_name(series):
     return {one.name: one for one in series}
 
 
-def test_angles_differ_on_the_circle_and_not_by_a_turn():
-    found = named(common_series([root(179.0), root(-179.0)], "both"))["somersault"]
-    assert found.unit == "deg"
-    assert found.values[:, 0] - found.values[:, 1] == pytest.approx(np.full(40, -2.0), abs=1e-9)
+def test_angles_differ_on_the_circle_and_not_by_a_revolution():
+    result = by_name(common_series([root(179.0), root(-179.0)], "both"))["somersault"]
+    assert result.unit == "deg"
+    assert result.values[:, 0] - result.values[:, 1] == pytest.approx(np.full(40, -2.0), abs=1e-9)
 
 
-def test_somersault_and_twist_are_left_out_where_they_cannot_be_told_apart():
+def test_somersault_and_twist_are_left_out_where_they_are_ambiguous():
     R = Rotation.from_euler("XYZ", np.stack([0 * T, np.linspace(0, np.pi / 2, 40), 0 * T], 1)).as_matrix()
-    found = root_variables(T, np.zeros((40, 3)), R)
-    assert np.isnan(found.columns["twist", "body"][-1])
-    assert np.isfinite(found.columns["tilt", "body"]).all()
+    result = root_variables(T, np.zeros((40, 3)), R)
+    assert np.isnan(result.columns["twist", "body"][-1])
+    assert np.isfinite(result.columns["tilt", "body"]).all()
 
 
 def test_only_common_times_and_variables_count():
     one = point_variables(T, np.ones((40, 2, 3)), ["hip", "knee"])
     other = point_variables(T[5:30] + 1e-4, np.zeros((25, 2, 3)), ["knee", "head"])
     third = point_variables(T[10:], np.zeros((30, 1, 3)), ["knee"])
-    found = named(common_series([one, other, third], "the three"))
-    assert set(found) == {"knee x", "knee y", "knee z", "all joints x", "all joints y", "all joints z"}
-    assert found["knee x"].values.shape == (20, 3)
-    assert found["knee x"].values[:, 0] == pytest.approx(np.full(20, 1000.0))
+    result = by_name(common_series([one, other, third], "the three"))
+    assert set(result) == {"knee x", "knee y", "knee z", "all joints x", "all joints y", "all joints z"}
+    assert result["knee x"].values.shape == (20, 3)
+    assert result["knee x"].values[:, 0] == pytest.approx(np.full(20, 1000.0))
 
 
-def test_nothing_in_common_is_said_plainly():
+def test_nothing_in_common_is_reported_plainly():
     with pytest.raises(ResultError, match=r"the runs have no time in common .* give those of one recording"):
         common_series([root(0.0), root(0.0, T + 100)], "the runs")
     with pytest.raises(ResultError, match="no variable in common"):
@@ -61,23 +61,23 @@ def test_nothing_in_common_is_said_plainly():
 def test_players_and_joints_are_individuals():
     points = np.random.default_rng(0).normal(size=(40, 2, 3))
     both = point_variables(T, points, ["hip", "knee"], "Anna") | point_variables(T, points, ["hip", "knee"], "Berta")
-    found = named(common_series([both, both], "both"))
-    assert set(found["hip x"].individual) == {"Anna", "Berta"}
-    assert len(set(found["all joints z"].individual)) == 4
-    assert [one.name for one in headline_series(list(found.values()))] == [f"all joints {axis}" for axis in "xyz"]
+    result = by_name(common_series([both, both], "both"))
+    assert set(result["hip x"].individual) == {"Anna", "Berta"}
+    assert len(set(result["all joints z"].individual)) == 4
+    assert [one.name for one in headline_series(list(result.values()))] == [f"all joints {axis}" for axis in "xyz"]
 
 
-def test_joint_angles_of_both_branches_are_the_same_turn():
+def test_joint_angles_of_both_branches_are_the_same_rotation():
     angles = np.random.default_rng(1).uniform(-1, 1, (40, 1, 3))
     other = np.stack([angles[..., 0] + np.pi, np.pi - angles[..., 1], angles[..., 2] - np.pi], axis=-1)
-    found = common_series(
+    result = common_series(
         [joint_angle_variables(T, angles, ["knee"]), joint_angle_variables(T, other, ["knee"])], "both"
     )
-    for one in found:
+    for one in result:
         assert one.values[:, 0] == pytest.approx(one.values[:, 1], abs=1e-9)
 
 
-def test_a_symmetric_body_is_turned_to_look_like_the_reference():
+def test_a_symmetric_body_is_aligned_with_the_reference():
     truth = flight()
     motion = motion_of(truth)
     turned = align_symmetry(motion, truth.R @ HALF_TURN[1], truth.time_s, HALF_TURN)
@@ -87,9 +87,9 @@ def test_a_symmetric_body_is_turned_to_look_like_the_reference():
 def test_joint_angles_are_read_and_a_broken_file_gets_one_line(tmp_path):
     path = tmp_path / "angles.csv"
     path.write_text("frame,time_s,knee_x_rad,knee_y_rad,knee_z_rad\n0,0.0,0.5,0.1,0\n1,0.02,0.6,0.1,\n")
-    found = read_joint_angles(path)
-    assert found.columns["knee turn x", "body"][0] == pytest.approx(np.rad2deg(0.5))
-    assert np.isnan(found.columns["knee turn z", "body"][1])
+    result = read_joint_angles(path)
+    assert result.columns["knee turn x", "body"][0] == pytest.approx(np.rad2deg(0.5))
+    assert np.isnan(result.columns["knee turn z", "body"][1])
     path.write_text("time_s,knee_x_rad\n0,1\n")
     with pytest.raises(ResultError, match="no column knee_y_rad"):
         read_joint_angles(path)

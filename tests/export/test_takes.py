@@ -99,7 +99,7 @@ def test_runs_that_have_no_rate_or_no_order_are_refused_in_one_line():
         take_of(motion, PERSON)
     motion = tumbling(4)
     motion.time_s[2] = motion.time_s[1]
-    with pytest.raises(ResultError, match=r"times.*do not grow"):
+    with pytest.raises(ResultError, match=r"times.*do not increase"):
         take_of(motion, PERSON)
 
 

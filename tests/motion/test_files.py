@@ -28,9 +28,9 @@ def write(path, estimates, joints=()):
     return path
 
 
-def assert_same(found, expected):
-    assert len(found) == len(expected)
-    for a, b in zip(found, expected, strict=True):
+def assert_same(result, expected):
+    assert len(result) == len(expected)
+    for a, b in zip(result, expected, strict=True):
         assert (a.index, a.time_s, a.status, a.n_views) == (b.index, b.time_s, b.status, b.n_views)
         np.testing.assert_array_equal(a.score, b.score)
         assert (a.pose is None, a.covariance is None) == (b.pose is None, b.covariance is None)
@@ -163,9 +163,9 @@ def test_killed_process_leaves_every_finished_frame(tmp_path, joints):
                 os.kill(process.pid, signal.SIGKILL)
                 break
         finished = max([20, *map(int, process.stdout.read().split())])
-    found = read_estimates(path)
-    assert finished <= found[-1].index <= finished + 1
-    assert_same(found, [estimate(i, n_joints=len(joints)) for i in range(len(found))])
+    result = read_estimates(path)
+    assert finished <= result[-1].index <= finished + 1
+    assert_same(result, [estimate(i, n_joints=len(joints)) for i in range(len(result))])
 
 
 JOINTS = ("chest", "head")
@@ -191,18 +191,18 @@ def test_without_covariance_bin_only_what_the_joints_add_is_unknown(tmp_path):
     estimates = run_with_gap(5, lost=[2], n_joints=2)
     path = write(tmp_path / "motion.csv", estimates, JOINTS)
     (tmp_path / "covariance.bin").unlink()
-    found = read_motion(path).covariance
+    result = read_motion(path).covariance
     expected = Motion.collect(estimates, JOINTS).covariance
     expected[:, 6:] = expected[:, :, 6:] = np.nan
-    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(result, expected)
 
 
 def test_covariance_of_the_root_alone_leaves_the_joints_unknown(tmp_path):
     item = estimate(0, n_joints=2)
     alone = replace(item, covariance=item.covariance[:6, :6])
-    found = read_motion(write(tmp_path / "motion.csv", [alone], JOINTS))
-    np.testing.assert_array_equal(found.covariance[0, :6, :6], alone.covariance)
-    assert np.isnan(found.covariance[0, 6:]).all()
+    result = read_motion(write(tmp_path / "motion.csv", [alone], JOINTS))
+    np.testing.assert_array_equal(result.covariance[0, :6, :6], alone.covariance)
+    assert np.isnan(result.covariance[0, 6:]).all()
 
 
 def test_cutting_both_files_of_a_body_with_joints_keeps_every_whole_row(tmp_path):
@@ -232,12 +232,12 @@ def test_resuming_without_whole_covariances_keeps_the_rows_together(tmp_path, le
         beside.write_bytes(beside.read_bytes()[: left * 8 * 78])
     with MotionWriter(path, JOINTS, resume=True) as writer:
         writer.append(estimates[3])
-    found = read_motion(path).covariance
+    result = read_motion(path).covariance
     is_known = np.array([k < (left or 0) for k in range(3)] + [True])
-    np.testing.assert_array_equal(np.isnan(found).any(axis=(1, 2)), ~is_known)
+    np.testing.assert_array_equal(np.isnan(result).any(axis=(1, 2)), ~is_known)
     whole = Motion.collect(estimates, JOINTS).covariance
-    np.testing.assert_array_equal(found[is_known], whole[is_known])
-    np.testing.assert_array_equal(found[:, :6, :6], whole[:, :6, :6])
+    np.testing.assert_array_equal(result[is_known], whole[is_known])
+    np.testing.assert_array_equal(result[:, :6, :6], whole[:, :6, :6])
 
 
 def test_covariances_of_another_run_are_refused_in_one_line(tmp_path):
@@ -256,8 +256,8 @@ def test_without_resume_old_covariances_are_replaced(tmp_path):
 
 
 def test_exact_time_does_not_pass_through_a_float(tmp_path):
-    (found,) = read_estimates(write(tmp_path / "motion.csv", [estimate(7)]))
-    assert found.time_s == Fraction(1001 * 7, 60000)
+    (result,) = read_estimates(write(tmp_path / "motion.csv", [estimate(7)]))
+    assert result.time_s == Fraction(1001 * 7, 60000)
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ def test_landmark_deviations_are_those_of_sampled_poses():
     np.testing.assert_allclose(sd[0], np.sqrt(points.var(axis=0).mean(axis=-1)), rtol=sampled(n))
 
 
-def test_unseen_turn_moves_only_what_it_carries():
+def test_unobserved_rotation_affects_only_its_descendants():
     covariance = small_covariance(MODEL)
     arm = 6 + 3 * (MODEL.index_of("arm") - 1)
     covariance[arm] = covariance[:, arm] = 0
@@ -48,14 +48,14 @@ def test_root_alone_known_leaves_the_other_segments_landmarks_unknown():
     assert np.isnan(sd[0]).tolist() == [mark.segment != "trunk" for mark in MODEL.landmarks]
 
 
-def test_joint_angles_run_on_over_whole_turns_and_lost_frames():
+def test_joint_angles_continue_over_full_revolutions_and_lost_frames():
     x = np.linspace(0, 4 * np.pi, 60)
     wrapped = np.stack([np.angle(np.exp(1j * x)), 0.2 * np.sin(x), np.zeros(60)], axis=-1)
     table = joint_angles(motion_of(MODEL, bent(*wrapped), lost=range(20, 24)), MODEL)
-    found = table["angle"].sel(joint="head", axis="x").to_numpy()
-    assert np.isnan(found[20:24]).all()
-    known = np.isfinite(found)
-    np.testing.assert_allclose(found[known], np.rad2deg(x)[known], atol=1e3 * ROUNDTRIP)
+    result = table["angle"].sel(joint="head", axis="x").to_numpy()
+    assert np.isnan(result[20:24]).all()
+    known = np.isfinite(result)
+    np.testing.assert_allclose(result[known], np.rad2deg(x)[known], atol=1e3 * ROUNDTRIP)
     assert table["angle"].attrs["units"] == "deg"
 
 
@@ -65,11 +65,11 @@ def test_joint_angles_run_on_through_a_right_angle():
     folded = np.where((y > np.pi / 2)[:, None], [0.3 + np.pi, np.pi, -0.2 - np.pi] - straight * [0, 1, 0], straight)
     np.testing.assert_allclose(matrix_from_angles(folded), matrix_from_angles(straight), atol=EXACT)
     table = joint_angles(motion_of(MODEL, bent(*folded), covariance=small_covariance(MODEL)), MODEL)
-    found = table.sel(joint="head")
-    np.testing.assert_allclose(found["angle"], np.rad2deg(straight), atol=1e3 * ROUNDTRIP)
+    result = table.sel(joint="head")
+    np.testing.assert_allclose(result["angle"], np.rad2deg(straight), atol=1e3 * ROUNDTRIP)
     is_near = np.abs(np.rad2deg(y) - 90) < 5
-    np.testing.assert_array_equal(found["is_singular"], is_near)
-    np.testing.assert_array_equal(np.isnan(found["angle_sd"]), np.stack([is_near] * 3, axis=-1) & [True, False, True])
+    np.testing.assert_array_equal(result["is_singular"], is_near)
+    np.testing.assert_array_equal(np.isnan(result["angle_sd"]), np.stack([is_near] * 3, axis=-1) & [True, False, True])
 
 
 @pytest.mark.parametrize("y", [0.4, 2.5])  # on either branch
@@ -81,7 +81,7 @@ def test_joint_angle_deviations_are_those_of_sampled_poses(y):
     np.testing.assert_allclose(table["angle_sd"][0], np.rad2deg(drawn.std(axis=0)), rtol=sampled(n))
 
 
-def test_turn_about_the_long_axis_that_nothing_shows_leaves_the_other_angles_known():
+def test_unobserved_rotation_about_the_long_axis_leaves_the_other_angles_known():
     covariance = small_covariance(MODEL)
     covariance[8] = covariance[:, 8] = 0
     covariance[8, 8] = np.inf

@@ -21,7 +21,7 @@ def test_lost_frames_are_unknown_and_the_others_are_not():
         assert np.isfinite(values[motion.has_pose]).all()
 
 
-def test_quaternions_turn_like_the_poses_and_have_no_negative_w():
+def test_quaternions_rotate_like_the_poses_and_have_no_negative_w():
     estimates = run_with_gap(20, lost=[])
     motion = Motion.collect(estimates)
     expected = np.stack([e.pose.world_from_root.rotation.as_matrix() for e in estimates])

@@ -50,9 +50,9 @@ def written(path, run, *, resume=False):
     return path
 
 
-def assert_same(found, expected):
+def assert_same(result, expected):
     for field in fields(PlayersMotion):
-        np.testing.assert_array_equal(getattr(found, field.name), getattr(expected, field.name), err_msg=field.name)
+        np.testing.assert_array_equal(getattr(result, field.name), getattr(expected, field.name), err_msg=field.name)
 
 
 def test_what_was_written_is_read_back_to_the_last_bit(tmp_path):
@@ -65,9 +65,9 @@ def test_an_infinite_deviation_and_a_single_frame_come_back(tmp_path):
     unseen = np.array(step[0].covariance)
     unseen[1] = np.diag([1e-4, np.inf, 1e-4])
     run = [(replace(step[0], covariance=unseen), step[1])]
-    found = read_players(written(tmp_path / "joints.csv", run))
-    assert_same(found, PlayersMotion.collect(run, JOINTS))
-    assert np.isinf(found.sd[0, 0, 1]) and np.isnan(found.rate)
+    result = read_players(written(tmp_path / "joints.csv", run))
+    assert_same(result, PlayersMotion.collect(run, JOINTS))
+    assert np.isinf(result.sd[0, 0, 1]) and np.isnan(result.rate)
 
 
 def test_deviation_is_the_root_mean_square_of_the_axes():
@@ -111,28 +111,28 @@ def test_a_torn_last_time_is_dropped(tmp_path):
 def test_going_on_with_another_result_is_refused_and_leaves_the_file(tmp_path):
     path = written(tmp_path / "joints.csv", steps(3))
     before = path.read_bytes()
-    with pytest.raises(ResultError, match="has another frame 0 than this run finds"):
+    with pytest.raises(ResultError, match="differs from this run in frame 0"):
         written(path, steps(3, seed=1), resume=True)
     assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         (b"score,n_views", b"score", "begins with"),
-        (b"\nAnna,0,0.0,tracked,hip_left", b"\nAnna,0,0.0,tracked,knee_left", "some frame has other rows"),
-        (b"\nAnna,3,", b"\nAnna,12,", "some frame has other rows"),
+        (b"\nAnna,0,0.0,tracked,hip_left", b"\nAnna,0,0.0,tracked,knee_left", "the rows of some frame"),
+        (b"\nAnna,3,", b"\nAnna,12,", "the rows of some frame"),
         (b"\nAnna,3,", b"\nAnna,three,", "three"),
     ],
 )
-def test_a_table_that_cannot_be_right_is_refused_in_one_line(tmp_path, old, new, said):
+def test_a_table_that_cannot_be_right_is_refused_in_one_line(tmp_path, old, new, message):
     path = written(tmp_path / "joints.csv", steps(4))
     data = path.read_bytes()
     assert old in data
     path.write_bytes(data.replace(old, new, 1))
     with pytest.raises(ResultError) as caught:
         read_players(path)
-    assert said in str(caught.value) and "\n" not in str(caught.value)
+    assert message in str(caught.value) and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("data", [None, b"", b"player,fra"])

@@ -37,7 +37,7 @@ def jointed_body():
     return BodyModel("body", (trunk, Segment("head", "trunk", np.array([0.0, 0, 0.6]), ())))
 
 
-def test_angles_of_a_steady_somersault_run_on_past_half_a_turn():
+def test_angles_of_a_steady_somersault_continue_past_half_a_revolution():
     estimates, truth = somersault(turns=2.0)
     table = root_angles(Motion.collect(estimates))
     for k, name in enumerate(("somersault", "tilt", "twist")):
@@ -149,7 +149,7 @@ def test_columns_of_a_jointed_body_are_documented(tmp_path, name):
     assert (tmp_path / name).read_text().splitlines()[0].split(",") == documented
 
 
-def test_unseen_rotation_leaves_the_roots_own_deviation_finite(tmp_path):
+def test_unobserved_rotation_leaves_the_roots_own_deviation_finite(tmp_path):
     item = estimate(0)
     item.covariance[3:] = item.covariance[:, 3:] = np.nan
     item.covariance[3, 3] = np.inf

@@ -17,23 +17,23 @@ def test_variances_are_the_diagonal_of_j_c_jt():
 
 
 @pytest.mark.parametrize("odd", [np.inf, np.nan])
-def test_unseen_or_unknown_direction_counts_only_for_what_moves_with_it(odd):
+def test_unobserved_or_unknown_direction_counts_only_for_what_depends_on_it(odd):
     covariance = COVARIANCE.copy()
     covariance[2, :] = covariance[:, 2] = 0.0
     covariance[2, 2] = odd
     jacobian = JACOBIAN.copy()
     jacobian[0, :, 2] = 1e-17  # a rounding error, no motion
-    found = propagate_variances(jacobian, covariance)
+    result = propagate_variances(jacobian, covariance)
     seen = [0, 1, 3, 4, 5]
-    np.testing.assert_allclose(found[0], propagate_variances(jacobian[..., seen], COVARIANCE[np.ix_(seen, seen)])[0])
-    np.testing.assert_array_equal(found[1:], np.full((2, 4), odd))
+    np.testing.assert_allclose(result[0], propagate_variances(jacobian[..., seen], COVARIANCE[np.ix_(seen, seen)])[0])
+    np.testing.assert_array_equal(result[1:], np.full((2, 4), odd))
 
 
 def test_unknown_correlations_leave_what_rests_on_them_unknown():
     covariance = COVARIANCE.copy()
     covariance[0, 1] = covariance[1, 0] = np.nan
-    found = propagate_variances(np.array([[1.0, 1, 0, 0, 0, 0], [1, 0, 1, 0, 0, 0]]), covariance)
-    assert np.isnan(found).tolist() == [True, False]
+    result = propagate_variances(np.array([[1.0, 1, 0, 0, 0, 0], [1, 0, 1, 0, 0, 0]]), covariance)
+    assert np.isnan(result).tolist() == [True, False]
 
 
 def test_negative_variance_is_an_unknown_deviation():

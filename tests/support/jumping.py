@@ -1,4 +1,4 @@
-"""A jumper made of formulas: stands, crouches, pushes off, flies on a parabola, lands; every truth is exact."""
+"""A jumper by closed formulas: stands, crouches, pushes off, flies on a parabola, lands; every truth is exact."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ import numpy as np
 
 from airborne.body.legs import LEG_POINTS
 from airborne.motion.free_fall import PLAYER_NOISE
-from airborne.motion.jumps.leg_track import LegTrack
-from airborne.motion.jumps.leg_track import extract_legs as track_of
+from airborne.motion.jumps.leg_track import LegTrack, extract_legs
 from airborne.motion.players import PlayersMotion
 
 G = 9.81
@@ -23,7 +22,7 @@ class Jumper:
     takeoff_s: float = 1.013
     speed_m_s: float = float(np.sqrt(2 * G * 0.45))
     depth_m: float = 0.35  # of the crouch
-    place_m: tuple[float, float] = (0.0, 0.0)
+    position_m: tuple[float, float] = (0.0, 0.0)
     duration_s: float = 2.5
     rate: float = 60.0
 
@@ -57,12 +56,12 @@ class Jumper:
         ankle = FLAT_M + np.where(flying, HEEL_M + rise, heel)
         ball = BALL_M + np.where(flying, 0.02 + rise * (0.02 + self.rise_m) / self.rise_m, 0.0)
         hip = FLAT_M + SHARE * LEG_M + HEEL_M + rise
-        hip = hip - self._pushed(before, self.speed_m_s) - self._pushed(after, touch_speed)
+        hip = hip - self._drop_m(before, self.speed_m_s) - self._drop_m(after, touch_speed)
         hip = np.where(before > 0.9, FLAT_M + SHARE * LEG_M, hip)
         return self._legs(hip, ankle, ball)
 
-    def _pushed(self, into_contact, speed):
-        """How far the hips are below where they were at the event; from the lowest place they rise to the stance."""
+    def _drop_m(self, into_contact, speed):
+        """How far the hips are below where they were at the event; from the lowest point they rise to the stance."""
         push = speed**2 / (2 * self.depth_m)
         turn = speed / push
         down = speed * into_contact - push / 2 * into_contact**2
@@ -80,12 +79,12 @@ class Jumper:
             points[:, 2 + k] = np.column_stack([np.full(n, x), forward, (hip + ankle) / 2])
             points[:, 4 + k] = np.column_stack([np.full(n, x), np.zeros(n), ankle])
             points[:, 6 + k] = np.column_stack([np.full(n, x), np.full(n, 0.15), ball])
-        points[..., :2] += self.place_m
+        points[..., :2] += self.position_m
         return points
 
 
 def players_motion(time_s, points, *, sd_m=1e-3, joints=LEG_POINTS, players=("one",)):
-    """Wrap points (n, players, joints, 3) as a motion whose errors are said to be sd_m."""
+    """Wrap points (n, players, joints, 3) as a motion with a stated standard deviation of sd_m."""
     n, p, j = points.shape[:3]
     return PlayersMotion(
         index=np.arange(n),
@@ -101,13 +100,13 @@ def players_motion(time_s, points, *, sd_m=1e-3, joints=LEG_POINTS, players=("on
     )
 
 
-def leg_track(motion) -> LegTrack:
+def first_legs(motion) -> LegTrack:
     """The legs of a motion's first player."""
-    return track_of(motion, motion.players[0])
+    return extract_legs(motion, motion.players[0])
 
 
 def motion_of(jumper, *, sd_m=1e-3, rng=None, feet=False):
-    """Return a jumper's motion, with noise of sd_m that is shared out as the players' trackers' where rng is given."""
+    """Return a jumper's motion, with noise of sd_m distributed like that of the players' trackers if rng is given."""
     joints = (*LEG_POINTS, "foot_left", "foot_right") if feet else LEG_POINTS
     points = jumper.points()[:, None, : len(joints)]
     if rng is not None:
@@ -116,7 +115,7 @@ def motion_of(jumper, *, sd_m=1e-3, rng=None, feet=False):
 
 
 def noise(rng, shape, rate=60.0):
-    """Unit noise (n, ...), in part white, else fading, as `OF_PLAYERS` has it."""
+    """Unit noise (n, ...), in part white, else correlated, as `PLAYER_NOISE` has it."""
     keep = np.exp(-1 / rate / PLAYER_NOISE.correlation_time_s)
     steps = rng.standard_normal(shape)
     slow = np.empty(shape)

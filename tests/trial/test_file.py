@@ -205,11 +205,11 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
         ("every = 2", 'colour = "blue"', "track.colour"),
         ("every = 2", 'v_rule = "v"', "track.v_rule"),
         ("every = 2", 'prediction = "psychic"', "track.prediction"),
-        ("steps_mm = [50, 5]", "steps_mm = [50]", "steps_mm and steps_deg need one number each for every loop each"),
+        ("steps_mm = [50, 5]", "steps_mm = [50]", "steps_mm and steps_deg need one number each for every loop"),
         (
             "steps_mm = [50, 5]\nsteps_deg = [10, 1]",
             "steps_mm = []\nsteps_deg = []",
-            "one number each for every loop each",
+            "one number each for every loop",
         ),
         ("steps_mm = [50, 5]", "steps_mm = [50, 0]", "track.steps_mm.1: expected greater than 0"),
         ("steps_mm = [50, 5]", "steps_mm = [50, inf]", "track.steps_mm.1"),

@@ -73,7 +73,7 @@ def test_each_camera_of_the_rig_needs_one_video(clip, names):
 
 
 def test_unknown_fields_are_refused(clip):
-    with pytest.raises(VideoError, match="cam1: fields = 'upper' is not known; use one of: progressive"):
+    with pytest.raises(VideoError, match="cam1: fields = 'upper' is unknown; use one of: progressive"):
         VideoSource("cam1", clip, "upper")
 
 

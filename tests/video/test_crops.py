@@ -84,8 +84,8 @@ def test_a_lazy_recording_shows_what_the_eager_one_does(tmp_path, distortion):
 def test_looking_at_a_part_converts_no_whole_image_and_the_whole_is_converted_once(tmp_path, monkeypatch):
     frames = [frame_from_rgb(image, short_side=50) for image in textured(1, SIZE)]
     path = write_clip(tmp_path / "cam1.mp4", frames, codec="libx264", pix_fmt="yuv420p")
-    asked, whole_of = [], lazy_frames.rgb_from_picture
-    monkeypatch.setattr(lazy_frames, "rgb_from_picture", lambda *given: asked.append(1) or whole_of(*given))
+    asked, whole_of = [], lazy_frames.rgb_from_decoded
+    monkeypatch.setattr(lazy_frames, "rgb_from_decoded", lambda *given: asked.append(1) or whole_of(*given))
     ((view,),) = [frames.views for frames in lazy(path, plain_rig("cam1", size=SIZE))]
     view.crop((3, 3, 20, 20))
     assert asked == []

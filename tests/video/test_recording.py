@@ -167,15 +167,15 @@ def test_each_frame_is_decoded_once(tmp_path, monkeypatch):
     import airborne.video.decoding as decoding
 
     decoded = []
-    sound_frames = decoding.sound_frames
+    intact_frames = decoding.intact_frames
 
     def counting(*args, **options):
-        for stamp, frame in sound_frames(*args, **options):
+        for stamp, frame in intact_frames(*args, **options):
             decoded.append(stamp)
             yield stamp, frame
 
     trial = recording(clip(tmp_path / "a.mkv", 25))
-    monkeypatch.setattr(decoding, "sound_frames", counting)
+    monkeypatch.setattr(decoding, "intact_frames", counting)
     assert len(list(trial)) == 25
     assert decoded == sorted(set(decoded))
     assert len(decoded) == 25

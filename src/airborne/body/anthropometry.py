@@ -1,6 +1,6 @@
 """From 95 measurements to the mass, volume and inertia of 18 segments, with Yeadon's solids and Dempster's densities.
 
-Yeadon (1990-II) builds a person of solids, each between two measured levels. Here they are combined into the segments of
+Yeadon (1990-II) builds a person of solids between measured levels. Here they are combined into the segments of
 `human18`, with palms facing the thighs and level soles in the zero pose (Yeadon's person stands with the palms
 forward and the toes pointed down).
 """

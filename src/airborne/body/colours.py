@@ -14,7 +14,8 @@ FEWEST_PX = 20  # fewer pixels than this say nothing of a part's colour
 def with_sampled_colours(model: BodyModel, pixels_of_parts: list[NDArray[np.uint8]]) -> BodyModel:
     """Give every uncoloured part the median of the pixels that show it.
 
-    pixels_of_parts: one (n, 3) array of sRGB per part, in the order of `model.parts`. Raises BodyError for a part that too few show.
+    pixels_of_parts: one (n, 3) array of sRGB per part, in the order of `model.parts`. Raises BodyError for a
+    part that too few pixels show.
     """
     colours = []
     for part, pixels in zip(model.parts, pixels_of_parts, strict=True):

@@ -127,7 +127,7 @@ def _joints(v: Mapping[str, float]) -> dict[str, Array]:
 def _ellipsoid(
     name: str, properties: MassProperties, v: Mapping[str, float], joints: dict[str, Array]
 ) -> tuple[Ellipsoid, Array, tuple[float, float]]:
-    """Make a segment's ellipsoid; return it, its centre in the segment's frame [m] and the heights of the segment's ends [m].
+    """Make a segment's ellipsoid, with its centre and the heights of the segment's ends in the segment's frame [m].
 
     Along the segment it spans the joints and a little more, so that joints leave no gap; its widths give the segment's
     volume between the joints, in the ratio of the solids' second moments.

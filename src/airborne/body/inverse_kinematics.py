@@ -100,7 +100,7 @@ def fit_lengths(model: BodyModel, joints: Array) -> dict[str, float]:
 
 
 def _trunk_ratios(model: BodyModel, core: Array) -> dict[str, list[Array]]:
-    """Return the trunk's and the shoulder girdles' scales (frames,) by segment, from CORE's positions (frames, 4, 3)."""
+    """Return the trunk's and the shoulder girdles' scales (frames,) by segment, from CORE points (frames, 4, 3)."""
     rest = model.with_pose(Pose(world_from_root=RigidTransform.identity()))
     tops = [next(mark.segment for mark in model.landmarks if mark.name == name) for name in CORE]
     at_rest = rest.t[[model.index_of(name) for name in tops]]

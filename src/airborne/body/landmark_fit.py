@@ -97,7 +97,7 @@ def minimise(
 
 
 def _step(gradient: Array, hessian: Array, damping: float, *, low: Array, high: Array) -> Array:
-    """Return the damped Gauss-Newton step (variables,) within bounds; a variable at its bound stays there (active set)."""
+    """Return the damped Gauss-Newton step (variables,) within bounds; what reaches a bound stays there (active set)."""
     step, moving = np.zeros(len(gradient)), (low < 0) & (high > 0)
     moving |= (low < 0) & (high >= 0) & (gradient > 0) | (low <= 0) & (high > 0) & (gradient < 0)
     damped = hessian + np.diag(damping * np.diag(hessian) + 1e-9)

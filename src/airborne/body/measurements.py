@@ -169,12 +169,12 @@ def check_measurements(measurements: Measurements) -> Measurements:
     for key, share in STATURE_SHARES.items():
         if key not in values:
             raise BodyError(f"{key} is missing; expected all 95 measurements")
-        typical = share * _TYPICAL_STATURE_M
+        mean = share * _TYPICAL_STATURE_M
         if not values[key] > 0:
-            raise BodyError(f"{key} is {values[key]:g} m; expected a length above zero, usually about {typical:.3f} m")
-        if not typical * _LEAST_RATIO < values[key] < typical * _GREATEST_RATIO:
+            raise BodyError(f"{key} is {values[key]:g} m; expected a length above zero, usually about {mean:.3f} m")
+        if not mean * _LEAST_RATIO < values[key] < mean * _GREATEST_RATIO:
             raise BodyError(
-                f"{key} is {values[key]:g} m after conversion; expected about {typical:.3f} m: check its unit ({_UNITS})"
+                f"{key} is {values[key]:g} m after conversion; expected about {mean:.3f} m: check its unit ({_UNITS})"
             )
     for levels in _ASCENDING:
         for near, far in pairwise(levels):

@@ -102,9 +102,9 @@ class RationalSurface:
 def stadium_loft(stations: Array) -> RationalSurface:
     """Loft a surface through stadium sections, exact at each: quadratic around, cubic along, by chord length.
 
-    stations (n, 5), n >= 4 [m]: position along z, half the straight side (along x), radius (along y), the section's centre
-    in x and y. A stadium is two half circles joined by straight lines; the section has width 2 (half side + radius) and
-    depth 2 radius. A section of radius 0 is a point.
+    stations (n, 5), n >= 4 [m]: position along z, half the straight side (along x), radius (along y), the section's
+    centre in x and y. A stadium is two half circles joined by straight lines; the section has width
+    2 (half side + radius) and depth 2 radius. A section of radius 0 is a point.
     """
     stations = np.asarray(stations, float)
     along, flat, radius, x, y = stations.T

@@ -112,8 +112,8 @@ def with_borders(model: BodyModel, borders: Mapping[str, Border | None]) -> Body
     """Return the body with other borders on its segments; None: a segment of one colour.
 
     A name without its side ("thigh") stands for both. A segment already cut along the same axis keeps its two parts'
-    names and colours; a newly cut one has its colour on both sides. Raises BodyError for an unknown segment, a share outside 0..1,
-    and a segment that is not one ellipsoid.
+    names and colours; a newly cut one has its colour on both sides. Raises BodyError for an unknown segment,
+    a share outside 0..1, and a segment that is not one ellipsoid.
     """
     names = {segment.name for segment in model.segments}
     border_of: dict[str, Border | None] = {}

@@ -1,4 +1,4 @@
-"""A smooth skin for a person: each segment a closed rational B-spline surface through stadium sections (Yeadon 1990-II).
+"""A person's smooth skin: each segment a closed rational B-spline surface through stadium sections (Yeadon 1990-II).
 
 Paper B draws its targets with a smooth model of a body scan and tracks them with ellipsoids: the same joints and
 colours, another surface. This is the smooth one, independent of the ellipsoids: its sections are the measured

@@ -1,4 +1,4 @@
-"""What a person wears, read off the images: where along each segment the colour changes, and the colours."""
+"""Clothing estimated from images: where along each segment the colour changes, and the colours."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from airborne.types import Array
 
 _N_BINS = 50  # along a segment
 _LEAST_SHARE = 0.1  # of a segment's length on either side of a border: less is the neighbour's colour
-_LEAST_CONTRAST = 25.0  # sRGB grey levels, root mean square of the channels, between the sides of a border
+_LEAST_CONTRAST = 25.0  # sRGB grey levels, RMS of the channels, between the sides of a border
 _LEAST_EXPLAINED = 0.4  # of the colour's variance along the segment
-_STRONG_CONTRAST = 0.4  # of the segment's brightness: no shading of one colour differs as much from end to end
+_STRONG_CONTRAST = 0.4  # of the segment's brightness: shading of one colour never differs as much from end to end
 _CORE_PX = 1  # this near to another segment or the scene, a pixel is mixed
 _FEWEST_PX = 60  # of one image, and on either side of a border: fewer say nothing
 _LEAST_PIXELS = 0.1  # of a segment's pixels that lie on either side of a border
@@ -49,7 +49,7 @@ class _ColourProfiles:
         n = np.bincount(at, minlength=_N_BINS).astype(float)
         colour = np.stack([np.bincount(at, rgb[:, k], _N_BINS) for k in range(3)], axis=1).astype(float)
         square = np.bincount(at, np.einsum("nk,nk->n", rgb, rgb), _N_BINS).astype(float)
-        self.pictures.append((n, colour, square))
+        self.images.append((n, colour, square))
 
     def border(self) -> tuple[float, float] | None:
         """Find the share where the colour steps, and the share of variance that explains; None where it does not.
@@ -57,13 +57,13 @@ class _ColourProfiles:
         Each image has its own two colours. A step must be strong, or explain more than an even change along the
         segment does, which shading may be.
         """
-        if not self.pictures:
+        if not self.images:
             return None
         cuts = np.arange(round(_LEAST_SHARE * _N_BINS), _N_BINS - round(_LEAST_SHARE * _N_BINS) + 1)
         whole, ramp, split, contrast, bright = 0.0, 0.0, np.zeros(len(cuts)), np.zeros(len(cuts)), 0.0
         pixels, below = 0.0, np.zeros(len(cuts))
         u = (np.arange(_N_BINS) + 0.5) / _N_BINS
-        for n, colour, square in self.pictures:
+        for n, colour, square in self.images:
             total = n.sum()
             mean, away = colour.sum(axis=0) / total, u - (n @ u) / total
             own = square.sum() - total * mean @ mean
@@ -98,74 +98,78 @@ class _ColourProfiles:
 PosedView = tuple[RenderModel, PosedBody, Region]  # the body in one image
 
 
-def sample_colours(model: BodyModel, views: Sequence[PosedView]) -> BodyModel:
+def sample_clothing(model: BodyModel, views: Sequence[PosedView]) -> BodyModel:
     """Sample the colours of a body's parts, left and right alike; BodyError for a part that too few pixels show.
 
-    The bodies of the sights may differ from the model in their surface.
+    The bodies of the views may differ from the model in their surface.
     """
     uncoloured = replace(
         model,
         segments=tuple(replace(s, parts=tuple(replace(p, colour=None) for p in s.parts)) for s in model.segments),
     )
-    synthesis = RenderModel.of(uncoloured)
-    seen: dict[str, list[NDArray[np.uint8]]] = defaultdict(list)
+    render_model = RenderModel.of(uncoloured)
+    pixels: dict[str, list[NDArray[np.uint8]]] = defaultdict(list)
     keys = [_key(part) for part in model.parts]
     for _, posed, region in views:
-        drawn = synthesis.draw_parts(PosedBody(uncoloured, posed.R, posed.t), region)
-        core = _interior(drawn)
+        part_map = render_model.draw_parts(PosedBody(uncoloured, posed.R, posed.t), region)
+        interior = _interior(part_map)
         for index, key in enumerate(keys):
-            seen[key].append(region.rgb[core & (drawn == index)])
-    return with_sampled_colours(uncoloured, [np.concatenate(seen[key]) for key in keys])
+            pixels[key].append(region.rgb[interior & (part_map == index)])
+    return with_sampled_colours(uncoloured, [np.concatenate(pixels[key]) for key in keys])
 
 
 def _key(part: Part) -> str:
-    """Name a part without its side, wherever in the name that stands."""
+    """Return a part's name without its side, wherever that stands."""
     return part.name.replace(_SIDED[0], "").replace(_SIDED[1], "")
 
 
 def find_borders(model: BodyModel, views: Sequence[PosedView]) -> dict[str, Border | None]:
     """Find where the colours of a body's segments change, left and right alike: stem -> Border, or None."""
-    sums: dict[tuple[str, int], _ColourProfiles] = defaultdict(_ColourProfiles)
+    profiles: dict[tuple[str, int], _ColourProfiles] = defaultdict(_ColourProfiles)
     axes = {s.name: _border_axes(model, s.name) for s in model.segments if s.parts}
-    for synthesis, posed, region in views:
-        drawn = synthesis.draw_parts(posed, region)
-        segment = np.where(drawn >= 0, synthesis.segment_of_part[drawn], -1)
-        core = _interior(segment)
+    for render_model, posed, region in views:
+        part_map = render_model.draw_parts(posed, region)
+        segment = np.where(part_map >= 0, render_model.segment_of_part[part_map], -1)
+        interior = _interior(segment)
         for index, name in enumerate(s.name for s in model.segments):
-            rows, columns = np.nonzero(core & (segment == index))
+            rows, columns = np.nonzero(interior & (segment == index))
             if not len(rows) or name not in axes:
                 continue
-            local = _surface_points(model, index, posed, region, np.stack([columns, rows], axis=1))
+            local = _surface_points(model, index, np.stack([columns, rows], axis=1), posed=posed, region=region)
             for axis in axes[name]:
                 start, end = extent_m(model, name, axis)
-                sums[stem_of(name), axis].add((local[:, axis] - start) / (end - start), region.rgb[rows, columns] * 1.0)
-    found: dict[str, Border | None] = {stem_of(name): None for name in axes}
-    best = dict.fromkeys(found, 0.0)
-    for (stem, axis), colours in sums.items():
+                profiles[stem_of(name), axis].add(
+                    (local[:, axis] - start) / (end - start), region.rgb[rows, columns] * 1.0
+                )
+    borders: dict[str, Border | None] = {stem_of(name): None for name in axes}
+    best = dict.fromkeys(borders, 0.0)
+    for (stem, axis), colours in profiles.items():
         border = colours.border()
         if border is not None and border[1] > best[stem]:
-            found[stem], best[stem] = Border(border[0], axis), border[1]
-    return found
+            borders[stem], best[stem] = Border(border[0], axis), border[1]
+    return borders
 
 
 def _border_axes(model: BodyModel, segment: str) -> list[int]:
-    """Return the axes that a segment's border may cross: its length; of one in which no joint hangs, its depth too."""
+    """Return the axes that a segment's border may cross: its length; of a segment without children, its depth too."""
     is_end = all(child.parent != segment for child in model.segments)
     along = length_axis(model, segment)
     return sorted({along, 1}) if is_end and not segment.endswith(_SIDED) else [along]
 
 
 def _interior(labels: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Say which pixels have only pixels of their own label round them."""
+    """Mark the pixels whose neighbourhood has one label."""
     size = np.ones((2 * _CORE_PX + 1,) * 2, np.uint8)
     shifted = (labels + 1).astype(np.uint16)
     return (cv2.erode(shifted, size) == cv2.dilate(shifted, size)) & (labels >= 0)
 
 
-def _surface_points(model: BodyModel, index: int, posed: PosedBody, region: Region, px: NDArray[np.integer]) -> Array:
-    """Return where the rays of pixels (n, 2) meet a segment's ellipsoid, in the segment's frame: (n, 3) [m].
+def _surface_points(
+    model: BodyModel, index: int, px: NDArray[np.integer], *, posed: PosedBody, region: Region
+) -> Array:
+    """Intersect the rays of pixels (n, 2) with a segment's ellipsoid, in the segment's frame: (n, 3) [m].
 
-    The nearest point of the ellipsoid's outline for a ray that just misses it.
+    For a ray that just misses it, the nearest point of the ellipsoid's outline.
     """
     ellipsoid, centre = ellipsoid_of(model, model.segments[index].name)
     camera, R = region.camera, posed.R[index]

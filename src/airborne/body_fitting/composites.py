@@ -1,7 +1,7 @@
-"""How the images of a body change with its shape and its poses at once, by differences of synthetic images.
+"""How a body's composite images change with its shape and its poses, by finite differences of rendered images.
 
 The same composite as `gauss_newton.fit_images`, the lit body over the empty scene, blurred, with the same robust
-cost; here its derivatives come from drawing the body twice for each parameter, so that any parameter will do.
+cost; here the body is rendered twice per parameter for its derivative, so that any parameter will do.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers
 from airborne.types import Array
 
 _SIGMA_PX = 1.2  # of the blur
-_SCALE_LIGHT = 0.1  # linear light, 0..1: a residual this large counts a quarter
-_CORRELATED_PX = BLOCK_PX**2  # pixels this near show the same fault of a shape that is only about right
+_SCALE_LIGHT = 0.1  # linear light, 0..1, of the robust cost: a residual this large has a quarter of the weight
+_CORRELATED_PX = BLOCK_PX**2  # pixels that share the error of an approximate shape
 _LIGHT_ROUNDS = 3
 _NEAR_PX = 4  # beyond this from the mask, a small step changes nothing
 
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """How far a body's images are from those seen, summed over pixels."""
+    """The difference between rendered and observed images, summed over pixels."""
 
     cost: float  # robust squared residual of the whole regions
     weight: float  # of the whole regions
@@ -37,7 +37,7 @@ class Misfit:
     body_weight: float  # weight where there is body
 
     def __add__(self, other: Misfit) -> Misfit:
-        """Add up views."""
+        """Add two views."""
         return Misfit(
             self.cost + other.cost,
             self.weight + other.weight,
@@ -47,7 +47,7 @@ class Misfit:
 
     @property
     def noise(self) -> float:
-        """Mean square of the weighted residual, times how many pixels share it."""
+        """Mean square of the weighted residual, times the number of correlated pixels."""
         return _CORRELATED_PX * max(self.body_cost / self.body_weight, 1e-9) if self.body_weight else 1.0
 
     @property
@@ -59,27 +59,30 @@ class Misfit:
 NO_MISFIT = Misfit(0.0, 0.0, 0.0, 0.0)
 
 
-def misfit(synthesis: RenderModel, posed: PosedBody, view: ViewBuffers) -> Misfit:
-    """Compare a body with a view; the view's light is fitted anew, in place."""
-    _fit_light(synthesis, posed, view)
-    return _weigh(view, _residual(view, _compose(synthesis, posed, view)))[0]
+def misfit(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -> Misfit:
+    """Compare a body with a view; refits the view's light in place."""
+    _fit_light(render_model, posed, view)
+    return _weigh(view, _residual(view, _compose(render_model, posed, view)))[0]
 
 
 PosedModel = tuple[RenderModel, PosedBody]
 
 
 def normal_equations(
-    synthesis: RenderModel, posed: PosedBody, view: ViewBuffers, steps: Sequence[tuple[PosedModel, PosedModel | None, float]]
+    render_model: RenderModel,
+    posed: PosedBody,
+    view: ViewBuffers,
+    steps: Sequence[tuple[PosedModel, PosedModel | None, float]],
 ) -> tuple[Misfit, Array, Array]:
     """Return a view's misfit and the normal equations H (d, d), g (d,) of d parameters: H step = g.
 
-    steps: for each parameter the body some way up; the body some way down, or None for the body as it is; and the
+    steps: for each parameter the body a step up; the body a step down, or None for the body as it is; and the
     difference of the parameter between the two.
     """
-    _fit_light(synthesis, posed, view)
-    here = _compose(synthesis, posed, view)
+    _fit_light(render_model, posed, view)
+    here = _compose(render_model, posed, view)
     residual = _residual(view, here)
-    found, weights = _weigh(view, residual)
+    total, weights = _weigh(view, residual)
     near = cv2.dilate((view.maps[0] >= 0).astype(np.uint8), np.ones((2 * _NEAR_PX + 1,) * 2, np.uint8)) > 0
     rows, across = _box(near)
     columns = np.zeros((len(steps), 3, rows.stop - rows.start, across.stop - across.start), np.float32)
@@ -92,23 +95,27 @@ def normal_equations(
             column[:, v, u] = blurred / np.float32(step)
     weight = np.tile(weights[rows, across].ravel(), 3)
     flat = columns.reshape(len(steps), -1)
-    weighed = flat * weight
-    return found, (weighed @ flat.T).astype(float), (weighed @ residual[:, rows, across].ravel()).astype(float)
+    weighted_columns = flat * weight
+    return (
+        total,
+        (weighted_columns @ flat.T).astype(float),
+        (weighted_columns @ residual[:, rows, across].ravel()).astype(float),
+    )
 
 
-def _fit_light(synthesis: RenderModel, posed: PosedBody, view: ViewBuffers) -> None:
+def _fit_light(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -> None:
     part, _, normals = view.maps
-    surface_maps(synthesis.shapes, synthesis.geometry, posed.R, posed.t, view.packed_view, *view.maps)
+    surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, view.packed_view, *view.maps)
     height, width = part.shape
-    fit_light(view.observation[0], part, normals, synthesis.albedo, view.light, _LIGHT_ROUNDS, 0, 0, width, height)
+    fit_light(view.observation[0], part, normals, render_model.albedo, view.light, _LIGHT_ROUNDS, 0, 0, width, height)
 
 
-def _compose(synthesis: RenderModel, posed: PosedBody, view: ViewBuffers) -> NDArray[np.float32]:
-    """Draw the body over the scene under the view's light: (3, h, w) linear light."""
+def _compose(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -> NDArray[np.float32]:
+    """Composite the body over the scene under the view's light: (3, h, w) linear light."""
     part, _, normals = view.maps
-    surface_maps(synthesis.shapes, synthesis.geometry, posed.R, posed.t, view.packed_view, *view.maps)
+    surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, view.packed_view, *view.maps)
     lit = np.zeros((3, *part.shape), np.float32)
-    shade_body(part, normals, synthesis.albedo, view.light, 0, 0, lit)
+    shade_body(part, normals, render_model.albedo, view.light, 0, 0, lit)
     return np.where(part >= 0, lit, view.observation[1])
 
 
@@ -119,32 +126,32 @@ def _residual(view: ViewBuffers, composite: NDArray[np.float32]) -> NDArray[np.f
 
 
 def _weigh(view: ViewBuffers, residual: NDArray[np.float32]) -> tuple[Misfit, NDArray[np.float32]]:
-    """Return the misfit and each pixel's weight (h, w), given that the view's maps hold the body."""
+    """Return the misfit and each pixel's weight (h, w), with the body already in the view's maps."""
     certainty, covered = view.observation[2], view.maps[0] >= 0
     e2 = np.einsum("khw,khw->hw", residual, residual)
-    down = 1 / (1 + e2 / _SCALE_LIGHT**2)
-    weights = certainty * down**2
-    found = Misfit(
-        float(np.sum(certainty * e2 * down)),
+    attenuation = 1 / (1 + e2 / _SCALE_LIGHT**2)
+    weights = certainty * attenuation**2
+    total = Misfit(
+        float(np.sum(certainty * e2 * attenuation)),
         float(np.sum(certainty)),
         float(np.sum((weights * e2)[covered])),
         float(np.sum(weights[covered])),
     )
-    return found, weights
+    return total, weights
 
 
 def _taps(view: ViewBuffers) -> tuple[Array, Array]:
-    """Return the blur's taps along rows and columns; a field's rows are farther apart."""
+    """Return the blur's taps along rows and columns; a field's rows are twice as far apart."""
     aspect = float(view.K[1, 1] / view.K[0, 0])
     return gaussian_taps(_SIGMA_PX), gaussian_taps(max(_SIGMA_PX * aspect, 0.5))
 
 
-def _box(chosen: NDArray[np.bool_], room: int = 0) -> tuple[slice, slice]:
-    """Return the rows and columns that hold what is chosen, and some room round it; empty where nothing is."""
-    rows, columns = np.flatnonzero(chosen.any(axis=1)), np.flatnonzero(chosen.any(axis=0))
+def _box(mask: NDArray[np.bool_], margin: int = 0) -> tuple[slice, slice]:
+    """Return the bounding rows and columns of a mask, with a margin; empty where the mask is."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not len(rows):
         return slice(0, 0), slice(0, 0)
     return (
-        slice(max(int(rows[0]) - room, 0), int(rows[-1]) + 1 + room),
-        slice(max(int(columns[0]) - room, 0), int(columns[-1]) + 1 + room),
+        slice(max(int(rows[0]) - margin, 0), int(rows[-1]) + 1 + margin),
+        slice(max(int(columns[0]) - margin, 0), int(columns[-1]) + 1 + margin),
     )

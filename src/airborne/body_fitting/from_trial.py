@@ -1,4 +1,4 @@
-"""A person's own body from a trial: detections -> a few frames -> `tracking.body_fit` -> a body file and an image."""
+"""A person's own body from a trial: detections -> a few frames -> `fit_body` -> a body file and an image."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from airborne.errors import TrialError
 from airborne.export.views import crop_camera, resample_view
 from airborne.rendering import FLAT, render
 from airborne.run.body_tracking import open_trial
-from airborne.run.first_pose import WEIGHTS, landmarks_over_time
+from airborne.run.first_pose import LANDMARK_WEIGHTS, landmarks_over_time
 from airborne.trial.file import Trial
 from airborne.types import Array
 from airborne.video import Frames, Recording
@@ -29,13 +29,13 @@ Progress = Callable[[str, int, int], None]  # what is being done, how far, of ho
 
 _N_SCENERY = 10  # further frames that show the scene without the person
 _PICTURE_NAME = "fit_body.png"
-_CELL_PX, _CELL_SCALE = 400, 0.4  # a cell of the image, and its pixels in those of `close_up`
+_CELL_PX, _CELL_SCALE = 400, 0.4  # a cell of the image, and its pixel size in pixels of `crop_camera`
 _LINE_RGB, _EMPTY_GREY = (255, 230, 0), 60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonFit:
-    """What fitting a trial's person leaves."""
+    """The result of fitting a body to a trial's person."""
 
     fit: BodyFit
     frames: tuple[int, ...]  # that it was fitted to
@@ -43,38 +43,38 @@ class PersonFit:
 
 
 def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: Progress | None = None) -> PersonFit:
-    """Fit a trial's body to the person that its images show; write the body file, and beside it `fit_body.png`.
+    """Fit a trial's body to the person in its images; write the body file, and beside it `fit_body.png`.
 
-    Where the trial's joints are known comes from the detections of its [start], or for one frame from its joints_m.
+    The joints come from the detections of the trial's [start], or for one frame from its joints_m.
     Raises an AirborneError for input that cannot be used.
     """
     if n_frames < 1:
         raise TrialError(f"frames is {n_frames}; expected at least 1 frame to fit the body to")
-    told = progress or (lambda what, done, total: None)
+    report = progress or (lambda what, done, total: None)
     model = trial.model()
     recording, _ = open_trial(trial)
-    known = _landmarks_by_frame(trial, recording)
-    chosen, around = _choose_frames(trial, known, n_frames)
-    sightings = _read(recording, known, sorted({*chosen, *around}), told)
-    missing = [index for index in chosen if index not in sightings]
+    landmarks = _landmarks_by_frame(trial, recording)
+    chosen, around = _choose_frames(trial, landmarks, n_frames)
+    observations = _read(recording, landmarks, sorted({*chosen, *around}), report)
+    missing = [index for index in chosen if index not in observations]
     if missing:
         raise TrialError(f"{trial.name}: the videos end before frame {missing[0]}, which has detections")
     fit = fit_body(
         model,
-        [sightings[index] for index in chosen],
-        scenery=[sightings[index] for index in around if index in sightings],
-        weights=WEIGHTS,
+        [observations[index] for index in chosen],
+        scenery=[observations[index] for index in around if index in observations],
+        weights=LANDMARK_WEIGHTS,
         mass_kg=trial.body.mass_kg,
-        progress=lambda done, total: told("fitting", done, total),
+        progress=lambda done, total: report("fitting", done, total),
     )
     picture = output.with_name(_PICTURE_NAME)
     write_body(output, fit.model)
-    picture.write_bytes(_contact_sheet(fit, [sightings[index].frames for index in chosen]))
+    picture.write_bytes(_contact_sheet(fit, [observations[index].frames for index in chosen]))
     return PersonFit(fit, tuple(chosen), picture)
 
 
 def describe_fit(person: PersonFit) -> str:
-    """Say in a few lines what was found."""
+    """Describe a fitted body in a few lines."""
     fit = person.fit
     lines = [f"fitted to frames {', '.join(map(str, person.frames))}", "segment     length  girth (two across)"]
     for stem, length in fit.lengths.items():
@@ -83,12 +83,12 @@ def describe_fit(person: PersonFit) -> str:
         lines.append(f"{stem:<12}{length:5.2f}   {girth}")
     borders = [f"{stem} at {border.share:.2f}" for stem, border in fit.borders.items()]
     lines.append(f"colours change along: {', '.join(borders) or 'no segment'}")
-    seen: dict[str, str] = {}
+    colours: dict[str, str] = {}
     for part in fit.model.parts:
         if part.colour is not None:
             name = part.name.replace("_left", "").replace("_right", "")
-            seen[name] = " ".join(f"{value:.0f}" for value in part.colour)
-    lines.append("sRGB: " + "; ".join(f"{name} {colour}" for name, colour in seen.items()))
+            colours[name] = " ".join(f"{value:.0f}" for value in part.colour)
+    lines.append("sRGB: " + "; ".join(f"{name} {colour}" for name, colour in colours.items()))
     before, after = fit.rms_light
     lines.append(f"residual: {before * 255:.2f} to {after * 255:.2f} (linear light, 0 to 255)")
     before, after = fit.landmark_rms_m
@@ -97,28 +97,30 @@ def describe_fit(person: PersonFit) -> str:
 
 
 def _landmarks_by_frame(trial: Trial, recording: Recording) -> dict[int, dict[str, Array]]:
-    """Return the landmarks known at each frame of the recording: frame -> landmark -> (3,) [m]."""
+    """Return the landmarks of each frame of the recording: frame -> landmark -> (3,) [m]."""
     if trial.start.detections is not None:
         over_time = landmarks_over_time(trial, recording.rig)
         facts, n = recording.facts[0], len(next(iter(over_time.values())))
         per_frame = round(facts.image_rate / facts.frame_rate)
         stop = n * per_frame if trial.track.stop is None else min(n * per_frame, trial.track.stop)
         indices = range(trial.start.frame, stop, trial.track.every * per_frame)
-        at = {index: {name: places[index // per_frame] for name, places in over_time.items()} for index in indices}
+        at = {
+            index: {name: positions[index // per_frame] for name, positions in over_time.items()} for index in indices
+        }
         return {
-            index: {name: place for name, place in places.items() if np.isfinite(place).all()}
-            for index, places in at.items()
+            index: {name: position for name, position in positions.items() if np.isfinite(position).all()}
+            for index, positions in at.items()
         }
     if isinstance(trial.start.joints_m, dict):
-        return {trial.start.frame: {name: np.array(place) for name, place in trial.start.joints_m.items()}}
+        return {trial.start.frame: {name: np.array(position) for name, position in trial.start.joints_m.items()}}
     if trial.start.joints_m is not None:
         return {trial.start.frame: read_positions(trial.path(trial.start.joints_m))}
     raise TrialError(f"{trial.name}: fitting the body needs known joints; give detections or joints_m under [start]")
 
 
 def _choose_frames(trial: Trial, landmarks: dict[int, dict[str, Array]], n: int) -> tuple[list[int], list[int]]:
-    """Choose frames spread over the recording, the fullest of each stretch; and more to see the scene by."""
-    usable = [index for index, places in landmarks.items() if set(CORE) <= set(places)]
+    """Choose frames spread over the recording, each with the most landmarks of its stretch; more for the background."""
+    usable = [index for index, positions in landmarks.items() if set(CORE) <= set(positions)]
     if not usable:
         raise TrialError(f"{trial.name}: no frame has both hips and both shoulders seen by two cameras that agree")
     stretches = [stretch for stretch in np.array_split(np.array(usable), min(n, len(usable))) if len(stretch)]
@@ -132,41 +134,41 @@ def _choose_frames(trial: Trial, landmarks: dict[int, dict[str, Array]], n: int)
 
 
 def _read(
-    recording: Recording, landmarks: dict[int, dict[str, Array]], wanted: Sequence[int], progress: Progress
+    recording: Recording, landmarks: dict[int, dict[str, Array]], indices: Sequence[int], progress: Progress
 ) -> dict[int, BodyObservation]:
-    found = {}
+    observations = {}
     with closing(iter(recording)) as stream:
         for frames in stream:
-            if frames.index in wanted:
-                found[frames.index] = BodyObservation(frames, landmarks[frames.index])
-                progress("reading", len(found), len(wanted))
-            if frames.index >= wanted[-1]:
+            if frames.index in indices:
+                observations[frames.index] = BodyObservation(frames, landmarks[frames.index])
+                progress("reading", len(observations), len(indices))
+            if frames.index >= indices[-1]:
                 break
-    return found
+    return observations
 
 
 def _contact_sheet(fit: BodyFit, frames: Sequence[Frames]) -> bytes:
-    """Draw the fitted body over every image it was fitted to, as a PNG: rows are times, columns cameras."""
+    """Draw the fitted body over every image used, as a PNG: rows are times, columns cameras."""
     rows = []
-    for seen, pose in zip(frames, fit.poses, strict=True):
-        rows.append(np.concatenate([_cell(seen, i, fit.model, pose) for i in range(len(seen.views))], axis=1))
-    done, png = cv2.imencode(".png", np.concatenate(rows)[..., ::-1])
-    assert done, "a picture in memory can be written as PNG"
+    for each, pose in zip(frames, fit.poses, strict=True):
+        rows.append(np.concatenate([_cell(each, i, fit.model, pose) for i in range(len(each.views))], axis=1))
+    is_written, png = cv2.imencode(".png", np.concatenate(rows)[..., ::-1])
+    assert is_written, "a picture in memory can be written as PNG"
     return png.tobytes()
 
 
 def _cell(frames: Frames, camera: int, model: BodyModel, pose: Pose) -> NDArray[np.uint8]:
-    """Show one camera's image round the body, with lines where one part's colour meets another's or the scene."""
+    """Draw one camera's image around the body, with lines where a part borders on another or on the scene."""
     view, posed = frames.views[camera], model.with_pose(pose)
     crop = None if view is None else crop_camera(view.camera, posed)
     if view is None or crop is None:
         return np.full((_CELL_PX, _CELL_PX, 3), _EMPTY_GREY, np.uint8)
     middle = (_CELL_SCALE - 1) / 2
     larger = crop.resample(scale=(_CELL_SCALE, _CELL_SCALE), offset=(middle, middle), size=(_CELL_PX, _CELL_PX))
-    picture = resample_view(view, larger)
+    image = resample_view(view, larger)
     part = render(surface_arrays(model), posed, larger, FLAT).part
     edge = np.zeros(part.shape, bool)
     edge[1:] |= part[1:] != part[:-1]
     edge[:, 1:] |= part[:, 1:] != part[:, :-1]
-    picture[edge] = _LINE_RGB
-    return picture
+    image[edge] = _LINE_RGB
+    return image

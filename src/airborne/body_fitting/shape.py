@@ -14,14 +14,14 @@ from airborne.body.shaping import length_axis, with_girths, with_segment_lengths
 from airborne.body_fitting.clothes import stem_of
 from airborne.types import Array
 
-_LENGTH_SD, _END_LENGTH_SD, _GIRTH_SD = 0.03, 0.08, 0.12  # of a factor; END: of a segment in which no joint hangs
-_BORDER_SD = 0.05  # of a border's share, about where it is seen to be
+_LENGTH_SD, _END_LENGTH_SD, _GIRTH_SD = 0.03, 0.08, 0.12  # of a factor; END: of a segment without children
+_BORDER_SD = 0.05  # of a border's share, about the detected one
 _INSIDE = 0.02, 0.98  # shares of a segment within which a border stays
 
 
 @dataclass(frozen=True, slots=True)
 class ShapeParameter:
-    """One number of a shape."""
+    """One parameter of a shape."""
 
     stem: str  # the segment without its side
     kind: Literal["length", "girth", "border"]
@@ -32,32 +32,38 @@ class ShapeParameter:
 
 
 def shape_parameters(model: BodyModel) -> tuple[ShapeParameter, ...]:
-    """List what may change: of every segment its length and girth; of one without a side, both girths apart."""
-    found: list[ShapeParameter] = []
+    """List the parameters: every segment's length and girth; of one without a side, two girths."""
+    parameters: list[ShapeParameter] = []
     for segment in model.segments:
         stem = stem_of(segment.name)
-        if not segment.parts or stem in {knob.stem for knob in found}:
+        if not segment.parts or stem in {parameter.stem for parameter in parameters}:
             continue
         half = np.max([_half_m(part) for part in segment.parts], axis=0)
         along = length_axis(model, segment.name)
         is_end = all(child.parent != segment.name for child in model.segments)
         across = [axis for axis in range(3) if axis != along]
-        found.append(ShapeParameter(stem, "length", 2 * float(half[along]), _END_LENGTH_SD if is_end else _LENGTH_SD))
+        parameters.append(
+            ShapeParameter(stem, "length", 2 * float(half[along]), _END_LENGTH_SD if is_end else _LENGTH_SD)
+        )
         if stem == segment.name:
-            found += [ShapeParameter(stem, "girth", float(half[axis]), _GIRTH_SD, axis=i) for i, axis in enumerate(across)]
+            parameters += [
+                ShapeParameter(stem, "girth", float(half[axis]), _GIRTH_SD, axis=i) for i, axis in enumerate(across)
+            ]
         else:
-            found.append(ShapeParameter(stem, "girth", float(half[across].mean()), _GIRTH_SD))
-    return tuple(found)
+            parameters.append(ShapeParameter(stem, "girth", float(half[across].mean()), _GIRTH_SD))
+    return tuple(parameters)
 
 
 def apply_shape(base: BodyModel, parameters: Sequence[ShapeParameter], shape: Array) -> BodyModel:
     """Return the body of a shape (k,), which is 0 for `base`."""
-    bordered = with_borders(base, borders_of(parameters, shape)) if any(knob.border for knob in parameters) else base
+    bordered = (
+        with_borders(base, borders_of(parameters, shape)) if any(parameter.border for parameter in parameters) else base
+    )
     return with_girths(with_segment_lengths(bordered, lengths_of(parameters, shape)), girths_of(parameters, shape))
 
 
 def border_parameters(model: BodyModel, borders: Mapping[str, Border | None]) -> tuple[ShapeParameter, ...]:
-    """List the borders that may shift."""
+    """List the parameters of the borders."""
     names = {stem_of(segment.name): segment.name for segment in model.segments}
     return tuple(
         ShapeParameter(
@@ -71,31 +77,33 @@ def border_parameters(model: BodyModel, borders: Mapping[str, Border | None]) ->
 def borders_of(parameters: Sequence[ShapeParameter], shape: Array) -> dict[str, Border]:
     """Return a shape's borders by stem."""
     return {
-        knob.stem: replace(knob.border, share=float(np.clip(knob.border.share + value, *_INSIDE)))
-        for knob, value in zip(parameters, shape, strict=True)
-        if knob.border is not None
+        parameter.stem: replace(parameter.border, share=float(np.clip(parameter.border.share + value, *_INSIDE)))
+        for parameter, value in zip(parameters, shape, strict=True)
+        if parameter.border is not None
     }
 
 
-def lengths_of(parameters: Sequence[ShapeParameter], shape: Array, first: Mapping[str, float] | None = None) -> dict[str, float]:
+def lengths_of(
+    parameters: Sequence[ShapeParameter], shape: Array, first: Mapping[str, float] | None = None
+) -> dict[str, float]:
     """Return a shape's factors of length by stem, multiplied by those of `first`, by segment, where given."""
     by_stem = {stem_of(name): scale for name, scale in (first or {}).items()}
     return {
-        knob.stem: by_stem.get(knob.stem, 1.0) * float(np.exp(value))
-        for knob, value in zip(parameters, shape, strict=True)
-        if knob.kind == "length"
+        parameter.stem: by_stem.get(parameter.stem, 1.0) * float(np.exp(value))
+        for parameter, value in zip(parameters, shape, strict=True)
+        if parameter.kind == "length"
     }
 
 
 def girths_of(parameters: Sequence[ShapeParameter], shape: Array) -> dict[str, tuple[float, float]]:
-    """Return a shape's factors across, by stem."""
-    found: dict[str, list[float]] = {}
-    for knob, value in zip(parameters, shape, strict=True):
-        if knob.kind == "girth":
-            own = found.setdefault(knob.stem, [1.0, 1.0])
-            for axis in (0, 1) if knob.axis is None else (knob.axis,):
+    """Return a shape's factors of girth, two axes across, by stem."""
+    factors: dict[str, list[float]] = {}
+    for parameter, value in zip(parameters, shape, strict=True):
+        if parameter.kind == "girth":
+            own = factors.setdefault(parameter.stem, [1.0, 1.0])
+            for axis in (0, 1) if parameter.axis is None else (parameter.axis,):
                 own[axis] = float(np.exp(value))
-    return {stem: (across[0], across[1]) for stem, across in found.items()}
+    return {stem: (across[0], across[1]) for stem, across in factors.items()}
 
 
 def _half_m(part: Part) -> Array:

@@ -11,16 +11,16 @@ from airborne.calibration.sources.control_points import ControlPoints, read_cont
 from airborne.calibration.sources.files import Sources, read_sources, sources_from
 
 __all__ = [
-    "RigCalibration",
     "Calibration",
     "CameraFit",
     "ControlPoints",
     "Resection",
+    "RigCalibration",
     "Sources",
     "calibrate",
     "calibrate_from",
-    "resect_cameras",
     "read_control_points",
     "read_sources",
+    "resect_cameras",
     "sources_from",
 ]

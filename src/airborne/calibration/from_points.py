@@ -110,7 +110,12 @@ def calibrate(
 
 
 def _solve(
-    points: ControlPoints, name: str, size: tuple[int, int], decomposition: Decomposition, method: CalibrationMethod, seed: int
+    points: ControlPoints,
+    name: str,
+    size: tuple[int, int],
+    decomposition: Decomposition,
+    method: CalibrationMethod,
+    seed: int,
 ) -> list[Solution]:
     seen = points.is_seen_by(name)
     world, px = points.world[seen], points.px[seen, points.cameras.index(name)]
@@ -124,7 +129,8 @@ def _solve(
         pinhole = anneal_pinhole(start, world, px, seed=seed)
         return [leave_one_out(pinhole, SEVEN_PARAMETERS, world, px)]
     return [
-        leave_one_out(fit_pinhole(start, model, world, px), model, world, px) for model in supported_models(PINHOLE_MODELS, len(world))
+        leave_one_out(fit_pinhole(start, model, world, px), model, world, px)
+        for model in supported_models(PINHOLE_MODELS, len(world))
     ]
 
 

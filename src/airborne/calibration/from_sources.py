@@ -9,7 +9,7 @@ import numpy as np
 
 from airborne.calibration.bundle import Adjustment, FreeParameters, ObservationLags, Source, adjust
 from airborne.calibration.cross_validation import cross_validate
-from airborne.calibration.initial.chaining import board_source, board_poses
+from airborne.calibration.initial.chaining import board_poses, board_source
 from airborne.calibration.initial.resection import Resection, find_misplaced_cameras, resect_cameras
 from airborne.calibration.initial.values import Inputs, Progress, read_inputs
 from airborne.calibration.sources.files import Sources
@@ -87,7 +87,9 @@ def _resect_misplaced(inputs: Inputs) -> tuple[Rig, tuple[Resection, ...]]:
     return resect_cameras(inputs.rig, inputs.detections, [m.camera.name for m in wrong])[0], wrong
 
 
-def _adjust(inputs: Inputs, rig: Rig, freedom: Mapping[str, FreeParameters], lag_sd_s: float | None, told: Progress) -> Adjustment:
+def _adjust(
+    inputs: Inputs, rig: Rig, freedom: Mapping[str, FreeParameters], lag_sd_s: float | None, told: Progress
+) -> Adjustment:
     evidence = _sources(inputs, rig, lag_sd_s)
     prior = None
     if inputs.start_rig is not None and inputs.sources.kinds == ["detections"]:
@@ -135,12 +137,13 @@ def _adjust_in_world(adjusted: Adjustment, place: WorldFrame, told: Progress) ->
     rig, sources = adjusted.transform(place.new_from_old, place.scale)
     if place.fixed_moment is not None:
         held = [
-            replace(s, is_held=np.arange(s.n_moments) == place.fixed_moment) if s.name == "board" else s for s in sources
+            replace(s, is_fixed=np.arange(s.n_moments) == place.fixed_moment) if s.name == "board" else s
+            for s in sources
         ]
         sources = tuple(held)
     freedom = dict(adjusted.free)
     if place.fixed_camera is not None:
-        freedom[place.fixed_camera] = replace(freedom[place.fixed_camera], place=False)
+        freedom[place.fixed_camera] = replace(freedom[place.fixed_camera], extrinsics=False)
     return adjust(rig, sources, freedom, progress=lambda step, _: told("adjusting", step, None))
 
 

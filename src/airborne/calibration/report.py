@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from airborne.calibration.bundle.lenses import FISHEYE_PARAMETERS, CAMERA_PARAMETERS
+from airborne.calibration.bundle.lenses import CAMERA_PARAMETERS, FISHEYE_PARAMETERS
 from airborne.calibration.diagnosis.results import diagnose
 from airborne.calibration.from_sources import RigCalibration
 from airborne.cameras import Camera

@@ -34,7 +34,9 @@ def _write_figure(path: Path, found: RigCalibration, i: int) -> Path:
     figure = Figure(figsize=(max(width * inches, _LEAST_INCHES), height * inches + 0.9), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    example = found.inputs.board_detections.examples.get(camera.name) if found.inputs.board_detections is not None else None
+    example = (
+        found.inputs.board_detections.examples.get(camera.name) if found.inputs.board_detections is not None else None
+    )
     if example is None:
         example = first_image(found.inputs.sources, found.inputs.sources.camera[i])
     if example is not None:
@@ -42,7 +44,9 @@ def _write_figure(path: Path, found: RigCalibration, i: int) -> Path:
     rng = np.random.default_rng(0)
     typical = _typical_px(found, i)
     magnified = _ARROW_SHARE * max(width, height) / 2 / typical
-    for number, (source, residual) in enumerate(zip(found.adjustment.sources, found.adjustment.residual_px, strict=True)):
+    for number, (source, residual) in enumerate(
+        zip(found.adjustment.sources, found.adjustment.residual_px, strict=True)
+    ):
         rows = np.flatnonzero((source.camera == i) & np.isfinite(residual[:, 0]))
         if len(rows) > _MOST_ARROWS:
             rows = np.sort(rng.choice(rows, _MOST_ARROWS, replace=False))

@@ -13,7 +13,7 @@ from airborne.cameras.camera import Rig
 from airborne.cameras.formats.aniposelib import aniposelib_text
 from airborne.cameras.formats.caliscope import caliscope_losses, caliscope_text, rig_from_caliscope
 from airborne.cameras.formats.dlt import dlt_losses, dlt_text, is_dlt, rig_from_dlt
-from airborne.cameras.formats.opencv import parse_opencv, easymocap_texts, halves_in, opencv_text, rig_from_opencv
+from airborne.cameras.formats.opencv import easymocap_texts, halves_in, opencv_text, parse_opencv, rig_from_opencv
 from airborne.cameras.formats.options import FileOptions, PixelConvention, Size, Unit
 from airborne.cameras.formats.pose2sim import pose2sim_text, rig_from_tables
 from airborne.cameras.formats.qualisys import qualisys_text, rig_from_qualisys
@@ -74,7 +74,9 @@ def build_rig(file: CalibrationFile, options: FileOptions) -> Rig:
             said = f"{camera.size[0]}x{camera.size[1]}"
             raise CalibrationError(f"{file.where} says that '{camera.name}' has pictures of {said}; leave --size out")
     if options.unit is None and check_baselines(rig):
-        asked = "millimetres? Then say --unit mm" if longest_baseline_m(rig) > FARTHEST_M else "metres? Then say --unit m"
+        asked = (
+            "millimetres? Then say --unit mm" if longest_baseline_m(rig) > FARTHEST_M else "metres? Then say --unit m"
+        )
         raise CalibrationError(
             f"{file.where}: the cameras lie up to {longest_baseline_m(rig):.3g} m from each other; are its lengths in {asked}; "
             "`airborne convert` writes such a file anew, in metres"

@@ -32,7 +32,7 @@ def synth_somersault_command(
     preset: Annotated[
         Literal["paper", "moving-arms", "pike"], typer.Option(help="11 poses of one shape, or motion at 50 frames/s.")
     ] = "paper",
-    target: Annotated[Literal["skin", "ellipsoids"], typer.Option(help="The surface of the person drawn.")] = "skin",
+    target: Annotated[Literal["skin", "ellipsoids"], typer.Option(help="The surface of the rendered person.")] = "skin",
     style: Annotated[
         Literal["exact", "gym"], typer.Option(help="Images in the tracker's own light, or as of cameras in a hall.")
     ] = "exact",

@@ -93,7 +93,7 @@ def analyse_agreement(series: Series) -> Agreement:
     series = series.drop_missing()
     difference = series.values[:, 0] - series.values[:, 1] if len(series.values) else np.empty(0)
     groups = [difference[series.individual == name] for name in dict.fromkeys(series.individual.tolist())]
-    counts = [effective_sample_size(group) for group in groups]
+    counts = [effective_number(group) for group in groups]
     components = variance_components(groups, counts)
     low, high = limits_of_agreement(components)
     span = float(np.ptp(series.values[:, 1])) if len(difference) else math.nan
@@ -119,7 +119,7 @@ def analyse_agreement(series: Series) -> Agreement:
     )
 
 
-def effective_sample_size(difference: Array) -> float:
+def effective_number(difference: Array) -> float:
     """Return the effective sample size of the mean of a series in order of time: 1 to n."""
     n = len(difference)
     deviation = difference - difference.mean() if n else difference

@@ -26,12 +26,12 @@ def agreement_table(rows: Sequence[Agreement]) -> str:
     width = max(16, *(len(f"{row.name} [{row.unit}]") + 2 for row in rows))
     lines = [f"{'agreement':<{width}}{'bias':>9}{'95 % limits':>19}{'RMSE':>9}{'nRMSE':>8}{'ICC(A,1)':>10}{'SEM':>9}"]
     for row in rows:
-        limits = f"{_fixed(row.lower_limit.value)} to {_fixed(row.upper_limit.value)}"
+        limits = f"{_number(row.lower_limit.value)} to {_number(row.upper_limit.value)}"
         share = or_dash(row.nrmse_percent.value / 100, ".2%")
         icc = or_dash(row.icc.agreement.value, ".4f")
         lines.append(
-            f"{f'  {row.name} [{row.unit}]':<{width}}{_fixed(row.bias.value):>9}{limits:>19}"
-            f"{_fixed(row.rmse.value):>9}{share:>8}{icc:>10}{_fixed(row.sem.value):>9}"
+            f"{f'  {row.name} [{row.unit}]':<{width}}{_number(row.bias.value):>9}{limits:>19}"
+            f"{_number(row.rmse.value):>9}{share:>8}{icc:>10}{_number(row.sem.value):>9}"
         )
     return "\n".join(lines)
 
@@ -42,9 +42,9 @@ def repeatability_table(rows: Sequence[Repeatability]) -> str:
     lines = [f"{'repeatability':<{width}}{'within sd':>10}{'coefficient':>12}{'ICC(A,1)':>10}{'SEM':>9}{'MDC':>9}"]
     for row in rows:
         icc = or_dash(row.icc.agreement.value, ".4f")
-        numbers = f"{_fixed(row.within_sd.value):>10}{_fixed(row.coefficient.value):>12}{icc:>10}"
+        numbers = f"{_number(row.within_sd.value):>10}{_number(row.coefficient.value):>12}{icc:>10}"
         lines.append(
-            f"{f'  {row.name} [{row.unit}]':<{width}}{numbers}{_fixed(row.sem.value):>9}{_fixed(row.mdc.value):>9}"
+            f"{f'  {row.name} [{row.unit}]':<{width}}{numbers}{_number(row.sem.value):>9}{_number(row.mdc.value):>9}"
         )
     return "\n".join(lines)
 
@@ -126,5 +126,5 @@ def _ci(measured: Measurement, digits: int = 2) -> str:
     return f"{measured.value:.{digits}f} [{measured.low:.{digits}f}, {measured.high:.{digits}f}]"
 
 
-def _fixed(value: float) -> str:
+def _number(value: float) -> str:
     return or_dash(value, ".2f")

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from airborne.evaluation.agreement import Series, Z, effective_sample_size, plain_numbers, scale_measurement
+from airborne.evaluation.agreement import Series, Z, effective_number, plain_numbers, scale_measurement
 from airborne.evaluation.icc import Reliability, mean_squares, reliability, sd_with_interval
 from airborne.motion.jumps.jump import UNKNOWN, Measurement
 
@@ -44,7 +44,7 @@ def analyse_repeatability(series: Series) -> Repeatability:
     n, k = series.values.shape
     within_sd, count, biases = UNKNOWN, float(n), tuple([math.nan] * k)
     if n > 1:
-        count = _effective_sample_size(series)
+        count = _effective_number(series)
         within_sd = sd_with_interval(mean_squares(series.values)[3], count * (k - 1))
         biases = tuple((series.values.mean(axis=0) - series.values.mean()).tolist())
     icc = reliability(series.values, count)
@@ -63,14 +63,14 @@ def analyse_repeatability(series: Series) -> Repeatability:
     )
 
 
-def _effective_sample_size(series: Series) -> float:
+def _effective_number(series: Series) -> float:
     """Return the effective number of moments: mean over the methods, each by its deviations from the mean of all."""
     deviation = series.values - series.values.mean(axis=1, keepdims=True)
     names = dict.fromkeys(series.individual.tolist())
     return float(
         np.mean(
             [
-                sum(effective_sample_size(deviation[series.individual == name, way]) for name in names)
+                sum(effective_number(deviation[series.individual == name, way]) for name in names)
                 for way in range(deviation.shape[1])
             ]
         )

@@ -93,7 +93,11 @@ def _visible_parts(segment: Segment) -> list[Part]:
         key, length_m = (id(part),), 0.0
         if isinstance(part.shape, Ellipsoid):
             segment_from_part, half = part.segment_from_part, float(part.shape.semi_axes_m[2])
-            key = tuple(np.round([*part.shape.semi_axes_m, *segment_from_part.translation, *segment_from_part.as_matrix()[:3, 0]], 9))
+            key = tuple(
+                np.round(
+                    [*part.shape.semi_axes_m, *segment_from_part.translation, *segment_from_part.as_matrix()[:3, 0]], 9
+                )
+            )
             length_m = min(part.slab_m[1], half) - max(part.slab_m[0], -half)
         if key not in best or length_m > best[key][0]:
             best[key] = (length_m, part)
@@ -167,7 +171,7 @@ def _joint(segment: Segment, name: str, parent: str) -> ET.Element:
 
 
 def _custom_joint(name: str, dofs: Sequence[_Coordinate]) -> tuple[ET.Element, list[ET.Element]]:
-    """Return a joint of three rotations and up to three translations, and its frames, to be fixed in parent and child."""
+    """Return a joint of three rotations and up to three translations, and its two frames, for parent and child."""
     joint = ET.Element("CustomJoint", name=name)
     ET.SubElement(joint, "socket_parent_frame").text = f"{name}_parent"
     ET.SubElement(joint, "socket_child_frame").text = f"{name}_child"

@@ -121,8 +121,8 @@ def _interval_cm(row: Mapping[str, Any], what: str) -> str:
 
 def _drop_notes(summary: Mapping[str, Any]) -> Iterator[str]:
     if live := summary.get("live"):
-        counts_by_camera = ", ".join(f"{c['name']} {c['n_dropped']} of {c['n_received']}" for c in live["cameras"])
-        yield f"live: frames dropped to keep up: {counts_by_camera}; delay {1e3 * live['median_delay_s']:.0f} ms (median)"
+        counts = ", ".join(f"{c['name']} {c['n_dropped']} of {c['n_received']}" for c in live["cameras"])
+        yield f"live: frames dropped to keep up: {counts}; delay {1e3 * live['median_delay_s']:.0f} ms (median)"
 
 
 def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:

@@ -98,7 +98,11 @@ def _angles_near(R, near, out):
     c, s = math.cos(x), math.sin(x)
     z = math.atan2(c * R[1, 0] + s * R[2, 0], c * R[1, 1] + s * R[2, 1])
     one0, one1, one2 = _nearest_equivalent(x, near[0]), _nearest_equivalent(y, near[1]), _nearest_equivalent(z, near[2])
-    two0, two1, two2 = _nearest_equivalent(x + math.pi, near[0]), _nearest_equivalent(math.pi - y, near[1]), _nearest_equivalent(z + math.pi, near[2])
+    two0, two1, two2 = (
+        _nearest_equivalent(x + math.pi, near[0]),
+        _nearest_equivalent(math.pi - y, near[1]),
+        _nearest_equivalent(z + math.pi, near[2]),
+    )
     first = (one0 - near[0]) ** 2 + (one1 - near[1]) ** 2 + (one2 - near[2]) ** 2
     second = (two0 - near[0]) ** 2 + (two1 - near[1]) ** 2 + (two2 - near[2]) ** 2
     if second < first:

@@ -93,7 +93,7 @@ class PlayersWriter:
         """Start a new file, or with `resume` compare with its finished rows first."""
         self.path = path
         self._joints = joints
-        self._n_finished_bytes = _finished_bytes(path) if resume and path.exists() else 0
+        self._n_finished_bytes = _whole_lines_end(path) if resume and path.exists() else 0
         self._file = path.open("r+b" if self._n_finished_bytes else "wb")
         self._file.truncate(self._n_finished_bytes)
         self._write(",".join(PLAYERS_COLUMNS) + "\n", "its first line")
@@ -134,7 +134,7 @@ def read_players(path: Path) -> PlayersMotion:
     The last time is dropped where some of its rows are missing. Raises ResultError in one line for a file that is
     missing, not a joints.csv of players, or without a finished time.
     """
-    n_bytes = _finished_bytes(path)
+    n_bytes = _whole_lines_end(path)
     if not n_bytes:
         raise ResultError(f"{path} is empty; {_EXPECTED}; track again")
     table = _table(path, n_bytes)
@@ -174,7 +174,7 @@ def read_players(path: Path) -> PlayersMotion:
 
 def write_players_parquet(path: Path, table_csv: Path) -> None:
     """Write the table of a joints.csv as Parquet, with its units in the metadata; empty cells become null."""
-    table = _table(table_csv, _finished_bytes(table_csv))
+    table = _table(table_csv, _whole_lines_end(table_csv))
     units = (
         {"time_s": "s", "sd_m": "m", "score": "nat"} | dict.fromkeys(_POSITION, "m") | dict.fromkeys(_COVARIANCE, "m2")
     )
@@ -196,7 +196,7 @@ def _lines(motion: PlayersMotion) -> list[str]:
     return lines
 
 
-def _finished_bytes(path: Path) -> int:
+def _whole_lines_end(path: Path) -> int:
     """Return the offset at which the last whole line ends."""
     try:
         with path.open("rb") as file:

@@ -22,7 +22,7 @@ from airborne.types import Array
 from airborne.video import VideoSource, inspect
 
 _LEAST_VISIBILITY = 0.3  # detections with a lower confidence are ignored
-_WEIGHTS = {  # of points that only lie near the landmark they stand for
+LANDMARK_WEIGHTS = {  # of points that only lie near the landmark they stand for
     "head": 0.1,
     **dict.fromkeys(("hand_left", "hand_right", "foot_left", "foot_right"), 0.3),
 }
@@ -153,7 +153,7 @@ def _fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: A
     landmarks = landmarks_from_points([names[i] for i in needed], points[needed])
     targets = {landmark.name: landmarks[landmark.name] for landmark in model.landmarks if landmark.name in landmarks}
     try:
-        fit = fit_pose(model, targets, weights=_WEIGHTS)
+        fit = fit_pose(model, targets, weights=LANDMARK_WEIGHTS)
     except BodyError as error:
         raise TrialError(f"{where}: {error}") from error
     off_m = {name: distance for name, distance in fit.residual_m.items() if np.isfinite(distance)}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.bundle import ALL_FIXED, FreeParameters, ObservationLags, Lengths, CameraPrior, adjust
+from airborne.calibration.bundle import ALL_FIXED, CameraPrior, FreeParameters, Lengths, ObservationLags, adjust
 from airborne.calibration.initial.chaining import board_source
 from airborne.calibration.intrinsics.physical import PINHOLE_MODELS, Pinhole, fit_pinhole
 from airborne.cameras import Rig
@@ -48,7 +48,7 @@ def test_one_lens_is_that_of_opencv():
     flags = cv2.CALIB_FIX_ASPECT_RATIO | cv2.CALIB_USE_INTRINSIC_GUESS
     K = rig.cameras[0].K.copy()
     rms, K, distortion, *_ = cv2.calibrateCamera(corners, px, rig.cameras[0].size, K, np.zeros(5), flags=flags)
-    found = adjust(rig, [board_source(views, places)], replace(ALL, place=False), loss="squares")
+    found = adjust(rig, [board_source(views, places)], replace(ALL, extrinsics=False), loss="squares")
     assert found.rms_px() == pytest.approx(rms, rel=1e-4)
     np.testing.assert_allclose(found.rig.cameras[0].K, K, atol=0.05)
     np.testing.assert_allclose(found.rig.cameras[0].distortion, distortion.ravel(), atol=0.02)

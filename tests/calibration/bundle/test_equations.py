@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from airborne.calibration.bundle import FreeParameters, ObservationLags, Lengths, Source
+from airborne.calibration.bundle import FreeParameters, Lengths, ObservationLags, Source
 from airborne.calibration.bundle.equations import (
     gauge_directions,
+    jacobian_of,
     length_residual_m,
     normal_equations,
     residual_px,
-    jacobian_of,
 )
-from airborne.calibration.bundle.problem import initial_state, apply_step, build_problem
+from airborne.calibration.bundle.problem import apply_step, build_problem, initial_state
 from airborne.calibration.initial.chaining import board_source
 from tests.support.rigs import MIDDLE, boards, ring, seen_board, seen_points
 
@@ -99,7 +99,7 @@ def test_the_world_is_as_free_as_the_sources_leave_it():
     places = boards(rng, 20)
     board = board_source(seen_board(rng, rig, places), places)
     assert frame_of(rig, [board], all_free) == 6
-    assert frame_of(rig, [replace(board, is_held=np.arange(20) == 4)], all_free) == 0
+    assert frame_of(rig, [replace(board, is_fixed=np.arange(20) == 4)], all_free) == 0
 
 
 def test_points_that_too_few_cameras_see_are_left_out():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.calibration.bundle.loss import robust_cost, loss_constants, robust_scale, robust_weight
+from airborne.calibration.bundle.loss import loss_constants, robust_cost, robust_scale, robust_weight
 from tests.support.tolerances import sampled
 
 LOSSES = ["cauchy", "huber", "squares"]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.calibration.diagnosis.clocks import check_counter, check_times, check_rolling_shutter, check_image_counts
+from airborne.calibration.diagnosis.clocks import check_counter, check_image_counts, check_rolling_shutter, check_times
 
 TIMES_S = np.arange(200) / 50 + np.random.default_rng(0).normal(0, 5e-4, 200)
 

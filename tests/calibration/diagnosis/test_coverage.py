@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.calibration.diagnosis.coverage import check_coverage, check_view_count, check_links, check_tilts
+from airborne.calibration.diagnosis.coverage import check_coverage, check_links, check_tilts, check_view_count
 
 NAMES = ("cam1", "cam2", "cam3", "cam4")
 SIZE = (1920, 1080)
@@ -11,7 +11,9 @@ SIZE = (1920, 1080)
 
 def test_few_views_are_counted():
     assert check_view_count("cam1", 8) == []
-    assert check_view_count("cam1", 1)[0].sentence.startswith("cam1 shows the board in 1 picture, expected 8: film it longer")
+    assert check_view_count("cam1", 1)[0].sentence.startswith(
+        "cam1 shows the board in 1 picture, expected 8: film it longer"
+    )
 
 
 def test_points_all_over_the_picture_are_enough():

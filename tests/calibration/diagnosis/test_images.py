@@ -8,10 +8,10 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.diagnosis.images import (
     check_floor,
-    check_mirroring,
     check_image_size,
-    check_swapped_files,
+    check_mirroring,
     check_roll,
+    check_swapped_files,
 )
 from airborne.cameras import Rig
 from tests.support import wand_waving as waving

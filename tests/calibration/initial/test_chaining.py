@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.calibration.bundle import adjust
-from airborne.calibration.initial.chaining import Views, board_source, board_poses, initial_lens, chain_cameras
+from airborne.calibration.initial.chaining import Views, board_poses, board_source, chain_cameras, initial_lens
 from airborne.calibration.intrinsics.lens_selection import choose_lens
 from airborne.calibration.sources.boards import NO_CORNERS
 from airborne.cameras import Rig
@@ -45,7 +45,7 @@ def test_cameras_without_shared_views_are_named():
             rows[2][moment] = NO_CORNERS
         else:
             rows[0][moment] = rows[1][moment] = NO_CORNERS
-    apart_views = replace(views, sightings=tuple(map(tuple, rows)))
+    apart_views = replace(views, detections=tuple(map(tuple, rows)))
     assert sorted(map(len, apart_views.groups())) == [1, 2]
     with pytest.raises(CalibrationError, match=r"shared between cam2 and .*cam"):
         chain_cameras(rig.cameras, apart_views)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airborne.calibration.initial.resection import find_misplaced_cameras, resect_cameras, resect
+from airborne.calibration.initial.resection import find_misplaced_cameras, resect, resect_cameras
 from airborne.cameras import Rig
 from airborne.errors import CalibrationError
 from tests.support.people_seen import four_cameras, knocked, seen, walking

@@ -36,7 +36,7 @@ def test_columns_may_stand_in_any_order(tmp_path):
 
 def test_the_bundled_points_are_seen_by_three_cameras(points):
     assert points.cameras == ("cam1", "cam2", "cam3")
-    assert [points.seen_by(camera).sum() for camera in points.cameras] == [23, 23, 21]
+    assert [points.is_seen_by(camera).sum() for camera in points.cameras] == [23, 23, 21]
 
 
 @pytest.mark.parametrize(

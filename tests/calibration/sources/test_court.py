@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airborne.calibration.sources.control_points import read_control_points
-from airborne.calibration.sources.court import court_points, closest_names
+from airborne.calibration.sources.court import closest_names, court_points
 from airborne.errors import CalibrationError
 from airborne.synthetic.block.court import COURT_M
 

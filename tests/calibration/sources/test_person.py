@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.sources.person import median_reprojection_px, align_rigs, person_source, refine_rig
+from airborne.calibration.sources.person import align_rigs, median_reprojection_px, person_source, refine_rig
 from airborne.cameras import Rig
 from tests.support.people_seen import four_cameras, knocked, seen, walking
 from tests.support.rigs import apart

@@ -7,7 +7,7 @@ import pytest
 
 from airborne.calibration.bundle import FreeParameters, adjust
 from airborne.calibration.sources.court import court_points
-from airborne.calibration.sources.scene_points import scene_source, initial_rig_from_points
+from airborne.calibration.sources.scene_points import initial_rig_from_points, scene_source
 from tests.support import wand_waving as waving
 
 RIG = waving.hall((1500.0, 1300.0, 1400.0, 1600.0))

@@ -125,7 +125,9 @@ def test_the_length_gives_the_scale():
     tracks = waving.tracks(rng, rig, 80)
     half = WandTracks(cameras=tracks.cameras, px=tracks.px, lengths_m={(0, 1): 0.5})
     spread = adjust(rig, [wand_source(rig, tracks)], FreeParameters()).rig
-    small, _ = adjust(spread, [wand_source(rig, tracks)], FreeParameters()).transform(spread["cam1"].camera_from_world, 0.5)
+    small, _ = adjust(spread, [wand_source(rig, tracks)], FreeParameters()).transform(
+        spread["cam1"].camera_from_world, 0.5
+    )
     narrow = adjust(small, [wand_source(small, half)], FreeParameters()).rig
     ratio = np.linalg.norm(narrow["cam1"].centre - narrow["cam3"].centre) / np.linalg.norm(
         spread["cam1"].centre - spread["cam3"].centre

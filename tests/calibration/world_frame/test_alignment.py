@@ -8,9 +8,9 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.world_frame.alignment import (
+    estimate_gravity,
     frame_of_gravity,
     frame_of_three_points,
-    estimate_gravity,
     merge_rigs,
 )
 from airborne.cameras import Rig

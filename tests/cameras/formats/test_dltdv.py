@@ -7,7 +7,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from airborne.cameras import Detections, PixelConvention
-from airborne.cameras.formats.dltdv import Digitisation, is_xypts, triangulate_digitisation, read_digitisation, write_digitisation
+from airborne.cameras.formats.dltdv import (
+    Digitisation,
+    is_xypts,
+    read_digitisation,
+    triangulate_digitisation,
+    write_digitisation,
+)
 from airborne.cameras.formats.options import FileOptions
 from airborne.errors import CalibrationError
 from tests.support.cameras import LENS, scattered, three_cameras

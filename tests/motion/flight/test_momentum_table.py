@@ -43,7 +43,7 @@ def test_centre_of_mass_deviations_are_those_of_sampled_poses():
     assert np.isnan(table["angular_momentum"][0]).all()
 
 
-def test_summary_of_a_free_fall_finds_gravity_turns_and_a_constant_momentum():
+def test_summary_of_a_free_fall_finds_gravity_rotations_and_a_constant_momentum():
     summary = flight_summary(motion_of(MODEL, falling()), MODEL)
     assert summary.fitted_gravity_m_s2 == pytest.approx(9.81, abs=ROUNDTRIP)
     assert summary.ballistic_rms_mm < 1e3 * ROUNDTRIP
@@ -56,7 +56,7 @@ def test_summary_of_a_free_fall_finds_gravity_turns_and_a_constant_momentum():
     assert summary.to_dict()["fitted_gravity_m_s2"] == summary.fitted_gravity_m_s2
 
 
-def test_a_body_that_does_not_fall_freely_is_told_by_its_gravity_and_its_distance_from_a_free_fall():
+def test_a_body_that_does_not_fall_freely_is_detected_by_its_gravity_and_its_distance_from_free_fall():
     summary = flight_summary(motion_of(MODEL, falling(gravity=8.0)), MODEL)
     assert summary.fitted_gravity_m_s2 == pytest.approx(8.0, abs=ROUNDTRIP)
     t = TIMES - TIMES.mean()

@@ -24,19 +24,19 @@ def hips(jumper, seed, sd_m):
 @pytest.mark.parametrize("seed", range(4))
 def test_a_jump_has_one_takeoff_and_one_landing(seed):
     jumper = Jumper()
-    found = find_flight_events(*hips(jumper, seed, 0.005))
-    assert [event.name for event in found] == ["take-off", "landing"]
-    assert found[0].time_s == pytest.approx(jumper.takeoff_s, abs=0.025)
-    assert found[1].time_s == pytest.approx(jumper.landing_s, abs=0.04)
+    result = find_flight_events(*hips(jumper, seed, 0.005))
+    assert [event.name for event in result] == ["take-off", "landing"]
+    assert result[0].time_s == pytest.approx(jumper.takeoff_s, abs=0.025)
+    assert result[1].time_s == pytest.approx(jumper.landing_s, abs=0.04)
 
 
 def test_two_jumps_have_two_of_each():
     one = Jumper(duration_s=2.5)
     _, height, variance = hips(one, 0, 0.004)
     both = np.concatenate([height, height])
-    found = find_flight_events(np.arange(len(both)) / one.rate, both, np.concatenate([variance, variance]))
-    assert [event.name for event in found] == ["take-off", "landing"] * 2
-    assert found[2].time_s - found[0].time_s == pytest.approx(2.5, abs=0.02)
+    result = find_flight_events(np.arange(len(both)) / one.rate, both, np.concatenate([variance, variance]))
+    assert [event.name for event in result] == ["take-off", "landing"] * 2
+    assert result[2].time_s - result[0].time_s == pytest.approx(2.5, abs=0.02)
 
 
 def test_who_stands_or_walks_or_squats_does_not_fly():
@@ -88,19 +88,19 @@ def test_of_a_body_with_masses_the_centre_of_mass_counts():
         for z in rise
     ]
     covariance = np.eye(18) * 1e-6
-    found = body_events(motion_of(body, poses, 60, covariance), body)
-    assert [event.name for event in found] == ["take-off", "landing"]
-    assert found[0].time_s == pytest.approx(jumper.takeoff_s, abs=0.03)
+    result = body_events(motion_of(body, poses, 60, covariance), body)
+    assert [event.name for event in result] == ["take-off", "landing"]
+    assert result[0].time_s == pytest.approx(jumper.takeoff_s, abs=0.03)
 
 
 def test_of_players_the_events_are_those_of_their_jumps():
     jumper = Jumper()
     standing = np.repeat(jumper.points()[:1], len(jumper.time_s), axis=0)
     points = np.stack([jumper.points(), standing], axis=1)[:, :, :6]
-    found = player_events(players_motion(jumper.time_s, points, players=("one", "two")))
-    assert [event.name for event in found["one"]] == ["take-off", "landing"]
-    assert found["one"][0].time_s == pytest.approx(jumper.takeoff_s, abs=0.02)
-    assert found["two"] == ()
+    result = player_events(players_motion(jumper.time_s, points, players=("one", "two")))
+    assert [event.name for event in result["one"]] == ["take-off", "landing"]
+    assert result["one"][0].time_s == pytest.approx(jumper.takeoff_s, abs=0.02)
+    assert result["two"] == ()
 
 
 def test_a_flight_that_the_recording_begins_in_ends_a_segment_at_its_landing_only():
@@ -108,5 +108,5 @@ def test_a_flight_that_the_recording_begins_in_ends_a_segment_at_its_landing_onl
     motion = jump_of(jumper)
     late = motion.time_s > jumper.takeoff_s + 0.1
     cut = players_motion(motion.time_s[late], motion.points[late])
-    found = player_events(cut)["one"]
-    assert [event.name for event in found] == ["landing"]
+    result = player_events(cut)["one"]
+    assert [event.name for event in result] == ["landing"]

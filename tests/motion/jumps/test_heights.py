@@ -1,4 +1,4 @@
-"""Jumps of a jumper made of formulas: known heights come out, what is not seen is not claimed, intervals are honest."""
+"""Jumps of a jumper by closed formulas: heights are recovered, unobserved events unreported, intervals calibrated."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.standing_posture import leg_lengths
 from airborne.motion.jumps.table import describe_jumps
 from airborne.motion.local_polynomials import local_fits
-from tests.support.jumping import FLAT_M, HEEL_M, LEG_M, SHARE, G, Jumper, leg_track, motion_of, noise, players_motion
+from tests.support.jumping import FLAT_M, HEEL_M, LEG_M, SHARE, G, Jumper, first_legs, motion_of, noise, players_motion
 from tests.support.tolerances import ROUNDTRIP
 
 CLEAN = Jumper()
@@ -25,7 +25,7 @@ def only(motion):
     return jump
 
 
-def known(jumper):
+def true_numbers(jumper):
     """The true numbers of a jumper, by the names of `Jump`."""
     over = HEEL_M + jumper.rise_m
     return {
@@ -59,17 +59,17 @@ def test_peaks_over_standing_are_exact_without_noise(clean):
 
 
 def test_every_interval_holds_the_truth_without_noise(clean):
-    for name, value in known(CLEAN).items():
+    for name, value in true_numbers(CLEAN).items():
         measured = getattr(clean, name)
         assert measured.low - 0.006 <= value <= measured.high + 0.006, name
 
 
-def test_events_are_within_a_third_of_a_frame_and_heights_within_a_centimetre_with_the_feet_seen():
+def test_events_are_within_a_third_of_a_frame_and_heights_within_a_centimetre_with_the_feet_tracked():
     jump = only(motion_of(CLEAN, feet=True))
     assert jump.takeoff_frame.value == pytest.approx(60 * CLEAN.takeoff_s, abs=0.33)
     assert jump.landing_frame.value == pytest.approx(60 * CLEAN.landing_s, abs=0.33)
     for name in HEIGHTS:
-        assert getattr(jump, name).value == pytest.approx(known(CLEAN)[name], abs=0.012), name
+        assert getattr(jump, name).value == pytest.approx(true_numbers(CLEAN)[name], abs=0.012), name
 
 
 def test_flight_is_landing_minus_takeoff_and_its_height_goes_with_its_square(clean):
@@ -140,7 +140,7 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say_and_errors_are_smal
             takeoff_s=1.0 + rng.uniform(0, 1 / 60), speed_m_s=np.sqrt(2 * G * rng.uniform(0.3, 0.6)), depth_m=0.3
         )
         jump = only(motion_of(jumper, sd_m=0.015, rng=rng, feet=bool(seed % 2)))
-        true = known(jumper)
+        true = true_numbers(jumper)
         hits.append([getattr(jump, name).low <= value <= getattr(jump, name).high for name, value in true.items()])
         errors.append([getattr(jump, name).value - value for name, value in true.items()])
     share = np.mean(hits, axis=0)
@@ -163,7 +163,7 @@ def test_who_is_carried_up_at_rest_does_not_jump():
     assert measure_jumps(players_motion(np.arange(150) / 60, points, sd_m=0.01)) == ()
 
 
-def test_two_jumps_are_told_apart():
+def test_two_jumps_are_separated():
     first, second = Jumper(takeoff_s=1.0), Jumper(takeoff_s=1.2, speed_m_s=2.6)
     points = np.concatenate([first.points(), second.points()])[:, None, :6]
     motion = players_motion(np.arange(len(points)) / 60, points)
@@ -177,9 +177,9 @@ def test_two_jumps_are_told_apart():
 def test_players_come_in_their_order_each_with_its_own_jump():
     low, high = Jumper(speed_m_s=2.5), Jumper(takeoff_s=1.2)
     points = np.stack([high.points(), low.points()], axis=1)[:, :, :6]
-    found = measure_jumps(players_motion(CLEAN.time_s, points, players=("high", "low")))
-    assert [jump.player for jump in found] == ["high", "low"]
-    assert found[0].foot_height_m.value > found[1].foot_height_m.value
+    result = measure_jumps(players_motion(CLEAN.time_s, points, players=("high", "low")))
+    assert [jump.player for jump in result] == ["high", "low"]
+    assert result[0].foot_height_m.value > result[1].foot_height_m.value
 
 
 def test_a_jump_that_the_end_cuts_off_has_no_landing_and_nothing_that_needs_one():
@@ -248,13 +248,13 @@ def test_who_never_stands_straight_is_measured_from_the_lengths_of_the_legs():
 
 def test_lengths_of_legs_are_not_made_longer_by_noise():
     motion = motion_of(CLEAN, sd_m=0.03, rng=np.random.default_rng(11))
-    assert leg_lengths(leg_track(motion)) == pytest.approx([LEG_M, LEG_M], abs=0.025)
+    assert leg_lengths(first_legs(motion)) == pytest.approx([LEG_M, LEG_M], abs=0.025)
 
 
 def test_errors_that_a_whole_leg_shares_leave_its_length():
     motion = motion_of(CLEAN, sd_m=0.03, rng=np.random.default_rng(11))
     stiff = replace(motion_of(CLEAN), covariance=motion.covariance)
-    assert leg_lengths(leg_track(stiff)) == pytest.approx([LEG_M, LEG_M], abs=1e-3)
+    assert leg_lengths(first_legs(stiff)) == pytest.approx([LEG_M, LEG_M], abs=1e-3)
 
 
 def test_peak_speeds_and_drift_are_those_of_the_motion():
@@ -299,7 +299,7 @@ def test_a_covariance_that_is_not_given_counts_as_20_mm():
     assert tuple(only(unknown).foot_height_m) == pytest.approx(tuple(only(motion).foot_height_m), abs=ROUNDTRIP)
 
 
-def test_a_joint_that_leaps_away_and_back_counts_as_unknown():
+def test_a_joint_that_jumps_away_and_back_counts_as_unknown():
     motion = motion_of(CLEAN, sd_m=0.01, rng=np.random.default_rng(13))
     points = motion.points.copy()
     at = round(60 * (CLEAN.takeoff_s + CLEAN.speed_m_s / G))
@@ -345,14 +345,14 @@ def test_local_fits_take_the_nine_known_values_nearest_to_the_time(rate_hz):
     known = np.flatnonzero(np.isfinite(values[:, 1]))
     at_s = rng.uniform(time_s[known[0]], time_s[known[-1]], 50)
     fit, covariance = local_fits(time_s, values, variance, at_s)
-    for at, found, spread in zip(at_s, fit, covariance, strict=True):
+    for at, result, spread in zip(at_s, fit, covariance, strict=True):
         rows = np.sort(known[np.argsort(np.abs(time_s[known] - at))[:9]])
         rows = rows[np.abs(time_s[rows] - at) <= 0.12]
         if len(rows) < 5:
-            assert np.isnan(found).all() and np.isnan(spread).all()
+            assert np.isnan(result).all() and np.isnan(spread).all()
             continue
         hat = np.linalg.pinv(np.vander(time_s[rows] - at, 3, increasing=True))[:2]
-        np.testing.assert_allclose(found, hat @ values[rows], rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(result, hat @ values[rows], rtol=1e-6, atol=1e-8)
         noise_of = noise_covariance(time_s[rows], variance[rows, 1])
         np.testing.assert_allclose(spread[1], hat @ noise_of @ hat.T, rtol=1e-6, atol=1e-8)
     assert np.isfinite(fit).all(axis=(1, 2)).mean() > 0.5

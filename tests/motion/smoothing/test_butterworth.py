@@ -73,19 +73,19 @@ def test_away_from_the_ends_it_is_plain_filtfilt():
 def test_a_parabola_passes_unchanged_up_to_its_ends_with_both_derivatives():
     t = times(31)
     fall = (1 + 3 * t - G / 2 * t**2)[:, None]
-    found = butterworth_smoother(t, fall, unknown(fall), cutoff_hz=6)
-    assert found.value == pytest.approx(fall, abs=ROUNDTRIP)
-    assert found.velocity[:, 0] == pytest.approx(3 - G * t, abs=1e-7)
-    assert found.acceleration[:, 0] == pytest.approx(np.full(31, -G), abs=1e-4)
+    result = butterworth_smoother(t, fall, unknown(fall), cutoff_hz=6)
+    assert result.value == pytest.approx(fall, abs=ROUNDTRIP)
+    assert result.velocity[:, 0] == pytest.approx(3 - G * t, abs=1e-7)
+    assert result.acceleration[:, 0] == pytest.approx(np.full(31, -G), abs=1e-4)
 
 
 def test_derivatives_of_a_slow_sine_are_those_of_calculus():
     t, w = times(600), 2 * np.pi
     wave = np.sin(w * t)[:, None]
-    found = butterworth_smoother(t, wave, unknown(wave), cutoff_hz=12)
+    result = butterworth_smoother(t, wave, unknown(wave), cutoff_hz=12)
     inside = slice(100, 500)
-    assert found.velocity[inside, 0] == pytest.approx(w * np.cos(w * t)[inside], abs=SOLVED * w)
-    assert found.acceleration[inside, 0] == pytest.approx(-(w**2) * np.sin(w * t)[inside], abs=SOLVED * w**2)
+    assert result.velocity[inside, 0] == pytest.approx(w * np.cos(w * t)[inside], abs=SOLVED * w)
+    assert result.acceleration[inside, 0] == pytest.approx(-(w**2) * np.sin(w * t)[inside], abs=SOLVED * w**2)
 
 
 @pytest.mark.parametrize("cutoff", [0.0, -1.0, 30.0, 31.0, np.nan, np.inf])
@@ -100,8 +100,8 @@ def test_uneven_times_are_refused_and_resampled_on_request():
     assert not is_evenly_sampled(t)
     with pytest.raises(ResultError, match=r"16\.67 to 50 ms"):
         butterworth_smoother(t, wave, unknown(wave), cutoff_hz=6)
-    found = butterworth_smoother(t, wave, unknown(wave), cutoff_hz=12, resample_hz=60)
-    assert found.value[10:-10] == pytest.approx(wave[10:-10], abs=2e-4)
+    result = butterworth_smoother(t, wave, unknown(wave), cutoff_hz=12, resample_hz=60)
+    assert result.value[10:-10] == pytest.approx(wave[10:-10], abs=2e-4)
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, 1e12])
@@ -135,10 +135,10 @@ def test_long_stretches_get_the_same_deviations_as_one_block():
 def test_where_the_noise_is_not_known_the_deviation_is_not_either():
     covariance = np.ones((60, 1, 1))
     covariance[30] = np.inf
-    found = butterworth_smoother(times(60), np.zeros((60, 1)), covariance, cutoff_hz=6)
-    assert np.isnan(found.value_sd[28:33]).all()
-    assert np.isfinite(found.value_sd[:10]).all()
-    assert found.value == pytest.approx(np.zeros((60, 1)), abs=EXACT)
+    result = butterworth_smoother(times(60), np.zeros((60, 1)), covariance, cutoff_hz=6)
+    assert np.isnan(result.value_sd[28:33]).all()
+    assert np.isfinite(result.value_sd[:10]).all()
+    assert result.value == pytest.approx(np.zeros((60, 1)), abs=EXACT)
 
 
 def test_a_step_at_takeoff_is_not_smeared():

@@ -55,10 +55,10 @@ def test_mean_covariance_and_likelihood_are_those_of_a_dense_solve():
     for density in (10.0, 1e4):
         mean, K, evidence = dense(t, z, variance, density)
         steps = state_space_model(t, z[:, None], measurement_noise(variance[:, None, None]), density)
-        found, P = rts_smoother(steps, z[:, None])
+        result, P = rts_smoother(steps, z[:, None])
         period = np.median(np.diff(t))
         scale = period ** -np.arange(3)
-        assert found[:, :3] * scale == pytest.approx(mean.reshape(-1, 3), rel=1e-5, abs=1e-6)
+        assert result[:, :3] * scale == pytest.approx(mean.reshape(-1, 3), rel=1e-5, abs=1e-6)
         sd = np.sqrt(np.diagonal(P, axis1=1, axis2=2)[:, :3]) * scale
         assert sd == pytest.approx(np.sqrt(np.diag(K)).reshape(-1, 3), rel=1e-5)
         assert kalman_filter(steps, z[:, None])[-1] == pytest.approx(evidence, rel=1e-6)
@@ -87,13 +87,13 @@ def test_free_fall_is_recovered_inside_a_flight():
     sd = 0.005
     noise = np.linalg.cholesky(noise_covariance(t, np.full(36, sd**2), noise=GENERIC_NOISE)) @ rng.normal(size=(36, 3))
     fall = np.stack([0.5 * t, 0 * t, 1 + 3 * t - 9.81 / 2 * t**2], axis=1)
-    found = kalman_smoother(t, fall + noise, np.broadcast_to(sd**2 * np.eye(3), (36, 3, 3)))
-    assert found.acceleration[:, 2].mean() == pytest.approx(-9.81, abs=3 * found.acceleration_sd[:, 2].mean())
-    assert abs(found.acceleration[:, 2].mean() + 9.81) < 0.5
-    assert found.velocity[:, 2] == pytest.approx(3 - 9.81 * t, abs=0.15)
+    result = kalman_smoother(t, fall + noise, np.broadcast_to(sd**2 * np.eye(3), (36, 3, 3)))
+    assert result.acceleration[:, 2].mean() == pytest.approx(-9.81, abs=3 * result.acceleration_sd[:, 2].mean())
+    assert abs(result.acceleration[:, 2].mean() + 9.81) < 0.5
+    assert result.velocity[:, 2] == pytest.approx(3 - 9.81 * t, abs=0.15)
 
 
-def test_deviations_are_honest_for_paths_as_the_model_has_them():
+def test_deviations_are_correct_for_paths_of_the_model():
     rng, n, ratios = np.random.default_rng(5), 40, {"value": [], "velocity": []}
     t, T, sd = np.arange(n) / RATE, 1 / RATE, 0.01
     F = np.array([[1, T, T * T / 2], [0, 1, T], [0, 0, 1]])
@@ -104,9 +104,9 @@ def test_deviations_are_honest_for_paths_as_the_model_has_them():
         for _ in range(n - 1):
             states.append(F @ states[-1] + root @ rng.normal(size=3))
         truth = np.array(states)
-        found = kalman_smoother(t, (truth[:, 0] + noise @ rng.normal(size=n))[:, None], np.full((n, 1, 1), sd**2))
-        ratios["value"].append((found.value[:, 0] - truth[:, 0]) / found.value_sd[:, 0])
-        ratios["velocity"].append((found.velocity[:, 0] - truth[:, 1]) / found.velocity_sd[:, 0])
+        result = kalman_smoother(t, (truth[:, 0] + noise @ rng.normal(size=n))[:, None], np.full((n, 1, 1), sd**2))
+        ratios["value"].append((result.value[:, 0] - truth[:, 0]) / result.value_sd[:, 0])
+        ratios["velocity"].append((result.velocity[:, 0] - truth[:, 1]) / result.velocity_sd[:, 0])
     for ratio in ratios.values():
         assert np.sqrt(np.mean(np.square(ratio))) == pytest.approx(1.0, abs=0.2)
 
@@ -117,9 +117,9 @@ def test_a_direction_that_nothing_shows_rests_on_the_others():
     covariance[5] = np.diag([np.inf, variance[5]])
     values = np.stack([z, z], axis=1)
     values[5, 0] += 3.0
-    found = kalman_smoother(t, values, covariance)
-    assert found.value[5, 0] == pytest.approx(np.sin(8 * t[5]), abs=0.05)
-    assert found.value_sd[5, 0] > found.value_sd[5, 1]
+    result = kalman_smoother(t, values, covariance)
+    assert result.value[5, 0] == pytest.approx(np.sin(8 * t[5]), abs=0.05)
+    assert result.value_sd[5, 0] > result.value_sd[5, 1]
 
 
 def test_rows_without_a_covariance_do_not_count_and_none_at_all_is_unknown():

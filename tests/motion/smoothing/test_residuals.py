@@ -22,8 +22,8 @@ def test_the_line_of_the_residuals_meets_the_axis_at_the_noise(sd):
 
 def test_the_chosen_cutoffs_lie_above_the_motion_and_do_it_good():
     clean, noisy = paths(0.01)
-    found = residual_analysis(T, noisy)
-    for cutoff in (found.chosen_hz, found.whitest_hz):
+    result = residual_analysis(T, noisy)
+    for cutoff in (result.chosen_hz, result.whitest_hz):
         assert 2.5 < cutoff < 9
         error = low_pass(noisy, cutoff_hz=cutoff, rate_hz=RATE) - clean
         assert error.std() < 0.7 * 0.01
@@ -35,10 +35,10 @@ def test_more_noise_asks_for_a_lower_cutoff():
 
 
 def test_residuals_fall_with_the_cutoff():
-    found = residual_analysis(T, paths(0.01)[1])
-    assert (np.diff(found.residual) < 0).all()
-    assert found.residual[0] > 0.3
-    assert found.n_values == 600 * 3
+    result = residual_analysis(T, paths(0.01)[1])
+    assert (np.diff(result.residual) < 0).all()
+    assert result.residual[0] > 0.3
+    assert result.n_values == 600 * 3
 
 
 def test_gaps_and_events_are_kept_apart_in_it():
@@ -51,6 +51,6 @@ def test_gaps_and_events_are_kept_apart_in_it():
 
 
 def test_too_little_says_nothing():
-    found = residual_analysis(T[:8], paths(0.01)[1][:8])
-    assert found.n_values == 0
-    assert np.isnan([found.chosen_hz, found.whitest_hz, found.noise]).all()
+    result = residual_analysis(T[:8], paths(0.01)[1][:8])
+    assert result.n_values == 0
+    assert np.isnan([result.chosen_hz, result.whitest_hz, result.noise]).all()

@@ -32,7 +32,7 @@ def spinning(sd=0.0, seed=0):
     return Rotation.from_rotvec(sd * rng.normal(size=(N, 3))) * Rotation.from_rotvec(T[:, None] * SPIN)
 
 
-def test_quaternions_run_on_over_turns_and_gaps():
+def test_quaternions_continue_over_revolutions_and_gaps():
     R = spinning().as_matrix()
     R[30:34] = np.nan
     q = continuous_quaternions(R)
@@ -44,36 +44,36 @@ def test_quaternions_run_on_over_turns_and_gaps():
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_a_steady_spin_keeps_its_rate_and_its_place(name):
-    found = smooth_rotations(METHODS[name], T, spinning().as_matrix(), np.full(N, 1e-6))
+def test_a_steady_spin_keeps_its_rate_and_phase(name):
+    result = smooth_rotations(METHODS[name], T, spinning().as_matrix(), np.full(N, 1e-6))
     inside = slice(10, -10)
-    assert geodesic(found.R, spinning().as_matrix())[inside].max() < 2e-3
-    assert found.velocity[inside] == pytest.approx(np.broadcast_to(SPIN, (N - 20, 3)), abs=0.05)
-    assert np.abs(found.acceleration[inside]).max() < 2.0
+    assert geodesic(result.R, spinning().as_matrix())[inside].max() < 2e-3
+    assert result.velocity[inside] == pytest.approx(np.broadcast_to(SPIN, (N - 20, 3)), abs=0.05)
+    assert np.abs(result.acceleration[inside]).max() < 2.0
 
 
 @pytest.mark.parametrize("name", METHODS)
 def test_noise_is_taken_off_and_the_rest_is_stated(name):
     sd = 0.03
-    found = smooth_rotations(METHODS[name], T, spinning(sd).as_matrix(), np.full(N, sd**2))
-    error = (Rotation.from_matrix(found.R) * spinning().inv()).as_rotvec()
+    result = smooth_rotations(METHODS[name], T, spinning(sd).as_matrix(), np.full(N, sd**2))
+    error = (Rotation.from_matrix(result.R) * spinning().inv()).as_rotvec()
     assert np.std(error) < 0.8 * sd
-    assert 0.4 < np.std(error) / np.median(found.sd) < 1.5
+    assert 0.4 < np.std(error) / np.median(result.sd) < 1.5
 
 
 def test_velocity_is_the_derivative_of_the_smooth_orientation():
-    found = smooth_rotations(METHODS["kalman"], T, spinning(0.02).as_matrix(), np.full(N, 4e-4))
-    step = (Rotation.from_matrix(found.R[2:]) * Rotation.from_matrix(found.R[:-2]).inv()).as_rotvec()
-    assert found.velocity[1:-1] == pytest.approx(step * RATE / 2, abs=0.1)
-    change = (found.velocity[2:] - found.velocity[:-2]) * RATE / 2
-    assert np.abs(found.acceleration[1:-1] - change).max() < 0.1 * np.abs(change).max() + 1.0
+    result = smooth_rotations(METHODS["kalman"], T, spinning(0.02).as_matrix(), np.full(N, 4e-4))
+    step = (Rotation.from_matrix(result.R[2:]) * Rotation.from_matrix(result.R[:-2]).inv()).as_rotvec()
+    assert result.velocity[1:-1] == pytest.approx(step * RATE / 2, abs=0.1)
+    change = (result.velocity[2:] - result.velocity[:-2]) * RATE / 2
+    assert np.abs(result.acceleration[1:-1] - change).max() < 0.1 * np.abs(change).max() + 1.0
 
 
 def test_lost_frames_stay_lost():
     R = spinning().as_matrix()
     R[40:44] = np.nan
-    found = smooth_rotations(METHODS["spline"], T, R, np.full(N, 1e-6))
-    assert np.isnan(found.R[40:44]).all()
+    result = smooth_rotations(METHODS["spline"], T, R, np.full(N, 1e-6))
+    assert np.isnan(result.R[40:44]).all()
     filled = smooth_rotations(METHODS["spline"], T, R, np.full(N, 1e-6), fill_s=0.1)
     assert geodesic(filled.R[40:44], spinning().as_matrix()[40:44]).max() < 0.02
     assert np.flatnonzero(filled.is_filled).tolist() == [40, 41, 42, 43]

@@ -56,12 +56,12 @@ def test_what_lies_beyond_an_event_or_a_gap_does_not_matter(name):
     other = noisy.copy()
     other[:30] += 5.0
     other[66:] *= -1.0
-    found = [
+    result = [
         smooth_stretches(METHODS[name], t, one, covariance, boundaries_s=[0.6], fill_s=0.05) for one in (noisy, other)
     ]
     middle = slice(30, 60)
     for field in ("value", "velocity", "acceleration", "value_sd"):
-        one, two = (getattr(each.paths, field)[middle] for each in found)
+        one, two = (getattr(each.paths, field)[middle] for each in result)
         assert np.array_equal(one, two, equal_nan=True)
 
 

@@ -33,50 +33,50 @@ def swing(sd=3e-3, lost=()):
     return true, motion_of(BODY, [shaken(rng, pose, covariance) for pose in poses], 50, covariance, lost=lost)
 
 
-@pytest.mark.parametrize("how", [BUTTERWORTH, Smoothing(method="kalman")], ids=lambda how: how.method)
-def test_a_bodys_root_comes_nearer_to_the_truth_in_place_and_turn(how):
+@pytest.mark.parametrize("smoothing", [BUTTERWORTH, Smoothing(method="kalman")], ids=lambda smoothing: smoothing.method)
+def test_a_bodys_root_comes_nearer_to_the_truth_in_position_and_orientation(smoothing):
     true, noisy = swing(sd=0.02)
-    found = smooth_root(noisy, how, [])
-    place = found["position"].to_numpy() - true.position
+    result = smooth_root(noisy, smoothing, [])
+    place = result["position"].to_numpy() - true.position
     assert np.std(place) < 0.8 * np.std(noisy.position - true.position)
-    R = Rotation.from_quat(found["quaternion"].to_numpy()).as_matrix()
+    R = Rotation.from_quat(result["quaternion"].to_numpy()).as_matrix()
     assert np.mean(geodesic(R, true.R)) < 0.9 * np.mean(geodesic(noisy.R, true.R))
 
 
 def test_free_fall_is_found_in_the_roots_acceleration():
     _, noisy = swing()
-    found = smooth_root(noisy, Smoothing(method="kalman"), [])
-    assert float(found["acceleration"].sel(space="z").mean()) == pytest.approx(-9.81, abs=0.3)
+    result = smooth_root(noisy, Smoothing(method="kalman"), [])
+    assert float(result["acceleration"].sel(space="z").mean()) == pytest.approx(-9.81, abs=0.3)
 
 
 def test_everything_has_its_unit_and_the_history_says_what_was_done():
     _, noisy = swing()
-    how = Smoothing(method="butterworth", cutoff_hz=6, fill_s=0.1)
-    found = smooth_root(noisy, how, [0.4])
-    units = {name: found[name].attrs.get("units") for name in found if name.startswith(("pos", "vel", "acc", "ang"))}
+    smoothing = Smoothing(method="butterworth", cutoff_hz=6, fill_s=0.1)
+    result = smooth_root(noisy, smoothing, [0.4])
+    units = {name: result[name].attrs.get("units") for name in result if name.startswith(("pos", "vel", "acc", "ang"))}
     assert units["velocity"] == "m/s"
     assert units["angular_acceleration_sd"] == "rad/s2"
     assert None not in units.values()
-    history = " ".join(found.attrs["history"])
+    history = " ".join(result.attrs["history"])
     assert "Butterworth" in history and "6 Hz" in history and "up to 0.1 s" in history and "0.4000 s" in history
     assert "no gap filled" in smooth_root(noisy, BUTTERWORTH, []).attrs["history"]
 
 
 def test_landmarks_and_the_centre_of_mass_are_smoothed():
     _, noisy = swing(sd=0.02)
-    found = smooth_landmarks(noisy, BODY, BUTTERWORTH, [])
-    assert found["joint"].to_numpy().tolist() == [*(mark.name for mark in BODY.landmarks), CENTRE_OF_MASS]
-    com = found["acceleration"].sel(joint=CENTRE_OF_MASS, space="z").to_numpy()
+    result = smooth_landmarks(noisy, BODY, BUTTERWORTH, [])
+    assert result["joint"].to_numpy().tolist() == [*(mark.name for mark in BODY.landmarks), CENTRE_OF_MASS]
+    com = result["acceleration"].sel(joint=CENTRE_OF_MASS, space="z").to_numpy()
     assert np.isfinite(com).all()
-    assert np.isfinite(found["position_sd"].to_numpy()).all()
+    assert np.isfinite(result["position_sd"].to_numpy()).all()
 
 
 def test_joints_are_smoothed_as_rotations_and_their_angles_run_on():
     true, noisy = swing(sd=0.05)
-    found = smooth_joint_angles(noisy, BODY, BUTTERWORTH, [])
-    error = np.deg2rad(found["angle"].to_numpy()) - true.joint_angles
+    result = smooth_joint_angles(noisy, BODY, BUTTERWORTH, [])
+    error = np.deg2rad(result["angle"].to_numpy()) - true.joint_angles
     assert np.std(error) < 0.8 * np.std(noisy.joint_angles - true.joint_angles)
-    assert found["velocity"].attrs["units"] == "deg/s"
+    assert result["velocity"].attrs["units"] == "deg/s"
     with pytest.raises(ResultError, match="give the run's body"):
         smooth_joint_angles(replace(noisy, joints=("a", "b", "c", "d")), BODY, BUTTERWORTH, [])
 
@@ -99,11 +99,11 @@ def test_each_player_has_own_segments():
         points=np.repeat(motion.points, 2, axis=1),
         covariance=np.repeat(motion.covariance, 2, axis=1),
     )
-    found = smooth_players(motion, BUTTERWORTH, {"one": [jumper.takeoff_s, jumper.landing_s], "two": []})
-    assert found["segment"].sel(player="one").max() == 2
-    assert found["segment"].sel(player="two").max() == 0
+    result = smooth_players(motion, BUTTERWORTH, {"one": [jumper.takeoff_s, jumper.landing_s], "two": []})
+    assert result["segment"].sel(player="one").max() == 2
+    assert result["segment"].sel(player="two").max() == 0
     inside = (motion.time_s > jumper.takeoff_s) & (motion.time_s < jumper.landing_s)
-    bend = found["acceleration"].sel(space="z", joint="hip_left").to_numpy()[inside]
+    bend = result["acceleration"].sel(space="z", joint="hip_left").to_numpy()[inside]
     assert bend[:, 0] == pytest.approx(np.full(inside.sum(), -9.81), abs=0.02)
     assert np.abs(bend[:, 1] + 9.81).max() > 5
 
@@ -121,13 +121,13 @@ def test_hardly_any_frame_gives_no_numbers_and_no_error(n):
     _, noisy = swing()
     estimates = Motion.collect([], noisy.joints)
     few = replace(estimates, **{name: getattr(noisy, name)[:n] for name in estimates.__slots__ if name != "joints"})
-    found = smooth_root(few, BUTTERWORTH, [])
-    assert found.sizes["time"] == n
-    assert np.isnan(found["position"].to_numpy()).all()
+    result = smooth_root(few, BUTTERWORTH, [])
+    assert result.sizes["time"] == n
+    assert np.isnan(result["position"].to_numpy()).all()
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "message"),
     [
         ({"method": "spline", "fill_s": 0.6}, "0 to 0.5 s"),
         ({"method": "spline", "fill_s": float("nan")}, "0 to 0.5 s"),
@@ -135,8 +135,8 @@ def test_hardly_any_frame_gives_no_numbers_and_no_error(n):
         ({"method": "spline", "resample_hz": 60}, "leave them out of spline"),
     ],
 )
-def test_what_makes_no_sense_is_refused(wrong, said):
-    with pytest.raises(ResultError, match=said):
+def test_what_makes_no_sense_is_refused(wrong, message):
+    with pytest.raises(ResultError, match=message):
         Smoothing(**wrong)
     with pytest.raises(ResultError, match="needs a cut-off"):
         Smoothing(method="butterworth").smoother()

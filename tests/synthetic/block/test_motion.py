@@ -142,7 +142,7 @@ def test_leg_reaches_its_foot():
     hip = rng.normal(0, 0.1, (n, 3)) + np.array([0, 0, 0.7])
     place = np.column_stack([rng.normal(0, 0.1, (n, 2)), rng.normal(np.pi, 0.4, n)])
     ankle, R_foot = roll_foot(SIZES, place, rng.uniform(0, 0.8, n), np.zeros(n))
-    angles, short = leg_angles(SIZES, R, hip, ankle, R_foot)
+    angles, short = leg_angles(SIZES, R, hip, ankle=ankle, R_foot=R_foot)
     chain, end = R, hip
     for k, length in enumerate((SIZES.thigh_m, SIZES.shank_m, 0.0)):
         x, y, z = angles[:, k].T
@@ -157,7 +157,7 @@ def test_leg_reaches_its_foot():
 def test_leg_that_is_too_short_says_by_how_much():
     straight = np.eye(3)[None]
     ankle = np.array([[0.0, 0.0, 1.0 - 0.95]])
-    _, short = leg_angles(SIZES, straight, np.array([[0.0, 0.0, 1.0]]), ankle, straight)
+    _, short = leg_angles(SIZES, straight, np.array([[0.0, 0.0, 1.0]]), ankle=ankle, R_foot=straight)
     assert short[0] == pytest.approx(0.95 - 0.91, abs=1e-4)
 
 
@@ -185,7 +185,7 @@ def test_steps_end_where_and_when_they_should(approach):
 
 def test_waiting_player_stands_and_steps():
     rng = np.random.default_rng(2)
-    plan = WaitPlan(position=np.array([1.0, -4.0]), yaw=np.pi, approach_m=0.5, arrival_s=0.8, lasts_s=1.4)
+    plan = WaitPlan(position=np.array([1.0, -4.0]), yaw=np.pi, approach_m=0.5, arrival_s=0.8, duration_s=1.4)
     movement = wait(rng, BODY, plan)
     poses = movement(np.arange(0, 1.4, 0.02))
     margins = margins_of(movement.person, poses, side=-1)

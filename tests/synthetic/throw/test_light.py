@@ -102,7 +102,9 @@ def test_shadow_of_an_ellipsoid_is_where_the_ray_comes_nearer_to_its_centre_than
         np.array([0.2, 0.35, 0.5]),
         np.array([0.3, 0.1, 2]),
     )
-    lit = is_lit(points, np.repeat(UP, 4000, axis=0), SPOT, NO_BOXES, ellipsoids_of(ball(centre, semi_axes, turn)))
+    lit = is_lit(
+        points, np.repeat(UP, 4000, axis=0), SPOT, NO_BOXES, ellipsoids=ellipsoids_of(ball(centre, semi_axes, turn))
+    )
     start, end = (turn.inv().apply(p - centre) / semi_axes for p in (points, SPOT.position[None]))
     way = end - start
     nearest = start - np.sum(start * way, axis=1, keepdims=True) / np.sum(way**2, axis=1, keepdims=True) * way
@@ -113,9 +115,9 @@ def test_shadow_of_an_ellipsoid_is_where_the_ray_comes_nearer_to_its_centre_than
 
 
 def test_ball_darkens_no_point_inside_it_before_it_or_beside_the_way():
-    balls = ellipsoids_of(ball((0, 0, 1), (0.5, 0.5, 0.5)))
+    spheres = ellipsoids_of(ball((0, 0, 1), (0.5, 0.5, 0.5)))
     points = np.array([[0, 0, 1.0], [0.1, 0, 1.3], [0, 0, 3.0], [1.5, 0, 1.0], [0, 0, 0.0]])
-    lit = is_lit(points, np.repeat(UP, 5, axis=0), SPOT, NO_BOXES, balls)
+    lit = is_lit(points, np.repeat(UP, 5, axis=0), SPOT, NO_BOXES, ellipsoids=spheres)
     np.testing.assert_array_equal(lit, [True, True, True, True, False])
 
 

@@ -24,6 +24,6 @@ scale unless a target or a length gives it. Move the result with `Adjusted.moved
 """
 
 from airborne.calibration.bundle.adjustment import Adjustment, adjust
-from airborne.calibration.bundle.source import ALL_FIXED, FreeParameters, ObservationLags, Lengths, CameraPrior, Source
+from airborne.calibration.bundle.source import ALL_FIXED, CameraPrior, FreeParameters, Lengths, ObservationLags, Source
 
-__all__ = ["ALL_FIXED", "Adjustment", "FreeParameters", "ObservationLags", "Lengths", "CameraPrior", "Source", "adjust"]
+__all__ = ["ALL_FIXED", "Adjustment", "CameraPrior", "FreeParameters", "Lengths", "ObservationLags", "Source", "adjust"]

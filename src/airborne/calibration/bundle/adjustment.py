@@ -14,19 +14,28 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from airborne.calibration.bundle.equations import (
-    NormalEquations,
     Jacobian,
+    NormalEquations,
     gauge_directions,
+    jacobian_of,
     length_residual_m,
     normal_equations,
     residual_px,
-    jacobian_of,
     rotation_vectors_from,
 )
 from airborne.calibration.bundle.loss import BEHIND_CAMERA, Loss, robust_cost, robust_scale, robust_weight
-from airborne.calibration.bundle.problem import State, Problem, rig_from_state, sources_from_state, initial_state, apply_step, build_problem, with_target_paths
-from airborne.calibration.bundle.source import FreeParameters, CameraPrior, Source
-from airborne.calibration.bundle.uncertainty import gauge_fixed_inverse, redundancies, estimate_uncertainty
+from airborne.calibration.bundle.problem import (
+    Problem,
+    State,
+    apply_step,
+    build_problem,
+    initial_state,
+    rig_from_state,
+    sources_from_state,
+    with_target_paths,
+)
+from airborne.calibration.bundle.source import CameraPrior, FreeParameters, Source
+from airborne.calibration.bundle.uncertainty import estimate_uncertainty, gauge_fixed_inverse, redundancies
 from airborne.cameras.camera import Rig
 from airborne.errors import CalibrationError
 from airborne.types import Array, Ints
@@ -102,7 +111,9 @@ def adjust(
     search = _LevenbergMarquardt(task, state, prior, loss, progress)
     state, noise, is_settled = search.run(_is_noise_known(sources))
     fit = search.linearise(state, noise)
-    found = estimate_uncertainty(task, state, fit.normal, fit.jacobian, weights=fit.row_weights, residuals=fit.rows, loss=loss)
+    found = estimate_uncertainty(
+        task, state, fit.normal, fit.jacobian, weights=fit.row_weights, residuals=fit.rows, loss=loss
+    )
     residuals = np.where(task.is_used[:, None], fit.residual, np.nan)
     rows = [task.source == i for i in range(len(sources))]
     adjusted = rig_from_state(rig, state)
@@ -257,7 +268,7 @@ class _LevenbergMarquardt:
         cameras, side = normal.cameras.copy(), normal.camera_rhs.copy()
         np.add.at(cameras, (columns[is_free], columns[is_free]), weight[is_free])
         np.add.at(side, columns[is_free], -(weight * self._prior_residual(state))[is_free])
-        return replace(normal, cameras=cameras, camera_side=side)
+        return replace(normal, cameras=cameras, camera_rhs=side)
 
 
 def _step(task: Problem, state: State, normal: NormalEquations, damping: float) -> tuple[Array, Array, float]:

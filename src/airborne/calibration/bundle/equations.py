@@ -10,7 +10,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial.transform import Rotation
 
 from airborne.calibration.bundle.lenses import N_PARAMETERS, cross_matrices, project, project_with_jacobian
-from airborne.calibration.bundle.problem import State, Problem
+from airborne.calibration.bundle.problem import Problem, State
 from airborne.types import Array, Ints
 
 _GAUGE_TOLERANCE = 1e-9  # of what a camera's own pixels resist: less is rounding

@@ -167,7 +167,7 @@ def apply_step(task: Problem, state: State, step: Array, other_step: Array) -> S
         state,
         R=Rotation.from_rotvec(change[:, :3]).as_matrix() @ state.R,
         centre=state.centre + change[:, 3:6],
-        inner=state.intrinsics + _keep_focal_ratio(state, change[:, 6:], task.camera_columns),
+        intrinsics=state.intrinsics + _keep_focal_ratio(state, change[:, 6:], task.camera_columns),
         target_R=Rotation.from_rotvec(target[:, :3]).as_matrix() @ state.target_R if len(target) else state.target_R,
         target_t=state.target_t + target[:, 3:],
         points=state.points + point,

@@ -9,9 +9,9 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU
 
-from airborne.calibration.bundle.equations import NormalEquations, Jacobian, gauge_directions
+from airborne.calibration.bundle.equations import Jacobian, NormalEquations, gauge_directions
 from airborne.calibration.bundle.loss import Loss, loss_constants
-from airborne.calibration.bundle.problem import State, Problem
+from airborne.calibration.bundle.problem import Problem, State
 from airborne.types import Array
 
 _MOST_ROWS_AT_ONCE = 200  # rows whose share is found together
@@ -96,7 +96,14 @@ def _leverages(rows: csr_array, factors: SuperLU | None, back: Array, inverse: A
 
 
 def estimate_uncertainty(
-    task: Problem, state: State, normal: NormalEquations, slopes: Jacobian, *, weights: Array, residuals: Array, loss: Loss
+    task: Problem,
+    state: State,
+    normal: NormalEquations,
+    slopes: Jacobian,
+    *,
+    weights: Array,
+    residuals: Array,
+    loss: Loss,
 ) -> Uncertainty:
     """Return the covariance of the cameras' numbers.
 

@@ -7,10 +7,10 @@ recording gives none. Errors and warnings about control points stand in `points`
 from airborne.calibration.diagnosis.control_points import (
     check_points,
     decompose_cameras,
+    find_outliers,
     flatness,
     warnings_about,
-    find_outliers,
 )
 from airborne.cameras.finding import Finding
 
-__all__ = ["Finding", "check_points", "decompose_cameras", "flatness", "warnings_about", "find_outliers"]
+__all__ = ["Finding", "check_points", "decompose_cameras", "find_outliers", "flatness", "warnings_about"]

@@ -47,7 +47,11 @@ def check_board_print(board: Board, pictures: Sequence[Image], camera: str = "")
     n_corners = board.inner_size[0] * board.inner_size[1]
     shown = [count for count in counts if count]
     if board.kind == "chessboard":
-        return [] if len(shown) >= max(_DETECTED_SHARE * len(chosen), 1) else _wrong_chessboard(board, chosen, where, camera)
+        return (
+            []
+            if len(shown) >= max(_DETECTED_SHARE * len(chosen), 1)
+            else _wrong_chessboard(board, chosen, where, camera)
+        )
     is_found = len(shown) >= _DETECTED_SHARE * len(chosen) and bool(np.median(shown) >= _DETECTED_SHARE * n_corners)
     found = list(_wrong_charuco(board, chosen, where, camera, is_found=is_found))
     if found or is_found:
@@ -185,7 +189,11 @@ def _likeliest_print(board: Board, pictures: Sequence[Image]) -> tuple[str, bool
     if best.rsplit("_", 1)[0] == board.dictionary.rsplit("_", 1)[0] and _dictionary_size(board.dictionary) > last:
         return board.dictionary, is_inverted, _n_markers(seen)
     family = [name for name in DICTIONARIES if name.rsplit("_", 1)[0] == best.rsplit("_", 1)[0]]
-    return next(name for name in sorted(family, key=_dictionary_size) if _dictionary_size(name) > last), is_inverted, _n_markers(seen)
+    return (
+        next(name for name in sorted(family, key=_dictionary_size) if _dictionary_size(name) > last),
+        is_inverted,
+        _n_markers(seen),
+    )
 
 
 def _dictionary_size(dictionary: str) -> int:

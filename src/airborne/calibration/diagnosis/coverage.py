@@ -46,7 +46,9 @@ def check_coverage(camera: str, px: Array, size: tuple[int, int]) -> list[Findin
         return []
     parts = {"left": filled[:2], "right": filled[-2:], "upper": filled[:, :1], "lower": filled[:, -1:]}
     empty = [name for name, part in parts.items() if part.mean() < _EMPTY]
-    borders = "near its borders" if len(empty) == len(parts) else f"in its {join_names(empty)} part{'s' * (len(empty) > 1)}"
+    borders = (
+        "near its borders" if len(empty) == len(parts) else f"in its {join_names(empty)} part{'s' * (len(empty) > 1)}"
+    )
     where = f", hardly any {borders}" if empty else ""
     return [
         Finding(

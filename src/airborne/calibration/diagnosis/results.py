@@ -8,8 +8,8 @@ from itertools import chain
 import numpy as np
 
 from airborne.calibration.diagnosis.clocks import check_rolling_shutter
-from airborne.calibration.diagnosis.coverage import check_coverage, check_view_count, check_links, check_tilts
-from airborne.calibration.diagnosis.images import check_floor, check_swapped_files, check_roll
+from airborne.calibration.diagnosis.coverage import check_coverage, check_links, check_tilts, check_view_count
+from airborne.calibration.diagnosis.images import check_floor, check_roll, check_swapped_files
 from airborne.calibration.diagnosis.moved_cameras import check_moved_cameras
 from airborne.calibration.from_sources import RigCalibration
 from airborne.calibration.initial.chaining import Views
@@ -117,9 +117,13 @@ def _check_lens_views(found: RigCalibration) -> Iterator[Finding]:
         if targets is None:
             continue
         for c, camera in enumerate(found.rig):
-            if camera.name not in found.inputs.lenses or (source.name == "board" and camera.name in found.inputs.lens_views):
+            if camera.name not in found.inputs.lenses or (
+                source.name == "board" and camera.name in found.inputs.lens_views
+            ):
                 continue
-            moments = np.unique(source.moments[(source.camera == c) & np.isfinite(found.adjustment.residual_px[i][:, 0])])
+            moments = np.unique(
+                source.moments[(source.camera == c) & np.isfinite(found.adjustment.residual_px[i][:, 0])]
+            )
             if not len(moments):
                 continue
             yield from check_view_count(camera.name, len(moments))

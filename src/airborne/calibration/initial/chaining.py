@@ -21,7 +21,6 @@ from airborne.types import Array, Ints
 
 _FOCALS = np.geomspace(0.4, 4.0, 14)  # of a picture's longer side: where the search for a focal length begins
 FEWEST_LENS_VIEWS = 3  # that tell a focal length
-MOST_VIEWS = 40  # of one camera that its lens is begun from
 _IDENTITY = RigidTransform.from_components(np.zeros(3), Rotation.identity())
 
 
@@ -45,7 +44,7 @@ class Views:
 
     def select_moments(self, moments: Sequence[int] | Ints) -> Views:
         """Return the views of some moments."""
-        return replace(self, sightings=tuple(tuple(row[m] for m in moments) for row in self.detections))
+        return replace(self, detections=tuple(tuple(row[m] for m in moments) for row in self.detections))
 
     def select_cameras(self, cameras: Sequence[int]) -> Views:
         """Return the views of some cameras."""
@@ -133,7 +132,9 @@ def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTr
     from_world: dict[int, RigidTransform] = {root: _IDENTITY}
     for i in order[1:]:
         j = int(before[i])
-        from_world[int(i)] = _relative_pose(cameras[i], cameras[j], views, places[i], places[j], (int(i), j)) * from_world[j]
+        from_world[int(i)] = (
+            _relative_pose(cameras[i], cameras[j], views, places[i], places[j], (int(i), j)) * from_world[j]
+        )
     rig = Rig(tuple(replace(camera, camera_from_world=from_world[i]) for i, camera in enumerate(cameras)))
     return rig, stack_transforms([_consensus_board_pose(rig, views, places, m) for m in range(views.n_moments)])
 

@@ -94,7 +94,9 @@ def resect(camera: Camera, points: Array, px: Array) -> Resection:
     straight = camera.without_distortion()
     weights = (np.ones(known.shape) / np.maximum(known.sum(axis=0), 1))[known]
     starts = [camera.camera_from_world, *_perspective_n_point(straight, xyz, uv)]
-    place, jacobian = min((_fit_pose(straight, start, xyz, uv, weights) for start in starts), key=lambda fit: fit[0])[1:]
+    place, jacobian = min((_fit_pose(straight, start, xyz, uv, weights) for start in starts), key=lambda fit: fit[0])[
+        1:
+    ]
     new = replace(camera, camera_from_world=place)
     residual = np.where(known[..., None], px - new.px_from_world(points), np.nan)
     steady_px = _systematic_error_px(residual)

@@ -54,7 +54,9 @@ def relative_pose(F: Array, K_a: Array, K_b: Array, px_a: Array, px_b: Array) ->
     """Return the place of camera b that puts most of the points (n, 2) [px] in front of both cameras."""
     R_1, R_2, t = (np.asarray(part, float) for part in cv2.decomposeEssentialMat(K_b.T @ F @ K_a))
     rays_a, rays_b = _rays(px_a, K_a), _rays(px_b, K_b)
-    candidates = [_triangulate_midpoints(R, sign * t.ravel(), rays_a, rays_b) for R in (R_1, R_2) for sign in (1.0, -1.0)]
+    candidates = [
+        _triangulate_midpoints(R, sign * t.ravel(), rays_a, rays_b) for R in (R_1, R_2) for sign in (1.0, -1.0)
+    ]
     return max(candidates, key=lambda place: place.front_share)
 
 

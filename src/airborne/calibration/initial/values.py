@@ -71,7 +71,8 @@ def read_inputs(sources: Sources, progress: Progress) -> Inputs:
     if given is not None:
         known |= {camera.name: camera for camera in given if camera.name not in known}
     told_by = {
-        name: initial_rig_from_points(table.select(_common(table.cameras, sizes)), sizes, known) for name, table in points.items()
+        name: initial_rig_from_points(table.select(_common(table.cameras, sizes)), sizes, known)
+        for name, table in points.items()
     }
     told_by |= {"calibration at the start": given} if given is not None else {}
     if wand is not None:
@@ -94,7 +95,9 @@ def read_inputs(sources: Sources, progress: Progress) -> Inputs:
     return Inputs(
         sources=sources,
         rig=rig,
-        free={c.name: _free_parameters(c, lenses.get(c.name), given is not None, counts[c.name]) for c in sources.camera},
+        free={
+            c.name: _free_parameters(c, lenses.get(c.name), given is not None, counts[c.name]) for c in sources.camera
+        },
         lenses=lenses,
         start_rig=given,
         board_detections=seen,
@@ -162,7 +165,11 @@ def _sizes(sources: Sources, given: Rig | None) -> dict[str, tuple[int, int]]:
 
 
 def _fit_lenses(
-    sources: Sources, seen: BoardDetections | None, alone: dict[str, Views], sizes: dict[str, tuple[int, int]], told: Progress
+    sources: Sources,
+    seen: BoardDetections | None,
+    alone: dict[str, Views],
+    sizes: dict[str, tuple[int, int]],
+    told: Progress,
 ) -> dict[str, LensFit]:
     """Find the lens of every camera that sees the board, by its own recording for that or by the common one."""
     wanted = {}

@@ -158,7 +158,11 @@ def _sample_frames(pair: _Pair, tracks: WandTracks) -> NDArray[np.integer]:
     for a, b in tracks.lengths_m:
         is_useful |= pair.is_inlier[:, a] & pair.is_inlier[:, b]
     rows = np.flatnonzero(is_useful)
-    return rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _N_SAMPLE_FRAMES)).astype(int))] if len(rows) else rows
+    return (
+        rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _N_SAMPLE_FRAMES)).astype(int))]
+        if len(rows)
+        else rows
+    )
 
 
 def _with_focal(camera: Camera, focal_px: float) -> Camera:
@@ -277,7 +281,9 @@ def _links(cameras: Sequence[Camera], pairs: Sequence[_Pair], tracks: WandTracks
     return sorted(found, key=lambda link: -link.quality)
 
 
-def _place_by_link(cameras: Sequence[Camera], placed: Mapping[int, Camera], links: Sequence[_Link]) -> tuple[int, Camera | None]:
+def _place_by_link(
+    cameras: Sequence[Camera], placed: Mapping[int, Camera], links: Sequence[_Link]
+) -> tuple[int, Camera | None]:
     """Return the next camera, placed by the best link to one that is placed; None where there is no link."""
     for link in links:
         for known, new, new_from_known in ((link.a, link.b, link.b_from_a), (link.b, link.a, link.b_from_a.inv())):

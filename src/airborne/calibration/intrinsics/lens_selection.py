@@ -73,7 +73,7 @@ def choose_lens(
     return LensFit(
         camera=fit.rig.cameras[0],
         model=chosen,
-        free=replace(dict(models)[chosen], place=True),
+        free=replace(dict(models)[chosen], extrinsics=True),
         n_views=len(row),
         rms_px=fit.rms_px(),
         held_out_rms_px={name: float(np.mean(score)) for name, score in scores.items()},

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airborne.calibration.intrinsics.physical import PinholeModel, Pinhole, fit_pinhole
+from airborne.calibration.intrinsics.physical import Pinhole, PinholeModel, fit_pinhole
 from airborne.types import Array
 
 

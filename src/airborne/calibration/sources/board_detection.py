@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from airborne.calibration.diagnosis.clocks import check_image_counts
 from airborne.calibration.diagnosis.inputs import check_board, check_time_stamps
 from airborne.calibration.initial.chaining import Views
-from airborne.calibration.sources.boards import NO_CORNERS, Board, DetectedCorners, match_print, board_detector
+from airborne.calibration.sources.boards import NO_CORNERS, Board, DetectedCorners, board_detector, match_print
 from airborne.calibration.sources.files import CameraSource, Sources
 from airborne.cameras.finding import Finding
 from airborne.errors import CalibrationError
@@ -150,7 +150,9 @@ def _moments(
     return found, time_s, tuple(check_image_counts(counts, _ODD_PICTURES))
 
 
-def _moments_by_time_stamps(path: Path, cameras: Sequence[CameraSource]) -> tuple[list[dict[int, int]], Array, tuple[Finding, ...]]:
+def _moments_by_time_stamps(
+    path: Path, cameras: Sequence[CameraSource]
+) -> tuple[list[dict[int, int]], Array, tuple[Finding, ...]]:
     """Read a table sync_index,cam_id,frame_time: the n-th row of a camera, by time, is its video's n-th frame."""
     expected = "expected the columns sync_index,cam_id,frame_time"
     try:

@@ -84,7 +84,9 @@ def _floor_points(side: str) -> Iterator[tuple[str, float, float]]:
     yield f"centre_{side}_middle", middle, 0.0
 
 
-def _net_points(side: str, height: float) -> Iterator[tuple[str, tuple[float, float, float], tuple[float, float, float]]]:
+def _net_points(
+    side: str, height: float
+) -> Iterator[tuple[str, tuple[float, float, float], tuple[float, float, float]]]:
     x, top = _WIDTH_M / 2, height + _NET_RISE_M
     band = (_BAND_SD_M, _PAINT_SD_M, _RISE_SD_M)
     antenna = (_BAND_SD_M, _BAND_SD_M, _BAND_SD_M)

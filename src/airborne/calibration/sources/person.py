@@ -13,8 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.bundle import Adjustment, FreeParameters, CameraPrior, Source, adjust
-from airborne.calibration.initial.resection import LEAST_RESECTION_VISIBILITY, MISPLACED_PX, Resection, find_misplaced_cameras, resect_cameras, sample_moments
+from airborne.calibration.bundle import Adjustment, CameraPrior, FreeParameters, Source, adjust
+from airborne.calibration.initial.resection import (
+    LEAST_RESECTION_VISIBILITY,
+    MISPLACED_PX,
+    Resection,
+    find_misplaced_cameras,
+    resect_cameras,
+    sample_moments,
+)
 from airborne.cameras.camera import Rig
 from airborne.cameras.consensus import triangulate_consensus
 from airborne.cameras.detections import Detections

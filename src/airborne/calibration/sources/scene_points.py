@@ -135,7 +135,9 @@ def _refine_camera(camera: Camera, world: Array, px: Array, *, is_focal_free: bo
     def moved(step: Array) -> Camera:
         turn = RigidTransform.from_components(step[3:6], Rotation.from_rotvec(step[:3]))
         K = camera.K.copy()
-        K[[0, 1], [0, 1]] *= np.exp(np.clip(step[6], -_LARGEST_LOG_CHANGE, _LARGEST_LOG_CHANGE)) if is_focal_free else 1.0
+        K[[0, 1], [0, 1]] *= (
+            np.exp(np.clip(step[6], -_LARGEST_LOG_CHANGE, _LARGEST_LOG_CHANGE)) if is_focal_free else 1.0
+        )
         return replace(camera, K=K, camera_from_world=turn * camera.camera_from_world)
 
     free = 7 if is_focal_free and 2 * len(world) >= 7 else 6

@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.calibration.bundle import Adjustment
 from airborne.calibration.initial.values import Inputs, pixel_convention
 from airborne.calibration.sources.person import align_rigs
-from airborne.calibration.world_frame.alignment import frame_of_gravity, frame_of_three_points, estimate_gravity
+from airborne.calibration.world_frame.alignment import estimate_gravity, frame_of_gravity, frame_of_three_points
 from airborne.cameras.clicks import read_clicks
 from airborne.cameras.consensus import triangulate_consensus
 from airborne.cameras.formats.dltdv import read_xypts

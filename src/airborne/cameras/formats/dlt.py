@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from airborne.cameras.camera import Camera, Rig
-from airborne.cameras.dlt import dlt_coefficients, decompose_with_skew
+from airborne.cameras.dlt import decompose_with_skew, dlt_coefficients
 from airborne.cameras.formats.options import METRES, FileOptions, PixelConvention, Unit
 from airborne.cameras.formats.parsing import LARGEST_NUMBER, build_camera, parse_size
 from airborne.cameras.formats.xml import parse_number
@@ -79,7 +79,9 @@ def _camera(where: str, name: str, L: Array, given: FileOptions) -> Camera:
     if not (np.all(np.abs(found.K) <= LARGEST_NUMBER) and np.all(np.abs(found.centre) <= LARGEST_NUMBER)):
         raise CalibrationError(f"{where}: {_NO_CAMERA}")
     translation = -found.R @ found.centre
-    return build_camera(where, name, K=found.K, size=size, rotation=found.R, translation=translation, distortion=np.zeros(5))
+    return build_camera(
+        where, name, K=found.K, size=size, rotation=found.R, translation=translation, distortion=np.zeros(5)
+    )
 
 
 def _check_view(rig: Rig, where: str, pixels: PixelConvention) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from airborne.cameras.camera import Camera, Rig
 from airborne.cameras.formats.options import METRES, FileOptions, Size, Unit
-from airborne.cameras.formats.parsing import build_camera, parse_array, refuse_fisheye, distortion_terms
+from airborne.cameras.formats.parsing import build_camera, distortion_terms, parse_array, refuse_fisheye
 from airborne.errors import CalibrationError
 from airborne.types import Array
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from airborne.cameras.camera import Rig
 from airborne.cameras.formats.options import FileOptions
-from airborne.cameras.formats.toml import camera_from_table, has_fifth_term, table_lines, toml_value, toml_key
+from airborne.cameras.formats.toml import camera_from_table, has_fifth_term, table_lines, toml_key, toml_value
 from airborne.errors import CalibrationError
 from airborne.io.text import list_keys
 

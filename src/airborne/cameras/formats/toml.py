@@ -8,7 +8,7 @@ import re
 import numpy as np
 
 from airborne.cameras.camera import Camera
-from airborne.cameras.formats.parsing import build_camera, parse_array, distortion_terms, parse_size
+from airborne.cameras.formats.parsing import build_camera, distortion_terms, parse_array, parse_size
 
 _ROTATION_SHAPES = ((3,), (3, 3))
 _TERM_SHAPES = {False: ((4,), (5,)), True: ((4,),)}  # by whether the lens is a fisheye

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from airborne.cameras.camera import Camera, Rig
 from airborne.cameras.formats.options import FileOptions
-from airborne.cameras.formats.parsing import build_camera, parse_array, refuse_fisheye, parse_size
+from airborne.cameras.formats.parsing import build_camera, parse_array, parse_size, refuse_fisheye
 from airborne.cameras.formats.xml import attribute_numbers, xml_text
 from airborne.errors import CalibrationError
 

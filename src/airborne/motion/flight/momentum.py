@@ -84,12 +84,12 @@ def angular_momenta(motion: Motion, model: BodyModel, window: int = WINDOW) -> t
             total = np.zeros(3)
             for other, gradient in _gradients(model, R, rates, row):
                 gradient[:, :3] = gradient[:, :3] @ motion.R[other].T  # the root's errors are in world axes
-                total = total + propagate_variances(gradient, bound_rotation_variance(motion.covariance[other])[3:, 3:])
+                total = total + propagate_variances(gradient, limit_rotation_variance(motion.covariance[other])[3:, 3:])
             variance[row] = total
     return value, variance
 
 
-def bound_rotation_variance(covariance: Array) -> Array:
+def limit_rotation_variance(covariance: Array) -> Array:
     """Return a covariance (d, d) in which unobserved rotations have a uniform circle's variance, not infinity."""
     is_unobserved = np.isinf(np.diagonal(covariance))
     is_unobserved[:3] = False

@@ -10,7 +10,7 @@ import xarray as xr
 from airborne.body import BodyModel
 from airborne.errors import BodyError
 from airborne.motion.angles import root_angles
-from airborne.motion.flight.momentum import WINDOW, angular_momenta, bound_rotation_variance, centre_of_mass
+from airborne.motion.flight.momentum import WINDOW, angular_momenta, limit_rotation_variance, centre_of_mass
 from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
 from airborne.motion.uncertainty import propagate_variances, standard_deviation
@@ -66,7 +66,7 @@ def measure_flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr
     com, variance = np.full((2, len(motion), 3), np.nan)
     for row in np.flatnonzero(motion.has_pose):
         com[row], jacobian = centre_of_mass(model.with_pose(motion.pose(row)))
-        variance[row] = propagate_variances(jacobian, bound_rotation_variance(motion.covariance[row]))
+        variance[row] = propagate_variances(jacobian, limit_rotation_variance(motion.covariance[row]))
     momentum, momentum_variance = angular_momenta(motion, model, window)
     angles = root_angles(motion)
     axes, units = ("time", "space"), "kg m2/s"

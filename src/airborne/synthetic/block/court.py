@@ -1,4 +1,4 @@
-"""A hall as one camera sees it: court, lines, stand with spectators, and the net as a layer of its own."""
+"""A hall as one camera sees it: court, lines, stand with spectators, and the net as a separate layer."""
 
 from __future__ import annotations
 
@@ -26,72 +26,72 @@ _CLOTHES = np.array(
 _SKIN = np.array((190, 142, 112))
 _NEAR_M = 0.3  # nothing nearer to a camera is drawn
 _SUB = 4  # cv2 draws to 1/16 of a pixel
-_CORD_COVER, _TAPE_COVER = 120, 250  # of 255
+_CORD_ALPHA, _TAPE_ALPHA = 120, 250  # of 255
 
 
 class Layer(NamedTuple):
-    """Something in front: colour (h, w, 3) sRGB, and cover (h, w), 0 to 255."""
+    """A foreground layer: colour (h, w, 3) sRGB, and opacity (h, w), 0 to 255."""
 
     colour: Image
     alpha: Image
 
 
-def hall_picture(rng: np.random.Generator, camera: Camera, things: Sequence[tuple[Array, Colour]]) -> Image:
-    """Draw everything that stands still but the net: (h, w, 3) sRGB. `things` are those of `clutter`."""
+def hall_image(rng: np.random.Generator, camera: Camera, objects: Sequence[tuple[Array, Colour]]) -> Image:
+    """Draw everything static except the net: (h, w, 3) sRGB; `objects` as of `draw_clutter`."""
     width, height = camera.size
-    picture = np.full((height, width, 3), _WALL, np.uint8)
+    image = np.full((height, width, 3), _WALL, np.uint8)
     for corners, colour in [*_walls(), *_floor()]:
-        _fill(picture, camera, corners, colour)
-    for corners, colour in sorted(things, key=lambda each: -each[0][:, 1].mean()):  # far from all cameras first
-        _fill(picture, camera, corners, colour)
+        _fill(image, camera, corners, colour)
+    for corners, colour in sorted(objects, key=lambda each: -each[0][:, 1].mean()):  # far from all cameras first
+        _fill(image, camera, corners, colour)
     coarse = rng.normal(1.0, 0.02, (height // 45, width // 45)).astype(np.float32)
     cloud = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC)
-    return np.clip(picture * cloud[..., None] + 0.5, 0, 255).astype(np.uint8)
+    return np.clip(image * cloud[..., None] + 0.5, 0, 255).astype(np.uint8)
 
 
 def net_layer(camera: Camera) -> Layer:
     """Draw the net with tapes, antennae and poles."""
     width, height = camera.size
-    colour, cover = np.full((height, width, 3), _CORD, np.uint8), np.zeros((height, width), np.uint8)
+    colour, alpha = np.full((height, width, 3), _CORD, np.uint8), np.zeros((height, width), np.uint8)
     half, depth, mesh = _NET_M
     top, bottom = NET_TOP_M, NET_TOP_M - depth
     for x in np.arange(-half, half + mesh / 2, mesh):
-        _draw_line(cover, camera, [[x, 0, bottom], [x, 0, top]], (_CORD_COVER,))
+        _draw_line(alpha, camera, [[x, 0, bottom], [x, 0, top]], (_CORD_ALPHA,))
     for z in np.arange(bottom, top + mesh / 2, mesh):
-        _draw_line(cover, camera, [[-half, 0, z], [half, 0, z]], (_CORD_COVER,))
+        _draw_line(alpha, camera, [[-half, 0, z], [half, 0, z]], (_CORD_ALPHA,))
     for corners, own in [*_tapes(half, top, bottom), *_antennae(top, bottom), *_poles()]:
         _fill(colour, camera, corners, own)
-        _fill(cover, camera, corners, (_TAPE_COVER,))
-    return Layer(colour, cover)
+        _fill(alpha, camera, corners, (_TAPE_ALPHA,))
+    return Layer(colour, alpha)
 
 
 def draw_clutter(rng: np.random.Generator) -> list[tuple[Array, Colour]]:
-    """Draw what stands behind the court, upright and flat: steps, spectators, boards, boxes on the floor."""
-    things: list[tuple[Array, Colour]] = []
+    """Draw upright rectangles behind the court at random: steps, spectators, boards, boxes on the floor."""
+    objects: list[tuple[Array, Colour]] = []
     for row in range(7):
         y, z = 14.0 + 0.9 * row, 0.5 + 0.45 * row
-        things.append(
+        objects.append(
             (_upright_rectangle(0.0, y, z - 0.5, 19.0 - 0.8 * row, 0.5), (112 - 3 * row, 111 - 3 * row, 114 - 3 * row))
         )
         for x in np.arange(-9.0 + 0.4 * row, 9.0 - 0.4 * row, 0.62):
             if rng.random() < 0.45:
                 cloth = _CLOTHES[rng.integers(len(_CLOTHES))] * rng.uniform(0.7, 1.0)
                 x += rng.normal(0, 0.06)
-                things.append((_upright_rectangle(x, y + 0.02, z, 0.44, 0.55), cloth))
-                things.append((_upright_rectangle(x, y + 0.01, z + 0.55, 0.2, 0.26), _SKIN * rng.uniform(0.6, 1.05)))
+                objects.append((_upright_rectangle(x, y + 0.02, z, 0.44, 0.55), cloth))
+                objects.append((_upright_rectangle(x, y + 0.01, z + 0.55, 0.2, 0.26), _SKIN * rng.uniform(0.6, 1.05)))
     for x in np.arange(-11.0, 11.1, 2.0):
-        things.append((_upright_rectangle(x, 12.0, 0.0, 1.96, 0.9), _CLOTHES[rng.integers(len(_CLOTHES))]))
+        objects.append((_upright_rectangle(x, 12.0, 0.0, 1.96, 0.9), _CLOTHES[rng.integers(len(_CLOTHES))]))
     for side in (-1, 1):
         for y in np.arange(-1.0, 11.1, 2.0):
             board = _upright_rectangle(0.0, 0.0, 0.0, 1.96, 0.9)[:, [1, 0, 2]] + [side * 9.6, y, 0]
-            things.append((board, _CLOTHES[rng.integers(len(_CLOTHES))] * 0.85))
+            objects.append((board, _CLOTHES[rng.integers(len(_CLOTHES))] * 0.85))
         for _ in range(5):
             x, y = side * rng.uniform(6.2, 9.0), rng.uniform(-4.0, 9.0)
             size = rng.uniform((0.4, 0.25), (0.8, 0.6))
-            things.append(
+            objects.append(
                 (_upright_rectangle(x, y, 0.0, *size), _CLOTHES[rng.integers(len(_CLOTHES))] * rng.uniform(0.7, 1.0))
             )
-    return things
+    return objects
 
 
 def _walls() -> Iterator[tuple[Array, Colour]]:
@@ -102,12 +102,12 @@ def _walls() -> Iterator[tuple[Array, Colour]]:
 
 def _floor() -> Iterator[tuple[Array, Colour]]:
     yield _floor_rectangle(0.0, 2.0, 30.0, 44.0), _BLUE
-    (wide, long), line = COURT_M, _LINE_M
-    yield _floor_rectangle(0.0, 0.0, wide, long), _ORANGE
-    for y in (-long / 2, -_ATTACK_M, 0.0, _ATTACK_M, long / 2):
-        yield _floor_rectangle(0.0, y, wide, line), _WHITE
-    for x in (-wide / 2, wide / 2):
-        yield _floor_rectangle(x, 0.0, line, long), _WHITE
+    (width, length), line_width = COURT_M, _LINE_M
+    yield _floor_rectangle(0.0, 0.0, width, length), _ORANGE
+    for y in (-length / 2, -_ATTACK_M, 0.0, _ATTACK_M, length / 2):
+        yield _floor_rectangle(0.0, y, width, line_width), _WHITE
+    for x in (-width / 2, width / 2):
+        yield _floor_rectangle(x, 0.0, line_width, length), _WHITE
 
 
 def _tapes(half: float, top: float, bottom: float) -> Iterator[tuple[Array, Colour]]:
@@ -128,38 +128,38 @@ def _poles() -> Iterator[tuple[Array, Colour]]:
         yield _upright_rectangle(x, 0.0, 0.0, 0.12, 2.55), _POLE
 
 
-def _floor_rectangle(x: float, y: float, wide: float, long: float) -> Array:
-    return np.array([[x + a * wide / 2, y + b * long / 2, 0.0] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+def _floor_rectangle(x: float, y: float, width: float, length: float) -> Array:
+    return np.array([[x + a * width / 2, y + b * length / 2, 0.0] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
 
 
-def _upright_rectangle(x: float, y: float, z: float, wide: float, high: float) -> Array:
-    return np.array([[x + a * wide / 2, y, z + b * high] for a, b in ((-1, 0), (1, 0), (1, 1), (-1, 1))])
+def _upright_rectangle(x: float, y: float, z: float, width: float, height: float) -> Array:
+    return np.array([[x + a * width / 2, y, z + b * height] for a, b in ((-1, 0), (1, 0), (1, 1), (-1, 1))])
 
 
-def _fill(picture: Image, camera: Camera, corners: Array, colour: Colour) -> None:
+def _fill(image: Image, camera: Camera, corners: Array, colour: Colour) -> None:
     px = _project(camera, corners, is_closed=True)
     if len(px) > 2:
-        cv2.fillConvexPoly(picture, px, [float(c) for c in colour], cv2.LINE_AA, _SUB)
+        cv2.fillConvexPoly(image, px, [float(c) for c in colour], cv2.LINE_AA, _SUB)
 
 
-def _draw_line(picture: Image, camera: Camera, ends: Sequence[Sequence[float]], colour: Colour) -> None:
+def _draw_line(image: Image, camera: Camera, ends: Sequence[Sequence[float]], colour: Colour) -> None:
     px = _project(camera, np.array(ends, float), is_closed=False)
     if len(px) == 2:
-        cv2.line(picture, px[0].tolist(), px[1].tolist(), [float(c) for c in colour], 1, cv2.LINE_AA, _SUB)
+        cv2.line(image, px[0].tolist(), px[1].tolist(), [float(c) for c in colour], 1, cv2.LINE_AA, _SUB)
 
 
 def _project(camera: Camera, corners: Array, *, is_closed: bool) -> NDArray[np.int32]:
     """Project a polygon or a line after cutting off what is behind the camera: in cv2's fractions of pixels."""
     xyz = camera.camera_from_world.apply(corners)
-    kept = []
+    clipped = []
     for k in range(len(xyz)):
         a, b = xyz[k], xyz[(k + 1) % len(xyz)]
         if a[2] >= _NEAR_M:
-            kept.append(a)
+            clipped.append(a)
         if (is_closed or k + 1 < len(xyz)) and (a[2] >= _NEAR_M) != (b[2] >= _NEAR_M):
-            kept.append(a + (b - a) * (_NEAR_M - a[2]) / (b[2] - a[2]))
-    if not kept:
+            clipped.append(a + (b - a) * (_NEAR_M - a[2]) / (b[2] - a[2]))
+    if not clipped:
         return np.zeros((0, 2), np.int32)
-    cut = np.array(kept)
-    px = (cut[:, :2] / cut[:, 2:]) @ camera.K[:2, :2].T + camera.K[:2, 2]
+    polygon = np.array(clipped)
+    px = (polygon[:, :2] / polygon[:, 2:]) @ camera.K[:2, :2].T + camera.K[:2, 2]
     return np.round(np.clip(px, -2000, 5000) * 2**_SUB).astype(np.int32)

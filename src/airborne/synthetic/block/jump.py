@@ -1,4 +1,4 @@
-"""Block and attack jumps: from a plan to a course that stands, leaves the floor, flies and lands."""
+"""Block and attack jumps: from a plan to a movement of stance, take-off, flight and landing."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ from airborne.synthetic.flight.rigid import GRAVITY_M_S2
 from airborne.types import Array
 
 _G = float(-GRAVITY_M_S2[2])
-_BOTTOM_ACCELERATIONS_M_S2 = np.arange(4.0, 22.0, 3.0)  # upward, of the centre of mass where it is lowest
+_BOTTOM_ACCELERATIONS_M_S2 = np.arange(4.0, 22.0, 3.0)  # upward, of the centre of mass at its lowest point
 _HEELS_LEFT = (-0.09, np.radians(13.0), 2.5, 30.0)  # heels on their way up [s, rad, rad/s, rad/s^2]
 _HEELS_DOWN_S = 0.1  # after touch-down
-_FOLLOW_S, _PREPARE_S = 0.045, 0.04  # legs come to rest after take-off, and move to meet the floor
+_FOLLOW_S, _PREPARE_S = 0.045, 0.04  # legs come to rest after take-off, and prepare for touch-down
 _POINTED_RAD = np.radians(47.0)  # feet go no further
-_REACHED_S, _FOLDING_S, _FOLDED_S = 0.14, 0.24, 0.1  # arms are up after take-off, come down before touch-down
-_PLANTED = 0.4  # share of the way down when the last step of the approach lands
+_REACHED_S, _FOLDING_S, _FOLDED_S = 0.14, 0.24, 0.1  # arms reach up after take-off, come down before touch-down
+_PLANTED = 0.4  # share of the crouch when the last step of the approach lands
 _RECOVERY_S = 0.5
 
 
 class KeyTimes(NamedTuple):
-    """The moments of a jump, take-off at 0 [s]."""
+    """The key times of a jump, take-off at 0 [s]."""
 
-    crouch: float  # going down begins
+    crouch: float  # the crouch begins
     bottom: float
     touch: float
     low: float  # lowest after landing
@@ -55,7 +55,7 @@ class KeyTimes(NamedTuple):
 def build_jump(model: BodyModel, plan: JumpPlan) -> Movement:
     """Build a jump of a `human18`; its poses hold NaN where the legs cannot reach as planned.
 
-    The durations of push-off and landing are those with the least greatest acceleration of the centre of mass.
+    The durations of push-off and landing minimise the peak acceleration of the centre of mass.
     """
     person = measure_person(model)
     levels = centre_heights(person, plan)
@@ -89,7 +89,7 @@ def build_jump(model: BodyModel, plan: JumpPlan) -> Movement:
         ),
         tuple(foot_path(side, first[side], steps, heels_up) for side in (0, 1)),
     )
-    places = foot_placements(landed, plan.yaw, plan.width_m)
+    placements = foot_placements(landed, plan.yaw, plan.width_m)
     after = StancePhase(
         quintic(
             [
@@ -104,16 +104,16 @@ def build_jump(model: BodyModel, plan: JumpPlan) -> Movement:
                 (times.end, levels.end, 0.0, 0.0),
             ]
         ),
-        tuple(foot_path(side, places[side], [], heels_down) for side in (0, 1)),
+        tuple(foot_path(side, placements[side], [], heels_down) for side in (0, 1)),
     )
-    legs = _legs_in_flight(person, plan, upper_body, before, after, duration)
+    legs = _legs_in_flight(person, plan, upper_body, before=before, after=after, duration=duration)
     return Movement(person, upper_body, before, FlightPhase(takeoff, velocity, duration, legs), after)
 
 
 def _least_peak_acceleration(distance_m: float, speed_m_s: float) -> tuple[float, float]:
-    """Return how to go from rest at the bottom to the flight's edge so that the greatest acceleration is least.
+    """Find the quintic from rest at the bottom to take-off or touch-down whose peak acceleration is least.
 
-    The time [s] and the upward acceleration at the bottom [m/s^2]; the way never goes below the bottom.
+    Returns its duration [s] and the upward acceleration at the bottom [m/s^2]; it never goes below the bottom.
     """
     s = np.linspace(0, 1, 41)
     ends = np.array([[0, 0, 0, 1, 1, 1], [0, 0, 0, 3, 4, 5], [0, 0, 0, 6, 12, 20]]).T  # of s^k and its derivatives at 1
@@ -121,28 +121,28 @@ def _least_peak_acceleration(distance_m: float, speed_m_s: float) -> tuple[float
     for time_s in np.linspace(1.2, 2.6, 29) * distance_m / speed_m_s:
         for bottom in _BOTTOM_ACCELERATIONS_M_S2:
             start = np.array([0.0, 0.0, bottom * time_s**2 / 2])
-            left = np.array([distance_m, speed_m_s * time_s, -_G * time_s**2]) - start[2] * np.array([1, 2, 2])
-            rise = np.concatenate([start, np.linalg.solve(ends[3:].T, left)])
+            remaining = np.array([distance_m, speed_m_s * time_s, -_G * time_s**2]) - start[2] * np.array([1, 2, 2])
+            rise = np.concatenate([start, np.linalg.solve(ends[3:].T, remaining)])
             if np.polynomial.polynomial.polyval(s, rise).min() >= 0:
                 double = np.polynomial.polynomial.polyval(s, np.arange(2, 6) * np.arange(1, 5) * rise[2:]) / time_s**2
                 best = min(best, (float(np.abs(double).max()), float(time_s), float(bottom)))
     return best[1:]
 
 
-def _path_to_takeoff(plan: JumpPlan, times: KeyTimes, way: list[tuple[float, Array]], takeoff: Array) -> PPoly:
-    """Return the way of the centre of mass over the floor (2,) to take-off: with the feet, then up and away."""
+def _path_to_takeoff(plan: JumpPlan, times: KeyTimes, midpoints: list[tuple[float, Array]], takeoff: Array) -> PPoly:
+    """Return the horizontal path (2,) of the centre of mass to take-off: along with the feet, then with the drift."""
     near = CENTRE_AHEAD_M * plan.forward
     bottom = plan.position + CENTRE_AHEAD_LOW_M * plan.forward + 0.4 * times.bottom * plan.drift_m_s
-    moments = [(t, middle + near) for t, middle in way if t < times.bottom - 0.5 * plan.crouch_s]
-    moments += [(times.bottom, bottom), (0.0, takeoff)]
-    walked = monotone_curve([t for t, _ in moments], [place for _, place in moments])
-    rates = [*walked([t for t, _ in moments[:-1]], 1), plan.drift_m_s]
-    return quintic([(t, place, rate, 0.0) for (t, place), rate in zip(moments, rates, strict=True)])
+    key_times = [(t, middle + near) for t, middle in midpoints if t < times.bottom - 0.5 * plan.crouch_s]
+    key_times += [(times.bottom, bottom), (0.0, takeoff)]
+    path = monotone_curve([t for t, _ in key_times], [point for _, point in key_times])
+    rates = [*path([t for t, _ in key_times[:-1]], 1), plan.drift_m_s]
+    return quintic([(t, point, rate, 0.0) for (t, point), rate in zip(key_times, rates, strict=True)])
 
 
 def _upper_body(person: Person, plan: JumpPlan, times: KeyTimes, steps: list[Step]) -> UpperBody:
-    holds, apex = plan.key_postures, times.touch / 2
-    moments = {
+    postures, apex = plan.key_postures, times.touch / 2
+    key_times = {
         "ready": times.crouch,
         "bottom": times.bottom,
         "takeoff": 0.0,
@@ -151,10 +151,10 @@ def _upper_body(person: Person, plan: JumpPlan, times: KeyTimes, steps: list[Ste
         "low": times.low,
         "end": times.end,
     }
-    pitch = monotone_curve(list(moments.values()), [np.radians(holds[name].pitch) for name in moments])
-    angles = {name: hold.angles(person) for name, hold in holds.items()}
+    pitch = monotone_curve(list(key_times.values()), [np.radians(postures[name].pitch) for name in key_times])
+    angles = {name: posture.angles(person) for name, posture in postures.items()}
     is_arm = np.array([s.name.startswith(("upper_arm", "forearm", "hand")) for s in person.model.segments[1:]])
-    arm_moments = [
+    arm_times = [
         (times.crouch, "ready"),
         (times.bottom, "bottom"),
         (0.0, "takeoff"),
@@ -168,18 +168,18 @@ def _upper_body(person: Person, plan: JumpPlan, times: KeyTimes, steps: list[Ste
     return UpperBody(
         yaw=body_yaw(plan.yaw, steps),
         pitch=pitch,
-        trunk=monotone_curve(list(moments.values()), [angles[name] * ~is_arm[:, None] for name in moments]),
-        arms=monotone_curve([t for t, _ in arm_moments], [angles[name] * is_arm[:, None] for _, name in arm_moments]),
+        trunk=monotone_curve(list(key_times.values()), [angles[name] * ~is_arm[:, None] for name in key_times]),
+        arms=monotone_curve([t for t, _ in arm_times], [angles[name] * is_arm[:, None] for _, name in arm_times]),
     )
 
 
 def _legs_in_flight(
-    person: Person, plan: JumpPlan, upper_body: UpperBody, before: StancePhase, after: StancePhase, duration: float
+    person: Person, plan: JumpPlan, upper_body: UpperBody, *, before: StancePhase, after: StancePhase, duration: float
 ) -> PPoly:
-    """Return the angles (6, 3) of hip, knee and ankle, left first: they leave and meet the floor as the feet do."""
+    """Return the angles (6, 3) of hip, knee and ankle, left first, continuous with the stance before and after."""
     first, rate, double = leg_derivatives(person, upper_body, before, 0.0, toward=-1)
     last, last_rate, last_double = leg_derivatives(person, upper_body, after, duration, toward=1)
-    follow = first + rate * _FOLLOW_S / 2 + double * _FOLLOW_S**2 / 12  # the gentlest way to rest
+    follow = first + rate * _FOLLOW_S / 2 + double * _FOLLOW_S**2 / 12  # the smoothest way to rest
     ankles = np.arange(2, 6, 3)
     follow[ankles, 0] = np.minimum(follow[ankles, 0], _POINTED_RAD)
     prepare = last - last_rate * _PREPARE_S / 2 + last_double * _PREPARE_S**2 / 12

@@ -1,6 +1,6 @@
-"""Legs on the floor: how a foot rolls without sliding, and the angles of a leg that stands where its foot is.
+"""Legs on the floor: how a foot rolls without sliding, and inverse kinematics of a leg from hip to foot.
 
-Angles are those of the preset `human18`; arrays only, n instants at once.
+Angles are those of the preset `human18`; arrays only, n times at once.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _STRAIGHT = 0.99995  # a leg reaches at most this share of its length
 
 
 class LegSizes(NamedTuple):
-    """What a leg's stand depends on."""
+    """The lengths of a leg and the size of its foot."""
 
     thigh_m: float
     shank_m: float
@@ -37,47 +37,47 @@ def axis_rotation(axis: int, angle: Array) -> Array:
     return R
 
 
-def roll_foot(sizes: LegSizes, place: Array, pitch: Array, lift_m: Array) -> tuple[Array, Array]:
-    """Return where the ankle is (n, 3) [m] and how the foot stands (n, 3, 3), world from foot.
+def roll_foot(sizes: LegSizes, placement: Array, pitch: Array, lift_m: Array) -> tuple[Array, Array]:
+    """Return the position of the ankle (n, 3) [m] and the orientation of the foot (n, 3, 3), world from foot.
 
-    `place` (n, 3) holds x, y [m] of the foot's middle while the sole is level, and its turn about z [rad]; at 0 the
-    toes point to -y. `pitch` (n,) [rad] raises the heel: the foot's ellipse then rolls over the floor toward the toes,
-    and the touching point has no speed. `lift_m` (n,) raises all of it.
+    `placement` (n, 3) holds x, y [m] of the foot's middle while the sole is level, and its yaw [rad]; at 0 the
+    toes point to -y. `pitch` (n,) [rad] raises the heel: the foot's ellipse then rolls without slip toward the toes.
+    `lift_m` (n,) raises the whole foot.
     """
     a, b = sizes.foot_half_length_m, sizes.foot_half_height_m
     sine, cosine = np.sin(pitch), np.cos(pitch)
     height = np.sqrt((a * sine) ** 2 + (b * cosine) ** 2)
-    rolled = a * ellipeinc(np.arctan2(a * sine, b * cosine), 1 - (b / a) ** 2)  # the arc that has touched the floor
-    ahead = rolled - (a**2 - b**2) * sine * cosine / height
-    yaw = place[:, 2]
+    arc = a * ellipeinc(np.arctan2(a * sine, b * cosine), 1 - (b / a) ** 2)  # arc length rolled on the floor
+    ahead = arc - (a**2 - b**2) * sine * cosine / height
+    yaw = placement[:, 2]
     centre = np.column_stack(
-        [place[:, 0] + np.sin(yaw) * ahead, place[:, 1] - np.cos(yaw) * ahead, np.asarray(height + lift_m)]
+        [placement[:, 0] + np.sin(yaw) * ahead, placement[:, 1] - np.cos(yaw) * ahead, np.asarray(height + lift_m)]
     )
     R = axis_rotation(2, yaw) @ axis_rotation(0, pitch)
     return centre - R @ sizes.foot_centre_m, R
 
 
-def leg_angles(sizes: LegSizes, R_pelvis: Array, hip: Array, ankle: Array, R_foot: Array) -> tuple[Array, Array]:
-    """Return the angles (n, 3, 3) [rad] of hip, knee and ankle, and by how much the leg is too short (n,) [m].
+def leg_angles(sizes: LegSizes, R_pelvis: Array, hip: Array, *, ankle: Array, R_foot: Array) -> tuple[Array, Array]:
+    """Return the angles (n, 3, 3) [rad] of hip, knee and ankle, and the missing length of the leg (n,) [m].
 
-    `hip` and `ankle` (n, 3) world [m], `R_pelvis` and `R_foot` (n, 3, 3) world from segment. The knee points where the
-    toes do.
+    `hip` and `ankle` (n, 3) world [m], `R_pelvis` and `R_foot` (n, 3, 3) world from segment. The knee points the same
+    way as the toes.
     """
-    way = np.einsum("nji,nj->ni", R_pelvis, ankle - hip)
-    length = np.linalg.norm(way, axis=1)
+    hip_to_ankle = np.einsum("nji,nj->ni", R_pelvis, ankle - hip)
+    length = np.linalg.norm(hip_to_ankle, axis=1)
     a, b = sizes.thigh_m, sizes.shank_m
     reached = np.clip(length, abs(a - b) + 1e-3, _STRAIGHT * (a + b))
     bend = np.pi - np.arccos((a**2 + b**2 - reached**2) / (2 * a * b))
-    way = way * (reached / length)[:, None]
+    hip_to_ankle = hip_to_ankle * (reached / length)[:, None]
     twist = _yaw_of(R_foot) - _yaw_of(R_pelvis)
     twist = (twist + np.pi) % (2 * np.pi) - np.pi
     straight = np.column_stack([np.zeros_like(bend), b * np.sin(bend), -a - b * np.cos(bend)])
-    turned = np.einsum("nij,nj->ni", axis_rotation(2, twist), straight)
-    across = np.hypot(turned[:, 0], turned[:, 2])
-    side = np.arctan2(turned[:, 0], -turned[:, 2]) - np.arcsin(np.clip(way[:, 0] / across, -1, 1))
-    down = np.cos(side) * turned[:, 2] - np.sin(side) * turned[:, 0]
-    short = length - reached + np.maximum(np.abs(way[:, 0]) - across, 0)
-    swing = np.arctan2(way[:, 2], way[:, 1]) - np.arctan2(down, turned[:, 1])
+    rotated = np.einsum("nij,nj->ni", axis_rotation(2, twist), straight)
+    across = np.hypot(rotated[:, 0], rotated[:, 2])
+    side = np.arctan2(rotated[:, 0], -rotated[:, 2]) - np.arcsin(np.clip(hip_to_ankle[:, 0] / across, -1, 1))
+    down = np.cos(side) * rotated[:, 2] - np.sin(side) * rotated[:, 0]
+    short = length - reached + np.maximum(np.abs(hip_to_ankle[:, 0]) - across, 0)
+    swing = np.arctan2(hip_to_ankle[:, 2], hip_to_ankle[:, 1]) - np.arctan2(down, rotated[:, 1])
     swing = (swing + np.pi) % (2 * np.pi) - np.pi
     knee = np.column_stack([bend, np.zeros_like(bend), np.zeros_like(bend)])
     R_shank = (
@@ -88,5 +88,5 @@ def leg_angles(sizes: LegSizes, R_pelvis: Array, hip: Array, ankle: Array, R_foo
 
 
 def _yaw_of(R: Array) -> Array:
-    """Return the turn about the vertical (n,) of a frame that is tipped about its own x axis."""
+    """Return the yaw (n,) of a frame that is pitched about its own x axis."""
     return np.arctan2(R[:, 1, 0], R[:, 0, 0])

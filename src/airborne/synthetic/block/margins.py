@@ -1,4 +1,4 @@
-"""How far a motion is from what no player can do: through the floor or the net, past a joint's limit, into another."""
+"""Margins to impossible motions: through the floor or the net, beyond a joint's limit, through another player."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ _BONES: tuple[tuple[str, str, float], ...] = (  # a capsule's ends and its radiu
 
 
 class Margins(NamedTuple):
-    """Distances to what must not happen, below zero where it does; NaN where the legs cannot reach the feet."""
+    """Margins, negative where violated; NaN where the legs cannot reach the feet."""
 
     floor_m: float  # of the lowest point above the floor
-    net_m: float  # to the net's plane, of what is not above the tape
+    net_m: float  # to the net's plane, of all that is not above the tape
     limits_rad: float  # to the nearest limit of a joint
 
 
 class Capsules(NamedTuple):
-    """The room that a body takes at n times: c capsules."""
+    """The volume of a body at n times: c capsules."""
 
     start: Array  # (n, c, 3) world [m]
     end: Array  # (n, c, 3)
@@ -67,23 +67,23 @@ def margins_of(person: Person, poses: Poses, *, side: float) -> Margins:
 
 
 def capsules_of(person: Person, poses: Poses, stature_m: float) -> Capsules:
-    """Return the room that a person takes in n poses."""
+    """Return the volume of a person in n poses."""
     marks = person.landmarks(poses)
     starts, stops = (np.stack([marks[name] for name in names], axis=1) for names in list(zip(*_BONES, strict=True))[:2])
     return Capsules(starts, stops, np.array([radius for *_, radius in _BONES]) * stature_m / 1.80)
 
 
 def gap_m(one: Capsules, other: Capsules) -> float:
-    """Return the least distance [m] between the surfaces of two players' capsules at n times; below 0 they overlap."""
+    """Return the least distance [m] between two players' capsules over n times; negative where they overlap."""
     (a, b, r), (c, d, s) = one, other
-    apart = _segment_distances(a[:, :, None], b[:, :, None], c[:, None], d[:, None])
-    return float((apart - r[:, None] - s[None, :]).min())
+    distance = _segment_distances(a[:, :, None], b[:, :, None], c[:, None], d[:, None])
+    return float((distance - r[:, None] - s[None, :]).min())
 
 
 def _segment_distances(a: Array, b: Array, c: Array, d: Array) -> Array:
     """Return the distances between the segments a-b and c-d (..., 3), broadcast: (...).
 
-    The nearest points of two lines, each cut to its segment in turn, then the other one's answer to that.
+    The nearest points of the two lines, each clipped to its segment in turn, then the nearest point of the other.
     """
     u, v, w = b - a, d - c, a - c
     uu, uv, vv = (np.einsum("...i,...i->...", *pair) for pair in ((u, u), (u, v), (v, v)))

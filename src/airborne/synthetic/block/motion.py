@@ -1,4 +1,4 @@
-"""How a person moves on the floor and in the air: a course of poses in time, with acceleration continuous."""
+"""A person's movement on the floor and in the air: poses over time, with continuous acceleration."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from airborne.synthetic.block.posture import Feet, Person, Poses, solve_stance
 from airborne.synthetic.flight.rigid import GRAVITY_M_S2
 from airborne.types import Array
 
-Knot = tuple[float, Any, Any, Any]  # time [s], value, its rate and the rate's rate
+Knot = tuple[float, Any, Any, Any]  # time [s], value, its first and second derivatives
 
-_STEP_S, _STEPS = 0.002, 6  # of the look back over the legs at take-off, and ahead at landing
+_STEP_S, _STEPS = 0.002, 6  # of the finite differences of the legs before take-off and after landing
 
 
 def quintic(knots: Sequence[Knot]) -> PPoly:
-    """Join knots by quintics: value, rate and acceleration are continuous. Values are numbers or arrays of a shape."""
+    """Join knots by quintics with continuous value, rate and acceleration; values are scalars or arrays of a shape."""
     values = [np.stack([np.broadcast_to(np.asarray(v, float), np.shape(k[1])) for v in k[1:]]) for k in knots]
     return PPoly.from_bernstein_basis(BPoly.from_derivatives([k[0] for k in knots], np.stack(values)))
 
 
 def minimum_jerk(time_s: Sequence[float], values: Sequence[object]) -> PPoly:
-    """Join values at rest by the quintics of least jerk."""
+    """Join values at rest by quintics of minimum jerk."""
     return quintic([(t, value, 0.0, 0.0) for t, value in zip(time_s, values, strict=True)])
 
 
 def monotone_curve(time_s: Sequence[float], values: Sequence[object]) -> PPoly:
-    """Join values by quintics that pass without a stop where the values go on the same way, and rest at the ends."""
+    """Join values by quintics with the slopes of monotone cubics (PCHIP), at rest at both ends."""
     stacked = np.stack([np.asarray(value, float) for value in values])
     rates = PchipInterpolator(time_s, stacked)(time_s, 1)
     rates[[0, -1]] = 0
@@ -39,20 +39,20 @@ def monotone_curve(time_s: Sequence[float], values: Sequence[object]) -> PPoly:
 
 
 def evaluate_clamped(curve: PPoly, time_s: Array) -> Array:
-    """Return a curve's values (n, ...) at times (n,) [s]; before and after its knots it keeps its ends."""
+    """Return a curve's values (n, ...) at times (n,) [s]; constant before and after its knots."""
     return curve(np.clip(time_s, curve.x[0], curve.x[-1]))
 
 
 class FootPath(NamedTuple):
-    """One foot's way over the floor; see `rolled_foot`."""
+    """One foot's path over the floor; see `roll_foot`."""
 
-    placement: PPoly  # (3,) x, y [m] and the turn about z [rad]
+    placement: PPoly  # (3,) x, y [m] and yaw [rad]
     lift: PPoly  # [m]
     pitch: PPoly  # [rad]
 
 
 class StancePhase(NamedTuple):
-    """A time on the floor; the centre of mass goes its way whatever the feet do."""
+    """A phase on the floor; the path of the centre of mass does not depend on the feet."""
 
     centre_xy: PPoly  # (2,) x, y of the centre of mass [m]
     centre_z: PPoly  # z of the centre of mass [m]
@@ -60,7 +60,7 @@ class StancePhase(NamedTuple):
 
 
 class UpperBody(NamedTuple):
-    """How root, trunk, head and arms are held; the legs follow."""
+    """The motion of root, trunk, head and arms; the legs follow."""
 
     yaw: PPoly  # of the root about z [rad]
     pitch: PPoly  # of the root, then forward about its own x [rad]
@@ -69,7 +69,7 @@ class UpperBody(NamedTuple):
 
 
 class FlightPhase(NamedTuple):
-    """A time in the air: a parabola of the centre of mass, from take-off at time 0."""
+    """A phase in the air: a parabola of the centre of mass, from take-off at time 0."""
 
     centre: Array  # (3,) of mass at take-off, world [m]
     velocity: Array  # (3,) [m/s]
@@ -77,14 +77,14 @@ class FlightPhase(NamedTuple):
     legs: PPoly  # (6, 3) angles of hip, knee, ankle, left first [rad]
 
     def centre_at(self, time_s: Array) -> Array:
-        """Return where the centre of mass is at the times (n,) [s] after take-off: (n, 3) world [m]."""
+        """Return the centre of mass at the times (n,) [s] after take-off: (n, 3) world [m]."""
         t = np.asarray(time_s, float)[:, None]
         return self.centre + self.velocity * t + GRAVITY_M_S2 * t**2 / 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Movement:
-    """A person's motion; a jumper leaves the floor at time 0."""
+    """A person's movement; a jumper takes off at time 0."""
 
     person: Person
     upper_body: UpperBody
@@ -93,7 +93,7 @@ class Movement:
     after: StancePhase | None = None
 
     def __call__(self, time_s: Array) -> Poses:
-        """Return the poses at the times (n,) [s]; before its first and after its last knot the person stands still."""
+        """Return the poses at the times (n,) [s]; static before its first and after its last knot."""
         time_s = np.asarray(time_s, float)
         flight, after = self.flight, self.after
         if flight is None or after is None:
@@ -101,18 +101,18 @@ class Movement:
         is_up = (time_s > 0) & (time_s < flight.duration_s)
         phases = [
             (time_s <= 0, lambda t: stance_poses(self.person, self.upper_body, self.before, t)),
-            (is_up, self._flying),
+            (is_up, self._flight_poses),
             (time_s >= flight.duration_s, lambda t: stance_poses(self.person, self.upper_body, after, t)),
         ]
         n, joints = len(time_s), len(self.person.model.segments) - 1
-        found = Poses(np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, joints, 3)))
-        for chosen, poses_at in phases:
-            if chosen.any():
-                for whole, part in zip(found, poses_at(time_s[chosen]), strict=True):
-                    whole[chosen] = part
-        return found
+        poses = Poses(np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, joints, 3)))
+        for selected, poses_at in phases:
+            if selected.any():
+                for whole, part in zip(poses, poses_at(time_s[selected]), strict=True):
+                    whole[selected] = part
+        return poses
 
-    def _flying(self, time_s: Array) -> Poses:
+    def _flight_poses(self, time_s: Array) -> Poses:
         assert self.flight is not None
         R, angles = upper_body_at(self.upper_body, time_s)
         angles[:, self.person.joints.ravel()] = self.flight.legs(time_s)
@@ -120,24 +120,24 @@ class Movement:
         return Poses(R, self.flight.centre_at(time_s) - own, angles)
 
 
-def translate(course: Movement, way: Array) -> Movement:
-    """Return the same motion at another place on the floor, `way` (2,) [m] from the old one."""
+def translate(movement: Movement, shift: Array) -> Movement:
+    """Return the same movement shifted over the floor by `shift` (2,) [m]."""
 
-    def shifted(curve: PPoly) -> PPoly:
+    def shift_curve(curve: PPoly) -> PPoly:
         c = curve.c.copy()
-        c[-1, :, :2] += way
+        c[-1, :, :2] += shift
         return PPoly(c, curve.x)
 
-    def stood(stand: StancePhase) -> StancePhase:
-        feet = tuple(foot._replace(placement=shifted(foot.placement)) for foot in stand.feet)
-        return stand._replace(centre_xy=shifted(stand.centre_xy), feet=feet)
+    def shift_stance(stance: StancePhase) -> StancePhase:
+        feet = tuple(foot._replace(placement=shift_curve(foot.placement)) for foot in stance.feet)
+        return stance._replace(centre_xy=shift_curve(stance.centre_xy), feet=feet)
 
-    flight, after = course.flight, course.after
+    flight, after = movement.flight, movement.after
     return replace(
-        course,
-        before=stood(course.before),
-        flight=None if flight is None else flight._replace(centre=flight.centre + np.append(way, 0.0)),
-        after=None if after is None else stood(after),
+        movement,
+        before=shift_stance(movement.before),
+        flight=None if flight is None else flight._replace(centre=flight.centre + np.append(shift, 0.0)),
+        after=None if after is None else shift_stance(after),
     )
 
 
@@ -149,8 +149,8 @@ def upper_body_at(upper_body: UpperBody, time_s: Array) -> tuple[Array, Array]:
     ) + evaluate_clamped(upper_body.arms, time_s)
 
 
-def stance_poses(person: Person, upper_body: UpperBody, stand: StancePhase, time_s: Array) -> Poses:
-    """Return the poses of a time on the floor at the times (n,) [s]."""
+def stance_poses(person: Person, upper_body: UpperBody, stance: StancePhase, time_s: Array) -> Poses:
+    """Return the poses of a stance phase at the times (n,) [s]."""
     R, angles = upper_body_at(upper_body, time_s)
     feet = [
         roll_foot(
@@ -159,27 +159,27 @@ def stance_poses(person: Person, upper_body: UpperBody, stand: StancePhase, time
             evaluate_clamped(foot.pitch, time_s),
             evaluate_clamped(foot.lift, time_s),
         )
-        for foot in stand.feet
+        for foot in stance.feet
     ]
-    both = Feet(np.stack([ankle for ankle, _ in feet]), np.stack([turned for _, turned in feet]))
+    both = Feet(np.stack([ankle for ankle, _ in feet]), np.stack([R_foot for _, R_foot in feet]))
     return solve_stance(
         person,
         R,
         angles,
-        both,
-        np.column_stack([evaluate_clamped(stand.centre_xy, time_s), evaluate_clamped(stand.centre_z, time_s)]),
+        feet=both,
+        centre=np.column_stack([evaluate_clamped(stance.centre_xy, time_s), evaluate_clamped(stance.centre_z, time_s)]),
     )
 
 
 def leg_derivatives(
-    person: Person, upper_body: UpperBody, stand: StancePhase, time_s: float, *, toward: int
+    person: Person, upper_body: UpperBody, stance: StancePhase, time_s: float, *, toward: int
 ) -> tuple[Array, ...]:
-    """Return the legs' angles, rates and accelerations, (6, 3) each, at a stand's first or last moment.
+    """Return the legs' angles, rates and accelerations, (6, 3) each, at the start or end of a stance phase.
 
-    `toward` is -1 to look back from its last moment, +1 to look ahead from its first.
+    `toward` is -1 for differences back from its end, +1 for differences ahead from its start.
     """
     steps = toward * np.arange(_STEPS)
-    angles = stance_poses(person, upper_body, stand, time_s + _STEP_S * steps).joint_angles[:, person.joints.ravel()]
+    angles = stance_poses(person, upper_body, stance, time_s + _STEP_S * steps).joint_angles[:, person.joints.ravel()]
     coefficients = np.linalg.solve(np.vander(steps.astype(float), increasing=True), angles.reshape(_STEPS, -1))
     shape = angles.shape[1:]
     value, rate, double = (coefficients[k].reshape(shape) / _STEP_S**k for k in range(3))

@@ -1,4 +1,4 @@
-"""What a jump is made of: its plan, how the body is held at the key moments, how high the centre of mass is then."""
+"""The plan of a jump: the body's posture and the height of the centre of mass at its key times."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ TOUCH_PITCH = (np.radians(26.0), -11.0, 0.0)
 CENTRE_AHEAD_M, CENTRE_AHEAD_LOW_M = (
     0.02,
     -0.01,
-)  # of the centre of mass before the feet's middle: standing, at its lowest
+)  # of the centre of mass ahead of the feet's midpoint: standing, at its lowest
 CENTRE_AHEAD_TAKEOFF_M, _CENTRE_AHEAD_TOUCH_M = 0.085, 0.05
-_HEIGHTS_PER_REACH, _N_HEIGHTS = (0.75, 1.5), 48  # of the centre of mass, tried, over a leg's length
-_DRIFT_LEAD_S = 0.1  # feet land ahead of a drifting body by what it goes in this time
+_HEIGHTS_PER_REACH, _N_HEIGHTS = (0.75, 1.5), 48  # of the centre of mass, sampled, over a leg's length
+_DRIFT_LEAD_S = 0.1  # feet land ahead of a drifting body by its drift in this time
 
 
 class KeyPosture(NamedTuple):
-    """How pelvis, trunk, head and arms are held, in degrees; see `posture`."""
+    """Posture of pelvis, trunk, head and arms at a key time, in degrees; see `upper_body_angles`."""
 
     pitch: float  # of the pelvis, forward
     trunk: float
@@ -47,11 +47,11 @@ READY = KeyPosture(15, 14, -16, (35, 35), (120, 120))
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JumpPlan:
-    """What a jump is made of; angles in degrees, of knees how far they are bent."""
+    """The parameters of a jump; angles in degrees, of knees their flexion."""
 
     rise_m: float  # of the centre of mass after take-off
-    position: Array  # (2,) x, y of the feet's middle at take-off [m]
-    yaw: float  # turn about z: 0 faces -y, pi faces +y [rad]
+    position: Array  # (2,) x, y of the feet's midpoint at take-off [m]
+    yaw: float  # about z: 0 faces -y, pi faces +y [rad]
     drift_m_s: Array  # (2,) horizontal velocity in flight
     approach: Approach = "static"
     approach_m: float = 0.0  # of the approach, along x
@@ -70,17 +70,17 @@ class JumpPlan:
 
     @property
     def forward(self) -> Array:
-        """The way that the player faces: (2,), unit."""
+        """The direction that the player faces: (2,), unit."""
         return np.array([np.sin(self.yaw), -np.cos(self.yaw)])
 
     @property
     def touch_offset_m(self) -> Array:
-        """Where the centre of mass is at touch-down, seen from the middle of the feet: (2,) [m]."""
+        """The centre of mass at touch-down relative to the feet's midpoint: (2,) [m]."""
         return _CENTRE_AHEAD_TOUCH_M * self.forward - _DRIFT_LEAD_S * self.drift_m_s
 
     @property
     def key_postures(self) -> dict[str, KeyPosture]:
-        """How the body is held at the key moments."""
+        """The postures at the key times."""
         up = 178.0 - self.tilt
         swing = {
             "block": (
@@ -121,13 +121,19 @@ class CentreHeights(NamedTuple):
 
 
 def centre_heights(person: Person, plan: JumpPlan) -> CentreHeights:
-    """Find how high the centre of mass is at the key moments, from how far the knees are bent."""
-    near, holds = CENTRE_AHEAD_M * plan.forward, plan.key_postures
+    """Find the heights of the centre of mass at the key times from the flexion of the knees."""
+    near, postures = CENTRE_AHEAD_M * plan.forward, plan.key_postures
 
-    def height(hold: str, knee: float, offset: Array = near, pitch: float = 0.0) -> float:
-        places = foot_placements(plan.position, plan.yaw, plan.width_m)
+    def height(posture: str, knee: float, offset: Array = near, pitch: float = 0.0) -> float:
+        placements = foot_placements(plan.position, plan.yaw, plan.width_m)
         return centre_height(
-            person, holds[hold], places, over=plan.position + offset, yaw=plan.yaw, knee=np.radians(knee), pitch=pitch
+            person,
+            postures[posture],
+            placements,
+            over=plan.position + offset,
+            yaw=plan.yaw,
+            knee=np.radians(knee),
+            pitch=pitch,
         )
 
     return CentreHeights(
@@ -141,23 +147,26 @@ def centre_heights(person: Person, plan: JumpPlan) -> CentreHeights:
 
 
 def centre_height(
-    person: Person, hold: KeyPosture, places: Array, *, over: Array, yaw: float, knee: float, pitch: float = 0.0
+    person: Person, posture: KeyPosture, placements: Array, *, over: Array, yaw: float, knee: float, pitch: float = 0.0
 ) -> float:
-    """Return the height of the centre of mass [m] at which the knees are bent by `knee` [rad] on the mean.
+    """Return the height of the centre of mass [m] at which the mean flexion of the knees is `knee` [rad].
 
-    Feet stand at `places` (2, 3) with their heels raised by `pitch`; the centre of mass is over `over` (2,) [m].
+    Feet stand at `placements` (2, 3) with their heels raised by `pitch`; `over` (2,) [m] is x, y of the centre of mass.
     """
     reach = person.leg.thigh_m + person.leg.shank_m
     heights = np.linspace(*_HEIGHTS_PER_REACH, _N_HEIGHTS) * reach
-    alike = np.ones(_N_HEIGHTS)
-    R = axis_rotation(2, yaw * alike) @ axis_rotation(0, np.radians(hold.pitch) * alike)
-    ankles, turns = zip(
-        *(roll_foot(person.leg, np.tile(place, (_N_HEIGHTS, 1)), pitch * alike, 0 * alike) for place in places),
+    ones = np.ones(_N_HEIGHTS)
+    R = axis_rotation(2, yaw * ones) @ axis_rotation(0, np.radians(posture.pitch) * ones)
+    ankles, R_feet = zip(
+        *(
+            roll_foot(person.leg, np.tile(placement, (_N_HEIGHTS, 1)), pitch * ones, 0 * ones)
+            for placement in placements
+        ),
         strict=True,
     )
     centres = np.column_stack([np.tile(over, (_N_HEIGHTS, 1)), heights])
-    angles = np.tile(hold.angles(person), (_N_HEIGHTS, 1, 1))
-    poses = solve_stance(person, R, angles, Feet(np.stack(ankles), np.stack(turns)), centres)
-    bent = poses.joint_angles[:, person.knees, 0].mean(axis=1)
-    can_stand = np.isfinite(bent)
-    return float(np.interp(-knee, -bent[can_stand], heights[can_stand]))
+    angles = np.tile(posture.angles(person), (_N_HEIGHTS, 1, 1))
+    poses = solve_stance(person, R, angles, feet=Feet(np.stack(ankles), np.stack(R_feet)), centre=centres)
+    flexion = poses.joint_angles[:, person.knees, 0].mean(axis=1)
+    can_stand = np.isfinite(flexion)
+    return float(np.interp(-knee, -flexion[can_stand], heights[can_stand]))

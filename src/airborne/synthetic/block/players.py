@@ -1,4 +1,4 @@
-"""Who plays: bodies, clothes and motions of blockers, team mates and opponents, drawn at random."""
+"""The players: random bodies, clothes and movements of blockers, team mates and opponents."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Role = Literal["blocker", "team mate", "opponent"]
 
 CLEARANCE_M = 0.03  # between two players, and to the net
 _ROUNDING_M = 1e-9
-_CHECK_S = 0.02  # from one check of a motion to the next
+_CHECK_S = 0.02  # between checks of a movement
 _LARGEST_ACCELERATION_M_S2 = 30.0  # acceleration of the centre of mass by the legs
 _APPROACHES_M: dict[Approach, tuple[float, float]] = {
     "static": (0.0, 0.0),
@@ -51,12 +51,12 @@ class Player:
 
     @property
     def side(self) -> float:
-        """On which side of the net: -1 for y < 0, where the blockers are."""
+        """The side of the net: -1 for y < 0, where the blockers are."""
         return 1.0 if self.role == "opponent" else -1.0
 
     @property
     def touch_s(self) -> float | None:
-        """When the player touches the floor again, on the scene's clock."""
+        """The time of touch-down on the scene's clock."""
         flight = self.movement.flight
         return None if flight is None or self.takeoff_s is None else self.takeoff_s + flight.duration_s
 
@@ -64,15 +64,15 @@ class Player:
         """Return the poses at the scene's times (n,) [s]."""
         return self.movement(np.asarray(time_s, float) - (self.takeoff_s or 0.0))
 
-    def translate(self, way: Array) -> Player:
-        """Return the player with the same motion `way` (2,) [m] further."""
-        return replace(self, movement=translate(self.movement, way))
+    def translate(self, shift: Array) -> Player:
+        """Return the player with the same movement shifted by `shift` (2,) [m]."""
+        return replace(self, movement=translate(self.movement, shift))
 
 
 def draw_person(rng: np.random.Generator, *, is_opponent: bool, similarity: float) -> tuple[float, Outfit, BodyModel]:
     """Draw a player's stature [m], clothes and body.
 
-    `similarity` 1 gives opponents the legs' colours of the blockers' team, 0 all their own.
+    `similarity` 1 gives opponents the leg colours of the blockers' team, 0 their own.
     """
     stature = float(np.clip(rng.normal(1.86, 0.06), 1.70, 2.05))
     mass = float(np.clip(22.2 * stature**2 + rng.normal(0, 4), 60, 110))
@@ -104,9 +104,9 @@ def draw_blocker(
     takeoff_s: float,
     approach: Approach,
     direction: float,
-    lasts_s: float,
+    duration_s: float,
 ) -> Player:
-    """Draw a blocker who takes off near x [m] at a time, from an approach along x in a direction of +1 or -1."""
+    """Draw a blocker who takes off near x [m] at `takeoff_s`, after an approach along x in the direction +1 or -1."""
     stature, outfit, body = draw_person(rng, is_opponent=False, similarity=1.0)
     rise = float(np.clip(rng.normal(0.47, 0.06), 0.30, 0.62))
     low, high = _APPROACHES_M[approach]
@@ -126,12 +126,14 @@ def draw_blocker(
         crouch_s=float(rng.uniform(0.27, 0.38)),
         tilt=float(rng.uniform(14, 26)),
     )
-    made = partial(Player, name=name, role="blocker", stature_m=stature, outfit=outfit, body=body, takeoff_s=takeoff_s)
-    return _move_clear_of_net(made(movement=build_jump(body, plan)), lasts_s)
+    player_with = partial(
+        Player, name=name, role="blocker", stature_m=stature, outfit=outfit, body=body, takeoff_s=takeoff_s
+    )
+    return _move_clear_of_net(player_with(movement=build_jump(body, plan)), duration_s)
 
 
 def draw_attacker(
-    rng: np.random.Generator, name: str, x: float, *, takeoff_s: float, similarity: float, lasts_s: float
+    rng: np.random.Generator, name: str, x: float, *, takeoff_s: float, similarity: float, duration_s: float
 ) -> Player:
     """Draw an opponent who jumps for a spike near x [m]."""
     stature, outfit, body = draw_person(rng, is_opponent=True, similarity=similarity)
@@ -146,14 +148,16 @@ def draw_attacker(
         width_m=0.32,
         arms="attack",
     )
-    made = partial(Player, name=name, role="opponent", stature_m=stature, outfit=outfit, body=body, takeoff_s=takeoff_s)
-    return _move_clear_of_net(made(movement=build_jump(body, plan)), lasts_s)
+    player_with = partial(
+        Player, name=name, role="opponent", stature_m=stature, outfit=outfit, body=body, takeoff_s=takeoff_s
+    )
+    return _move_clear_of_net(player_with(movement=build_jump(body, plan)), duration_s)
 
 
 def draw_bystander(
-    rng: np.random.Generator, name: str, position: Array, *, is_opponent: bool, similarity: float, lasts_s: float
+    rng: np.random.Generator, name: str, position: Array, *, is_opponent: bool, similarity: float, duration_s: float
 ) -> Player:
-    """Draw a player who stays on the floor at `place` (2,) [m]; some shuffle there."""
+    """Draw a player who stays on the floor at `position` (2,) [m]; some shuffle there."""
     stature, outfit, body = draw_person(rng, is_opponent=is_opponent, similarity=similarity)
     reach, bend = rng.uniform(15, 60), rng.uniform(30, 100)
     plan = WaitPlan(
@@ -162,9 +166,9 @@ def draw_bystander(
         knee=float(rng.uniform(25, 62)),
         width_m=float(rng.uniform(0.35, 0.55)),
         approach_m=float(rng.choice([0.0, rng.uniform(-0.7, 0.7)])),
-        arrival_s=float(rng.uniform(0.3, 0.8) * lasts_s),
-        lasts_s=lasts_s,
-        hold=KeyPosture(
+        arrival_s=float(rng.uniform(0.3, 0.8) * duration_s),
+        duration_s=duration_s,
+        posture=KeyPosture(
             rng.uniform(12, 28), rng.uniform(8, 22), -20.0, (reach, reach), (bend, bend), rng.uniform(8, 25)
         ),
     )
@@ -173,24 +177,26 @@ def draw_bystander(
     player = Player(
         name=name, role=role, stature_m=stature, outfit=outfit, body=body, movement=movement, takeoff_s=None
     )
-    return _move_clear_of_net(player, lasts_s)
+    return _move_clear_of_net(player, duration_s)
 
 
-def _move_clear_of_net(player: Player, lasts_s: float) -> Player:
-    """Return the player far enough from the net; raises TrialError for a motion that no body can make."""
-    time_s, centre_z = check_times(lasts_s), player.movement.before.centre_z
+def _move_clear_of_net(player: Player, duration_s: float) -> Player:
+    """Move the player far enough from the net; raises TrialError for an impossible movement."""
+    time_s, centre_z = check_times(duration_s), player.movement.before.centre_z
     margins = margins_of(player.movement.person, player.poses(time_s), side=player.side)
-    hardest = np.abs(centre_z(np.linspace(centre_z.x[0], centre_z.x[-1], 200), 2)).max()
-    if not (margins.floor_m > -_ROUNDING_M and margins.limits_rad > 0 and hardest < _LARGEST_ACCELERATION_M_S2):
-        raise TrialError(f"{player.name}: the motion drawn is more than a body can do; use another seed")
+    largest_acceleration = np.abs(centre_z(np.linspace(centre_z.x[0], centre_z.x[-1], 200), 2)).max()
+    if not (
+        margins.floor_m > -_ROUNDING_M and margins.limits_rad > 0 and largest_acceleration < _LARGEST_ACCELERATION_M_S2
+    ):
+        raise TrialError(f"{player.name}: the movement drawn is more than a body can do; use another seed")
     return player.translate(np.array([0.0, player.side * max(CLEARANCE_M - margins.net_m, 0.0)]))
 
 
-def occupied_volume(player: Player, lasts_s: float) -> Capsules:
-    """Return the room that a player takes while a recording lasts."""
-    return capsules_of(player.movement.person, player.poses(check_times(lasts_s)), player.stature_m)
+def occupied_volume(player: Player, duration_s: float) -> Capsules:
+    """Return the volume of a player over a recording."""
+    return capsules_of(player.movement.person, player.poses(check_times(duration_s)), player.stature_m)
 
 
-def check_times(lasts_s: float) -> Array:
-    """Return the times (n,) [s] at which motions are checked: a recording, a little more at both ends."""
-    return np.arange(-_CHECK_S, lasts_s + _CHECK_S, _CHECK_S)
+def check_times(duration_s: float) -> Array:
+    """Return the times (n,) [s] at which movements are checked: a recording and a little more at both ends."""
+    return np.arange(-_CHECK_S, duration_s + _CHECK_S, _CHECK_S)

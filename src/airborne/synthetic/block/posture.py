@@ -1,4 +1,4 @@
-"""A person of the preset `human18` who stands: the root is where feet and centre of mass want it."""
+"""Inverse kinematics of a `human18` in stance: the root follows from the feet and the centre of mass."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from airborne.types import Array
 
 _SIDES = ("left", "right")
 _MOST_ITERATIONS, _TOLERANCE_M, _TOO_SHORT_M = 60, 1e-13, 1e-6
-_OVER_RELAXATION = 1.2  # the centre of mass follows the root by a part of its way
+_OVER_RELAXATION = 1.2  # the centre of mass follows the root by less than its step
 
 
 class Poses(NamedTuple):
@@ -29,13 +29,13 @@ class Poses(NamedTuple):
     joint_angles: Array  # (n, 17, 3) [rad]
 
     def pose(self, i: int) -> Pose:
-        """Return the i-th one."""
+        """Return the i-th pose."""
         root = RigidTransform.from_components(self.root_t[i], Rotation.from_matrix(self.root_R[i]))
         return Pose(world_from_root=root, joint_angles=self.joint_angles[i])
 
 
 class Feet(NamedTuple):
-    """Where n pairs of feet are, left first."""
+    """Positions and orientations of n pairs of feet, left first."""
 
     ankle: Array  # (2, n, 3) world [m]
     R: Array  # (2, n, 3, 3) world from foot
@@ -43,7 +43,7 @@ class Feet(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """A body and what of it standing needs."""
+    """A body and its quantities that stance needs."""
 
     model: BodyModel
     mass_kg: Array  # (segments,)
@@ -62,7 +62,7 @@ class Person:
         return pose_segments(self.model, poses.root_R, poses.root_t, poses.joint_angles)
 
     def centre_of_mass(self, poses: Poses) -> Array:
-        """Return where the centre of mass is: (n, 3) world [m]."""
+        """Return the centre of mass: (n, 3) world [m]."""
         R, t = self.pose_segments(poses)
         return np.einsum(
             "s,nsi->ni", self.mass_kg / self.mass_kg.sum(), np.einsum("nsij,sj->nsi", R, self.centre_m) + t
@@ -74,16 +74,16 @@ class Person:
         local = {mark.name: (mark.segment, mark.position_m) for mark in self.model.landmarks}
         tip = self.leg.foot_centre_m - [0, self.leg.foot_half_length_m, 0]
         local |= {f"toe_{side}": (f"foot_{side}", tip) for side in _SIDES}
-        found = {}
-        for name, (segment, place) in local.items():
+        positions = {}
+        for name, (segment, point) in local.items():
             k = self.model.index_of(segment)
-            found[name] = R[:, k] @ place + t[:, k]
-        return found
+            positions[name] = R[:, k] @ point + t[:, k]
+        return positions
 
 
 @lru_cache(maxsize=64)
 def measure_person(model: BodyModel) -> Person:
-    """Measure a `human18`."""
+    """Collect the segment masses and leg sizes of a `human18`."""
     mass, centres, _ = segment_inertias(model)
     segment = {each.name: each for each in model.segments}
     foot = segment["foot_left"].parts[0]
@@ -100,22 +100,22 @@ def measure_person(model: BodyModel) -> Person:
     return Person(model, mass, centres, leg, hips, joints)
 
 
-def solve_stance(person: Person, root_R: Array, joint_angles: Array, feet: Feet, centre: Array) -> Poses:
-    """Put the root where legs from the hips to the feet bring the centre of mass to `centre` (n, 3) [m].
+def solve_stance(person: Person, root_R: Array, joint_angles: Array, *, feet: Feet, centre: Array) -> Poses:
+    """Solve for the root and leg angles that put the feet in place and the centre of mass at `centre` (n, 3) [m].
 
-    `joint_angles` (n, 17, 3) are those of all other joints; the legs' are found. NaN where a leg is too short.
+    `joint_angles` (n, 17, 3) are those of all other joints. NaN where a leg is too short.
     """
     angles, root, n = np.array(joint_angles, float), np.array(centre, float), len(centre)
     R_pelvis, hips = np.concatenate([root_R, root_R]), np.concatenate([root_R @ hip for hip in person.hips_m])
     ankles, R_feet = feet.ankle.reshape(2 * n, 3), feet.R.reshape(2 * n, 3, 3)
     short = np.zeros(2 * n)
     for _ in range(_MOST_ITERATIONS):
-        legs, short = leg_angles(person.leg, R_pelvis, hips + np.concatenate([root, root]), ankles, R_feet)
+        legs, short = leg_angles(person.leg, R_pelvis, hips + np.concatenate([root, root]), ankle=ankles, R_foot=R_feet)
         angles[:, person.joints[0]], angles[:, person.joints[1]] = legs[:n], legs[n:]
-        off = centre - person.centre_of_mass(Poses(root_R, root, angles))
-        if np.abs(off).max(initial=0.0) < _TOLERANCE_M:
+        error = centre - person.centre_of_mass(Poses(root_R, root, angles))
+        if np.abs(error).max(initial=0.0) < _TOLERANCE_M:
             break
-        root = root + _OVER_RELAXATION * off
+        root = root + _OVER_RELAXATION * error
     angles[np.any(short.reshape(2, n) > _TOO_SHORT_M, axis=0)] = np.nan
     return Poses(root_R, root, angles)
 
@@ -129,19 +129,19 @@ def upper_body_angles(
     elbows: tuple[float, float] = (10.0, 10.0),
     abduction: float = 8.0,
 ) -> Array:
-    """Return joint angles (17, 3) [rad] of a bent trunk and of arms raised forward, the left first; all in degrees.
+    """Return joint angles (17, 3) [rad] of a flexed trunk and of arms raised forward, the left first; given in degrees.
 
-    `abduction` is how far the arms go outward. The legs stay straight.
+    `abduction` is that of the arms. The legs stay straight.
     """
     angles = np.zeros((len(person.model.segments) - 1, 3))
 
-    def put(segment: str, x: float, y: float = 0.0) -> None:
+    def set_angles(segment: str, x: float, y: float = 0.0) -> None:
         angles[person.model.index_of(segment) - 1, :2] = x, y
 
-    put("torso", 0.6 * trunk)
-    put("chest", 0.4 * trunk)
-    put("head", head)
+    set_angles("torso", 0.6 * trunk)
+    set_angles("chest", 0.4 * trunk)
+    set_angles("head", head)
     for side, sign, arm, elbow in zip(_SIDES, (-1, 1), arms, elbows, strict=True):
-        put(f"upper_arm_{side}", -arm, sign * abduction)
-        put(f"forearm_{side}", -elbow)
+        set_angles(f"upper_arm_{side}", -arm, sign * abduction)
+        set_angles(f"forearm_{side}", -elbow)
     return np.radians(angles)

@@ -1,4 +1,4 @@
-"""The hall's cameras: corners and middle behind the blockers' team, and how far their calibration is off."""
+"""The hall's cameras: corners and middle behind the blockers' team, and the error of their calibration."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ _FOCAL_PX = (1600.0, 1720.0)
 
 
 def hall_rig(rng: np.random.Generator, n_cameras: int) -> Rig:
-    """Place 2 to 6 cameras; two are the corners'. Raises TrialError for other numbers."""
+    """Place 2 to 6 cameras, the first two in the corners. Raises TrialError for other numbers."""
     if not 2 <= n_cameras <= len(_POSITIONS_M):
         raise TrialError(f"{n_cameras} cameras were asked for; give 2 to {len(_POSITIONS_M)}")
     return Rig(
         tuple(
             camera_looking_at(
                 f"cam{k + 1}",
-                place + rng.normal(0, _POSITION_SD_M, 3),
+                position + rng.normal(0, _POSITION_SD_M, 3),
                 _TARGET_M + rng.normal(0, _TARGET_SD_M, 3),
                 rng.uniform(*_FOCAL_PX),
                 SIZE,
             )
-            for k, place in enumerate(_POSITIONS_M[:n_cameras])
+            for k, position in enumerate(_POSITIONS_M[:n_cameras])
         )
     )
 
 
 def perturb_calibration(rng: np.random.Generator, rig: Rig, error_px: float) -> Rig:
-    """Return the cameras as a calibration finds them: turned about their centres.
+    """Return the cameras with calibration errors: rotated about their centres.
 
     The middle of the picture is off by a normal deviate of sd `error_px` to the right, and another down; the picture
     is turned so that its corners are off by as much again.
@@ -48,6 +48,6 @@ def perturb_calibration(rng: np.random.Generator, rig: Rig, error_px: float) -> 
 
 def _perturb_rotation(rng: np.random.Generator, camera: Camera, error_px: float) -> Camera:
     focal, corner = camera.K[0, 0], float(np.hypot(*camera.size)) / 2
-    off = Rotation.from_rotvec(rng.normal(0, 1, 3) * error_px / np.array([focal, focal, corner]))
-    turn = RigidTransform.from_components(np.zeros(3), off)
-    return replace(camera, camera_from_world=turn * camera.camera_from_world)
+    error = Rotation.from_rotvec(rng.normal(0, 1, 3) * error_px / np.array([focal, focal, corner]))
+    rotation = RigidTransform.from_components(np.zeros(3), error)
+    return replace(camera, camera_from_world=rotation * camera.camera_from_world)

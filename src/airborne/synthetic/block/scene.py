@@ -43,17 +43,17 @@ _APPROACHES: tuple[Approach, ...] = ("static", "shuffle", "crossover")
 class Difficulty:
     """How hard a recording is."""
 
-    colour_similarity: float = 0.8  # of the opponents' legs to the blockers': 0 all their own, 1 the same clothes
-    occlusion: float = 0.35  # chance that another player stands in the way of a camera, or behind a blocker's legs
+    colour_similarity: float = 0.8  # of the opponents' legs to the blockers': 0 none, 1 the same clothes
+    occlusion: float = 0.35  # probability that another player occludes a view, or stands behind a blocker's legs
     frame_rate: int = 60  # [1/s]: 30, 60 or 120
     n_cameras: int = 3  # 2 to 6
     calibration_error_px: float = 0.5  # sd to the right, and down
-    torso_noise_m: float = 0.025  # sd of the torso's given path, each axis
+    torso_noise_m: float = 0.025  # sd of the torso's input path, each axis
     start_noise_m: float = 0.015  # sd of the joints set by hand, each axis
     noise_sd: float = 3.0  # of the sensor [grey levels]
-    gain_spread: float = 0.08  # greatest change of a camera's brightness, and of its red and blue
+    gain_spread: float = 0.08  # largest change of a camera's gain, and of its red and blue
     jpeg_quality: int = 85  # 0: no compression
-    shadow: float = 0.35  # of the light that is missing where a body shades the floor most
+    shadow: float = 0.35  # largest share of light missing in a body's shadow
 
     def __post_init__(self) -> None:
         for name in ("colour_similarity", "occlusion", "shadow"):
@@ -75,19 +75,19 @@ DIFFICULTIES = {"easy": _EASY, "default": Difficulty(), "hard": _HARD}
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BlockScene:
-    """Players at the net and how they are recorded."""
+    """Players at the net, and how they are recorded."""
 
     name: str
-    seed: int  # of everything random
+    seed: int  # of all random numbers
     rig: Rig  # the true cameras
-    calibrated_rig: Rig  # the cameras as they are told
+    calibrated_rig: Rig  # the cameras as calibrated
     players: tuple[Player, ...]  # blockers first
     n_frames: int
     difficulty: Difficulty = field(default_factory=Difficulty)
 
     @property
     def rate(self) -> Fraction:
-        """Pictures of each camera [1/s]."""
+        """Frame rate of the cameras [1/s]."""
         return Fraction(self.difficulty.frame_rate)
 
     @property
@@ -97,7 +97,7 @@ class BlockScene:
 
     @property
     def blockers(self) -> tuple[Player, ...]:
-        """The players whose legs are looked for."""
+        """The players whose legs are tracked."""
         return tuple(player for player in self.players if player.role == "blocker")
 
 
@@ -110,7 +110,8 @@ def block_scene(
 ) -> BlockScene:
     """Draw a block of one to three players against a spiker, with decoys and three team mates in defence.
 
-    `n_frames` is 82 at 60 frames/s and as long at others, unless given. Raises TrialError for an unusable number.
+    `n_frames` defaults to 82 at 60 frames/s, and to the same duration at other rates. Raises TrialError for an unusable
+    number.
     """
     difficulty = difficulty or Difficulty()
     if not 1 <= n_blockers <= 3:
@@ -121,9 +122,9 @@ def block_scene(
     rng = np.random.default_rng([seed, 21])
     rig = hall_rig(rng, difficulty.n_cameras)
     calibrated_rig = perturb_calibration(rng, rig, difficulty.calibration_error_px)
-    lasts_s = n_frames / difficulty.frame_rate
-    blockers = _draw_block(rng, n_blockers, lasts_s)
-    players = _add_others(rng, blockers, rig, lasts_s, difficulty)
+    duration_s = n_frames / difficulty.frame_rate
+    blockers = _draw_block(rng, n_blockers, duration_s)
+    players = _add_others(rng, blockers, rig, duration_s=duration_s, difficulty=difficulty)
     return BlockScene(
         name=f"block jump {seed}",
         seed=seed,
@@ -156,61 +157,64 @@ def paper_lengths(rng: np.random.Generator) -> tuple[NDArray[np.integer], NDArra
     return counts, n_blockers
 
 
-def _draw_block(rng: np.random.Generator, n_blockers: int, lasts_s: float) -> list[Player]:
-    """Draw blockers side by side, as near to each other as bodies allow; they come the same way."""
-    first_s = float(rng.uniform(0.5, 0.62)) * (lasts_s - _FLIGHT_S)
+def _draw_block(rng: np.random.Generator, n_blockers: int, duration_s: float) -> list[Player]:
+    """Draw blockers side by side, as near to each other as bodies allow; all approach from the same side."""
+    first_s = float(rng.uniform(0.5, 0.62)) * (duration_s - _FLIGHT_S)
     approach = _APPROACHES[rng.choice(3, p=[0.4, 0.4, 0.2])]
     direction = float(rng.choice([-1.0, 1.0]))
     x = float(rng.uniform(*_POSITION_RANGE_M)) - 0.35 * (n_blockers - 1)
-    found: list[Player] = []
+    blockers: list[Player] = []
     for k in range(n_blockers):
         takeoff_s = first_s + (float(rng.uniform(0, _SPREAD_S)) if k else 0.0)
         player = _draw_until(
-            lambda name=f"blocker{k + 1}", place=x, takeoff_s=takeoff_s: draw_blocker(
-                rng, name, place, takeoff_s=takeoff_s, approach=approach, direction=direction, lasts_s=lasts_s
+            lambda name=f"blocker{k + 1}", x=x, takeoff_s=takeoff_s: draw_blocker(
+                rng, name, x, takeoff_s=takeoff_s, approach=approach, direction=direction, duration_s=duration_s
             )
         )
-        while found and gap_m(occupied_volume(player, lasts_s), occupied_volume(found[-1], lasts_s)) < CLEARANCE_M:
+        while (
+            blockers
+            and gap_m(occupied_volume(player, duration_s), occupied_volume(blockers[-1], duration_s)) < CLEARANCE_M
+        ):
             player = player.translate(np.array([_WIDER_M, 0.0]))
             x += _WIDER_M
-        found.append(player)
+        blockers.append(player)
         x += float(rng.uniform(*_SPACING_M))
-    return found
+    return blockers
 
 
 def _add_others(
-    rng: np.random.Generator, blockers: list[Player], rig: Rig, lasts_s: float, difficulty: Difficulty
+    rng: np.random.Generator, blockers: list[Player], rig: Rig, *, duration_s: float, difficulty: Difficulty
 ) -> tuple[Player, ...]:
     """Add a spiker, one or two decoys and three team mates, each where there is room."""
     players = list(blockers)
     similarity = difficulty.colour_similarity
-    spot = np.mean([_position(player) for player in blockers], axis=0)
+    block_xy = np.mean([_position(player) for player in blockers], axis=0)
     hit_s = float(np.mean([player.takeoff_s or 0.0 for player in blockers])) - float(rng.uniform(0.02, 0.15))
 
     def spiker() -> Player:
-        x = spot[0] + _lateral_offset(rng, difficulty.occlusion)
-        return draw_attacker(rng, "spiker", x, takeoff_s=hit_s, similarity=similarity, lasts_s=lasts_s)
+        x = block_xy[0] + _lateral_offset(rng, difficulty.occlusion)
+        return draw_attacker(rng, "spiker", x, takeoff_s=hit_s, similarity=similarity, duration_s=duration_s)
 
     def decoy(name: str) -> Player:
-        place = np.array([spot[0] + _lateral_offset(rng, difficulty.occlusion), rng.uniform(0.7, 1.6)])
-        return draw_bystander(rng, name, place, is_opponent=True, similarity=similarity, lasts_s=lasts_s)
+        position = np.array([block_xy[0] + _lateral_offset(rng, difficulty.occlusion), rng.uniform(0.7, 1.6)])
+        return draw_bystander(rng, name, position, is_opponent=True, similarity=similarity, duration_s=duration_s)
 
     def mate(name: str) -> Player:
-        place = _defence_position(rng, spot, rig, difficulty.occlusion)
-        return draw_bystander(rng, name, place, is_opponent=False, similarity=similarity, lasts_s=lasts_s)
+        position = _defence_position(rng, block_xy, rig, difficulty.occlusion)
+        return draw_bystander(rng, name, position, is_opponent=False, similarity=similarity, duration_s=duration_s)
 
     draws = [spiker, *(partial(decoy, f"opponent{k}") for k in range(2, 3 + int(rng.integers(1, 3))))]
     draws += [partial(mate, f"mate{k}") for k in (1, 2, 3)]
-    rooms = [occupied_volume(player, lasts_s) for player in players]
+    volumes = [occupied_volume(player, duration_s) for player in players]
     for draw in draws:
-        player = _draw_until(draw, lambda drawn: _has_room(occupied_volume(drawn, lasts_s), rooms))
+        player = _draw_until(draw, lambda drawn: _is_clear(occupied_volume(drawn, duration_s), volumes))
         players.append(player)
-        rooms.append(occupied_volume(player, lasts_s))
+        volumes.append(occupied_volume(player, duration_s))
     return tuple(players)
 
 
 def _draw_until(draw: Callable[[], Player], is_good: Callable[[Player], bool] = lambda _: True) -> Player:
-    """Draw until a player can do what was drawn and is where he may be."""
+    """Draw players until one has a possible movement and passes the check."""
     for _ in range(_TRIES):
         try:
             player = draw()
@@ -221,35 +225,35 @@ def _draw_until(draw: Callable[[], Player], is_good: Callable[[Player], bool] = 
     raise TrialError("no room was found for all players; use another seed")
 
 
-def _has_room(room: Capsules, others: Sequence[Capsules]) -> bool:
-    """Say whether a player's room meets no other's; those far away are not looked at closely."""
-    middle = room[0][0].mean(axis=0)[:2]
+def _is_clear(volume: Capsules, others: Sequence[Capsules]) -> bool:
+    """Say whether a player's volume is clear of all others; distant ones are not checked closely."""
+    middle = volume[0][0].mean(axis=0)[:2]
     near = [other for other in others if np.linalg.norm(other[0][0].mean(axis=0)[:2] - middle) < _NEAR_M]
-    return all(gap_m(room, other) >= CLEARANCE_M for other in near)
+    return all(gap_m(volume, other) >= CLEARANCE_M for other in near)
 
 
 def _position(player: Player) -> Array:
-    """Return where a player is when things happen: (2,) [m]."""
+    """Return a player's position at take-off, or at time 0: (2,) [m]."""
     return player.poses(np.array([player.takeoff_s or 0.0])).root_t[0, :2]
 
 
 def _lateral_offset(rng: np.random.Generator, occlusion: float) -> float:
-    """Draw how far along the net an opponent is from the block [m]: behind it, or off to a side."""
+    """Draw an opponent's offset from the block along the net [m]: behind it, or to one side."""
     if rng.random() < occlusion:
         return float(rng.uniform(-0.35, 0.35))
     return float(rng.choice([-1.0, 1.0]) * rng.uniform(0.8, 2.4))
 
 
-def _defence_position(rng: np.random.Generator, spot: Array, rig: Rig, occlusion: float) -> Array:
-    """Draw where a team mate stands (2,) [m]: in the way of one of the cameras, or out of the way of all."""
+def _defence_position(rng: np.random.Generator, block_xy: Array, rig: Rig, occlusion: float) -> Array:
+    """Draw a team mate's position (2,) [m]: occluding one of the cameras, or none of them."""
     centres = np.array([camera.centre[:2] for camera in rig])
-    rays = (centres - spot) / np.linalg.norm(centres - spot, axis=1, keepdims=True)
+    rays = (centres - block_xy) / np.linalg.norm(centres - block_xy, axis=1, keepdims=True)
     if rng.random() < occlusion:
         ray = rays[int(rng.integers(min(len(rays), 3)))]
-        return spot + ray * (rng.uniform(1.9, 2.8) / max(-ray[1], 0.4)) + rng.normal(0, 0.12, 2)
+        return block_xy + ray * (rng.uniform(1.9, 2.8) / max(-ray[1], 0.4)) + rng.normal(0, 0.12, 2)
     while True:
-        place = np.array([rng.uniform(-4.0, 4.0), rng.uniform(-7.0, -3.0)])
-        off = place - spot
-        beside = np.abs(rays[:, 0] * off[1] - rays[:, 1] * off[0])
-        if np.all(beside > _OUT_OF_WAY_M):
-            return place
+        position = np.array([rng.uniform(-4.0, 4.0), rng.uniform(-7.0, -3.0)])
+        offset = position - block_xy
+        distance = np.abs(rays[:, 0] * offset[1] - rays[:, 1] * offset[0])
+        if np.all(distance > _OUT_OF_WAY_M):
+            return position

@@ -1,4 +1,4 @@
-"""What is true of a block scene, and what a person or another tracker would tell of it."""
+"""The truth of a block scene, and simulated inputs: hand-set starts and tracked torsos."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ def true_joints(player: Player, time_s: Array) -> dict[str, Array]:
     hips and shoulders.
     """
     marks = player.movement.person.landmarks(player.poses(time_s))
-    found = {name: marks[name] for name in TRUTH_JOINTS.values()}
-    return found | {"torso": np.mean([marks[name] for name in _TORSO_OF], axis=0)}
+    joints = {name: marks[name] for name in TRUTH_JOINTS.values()}
+    return joints | {"torso": np.mean([marks[name] for name in _TORSO_OF], axis=0)}
 
 
 def noisy_starts(scene: BlockScene) -> dict[str, dict[str, Array]]:
-    """Return what is set by hand in the first frame: player -> joint -> (3,) [m], blockers first.
+    """Return the joints as set by hand in the first frame: player -> joint -> (3,) [m], blockers first.
 
     Blockers have their torso, hips, knees, ankles and feet, the others their torso only; each coordinate is off by a
     normal deviate of sd `start_noise_m`.
     """
     rng = np.random.default_rng([scene.seed, 24])
-    found = {}
+    starts = {}
     for player in scene.players:
         true = true_joints(player, np.zeros(1))
         names = ("torso", *_START_JOINTS) if player.role == "blocker" else ("torso",)
-        found[player.name] = {name: true[name][0] + rng.normal(0, scene.difficulty.start_noise_m, 3) for name in names}
-    return found
+        starts[player.name] = {name: true[name][0] + rng.normal(0, scene.difficulty.start_noise_m, 3) for name in names}
+    return starts
 
 
 def torso_input(scene: BlockScene) -> Array:
-    """Return all players' torsos as a tracker of torsos gives them: (frames, players, 3) [m].
+    """Return all players' torsos as from a torso tracker: (frames, players, 3) [m].
 
     The truth with an error of sd `torso_noise_m` for each coordinate, correlated by 0.8 from frame to frame.
     """
@@ -59,7 +59,7 @@ def torso_input(scene: BlockScene) -> Array:
 
 
 def jump_truth(player: Player, rate_hz: float) -> dict[str, float]:
-    """Return what is true of a player's jump; frames are fractions, counted from the recording's first [frame].
+    """Return the truth of a player's jump; frames are fractions, counted from the recording's first [frame].
 
     Rises of hips and feet (ankles) are from the upright stand on level soles to the peak.
     """

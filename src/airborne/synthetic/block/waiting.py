@@ -13,7 +13,7 @@ from airborne.synthetic.block.posture import measure_person
 from airborne.synthetic.block.steps import approach_steps, feet_midpoints, foot_path, foot_placements
 from airborne.types import Array
 
-_TOES_OUT_RAD, _TOES_PER_WIDTH, _NARROW_M = 0.2, 1.2, 0.35  # wide stances turn the toes out: [rad], [rad/m]
+_TOES_OUT_RAD, _TOES_PER_WIDTH, _NARROW_M = 0.2, 1.2, 0.35  # wide stances rotate the toes outward: [rad], [rad/m]
 _SWAY_S, _SWAY_M = 0.45, 0.02  # between turning points; sd of the centre of mass there
 
 
@@ -21,14 +21,14 @@ _SWAY_S, _SWAY_M = 0.45, 0.02  # between turning points; sd of the centre of mas
 class WaitPlan:
     """How a player waits; time 0 is the scene's."""
 
-    position: Array  # (2,) x, y of the feet's middle after any steps [m]
-    yaw: float  # turn about z: 0 faces -y, pi faces +y [rad]
+    position: Array  # (2,) x, y of the feet's midpoint after any steps [m]
+    yaw: float  # about z: 0 faces -y, pi faces +y [rad]
     knee: float = 40.0  # [degrees]
     width_m: float = 0.4
     approach_m: float = 0.0  # of a shuffle along x that ends at `arrival_s`
     arrival_s: float = 0.5
-    lasts_s: float = 3.0
-    hold: KeyPosture = READY
+    duration_s: float = 3.0
+    posture: KeyPosture = READY
 
 
 def wait(rng: np.random.Generator, model: BodyModel, plan: WaitPlan) -> Movement:
@@ -36,27 +36,27 @@ def wait(rng: np.random.Generator, model: BodyModel, plan: WaitPlan) -> Movement
     person = measure_person(model)
     forward = np.array([np.sin(plan.yaw), -np.cos(plan.yaw)])
     toes_out = _TOES_OUT_RAD + _TOES_PER_WIDTH * (plan.width_m - _NARROW_M)
-    places = foot_placements(plan.position, plan.yaw, plan.width_m, toes_out)
-    first = places - [plan.approach_m, 0.0, 0.0]
-    steps = approach_steps("shuffle", first, places, plan.arrival_s)
+    placements = foot_placements(plan.position, plan.yaw, plan.width_m, toes_out)
+    first = placements - [plan.approach_m, 0.0, 0.0]
+    steps = approach_steps("shuffle", first, placements, plan.arrival_s)
     over = plan.position + CENTRE_AHEAD_M * forward
-    level = centre_height(person, plan.hold, places, over=over, yaw=plan.yaw, knee=np.radians(plan.knee))
+    level = centre_height(person, plan.posture, placements, over=over, yaw=plan.yaw, knee=np.radians(plan.knee))
     knots = (
         [(t, middle + CENTRE_AHEAD_M * forward) for t, middle in feet_midpoints(first, steps)]
         if steps
         else [(0.0, over)]
     )
-    times = np.arange(knots[-1][0] + _SWAY_S, max(knots[-1][0], plan.lasts_s) + 3 * _SWAY_S, _SWAY_S)
+    times = np.arange(knots[-1][0] + _SWAY_S, max(knots[-1][0], plan.duration_s) + 3 * _SWAY_S, _SWAY_S)
     knots += [(float(t), over + rng.normal(0, _SWAY_M, 2)) for t in times]
     heights = [level - abs(rng.normal(0, _SWAY_M)) for _ in times]
     upper_body = UpperBody(
         yaw=minimum_jerk([0.0, 1.0], [plan.yaw, plan.yaw]),
-        pitch=minimum_jerk([0.0, 1.0], [np.radians(plan.hold.pitch)] * 2),
-        trunk=minimum_jerk([0.0, 1.0], [plan.hold.angles(person)] * 2),
+        pitch=minimum_jerk([0.0, 1.0], [np.radians(plan.posture.pitch)] * 2),
+        trunk=minimum_jerk([0.0, 1.0], [plan.posture.angles(person)] * 2),
         arms=minimum_jerk([0.0, 1.0], [np.zeros((len(model.segments) - 1, 3))] * 2),
     )
     stand = StancePhase(
-        monotone_curve([t for t, _ in knots], [place for _, place in knots]),
+        monotone_curve([t for t, _ in knots], [point for _, point in knots]),
         monotone_curve(list(times), heights),
         tuple(foot_path(side, first[side], steps) for side in (0, 1)),
     )

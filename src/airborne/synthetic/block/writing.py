@@ -28,7 +28,7 @@ def write_block(folder: Path, scene: BlockScene, *, overwrite: bool = False, pro
 
     `<camera>.mp4`, `calib.toml` (the calibrated cameras), `calib_true.toml` where they differ, `first_frame.json` and
     `trial.toml` (the start set by hand), `truth.csv` (the joints of all players) and `players.json` (clothes, and the
-    truth of the jumps). `progress` is told after every frame. Raises TrialError for a folder that holds anything,
+    truth of the jumps). `progress` is called after every frame. Raises TrialError for a folder that holds anything,
     unless `overwrite`: then files of these names are replaced.
     """
     require_empty(folder, overwrite)
@@ -56,7 +56,7 @@ def block_toml(scene: BlockScene, starts: dict[str, dict[str, Array]]) -> str:
     lines += [f"[start]                # joints set by hand, {off}", "frame = 0"]
     for player, joints in starts.items():
         lines += ["", "[[start.player]]", f"name = {json.dumps(player)}", "[start.player.joints_m]"]
-        lines += [f"{joint} = {np.round(place, 4).tolist()}" for joint, place in joints.items()]
+        lines += [f"{joint} = {np.round(position, 4).tolist()}" for joint, position in joints.items()]
     return "\n".join(lines) + "\n"
 
 
@@ -68,7 +68,7 @@ def _first_frame(scene: BlockScene, starts: dict[str, dict[str, Array]]) -> dict
         "note": f"set by hand: {1000 * scene.difficulty.start_noise_m:.0f} mm (one sigma, each axis) off; "
         "foot = ball of the foot; torso = mean of hips and shoulders",
         "blockers": {
-            player: {_TRUTH_NAMES[joint]: np.round(place, 4).tolist() for joint, place in joints.items()}
+            player: {_TRUTH_NAMES[joint]: np.round(position, 4).tolist() for joint, position in joints.items()}
             for player, joints in starts.items()
             if player in blockers
         },
@@ -78,7 +78,7 @@ def _first_frame(scene: BlockScene, starts: dict[str, dict[str, Array]]) -> dict
 def _player_record(player: Player, scene: BlockScene) -> dict:
     clothes = ("skin", "hair", "shorts", "shirt", "socks", "shoes")
     colours = {name: np.round(getattr(player.outfit, name)).astype(int).tolist() for name in clothes}
-    found = {
+    record = {
         "name": player.name,
         "role": player.role,
         "stature_m": round(player.stature_m, 3),
@@ -86,17 +86,17 @@ def _player_record(player: Player, scene: BlockScene) -> dict:
         "jumps": player.takeoff_s is not None,
         "colours_srgb": colours,
     }
-    return found | ({} if player.takeoff_s is None else {"jump": jump_truth(player, float(scene.rate))})
+    return record | ({} if player.takeoff_s is None else {"jump": jump_truth(player, float(scene.rate))})
 
 
 def _write_truth(path: Path, scene: BlockScene) -> None:
     columns = [*TRUTH_JOINTS, "torso"]
-    places = [true_joints(player, scene.times_s) for player in scene.players]
+    joints_by_player = [true_joints(player, scene.times_s) for player in scene.players]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["frame", "time_s", "player", *(f"{name}_{axis}" for name in columns for axis in "xyz")])
         for i, time in enumerate(scene.times_s):
-            for player, joints in zip(scene.players, places, strict=True):
+            for player, joints in zip(scene.players, joints_by_player, strict=True):
                 numbers = np.concatenate([joints[TRUTH_JOINTS.get(name, name)][i] for name in columns])
                 writer.writerow([i, repr(float(time)), player.name, *(f"{number:.6f}" for number in numbers)])
 

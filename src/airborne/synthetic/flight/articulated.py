@@ -119,7 +119,7 @@ def fly_articulated(
 
 
 def with_fixed_joints(model: BodyModel, flight: SampledFlight, joint_angles: Array) -> SampledFlight:
-    """Return the flight with the root as it is and the joints fixed at the angles (joints, 3) [rad] (paper B, "Method").
+    """Return the flight with the same root and the joints fixed at the angles (joints, 3) [rad] (paper B, "Method").
 
     Such a body has another centre of mass than the one that flew, and its angular momentum is not constant: NaN.
     """

@@ -142,10 +142,10 @@ def somersault_scene(
     """Return a half-twisting somersault seen by three cameras, front, side and top, 768 x 576.
 
     "paper": 11 poses of one shape, one colour a segment, as paper B has it; "moving-arms": 50 frames/s, with the arm
-    movements that cause the twist; "pike": hips, knees and trunk too. The rendered body is a smooth skin or the tracker's own
-    ellipsoids. "exact" images are rendered in the tracker's light, on black; those of the "gym" are as cameras in a
-    hall record them. The seed varies the start, the noise, the lamps and the background, where `clutter` boxes stand
-    along either wall.
+    movements that cause the twist; "pike": hips, knees and trunk too. The rendered body is a smooth skin or the
+    tracker's own ellipsoids. "exact" images are rendered in the tracker's light, on black; those of the "gym" are as
+    cameras in a hall record them. The seed varies the start, the noise, the lamps and the background, where `clutter`
+    boxes stand along either wall.
     Raises TrialError for an unknown choice. Source: paper B, "Method".
     """
     for value, choices, name in (
@@ -253,7 +253,7 @@ def _launch(skill: Skill, flight: SampledFlight) -> Skill:
     about = flight.position - flight.centre  # of the root about the centre of mass, whatever the duration
 
     def path(x: Array) -> Array:
-        """Return the root's positions for distances along x and -y [m] and a duration [s]; take-off is at `about[0]`."""
+        """Return the root's path for distances along x and -y [m] and a duration [s]; take-off is at `about[0]`."""
         rise = g * x[2] ** 2 / 2 * (time - time**2) - time * (about[-1, 2] - about[0, 2])
         return about + np.column_stack([x[0] * time, -x[1] * time, rise])
 

@@ -17,7 +17,7 @@ from airborne.video import Frames, View
 
 
 def exact_frames(scene: Scene, lights: Lights) -> Iterator[Frames]:
-    """Render the scene frame by frame: no antialiasing, blur, exposure or shadows; noise is white, alike in all colours.
+    """Render the scene frame by frame: no antialiasing, blur, exposure or shadows; white noise.
 
     The surroundings are rendered in the same light; where there are none, images are black.
     """

@@ -13,9 +13,7 @@ from airborne.body import Box, Ellipsoid, Part, PosedBody
 from airborne.types import Array
 
 _CLEARANCE_M = 1e-3  # a surface does not occlude itself
-_CORE = (
-    0.93  # share of an ellipsoid's size that blocks light: a smooth skin lies partly inside its ellipsoid
-)
+_CORE = 0.93  # share of an ellipsoid's size that blocks light: a smooth skin lies partly inside its ellipsoid
 _NOTHING = np.zeros((0, 3, 4))
 
 
@@ -146,7 +144,11 @@ def _trace_ellipsoids(points, target, ellipsoids, out):
             continue
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         for e in range(len(ellipsoids)):
-            inside, along, length2 = -1.0, 0.0, 0.0  # |p|^2 - 1, p.d and |d|^2 of the point p and the ray d to the target
+            inside, along, length2 = (
+                -1.0,
+                0.0,
+                0.0,
+            )  # |p|^2 - 1, p.d and |d|^2 of the point p and the ray d to the target
             for k in range(3):
                 p = ellipsoids[e, k, 0] * x + ellipsoids[e, k, 1] * y + ellipsoids[e, k, 2] * z + ellipsoids[e, k, 3]
                 d = ends[e, k] - p

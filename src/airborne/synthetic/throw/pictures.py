@@ -92,7 +92,8 @@ def background(scene: Scene, camera: Camera) -> Background:
     visible = visible_surface(surface_arrays(scene.surroundings), posed, _supersample(camera, n, (0, 0, width, height)))
     boxes = boxes_of(posed)
     spots = [
-        spot_irradiance(spot, visible.points, visible.normals) * is_lit(visible.points, visible.normals, spot, boxes)[:, None]
+        spot_irradiance(spot, visible.points, visible.normals)
+        * is_lit(visible.points, visible.normals, spot, boxes)[:, None]
         for spot in scene.spots
     ]
     points, normals = (_mean(_scatter(values, visible.mask), n) for values in (visible.points, visible.normals))
@@ -102,7 +103,7 @@ def background(scene: Scene, camera: Camera) -> Background:
 
 
 def linear_image(scene: Scene, backdrop: Background, bodies: Sequence[PosedBody]) -> NDArray[np.float32]:
-    """Render the whole frame (h, w, 3) in linear light: the mean of the posed bodies, over the background with its shadow."""
+    """Render the whole frame (h, w, 3) in linear light: the mean of the posed bodies over the background."""
     light = _cast_shadow(scene, backdrop, bodies[len(bodies) // 2])
     x0, y0, x1, y1 = _region(scene.body, bodies, backdrop.camera)
     if x1 > x0 and y1 > y0:
@@ -192,7 +193,9 @@ def _corners(shape: SurfaceArrays) -> tuple[NDArray[np.int64], Array]:
     round_ellipsoids = shape.ellipsoid_centre[:, None] + np.einsum("eij,cj->eci", axes, _SIGNS)
     of_ellipsoids = np.repeat(shape.ellipsoid_segment, len(_SIGNS))
     of_polygons = np.repeat(shape.polygon_segment, np.diff(shape.start))
-    return np.concatenate([of_polygons, of_ellipsoids]), np.concatenate([shape.corners, round_ellipsoids.reshape(-1, 3)])
+    return np.concatenate([of_polygons, of_ellipsoids]), np.concatenate(
+        [shape.corners, round_ellipsoids.reshape(-1, 3)]
+    )
 
 
 @lru_cache(maxsize=4)

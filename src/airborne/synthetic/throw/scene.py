@@ -64,7 +64,7 @@ class Scene:
     name: str
     seed: int  # of all random numbers
     rig: Rig  # cameras without distortion
-    body: BodyModel  # as drawn
+    body: BodyModel  # as rendered
     flight: FlightModel  # the true motion at given times
     surroundings: BodyModel | None  # static, in world coordinates; the body flies before them; None: black
     spots: tuple[Spot, ...] = ()
