@@ -15,14 +15,11 @@ import numpy as np
 from airborne.appearance.model import Appearance, Region
 from airborne.body import Pose, PosedBody
 from airborne.tracking.covariance import covariance_of
+from airborne.tracking.model_based.blur import gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, PosePrior
+from airborne.tracking.model_based.kernel_arguments import Comparison, Paint
 from airborne.tracking.model_based.normal_equations import (
-    Sums,
-    add_score_covariance,
-    gaussian_taps,
     known_light_equations,
-    map_equations,
-    new_blocks,
     photometric_equations,
     silhouette_equations,
 )
@@ -33,6 +30,7 @@ from airborne.tracking.model_based.render_model import (
     shift_sds_px,
     silhouette_buffers,
 )
+from airborne.tracking.model_based.twist_equations import Sums, add_score_covariance, map_equations, new_blocks
 from airborne.types import Array
 
 PyramidLevels = Sequence[tuple[int, int]]
@@ -122,8 +120,8 @@ def fit_silhouettes(
             sums, totals, blocks = Sums.zero(n), np.zeros(3), []
             for view in views:
                 blocks.append(_blocks(view, n))
-                comparison = view.window, taps, taps, _CLIP_MASK
-                args = render_model.body, _projection(posed, view), view.observation, comparison, view.maps
+                comparison = Comparison(view.window, taps, taps, _CLIP_MASK)
+                args = render_model.body, view.projection(posed), view.observation, comparison, view.maps
                 totals += np.array(silhouette_equations(*args, sums, blocks[-1]))
             return _map_to_dofs(
                 render_model,
@@ -155,7 +153,7 @@ def fit_images(
     Of several starts, the one that ends in the best agreement with images and prior is returned.
     """
     evaluate, correlated = _image_evaluator(render_model, poses, regions, appearance, dofs=dofs)
-    most_steps = _MOST_STEPS_STIFF if len(dofs.columns) <= 6 else _MOST_STEPS
+    most_steps = _MOST_STEPS if dofs.moves_joints else _MOST_STEPS_STIFF
     ends = [
         _descend(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, tolerance=_CONVERGED)
         for pose in poses
@@ -201,7 +199,7 @@ def _image_evaluator(
                 render_model, posed, view, taps=each_taps, iterations=iterations, sums=sums, blocks=blocks[-1]
             )
             shifted.append(np.moveaxis(sums.B * shift, 2, 0))
-            if len(dofs.columns) > 6:
+            if dofs.moves_joints:
                 shifted.append(_shape_error_gradients(sums.B, posed, view))
         return _map_to_dofs(
             render_model,
@@ -229,20 +227,13 @@ def _add_image_equations(
     blocks: Array,
 ) -> Array:
     """Add one view's equations; return the cost, the weighted squared residual and the weight."""
-    comparison = view.window, *taps, _CLIP if render_model.lights is None else _CLIP_LIT
-    args = render_model.body, _projection(posed, view), view.observation, comparison, view.maps
+    comparison = Comparison(view.window, *taps, _CLIP if render_model.lights is None else _CLIP_LIT)
+    args = render_model.body, view.projection(posed), view.observation, comparison, view.maps
     if render_model.lights is None:
-        paint = render_model.albedo, render_model.is_faceted
+        paint = Paint(render_model.albedo, render_model.is_faceted)
         return np.array(photometric_equations(*args, paint, view.light, iterations, sums, blocks))
-    size = view.maps[0].shape
-    workspace = (
-        np.empty(size, np.int16),
-        np.empty(size, np.int16),
-        np.empty(size, np.float32),
-        np.empty((*size, 3), np.float32),
-    )
     lamps, ambient = view.light
-    return np.array(known_light_equations(*args, workspace, render_model.is_faceted, lamps, ambient, sums, blocks))
+    return np.array(known_light_equations(*args, render_model.is_faceted, lamps, ambient, sums, blocks))
 
 
 def _shape_error_gradients(B: Array, posed: PosedBody, view: ViewBuffers) -> Array:
@@ -256,10 +247,6 @@ def _shape_error_gradients(B: Array, posed: PosedBody, view: ViewBuffers) -> Arr
     rows = np.zeros((n, 2, n, 6))
     rows[np.arange(n), :, np.arange(n)] = np.swapaxes(B[..., :2], 1, 2) * sd_px[..., None]
     return rows.reshape(2 * n, n, 6)
-
-
-def _projection(posed: PosedBody, view: ViewBuffers) -> tuple:
-    return posed.R, posed.t, view.packed_view, view.K, posed.t[0]
 
 
 def _blocks(view: ViewBuffers, n_segments: int) -> Array:
