@@ -24,7 +24,7 @@ def test_clicks_are_given_by_camera_in_the_order_asked_for(tmp_path):
 def test_camera_without_columns_saw_nothing_and_others_do_not_matter(tmp_path):
     _, px = read_clicks(write(tmp_path, CLICKS), ["left", "above", "right"])
     assert np.isnan(px[:, 1]).all()
-    with pytest.raises(CalibrationError, match="of left of the cameras left, above; a place needs two"):
+    with pytest.raises(CalibrationError, match="of left of the cameras left, above; a position needs two"):
         read_clicks(write(tmp_path, CLICKS), ["left", "above"])
 
 

@@ -20,7 +20,7 @@ _N_STEPS = 100
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class LandmarkProblem:
     """A fit of a body's landmarks to targets."""
 
     model: BodyModel
@@ -66,7 +66,7 @@ class PoseState:
 
 
 def minimise(
-    problem: Problem, state: PoseState, free: NDArray[np.bool_], least_gain: float = _FINE_GAIN
+    problem: LandmarkProblem, state: PoseState, free: NDArray[np.bool_], least_gain: float = _FINE_GAIN
 ) -> tuple[PoseState, float]:
     """Minimise the cost over the free variables (6 + 3 joints,); return the state and its cost."""
     free_m = np.full((6, 2), [-np.inf, np.inf])
@@ -114,7 +114,7 @@ def _step(gradient: Array, hessian: Array, damping: float, *, low: Array, high: 
     return step
 
 
-def _equations(problem: Problem, state: PoseState) -> tuple[float, Array, Array]:
+def _equations(problem: LandmarkProblem, state: PoseState) -> tuple[float, Array, Array]:
     """Return half the squared residuals, their gradient and Gauss-Newton Hessian."""
     has_target, scale = problem.is_given, (problem.root_weights / problem.sd_m)[problem.is_given]
     posed = PosedBody(problem.model, *_forward_kinematics(problem.model, state))
@@ -155,12 +155,12 @@ def _forward_kinematics(model: BodyModel, state: PoseState) -> tuple[Array, Arra
     return np.stack(R, axis=-3), np.stack(t, axis=-2)
 
 
-def landmark_positions(problem: Problem, state: PoseState) -> Array:
+def landmark_positions(problem: LandmarkProblem, state: PoseState) -> Array:
     """Return the landmarks' positions: (..., landmarks, 3) world [m]."""
     R, t = _forward_kinematics(problem.model, state)
     return np.einsum("...nij,nj->...ni", R[..., problem.segments, :, :], problem.local) + t[..., problem.segments, :]
 
 
-def landmark_distances(problem: Problem, state: PoseState) -> Array:
+def landmark_distances(problem: LandmarkProblem, state: PoseState) -> Array:
     """Return the landmarks' distances from their targets: (..., landmarks) [m]; NaN without a target."""
     return np.linalg.norm(landmark_positions(problem, state) - problem.targets, axis=-1)

@@ -25,7 +25,7 @@ from airborne.trial.file import Trial
 from airborne.types import Array
 from airborne.video import Frames, Recording
 
-Progress = Callable[[str, int, int], None]  # what is being done, how far, of how many
+StageProgress = Callable[[str, int, int], None]  # what is being done, how far, of how many
 
 _N_SCENERY = 10  # further frames that show the scene without the person
 _PICTURE_NAME = "fit_body.png"
@@ -42,7 +42,7 @@ class PersonFit:
     picture: Path
 
 
-def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: Progress | None = None) -> PersonFit:
+def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: StageProgress | None = None) -> PersonFit:
     """Fit a trial's body to the person in its images; write the body file, and beside it `fit_body.png`.
 
     The joints come from the detections of the trial's [start], or for one frame from its joints_m.
@@ -134,7 +134,7 @@ def _choose_frames(trial: Trial, landmarks: dict[int, dict[str, Array]], n: int)
 
 
 def _read(
-    recording: Recording, landmarks: dict[int, dict[str, Array]], indices: Sequence[int], progress: Progress
+    recording: Recording, landmarks: dict[int, dict[str, Array]], indices: Sequence[int], progress: StageProgress
 ) -> dict[int, BodyObservation]:
     observations = {}
     with closing(iter(recording)) as stream:

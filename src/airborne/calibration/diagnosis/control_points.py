@@ -147,7 +147,7 @@ def find_outliers(solution: Solution) -> dict[int, float]:
     """Return the points that do not belong: index among the camera's points -> held-out error [px], worst first.
 
     A point is called wrong when leaving it out lowers the sum of squares by more than chance allows: an F test with 2
-    and `2 (n - 1) - k` degrees of freedom, at `CHANCE` over all points; then again without it.
+    and `2 (n - 1) - k` degrees of freedom, at `_SIGNIFICANCE` over all points; then again without it.
     """
     found: dict[int, float] = {}
     index = np.arange(len(solution.world))

@@ -25,7 +25,7 @@ from airborne.video import VideoSource, inspect
 from airborne.video.decoding import decode, rgb_from_decoded
 
 Grey = NDArray[np.uint8]
-Progress = Progress
+
 
 _MOST_MOMENTS = 240  # that the board is looked for at, spread over a recording
 _IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")

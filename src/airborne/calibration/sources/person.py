@@ -63,7 +63,7 @@ def refine_rig(rig: Rig, detections: Detections, free: FreeParameters | None = N
 
 
 def calibration_prior(rig: Rig, trusted: Sequence[str], points: Array) -> CameraPrior:
-    """Return what a calibration is worth that its cameras were not found wrong in: GIVEN_PX at points (n, 3) [m].
+    """Return what a calibration is worth that its cameras were not found wrong in: _CALIBRATION_SD_PX at points (n, 3) [m].
 
     Half of it by each camera's place and half by its direction; nothing is known of cameras that are not trusted, and
     nothing of lenses.

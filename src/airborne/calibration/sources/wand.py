@@ -116,7 +116,7 @@ def _row(
 def wand_source(rig: Rig, tracks: WandTracks) -> Source:
     """Return the wand as evidence: its markers as free points, triangulated with the rig, tied by the known lengths.
 
-    Places that do not fit the other cameras' are left out (see `agreed_points`), and so are two markers whose distance
+    Places that do not fit the other cameras' are left out (see `triangulate_consensus`), and so are two markers whose distance
     comes out far from what is known.
     """
     tracks = tracks.select([name for name in rig.names if name in tracks.cameras])
