@@ -31,9 +31,9 @@ class Uncertainty:
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     def shift_sd_px(self, problem: Problem, jacobian: Jacobian) -> Array:
-        """Return the standard deviation of projected points due to each camera's parameters, per coordinate: (cameras,).
+        """Return the standard deviation of projected points due to each camera's parameters: (cameras,) [px].
 
-        In px, RMS over the observations of the camera.
+        Of one coordinate, RMS over the observations of the camera.
         """
         rows = jacobian.by_camera[: 2 * len(problem.px)]
         variance = np.asarray((rows @ self.covariance) * rows.toarray()).sum(axis=1) if rows.shape[1] else np.zeros(0)

@@ -87,7 +87,7 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
     starts = [start for start in starts if len(start)]
     if not starts:
         raise CalibrationError(
-            "no source determines the pose of any camera; each needs four known points, or views of the board or the wand"
+            "no source determines the pose of any camera; each needs four known points, or views of board or wand"
         )
     rig = merge_rigs(starts)
     missing = [name for name in sources.names if name not in rig.names]

@@ -1,4 +1,4 @@
-"""Model selection for a lens from its views of a board, by cross-validation: the simplest model that predicts as well."""
+"""Model selection for a lens from its views of a board: the simplest model that predicts held-out views as well."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ class LensFit:
 def choose_lens(
     views: Views, size: tuple[int, int], *, lens: Lens = "brown", progress: Callable[[], None] | None = None
 ) -> LensFit:
-    """Fit the lens of the views' only camera with the fewest parameters that predict held-out views as well as the best.
+    """Fit the lens of the views' only camera, with the fewest parameters that predict held-out views as well.
 
-    As well: the mean over the views of the difference to the best is within its standard error.
+    As well: the mean over the views of the difference to the best model is within its standard error.
     Raises CalibrationError where too few views show the board.
     """
     row = views.detections[0]

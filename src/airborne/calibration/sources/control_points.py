@@ -37,7 +37,7 @@ class ControlPoints:
         return replace(self, cameras=tuple(cameras), px=self.px[:, [self.cameras.index(name) for name in cameras]])
 
 
-def read_control_points(path: str | Path, known: dict[str, ScenePoint] | None = None) -> ControlPoints:
+def read_control_points(path: str | Path, scene_points: dict[str, ScenePoint] | None = None) -> ControlPoints:
     """Read a table `point,x_m,y_m,z_m,<camera>_u,<camera>_v,...`; blank (or NaN) pixels where a point is not seen.
 
     World coordinates in metres, pixels with (0, 0) at the centre of the top-left pixel. Columns may stand in any
@@ -47,7 +47,7 @@ def read_control_points(path: str | Path, known: dict[str, ScenePoint] | None = 
     path = Path(path)
     header, *rows = _read_rows(path)
     column = {name: i for i, name in enumerate(header)}
-    cameras = _check_header(path, header, needs_world=not known)
+    cameras = _check_header(path, header, needs_world=not scene_points)
     n = len(header)
     names: dict[str, int] = {}
     for line, row in rows:
@@ -59,8 +59,8 @@ def read_control_points(path: str | Path, known: dict[str, ScenePoint] | None = 
         if name in names:
             raise CalibrationError(f"{path}: point '{name}' stands in rows {names[name]} and {line}; remove one")
         names[name] = line
-    places = [_scene_point(path, line, {c: row[column[c]] for c in column}, known or {}) for line, row in rows]
-    if known and not any(place is known.get(name) for name, place in zip(names, places, strict=True)):
+    places = [_scene_point(path, line, {c: row[column[c]] for c in column}, scene_points or {}) for line, row in rows]
+    if scene_points and not any(place is scene_points.get(name) for name, place in zip(names, places, strict=True)):
         raise CalibrationError(
             f"{path}: not one point has its place from the court, as all have coordinates of their own; "
             "give such a table as control points, without a court"
@@ -76,7 +76,7 @@ def read_control_points(path: str | Path, known: dict[str, ScenePoint] | None = 
         world=np.array([place.position_m for place in places]),
         cameras=cameras,
         px=px,
-        sd_m=np.array([place.sd_m for place in places]) if known else None,
+        sd_m=np.array([place.sd_m for place in places]) if scene_points else None,
     )
 
 
