@@ -93,8 +93,8 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
     missing = [name for name in sources.names if name not in rig.names]
     if missing:
         raise CalibrationError(
-            f"no source determines where {', '.join(missing)} stands; show it the board or the wand together with another "
-            "camera, or click four known points in its picture"
+            f"no source determines where {', '.join(missing)} stands; show it the board or the wand together with "
+            "another camera, or click four known points in its picture"
         )
     rig = Rig(tuple(_with_lens(rig[name], lenses.get(name)) for name in sources.names))
     counts = {name: _n_observations(name, points, wand) for name in sources.names}
@@ -207,8 +207,8 @@ def _fit_lenses(
 def _board_starts(views: Views, known_lenses: dict[str, Camera], *, alone_is_enough: bool) -> list[Rig]:
     if views.board.is_ambiguous and len(views.cameras) > 1:
         raise CalibrationError(
-            "this chessboard looks the same after half a revolution, so cameras cannot be linked by it: use a board with "
-            "an even and an odd number of inner corners, or a ChArUco board"
+            "this chessboard looks the same after half a revolution, so cameras cannot be linked by it: use a board "
+            "with an even and an odd number of inner corners, or a ChArUco board"
         )
     groups = [list(range(len(views.cameras)))] if alone_is_enough else views.groups()
     return [
