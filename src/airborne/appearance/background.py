@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from airborne.kernels import kernel
 
 START_SD = 6.0  # grey levels: what one look at a pixel is worth
 _SLOWEST = 0.05  # a pixel's newest look counts at least this much: slow changes of light are followed
@@ -22,7 +23,7 @@ class Plate:
 
 
 # one signature for whole pictures and for regions of them: whichever a process looks at first, rounding is the same
-@njit("(u1[:,:,:], b1[:,:], f4[:,:,:], f4[:,:], u1[:,:])", cache=True, nogil=True, fastmath=True)
+@kernel(signature="(u1[:,:,:], b1[:,:], f4[:,:,:], f4[:,:], u1[:,:])", fastmath=True)
 def look(rgb, covered, mean, sd, looks):
     """Learn from one picture: rgb (h, w, 3) uint8, covered (h, w) bool where the body may be; the rest in place."""
     h, w, _ = rgb.shape
@@ -46,7 +47,7 @@ def look(rgb, covered, mean, sd, looks):
             looks[y, x] = min(n + 1, 250)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def fill(mean, looks, out):
     """Copy mean (h, w, 3) to out, growing known pixels into unseen ones, ring by ring; False if none is known."""
     h, w, _ = mean.shape
@@ -97,7 +98,7 @@ def fill(mean, looks, out):
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _known_neighbours(done, y, x):
     h, w = done.shape
     n = 0

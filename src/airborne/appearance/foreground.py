@@ -7,8 +7,9 @@ in nats; where the empty scene is known (`plate`), a pixel that looks like it is
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from airborne.kernels import kernel
 
 BINS = 32
 EVIDENCE_LIMIT = 5.0  # nats; no single pixel may shout louder
@@ -18,7 +19,7 @@ _HALF = np.float32(0.5)
 _SPREAD = np.array([0.25, 0.5, 0.25], np.float32)  # a colour also counts in its neighbours' bins
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_colours(rgb, chosen, stride, counts):
     """Add the colours of the chosen pixels to counts (32, 32, 32), each spread over its 27 neighbours' bins.
 
@@ -43,7 +44,7 @@ def count_colours(rgb, chosen, stride, counts):
     return taken
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def posterior(rgb, body, background, plate, plate_sd, known, out):
     """Fill out (h, w) with each pixel's probability to be body, at even odds.
 
@@ -67,7 +68,7 @@ def posterior(rgb, body, background, plate, plate_sd, known, out):
             out[y, x] = p_body / (p_body + p_back)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def evidence(posterior, out):
     """Fill out (h, w) with the evidence [nats] of posterior (h, w)."""
     limit = np.float32(EVIDENCE_LIMIT)
@@ -78,7 +79,7 @@ def evidence(posterior, out):
             out[y, x] = min(max(np.log(p / (np.float32(1) - p)), -limit), limit)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def agreement(posterior, part, margin_u, margin_v):
     """Compare a mask, part (h, w) >= 0, with the posterior (h, w).
 

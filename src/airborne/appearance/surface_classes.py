@@ -8,10 +8,10 @@ not. No kernel uses fast maths, so that maps are the same to the last bit howeve
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from airborne.appearance.foreground import BINS
+from airborne.kernels import kernel
 
 COLUMNS = 8  # of a table: room for the kinds, a whole number of cache lines
 _UNSEEN = 1e-6  # probability of a colour never seen, a bin
@@ -29,7 +29,7 @@ def ratio_table(kinds: NDArray, background: NDArray, hidden: NDArray) -> NDArray
     return table
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fill_table(kinds, background, hidden, table):
     n, cells = kinds.shape
     one = np.float32(1)
@@ -48,7 +48,7 @@ def _fill_table(kinds, background, hidden, table):
             table[cell, c] = np.log(((one - o) * kinds[c, cell] + other) / ((one - o) * background[cell] + other))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def evidence_maps(rgb, table, reduction, out):
     """Fill out (5, h // r, w // r) with the mean evidence over blocks of r x r pixels of rgb (h, w, 3) uint8."""
     _, h, w = out.shape
@@ -68,7 +68,7 @@ def evidence_maps(rgb, table, reduction, out):
             out[3, y, x], out[4, y, x] = share * d, share * e
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def smooth(maps, out):
     """Blur maps (k, h, w) with [1 2 1] / 4 along rows and columns into out; the border stays."""
     k, h, w = maps.shape

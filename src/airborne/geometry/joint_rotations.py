@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from airborne.kernels import kernel
 
 _LOCKED = 1e-8  # cosine of the middle angle below which the other two are one angle
 _SMALL = 1e-8  # of an angle or its sine
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def turned(angles, turns):
     """Return the angles (n, 3) [rad] of Rx Ry Rz exp(turn), on the branch near the old angles (n, 3).
 
@@ -28,7 +29,7 @@ def turned(angles, turns):
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def turns_between(earlier, later):
     """Return the rotation vectors (n, 3) that `turned` takes from angles earlier (n, 3) to later (n, 3) [rad]."""
     out, A, B, product = np.empty_like(earlier), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -42,7 +43,7 @@ def turns_between(earlier, later):
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _matrix(angles, R):
     cx, sx = math.cos(angles[0]), math.sin(angles[0])
     cy, sy = math.cos(angles[1]), math.sin(angles[1])
@@ -52,7 +53,7 @@ def _matrix(angles, R):
     R[2, 0], R[2, 1], R[2, 2] = sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _exponential(turn, R):
     angle2 = turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2
     angle = math.sqrt(angle2)
@@ -66,7 +67,7 @@ def _exponential(turn, R):
     R[1, 2], R[2, 1] = c * y * z - s * x, c * y * z + s * x
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _logarithm(R, turn):
     """Fill the rotation vector of R through its quaternion, whose largest component is found without cancellation."""
     w = 1 + R[0, 0] + R[1, 1] + R[2, 2]
@@ -89,7 +90,7 @@ def _logarithm(R, turn):
     turn[0], turn[1], turn[2] = scale * x, scale * y, scale * z
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _angles_near(R, near, out):
     """Fill the angles of R on the branch nearest to `near` (3,); where y is +-90 degrees, x stays as it was."""
     cosine = math.hypot(R[1, 2], R[2, 2])
@@ -107,7 +108,7 @@ def _angles_near(R, near, out):
         out[0], out[1], out[2] = one0, one1, one2
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _wound(angle, near):
     """Return the angle, whole turns added, nearest to another."""
     return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))

@@ -10,15 +10,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from airborne.body import Geometry
 from airborne.cameras import Camera
+from airborne.kernels import kernel
 from airborne.rendering.packing import packed_view
 from airborne.rendering.reduction import reduced, reduced_camera
 from airborne.rendering.rows import all_spans
-from airborne.rendering.shapes import KERNEL, new_shapes, place
+from airborne.rendering.shapes import new_shapes, place
 from airborne.rendering.threads import in_threads
 
 Array = NDArray[np.floating]
@@ -70,7 +70,7 @@ def mask_evidence(geometry: Geometry, maps: EvidenceMaps, R: Array, t: Array, *,
     return out
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _sum_evidence(shapes, geometry, R, t, views, sizes, sums, out):
     """Fill `out` (n, views); see `mask_evidence`. In each row the spans are taken from the left and joined."""
     for h in range(len(R)):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from airborne.kernels import kernel
 
 Array = NDArray[np.floating]
 
@@ -37,7 +38,7 @@ def covariance_of(curvature: Array, *, noise: float, spread: Array | None = None
     return (covariance + covariance.T) / 2
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def principal(matrix):
     """Return the eigenvalues (d,) and the eigenvectors (d, d), as columns, of a symmetric matrix, in no order.
 
@@ -71,7 +72,7 @@ def principal(matrix):
     return np.diag(A).copy(), V
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _along(directions, matrix):
     """Return what a symmetric matrix (d, d) is along each direction, a column of (d, d): (d,)."""
     d = len(matrix)
@@ -83,7 +84,7 @@ def _along(directions, matrix):
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _composed(directions, values):
     """Return the matrix (d, d) with these eigenvectors, as columns, and eigenvalues (d,)."""
     d = len(values)

@@ -12,10 +12,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from airborne.kernels import kernel
 from airborne.motion.free_fall import OF_ANYTHING
 from airborne.motion.smoothing.segments import Smoothed, known_rows
 
@@ -143,7 +143,7 @@ def filtered(steps: Steps, values: Array) -> tuple[Array, Array, Array, Array, f
     return *passes[:4], float(passes[4] - scale)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _filtered(
     F: Array, Q: Array, H: Array, z: Array, is_measured: NDArray[np.bool_], mean: Array, P: Array
 ) -> tuple[Array, Array, Array, Array, float]:
@@ -174,7 +174,7 @@ def _filtered(
     return before, P_before, after, P_after, log_likelihood
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _moved_mean(F: Array, mean: Array) -> Array:
     found = np.zeros_like(mean)
     for a in range(len(mean)):
@@ -183,7 +183,7 @@ def _moved_mean(F: Array, mean: Array) -> Array:
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _moved(F: Array, P: Array, Q: Array) -> Array:
     """Return F P F' + Q."""
     d = len(P)

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from airborne.body import Box, Ellipsoid, Part, PosedBody
+from airborne.kernels import kernel
 
 Array = NDArray[np.floating]
 
@@ -106,7 +106,7 @@ def _to_unit(unit_from_world: Array, place: Array) -> Array:
     return np.column_stack([unit_from_world, -unit_from_world @ place])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _see(points, target, boxes, out):
     for i in range(len(points)):
         out[i] = True
@@ -131,7 +131,7 @@ def _see(points, target, boxes, out):
                 break
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _see_past_balls(points, target, balls, out):
     ends = np.empty((len(balls), 3))  # the target, as each ball sees it
     for e in range(len(balls)):

@@ -6,13 +6,12 @@ A state is one array (35,): the pose (18,), the lengths (9,) and the radii (8,) 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from airborne.kernels import kernel
 from airborne.tracking.capsules.evidence import evidence
 from airborne.tracking.capsules.jumper import CAPSULES, KINDS, N_DOF, place, shares
 from airborne.tracking.capsules.outlines import BEHIND, project
-from airborne.tracking.capsules.spans import EXACT
 
 N_LENGTHS, N_CAPSULES, N_POINTS = 9, 10, 9
 NOBODY = np.empty((0, 2, 3)), np.empty((0, 2))  # the capsules of no other players
@@ -25,7 +24,7 @@ def kinds_with(others: tuple[NDArray, NDArray]) -> NDArray[np.int64]:
     return np.concatenate([CAPSULES[:, :2], np.full((len(others[0]), 2), len(KINDS))])
 
 
-@njit(**EXACT)
+@kernel
 def placed(state, points, ends, balls, share):
     """Place a state: fill points (9, 3) [m], the capsules' ends (10, 2, 3) and radii (10, 2) [m], and shares (10,)."""
     lengths, radii = state[N_DOF : N_DOF + N_LENGTHS], state[N_DOF + N_LENGTHS :]
@@ -33,7 +32,7 @@ def placed(state, points, ends, balls, share):
     shares(lengths, radii, share)
 
 
-@njit(**EXACT)
+@kernel
 def gathered(state, n_free, cameras, kinds, maps, others, work, owned, equations):
     """Add up a jumper's evidence over the views and return it [nats times pixels].
 
@@ -82,7 +81,7 @@ def gathered(state, n_free, cameras, kinds, maps, others, work, owned, equations
     return total
 
 
-@njit(**EXACT)
+@kernel
 def _lift(ends, discs, depth, camera, g, H, pull, stiffness, beside):
     """Add a capsule's gradient (7,) and curvature (7, 7) by its discs and share to those by where it is in the world.
 
@@ -116,7 +115,7 @@ def _lift(ends, discs, depth, camera, g, H, pull, stiffness, beside):
             beside[p, k] = px_per_m * (HJ[p, k] + HJ[p + 3, k])
 
 
-@njit(**EXACT)
+@kernel
 def _differentiate(state, points, ends, balls, share, by_state, by_capsule):
     """Fill how the points (27, n_free) and the capsules (10, 9, n_free) move with the first numbers of a state."""
     n, n_free = N_CAPSULES, by_state.shape[1]

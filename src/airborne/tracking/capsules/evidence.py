@@ -8,12 +8,10 @@ two maps, pixels change hands.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from airborne.kernels import kernel
 from airborne.tracking.capsules.outlines import BEHIND, border_in_row, outline, part_at
 from airborne.tracking.capsules.spans import (
-    EXACT,
-    INLINE,
     MOST_SPANS,
     add_span,
     claim,
@@ -28,7 +26,7 @@ _BORDER_SAMPLES = 5
 _LEVEL = 2.0  # tangents that run this much further across than down are gone along column by column, not row by row
 
 
-@njit(**EXACT)
+@kernel
 def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, gradient, curvature):
     """Add up maps under the capsules, and how the sum changes as their discs move.
 
@@ -106,13 +104,13 @@ def evidence(discs, depth, kinds, share, sums, contrast, origin, work, out, grad
                 curvature[i, q, p] = curvature[i, p, q]
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def _stretch(top, bottom, y):
     """Return what of a stretch of heights counts for the row at y: half way to its neighbours, or to the end."""
     return top if y - 1 < top else y - 0.5, bottom if y + 1 > bottom else y + 0.5
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def _motion(discs, tangents, who, piece, y, outward):
     """Say how an end of a span of capsule `who` moves: (x0, x1, t, by_y, by_r).
 
@@ -137,7 +135,7 @@ def _motion(discs, tangents, who, piece, y, outward):
     return cx + outward * h_top, cx + outward * h_bottom, float(piece), -outward * (h_bottom - h_top), turn
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def _pull(discs, tangents, edge, map_0, map_1, border, pull, gradient, curvature):
     """Add what the end of a span gains when its capsule's discs move: `pull` is its sign and the contrast there.
 
@@ -162,7 +160,7 @@ def _pull(discs, tangents, edge, map_0, map_1, border, pull, gradient, curvature
     _add(1.0, by_y, by_r, t, value, contrast / np.sqrt(1 + by_y * by_y), gradient[who], curvature[who])
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def _add(by_x, by_y, by_r, t, value, facing, gradient, curvature):
     """Add an edge that moves by_x, by_y, by_r times as x, y, radius: 1 - t of disc a, t of b; `value` is its gain."""
     of_a, of_b, by = 1 - t, t, (by_x, by_y, by_r)
@@ -182,13 +180,13 @@ def _add(by_x, by_y, by_r, t, value, facing, gradient, curvature):
                     curvature[3 + p, q] += facing * of_a * of_b * by[p] * by[q]
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def _is_level(tangent):
     """Say whether a tangent runs across rather than down; False where there is none."""
     return abs(tangent[6] - tangent[0]) > _LEVEL * abs(tangent[2] - tangent[1])
 
 
-@njit(**EXACT)
+@kernel
 def _go_along_level(discs, share, tangents, kinds, sums, contrast, nearer, origin, out, gradient, curvature):
     """Make the sums along the level tangents of a capsule exact, column by column, and add what these gain in moving.
 
@@ -235,7 +233,7 @@ def _go_along_level(discs, share, tangents, kinds, sums, contrast, nearer, origi
                     _add(-m, 1.0, 1 / ny, t, outward * step * value, facing, gradient[i], curvature[i])
 
 
-@njit(**EXACT)
+@kernel
 def _is_hidden(nearer, u, row):
     """Say whether a nearer capsule lies over a place of a row."""
     order, i, first, last, x = nearer
@@ -247,7 +245,7 @@ def _is_hidden(nearer, u, row):
     return False
 
 
-@njit(**EXACT)
+@kernel
 def _pull_border(disc, share, maps, contrast, nearer, origin, gradient, curvature):
     """Add what a border across a capsule gains when it moves along the axis."""
     ux, uy = disc[1, 0] - disc[0, 0], disc[1, 1] - disc[0, 1]

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from airborne.kernels import kernel
 from airborne.tracking.capsules.equations import N_CAPSULES, N_POINTS, gathered, kinds_with
 from airborne.tracking.capsules.jumper import BALL_HEIGHT_M, LIMITS_RAD, N_DOF
-from airborne.tracking.capsules.spans import EXACT
 from airborne.tracking.capsules.views import Seen, workspace
 
 Array = NDArray[np.floating]
@@ -112,7 +111,7 @@ def _place(state: Array, n: int, owned: Array) -> _Place:
     return _Place(state.copy(), np.empty(2), np.empty(n), np.empty((n, n)), owned.copy(), equations)
 
 
-@njit(**EXACT)
+@kernel
 def _climbed(best, tried, known, pictures, worth, most_steps):
     """Go from the place `best` up to the nearest maximum and return that one of the two places where it is known."""
     n, damping = len(best.pull), _DAMPING
@@ -136,7 +135,7 @@ def _climbed(best, tried, known, pictures, worth, most_steps):
     return best
 
 
-@njit(**EXACT)
+@kernel
 def _evaluate(at, known, pictures, worth):
     """Look at the pictures from a place's state, weigh in what is `known`, and fill the rest of the place."""
     mean, information, anchors, anchor_sd_m, habits = known
@@ -174,7 +173,7 @@ def _evaluate(at, known, pictures, worth):
     at.totals[0], at.totals[1] = nats, nats - cost
 
 
-@njit(**EXACT)
+@kernel
 def _add(row, target, weight, A, b):
     """Add to the normal equations that row (n,) times the step should be `target`."""
     for i in range(len(row)):

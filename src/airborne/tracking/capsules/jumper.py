@@ -7,13 +7,11 @@ x, y, z, the knee's and the ankle's flexion. Axes and signs are those of `human`
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from airborne.body.legs import LEG_POINTS
+from airborne.kernels import kernel
 
 Array = NDArray[np.floating]
 
@@ -37,7 +35,6 @@ LIMITS_RAD = np.radians(  # (18, 2) least and greatest; the right leg mirrors y 
     + list(_LEG_LIMITS_DEG)
     + [tuple(-x for x in limits[::-1]) if i in (1, 2) else limits for i, limits in enumerate(_LEG_LIMITS_DEG)]
 )
-_KERNEL: dict[str, Any] = {"nogil": True, "error_model": "numpy", "cache": True}
 
 
 # the two kinds and the leg (0 trunk, 1 left, 2 right) of each capsule
@@ -48,7 +45,7 @@ CAPSULES = np.array(
 )
 
 
-@njit(**_KERNEL)
+@kernel
 def _turn(R, axis, angle, out):
     """Fill out (3, 3) with R times a turn about one of its axes."""
     c, s = np.cos(angle), np.sin(angle)
@@ -59,7 +56,7 @@ def _turn(R, axis, angle, out):
         out[i, j], out[i, k] = c * a + s * b, c * b - s * a
 
 
-@njit(**_KERNEL)
+@kernel
 def place(pose, lengths, radii, points, ends, balls):
     """Place a jumper: pose (18,), lengths (9,), radii (8,) [m].
 
@@ -91,7 +88,7 @@ def place(pose, lengths, radii, points, ends, balls):
         _place_leg(pose, lengths, radii, side, pelvis, points, ends, balls)
 
 
-@njit(**_KERNEL)
+@kernel
 def _place_leg(pose, lengths, radii, side, pelvis, points, ends, balls):
     first, c = 8 + 5 * side, 4 + 3 * side
     R, thigh, shank = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -116,7 +113,7 @@ def _place_leg(pose, lengths, radii, side, pelvis, points, ends, balls):
     balls[c + 2, 0] = balls[c + 2, 1] = radii[R_FOOT]
 
 
-@njit(**_KERNEL)
+@kernel
 def shares(lengths, radii, out):
     """Fill out (10,) with how far along its axis the first kind of each capsule reaches.
 

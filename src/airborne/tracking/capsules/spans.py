@@ -1,23 +1,19 @@
 """Spans of rows over maps that are kept as running sums: the sum over a span costs two reads, however long it is.
 
-Where a row crosses from one map to another, `cut`, `weight` and `split` say how, as `capsules.border_in_row` does.
+What is called for every span is inlined: handing arrays over costs more. Where a row crosses from one map to another,
+`cut`, `weight` and `split` say how, as `capsules.border_in_row` does.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 
-# no fast maths: sums keep their order, so that a run is the same to the last bit however the code was compiled
-EXACT: dict[str, Any] = {"nogil": True, "error_model": "numpy", "cache": True}
-INLINE: dict[str, Any] = {**EXACT, "inline": "always"}  # what is called for every span: handing arrays over costs more
+from airborne.kernels import kernel
 
 MOST_SPANS = 64  # separate ones in one row
 
 
-@njit(**EXACT)
+@kernel
 def running_sums(maps, out):
     """Fill out (k, h, w + 1) with the sums of maps (k, h, w) over all pixels to the left of each pixel's left side."""
     k, h, w = maps.shape
@@ -30,14 +26,14 @@ def running_sums(maps, out):
                 out[c, y, x + 1] = total
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def read(row, x):
     """Read running sums between pixels: pixel i reaches from i - 0.5 to i + 0.5."""
     i = int(x + np.float32(0.5))
     return row[i] + (x + np.float32(0.5) - i) * (row[i + 1] - row[i])
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def value_at(row, x):
     """Read the map itself from its running sums: linear between the pixels' middles."""
     i = int(x)
@@ -45,13 +41,13 @@ def value_at(row, x):
     return (1 - f) * (row[i + 1] - row[i]) + f * (row[i + 2] - row[i + 1])
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def value_between(sums, x, y, above):
     """Read a map between its rows, of which `above` is the upper one."""
     return (above + 1 - y) * value_at(sums[above], x) + (y - above) * value_at(sums[above + 1], x)
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def read_mixed(map_0, map_1, x, cut, weight, split):
     """Read the running sums of the maps that hold left of x, up to a constant."""
     if split == 0:
@@ -63,7 +59,7 @@ def read_mixed(map_0, map_1, x, cut, weight, split):
     return read(on_left, middle) + read(on_right, x) - read(on_right, middle)
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def map_at(map_0, map_1, edge, cut, weight, split):
     """Read the map that holds at an edge of a span."""
     if split == 0:
@@ -71,7 +67,7 @@ def map_at(map_0, map_1, edge, cut, weight, split):
     return value_at(map_0, edge) if (edge < cut) == (split > 0) else value_at(map_1, edge)
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def contrast_at(contrast, kind_0, kind_1, edge, border):
     """Read the contrast of the map that holds at an edge of a span."""
     cut, weight, split = border
@@ -80,7 +76,7 @@ def contrast_at(contrast, kind_0, kind_1, edge, border):
     return contrast[kind_0] if (edge < cut) == (split > 0) else contrast[kind_1]
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def add_span(map_0, map_1, at, end, cut, weight, split, out):
     """Add the sums and the areas from `at` to `end` of a row of running sums to out (2, 2)."""
     if split == 0:
@@ -100,7 +96,7 @@ def add_span(map_0, map_1, at, end, cut, weight, split, out):
     out[j, 1] += end - middle
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def claim(taken_x, taken_by, taken, a, b, owner):
     """Join a span to the ordered, separate ones taken so far, each end with its owner; return how many there are."""
     left_by, right_by, kept = owner, owner, 0

@@ -13,12 +13,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from airborne.appearance.lighting import fit_light, light_up, paint_evenly
+from airborne.kernels import kernel
 from airborne.rendering.drawing import draw_maps
 from airborne.rendering.maps import surface_maps
-from airborne.rendering.shapes import KERNEL
 
 BLOCK_PX = 16  # residuals this close are not independent: the side of a block of the covariance's sandwich
 RADIUS_PX = 4  # reach of the blur: three sds of the widest one used
@@ -59,7 +58,7 @@ def gaussian_taps(sigma_px: float) -> np.ndarray:
     return (taps / (2 * taps.sum() - taps[0])).astype(np.float32)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def blur(planes, taps_u, taps_v, out):
     """Blur planes (c, h, w) with separable symmetric taps (5,) into out; outside the planes the border is repeated."""
     c, h, w = planes.shape
@@ -96,7 +95,7 @@ def blur(planes, taps_u, taps_v, out):
                 )
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def window_of(part):
     """Return the padded window (x0, y0, x1, y1) round the body's pixels; (0, 0, 0, 0) where there is none."""
     h, w = part.shape
@@ -111,7 +110,7 @@ def window_of(part):
     return max(x0 - _PAD_PX, 0), max(y0 - _PAD_PX, 0), min(x1 + _PAD_PX + 1, w), min(y1 + _PAD_PX + 1, h)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
     """Say which segment moves each pixel's edges: of those with an edge within REACH_PX the one nearest to the camera.
 
@@ -141,7 +140,7 @@ def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
                         owner[y, x], nearness[y, x], distance[y, x] = own, near, d
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _is_front_edge(part, inverse_depth, segment_of_part, v, u):
     """Say whether a pixel of the body borders on another segment behind it, or on the background."""
     height, width = part.shape
@@ -155,7 +154,7 @@ def _is_front_edge(part, inverse_depth, segment_of_part, v, u):
     return False
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def accumulate(residual, shape, coverage, owner, nearness, place, seen, through, sums, blocks):
     """Add one view's normal equations for the rigid motion of each segment about the origin: A motion = g.
 
@@ -243,7 +242,7 @@ def accumulate(residual, shape, coverage, owner, nearness, place, seen, through,
     return cost, total, weight_sum
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def silhouette_equations(body, place, seen, through, maps, sums, blocks):
     """Add one view's normal equations of `blurred posterior - blurred mask`; see `accumulate`.
 
@@ -264,7 +263,7 @@ def silhouette_equations(body, place, seen, through, maps, sums, blocks):
     return accumulate(residual, shape, coverage[0], owner, nearness, place, seen, through, sums, blocks)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def photometric_equations(body, place, seen, through, maps, paint, light, rounds, sums, blocks):
     """Add one view's normal equations of `blurred observed - blurred composite`, in linear light; see `accumulate`.
 
@@ -283,7 +282,7 @@ def photometric_equations(body, place, seen, through, maps, paint, light, rounds
     return _of_composite(lit, is_faceted, part, owner, nearness, place, seen, through, sums, blocks)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def lit_equations(body, place, seen, through, maps, drawn, is_faceted, lamps, ambient, sums, blocks):
     """Add one view's normal equations under known lights, in shares of full sRGB; see `photometric_equations`.
 
@@ -304,7 +303,7 @@ def lit_equations(body, place, seen, through, maps, drawn, is_faceted, lamps, am
     return _of_composite(lit, is_faceted, maps[0], owner, nearness, place, seen, through, sums, blocks)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _draw(body, place, maps, window):
     """Draw the maps of a view; return who owns each pixel of the window, and how near that is."""
     shapes, geometry, segment_of_part = body
@@ -317,7 +316,7 @@ def _draw(body, place, maps, window):
     return owner, nearness
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _blurred_mask(part, through):
     window, taps_u, taps_v, _ = through
     x0, y0, x1, y1 = window
@@ -329,7 +328,7 @@ def _blurred_mask(part, through):
     return coverage
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _of_composite(lit, is_faceted, part, owner, nearness, place, seen, through, sums, blocks):
     """Compare the picture with the lit body (3, h, w) before the scene."""
     observed, scene, _ = seen
@@ -349,7 +348,7 @@ def _of_composite(lit, is_faceted, part, owner, nearness, place, seen, through, 
     return accumulate(residual, shape, coverage[0], owner, nearness, place, seen, through, sums, blocks)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def mapped(A, g, jacobians, H, gradient):
     """Add the segments' equations, A (s, 6, 6) and g (s, 6), mapped by jacobians (s, 6, d), to H (d, d) and (d,).
 
@@ -380,7 +379,7 @@ def mapped(A, g, jacobians, H, gradient):
                             H[i, j] += J[p, i] * AJ[p, j]
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def spread_of(blocks, jacobians, S):
     """Add to S (d, d) the sum of G G' over the blocks (n, s, 6), G a block's gradient mapped by jacobians (s, 6, d)."""
     d = len(S)

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from airborne.appearance.hue_saturation import BINS, OUTSIDE
+from airborne.kernels import kernel
 
 ALONG, ACROSS = 15, 7
 SAMPLES = ALONG * ACROSS
@@ -23,7 +23,7 @@ _FIXED = float(1 << _FIXED_BITS)  # pixels are stepped through in whole numbers:
 _ROOT_STEPS = np.diff(np.sqrt(np.arange(SAMPLES + 1) / SAMPLES)).astype(np.float32)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _frame_of(ends, projection, focal_px, width_m, frame):
     """Fill frame (6,): the pixel of one corner's cell, the step along, the step across. False behind the camera."""
     ua, va, wa = 0.0, 0.0, 0.0
@@ -53,7 +53,7 @@ def _frame_of(ends, projection, focal_px, width_m, frame):
     return abs(frame[0]) < _FAR_PX and abs(frame[1]) < _FAR_PX and length + width < _FAR_PX
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def read_rods(codes, corner, projection, focal_px, ends, widths_m, roots, classes, overlap, share):
     """Compare many rods with their references in one picture.
 
@@ -91,7 +91,7 @@ def read_rods(codes, corner, projection, focal_px, ends, widths_m, roots, classe
             overlap[i, r], share[i, r] = total, hits / SAMPLES
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_rods(codes, corner, projection, focal_px, ends, widths_m, counts):
     """Add to counts (rods, 111) the bins of the rods' samples: ends (rods, 2, 3) [m], the rest as in `read_rods`."""
     h, w = codes.shape
