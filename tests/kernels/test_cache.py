@@ -33,6 +33,31 @@ CALL = """
 from outer import alone, outer
 print(outer(10), alone(1), sum(outer.stats.cache_hits.values()), sum(alone.stats.cache_hits.values()))
 """
+SUMS = """
+import hashlib
+import sys
+
+import numpy as np
+
+from airborne.kernels import kernel
+from airborne.tracking.model_based.normal_equations import accumulate
+
+@kernel(fastmath=True)
+def through_a_caller(residual, shape, coverage, owner, nearness, place, seen, window, sums, blocks):
+    return accumulate(residual, shape, coverage, owner, nearness, place, seen, window, sums, blocks)
+
+rng = np.random.default_rng(0)
+h, w, s = 40, 50, 3
+residual, shape, coverage, scene, certainty = rng.random((5, 1, h, w)).astype(np.float32)
+owner, nearness = rng.integers(-1, s, (h, w)).astype(np.int16), 1 + coverage
+K, taps = np.array([[300.0, 0, 25], [0, 310, 20], [0, 0, 1]]), np.ones(5, np.float32)
+place, seen = (0, 0, rng.random(18), K, np.zeros(3)), (0, scene, certainty[0])
+sums = np.zeros((s, 6, 6)), np.zeros((s, 6)), np.zeros((s, 6, 3))
+call = accumulate if sys.argv[1] == "directly" else through_a_caller
+window, blocks = ((0, 0, w, h), taps, taps, 0.5), np.zeros((3, 4, s, 6))
+call(residual, shape, coverage[0], owner, nearness[0], place, seen, window, sums, blocks)
+print(hashlib.sha256(b"".join(part.tobytes() for part in sums)).hexdigest())
+"""
 
 
 def run(code, cache, *args, folder=Path()):
@@ -75,3 +100,10 @@ def test_a_damaged_file_is_compiled_anew_in_the_folder_that_the_user_names(kerne
     for path in tmp_path.rglob("*.nbc"):
         path.write_bytes(path.read_bytes()[:100])
     assert run(CALL, tmp_path / "chosen", folder=kernels) == ["24", "5", "0", "0"]
+
+
+def test_just_compiled_or_loaded_a_kernel_under_fast_maths_gives_the_same_bytes(tmp_path):
+    cold = run(SUMS, tmp_path / "a", "through a caller", folder=tmp_path)
+    assert run(SUMS, tmp_path / "a", "through a caller", folder=tmp_path) == cold
+    run(SUMS, tmp_path / "b", "directly", folder=tmp_path)
+    assert run(SUMS, tmp_path / "b", "through a caller", folder=tmp_path) == cold
