@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from airborne.kernels import kernel
 
 START_SD = 6.0  # [grey levels] of a pixel that was observed once
 _MIN_RATE = 0.05  # least weight of a pixel's newest observation, so that slow changes of light are followed
@@ -22,7 +23,7 @@ class BackgroundModel:
 
 
 # one signature for whole images and for regions of them: rounding is the same whichever a process meets first
-@njit("(u1[:,:,:], b1[:,:], f4[:,:,:], f4[:,:], u1[:,:])", cache=True, nogil=True, fastmath=True)
+@kernel(signature="(u1[:,:,:], b1[:,:], f4[:,:,:], f4[:,:], u1[:,:])", fastmath=True)
 def update_background(rgb, covered, mean, sd, n_observations):
     """Learn from one image: rgb (h, w, 3) uint8, covered (h, w) bool where the body may be; the rest in place."""
     h, w, _ = rgb.shape
@@ -46,7 +47,7 @@ def update_background(rgb, covered, mean, sd, n_observations):
             n_observations[y, x] = min(n + 1, 250)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def inpaint(mean, n_observations, out):
     """Copy mean (h, w, 3) to out and grow observed pixels into the others, ring by ring; False if none was observed."""
     h, w, _ = mean.shape
@@ -97,7 +98,7 @@ def inpaint(mean, n_observations, out):
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_done_neighbours(done, y, x):
     h, w = done.shape
     n = 0

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from airborne.kernels import kernel
 
 _GIMBAL_LOCK = 1e-8  # cosine of the middle angle below which the other two are one angle
 _SMALL = 1e-8  # of an angle or its sine
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def compose_rotation_vectors(angles, rotation_vectors):
     """Return the angles (n, 3) [rad] of Rx Ry Rz exp(v), on the branch near the old angles (n, 3).
 
@@ -28,7 +29,7 @@ def compose_rotation_vectors(angles, rotation_vectors):
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def rotation_vectors_between(earlier, later):
     """Return the rotation vectors (n, 3) [rad] from angles earlier to later (n, 3).
 
@@ -45,7 +46,7 @@ def rotation_vectors_between(earlier, later):
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _matrix(angles, R):
     cx, sx = math.cos(angles[0]), math.sin(angles[0])
     cy, sy = math.cos(angles[1]), math.sin(angles[1])
@@ -55,7 +56,7 @@ def _matrix(angles, R):
     R[2, 0], R[2, 1], R[2, 2] = sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _exponential(vector, R):
     angle2 = vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2
     angle = math.sqrt(angle2)
@@ -69,7 +70,7 @@ def _exponential(vector, R):
     R[1, 2], R[2, 1] = c * y * z - s * x, c * y * z + s * x
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _logarithm(R, vector):
     """Fill the rotation vector of R through its quaternion, whose largest component is found without cancellation."""
     w = 1 + R[0, 0] + R[1, 1] + R[2, 2]
@@ -92,7 +93,7 @@ def _logarithm(R, vector):
     vector[0], vector[1], vector[2] = scale * x, scale * y, scale * z
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _angles_near(R, near, out):
     """Fill the angles of R on the branch nearest to `near` (3,); where y is +-90 degrees, x keeps its value."""
     cosine = math.hypot(R[1, 2], R[2, 2])
@@ -114,7 +115,7 @@ def _angles_near(R, near, out):
         out[0], out[1], out[2] = one0, one1, one2
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _nearest_equivalent(angle, near):
     """Return the angle plus the whole revolutions that bring it nearest to another."""
     return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))

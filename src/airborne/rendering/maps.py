@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from airborne.kernels import kernel
 from airborne.rendering.rows import BLOCK, LANES, NX, NY, NZ, SHAPE, W, block_range, draw_row, list_spans, new_row
-from airborne.rendering.shapes import B_1, B_U, B_V, KERNEL, pose_shapes
+from airborne.rendering.shapes import B_1, B_U, B_V, pose_shapes
 
 
 def empty_maps(size: tuple[int, int]) -> tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.float32]]:
@@ -20,7 +20,7 @@ def empty_maps(size: tuple[int, int]) -> tuple[NDArray[np.int16], NDArray[np.flo
     )
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
     """Fill the maps of one view with the surface nearest to the camera.
 

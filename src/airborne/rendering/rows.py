@@ -4,7 +4,7 @@ A row's pixels live in blocks of 16: each block holds nine planes of 16 numbers 
 memory is a constant and LLVM can put a whole plane into one register. Inverse depth is the z-buffer: larger is nearer.
 A lane loop that is too small gets unrolled instead of vectorised, and then costs ten times as much; so does one that
 adds to memory under a condition (add a selected value instead). Measure with `benchmarks/speed/yardstick.py` after any
-change, and delete the folder's `__pycache__` before (see `shapes.py`).
+change.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from airborne.kernels import kernel
 from airborne.rendering.shapes import (
     ALPHA,
     B_1,
@@ -27,7 +27,6 @@ from airborne.rendering.shapes import (
     HALF_VV,
     HEIGHT,
     ID,
-    INNER,
     MID_1,
     MID_V,
     N_STEP,
@@ -43,7 +42,7 @@ W, NX, NY, NZ, RED, GREEN, BLUE, SHAPE, SHADE, BLOCK = 0, 16, 32, 48, 64, 80, 96
 f4 = np.float32
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def new_row(width):
     """Allocate the blocks of one row, all empty."""
     row = np.empty((width // LANES + 2) * BLOCK, np.float32)
@@ -52,7 +51,7 @@ def new_row(width):
     return row
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _count_rows(shapes, row_start):
     """Fill `row_start` (height + 1,) with room for a shape's spans in each row; return the number of spans."""
     for v in range(len(row_start)):
@@ -70,7 +69,7 @@ def _count_rows(shapes, row_start):
     return row_start[-1]
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _find_spans(shapes, geometry, width, row_start, row_stop, ends, curves):
     """List the pixels of every shape in every row.
 
@@ -114,7 +113,7 @@ def _find_spans(shapes, geometry, width, row_start, row_stop, ends, curves):
             _cut_spans(shapes, e, width, row_stop, ends, curves)
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _add_span(low, high, middle, half_squared, s, v, row_stop, ends, curves):
     """List the pixels of a shape from `low` to `high`, where there are any."""
     if high < low:
@@ -127,7 +126,7 @@ def _add_span(low, high, middle, half_squared, s, v, row_stop, ends, curves):
         row_stop[v] = i + 1
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _cut_spans(shapes, s, width, row_stop, ends, curves):
     """List the pixels at which the near surface of an ellipsoid lies in its slab: at most two spans a row.
 
@@ -157,7 +156,7 @@ def _cut_spans(shapes, s, width, row_stop, ends, curves):
             _add_span(max(least, middle + hole_1), most, middle, half_squared, s, v, row_stop, ends, curves)
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _beyond(outline, height, v, middle, half):
     """Cut row v of an ellipsoid's near surface by the plane at a height: (is_below, low, high), u - middle [px].
 
@@ -185,7 +184,7 @@ def _beyond(outline, height, v, middle, half):
     return d >= 0, low, high
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def list_spans(shapes, geometry, view, width, height):
     """Outline the posed shapes in a view and list their spans: row_start, row_stop, ends, curves of `_find_spans`."""
     outline_all(shapes, geometry, view, width, height)
@@ -196,7 +195,7 @@ def list_spans(shapes, geometry, view, width, height):
     return row_start, row_stop, ends, curves
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def block_range(ends, start, stop):
     """Return the first block that the spans `start` to `stop - 1` touch, and the last."""
     first, last = ends[start, 0], ends[start, 1]
@@ -205,7 +204,7 @@ def block_range(ends, start, stop):
     return first // LANES, last // LANES
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def draw_row(row, outlines, surfaces, ends, curves, start, stop, v, first_block):
     """Draw the spans `start` to `stop - 1` of row v into the blocks of `row`, the nearest surface on top."""
     for i in range(start, stop):
@@ -242,7 +241,7 @@ def draw_row(row, outlines, surfaces, ends, curves, start, stop, v, first_block)
                 block[SHAPE + j] = shape if is_nearest else block[SHAPE + j]
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def light_block(block, lights, x, x_step, y, y_step):
     """Add to the block's light what each lamp gives: intensity times the cosine to the normal, inside its cone.
 

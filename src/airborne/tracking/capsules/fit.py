@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from airborne.kernels import kernel
 from airborne.tracking.capsules.equations import N_CAPSULES, N_POINTS, accumulate_equations, classes_with
 from airborne.tracking.capsules.jumper import FOOT_HEIGHT_M, LIMITS_RAD, N_DOF
-from airborne.tracking.capsules.spans import EXACT
 from airborne.tracking.capsules.views import RegionMaps, workspace
 from airborne.types import Array
 
@@ -114,7 +113,7 @@ def _allocate_iterate(state: Array, n: int, owned: Array) -> _Iterate:
     return _Iterate(state.copy(), np.empty(2), np.empty(n), np.empty((n, n)), owned.copy(), equations)
 
 
-@njit(**EXACT)
+@kernel
 def _maximise(best, trial, priors, images, weight, most_steps):
     """Climb from the iterate `best` to the nearest maximum; return whichever of the two iterates holds it."""
     n, damping = len(best.gradient), _DAMPING
@@ -138,7 +137,7 @@ def _maximise(best, trial, priors, images, weight, most_steps):
     return best
 
 
-@njit(**EXACT)
+@kernel
 def _evaluate(iterate, priors, images, weight):
     """Evaluate the evidence at an iterate's state, add the priors, and fill the rest of the iterate."""
     mean, information, anchors, anchor_sd_m, posture = priors
@@ -178,7 +177,7 @@ def _evaluate(iterate, priors, images, weight):
     iterate.totals[0], iterate.totals[1] = nats, nats - cost
 
 
-@njit(**EXACT)
+@kernel
 def _add(row, target, weight, A, b):
     """Add an observation to the normal equations: row (n,) times the step is `target`."""
     for i in range(len(row)):

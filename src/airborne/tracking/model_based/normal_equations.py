@@ -13,12 +13,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from airborne.appearance.lighting import fit_light, flatten_shading, shade_body
+from airborne.kernels import kernel
 from airborne.rendering.drawing import draw_maps
 from airborne.rendering.maps import surface_maps
-from airborne.rendering.shapes import KERNEL
 
 BLOCK_PX = 16  # residuals this close are correlated: the side of a block of the covariance's sandwich
 RADIUS_PX = 4  # radius of the blur: three sds of the widest one used
@@ -59,7 +58,7 @@ def gaussian_taps(sigma_px: float) -> np.ndarray:
     return (taps / (2 * taps.sum() - taps[0])).astype(np.float32)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def blur(planes, taps_u, taps_v, out):
     """Blur planes (c, h, w) with separable symmetric taps (5,) into out; outside the planes the border is repeated."""
     c, h, w = planes.shape
@@ -96,7 +95,7 @@ def blur(planes, taps_u, taps_v, out):
                 )
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def mask_window(part):
     """Return the padded window (x0, y0, x1, y1) around the body's pixels; (0, 0, 0, 0) where there is none."""
     h, w = part.shape
@@ -111,7 +110,7 @@ def mask_window(part):
     return max(x0 - _PAD_PX, 0), max(y0 - _PAD_PX, 0), min(x1 + _PAD_PX + 1, w), min(y1 + _PAD_PX + 1, h)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
     """Assign each pixel to the segment whose edge moves it: of those within REACH_PX, the one nearest to the camera.
 
@@ -141,7 +140,7 @@ def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
                         owner[y, x], nearness[y, x], distance[y, x] = own, near, d
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _is_front_edge(part, inverse_depth, segment_of_part, v, u):
     """Return whether a pixel of the body borders on a segment behind it, or on the background."""
     height, width = part.shape
@@ -155,7 +154,7 @@ def _is_front_edge(part, inverse_depth, segment_of_part, v, u):
     return False
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _accumulate(residual, shape, coverage, owner, nearness, projection, observation, comparison, sums, blocks):
     """Add one view's normal equations for the twist of each segment about the origin: A twist = g.
 
@@ -243,7 +242,7 @@ def _accumulate(residual, shape, coverage, owner, nearness, projection, observat
     return cost, total, weight_sum
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def silhouette_equations(body, projection, observation, comparison, maps, sums, blocks):
     """Add one view's normal equations of `blurred posterior - blurred mask`; see `_accumulate`.
 
@@ -264,7 +263,7 @@ def silhouette_equations(body, projection, observation, comparison, maps, sums, 
     return _accumulate(residual, shape, coverage[0], owner, nearness, projection, observation, comparison, sums, blocks)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def photometric_equations(body, projection, observation, comparison, maps, paint, light, iterations, sums, blocks):
     """Add one view's normal equations of `blurred observed - blurred composite`, in linear light; see `_accumulate`.
 
@@ -285,7 +284,7 @@ def photometric_equations(body, projection, observation, comparison, maps, paint
     )
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def known_light_equations(
     body, projection, observation, comparison, maps, workspace, is_faceted, lamps, ambient, sums, blocks
 ):
@@ -310,7 +309,7 @@ def known_light_equations(
     )
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _draw(body, projection, maps, window):
     """Draw the maps of a view; return the segment that owns each pixel of the window, and its inverse depth."""
     shapes, geometry, segment_of_part = body
@@ -323,7 +322,7 @@ def _draw(body, projection, maps, window):
     return owner, nearness
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _mask_coverage(part, comparison):
     window, taps_u, taps_v, _ = comparison
     x0, y0, x1, y1 = window
@@ -335,7 +334,7 @@ def _mask_coverage(part, comparison):
     return coverage
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _composite_equations(lit, is_faceted, part, owner, nearness, projection, observation, comparison, sums, blocks):
     """Compare the image with the lit body (3, h, w) in front of the background."""
     observed, background, _ = observation
@@ -355,7 +354,7 @@ def _composite_equations(lit, is_faceted, part, owner, nearness, projection, obs
     return _accumulate(residual, shape, coverage[0], owner, nearness, projection, observation, comparison, sums, blocks)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def map_equations(A, g, jacobians, H, gradient):
     """Add the segments' equations, A (s, 6, 6) and g (s, 6), mapped by the jacobians (s, 6, d), to H (d, d) and (d,).
 
@@ -386,7 +385,7 @@ def map_equations(A, g, jacobians, H, gradient):
                             H[i, j] += J[p, i] * AJ[p, j]
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def add_score_covariance(blocks, jacobians, S):
     """Add to S (d, d) the sum of G G' over the blocks (n, s, 6), G a block's gradient mapped by jacobians (s, 6, d)."""
     d = len(S)
