@@ -85,4 +85,5 @@ def _default(option):
 
 def _plain(text):
     """Return text as Markdown that shows it as it is."""
-    return re.sub(r"([\\<*|\[\]])", r"\\\1", " ".join((text or "").split()))
+    escaped = re.sub(r"([\\<*|\[\]])", r"\\\1", " ".join((text or "").split()))
+    return re.sub(r"(?<![\w`])(--[a-z][a-z-]*)", r"`\1`", escaped)

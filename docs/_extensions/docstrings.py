@@ -8,6 +8,7 @@ import re
 def setup(app):
     """Look at everything that is documented."""
     app.connect("autodoc-process-docstring", _change)
+    app.connect("autodoc-process-signature", _shorten)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
 
 
@@ -15,6 +16,11 @@ def _change(app, what, name, obj, options, lines):
     lines[:] = literals("\n".join(lines)).split("\n")
     if what == "class" and dataclasses.is_dataclass(obj):
         lines += ["", *(f":param {field}: {text}" for field, text in comments(obj))]
+
+
+def _shorten(app, what, name, obj, options, signature, returns):
+    """Write ... for a default that a dataclass makes anew each time."""
+    return (signature or "").replace("<factory>", "...") or None, returns
 
 
 def literals(text):

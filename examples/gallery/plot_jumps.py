@@ -40,6 +40,10 @@ motion = PlayersMotion(
 [jump] = jumps(motion)
 print(f"take-off at {jump.takeoff_s.value:.3f} s, landing at {jump.landing_s.value:.3f} s")
 
+# %%
+# The four heights answer different questions: the first two count the heels' rise before take-off, the last two do not.
+# Bars are 95 % intervals, crosses the truth where a definition has one.
+
 figure, (path, bars) = plt.subplots(1, 2, figsize=(11, 4), width_ratios=(3, 2), layout="constrained")
 for joint, colour in (("hip", "#0072b2"), ("ankle", "#d55e00")):
     columns = [JOINTS.index(f"{joint}_left"), JOINTS.index(f"{joint}_right")]
@@ -51,10 +55,6 @@ for event, name in ((jump.takeoff_s, "take-off"), (jump.landing_s, "landing")):
     path.text(event.value, 0.02, f" {name}", fontsize=9)
 path.set(xlabel="time [s]", ylabel="height [m]", ylim=(0, 1.6))
 path.legend(loc="upper left", frameon=False)
-
-# %%
-# The four heights answer different questions: the first two count the heels' rise before take-off, the last two do not.
-# Bars are 95 % intervals, crosses the truth where a definition has one.
 
 facts = jump_facts(player, float(scene.rate))
 heights = {

@@ -31,7 +31,7 @@ def smoothed(cutoff_hz):
 
 
 # %%
-# Winter's residual analysis chooses the cut-off that lets through as much noise as it removes motion.
+# Winter's residual analysis chooses the cut-off at which as much signal is removed as noise is let through.
 
 analysis = residual_analysis(time_s, measured[:, None, None])
 print(f"chosen cut-off: {analysis.chosen_hz:.1f} Hz; noise: {1e3 * analysis.noise:.1f} mm")
