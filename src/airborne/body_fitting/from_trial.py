@@ -28,7 +28,7 @@ from airborne.video import Frames, Recording
 StageProgress = Callable[[str, int, int], None]  # what is being done, how far, of how many
 
 _N_SCENERY = 10  # further frames that show the scene without the person
-_PICTURE_NAME = "fit_body.png"
+PICTURE = "fit_body.png"
 _CELL_PX, _CELL_SCALE = 400, 0.4  # a cell of the image, and its pixel size in pixels of `crop_camera`
 _LINE_RGB, _EMPTY_GREY = (255, 230, 0), 60
 
@@ -67,7 +67,7 @@ def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: Stage
         mass_kg=trial.body.mass_kg,
         progress=lambda done, total: report("fitting", done, total),
     )
-    picture = output.with_name(_PICTURE_NAME)
+    picture = output.with_name(PICTURE)
     write_body(output, fit.model)
     picture.write_bytes(_contact_sheet(fit, [observations[index].frames for index in chosen]))
     return PersonFit(fit, tuple(chosen), picture)
