@@ -17,7 +17,10 @@ SIZES = {f"cam{i + 1}": SIZE for i in range(4)}
 
 def hall(focals_px=FOCALS_PX, k1=0.0) -> Rig:
     """Four cameras in the corners."""
-    rig = [camera_looking_at(f"cam{i + 1}", place, (0.3 * i, 0.2, 1.4), focals_px[i], SIZE) for i, place in enumerate(PLACES)]
+    rig = [
+        camera_looking_at(f"cam{i + 1}", place, (0.3 * i, 0.2, 1.4), focal_px=focals_px[i], size=SIZE)
+        for i, place in enumerate(PLACES)
+    ]
     return Rig(tuple(replace(camera, distortion=np.array([k1, 0, 0, 0, 0])) for camera in rig))
 
 

@@ -14,7 +14,12 @@ from tests.support.places import THROWN_CROSS
 from tests.support.tolerances import ROUNDTRIP
 
 PLACES = ((-3.0, -5.0, 1.5), (3.0, -4.5, 2.0), (0.3, -1.0, 6.0))
-RIG = Rig(tuple(camera_looking_at(f"cam{i}", place, (0, 0, 1.4), 700.0, (640, 480)) for i, place in enumerate(PLACES)))
+RIG = Rig(
+    tuple(
+        camera_looking_at(f"cam{i}", place, (0, 0, 1.4), focal_px=700.0, size=(640, 480))
+        for i, place in enumerate(PLACES)
+    )
+)
 CORNERS = np.random.default_rng(2).uniform(-0.3, 0.3, (12, 3))
 PERIOD_S = 0.02
 THROWN = THROWN_CROSS

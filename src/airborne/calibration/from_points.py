@@ -96,7 +96,9 @@ def calibrate(
     decompositions = decompose_cameras(points)
     cameras, fits, solutions = [], [], {}
     for name in points.cameras:
-        candidates = _solve(points, name, sizes[name], decompositions[name], method, seed)
+        candidates = _solve(
+            points, name, size=sizes[name], decomposition=decompositions[name], method=method, seed=seed
+        )
         solutions[name] = choose_simplest(candidates)
         cameras.append(_camera(name, sizes[name], solutions[name]))
         fits.append(_describe_fit(points, name, solutions[name], candidates))
@@ -112,6 +114,7 @@ def calibrate(
 def _solve(
     points: ControlPoints,
     name: str,
+    *,
     size: tuple[int, int],
     decomposition: Decomposition,
     method: CalibrationMethod,

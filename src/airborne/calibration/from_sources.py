@@ -52,16 +52,18 @@ def calibrate_from(sources: Sources, progress: Progress) -> RigCalibration:
     inputs = read_inputs(sources, progress)
     rig, mended = _resect_misplaced(inputs)
     free = inputs.free
-    without_lags = _adjust(inputs, rig, free, None, progress)
+    without_lags = _adjust(inputs, rig, free, lag_sd_s=None, progress=progress)
     adjustment, lag_sd_s = without_lags, _lag_sd_s(inputs)
     if lag_sd_s is not None:
-        with_lags = _adjust(inputs, without_lags.rig, free, lag_sd_s, progress)
+        with_lags = _adjust(inputs, without_lags.rig, free, lag_sd_s=lag_sd_s, progress=progress)
         row = [source.name for source in with_lags.sources].index("board")
         is_better = with_lags.noise_px[row] < _LOOSE_SYNC_NOISE_SHARE * without_lags.noise_px[row]
         is_requested = sources.board is not None and sources.board.sync == "loose"
         adjustment, lag_sd_s = (with_lags, lag_sd_s) if is_better or is_requested else (without_lags, None)
     elif inputs.wand is not None or (inputs.detections is not None and without_lags.prior is None):
-        adjustment = _adjust(inputs, without_lags.rig, free, None, progress)  # triangulated anew by better cameras
+        adjustment = _adjust(
+            inputs, without_lags.rig, free, lag_sd_s=None, progress=progress
+        )  # triangulated anew by better cameras
     frame = choose_world_frame(inputs, adjustment, [m.camera.name for m in mended])
     final = adjustment if frame.is_unchanged else _adjust_in_world(adjustment, frame, progress)
     held_out_px = cross_validate(final, lambda done, n: progress("leaving out and predicting", done, n))
@@ -88,7 +90,7 @@ def _resect_misplaced(inputs: Inputs) -> tuple[Rig, tuple[Resection, ...]]:
 
 
 def _adjust(
-    inputs: Inputs, rig: Rig, free: Mapping[str, FreeParameters], lag_sd_s: float | None, progress: Progress
+    inputs: Inputs, rig: Rig, free: Mapping[str, FreeParameters], *, lag_sd_s: float | None, progress: Progress
 ) -> Adjustment:
     sources = _sources(inputs, rig, lag_sd_s)
     prior = None

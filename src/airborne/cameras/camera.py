@@ -103,6 +103,7 @@ def camera_looking_at(
     name: str,
     position: ArrayLike,
     target: ArrayLike,
+    *,
     focal_px: float,
     size: tuple[int, int],
 ) -> Camera:

@@ -26,8 +26,8 @@ def read_clicks(path: Path, cameras: Sequence[str]) -> tuple[tuple[str, ...], Ar
     with_columns = [name for name in cameras if f"{name}_u" in columns and f"{name}_v" in columns]
     if len(with_columns) < 2:
         raise CalibrationError(
-            f"{path.name}: has columns _u and _v of {', '.join(with_columns) or 'none'} of the cameras {', '.join(cameras)}; "
-            "a position needs two of them"
+            f"{path.name}: has columns _u and _v of {', '.join(with_columns) or 'none'} of the cameras "
+            f"{', '.join(cameras)}; a position needs two of them"
         )
     px = np.full((len(names), len(cameras), 2), np.nan)
     for name in with_columns:
@@ -57,8 +57,8 @@ def read_named_numbers(path: Path, key: str, expected: str) -> tuple[tuple[str, 
     lines = [row for _, row in read_csv(path, expected, CalibrationError)]
     header, *rows = lines or [[]]
     if key not in header or len(set(header)) < len(header) or not rows:
-        found = ",".join(header)[:80] or "nothing"
-        raise CalibrationError(f"{path.name}: found the header {found} and {len(rows)} rows; {expected}, each once")
+        header_text = ",".join(header)[:80] or "nothing"
+        raise CalibrationError(f"{path.name}: found the header {header_text} and {len(rows)} rows; {expected}, each once")
     key_column = header.index(key)
     columns = tuple(header[:key_column] + header[key_column + 1 :])
     names: list[str] = []

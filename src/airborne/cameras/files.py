@@ -80,8 +80,8 @@ def build_rig(file: CalibrationFile, options: FileOptions) -> Rig:
             "millimetres? Then say --unit mm" if longest_baseline_m(rig) > FARTHEST_M else "metres? Then say --unit m"
         )
         raise CalibrationError(
-            f"{file.where}: the cameras lie up to {longest_baseline_m(rig):.3g} m from each other; are its lengths in {question}; "
-            "`airborne convert` writes such a file anew, in metres"
+            f"{file.where}: the cameras lie up to {longest_baseline_m(rig):.3g} m from each other; are its lengths in "
+            f"{question}; `airborne convert` writes such a file anew, in metres"
         )
     return rig
 
@@ -137,7 +137,7 @@ def write_rig(
     for name in rig.names:
         if not name.isprintable() or not name.strip():
             raise CalibrationError(f"camera {name!r} has a name that files cannot hold; rename it")
-    texts, notes = _texts(kind, rig, file_unit, pixels or PixelConvention(), errors_px)
+    texts, notes = _texts(kind, rig, file_unit, pixels=pixels or PixelConvention(), errors_px=errors_px)
     if kind == "easymocap":
         path.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
@@ -163,7 +163,7 @@ def format_of_name(path: Path) -> str:
 
 
 def _texts(
-    kind: str, rig: Rig, unit: Unit, pixels: PixelConvention, errors_px: Mapping[str, float] | None
+    kind: str, rig: Rig, unit: Unit, *, pixels: PixelConvention, errors_px: Mapping[str, float] | None
 ) -> tuple[dict[str, str], tuple[str, ...]]:
     """Return the texts by file name, and what they cannot hold."""
     if kind == "easymocap":

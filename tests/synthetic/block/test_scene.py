@@ -45,7 +45,7 @@ def shorten(scene, n_frames, *, scale=3):
     def small(rig):
         return Rig(
             tuple(
-                camera.resampled(scale=(scale, scale), offset=(0, 0), size=tuple(s // scale for s in camera.size))
+                camera.resample(scale=(scale, scale), offset=(0, 0), size=tuple(s // scale for s in camera.size))
                 for camera in rig
             )
         )

@@ -33,7 +33,7 @@ MODEL = human18(STATURE_M, MASS_KG)
 def reduce_scene(scene, scale=4):
     """The scene with images smaller by `scale`."""
     cameras = (
-        c.resampled(scale=(scale, scale), offset=((scale - 1) / 2,) * 2, size=(c.size[0] // scale, c.size[1] // scale))
+        c.resample(scale=(scale, scale), offset=((scale - 1) / 2,) * 2, size=(c.size[0] // scale, c.size[1] // scale))
         for c in scene.rig
     )
     return replace(scene, rig=Rig(tuple(cameras)))

@@ -80,7 +80,11 @@ def residual_px(problem: Problem, state: State) -> Array:
     """Return measured minus projected pixels (n, 2) [px]; NaN behind the camera."""
     i = problem.camera
     return problem.px - project(
-        state.R[i], state.centre[i], state.intrinsics[i], problem.is_fisheye[i], world_points(problem, state)
+        state.R[i],
+        state.centre[i],
+        state.intrinsics[i],
+        is_fisheye=problem.is_fisheye[i],
+        world=world_points(problem, state),
     )
 
 
@@ -97,7 +101,7 @@ def jacobian_of(problem: Problem, state: State) -> Jacobian:
     world, arm, displacement = _points_at_moments(problem, state)
     world = world + np.cross(displacement[:, :3], arm) + displacement[:, 3:]
     _, by_camera, by_world = project_with_jacobian(
-        state.R[i], state.centre[i], state.intrinsics[i], problem.is_fisheye[i], world
+        state.R[i], state.centre[i], state.intrinsics[i], is_fisheye=problem.is_fisheye[i], world=world
     )
     by_camera[:, :, 7] *= _focal_ratio(problem, state)[i, None]
     entries = [_entries(by_camera, np.broadcast_to(problem.camera_columns[i][:, None], by_camera.shape), np.arange(n))]

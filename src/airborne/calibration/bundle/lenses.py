@@ -17,7 +17,7 @@ FISHEYE_PARAMETERS = (*CAMERA_PARAMETERS[:10], "k1", "k2", "k3", "k4", "")
 _NEAREST_DEPTH_M = 1e-9  # a point at a smaller depth counts as behind the camera
 
 
-def project(R: Array, centre: Array, intrinsics: Array, is_fisheye: NDArray[np.bool_], world: Array) -> Array:
+def project(R: Array, centre: Array, intrinsics: Array, *, is_fisheye: NDArray[np.bool_], world: Array) -> Array:
     """Project one world point a row: (n, 2) [px]; NaN behind the camera.
 
     R (n, 3, 3) camera from world, centre (n, 3) [m], intrinsics (n, 9) fx, fy, cx, cy and lens terms, world (n, 3) [m].
@@ -28,7 +28,7 @@ def project(R: Array, centre: Array, intrinsics: Array, is_fisheye: NDArray[np.b
 
 
 def project_with_jacobian(
-    R: Array, centre: Array, intrinsics: Array, is_fisheye: NDArray[np.bool_], world: Array
+    R: Array, centre: Array, intrinsics: Array, *, is_fisheye: NDArray[np.bool_], world: Array
 ) -> tuple[Array, Array, Array]:
     """Return pixels (n, 2) and their derivatives by the camera's parameters (n, 2, 15) and the point (n, 2, 3).
 

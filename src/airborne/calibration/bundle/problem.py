@@ -81,7 +81,7 @@ def build_problem(rig: Rig, sources: Sequence[Source], free_parameters: Mapping[
     ends = [np.stack([x.first, x.second], axis=1) + p for _, x, p in lengths]
     length_ends = np.concatenate([np.zeros((0, 2), int), *ends])
     free = np.concatenate([np.zeros((0, 3), bool), *(s.free_coordinates for s in sources)])
-    free &= _is_determined(free, camera, moment, point, length_ends)[:, None]
+    free &= _is_determined(free, camera=camera, moment=moment, point=point, ends=length_ends)[:, None]
     is_fixed = np.concatenate([np.zeros(0, bool), *(s.fixed_targets for s in sources)])
     target_columns, point_columns, n_others = _other_columns(is_fixed, free, moment)
     lag, lag_sd_s, lag_source = _lags(sources)
@@ -245,7 +245,9 @@ def _camera_columns(rig: Rig, free_parameters: Mapping[str, FreeParameters]) -> 
     return columns
 
 
-def _is_determined(free: NDArray[np.bool_], camera: Ints, moment: Ints, point: Ints, ends: Ints) -> NDArray[np.bool_]:
+def _is_determined(
+    free: NDArray[np.bool_], *, camera: Ints, moment: Ints, point: Ints, ends: Ints
+) -> NDArray[np.bool_]:
     """Say which points (p,) are determined: each view gives two equations, each length one."""
     pairs = np.unique(np.stack([point[moment < 0], camera[moment < 0]], axis=1), axis=0)
     n_views = np.bincount(pairs[:, 0], minlength=len(free))

@@ -58,7 +58,7 @@ def check_board_print(board: Board, pictures: Sequence[Image], camera: str = "")
     findings = list(_wrong_charuco(board, sample, where, camera, is_found=is_found))
     if findings or is_found:
         return findings
-    return [_not_detected(board, sample, counts, where, camera)]
+    return [_not_detected(board, sample, counts, where=where, camera=camera)]
 
 
 def _corner_counts(board: Board, pictures: Sequence[Image]) -> list[int]:
@@ -66,7 +66,9 @@ def _corner_counts(board: Board, pictures: Sequence[Image]) -> list[int]:
     return [len(detect(picture).corner) for picture in pictures]
 
 
-def _not_detected(board: Board, pictures: Sequence[Image], counts: Sequence[int], where: str, camera: str) -> Finding:
+def _not_detected(
+    board: Board, pictures: Sequence[Image], counts: Sequence[int], *, where: str, camera: str
+) -> Finding:
     n_detected, n_corners = sum(count > 0 for count in counts), board.inner_size[0] * board.inner_size[1]
     return Finding(
         kind="board",
@@ -99,13 +101,13 @@ def _wrong_charuco(
         is_own_seen = n_here >= _FEWEST_MARKERS * len(sample)
         dictionary, is_inverted, n_there = ("", False, 0) if is_own_seen else _likeliest_print(board, sample)
         if n_there >= _CLEAR_RATIO * max(n_here, _FEWEST_MARKERS):
-            yield _other_print(board, dictionary, is_inverted, where, about, (n_here, n_there))
+            yield _other_print(board, dictionary, is_inverted, where=where, about=about, counts=(n_here, n_there))
             board = replace(board, dictionary=dictionary, is_inverted=is_inverted)
     yield from _wrong_layout(board, _all_markers(pictures, board.dictionary, board.is_inverted), where, about)
 
 
 def _other_print(
-    board: Board, dictionary: str, is_inverted: bool, where: str, about: tuple[str, ...], counts: tuple[int, int]
+    board: Board, dictionary: str, is_inverted: bool, *, where: str, about: tuple[str, ...], counts: tuple[int, int]
 ) -> Finding:
     settings = [f'dictionary = "{dictionary}"'] * (dictionary != board.dictionary)
     settings += [f"inverted = {str(is_inverted).lower()}"] * (is_inverted != board.is_inverted)
@@ -280,7 +282,7 @@ def _wrong_chessboard(board: Board, pictures: Sequence[Image], where: str, camer
     short, long = max(counts, key=lambda size: (counts[size], size), default=(0, 0))
     n_detected = counts.get((short, long), 0)
     if n_detected < _FEWEST_PICTURES:
-        return [_not_detected(board, pictures, _corner_counts(board, pictures), where, camera)]
+        return [_not_detected(board, pictures, _corner_counts(board, pictures), where=where, camera=camera)]
     columns, rows = (long, short) if board.columns >= board.rows else (short, long)
     squares = (columns + 1, rows + 1) == (board.columns, board.rows)
     return [

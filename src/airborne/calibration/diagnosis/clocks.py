@@ -106,7 +106,7 @@ def _finding(camera: str, what: str, advice: str) -> Finding:
 
 
 def check_rolling_shutter(
-    camera: str, residual_px: Array, velocity_px_per_s: Array, row_px: Array, height_px: int
+    camera: str, residual_px: Array, velocity_px_per_s: Array, *, row_px: Array, height_px: int
 ) -> list[Finding]:
     """Report a rolling shutter: moving points are displaced in proportion to their row.
 

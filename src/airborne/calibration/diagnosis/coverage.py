@@ -77,10 +77,16 @@ def check_tilts(camera: str, tilts_rad: Array) -> list[Finding]:
 def check_links(names: Sequence[str], n_shared: Array, what: str = "moments") -> list[Finding]:
     """Report cameras that are not linked to the others; n_shared (cameras, cameras) counts what two see at once."""
     n_groups, group = connected_components(np.asarray(n_shared) >= _FEWEST_SHARED, directed=False)
-    return list(_missing_links(names, np.asarray(n_shared), group, n_groups, what)) if n_groups > 1 else []
+    return (
+        list(_missing_links(names, np.asarray(n_shared), group=group, n_groups=n_groups, what=what))
+        if n_groups > 1
+        else []
+    )
 
 
-def _missing_links(names: Sequence[str], n_shared: Array, group: Array, n_groups: int, what: str) -> Iterator[Finding]:
+def _missing_links(
+    names: Sequence[str], n_shared: Array, *, group: Array, n_groups: int, what: str
+) -> Iterator[Finding]:
     main = int(np.argmax(np.bincount(group)))
     for other in (g for g in range(n_groups) if g != main):
         here, there = np.flatnonzero(group == main), np.flatnonzero(group == other)

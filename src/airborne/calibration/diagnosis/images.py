@@ -139,13 +139,13 @@ def check_swaps(names: tuple[str, ...], misfit_px: Callable[[Sequence[int]], flo
     if best is None or misfits[best] > _SWAPPED_SHARE * misfit:
         return []
     pair = [names[i] for i in best]
-    exchanged = join_names(pair)
+    both = join_names(pair)
     before = f"{misfit:.1f} px" if np.isfinite(misfit) else "nowhere"
     return [
         Finding(
             kind="swapped",
-            what=f"points fit to {before} as the files are named, {misfits[best]:.1f} px with {exchanged} exchanged",
-            advice=f"the files of {exchanged} are swapped; exchange them",
+            what=f"points fit to {before} as the files are named, {misfits[best]:.1f} px with {both} exchanged",
+            advice=f"the files of {both} are swapped; exchange them",
             cameras=tuple(pair),
         )
     ]
@@ -156,13 +156,12 @@ def check_floor(rig: Rig) -> list[Finding]:
     names = [camera.name for camera in rig if camera.centre[2] < 0]
     if not names:
         return []
+    come = "come" if len(names) > 1 else "comes"
     deepest = min(camera.centre[2] for camera in rig)
     return [
         Finding(
             kind="mirrored",
-            what=(
-                f"{join_names(names)} {'come' if len(names) > 1 else 'comes'} out below the floor, at z = {deepest:.1f} m"
-            ),
+            what=f"{join_names(names)} {come} out below the floor, at z = {deepest:.1f} m",
             advice="left and right, or near and far, are exchanged in the points' names, or the pictures are mirrored",
             cameras=tuple(names),
         )

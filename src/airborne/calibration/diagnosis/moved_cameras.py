@@ -68,9 +68,9 @@ def _moved_finding(name: str, displacement: _Displacement, times: Sequence[str])
     return Finding(
         kind="moved",
         what=(
-            f"{name} moved between {times[displacement.moment - 1]} and {times[displacement.moment]}: its picture jumps by "
-            f"{displacement.shift_px:.1f} px (turned by {np.degrees(displacement.turn_rad):.2f} degrees, shifted by "
-            f"{displacement.shift_m * 1e3:.0f} mm)"
+            f"{name} moved between {times[displacement.moment - 1]} and {times[displacement.moment]}: its picture "
+            f"jumps by {displacement.shift_px:.1f} px (turned by {np.degrees(displacement.turn_rad):.2f} degrees, "
+            f"shifted by {displacement.shift_m * 1e3:.0f} mm)"
         ),
         advice=(
             "fix it better and film again, or calibrate only with the side of the jump on which the trial was filmed"
@@ -161,8 +161,8 @@ def _project(camera: Camera, points: Array) -> tuple[Array, Array]:
         np.broadcast_to(R, (n, 3, 3)),
         np.broadcast_to(camera.centre, (n, 3)),
         np.broadcast_to(intrinsics, (n, 9)),
-        np.full(n, camera.lens == "fisheye"),
-        points,
+        is_fisheye=np.full(n, camera.lens == "fisheye"),
+        world=points,
     )
     return px, jacobian[:, :, :6]
 

@@ -18,7 +18,7 @@ from airborne.cameras.units import check_baselines
 from airborne.types import Array
 
 _UP = np.array([0.0, 0.0, 1.0])
-_MISFIT_PX, _MISFIT_SHARE = 4.0, 0.002  # RMS of clicked points; share of the pictures' longer sides
+_MISFIT_PX, _MISFIT_SHARE = 4.0, 0.002  # RMS of clicked points; share of the images' longer sides
 
 
 def diagnose(calibration: RigCalibration) -> tuple[Finding, ...]:
@@ -145,4 +145,6 @@ def _check_rolling_shutter(calibration: RigCalibration) -> Iterator[Finding]:
     for c, camera in enumerate(calibration.rig):
         own = source.camera == c
         v = velocity[source.moments[own], source.point[own], c]
-        yield from check_rolling_shutter(camera.name, residual[own], v, source.px[own, 1], camera.size[1])
+        yield from check_rolling_shutter(
+            camera.name, residual[own], v, row_px=source.px[own, 1], height_px=camera.size[1]
+        )

@@ -113,7 +113,7 @@ def initial_lens(views: Views, size: tuple[int, int], *, lens: Lens) -> tuple[Ca
 
 
 def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTransform]:
-    """Chain the poses of cameras with known lenses along shared views, over the tree with the most shared moments.
+    """Chain the poses of cameras with known lenses along the spanning tree with the most shared moments.
 
     The camera with the most shared moments is the world's origin. Return the rig, and the board's pose at every moment.
     Raises CalibrationError naming the cameras that share no view with the others.
@@ -133,7 +133,14 @@ def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTr
     for i in order[1:]:
         j = int(parent[i])
         from_world[int(i)] = (
-            _relative_pose(cameras[i], cameras[j], views, camera_from_board[i], camera_from_board[j], (int(i), j))
+            _relative_pose(
+                cameras[i],
+                cameras[j],
+                views,
+                poses=camera_from_board[i],
+                other_poses=camera_from_board[j],
+                pair=(int(i), j),
+            )
             * from_world[j]
         )
     rig = Rig(tuple(replace(camera, camera_from_world=from_world[i]) for i, camera in enumerate(cameras)))
@@ -198,6 +205,7 @@ def _relative_pose(
     one: Camera,
     other: Camera,
     views: Views,
+    *,
     poses: Sequence[RigidTransform | None],
     other_poses: Sequence[RigidTransform | None],
     pair: tuple[int, int],

@@ -95,7 +95,8 @@ def resect(camera: Camera, points: Array, px: Array) -> Resection:
     weights = (np.ones(is_valid.shape) / np.maximum(is_valid.sum(axis=0), 1))[is_valid]
     initial_poses = [camera.camera_from_world, *_perspective_n_point(pinhole, xyz, uv)]
     pose, jacobian = min(
-        (_fit_pose(pinhole, initial, xyz, uv, weights) for initial in initial_poses), key=lambda fit: fit[0]
+        (_fit_pose(pinhole, initial, xyz=xyz, uv=uv, weights=weights) for initial in initial_poses),
+        key=lambda fit: fit[0],
     )[1:]
     resected = replace(camera, camera_from_world=pose)
     residual = np.where(is_valid[..., None], px - resected.px_from_world(points), np.nan)
@@ -166,7 +167,7 @@ def _perspective_n_point(camera: Camera, xyz: Array, uv: Array) -> list[RigidTra
 
 
 def _fit_pose(
-    camera: Camera, initial: RigidTransform, xyz: Array, uv: Array, weights: Array
+    camera: Camera, initial: RigidTransform, *, xyz: Array, uv: Array, weights: Array
 ) -> tuple[float, RigidTransform, Array]:
     """Return the cost, the pose that fits best near the initial one, and the residuals' Jacobian (n, 2, 6) there.
 

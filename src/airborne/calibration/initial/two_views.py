@@ -50,7 +50,7 @@ def fit_epipolar_geometry(px_a: Array, px_b: Array, *, limit_px: float) -> Epipo
     return EpipolarGeometry(F.astype(float), mask.ravel().astype(bool))
 
 
-def relative_pose(F: Array, K_a: Array, K_b: Array, px_a: Array, px_b: Array) -> RelativePose:
+def relative_pose(F: Array, K_a: Array, K_b: Array, *, px_a: Array, px_b: Array) -> RelativePose:
     """Return the pose of camera b with most of the points (n, 2) [px] in front of both cameras."""
     R_1, R_2, t = (np.asarray(part, float) for part in cv2.decomposeEssentialMat(K_b.T @ F @ K_a))
     rays_a, rays_b = _rays(px_a, K_a), _rays(px_b, K_b)

@@ -59,7 +59,9 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
         board_detections, lens_views = _detect_boards(
             sources, board, lambda done, n: progress("looking for the board", done, n)
         )
-    lenses = _fit_lenses(sources, board_detections, lens_views, sizes, progress)
+    lenses = _fit_lenses(
+        sources, board_detections=board_detections, lens_views=lens_views, sizes=sizes, progress=progress
+    )
     points = {}
     if sources.control_points is not None:
         points["control points"] = read_control_points(sources.path(sources.control_points.file))
@@ -178,6 +180,7 @@ def _sizes(sources: Sources, start_rig: Rig | None) -> dict[str, tuple[int, int]
 
 def _fit_lenses(
     sources: Sources,
+    *,
     board_detections: BoardDetections | None,
     lens_views: dict[str, Views],
     sizes: dict[str, tuple[int, int]],

@@ -42,7 +42,7 @@ class _Pair:
 
     a: int
     b: int
-    is_inlier: NDArray[np.bool_]  # (frames, markers), seen by both
+    is_inlier: NDArray[np.bool_]  # (frames, markers) of both cameras
     epipolar: EpipolarGeometry
 
 
@@ -127,7 +127,10 @@ def _with_focal_lengths(
 
     def misfit(focals: Array, only: int | None = None) -> float:
         relevant = [pair for pair in pairs if only is None or only in (pair.a, pair.b)]
-        return sum(_length_variation(pair, samples[id(pair)], cameras, focals, tracks) for pair in relevant)
+        return sum(
+            _length_variation(pair, samples[id(pair)], cameras=cameras, focals=focals, tracks=tracks)
+            for pair in relevant
+        )
 
     for ratio in _FOCAL_RATIOS:  # all alike first: cameras of one recording mostly are
         guess = focal.copy()
@@ -172,24 +175,24 @@ def _with_focal(camera: Camera, focal_px: float) -> Camera:
 
 
 def _length_variation(
-    pair: _Pair, rows: NDArray[np.integer], cameras: Sequence[Camera], focals: Array, tracks: WandTracks
+    pair: _Pair, rows: NDArray[np.integer], *, cameras: Sequence[Camera], focals: Array, tracks: WandTracks
 ) -> float:
     """Return the relative variation of the wand's length in one pair, plus the share of markers behind the cameras."""
     if len(rows) < _LEAST_SHARED:
         return 0.0
     K_a, K_b = (_with_focal(cameras[i], focals[i]).K for i in (pair.a, pair.b))
-    pose, points = _relative_pose(pair, rows, tracks, K_a, K_b)
+    pose, points = _relative_pose(pair, rows, tracks, K_a=K_a, K_b=K_b)
     _, variation = _scale(points, pair.is_inlier[rows], tracks)
     return min(variation + 1 - pose.front_share, _MOST_LENGTH_VARIATION)
 
 
 def _relative_pose(
-    pair: _Pair, rows: NDArray[np.integer], tracks: WandTracks, K_a: Array, K_b: Array
+    pair: _Pair, rows: NDArray[np.integer], tracks: WandTracks, *, K_a: Array, K_b: Array
 ) -> tuple[RelativePose, Array]:
     """Return the pair's relative pose from some frames, and their markers (frames, markers, 3) in a's axes."""
     is_inlier = pair.is_inlier[rows]
     px = tracks.px[rows][is_inlier]
-    pose = relative_pose(pair.epipolar.F, K_a, K_b, px[:, pair.a], px[:, pair.b])
+    pose = relative_pose(pair.epipolar.F, K_a, K_b, px_a=px[:, pair.a], px_b=px[:, pair.b])
     points = np.full((*is_inlier.shape, 3), np.nan)
     points[is_inlier] = pose.points
     return pose, points
@@ -267,7 +270,7 @@ def _links(cameras: Sequence[Camera], pairs: Sequence[_Pair], tracks: WandTracks
     least_variation = np.inf
     for pair in pairs:
         rows = np.flatnonzero(pair.is_inlier.any(axis=1))
-        pose, points = _relative_pose(pair, rows, tracks, cameras[pair.a].K, cameras[pair.b].K)
+        pose, points = _relative_pose(pair, rows, tracks, K_a=cameras[pair.a].K, K_b=cameras[pair.b].K)
         factor, variation = _scale(points, pair.is_inlier[rows], tracks)
         least_variation = min(least_variation, variation)
         if pose.front_share < _LEAST_FRONT or variation > _MOST_LENGTH_VARIATION:

@@ -66,8 +66,8 @@ class Gravity:
         if error <= max(3 * self.magnitude_sd, 0.01 * _STANDARD_GRAVITY):
             return sentence
         return (
-            f"{sentence}, so lengths come out as {ratio:.3f} of the truth or times as {ratio**-0.5:.3f} of it; check the "
-            "length of the wand or the board, and the frame rate"
+            f"{sentence}, so lengths come out as {ratio:.3f} of the truth or times as {ratio**-0.5:.3f} of it; check "
+            "the length of the wand or the board, and the frame rate"
         )
 
 
@@ -108,7 +108,7 @@ def frame_of_gravity(gravity: Gravity, origin: Array, along_x: Array) -> RigidTr
 
 
 def merge_rigs(rigs: Sequence[Rig]) -> Rig:
-    """Merge the initial rigs of several sources: the first rig's world stays, the others are aligned with it one by one.
+    """Merge the initial rigs of several sources: the first rig's world stays, the others are aligned with it in turn.
 
     Rigs are aligned by the cameras that both hold: by one camera's pose or, if there are more, by all positions and the
     mean rotation; both must be in metres. Raises CalibrationError naming the cameras that stay unconnected.
@@ -120,8 +120,8 @@ def merge_rigs(rigs: Sequence[Rig]) -> Rig:
         shared = [name for name in next_rig.names if name in merged]
         if not shared:
             raise CalibrationError(
-                f"nothing ties {', '.join(next_rig.names)} to {', '.join(merged)}: let one camera at least take part in "
-                "both sources (board, wand, court, points)"
+                f"nothing ties {', '.join(next_rig.names)} to {', '.join(merged)}: let one camera at least take part "
+                "in both sources (board, wand, court, points)"
             )
         new_from_old = _align_rig([merged[name].camera_from_world for name in shared], next_rig.select(shared))
         for camera in next_rig:

@@ -71,7 +71,7 @@ def read_digitisation(path: Path, options: FileOptions, cameras: Sequence[str] |
 
 
 def read_xypts(path: Path, options: FileOptions, cameras: Sequence[str] | None = None) -> Detections:
-    """Read `xypts.csv`, pixels as `options.pixels` counts them; from below sizes are needed. Raises CalibrationError."""
+    """Read `xypts.csv` in the pixels of `options.pixels`; a lower corner needs sizes. Raises CalibrationError."""
     header, values = _read_table(path)
     keys = [key for name in header if (key := _parse_column(name)) is not None]
     if not header or len(keys) < len(header):

@@ -40,7 +40,7 @@ def halves_in(document: dict[str, Any]) -> set[str]:
 def rig_from_opencv(document: dict[str, Any], where: str, options: FileOptions) -> Rig:
     """Return the rig of one file's nodes, or of two files' together; in metres unless the options say otherwise.
 
-    `Rot_<camera>` is the rotation as a matrix, `R_<camera>` as a Rodrigues vector (or a matrix). Picture sizes stand in
+    `Rot_<camera>` is the rotation as a matrix, `R_<camera>` as a Rodrigues vector (or a matrix). Image sizes stand in
     `W_<camera>` and `H_<camera>`, else they must be given. Raises CalibrationError.
     """
     names_node = document.get("names")
@@ -53,7 +53,7 @@ def rig_from_opencv(document: dict[str, Any], where: str, options: FileOptions) 
         keys = {name: str(number) for number, name in enumerate(names, 1)}
     if not names:
         raise CalibrationError(f"{where} has no cameras; {_EXPECTED}")
-    return Rig(tuple(_camera(document, where, name, keys[name], options) for name in names))
+    return Rig(tuple(_camera(document, where, name, key=keys[name], options=options) for name in names))
 
 
 def opencv_text(rig: Rig, unit: Unit = "m") -> str:
@@ -87,20 +87,20 @@ def _items(text: str) -> list[str]:
     return [item.strip().strip("\"'") for item in inner.split(",")] if inner else []
 
 
-def _camera(document: dict[str, Any], where: str, name: str, key: str, options: FileOptions) -> Camera:
+def _camera(document: dict[str, Any], where: str, name: str, *, key: str, options: FileOptions) -> Camera:
     where = f"{where}, camera '{name[:60]}'"
     return build_camera(
         where,
         name,
         K=_matrix(document, where, f"K_{key}", (3, 3)),
-        size=_size(document, where, name, key, options),
+        size=_size(document, where, name, key=key, options=options),
         rotation=_rotation(document, where, key),
         translation=options.metres("m") * _matrix(document, where, f"T_{key}", (3, 1), (1, 3)).ravel(),
         distortion=_matrix(document, where, f"dist_{key}", (1, 4), (4, 1), (1, 5), (5, 1)).ravel(),
     )
 
 
-def _size(document: dict[str, Any], where: str, name: str, key: str, options: FileOptions) -> Size | Array:
+def _size(document: dict[str, Any], where: str, name: str, *, key: str, options: FileOptions) -> Size | Array:
     if f"W_{key}" in document and f"H_{key}" in document:
         return np.array([parse_array(where, f"{side}_{key}", document[f"{side}_{key}"], ()) for side in "WH"])
     return options.size_of(name, where)

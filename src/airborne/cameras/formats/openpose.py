@@ -12,7 +12,7 @@ from airborne.errors import CalibrationError
 from airborne.io.text import read_json
 from airborne.types import Array
 
-_LARGEST_FILE_BYTES = 5_000_000  # a picture of a thousand people
+_LARGEST_FILE_BYTES = 5_000_000  # an image of a thousand people
 _MOST_NUMBERS = 10_000_000  # frames times points
 _AMBIGUOUS_SHARE = 0.8  # of the highest confidence: a second person with more makes the choice ambiguous
 
