@@ -16,6 +16,7 @@ EVIDENCE_LIMIT = 5.0  # [nats] bound of a single pixel's evidence
 _FLOOR = np.float32(2e-5)  # probability of a bin that was never observed
 _BIN_AT_PEAK = np.float32(37.1)  # a bin's volume times the Student density's peak at an sd of one grey level
 _HALF = np.float32(0.5)
+_KERNEL = np.array([0.25, 0.5, 0.25], np.float32)  # a colour also counts in its neighbours' bins
 
 
 @kernel
