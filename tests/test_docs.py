@@ -143,7 +143,7 @@ def slug(heading):
 def test_every_link_leads_somewhere(page):
     broken = []
     for link in re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
-        if link.startswith("https://"):
+        if link.startswith("https://") or link.endswith("gallery/index.rst"):  # the gallery is made with the site
             continue
         path, _, anchor = link.partition("#")
         target = page.parent / path if path else page

@@ -58,7 +58,7 @@ def read_named_numbers(path: Path, key: str, expected: str) -> tuple[tuple[str, 
     header, *rows = lines or [[]]
     if key not in header or len(set(header)) < len(header) or not rows:
         header_text = ",".join(header)[:80] or "nothing"
-        raise CalibrationError(f"{path.name}: found the header {header_text} and {len(rows)} rows; {expected}, each once")
+        raise CalibrationError(f"{path.name}: found header {header_text} and {len(rows)} rows; {expected}, each once")
     key_column = header.index(key)
     columns = tuple(header[:key_column] + header[key_column + 1 :])
     names: list[str] = []
