@@ -14,10 +14,12 @@ from typing import get_args
 import pytest
 import typer
 from pydantic import BaseModel
+from typer.testing import CliRunner
 
 from airborne.body import files as bodies
 from airborne.body.files import read_body
 from airborne.body.human import LIMITS_DEG, PARENTS
+from airborne.body_fitting.from_trial import PICTURE
 from airborne.cli import app
 from airborne.evaluation import PlayerErrors, PlayersComparison
 from airborne.evaluation.jump_errors import JumpErrors
@@ -25,7 +27,7 @@ from airborne.evaluation.players import PartErrors
 from airborne.export import write_figures
 from airborne.motion import covariance_file, flight_summary
 from airborne.motion.files import _header
-from airborne.run import body_tracking
+from airborne.run import body_tracking, smooth
 from airborne.run.evaluate import assess
 from airborne.trial import file as trials
 from airborne.trial.file import PlayersMethod, Trial, read_trial
@@ -33,7 +35,9 @@ from tests.support.export_scenes import PERSON, person_run
 from tests.support.places import ROOT
 
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(DOCS.glob("*.md"))]
+RESULTS = DOCS / "reference" / "results.md"
+TRIAL = DOCS / "reference" / "trial.md"
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
 TREE = typer.main.get_command(app)
 LARGEST_IMAGES_BYTES = 700_000
 
@@ -97,7 +101,7 @@ def test_a_wrong_command_is_noticed():
     assert complaint("airborne synth cross -o x --seed 3") is None
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_every_command_shown_exists_with_its_options(page):
     assert [wrong for line in shown_commands(page) if (wrong := complaint(line))] == []
 
@@ -117,16 +121,29 @@ def test_every_command_has_a_page_of_help_with_an_example_that_exists(name):
     assert all(getattr(parameter, "help", "") for parameter in command.params if parameter.name != "help")
 
 
+def test_help_shows_square_brackets():
+    text = CliRunner().invoke(app, ["fit-body", "--help"]).output
+    assert "its [start] has detections" in " ".join(text.split())
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_shows_every_word_that_was_written(name):
+    text = CliRunner().invoke(app, [*name.split()[1:], "--help"]).output
+    shown = "".join(text.split())
+    texts = [COMMANDS[name].help, *(parameter.help for parameter in COMMANDS[name].params)]
+    assert [each for each in texts if "".join(each.split()) not in shown] == []
+
+
 def slug(heading):
     """The name by which the repository's page links to a heading."""
     return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_every_link_leads_somewhere(page):
     broken = []
     for link in re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
-        if link.startswith("https://"):
+        if link.startswith("https://") or link.endswith("gallery/index.rst"):  # the gallery is made with the site
             continue
         path, _, anchor = link.partition("#")
         target = page.parent / path if path else page
@@ -139,7 +156,8 @@ def test_every_link_leads_somewhere(page):
 
 def test_the_readme_links_every_page():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert [page.name for page in DOCS.glob("*.md") if f"(docs/{page.name})" not in readme] == []
+    pages = [page.relative_to(ROOT).as_posix() for page in DOCS.rglob("*.md") if page.name != "index.md"]
+    assert [page for page in pages if f"({page})" not in readme] == []
 
 
 def test_images_are_small():
@@ -166,7 +184,7 @@ MODELS = {
 @pytest.mark.parametrize("heading", MODELS)
 def test_every_key_is_documented_with_its_default(heading):
     model: type[BaseModel] = MODELS[heading]
-    documented = {row[0].strip("`"): row[1].strip("`") for row in table_of(DOCS / "trial.md", heading)}
+    documented = {row[0].strip("`"): row[1].strip("`") for row in table_of(TRIAL, heading)}
     assert list(documented) == list(model.model_fields)
     for key, field in model.model_fields.items():
         if field.is_required():
@@ -178,14 +196,14 @@ def test_every_key_is_documented_with_its_default(heading):
 
 
 def test_every_table_of_the_trial_file_has_a_section():
-    text = (DOCS / "trial.md").read_text(encoding="utf-8")
-    rows = {row[0].strip("`") for row in table_of(DOCS / "trial.md", "Top level")}
+    text = (TRIAL).read_text(encoding="utf-8")
+    rows = {row[0].strip("`") for row in table_of(TRIAL, "Top level")}
     headings = {slug(heading) for heading in re.findall(r"^## (.*)", text, re.MULTILINE)}
     assert set(Trial.model_fields) == rows | (headings & set(Trial.model_fields))
 
 
 def test_examples_of_trial_files_are_valid():
-    trial, body = fences((DOCS / "trial.md").read_text(encoding="utf-8"), "toml")
+    trial, body = fences((TRIAL).read_text(encoding="utf-8"), "toml")
     short, person, players = fences((ROOT / "README.md").read_text(encoding="utf-8"), "toml")
     assert len(Trial.model_validate(tomllib.loads(trial)).camera) == 3
     assert len(Trial.model_validate(tomllib.loads(short)).camera) == 2
@@ -195,7 +213,7 @@ def test_examples_of_trial_files_are_valid():
 
 
 def test_the_example_body_is_a_body(tmp_path):
-    _, body = fences((DOCS / "trial.md").read_text(encoding="utf-8"), "toml")
+    _, body = fences((TRIAL).read_text(encoding="utf-8"), "toml")
     (tmp_path / "body.toml").write_text(body)
     corners = ["0 0 0", "100 0 0", "0 100 0", "0 0 100"]
     faces = ["1 3 2", "1 2 4", "1 4 3", "2 3 4"]
@@ -215,12 +233,18 @@ def run(tmp_path_factory):
 
 def test_every_file_of_a_run_is_documented(run):
     left = {re.sub(r"_cam\d", "_<camera>", path.name) for path in run.iterdir()}
-    assert left == {name for row in table_of(DOCS / "results.md", "Files") for name in named(row[0])}
+    assert left == {name for row in table_of(RESULTS, "Files") for name in named(row[0])}
+
+
+def test_every_file_of_a_smoothed_run_is_documented():
+    documented = {name for row in table_of(RESULTS, "Files added to a finished run") for name in named(row[0])}
+    assert {smooth.MOTION, smooth.JOINTS, smooth.ANGLES, smooth.EVENTS, smooth.FIGURE, smooth.RECORD} <= documented
+    assert f"`{PICTURE}`" in RESULTS.read_text(encoding="utf-8")
 
 
 def test_every_number_of_the_summary_is_documented(run):
     keys = list(json.loads((run / "summary.json").read_text(encoding="utf-8")))
-    documented = [name for row in table_of(DOCS / "results.md", "`summary.json`") for name in named(row[0])]
+    documented = [name for row in table_of(RESULTS, "`summary.json`") for name in named(row[0])]
     assert sorted(keys) == sorted(documented)
 
 
@@ -228,11 +252,11 @@ def test_every_number_of_the_summary_is_documented(run):
 def test_every_column_is_documented(run, name):
     with (run / name).open(encoding="utf-8") as file:
         header = next(csv.reader(file))
-    assert header == [column for row in table_of(DOCS / "results.md", f"`{name}`") for column in named(row[0])]
+    assert header == [column for row in table_of(RESULTS, f"`{name}`") for column in named(row[0])]
 
 
 def test_every_column_of_the_motion_is_documented():
-    documented = [name for row in table_of(DOCS / "results.md", "`motion.csv`") for name in named(row[0])]
+    documented = [name for row in table_of(RESULTS, "`motion.csv`") for name in named(row[0])]
     header = _header(("<segment>",))
     spans = (("cov_00", "cov_55"), ("r00", "r22"))  # written by their ends
     for first, last in spans:
@@ -252,23 +276,23 @@ def person(tmp_path_factory):
 
 def test_every_file_of_a_body_with_joints_is_documented(person, run):
     left = {path.name for path in person[0].iterdir()} - {path.name for path in run.iterdir()}
-    rows = table_of(DOCS / "results.md", "Files of a body with joints")
+    rows = table_of(RESULTS, "Files of a body with joints")
     assert left | {covariance_file.COVARIANCE_FILE} == {name for row in rows for name in named(row[0])}
 
 
 @pytest.mark.parametrize("name", ["joint_angles.csv", "flight.csv"])
 def test_every_column_of_a_body_with_joints_is_documented(person, name):
     header = (person[0] / name).read_text(encoding="utf-8").splitlines()[0].split(",")
-    assert header == [column for row in table_of(DOCS / "results.md", f"`{name}`") for column in named(row[0])]
+    assert header == [column for row in table_of(RESULTS, f"`{name}`") for column in named(row[0])]
 
 
 def test_every_number_of_a_flight_is_documented(person):
-    documented = [name for row in table_of(DOCS / "results.md", "`flight`") for name in named(row[0])]
+    documented = [name for row in table_of(RESULTS, "`flight`") for name in named(row[0])]
     assert sorted(documented) == sorted(flight_summary(person[1], PERSON).to_dict())
 
 
 def test_the_segments_of_a_person_and_their_limits_are_documented():
-    rows = {row[0].strip("`"): row[1:] for row in table_of(DOCS / "human.md", "Segments and limits")}
+    rows = {row[0].strip("`"): row[1:] for row in table_of(DOCS / "explanation" / "human.md", "Segments and limits")}
     middle_and_left = {name: parent for name, parent in PARENTS.items() if not name.endswith("_right")}
     assert list(rows) == list(middle_and_left)
     assert {name: row[0].strip("`") for name, row in rows.items()} == middle_and_left | {"pelvis": "the root"}
@@ -277,7 +301,7 @@ def test_the_segments_of_a_person_and_their_limits_are_documented():
 
 
 def test_the_landmarks_of_a_person_are_documented():
-    text = (DOCS / "human.md").read_text(encoding="utf-8")
+    text = (DOCS / "explanation" / "human.md").read_text(encoding="utf-8")
     stems = {landmark.name.removesuffix("_left").removesuffix("_right") for landmark in PERSON.landmarks}
     sentence = re.search(r"Landmarks: (.*?\.)\n", text, re.DOTALL)
     assert sentence and stems == set(named(sentence[1])) - {"_left", "_right"}
@@ -292,20 +316,22 @@ def test_the_landmarks_of_a_person_are_documented():
     ],
 )
 def test_every_number_of_a_comparison_of_players_is_documented(heading, values):
-    rows = table_of(DOCS / "results.md", heading)
+    rows = table_of(RESULTS, heading)
     assert {name for row in rows for name in named(row[0])} == {each.name for value in values for each in fields(value)}
 
 
 def test_every_method_of_players_stands_in_the_page_on_legs():
     header = next(
-        line for line in (DOCS / "legs.md").read_text(encoding="utf-8").splitlines() if line.startswith("| |")
+        line
+        for line in (DOCS / "explanation" / "legs.md").read_text(encoding="utf-8").splitlines()
+        if line.startswith("| |")
     )
     assert set(named(header)) == set(get_args(PlayersMethod))
 
 
 @pytest.mark.parametrize(("page", "least"), [("methods.md", 8), ("human.md", 9), ("legs.md", 7)])
 def test_constants_in_the_pages_on_methods_are_those_of_the_code(page, least):
-    text = (DOCS / page).read_text(encoding="utf-8")
+    text = (DOCS / "explanation" / page).read_text(encoding="utf-8")
     checked = 0
     for line in text.splitlines():
         for module, name in re.findall(r"`((?:\w+\.)+\w+)\.(_?[A-Z][A-Z0-9_]+)`", line):

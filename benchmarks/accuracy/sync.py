@@ -27,7 +27,7 @@ from airborne.synthetic.throw.scene import thrown_cross
 from airborne.synthetic.throw.writing import write_trial
 from airborne.trial.file import read_trial
 from airborne.video import VideoWriter, fill_rows, weave
-from airborne.video.decoding import inspect, decode, rgb_from_decoded
+from airborne.video.decoding import decode, inspect, rgb_from_decoded
 
 LATE_MS = ((0, 3), (1, 10), (2, 17))  # seed, third camera's delay
 RESAMPLED_MS = (2, 5, 8, 10, 13, 16, 19)

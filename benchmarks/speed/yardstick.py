@@ -25,7 +25,7 @@ from rows import append
 
 from airborne.body import BodyModel, Ellipsoid, Part, Segment, surface_arrays
 from airborne.cameras import Camera
-from airborne.rendering import RULES, Lamp, Lights, pose_segments, score, pack_targets
+from airborne.rendering import RULES, Lamp, Lights, pack_targets, pose_segments, score
 from airborne.run.bench import measure_speed
 from airborne.video import View
 

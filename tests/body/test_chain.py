@@ -40,30 +40,30 @@ def owners(model):
     return np.array([model.index_of(mark.segment) for mark in model.landmarks])
 
 
-def n_motion(model):
+def n_dof(model):
     return 6 + 3 * (len(model.segments) - 1)
 
 
 MODEL = body()
 
 
-@pytest.mark.parametrize("k", range(n_motion(MODEL)))
+@pytest.mark.parametrize("k", range(n_dof(MODEL)))
 def test_point_jacobian_is_the_difference_quotient_of_every_degree_of_freedom(k):
-    pose, motion = a_pose(MODEL), np.zeros(n_motion(MODEL))
-    motion[k] = STEP
-    ahead, behind = (MODEL.with_pose(move_pose(pose, sign * motion)).landmarks for sign in (1, -1))
+    pose, delta = a_pose(MODEL), np.zeros(n_dof(MODEL))
+    delta[k] = STEP
+    ahead, behind = (MODEL.with_pose(move_pose(pose, sign * delta)).landmarks for sign in (1, -1))
     posed = MODEL.with_pose(pose)
     found = point_jacobian(posed, owners(MODEL), posed.landmarks)
     np.testing.assert_allclose(found[..., k], (ahead - behind) / (2 * STEP), atol=SECOND_ORDER)
 
 
-@pytest.mark.parametrize("k", range(n_motion(MODEL)))
+@pytest.mark.parametrize("k", range(n_dof(MODEL)))
 def test_segment_jacobian_is_the_difference_quotient_of_every_degree_of_freedom(k):
-    pose, motion, origin = a_pose(MODEL), np.zeros(n_motion(MODEL)), np.array([0.3, -0.2, 0.9])
-    motion[k] = STEP
+    pose, delta, origin = a_pose(MODEL), np.zeros(n_dof(MODEL)), np.array([0.3, -0.2, 0.9])
+    delta[k] = STEP
     now = MODEL.with_pose(pose)
     at_origin = np.einsum("sji,sj->si", now.R, origin - now.t)  # in each segment's own frame
-    ahead, behind = (MODEL.with_pose(move_pose(pose, sign * motion)) for sign in (1, -1))
+    ahead, behind = (MODEL.with_pose(move_pose(pose, sign * delta)) for sign in (1, -1))
     places = [np.einsum("sij,sj->si", p.R, at_origin) + p.t for p in (ahead, behind)]
     turn = Rotation.from_matrix(ahead.R @ np.swapaxes(behind.R, -1, -2)).as_rotvec()
     found = segment_jacobians(now, origin)[..., k]
@@ -90,33 +90,33 @@ def test_body_in_one_piece_has_the_six_columns_of_a_rigid_body():
 @pytest.mark.parametrize("spread", [0.1, 1.0, 3.0])
 def test_no_motion_leaves_a_pose_where_it_is(spread):
     pose = a_pose(MODEL, spread=spread)  # 3 rad: most joints lie on another branch than a first reading gives
-    moved = move_pose(pose, np.zeros(n_motion(MODEL)))
+    moved = move_pose(pose, np.zeros(n_dof(MODEL)))
     np.testing.assert_allclose(moved.joint_angles, pose.joint_angles, atol=ROUNDTRIP)
     np.testing.assert_allclose(moved.world_from_root.as_matrix(), pose.world_from_root.as_matrix(), atol=EXACT)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_turning_a_joint_back_undoes_the_turn(seed):
-    pose, motion = a_pose(MODEL, seed), 0.3 * np.random.default_rng(seed).normal(size=n_motion(MODEL))
-    there = move_pose(pose, motion)
-    back = move_pose(there, -motion)
+    pose, delta = a_pose(MODEL, seed), 0.3 * np.random.default_rng(seed).normal(size=n_dof(MODEL))
+    there = move_pose(pose, delta)
+    back = move_pose(there, -delta)
     np.testing.assert_allclose(back.joint_angles, pose.joint_angles, atol=ROUNDTRIP)
     np.testing.assert_allclose(back.world_from_root.as_matrix(), pose.world_from_root.as_matrix(), atol=ROUNDTRIP)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_motion_between_two_poses_takes_the_one_to_the_other(seed):
-    motion = 0.3 * np.random.default_rng(seed).normal(size=n_motion(MODEL))
+    delta = 0.3 * np.random.default_rng(seed).normal(size=n_dof(MODEL))
     pose = a_pose(MODEL, seed)
-    np.testing.assert_allclose(delta_between(pose, move_pose(pose, motion)), motion, atol=ROUNDTRIP)
+    np.testing.assert_allclose(delta_between(pose, move_pose(pose, delta)), delta, atol=ROUNDTRIP)
     rigid = Pose(world_from_root=pose.world_from_root)
-    np.testing.assert_allclose(delta_between(rigid, move_pose(rigid, motion[:6])), motion[:6], atol=ROUNDTRIP)
+    np.testing.assert_allclose(delta_between(rigid, move_pose(rigid, delta[:6])), delta[:6], atol=ROUNDTRIP)
 
 
 def test_a_joint_turns_about_its_own_axes_after_its_angles():
-    pose, motion = a_pose(MODEL), np.zeros(n_motion(MODEL))
-    motion[6 + 3 * 3 : 9 + 3 * 3] = [0.2, -0.4, 0.1]  # the joint of the fourth segment after the root
-    before, after = MODEL.with_pose(pose), MODEL.with_pose(move_pose(pose, motion))
+    pose, delta = a_pose(MODEL), np.zeros(n_dof(MODEL))
+    delta[6 + 3 * 3 : 9 + 3 * 3] = [0.2, -0.4, 0.1]  # the joint of the fourth segment after the root
+    before, after = MODEL.with_pose(pose), MODEL.with_pose(move_pose(pose, delta))
     expected = before.R[4] @ Rotation.from_rotvec([0.2, -0.4, 0.1]).as_matrix()
     np.testing.assert_allclose(after.R[4], expected, atol=EXACT)
     np.testing.assert_allclose(after.R[:4], before.R[:4], atol=EXACT)
@@ -124,18 +124,18 @@ def test_a_joint_turns_about_its_own_axes_after_its_angles():
 
 def test_missing_joint_angles_are_straight_joints():
     root = a_pose(MODEL).world_from_root
-    motion = np.zeros(n_motion(MODEL))
-    motion[6] = 0.25
-    found = move_pose(Pose(world_from_root=root), motion).joint_angles
+    delta = np.zeros(n_dof(MODEL))
+    delta[6] = 0.25
+    found = move_pose(Pose(world_from_root=root), delta).joint_angles
     assert found[0].tolist() == pytest.approx([0.25, 0, 0], abs=EXACT)
     assert np.abs(found[1:]).max() < EXACT
 
 
 def test_angles_run_smoothly_through_a_right_angle():
-    motion, poses = np.array([0.0] * 7 + [0.02, 0.0]), [Pose(world_from_root=RigidTransform.identity())]
+    delta, poses = np.array([0.0] * 7 + [0.02, 0.0]), [Pose(world_from_root=RigidTransform.identity())]
     poses[0] = Pose(world_from_root=RigidTransform.identity(), joint_angles=np.array([[0.3, 1.4, 0.0]]))
     for _ in range(20):
-        poses.append(move_pose(poses[-1], motion))
+        poses.append(move_pose(poses[-1], delta))
     angles = np.array([pose.joint_angles[0] for pose in poses])
     np.testing.assert_allclose(angles, [[0.3, 1.4 + 0.02 * k, 0.0] for k in range(21)], atol=1e2 * ROUNDTRIP)
 

@@ -87,7 +87,7 @@ def complaint(tmp_path, text):
     return message
 
 
-def test_file_says_segments_parts_places_and_colours(tmp_path):
+def test_file_holds_segments_parts_positions_and_colours(tmp_path):
     model = read(tmp_path, GOOD)
     assert model.name == "leg"
     assert [s.name for s in model.segments] == ["thigh", "shank"]
@@ -108,7 +108,7 @@ def test_file_says_segments_parts_places_and_colours(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         ('name = "leg"', 'name = "leg"\nheight = 3', "height: unknown key"),
         ('name = "leg"', "", "name: is missing"),
@@ -135,11 +135,11 @@ def test_file_says_segments_parts_places_and_colours(tmp_path):
         ("[[segment]]", "[[segment", "not a TOML file"),
     ],
 )
-def test_malformed_file_is_refused_in_one_line_that_names_it_and_the_fault(tmp_path, old, new, said):
+def test_malformed_file_is_refused_in_one_line_that_names_it_and_the_fault(tmp_path, old, new, expected):
     assert old in GOOD
     message = complaint(tmp_path, GOOD.replace(old, new, 1))
     assert message.startswith("body.toml: ")
-    assert said in message
+    assert expected in message
 
 
 def test_file_without_segments_is_refused(tmp_path):
@@ -180,7 +180,7 @@ def test_mesh_in_other_units_is_scaled_to_metres(tmp_path):
     assert "scale" in complaint(tmp_path, MESH.replace("FILE", "lump.obj") + "scale = 0\n")
 
 
-def test_mesh_with_inward_faces_is_turned_outward(tmp_path):
+def test_mesh_with_inward_faces_is_flipped_outward(tmp_path):
     lump = trimesh.creation.box((0.2, 0.4, 0.6))
     lump.invert()
     lump.export(tmp_path / "lump.obj")
@@ -190,7 +190,7 @@ def test_mesh_with_inward_faces_is_turned_outward(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    ("name", "content", "expected"),
     [
         ("lump.obj", None, "mesh file lump.obj not found beside the body file"),
         ("lump.obj", b"", "lump.obj: "),
@@ -201,10 +201,10 @@ def test_mesh_with_inward_faces_is_turned_outward(tmp_path):
         ("lump.xyz", b"0 0 0\n1 0 0\n", "lump.xyz: "),
     ],
 )
-def test_unusable_mesh_file_is_refused_in_one_line(tmp_path, name, content, said):
+def test_unusable_mesh_file_is_refused_in_one_line(tmp_path, name, content, expected):
     if content is not None:
         (tmp_path / name).write_bytes(content)
-    assert said in complaint(tmp_path, MESH.replace("FILE", name))
+    assert expected in complaint(tmp_path, MESH.replace("FILE", name))
 
 
 @pytest.mark.parametrize("name", ["../ball.stl", "/ball.stl"])
@@ -246,7 +246,7 @@ def test_file_says_limits_slabs_inertia_and_landmarks(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         ("[[-5, 140], ", "[[140, -5], ", "segment 'shank': each joint limit needs a least and a greatest angle"),
         ("[[-5, 140], ", "[[nan, 140], ", "segment 'shank': each joint limit needs a least and a greatest angle"),
@@ -271,11 +271,11 @@ def test_file_says_limits_slabs_inertia_and_landmarks(tmp_path):
         ("position_m = [0.0, 0.0, -0.4]", "position_m = [0.0, inf, -0.4]", "landmark.1.position_m"),
     ],
 )
-def test_faulty_limit_slab_inertia_or_landmark_is_refused_in_one_line(tmp_path, old, new, said):
+def test_faulty_limit_slab_inertia_or_landmark_is_refused_in_one_line(tmp_path, old, new, expected):
     assert old in FULL
     message = complaint(tmp_path, FULL.replace(old, new, 1))
     assert message.startswith("body.toml: ")
-    assert said in message
+    assert expected in message
 
 
 def same(a, b):

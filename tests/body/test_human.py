@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import SAMPLED, Ellipsoid, Pose, human18, human18_from_measurements, total_inertia
-from airborne.body.anthropometry import mass_properties, measurements_of
+from airborne.body.anthropometry import measurements_of, segment_properties
 from airborne.body.human import PARENTS
 from airborne.errors import BodyError
 from tests.support.tolerances import EXACT, ROUNDTRIP
@@ -23,7 +23,7 @@ def posed(model=None, root=None, **degrees):
     return model.with_pose(Pose(world_from_root=root or RigidTransform.identity(), joint_angles=angles))
 
 
-def places(body):
+def positions(body):
     return dict(zip([mark.name for mark in body.model.landmarks], body.landmarks, strict=True))
 
 
@@ -41,7 +41,7 @@ def test_it_is_the_papers_tree_of_18_segments_with_57_degrees_of_freedom():
 
 def test_landmarks_are_joint_centres_balls_of_the_feet_hands_and_head():
     expected = [f"{name}_{side}" for side in ("left", "right") for name in LIMB] + ["pelvis", "torso", "neck", "head"]
-    model, at = human18(), places(posed())
+    model, at = human18(), positions(posed())
     assert list(at) == expected
     joints = dict(zip(PARENTS, posed().t, strict=True))
     for landmark, segment in {"knee_left": "shank_left", "wrist_right": "hand_right", "neck": "head"}.items():
@@ -52,7 +52,7 @@ def test_landmarks_are_joint_centres_balls_of_the_feet_hands_and_head():
 
 
 def test_zero_pose_stands_upright_with_hanging_arms_level_feet_and_toes_forward():
-    at = places(posed())
+    at = positions(posed())
     for side, sign in (("left", 1), ("right", -1)):
         ball, ankle = at[f"foot_{side}"], at[f"ankle_{side}"]
         assert ball[1] < ankle[1] - 0.1
@@ -98,13 +98,13 @@ def test_it_weighs_its_mass_in_the_proportions_of_a_man(stature, mass):
     for name, share in shares.items():
         assert kg[name] / mass == pytest.approx(share, rel=0.15), name
     body = posed(model)
-    sole = places(body)["ankle_left"][2] - 0.039 * stature
+    sole = positions(body)["ankle_left"][2] - 0.039 * stature
     assert 0.54 < (total_inertia(body).centre_m[2] - sole) / stature < 0.575
 
 
 @pytest.mark.parametrize(("stature", "mass"), PEOPLE)
-def test_lengths_are_the_usual_shares_of_stature(stature, mass):
-    at = places(posed(human18(stature, mass)))
+def test_lengths_are_the_standard_shares_of_stature(stature, mass):
+    at = positions(posed(human18(stature, mass)))
     shares = {  # Drillis and Contini
         ("hip_left", "knee_left"): 0.245,
         ("knee_right", "ankle_right"): 0.246,
@@ -168,7 +168,7 @@ def test_an_ellipsoid_holds_its_segments_volume_between_the_joints(name):
     z = (edges[1:] + edges[:-1]) / 2 - part.segment_from_part.translation[2]
     a, b, c = part.shape.semi_axes_m
     volume = np.sum(np.pi * a * b * np.clip(1 - (z / c) ** 2, 0, None)) * np.diff(edges)[0]
-    assert volume == pytest.approx(mass_properties(person)[name].volume_m3, rel=1e-6)
+    assert volume == pytest.approx(segment_properties(person)[name].volume_m3, rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -183,7 +183,7 @@ def test_joint_centres_and_axes_are_where_yeadons_own_model_has_them(seed):
         np.testing.assert_allclose(body.t[index], segment.pos.ravel(), atol=EXACT)
         R = body.R[index] @ turned if ours.startswith("forearm") else body.R[index]
         np.testing.assert_allclose(R, segment.rot_mat, atol=EXACT)
-    at = places(body)
+    at = positions(body)
     np.testing.assert_allclose(at["pelvis"], 0, atol=EXACT)
     for theirs, ours in {"A2": "wrist_left", "B2": "wrist_right", "J2": "ankle_left", "K2": "ankle_right"}.items():
         chain = getattr(human, theirs).solids[2]  # the hand, or the foot, begins there
@@ -196,7 +196,7 @@ def test_joint_centres_and_axes_are_where_yeadons_own_model_has_them(seed):
 def test_every_angle_of_yeadons_moves_hands_feet_and_head_alike(name):
     person, configuration = measurements_of(1.75, 70.0), {name: 0.4}
     human = yeadon_person(person, configuration)
-    at = places(human18_from_measurements(person).with_pose(same_pose(person, configuration)))
+    at = positions(human18_from_measurements(person).with_pose(same_pose(person, configuration)))
     tips = {"A2": ("hand_left", 6), "B2": ("hand_right", 6), "J2": ("foot_left", 7), "K2": ("foot_right", 7)}
     for theirs, (ours, _) in tips.items():
         segment = getattr(human, theirs)
@@ -240,7 +240,7 @@ SIGNS = [  # movement, segment, axis, sign, landmark that moves, direction it mo
 def test_joints_turn_the_way_their_limits_say(movement, segment, axis, sign, landmark, direction):
     angles = np.zeros(3)
     angles[axis] = sign * 15
-    moved = places(posed(**{segment: angles}))[landmark] - places(posed())[landmark]
+    moved = positions(posed(**{segment: angles}))[landmark] - positions(posed())[landmark]
     assert moved @ direction > 0.5 * np.linalg.norm(moved) > 0.005
     model = human18()
     limit = model.segments[model.index_of(segment)].limits_rad[axis]
@@ -260,16 +260,16 @@ def test_angles_of_the_clinic_are_the_limits():
 
 
 @pytest.mark.parametrize(
-    ("stature", "mass", "said"),
+    ("stature", "mass", "expected"),
     [
         (180, 75, "stature_m is 180; expected 0.8 to 2.5 metres"),
         (1.8, 75000, "mass_kg is 75000; expected 10 to 300 kilograms"),
         (float("nan"), 75, "stature_m is nan"),
-        (2.4, 20, "20 kg at 2.4 m means girths 0.33 times the usual"),
+        (2.4, 20, "20 kg at 2.4 m means girths 0.33 times the average"),
     ],
 )
-def test_impossible_person_is_refused_in_one_line(stature, mass, said):
+def test_impossible_person_is_refused_in_one_line(stature, mass, expected):
     with pytest.raises(BodyError) as caught:
         human18(stature, mass)
-    assert said in str(caught.value)
+    assert expected in str(caught.value)
     assert "\n" not in str(caught.value)

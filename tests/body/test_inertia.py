@@ -18,7 +18,7 @@ from airborne.body import (
     total_inertia,
     total_inertias,
 )
-from airborne.body.anthropometry import mass_properties, measurements_of
+from airborne.body.anthropometry import measurements_of, segment_properties
 from airborne.body.inertia import combine_inertias, transform_inertia
 from airborne.errors import BodyError
 from tests.support.tolerances import EXACT, ROUNDTRIP
@@ -60,7 +60,11 @@ def test_pieces_together_are_all_their_points():
 
 def test_joining_is_associative():
     pieces = [of_points(*cloud(seed)) for seed in range(3)]
-    same(combine_inertias([combine_inertias(pieces[:2]), pieces[2]]), combine_inertias([pieces[0], combine_inertias(pieces[1:])]), EXACT * 10)
+    same(
+        combine_inertias([combine_inertias(pieces[:2]), pieces[2]]),
+        combine_inertias([pieces[0], combine_inertias(pieces[1:])]),
+        EXACT * 10,
+    )
 
 
 def test_a_piece_in_another_frame_is_its_points_in_that_frame():
@@ -104,7 +108,10 @@ def test_a_person_in_any_configuration_is_the_sum_of_yeadons_solids(seed):
 
 def test_a_leaner_density_is_shared_by_all_segments():
     person = measurements_of(1.70, 64.0)
-    plain, weighed = mass_properties(replace(person, mass_kg=None)), mass_properties(replace(person, mass_kg=60.0))
+    plain, weighed = (
+        segment_properties(replace(person, mass_kg=None)),
+        segment_properties(replace(person, mass_kg=60.0)),
+    )
     for name, bulk in plain.items():
         np.testing.assert_allclose(weighed[name].inertia.mass_kg / bulk.inertia.mass_kg, 60 / 64, rtol=ROUNDTRIP)
         np.testing.assert_array_equal(weighed[name].inertia.centre_m, bulk.inertia.centre_m)
@@ -116,7 +123,10 @@ def test_left_and_right_limbs_have_their_own_measurements():
     person = measurements_of(1.80, 75.0)
     on_right = {key for key in person.values_m if key[:2] in ("Lb", "Lk") and key[-1] != "L"}
     thicker = {key: value * (1.1 if key in on_right else 1) for key, value in person.values_m.items()}
-    found, usual = mass_properties(replace(person, values_m=thicker, mass_kg=None)), mass_properties(replace(person, mass_kg=None))
+    found, usual = (
+        segment_properties(replace(person, values_m=thicker, mass_kg=None)),
+        segment_properties(replace(person, mass_kg=None)),
+    )
     for name in ("upper_arm", "forearm", "hand", "shank", "foot"):
         was = usual[f"{name}_right"].volume_m3
         assert found[f"{name}_left"].volume_m3 == pytest.approx(was, rel=EXACT)

@@ -70,7 +70,7 @@ def test_residual_is_the_distance_of_the_posed_landmarks_from_the_targets():
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_places_wrong_by_20_mm_give_a_pose_within_limits_that_is_little_worse(seed):
+def test_landmarks_wrong_by_20_mm_give_a_pose_within_limits_that_is_little_worse(seed):
     rng = np.random.default_rng(seed)
     pose = pose_within_limits(rng, 0.3)
     targets = {name: place + rng.normal(0, 0.02, 3) for name, place in landmarks(pose, LIMBS).items()}
@@ -97,7 +97,7 @@ def test_limits_hold_however_far_the_targets_lie_beyond_them():
     assert fit.residual_m["ankle_left"] > 0.05
 
 
-def test_limb_without_places_stays_straight():
+def test_limb_without_landmarks_stays_straight():
     pose = pose_within_limits(np.random.default_rng(1), 0.5)
     unseen = ("elbow_left", "wrist_left", "hand_left")
     fit = fit_pose(MODEL, {name: place for name, place in landmarks(pose).items() if name not in unseen})
@@ -141,7 +141,7 @@ def test_search_from_a_start_stays_with_it():
     np.testing.assert_allclose(few.pose.joint_angles, pose.joint_angles, atol=1e-3)
 
 
-def test_left_and_right_exchanged_is_said():
+def test_left_and_right_exchanged_is_noted():
     pose = pose_within_limits(np.random.default_rng(0), 0.4)
     sides = {"left": "right", "right": "left"}
     exchanged = {
@@ -153,7 +153,7 @@ def test_left_and_right_exchanged_is_said():
     assert fit.note is not None and fit.note.startswith("left and right look exchanged: landmarks ")
 
 
-def test_mirrored_space_is_said():
+def test_mirrored_space_is_noted():
     pose = pose_within_limits(np.random.default_rng(4), 0.4)
     fit = fit_pose(MODEL, {name: place * [-1, 1, 1] for name, place in landmarks(pose, LIMBS).items()})
     assert fit.rms_m > 0.02

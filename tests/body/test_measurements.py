@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airborne.body import human18, human18_from_measurements, read_measurements, write_measurements
-from airborne.body.anthropometry import mass_properties, measurements_of
+from airborne.body.anthropometry import measurements_of, segment_properties
 from airborne.body.measurements import STATURE_SHARES, check_measurements
 from airborne.errors import BodyError
 from tests.support.tolerances import EXACT, ROUNDTRIP
@@ -97,7 +97,7 @@ def test_swapping_twice_changes_nothing_and_evening_ends_the_difference():
     assert even.values_m["Ls1L"] == PERSON.values_m["Ls1L"]
 
 
-def test_limbs_are_evened_unless_the_person_is_to_stay_as_measured():
+def test_limbs_are_symmetrised_unless_the_person_is_to_stay_as_measured():
     uneven = replace(PERSON, values_m={key: v * (1.05 if key[1] == "a" else 1) for key, v in PERSON.values_m.items()})
 
     def arms(body):
@@ -116,7 +116,9 @@ def test_a_section_deeper_than_wide_weighs_as_the_round_one_that_yeadon_makes_of
     with pytest.warns(UserWarning, match="Ls2"):
         human = Human(dict(deep.values_m))
     assert "stadium set as circle" in capsys.readouterr().out
-    assert sum(b.inertia.mass_kg for b in mass_properties(deep).values()) == pytest.approx(human.mass, rel=EXACT * 10)
+    assert sum(b.inertia.mass_kg for b in segment_properties(deep).values()) == pytest.approx(
+        human.mass, rel=EXACT * 10
+    )
 
 
 FACTOR = "measurementconversionfactor: 0.01"
@@ -127,7 +129,7 @@ def line(key):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         (line("La3p"), "", "La3p is missing; expected a length above zero"),
         (line("La3p"), "La3p:", "La3p is missing"),
@@ -166,10 +168,10 @@ def line(key):
         ("Ls1L: ", "Ls1L= ", "not a YAML file of measurements"),
     ],
 )
-def test_a_mistake_is_refused_in_one_line_that_names_file_key_and_what_was_expected(tmp_path, old, new, said):
+def test_a_mistake_is_refused_in_one_line_that_names_file_key_and_what_was_expected(tmp_path, old, new, expected):
     text = text_of(PERSON.values_m)
     assert old in text
-    assert said in complaint(tmp_path, text.replace(old, new, 1))
+    assert expected in complaint(tmp_path, text.replace(old, new, 1))
 
 
 def test_files_of_another_kind_are_refused(tmp_path):

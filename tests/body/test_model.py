@@ -57,8 +57,8 @@ def test_each_segment_stands_where_the_transforms_along_its_chain_put_it(seed):
 @pytest.mark.parametrize("seed", range(5))
 def test_moving_a_posed_body_is_posing_the_moved_body(seed):
     model, pose = leg(), random_pose(seed)
-    motion = np.random.default_rng(seed).normal(size=6)
-    moved, posed = model.with_pose(pose).move(motion), model.with_pose(pose.move(motion[:3], motion[3:]))
+    delta = np.random.default_rng(seed).normal(size=6)
+    moved, posed = model.with_pose(pose).move(delta), model.with_pose(pose.move(delta[:3], delta[3:]))
     np.testing.assert_allclose(moved.R, posed.R, atol=EXACT)
     np.testing.assert_allclose(moved.t, posed.t, atol=EXACT)
 

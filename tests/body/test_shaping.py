@@ -13,7 +13,7 @@ from tests.support.tolerances import EXACT, ROUNDTRIP
 UPRIGHT = Pose(world_from_root=RigidTransform.identity())
 
 
-def places(model):
+def positions(model):
     return dict(zip([mark.name for mark in model.landmarks], model.with_pose(UPRIGHT).landmarks, strict=True))
 
 
@@ -54,8 +54,8 @@ def test_a_scale_is_undone_by_its_inverse_and_two_are_their_product(change):
 
 
 def test_a_longer_thigh_lowers_knee_and_foot_and_nothing_else():
-    model, before = human18(), places(human18())
-    after = places(with_segment_lengths(model, {"thigh_left": 1.1}))
+    model, before = human18(), positions(human18())
+    after = positions(with_segment_lengths(model, {"thigh_left": 1.1}))
     drop = 0.1 * (before["hip_left"][2] - before["knee_left"][2])
     for name in ("knee_left", "ankle_left", "foot_left"):
         np.testing.assert_allclose(after[name], before[name] - [0, 0, drop], atol=EXACT)
@@ -67,7 +67,7 @@ def test_every_segment_grows_along_its_own_length():
     axes = {s.name: length_axis(human18(), s.name) for s in human18().segments}
     assert {name for name, axis in axes.items() if axis == 1} == {"foot_left", "foot_right"}
     assert {name for name, axis in axes.items() if axis == 0} == {"shoulder_left", "shoulder_right"}
-    before, after = places(human18()), places(with_segment_lengths(human18(), {"shoulder": 1.2}))
+    before, after = positions(human18()), positions(with_segment_lengths(human18(), {"shoulder": 1.2}))
     assert after["shoulder_left"][0] > before["shoulder_left"][0] > 0 > before["hand_right"][0] > after["hand_right"][0]
     assert after["head"] == pytest.approx(before["head"])
 
@@ -89,9 +89,9 @@ def test_a_border_stays_at_its_share_of_a_longer_segment():
 
 def test_girth_widens_ellipsoids_and_leaves_every_joint():
     model, thick = human18(), with_girths(human18(), {"torso": 1.2, "foot": 1.1, "head": 1.1})
-    assert places(thick).keys() == places(model).keys()
-    for name, place in places(model).items():
-        np.testing.assert_allclose(places(thick)[name], place, atol=EXACT)
+    assert positions(thick).keys() == positions(model).keys()
+    for name, place in positions(model).items():
+        np.testing.assert_allclose(positions(thick)[name], place, atol=EXACT)
     for name, factors in {"torso": [1.2, 1.2, 1], "foot_left": [1.1, 1, 1.1], "head": [1.1, 1, 1.1]}.items():
         ratio = segment(thick, name).parts[0].shape.semi_axes_m / segment(model, name).parts[0].shape.semi_axes_m
         np.testing.assert_allclose(ratio, factors, atol=ROUNDTRIP)  # the head's part has its z backward
@@ -121,8 +121,8 @@ def test_inertia_is_that_of_the_stretched_solid():
         np.testing.assert_allclose(found.centre_m, kept if change is with_girths else expected.centre_m, atol=ROUNDTRIP)
 
 
-def test_boxes_and_meshes_stretch_and_boxes_askew_are_refused():
-    quarter, askew = Rotation.from_euler("y", 90, degrees=True), Rotation.from_euler("y", 20, degrees=True)
+def test_boxes_and_meshes_stretch_and_oblique_boxes_are_refused():
+    quarter, oblique = Rotation.from_euler("y", 90, degrees=True), Rotation.from_euler("y", 20, degrees=True)
     ball = trimesh.creation.icosphere(subdivisions=1, radius=0.1)
 
     def stick(shape, rotation):
@@ -134,11 +134,11 @@ def test_boxes_and_meshes_stretch_and_boxes_askew_are_refused():
     np.testing.assert_allclose(box.shape.size_m, [2, 0.1, 0.2], atol=ROUNDTRIP)
     np.testing.assert_allclose(box.segment_from_part.translation, [0, 0, 1], atol=EXACT)
     mesh = Mesh(np.asarray(ball.vertices, float), np.asarray(ball.faces, np.int64))
-    (part,) = with_segment_lengths(stick(mesh, askew), {"bar": 2.0}).parts
-    before = RigidTransform.from_components([0, 0, 0.5], askew).apply(mesh.vertices_m)
+    (part,) = with_segment_lengths(stick(mesh, oblique), {"bar": 2.0}).parts
+    before = RigidTransform.from_components([0, 0, 0.5], oblique).apply(mesh.vertices_m)
     np.testing.assert_allclose(part.segment_from_part.apply(part.shape.vertices_m), before * [1, 1, 2], atol=EXACT)
-    with pytest.raises(BodyError, match="part 'bar' stands askew"):
-        with_segment_lengths(stick(Box(np.array([1.0, 0.1, 0.2])), askew), {"bar": 2.0})
+    with pytest.raises(BodyError, match="part 'bar' is oblique"):
+        with_segment_lengths(stick(Box(np.array([1.0, 0.1, 0.2])), oblique), {"bar": 2.0})
 
 
 @pytest.mark.parametrize("change", [with_segment_lengths, with_girths])

@@ -50,7 +50,7 @@ def masks(model, *, turn):
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_every_segment_is_closed_and_turned_outward(seed):
+def test_every_segment_is_closed_and_faces_outward(seed):
     for each in skin_of(PERSON, seed=seed).segments:
         whole = solid(each)
         assert whole.is_watertight and whole.is_winding_consistent and whole.volume > 0, each.name
@@ -189,7 +189,7 @@ def test_every_person_can_have_a_skin_as_tall_as_his_bones(stature, mass):
     assert np.ptp(np.concatenate(heights)) == pytest.approx(stature, rel=0.01)
 
 
-def test_other_bodies_are_told_what_is_missing():
+def test_errors_for_other_bodies_name_what_is_missing():
     ball = BodyModel("ball", (replace(PERSON.segments[0], inertia=None),), ())
     with pytest.raises(BodyError, match="no human18"):
         skin_of(ball)

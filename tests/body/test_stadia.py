@@ -24,14 +24,14 @@ def cubes(low, high, height, density, keep=lambda x: x == x):
     return density * side**2 * height / 60, np.concatenate(places)
 
 
-def assert_is(bulk, mass, places):
-    """Compare a bulk with equal point masses."""
+def assert_is(properties, mass, places):
+    """Compare a properties with equal point masses."""
     total, centre = mass * len(places), places.mean(axis=0)
     spread = mass * (places - centre).T @ (places - centre)
     tensor = np.trace(spread) * np.eye(3) - spread
-    assert bulk.inertia.mass_kg == pytest.approx(total, rel=CUBES)
-    np.testing.assert_allclose(bulk.inertia.centre_m, centre, atol=3e-4)
-    np.testing.assert_allclose(bulk.inertia.tensor_kg_m2, tensor, atol=CUBES * np.abs(tensor).max())
+    assert properties.inertia.mass_kg == pytest.approx(total, rel=CUBES)
+    np.testing.assert_allclose(properties.inertia.centre_m, centre, atol=3e-4)
+    np.testing.assert_allclose(properties.inertia.tensor_kg_m2, tensor, atol=CUBES * np.abs(tensor).max())
 
 
 @pytest.mark.parametrize("sections", [(WIDE, NARROW), (ROUND, WIDE), (NARROW, ROUND), (ROUND, Stadium(0.0, 0.03))])
@@ -41,9 +41,9 @@ def test_a_solid_is_the_sum_of_its_small_cubes(sections):
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_half_solid_is_the_sum_of_its_small_cubes(sign):
-    bulk = half_solid(WIDE, Stadium(0.04, 0.03), 0.12, 1000.0, sign=sign)
-    assert_is(bulk, *cubes(WIDE, Stadium(0.04, 0.03), 0.12, 1000.0, keep=lambda x: sign * x > 0))
-    assert abs(bulk.inertia.tensor_kg_m2[0, 2]) > 10 * CUBES * 1e-3, "the half leans inward"
+    properties = half_solid(WIDE, Stadium(0.04, 0.03), 0.12, 1000.0, sign=sign)
+    assert_is(properties, *cubes(WIDE, Stadium(0.04, 0.03), 0.12, 1000.0, keep=lambda x: sign * x > 0))
+    assert abs(properties.inertia.tensor_kg_m2[0, 2]) > 10 * CUBES * 1e-3, "the half leans inward"
 
 
 def test_two_halves_are_the_whole():
@@ -87,7 +87,7 @@ def test_upside_down_and_cut_in_two_a_solid_is_the_same():
         np.testing.assert_allclose(other.tensor_kg_m2, whole.tensor_kg_m2, atol=EXACT)
 
 
-def test_a_turned_solid_is_wide_from_front_to_back():
+def test_a_rotated_solid_is_wide_from_front_to_back():
     plain, turned = solid(WIDE, ROUND, 0.2, 1000.0).inertia, solid(WIDE, ROUND, 0.2, 1000.0, is_turned=True).inertia
     quarter = transform_inertia(plain, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.zeros(3))
     np.testing.assert_allclose(turned.tensor_kg_m2, quarter.tensor_kg_m2, atol=EXACT)

@@ -99,7 +99,7 @@ def test_mesh_with_repeated_vertices_still_looks_like_itself():
     assert len(symmetries(body(part(Mesh(soup, np.arange(len(soup)).reshape(-1, 3)))))) >= 1
 
 
-def test_parts_of_jointed_segments_count_at_their_places():
+def test_parts_of_jointed_segments_count_at_their_positions():
     root = Segment("root", None, np.zeros(3), (part(box(1, 0.2, 0.3)),))
     arms = [Segment(f"arm{y}", "root", np.array([0.0, y, 0]), (part(box(0.1, 0.1, 0.1)),)) for y in (-1, 1)]
     assert len(symmetries(BodyModel("b", (root, *arms)))) == 4
@@ -123,7 +123,7 @@ def test_parts_of_jointed_segments_count_at_their_places():
         ([part(ellipsoid(1, 1, 2)), part(box(1, 1, 1))], 0),
     ],
 )
-def test_only_spheroids_and_spheres_on_one_axis_can_turn_unseen(parts, axes):
+def test_only_spheroids_and_spheres_on_one_axis_can_rotate_unseen(parts, axes):
     assert len(continuous_axes(body(*parts))) == axes
 
 
@@ -141,7 +141,7 @@ def test_two_halves_of_a_ball_swap_only_when_their_colours_agree():
     assert len(symmetries(body(*repainted))) == 4
 
 
-def test_unseen_turn_is_about_the_spheroids_own_axis():
+def test_undetectable_rotation_is_about_the_spheroids_own_axis():
     place = Rotation.from_euler("XYZ", [0.3, 0.4, 0.5])
     (axis,) = continuous_axes(body(part(ellipsoid(0.1, 0.1, 0.3), rotation=place)))
     np.testing.assert_allclose(np.abs(axis @ place.as_matrix()), [0, 0, 1], atol=ROUNDTRIP)

@@ -29,7 +29,7 @@ JOINT_SD_M = 0.015
 
 
 def person():
-    """The body that is filmed."""
+    """The body that is observations."""
     given = human18(STATURE_M, MASS_KG, outfit=ATHLETE)
     return with_borders(with_girths(with_segment_lengths(given, LENGTHS), GIRTHS), BORDERS)
 
@@ -55,8 +55,8 @@ def moving(time_s: Fraction) -> Pose:
 
 
 @pytest.fixture(scope="module")
-def filmed():
-    """Sightings of the person, with joints that are a little off."""
+def observations():
+    """Observations of the person, with joints that are a little off."""
     rng = np.random.default_rng(7)
     scene = Scene(model=person(), motion=moving, cameras=CAMERAS[:3], reach=0.3)
     found = []
@@ -69,9 +69,9 @@ def filmed():
 
 
 @pytest.fixture(scope="module")
-def fitted(filmed):
+def fitted(observations):
     given = human18(STATURE_M, MASS_KG, outfit=SAMPLED)
-    return fit_body(given, filmed, mass_kg=70.0, levels_px_per_m=(50.0, 100.0))
+    return fit_body(given, observations, mass_kg=70.0, levels_px_per_m=(50.0, 100.0))
 
 
 def axes(model, segment):
@@ -141,14 +141,16 @@ def test_left_and_right_are_alike_and_the_mass_is_as_given(fitted):
 
 def test_a_shape_of_zeros_is_the_body_itself_and_a_shape_says_its_factors():
     body = human18(outfit=ATHLETE)
-    knobs = (*shape_parameters(body), *border_parameters(body, {"thigh": Border(0.5), "head": None}))
-    np.testing.assert_allclose(axes(apply_shape(body, knobs, np.zeros(len(knobs))), "thigh_left"), axes(body, "thigh_left"))
-    shape = np.linspace(-0.1, 0.1, len(knobs))
-    other = apply_shape(body, knobs, shape)
-    lengths, girths = lengths_of(knobs, shape), girths_of(knobs, shape)
+    parameters = (*shape_parameters(body), *border_parameters(body, {"thigh": Border(0.5), "head": None}))
+    np.testing.assert_allclose(
+        axes(apply_shape(body, parameters, np.zeros(len(parameters))), "thigh_left"), axes(body, "thigh_left")
+    )
+    shape = np.linspace(-0.1, 0.1, len(parameters))
+    other = apply_shape(body, parameters, shape)
+    lengths, girths = lengths_of(parameters, shape), girths_of(parameters, shape)
     ratio = axes(other, "torso") / axes(body, "torso")
     np.testing.assert_allclose(ratio, (*girths["torso"], lengths["torso"]))
-    assert borders_of(knobs, shape)["thigh"].share == pytest.approx(0.5 + shape[-1])
+    assert borders_of(parameters, shape)["thigh"].share == pytest.approx(0.5 + shape[-1])
     assert girths["thigh"][0] == girths["thigh"][1]
 
 

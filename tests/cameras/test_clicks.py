@@ -24,7 +24,7 @@ def test_clicks_are_given_by_camera_in_the_order_asked_for(tmp_path):
 def test_camera_without_columns_saw_nothing_and_others_do_not_matter(tmp_path):
     _, px = read_clicks(write(tmp_path, CLICKS), ["left", "above", "right"])
     assert np.isnan(px[:, 1]).all()
-    with pytest.raises(CalibrationError, match="of left of the cameras left, above; a place needs two"):
+    with pytest.raises(CalibrationError, match="of left of the cameras left, above; a position needs two"):
         read_clicks(write(tmp_path, CLICKS), ["left", "above"])
 
 
@@ -36,9 +36,9 @@ def test_camera_without_columns_saw_nothing_and_others_do_not_matter(tmp_path):
         ("3,4", "3,inf", "'inf' is not a number"),
         ("knee_left", "hip_left", "row 'hip_left,,,5,6' needs 5 values and a point of its own"),
         ("5,6", "5", "row 'knee_left,,,5' needs 5 values"),
-        ("point", "joint", "found the header joint,right_u"),
+        ("point", "joint", "found header joint,right_u"),
         ("right_u", "x_m", "column 'x_m' is not <camera>_u or <camera>_v"),
-        (CLICKS, "", "found the header nothing and 0 rows"),
+        (CLICKS, "", "found header nothing and 0 rows"),
         (CLICKS, "point,a_u,a_v\n", "and 0 rows"),
     ],
 )

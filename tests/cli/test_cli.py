@@ -35,8 +35,8 @@ def trial(tmp_path_factory) -> Path:
         else:
             shutil.copyfile(path, folder / path.name)
     exact = ('control_points = "control_points.csv"', CALIBRATED)  # saves each run the fit of the cameras
-    changed(folder / "trial.toml", "trial.toml", ("[track]", f"[track]\nstop = {SHORT}"), exact)
-    changed(folder / "trial.toml", "long.toml", (f"stop = {SHORT}", f"stop = {LONG}"))
+    edit_trial(folder / "trial.toml", "trial.toml", ("[track]", f"[track]\nstop = {SHORT}"), exact)
+    edit_trial(folder / "trial.toml", "long.toml", (f"stop = {SHORT}", f"stop = {LONG}"))
     return folder / "trial.toml"
 
 
@@ -48,7 +48,7 @@ def short_run(trial, tmp_path_factory) -> Path:
     return folder
 
 
-def changed(path: Path, name: str, *replacements: tuple[str, str]) -> Path:
+def edit_trial(path: Path, name: str, *replacements: tuple[str, str]) -> Path:
     """Write a changed copy of a text file beside it."""
     text = path.read_text(encoding="utf-8")
     for old, new in replacements:
@@ -70,7 +70,7 @@ def in_process(*arguments) -> int:
     return 0
 
 
-def started(*arguments) -> subprocess.Popen:
+def start_command(*arguments) -> subprocess.Popen:
     """Start a command of its own process."""
     command = [sys.executable, "-c", "from airborne.cli import main; main()", *map(str, arguments)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -130,10 +130,10 @@ def test_evaluate_compares_with_the_truth_and_with_clicks(trial, short_run, caps
     assert in_process(*arguments) == 0
     assert "position [mm]" in capsys.readouterr().out
     assert in_process(*arguments, "--json") == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["truth"]["n_matched"] == SHORT
-    assert found["truth"]["position"]["rms_3d_mm"] < 10
-    assert found["digitised"]["tracked_minus_digitised"]["n_matched"] == SHORT
+    result = json.loads(capsys.readouterr().out)
+    assert result["truth"]["n_matched"] == SHORT
+    assert result["truth"]["position"]["rms_3d_mm"] < 10
+    assert result["digitised"]["tracked_minus_digitised"]["n_matched"] == SHORT
 
 
 def test_calibrate_writes_cameras_that_track_takes(trial, tmp_path, capsys):
@@ -144,7 +144,7 @@ def test_calibrate_writes_cameras_that_track_takes(trial, tmp_path, capsys):
     assert in_process("calibrate", points, "--size", "cam1=768x576,cam2=768x576,cam3=768x576", "-o", out, "--json") == 0
     assert set(json.loads(capsys.readouterr().out)["cameras"]) == {"cam1", "cam2", "cam3"}
     for source in ('file = "calib.toml"', 'control_points = "control_points.csv"'):
-        other = changed(trial, "other.toml", (CALIBRATED, source))
+        other = edit_trial(trial, "other.toml", (CALIBRATED, source))
         assert in_process("track", other, "-o", tmp_path / source[:4], "--no-pictures", "--cameras", "cam1,cam2") == 0
     motions = [read_motion(tmp_path / name / "motion.csv") for name in ("file", "cont")]
     assert abs(motions[0].position - motions[1].position).max() < 5e-3
@@ -188,8 +188,8 @@ def test_evaluate_compares_players_with_their_truth(tmp_path, capsys):
     assert "number 7: 9 tracked, 3 uncertain, 0 lost" in out
     assert "nan" not in out
     assert in_process("evaluate", run, truth, "--json") == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["truth"]["players"]["Anna"]["parts"]["knees"]["mean_mm"] == pytest.approx(20)
+    result = json.loads(capsys.readouterr().out)
+    assert result["truth"]["players"]["Anna"]["parts"]["knees"]["mean_mm"] == pytest.approx(20)
     assert "leave --digitised" in refusal(capsys, "evaluate", run, truth, "--digitised", truth)
     assert "give a truth.csv" in refusal(capsys, "evaluate", run)
     assert "cannot be read" in refusal(capsys, "evaluate", run, tmp_path / "none.csv")
@@ -217,17 +217,17 @@ def test_demo_runs_again_in_its_own_folder_and_spares_any_other(trial, short_run
 
 def test_a_killed_run_is_readable_and_resumes_to_the_same_bytes(trial, tmp_path):
     long = trial.with_name("long.toml")
-    whole = started("track", long, "-o", tmp_path / "whole", "--no-pictures")
+    whole = start_command("track", long, "-o", tmp_path / "whole", "--no-pictures")
     whole.communicate()
     assert whole.returncode == 0
-    process = started("track", long, "-o", tmp_path / "killed", "--no-pictures")
+    process = start_command("track", long, "-o", tmp_path / "killed", "--no-pictures")
     wait_for_rows(process, tmp_path / "killed" / "motion.csv", KILLED_AFTER)
     process.kill()
     process.communicate()
     n_kept = len(read_motion(tmp_path / "killed" / "motion.csv"))
     assert KILLED_AFTER <= n_kept < LONG
     assert not (tmp_path / "killed" / "summary.json").exists()
-    resumed = started("track", long, "-o", tmp_path / "killed", "--no-pictures", "--resume")
+    resumed = start_command("track", long, "-o", tmp_path / "killed", "--no-pictures", "--resume")
     resumed.communicate()
     assert resumed.returncode == 0
     for name in ("motion.csv", "angles.csv", "joints.csv"):
@@ -235,7 +235,7 @@ def test_a_killed_run_is_readable_and_resumes_to_the_same_bytes(trial, tmp_path)
 
 
 def test_ctrl_c_stops_with_one_line_and_keeps_the_frames(trial, tmp_path):
-    process = started("track", trial.with_name("long.toml"), "-o", tmp_path / "run", "--no-pictures")
+    process = start_command("track", trial.with_name("long.toml"), "-o", tmp_path / "run", "--no-pictures")
     wait_for_rows(process, tmp_path / "run" / "motion.csv", 1)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=PATIENCE_S)
@@ -287,11 +287,11 @@ def refusal(capsys, *arguments) -> str:
 @pytest.mark.parametrize("what", BROKEN_TRIALS)
 def test_a_trial_that_cannot_be_used_gets_one_line(trial, tmp_path, capsys, what):
     spoil(trial.parent)
-    replacement, said = BROKEN_TRIALS[what]
-    broken = changed(trial, "broken.toml", replacement)
+    replacement, output = BROKEN_TRIALS[what]
+    broken = edit_trial(trial, "broken.toml", replacement)
     if what == "start past the end":
-        broken = changed(broken, "broken.toml", ("frame = 0", "frame = 500"))
-    assert said in refusal(capsys, "track", broken, "-o", tmp_path / "run", "--no-pictures")
+        broken = edit_trial(broken, "broken.toml", ("frame = 0", "frame = 500"))
+    assert output in refusal(capsys, "track", broken, "-o", tmp_path / "run", "--no-pictures")
 
 
 def test_arguments_that_name_nothing_get_one_line(trial, tmp_path, capsys):
@@ -359,8 +359,8 @@ def test_calibrate_says_what_it_lacks(trial, tmp_path, capsys):
     assert "no.toml does not exist" in refusal(capsys, "calibrate", tmp_path / "no.toml", "--size", "10x10", "-o", out)
     assert "sides of 16" in refusal(capsys, "calibrate", points, "--size", "10x10", "-o", out)
     for length in ("-1", "0", "nan", "1000"):
-        said = refusal(capsys, "calibrate", points, "--wand", length, "--size", "768x576", "-o", out)
-        assert f"--wand {length}: expected" in said
+        output = refusal(capsys, "calibrate", points, "--wand", length, "--size", "768x576", "-o", out)
+        assert f"--wand {length}: expected" in output
     assert "not one point" in refusal(capsys, "calibrate", points, "--court", "men", "--size", "768x576", "-o", out)
     assert not out.exists()
 
@@ -371,8 +371,8 @@ def test_a_folder_with_anything_but_a_run_is_left_alone(trial, capsys):
     assert {path.name: path.read_bytes() for path in trial.parent.iterdir() if path.is_file()} == before
 
 
-def test_a_body_found_nowhere_is_said_plainly(trial, tmp_path, capsys):
-    far = changed(trial, "far.toml", ("position_m = [-0.42419,", "position_m = [40.0,"))
+def test_a_body_found_nowhere_is_reported(trial, tmp_path, capsys):
+    far = edit_trial(trial, "far.toml", ("position_m = [-0.42419,", "position_m = [40.0,"))
     assert in_process("track", far, "-o", tmp_path / "run", "--no-pictures") == 1
     out, _ = capsys.readouterr()
     assert "found in no frame" in out

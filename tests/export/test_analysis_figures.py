@@ -11,20 +11,20 @@ from airborne.motion.smoothing import residual_analysis
 BIAS_GREY = (51, 51, 51)
 
 
-def drawn(n_variables, n=40, sd=1.0):
-    rng, found = np.random.default_rng(0), []
+def make_variables(n_variables, n=40, sd=1.0):
+    rng, result = np.random.default_rng(0), []
     for k in range(n_variables):
         reference = np.linspace(0, 100, n)
         values = np.stack([reference + sd * rng.normal(size=n), reference], axis=1)
         series = Series(f"variable {k}", "mm", values, np.where(np.arange(n) % 2, "one", "two"))
-        found.append((series, analyse_agreement(series)))
-    return found
+        result.append((series, analyse_agreement(series)))
+    return result
 
 
 @pytest.mark.parametrize("n_variables", [1, 3, 7])
 @pytest.mark.parametrize("write", [write_bland_altman, write_identity])
 def test_there_is_a_panel_for_each_variable(tmp_path, write, n_variables):
-    write(tmp_path / "few.png", drawn(n_variables))
+    write(tmp_path / "few.png", make_variables(n_variables))
     with Image.open(tmp_path / "few.png") as picture:
         pixels = np.asarray(picture.convert("L"))
     columns = min(3, n_variables)
@@ -37,15 +37,15 @@ def test_there_is_a_panel_for_each_variable(tmp_path, write, n_variables):
 @pytest.mark.parametrize("n", [2, 3])
 @pytest.mark.parametrize("sd", [0.0, 1.0])
 def test_hardly_anything_is_drawn_too(tmp_path, n, sd):
-    write_bland_altman(tmp_path / "a.png", drawn(1, n, sd))
-    write_identity(tmp_path / "b.png", drawn(1, n, sd))
+    write_bland_altman(tmp_path / "a.png", make_variables(1, n, sd))
+    write_identity(tmp_path / "b.png", make_variables(1, n, sd))
     assert (tmp_path / "a.png").stat().st_size > 5000
 
 
 def test_residuals_are_drawn_with_and_without_a_cutoff_used(tmp_path):
     t = np.arange(200) / 60
     noise = 0.01 * np.random.default_rng(1).normal(size=(200, 1, 1))
-    found = residual_analysis(t, np.sin(6 * t)[:, None, None] + noise)
-    write_residuals(tmp_path / "a.png", found)
-    write_residuals(tmp_path / "b.png", found, 3.0)
+    result = residual_analysis(t, np.sin(6 * t)[:, None, None] + noise)
+    write_residuals(tmp_path / "a.png", result)
+    write_residuals(tmp_path / "b.png", result, 3.0)
     assert (tmp_path / "a.png").read_bytes() != (tmp_path / "b.png").read_bytes()

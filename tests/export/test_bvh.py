@@ -43,27 +43,27 @@ def read(path):
     assert stack == [] and words[k + 1] == "Frames:"
     n_frames, period_s = int(words[k + 2]), float(words[k + 5])
     values = np.array(words[k + 6 :], float).reshape(n_frames, -1)
-    places = {}
+    positions = {}
     column, turns, at = 0, [], []
     for j, joint in enumerate(joints):
         above, R = joint["parent"], np.tile(np.eye(3), (n_frames, 1, 1))
-        place = np.tile(joint["offset"], (n_frames, 1))
+        position = np.tile(joint["offset"], (n_frames, 1))
         for channel in joint["channels"]:
             axis = "XYZ".index(channel[0])
             if channel.endswith("position"):
-                place[:, axis] += values[:, column]
+                position[:, axis] += values[:, column]
             else:
                 R = R @ Rotation.from_euler(channel[0], values[:, [column]], degrees=True).as_matrix()
             column += 1
         turns.append(R if above is None else turns[above] @ R)
-        at.append(place if above is None else at[above] + np.einsum("nij,nj->ni", turns[above], place))
+        at.append(position if above is None else at[above] + np.einsum("nij,nj->ni", turns[above], position))
         name = joint["name"] if joint["channels"] else f"end of {joints[above]['name']}"
-        places[name] = at[j] @ TO_WORLD.T / 100
+        positions[name] = at[j] @ TO_WORLD.T / 100
     assert column == values.shape[1]
-    return places, period_s
+    return positions, period_s
 
 
-def shuffled(model):
+def shuffle(model):
     """The same body, its segments in another order, each still after its parent."""
     order = sorted(range(len(model.segments)), key=lambda k: depth(model, k))
     return BodyModel(model.name, tuple(model.segments[k] for k in order), model.landmarks)
@@ -73,26 +73,26 @@ def depth(model, k):
     return 0 if model.parents[k] < 0 else 1 + depth(model, model.parents[k])
 
 
-@pytest.mark.parametrize("model", [PERSON, shuffled(PERSON), BOX], ids=["person", "another order", "box"])
-def test_every_joint_is_where_it_was(model, tmp_path):
+@pytest.mark.parametrize("model", [PERSON, shuffle(PERSON), BOX], ids=["person", "another order", "box"])
+def test_every_joint_keeps_its_position(model, tmp_path):
     motion = tumbling(6, model=model)
     (path,) = write_bvh(tmp_path / "run.bvh", take_of(motion, model))
-    places, period_s = read(path)
+    positions, period_s = read(path)
     assert period_s == 1001 / 60000
     for row in range(6):
         body = model.with_pose(motion.pose(row))
         for segment, t in zip(model.segments, body.t, strict=True):
-            np.testing.assert_allclose(places[segment.name][row], t, atol=WRITTEN_M)
+            np.testing.assert_allclose(positions[segment.name][row], t, atol=WRITTEN_M)
 
 
-def test_players_joints_are_where_they_were(tmp_path):
+def test_players_joints_keep_their_positions(tmp_path):
     motion = jumping(6)
     (path,) = write_bvh(tmp_path / "seven.bvh", player_takes(motion)[1])
-    places, _ = read(path)
-    found = {"hip_left": "thigh_left", "knee_right": "shank_right", "ankle_left": "foot_left"}
-    found |= {"foot_left": "end of foot_left"}
-    for joint, name in found.items():
-        np.testing.assert_allclose(places[name], motion.points[:, 1, motion.joints.index(joint)], atol=WRITTEN_M)
+    positions, _ = read(path)
+    result = {"hip_left": "thigh_left", "knee_right": "shank_right", "ankle_left": "foot_left"}
+    result |= {"foot_left": "end of foot_left"}
+    for joint, name in result.items():
+        np.testing.assert_allclose(positions[name], motion.points[:, 1, motion.joints.index(joint)], atol=WRITTEN_M)
 
 
 def test_angles_never_jump_in_a_triple_somersault(tmp_path):
@@ -116,8 +116,8 @@ def test_a_last_segment_without_a_landmark_ends_in_its_middle(tmp_path):
     bare = replace(PERSON, landmarks=tuple(mark for mark in PERSON.landmarks if mark.name != "hand_left"))
     motion = tumbling(2)
     (path,) = write_bvh(tmp_path / "run.bvh", take_of(motion, bare))
-    places, _ = read(path)
+    positions, _ = read(path)
     body = bare.with_pose(motion.pose(1))
     hand = bare.index_of("hand_left")
     middle = body.R[hand] @ bare.segments[hand].parts[0].segment_from_part.translation + body.t[hand]
-    np.testing.assert_allclose(places["end of hand_left"][1], middle, atol=WRITTEN_M)
+    np.testing.assert_allclose(positions["end of hand_left"][1], middle, atol=WRITTEN_M)

@@ -26,19 +26,19 @@ def take():
 def read(ezc3d, tmp_path):
     """Write takes and read them with ezc3d: parameters, header, points (n, markers, 3) [mm]."""
 
-    def written(*takes):
+    def write_and_read(*takes):
         write_c3d(tmp_path / "run.c3d", takes)
         file = ezc3d.c3d(str(tmp_path / "run.c3d"))
         return file["parameters"], file["header"]["points"], file["data"]["points"][:3].T
 
-    return written
+    return write_and_read
 
 
 @pytest.fixture
 def words(plain_c3d, tmp_path):
     """Write takes and read them with the package c3d: places and residuals [mm], (n, markers, 4)."""
 
-    def written(*takes):
+    def write_and_read(*takes):
         write_c3d(tmp_path / "run.c3d", takes)
         with (tmp_path / "run.c3d").open("rb") as file, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that there are no analogue channels
@@ -46,10 +46,10 @@ def words(plain_c3d, tmp_path):
             frames = list(reader.read_frames())
         return reader, np.array([points[:, :4] for _, points, _ in frames])
 
-    return written
+    return write_and_read
 
 
-def test_places_and_gaps_read_back(take, read):
+def test_positions_and_gaps_read_back(take, read):
     _, _, points = read(take)
     np.testing.assert_allclose(points, 1e3 * take.points, atol=TOLERANCE_MM)  # NaN where NaN
 
@@ -73,20 +73,20 @@ def test_the_rate_is_not_rounded(take, read):
 
 
 def test_the_residual_is_the_standard_deviation(take, words):
-    reader, found = words(take)
-    known = np.isfinite(take.sd)
+    reader, result = words(take)
+    is_known = np.isfinite(take.sd)
     step_mm = abs(reader.point_scale)
     assert step_mm < 0.2
-    np.testing.assert_allclose(found[known][:, 3], 1e3 * take.sd[known], atol=step_mm / 2 + 1e-6)
-    np.testing.assert_array_equal(found[~known][:, 3], -1)
-    np.testing.assert_allclose(found[known][:, :3], 1e3 * take.points[known], atol=TOLERANCE_MM)
+    np.testing.assert_allclose(result[is_known][:, 3], 1e3 * take.sd[is_known], atol=step_mm / 2 + 1e-6)
+    np.testing.assert_array_equal(result[~is_known][:, 3], -1)
+    np.testing.assert_allclose(result[is_known][:, :3], 1e3 * take.points[is_known], atol=TOLERANCE_MM)
 
 
-def test_tiny_unknown_and_unseen_deviations_are_told_apart(take, words):
+def test_tiny_unknown_and_infinite_deviations_differ(take, words):
     sd = take.sd.copy()
     sd[0, :4] = [1e-9, np.nan, np.inf, 3.0]
-    reader, found = words(replace(take, sd=sd))
-    smallest, unknown, unseen, huge = found[0, :4, 3]
+    reader, result = words(replace(take, sd=sd))
+    smallest, unknown, unseen, huge = result[0, :4, 3]
     assert smallest == pytest.approx(abs(reader.point_scale))
     assert unknown == 0
     assert unseen == huge == pytest.approx(LARGEST_RESIDUAL_MM)

@@ -1,4 +1,4 @@
-"""`airborne convert`: what goes in comes out in the other format, and what got lost is said."""
+"""`airborne convert`: what goes in comes out in the other format, and losses are reported."""
 
 import shutil
 from dataclasses import replace
@@ -36,23 +36,23 @@ def test_every_calibration_format_becomes_every_other(tmp_path, airborne):
         size = ("--size", "768x576") if kind == "dlt" else ()
         for other in kinds:
             out = tmp_path / f"{kind} to {other}"
-            code, said, complaint = airborne("convert", tmp_path / kind, out, "--to", other, *size)
+            code, output, complaint = airborne("convert", tmp_path / kind, out, "--to", other, *size)
             assert (code, complaint) == (0, "")
-            assert said.startswith(f"read: {tmp_path / kind}, ")
-            found = read_rig(out, size=(768, 576) if other == "dlt" else None)
-            assert_same(found, plain, with_names="dlt" not in (kind, other) and "caliscope" not in (kind, other))
+            assert output.startswith(f"read: {tmp_path / kind}, ")
+            result = read_rig(out, size=(768, 576) if other == "dlt" else None)
+            assert_same(result, plain, with_names="dlt" not in (kind, other) and "caliscope" not in (kind, other))
 
 
-def test_the_name_of_the_file_says_the_format_and_what_is_lost_is_said(tmp_path, airborne):
+def test_the_name_of_the_file_says_the_format_and_what_is_lost_is_reported(tmp_path, airborne):
     write_rig(tmp_path / "calib.toml", three_cameras(LENS))
-    code, said, _ = airborne("convert", tmp_path / "calib.toml", tmp_path / "rig.xcp")
+    code, output, _ = airborne("convert", tmp_path / "calib.toml", tmp_path / "rig.xcp")
     assert code == 0
-    assert said.splitlines()[1:] == [
+    assert output.splitlines()[1:] == [
         f"written: {tmp_path / 'rig.xcp'}, vicon",
         "not in the new file: tangential distortion of left, right, side",
     ]
-    _, said, _ = airborne("convert", tmp_path / "calib.toml", tmp_path / "d.csv", "--to-origin", "lower-left")
-    assert f"written: {tmp_path / 'd.csv'}, dlt, lengths in m, pixels from the lower-left, the first is 1\n" in said
+    _, output, _ = airborne("convert", tmp_path / "calib.toml", tmp_path / "d.csv", "--to-origin", "lower-left")
+    assert f"written: {tmp_path / 'd.csv'}, dlt, lengths in m, pixels from the lower-left, the first is 1\n" in output
 
 
 def test_coefficients_from_below_need_their_origin(tmp_path, airborne):
@@ -76,29 +76,29 @@ def test_clicked_points_go_to_dltdv_and_back(tmp_path, thrown_cross, airborne):
     np.testing.assert_allclose(first, second, atol=1e-9)
 
 
-def test_a_calibration_places_clicked_points(tmp_path, thrown_cross, airborne):
+def test_a_calibration_triangulates_clicked_points(tmp_path, thrown_cross, airborne):
     calib = ("--calibration", thrown_cross / "calib_true.toml")
-    code, said, _ = airborne("convert", thrown_cross / "digitised.csv", tmp_path / "a_xypts.csv", *calib)
+    code, output, _ = airborne("convert", thrown_cross / "digitised.csv", tmp_path / "a_xypts.csv", *calib)
     assert code == 0
-    assert "a_xyzres.csv" in said
-    residual = float(said.split("median residual of ")[1].split(" px")[0])
+    assert "a_xyzres.csv" in output
+    residual = float(output.split("median residual of ")[1].split(" px")[0])
     assert 0.5 < residual < 3  # clicks of 1.2 px
-    assert "names: pt1 to pt4 for long_minus, long_plus, short_minus, short_plus" in said
-    places = np.genfromtxt(tmp_path / "a_xyzpts.csv", delimiter=",", skip_header=1).reshape(-1, 4, 3)
-    lengths = np.linalg.norm(places[:, 0] - places[:, 1], axis=-1)
+    assert "names: pt1 to pt4 for long_minus, long_plus, short_minus, short_plus" in output
+    positions = np.genfromtxt(tmp_path / "a_xyzpts.csv", delimiter=",", skip_header=1).reshape(-1, 4, 3)
+    lengths = np.linalg.norm(positions[:, 0] - positions[:, 1], axis=-1)
     assert np.nanstd(lengths) < 0.05 * np.nanmean(lengths)  # a bar stays as long as it is
 
 
 def test_a_wrong_origin_shows_as_a_large_residual(tmp_path, thrown_cross, airborne):
     calib = ("--calibration", thrown_cross / "calib_true.toml")
     airborne("convert", thrown_cross / "digitised.csv", tmp_path / "a_xypts.csv", *calib)
-    _, said, _ = airborne("convert", tmp_path / "a_xypts.csv", tmp_path / "b.csv", *calib)
-    assert "median residual" in said and "this is large" not in said
-    _, said, _ = airborne("convert", tmp_path / "a_xypts.csv", tmp_path / "b.csv", *calib, "--origin", "lower-left")
-    assert "this is large: are --origin" in said
+    _, output, _ = airborne("convert", tmp_path / "a_xypts.csv", tmp_path / "b.csv", *calib)
+    assert "median residual" in output and "this is large" not in output
+    _, output, _ = airborne("convert", tmp_path / "a_xypts.csv", tmp_path / "b.csv", *calib, "--origin", "lower-left")
+    assert "this is large: are --origin" in output
 
 
-def test_a_unit_that_cannot_be_is_doubted(tmp_path, airborne):
+def test_an_implausible_unit_is_questioned(tmp_path, airborne):
     write_rig(tmp_path / "calib.toml", three_cameras())
     write_rig(tmp_path / "mm.csv", three_cameras(), unit="mm")
     to = tmp_path / "out.toml"
@@ -127,9 +127,9 @@ def test_another_file_is_answered_with_what_it_looks_like(tmp_path, airborne, na
     path = tmp_path / name
     path.parent.mkdir(exist_ok=True)
     path.write_bytes(text.encode("latin-1"))
-    code, said, told = airborne("convert", path.parent if name == "run/run.json" else path, tmp_path / "out.toml")
-    assert (code, said) == (2, "")
-    assert complaint in told
+    code, output, calls = airborne("convert", path.parent if name == "run/run.json" else path, tmp_path / "out.toml")
+    assert (code, output) == (2, "")
+    assert complaint in calls
     assert not (tmp_path / "out.toml").exists()
 
 
@@ -165,14 +165,14 @@ def test_detections_go_to_openpose_and_back(tmp_path, shared_data, airborne):
         (("coefficients.csv", "x.toml", "--size", "768"), "--size 768: expected WIDTHxHEIGHT"),
     ],
 )
-def test_what_cannot_be_is_told(tmp_path, monkeypatch, airborne, words, complaint):
+def test_impossible_conversions_are_refused(tmp_path, monkeypatch, airborne, words, complaint):
     monkeypatch.chdir(tmp_path)
     write_rig(tmp_path / "calib.toml", three_cameras())
     write_rig(tmp_path / "coefficients.csv", three_cameras())
     (tmp_path / "clicks.csv").write_text("frame,p_a_u,p_a_v\n0,1,2\n")
-    code, _, said = airborne("convert", *words)
+    code, _, output = airborne("convert", *words)
     assert code == 2
-    assert complaint in said
+    assert complaint in output
     assert not list(tmp_path.glob("x*"))
 
 

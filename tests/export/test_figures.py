@@ -51,27 +51,27 @@ def test_every_figure_is_written_at_report_width_whatever_the_run_holds(tmp_path
     assert dict(matplotlib.rcParams) == settings
 
 
-def test_no_comparison_is_drawn_where_nothing_is_known_to_compare_with(tmp_path):
+def test_no_comparison_is_plotted_without_a_reference(tmp_path):
     write_figures(tmp_path, run(), BOX)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["pose.png", "score.png"]
 
 
 def test_an_infinite_deviation_shows(tmp_path):
-    seen, unseen = run(), run(unseen=(9,))
-    write_pose(tmp_path / "seen.png", seen)
+    observed, unseen = run(), run(unseen=(9,))
+    write_pose(tmp_path / "seen.png", observed)
     write_pose(tmp_path / "unseen.png", unseen)
     assert (tmp_path / "seen.png").read_bytes() != (tmp_path / "unseen.png").read_bytes()
 
 
-def test_a_motion_turned_by_a_symmetry_of_the_body_gives_the_same_figure(tmp_path):
+def test_a_motion_rotated_by_a_symmetry_of_the_body_gives_the_same_figure(tmp_path):
     motion = run(lost=(4, 5))
     turned = replace(motion, R=motion.R @ HALF_TURN)
-    for name, shown, symmetries in (
+    for name, displayed, symmetries in (
         ("plain", motion, [np.eye(3), HALF_TURN]),
         ("alike", turned, [np.eye(3), HALF_TURN]),
         ("rigid", turned, [np.eye(3)]),
     ):
-        write_errors(tmp_path / f"{name}.png", shown, truth_of(run()), symmetries)
+        write_errors(tmp_path / f"{name}.png", displayed, truth_of(run()), symmetries)
     plain, alike, rigid = ((tmp_path / f"{name}.png").read_bytes() for name in ("plain", "alike", "rigid"))
     assert plain == alike
     assert plain != rigid
@@ -96,7 +96,7 @@ def test_one_symmetry_is_chosen_for_the_whole_run():
     np.testing.assert_allclose(chosen.R, R)
 
 
-def test_reference_angles_lie_in_the_turn_of_the_tracked_ones():
+def test_reference_angles_lie_in_the_revolution_of_the_tracked_ones():
     tracked = np.array([[370.0, 1.0, -350.0], [np.nan] * 3, [380.0, 1.0, -340.0]])
     reference = np.array([[12.0, 1.0, 9.0], [15.0, 1.0, 15.0], [21.0, 1.0, 22.0]])
     np.testing.assert_allclose(_match_revolutions(tracked, reference), reference + np.array([360, 0, -360]))
@@ -126,22 +126,22 @@ def test_the_band_is_two_standard_deviations_wide_and_absent_where_they_are_infi
 
 
 @pytest.fixture
-def drawn(monkeypatch):
-    """Everything drawn as an estimate: panel label -> values; labels are given after drawing."""
-    panes, found = {}, {}
-    estimate, name = panels.draw_estimate, panels.label_panel
+def plotted(monkeypatch):
+    """Everything plotted as an estimate: panel label -> values; labels are set after plotting."""
+    by_axes, plotted = {}, {}
+    draw_estimate, label_panel = panels.draw_estimate, panels.label_panel
 
     def draw(axes, motion, values):
-        panes[axes] = values
-        estimate(axes, motion, values)
+        by_axes[axes] = values
+        draw_estimate(axes, motion, values)
 
     def label(axes, text):
-        found[text] = panes[axes]
-        name(axes, text)
+        plotted[text] = by_axes[axes]
+        label_panel(axes, text)
 
     monkeypatch.setattr(panels, "draw_estimate", draw)
-    monkeypatch.setattr(panels, "name_panel", label)
-    return found
+    monkeypatch.setattr(panels, "label_panel", label)
+    return plotted
 
 
 @pytest.mark.parametrize(
@@ -162,16 +162,16 @@ def test_joints_without_masses_get_no_flight(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["joints.png", "pose.png", "score.png"]
 
 
-def test_flexion_is_positive_in_every_joint_drawn(tmp_path, drawn):
+def test_flexion_is_positive_in_every_joint_plotted(tmp_path, plotted):
     write_joints_figure(tmp_path / "joints.png", person_run(), PERSON)
-    assert len(drawn) == 8
+    assert len(plotted) == 8
     bent = np.degrees(0.05 * np.arange(12))
-    for label, values in drawn.items():
+    for label, values in plotted.items():
         expected = bent if label in ("knee left [°]", "elbow left [°]") else 0 * bent
         np.testing.assert_allclose(values, expected, atol=1e-9, err_msg=label)
 
 
-def test_a_joint_that_cannot_be_seen_shows(tmp_path):
+def test_an_unobservable_joint_is_marked(tmp_path):
     write_joints_figure(tmp_path / "seen.png", person_run(), PERSON)
     write_joints_figure(tmp_path / "unseen.png", person_run(unseen=(5, 6)), PERSON)
     assert (tmp_path / "seen.png").read_bytes() != (tmp_path / "unseen.png").read_bytes()
@@ -181,12 +181,12 @@ def test_the_legend_lies_within_the_figure_however_much_it_has_to_say(tmp_path, 
     widths = []
     save = Figure.savefig
 
-    def measured(figure, path, **options):
+    def check_legend(figure, path, **options):
         save(figure, path, **options)
         legend = figure.legends[0].get_window_extent()
         widths.append((legend.x0 / figure.bbox.width, legend.x1 / figure.bbox.width))
 
-    monkeypatch.setattr(Figure, "savefig", measured)
+    monkeypatch.setattr(Figure, "savefig", check_legend)
     motion = person_run(lost=(3,), unseen=(5,), raised=np.pi / 2)
     write_joints_figure(tmp_path / "joints.png", motion, PERSON)
     write_pose(tmp_path / "pose.png", run(lost=(4, 5), uncertain=(6,), unseen=(9,)))
@@ -199,8 +199,8 @@ def test_other_bodies_show_their_first_joints():
     assert len(_joint_panels([f"link {k}" for k in range(30)])) == 8
 
 
-def test_the_height_of_a_falling_stiff_body_is_a_parabola_and_its_momentum_is_none(tmp_path, drawn):
+def test_the_height_of_a_falling_rigid_body_is_a_parabola_and_its_momentum_is_none(tmp_path, plotted):
     write_flight_figure(tmp_path / "flight.png", person_run(bent=0.0), PERSON)
-    height, *momenta = drawn.values()
+    height, *momenta = plotted.values()
     np.testing.assert_allclose(np.diff(height, 2), -9.81 / 50**2, atol=1e-9)
     np.testing.assert_allclose(momenta, 0, atol=1e-9)

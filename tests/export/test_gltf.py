@@ -58,7 +58,7 @@ class Asset:
                 target = channel["target"]
                 yield target["node"], target["path"], sampler["interpolation"], times, self.read(sampler["output"])
 
-    def placed(self, seconds):
+    def world_from_nodes(self, seconds):
         """World from node, our axes, at a time: linear places and steps; rotations only at keys."""
         local = {k: {p: node.get(p) for p in ("translation", "rotation", "scale")} for k, node in enumerate(self.nodes)}
         for node, path, interpolation, times, values in self.channels():
@@ -86,26 +86,26 @@ class Asset:
         return placed
 
 
-def written(tmp_path, *takes):
+def write_and_read(tmp_path, *takes):
     write_animation(tmp_path / "run.glb", takes)
     return Asset(tmp_path / "run.glb")
 
 
 @pytest.mark.parametrize("model", [PERSON, BOX], ids=["person", "box"])
-def test_at_every_key_the_body_stands_where_it_was_found(model, tmp_path):
+def test_at_every_key_the_body_has_its_estimated_pose(model, tmp_path):
     motion = tumbling(5, model=model, first=30)
     take = take_of(motion, model)
-    asset = written(tmp_path, take)
+    asset = write_and_read(tmp_path, take)
     for row, seconds in enumerate(take.time_s - take.time_s[0]):
-        body, placed = model.with_pose(motion.pose(row)), asset.placed(seconds)
+        body, placed = model.with_pose(motion.pose(row)), asset.world_from_nodes(seconds)
         for segment, R, t in zip(model.segments, body.R, body.t, strict=True):
-            found = placed[asset.names.index(segment.name)]
-            np.testing.assert_allclose(found[:3, :3], R, atol=SINGLE)
-            np.testing.assert_allclose(found[:3, 3], t, atol=SINGLE)
+            result = placed[asset.names.index(segment.name)]
+            np.testing.assert_allclose(result[:3, :3], R, atol=SINGLE)
+            np.testing.assert_allclose(result[:3, 3], t, atol=SINGLE)
 
 
 def test_parts_hang_on_their_segments_as_they_are(tmp_path):
-    asset = written(tmp_path, take_of(tumbling(2), PERSON))
+    asset = write_and_read(tmp_path, take_of(tumbling(2), PERSON))
     shapes = [part for segment in PERSON.segments for part in segment.parts]
     owners = [segment.name for segment in PERSON.segments for _ in segment.parts]
     parents = {child: k for k, node in enumerate(asset.nodes) for child in node.get("children", [])}
@@ -123,45 +123,45 @@ def test_parts_hang_on_their_segments_as_they_are(tmp_path):
 
 
 def test_samplers_are_as_the_specification_asks(tmp_path):
-    asset = written(tmp_path, take_of(tumbling(30, turns=4.0, lost=(7, 8)), PERSON))
-    seen = set()
+    asset = write_and_read(tmp_path, take_of(tumbling(30, turns=4.0, lost=(7, 8)), PERSON))
+    observed = set()
     for node, path, interpolation, times, values in asset.channels():
-        assert (node, path) not in seen
-        seen.add((node, path))
+        assert (node, path) not in observed
+        observed.add((node, path))
         assert times[0] >= 0 and (np.diff(times) > 0).all()
         assert len(times) == len(values)
         assert interpolation == ("STEP" if path == "scale" else "LINEAR")
         if path == "rotation":
             np.testing.assert_allclose(np.linalg.norm(values, axis=1), 1, atol=1e-6)
             assert (np.sum(values[1:] * values[:-1], axis=1) > 0).all()  # the short way round
-    assert len(seen) == len(PERSON.segments) + 2
+    assert len(observed) == len(PERSON.segments) + 2
 
 
 def test_a_lost_body_is_not_shown(tmp_path):
     take = take_of(tumbling(9, lost=(0, 4, 5)), PERSON)
-    asset = written(tmp_path, take)
+    asset = write_and_read(tmp_path, take)
     for row, seconds in enumerate(take.time_s - take.time_s[0]):
-        size = np.abs(np.linalg.det(asset.placed(seconds)[asset.names.index("head")][:3, :3]))
+        size = np.abs(np.linalg.det(asset.world_from_nodes(seconds)[asset.names.index("head")][:3, :3]))
         assert size == pytest.approx(1.0 if take.has_pose[row] else 0.0, abs=1e-5)
 
 
 def test_players_share_the_animation_and_its_clock(tmp_path):
     motion = jumping(6, lost=(2,))
     takes = player_takes(motion)
-    asset = written(tmp_path, *takes)
+    asset = write_and_read(tmp_path, *takes)
     for row in (0, 1, 3, 5):
-        placed = asset.placed(row / 60)
+        placed = asset.world_from_nodes(row / 60)
         for p, name in enumerate(("Anna", "number_7")):
             for joint, segment in (
                 ("hip_left", "thigh_left"),
                 ("knee_right", "shank_right"),
                 ("ankle_left", "foot_left"),
             ):
-                found = placed[asset.names.index(f"{name}:{segment}")][:3, 3]
-                np.testing.assert_allclose(found, motion.points[row, p, motion.joints.index(joint)], atol=SINGLE)
+                result = placed[asset.names.index(f"{name}:{segment}")][:3, 3]
+                np.testing.assert_allclose(result, motion.points[row, p, motion.joints.index(joint)], atol=SINGLE)
 
 
 def test_trimesh_loads_the_scene(tmp_path):
-    written(tmp_path, take_of(tumbling(3), PERSON))
+    write_and_read(tmp_path, take_of(tumbling(3), PERSON))
     scene = trimesh.load_scene(tmp_path / "run.glb")
     assert len(scene.geometry) == len(PERSON.parts)

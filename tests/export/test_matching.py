@@ -19,11 +19,11 @@ def test_the_first_tracked_frame_is_drawn_and_no_other(tmp_path):
     assert width / height > len(TITLES) / (len(RIG) + 1)
 
 
-def test_what_is_seen_through_the_mask_is_the_picture_there_and_black_elsewhere():
-    seen, _, mask, through, match = _row(frames().views[0], RIG.cameras[0], posed())
-    assert (through[mask > 0] == seen[mask > 0]).all()
+def test_through_the_mask_is_the_image_inside_and_black_elsewhere():
+    observed, _, mask, through, match = _row(frames().views[0], RIG.cameras[0], posed())
+    assert (through[mask > 0] == observed[mask > 0]).all()
     assert not through[mask == 0].any() and not match[mask == 0].any()
-    assert (seen == SCENE_GREY).all()
+    assert (observed == SCENE_GREY).all()
 
 
 def test_a_missing_view_leaves_its_row_empty():

@@ -46,7 +46,7 @@ def small_body():
     )
 
 
-def posed(model, seed=0):
+def pose_model(model, seed=0):
     rng = np.random.default_rng(seed)
     root = RigidTransform.from_components(rng.normal(0, 1, 3), Rotation.random(rng=rng))
     return model.with_pose(Pose(world_from_root=root, joint_angles=rng.normal(0, 0.5, (len(model.segments) - 1, 3))))
@@ -54,18 +54,18 @@ def posed(model, seed=0):
 
 def volumes_and_centres(body):
     """Of every part, from its tessellation and the pose."""
-    found = []
+    result = []
     for segment, R, t in zip(body.model.segments, body.R, body.t, strict=True):
         for part in segment.parts:
             mesh, place = part_mesh(part), part.segment_from_part
             vertices = place.apply(mesh.vertices_m) @ R.T + t
-            found.append(trimesh.Trimesh(vertices, mesh.faces, process=False))
-    return found
+            result.append(trimesh.Trimesh(vertices, mesh.faces, process=False))
+    return result
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_part_reads_back_where_the_pose_put_it(kind, tmp_path):
-    body = posed(small_body())
+    body = pose_model(small_body())
     write_model(tmp_path / f"body.{kind}", body)
     read = trimesh.load_scene(tmp_path / f"body.{kind}", process=False)
     whole = read.to_mesh()
@@ -81,7 +81,7 @@ def test_every_part_reads_back_where_the_pose_put_it(kind, tmp_path):
 
 @pytest.mark.parametrize("kind", ["glb", "gltf"])
 def test_gltf_is_a_skeleton_of_the_segments_in_linear_colours(kind, tmp_path):
-    body = posed(small_body(), 1)
+    body = pose_model(small_body(), 1)
     write_model(tmp_path / f"body.{kind}", body)
     scene = trimesh.load(tmp_path / f"body.{kind}")
     assert {child: scene.graph.transforms.parents[child] for child in ("root", "tip", "ball")} == {
@@ -106,8 +106,8 @@ def test_obj_and_ply_keep_the_srgb_colours(tmp_path):
     write_model(tmp_path / "body.obj", body)
     write_model(tmp_path / "body.ply", body)
     scene = trimesh.load(tmp_path / "body.obj")
-    found = {name.split("_")[1]: mesh.visual.material.diffuse[:3] for name, mesh in scene.geometry.items()}
-    assert {name: tuple(colour) for name, colour in found.items()} == {
+    result = {name.split("_")[1]: mesh.visual.material.diffuse[:3] for name, mesh in scene.geometry.items()}
+    assert {name: tuple(colour) for name, colour in result.items()} == {
         "block": tuple(RED),
         "tetra": tuple(GREEN),
         "lower": tuple(BLUE),

@@ -41,12 +41,12 @@ def warnings_of(opensim, path):
         opensim.Logger.setLevelString("Off")
 
 
-def played(opensim, model, path):
+def play(opensim, model, path):
     """Set the model's coordinates row by row; return where its markers are, by name, (n, 3) each."""
     state, table = model.initSystem(), opensim.TimeSeriesTable(str(path))
     assert table.getTableMetaDataString("inDegrees") == "yes"
     coordinates, markers = model.updCoordinateSet(), model.getMarkerSet()
-    found = {markers.get(k).getName(): [] for k in range(markers.getSize())}
+    result = {markers.get(k).getName(): [] for k in range(markers.getSize())}
     for row in (table.getRowAtIndex(k) for k in range(table.getNumRows())):
         for name, value in zip(table.getColumnLabels(), (row[k] for k in range(row.size())), strict=True):
             coordinate = coordinates.get(name)
@@ -56,10 +56,10 @@ def played(opensim, model, path):
             else:
                 coordinate.setValue(state, np.deg2rad(value) if turns else value, False)
         model.realizePosition(state)
-        for name, places in found.items():
-            place = markers.get(name).getLocationInGround(state)
-            places.append([place[k] for k in range(3)])
-    return {name: np.array(places) for name, places in found.items()}
+        for name, positions in result.items():
+            position = markers.get(name).getLocationInGround(state)
+            positions.append([position[k] for k in range(3)])
+    return {name: np.array(positions) for name, positions in result.items()}
 
 
 def truth_of(take):
@@ -68,7 +68,7 @@ def truth_of(take):
 
 
 def farthest(found, truth):
-    return max(np.linalg.norm(places - truth[name], axis=1).max() for name, places in found.items())
+    return max(np.linalg.norm(positions - truth[name], axis=1).max() for name, positions in found.items())
 
 
 TAKES = {
@@ -80,16 +80,16 @@ TAKES = {
 
 
 @pytest.mark.parametrize("who", TAKES)
-def test_opensim_plays_the_motion_to_our_places(who, opensim, tmp_path):
+def test_opensim_plays_the_motion_to_our_positions(who, opensim, tmp_path):
     take = TAKES[who]()
     write_osim(tmp_path / "run.osim", take.model)
     (path,) = write_mot(tmp_path / "run.mot", take)
     with warnings_of(opensim, tmp_path / "log.txt"):
         model = opensim.Model(str(tmp_path / "run.osim"))
-        found = played(opensim, model, path)
+        result = play(opensim, model, path)
     assert (tmp_path / "log.txt").read_text() == ""
-    assert len(found) == len(take.model.landmarks) >= 4
-    assert farthest(found, truth_of(take)) < PLAYED_M
+    assert len(result) == len(take.model.landmarks) >= 4
+    assert farthest(result, truth_of(take)) < PLAYED_M
 
 
 @pytest.mark.parametrize("who", TAKES)
@@ -105,9 +105,9 @@ def test_inverse_kinematics_reproduces_our_joint_centres(who, opensim, tmp_path)
     tool.set_report_errors(False)
     tool.setOutputMotionFileName(str(tmp_path / "found.mot"))
     assert tool.run()
-    found = played(opensim, opensim.Model(str(tmp_path / "run.osim")), tmp_path / "found.mot")
-    assert len(next(iter(found.values()))) == 6
-    assert farthest(found, truth_of(take)) < FOUND_M
+    result = play(opensim, opensim.Model(str(tmp_path / "run.osim")), tmp_path / "found.mot")
+    assert len(next(iter(result.values()))) == 6
+    assert farthest(result, truth_of(take)) < FOUND_M
 
 
 def test_the_model_has_the_bodys_masses(opensim, tmp_path):
@@ -128,7 +128,7 @@ def test_the_model_has_the_bodys_masses(opensim, tmp_path):
     np.testing.assert_allclose([centre[k] for k in range(3)], whole.centre_m[Y_UP], atol=PLAYED_M)
 
 
-def test_inertia_tensors_turn_with_their_axes(tmp_path):
+def test_inertia_tensors_rotate_with_their_axes(tmp_path):
     tensor = np.array([[3.0, 0.1, 0.2], [0.1, 4.0, 0.3], [0.2, 0.3, 5.0]])
     segment = replace(BOX.segments[0], inertia=Inertia(2.0, np.array([0.01, 0.02, 0.03]), tensor))
     write_osim(tmp_path / "box.osim", replace(BOX, segments=(segment,)))
@@ -153,19 +153,19 @@ def test_shapes_lie_in_the_model_as_in_the_body(opensim, tmp_path):
     write_osim(tmp_path / "body.osim", BodyModel("shapes", (Segment("root", None, np.zeros(3), parts),)))
     model = opensim.Model(str(tmp_path / "body.osim"))
     state = model.initSystem()
-    drawn = ET.parse(tmp_path / "body.osim").findall(".//Body/components/PhysicalOffsetFrame/attached_geometry/*")
-    assert [(each.tag, each[-1].text) for each in drawn] == [
+    rendered = ET.parse(tmp_path / "body.osim").findall(".//Body/components/PhysicalOffsetFrame/attached_geometry/*")
+    assert [(each.tag, each[-1].text) for each in rendered] == [
         ("Ellipsoid", "0.1 0.2 0.3"),
         ("Brick", "0.1 0.2 0.3"),
         ("Brick", "0.5 1.0 1.5"),
     ]
-    assert drawn[0].find("Appearance/color").text == "1.0 0.0 0.0"  # the longer of the two slabs
+    assert rendered[0].find("Appearance/color").text == "1.0 0.0 0.0"  # the longer of the two slabs
     world_from_part = {"root_part1": place, "root_part3": RigidTransform.from_translation([0.5, 1.0, 1.5])}
     for name, expected in world_from_part.items():
         frame = opensim.PhysicalOffsetFrame.safeDownCast(model.getComponent(f"/bodyset/root/{name}"))
         for local in np.vstack([np.zeros(3), np.eye(3)]):
-            shown = frame.findStationLocationInGround(state, opensim.Vec3(*local))
-            np.testing.assert_allclose([shown[k] for k in range(3)], expected.apply(local)[Y_UP], atol=1e-9)
+            displayed = frame.findStationLocationInGround(state, opensim.Vec3(*local))
+            np.testing.assert_allclose([displayed[k] for k in range(3)], expected.apply(local)[Y_UP], atol=1e-9)
 
 
 def test_a_gap_ends_a_file_and_no_number_is_invented(tmp_path):
@@ -181,7 +181,7 @@ def test_a_gap_ends_a_file_and_no_number_is_invented(tmp_path):
     assert write_mot(tmp_path / "none.mot", take_of(tumbling(2, lost=(0, 1)), PERSON)) == []
 
 
-def test_angles_are_ours_in_degrees_and_run_on(tmp_path):
+def test_angles_are_ours_in_degrees_and_unwrapped(tmp_path):
     take = take_of(tumbling(60, turns=3.0), PERSON)
     _, names, values = columns_of(write_mot(tmp_path / "run.mot", take)[0])
     assert names[:8] == ["time", "somersault", "tilt", "twist", "pelvis_tx", "pelvis_ty", "pelvis_tz", "torso_x"]

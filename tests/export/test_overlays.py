@@ -24,7 +24,7 @@ def pictures(path):
         return [frame.to_ndarray(format="rgb24").astype(int) for frame in video.decode(video=0)]
 
 
-def written(folder, shots, rig=RIG):
+def write_videos(folder, shots, rig=RIG):
     with OverlayVideos(folder, rig, Fraction(50)) as videos:
         for shot in shots:
             videos.write(*shot)
@@ -39,7 +39,7 @@ def far_from(picture, rgb):
 def test_the_outline_has_the_colour_of_the_status_and_hides_none_of_the_body(tmp_path, status):
     rig = Rig((camera(size=(960, 720)),))
     body = posed(position=(0.1, 0.0, -0.1))
-    ((picture,),) = written(tmp_path, [(frames(rig=rig), body, status)], rig)
+    ((picture,),) = write_videos(tmp_path, [(frames(rig=rig), body, status)], rig)
     mask = render(surface_arrays(BOX), body, rig.cameras[0], FLAT).mask
     rows, columns = np.nonzero(mask)
     middle, left = round(rows.mean()), columns.min()
@@ -51,40 +51,40 @@ def test_the_outline_has_the_colour_of_the_status_and_hides_none_of_the_body(tmp
 
 
 def test_a_lost_frame_has_a_border_and_no_outline(tmp_path):
-    ((lost, found), _) = written(tmp_path, [(frames(0), None, Status.LOST), (frames(1), posed(), Status.TRACKED)])
+    ((lost, result), _) = write_videos(tmp_path, [(frames(0), None, Status.LOST), (frames(1), posed(), Status.TRACKED)])
     assert far_from(lost[1, 100:-100], STATUS_RGB[Status.LOST]).mean() < CODED
-    assert far_from(found[1, 100:-100], STATUS_RGB[Status.LOST]).mean() > 3 * CODED
+    assert far_from(result[1, 100:-100], STATUS_RGB[Status.LOST]).mean() > 3 * CODED
     assert far_from(lost[60:-10, 10:-10], [SCENE_GREY] * 3).max() < CODED
-    assert far_from(found[60:-10, 10:-10], [SCENE_GREY] * 3).max() > CODED
+    assert far_from(result[60:-10, 10:-10], [SCENE_GREY] * 3).max() > CODED
 
 
-def test_a_missing_view_is_a_dark_picture_that_says_so_and_keeps_the_size(tmp_path):
-    seen, missing = written(tmp_path, [(frames(missing=(1,)), posed(), Status.TRACKED)])
-    assert seen[0].shape == missing[0].shape
+def test_a_missing_view_is_a_dark_image_of_the_same_size_that_says_so(tmp_path):
+    observed, missing = write_videos(tmp_path, [(frames(missing=(1,)), posed(), Status.TRACKED)])
+    assert observed[0].shape == missing[0].shape
     assert np.median(missing[0]) < SCENE_GREY / 2
     assert missing[0][60:-60].max() > SCENE_GREY  # the words
 
 
-def test_every_time_gives_one_picture_in_every_video(tmp_path):
+def test_every_time_gives_one_frame_in_every_video(tmp_path):
     shots = [(frames(i, missing=(i % 2,)), None, Status.LOST) for i in range(5)]
-    assert [len(video) for video in written(tmp_path, shots)] == [5, 5]
+    assert [len(video) for video in write_videos(tmp_path, shots)] == [5, 5]
 
 
-def test_large_pictures_are_reduced_in_proportion(tmp_path):
+def test_large_images_are_reduced_in_proportion(tmp_path):
     rig = Rig((camera(size=(2 * LONGEST_SIDE_PX, LONGEST_SIDE_PX)),))
-    ((picture,),) = written(tmp_path, [(frames(rig=rig), posed(), Status.TRACKED)], rig)
+    ((picture,),) = write_videos(tmp_path, [(frames(rig=rig), posed(), Status.TRACKED)], rig)
     assert picture.shape == (LONGEST_SIDE_PX // 2, LONGEST_SIDE_PX, 3)
 
 
-def test_a_still_scene_does_not_move_between_its_fields():
+def test_a_static_scene_does_not_move_between_its_fields():
     whole = camera()
     rows = np.arange(whole.size[1], dtype=float)[:, None, None]
     scene = np.broadcast_to(128 + 100 * np.sin(rows / 15), (whole.size[1], whole.size[0], 3)).round().astype(np.uint8)
     for parity in (0, 1):
-        shown = resample_view(View(whole.field(parity), scene[parity::2]), whole)
-        assert shown.shape == scene.shape
-        np.testing.assert_array_equal(shown[parity::2][1:-1], scene[parity::2][1:-1])
-        assert np.abs(shown[2:-2].astype(int) - scene[2:-2]).max() <= 2
+        displayed = resample_view(View(whole.field(parity), scene[parity::2]), whole)
+        assert displayed.shape == scene.shape
+        np.testing.assert_array_equal(displayed[parity::2][1:-1], scene[parity::2][1:-1])
+        assert np.abs(displayed[2:-2].astype(int) - scene[2:-2]).max() <= 2
 
 
 def test_a_folder_that_is_not_there_is_named(tmp_path):

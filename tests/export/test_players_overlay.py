@@ -36,13 +36,13 @@ def last_picture(folder, shots, style, **kwargs):
     """The last picture of the video of one camera, as it can be seen."""
     folder.mkdir(exist_ok=True)
     with PlayersOverlayVideos(folder, Rig((BIG,)), Fraction(50), style=style, starts=STARTS, **kwargs) as videos:
-        for seen, estimates in shots:
-            videos.write(seen, LEG_POINTS, estimates)
+        for observed, estimates in shots:
+            videos.write(observed, LEG_POINTS, estimates)
     with av.open(str(folder / "overlay_left.mp4")) as video:
         return [frame.to_ndarray(format="rgb24") for frame in video.decode(video=0)][-1].astype(int)
 
 
-def found(index=0, **changes):
+def player_estimate(index=0, **changes):
     """What the stand-in finds; `changes` are of the first player."""
     first, second = StandIn().step(0, frames(index))[1]
     return replace(first, **changes), second
@@ -70,7 +70,7 @@ def test_a_rod_seen_from_its_end_still_has_a_rectangle():
 
 
 def test_the_papers_rectangles_lie_round_the_legs_in_green(tmp_path):
-    picture = last_picture(tmp_path, [(frames(), found())], "paper")
+    picture = last_picture(tmp_path, [(frames(), player_estimate())], "paper")
     green = is_near(picture, GREEN_RGB, 100)
     for x in PLAYERS.values():
         points = points_of(x)
@@ -84,10 +84,10 @@ def test_the_papers_rectangles_lie_round_the_legs_in_green(tmp_path):
             assert np.abs(picture[middle[1], middle[0]] - GREY).max() < 40
 
 
-def test_uncertain_players_are_amber_and_lost_ones_are_not_drawn(tmp_path):
-    amber = last_picture(tmp_path / "a", [(frames(), found(status=Status.UNCERTAIN))], "paper")
+def test_uncertain_players_are_amber_and_lost_ones_are_omitted(tmp_path):
+    amber = last_picture(tmp_path / "a", [(frames(), player_estimate(status=Status.UNCERTAIN))], "paper")
     lost = last_picture(
-        tmp_path / "b", [(frames(), found(status=Status.LOST, points=np.full((6, 3), np.nan)))], "paper"
+        tmp_path / "b", [(frames(), player_estimate(status=Status.LOST, points=np.full((6, 3), np.nan)))], "paper"
     )
     half = 320
     for picture, shows_amber in ((amber, True), (lost, False)):
@@ -98,13 +98,15 @@ def test_uncertain_players_are_amber_and_lost_ones_are_not_drawn(tmp_path):
 
 
 @pytest.mark.parametrize("style", ["paper", "broadcast"])
-def test_a_camera_without_a_picture_has_a_grey_one_and_no_graphic(tmp_path, style):
-    picture = last_picture(tmp_path, [(frames(), found()), (frames(1, missing=True), found(1))], style)
+def test_a_missing_view_is_grey_and_has_no_graphic(tmp_path, style):
+    picture = last_picture(
+        tmp_path, [(frames(), player_estimate()), (frames(1, missing=True), player_estimate(1))], style
+    )
     assert not is_near(picture, GREEN_RGB, 100).any()
     assert not is_near(picture, ACCENT).any()
 
 
-def drawn(jumpers):
+def draw(jumpers):
     picture = np.full((480, 640, 3), GREY, np.uint8)
     draw_heights(picture, BIG, jumpers)
     return picture.astype(int)
@@ -112,7 +114,7 @@ def drawn(jumpers):
 
 def test_the_bar_on_the_ruler_ends_at_the_height():
     def top_of_bar(height_m):
-        picture = drawn([Jumper("Anna", points_of(0.0, height_m), Height(height_m), is_sure=True)])
+        picture = draw([Jumper("Anna", points_of(0.0, height_m), Height(height_m), is_sure=True)])
         column = round(BIG.px_from_world(np.array([0.5, 0.0, 0.3]))[0])
         return np.flatnonzero(is_near(picture[:400, column], ACCENT)).min()
 
@@ -122,22 +124,22 @@ def test_the_bar_on_the_ruler_ends_at_the_height():
 
 
 def test_the_line_lies_on_the_floor_below_a_player_in_the_air():
-    picture = drawn([Jumper("Anna", points_of(0.0, 0.5), Height(0.5), is_sure=True)])
+    picture = draw([Jumper("Anna", points_of(0.0, 0.5), Height(0.5), is_sure=True)])
     row = round(BIG.px_from_world(np.zeros(3))[1])
     on_line = is_near(picture[row - 1 : row + 2], ACCENT).any(axis=0)
     ends = BIG.px_from_world(np.array([[-0.35, 0, 0], [0.35, 0, 0]]))[:, 0].round().astype(int)
     assert on_line[ends[0] + 2 : ends[1] - 2].all() and not on_line[: ends[0] - 4].any()
 
 
-def test_what_is_not_sure_is_grey():
-    picture = drawn([Jumper("Anna", points_of(0.0), Height(0.2), is_sure=False)])
+def test_uncertain_heights_are_grey():
+    picture = draw([Jumper("Anna", points_of(0.0), Height(0.2), is_sure=False)])
     assert not is_near(picture, ACCENT).any()
     assert is_near(picture, UNSURE, 5).any()
 
 
 def test_rulers_of_two_players_stand_outside_of_both():
     both = [Jumper(name, points_of(x), Height(0.5), is_sure=True) for name, x in PLAYERS.items()]
-    picture = drawn(both)
+    picture = draw(both)
     for x, side in zip(PLAYERS.values(), (-1, 1), strict=True):
         column, row = BIG.px_from_world(np.array([x + side * 0.5, 0.0, 0.25])).round().astype(int)
         assert is_near(picture[row, column - 2 : column + 3], ACCENT).any()
@@ -146,9 +148,9 @@ def test_rulers_of_two_players_stand_outside_of_both():
 def test_heights_count_from_the_feet_at_the_start_and_the_peak_holds_until_the_next_jump():
     heights = Heights(STARTS)
     path = [0.0, 0.02, 0.08, 0.3, 0.5, 0.2, 0.01, 0.06, 0.0, 0.2, 0.35, 0.1, 0.0]
-    shown = [heights.update({"Anna": (points_of(-0.6, z), Status.TRACKED)})["Anna"] for z in path]
-    np.testing.assert_allclose([height.now_m for height in shown], path, atol=1e-12)
-    peaks = [height.peak_m for height in shown]
+    displayed = [heights.update({"Anna": (points_of(-0.6, z), Status.TRACKED)})["Anna"] for z in path]
+    np.testing.assert_allclose([height.now_m for height in displayed], path, atol=1e-12)
+    peaks = [height.peak_m for height in displayed]
     assert peaks[:3] == [None] * 3
     np.testing.assert_allclose(peaks[3:], [0.3, 0.5, 0.5, 0.5, 0.5, 0.5, 0.2, 0.35, 0.35, 0.35], atol=1e-12)
 

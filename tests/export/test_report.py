@@ -50,7 +50,7 @@ def test_headline_numbers_stand_on_the_page(tmp_path):
         assert words in html
 
 
-def test_what_cannot_be_seen_is_said_plainly_and_has_no_number(tmp_path):
+def test_the_unobservable_is_named_and_has_no_number(tmp_path):
     html = html_of(tmp_path, run(unseen=range(20)))
     assert "<b>cannot be seen</b>" in html
     assert "In 20 of 20 frames with a pose" in html
@@ -59,7 +59,7 @@ def test_what_cannot_be_seen_is_said_plainly_and_has_no_number(tmp_path):
     assert "inf" not in re.sub(r"infinite|Infinite", "", html)
 
 
-def test_a_sound_run_is_said_to_be_sound_and_another_is_not(tmp_path):
+def test_only_a_run_without_faults_is_called_fine(tmp_path):
     words = "Every frame was tracked"
     assert words in html_of(tmp_path, run())
     for weak in (run(lost=(4,)), run(unseen=(4,)), Motion.collect([])):
@@ -95,7 +95,7 @@ def test_a_body_with_joints_gets_their_angles_and_its_flight_and_another_does_no
     assert [word for word in words if word in html_of(tmp_path / "rigid", run())] == []
 
 
-def test_numbers_of_a_flight_that_are_not_known_are_said_to_be_so(tmp_path):
+def test_unknown_numbers_of_a_flight_are_shown_as_not_known(tmp_path):
     motion = person_run(2)
     write_figures(tmp_path, motion, PERSON)
     html = html_of(tmp_path, motion, flight=flight_summary(motion, PERSON).to_dict())

@@ -27,10 +27,10 @@ def test_a_cell_shows_the_scene_inside_the_mask_only():
     assert set(np.unique(cell)) == {SCENE_GREY, BACKGROUND_GREY}
 
 
-def test_fields_and_whole_pictures_give_the_same_cell():
+def test_fields_and_whole_frames_give_the_same_cell():
     whole = camera()
-    seen = [shown_px(view, (0.2, 0, 0.1)) for view in (whole, whole.field(0), whole.field(1))]
-    assert seen[1:] == pytest.approx([seen[0]] * 2, rel=0.01)
+    observed = [shown_px(view, (0.2, 0, 0.1)) for view in (whole, whole.field(0), whole.field(1))]
+    assert observed[1:] == pytest.approx([observed[0]] * 2, rel=0.01)
 
 
 def test_there_is_no_cell_behind_the_camera_or_without_a_view():

@@ -11,7 +11,7 @@ from tests.support.takes import LEGS, jumping
 from tests.support.tolerances import ROUNDTRIP
 
 
-def placed(figure, row):
+def pose_figure(figure, row):
     R = Rotation.from_euler("XYZ", figure.root_angles[row])
     root = RigidTransform.from_components(figure.position[row], R)
     return figure.model.with_pose(Pose(world_from_root=root, joint_angles=figure.joint_angles[row]))
@@ -25,7 +25,7 @@ def test_its_pose_gives_the_joints_back(joints):
     assert sorted(names) == sorted(name for name in joints if name != "torso")
     at = [joints.index(name) for name in names]
     for row in range(len(motion)):
-        np.testing.assert_allclose(placed(figure, row).landmarks, motion.points[row, 1, at], atol=ROUNDTRIP)
+        np.testing.assert_allclose(pose_figure(figure, row).landmarks, motion.points[row, 1, at], atol=ROUNDTRIP)
 
 
 def test_what_joint_centres_do_not_show_is_zero_and_locked():
@@ -43,10 +43,10 @@ def test_what_joint_centres_do_not_show_is_zero_and_locked():
 def test_the_torso_points_from_the_hips_to_its_joint():
     motion = jumping()
     figure = fit_stick_figure(motion.points[:, 0], motion.joints)
-    body = placed(figure, 3)
+    body = pose_figure(figure, 3)
     up = body.R[figure.model.index_of("torso")] @ [0, 0, 1]
-    seen = motion.points[3, 0, 8] - motion.points[3, 0, :2].mean(axis=0)
-    np.testing.assert_allclose(up, seen / np.linalg.norm(seen), atol=ROUNDTRIP)
+    observed = motion.points[3, 0, 8] - motion.points[3, 0, :2].mean(axis=0)
+    np.testing.assert_allclose(up, observed / np.linalg.norm(observed), atol=ROUNDTRIP)
 
 
 def test_a_person_at_attention_has_no_angle():
@@ -57,7 +57,7 @@ def test_a_person_at_attention_has_no_angle():
     np.testing.assert_allclose(figure.root_angles, 0, atol=ROUNDTRIP)
 
 
-def test_a_joint_that_is_not_known_leaves_the_rest_of_the_body_known():
+def test_a_missing_joint_leaves_the_rest_of_the_body_intact():
     motion = jumping()
     points = motion.points[:, 0].copy()
     points[2, LEGS.index("knee_left")] = np.nan

@@ -12,7 +12,7 @@ from tests.support.export_scenes import run
 from tests.support.tolerances import ROUNDTRIP
 
 
-def test_headline_counts_frames_turns_and_time():
+def test_headline_counts_frames_revolutions_and_time():
     head = headline(run(21, uncertain=(4, 5)))
     assert (head["n_frames"], head["n_tracked"], head["n_uncertain"], head["n_lost"]) == (21, 19, 2, 0)
     assert head["duration_s"] == pytest.approx(0.4, abs=ROUNDTRIP)
@@ -24,11 +24,11 @@ def test_headline_counts_frames_turns_and_time():
     assert head["median_rotation_sd_deg"] == pytest.approx(np.rad2deg(0.01), abs=ROUNDTRIP)
 
 
-def test_backward_turns_are_negative():
+def test_backward_revolutions_are_negative():
     assert headline(run(turns=-2.0))["somersault_rev"] == pytest.approx(-2.0, abs=ROUNDTRIP)
 
 
-def test_median_spread_is_infinite_where_most_frames_do_not_show_a_direction():
+def test_median_sd_is_infinite_where_most_frames_do_not_show_a_direction():
     head = headline(run(10, unseen=range(6)))
     assert head["median_rotation_sd_deg"] == np.inf
     assert (head["n_rotation_unobservable"], head["n_position_unobservable"]) == (6, 0)
@@ -49,7 +49,7 @@ def test_a_run_without_poses_claims_no_number(motion):
     assert "found in no frame" in " ".join(body_warnings(head))
 
 
-def test_a_sound_run_warns_of_nothing():
+def test_a_run_without_faults_warns_of_nothing():
     assert list(body_warnings(json_ready(headline(run())))) == []
 
 
@@ -66,7 +66,7 @@ def test_each_weakness_has_its_warning(kwargs, words):
     assert words in " ".join(body_warnings(json_ready(headline(run(**kwargs)))))
 
 
-def test_unknown_spread_is_warned_of():
+def test_unknown_uncertainty_is_warned_of():
     head = json_ready(headline(run())) | {"median_position_sd_mm": None}
     assert "uncertainty of the position is not known" in " ".join(body_warnings(head))
 

@@ -15,7 +15,7 @@ from tests.support.takes import jumping, tumbling
 def person_columns(motion):
     table = measure_flight(motion, PERSON)
     com = table["com"].to_numpy(), table["com_sd"].to_numpy()
-    return body_columns(motion, PERSON, *landmarks(motion, PERSON), com)
+    return body_columns(motion, PERSON, *landmarks(motion, PERSON), com=com)
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def columns(motion):
     return person_columns(motion)
 
 
-def test_a_row_holds_places_angles_and_the_centre_of_mass_with_their_deviations(motion, columns):
+def test_a_row_holds_positions_angles_and_the_centre_of_mass_with_their_deviations(motion, columns):
     points, sd = landmarks(motion, PERSON)
     names = [landmark.name for landmark in PERSON.landmarks]
     np.testing.assert_array_equal(columns["knee_left_z_m"].values, points[:, names.index("knee_left"), 2])
@@ -43,7 +43,7 @@ def test_a_row_holds_places_angles_and_the_centre_of_mass_with_their_deviations(
 
 def test_a_body_in_one_piece_has_no_joints_and_no_mass():
     motion = tumbling(3, model=BOX)
-    columns = body_columns(motion, BOX, *landmarks(motion, BOX), None)
+    columns = body_columns(motion, BOX, *landmarks(motion, BOX), com=None)
     assert list(columns)[9:] == ["root_x_m", "root_y_m", "root_z_m", "root_m_sd"]
 
 
@@ -69,7 +69,7 @@ def test_csv_and_parquet_read_back_to_the_last_bit(columns, tmp_path):
                 assert table[name].to_pylist() == column.values.tolist()
 
 
-def test_the_unknown_is_empty_and_the_unseen_infinite(columns, tmp_path):
+def test_the_unknown_is_empty_and_the_unobservable_infinite(columns, tmp_path):
     unseen = np.where(np.arange(6) == 3, np.inf, columns["head_m_sd"].values)
     columns = {**columns, "head_m_sd": columns["head_m_sd"]._replace(values=unseen)}
     write_csv(tmp_path / "run.csv", columns)

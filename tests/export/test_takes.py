@@ -46,7 +46,7 @@ def test_lost_frames_at_both_ends_and_between_split_a_take():
     assert take_of(tumbling(3, lost=(0, 1, 2)), PERSON).stretches() == []
 
 
-def test_turns_run_on_and_give_the_rotation_back():
+def test_root_angles_are_unwrapped_and_give_the_rotation_back():
     motion = tumbling(40, turns=3.0)
     take = take_of(motion, PERSON)
     assert np.rad2deg(take.root_angles[-1, 0]) == pytest.approx(1080, abs=40)
@@ -54,7 +54,7 @@ def test_turns_run_on_and_give_the_rotation_back():
     np.testing.assert_allclose(take.R, motion.R, atol=ROUNDTRIP)
 
 
-def test_times_that_stray_from_the_beat_are_measured():
+def test_jitter_is_the_largest_deviation_from_uniform_sampling():
     motion = tumbling(5, rate=Fraction(50))
     motion.time_s[2] += 0.004
     assert take_of(motion, PERSON).jitter_s == pytest.approx(0.004)
@@ -69,7 +69,7 @@ def test_a_body_known_by_its_origin_alone_gets_markers_on_its_axes_and_a_person_
     np.testing.assert_allclose(take.points[:, 2] - take.points[:, 0], 0.1 * motion.R[..., 1], atol=EXACT)
 
 
-def test_names_become_plain_and_stay_apart():
+def test_names_become_portable_and_stay_unique():
     names = portable_names(["Jürgen Müller (7)", "hip_left", "a/b", "a b", "№", "", "x" * 300])
     assert names[:4] == ("Jurgen_Muller_7", "hip_left", "a_b", "a_b_2")
     assert len(set(names)) == len(names)
@@ -104,17 +104,17 @@ def test_runs_that_have_no_rate_or_no_order_are_refused_in_one_line():
 
 
 @pytest.mark.parametrize("place", [1e9, np.inf])
-def test_places_off_the_earth_are_refused_in_one_line(place):
+def test_positions_off_the_earth_are_refused_in_one_line(place):
     motion = tumbling(4)
     motion.position[1, 2] = place
-    with pytest.raises(ResultError, match=r"places something (1e\+09|inf) m from the origin"):
+    with pytest.raises(ResultError, match=r"holds a point (1e\+09|inf) m from the origin"):
         take_of(motion, PERSON)
 
 
 def test_parts_replace_the_parts_of_an_older_export_and_nothing_else(tmp_path):
-    kept = ["run_b.mot", "run.trc", "run_part.mot", "rerun_part1.mot", "run_part1.mot.bak"]
-    for name in [*kept, "run.mot", "run_part1.mot", "run_part2.mot", "run_part13.mot"]:
+    remaining = ["run_b.mot", "run.trc", "run_part.mot", "rerun_part1.mot", "run_part1.mot.bak"]
+    for name in [*remaining, "run.mot", "run_part1.mot", "run_part2.mot", "run_part13.mot"]:
         (tmp_path / name).touch()
     assert [path.name for path in part_paths(tmp_path / "run.mot", 2)] == ["run_part1.mot", "run_part2.mot"]
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(kept)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(remaining)
     assert part_paths(tmp_path / "run.mot", 1) == [tmp_path / "run.mot"]

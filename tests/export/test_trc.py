@@ -17,7 +17,7 @@ def take():
     return hidden(take_of(tumbling(7, lost=(3,), first=10), PERSON), [0, 2], [0, 5])
 
 
-def test_our_own_reader_gives_the_places_in_the_world_back(take, tmp_path):
+def test_our_own_reader_gives_the_world_positions_back(take, tmp_path):
     write_trc(tmp_path / "run.trc", take)
     paths = read_joint_paths(tmp_path / "run.trc")
     assert paths.names == take.markers
@@ -29,8 +29,8 @@ def test_opensim_gives_them_back_with_y_up(take, opensim, tmp_path):
     write_trc(tmp_path / "run.trc", take)
     table = opensim.TimeSeriesTableVec3(str(tmp_path / "run.trc"))
     rows = [table.getRowAtIndex(k) for k in range(table.getNumRows())]
-    found = np.array([[[row[m][axis] for axis in range(3)] for m in range(row.size())] for row in rows])
-    np.testing.assert_allclose(found, take.points[..., [1, 2, 0]], atol=TOLERANCE_M)
+    result = np.array([[[row[m][axis] for axis in range(3)] for m in range(row.size())] for row in rows])
+    np.testing.assert_allclose(result, take.points[..., [1, 2, 0]], atol=TOLERANCE_M)
     assert table.getColumnLabels() == take.markers
     np.testing.assert_allclose(table.getIndependentColumn(), take.time_s, atol=1e-9)
     assert table.getTableMetaDataString("Units") == "m"

@@ -47,7 +47,7 @@ def run(rule, start, sign=1.0, **settings):
 @EVERY
 @pytest.mark.parametrize("start", [(-1.2, 1.0, 0.0), (2.0, -1.0, 3.0), (0.0, 0.0, 0.0)])
 def test_descent_ends_in_scipys_minimum(rule, start):
-    end = run(rule, start, most_steps=200, least_promise=(1e-16, 0.0))
+    end = run(rule, start, most_steps=200, least_predicted=(1e-16, 0.0))
     assert end.outcome is Outcome.CONVERGED
     np.testing.assert_allclose(end.best.x, least_squares(residuals, start, xtol=1e-12).x, atol=SOLVED)
 
@@ -64,7 +64,7 @@ def test_every_gain_makes_the_cost_smaller(rule):
 
 @EVERY
 def test_a_descent_that_is_cut_short_says_so(rule):
-    end = run(rule, (-1.2, 1.0, 0.0), most_steps=2, least_promise=(1e-16, 0.0))
+    end = run(rule, (-1.2, 1.0, 0.0), most_steps=2, least_predicted=(1e-16, 0.0))
     assert (end.outcome, end.n_steps) == (Outcome.OUT_OF_STEPS, 2)
 
 

@@ -35,12 +35,12 @@ def run(tmp_path, thrown_cross):
 
 
 def test_paths_of_joints_are_compared_and_kept_in_the_summary(run):
-    found = assess(run, None, None, run.parent / "higher.csv")
-    assert list(found) == ["joints"]
-    assert found["joints"].whole.mean_mm == pytest.approx(10)
-    kept = json.loads((run / "summary.json").read_text())
-    assert kept["joints"]["whole"]["bias_mm"] == pytest.approx([0, 0, -10], abs=1e-9)
-    assert kept["name"] == "run"
+    result = assess(run, None, None, run.parent / "higher.csv")
+    assert list(result) == ["joints"]
+    assert result["joints"].whole.mean_mm == pytest.approx(10)
+    remaining = json.loads((run / "summary.json").read_text())
+    assert remaining["joints"]["whole"]["bias_mm"] == pytest.approx([0, 0, -10], abs=1e-9)
+    assert remaining["name"] == "run"
 
 
 def test_nothing_to_compare_with_is_refused(run):
@@ -55,12 +55,12 @@ def test_a_truth_given_as_joints_is_refused_in_one_line(run, thrown_cross):
 
 def test_players_are_compared_with_their_truth_and_the_summary_keeps_it(tmp_path):
     run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv", off_m=0.03)
-    found = assess(run, truth, None)
-    assert list(found) == ["truth"]
-    assert [errors.parts["all"].mean_mm for errors in found["truth"].players.values()] == pytest.approx([30, 30])
-    kept = json.loads((run / "summary.json").read_text())
-    assert list(kept["truth"]["players"]) == list(PLAYERS)
-    assert kept["name"] == "a block"
+    result = assess(run, truth, None)
+    assert list(result) == ["truth"]
+    assert [errors.parts["all"].mean_mm for errors in result["truth"].players.values()] == pytest.approx([30, 30])
+    remaining = json.loads((run / "summary.json").read_text())
+    assert list(remaining["truth"]["players"]) == list(PLAYERS)
+    assert remaining["name"] == "a block"
 
 
 def test_a_broken_list_of_jumps_beside_the_truth_is_refused(tmp_path):
@@ -84,7 +84,7 @@ def test_players_have_a_truth_only(tmp_path):
             assess(run, *given)
 
 
-def test_truths_of_players_and_of_a_body_are_told_apart(run, thrown_cross, tmp_path):
+def test_truths_of_players_and_of_a_body_are_distinguished(run, thrown_cross, tmp_path):
     with pytest.raises(ResultError, match="expected a truth table of players"):
         assess(write_run(tmp_path / "players"), thrown_cross / "truth.csv", None)
     with pytest.raises(ResultError, match="no column x_m"):
@@ -95,14 +95,19 @@ def agreements(found, against):
     return {row.name: row for row in found.agreements[against]}
 
 
-def test_agreement_of_joints_is_told_with_tables_figures_and_a_paragraph(run, tmp_path):
+def test_agreement_of_joints_is_reported_in_tables_figures_and_a_paragraph(run, tmp_path):
     before = {path.name: path.read_bytes() for path in run.iterdir()}
-    found = evaluate_agreement(run, joints=run.parent / "higher.csv", out=tmp_path / "agreement")
-    rows = agreements(found, "the joints")
+    result = evaluate_agreement(run, joints=run.parent / "higher.csv", out=tmp_path / "agreement")
+    rows = agreements(result, "the joints")
     assert rows["all joints z"].bias.value == pytest.approx(-10)
     assert rows["all joints x"].rmse.value == pytest.approx(0, abs=1e-9)
-    assert {path.name for path in (tmp_path / "agreement").iterdir()} == set(found.files)
-    assert set(found.files) == {"agreement.csv", "agreement_joints.png", "identity_joints.png", "agreement_methods.txt"}
+    assert {path.name for path in (tmp_path / "agreement").iterdir()} == set(result.files)
+    assert set(result.files) == {
+        "agreement.csv",
+        "agreement_joints.png",
+        "identity_joints.png",
+        "agreement_methods.txt",
+    }
     text = (tmp_path / "agreement" / "agreement_methods.txt").read_text()
     assert "Bland" in text and "McGraw" in text and "bias -10.00" in text and "airborne" in text
     assert {path.name: path.read_bytes() for path in run.iterdir()} == before
@@ -119,12 +124,12 @@ def test_each_number_of_the_table_has_its_interval(run, tmp_path):
 
 def test_runs_of_one_trial_are_compared_with_one_another(run, tmp_path):
     others = [shutil.copytree(run, tmp_path / name) for name in ("other", "third")]
-    found = evaluate_agreement(run, repeats=others, out=tmp_path)
-    rows = {row.name: row for row in found.repeats["runs"]}
+    result = evaluate_agreement(run, repeats=others, out=tmp_path)
+    rows = {row.name: row for row in result.repeats["runs"]}
     assert rows["x"].n_ways == 3 and rows["x"].within_sd.value == pytest.approx(0, abs=1e-9)
     assert {"somersault", "tilt", "twist", "all joints x"} <= set(rows)
-    assert "between runs" in found.describe()
-    assert not found.agreements
+    assert "between runs" in result.describe()
+    assert not result.agreements
     with pytest.raises(ResultError, match="holds no run"):
         evaluate_agreement(run, repeats=[tmp_path])
 
@@ -155,28 +160,28 @@ def test_a_run_without_its_body_is_refused(run):
         assess(run, None, None, run.parent / "higher.csv")
 
 
-def test_people_who_click_the_same_pictures_are_compared(run, thrown_cross, tmp_path):
+def test_people_who_click_the_same_images_are_compared(run, thrown_cross, tmp_path):
     write_pose2sim(run / "calib.toml", read_rig(thrown_cross / "calib_true.toml"))
     clicks = thrown_cross / "digitised.csv"
     others = shutil.copyfile(clicks, tmp_path / "others.csv")
-    found = evaluate_agreement(run, digitised=clicks, operators=[others], out=tmp_path)
-    assert {row.name for row in found.repeats["operators"]} == {"x", "y", "z", "somersault", "tilt", "twist"}
-    assert list(found.agreements) == ["points digitised"]
+    result = evaluate_agreement(run, digitised=clicks, operators=[others], out=tmp_path)
+    assert {row.name for row in result.repeats["operators"]} == {"x", "y", "z", "somersault", "tilt", "twist"}
+    assert list(result.agreements) == ["points digitised"]
     with pytest.raises(ResultError, match="give those as --digitised"):
         evaluate_agreement(run, operators=[clicks])
 
 
 def test_players_and_their_jumps_agree_with_their_truth(tmp_path):
     run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv", off_m=0.03)
-    found = evaluate_agreement(run, truth, repeats=[shutil.copytree(run, tmp_path / "again")])
-    rows = agreements(found, "the truth")
+    result = evaluate_agreement(run, truth, repeats=[shutil.copytree(run, tmp_path / "again")])
+    rows = agreements(result, "the truth")
     assert rows["ankle_left z"].bias.value == pytest.approx(30)
     assert rows["ankle_left z"].n_individuals == 2
     assert rows["all joints z"].n_individuals == 12
-    assert [row.name for row in found.repeats["runs"]][:3] == ["hip_left x", "all joints x", "hip_left y"]
+    assert [row.name for row in result.repeats["runs"]][:3] == ["hip_left x", "all joints x", "hip_left y"]
     with pytest.raises(ResultError, match="a run of players"):
         evaluate_agreement(run, joints=truth)
-    plain = json.dumps(found.to_dict(), allow_nan=False)
+    plain = json.dumps(result.to_dict(), allow_nan=False)
     assert "NaN" not in plain
 
 

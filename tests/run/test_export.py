@@ -58,7 +58,7 @@ def names(exported):
     return [path.name for path in exported.files]
 
 
-def test_a_killed_run_of_a_person_goes_out_in_every_kind(person_run, tmp_path):
+def test_a_killed_run_of_a_person_is_exported_in_every_format(person_run, tmp_path):
     exported = export_run(person_run, tmp_path / "out")
     assert names(exported) == [f"my_run.{suffix}" for suffix in SUFFIXES]
     assert exported.notes == ()
@@ -68,7 +68,7 @@ def test_a_killed_run_of_a_person_goes_out_in_every_kind(person_run, tmp_path):
     np.testing.assert_allclose(paths.points, points, atol=1e-6)
 
 
-def test_a_body_in_one_piece_goes_out_in_every_kind(tmp_path):
+def test_a_body_in_one_piece_is_exported_in_every_format(tmp_path):
     folder = write_body_run(tmp_path / "throw", tumbling(5, model=BOX, lost=(0, 2)), BOX)
     exported = export_run(folder)
     assert {path.parent for path in exported.files} == {folder / "export"}
@@ -92,8 +92,8 @@ def test_players_share_some_files_and_have_others_each(players_run, tmp_path):
     each = [f"block_{who}.{kind}" for kind in ("trc", "mot", "osim") for who in ("Anna", "number_7")]
     bvh = [f"block_{who}.bvh" for who in ("Anna", "number_7")]
     assert names(exported) == ["block.c3d", *each, "block.glb", *bvh, "block.csv", "block.parquet"]
-    found = read_joint_paths(tmp_path / "block_number_7.trc")
-    np.testing.assert_allclose(found.points, read_players(players_run / "joints.csv").points[:, 1], atol=1e-6)
+    result = read_joint_paths(tmp_path / "block_number_7.trc")
+    np.testing.assert_allclose(result.points, read_players(players_run / "joints.csv").points[:, 1], atol=1e-6)
 
 
 def test_only_what_is_asked_for_is_written_and_the_rest_of_the_folder_stays(players_run, tmp_path):
@@ -125,9 +125,9 @@ def test_where_nothing_was_found_there_is_nothing_to_export(tmp_path):
 
 
 def test_progress_grows_to_its_end(person_run, tmp_path):
-    told = []
-    export_run(person_run, tmp_path, progress=lambda done, total: told.append((done, total)))
-    assert told == [(5, 10), (10, 10)]
+    calls = []
+    export_run(person_run, tmp_path, progress=lambda done, total: calls.append((done, total)))
+    assert calls == [(5, 10), (10, 10)]
 
 
 def run_command(monkeypatch, *arguments):
@@ -145,7 +145,7 @@ def test_the_command_lists_its_files(players_run, tmp_path, monkeypatch, capsys)
     assert json.loads(capsys.readouterr().out) == {"files": [str(tmp_path / "block.glb")], "notes": []}
 
 
-def test_every_kind_has_its_option(players_run, tmp_path, monkeypatch):
+def test_every_format_has_its_option(players_run, tmp_path, monkeypatch):
     for kind in EXPORT_FORMATS:
         assert run_command(monkeypatch, "export", players_run, "-o", tmp_path / kind, f"--{kind}") == 0
         suffix = "glb" if kind == "gltf" else kind
@@ -162,7 +162,7 @@ def test_every_kind_has_its_option(players_run, tmp_path, monkeypatch):
         ({"joints.csv": b""}, "is empty"),
     ],
 )
-def test_what_is_no_run_is_refused_in_one_line(files, said, tmp_path, monkeypatch, capsys):
+def test_a_folder_without_a_run_is_refused_in_one_line(files, said, tmp_path, monkeypatch, capsys):
     for name, content in files.items():
         (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
     assert run_command(monkeypatch, "export", tmp_path) == 2

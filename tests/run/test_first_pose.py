@@ -1,4 +1,4 @@
-"""The first pose of a trial, however it is given, and its cameras, mended where asked for."""
+"""The first pose of a trial, however it is given, and its cameras, resected where asked for."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -62,9 +62,10 @@ def coco(points):
     """COCO's 17 points of landmarks (..., 20, 3); the ears stand to the head's sides, the face before it."""
     head = points[..., NAMES.index("head"), :]
     side = 0.07 * (points[..., NAMES.index("shoulder_left"), :] - points[..., NAMES.index("shoulder_right"), :])
-    places = {"nose": head, "eye_left": head, "eye_right": head, "ear_left": head + side, "ear_right": head - side}
+    positions = {"nose": head, "eye_left": head, "eye_right": head, "ear_left": head + side, "ear_right": head - side}
     return np.stack(
-        [places.get(name, points[..., NAMES.index(name) if name in NAMES else 0, :]) for name in NETWORKS[17]], axis=-2
+        [positions.get(name, points[..., NAMES.index(name) if name in NAMES else 0, :]) for name in NETWORKS[17]],
+        axis=-2,
     )
 
 
@@ -99,8 +100,8 @@ def trial(tmp_path):
 
 def off_m(pose, frame=0, names=NAMES):
     """How far the pose's landmarks are from the truth, at most."""
-    found = MODEL.with_pose(pose).landmarks
-    return max(np.linalg.norm(found[NAMES.index(name)] - TRUE[frame, NAMES.index(name)]) for name in names)
+    result = MODEL.with_pose(pose).landmarks
+    return max(np.linalg.norm(result[NAMES.index(name)] - TRUE[frame, NAMES.index(name)]) for name in names)
 
 
 ON_COCO = [name for name in NAMES if name in NETWORKS[17]]
@@ -115,32 +116,32 @@ def test_root_and_joint_angles_set_by_hand(trial):
     start += "[start.joint_angles_deg]\n"
     for segment, xyz in zip(MODEL.segments[1:], np.degrees(true.joint_angles), strict=True):
         start += f"{segment.name} = {xyz.tolist()}\n" if xyz.any() else ""
-    found = find_first_pose(trial(start), MODEL, RIG)
-    assert off_m(found.pose) < 1e-9
-    assert found.notes == ()
+    result = find_first_pose(trial(start), MODEL, RIG)
+    assert off_m(result.pose) < 1e-9
+    assert result.notes == ()
 
 
 def test_joint_angles_of_an_unknown_joint_are_refused_and_impossible_ones_noted(trial):
     root = "[start]\nposition_m = [0, 0, 1]\nquaternion_xyzw = [0, 0, 0, 1]\n"
     with pytest.raises(TrialError, match="body 'human18' has no joint 'knee_left'; it has: torso, chest"):
         find_first_pose(trial(root + "joint_angles_deg = {knee_left = [1, 2, 3]}\n"), MODEL, RIG)
-    found = find_first_pose(trial(root + "joint_angles_deg = {shank_left = [-90, 0, 0]}\n"), MODEL, RIG)
-    assert found.notes == ("start.joint_angles_deg: shank_left beyond the body's joint limits",)
+    result = find_first_pose(trial(root + "joint_angles_deg = {shank_left = [-90, 0, 0]}\n"), MODEL, RIG)
+    assert result.notes == ("start.joint_angles_deg: shank_left beyond the body's joint limits",)
 
 
-def test_places_of_landmarks_in_the_file_or_in_a_table(trial, tmp_path):
-    places = dict(zip(NAMES, TRUE[0].tolist(), strict=True))
-    written = ", ".join(f"{name} = {place}" for name, place in places.items())
-    found = find_first_pose(trial(f"[start]\njoints_m = {{{written}}}\n"), MODEL, RIG)
-    assert off_m(found.pose) < 1e-3
-    rows = [f"{name},{','.join(map(str, place))}" for name, place in places.items()]
+def test_positions_of_landmarks_in_the_file_or_in_a_table(trial, tmp_path):
+    positions = dict(zip(NAMES, TRUE[0].tolist(), strict=True))
+    written = ", ".join(f"{name} = {place}" for name, place in positions.items())
+    result = find_first_pose(trial(f"[start]\njoints_m = {{{written}}}\n"), MODEL, RIG)
+    assert off_m(result.pose) < 1e-3
+    rows = [f"{name},{','.join(map(str, place))}" for name, place in positions.items()]
     (tmp_path / "joints.csv").write_text("\n".join(["joint,x_m,y_m,z_m", *rows]))
     again = find_first_pose(trial('[start]\njoints_m = "joints.csv"\n'), MODEL, RIG)
     assert off_m(again.pose) < 1e-3
     assert "first pose found, landmarks 0 mm off (RMS)" in again.notes[0]
 
 
-def test_points_clicked_in_the_pictures(trial, tmp_path):
+def test_points_clicked_in_the_images(trial, tmp_path):
     px = {camera.name: camera.px_from_world(TRUE[0]) for camera in RIG}
     header = ["point", *(f"{name}_{axis}" for name in px for axis in "uv")]
     rows = [[name, *np.concatenate([at[i] for at in px.values()]).tolist()] for i, name in enumerate(NAMES)]
@@ -154,9 +155,9 @@ def test_points_clicked_in_the_pictures(trial, tmp_path):
 
 def test_detections_at_the_first_frame_tracked(trial):
     given = trial(DETECTIONS + "frame = 7\n", tables=detections())
-    found = find_first_pose(given, MODEL, RIG)
-    assert off_m(found.pose, 7, ON_COCO) < 2e-3
-    assert found.notes[0].startswith("found.npz, frame 7: first pose found, landmarks ")
+    result = find_first_pose(given, MODEL, RIG)
+    assert off_m(result.pose, 7, ON_COCO) < 2e-3
+    assert result.notes[0].startswith("found.npz, frame 7: first pose found, landmarks ")
 
 
 def test_cameras_with_other_times_are_matched_by_time(trial):
@@ -165,9 +166,9 @@ def test_cameras_with_other_times_are_matched_by_time(trial):
     tables["cam2"] = late["cam2"]  # began three frames later
     given = trial(DETECTIONS + "frame = 5\n", tables=tables, extra={"cam2": "offset_s = 0.12\n"})
     assert off_m(find_first_pose(given, MODEL, RIG).pose, 5, ON_COCO) < 2e-3
-    found = landmarks_over_time(given, RIG)
+    result = landmarks_over_time(given, RIG)
     for name in ON_COCO:
-        np.testing.assert_allclose(found[name], TRUE[:, NAMES.index(name)], atol=SOLVED)
+        np.testing.assert_allclose(result[name], TRUE[:, NAMES.index(name)], atol=SOLVED)
 
 
 def test_a_field_takes_the_detections_of_its_frame(trial):
@@ -181,14 +182,14 @@ def test_camera_that_saw_something_else_is_left_out_and_named(trial):
     tables = detections()
     tables["cam3"][0, NETWORKS[17].index("wrist_left")] += [25, 0, 0]
     tables["cam3"][0, NETWORKS[17].index("nose")] += [25, 0, 0]
-    found = find_first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG)
-    assert off_m(found.pose, 0, ON_COCO) < 2e-3
-    assert found.notes[0] == (
+    result = find_first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG)
+    assert off_m(result.pose, 0, ON_COCO) < 2e-3
+    assert result.notes[0] == (
         "found.npz, frame 0: cam3 left out at wrist_left, up to 25 px from where the other cameras see them"
     )
 
 
-def test_unseen_limb_is_named(trial):
+def test_missing_limb_is_named(trial):
     tables = detections()
     for name in ("wrist_left", "elbow_left"):
         for table in tables.values():
@@ -197,7 +198,7 @@ def test_unseen_limb_is_named(trial):
     assert any("no place of elbow_left, wrist_left; " in note for note in notes)
 
 
-def test_detections_that_do_not_settle_a_pose_are_refused(trial):
+def test_detections_that_do_not_determine_a_pose_are_refused(trial):
     tables = detections()
     for table in tables.values():
         table[:, NETWORKS[17].index("hip_left"), 2] = 0.0
@@ -214,14 +215,14 @@ def test_camera_without_detections_is_refused(trial):
         find_first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG)
 
 
-def test_camera_is_mended_where_the_trial_asks_for_it(trial, tmp_path):
+def test_camera_is_resected_where_the_trial_asks_for_it(trial, tmp_path):
     write_pose2sim(tmp_path / "calib.toml", knocked(RIG, "cam3", (0.5, -0.4, 0.3), (8, -9, 3)))
     tables = detections(sd_px=0.1)
-    mended = trial(DETECTIONS, tables=tables, calibration=CALIBRATION + 'mend = ["cam3"]\n')
-    recording, _ = open_trial(mended)
+    resected = trial(DETECTIONS, tables=tables, calibration=CALIBRATION + 'mend = ["cam3"]\n')
+    recording, _ = open_trial(resected)
     assert np.linalg.norm(recording.rig["cam3"].centre - RIG["cam3"].centre) < 0.15
     assert len(recording.events) == 1 and recording.events[0].startswith("cam3: moved by ")
-    rig, _ = cameras_of(mended)
+    rig, _ = cameras_of(resected)
     np.testing.assert_array_equal(rig.P, recording.rig.P)
 
 
@@ -235,7 +236,7 @@ def test_camera_that_disagrees_is_named_with_the_remedy_and_left_alone(trial, tm
     assert resect_moved_cameras(trial(DETECTIONS, tables=detections()), RIG) == (RIG, ())
 
 
-def test_without_detections_no_camera_is_looked_at(trial):
+def test_without_detections_no_camera_is_checked(trial):
     given = trial("[start]\nposition_m = [0, 0, 1]\nquaternion_xyzw = [0, 0, 0, 1]\n")
     assert resect_moved_cameras(given, RIG) == (RIG, ())
 
@@ -244,8 +245,8 @@ def test_another_start_is_another_run(trial):
     one = input_hashes(trial(DETECTIONS, tables=detections()))
     other = input_hashes(trial(DETECTIONS, tables=detections(sd_px=1.0)))
     assert {name for name in one if one[name] != other[name]} == {"found.npz"}
-    mended = input_hashes(trial(DETECTIONS, calibration=CALIBRATION + 'mend = ["cam3"]\n'))
-    assert [name for name in other if other[name] != mended[name]] == ["start and lights"]
+    resected = input_hashes(trial(DETECTIONS, calibration=CALIBRATION + 'mend = ["cam3"]\n'))
+    assert [name for name in other if other[name] != resected[name]] == ["start and lights"]
 
 
 def test_impossible_person_is_refused(trial):
@@ -269,8 +270,8 @@ def test_the_man_on_the_beam(shared_data, tmp_path):
     rig = recording.rig
     assert [event.split(" with ")[0] for event in recording.events] == ["cam03 disagrees"]
     (tmp_path / "trial.toml").write_text(text.replace("[body]", 'mend = ["cam03"]\n[body]'))
-    mending = read_trial(tmp_path / "trial.toml")
-    mended, notes = resect_moved_cameras(mending, rig)
+    with_mend = read_trial(tmp_path / "trial.toml")
+    resected, notes = resect_moved_cameras(with_mend, rig)
     assert [note.split(":")[0] for note in notes] == ["cam03"]
     static = np.array(  # white dots on the platform's left, near and far, and a post's rim, by hand; 2 px
         [
@@ -282,17 +283,17 @@ def test_the_man_on_the_beam(shared_data, tmp_path):
     )
     others = static.copy()
     others[:, 2] = np.nan
-    places = mended.points_from_px(others)
+    positions = resected.points_from_px(others)
     before, after = (
-        np.median(np.linalg.norm(cameras["cam03"].px_from_world(places) - static[:, 2], axis=-1))
-        for cameras in (rig, mended)
+        np.median(np.linalg.norm(cameras["cam03"].px_from_world(positions) - static[:, 2], axis=-1))
+        for cameras in (rig, resected)
     )
     assert after < 10 < 15 < before
-    found = find_first_pose(mending, MODEL, mended)
-    joints = landmarks_over_time(mending, mended)
-    posed = MODEL.with_pose(found.pose).landmarks
+    result = find_first_pose(with_mend, MODEL, resected)
+    joints = landmarks_over_time(with_mend, resected)
+    posed = MODEL.with_pose(result.pose).landmarks
     off = [
         np.linalg.norm(posed[NAMES.index(name)] - joints[name][0]) for name in ("hip_left", "knee_right", "wrist_left")
     ]
     assert max(off) < 0.1
-    assert not any("exchanged" in note for note in found.notes)
+    assert not any("exchanged" in note for note in result.notes)

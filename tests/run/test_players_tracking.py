@@ -57,7 +57,7 @@ def test_a_run_leaves_every_players_joints_at_every_frame(path, tmp_path):
     assert read_rig(tmp_path / "run" / "calib.toml").names == ("left", "right")
 
 
-def test_the_summary_counts_each_player_and_tells_what_was_used(path, tmp_path):
+def test_the_summary_counts_each_player_and_names_the_inputs(path, tmp_path):
     track_players(read_trial(path), tmp_path / "run", pictures=False)
     summary = summary_of(tmp_path / "run")
     assert (summary["n_frames"], summary["n_tracked"], summary["n_uncertain"], summary["n_lost"]) == (12, 9, 3, 0)
@@ -82,7 +82,7 @@ def test_particle_filters_warn_that_their_deviations_are_too_small(path, tmp_pat
     assert n == 1 or (method in warnings[1] and "far too small" in warnings[1])
 
 
-def test_pictures_and_report_are_written_where_wanted(path, tmp_path):
+def test_videos_and_report_are_written_on_request(path, tmp_path):
     track_players(read_trial(path, {"overlay": "broadcast"}), tmp_path / "run")
     assert {file.name for file in (tmp_path / "run").iterdir()} == TABLES | PICTURES
     report = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
@@ -101,7 +101,7 @@ def test_everything_that_a_run_leaves_is_documented(path, tmp_path):
     assert keys == {*run.summary, "live"}
 
 
-def test_start_every_and_stop_are_kept_to(tmp_path):
+def test_start_every_and_stop_are_respected(tmp_path):
     trial = write_trial(tmp_path / "trial", 12, track="every = 2\nstop = 9", start="frame = 3")
     motion = track_players(read_trial(trial), tmp_path / "run", pictures=False).motion
     assert motion.index.tolist() == [3, 5, 7]
@@ -148,7 +148,7 @@ def test_a_start_past_the_end_is_refused(tmp_path):
         track_players(read_trial(trial), tmp_path / "run", pictures=False)
 
 
-def test_cameras_that_end_or_go_dark_are_told_with_their_frames(tmp_path):
+def test_cameras_that_end_or_go_dark_are_reported_with_their_frames(tmp_path):
     trial = write_trial(tmp_path / "trial", 12)
     folder = trial.parent
     write_clip(folder / "left.mkv", pictures(5), codec="libx264", pix_fmt="yuv420p")
@@ -172,7 +172,7 @@ def test_the_command_line_tracks_players_and_says_how_each_was_found(path, tmp_p
     assert summary_of(tmp_path / "run")["method"]["overlay"] == "broadcast"
 
 
-def test_an_interrupt_leaves_what_was_found_and_says_so(path, tmp_path, capsys, monkeypatch):
+def test_an_interrupt_leaves_the_tracked_frames_and_says_so(path, tmp_path, capsys, monkeypatch):
     class Interrupted(StandIn):
         def step(self, state, frames):
             if frames.index == 5:
@@ -188,7 +188,7 @@ def test_an_interrupt_leaves_what_was_found_and_says_so(path, tmp_path, capsys, 
     assert len(read_players(tmp_path / "run" / "joints.csv")) == 12
 
 
-def test_live_files_are_tracked_at_their_own_speed_and_what_was_dropped_is_told(path, tmp_path, capsys):
+def test_live_files_are_tracked_at_their_own_speed_and_dropped_frames_are_reported(path, tmp_path, capsys):
     assert in_process("track", "--live", path, "-o", tmp_path / "run", "--no-pictures") == 0
     live = summary_of(tmp_path / "run")["live"]
     motion = read_players(tmp_path / "run" / "joints.csv")

@@ -43,8 +43,8 @@ def table(path):
 def test_new_tables_lie_beside_the_raw_ones_which_stay(run, capsys):
     before = {path.name: path.read_bytes() for path in run.iterdir()}
     assert in_process("smooth", run, "--butterworth", "10") == 0
-    said = capsys.readouterr().out
-    assert "-3 dB of both at 10 Hz" in said and "no gap filled" in said and "Winter" in said
+    output = capsys.readouterr().out
+    assert "-3 dB of both at 10 Hz" in output and "no gap filled" in output and "Winter" in output
     assert {path.name: path.read_bytes() for path in run.iterdir() if path.name in before} == before
     assert {path.name for path in run.iterdir()} - set(before) == NEW
     rows = table(run / "smooth_motion.csv")
@@ -64,10 +64,10 @@ def test_gaps_are_filled_on_request_into_another_folder(run, tmp_path):
 
 def test_auto_takes_the_cutoff_of_the_residual_analysis_and_json_says_all(run, capsys):
     assert in_process("smooth", run, "--butterworth", "auto", "--events", "0.2,0.20", "--json") == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found == json.loads((run / "smooth.json").read_text())
-    assert found["cutoff_hz"] == found["residual_analysis"]["chosen_hz"]
-    assert found["events"] == {"": [{"name": "given", "time_s": 0.2}]}
+    result = json.loads(capsys.readouterr().out)
+    assert result == json.loads((run / "smooth.json").read_text())
+    assert result["cutoff_hz"] == result["residual_analysis"]["chosen_hz"]
+    assert result["events"] == {"": [{"name": "given", "time_s": 0.2}]}
     assert [row["segment"] for row in table(run / "smooth_motion.csv")[8:12]] == ["0", "0", "1", "1"]
 
 
@@ -84,11 +84,11 @@ def test_players_are_smoothed_too(tmp_path, capsys):
 
 def test_events_of_players_are_found_unless_given(tmp_path):
     run = write_run(tmp_path / "run", n=40)
-    found = smooth_run(run, Smoothing(method="butterworth", cutoff_hz=8), out=tmp_path / "out")
-    assert set(found.events) == {"Anna", "number 7"}
+    result = smooth_run(run, Smoothing(method="butterworth", cutoff_hz=8), out=tmp_path / "out")
+    assert set(result.events) == {"Anna", "number 7"}
 
 
-def test_what_cannot_be_done_is_said_in_one_line(run, tmp_path, capsys):
+def test_what_cannot_be_done_is_refused_in_one_line(run, tmp_path, capsys):
     assert "say how to smooth" in refusal(capsys, "smooth", run)
     assert "say how to smooth" in refusal(capsys, "smooth", run, "--kalman", "--spline")
     assert "below 25 Hz" in refusal(capsys, "smooth", run, "--butterworth", "25")
@@ -106,7 +106,7 @@ def test_a_motion_too_short_to_choose_by_is_refused(tmp_path):
         smooth_run(run, Smoothing(method="butterworth"), events_s=[])
 
 
-def documented(page, heading):
+def documented_columns(page, heading):
     return [name for row in table_of(DOCS / page, heading) for name in named(row[0])]
 
 
@@ -114,7 +114,7 @@ def test_every_column_is_documented(run, tmp_path):
     smooth_run(run, Smoothing(method="spline"))
     players = write_run(tmp_path / "players")
     smooth_run(players, Smoothing(method="spline"), events_s=[])
-    assert set(table(run / "smooth_motion.csv")[0]) == set(documented("signals.md", "`smooth_motion.csv`"))
-    assert set(table(players / "smooth_joints.csv")[0]) == set(documented("signals.md", "`smooth_joints.csv`"))
+    assert set(table(run / "smooth_motion.csv")[0]) == set(documented_columns("signals.md", "`smooth_motion.csv`"))
+    assert set(table(players / "smooth_joints.csv")[0]) == set(documented_columns("signals.md", "`smooth_joints.csv`"))
     text = (DOCS / "signals.md").read_text(encoding="utf-8")
     assert all(f"`{name}`" in text for name in (run / "smooth_events.csv").read_text().splitlines()[0].split(","))

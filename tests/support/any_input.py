@@ -33,7 +33,7 @@ from airborne.calibration.sources.wand import read_wand
 from airborne.cameras import PixelConvention, read_detections, read_rig, write_rig
 from airborne.cameras.clicks import read_clicks, read_positions
 from airborne.cameras.detections import NETWORKS, Detections, write_detections
-from airborne.cameras.formats.dltdv import triangulate_digitisation, read_digitisation, write_digitisation
+from airborne.cameras.formats.dltdv import read_digitisation, triangulate_digitisation, write_digitisation
 from airborne.cameras.formats.options import FileOptions
 from airborne.errors import AirborneError
 from airborne.evaluation import read_clicked_frames, read_joint_paths, read_players_truth, read_truth

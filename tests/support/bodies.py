@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import BodyModel, Box, Ellipsoid, SurfaceArrays, Mesh, Part, Pose, PosedBody, Segment, surface_arrays
+from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Pose, PosedBody, Segment, SurfaceArrays, surface_arrays
 from airborne.cameras import Camera
 from airborne.rendering import Lamp, Lights
 from airborne.video import View

@@ -20,7 +20,12 @@ BOARD_TOML = 'kind = "charuco"\ncolumns = 6\nrows = 5\nsquare_m = 0.12\nmarker_m
 def three_side_by_side() -> Rig:
     """Cameras in a row that look at the same place, without distortion."""
     places = ([-1.0, -2.5, 1.5], [0.0, -2.6, 1.2], [1.1, -2.4, 1.6])
-    return Rig(tuple(camera_looking_at(f"cam{i}", place, [0, 0, 1], 560 + 10 * i, SIZE) for i, place in enumerate(places)))
+    return Rig(
+        tuple(
+            camera_looking_at(f"cam{i}", place, [0, 0, 1], focal_px=560 + 10 * i, size=SIZE)
+            for i, place in enumerate(places)
+        )
+    )
 
 
 def waved(n: int) -> RigidTransform:

@@ -21,7 +21,9 @@ def cameras(draw, name, lenses, *, with_skew):
     lens = draw(st.sampled_from(lenses))
     n_terms = {"pinhole": 0, "radial": 2, "four": 4, "brown": 5, "fisheye": 4}[lens]
     away = np.array([draw(numbers(1, 9)), draw(numbers(-9, 9)), draw(numbers(0.1, 5))])
-    flat = camera_looking_at(name, TARGET + away, TARGET, draw(numbers(200, 5000)), (draw(st.integers(16, 4000)), 1080))
+    flat = camera_looking_at(
+        name, TARGET + away, TARGET, focal_px=draw(numbers(200, 5000)), size=(draw(st.integers(16, 4000)), 1080)
+    )
     roll = RigidTransform.from_rotation(Rotation.from_rotvec([0, 0, draw(numbers(-4, 4))]))
     K = flat.K * [[draw(numbers(0.8, 1.2)), 1, draw(numbers(0.5, 1.5))], [1, 1, draw(numbers(0.5, 1.5))], [1, 1, 1]]
     K[0, 1] = draw(numbers(-20, 20)) if with_skew else 0

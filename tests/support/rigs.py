@@ -23,7 +23,7 @@ def ring(n=4, *, distortion=BROWN, lens="brown"):
     for i in range(n):
         angle = 2 * np.pi * i / n
         place = [3.0 * np.cos(angle), 3.0 * np.sin(angle), 1.6 + 0.2 * i]
-        camera = camera_looking_at(f"cam{i}", place, [0, 0, 1.0], 900 + 40 * i, SIZE)
+        camera = camera_looking_at(f"cam{i}", place, [0, 0, 1.0], focal_px=900 + 40 * i, size=SIZE)
         found.append(replace(camera, distortion=distortion.copy(), lens=lens))
     return Rig(tuple(found))
 

@@ -17,7 +17,10 @@ SIZES = {f"cam{i + 1}": SIZE for i in range(4)}
 
 def hall(focals_px=FOCALS_PX, k1=0.0) -> Rig:
     """Four cameras in the corners."""
-    rig = [camera_looking_at(f"cam{i + 1}", place, (0.3 * i, 0.2, 1.4), focals_px[i], SIZE) for i, place in enumerate(PLACES)]
+    rig = [
+        camera_looking_at(f"cam{i + 1}", place, (0.3 * i, 0.2, 1.4), focal_px=focals_px[i], size=SIZE)
+        for i, place in enumerate(PLACES)
+    ]
     return Rig(tuple(replace(camera, distortion=np.array([k1, 0, 0, 0, 0])) for camera in rig))
 
 
@@ -49,7 +52,7 @@ def clicked(rng, rig, names=None, *, noise_px=0.5) -> ControlPoints:
     """The court's points as every camera sees them, painted as exactly as courts are."""
     known = court_points("men")
     names = tuple(names or known)
-    world, sd_m = (np.array([getattr(known[name], key) for name in names]) for key in ("place_m", "sd_m"))
+    world, sd_m = (np.array([getattr(known[name], key) for name in names]) for key in ("position_m", "sd_m"))
     px = seen(rng, rig, world + sd_m * rng.standard_normal(world.shape), noise_px=noise_px)
     return ControlPoints(names=names, world=world, cameras=rig.names, px=px, sd_m=sd_m)
 

@@ -116,5 +116,9 @@ def _by_slices(piece, n=600):
 def whole_by_slices(human):
     """Put all of a yeadon person's solids together in world axes."""
     return combine_inertias(
-        [transform_inertia(by_slices(p), segment.rot_mat, p.pos.ravel()) for segment in human.segments for p in segment.solids]
+        [
+            transform_inertia(by_slices(p), segment.rot_mat, p.pos.ravel())
+            for segment in human.segments
+            for p in segment.solids
+        ]
     )

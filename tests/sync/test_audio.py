@@ -25,14 +25,14 @@ def hall(seconds: float) -> np.ndarray:
     return sound.astype(np.float32)
 
 
-def filmed(
-    path, late_s: float, *, seed: int = 0, seconds: float = 6.0, codec: str = "pcm_s16le", heard=None
+def film(
+    path, late_s: float, *, seed: int = 0, seconds: float = 6.0, codec: str = "pcm_s16le", sound=None
 ) -> VideoSource:
     """A camera that starts late_s after time 0 and hears the hall, with its own noise and loudness."""
-    heard = hall(8) if heard is None else heard
+    sound = hall(8) if sound is None else sound
     rng = np.random.default_rng(seed)
     first = round((1 + late_s) * RATE_HZ)
-    own = heard[first : first + round(seconds * RATE_HZ)] * rng.uniform(0.3, 1)
+    own = sound[first : first + round(seconds * RATE_HZ)] * rng.uniform(0.3, 1)
     own = own + 0.004 * rng.standard_normal(len(own)).astype(np.float32)
     with av.open(path, "w") as container:
         video = container.add_stream("ffv1", rate=Fraction(25))
@@ -57,31 +57,31 @@ def filmed(
 
 @pytest.mark.parametrize("late_s", [0.1234, -0.4567, 0.0])
 def test_sound_brings_cameras_together_within_a_fraction_of_a_millisecond(tmp_path, late_s):
-    found = offsets_by_sound([filmed(tmp_path / "a.mkv", 0.0), filmed(tmp_path / "b.mkv", late_s, seed=1)])
+    found = offsets_by_sound([film(tmp_path / "a.mkv", 0.0), film(tmp_path / "b.mkv", late_s, seed=1)])
     assert abs(found.offset_s[1] - late_s) < 2e-4
     assert found.offset_sd_s[1] < 1e-3
     assert "3 ms a metre" in found.notes[0]
 
 
 def test_how_far_the_microphones_are_apart_widens_the_sd(tmp_path):
-    sources = [filmed(tmp_path / "a.mkv", 0.0), filmed(tmp_path / "b.mkv", 0.2, seed=1)]
+    sources = [film(tmp_path / "a.mkv", 0.0), film(tmp_path / "b.mkv", 0.2, seed=1)]
     near, far = (offsets_by_sound(sources, microphones_apart_m=m) for m in (0.0, 10.0))
     assert far.offset_sd_s[1] == pytest.approx(np.hypot(near.offset_sd_s[1], 10 / 343 / np.sqrt(3)))
     assert far.notes == ()
 
 
 def test_compressed_sound_does_as_well(tmp_path):
-    sources = [filmed(tmp_path / "a.mkv", 0.0, codec="aac"), filmed(tmp_path / "b.mkv", 0.2, seed=1, codec="aac")]
+    sources = [film(tmp_path / "a.mkv", 0.0, codec="aac"), film(tmp_path / "b.mkv", 0.2, seed=1, codec="aac")]
     assert abs(offsets_by_sound(sources).offset_s[1] - 0.2) < 1e-3
 
 
 def test_a_camera_without_sound_is_named(tmp_path):
     silent = VideoSource("silent", write_clip(tmp_path / "silent.mkv", numbered(5)))
     with pytest.raises(VideoError, match="has no sound"):
-        offsets_by_sound([filmed(tmp_path / "a.mkv", 0.0), silent])
+        offsets_by_sound([film(tmp_path / "a.mkv", 0.0), silent])
 
 
 def test_sound_of_another_place_is_refused(tmp_path):
     other = np.random.default_rng(9).standard_normal(10 * RATE_HZ).astype(np.float32) * 0.05
     with pytest.raises(VideoError, match="b: its sound does not fit that of a"):
-        offsets_by_sound([filmed(tmp_path / "a.mkv", 0.0), filmed(tmp_path / "b.mkv", 0.0, heard=other)])
+        offsets_by_sound([film(tmp_path / "a.mkv", 0.0), film(tmp_path / "b.mkv", 0.0, sound=other)])

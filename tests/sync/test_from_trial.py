@@ -43,9 +43,9 @@ def run(monkeypatch, *words) -> int:
 def test_motion_finds_the_examples_cameras_in_time_and_writes_it_down(trial, monkeypatch, capsys):
     before = trial.read_text()
     assert run(monkeypatch, "sync", trial, "--by", "motion", "--within", 0.2) == 0
-    said = capsys.readouterr().out
-    assert "cam3: offset" in said
-    assert str(trial) in said
+    output = capsys.readouterr().out
+    assert "cam3: offset" in output
+    assert str(trial) in output
     cameras = tomllib.loads(trial.read_text())["camera"]
     assert [abs(camera.get("offset_s", 0)) < 1e-3 for camera in cameras] == [True] * 3
     assert all(0 < camera["offset_sd_s"] < 1e-3 for camera in cameras[1:])
@@ -110,7 +110,7 @@ def test_cameras_written_in_another_way_are_left_to_the_user(tmp_path):
         write_offsets(path, offsets((0, 0, 0)))
 
 
-def test_whole_images_are_rounded_to_and_doubts_told():
+def test_whole_images_are_rounded_to_and_doubts_noted():
     sources = [VideoSource(name, EXAMPLE / f"{name}.mp4", "top-first") for name in NAMES]
     found = round_to_images(offsets((0, 0.041, -0.0085), sd_s=(0, 0.001, 0.001)), sources)
     assert np.allclose(found.offset_s, (0, 2 * FIELD_S, 0), atol=EXACT)
@@ -119,21 +119,21 @@ def test_whole_images_are_rounded_to_and_doubts_told():
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "expected"),
     [
         (("--by", "flash"), "no flash seen by cam1, cam2, cam3"),
         (("--by", "sound"), "cam1: .* has no sound"),
-        (("--by", "motion", "--drift"), "drift cannot be told by motion"),
+        (("--by", "motion", "--drift"), "drift cannot be estimated by motion"),
         (("--by", "guess"), "guess"),
         (("--within", "0"), "within"),
     ],
 )
-def test_what_cannot_be_had_is_refused_in_one_line(trial, monkeypatch, capsys, options, said):
+def test_what_cannot_be_had_is_refused_in_one_line(trial, monkeypatch, capsys, options, expected):
     before = trial.read_text()
     assert run(monkeypatch, "sync", trial, *options) == 2
     error = capsys.readouterr().err.strip()
     assert len(error.splitlines()) == 1
-    assert re.search(said, error)
+    assert re.search(expected, error)
     assert trial.read_text() == before
 
 

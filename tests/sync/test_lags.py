@@ -11,7 +11,7 @@ _HALVES = RNG.normal(size=(N, C, 4, 6)) * 100
 CURVATURE = np.einsum("kcai,kcaj->kcij", _HALVES, _HALVES)
 
 
-def sightings(lag_s, drift=(0, 0, 0), noise=0.0, seed=0) -> LagEquations:
+def equations(lag_s, drift=(0, 0, 0), noise=0.0, seed=0) -> LagEquations:
     """What cameras of given lags see of a body whose poses were found slightly wrong."""
     rng = np.random.default_rng(seed)
     wrong = rng.normal(0, 1e-3, (N, 1, 6))
@@ -23,42 +23,42 @@ def sightings(lag_s, drift=(0, 0, 0), noise=0.0, seed=0) -> LagEquations:
 
 
 def test_lags_come_out_of_exact_sightings_exactly_whatever_the_poses_errors():
-    step, sd = solve_lags(sightings((0, 0.004, -0.011)))
+    step, sd = solve_lags(equations((0, 0.004, -0.011)))
     assert np.allclose(step[:C], (0, 0.004, -0.011), atol=1e-9)
     assert np.allclose(sd, 0, atol=1e-9)
     assert np.allclose(step[C:], 0, atol=EXACT)
 
 
 def test_a_lag_of_all_cameras_together_is_none():
-    step, _ = solve_lags(sightings((0.01, 0.01, 0.01)))
+    step, _ = solve_lags(equations((0.01, 0.01, 0.01)))
     assert np.allclose(step, 0, atol=1e-9)
 
 
-def test_drift_is_told_from_a_lag():
-    step, _ = solve_lags(sightings((0, 0.004, -0.002), drift=(0, 0.003, -0.001)), with_drift=True)
+def test_drift_and_lag_are_separated():
+    step, _ = solve_lags(equations((0, 0.004, -0.002), drift=(0, 0.003, -0.001)), with_drift=True)
     assert np.allclose(step, (0, 0.004, -0.002, 0, 0.003, -0.001), atol=1e-8)
 
 
 def test_errors_lie_within_the_stated_sds():
     misses = []
     for seed in range(60):
-        step, sd = solve_lags(sightings((0, 0.004, -0.002), noise=1.0, seed=seed))
+        step, sd = solve_lags(equations((0, 0.004, -0.002), noise=1.0, seed=seed))
         misses += list((step - (0, 0.004, -0.002, 0, 0, 0))[1:C] / sd[1:C])
     assert 0.85 < np.sqrt(np.mean(np.square(misses))) < 1.25
 
 
 def test_a_camera_that_saw_nothing_has_no_lag():
-    seen = sightings((0, 0.004, -0.002))
-    seen.information[:, 2] = seen.gradient[:, 2] = 0
-    step, sd = solve_lags(seen)
+    system = equations((0, 0.004, -0.002))
+    system.information[:, 2] = system.gradient[:, 2] = 0
+    step, sd = solve_lags(system)
     assert np.isnan([step[2], sd[2]]).all()
     assert abs(step[1] - 0.004) < 1e-9
 
 
 def test_without_the_first_camera_the_next_one_is_the_clock():
-    seen = sightings((0, 0.004, -0.002))
-    seen.information[:, 0] = seen.gradient[:, 0] = 0
-    step, sd = solve_lags(seen)
+    system = equations((0, 0.004, -0.002))
+    system.information[:, 0] = system.gradient[:, 0] = 0
+    step, sd = solve_lags(system)
     assert np.isnan([step[0], sd[0]]).all()
     assert step[1] == sd[1] == 0
     assert abs(step[2] + 0.006) < 1e-9
@@ -67,25 +67,25 @@ def test_without_the_first_camera_the_next_one_is_the_clock():
 def test_a_camera_that_never_sees_the_body_keeps_no_other_from_its_lag():
     truth = np.array([0, 0.007, -0.003])
 
-    def look(lag_s, drift):
-        seen = sightings(truth - lag_s)
-        seen.information[:, 2] = seen.gradient[:, 2] = 0
-        return seen
+    def measure(lag_s, drift):
+        system = equations(truth - lag_s)
+        system.information[:, 2] = system.gradient[:, 2] = 0
+        return system
 
-    found = find_lags(look, np.zeros(C))
+    found = find_lags(measure, np.zeros(C))
     assert np.allclose(found.lag_s[:2], truth[:2], atol=SOLVED)
     assert np.isnan([found.lag_s[2], found.sd_s[2]]).all()
 
 
 def test_steps_that_are_too_short_still_lead_there_and_widen_the_sds():
-    truth, looks = np.array([0, 0.007, -0.003]), []
+    truth, measurements = np.array([0, 0.007, -0.003]), []
 
-    def look(lag_s, drift):
-        looks.append(lag_s)
-        return sightings(0.4 * (truth - lag_s), noise=0.02, seed=len(looks))
+    def measure(lag_s, drift):
+        measurements.append(lag_s)
+        return equations(0.4 * (truth - lag_s), noise=0.02, seed=len(measurements))
 
-    found = find_lags(look, np.zeros(C))
+    found = find_lags(measure, np.zeros(C))
     assert np.allclose(found.lag_s, truth, atol=SOLVED)
-    assert len(looks) <= 6
-    _, sd = solve_lags(look(truth, np.zeros(C)))
+    assert len(measurements) <= 6
+    _, sd = solve_lags(measure(truth, np.zeros(C)))
     assert np.all(found.sd_s[1:] > 1.5 * sd[1:C])

@@ -14,13 +14,18 @@ from tests.support.places import THROWN_CROSS
 from tests.support.tolerances import ROUNDTRIP
 
 PLACES = ((-3.0, -5.0, 1.5), (3.0, -4.5, 2.0), (0.3, -1.0, 6.0))
-RIG = Rig(tuple(camera_looking_at(f"cam{i}", place, (0, 0, 1.4), 700.0, (640, 480)) for i, place in enumerate(PLACES)))
+RIG = Rig(
+    tuple(
+        camera_looking_at(f"cam{i}", place, (0, 0, 1.4), focal_px=700.0, size=(640, 480))
+        for i, place in enumerate(PLACES)
+    )
+)
 CORNERS = np.random.default_rng(2).uniform(-0.3, 0.3, (12, 3))
 PERIOD_S = 0.02
 THROWN = THROWN_CROSS
 
 
-def seen(camera, late_s, n=40, noise=0.0, seed=0):
+def silhouettes_at(camera, late_s, n=40, noise=0.0, seed=0):
     """Silhouettes of a tumbling thing of 12 corners; image k is taken at late_s + k periods, and says k periods."""
     rng = np.random.default_rng(seed)
     times = late_s + np.arange(n) * PERIOD_S
@@ -35,7 +40,7 @@ def seen(camera, late_s, n=40, noise=0.0, seed=0):
 
 @pytest.mark.parametrize("late_s", [(0, 0, 0), (0, 0.06, -0.04), (0, 0.0133, 0.0071), (0, -0.251, 0.18)])
 def test_shifts_are_found_to_a_fraction_of_a_millisecond(late_s):
-    offset_s, sd_s = solve_shifts([seen(camera, late) for camera, late in zip(RIG, late_s, strict=True)], 0.5)
+    offset_s, sd_s = solve_shifts([silhouettes_at(camera, late) for camera, late in zip(RIG, late_s, strict=True)], 0.5)
     assert np.allclose(offset_s, late_s, atol=3e-4)
     assert sd_s[0] == 0
     assert np.all(sd_s[1:] < 1e-3)
@@ -45,7 +50,8 @@ def test_errors_lie_within_the_stated_sds():
     late_s, misses = (0, 0.013, -0.027), []
     for seed in range(16):
         views = [
-            seen(c, late, noise=0.004, seed=10 * seed + i) for i, (c, late) in enumerate(zip(RIG, late_s, strict=True))
+            silhouettes_at(c, late, noise=0.004, seed=10 * seed + i)
+            for i, (c, late) in enumerate(zip(RIG, late_s, strict=True))
         ]
         offset_s, sd_s = solve_shifts(views, 0.1)
         misses += list((offset_s - late_s)[1:] / sd_s[1:])
@@ -95,7 +101,7 @@ def test_a_camera_before_which_nothing_moves_is_named(tmp_path):
 
 
 def test_cameras_that_never_saw_the_same_are_not_given_an_offset():
-    first, second = seen(RIG.cameras[0], 0, n=12), seen(RIG.cameras[1], 0, n=12)
+    first, second = silhouettes_at(RIG.cameras[0], 0, n=12), silhouettes_at(RIG.cameras[1], 0, n=12)
     gone = replace(second, time_s=second.time_s + 100.0)
     _, sd_s = solve_shifts([first, gone], 0.2)
     assert np.isinf(sd_s[1])

@@ -61,7 +61,7 @@ def complaint(folder, text, **kwargs):
     return message
 
 
-def test_file_says_cameras_body_start_and_method(folder):
+def test_file_gives_cameras_body_start_and_method(folder):
     trial = read(folder)
     assert trial.name == "a throw"
     assert [(c.name, c.video, c.fields, c.offset_s) for c in trial.camera] == [
@@ -83,7 +83,7 @@ def test_settings_are_in_metres_and_radians(folder):
     assert settings.lights is None
 
 
-def test_method_is_refined_unless_told(folder):
+def test_method_is_refined_by_default(folder):
     assert read(folder, GOOD[: GOOD.index("[track]")]).settings.method == "refined"
 
 
@@ -232,7 +232,7 @@ def by(start):
     return GOOD[: GOOD.index("[start]")] + f"[start]\n{start}\n" + GOOD[GOOD.index("[track]") :]
 
 
-def test_start_can_be_given_by_places_clicks_or_detections(folder):
+def test_start_can_be_given_by_positions_clicks_or_detections(folder):
     for name in ("joints.csv", "clicks.csv", "found.npz"):
         (folder / name).write_text("")
     (folder / "json").mkdir()
@@ -268,7 +268,7 @@ def test_start_without_one_clear_source_is_refused(folder, start, said):
 def test_start_that_needs_the_body_gives_no_pose_by_itself(folder):
     angles = GOOD.replace("frame = 3", "joint_angles_deg = {knee = [1, 2, 3]}")
     for text in (angles, by(PLACES)):
-        with pytest.raises(TrialError, match=r"use airborne\.start\.first_pose"):
+        with pytest.raises(TrialError, match=r"use airborne\.run\.first_pose"):
             _ = read(folder, text).start.pose
 
 
@@ -285,7 +285,7 @@ def test_person_can_be_asked_for_by_stature_and_mass_or_by_measurements(folder):
     assert measured.needs_colours
 
 
-def test_mending_is_for_cameras_that_are_kept(folder):
+def test_resection_is_for_selected_cameras(folder):
     (folder / "found.npz").write_text("")
     text = by('detections = "found.npz"').replace('file = "calib.toml"', 'file = "calib.toml"\nmend = ["right"]')
     assert read(folder, text).calibration.mend == ["right"]
@@ -312,8 +312,8 @@ def test_value_where_a_table_belongs_is_refused(folder, wrong):
     key = wrong.split()[0]
     lines = [line for line in GOOD.splitlines() if line]
     starts = [i for i, line in enumerate(lines) if line.startswith("[")] + [len(lines)]
-    kept = [lines[a:b] for a, b in pairwise(starts) if lines[a].strip("[]") != key]
-    text = "\n".join([lines[0], wrong, *(line for table in kept for line in table)])
+    remaining = [lines[a:b] for a, b in pairwise(starts) if lines[a].strip("[]") != key]
+    text = "\n".join([lines[0], wrong, *(line for table in remaining for line in table)])
     assert key in complaint(folder, text)
 
 

@@ -39,7 +39,7 @@ def test_players_and_bystanders_are_read_with_their_points(folder):
     assert list(referee.joints_m) == ["torso"]
 
 
-def test_legs_are_tracked_as_blockers_unless_told(folder):
+def test_legs_are_tracked_by_blocker_by_default(folder):
     assert read(folder, trial_text()).track.method == "blocker"
     assert read(folder, trial_text(track='method = "mixture"')).track.method == "mixture"
     assert read(folder, trial_text(), track={"method": "framework"}).track.method == "framework"

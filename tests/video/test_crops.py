@@ -50,7 +50,7 @@ def test_of_rare_formats_there_is_only_the_whole(pix_fmt):
 
 
 @pytest.mark.parametrize("location", ["left", "center", "topleft"])
-def test_the_place_of_the_chroma_is_found_out(tmp_path, location):
+def test_the_chroma_siting_is_detected(tmp_path, location):
     """x264 writes into the stream where its chroma lies, and the decoded frames carry it on."""
     places = {"left": "0", "center": "1", "topleft": "2"}
     frames = [noisy_frame("yuv420p", size=(64, 48))] * 3
@@ -94,7 +94,7 @@ def test_looking_at_a_part_converts_no_whole_image_and_the_whole_is_converted_on
 
 
 @pytest.mark.parametrize("rotation_deg", [90, 180])
-def test_turned_images_are_cropped_by_way_of_the_whole(tmp_path, rotation_deg):
+def test_rotated_images_are_cropped_by_way_of_the_whole(tmp_path, rotation_deg):
     path = write_clip(tmp_path / "cam1.mp4", textured(2), codec="libx264", pix_fmt="yuv420p", rotation_deg=rotation_deg)
     size = (48, 64) if rotation_deg == 90 else (64, 48)
     rig = plain_rig("cam1", size=size)

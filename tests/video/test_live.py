@@ -1,4 +1,4 @@
-"""Live images: the newest of each camera, matched in time; late ones are dropped and counted, never queued."""
+"""Live images: the newest of each camera, matched in time; late ones are dropped and counts_of, never queued."""
 
 import os
 import threading
@@ -25,7 +25,7 @@ OPTIONS = {"mpegts": {"flush_packets": "1"}, "matroska": {"cluster_time_limit": 
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _compiled():
+def _compile():
     """Load what converts images, which takes longer than any image waits."""
     conversion_of(frame_from_rgb(np.zeros((48, 64, 3), np.uint8), short_side=48), short_side=48)
 
@@ -65,7 +65,7 @@ class Sender(threading.Thread):
 
 
 @contextmanager
-def piped(folder, n, names=NAMES, rig=None, **of_camera):
+def record_pipes(folder, n, names=NAMES, rig=None, **of_camera):
     """Recordings from a pipe a camera; `of_camera` holds what is special about one's sender."""
     for name in names:
         os.mkfifo(folder / name)
@@ -79,22 +79,22 @@ def piped(folder, n, names=NAMES, rig=None, **of_camera):
         assert not sender.is_alive()
 
 
-def shown(frames):
+def levels_of(frames):
     """The numbers of the images of one time."""
     levels = [None if view is None else int(view.crop((5, 5, 6, 6))[0, 0, 0]) for view in frames.views]
     return [None if level is None else round((level - level_of(0)) / 4) for level in levels]
 
 
-def counted(recording):
+def counts_of(recording):
     return {each["name"]: (each["n_received"], each["n_used"], each["n_dropped"]) for each in recording.image_counts()}
 
 
 @pytest.mark.parametrize("container", ["mpegts", "matroska"])
 def test_images_of_one_time_come_together_and_in_order(tmp_path, container):
-    with piped(tmp_path, 40, **{name: {"container": container} for name in NAMES}) as recording:
+    with record_pipes(tmp_path, 40, **{name: {"container": container} for name in NAMES}) as recording:
         assert recording.rate == RATE
-        seen = [(frames.index, frames.time_s, shown(frames)) for frames in recording]
-        counts = counted(recording)
+        seen = [(frames.index, frames.time_s, levels_of(frames)) for frames in recording]
+        counts = counts_of(recording)
     indices = [index for index, *_ in seen]
     assert indices == sorted(set(indices)) and indices[0] == 0 and indices[-1] == 39
     whole = [numbers for _, _, numbers in seen if None not in numbers]
@@ -110,12 +110,12 @@ def test_images_of_one_time_come_together_and_in_order(tmp_path, container):
 
 def test_a_slow_tracker_drops_images_and_falls_behind_by_no_more_than_its_own_time(tmp_path):
     step_s, delays_s = 0.09, []
-    with piped(tmp_path, 60) as recording:
+    with record_pipes(tmp_path, 60) as recording:
         for frames in recording:
             delays_s.append(time.monotonic() - recording.arrival_s)
             last = frames.index
             time.sleep(step_s)
-        counts = counted(recording)
+        counts = counts_of(recording)
     assert last >= 58
     for n_received, n_used, n_dropped in counts.values():
         assert n_received == 60 == n_used + n_dropped
@@ -126,12 +126,12 @@ def test_a_slow_tracker_drops_images_and_falls_behind_by_no_more_than_its_own_ti
 
 
 def test_a_camera_that_goes_quiet_is_waited_for_once_and_then_missed(tmp_path):
-    with piped(tmp_path, 100, cam2={"silent": range(40, 100)}) as recording:
+    with record_pipes(tmp_path, 100, cam2={"silent": range(40, 100)}) as recording:
         seen, gaps_s, before_s = [], [], time.monotonic()
         for frames in recording:
             gaps_s.append(time.monotonic() - before_s)
             before_s = time.monotonic()
-            seen.append((frames.index, shown(frames)))
+            seen.append((frames.index, levels_of(frames)))
     late = [numbers for index, numbers in seen if index >= 58]
     assert len(late) > 15
     assert all(numbers[1] is None and numbers[0] is not None and numbers[2] is not None for numbers in late)
@@ -139,8 +139,8 @@ def test_a_camera_that_goes_quiet_is_waited_for_once_and_then_missed(tmp_path):
 
 
 def test_cameras_that_end_early_leave_the_others_even_if_one_was_the_clock(tmp_path):
-    with piped(tmp_path, 40, cam1={"gone_after": 12}) as recording:
-        seen = {frames.index: shown(frames) for frames in recording}
+    with record_pipes(tmp_path, 40, cam1={"gone_after": 12}) as recording:
+        seen = {frames.index: levels_of(frames) for frames in recording}
     assert max(seen) == 39
     assert all(numbers[0] is None for index, numbers in seen.items() if index > 14)
     assert all(numbers[1] is not None for index, numbers in seen.items() if index > 14)
@@ -183,29 +183,29 @@ def test_start_every_and_stop_choose_frames(tmp_path):
 
 def test_leaving_early_lets_the_senders_go(tmp_path):
     n_threads = threading.active_count()
-    with piped(tmp_path, 500) as recording:
+    with record_pipes(tmp_path, 500) as recording:
         for frames in recording:
             if frames.index > 3:
                 break
     assert threading.active_count() == n_threads
 
 
-def test_waiting_for_images_is_told_and_can_be_interrupted(tmp_path):
+def test_waiting_for_images_is_reported_and_can_be_interrupted(tmp_path):
     os.mkfifo(tmp_path / "cam1")
-    told = []
+    calls = []
 
     def waiting():
-        told.append(1)
-        if len(told) == 3:
+        calls.append(1)
+        if len(calls) == 3:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt), connect([VideoSource("cam1", tmp_path / "cam1")], waiting):
         pass
-    assert len(told) == 3
+    assert len(calls) == 3
 
 
 @pytest.mark.parametrize(
-    ("sources", "said"),
+    ("sources", "expected"),
     [
         ([("cam1", "nowhere", "progressive")], "is no file, pipe or capture device"),
         ([("cam1", "clip.mkv", "top-first")], "live pictures are read as whole frames"),
@@ -213,13 +213,13 @@ def test_waiting_for_images_is_told_and_can_be_interrupted(tmp_path):
         ([("cam1", "text", "progressive")], "no pictures come from"),
     ],
 )
-def test_what_gives_no_images_is_refused_in_one_line(tmp_path, sources, said):
+def test_what_gives_no_images_is_refused_in_one_line(tmp_path, sources, expected):
     write_clip(tmp_path / "clip.mkv", numbered(3))
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "text").write_text("no video")
     with pytest.raises(VideoError) as caught, connect([VideoSource(n, tmp_path / p, f) for n, p, f in sources]):
         pass
-    assert said in str(caught.value) and "\n" not in str(caught.value)
+    assert expected in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_a_camera_of_another_size_is_refused(tmp_path):

@@ -1,4 +1,4 @@
-"""Cameras that show nothing are told with their frames."""
+"""Outages of cameras are reported with their frames."""
 
 from fractions import Fraction
 
@@ -15,8 +15,8 @@ def view(level):
     return View(camera, np.full((camera.size[1], camera.size[0], 3), level, np.uint8))
 
 
-def told(levels, step=1):
-    """What is said of a first camera that shows these levels (None: no image), beside a sound one."""
+def outages_of(levels, step=1):
+    """What is reported of a first camera that shows these levels (None: no image), beside an intact one."""
     outages = Outages(("left", "right"))
     for k, level in enumerate(levels):
         views = (None if level is None else view(level), view(90))
@@ -24,26 +24,26 @@ def told(levels, step=1):
     return list(outages.describe())
 
 
-def test_nothing_is_said_of_cameras_that_show_something():
-    assert told([90, 200, DARK_LEVEL]) == []
+def test_nothing_is_reported_of_cameras_that_show_something():
+    assert outages_of([90, 200, DARK_LEVEL]) == []
 
 
-def test_missing_and_dark_images_are_told_by_camera_and_frames():
-    assert told([90, None, None, 90, 3, 90, None]) == [
+def test_missing_and_dark_images_are_reported_by_camera_and_frames():
+    assert outages_of([90, None, None, 90, 3, 90, None]) == [
         "left: no picture at 3 of 7 frames: frames 1 to 2, 6",
         "left: dark at 1 of 7 frames: frame 4",
     ]
 
 
 def test_frames_that_are_left_out_on_purpose_make_no_new_stretch():
-    assert told([90, None, None, None], step=3) == ["left: no picture at 3 of 4 frames: frames 3 to 9"]
+    assert outages_of([90, None, None, None], step=3) == ["left: no picture at 3 of 4 frames: frames 3 to 9"]
 
 
 @pytest.mark.parametrize("n", [40, 4000])
-def test_what_is_said_and_kept_does_not_grow_with_the_run(n):
-    (said,) = told([None if k % 2 else 90 for k in range(n)])
-    assert said.startswith(f"left: no picture at {n // 2} of {n} frames: frames 1, 3, 5, 7, 9 and")
-    assert said.endswith(f"{n // 2 - N_LISTED} more times")
+def test_the_report_does_not_grow_with_the_run(n):
+    (line,) = outages_of([None if k % 2 else 90 for k in range(n)])
+    assert line.startswith(f"left: no picture at {n // 2} of {n} frames: frames 1, 3, 5, 7, 9 and")
+    assert line.endswith(f"{n // 2 - N_LISTED} more times")
 
 
 def test_a_dark_image_with_a_bright_corner_is_not_dark():

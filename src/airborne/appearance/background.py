@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from airborne.kernels import kernel
 
 START_SD = 6.0  # [grey levels] of a pixel that was observed once
 _TILE_PX = 128  # side of the tiles that a learned background shares with the one before
@@ -22,11 +23,12 @@ class BackgroundPixels(NamedTuple):
     sd: NDArray[np.float32]  # (h, w)
     n_observations: NDArray[np.uint8]  # (h, w)
 
-    @classmethod
-    def unknown(cls, height: int, width: int) -> BackgroundPixels:
-        """Return pixels of which nothing is known."""
-        shape = height, width
-        return cls(np.zeros((*shape, 3), np.float32), np.full(shape, START_SD, np.float32), np.zeros(shape, np.uint8))
+
+_UNKNOWN = BackgroundPixels(
+    np.zeros((_TILE_PX, _TILE_PX, 3), np.float32),
+    np.full((_TILE_PX, _TILE_PX), START_SD, np.float32),
+    np.zeros((_TILE_PX, _TILE_PX), np.uint8),
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,22 +42,20 @@ class BackgroundModel:
 
     def crop(self, corner: tuple[int, int], size: tuple[int, int]) -> BackgroundPixels:
         """Copy what is known of a region."""
-        pixels = BackgroundPixels.unknown(*size)
+        pixels = BackgroundPixels(
+            np.empty((*size, 3), np.float32), np.empty(size, np.float32), np.empty(size, np.uint8)
+        )
         for at, in_region, in_tile in _tiles_of(corner, size):
-            if at in self.tiles:
-                _copy(self.tiles[at], in_tile, pixels, in_region)
+            for region, tile in zip(pixels, self.tiles.get(at, _UNKNOWN), strict=True):
+                region[in_region] = tile[in_tile]
         return pixels
 
     def learn(self, rgb: NDArray[np.uint8], covered: NDArray[np.bool_], corner: tuple[int, int]) -> BackgroundModel:
         """Learn from a region's image rgb (h, w, 3); covered (h, w) where the body may be."""
-        size = covered.shape[0], covered.shape[1]
-        pixels, learned = self.crop(corner, size), dict(self.tiles)
-        update_background(rgb, covered, *pixels)
-        for at, in_region, in_tile in _tiles_of(corner, size):
-            learned[at] = BackgroundPixels.unknown(_TILE_PX, _TILE_PX)
-            if at in self.tiles:
-                _copy(self.tiles[at], np.s_[:, :], learned[at], np.s_[:, :])
-            _copy(pixels, in_region, learned[at], in_tile)
+        learned = dict(self.tiles)
+        for at, in_region, in_tile in _tiles_of(corner, covered.shape):
+            learned[at] = BackgroundPixels(*(each.copy() for each in self.tiles.get(at, _UNKNOWN)))
+            update_background(rgb[in_region], covered[in_region], *(each[in_tile] for each in learned[at]))
         return BackgroundModel(learned)
 
 
@@ -78,13 +78,8 @@ def _tiles_of(corner: tuple[int, int], size: tuple[int, int]) -> Iterator[tuple[
             )
 
 
-def _copy(source: BackgroundPixels, at: _Slices, target: BackgroundPixels, to: _Slices) -> None:
-    for old, new in zip(source, target, strict=True):
-        new[to] = old[at]
-
-
 # one signature for whole images and for regions of them: rounding is the same whichever a process meets first
-@njit("(u1[:,:,:], b1[:,:], f4[:,:,:], f4[:,:], u1[:,:])", cache=True, nogil=True, fastmath=True)
+@kernel(signature="(u1[:,:,:], b1[:,:], f4[:,:,:], f4[:,:], u1[:,:])", fastmath=True)
 def update_background(rgb, covered, mean, sd, n_observations):
     """Learn from one image: rgb (h, w, 3) uint8, covered (h, w) bool where the body may be; the rest in place."""
     h, w, _ = rgb.shape
@@ -108,7 +103,7 @@ def update_background(rgb, covered, mean, sd, n_observations):
             n_observations[y, x] = min(n + 1, 250)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def inpaint(mean, n_observations, out):
     """Copy mean (h, w, 3) to out and grow observed pixels into the others, ring by ring; False if none was observed."""
     h, w, _ = mean.shape
@@ -159,7 +154,7 @@ def inpaint(mean, n_observations, out):
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _count_done_neighbours(done, y, x):
     h, w = done.shape
     n = 0

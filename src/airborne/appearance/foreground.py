@@ -7,8 +7,9 @@ in nats; where a background model exists, a pixel that agrees with it is backgro
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from airborne.kernels import kernel
 
 BINS_PER_CHANNEL = 32
 EVIDENCE_LIMIT = 5.0  # [nats] bound of a single pixel's evidence
@@ -18,7 +19,7 @@ _HALF = np.float32(0.5)
 _KERNEL = np.array([0.25, 0.5, 0.25], np.float32)  # a colour also counts in its neighbours' bins
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_colours(rgb, chosen, stride, counts):
     """Add the colours of the chosen pixels to counts (32, 32, 32), each blurred over the 27 bins around it.
 
@@ -43,7 +44,7 @@ def count_colours(rgb, chosen, stride, counts):
     return taken
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def posterior(rgb, body, background, mean, sd, n_observations, out):
     """Fill out (h, w) with each pixel's probability to be body, at even odds.
 
@@ -67,7 +68,7 @@ def posterior(rgb, body, background, mean, sd, n_observations, out):
             out[y, x] = p_body / (p_body + p_back)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def log_odds(posterior, out):
     """Fill out (h, w) with the evidence of posterior (h, w): its log-odds [nats], within EVIDENCE_LIMIT."""
     limit = np.float32(EVIDENCE_LIMIT)
@@ -78,7 +79,7 @@ def log_odds(posterior, out):
             out[y, x] = min(max(np.log(p / (np.float32(1) - p)), -limit), limit)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def posterior_sums(posterior, part, margin_u, margin_v):
     """Sum the posterior (h, w) over a mask, part (h, w) >= 0, and around it.
 

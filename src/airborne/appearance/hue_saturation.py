@@ -9,8 +9,9 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from airborne.kernels import kernel
 
 HSV_BINS = 110
 OUTSIDE = HSV_BINS  # the bin of what no image shows
@@ -42,7 +43,7 @@ def bin_table() -> NDArray[np.uint16]:
     return table
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def look_up(rgb, table):
     """Return table[colour] of every pixel: rgb (h, w, 3) uint8, table (32768,) uint16 -> (h, w) uint16."""
     h, w, _ = rgb.shape

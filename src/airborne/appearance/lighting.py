@@ -7,8 +7,8 @@ lamps. Cast shadows are outliers and are weighted down. Colours are linear light
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from airborne.kernels import kernel
 from airborne.rendering.srgb import light_from_srgb
 
 LIGHT_FROM_SRGB = light_from_srgb(np.arange(1024) * (255 / 1023)).astype(np.float32)
@@ -19,7 +19,7 @@ _BORDER_WEIGHT = np.float32(0.02)  # weight of a mixed pixel: it matters only fo
 _SAME_FACE = 0.9  # cosine between neighbouring normals
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def light_planes(image, table, out):
     """Turn an image (h, w, 3), sRGB 0..255 of any type, into planes (3, h, w) by a table like `LIGHT_FROM_SRGB`."""
     h, w, _ = image.shape
@@ -29,7 +29,7 @@ def light_planes(image, table, out):
                 out[k, y, x] = table[int(image[y, x, k] * np.float32(1023 / 255) + np.float32(0.5))]
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def fit_light(observed, part, normals, albedo, coefficients, iterations, x0, y0, x1, y1):
     """Fit coefficients (3, LIGHT_TERMS) in place: albedo * (a + b . n + c . u) is the light observed inside the mask.
 
@@ -101,14 +101,14 @@ def fit_light(observed, part, normals, albedo, coefficients, iterations, x0, y0,
     return sd
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def _region_coordinates(part, y, x):
     """Return a pixel's coordinates in its region, -1 to 1 in both directions."""
     h, w = part.shape
     return np.float32(2) * x / w - np.float32(1), np.float32(2) * y / h - np.float32(1)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def _is_surrounded(part, normals, y, x):
     """Say whether the four neighbours show the same part, facing nearly the same way."""
     h, w = part.shape
@@ -124,7 +124,7 @@ def _is_surrounded(part, normals, y, x):
     return True
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def shade_body(part, normals, albedo, coefficients, x0, y0, lit):
     """Fill lit (3, h, w), zero before, with the body's linear light; (x0, y0) is the first pixel of its window.
 
@@ -144,7 +144,7 @@ def shade_body(part, normals, albedo, coefficients, x0, y0, lit):
                 lit[k, y, x] = albedo[p, k] * light
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(fastmath=True)
 def flatten_shading(part, is_faceted, x0, y0, lit):
     """Give every part that is not faceted its mean light: shading does not rotate with a smooth surface.
 

@@ -8,10 +8,10 @@ or not. No kernel uses fast maths, so that maps are the same to the last bit how
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from airborne.appearance.foreground import BINS_PER_CHANNEL
+from airborne.kernels import kernel
 
 TABLE_COLUMNS = 8  # room for the classes, a whole number of cache lines
 _FLOOR = 1e-6  # probability of a bin that was never observed
@@ -29,7 +29,7 @@ def log_ratio_table(classes: NDArray, background: NDArray, occlusion: NDArray) -
     return table
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fill_table(classes, background, occlusion, table):
     n, cells = classes.shape
     one = np.float32(1)
@@ -48,7 +48,7 @@ def _fill_table(classes, background, occlusion, table):
             table[cell, c] = np.log(((one - o) * classes[c, cell] + other) / ((one - o) * background[cell] + other))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def class_evidence(rgb, table, reduction, out):
     """Fill out (5, h // r, w // r) with the mean evidence over blocks of r x r pixels of rgb (h, w, 3) uint8."""
     _, h, w = out.shape
@@ -68,7 +68,7 @@ def class_evidence(rgb, table, reduction, out):
             out[3, y, x], out[4, y, x] = share * d, share * e
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def blur_maps(maps, out):
     """Blur maps (k, h, w) with [1 2 1] / 4 along rows and columns into out; the border stays."""
     k, h, w = maps.shape

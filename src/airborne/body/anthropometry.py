@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from airborne.body.inertia import combine_inertias, transform_inertia
 from airborne.body.measurements import STATURE_SHARES, Measurements, check_measurements
 from airborne.body.model import Inertia
-from airborne.body.stadia import MassProperties, Stadium, circle, dome, half_solid, solid, stadium
+from airborne.body.stadia import SolidProperties, Stadium, circle, dome, half_solid, solid, stadium
 from airborne.errors import BodyError
 from airborne.types import Array
 
@@ -73,8 +73,8 @@ def sternoclavicular_m(values_m: Mapping[str, float], sign: float) -> Array:
     return np.array([sign * 0.07 * values_m["Ls4w"], -0.2 * values_m["Ls4d"], rise])
 
 
-def mass_properties(measurements: Measurements) -> dict[str, MassProperties]:
-    """Compute each segment's mass properties, in the segments' own frames; raises BodyError as `check_measurements`.
+def segment_properties(measurements: Measurements) -> dict[str, SolidProperties]:
+    """Compute each segment's inertia and volume, in the segments' own frames; raises BodyError as `check_measurements`.
 
     With a measured mass, one factor on all densities gives it.
     """
@@ -88,7 +88,7 @@ def mass_properties(measurements: Measurements) -> dict[str, MassProperties]:
     return {name: each._replace(inertia=_scale_density(each.inertia, share)) for name, each in segments.items()}
 
 
-def _trunk(v: Mapping[str, float]) -> dict[str, MassProperties]:
+def _trunk(v: Mapping[str, float]) -> dict[str, SolidProperties]:
     sections = [stadium(v[f"Ls{i}p"], v[f"Ls{i}w"]) for i in range(4)]
     radius = v["Ls4d"] / 2
     shoulders = Stadium(v["Ls4w"] / 2 - radius, radius)
@@ -113,7 +113,7 @@ def _trunk(v: Mapping[str, float]) -> dict[str, MassProperties]:
     return segments
 
 
-def _arm(v: Mapping[str, float], arm: str) -> dict[str, MassProperties]:
+def _arm(v: Mapping[str, float], arm: str) -> dict[str, SolidProperties]:
     rounds = [circle(v[f"L{arm}{i}p"]) for i in range(4)]
     flats = [stadium(v[f"L{arm}{i}p"], v[f"L{arm}{i}w"]) for i in range(4, 8)]
     elbow, widest, wrist = (v[f"L{arm}{i}L"] for i in (2, 3, 4))
@@ -125,7 +125,7 @@ def _arm(v: Mapping[str, float], arm: str) -> dict[str, MassProperties]:
     }
 
 
-def _leg(v: Mapping[str, float], leg: str) -> dict[str, MassProperties]:
+def _leg(v: Mapping[str, float], leg: str) -> dict[str, SolidProperties]:
     hips = stadium(v["Ls0p"], v["Ls0w"])
     top = Stadium(0.0, np.sqrt(hips.radius_m * (hips.radius_m + hips.flat_m) / 2))  # as Yeadon's program has it
     rounds = [top, *(circle(v[f"L{leg}{i}p"]) for i in range(1, 6))]
@@ -149,7 +149,7 @@ def _leg(v: Mapping[str, float], leg: str) -> dict[str, MassProperties]:
 
 def _stack(
     sections: Sequence[Stadium], heights_m: Sequence[float] | Array, kind: str, *, is_turned: bool = False
-) -> MassProperties:
+) -> SolidProperties:
     """Stack the solids between successive sections, the first at z = 0; heights below zero [m] go down."""
     pieces, z = [], 0.0
     for near, far, height in zip(sections, sections[1:], heights_m, strict=False):
@@ -160,17 +160,17 @@ def _stack(
     return _join(pieces)
 
 
-def _join(pieces: Sequence[MassProperties]) -> MassProperties:
-    return MassProperties(
+def _join(pieces: Sequence[SolidProperties]) -> SolidProperties:
+    return SolidProperties(
         combine_inertias([piece.inertia for piece in pieces]), sum(piece.volume_m3 for piece in pieces)
     )
 
 
-def _shift(properties: MassProperties, z_m: float) -> MassProperties:
+def _shift(properties: SolidProperties, z_m: float) -> SolidProperties:
     return properties._replace(inertia=transform_inertia(properties.inertia, np.eye(3), np.array([0.0, 0.0, z_m])))
 
 
-def _rotate(properties: MassProperties, R: Array) -> MassProperties:
+def _rotate(properties: SolidProperties, R: Array) -> SolidProperties:
     return properties._replace(inertia=transform_inertia(properties.inertia, R, np.zeros(3)))
 
 
@@ -184,5 +184,6 @@ def _mass_per_cubic_stature() -> float:
     stature_m = 1.75  # of an average person, so that the check of units passes
     values = {key: share * stature_m for key, share in STATURE_SHARES.items()}
     return (
-        sum(each.inertia.mass_kg for each in mass_properties(Measurements("average", values)).values()) / stature_m**3
+        sum(each.inertia.mass_kg for each in segment_properties(Measurements("average", values)).values())
+        / stature_m**3
     )

@@ -19,11 +19,11 @@ from pathlib import Path
 
 import numpy as np
 
-from airborne.body.anthropometry import FOOT_SLOPE_RAD, mass_properties, measurements_of, sternoclavicular_m
+from airborne.body.anthropometry import FOOT_SLOPE_RAD, measurements_of, segment_properties, sternoclavicular_m
 from airborne.body.measurements import Measurements, check_measurements, read_measurements
 from airborne.body.model import UNLIMITED, BodyModel, Ellipsoid, Landmark, Segment
 from airborne.body.outfits import ATHLETE, Outfit
-from airborne.body.stadia import MassProperties
+from airborne.body.stadia import SolidProperties
 from airborne.types import Array
 
 PARENTS = {
@@ -93,7 +93,7 @@ def human18_from_measurements(
     """
     measurements = check_measurements(source) if isinstance(source, Measurements) else read_measurements(Path(source))
     person = measurements.symmetrise() if symmetric else measurements
-    values, properties = person.values_m, mass_properties(person)
+    values, properties = person.values_m, segment_properties(person)
     joints = _joints(values)
     segments = []
     for name, parent in PARENTS.items():
@@ -125,7 +125,7 @@ def _joints(v: Mapping[str, float]) -> dict[str, Array]:
 
 
 def _ellipsoid(
-    name: str, properties: MassProperties, v: Mapping[str, float], joints: dict[str, Array]
+    name: str, properties: SolidProperties, v: Mapping[str, float], joints: dict[str, Array]
 ) -> tuple[Ellipsoid, Array, tuple[float, float]]:
     """Make a segment's ellipsoid, with its centre and the heights of the segment's ends in the segment's frame [m].
 
@@ -162,7 +162,7 @@ def _ellipsoid(
 
 
 def _shoulder(
-    properties: MassProperties, v: Mapping[str, float], joint: Array, arm: Array
+    properties: SolidProperties, v: Mapping[str, float], joint: Array, arm: Array
 ) -> tuple[Ellipsoid, Array, tuple[float, float]]:
     """Span from the breastbone to beyond the shoulder joint."""
     side = np.sign(arm[0])
@@ -173,7 +173,9 @@ def _shoulder(
     return Ellipsoid(np.array([half, depth, 0.6 * depth])), centre, (centre[2] - 0.6 * depth, centre[2] + 0.6 * depth)
 
 
-def _foot(properties: MassProperties, v: Mapping[str, float], leg: str) -> tuple[Ellipsoid, Array, tuple[float, float]]:
+def _foot(
+    properties: SolidProperties, v: Mapping[str, float], leg: str
+) -> tuple[Ellipsoid, Array, tuple[float, float]]:
     """Span from the heel to the toes, resting on the sole, as wide as the ball."""
     toe = v[f"L{leg}9L"] * np.cos(FOOT_SLOPE_RAD)
     length, width = (1 + _HEEL_PER_TOE) * toe / 2, v[f"L{leg}8w"] / 2

@@ -14,7 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body.landmark_fit import COARSE_GAIN, PoseState, Problem, landmark_distances, landmark_positions, minimise
+from airborne.body.landmark_fit import (
+    COARSE_GAIN,
+    LandmarkProblem,
+    PoseState,
+    landmark_distances,
+    landmark_positions,
+    minimise,
+)
 from airborne.body.model import BodyModel, Pose
 from airborne.errors import BodyError
 from airborne.types import Array
@@ -58,7 +65,7 @@ def fit_pose(
     for name, position in targets.items():
         positions[names.index(name)] = position
     root_weights = np.sqrt([(weights or {}).get(name, 1.0) for name in names])
-    problem = Problem(model, positions, root_weights, _LEAST_SD_M)
+    problem = LandmarkProblem(model, positions, root_weights, _LEAST_SD_M)
     _check(problem, names, has_start=start is not None)
     pose, residual_m, rms_m = _fit(problem, start)
     note = None
@@ -116,7 +123,7 @@ def _trunk_ratios(model: BodyModel, core: Array) -> dict[str, list[Array]]:
     return ratios
 
 
-def _fit(problem: Problem, start: Pose | None) -> tuple[Pose, Array, float]:
+def _fit(problem: LandmarkProblem, start: Pose | None) -> tuple[Pose, Array, float]:
     """Return the pose, each landmark's distance (landmarks,) [m] and their RMS, targets only [m]."""
     n_joints = len(problem.model.segments) - 1
     if start is None:
@@ -140,7 +147,7 @@ def _fit(problem: Problem, start: Pose | None) -> tuple[Pose, Array, float]:
     return Pose(world_from_root=root, joint_angles=state.angles), off_m, _rms(off_m)
 
 
-def _initial_state(problem: Problem) -> PoseState:
+def _initial_state(problem: LandmarkProblem) -> PoseState:
     """Return initial values: the trunk first, then each limb from several starts."""
     model = problem.model
     names = [landmark.name for landmark in model.landmarks]
@@ -155,7 +162,7 @@ def _initial_state(problem: Problem) -> PoseState:
     return _fit_limbs(problem, state)
 
 
-def _fit_limbs(problem: Problem, state: PoseState) -> PoseState:
+def _fit_limbs(problem: LandmarkProblem, state: PoseState) -> PoseState:
     """Fit each limb of a body that has limbs, one after the other."""
     landmarks = {landmark.name: landmark for landmark in problem.model.landmarks}
     for name in CORE if set(CORE) <= set(landmarks) else ():
@@ -163,7 +170,7 @@ def _fit_limbs(problem: Problem, state: PoseState) -> PoseState:
     return state
 
 
-def _fit_limb(problem: Problem, state: PoseState, top: int) -> PoseState:
+def _fit_limb(problem: LandmarkProblem, state: PoseState, top: int) -> PoseState:
     """Fit the limb that begins with segment `top`, and its girdle; the rest is fixed.
 
     Of a grid over its first two joints, minimise from the best point of each axial rotation.
@@ -203,7 +210,7 @@ def _align(state: PoseState, points: Array, targets: Array) -> PoseState:
     return PoseState(R @ state.R, targets.mean(axis=0) + R @ (state.t - points.mean(axis=0)), state.angles)
 
 
-def _check(problem: Problem, names: list[str], *, has_start: bool) -> None:
+def _check(problem: LandmarkProblem, names: list[str], *, has_start: bool) -> None:
     """Raise BodyError for targets that do not determine the root."""
     present = [name for name, is_given in zip(names, problem.is_given, strict=True) if is_given]
     needed = CORE if set(CORE) <= set(names) else ()

@@ -22,7 +22,7 @@ _DAMPING = MarquardtRule(first=1e-4, down=5, up=4, least=1e-9, most=4e8)
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class LandmarkProblem:
     """A fit of a body's landmarks to targets."""
 
     model: BodyModel
@@ -68,17 +68,14 @@ class PoseState:
 
 
 def minimise(
-    problem: Problem, state: PoseState, free: NDArray[np.bool_], least_gain: float = _FINE_GAIN
+    problem: LandmarkProblem, state: PoseState, free: NDArray[np.bool_], least_gain: float = _FINE_GAIN
 ) -> tuple[PoseState, float]:
     """Minimise the cost over the free variables (6 + 3 joints,); return the state and its cost."""
-    first = _Iterate(problem, state, free)
-    best = descend(
-        first,
-        lambda state: _Iterate(problem, state, free),
-        _DAMPING,
-        most_steps=_MOST_STEPS,
-        least_gain=least_gain,
-    ).best
+
+    def evaluate(state: PoseState) -> _Iterate:
+        return _Iterate(problem, state, free)
+
+    best = descend(evaluate(state), evaluate, _DAMPING, most_steps=_MOST_STEPS, least_gain=least_gain).best
     return best.state, best.equations[0]
 
 
@@ -86,7 +83,7 @@ def minimise(
 class _Iterate:
     """A state in the descent."""
 
-    problem: Problem
+    problem: LandmarkProblem
     state: PoseState
     free: NDArray[np.bool_]  # (6 + 3 joints,)
 
@@ -100,7 +97,7 @@ class _Iterate:
         return self.equations[0]
 
     def step(self, damping: float) -> tuple[PoseState, float]:
-        """Return the state after a damped step; one that stops at the limits makes no exact promise."""
+        """Return the state after a damped step; no decrease is predicted, as it may stop at the limits."""
         _, gradient, hessian = self.equations
         low, high = np.concatenate([np.full((6, 2), [-np.inf, np.inf]), self.problem.limits.reshape(-1, 2)]).T
         now = np.concatenate([np.zeros(6), self.state.angles.ravel()])
@@ -129,7 +126,7 @@ def _step(gradient: Array, hessian: Array, damping: float, *, low: Array, high: 
     return step
 
 
-def _equations(problem: Problem, state: PoseState) -> tuple[float, Array, Array]:
+def _equations(problem: LandmarkProblem, state: PoseState) -> tuple[float, Array, Array]:
     """Return half the squared residuals, their gradient and Gauss-Newton Hessian."""
     has_target, scale = problem.is_given, (problem.root_weights / problem.sd_m)[problem.is_given]
     posed = PosedBody(problem.model, *_forward_kinematics(problem.model, state))
@@ -170,12 +167,12 @@ def _forward_kinematics(model: BodyModel, state: PoseState) -> tuple[Array, Arra
     return np.stack(R, axis=-3), np.stack(t, axis=-2)
 
 
-def landmark_positions(problem: Problem, state: PoseState) -> Array:
+def landmark_positions(problem: LandmarkProblem, state: PoseState) -> Array:
     """Return the landmarks' positions: (..., landmarks, 3) world [m]."""
     R, t = _forward_kinematics(problem.model, state)
     return np.einsum("...nij,nj->...ni", R[..., problem.segments, :, :], problem.local) + t[..., problem.segments, :]
 
 
-def landmark_distances(problem: Problem, state: PoseState) -> Array:
+def landmark_distances(problem: LandmarkProblem, state: PoseState) -> Array:
     """Return the landmarks' distances from their targets: (..., landmarks) [m]; NaN without a target."""
     return np.linalg.norm(landmark_positions(problem, state) - problem.targets, axis=-1)

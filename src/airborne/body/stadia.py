@@ -18,7 +18,7 @@ _NODES, _WEIGHTS = (values / 2 for values in np.polynomial.legendre.leggauss(4))
 _NODES = _NODES + 0.5
 
 
-class MassProperties(NamedTuple):
+class SolidProperties(NamedTuple):
     """The inertia and the volume of a piece of a body."""
 
     inertia: Inertia
@@ -46,7 +46,7 @@ def circle(perimeter_m: float) -> Stadium:
     return Stadium(0.0, perimeter_m / (2 * np.pi))
 
 
-def solid(low: Stadium, high: Stadium, height_m: float, density: float, *, is_turned: bool = False) -> MassProperties:
+def solid(low: Stadium, high: Stadium, height_m: float, density: float, *, is_turned: bool = False) -> SolidProperties:
     """Fill the space between two sections; the origin is the centre of the low one, z points to the high one.
 
     density [kg/m^3]; `is_turned`: the sections are wide along y.
@@ -63,10 +63,10 @@ def solid(low: Stadium, high: Stadium, height_m: float, density: float, *, is_tu
     if is_turned:
         spread = spread[[1, 0, 2]]
     tensor = np.diag(spread.sum() - spread)
-    return MassProperties(Inertia(density * volume, np.array([0.0, 0.0, centre]), tensor), volume)
+    return SolidProperties(Inertia(density * volume, np.array([0.0, 0.0, centre]), tensor), volume)
 
 
-def half_solid(low: Stadium, high: Stadium, height_m: float, density: float, *, sign: float) -> MassProperties:
+def half_solid(low: Stadium, high: Stadium, height_m: float, density: float, *, sign: float) -> SolidProperties:
     """Cut `solid` in the plane x = 0 and keep the half where sign * x > 0; same frame."""
     whole = solid(low, high, height_m, density)
     t, r = _at_nodes(low, high)
@@ -76,17 +76,17 @@ def half_solid(low: Stadium, high: Stadium, height_m: float, density: float, *, 
     x = x_dm.sum() / mass
     tensor = whole.inertia.tensor_kg_m2 / 2 - mass * x**2 * np.diag([0.0, 1.0, 1.0])
     tensor[0, 2] = tensor[2, 0] = -x_dm @ (height_m * _NODES - middle[2])
-    return MassProperties(Inertia(mass, middle + np.array([x, 0.0, 0.0]), tensor), whole.volume_m3 / 2)
+    return SolidProperties(Inertia(mass, middle + np.array([x, 0.0, 0.0]), tensor), whole.volume_m3 / 2)
 
 
-def dome(perimeter_m: float, height_m: float, density: float) -> MassProperties:
+def dome(perimeter_m: float, height_m: float, density: float) -> SolidProperties:
     """Make half an ellipsoid on a round base at z = 0."""
     radius = perimeter_m / (2 * np.pi)
     volume = 2 / 3 * np.pi * radius**2 * height_m
     mass, centre = density * volume, 3 / 8 * height_m
     side = mass * ((radius**2 + height_m**2) / 5 - centre**2)
     tensor = np.diag([side, side, 2 / 5 * mass * radius**2])
-    return MassProperties(Inertia(mass, np.array([0.0, 0.0, centre]), tensor), volume)
+    return SolidProperties(Inertia(mass, np.array([0.0, 0.0, centre]), tensor), volume)
 
 
 def _at_nodes(low: Stadium, high: Stadium) -> tuple[Array, Array]:

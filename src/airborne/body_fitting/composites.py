@@ -69,7 +69,7 @@ def misfit(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -> Mi
 PosedModel = tuple[RenderModel, PosedBody]
 
 
-def normal_equations(
+def composite_equations(
     render_model: RenderModel,
     posed: PosedBody,
     view: ViewBuffers,

@@ -18,7 +18,7 @@ from airborne.body.inverse_kinematics import fit_lengths, fit_pose
 from airborne.body.outfits import Border, with_borders
 from airborne.body.shaping import with_mass, with_segment_lengths
 from airborne.body_fitting.clothes import find_borders, sample_clothing
-from airborne.body_fitting.composites import NO_MISFIT, misfit, normal_equations
+from airborne.body_fitting.composites import NO_MISFIT, composite_equations, misfit
 from airborne.body_fitting.shape import (
     ShapeParameter,
     apply_shape,
@@ -199,7 +199,7 @@ def _step(level: _Level, state: _Iterate) -> _Iterate | None:
         steps += _pose_steps(here, pose, level.step_m)
         H, g = np.zeros((len(steps),) * 2), np.zeros(len(steps))
         for view in views:
-            view_misfit, own_H, own_g = normal_equations(here, posed, view, steps)
+            view_misfit, own_H, own_g = composite_equations(here, posed, view, steps)
             total, H, g = total + view_misfit, H + own_H, g + own_g
         ends = [(up[1], posed if down is None else down[1], step) for up, down, step in steps]
         rows = np.array(
@@ -234,7 +234,7 @@ def _step(level: _Level, state: _Iterate) -> _Iterate | None:
 
 
 def _pose_steps(here: RenderModel, pose: Pose, step_m: float) -> list:
-    """Return the body a step up along each degree of freedom, for `composites.normal_equations`."""
+    """Return the body a step up along each degree of freedom, for `composites.composite_equations`."""
     steps = []
     for i, unit in enumerate(np.eye(6 + 3 * (len(here.model.segments) - 1))):
         h = step_m if i < 3 else step_m / _LEVER_M

@@ -25,10 +25,10 @@ from airborne.trial.file import Trial
 from airborne.types import Array
 from airborne.video import Frames, Recording
 
-Progress = Callable[[str, int, int], None]  # what is being done, how far, of how many
+StageProgress = Callable[[str, int, int], None]  # what is being done, how far, of how many
 
 _N_SCENERY = 10  # further frames that show the scene without the person
-_PICTURE_NAME = "fit_body.png"
+PICTURE = "fit_body.png"
 _CELL_PX, _CELL_SCALE = 400, 0.4  # a cell of the image, and its pixel size in pixels of `crop_camera`
 _LINE_RGB, _EMPTY_GREY = (255, 230, 0), 60
 
@@ -42,7 +42,7 @@ class PersonFit:
     picture: Path
 
 
-def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: Progress | None = None) -> PersonFit:
+def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: StageProgress | None = None) -> PersonFit:
     """Fit a trial's body to the person in its images; write the body file, and beside it `fit_body.png`.
 
     The joints come from the detections of the trial's [start], or for one frame from its joints_m.
@@ -67,7 +67,7 @@ def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: Progr
         mass_kg=trial.body.mass_kg,
         progress=lambda done, total: report("fitting", done, total),
     )
-    picture = output.with_name(_PICTURE_NAME)
+    picture = output.with_name(PICTURE)
     write_body(output, fit.model)
     picture.write_bytes(_contact_sheet(fit, [observations[index].frames for index in chosen]))
     return PersonFit(fit, tuple(chosen), picture)
@@ -134,7 +134,7 @@ def _choose_frames(trial: Trial, landmarks: dict[int, dict[str, Array]], n: int)
 
 
 def _read(
-    recording: Recording, landmarks: dict[int, dict[str, Array]], indices: Sequence[int], progress: Progress
+    recording: Recording, landmarks: dict[int, dict[str, Array]], indices: Sequence[int], progress: StageProgress
 ) -> dict[int, BodyObservation]:
     observations = {}
     with closing(iter(recording)) as stream:

@@ -1,7 +1,7 @@
-"""Calibration: how cameras are found, from control points or from any sources, alone or together.
+"""Calibration: cameras estimated from control points or from any sources, alone or together.
 
-In come control points, or a file that names videos, pictures, tables of points and detections; out go a `Calibration`
-or a `Calibrated` rig that say how far to trust them, and their report. Knows no body and no trial.
+In come control points, or a file that names videos, images, tables of points and detections; out go a `Calibration` or
+a `RigCalibration` with its uncertainty, and their report. Knows no body and no trial.
 """
 
 from airborne.calibration.from_points import Calibration, CameraFit, calibrate

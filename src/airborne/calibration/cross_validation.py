@@ -1,4 +1,4 @@
-"""What was left out of a fit, and how far it lies from where the fit expects it."""
+"""Cross-validation: how far observations lie from the predictions of cameras fitted without them."""
 
 from __future__ import annotations
 
@@ -13,39 +13,39 @@ from airborne.errors import CalibrationError
 from airborne.types import Array, Ints
 
 _N_FOLDS = 3
-_BLOCK_MOMENTS = 8  # moments that go together where they say of each other how the board moves
+_BLOCK_MOMENTS = 8  # successive moments in one fold, where lags relate them by the board's motion
 
 
 def cross_validate(adjustment: Adjustment, progress: Callable[[int, int], None]) -> dict[str, Array]:
-    """Return by source the distances [px] of observations from cameras fitted without them.
+    """Return by source the distances [px] of observations from their predictions by cameras fitted without them.
 
-    Left out together: a board's moment with all its views, a point with all its views, points tied by a length. Their
-    own places are found from them, the cameras stay; a known point is simply projected. NaN where nothing can be told.
+    Held out together: all views of a board's moment, all views of a point, points connected by a length. Their own
+    poses and positions are fitted to them with fixed cameras; a known point is simply projected. NaN where impossible.
     """
     sources = adjustment.with_estimated_noise()
-    units = [observation_groups(source) for source in sources]
-    missed = {source.name: np.full(len(source.px), np.nan) for source in sources}
+    groups = [observation_groups(source) for source in sources]
+    distances = {source.name: np.full(len(source.px), np.nan) for source in sources}
     for fold in range(_N_FOLDS):
-        left = [_fold(s, unit) == fold for s, unit in zip(sources, units, strict=True)]
-        kept = [s.select(~out) for s, out in zip(sources, left, strict=True)]
+        is_held_out = [_fold(s, group) == fold for s, group in zip(sources, groups, strict=True)]
+        training = [s.select(~is_out) for s, is_out in zip(sources, is_held_out, strict=True)]
         try:
-            cameras = adjust(adjustment.rig, kept, adjustment.free, prior=adjustment.prior).rig
-            for source, out in zip(sources, left, strict=True):
-                if out.any():
-                    found = adjust(cameras, [source.select(out)], ALL_FIXED)
-                    missed[source.name][out] = np.linalg.norm(found.residual_px[0], axis=1)
+            cameras = adjust(adjustment.rig, training, adjustment.free, prior=adjustment.prior).rig
+            for source, is_out in zip(sources, is_held_out, strict=True):
+                if is_out.any():
+                    validation = adjust(cameras, [source.select(is_out)], ALL_FIXED)
+                    distances[source.name][is_out] = np.linalg.norm(validation.residual_px[0], axis=1)
         except CalibrationError:
-            continue  # too little is left: these distances stay unknown
+            continue  # too little is left: these distances stay NaN
         progress(fold + 1, _N_FOLDS)
-    return missed
+    return distances
 
 
-def _fold(source: Source, unit: Ints) -> Ints:
-    return unit // (1 if source.lags is None else _BLOCK_MOMENTS) % _N_FOLDS
+def _fold(source: Source, group: Ints) -> Ints:
+    return group // (1 if source.lags is None else _BLOCK_MOMENTS) % _N_FOLDS
 
 
 def observation_groups(source: Source) -> Ints:
-    """Return to which unit each observation belongs (n,), numbered from 0: what is left out together."""
+    """Return each observation's group (n,), numbered from 0: observations that are held out together."""
     p, m = len(source.points), source.n_moments
     nodes = np.where(source.moments >= 0, p + source.moments, source.point)
     first = np.zeros(0, int) if source.lengths is None else source.lengths.first

@@ -1,4 +1,4 @@
-"""Calibration: from control points to a rig, with what is known about its errors."""
+"""Calibration from control points, with its errors."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class CameraFit:
     """How well one camera fits its control points. RMS values are of distances, over the points it sees."""
 
     name: str
-    model: str  # the one chosen
+    model: str  # the selected one
     n_points: int
     residual_px: Array  # (n, 2) [px], measured minus projected; NaN where not seen
     held_out_px: Array  # (n, 2) [px], the same for the camera fitted without the point
@@ -64,7 +64,7 @@ class CameraFit:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Calibration:
-    """A rig and how far it can be trusted."""
+    """A rig with its errors on control points."""
 
     rig: Rig
     method: CalibrationMethod
@@ -83,12 +83,12 @@ class Calibration:
 def calibrate(
     points: ControlPoints, sizes: Mapping[str, tuple[int, int]], *, method: CalibrationMethod = "lm", seed: int = 0
 ) -> Calibration:
-    """Find every camera that the control points were clicked in.
+    """Estimate every camera that the control points were clicked in.
 
     sizes: (width, height) [px] by camera name. Each camera starts from the decomposition of its DLT. Method "lm": least
-    squares on the pixels for a ladder of physical cameras, of which the simplest is taken that predicts held-out points
-    as well as the best. Method "annealing": paper B's seven-parameter camera by simulated annealing, `seed` fixed.
-    Raises CalibrationError where no camera can be found; what is only doubtful stands in `warnings`.
+    squares on the pixels for physical cameras of growing complexity; the simplest that predicts held-out points as well
+    as the best is selected. Method "annealing": paper B's seven-parameter camera by simulated annealing, `seed` fixed.
+    Raises CalibrationError where a camera cannot be estimated; what is only doubtful goes to `warnings`.
     """
     if method not in ("lm", "annealing"):
         raise CalibrationError(f"unknown calibration method '{method}'; expected 'lm' or 'annealing'")
@@ -96,7 +96,9 @@ def calibrate(
     decompositions = decompose_cameras(points)
     cameras, fits, solutions = [], [], {}
     for name in points.cameras:
-        candidates = _solve(points, name, sizes[name], decompositions[name], method, seed)
+        candidates = _solve(
+            points, name, size=sizes[name], decomposition=decompositions[name], method=method, seed=seed
+        )
         solutions[name] = choose_simplest(candidates)
         cameras.append(_camera(name, sizes[name], solutions[name]))
         fits.append(_describe_fit(points, name, solutions[name], candidates))
@@ -112,24 +114,25 @@ def calibrate(
 def _solve(
     points: ControlPoints,
     name: str,
+    *,
     size: tuple[int, int],
     decomposition: Decomposition,
     method: CalibrationMethod,
     seed: int,
 ) -> list[Solution]:
-    seen = points.is_seen_by(name)
-    world, px = points.world[seen], points.px[seen, points.cameras.index(name)]
-    start = Pinhole(
+    is_seen = points.is_seen_by(name)
+    world, px = points.world[is_seen], points.px[is_seen, points.cameras.index(name)]
+    initial = Pinhole(
         decomposition.R,
         decomposition.centre,
         (decomposition.K[0, 0] + decomposition.K[1, 1]) / 2,
         (np.array(size) - 1) / 2,
     )
     if method == "annealing":
-        pinhole = anneal_pinhole(start, world, px, seed=seed)
+        pinhole = anneal_pinhole(initial, world, px, seed=seed)
         return [leave_one_out(pinhole, SEVEN_PARAMETERS, world, px)]
     return [
-        leave_one_out(fit_pinhole(start, model, world, px), model, world, px)
+        leave_one_out(fit_pinhole(initial, model, world, px), model, world, px)
         for model in supported_models(PINHOLE_MODELS, len(world))
     ]
 
@@ -147,20 +150,20 @@ def _camera(name: str, size: tuple[int, int], solution: Solution) -> Camera:
     )
 
 
-def _describe_fit(points: ControlPoints, name: str, chosen: Solution, candidates: list[Solution]) -> CameraFit:
-    seen = points.is_seen_by(name)
-    P_dlt = fit_dlt(chosen.world, chosen.px)
-    sd = parameter_sd(chosen.pinhole, chosen.model, chosen.world, chosen.px)
+def _describe_fit(points: ControlPoints, name: str, best: Solution, candidates: list[Solution]) -> CameraFit:
+    is_seen = points.is_seen_by(name)
+    P_dlt = fit_dlt(best.world, best.px)
+    sd = parameter_sd(best.pinhole, best.model, best.world, best.px)
     return CameraFit(
         name=name,
-        model=chosen.model.name,
-        n_points=int(seen.sum()),
-        residual_px=_spread_over_points(seen, chosen.residual_px),
-        held_out_px=_spread_over_points(seen, chosen.held_out_px),
-        m_per_px=_spread_over_points(seen, chosen.pinhole.depth(chosen.world) / chosen.pinhole.focal_px),
+        model=best.model.name,
+        n_points=int(is_seen.sum()),
+        residual_px=_spread_over_points(is_seen, best.residual_px),
+        held_out_px=_spread_over_points(is_seen, best.held_out_px),
+        m_per_px=_spread_over_points(is_seen, best.pinhole.depth(best.world) / best.pinhole.focal_px),
         held_out_rms_px={solution.model.name: _rms(solution.held_out_px) for solution in candidates},
-        sd=dict(zip(parameter_names(chosen.model), sd.tolist(), strict=True)),
-        dlt_rms_px=_rms(chosen.px - px_from_points(P_dlt[None], chosen.world)[:, 0]),
+        sd=dict(zip(parameter_names(best.model), sd.tolist(), strict=True)),
+        dlt_rms_px=_rms(best.px - px_from_points(P_dlt[None], best.world)[:, 0]),
         dlt=dlt_coefficients(P_dlt),
     )
 
@@ -171,18 +174,18 @@ def _held_out_point_errors(points: ControlPoints, solutions: Mapping[str, Soluti
     P, px = np.zeros((n, c, 3, 4)), np.full((n, c, 2), np.nan)
     for i, name in enumerate(points.cameras):
         solution = solutions[name]
-        for row, pinhole, seen_px in zip(
+        for row, pinhole, px_in_camera in zip(
             np.flatnonzero(points.is_seen_by(name)), solution.refits, solution.px, strict=True
         ):
             P[row, i] = pinhole.P
-            px[row, i] = pinhole.undistort_px(seen_px)
+            px[row, i] = pinhole.undistort_px(px_in_camera)
     return triangulate(P, px) - points.world
 
 
-def _spread_over_points(seen: NDArray[np.bool_], values: Array) -> Array:
-    """Spread the values of seen points over all points, NaN elsewhere."""
-    full = np.full((len(seen), *values.shape[1:]), np.nan)
-    full[seen] = values
+def _spread_over_points(is_seen: NDArray[np.bool_], values: Array) -> Array:
+    """Return values of the seen points as an array over all points, NaN elsewhere."""
+    full = np.full((len(is_seen), *values.shape[1:]), np.nan)
+    full[is_seen] = values
     return full
 
 

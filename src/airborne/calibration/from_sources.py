@@ -1,4 +1,4 @@
-"""All sources in one adjustment: evidence, time, world frame, and how well what was left out is predicted."""
+"""All sources in one adjustment: observations, lags, world frame, cross-validation."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from airborne.calibration.world_frame.choice import WorldFrame, choose_world_fra
 from airborne.cameras import Rig
 from airborne.types import Array
 
-_LONGEST_GAP_S = 0.26  # between pictures that say how the board moves
-_LOOSE_SYNC_NOISE_SHARE = 0.75  # of the noise: lags are kept where they leave less than this
+_LONGEST_GAP_S = 0.26  # between images of which the board's motion can be interpolated
+_LOOSE_SYNC_NOISE_SHARE = 0.75  # lags are accepted where they lower the noise to less than this share
 _FEWEST_MOMENTS = 10
-_LAG_SD = 0.5  # of the time between pictures
+_LAG_SD = 0.5  # of the time between images
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RigCalibration:
-    """Cameras from all sources, and how far to trust them."""
+    """Cameras from all sources, with their uncertainty."""
 
     inputs: Inputs
-    adjustment: Adjustment  # in the wanted world
-    world: str  # how the world's frame was found, in words
-    held_out_px: Mapping[str, Array]  # by source, distances of what was left out of the fit [px]
-    lag_s: Mapping[str, Array]  # by camera, of its pictures against the others' mean; empty where all are in time
+    adjustment: Adjustment  # in the requested world frame
+    world: str  # what defines the world frame, in words
+    held_out_px: Mapping[str, Array]  # by source, distances of held-out observations [px]
+    lag_s: Mapping[str, Array]  # by camera, of its images against the others' mean; empty if synchronous
     resections: tuple[Resection, ...]
     notes: tuple[str, ...]
 
@@ -47,30 +47,32 @@ class RigCalibration:
 def calibrate_from(sources: Sources, progress: Progress) -> RigCalibration:
     """Read all sources and adjust the cameras to all of them at once; raises an AirborneError in one line.
 
-    told: what is being done, how much of it is done, and of how much.
+    progress is called with the stage, the steps done, and the steps expected.
     """
     inputs = read_inputs(sources, progress)
     rig, mended = _resect_misplaced(inputs)
-    freedom = inputs.free
-    first = _adjust(inputs, rig, freedom, None, progress)
-    adjusted, lag_sd_s = first, _lag_sd_s(inputs)
+    free = inputs.free
+    without_lags = _adjust(inputs, rig, free, lag_sd_s=None, progress=progress)
+    adjustment, lag_sd_s = without_lags, _lag_sd_s(inputs)
     if lag_sd_s is not None:
-        looser = _adjust(inputs, first.rig, freedom, lag_sd_s, progress)
-        row = [source.name for source in looser.sources].index("board")
-        is_better = looser.noise_px[row] < _LOOSE_SYNC_NOISE_SHARE * first.noise_px[row]
-        asked = sources.board is not None and sources.board.sync == "loose"
-        adjusted, lag_sd_s = (looser, lag_sd_s) if is_better or asked else (first, None)
-    elif inputs.wand is not None or (inputs.detections is not None and first.prior is None):
-        adjusted = _adjust(inputs, first.rig, freedom, None, progress)  # triangulated anew by better cameras
-    place = choose_world_frame(inputs, adjusted, [m.camera.name for m in mended])
-    final = adjusted if place.is_unchanged else _adjust_in_world(adjusted, place, progress)
-    missed = cross_validate(final, lambda done, n: progress("leaving out and predicting", done, n))
+        with_lags = _adjust(inputs, without_lags.rig, free, lag_sd_s=lag_sd_s, progress=progress)
+        row = [source.name for source in with_lags.sources].index("board")
+        is_better = with_lags.noise_px[row] < _LOOSE_SYNC_NOISE_SHARE * without_lags.noise_px[row]
+        is_requested = sources.board is not None and sources.board.sync == "loose"
+        adjustment, lag_sd_s = (with_lags, lag_sd_s) if is_better or is_requested else (without_lags, None)
+    elif inputs.wand is not None or (inputs.detections is not None and without_lags.prior is None):
+        adjustment = _adjust(
+            inputs, without_lags.rig, free, lag_sd_s=None, progress=progress
+        )  # triangulated anew by better cameras
+    frame = choose_world_frame(inputs, adjustment, [m.camera.name for m in mended])
+    final = adjustment if frame.is_unchanged else _adjust_in_world(adjustment, frame, progress)
+    held_out_px = cross_validate(final, lambda done, n: progress("leaving out and predicting", done, n))
     lags = _lags(final) if lag_sd_s is not None else {}
     return RigCalibration(
         inputs=inputs,
         adjustment=final,
-        world=place.description,
-        held_out_px=missed,
+        world=frame.description,
+        held_out_px=held_out_px,
         lag_s=lags,
         resections=mended,
         notes=(*inputs.notes, *_lag_notes(lags)),
@@ -78,30 +80,30 @@ def calibrate_from(sources: Sources, progress: Progress) -> RigCalibration:
 
 
 def _resect_misplaced(inputs: Inputs) -> tuple[Rig, tuple[Resection, ...]]:
-    """Place cameras anew first that a person's detections say are elsewhere than the calibration at the start."""
+    """Resect the cameras that a person's detections show to be misplaced in the initial calibration."""
     if inputs.detections is None or inputs.start_rig is None:
         return inputs.rig, ()
-    wrong = find_misplaced_cameras(inputs.rig, inputs.detections)
-    if not wrong:
+    misplaced = find_misplaced_cameras(inputs.rig, inputs.detections)
+    if not misplaced:
         return inputs.rig, ()
-    return resect_cameras(inputs.rig, inputs.detections, [m.camera.name for m in wrong])[0], wrong
+    return resect_cameras(inputs.rig, inputs.detections, [m.camera.name for m in misplaced])[0], misplaced
 
 
 def _adjust(
-    inputs: Inputs, rig: Rig, freedom: Mapping[str, FreeParameters], lag_sd_s: float | None, told: Progress
+    inputs: Inputs, rig: Rig, free: Mapping[str, FreeParameters], *, lag_sd_s: float | None, progress: Progress
 ) -> Adjustment:
-    evidence = _sources(inputs, rig, lag_sd_s)
+    sources = _sources(inputs, rig, lag_sd_s)
     prior = None
     if inputs.start_rig is not None and inputs.sources.kinds == ["detections"]:
         prior = calibration_prior(
-            rig, [c.name for c, old in zip(rig, inputs.rig, strict=True) if c is old], evidence[0].points
+            rig, [c.name for c, old in zip(rig, inputs.rig, strict=True) if c is old], sources[0].points
         )
-    return adjust(rig, evidence, freedom, prior=prior, progress=lambda step, _: told("adjusting", step, None))
+    return adjust(rig, sources, free, prior=prior, progress=lambda step, _: progress("adjusting", step, None))
 
 
 def _sources(inputs: Inputs, rig: Rig, lag_sd_s: float | None) -> list[Source]:
-    """Return every source, its unknowns beginning where the rig sees them."""
-    found = [scene_source(rig.names, points, name=name) for name, points in inputs.points.items()]
+    """Return every source, its unknowns initialised from the rig."""
+    sources = [scene_source(rig.names, points, name=name) for name, points in inputs.points.items()]
     if inputs.board_detections is not None:
         views = inputs.board_detections.views
         source = board_source(
@@ -111,58 +113,64 @@ def _sources(inputs: Inputs, rig: Rig, lag_sd_s: float | None) -> list[Source]:
         if lag_sd_s is not None and time_s is not None:
             group = source.camera * views.n_moments + source.moments
             source = replace(source, lags=ObservationLags(group=group, time_s=time_s, sd_s=lag_sd_s))
-        found.append(source)
+        sources.append(source)
     for name, views in inputs.lens_views.items():
-        places = board_poses(rig.select([name]), views)
-        found.append(board_source(views, places, name=f"lens of {name}", rows=[rig.names.index(name)]))
+        world_from_board = board_poses(rig.select([name]), views)
+        sources.append(board_source(views, world_from_board, name=f"lens of {name}", rows=[rig.names.index(name)]))
     if inputs.wand is not None:
-        found.append(wand_source(rig, inputs.wand))
+        sources.append(wand_source(rig, inputs.wand))
     if inputs.detections is not None:
-        found.append(person_source(rig, inputs.detections))
-    return found
+        sources.append(person_source(rig, inputs.detections))
+    return sources
 
 
 def _lag_sd_s(inputs: Inputs) -> float | None:
-    """Return how far pictures may lag behind others, or None where they are taken to be of the same instant."""
-    seen, table = inputs.board_detections, inputs.sources.board
-    if seen is None or table is None or table.sync == "exact" or seen.time_s is None or len(seen.views.cameras) < 2:
+    """Return the prior standard deviation of images' lags [s], or None where the cameras count as synchronous."""
+    detections, table = inputs.board_detections, inputs.sources.board
+    if (
+        detections is None
+        or table is None
+        or table.sync == "exact"
+        or detections.time_s is None
+        or len(detections.views.cameras) < 2
+    ):
         return None
-    gap_s = float(np.median(np.diff(seen.time_s))) if len(seen.time_s) > 1 else np.inf
-    is_dense = gap_s <= _LONGEST_GAP_S and (seen.views.n_corners > 0).any(axis=0).sum() >= _FEWEST_MOMENTS
+    gap_s = float(np.median(np.diff(detections.time_s))) if len(detections.time_s) > 1 else np.inf
+    is_dense = gap_s <= _LONGEST_GAP_S and (detections.views.n_corners > 0).any(axis=0).sum() >= _FEWEST_MOMENTS
     return _LAG_SD * gap_s if is_dense else None
 
 
-def _adjust_in_world(adjusted: Adjustment, place: WorldFrame, told: Progress) -> Adjustment:
-    """Move everything to the world that is wanted, and find the standard deviations there."""
-    rig, sources = adjusted.transform(place.new_from_old, place.scale)
-    if place.fixed_moment is not None:
-        held = [
-            replace(s, is_fixed=np.arange(s.n_moments) == place.fixed_moment) if s.name == "board" else s
+def _adjust_in_world(adjustment: Adjustment, frame: WorldFrame, progress: Progress) -> Adjustment:
+    """Transform everything to the requested world frame, and estimate the standard deviations there."""
+    rig, sources = adjustment.transform(frame.new_from_old, frame.scale)
+    if frame.fixed_moment is not None:
+        updated = [
+            replace(s, is_fixed=np.arange(s.n_moments) == frame.fixed_moment) if s.name == "board" else s
             for s in sources
         ]
-        sources = tuple(held)
-    freedom = dict(adjusted.free)
-    if place.fixed_camera is not None:
-        freedom[place.fixed_camera] = replace(freedom[place.fixed_camera], extrinsics=False)
-    return adjust(rig, sources, freedom, progress=lambda step, _: told("adjusting", step, None))
+        sources = tuple(updated)
+    free = dict(adjustment.free)
+    if frame.fixed_camera is not None:
+        free[frame.fixed_camera] = replace(free[frame.fixed_camera], extrinsics=False)
+    return adjust(rig, sources, free, progress=lambda step, _: progress("adjusting", step, None))
 
 
-def _lags(adjusted: Adjustment) -> dict[str, Array]:
-    """Return each camera's lags, one a picture of the moving board."""
-    row = [source.name for source in adjusted.sources].index("board")
-    source, lag_s = adjusted.sources[row], adjusted.lag_s[row]
-    found = {}
-    for i, name in enumerate(adjusted.rig.names):
+def _lags(adjustment: Adjustment) -> dict[str, Array]:
+    """Return each camera's lags, one an image of the moving board."""
+    row = [source.name for source in adjustment.sources].index("board")
+    source, lag_s = adjustment.sources[row], adjustment.lag_s[row]
+    lags = {}
+    for i, name in enumerate(adjustment.rig.names):
         _, first = np.unique(source.moments[source.camera == i], return_index=True)
-        found[name] = lag_s[source.camera == i][first]
-    return found
+        lags[name] = lag_s[source.camera == i][first]
+    return lags
 
 
 def _lag_notes(lags: Mapping[str, Array]) -> tuple[str, ...]:
     if not lags:
         return ()
-    said = ", ".join(f"{name} {np.median(lag_s) * 1e3:+.0f} ms" for name, lag_s in lags.items() if len(lag_s))
+    medians = ", ".join(f"{name} {np.median(lag_s) * 1e3:+.0f} ms" for name, lag_s in lags.items() if len(lag_s))
     return (
         "the cameras do not look at the same instant; each picture of the moving board has its own time now "
-        f"(median against the others: {said})",
+        f"(median against the others: {medians})",
     )

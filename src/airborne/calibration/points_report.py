@@ -1,4 +1,4 @@
-"""A calibration in words and numbers, for people and for programs."""
+"""A calibration from control points in words and numbers, for people and for programs."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from airborne.calibration.from_points import Calibration, CameraFit
 def describe_points_calibration(calibration: Calibration) -> str:
     """Return a short plain table: RMS per camera in px and mm, held-out errors, chosen models, warnings.
 
-    RMS of 2D distances; mm across the line of sight at each point's depth. "held out": each point measured by a camera
-    fitted without it. "DLT": the 11-parameter transformation's own residual.
+    RMS of 2D distances; mm across the line of sight at each point's depth. "held out": each point predicted by a camera
+    fitted without it. "DLT": the residual of the 11-parameter transformation.
     """
     header = ("camera", "points", "RMS px", "RMS mm", "held-out px", "held-out mm", "DLT px", "model")
     rows = [header, *(_row(fit) for fit in calibration.fits)]
@@ -64,5 +64,5 @@ def _row(fit: CameraFit) -> tuple[str, ...]:
 
 
 def _reason(fit: CameraFit) -> str:
-    tried = ", ".join(f"{name} {rms:.2f}" for name, rms in fit.held_out_rms_px.items())
-    return f"{fit.name}: '{fit.model}' is the simplest model not clearly worse on held-out points (px: {tried})"
+    scores = ", ".join(f"{name} {rms:.2f}" for name, rms in fit.held_out_rms_px.items())
+    return f"{fit.name}: '{fit.model}' is the simplest model not clearly worse on held-out points (px: {scores})"

@@ -1,4 +1,4 @@
-"""A picture a camera: where it saw something, and how far that lies from where the calibration expects it."""
+"""A figure a camera: its observations and their residuals, magnified."""
 
 from __future__ import annotations
 
@@ -10,42 +10,45 @@ from airborne.calibration.from_sources import RigCalibration
 from airborne.calibration.sources.board_detection import first_image
 
 _INCHES, _LEAST_INCHES = 9.0, 6.0
-_ARROW_SHARE = 0.06  # of a picture's longer side: how long an arrow of the typical residual is drawn
+_ARROW_SHARE = 0.06  # of an image's longer side: the length of an arrow of the median residual
 _MOST_ARROWS = 1500
 _COLOURS = ("#d95f02", "#1b9e77", "#7570b3", "#e7298a", "#66a61e", "#e6ab02")
 
 
-def write_residual_figures(folder: Path, found: RigCalibration) -> list[Path]:
+def write_residual_figures(folder: Path, calibration: RigCalibration) -> list[Path]:
     """Write `residuals_<camera>.png` for every camera and return the paths."""
     folder.mkdir(parents=True, exist_ok=True)
     return [
-        _write_figure(folder / f"residuals_{_file_name(name)}.png", found, i) for i, name in enumerate(found.rig.names)
+        _write_figure(folder / f"residuals_{_file_name(name)}.png", calibration, i)
+        for i, name in enumerate(calibration.rig.names)
     ]
 
 
-def _write_figure(path: Path, found: RigCalibration, i: int) -> Path:
-    """Draw one camera: its picture where there is one, arrows from seen to expected places, magnified."""
+def _write_figure(path: Path, calibration: RigCalibration, i: int) -> Path:
+    """Draw one camera: an image if there is one, arrows from observed to projected points, magnified."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    camera = found.rig.cameras[i]
+    camera = calibration.rig.cameras[i]
     width, height = camera.size
     inches = _INCHES / max(width, height)
     figure = Figure(figsize=(max(width * inches, _LEAST_INCHES), height * inches + 0.9), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     example = (
-        found.inputs.board_detections.examples.get(camera.name) if found.inputs.board_detections is not None else None
+        calibration.inputs.board_detections.examples.get(camera.name)
+        if calibration.inputs.board_detections is not None
+        else None
     )
     if example is None:
-        example = first_image(found.inputs.sources, found.inputs.sources.camera[i])
+        example = first_image(calibration.inputs.sources, calibration.inputs.sources.camera[i])
     if example is not None:
         axes.imshow(example, cmap="gray", vmin=-500, vmax=300)  # pale, so that arrows stand out
     rng = np.random.default_rng(0)
-    typical = _typical_px(found, i)
+    typical = _typical_px(calibration, i)
     magnified = _ARROW_SHARE * max(width, height) / 2 / typical
     for number, (source, residual) in enumerate(
-        zip(found.adjustment.sources, found.adjustment.residual_px, strict=True)
+        zip(calibration.adjustment.sources, calibration.adjustment.residual_px, strict=True)
     ):
         rows = np.flatnonzero((source.camera == i) & np.isfinite(residual[:, 0]))
         if len(rows) > _MOST_ARROWS:
@@ -67,15 +70,15 @@ def _write_figure(path: Path, found: RigCalibration, i: int) -> Path:
     return path
 
 
-def _typical_px(found: RigCalibration, i: int) -> float:
-    off = np.concatenate(
+def _typical_px(calibration: RigCalibration, i: int) -> float:
+    distances = np.concatenate(
         [
             np.linalg.norm(residual[source.camera == i], axis=1)
-            for source, residual in zip(found.adjustment.sources, found.adjustment.residual_px, strict=True)
+            for source, residual in zip(calibration.adjustment.sources, calibration.adjustment.residual_px, strict=True)
         ]
     )
-    off = off[np.isfinite(off)]
-    return max(float(np.median(off)) if len(off) else 1.0, 1e-3)
+    distances = distances[np.isfinite(distances)]
+    return max(float(np.median(distances)) if len(distances) else 1.0, 1e-3)
 
 
 def _file_name(name: str) -> str:

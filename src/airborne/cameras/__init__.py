@@ -1,7 +1,7 @@
 """Cameras: what a camera is, and its files.
 
-In come calibration files of any known format, detections and clicks; out go `Camera`, `Rig` and points in pictures.
-Knows no video, no body and no trial, and finds no camera: that is `calibration`.
+In come calibration files of any known format, detections and clicks; out go `Camera`, `Rig` and image points.
+Knows no video, no body and no trial. Cameras are estimated in `calibration`.
 """
 
 from airborne.cameras.camera import Camera, Rig, camera_looking_at

@@ -31,7 +31,7 @@ class Camera:
     camera_from_world: RigidTransform
     distortion: Array = field(default_factory=lambda: np.zeros(5))  # k1, k2, p1, p2, k3; of a fisheye k1, k2, k3, k4
     lens: Lens = "brown"
-    shift_sd_px: float = 0.0  # how far the calibration may displace a picture as a whole, right or down [px]
+    shift_sd_px: float = 0.0  # how far the calibration may displace an image as a whole, right or down [px]
 
     @property
     def centre(self) -> Array:
@@ -56,21 +56,21 @@ class Camera:
         return self._distort(xyz[..., :2] / z) @ self.K[:2, :2].T + self.K[:2, 2]
 
     def distort_px(self, px: Array) -> Array:
-        """Move pixels (..., 2) of the same camera without distortion to where this one sees them: (..., 2) [px]."""
+        """Map undistorted pixels (..., 2) to the pixels that the lens gives: (..., 2) [px]."""
         xy = (np.asarray(px, float) - self.K[:2, 2]) @ np.linalg.inv(self.K[:2, :2]).T
         return self._distort(xy) @ self.K[:2, :2].T + self.K[:2, 2]
 
     def undistort_px(self, px: Array) -> Array:
-        """Move pixels (..., 2) [px] to where the same camera without distortion would see them: (..., 2) [px].
+        """Map pixels (..., 2) [px] to those of the same camera without distortion: (..., 2) [px].
 
-        NaN stays NaN, and comes out where the lens model has no inverse.
+        NaN stays NaN; NaN also where the lens model has no inverse.
         """
         px = np.asarray(px, float)
         if not self.is_distorted:
             return px
         xy = (px - self.K[:2, 2]) @ np.linalg.inv(self.K[:2, :2]).T
-        straighten = undistort_fisheye if self.lens == "fisheye" else undistort
-        return straighten(xy, self.distortion) @ self.K[:2, :2].T + self.K[:2, 2]
+        inverse = undistort_fisheye if self.lens == "fisheye" else undistort
+        return inverse(xy, self.distortion) @ self.K[:2, :2].T + self.K[:2, 2]
 
     def _distort(self, xy: Array) -> Array:
         if not self.is_distorted:
@@ -82,7 +82,7 @@ class Camera:
     ) -> Camera:
         """Return the camera of an image whose pixel (i, j) is this image's pixel `scale * (i, j) + offset`.
 
-        One home for fields (scale (1, 2), offset (0, parity)), reduced images and crops.
+        Serves fields (scale (1, 2), offset (0, parity)), reduced images and crops.
         """
         new_from_old = np.array(
             [[1 / scale[0], 0, -offset[0] / scale[0]], [0, 1 / scale[1], -offset[1] / scale[1]], [0, 0, 1.0]]
@@ -90,7 +90,7 @@ class Camera:
         return replace(self, K=new_from_old @ self.K, size=size)
 
     def field(self, parity: int) -> Camera:
-        """Return the camera of one field: the rows `parity, parity + 2, ...` kept at their own places."""
+        """Return the camera of one field: the rows `parity, parity + 2, ...` of the frame."""
         width, height = self.size
         return self.resample(scale=(1, 2), offset=(0, parity), size=(width, (height - parity + 1) // 2))
 
@@ -103,10 +103,11 @@ def camera_looking_at(
     name: str,
     position: ArrayLike,
     target: ArrayLike,
+    *,
     focal_px: float,
     size: tuple[int, int],
 ) -> Camera:
-    """Return a camera of size (width, height) [px] that looks from one world point (3,) to another [m], held level."""
+    """Return a level camera of size (width, height) [px] that looks from one world point (3,) to another [m]."""
     centre, forward = np.asarray(position, float), np.subtract(target, position)
     forward = forward / np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 0.0, 1.0])
@@ -164,5 +165,5 @@ class Rig:
         Lens distortion is taken out first; NaN where fewer than two cameras see the point (see `triangulate`).
         """
         px = np.asarray(px, float)
-        straight = [camera.undistort_px(px[..., i, :]) for i, camera in enumerate(self.cameras)]
-        return triangulate(self.P, np.stack(straight, axis=-2), weights)
+        undistorted = [camera.undistort_px(px[..., i, :]) for i, camera in enumerate(self.cameras)]
+        return triangulate(self.P, np.stack(undistorted, axis=-2), weights)

@@ -1,4 +1,4 @@
-"""Tables of named rows and numbers: points clicked in several pictures, or places typed in."""
+"""Tables of named rows and numbers: points clicked in several images, or positions typed in."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ def read_clicks(path: Path, cameras: Sequence[str]) -> tuple[tuple[str, ...], Ar
     """
     expected = "expected point,<camera>_u,<camera>_v,..."
     names, columns, values = read_named_numbers(path, "point", expected)
-    strange = [name for name in columns if name[-2:] not in ("_u", "_v")]
-    if strange:
-        raise CalibrationError(f"{path.name}: column '{strange[0]}' is not <camera>_u or <camera>_v; {expected}")
-    known = [name for name in cameras if f"{name}_u" in columns and f"{name}_v" in columns]
-    if len(known) < 2:
+    unknown = [name for name in columns if name[-2:] not in ("_u", "_v")]
+    if unknown:
+        raise CalibrationError(f"{path.name}: column '{unknown[0]}' is not <camera>_u or <camera>_v; {expected}")
+    with_columns = [name for name in cameras if f"{name}_u" in columns and f"{name}_v" in columns]
+    if len(with_columns) < 2:
         raise CalibrationError(
-            f"{path.name}: has columns _u and _v of {', '.join(known) or 'none'} of the cameras {', '.join(cameras)}; "
-            "a place needs two of them"
+            f"{path.name}: has columns _u and _v of {', '.join(with_columns) or 'none'} of the cameras "
+            f"{', '.join(cameras)}; a position needs two of them"
         )
     px = np.full((len(names), len(cameras), 2), np.nan)
-    for name in known:
+    for name in with_columns:
         px[:, cameras.index(name)] = values[:, [columns.index(f"{name}_u"), columns.index(f"{name}_v")]]
     for row, column in np.argwhere(np.isnan(px).sum(axis=2) == 1):
         raise CalibrationError(
@@ -57,20 +57,20 @@ def read_named_numbers(path: Path, key: str, expected: str) -> tuple[tuple[str, 
     lines = [row for _, row in read_csv(path, expected, CalibrationError)]
     header, *rows = lines or [[]]
     if key not in header or len(set(header)) < len(header) or not rows:
-        found = ",".join(header)[:80] or "nothing"
-        raise CalibrationError(f"{path.name}: found the header {found} and {len(rows)} rows; {expected}, each once")
-    place = header.index(key)
-    columns = tuple(header[:place] + header[place + 1 :])
+        header_text = ",".join(header)[:80] or "nothing"
+        raise CalibrationError(f"{path.name}: found header {header_text} and {len(rows)} rows; {expected}, each once")
+    key_column = header.index(key)
+    columns = tuple(header[:key_column] + header[key_column + 1 :])
     names: list[str] = []
     values = np.full((len(rows), len(columns)), np.nan)
     for number, row in enumerate(rows):
-        if len(row) != len(header) or not row[place] or row[place] in names:
+        if len(row) != len(header) or not row[key_column] or row[key_column] in names:
             raise CalibrationError(
                 f"{path.name}: row '{','.join(row)[:60]}' needs {len(header)} values and a {key} of its own; {expected}"
             )
-        names.append(row[place])
-        cells = row[:place] + row[place + 1 :]
-        where = f"{path.name}, {key} '{row[place]}'"
+        names.append(row[key_column])
+        cells = row[:key_column] + row[key_column + 1 :]
+        where = f"{path.name}, {key} '{row[key_column]}'"
         values[number] = [_number(cell, f"{where}, {column}") for cell, column in zip(cells, columns, strict=True)]
     return tuple(names), columns, values
 

@@ -1,8 +1,8 @@
-"""2D detections: where a pose network, or a hand, saw a person's points in every camera's pictures.
+"""2D detections: a person's keypoints in every camera's images, found by a pose network or clicked.
 
-Points go by names of our own (`hip_left`, `toe_right`, ...), whichever list of points the network keeps; the list is
-told by its length: COCO 17, OpenPose's COCO 18, BODY_25, HALPE 26, BlazePose 33, and the first points of COCO-WholeBody
-133 and HALPE 136.
+Keypoints have our own names (`hip_left`, `toe_right`, ...), whichever set the network uses; the set is recognised by
+its length: COCO 17, OpenPose's COCO 18, BODY_25, HALPE 26, BlazePose 33, and the first points of COCO-WholeBody 133
+and HALPE 136.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from airborne.types import Array
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Detections:
-    """Points of one person in the pictures of several cameras, frame by frame."""
+    """Keypoints of one person in the images of several cameras, frame by frame."""
 
     cameras: tuple[str, ...]
     points: tuple[str, ...]
     px: Array  # (frames, points, cameras, 2) [px] of the videos themselves; NaN where not seen
-    visibility: Array  # (frames, points, cameras) 0..1: how sure the network is; 0 where not seen
+    visibility: Array  # (frames, points, cameras) 0..1: the network's confidence; 0 where not seen
     notes: tuple[str, ...] = ()  # what the reader should know, one line each
 
     @classmethod
@@ -53,7 +53,7 @@ class Detections:
         return replace(self, px=px, visibility=np.where(is_there[:, None], visibility, 0.0))
 
     def above_visibility(self, least: float) -> Detections:
-        """Return the detections without those less sure than `least`."""
+        """Return the detections with a visibility of `least` or more; the others count as not seen."""
         is_sure = self.visibility >= least
         return replace(
             self, px=np.where(is_sure[..., None], self.px, np.nan), visibility=np.where(is_sure, self.visibility, 0.0)
@@ -67,17 +67,17 @@ def read_detections(
 
     `.npz`: one array (frames, points, 3) a camera, x, y [px] and visibility. Folder: `<camera>_json` or `<camera>`
     below it, one file a frame, the frame being the last number of the file's name. An array or folder belongs to a
-    camera by `named`, by its name, or by the number that it ends in. Of several people in a folder's pictures the one
-    detected most surely is taken, or the one at the place `person` of each file's list. Raises CalibrationError where a
-    camera is missing, or two people are detected about equally surely and `person` does not say which.
+    camera by `named`, by its name, or by the number that it ends in. Of several people in an image the one with the
+    highest confidence is taken, or the one with the index `person` in each file. Raises CalibrationError where a camera
+    is missing, or where two people have about the same confidence and `person` does not say which.
     """
     if path.is_dir():
-        found = camera_folders(path)
+        folders = camera_folders(path)
         named = {camera: name.removesuffix("_json") for camera, name in (named or {}).items()}
-        chosen = _match_cameras(str(path), cameras, list(found), named)
+        key_of = _match_cameras(str(path), cameras, list(folders), named)
         tables, notes = {}, []
-        for camera, name in chosen.items():
-            tables[camera], n_people = read_folder(found[name], person)
+        for camera, name in key_of.items():
+            tables[camera], n_people = read_folder(folders[name], person)
             if n_people > 1:
                 which = "the one detected most surely" if person is None else f"number {person} of each"
                 notes.append(f"{camera}: up to {n_people} people in a picture; took {which}")
@@ -90,8 +90,8 @@ def read_detections(
         raise CalibrationError(
             f"{path} is not a .npz of numbers; expected one array (frames, points, 3) a camera"
         ) from None
-    chosen = _match_cameras(path.name, cameras, list(arrays), named or {})
-    return _detections(path.name, {camera: arrays[name] for camera, name in chosen.items()})
+    key_of = _match_cameras(path.name, cameras, list(arrays), named or {})
+    return _detections(path.name, {camera: arrays[name] for camera, name in key_of.items()})
 
 
 def camera_names(path: Path) -> tuple[str, ...]:
@@ -127,25 +127,25 @@ def write_detections(path: Path, detections: Detections, *, as_folder: bool = Fa
 
 def _match_cameras(where: str, cameras: Sequence[str], keys: Sequence[str], named: Mapping[str, str]) -> dict[str, str]:
     """Return the key of every camera: as named, of the same name, or the only one that ends in the same number."""
-    chosen = {}
+    key_of = {}
     for camera in cameras:
         wanted = named.get(camera, camera)
         alike = [key for key in keys if number_at_end(key) == number_at_end(camera) is not None]
         rivals = [name for name in cameras if number_at_end(name) == number_at_end(camera)]
         if wanted in keys:
-            chosen[camera] = wanted
+            key_of[camera] = wanted
         elif camera not in named and len(alike) == len(rivals) == 1:
-            chosen[camera] = alike[0]
+            key_of[camera] = alike[0]
         else:
             raise CalibrationError(
                 f"{where} holds no detections of '{wanted}'; it has: {', '.join(keys)[:200] or 'none'}; "
                 f'say which are whose with detections_cameras = {{{camera} = "..."}}'
             )
-    return chosen
+    return key_of
 
 
 def _detections(where: str, tables: Mapping[str, Array], notes: tuple[str, ...] = ()) -> Detections:
-    """Put the cameras' tables (frames, points, 3) together; shorter ones end unseen."""
+    """Stack the cameras' tables (frames, points, 3); shorter ones are padded with NaN."""
     if not tables:
         raise CalibrationError(
             f"{where} holds no detections; expected a folder of OpenPose JSON for each camera, or .npz"
@@ -161,8 +161,8 @@ def _detections(where: str, tables: Mapping[str, Array], notes: tuple[str, ...] 
     count = max(n_points.values())
     if len(set(n_points.values())) > 1 or count not in NETWORKS:
         counts = ", ".join(f"{camera} {n}" for camera, n in n_points.items())
-        known = ", ".join(map(str, NETWORKS))
-        raise CalibrationError(f"{where}: points per picture: {counts}; expected the same for all, one of {known}")
+        expected = ", ".join(map(str, NETWORKS))
+        raise CalibrationError(f"{where}: points per picture: {counts}; expected the same for all, one of {expected}")
     names = NETWORKS[count]
     values = np.full((max(map(len, tables.values())), len(names), len(tables), 3), np.nan)
     for column, table in enumerate(tables.values()):
@@ -174,19 +174,19 @@ def _detections(where: str, tables: Mapping[str, Array], notes: tuple[str, ...] 
 
 
 def landmarks_from_points(names: Sequence[str], points: Array) -> dict[str, Array]:
-    """Return points (..., points, 3) [m] by name, and with them the landmarks that lie between them, each (..., 3).
+    """Return points (..., points, 3) [m] by name, and the landmarks interpolated between them, each (..., 3).
 
-    Where they have no point of their own, the head is midway between the ears, the middle of the hand between the
-    knuckles of the first and the last finger, the ball of the foot three quarters of the way from heel to toes. NaN
-    where a point that it needs is NaN; left out where there is no such point.
+    Without keypoints of their own, the head is midway between the ears, the middle of the hand between the knuckles of
+    the first and the last finger, the ball of the foot three quarters of the way from heel to toes. NaN where a
+    keypoint that it needs is NaN; left out where the set has no such keypoint.
     """
-    found = {name: points[..., i, :] for i, name in enumerate(names)}
+    landmarks = {name: points[..., i, :] for i, name in enumerate(names)}
     for landmark, recipes in LANDMARK_RECIPES.items():
         for recipe in recipes:
-            if landmark not in found and set(recipe) <= set(names):
+            if landmark not in landmarks and set(recipe) <= set(names):
                 between = points[..., [names.index(name) for name in recipe], :]
-                found[landmark] = np.einsum("...pi,p->...i", between, np.array(list(recipe.values())))
-    return found
+                landmarks[landmark] = np.einsum("...pi,p->...i", between, np.array(list(recipe.values())))
+    return landmarks
 
 
 def _both_sides(*names: str) -> tuple[str, ...]:

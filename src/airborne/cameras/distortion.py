@@ -11,7 +11,7 @@ _TOLERANCE = 1e-9  # a point still this far off lies where the lens model has no
 
 
 def distort(xy: Array, coefficients: Array) -> Array:
-    """Move ideal normalised points (..., 2) to where the lens puts them: (..., 2)."""
+    """Distort normalised points (..., 2): (..., 2)."""
     k1, k2, p1, p2, k3 = (*coefficients, 0.0, 0.0, 0.0, 0.0)[:5]
     x, y = xy[..., 0], xy[..., 1]
     r2 = x * x + y * y
@@ -26,19 +26,19 @@ def distort(xy: Array, coefficients: Array) -> Array:
 
 
 def undistort(xy: Array, coefficients: Array) -> Array:
-    """Move normalised points (..., 2) from where the lens puts them to the ideal ones: (..., 2).
+    """Undistort normalised points (..., 2): (..., 2).
 
-    The inverse of `distort` by Newton's iteration; NaN where a strong lens model folds back and has no inverse.
+    The inverse of `distort` by Newton's method; NaN where a strong lens model folds back and has no inverse.
     """
     xy = np.asarray(xy, float)
     ideal = xy.copy()
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a diverging point ends as NaN below
         for _ in range(_N_STEPS):
-            miss = distort(ideal, coefficients) - xy
-            ideal = ideal - np.einsum("...ij,...j->...i", _inverse_jacobian(ideal, coefficients), miss)
-        miss = np.abs(distort(ideal, coefficients) - xy).max(axis=-1)
+            error = distort(ideal, coefficients) - xy
+            ideal = ideal - np.einsum("...ij,...j->...i", _inverse_jacobian(ideal, coefficients), error)
+        error = np.abs(distort(ideal, coefficients) - xy).max(axis=-1)
         is_before_fold = np.linalg.det(_inverse_jacobian(ideal, coefficients)) > 0
-    is_solved = is_before_fold & (miss <= _TOLERANCE * (1 + np.abs(xy).max(axis=-1)))
+    is_solved = is_before_fold & (error <= _TOLERANCE * (1 + np.abs(xy).max(axis=-1)))
     return np.where(is_solved[..., None], ideal, np.nan)
 
 
@@ -48,18 +48,18 @@ def _inverse_jacobian(xy: Array, coefficients: Array) -> Array:
     x, y = xy[..., 0], xy[..., 1]
     r2 = x * x + y * y
     radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    radial_slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))  # d radial / d r2, twice: times x or y below
-    xx = radial + x * x * radial_slope + 2 * p1 * y + 6 * p2 * x
-    yy = radial + y * y * radial_slope + 6 * p1 * y + 2 * p2 * x
-    xy_ = x * y * radial_slope + 2 * p1 * x + 2 * p2 * y  # the derivative is symmetric
+    radial_derivative = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))  # d radial / d r2, twice: times x or y below
+    xx = radial + x * x * radial_derivative + 2 * p1 * y + 6 * p2 * x
+    yy = radial + y * y * radial_derivative + 6 * p1 * y + 2 * p2 * x
+    xy_ = x * y * radial_derivative + 2 * p1 * x + 2 * p2 * y  # the derivative is symmetric
     determinant = xx * yy - xy_ * xy_
     return np.stack([np.stack([yy, -xy_], -1), np.stack([-xy_, xx], -1)], -2) / determinant[..., None, None]
 
 
 def distort_fisheye(xy: Array, coefficients: Array) -> Array:
-    """Move pinhole points (..., 2) to where a fisheye lens puts them: (..., 2).
+    """Distort pinhole points (..., 2) by a fisheye lens: (..., 2).
 
-    A ray at the angle a from the axis is seen at the radius `a + k1 a^3 + k2 a^5 + k3 a^7 + k4 a^9` (Kannala and
+    A ray at the angle a from the axis is imaged at the radius `a + k1 a^3 + k2 a^5 + k3 a^7 + k4 a^9` (Kannala and
     Brandt 2006, as in OpenCV); coefficients (4,).
     """
     xy = np.asarray(xy, float)
@@ -69,7 +69,7 @@ def distort_fisheye(xy: Array, coefficients: Array) -> Array:
 
 
 def undistort_fisheye(xy: Array, coefficients: Array) -> Array:
-    """Move points (..., 2) from where a fisheye lens puts them to the pinhole ones: (..., 2).
+    """Undistort points (..., 2) of a fisheye lens: (..., 2).
 
     The inverse of `distort_fisheye`; NaN for rays 90 degrees and more from the axis, and where the lens folds back.
     """
@@ -79,8 +79,8 @@ def undistort_fisheye(xy: Array, coefficients: Array) -> Array:
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a diverging point ends as NaN below
         for _ in range(_N_STEPS):
             angle = angle - (_fisheye_radius(angle, coefficients) - radius) / _fisheye_derivative(angle, coefficients)
-        miss = np.abs(_fisheye_radius(angle, coefficients) - radius)
-        is_solved = (miss <= _TOLERANCE * (1 + radius)) & (_fisheye_derivative(angle, coefficients) > 0)
+        error = np.abs(_fisheye_radius(angle, coefficients) - radius)
+        is_solved = (error <= _TOLERANCE * (1 + radius)) & (_fisheye_derivative(angle, coefficients) > 0)
         is_solved &= (angle >= 0) & (angle < np.pi / 2)
         scale = np.where(radius > 0, np.tan(angle) / radius, 1)
     return np.where(is_solved[..., None], xy * scale[..., None], np.nan)

@@ -1,7 +1,7 @@
-"""The direct linear transformation: 11 numbers that map the world to one picture. Arrays only.
+"""The direct linear transformation: 11 numbers that map the world to one image. Arrays only.
 
 `u = (L1 X + L2 Y + L3 Z + L4) / (L9 X + L10 Y + L11 Z + 1)`, v likewise with L5..L8. Kept here as the matrix P (3, 4)
-of the same numbers, scaled so that its third row gives the depth in metres: it also holds where the 1 would vanish.
+of the same numbers, scaled so that its third row gives the depth in metres: valid even where L12 = 0.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ FEWEST_DLT_POINTS = 6  # needed for 11 numbers
 class Decomposition:
     """What a projection matrix says about the camera: x right, y down, z forward.
 
-    `R` is orthogonal; its determinant is -1 where no real camera fits because the world or the picture is mirrored.
+    `R` is orthogonal; its determinant is -1 where no real camera fits because the world or the image is mirrored.
     """
 
     K: Array  # (3, 3) [px]
@@ -63,8 +63,8 @@ def dlt_coefficients(P: Array) -> Array:
 def decompose(P: Array) -> Decomposition:
     """Split P (3, 4) into K, R and centre, in the classical closed form.
 
-    The axes are the rows of P without their share along the line of sight. Skew is dropped and R made orthogonal, so a
-    P without skew comes back from `compose` exactly.
+    The axes are the rows of P without their component along the optical axis. Skew is dropped and R made orthogonal, so
+    `compose` restores a P without skew exactly.
     """
     r3 = P[2, :3] / np.linalg.norm(P[2, :3])
     P = P / np.linalg.norm(P[2, :3])
@@ -80,8 +80,7 @@ def decompose(P: Array) -> Decomposition:
 def decompose_with_skew(P: Array) -> Decomposition:
     """Split P (3, 4), of either sign, into K with skew, R and centre: all eleven numbers are kept.
 
-    The axes by Gram and Schmidt from the line of sight upwards, which is the RQ decomposition. P's sign is chosen so
-    that R is a rotation.
+    RQ decomposition by Gram-Schmidt, beginning with the optical axis. P's sign is chosen so that R is a rotation.
     """
     P = P / np.linalg.norm(P[2, :3]) * np.sign(np.linalg.det(P[:, :3]))
     right, down, r3 = P[:, :3]

@@ -1,4 +1,4 @@
-"""Calibration files: told apart by what is in them, not by their names; each format has its file in `formats/`."""
+"""Calibration files: recognised by their content, not by their names; each format has its module in `formats/`."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ _XML_ROOTS = {"calibration": ("qualisys", rig_from_qualisys), "Cameras": ("vicon
 
 @dataclass(frozen=True, slots=True)
 class CalibrationFile:
-    """A calibration file that was told from others, and not yet built."""
+    """A calibration file of a recognised format; `build` makes the rig."""
 
-    format: str  # one of UNITS; pose2sim also for aniposelib, which has the same layout
+    format: str  # one of FORMAT_UNITS; pose2sim also for aniposelib, which has the same layout
     where: str
     build: Callable[[FileOptions], Rig]
 
@@ -57,35 +57,37 @@ def read_rig(
 ) -> Rig:
     """Read a calibration of any known format, in the file's order of cameras; a folder of OpenCV YAML counts as one.
 
-    unit: of the file's lengths; None takes what the format defines (Pose2Sim's layout: metres). size: of the pictures,
-    (width, height) [px], for formats that do not hold it: DLT coefficients, some OpenCV files. pixels: where DLT
-    coefficients count pixels from; None takes DLTdv 8's way. Raises CalibrationError for a file that is of no known
-    format, and where no unit was given and the cameras lie more than 200 m or all within 5 cm of each other.
+    unit: of the file's lengths; None takes what the format defines (Pose2Sim's layout: metres). size: of the images,
+    (width, height) [px], for formats that do not hold it: DLT coefficients, some OpenCV files. pixels: the pixel
+    convention of DLT coefficients; None is DLTdv 8's. Raises CalibrationError for a file of no known format, and where
+    no unit is given and the cameras stand more than 200 m apart or all within 5 cm of each other.
     """
     return build_rig(open_calibration(path), FileOptions(unit=unit, size=size, pixels=pixels or PixelConvention()))
 
 
 def build_rig(file: CalibrationFile, options: FileOptions) -> Rig:
-    """Return the rig of a calibration file, checked against what was given (see `read_rig`)."""
+    """Build the rig of a calibration file and check it against the options (see `read_rig`)."""
     rig = file.build(options)
     for camera in rig:
         size = options.size.get(camera.name) if isinstance(options.size, Mapping) else options.size
         if size not in (None, camera.size):
-            said = f"{camera.size[0]}x{camera.size[1]}"
-            raise CalibrationError(f"{file.where} says that '{camera.name}' has pictures of {said}; leave --size out")
+            size_text = f"{camera.size[0]}x{camera.size[1]}"
+            raise CalibrationError(
+                f"{file.where} says that '{camera.name}' has pictures of {size_text}; leave --size out"
+            )
     if options.unit is None and check_baselines(rig):
-        asked = (
+        question = (
             "millimetres? Then say --unit mm" if longest_baseline_m(rig) > FARTHEST_M else "metres? Then say --unit m"
         )
         raise CalibrationError(
-            f"{file.where}: the cameras lie up to {longest_baseline_m(rig):.3g} m from each other; are its lengths in {asked}; "
-            "`airborne convert` writes such a file anew, in metres"
+            f"{file.where}: the cameras lie up to {longest_baseline_m(rig):.3g} m from each other; are its lengths in "
+            f"{question}; `airborne convert` writes such a file anew, in metres"
         )
     return rig
 
 
 def open_calibration(path: str | Path) -> CalibrationFile:
-    """Tell of which format a calibration is. Raises CalibrationError for a file of no known one."""
+    """Recognise the format of a calibration file. Raises CalibrationError for a file of no known format."""
     path = Path(path)
     where = str(path)
     if path.is_dir():
@@ -107,8 +109,8 @@ def open_calibration(path: str | Path) -> CalibrationFile:
         document = parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         first = text.strip().splitlines()[0][:40]
-        found = f"as TOML, {_short(error)}" if path.suffix.lower() == ".toml" else f"it begins with {first!r}"
-        raise CalibrationError(f"{where} is no calibration ({found}); {_EXPECTED}") from None
+        content = f"as TOML, {_short(error)}" if path.suffix.lower() == ".toml" else f"it begins with {first!r}"
+        raise CalibrationError(f"{where} is no calibration ({content}); {_EXPECTED}") from None
     if isinstance(document.get("cameras"), dict):
         return CalibrationFile("caliscope", where, partial(rig_from_caliscope, document, where))
     return CalibrationFile("pose2sim", where, partial(rig_from_tables, document, where))
@@ -123,19 +125,19 @@ def write_rig(
     pixels: PixelConvention | None = None,
     errors_px: Mapping[str, float] | None = None,
 ) -> tuple[str, ...]:
-    """Write a calibration and return what the format cannot hold, a phrase each; `read_rig` gives the rest back.
+    """Write a calibration and return what the format cannot hold, a phrase each; `read_rig` restores the rest.
 
-    format: a key of `UNITS`; None goes by the file's name. easymocap makes a folder with two files. unit: of lengths,
-    where the format leaves a choice. pixels: where DLT coefficients count pixels from; None is DLTdv 8's way.
-    errors_px: reprojection RMS by camera, kept by pose2sim and caliscope. Raises CalibrationError.
+    format: a key of `FORMAT_UNITS`; None goes by the file's name. easymocap makes a folder with two files. unit: of
+    lengths, where the format leaves a choice. pixels: the pixel convention of DLT coefficients; None is DLTdv 8's.
+    errors_px: reprojection RMS by camera, written by pose2sim and caliscope. Raises CalibrationError.
     """
     path = Path(path)
     kind = format or format_of_name(path)
-    chosen = _unit(kind, unit)
+    file_unit = _unit(kind, unit)
     for name in rig.names:
         if not name.isprintable() or not name.strip():
             raise CalibrationError(f"camera {name!r} has a name that files cannot hold; rename it")
-    texts, notes = _texts(kind, rig, chosen, pixels or PixelConvention(), errors_px)
+    texts, notes = _texts(kind, rig, file_unit, pixels=pixels or PixelConvention(), errors_px=errors_px)
     if kind == "easymocap":
         path.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
@@ -144,7 +146,7 @@ def write_rig(
 
 
 def write_pose2sim(path: str | Path, rig: Rig, *, errors_px: Mapping[str, float] | None = None) -> None:
-    """Write a Pose2Sim `Calib.toml`; `read_rig` gives the numbers back, the rotation up to rounding.
+    """Write a Pose2Sim `Calib.toml`; `read_rig` restores the numbers, the rotation up to rounding.
 
     A fifth distortion term is written where there is one. errors_px: reprojection RMS by camera; each stands in its
     camera's table as `error`, their RMS in `[metadata]`.
@@ -161,9 +163,9 @@ def format_of_name(path: Path) -> str:
 
 
 def _texts(
-    kind: str, rig: Rig, unit: Unit, pixels: PixelConvention, errors_px: Mapping[str, float] | None
+    kind: str, rig: Rig, unit: Unit, *, pixels: PixelConvention, errors_px: Mapping[str, float] | None
 ) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Return the texts by the name of their file, and what they do not hold."""
+    """Return the texts by file name, and what they cannot hold."""
     if kind == "easymocap":
         return easymocap_texts(rig, unit), ()
     write = {
@@ -199,7 +201,7 @@ def _read_text(path: Path) -> str:
 
 
 def _opencv_calibration(path: Path, where: str, document: dict[str, Any]) -> CalibrationFile:
-    """Return an OpenCV calibration; where it has only one half, the other is looked for beside it."""
+    """Return an OpenCV calibration; if the file holds intrinsics or extrinsics only, look for the others beside it."""
     if path.is_file() and len(halves_in(document)) == 1:
         beside = [_opencv_file(other) for other in _yaml_files(path.parent) if other != path]
         others = [other for other in beside if len(halves_in(other) | halves_in(document)) == 2]
@@ -220,8 +222,8 @@ def _opencv_file(path: Path) -> dict[str, Any]:
 
 
 def _yaml_files(folder: Path) -> list[Path]:
-    found = sorted(path for path in folder.iterdir() if path.suffix.lower() in (".yml", ".yaml") and path.is_file())
-    return [path for path in found if path.read_bytes()[:5] == b"%YAML"]
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in (".yml", ".yaml") and path.is_file())
+    return [path for path in paths if path.read_bytes()[:5] == b"%YAML"]
 
 
 def _short(error: Exception) -> str:

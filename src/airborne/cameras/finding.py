@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One thing found: what, with the number that shows it, and what to do."""
+    """One diagnosis: what is wrong, with the number that shows it, and what to do."""
 
     kind: str  # one word for programs: "board", "coverage", "bridge", "mirrored", "turned", "moved", "swapped", ...
     what: str
     advice: str
-    cameras: tuple[str, ...] = ()  # whom it is about; empty: all
+    cameras: tuple[str, ...] = ()  # which it concerns; empty: all
 
     @property
     def sentence(self) -> str:
@@ -22,5 +22,5 @@ class Finding:
 
 
 def join_names(names: Sequence[str]) -> str:
-    """Return names as people write them: a, b and c."""
+    """Join names as people write them: a, b and c."""
     return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]])) if names else "none"

@@ -40,7 +40,7 @@ _REPRODUCE = {"rigid": reproduce.reproduce_rigid_command, "blockjump": reproduce
 
 
 def _group(commands: dict, text: str, **options: Any) -> typer.Typer:
-    group = typer.Typer(no_args_is_help=True, help=text, **options)
+    group = typer.Typer(no_args_is_help=True, help=text, rich_markup_mode=None, **options)  # [start] is no markup
     for name, command in commands.items():
         group.command(name)(command)
     return group

@@ -30,7 +30,7 @@ Columns = Mapping[str, Column]
 
 
 def body_columns(
-    motion: Motion, model: BodyModel, points: NDArray, *, sd: NDArray, com: tuple[NDArray, NDArray] | None
+    motion: Motion, model: BodyModel, points: NDArray, sd: NDArray, *, com: tuple[NDArray, NDArray] | None
 ) -> Columns:
     """Return the columns of one body: the root's angles, its landmarks, its joints' angles, its centre of mass.
 

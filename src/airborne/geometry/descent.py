@@ -26,7 +26,7 @@ class Rule(Protocol):
     first: float
 
     def after_gain(self, value: float, ratio: float) -> float:
-        """Return the number after a step that gained `ratio` times what it promised."""
+        """Return the number after a step that gained `ratio` times the predicted decrease."""
         ...
 
     def after_loss(self, value: float, n_losses: int) -> float:
@@ -63,15 +63,15 @@ class MarquardtRule:
 
 @dataclass(frozen=True, slots=True)
 class NielsenRule:
-    """Damping by the gain, as a share of what was promised, and ever faster from loss to loss (Nielsen 1999)."""
+    """Damping by the gain ratio, and ever faster from loss to loss (Nielsen 1999)."""
 
     first: float
     least: float
     most: float
-    least_factor: float  # after a gain as large as promised
+    least_factor: float  # after a gain as large as predicted
 
     def after_gain(self, value: float, ratio: float) -> float:
-        """Return the damping: less above half of the promise, more below."""
+        """Return the damping: less for a ratio above one half, more below."""
         return max(value * max(self.least_factor, 1 - (2 * min(ratio, 1.0) - 1) ** 3), self.least)
 
     def after_loss(self, value: float, n_losses: int) -> float:
@@ -111,7 +111,7 @@ class Iterate(Protocol):
         ...
 
     def step(self, value: float) -> tuple[Any, float]:
-        """Return where a step leads, damped or shortened by the rule's number, and how much less cost it promises."""
+        """Return where a step leads, damped or shortened by the rule, and the predicted decrease of the cost."""
         ...
 
 
@@ -134,24 +134,24 @@ def descend(
     rule: Rule,
     *,
     most_steps: int,
-    least_promise: tuple[float, float] | None = None,
+    least_predicted: tuple[float, float] | None = None,
     least_gain: float = 0.0,
     slack: float = 0.0,
     progress: Callable[[int, float], None] | None = None,
 ) -> Descent[T]:
-    """Step downhill from the first iterate until the next step promises, or the last one gained, next to nothing.
+    """Step downhill from the first iterate until the predicted decrease, or the last gain, is next to nothing.
 
-    least_promise: of the cost, absolute and as a share of it. least_gain, a share of the cost, ends the descent after
-    a smaller gain. slack: a cost larger by this share still counts as a gain, where it fluctuates. progress takes the
-    steps tried and the cost at every gain.
+    least_predicted: decrease of the cost, absolute and as a share of it. least_gain, a share of the cost, ends the
+    descent after a smaller gain. slack: a cost larger by this share still counts as a gain, where it fluctuates.
+    progress takes the steps tried and the cost at every gain.
     """
     best, value, n_losses = first, rule.first, 0
     cost, n = first.cost(first), 0
     while n < most_steps:
         if rule.is_exhausted(value):
             return Descent(best, Outcome.STUCK, n, n_losses)
-        following, promised = best.step(value)
-        if least_promise is not None and promised <= least_promise[0] + least_promise[1] * cost:
+        following, predicted = best.step(value)
+        if least_predicted is not None and predicted <= least_predicted[0] + least_predicted[1] * cost:
             return Descent(best, Outcome.CONVERGED, n, n_losses)
         trial = evaluate(following)
         new, n = trial.cost(best), n + 1
@@ -160,7 +160,7 @@ def descend(
             value = rule.after_loss(value, n_losses)
             continue
         gain, best, n_losses = cost - new, trial, 0
-        value = rule.after_gain(value, gain / promised)
+        value = rule.after_gain(value, gain / predicted)
         cost = trial.cost(trial)
         if progress is not None:
             progress(n, cost)

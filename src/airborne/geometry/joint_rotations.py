@@ -1,21 +1,22 @@
-"""Kernels that turn joints and tell the turn between two of them: x-y-z angles and rotation vectors, many at once."""
+"""Kernels on SO(3) for many joints at once: compose x-y-z angles with rotation vectors, and the inverse."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from numba import njit
+
+from airborne.kernels import kernel
 
 _GIMBAL_LOCK = 1e-8  # cosine of the middle angle below which the other two are one angle
 _SMALL = 1e-8  # of an angle or its sine
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def compose_rotation_vectors(angles, rotation_vectors):
-    """Return the angles (n, 3) [rad] of Rx Ry Rz exp(turn), on the branch near the old angles (n, 3).
+    """Return the angles (n, 3) [rad] of Rx Ry Rz exp(v), on the branch near the old angles (n, 3).
 
-    turns (n, 3) are rotation vectors [rad] in the turned axes.
+    rotation_vectors (n, 3) [rad] are given in the joint's own, rotated axes.
     """
     out, R, T, product = np.empty_like(angles), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for j in range(len(angles)):
@@ -28,9 +29,12 @@ def compose_rotation_vectors(angles, rotation_vectors):
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def rotation_vectors_between(earlier, later):
-    """Return the rotation vectors (n, 3) that `turned` takes from angles earlier (n, 3) to later (n, 3) [rad]."""
+    """Return the rotation vectors (n, 3) [rad] from angles earlier to later (n, 3).
+
+    The inverse of `compose_rotation_vectors`.
+    """
     out, A, B, product = np.empty_like(earlier), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for j in range(len(earlier)):
         _matrix(earlier[j], A)
@@ -42,7 +46,7 @@ def rotation_vectors_between(earlier, later):
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _matrix(angles, R):
     cx, sx = math.cos(angles[0]), math.sin(angles[0])
     cy, sy = math.cos(angles[1]), math.sin(angles[1])
@@ -52,22 +56,22 @@ def _matrix(angles, R):
     R[2, 0], R[2, 1], R[2, 2] = sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy
 
 
-@njit(cache=True, nogil=True)
-def _exponential(turn, R):
-    angle2 = turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2
+@kernel
+def _exponential(vector, R):
+    angle2 = vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2
     angle = math.sqrt(angle2)
     small = angle < _SMALL
     s = 1.0 if small else math.sin(angle) / angle
     c = 0.5 if small else (1 - math.cos(angle)) / angle2
-    x, y, z = turn[0], turn[1], turn[2]
+    x, y, z = vector[0], vector[1], vector[2]
     R[0, 0], R[1, 1], R[2, 2] = 1 - c * (y * y + z * z), 1 - c * (x * x + z * z), 1 - c * (x * x + y * y)
     R[0, 1], R[1, 0] = c * x * y - s * z, c * x * y + s * z
     R[0, 2], R[2, 0] = c * x * z + s * y, c * x * z - s * y
     R[1, 2], R[2, 1] = c * y * z - s * x, c * y * z + s * x
 
 
-@njit(cache=True, nogil=True)
-def _logarithm(R, turn):
+@kernel
+def _logarithm(R, vector):
     """Fill the rotation vector of R through its quaternion, whose largest component is found without cancellation."""
     w = 1 + R[0, 0] + R[1, 1] + R[2, 2]
     x = 1 + R[0, 0] - R[1, 1] - R[2, 2]
@@ -86,12 +90,12 @@ def _logarithm(R, turn):
     if w < 0:
         w, x, y, z = -w, -x, -y, -z
     scale = 2 / w if sine < _SMALL * w else 2 * math.atan2(sine, w) / sine
-    turn[0], turn[1], turn[2] = scale * x, scale * y, scale * z
+    vector[0], vector[1], vector[2] = scale * x, scale * y, scale * z
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _angles_near(R, near, out):
-    """Fill the angles of R on the branch nearest to `near` (3,); where y is +-90 degrees, x stays as it was."""
+    """Fill the angles of R on the branch nearest to `near` (3,); where y is +-90 degrees, x keeps its value."""
     cosine = math.hypot(R[1, 2], R[2, 2])
     x = near[0] if cosine < _GIMBAL_LOCK else math.atan2(-R[1, 2], R[2, 2])
     y = math.atan2(R[0, 2], math.hypot(R[0, 0], R[0, 1]))
@@ -111,7 +115,7 @@ def _angles_near(R, near, out):
         out[0], out[1], out[2] = one0, one1, one2
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _nearest_equivalent(angle, near):
-    """Return the angle, whole turns added, nearest to another."""
+    """Return the angle plus the whole revolutions that bring it nearest to another."""
     return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))

@@ -1,4 +1,4 @@
-"""How much numbers scatter: among strays, and as sums of terms that are not independent. Arrays only."""
+"""Robust scatter: standard deviations despite outliers, covariances of sums of correlated terms. Arrays only."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ SD_OF_MEDIAN_DEVIATION = 1.4826  # of normal noise
 
 
 def robust_sd(values: Array) -> float:
-    """Return the standard deviation of normal noise with strays in it, from the median distance to the median."""
+    """Return the standard deviation of normal noise with outliers in it, from the median absolute deviation."""
     return SD_OF_MEDIAN_DEVIATION * float(np.median(np.abs(values - np.median(values))))
 
 
 def covariance_of_sum(terms: Array, reach: int) -> Array:
-    """Return the covariance (d, d) of the sum of terms (n, d) of mean zero, up to `reach` neighbours being alike.
+    """Return the covariance (d, d) of the sum of terms (n, d) of mean zero, correlated over up to `reach` neighbours.
 
-    Products of terms further apart count less and less (Newey and West 1987).
+    The weight of products falls with the distance between the terms (Newey and West 1987).
     """
     total = terms.T @ terms
-    for apart in range(1, min(reach, len(terms) - 1) + 1):
-        both = terms[apart:].T @ terms[:-apart]
-        total += (1 - apart / (reach + 1)) * (both + both.T)
+    for lag in range(1, min(reach, len(terms) - 1) + 1):
+        product = terms[lag:].T @ terms[:-lag]
+        total += (1 - lag / (reach + 1)) * (product + product.T)
     return total

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from airborne.types import Array
 
 _SINGULAR_MARGIN_RAD = np.deg2rad(5.0)  # closer to +-90 degrees of tilt, errors grow over elevenfold
-_RATE_ROWS = 5  # rows before a gap whose mean turning rate is carried across it
+_RATE_ROWS = 5  # rows before a gap whose mean angular rate is carried across it
 
 
 def matrix_from_angles(angles: Array) -> Array:
@@ -40,20 +40,20 @@ def angles_from_matrix(R: Array) -> Array:
 
 
 def is_near_singular(angles: Array) -> NDArray[np.bool_]:
-    """Say where tilt is within 5 degrees of +-90, so that somersault and twist cannot be told apart: (...)."""
+    """Say where tilt is within 5 degrees of +-90 (gimbal lock), where somersault and twist are one rotation: (...)."""
     return np.abs(np.asarray(angles, float)[..., 1]) > np.pi / 2 - _SINGULAR_MARGIN_RAD
 
 
 def unwrap(angles: Array, time_s: Array) -> Array:
-    """Add whole turns to somersault and twist (n, 3) [rad] so that they run on over time (n,) [s].
+    """Add whole revolutions to somersault and twist (n, 3) [rad] so that they are continuous over time (n,) [s].
 
-    Each row lands within half a turn of the row before. Over a gap (NaN rows) it lands within half a turn of where
-    the mean rate of the last rows before the gap leads.
+    Each row lands within half a revolution of the row before; after a gap (NaN rows), within half a revolution of the
+    angle extrapolated at the mean rate of the last rows before the gap.
     """
     result = np.array(angles, float)
-    known = np.flatnonzero(np.isfinite(result).all(axis=-1))
-    for k in range(1, len(known)):
-        row, before = known[k], known[max(k - _RATE_ROWS, 0) : k]
+    valid = np.flatnonzero(np.isfinite(result).all(axis=-1))
+    for k in range(1, len(valid)):
+        row, before = valid[k], valid[max(k - _RATE_ROWS, 0) : k]
         guess = result[before[-1]]
         if row > before[-1] + 1 and len(before) > 1:
             step = (time_s[row] - time_s[before[-1]]) / (time_s[before[-1]] - time_s[before[0]])
@@ -78,12 +78,12 @@ def angles_from_world_rotation(angles: Array) -> Array:
 
 
 def geodesic(A: Array, B: Array) -> Array:
-    """Measure the smallest angle that turns A into B, rotation matrices (..., 3, 3): (...) [rad], 0..pi."""
+    """Return the angle of the rotation between A and B, rotation matrices (..., 3, 3): (...) [rad], 0..pi."""
     relative = np.swapaxes(A, -1, -2) @ B
     axis = relative[..., (2, 0, 1), (1, 2, 0)] - relative[..., (1, 2, 0), (2, 0, 1)]  # 2 sin(angle) times the axis
     return np.arctan2(np.linalg.norm(axis, axis=-1), np.trace(relative, axis1=-2, axis2=-1) - 1)
 
 
 def wrap(angle: Array) -> Array:
-    """Bring angles to the half turn on either side of zero, [-pi, pi) [rad]."""
+    """Wrap angles to [-pi, pi) [rad]."""
     return np.remainder(np.asarray(angle, float) + np.pi, 2 * np.pi) - np.pi

@@ -82,12 +82,12 @@ def _is_seen(px: Array) -> NDArray[np.bool_]:
 
 def _residual_and_jacobian(P: Array, points: Array, px: Array) -> tuple[Array, Array]:
     """Residual (..., c, 2) and the projection's derivative (..., c, 2, 3); zero for views that do not see the point."""
-    seen = _is_seen(px)[..., None]
+    is_seen = _is_seen(px)[..., None]
     projected = px_from_points(P, points)
     depth = _homogeneous_px(P, points)[..., 2]
     depth = np.where(depth > 0, depth, np.nan)
     jacobian = (P[..., :2, :3] - projected[..., None] * P[..., 2:, :3]) / depth[..., None, None]
-    return np.where(seen, px - projected, 0.0), np.where(seen[..., None], jacobian, 0.0)
+    return np.where(is_seen, px - projected, 0.0), np.where(is_seen[..., None], jacobian, 0.0)
 
 
 def _inverse(jacobian: Array) -> Array:

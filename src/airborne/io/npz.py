@@ -1,4 +1,4 @@
-"""`.npz` files read with care: no pickles, nothing larger than it may be, whatever the file declares."""
+"""`.npz` files, read with care: no pickles, and a limit on size whatever the file declares."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _BROKEN += (NotImplementedError, RuntimeError, SyntaxError, MemoryError, Overflo
 
 
 def read_arrays(path: Path) -> dict[str, NDArray]:
-    """Return a file's arrays by name. Raises ValueError for anything but a `.npz` of numbers, OSError where unread."""
+    """Return a file's arrays by name. Raises ValueError for anything but a `.npz` of numbers, OSError if unreadable."""
     try:
         with zipfile.ZipFile(path) as archive:
             members = [member for member in archive.infolist() if member.filename.endswith(".npy")]
@@ -32,7 +32,7 @@ def read_arrays(path: Path) -> dict[str, NDArray]:
 
 
 def write_arrays(path: Path, arrays: Mapping[str, NDArray]) -> None:
-    """Write arrays by name, whatever the names are (`np.savez` takes some for its own)."""
+    """Write arrays by name, whatever the names are (`np.savez` reserves some for itself)."""
     with zipfile.ZipFile(path, "w") as archive:
         for name, values in arrays.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as file:

@@ -1,4 +1,4 @@
-"""Text files read with care: none larger than it may be, none nested too deep. Knows no noun."""
+"""Text files, read with limits on size and nesting; knows no noun of the field."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ _LARGEST_TOML_BYTES = 5_000_000
 _LARGEST_JSON_BYTES = 50_000_000
 _LARGEST_CSV_BYTES = 50_000_000
 
-_DEEP_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){64}""")  # a.a.a...: takes time in squares
+_DEEP_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){64}""")  # a.a.a...: takes quadratic time
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file. Raises OSError, or TOMLDecodeError for anything else, also where it is large or nested."""
+    """Read a TOML file. Raises OSError, or TOMLDecodeError for anything else, also if too large or nested too deep."""
     if path.stat().st_size > _LARGEST_TOML_BYTES:
         raise tomllib.TOMLDecodeError(f"larger than {_LARGEST_TOML_BYTES // 1_000_000} MB")
     try:
@@ -27,12 +27,12 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def list_keys(document: dict[str, Any]) -> str:
-    """Return what stands at the top of a document, for an error."""
+    """Return the top-level keys of a document, for an error message."""
     return ", ".join(key[:60] for key in [*document][:6]) or "nothing"
 
 
 def read_json(path: Path) -> Any:
-    """Read a JSON file. Raises OSError, or ValueError for anything else, also where it is large or nested too deep."""
+    """Read a JSON file. Raises OSError, or ValueError for anything else, also if too large or nested too deep."""
     if path.stat().st_size > _LARGEST_JSON_BYTES:
         raise ValueError(f"larger than {_LARGEST_JSON_BYTES // 1_000_000} MB")
     try:
@@ -42,7 +42,7 @@ def read_json(path: Path) -> Any:
 
 
 def read_csv(path: Path, expected: str, error: type[Exception]) -> list[tuple[int, list[str]]]:
-    """Read the rows of a table with commas that are not empty: the line's number, from 1, and its cells, stripped.
+    """Read the non-empty rows of a comma-separated table: the line number, from 1, and the stripped cells.
 
     Raises `error`, saying in one line what was found and what is `expected`.
     """
@@ -65,7 +65,7 @@ def read_csv(path: Path, expected: str, error: type[Exception]) -> list[tuple[in
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Parse TOML. Raises TOMLDecodeError, in place of whatever else the parser meets in odd files."""
+    """Parse TOML. Raises TOMLDecodeError for whatever the parser stumbles over."""
     if _DEEP_KEY.search(text):
         raise tomllib.TOMLDecodeError("nested too deep")
     try:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from airborne.body import PosedBody, SurfaceArrays
 from airborne.cameras import Camera
+from airborne.kernels import kernel
 from airborne.rendering.lights import Lights
 from airborne.rendering.packing import pack_lights, pack_view, shift_view
 from airborne.rendering.rows import (
@@ -29,7 +29,7 @@ from airborne.rendering.rows import (
     list_spans,
     new_row,
 )
-from airborne.rendering.shapes import KERNEL, VIEW_K, new_shapes, pose_shapes
+from airborne.rendering.shapes import VIEW_K, new_shapes, pose_shapes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +85,7 @@ def render(
     return Rendering((x0, y0, x1, y1), part, segment, inverse_depth, colour)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def draw_maps(shapes, geometry, R, t, view, lights, ambient, part, segment, inverse_depth, colour):
     """Draw on maps that hold background everywhere; see `Rendering` for them, `sum_hypotheses` for the rest."""
     height, width = part.shape

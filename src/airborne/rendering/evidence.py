@@ -10,15 +10,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from airborne.body import SurfaceArrays
 from airborne.cameras import Camera
+from airborne.kernels import kernel
 from airborne.rendering.packing import pack_view
 from airborne.rendering.reduction import reduce_camera, reduce_image
 from airborne.rendering.rows import list_spans
-from airborne.rendering.shapes import KERNEL, new_shapes, pose_shapes
+from airborne.rendering.shapes import new_shapes, pose_shapes
 from airborne.rendering.threads import in_threads
 from airborne.types import Array
 
@@ -69,7 +69,7 @@ def mask_evidence(geometry: SurfaceArrays, maps: EvidenceMaps, R: Array, t: Arra
     return out
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _sum_evidence(shapes, geometry, R, t, views, sizes, sums, out):
     """Fill `out` (n, views); see `mask_evidence`. In each row the spans are sorted from the left and merged."""
     for h in range(len(R)):

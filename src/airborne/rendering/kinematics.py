@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from airborne.body import BodyModel
-from airborne.rendering.shapes import KERNEL
+from airborne.kernels import kernel
 from airborne.types import Array
 
 
@@ -26,7 +25,7 @@ def pose_segments(model: BodyModel, root_R: Array, root_t: Array, joint_angles: 
     return R, t
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _chain(parents, joints, angles, R, t):
     """Fill R and t of every segment but the root: parent's rotation times Rx Ry Rz, about the joint in the parent."""
     for h in range(len(R)):

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from airborne.kernels import kernel
 from airborne.rendering.rows import BLOCK, LANES, NX, NY, NZ, SHAPE, W, block_range, draw_row, list_spans, new_row
-from airborne.rendering.shapes import B_1, B_U, B_V, KERNEL, pose_shapes
+from airborne.rendering.shapes import B_1, B_U, B_V, pose_shapes
 
 
 class SurfaceMaps(NamedTuple):
@@ -30,7 +30,7 @@ def empty_maps(size: tuple[int, int]) -> SurfaceMaps:
     )
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
     """Fill the maps of one view with the surface nearest to the camera.
 

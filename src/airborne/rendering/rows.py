@@ -4,7 +4,7 @@ A row's pixels live in blocks of 16: each block holds nine planes of 16 numbers 
 memory is a constant and LLVM can put a whole plane into one register. Inverse depth is the z-buffer: larger is nearer.
 A lane loop that is too small gets unrolled instead of vectorised, and then costs ten times as much; so does one that
 adds to memory under a condition (add a selected value instead). Measure with `benchmarks/speed/yardstick.py` after any
-change, and delete the folder's `__pycache__` before (see `shapes.py`).
+change.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from airborne.kernels import kernel
 from airborne.rendering.shapes import (
     ALPHA,
     B_1,
@@ -28,7 +28,6 @@ from airborne.rendering.shapes import (
     HALF_VV,
     HEIGHT,
     ID,
-    INNER,
     MID_1,
     MID_V,
     N_STEP,
@@ -53,7 +52,7 @@ class Spans(NamedTuple):
     curves: Any  # (spans, 2) the middle and the half width squared [px]
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def new_row(width):
     """Allocate the blocks of one row, all empty."""
     row = np.empty((width // LANES + 2) * BLOCK, np.float32)
@@ -62,7 +61,7 @@ def new_row(width):
     return row
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _count_rows(shapes, row_start):
     """Fill `row_start` (height + 1,) with room for a shape's spans in each row; return the number of spans."""
     for v in range(len(row_start)):
@@ -80,7 +79,7 @@ def _count_rows(shapes, row_start):
     return row_start[-1]
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _find_spans(shapes, geometry, width, row_start, row_stop, ends, curves):
     """List the pixels of every shape in every row; see `Spans`."""
     for v in range(len(row_stop)):
@@ -120,7 +119,7 @@ def _find_spans(shapes, geometry, width, row_start, row_stop, ends, curves):
             _cut_spans(shapes, e, width, row_stop, ends, curves)
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _add_span(low, high, middle, half_squared, s, v, row_stop, ends, curves):
     """List the pixels of a shape from `low` to `high`, where there are any."""
     if high < low:
@@ -133,7 +132,7 @@ def _add_span(low, high, middle, half_squared, s, v, row_stop, ends, curves):
         row_stop[v] = i + 1
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _cut_spans(shapes, s, width, row_stop, ends, curves):
     """List the pixels at which the near surface of an ellipsoid lies in its slab: at most two spans a row.
 
@@ -163,7 +162,7 @@ def _cut_spans(shapes, s, width, row_stop, ends, curves):
             _add_span(max(least, middle + hole_1), most, middle, half_squared, s, v, row_stop, ends, curves)
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _beyond(outline, height, v, middle, half):
     """Cut row v of an ellipsoid's near surface by the plane at a height: (is_below, low, high), u - middle [px].
 
@@ -191,7 +190,7 @@ def _beyond(outline, height, v, middle, half):
     return d >= 0, low, high
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def list_spans(shapes, geometry, view, width, height):
     """Outline the posed shapes in a view and list their spans."""
     outline_all(shapes, geometry, view, width, height)
@@ -202,7 +201,7 @@ def list_spans(shapes, geometry, view, width, height):
     return Spans(row_start, row_stop, ends, curves)
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def block_range(ends, start, stop):
     """Return the first block that the spans `start` to `stop - 1` touch, and the last."""
     first, last = ends[start, 0], ends[start, 1]
@@ -211,7 +210,7 @@ def block_range(ends, start, stop):
     return first // LANES, last // LANES
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def draw_row(row, outlines, surfaces, ends, curves, start, stop, v, first_block):
     """Draw the spans `start` to `stop - 1` of row v into the blocks of `row`, the nearest surface on top."""
     for i in range(start, stop):
@@ -248,7 +247,7 @@ def draw_row(row, outlines, surfaces, ends, curves, start, stop, v, first_block)
                 block[SHAPE + j] = shape if is_nearest else block[SHAPE + j]
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def light_block(block, lights, x, x_step, y, y_step):
     """Add to the block's light what each lamp gives: intensity times the cosine to the normal, inside its cone.
 

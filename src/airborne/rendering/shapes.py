@@ -13,8 +13,6 @@ B = K^-T m / d, alpha = 0, N = 0 and g = -m; where its shading is smooth, a tria
 g = 0 and N = sum n_i (X_j x X_k)' K^-1 / det(X), the n_i weighted by nearness, times w. A row cuts a polygon between
 its edges, each a half-plane of the image that the camera's centre and the edge span, so nothing has to be clipped where
 corners lie behind the camera.
-
-Numba's cache looks at the file of the calling kernel only: after a change here, delete the folder's `__pycache__`.
 """
 
 from __future__ import annotations
@@ -23,13 +21,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from airborne.body import SurfaceArrays
-
-_COMMON: dict[str, Any] = {"nogil": True, "fastmath": True, "error_model": "numpy"}
-KERNEL = {**_COMMON, "cache": True}  # called from Python
-INNER = {**_COMMON, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # called by kernels only
+from airborne.kernels import kernel
 
 _SEAM_PX = 1e-7  # polygons reach this far beyond their edges, so that no pixel falls between two of a mesh
 
@@ -81,7 +75,7 @@ def new_shapes(geometry: SurfaceArrays) -> Shapes:
     )
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def pose_shapes(shapes, geometry, R, t):
     """Pose the shapes in the world by the segments' R (s, 3, 3) and t (s, 3) [m]."""
     for e in range(len(geometry.ellipsoid_segment)):
@@ -106,7 +100,7 @@ def pose_shapes(shapes, geometry, R, t):
                 shapes.corners[k, i] = a * corner[0] + b * corner[1] + c * corner[2] + t[segment, i]
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _pose_corner_normals(shapes, geometry, R):
     """Rotate the corner normals of smooth triangles to the world."""
     for p in range(len(geometry.is_smooth)):
@@ -118,7 +112,7 @@ def _pose_corner_normals(shapes, geometry, R):
                     shapes.corner_normals[k, i] = R[segment, i, 0] * x + R[segment, i, 1] * y + R[segment, i, 2] * z
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def outline_all(shapes, geometry, view, width, height):
     """Outline every posed shape in a view of `width` pixels a row and `height` rows."""
     n_ellipsoids = len(geometry.ellipsoid_segment)
@@ -137,7 +131,7 @@ def outline_all(shapes, geometry, view, width, height):
         _shade_smoothly(shapes, geometry, view)
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _rotate(view, x, y, z):
     return (
         view[0] * x + view[1] * y + view[2] * z,
@@ -146,7 +140,7 @@ def _rotate(view, x, y, z):
     )
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _outline_ellipsoid(centre, axes, outline, surface, rows, view, height):
     """Outline one ellipsoid; False where it reaches the camera's plane, or no row meets it."""
     m00 = m01 = m02 = m11 = m12 = m22 = a = b = c = 0.0
@@ -199,7 +193,7 @@ def _outline_ellipsoid(centre, axes, outline, surface, rows, view, height):
     return True
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _outline_polygon(shapes, s, p, start, stop, view, height):
     """Outline one convex polygon; False where it faces away, or no row meets it."""
     m0, m1, m2 = _rotate(view, shapes.normals[p, 0], shapes.normals[p, 1], shapes.normals[p, 2])
@@ -240,7 +234,7 @@ def _outline_polygon(shapes, s, p, start, stop, view, height):
     return True
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _shade_smoothly(shapes, geometry, view):
     """Let the normals of smooth triangles go over from corner to corner; one loop, for calls copy all of `shapes`."""
     n_ellipsoids, normals = len(geometry.ellipsoid_segment), shapes.corner_normals
@@ -269,13 +263,13 @@ def _shade_smoothly(shapes, geometry, view):
             surface[N_STEP + j], surface[G + j] = outline[NORMAL + 3 * j], 0.0
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _in_camera(view, point):
     x, y, z = _rotate(view, point[0], point[1], point[2])
     return x + view[_VIEW_T], y + view[_VIEW_T + 1], z + view[_VIEW_T + 2]
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _row_of(view, x, y):
     """Return the row v of the ray (x, y, 1): the second unknown of K^-1 (u, v, 1) = (x, y, 1)."""
     k00, k01, k10, k11 = view[VIEW_K], view[VIEW_K + 1], view[VIEW_K + 3], view[VIEW_K + 4]

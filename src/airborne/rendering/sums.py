@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from airborne.kernels import kernel
 from airborne.rendering.rows import (
     BLOCK,
     BLUE,
@@ -20,7 +20,7 @@ from airborne.rendering.rows import (
     list_spans,
     new_row,
 )
-from airborne.rendering.shapes import INNER, KERNEL, VIEW_K, pose_shapes
+from airborne.rendering.shapes import VIEW_K, pose_shapes
 
 _DARK_SUM = 30.0  # a pixel whose R + G + B is below this has no usable chromaticity
 
@@ -28,7 +28,7 @@ _DARK_SUM = 30.0  # a pixel whose R + G + B is below this has no usable chromati
 PIXELS, ERROR, CROSS, MODEL, COLOURED, CHROMA_ERROR, SUMS = 0, 1, 2, 3, 4, 5, 6
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _compare_row(row, n_blocks, lights, ambient, x, x_step, y, y_step, images, offset, totals):
     """Light the blocks of a row, add their differences from the image to `totals` (SUMS * LANES,), empty them."""
     for b in range(n_blocks):
@@ -52,7 +52,7 @@ def _compare_row(row, n_blocks, lights, ambient, x, x_step, y, y_step, images, o
         y += f4(LANES) * y_step
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _compare_chroma_row(row, n_blocks, images, offset, totals):
     """Add the differences in chromaticity, 255 RGB / (R + G + B), to `totals`; dark pixels and parts are left out."""
     for b in range(n_blocks):
@@ -69,7 +69,7 @@ def _compare_chroma_row(row, n_blocks, images, offset, totals):
             totals[CHROMA_ERROR * LANES + j] += on * (r0 * r0 + r1 * r1 + r2 * r2)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def sum_hypotheses(shapes, geometry, R, t, views, sizes, lights, ambient, images, with_chroma, out):
     """Fill `out` (n, views, SUMS) for the hypotheses R (n, s, 3, 3), t (n, s, 3) [m].
 
@@ -106,7 +106,7 @@ def sum_hypotheses(shapes, geometry, R, t, views, sizes, lights, ambient, images
                 out[h, i, k] = total
 
 
-@njit(**INNER)
+@kernel(fastmath=True, is_inner=True)
 def _largest_width(sizes):
     width = 0
     for i in range(len(sizes)):

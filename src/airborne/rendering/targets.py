@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from airborne.kernels import kernel
 from airborne.rendering.evidence import EvidenceMaps, evidence_maps
 from airborne.rendering.lights import Lights
 from airborne.rendering.packing import pack_lights, pack_view
 from airborne.rendering.reduction import reduce_camera, reduce_image
 from airborne.rendering.rows import LANES
-from airborne.rendering.shapes import KERNEL
 from airborne.video import View
 
 
@@ -73,7 +72,7 @@ def pack_targets(
     )
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _pack_pixels(rgb, out):
     """Copy rgb (h, w, 3) to `out` (w, blocks, 3, LANES)."""
     height, width, _ = rgb.shape

@@ -97,7 +97,7 @@ def _read_body(folder: Path, has_tables: bool, progress: Progress) -> _RunData:
     com = (
         _measure_in_chunks(motion, lambda part: _com(part, model), progress, of_rounds=(1, rounds)) if has_com else None
     )
-    columns = body_columns(motion, model, points, sd=sd, com=com) if has_tables else {}
+    columns = body_columns(motion, model, points, sd, com=com) if has_tables else {}
     return _RunData([body_take(motion, model, points, sd)], columns)
 
 

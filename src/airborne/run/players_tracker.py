@@ -56,7 +56,10 @@ def compile_kernels(trial: Trial) -> None:
     at = np.mean([point for start in trial.players for point in start.joints_m.values()], axis=0)
     size = (640, 480)
     asides = zip(trial.camera, np.linspace([-1, 0, 0], [1, 0, 0], len(trial.camera)), strict=True)
-    cameras = [camera_looking_at(camera.name, at + aside + _AWAY, at + aside, 400.0, size) for camera, aside in asides]
+    cameras = [
+        camera_looking_at(camera.name, at + aside + _AWAY, at + aside, focal_px=400.0, size=size)
+        for camera, aside in asides
+    ]
     tracker, grey = players_tracker_of(trial, Rig(tuple(cameras))), np.full((size[1], size[0], 3), 128, np.uint8)
     state = tracker.init()
     for index in range(2):

@@ -123,12 +123,12 @@ def solve_shifts(silhouettes: Sequence[Silhouettes], within_s: float) -> tuple[A
     around = np.vstack([np.eye(n), -np.eye(n), np.zeros((1, n))]) * period_s
     is_finite = np.all([np.isfinite(residuals(offset_s[1:] + change)) for change in around], axis=0)
 
-    def weighted(free_s: Array) -> Array:
+    def in_scale(free_s: Array) -> Array:
         return np.nan_to_num(residuals(free_s)[is_finite]) / _SCALE_RAD
 
     near = offset_s[1:] - period_s, offset_s[1:] + period_s
-    solution = least_squares(weighted, offset_s[1:], bounds=near, loss="cauchy", x_scale=period_s)
-    return np.concatenate([[0.0], solution.x]), np.concatenate([[0.0], _sd(weighted, solution.x, period_s / 8)])
+    solution = least_squares(in_scale, offset_s[1:], bounds=near, loss="cauchy", x_scale=period_s)
+    return np.concatenate([[0.0], solution.x]), np.concatenate([[0.0], _sd(in_scale, solution.x, period_s / 8)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from airborne.kernels import kernel
 from airborne.types import Array
 
 SHIFT_SD_PX = 0.12  # of a full frame: light and edges that are not quite as modelled may displace an image by this
@@ -37,7 +37,7 @@ def covariance_of(curvature: Array, *, noise: float, score_covariance: Array | N
     return (covariance + covariance.T) / 2
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def eigen_decomposition(matrix):
     """Return the eigenvalues (d,) and the eigenvectors (d, d), as columns, of a symmetric matrix, in no order.
 
@@ -71,7 +71,7 @@ def eigen_decomposition(matrix):
     return np.diag(A).copy(), V
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _quadratic_forms(directions, matrix):
     """Return v' M v of a symmetric matrix M (d, d) for each direction v, a column of (d, d): (d,)."""
     d = len(matrix)
@@ -83,7 +83,7 @@ def _quadratic_forms(directions, matrix):
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _compose(directions, values):
     """Return the matrix (d, d) with these eigenvectors, as columns, and eigenvalues (d,)."""
     d = len(values)

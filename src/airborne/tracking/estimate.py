@@ -26,7 +26,7 @@ class Estimate:
 
     The covariance (6 + 3 joints, 6 + 3 joints) is over the root's position [m], a rotation vector in world axes [rad],
     and for the joint of every segment after the root a rotation vector in that segment's own axes [rad]: the numbers of
-    `airborne.body.chain.moved_pose`. (6, 6) of a body with joints says nothing of them. A direction that the images do
+    `airborne.body.chain.move_pose`. (6, 6) of a body with joints says nothing of them. A direction that the images do
     not show has an infinite variance.
     """
 

@@ -8,9 +8,9 @@ from itertools import product
 import av
 import numpy as np
 from av.video.reformatter import ColorRange, Colorspace
-from numba import njit
 from numpy.typing import NDArray
 
+from airborne.kernels import kernel
 from airborne.types import Image
 from airborne.video.frames import PixelBox
 from airborne.video.pixels import UNSPECIFIED_MATRIX, matrix_for, plane_rows, rgb_from_frame
@@ -78,7 +78,7 @@ def _scale(red: float, blue: float, *, is_full: bool) -> NDArray[np.float32]:
     return np.array([black, luma, of_v, of_u * blue / green, of_v * red / green, of_u], np.float32)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _convert(
     y: NDArray[np.uint8],
     u: NDArray[np.uint8],
@@ -115,7 +115,7 @@ def _convert(
             rgb[row, i, 0], rgb[row, i, 1], rgb[row, i, 2] = red[i], green[i], blue[i]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _chroma_rows(row: int, n: int, siting: tuple[int, int], rows_per_chroma: int) -> tuple[int, int, np.float32]:
     """Return the two rows of chroma around a row of luma, and the second one's share."""
     if rows_per_chroma == 1:
@@ -124,7 +124,7 @@ def _chroma_rows(row: int, n: int, siting: tuple[int, int], rows_per_chroma: int
     return j, min(max(j + 2 * is_odd - 1, 0), n - 1), np.float32(siting[is_odd] / 4)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _interpolate_chroma(
     near: NDArray[np.uint8],
     far: NDArray[np.uint8],

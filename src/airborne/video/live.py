@@ -16,7 +16,7 @@ from airborne.video.decoding import DecodedImage, VideoFacts, VideoSource, facts
 from airborne.video.frames import Frames, View
 from airborne.video.lazy import ConversionCache, lazy_view
 from airborne.video.recording import check_sizes
-from airborne.video.sources import POLL_S, SourceKind, kind_of, open_live
+from airborne.video.sources import POLL_S, SourceKind, kind_of, open_source
 from airborne.video.undistortion import Undistortion, undistortion_of
 
 _BUFFER_LENGTH = 16  # images of a camera that wait to be matched, the newest
@@ -60,7 +60,7 @@ class LiveCamera:
                 self.changed.notify_all()
 
     def _read(self) -> None:
-        with open_live(self.source, self.stop) as (container, stream):
+        with open_source(self.source, self.stop) as (container, stream):
             tick = stream.time_base or Fraction(1, _MICRO)
             start_s = 0.0
             for n_ticks, frame in intact_frames(container, stream, size=None):

@@ -39,7 +39,7 @@ def kind_of(source: VideoSource) -> SourceKind:
 
 
 @contextmanager
-def open_live(source: VideoSource, stop: Event) -> Iterator[tuple[InputContainer, VideoStream]]:
+def open_source(source: VideoSource, stop: Event) -> Iterator[tuple[InputContainer, VideoStream]]:
     """Open a live source and yield its container and video stream; reading ends early once `stop` is set.
 
     Raises VideoError where there are no images.

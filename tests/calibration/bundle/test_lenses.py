@@ -26,14 +26,14 @@ def test_pixels_are_those_of_the_camera(lens):
     inner[:, 1] = inner[:, 0]
     inner[:, 4:] = np.stack([np.pad(c.distortion, (0, 5 - len(c.distortion))) for c in rig])
     expected = np.stack([camera.px_from_world(point) for camera, point in zip(rig, world, strict=True)])
-    np.testing.assert_allclose(project(R, centre, inner, is_fisheye, world), expected, rtol=1e-12)
+    np.testing.assert_allclose(project(R, centre, inner, is_fisheye=is_fisheye, world=world), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("lens", ["brown", "fisheye"])
 def test_slopes_are_those_of_differences(lens):
     _, R, centre, inner, is_fisheye, world = numbers(lens)
-    px, by_camera, by_world = project_with_jacobian(R, centre, inner, is_fisheye, world)
-    np.testing.assert_allclose(px, project(R, centre, inner, is_fisheye, world), rtol=EXACT)
+    px, by_camera, by_world = project_with_jacobian(R, centre, inner, is_fisheye=is_fisheye, world=world)
+    np.testing.assert_allclose(px, project(R, centre, inner, is_fisheye=is_fisheye, world=world), rtol=EXACT)
     for number in range(15):
         width = 1e-3 if 6 <= number < 10 else 1e-6
 
@@ -41,22 +41,22 @@ def test_slopes_are_those_of_differences(lens):
             change = np.zeros(15)
             change[number] = step
             turned = Rotation.from_rotvec(change[:3]).as_matrix() @ R
-            return project(turned, centre + change[3:6], inner + change[6:], is_fisheye, world)
+            return project(turned, centre + change[3:6], inner + change[6:], is_fisheye=is_fisheye, world=world)
 
         expected = (moved(width) - moved(-width)) / (2 * width)
         scale = 1 + np.abs(expected).max()
         np.testing.assert_allclose(by_camera[:, :, number] / scale, expected / scale, atol=1e-7)
     for axis in range(3):
         step = 1e-6 * np.eye(3)[axis]
-        ahead = project(R, centre, inner, is_fisheye, world + step)
-        behind = project(R, centre, inner, is_fisheye, world - step)
+        ahead = project(R, centre, inner, is_fisheye=is_fisheye, world=world + step)
+        behind = project(R, centre, inner, is_fisheye=is_fisheye, world=world - step)
         np.testing.assert_allclose(by_world[:, :, axis], (ahead - behind) / 2e-6, rtol=1e-5, atol=1e-3)
 
 
 def test_behind_the_camera_there_is_no_pixel_and_no_slope():
     _, R, centre, inner, is_fisheye, _ = numbers("brown")
     behind = centre - 2 * R[:, 2]
-    px, by_camera, by_world = project_with_jacobian(R, centre, inner, is_fisheye, behind)
+    px, by_camera, by_world = project_with_jacobian(R, centre, inner, is_fisheye=is_fisheye, world=behind)
     assert np.isnan(px).all()
     assert not by_camera.any()
     assert not by_world.any()

@@ -14,7 +14,7 @@ from tests.support.board_prints import photographed
 
 CHARUCO = Board(kind="charuco", columns=5, rows=4, square_m=0.1, marker_m=0.07, dictionary="DICT_5X5_50")
 CHESS = Board(kind="chessboard", columns=7, rows=4, square_m=0.08)
-CAMERA = camera_looking_at("cam", [0, -1.2, 0], [0, 0, 0], 480, (560, 400))
+CAMERA = camera_looking_at("cam", [0, -1.2, 0], [0, 0, 0], focal_px=480, size=(560, 400))
 
 
 def pictures(board, n=3):

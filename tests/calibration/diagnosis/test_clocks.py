@@ -69,12 +69,13 @@ def rows_read_late(readout_s, *, offset_s=0.0, n=400):
 def test_rows_read_one_by_one_are_told_with_their_time():
     residual, velocity, row = rows_read_late(0.020, offset_s=0.004)
     residual[::17] += 30
-    [found] = check_rolling_shutter("cam1", residual, velocity, row, 1080)
+    [found] = check_rolling_shutter("cam1", residual, velocity, row_px=row, height_px=1080)
     assert float(found.sentence.split("over ")[1].split(" ms")[0]) == pytest.approx(20, abs=2)
 
 
 def test_a_shutter_that_opens_at_once_is_not_doubted():
-    assert check_rolling_shutter("cam1", *rows_read_late(0.0, offset_s=0.004), 1080) == []
+    residual, velocity, row = rows_read_late(0.0, offset_s=0.004)
+    assert check_rolling_shutter("cam1", residual, velocity, row_px=row, height_px=1080) == []
     residual, velocity, row = rows_read_late(0.02)
-    assert check_rolling_shutter("cam1", residual, 0 * velocity, row, 1080) == []
-    assert check_rolling_shutter("cam1", residual * np.nan, velocity, row, 1080) == []
+    assert check_rolling_shutter("cam1", residual, 0 * velocity, row_px=row, height_px=1080) == []
+    assert check_rolling_shutter("cam1", residual * np.nan, velocity, row_px=row, height_px=1080) == []

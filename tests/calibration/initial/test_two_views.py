@@ -7,8 +7,8 @@ from airborne.calibration.initial.two_views import fit_epipolar_geometry, relati
 from airborne.cameras import camera_looking_at
 from tests.support.tolerances import SOLVED
 
-A = camera_looking_at("a", (-4, -6, 2), (0, 0, 1), 1200, (1280, 720))
-B = camera_looking_at("b", (5, -5, 3), (0.2, 0, 1.2), 900, (1280, 720))
+A = camera_looking_at("a", (-4, -6, 2), (0, 0, 1), focal_px=1200, size=(1280, 720))
+B = camera_looking_at("b", (5, -5, 3), (0.2, 0, 1.2), focal_px=900, size=(1280, 720))
 
 
 def pair(rng, n=100):
@@ -19,7 +19,7 @@ def pair(rng, n=100):
 def test_the_place_of_the_second_camera_is_found_but_for_the_scale():
     points, px_a, px_b = pair(np.random.default_rng(0))
     found = fit_epipolar_geometry(px_a, px_b, limit_px=1.0)
-    place = relative_pose(found.F, A.K, B.K, px_a, px_b)
+    place = relative_pose(found.F, A.K, B.K, px_a=px_a, px_b=px_b)
     b_from_a = B.camera_from_world * A.camera_from_world.inv()
     length = np.linalg.norm(b_from_a.translation)
     assert found.is_inlier.all()
@@ -31,7 +31,7 @@ def test_the_place_of_the_second_camera_is_found_but_for_the_scale():
 
 def test_the_parallax_is_the_angle_between_the_rays():
     points, px_a, px_b = pair(np.random.default_rng(1))
-    place = relative_pose(fit_epipolar_geometry(px_a, px_b, limit_px=1.0).F, A.K, B.K, px_a, px_b)
+    place = relative_pose(fit_epipolar_geometry(px_a, px_b, limit_px=1.0).F, A.K, B.K, px_a=px_a, px_b=px_b)
     rays = [camera.centre - points for camera in (A, B)]
     cosine = np.sum(rays[0] * rays[1], axis=1) / np.prod([np.linalg.norm(ray, axis=1) for ray in rays], axis=0)
     assert place.parallax_rad == pytest.approx(np.median(np.arccos(cosine)), abs=1e-4)

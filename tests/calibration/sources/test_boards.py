@@ -13,7 +13,7 @@ from tests.support.board_prints import photographed
 
 CHARUCO = Board(kind="charuco", columns=5, rows=4, square_m=0.1, marker_m=0.075, dictionary="DICT_4X4_50")
 CHESS = Board(kind="chessboard", columns=7, rows=4, square_m=0.08)
-CAMERA = camera_looking_at("cam", [0, -1.2, 0], [0, 0, 0], 800, (960, 640))
+CAMERA = camera_looking_at("cam", [0, -1.2, 0], [0, 0, 0], focal_px=800, size=(960, 640))
 FACING = Rotation.from_euler("x", -90, degrees=True)  # the board's z along the camera's
 
 

@@ -36,7 +36,7 @@ def test_caliscope_cameras_without_a_place_are_left_out(tmp_path, text_of):
     for absent in ("", 'rotation = "null"\n'):
         found = read(tmp_path, text.replace(rotation, absent))
         assert found.names == ("cam_0", "cam_2")
-    with pytest.raises(CalibrationError, match="none of its 3 cameras has a place"):
+    with pytest.raises(CalibrationError, match="none of its 3 cameras has a pose"):
         read(tmp_path, re.sub(r"rotation = .*\n", "", text))
 
 

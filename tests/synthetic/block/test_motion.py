@@ -50,7 +50,7 @@ def test_jump_rises_as_planned(movement):
     assert heights.max() - heights[0] == pytest.approx(PLAN.rise_m, abs=1e-5)
 
 
-def test_place_and_speed_go_on_through_takeoff_and_landing(movement):
+def test_position_and_velocity_are_continuous_at_takeoff_and_landing(movement):
     h = 1e-5
     for edge in (0.0, movement.flight.duration_s):
         t = edge + h * np.array([-2, -1, 1, 2])
@@ -63,7 +63,7 @@ def test_place_and_speed_go_on_through_takeoff_and_landing(movement):
         np.testing.assert_allclose(at.joint_angles[0], at.joint_angles[1], atol=1e-6)
 
 
-def test_acceleration_goes_on_through_takeoff(movement):
+def test_acceleration_is_continuous_at_takeoff(movement):
     h = 1e-4
     t = h * np.array([-3, -2, -1, 0, 1, 2, 3])
     centre = movement.person.centre_of_mass(movement(t))
@@ -129,7 +129,7 @@ def test_margins_see_a_body_under_the_floor_and_through_the_net():
     assert margins_of(movement.person, bent, side=-1).limits_rad < 0
 
 
-def test_moved_course_is_the_same_motion_elsewhere(movement):
+def test_translated_movement_is_the_same_elsewhere(movement):
     t, way = all_times(movement, 25), np.array([0.7, -0.3])
     here, there = movement(t), translate(movement, way)(t)
     np.testing.assert_allclose(there.root_t, here.root_t + np.array([0.7, -0.3, 0]), atol=ROUNDTRIP)
@@ -140,8 +140,8 @@ def test_leg_reaches_its_foot():
     rng, n = np.random.default_rng(0), 100
     R = axis_rotation(2, rng.normal(np.pi, 0.5, n)) @ axis_rotation(0, rng.normal(0.3, 0.2, n))
     hip = rng.normal(0, 0.1, (n, 3)) + np.array([0, 0, 0.7])
-    place = np.column_stack([rng.normal(0, 0.1, (n, 2)), rng.normal(np.pi, 0.4, n)])
-    ankle, R_foot = roll_foot(SIZES, place, rng.uniform(0, 0.8, n), np.zeros(n))
+    position = np.column_stack([rng.normal(0, 0.1, (n, 2)), rng.normal(np.pi, 0.4, n)])
+    ankle, R_foot = roll_foot(SIZES, position, rng.uniform(0, 0.8, n), np.zeros(n))
     angles, short = leg_angles(SIZES, R, hip, ankle=ankle, R_foot=R_foot)
     chain, end = R, hip
     for k, length in enumerate((SIZES.thigh_m, SIZES.shank_m, 0.0)):
@@ -161,7 +161,7 @@ def test_leg_that_is_too_short_says_by_how_much():
     assert short[0] == pytest.approx(0.95 - 0.91, abs=1e-4)
 
 
-def test_level_foot_stands_on_its_sole_where_it_was_put():
+def test_level_foot_stands_on_its_sole_at_its_placement():
     ankle, R = roll_foot(SIZES, np.array([[0.3, -0.5, np.pi]]), np.zeros(1), np.zeros(1))
     centre = ankle[0] + R[0] @ SIZES.foot_centre_m
     np.testing.assert_allclose(centre, [0.3, -0.5, SIZES.foot_half_height_m], atol=EXACT)

@@ -39,13 +39,13 @@ def scene():
     return block_scene(4, n_blockers=2)
 
 
-def shortened(scene, n_frames, *, scale=3):
+def shorten(scene, n_frames, *, scale=3):
     """The same scene with fewer frames and smaller pictures."""
 
     def small(rig):
         return Rig(
             tuple(
-                camera.resampled(scale=(scale, scale), offset=(0, 0), size=tuple(s // scale for s in camera.size))
+                camera.resample(scale=(scale, scale), offset=(0, 0), size=tuple(s // scale for s in camera.size))
                 for camera in rig
             )
         )
@@ -62,7 +62,7 @@ def test_scene_has_blockers_a_spiker_decoys_and_three_mates(scene):
     assert scene.n_frames == 82
 
 
-def test_every_player_keeps_to_floor_net_and_joints(scene):
+def test_every_player_respects_floor_net_and_joint_limits(scene):
     for player in scene.players:
         margins = margins_of(player.movement.person, player.poses(scene.times_s), side=player.side)
         assert margins.floor_m > -ROUNDTRIP
@@ -82,7 +82,7 @@ def test_neighbours_stand_as_close_as_blockers_do(scene):
     assert abs(scene.blockers[1].takeoff_s - scene.blockers[0].takeoff_s) <= 0.08
 
 
-def test_jumps_lie_within_the_recording_and_their_facts_agree_with_the_motion(scene):
+def test_jumps_lie_within_the_recording_and_their_truth_agrees_with_the_motion(scene):
     for player in scene.blockers:
         facts = jump_truth(player, 60.0)
         assert 0.1 < facts["last_contact_s"] < facts["first_contact_s"] < scene.n_frames / 60
@@ -105,8 +105,8 @@ def test_seed_makes_the_scene_and_the_frame_rate_only_says_how_often_one_looks(s
         knees = [true_joints(player, scene.times_s)["knee_left"], true_joints(same, fast.times_s[::2])["knee_left"]]
         np.testing.assert_allclose(knees[0], knees[1], atol=ROUNDTRIP)
     other = block_scene(5, n_frames=70)
-    places = [true_joints(s.blockers[0], np.zeros(1))["torso"] for s in (scene, other)]
-    assert np.abs(places[0] - places[1]).max() > 0.01
+    positions = [true_joints(s.blockers[0], np.zeros(1))["torso"] for s in (scene, other)]
+    assert np.abs(positions[0] - positions[1]).max() > 0.01
 
 
 def test_paper_has_22_sequences_of_1798_frames_five_with_several_blockers():
@@ -117,7 +117,7 @@ def test_paper_has_22_sequences_of_1798_frames_five_with_several_blockers():
     assert sorted(blockers.tolist()) == [1] * 17 + [2, 2, 2, 3, 3]
 
 
-def test_torso_input_has_the_noise_asked_for(scene):
+def test_torso_input_has_the_specified_noise(scene):
     noisy = torso_input(scene)
     true = np.stack([true_joints(player, scene.times_s)["torso"] for player in scene.players], axis=1)
     error = noisy - true
@@ -128,7 +128,7 @@ def test_torso_input_has_the_noise_asked_for(scene):
     assert correlation == pytest.approx(0.8, abs=2 * sampled(n))
 
 
-def test_start_is_the_truth_and_a_hands_error(scene):
+def test_start_is_the_truth_plus_noise(scene):
     starts = noisy_starts(scene)
     errors = []
     for player in scene.players:
@@ -139,14 +139,14 @@ def test_start_is_the_truth_and_a_hands_error(scene):
     assert np.std(errors) == pytest.approx(0.015, rel=3 / np.sqrt(2 * np.size(errors)) + 0.05)
 
 
-def test_calibration_is_off_by_what_was_asked():
+def test_calibration_is_off_by_the_specified_error():
     rng = np.random.default_rng(3)
     true = hall_rig(rng, 6)
     middle = np.array([0.0, -0.7, 1.6])
     off = [
-        told.px_from_world(middle) - camera.px_from_world(middle)
+        calls.px_from_world(middle) - camera.px_from_world(middle)
         for _ in range(25)
-        for told, camera in zip(perturb_calibration(rng, true, 2.0), true, strict=True)
+        for calls, camera in zip(perturb_calibration(rng, true, 2.0), true, strict=True)
     ]
     assert np.std(off) == pytest.approx(2.0, rel=3 / np.sqrt(2 * np.size(off)) + 0.02)
     exact = perturb_calibration(rng, true, 0.0)
@@ -185,8 +185,8 @@ def test_impossible_scenes_are_refused():
         block_scene(0, difficulty=Difficulty(n_cameras=1))
 
 
-def test_pictures_show_the_players_where_they_are(scene):
-    small = shortened(replace(scene, difficulty=replace(scene.difficulty, noise_sd=1.0, gain_spread=0.0)), 31)
+def test_images_show_the_players_at_their_positions(scene):
+    small = shorten(replace(scene, difficulty=replace(scene.difficulty, noise_sd=1.0, gain_spread=0.0)), 31)
     wanted = {0: None, 30: None}
     for frames in block_frames(small):
         if frames.index in wanted:
@@ -205,8 +205,8 @@ def test_pictures_show_the_players_where_they_are(scene):
     assert np.abs(first.astype(int) - later).max() > 100
 
 
-def test_frames_are_the_same_each_time_and_carry_the_told_cameras(scene):
-    small = shortened(scene, 2, scale=4)
+def test_frames_are_reproducible_and_carry_the_calibrated_cameras(scene):
+    small = shorten(scene, 2, scale=4)
     one, two = (list(block_frames(small)) for _ in range(2))
     for a, b in zip(one, two, strict=True):
         for x, y, camera in zip(a.views, b.views, small.calibrated_rig, strict=True):
@@ -215,24 +215,24 @@ def test_frames_are_the_same_each_time_and_carry_the_told_cameras(scene):
     assert [frames.time_s for frames in one] == [0, 1 / small.rate]
 
 
-def test_only_what_is_near_players_is_drawn_anew(scene):
-    small = shortened(replace(scene, difficulty=replace(scene.difficulty, noise_sd=0.0, jpeg_quality=0)), 3)
+def test_only_regions_near_players_are_rendered_anew(scene):
+    small = shorten(replace(scene, difficulty=replace(scene.difficulty, noise_sd=0.0, jpeg_quality=0)), 3)
     frames = list(block_frames(small))
     for view, next_view in zip(frames[0].views, frames[2].views, strict=True):
         is_same = np.all(view.rgb == next_view.rgb, axis=2)
         assert 0.8 < is_same.mean() < 1.0
 
 
-def test_boxes_that_meet_become_one():
+def test_overlapping_boxes_become_one():
     boxes = [np.array(box) for box in ((0, 0, 10, 10), (30, 0, 40, 10), (8, 5, 31, 7), (50, 50, 60, 60), (5, 5, 5, 9))]
     assert sorted(_merge(boxes)) == [(0, 0, 40, 10), (50, 50, 60, 60)]
 
 
 def test_written_trial_is_whole_and_reads_back(scene, tmp_path):
-    small, told = shortened(scene, 3, scale=4), []
-    write_block(tmp_path / "new", small, progress=lambda done, total: told.append((done, total)))
+    small, calls = shorten(scene, 3, scale=4), []
+    write_block(tmp_path / "new", small, progress=lambda done, total: calls.append((done, total)))
     folder = tmp_path / "new"
-    assert told == [(1, 3), (2, 3), (3, 3)]
+    assert calls == [(1, 3), (2, 3), (3, 3)]
     trial = read_trial(folder / "trial.toml")
     assert [camera.name for camera in trial.camera] == ["cam1", "cam2", "cam3"]
     tables = tomllib.loads((folder / "trial.toml").read_text())["start"]["player"]
@@ -257,7 +257,7 @@ def test_written_trial_is_whole_and_reads_back(scene, tmp_path):
 
 
 def test_truth_has_the_columns_of_the_rendered_block_jump(shared_data, scene, tmp_path):
-    write_block(tmp_path / "new", shortened(scene, 1, scale=6))
+    write_block(tmp_path / "new", shorten(scene, 1, scale=6))
     headers = [
         (folder / "truth.csv").read_text().splitlines()[0] for folder in (shared_data("block_jump"), tmp_path / "new")
     ]

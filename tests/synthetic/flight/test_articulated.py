@@ -129,16 +129,16 @@ def test_second_difference_of_the_centre_of_mass_of_the_segments_is_gravity():
     flight = fly_articulated(BODY, takeoff(), bending(), TIMES)
     mass = np.array([s.inertia.mass_kg for s in BODY.segments])
     local = np.array([s.inertia.centre_m for s in BODY.segments])
-    found = []
+    result = []
     for i in range(len(TIMES)):
         posed = BODY.with_pose(flight.pose(i))
-        found.append(mass @ (np.einsum("sij,sj->si", posed.R, local) + posed.t) / mass.sum())
-    np.testing.assert_allclose(found, flight.centre, atol=EXACT)
-    acceleration = np.diff(found, 2, axis=0) / 0.05**2
+        result.append(mass @ (np.einsum("sij,sj->si", posed.R, local) + posed.t) / mass.sum())
+    np.testing.assert_allclose(result, flight.centre, atol=EXACT)
+    acceleration = np.diff(result, 2, axis=0) / 0.05**2
     np.testing.assert_allclose(acceleration, np.broadcast_to(GRAVITY_M_S2, acceleration.shape), atol=ROUNDTRIP)
 
 
-def test_body_that_holds_its_shape_flies_as_the_stiff_body_of_that_shape():
+def test_body_with_fixed_joints_flies_as_the_rigid_body_of_that_shape():
     flight = fly_articulated(BODY, takeoff(), constant_joints(BENT), np.array([0.3, -0.2, 0.0, 0.5, 0.3]))
     mass = mass_at_angles(BODY, BENT)
     w = np.linalg.solve(mass.inertia, takeoff().R.T @ takeoff().angular_momentum)
@@ -190,7 +190,7 @@ def test_rotations_follow_the_angular_velocity_whatever_the_order_of_the_times()
     np.testing.assert_allclose(flight.R[2], alone.R[0], atol=ROUNDTRIP)
 
 
-def test_short_move_late_in_a_flight_without_turning_is_not_missed():
+def test_short_joint_motion_late_in_a_flight_without_rotation_is_not_missed():
     joints = joint_motion(np.array([5.0, 5.02]), np.array([STRAIGHT, BENT]))
     start = takeoff(angular_momentum=np.zeros(3))
     flight = fly_articulated(BODY, start, joints, np.array([4.9, 6.0]))
@@ -201,7 +201,7 @@ def test_short_move_late_in_a_flight_without_turning_is_not_missed():
     assert geodesic(flight.R[1], flight.R[0]) > 0.05
 
 
-def test_moves_rest_at_their_ends_with_a_continuous_acceleration():
+def test_joint_motions_rest_at_their_ends_with_a_continuous_acceleration():
     joints = joint_motion(np.array([0.1, 0.3, 0.6]), np.array([STRAIGHT, BENT, -BENT]))
     np.testing.assert_allclose(joints([0.1, 0.3, 0.6]), [STRAIGHT, BENT, -BENT], atol=EXACT)
     for order in (1, 2):
@@ -210,7 +210,7 @@ def test_moves_rest_at_their_ends_with_a_continuous_acceleration():
     assert np.all(np.diff(joints(np.linspace(0.1, 0.3, 30))[:, 0, 0]) >= 0)
 
 
-def test_motions_together_are_their_sum_at_every_time_of_either():
+def test_sum_of_motions_is_their_sum_at_every_time_of_either():
     a = joint_motion(np.array([0.0, 0.4]), np.array([STRAIGHT, BENT]))
     b = joint_motion(np.array([0.3, 0.5, 0.9]), np.array([STRAIGHT, -BENT, BENT]))
     t = np.linspace(0, 0.9, 50)
@@ -221,7 +221,7 @@ def test_motions_together_are_their_sum_at_every_time_of_either():
     )
 
 
-def test_slowed_flight_with_less_momentum_passes_the_same_orientations():
+def test_flight_scaled_in_time_with_less_momentum_passes_the_same_orientations():
     quick = fly_articulated(BODY, takeoff(), bending(), TIMES)
     weak = takeoff(angular_momentum=takeoff().angular_momentum / 3)
     slow = fly_articulated(BODY, weak, scale_time(bending(), 3.0), 3 * TIMES)
@@ -229,7 +229,7 @@ def test_slowed_flight_with_less_momentum_passes_the_same_orientations():
     np.testing.assert_allclose(slow.joint_angles, quick.joint_angles, atol=EXACT)
 
 
-def test_shape_held_keeps_the_root_where_it_was_and_the_joints_as_told():
+def test_fixed_joints_keep_the_root_and_the_given_angles():
     flight = fly_articulated(BODY, takeoff(), bending(), TIMES)
     held = with_fixed_joints(BODY, flight, BENT)
     np.testing.assert_array_equal(held.R, flight.R)
@@ -240,21 +240,21 @@ def test_shape_held_keeps_the_root_where_it_was_and_the_joints_as_told():
 
 
 def test_mass_of_a_straight_body_is_the_sum_of_its_segments():
-    found = mass_at_angles(BODY, STRAIGHT)
+    result = mass_at_angles(BODY, STRAIGHT)
     origins = {None: np.zeros(3)}
-    places, tensors, masses = [], [], []
+    positions, tensors, masses = [], [], []
     for s in BODY.segments:
         origins[s.name] = origins[s.parent] + s.joint_m
-        places.append(origins[s.name] + s.inertia.centre_m)
+        positions.append(origins[s.name] + s.inertia.centre_m)
         tensors.append(s.inertia.tensor_kg_m2)
         masses.append(s.inertia.mass_kg)
-    centre = np.average(places, axis=0, weights=masses)
-    arms = np.array(places) - centre
+    centre = np.average(positions, axis=0, weights=masses)
+    arms = np.array(positions) - centre
     inertia = sum(J + m * (d @ d * np.eye(3) - np.outer(d, d)) for J, m, d in zip(tensors, masses, arms, strict=True))
-    assert isinstance(found, MassProperties)
-    assert found.mass_kg == pytest.approx(sum(masses), rel=EXACT)
-    np.testing.assert_allclose(found.centre, centre, atol=EXACT)
-    np.testing.assert_allclose(found.inertia, inertia, atol=EXACT)
+    assert isinstance(result, MassProperties)
+    assert result.mass_kg == pytest.approx(sum(masses), rel=EXACT)
+    np.testing.assert_allclose(result.centre, centre, atol=EXACT)
+    np.testing.assert_allclose(result.inertia, inertia, atol=EXACT)
 
 
 def test_body_with_a_segment_without_inertia_is_refused_by_name():
@@ -269,12 +269,12 @@ def test_mujoco_flies_a_somersault_to_the_same_landing():
 
     skill = half_twist(human18(1.66, 58.0), has_pike=True)
     flight = skill(np.array([0.0, skill.duration_s]))
-    R, position = flown_by_mujoco(mujoco, skill, flight, step_s=skill.duration_s / 400)
+    R, position = fly_in_mujoco(mujoco, skill, flight, step_s=skill.duration_s / 400)
     assert geodesic(R, flight.R[1]) < np.radians(0.001)
     assert np.linalg.norm(position - flight.position[1]) < 1e-5
 
 
-def flown_by_mujoco(mujoco, skill, flight, step_s):
+def fly_in_mujoco(mujoco, skill, flight, step_s):
     """Drive MuJoCo's joints along the skill's angles by inverse dynamics; return the root's landing R and place."""
     model = mujoco.MjModel.from_xml_string(mjcf(skill.model, step_s))
     data = mujoco.MjData(model)
@@ -327,10 +327,10 @@ def mjcf(model, step_s):
     def numbers(values):
         return " ".join(repr(float(v)) for v in np.ravel(values))
 
-    def written(segment):
+    def write_segment(segment):
         J, tensor = segment.inertia, segment.inertia.tensor_kg_m2
         joint = "<freejoint/>" if segment.parent is None else '<joint type="ball"/>'
-        inside = "".join(written(child) for child in children[segment.name])
+        inside = "".join(write_segment(child) for child in children[segment.name])
         return (
             f'<body name="{segment.name}" pos="{numbers(segment.joint_m)}">{joint}'
             f'<inertial pos="{numbers(J.centre_m)}" mass="{J.mass_kg!r}" '
@@ -340,5 +340,5 @@ def mjcf(model, step_s):
     return (
         f'<mujoco><compiler angle="radian" balanceinertia="false"/>'
         f'<option timestep="{step_s}" integrator="RK4" gravity="0 0 -9.81"/>'
-        f"<worldbody>{written(model.segments[0])}</worldbody></mujoco>"
+        f"<worldbody>{write_segment(model.segments[0])}</worldbody></mujoco>"
     )

@@ -15,7 +15,7 @@ from tests.support.tolerances import EXACT, ROUNDTRIP
 TIMES = np.arange(40) / 50
 
 
-def thrown(**changes):
+def throw(**changes):
     launch = Launch(
         centre=np.array([0.1, -0.2, 1.3]),
         velocity=np.array([1.0, 0.2, 3.2]),
@@ -41,14 +41,14 @@ def part(shape, centre=(0, 0, 0), turn=None):
 
 def test_angular_momentum_stays_the_same_in_the_world():
     mass = cross_mass()
-    flight = fly(mass, thrown(), TIMES)
+    flight = fly(mass, throw(), TIMES)
     momentum = np.einsum("nij,nj->ni", flight.R @ mass.inertia, flight.angular_velocity)
     np.testing.assert_allclose(momentum, np.broadcast_to(momentum[0], momentum.shape), atol=ROUNDTRIP)
 
 
-def test_energy_of_the_turning_stays_the_same():
+def test_rotational_energy_stays_the_same():
     mass = cross_mass()
-    w = fly(mass, thrown(), TIMES).angular_velocity
+    w = fly(mass, throw(), TIMES).angular_velocity
     energy = np.einsum("ni,ij,nj->n", w, mass.inertia, w) / 2
     np.testing.assert_allclose(energy, energy[0], rtol=ROUNDTRIP)
 
@@ -56,7 +56,7 @@ def test_energy_of_the_turning_stays_the_same():
 def test_top_precesses_at_the_rate_of_its_angular_momentum_over_its_transverse_inertia():
     A, C = 0.3, 0.1
     mass = MassProperties(2.0, np.zeros(3), np.diag([A, A, C]))
-    flight = fly(mass, thrown(angular_velocity=np.array([1.5, 0.0, 12.0])), TIMES)
+    flight = fly(mass, throw(angular_velocity=np.array([1.5, 0.0, 12.0])), TIMES)
     momentum = flight.R[0] @ mass.inertia @ flight.angular_velocity[0]
     precession = Rotation.from_rotvec(TIMES[:, None] * momentum / A).as_matrix()
     np.testing.assert_allclose(flight.R[:, :, 2], precession @ flight.R[0, :, 2], atol=ROUNDTRIP)
@@ -65,27 +65,27 @@ def test_top_precesses_at_the_rate_of_its_angular_momentum_over_its_transverse_i
 
 
 def test_second_difference_of_the_centre_of_mass_is_gravity():
-    flight = fly(cross_mass(), thrown(), TIMES)
+    flight = fly(cross_mass(), throw(), TIMES)
     acceleration = np.diff(flight.centre, 2, axis=0) * 50**2
     np.testing.assert_allclose(acceleration, np.broadcast_to(GRAVITY_M_S2, acceleration.shape), atol=ROUNDTRIP)
 
 
 def test_centre_of_mass_stays_where_it_is_in_the_body():
     mass = cross_mass()
-    flight = fly(mass, thrown(), TIMES)
+    flight = fly(mass, throw(), TIMES)
     np.testing.assert_allclose(flight.R @ mass.centre + flight.position, flight.centre, atol=EXACT)
     assert np.ptp(np.linalg.norm(np.diff(flight.position, 2, axis=0), axis=1)) > 1e-3  # the origin is no such point
 
 
 def test_rotations_follow_the_angular_velocity():
     step = 1e-5
-    flight = fly(cross_mass(), thrown(), np.array([0.3 - step, 0.3, 0.3 + step]))
+    flight = fly(cross_mass(), throw(), np.array([0.3 - step, 0.3, 0.3 + step]))
     turned = Rotation.from_matrix(flight.R[0].T @ flight.R[2]).as_rotvec() / (2 * step)
     np.testing.assert_allclose(turned, flight.angular_velocity[1], rtol=1e-6)
 
 
 def test_flight_is_the_same_in_any_order_of_times_and_runs_backward():
-    launch, times = thrown(), np.array([0.3, -0.2, 0.0, 0.3, -0.1, 0.1])
+    launch, times = throw(), np.array([0.3, -0.2, 0.0, 0.3, -0.1, 0.1])
     flight = fly(cross_mass(), launch, times)
     for i, time in enumerate(times):
         alone = fly(cross_mass(), launch, np.array([time]))
@@ -120,5 +120,5 @@ def test_cross_has_its_centre_of_mass_between_its_bars():
 
 
 def test_body_with_a_part_that_is_no_box_is_refused_by_name():
-    with pytest.raises(BodyError, match="'part' is no box"):
+    with pytest.raises(BodyError, match="'part' is not a box"):
         mass_properties(body(part(Ellipsoid(np.ones(3)))), 500.0)

@@ -30,16 +30,16 @@ PRESETS = ["paper", "moving-arms", "pike"]
 MODEL = human18(STATURE_M, MASS_KG)
 
 
-def smaller(scene, scale=4):
+def reduce_scene(scene, scale=4):
     """The scene with images smaller by `scale`."""
     cameras = (
-        c.resampled(scale=(scale, scale), offset=((scale - 1) / 2,) * 2, size=(c.size[0] // scale, c.size[1] // scale))
+        c.resample(scale=(scale, scale), offset=((scale - 1) / 2,) * 2, size=(c.size[0] // scale, c.size[1] // scale))
         for c in scene.rig
     )
     return replace(scene, rig=Rig(tuple(cameras)))
 
 
-def flown(scene):
+def fly_scene(scene):
     return scene.flight(np.array([float(scene.time_s(i)) for i in range(scene.n_pictures)]))
 
 
@@ -48,25 +48,25 @@ def joint(flight, name):
 
 
 def test_ranges_of_the_poses_are_those_of_the_paper():
-    found = pose_ranges(flown(somersault_scene("paper", target="ellipsoids")))
+    result = pose_ranges(fly_scene(somersault_scene("paper", target="ellipsoids")))
     for name in ("forward_m", "lateral_m", "somersault_rad", "tilt_rad", "twist_rad"):
-        assert getattr(found, name) == pytest.approx(getattr(PAPER_RANGES, name), rel=SOLVED), name
-    assert found.vertical_m == pytest.approx(0.79, abs=0.002)  # durations are whole milliseconds
+        assert getattr(result, name) == pytest.approx(getattr(PAPER_RANGES, name), rel=SOLVED), name
+    assert result.vertical_m == pytest.approx(0.79, abs=0.002)  # durations are whole milliseconds
     assert (PAPER_RANGES.vertical_m, PAPER_RANGES.forward_m, PAPER_RANGES.lateral_m) == (0.79, 1.0, 0.01)
 
 
-def test_ranges_are_read_off_places_and_unwrapped_angles():
+def test_ranges_are_those_of_positions_and_unwrapped_angles():
     flight = half_twist(MODEL)(np.linspace(0, 0.5, 11))
     angles = np.linspace([0, 0, 0], [7.0, -0.2, -4.0], 11)
-    places = np.linspace([0.1, 0.2, 0.3], [0.4, -0.7, 0.3], 11)
-    places[4, 2] = 0.8
-    found = pose_ranges(replace(flight, R=matrix_from_angles(angles), position=places))
-    assert (found.somersault_rad, found.tilt_rad, found.twist_rad) == pytest.approx((7.0, 0.2, 4.0), abs=ROUNDTRIP)
-    assert (found.lateral_m, found.forward_m, found.vertical_m) == pytest.approx((0.3, 0.9, 0.5), abs=ROUNDTRIP)
+    positions = np.linspace([0.1, 0.2, 0.3], [0.4, -0.7, 0.3], 11)
+    positions[4, 2] = 0.8
+    result = pose_ranges(replace(flight, R=matrix_from_angles(angles), position=positions))
+    assert (result.somersault_rad, result.tilt_rad, result.twist_rad) == pytest.approx((7.0, 0.2, 4.0), abs=ROUNDTRIP)
+    assert (result.lateral_m, result.forward_m, result.vertical_m) == pytest.approx((0.3, 0.9, 0.5), abs=ROUNDTRIP)
 
 
 @pytest.mark.parametrize("has_pike", [False, True])
-def test_gymnast_flies_forward_lands_upright_with_the_back_turned_and_obeys_the_laws(has_pike):
+def test_gymnast_flies_forward_lands_upright_facing_back_and_obeys_the_laws(has_pike):
     skill = half_twist(MODEL, has_pike=has_pike)
     flight = skill(skill.poses_s)
     angles = unwrap(angles_from_matrix(flight.R), flight.time_s)
@@ -84,7 +84,7 @@ def test_gymnast_flies_forward_lands_upright_with_the_back_turned_and_obeys_the_
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_joints_stay_within_their_limits_and_arms_between_down_and_up(preset):
-    flight = flown(somersault_scene(preset, target="ellipsoids"))
+    flight = fly_scene(somersault_scene(preset, target="ellipsoids"))
     lowest, highest = np.moveaxis(MODEL.limits_rad, -1, 0)
     assert np.all(flight.joint_angles >= lowest)
     assert np.all(flight.joint_angles <= highest)
@@ -93,7 +93,7 @@ def test_joints_stay_within_their_limits_and_arms_between_down_and_up(preset):
 
 
 def test_arms_swing_by_equal_angles_and_only_a_pike_bends_the_rest():
-    arms, pike = (flown(somersault_scene(preset, target="ellipsoids")) for preset in ("moving-arms", "pike"))
+    arms, pike = (fly_scene(somersault_scene(preset, target="ellipsoids")) for preset in ("moving-arms", "pike"))
     left, right = joint(arms, "upper_arm_left")[:, 1], joint(arms, "upper_arm_right")[:, 1]
     np.testing.assert_allclose(left + np.pi / 2, right - np.pi / 2, atol=EXACT)  # left up, right down
     assert np.ptp(left) > 0.3
@@ -105,7 +105,7 @@ def test_arms_swing_by_equal_angles_and_only_a_pike_bends_the_rest():
 
 def test_paper_holds_the_first_shape_along_the_path_of_the_moving_arms():
     scene, moving = (somersault_scene(preset, target="ellipsoids") for preset in ("paper", "moving-arms"))
-    held, times = flown(scene), np.array([float(scene.time_s(i)) for i in range(11)])
+    held, times = fly_scene(scene), np.array([float(scene.time_s(i)) for i in range(11)])
     true = moving.flight(times)
     np.testing.assert_array_equal(held.R, true.R)
     np.testing.assert_array_equal(held.position, true.position)
@@ -123,7 +123,7 @@ def test_presets_last_the_whole_flight_at_their_rates():
 
 @pytest.mark.parametrize(("preset", "target"), [("paper", "skin"), ("pike", "ellipsoids")])
 def test_whole_flight_is_in_view_and_the_person_large(preset, target):
-    scene = smaller(somersault_scene(preset, target=target), 2)
+    scene = reduce_scene(somersault_scene(preset, target=target), 2)
     tallest = dict.fromkeys(scene.rig.names, 0)
     for recorded in scene_frames(scene):
         for view in recorded.views:
@@ -144,7 +144,7 @@ def test_cameras_look_from_the_front_the_side_and_the_top():
 
 
 def test_skin_and_ellipsoids_are_two_surfaces_of_one_flight():
-    skin, plain = (smaller(somersault_scene(target=target)) for target in ("skin", "ellipsoids"))
+    skin, plain = (reduce_scene(somersault_scene(target=target)) for target in ("skin", "ellipsoids"))
     for a, b in zip(scene_frames(skin), scene_frames(plain), strict=True):
         for x, y in zip(a.views, b.views, strict=True):
             one, two = x.rgb.any(axis=2), y.rgb.any(axis=2)
@@ -154,7 +154,7 @@ def test_skin_and_ellipsoids_are_two_surfaces_of_one_flight():
 
 def test_frames_of_the_gym_are_the_same_again_and_other_seeds_make_another_gym():
     scene, other = (
-        replace(smaller(somersault_scene("moving-arms", target="ellipsoids", style="gym", seed=s)), n_pictures=1)
+        replace(reduce_scene(somersault_scene("moving-arms", target="ellipsoids", style="gym", seed=s)), n_pictures=1)
         for s in (3, 4)
     )
     (first,), (again,), (another,) = list(scene_frames(scene)), list(scene_frames(scene)), list(scene_frames(other))
@@ -164,8 +164,8 @@ def test_frames_of_the_gym_are_the_same_again_and_other_seeds_make_another_gym()
         assert np.mean(x.rgb > 0) > 0.99  # no camera sees beside the hall
 
 
-def test_skin_in_the_gym_throws_the_shadow_of_its_ellipsoids():
-    scenes = [smaller(somersault_scene(target=t, style="gym")) for t in ("skin", "ellipsoids")]
+def test_skin_in_the_gym_casts_the_shadow_of_its_ellipsoids():
+    scenes = [reduce_scene(somersault_scene(target=t, style="gym")) for t in ("skin", "ellipsoids")]
     darkened = []
     for scene in scenes:
         camera = scene.rig["top"]
@@ -181,7 +181,7 @@ def test_skin_in_the_gym_throws_the_shadow_of_its_ellipsoids():
     assert both > 0.8 * np.count_nonzero(darkened[1])
 
 
-def test_choice_that_is_not_known_is_refused_with_what_is():
+def test_unknown_choice_is_refused_with_those_there_are():
     for wrong, known in (({"preset": "tuck"}, "moving-arms"), ({"target": "mesh"}, "skin"), ({"style": "hd"}, "exact")):
         with pytest.raises(TrialError, match=f"is not known; choose .*{known}"):
             somersault_scene(**wrong)
@@ -200,32 +200,32 @@ def test_body_whose_arms_weigh_nothing_cannot_twist():
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    folder, told = tmp_path_factory.mktemp("somersault"), []
-    scene = replace(smaller(somersault_scene("pike", target="ellipsoids", seed=2)), n_pictures=6)
-    write_trial(scene, folder, progress=lambda done, total: told.append((done, total)))
-    return scene, folder, told
+    folder, calls = tmp_path_factory.mktemp("somersault"), []
+    scene = replace(reduce_scene(somersault_scene("pike", target="ellipsoids", seed=2)), n_pictures=6)
+    write_trial(scene, folder, progress=lambda done, total: calls.append((done, total)))
+    return scene, folder, calls
 
 
 def test_trial_has_its_truth_and_its_body(written):
-    scene, folder, told = written
-    flight, truth = flown(scene), read_truth(folder / "truth.csv")
+    scene, folder, calls = written
+    flight, truth = fly_scene(scene), read_truth(folder / "truth.csv")
     np.testing.assert_allclose(truth.position, flight.position, atol=ROUNDTRIP)
     np.testing.assert_allclose(truth.R, flight.R, atol=ROUNDTRIP)
     body = read_body(folder / "body.toml")
     assert [s.name for s in body.segments] == [s.name for s in MODEL.segments]
     with (folder / "truth_angles.csv").open() as file:
         rows = list(csv.DictReader(file))
-    found = [[float(row[f"{s.name}_{axis}_rad"]) for s in body.segments[1:] for axis in "xyz"] for row in rows]
-    np.testing.assert_array_equal(np.reshape(found, flight.joint_angles.shape), flight.joint_angles)
+    result = [[float(row[f"{s.name}_{axis}_rad"]) for s in body.segments[1:] for axis in "xyz"] for row in rows]
+    np.testing.assert_array_equal(np.reshape(result, flight.joint_angles.shape), flight.joint_angles)
     with (folder / "truth_joints.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 6 * len(body.landmarks)
     for row in rows:
         posed = body.with_pose(flight.pose(int(row["frame"])))
-        place = dict(zip([landmark.name for landmark in body.landmarks], posed.landmarks, strict=True))[row["joint"]]
-        np.testing.assert_allclose([float(row[f"{axis}_m"]) for axis in "xyz"], place, atol=ROUNDTRIP)
+        position = dict(zip([landmark.name for landmark in body.landmarks], posed.landmarks, strict=True))[row["joint"]]
+        np.testing.assert_allclose([float(row[f"{axis}_m"]) for axis in "xyz"], position, atol=ROUNDTRIP)
         assert float(row["time_s"]) == int(row["frame"]) / 50
-    assert told[-1] == (6, 6)
+    assert calls[-1] == (6, 6)
     assert not (folder / "control_points.csv").exists()
 
 
@@ -246,17 +246,17 @@ def test_trial_starts_off_by_the_errors_of_the_scene_and_within_the_limits(writt
     for lamp, given in zip(lights.lamps, scene.lights.lamps, strict=True):
         np.testing.assert_array_equal(lamp.position_m, given.position_m)
         assert lamp.intensity == given.intensity
-    told = tomllib.loads((folder / "trial.toml").read_text())["start"]["joint_angles_deg"]
-    assert list(told) == [segment.name for segment in MODEL.segments[1:]]
-    np.testing.assert_allclose(list(told.values()), np.degrees(start.joint_angles), atol=1e-4)
+    calls = tomllib.loads((folder / "trial.toml").read_text())["start"]["joint_angles_deg"]
+    assert list(calls) == [segment.name for segment in MODEL.segments[1:]]
+    np.testing.assert_allclose(list(calls.values()), np.degrees(start.joint_angles), atol=1e-4)
 
 
-def test_shape_is_known_at_the_start_where_it_is_held():
+def test_shape_at_the_start_is_exact_where_it_is_fixed():
     scene = somersault_scene("paper", target="ellipsoids")
-    np.testing.assert_allclose(start_pose(scene).joint_angles, flown(scene).joint_angles[0], atol=ROUNDTRIP)
+    np.testing.assert_allclose(start_pose(scene).joint_angles, fly_scene(scene).joint_angles[0], atol=ROUNDTRIP)
 
 
-def test_videos_hold_the_exact_pictures_nearly(written):
+def test_videos_hold_nearly_the_exact_images(written):
     scene, folder, _ = written
     sources = [VideoSource(c.name, folder / f"{c.name}.mp4", fields="progressive") for c in scene.rig]
     read = list(open_recording(sources, read_rig(folder / "calib_true.toml")))
@@ -268,7 +268,7 @@ def test_videos_hold_the_exact_pictures_nearly(written):
             assert np.abs(x.rgb.astype(int) - y.rgb).mean() < 1.0
 
 
-def test_command_writes_what_is_asked(tmp_path, capsys, monkeypatch):
+def test_command_writes_the_requested_trial(tmp_path, capsys, monkeypatch):
     asked = []
     monkeypatch.setattr(
         "airborne.synthetic.write_somersault", lambda folder, **options: asked.append((folder, options))
@@ -295,7 +295,7 @@ def test_folder_with_something_in_it_is_refused_before_anything_is_solved(tmp_pa
         write_somersault(tmp_path)
 
 
-def test_still_joints_give_no_half_twist():
+def test_constant_joints_give_no_half_twist():
     skill = half_twist(MODEL)
     stiff = replace(skill, joints=constant_joints(skill.joints(skill.joints.x[0])))
     assert pose_ranges(stiff(skill.poses_s)).twist_rad < 1e-3

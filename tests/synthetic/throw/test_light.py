@@ -80,8 +80,8 @@ def test_light_brighter_than_white_is_clipped():
 
 @pytest.mark.parametrize("level", [0, 10, 128, 255])
 def test_srgb_agrees_with_its_standard_at_known_levels(level):
-    known = {0: 0.0, 10: 0.003035, 128: 0.215861, 255: 1.0}
-    assert light_from_srgb(np.array(level)) == pytest.approx(known[level], abs=1e-6)
+    is_known = {0: 0.0, 10: 0.003035, 128: 0.215861, 255: 1.0}
+    assert light_from_srgb(np.array(level)) == pytest.approx(is_known[level], abs=1e-6)
 
 
 NO_BOXES = np.zeros((0, 3, 4))
@@ -114,7 +114,7 @@ def test_shadow_of_an_ellipsoid_is_where_the_ray_comes_nearer_to_its_centre_than
     assert 100 < np.count_nonzero(~lit) < 2000
 
 
-def test_ball_darkens_no_point_inside_it_before_it_or_beside_the_way():
+def test_ellipsoid_shades_no_point_inside_it_before_it_or_beside_the_ray():
     spheres = ellipsoids_of(ball((0, 0, 1), (0.5, 0.5, 0.5)))
     points = np.array([[0, 0, 1.0], [0.1, 0, 1.3], [0, 0, 3.0], [1.5, 0, 1.0], [0, 0, 0.0]])
     lit = is_lit(points, np.repeat(UP, 5, axis=0), SPOT, NO_BOXES, ellipsoids=spheres)

@@ -68,7 +68,7 @@ def test_fields_fill_whole_frames_where_the_truth_covers_an_odd_number():
     assert len(list(scene_frames(small_scene(n_pictures=3)))) == 4
 
 
-def test_body_lies_in_the_picture_where_its_finely_drawn_mask_lies():
+def test_body_lies_in_the_image_at_its_finely_rendered_mask():
     scene = dark_room(small_scene(blur_px=0.0))
     camera = scene.rig["cam2"]
     posed = posed_at(scene, [0.1])
@@ -85,7 +85,7 @@ def test_body_lies_in_the_picture_where_its_finely_drawn_mask_lies():
     np.testing.assert_allclose(light.reshape(-1, 3).sum(axis=0), yellow * mask.sum() / n**2, rtol=0.02)
 
 
-def test_exposure_is_centred_on_the_time_of_the_picture():
+def test_exposure_is_centred_on_the_time_of_the_image():
     scene = dark_room(small_scene(blur_px=0.0, noise_sd=0.0, exposure_s=0.03, is_interlaced=False, n_pictures=2))
     camera = scene.rig["cam1"]
     short = linear_image(scene, background(scene, camera), posed_at(scene, [0.02]))
@@ -97,12 +97,12 @@ def test_exposure_is_centred_on_the_time_of_the_picture():
 def test_surface_points_project_to_their_pixels_and_lie_on_the_body():
     scene = small_scene()
     camera, posed = scene.rig["cam3"], posed_at(scene, [0.2])[0]
-    seen = visible_surface(surface_arrays(scene.body), posed, camera)
-    v, u = np.nonzero(seen.mask)
-    np.testing.assert_allclose(camera.px_from_world(seen.points), np.column_stack([u, v]), atol=1e-3)
-    in_body = np.abs((seen.points - posed.t[0]) @ posed.R[0])
+    observed = visible_surface(surface_arrays(scene.body), posed, camera)
+    v, u = np.nonzero(observed.mask)
+    np.testing.assert_allclose(camera.px_from_world(observed.points), np.column_stack([u, v]), atol=1e-3)
+    in_body = np.abs((observed.points - posed.t[0]) @ posed.R[0])
     assert np.all(np.isclose(in_body[:, 2], 0.0225, atol=1e-5) | (in_body[:, 2] < 0.0225))
-    assert np.all(np.einsum("ni,ni->n", seen.normals, seen.points - camera.centre) < 0)
+    assert np.all(np.einsum("ni,ni->n", observed.normals, observed.points - camera.centre) < 0)
 
 
 def test_faces_differ_in_brightness_and_some_are_saturated_and_some_dark():
@@ -134,7 +134,7 @@ def test_body_casts_a_shadow_that_moves():
     assert np.count_nonzero(shadows[0] & shadows[1]) < 0.5 * np.count_nonzero(shadows[0])
 
 
-def test_noise_has_the_stated_spread():
+def test_noise_has_the_stated_sd():
     scene = small_scene(n_pictures=2, is_interlaced=False, spots=(), noise_sd=6.0)
     quiet = replace(scene, noise_sd=0.0)
     for noisy, clean in zip(scene_frames(scene), scene_frames(quiet), strict=True):
@@ -157,10 +157,10 @@ def test_surface_points_of_an_ellipsoid_lie_on_it():
     ball = BodyModel("ball", (Segment("ball", None, np.zeros(3), (part,)),))
     scene = small_scene()
     posed = ball.with_pose(scene.flight(np.array([0.1])).pose(0))
-    seen = visible_surface(surface_arrays(ball), posed, scene.rig["cam1"])
-    inside = (seen.points - posed.t[0]) @ posed.R[0] / semi_axes
+    observed = visible_surface(surface_arrays(ball), posed, scene.rig["cam1"])
+    inside = (observed.points - posed.t[0]) @ posed.R[0] / semi_axes
     np.testing.assert_allclose(np.linalg.norm(inside, axis=1), 1.0, atol=1e-4)
-    facing = np.einsum("ni,ni->n", seen.normals, (inside / semi_axes) @ posed.R[0].T)
+    facing = np.einsum("ni,ni->n", observed.normals, (inside / semi_axes) @ posed.R[0].T)
     np.testing.assert_allclose(facing, np.linalg.norm(inside / semi_axes, axis=1), rtol=1e-4)
 
 

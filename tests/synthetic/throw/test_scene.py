@@ -13,39 +13,39 @@ from tests.support.tolerances import EXACT
 PRESETS = ("side-somersault", "half-twist")
 
 
-def flown(scene):
+def fly_scene(scene):
     return scene.flight(np.arange(scene.n_pictures) / 50)
 
 
 def share_along_momentum(scene, axis):
     """Return the cosine between a body axis and the angular momentum at the first and the last field."""
-    mass, flight = mass_properties(scene.body, scene.flight.density_kg_m3), flown(scene)
+    mass, flight = mass_properties(scene.body, scene.flight.density_kg_m3), fly_scene(scene)
     momentum = flight.R[0] @ mass.inertia @ flight.angular_velocity[0]
     return flight.R[[0, -1], :, axis] @ momentum / np.linalg.norm(momentum)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_half_twist_turns_the_short_bar_over(seed):
+def test_half_twist_flips_the_short_bar(seed):
     start, end = share_along_momentum(thrown_cross("half-twist", seed=seed), axis=0)
     assert start > 0.95
     assert end < -0.95
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_side_somersault_keeps_the_plane_of_the_bars_and_turns_once(seed):
+def test_side_somersault_keeps_the_plane_of_the_bars_and_rotates_once(seed):
     scene = thrown_cross("side-somersault", seed=seed)
     start, end = share_along_momentum(scene, axis=2)
     assert start < -0.97
     assert end < -0.97
-    turned = np.linalg.norm(flown(scene).angular_velocity, axis=1).mean() * 38 / 50
+    turned = np.linalg.norm(fly_scene(scene).angular_velocity, axis=1).mean() * 38 / 50
     assert np.degrees(turned) == pytest.approx(360, abs=30)
 
 
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize("seed", range(3))
-def test_body_stays_in_every_picture_above_the_floor_and_before_the_clutter(preset, seed):
+def test_body_stays_in_every_image_above_the_floor_and_before_the_clutter(preset, seed):
     scene = thrown_cross(preset, seed=seed)
-    flight, corners = flown(scene), surface_arrays(scene.body).corners
+    flight, corners = fly_scene(scene), surface_arrays(scene.body).corners
     world = np.einsum("nij,cj->nci", flight.R, corners) + flight.position[:, None]
     for camera in scene.rig:
         px = camera.px_from_world(world)
@@ -68,19 +68,19 @@ def test_seed_varies_the_throw_and_the_background():
 
 def test_start_is_off_by_what_the_scene_states():
     scene = thrown_cross(seed=7)
-    start, true = start_pose(scene).world_from_root, flown(scene).pose(0).world_from_root
+    start, true = start_pose(scene).world_from_root, fly_scene(scene).pose(0).world_from_root
     assert np.linalg.norm(start.translation - true.translation) == pytest.approx(scene.start_error_m, rel=1e-9)
     assert (start.rotation * true.rotation.inv()).magnitude() == pytest.approx(scene.start_error_rad, rel=1e-9)
 
 
-def test_clicks_scatter_about_the_points_they_show():
+def test_clicks_scatter_about_their_points():
     scene = thrown_cross(seed=2)
     points = control_points(scene)
     px = np.stack([camera.px_from_world(points.world) for camera in scene.rig], axis=1)
     error = (points.px - px)[np.isfinite(points.px)]
     assert len(error) > 110
     assert error.std() == pytest.approx(0.5, rel=0.2)
-    flight = flown(scene)
+    flight = fly_scene(scene)
     ends = digitise(scene, flight)
     assert list(ends) == ["long_minus", "long_plus", "short_minus", "short_plus"]
     world = flight.R @ np.array([0.3, 0.18, 0]) + flight.position

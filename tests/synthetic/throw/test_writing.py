@@ -24,26 +24,26 @@ from tests.support.tolerances import ROUNDTRIP
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    scene, folder, told = small_scene(), tmp_path_factory.mktemp("trial"), []
-    write_trial(scene, folder, progress=lambda done, total: told.append((done, total)))
-    return scene, folder, told
+    scene, folder, calls = small_scene(), tmp_path_factory.mktemp("trial"), []
+    write_trial(scene, folder, progress=lambda done, total: calls.append((done, total)))
+    return scene, folder, calls
 
 
-def test_videos_hold_the_fields_that_were_drawn(written):
+def test_videos_hold_the_rendered_fields(written):
     scene, folder, _ = written
     rig = read_rig(folder / "calib_true.toml")
     trial = read_trial(folder / "trial.toml")
     sources = [VideoSource(c.name, trial.path(c.video), fields=c.fields) for c in trial.camera]
     assert {inspect(source).flagged_order for source in sources} == {"top-first"}
-    drawn = list(scene_frames(scene))
+    rendered = list(scene_frames(scene))
     read = list(open_recording(sources, rig, fields_as="rows"))
-    assert [f.time_s for f in read] == [f.time_s for f in drawn] == [Fraction(i, 50) for i in range(4)]
-    for a, b in zip(drawn, read, strict=True):
+    assert [f.time_s for f in read] == [f.time_s for f in rendered] == [Fraction(i, 50) for i in range(4)]
+    for a, b in zip(rendered, read, strict=True):
         for x, y in zip(a.views, b.views, strict=True):
             np.testing.assert_allclose(y.camera.K, x.camera.K, atol=ROUNDTRIP)
             grey_x, grey_y = x.rgb.mean(axis=2), y.rgb.mean(axis=2)
             assert np.abs(grey_x - grey_y).mean() < 3
-            other = drawn[(a.index + 2) % 4].views[0]
+            other = rendered[(a.index + 2) % 4].views[0]
             if y.camera.name == other.camera.name:
                 assert np.abs(grey_x - grey_y).mean() < np.abs(other.rgb.mean(axis=2) - grey_y).mean()
 
@@ -56,21 +56,21 @@ def test_truth_is_the_flight_at_the_times_of_the_fields(written):
     np.testing.assert_allclose(truth.R, flight.R, atol=ROUNDTRIP)
 
 
-def test_cameras_are_found_again_from_the_control_points():
+def test_cameras_are_recovered_from_the_control_points():
     scene = thrown_cross(seed=5)
     points = control_points(scene)
     sizes = {camera.name: camera.size for camera in scene.rig}
-    found = calibrate(points, sizes)
+    result = calibrate(points, sizes)
     for camera in scene.rig:
-        assert np.linalg.norm(found.rig[camera.name].centre - camera.centre) < 0.04
-    assert max(fit.rms_px for fit in found.fits) < 1.0
+        assert np.linalg.norm(result.rig[camera.name].centre - camera.centre) < 0.04
+    assert max(fit.rms_px for fit in result.fits) < 1.0
 
 
 def test_control_points_are_read_back_as_clicked(written):
     scene, folder, _ = written
-    points, drawn = read_control_points(folder / "control_points.csv"), control_points(scene)
-    np.testing.assert_allclose(points.world, drawn.world, atol=ROUNDTRIP)
-    np.testing.assert_allclose(points.px, drawn.px, atol=0.0051)
+    points, rendered = read_control_points(folder / "control_points.csv"), control_points(scene)
+    np.testing.assert_allclose(points.world, rendered.world, atol=ROUNDTRIP)
+    np.testing.assert_allclose(points.px, rendered.px, atol=0.0051)
 
 
 def test_clicked_ends_give_the_pose_to_what_clicks_allow(written):
@@ -81,7 +81,7 @@ def test_clicked_ends_give_the_pose_to_what_clicks_allow(written):
     assert 1e-4 < np.abs(error).max() < 0.1  # 1.2 px of a small picture are 2.5 cm
 
 
-def test_body_is_read_back_with_its_boxes_places_and_colours(written, tmp_path):
+def test_body_is_read_back_with_its_boxes_positions_and_colours(written, tmp_path):
     scene, folder, _ = written
     gym = tmp_path / "gym.toml"
     gym.write_text(body_toml(scene.surroundings))
@@ -105,7 +105,7 @@ def test_trial_names_what_was_written_and_starts_near_the_truth(written):
     assert len(json.loads((folder / "lights.json").read_text())["spotlights"]) == 2
 
 
-def test_progress_is_told_after_every_picture(written):
+def test_progress_is_reported_after_every_image(written):
     assert written[2] == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
@@ -119,7 +119,7 @@ def test_progressive_trial_has_frames_at_its_rate(tmp_path):
     assert [camera.fields for camera in read_trial(tmp_path / "trial.toml").camera] == ["progressive"] * 3
 
 
-def test_folder_with_something_in_it_is_left_alone_unless_told_otherwise(tmp_path):
+def test_folder_with_something_in_it_is_left_alone_unless_overwritten(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     scene = small_scene(n_pictures=2)
     with pytest.raises(TrialError, match="is not empty; give another folder, or overwrite it"):
@@ -142,7 +142,7 @@ def test_broken_off_recording_leaves_no_trial_file(tmp_path):
 
 
 def test_writing_a_preset_writes_its_own_scene(tmp_path, monkeypatch):
-    seen = []
-    monkeypatch.setattr("airborne.synthetic.throw.writing.write_trial", lambda scene, *_, **__: seen.append(scene))
+    observed = []
+    monkeypatch.setattr("airborne.synthetic.throw.writing.write_trial", lambda scene, *_, **__: observed.append(scene))
     write_thrown_cross(tmp_path, preset="side-somersault", seed=9)
-    assert (seen[0].seed, seen[0].n_pictures) == (9, 39)
+    assert (observed[0].seed, observed[0].n_pictures) == (9, 39)

@@ -1,4 +1,4 @@
-"""Residuals, their normal equations, and the unknowns eliminated that only one source knows."""
+"""Residuals, their Jacobian, the normal equations, and the Schur complement that eliminates points and targets."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from airborne.calibration.bundle.lenses import N_PARAMETERS, cross_matrices, pro
 from airborne.calibration.bundle.problem import Problem, State
 from airborne.types import Array, Ints
 
-_GAUGE_TOLERANCE = 1e-9  # of what a camera's own pixels resist: less is rounding
-_RIDGE = 1e-13  # of a diagonal: keeps what no observation tells from dividing by zero
+_GAUGE_TOLERANCE = 1e-9  # of the camera's own curvature: below it, a direction counts as unobserved
+_RIDGE = 1e-13  # of a diagonal: regularises unobserved parameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Jacobian:
-    """Derivatives, two rows an observation, then one a length, then one a lag; not weighted."""
+    """Derivatives of the residuals' predictions, unweighted: two rows an observation, then one a length, one a lag."""
 
     by_camera: csr_array  # (rows, camera columns)
     by_other: csr_array  # (rows, other columns)
@@ -27,7 +27,7 @@ class Jacobian:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NormalEquations:
-    """The normal equations: cameras, others, and what couples them."""
+    """The normal equations in blocks: cameras, others, and their coupling."""
 
     cameras: Array  # (c, c)
     coupling: Array  # (c, o)
@@ -36,7 +36,10 @@ class NormalEquations:
     other_rhs: Array  # (o,)
 
     def reduce(self, damping: float) -> tuple[Array, Array, SuperLU | None, Array]:
-        """Eliminate the others: the cameras' matrix and side, the others' factors, and `others^-1 coupling^T`."""
+        """Eliminate the others by their Schur complement.
+
+        Return the reduced camera matrix and right-hand side, the others' factors, and `others^-1 coupling^T`.
+        """
         cameras = self.cameras + damping * np.diag(np.diag(self.cameras))
         if not len(self.other_rhs):
             return cameras, self.camera_rhs, None, np.zeros((0, len(cameras)))
@@ -51,91 +54,95 @@ class NormalEquations:
         return cameras - self.coupling @ back, self.camera_rhs - back.T @ self.other_rhs, factors, back
 
 
-def world_points(task: Problem, state: State) -> Array:
-    """Return where in the world every observed point is, when it is looked at: (n, 3) [m]."""
-    world, arm, motion = _points_at_moments(task, state)
-    return world + np.cross(motion[:, :3], arm) + motion[:, 3:]
+def world_points(problem: Problem, state: State) -> Array:
+    """Return every observed point's world position at its time of exposure: (n, 3) [m]."""
+    world, arm, displacement = _points_at_moments(problem, state)
+    return world + np.cross(displacement[:, :3], arm) + displacement[:, 3:]
 
 
-def _points_at_moments(task: Problem, state: State) -> tuple[Array, Array, Array]:
-    """Return points (n, 3) at their moments, their arms from their targets' origins, and the motion (n, 6) since.
+def _points_at_moments(problem: Problem, state: State) -> tuple[Array, Array, Array]:
+    """Return points (n, 3) at their moments, their arms from their targets' origins, and the displacement (n, 6) since.
 
-    The motion is a small turn and a shift; arms and motions are 0 for points that are on no target.
+    The displacement is a small rotation and a shift; arm and displacement are 0 for points on no target.
     """
-    local, moment = state.points[task.point], task.moment
-    arm, motion, world = np.zeros(local.shape), np.zeros((len(local), 6)), local.copy()
-    on = moment >= 0
-    arm[on] = np.einsum("nij,nj->ni", state.target_R[moment[on]], local[on])
-    world[on] = arm[on] + state.target_t[moment[on]]
-    late = task.lag >= 0
-    lag, path = state.lags[task.lag[late], None], state.target_paths[moment[late]]
-    motion[late] = lag * path[:, 0] + lag**2 * path[:, 1]
-    return world, arm, motion
+    local, moment = state.points[problem.point], problem.moment
+    arm, displacement, world = np.zeros(local.shape), np.zeros((len(local), 6)), local.copy()
+    on_target = moment >= 0
+    arm[on_target] = np.einsum("nij,nj->ni", state.target_R[moment[on_target]], local[on_target])
+    world[on_target] = arm[on_target] + state.target_t[moment[on_target]]
+    is_late = problem.lag >= 0
+    lag, path = state.lags[problem.lag[is_late], None], state.target_paths[moment[is_late]]
+    displacement[is_late] = lag * path[:, 0] + lag**2 * path[:, 1]
+    return world, arm, displacement
 
 
-def residual_px(task: Problem, state: State) -> Array:
+def residual_px(problem: Problem, state: State) -> Array:
     """Return measured minus projected pixels (n, 2) [px]; NaN behind the camera."""
-    i = task.camera
-    return task.px - project(
-        state.R[i], state.centre[i], state.intrinsics[i], task.is_fisheye[i], world_points(task, state)
+    i = problem.camera
+    return problem.px - project(
+        state.R[i],
+        state.centre[i],
+        state.intrinsics[i],
+        is_fisheye=problem.is_fisheye[i],
+        world=world_points(problem, state),
     )
 
 
-def length_residual_m(task: Problem, state: State) -> Array:
-    """Return known minus found lengths (k,) [m]."""
-    ends = state.points[task.length_ends]
-    return task.length_m - np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)
+def length_residual_m(problem: Problem, state: State) -> Array:
+    """Return measured minus estimated lengths (k,) [m]."""
+    ends = state.points[problem.length_ends]
+    return problem.length_m - np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)
 
 
-def jacobian_of(task: Problem, state: State) -> Jacobian:
-    """Return the derivatives of the projections and lengths to the free numbers."""
-    i, n, k = task.camera, len(task.px), len(task.length_m)
-    n_rows = 2 * n + k + len(task.lag_sd_s)
-    world, arm, motion = _points_at_moments(task, state)
-    world = world + np.cross(motion[:, :3], arm) + motion[:, 3:]
+def jacobian_of(problem: Problem, state: State) -> Jacobian:
+    """Return the derivatives of the projections, lengths and lags by the free parameters."""
+    i, n, k = problem.camera, len(problem.px), len(problem.length_m)
+    n_rows = 2 * n + k + len(problem.lag_sd_s)
+    world, arm, displacement = _points_at_moments(problem, state)
+    world = world + np.cross(displacement[:, :3], arm) + displacement[:, 3:]
     _, by_camera, by_world = project_with_jacobian(
-        state.R[i], state.centre[i], state.intrinsics[i], task.is_fisheye[i], world
+        state.R[i], state.centre[i], state.intrinsics[i], is_fisheye=problem.is_fisheye[i], world=world
     )
-    by_camera[:, :, 7] *= _focal_ratio(task, state)[i, None]
-    entries = [_entries(by_camera, np.broadcast_to(task.camera_columns[i][:, None], by_camera.shape), np.arange(n))]
-    cameras = _matrix(entries, n_rows, task.n_camera_columns)
+    by_camera[:, :, 7] *= _focal_ratio(problem, state)[i, None]
+    entries = [_entries(by_camera, np.broadcast_to(problem.camera_columns[i][:, None], by_camera.shape), np.arange(n))]
+    cameras = _matrix(entries, n_rows, problem.n_camera_columns)
     others = []
-    on = np.flatnonzero(task.moment >= 0)
-    if len(on):
-        by_arm = by_world[on] + by_world[on] @ cross_matrices(motion[on, :3])
-        by_target = np.concatenate([-by_arm @ cross_matrices(arm[on]), by_world[on]], axis=2)
-        columns = task.target_columns[task.moment[on]]
-        others.append(_entries(by_target, np.broadcast_to(columns[:, None], by_target.shape), on))
-    off = np.flatnonzero((task.moment < 0) & (task.point_columns[task.point] >= 0).any(axis=1))
-    if len(off):
-        columns = task.point_columns[task.point[off]]
-        others.append(_entries(by_world[off], np.broadcast_to(columns[:, None], (len(off), 2, 3)), off))
-    late = np.flatnonzero(task.lag >= 0)
+    on_target = np.flatnonzero(problem.moment >= 0)
+    if len(on_target):
+        by_arm = by_world[on_target] + by_world[on_target] @ cross_matrices(displacement[on_target, :3])
+        by_target = np.concatenate([-by_arm @ cross_matrices(arm[on_target]), by_world[on_target]], axis=2)
+        columns = problem.target_columns[problem.moment[on_target]]
+        others.append(_entries(by_target, np.broadcast_to(columns[:, None], by_target.shape), on_target))
+    in_world = np.flatnonzero((problem.moment < 0) & (problem.point_columns[problem.point] >= 0).any(axis=1))
+    if len(in_world):
+        columns = problem.point_columns[problem.point[in_world]]
+        others.append(_entries(by_world[in_world], np.broadcast_to(columns[:, None], (len(in_world), 2, 3)), in_world))
+    late = np.flatnonzero(problem.lag >= 0)
     if len(late):
-        path = state.target_paths[task.moment[late]]
-        rate = path[:, 0] + 2 * state.lags[task.lag[late], None] * path[:, 1]
+        path = state.target_paths[problem.moment[late]]
+        rate = path[:, 0] + 2 * state.lags[problem.lag[late], None] * path[:, 1]
         by_lag = by_world[late] @ (np.cross(rate[:, :3], arm[late]) + rate[:, 3:])[:, :, None]
-        columns = task.lag_columns[task.lag[late]]
+        columns = problem.lag_columns[problem.lag[late]]
         others.append(_entries(by_lag, np.broadcast_to(columns[:, None, None], by_lag.shape), late))
-        lags = np.arange(len(task.lag_sd_s))
-        others.append((np.ones(len(lags)), 2 * n + k + lags, task.lag_columns))
+        lags = np.arange(len(problem.lag_sd_s))
+        others.append((np.ones(len(lags)), 2 * n + k + lags, problem.lag_columns))
     if k:
-        ends = state.points[task.length_ends]
+        ends = state.points[problem.length_ends]
         along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)[:, None]
         rows = np.repeat(2 * n + np.arange(k)[:, None], 3, axis=1)
         for values, end in ((-along, 0), (along, 1)):
-            others.append((values, rows, task.point_columns[task.length_ends[:, end]]))
-    return Jacobian(cameras, _matrix(others, n_rows, task.n_other_columns))
+            others.append((values, rows, problem.point_columns[problem.length_ends[:, end]]))
+    return Jacobian(cameras, _matrix(others, n_rows, problem.n_other_columns))
 
 
-def normal_equations(slopes: Jacobian, row_weights: Array, residuals: Array) -> NormalEquations:
-    """Return the normal equations of rows with weights (rows,) and residuals (rows,), 0 where nothing is known."""
-    weighted = _scale_rows(slopes.by_camera, row_weights)
-    weighted_others = _scale_rows(slopes.by_other, row_weights)
+def normal_equations(jacobian: Jacobian, row_weights: Array, residuals: Array) -> NormalEquations:
+    """Return the normal equations of rows with weights (rows,) and residuals (rows,), 0 for missing ones."""
+    weighted = _scale_rows(jacobian.by_camera, row_weights)
+    weighted_others = _scale_rows(jacobian.by_other, row_weights)
     return NormalEquations(
-        cameras=(slopes.by_camera.T @ weighted).toarray(),
-        coupling=(weighted.T @ slopes.by_other).toarray(),
-        others=csc_array(slopes.by_other.T @ weighted_others),
+        cameras=(jacobian.by_camera.T @ weighted).toarray(),
+        coupling=(weighted.T @ jacobian.by_other).toarray(),
+        others=csc_array(jacobian.by_other.T @ weighted_others),
         camera_rhs=weighted.T @ residuals,
         other_rhs=weighted_others.T @ residuals,
     )
@@ -147,46 +154,46 @@ def _scale_rows(rows: csr_array, weights: Array) -> csr_array:
     return csr_array((data, rows.indices, rows.indptr), shape=rows.shape)
 
 
-def gauge_directions(task: Problem, state: State, normal: NormalEquations, reduced: Array) -> Array:
-    """Return the directions (camera columns, k) in which the rig moves or grows as a whole and nothing is measured.
+def gauge_directions(problem: Problem, state: State, normal: NormalEquations, reduced: Array) -> Array:
+    """Return the gauge freedoms (camera columns, k): motions and scalings of the whole rig that change no residual.
 
-    Of the seven small similarities of the world those are kept that move no held number and that the reduced normal
-    equations (camera columns squared) do not resist; the columns are orthonormal.
+    Of the seven infinitesimal similarities of the world, those that move no fixed parameter and that lie in the null
+    space of the reduced camera matrix (camera columns squared); the columns are orthonormal.
     """
     n = len(state.R)
     generators = np.zeros((n, N_PARAMETERS, 7))
-    about = state.centre - state.centre.mean(axis=0)
+    arm = state.centre - state.centre.mean(axis=0)
     generators[:, 3:6, :3] = np.eye(3)
     generators[:, :3, 3:6] = -state.R
-    generators[:, 3:6, 3:6] = -cross_matrices(about)
-    generators[:, 3:6, 6] = about
-    is_held = task.camera_columns < 0
-    held = generators[is_held]
-    held = held[np.abs(held).max(axis=1) > 1e-9]
-    if len(held):
-        _, size, directions = np.linalg.svd(held, full_matrices=True)
+    generators[:, 3:6, 3:6] = -cross_matrices(arm)
+    generators[:, 3:6, 6] = arm
+    is_fixed = problem.camera_columns < 0
+    fixed = generators[is_fixed]
+    fixed = fixed[np.abs(fixed).max(axis=1) > 1e-9]
+    if len(fixed):
+        _, size, directions = np.linalg.svd(fixed, full_matrices=True)
         rank = int((size > 1e-9 * size[0]).sum())
         generators = generators @ directions[rank:].T
-    moved = np.zeros((task.n_camera_columns, generators.shape[2]))
-    moved[task.camera_columns[~is_held]] = generators[~is_held]
-    moved = moved[:, np.linalg.norm(moved, axis=0) > 1e-12]
-    if moved.shape[1] == 0:
-        return moved
-    stiff = np.sqrt(np.maximum(np.diag(normal.cameras), 1e-30))
-    scaled, _ = np.linalg.qr(stiff[:, None] * moved)
-    resistance, turn = np.linalg.eigh(scaled.T @ (reduced / stiff[:, None] / stiff) @ scaled)
-    loose = (scaled @ turn)[:, resistance < _GAUGE_TOLERANCE] / stiff[:, None]
-    return np.linalg.qr(loose)[0] if loose.shape[1] else loose
+    directions_of_cameras = np.zeros((problem.n_camera_columns, generators.shape[2]))
+    directions_of_cameras[problem.camera_columns[~is_fixed]] = generators[~is_fixed]
+    directions_of_cameras = directions_of_cameras[:, np.linalg.norm(directions_of_cameras, axis=0) > 1e-12]
+    if directions_of_cameras.shape[1] == 0:
+        return directions_of_cameras
+    scale = np.sqrt(np.maximum(np.diag(normal.cameras), 1e-30))
+    scaled, _ = np.linalg.qr(scale[:, None] * directions_of_cameras)
+    eigenvalues, eigenvectors = np.linalg.eigh(scaled.T @ (reduced / scale[:, None] / scale) @ scaled)
+    null_space = (scaled @ eigenvectors)[:, eigenvalues < _GAUGE_TOLERANCE] / scale[:, None]
+    return np.linalg.qr(null_space)[0] if null_space.shape[1] else null_space
 
 
 def rotation_vectors_from(start: Array, now: Array) -> Array:
-    """Return the rotation vectors (n, 3) [rad] by which matrices moved on, about the camera's own axes."""
+    """Return the rotation vectors (n, 3) [rad] from start to now (n, 3, 3), about the camera's own axes."""
     return Rotation.from_matrix(now @ np.swapaxes(start, 1, 2)).as_rotvec()
 
 
-def _focal_ratio(task: Problem, state: State) -> Array:
+def _focal_ratio(problem: Problem, state: State) -> Array:
     """Return fy / fx where they share a column, else 1: (cameras,)."""
-    columns = task.camera_columns
+    columns = problem.camera_columns
     is_square = (columns[:, 6] >= 0) & (columns[:, 6] == columns[:, 7])
     return np.where(is_square, state.intrinsics[:, 1] / state.intrinsics[:, 0], 1.0)
 

@@ -1,4 +1,4 @@
-"""Robust losses of pixel distances, and what they do to scale and variance of normal errors. Arrays only."""
+"""Robust losses of pixel distances, and their scale and efficiency under normal errors. Arrays only."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from airborne.types import Array
 
 Loss = Literal["cauchy", "huber", "squares"]
 
-_CAUCHY, _HUBER = 2.4, 1.5  # standard deviations beyond which a residual counts less; 95 % efficient for normal errors
+_CAUCHY, _HUBER = 2.4, 1.5  # tuning constants in standard deviations; 95 % efficient under normal errors
 _N_QUANTILES = 100_000
-BEHIND_CAMERA = 1e4  # squared distance, in standard deviations, of what lies behind its camera
+BEHIND_CAMERA = 1e4  # squared distance, in standard deviations, of a point behind its camera
 
 
 def robust_cost(loss: Loss, s: Array) -> Array:
@@ -35,7 +35,7 @@ def robust_weight(loss: Loss, s: Array) -> Array:
 
 
 class LossConstants(NamedTuple):
-    """What a loss makes of normal errors in two directions."""
+    """Constants of a loss under normal errors in two coordinates."""
 
     scale: float  # mean of weight times squared coordinate, in variances
     variance: float  # of the estimate, as a multiple of the inverse weighted information
@@ -46,14 +46,14 @@ class LossConstants(NamedTuple):
 def loss_constants(loss: Loss) -> LossConstants:
     """Return the constants of a loss, over the quantiles of the squared distance of two normal coordinates.
 
-    With influence `psi = w r`: variance `E[psi^2] / E[psi']^2` (Huber 1964), and E[w] for the weights in the
-    information.
+    With the influence function `psi = w r`: variance `E[psi^2] / E[psi']^2` (Huber 1964), and E[w] for the weights in
+    the information matrix.
     """
     s = -2 * np.log1p(-(np.arange(_N_QUANTILES) + 0.5) / _N_QUANTILES)
     w = robust_weight(loss, s)
     above, below = s + 1e-5 * (1 + s), np.maximum(s - 1e-5 * (1 + s), 0)
-    slope = (robust_weight(loss, above) - robust_weight(loss, below)) / (above - below)
-    mean_w, influence, sharpness = np.mean(w), np.mean(w * w * s) / 2, np.mean(w + s * slope)
+    derivative = (robust_weight(loss, above) - robust_weight(loss, below)) / (above - below)
+    mean_w, influence, sharpness = np.mean(w), np.mean(w * w * s) / 2, np.mean(w + s * derivative)
     return LossConstants(
         scale=float(np.mean(w * s) / 2),
         variance=float(mean_w * influence / sharpness**2),
@@ -62,9 +62,9 @@ def loss_constants(loss: Loss) -> LossConstants:
 
 
 def robust_scale(loss: Loss, s: Array) -> float:
-    """Return by how much standard deviations are too small: s (n,) squared distances, in them.
+    """Return the factor k of the assumed standard deviations, an M-estimate of scale; s (n,) squared distances in them.
 
-    Solves `mean(w(s / k^2) s / k^2) = E` for k, E as two normal coordinates have it, begun from the median.
+    Solves `mean(w(s / k^2) s / k^2) = E` for k, with E its value under normal errors, starting from the median.
     """
     expected = 2 * loss_constants(loss).scale * len(s)
     k2 = max(float(np.median(s)) / (2 * np.log(2)), 1e-12)

@@ -1,4 +1,4 @@
-"""All sources as one list of arrays, and a column of the equations for every number that is free."""
+"""All sources as one set of arrays, with a column of the equations for every free parameter."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from airborne.types import Array, Ints
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """The value of every number that may be free, and of those that are not."""
+    """The values of all parameters, free and fixed."""
 
     R: Array  # (cameras, 3, 3) camera from world
     centre: Array  # (cameras, 3) [m]
@@ -26,14 +26,14 @@ class State:
     target_t: Array  # (m, 3) [m]
     points: Array  # (p, 3) [m], in the world or in a target's axes
     lags: Array  # (l,) [s]
-    target_paths: Array  # (m, 2, 6): turn about the world's axes [rad] and shift [m] a second, and a square second
+    target_paths: Array  # (m, 2, 6): rotation about the world's axes [rad] and shift [m], per s and per s^2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
-    """What is measured, all sources after each other, and which numbers are free.
+    """The observations of all sources, one after another, and the columns of the free parameters.
 
-    A camera's columns count from 0; those of targets and points, which are eliminated, count from 0 again. -1: held.
+    A camera's columns count from 0; those of targets and points, which are eliminated, count from 0 again. -1: fixed.
     """
 
     is_fisheye: NDArray[np.bool_]  # (cameras,)
@@ -44,9 +44,9 @@ class Problem:
     sd_px: Array  # (n,)
     source: Ints  # (n,)
     cluster: Ints  # (n,), numbered over all sources; -1: none
-    is_used: NDArray[np.bool_]  # (n,) whether the observation says anything about the unknowns
+    is_used: NDArray[np.bool_]  # (n,) whether the observation constrains the unknowns
     camera_columns: Ints  # (cameras, 15)
-    target_columns: Ints  # (m, 6): turn about the world's axes [rad], shift [m]
+    target_columns: Ints  # (m, 6): rotation about the world's axes [rad], shift [m]
     point_columns: Ints  # (p, 3)
     source_of_column: Ints  # of targets' and points' columns
     length_ends: Ints  # (k, 2) rows of points
@@ -57,21 +57,21 @@ class Problem:
     lag_columns: Ints  # (l,)
     lag_sd_s: Array  # (l,)
     lag_source: Ints  # (l,)
-    time_s: Array  # (m,) of each moment; NaN where nobody asks [s]
+    time_s: Array  # (m,) of each moment; NaN without lags [s]
 
     @property
     def n_camera_columns(self) -> int:
-        """How many numbers of cameras are free."""
+        """How many camera parameters are free."""
         return int(self.camera_columns.max(initial=-1)) + 1
 
     @property
     def n_other_columns(self) -> int:
-        """How many numbers of targets and points are free."""
+        """How many parameters of targets, points and lags are free."""
         return len(self.source_of_column)
 
 
-def build_problem(rig: Rig, sources: Sequence[Source], freedom: Mapping[str, FreeParameters]) -> Problem:
-    """Return everything that is measured, with a number for everything that is free."""
+def build_problem(rig: Rig, sources: Sequence[Source], free_parameters: Mapping[str, FreeParameters]) -> Problem:
+    """Stack the sources and number the free parameters."""
     moments = np.cumsum([0, *(source.n_moments for source in sources)])
     points = np.cumsum([0, *(len(source.points) for source in sources)])
     moment = _concatenate([np.where(s.moments < 0, -1, s.moments + m) for s, m in zip(sources, moments, strict=False)])
@@ -81,9 +81,9 @@ def build_problem(rig: Rig, sources: Sequence[Source], freedom: Mapping[str, Fre
     ends = [np.stack([x.first, x.second], axis=1) + p for _, x, p in lengths]
     length_ends = np.concatenate([np.zeros((0, 2), int), *ends])
     free = np.concatenate([np.zeros((0, 3), bool), *(s.free_coordinates for s in sources)])
-    free &= _is_determined(free, camera, moment, point, length_ends)[:, None]
-    held = np.concatenate([np.zeros(0, bool), *(s.fixed_targets for s in sources)])
-    target_columns, point_columns, n_others = _other_columns(held, free, moment)
+    free &= _is_determined(free, camera=camera, moment=moment, point=point, ends=length_ends)[:, None]
+    is_fixed = np.concatenate([np.zeros(0, bool), *(s.fixed_targets for s in sources)])
+    target_columns, point_columns, n_others = _other_columns(is_fixed, free, moment)
     lag, lag_sd_s, lag_source = _lags(sources)
     source_of_column = np.concatenate([np.zeros(n_others, int), lag_source])
     for i, _ in enumerate(sources):
@@ -91,7 +91,7 @@ def build_problem(rig: Rig, sources: Sequence[Source], freedom: Mapping[str, Fre
             own = columns[first[i] : first[i + 1]]
             source_of_column[own[own >= 0]] = i
     is_free_point = np.concatenate([np.zeros(0, bool), *(s.free_coordinates.any(axis=1) for s in sources)])
-    lost = (is_free_point & (point_columns < 0).all(axis=1))[point]
+    is_undetermined = (is_free_point & (point_columns < 0).all(axis=1))[point]
     return Problem(
         is_fisheye=np.array([c.lens == "fisheye" for c in rig]),
         camera=camera,
@@ -101,8 +101,8 @@ def build_problem(rig: Rig, sources: Sequence[Source], freedom: Mapping[str, Fre
         sd_px=np.concatenate([np.zeros(0), *(np.broadcast_to(s.sd_px, len(s.px)) for s in sources)]),
         source=np.repeat(np.arange(len(sources)), [len(s.px) for s in sources]),
         cluster=_clusters(sources),
-        is_used=~lost,
-        camera_columns=_camera_columns(rig, freedom),
+        is_used=~is_undetermined,
+        camera_columns=_camera_columns(rig, free_parameters),
         target_columns=target_columns,
         point_columns=point_columns,
         source_of_column=source_of_column,
@@ -118,8 +118,8 @@ def build_problem(rig: Rig, sources: Sequence[Source], freedom: Mapping[str, Fre
     )
 
 
-def initial_state(rig: Rig, sources: Sequence[Source], task: Problem) -> State:
-    """Return the start as arrays."""
+def initial_state(rig: Rig, sources: Sequence[Source], problem: Problem) -> State:
+    """Return the initial values as arrays."""
     targets = [s.world_from_target for s in sources if s.world_from_target is not None]
     state = State(
         R=np.stack([c.camera_from_world.rotation.as_matrix() for c in rig]),
@@ -133,65 +133,67 @@ def initial_state(rig: Rig, sources: Sequence[Source], task: Problem) -> State:
         target_R=np.concatenate([np.zeros((0, 3, 3)), *(t.rotation.as_matrix() for t in targets)]),
         target_t=np.concatenate([np.zeros((0, 3)), *(t.translation for t in targets)]),
         points=np.concatenate([np.zeros((0, 3)), *(s.points for s in sources)]).astype(float),
-        lags=np.zeros(len(task.lag_sd_s)),
-        target_paths=np.zeros((len(task.time_s), 2, 6)),
+        lags=np.zeros(len(problem.lag_sd_s)),
+        target_paths=np.zeros((len(problem.time_s), 2, 6)),
     )
-    return with_target_paths(task, state)
+    return with_target_paths(problem, state)
 
 
-def with_target_paths(task: Problem, state: State) -> State:
-    """Return the state with each target's way about its moment: the parabola through the moments before and after.
+def with_target_paths(problem: Problem, state: State) -> State:
+    """Return the state with each target's path about its moment: the parabola through the moments before and after.
 
-    A straight line where only one neighbour has been seen, standstill where none or where nobody asks for lags.
+    A straight line where only one neighbour is seen; at rest where none is, or without lags.
     """
-    is_known = np.isfinite(task.time_s) & np.isin(np.arange(len(task.time_s)), task.moment)
-    paths = np.zeros((len(task.time_s), 2, 6))
+    is_known = np.isfinite(problem.time_s) & np.isin(np.arange(len(problem.time_s)), problem.moment)
+    paths = np.zeros((len(problem.time_s), 2, 6))
     for m in np.flatnonzero(is_known):
-        near = [
-            i for i in (m - 1, m + 1) if 0 <= i < len(is_known) and is_known[i] and task.time_s[i] != task.time_s[m]
+        neighbours = [
+            i
+            for i in (m - 1, m + 1)
+            if 0 <= i < len(is_known) and is_known[i] and problem.time_s[i] != problem.time_s[m]
         ]
-        if near:
-            turn = Rotation.from_matrix(state.target_R[near] @ state.target_R[m].T).as_rotvec()
-            change = np.concatenate([turn, state.target_t[near] - state.target_t[m]], axis=1)
-            time_s = task.time_s[near] - task.time_s[m]
-            powers = time_s[:, None] ** np.arange(1, len(near) + 1)
-            paths[m, : len(near)] = np.linalg.solve(powers, change)
+        if neighbours:
+            rotation = Rotation.from_matrix(state.target_R[neighbours] @ state.target_R[m].T).as_rotvec()
+            change = np.concatenate([rotation, state.target_t[neighbours] - state.target_t[m]], axis=1)
+            time_s = problem.time_s[neighbours] - problem.time_s[m]
+            powers = time_s[:, None] ** np.arange(1, len(neighbours) + 1)
+            paths[m, : len(neighbours)] = np.linalg.solve(powers, change)
     return replace(state, target_paths=paths)
 
 
-def apply_step(task: Problem, state: State, step: Array, other_step: Array) -> State:
-    """Return the state after a step of the cameras' columns and one of the others'."""
-    change = _step_of(step, task.camera_columns)
-    target, point = _step_of(other_step, task.target_columns), _step_of(other_step, task.point_columns)
+def apply_step(problem: Problem, state: State, step: Array, other_step: Array) -> State:
+    """Return the state after a step in the cameras' columns and one in the others'."""
+    change = _step_of(step, problem.camera_columns)
+    target, point = _step_of(other_step, problem.target_columns), _step_of(other_step, problem.point_columns)
     return replace(
         state,
         R=Rotation.from_rotvec(change[:, :3]).as_matrix() @ state.R,
         centre=state.centre + change[:, 3:6],
-        intrinsics=state.intrinsics + _keep_focal_ratio(state, change[:, 6:], task.camera_columns),
+        intrinsics=state.intrinsics + _keep_focal_ratio(state, change[:, 6:], problem.camera_columns),
         target_R=Rotation.from_rotvec(target[:, :3]).as_matrix() @ state.target_R if len(target) else state.target_R,
         target_t=state.target_t + target[:, 3:],
         points=state.points + point,
-        lags=state.lags + _step_of(other_step, task.lag_columns),
+        lags=state.lags + _step_of(other_step, problem.lag_columns),
     )
 
 
 def rig_from_state(rig: Rig, state: State) -> Rig:
-    """Return the cameras with the state's numbers."""
+    """Return the cameras with the state's parameters."""
     return Rig(tuple(_camera(camera, state, i) for i, camera in enumerate(rig)))
 
 
 def sources_from_state(sources: Sequence[Source], state: State) -> tuple[Source, ...]:
-    """Return the sources with their points and targets where the state has them."""
-    done, m, p = [], 0, 0
+    """Return the sources with the state's points and targets."""
+    updated, m, p = [], 0, 0
     for source in sources:
         moments, points = slice(m, m + source.n_moments), slice(p, p + len(source.points))
         targets = None
         if source.n_moments:
             rotation = Rotation.from_matrix(state.target_R[moments])
             targets = RigidTransform.from_components(state.target_t[moments], rotation)
-        done.append(replace(source, points=state.points[points], world_from_target=targets))
+        updated.append(replace(source, points=state.points[points], world_from_target=targets))
         m, p = moments.stop, points.stop
-    return tuple(done)
+    return tuple(updated)
 
 
 def _camera(camera: Camera, state: State, i: int) -> Camera:
@@ -210,12 +212,12 @@ def _concatenate(columns: Sequence[Ints]) -> Ints:
 
 
 def _step_of(step: Array, columns: Ints) -> Array:
-    """Return each number's step, 0 where it is held; the shape is that of columns."""
+    """Return each parameter's step, 0 where it is fixed; the shape is that of columns."""
     return np.append(step, 0.0)[columns]
 
 
 def _keep_focal_ratio(state: State, change: Array, columns: Ints) -> Array:
-    """Keep the ratio of the focal lengths where they share a column; change (cameras, 9)."""
+    """Preserve the ratio of the focal lengths where they share a column; change (cameras, 9)."""
     is_square = (columns[:, 6] >= 0) & (columns[:, 6] == columns[:, 7])
     ratio = state.intrinsics[:, 1] / state.intrinsics[:, 0]
     change = change.copy()
@@ -223,12 +225,12 @@ def _keep_focal_ratio(state: State, change: Array, columns: Ints) -> Array:
     return change
 
 
-def _camera_columns(rig: Rig, freedom: Mapping[str, FreeParameters]) -> Ints:
+def _camera_columns(rig: Rig, free_parameters: Mapping[str, FreeParameters]) -> Ints:
     columns = np.full((len(rig), N_PARAMETERS), -1)
     shared: dict[str, int] = {}
     n = 0
     for row, camera in zip(columns, rig, strict=True):
-        own = freedom[camera.name]
+        own = free_parameters[camera.name]
         for number in own.parameters(camera.lens):
             if number in (6, 7) and own.shares_focal:
                 key = f"{own.shares_focal} {number}"
@@ -243,17 +245,19 @@ def _camera_columns(rig: Rig, freedom: Mapping[str, FreeParameters]) -> Ints:
     return columns
 
 
-def _is_determined(free: NDArray[np.bool_], camera: Ints, moment: Ints, point: Ints, ends: Ints) -> NDArray[np.bool_]:
-    """Say which points (p,) can be found: each view tells two coordinates, each length one."""
+def _is_determined(
+    free: NDArray[np.bool_], *, camera: Ints, moment: Ints, point: Ints, ends: Ints
+) -> NDArray[np.bool_]:
+    """Say which points (p,) are determined: each view gives two equations, each length one."""
     pairs = np.unique(np.stack([point[moment < 0], camera[moment < 0]], axis=1), axis=0)
     n_views = np.bincount(pairs[:, 0], minlength=len(free))
     n_lengths = np.bincount(ends.ravel(), minlength=len(free))
     return (n_views > 0) & (2 * n_views + n_lengths >= free.sum(axis=1))
 
 
-def _other_columns(held: NDArray[np.bool_], free: NDArray[np.bool_], moment: Ints) -> tuple[Ints, Ints, int]:
-    is_seen = np.isin(np.arange(len(held)), moment)
-    moves = np.repeat((~held & is_seen)[:, None], 6, axis=1)
+def _other_columns(is_fixed: NDArray[np.bool_], free: NDArray[np.bool_], moment: Ints) -> tuple[Ints, Ints, int]:
+    is_seen = np.isin(np.arange(len(is_fixed)), moment)
+    moves = np.repeat((~is_fixed & is_seen)[:, None], 6, axis=1)
     targets, points = np.full(moves.shape, -1), np.full(free.shape, -1)
     targets[moves] = np.arange(moves.sum())
     points[free] = np.arange(free.sum()) + moves.sum()
@@ -261,20 +265,20 @@ def _other_columns(held: NDArray[np.bool_], free: NDArray[np.bool_], moment: Int
 
 
 def _clusters(sources: Sequence[Source]) -> Ints:
-    found, n = [], 0
+    clusters, n = [], 0
     for source in sources:
         if source.cluster is None:
-            found.append(np.full(len(source.px), -1))
+            clusters.append(np.full(len(source.px), -1))
             continue
         _, own = np.unique(source.cluster, return_inverse=True)
-        found.append(own + n)
+        clusters.append(own + n)
         n += int(own.max(initial=-1)) + 1
-    return _concatenate(found)
+    return _concatenate(clusters)
 
 
 def _lags(sources: Sequence[Source]) -> tuple[Ints, Array, Ints]:
     """Return every observation's lag (n,), the lags' standard deviations (l,) and sources (l,)."""
-    found, sds, owners, n = [], [np.zeros(0)], [np.zeros(0, int)], 0
+    lags, sds, owners, n = [], [np.zeros(0)], [np.zeros(0, int)], 0
     for i, source in enumerate(sources):
         own = np.full(len(source.px), -1)
         if source.lags is not None:
@@ -284,8 +288,8 @@ def _lags(sources: Sequence[Source]) -> tuple[Ints, Array, Ints]:
             n += len(groups)
             sds.append(np.full(len(groups), source.lags.sd_s))
             owners.append(np.full(len(groups), i))
-        found.append(own)
-    return _concatenate(found), np.concatenate(sds), np.concatenate(owners)
+        lags.append(own)
+    return _concatenate(lags), np.concatenate(sds), np.concatenate(owners)
 
 
 def _times(source: Source) -> Array:

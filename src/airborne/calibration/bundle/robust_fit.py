@@ -27,16 +27,16 @@ from airborne.geometry.descent import Descent, NielsenRule, Outcome, descend
 from airborne.types import Array, Ints
 
 _MOST_STEPS, _MOST_SCALINGS = 200, 12
-_CONVERGED = 1e-5, 1e-10  # of the cost, alone and as a share of it: a step that promises less is not taken
+_CONVERGED = 1e-5, 1e-10  # predicted decrease, absolute and relative to the cost, below which the iteration stops
 _SAME_NOISE = 0.01
 _DAMPING = NielsenRule(first=1e-3, least=1e-12, most=1e8, least_factor=1 / 10)
 _LEAST_SCALE = 1e-6
-_LEAST_REDUNDANCY = 8  # numbers more than were fitted; fewer do not show that the noise is smaller than was said
+_LEAST_REDUNDANCY = 8  # below it, residuals cannot lower the assumed noise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Linearisation:
-    """The equations at one state."""
+    """The linearised problem at one state."""
 
     residual: Array  # (n, 2) [px]
     weight: Array  # (n,)
@@ -48,15 +48,15 @@ class Linearisation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Noise:
-    """What is known of the sources' noise: (sources,)."""
+    """The noise model of the sources: (sources,)."""
 
-    scale: Array  # of the standard deviations that were given
-    effect: Array  # how many observations are worth one, because clusters err together (Kish's design effect)
+    scale: Array  # of the sources' standard deviations
+    effect: Array  # Kish's design effect: correlated observations that are worth an independent one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobustFit:
-    """The fit of one problem: descents, each with the noise that the last one left."""
+    """The minimisation of one problem: descents, each with the noise that the last one left."""
 
     problem: Problem
     start: State
@@ -64,19 +64,16 @@ class RobustFit:
     loss: Loss
     progress: Callable[[int, float], None] | None
 
-    def run(self, known: NDArray[np.bool_]) -> tuple[State, Noise, Outcome]:
-        """Return the best state, the sources' noise, and why the last descent ended.
-
-        known (sources,): whose noise is known.
-        """
+    def run(self, is_known: NDArray[np.bool_]) -> tuple[State, Noise, Outcome]:
+        """Return the best state, the sources' noise, and why the last descent ended."""
         state, n_steps, outcome = self.start, 0, Outcome.OUT_OF_STEPS
-        noise = self._estimate_noise(state, Noise(np.ones(len(known)), np.ones(len(known))), known, None)
+        noise = self._estimate_noise(state, Noise(np.ones(len(is_known)), np.ones(len(is_known))), is_known, None)
         for _ in range(_MOST_SCALINGS):
             descent = self._descend(with_target_paths(self.problem, state), noise, n_steps)
             state, fit, outcome = descent.best.state, descent.best.linearisation, descent.outcome
             n_steps += descent.n_steps
             redundancy = redundancies(self.problem, state, fit.normal, fit.jacobian, weights=fit.row_weights)
-            new = self._estimate_noise(state, noise, known, redundancy)
+            new = self._estimate_noise(state, noise, is_known, redundancy)
             change = (
                 np.abs(new.scale / noise.scale - 1).max(initial=0),
                 np.abs(new.effect / noise.effect - 1).max(initial=0),
@@ -88,15 +85,17 @@ class RobustFit:
 
     def linearise(self, state: State, noise: Noise) -> Linearisation:
         """Return the weighted equations at a state."""
-        task = self.problem
+        problem = self.problem
         residual, s = self._squares(state, noise.scale)
-        variance = (task.sd_px * noise.scale[task.source]) ** 2 * noise.effect[task.source]
-        weight = np.where(task.is_used & np.isfinite(residual[:, 0]), robust_weight(self.loss, s), 0.0)
-        row_weights = np.concatenate([np.repeat(weight / variance, 2), 1 / task.length_sd_m**2, 1 / task.lag_sd_s**2])
-        rows = np.concatenate([np.nan_to_num(residual).ravel(), length_residual_m(task, state), -state.lags])
-        slopes = jacobian_of(task, state)
-        normal = normal_equations(slopes, row_weights, rows)
-        return Linearisation(residual, weight, row_weights, rows, slopes, self._with_prior(normal, state))
+        variance = (problem.sd_px * noise.scale[problem.source]) ** 2 * noise.effect[problem.source]
+        weight = np.where(problem.is_used & np.isfinite(residual[:, 0]), robust_weight(self.loss, s), 0.0)
+        row_weights = np.concatenate(
+            [np.repeat(weight / variance, 2), 1 / problem.length_sd_m**2, 1 / problem.lag_sd_s**2]
+        )
+        rows = np.concatenate([np.nan_to_num(residual).ravel(), length_residual_m(problem, state), -state.lags])
+        jacobian = jacobian_of(problem, state)
+        normal = normal_equations(jacobian, row_weights, rows)
+        return Linearisation(residual, weight, row_weights, rows, jacobian, self._with_prior(normal, state))
 
     def cost(self, state: State, noise: Noise) -> float:
         """Return minus the log-posterior at a state."""
@@ -107,41 +106,43 @@ class RobustFit:
         return float(pixels + lengths + lags + self._prior_cost(state)) / 2
 
     def _descend(self, state: State, noise: Noise, n_before: int) -> Descent[_Iterate]:
-        tell = self.progress
+        report = self.progress
         return descend(
             _Iterate(self, state, noise),
             lambda state: _Iterate(self, state, noise),
             _DAMPING,
             most_steps=_MOST_STEPS - n_before,
-            least_promise=_CONVERGED,
-            progress=tell and (lambda n_steps, cost: tell(n_before + n_steps, cost)),
+            least_predicted=_CONVERGED,
+            progress=report and (lambda n_steps, cost: report(n_before + n_steps, cost)),
         )
 
     def _squares(self, state: State, scales: Array) -> tuple[Array, Array]:
         """Return the residuals (n, 2) [px] and their squared distances in standard deviations (n,)."""
-        task = self.problem
-        residual = residual_px(task, state)
-        s = np.sum(residual**2, axis=1) / (task.sd_px * scales[task.source]) ** 2
-        return residual, np.where(task.is_used, np.where(np.isfinite(s), s, BEHIND_CAMERA), 0.0)
+        problem = self.problem
+        residual = residual_px(problem, state)
+        s = np.sum(residual**2, axis=1) / (problem.sd_px * scales[problem.source]) ** 2
+        return residual, np.where(problem.is_used, np.where(np.isfinite(s), s, BEHIND_CAMERA), 0.0)
 
-    def _estimate_noise(self, state: State, noise: Noise, known: NDArray[np.bool_], redundancy: Array | None) -> Noise:
-        """Find the sources' noise from the residuals, as far as it is not known."""
-        residual, s = self._squares(state, np.ones(len(known)))
+    def _estimate_noise(
+        self, state: State, noise: Noise, is_known: NDArray[np.bool_], redundancy: Array | None
+    ) -> Noise:
+        """Estimate the sources' noise from the residuals where it is not known."""
+        residual, s = self._squares(state, np.ones(len(is_known)))
         scale, effect = noise.scale.copy(), noise.effect.copy()
-        for i in range(len(known)):
+        for i in range(len(is_known)):
             rows = (self.problem.source == i) & self.problem.is_used
-            if rows.any() and not known[i]:
-                shrunk = 1.0 if redundancy is None else redundancy[i] / (2 * rows.sum())  # by what was fitted
+            if rows.any() and not is_known[i]:
+                redundant_share = 1.0 if redundancy is None else redundancy[i] / (2 * rows.sum())  # by what was fitted
                 least = 1.0 if redundancy is not None and redundancy[i] < _LEAST_REDUNDANCY else _LEAST_SCALE
-                scale[i] = max(robust_scale(self.loss, s[rows] / shrunk), least)
+                scale[i] = max(robust_scale(self.loss, s[rows] / redundant_share), least)
             if rows.any() and redundancy is not None:
                 weight = robust_weight(self.loss, s[rows] / scale[i] ** 2) / self.problem.sd_px[rows] ** 2
                 effect[i] = _design_effect(weight[:, None] * np.nan_to_num(residual[rows]), self.problem.cluster[rows])
         return Noise(scale, effect)
 
     def _prior_residual(self, state: State) -> Array:
-        turn = rotation_vectors_from(self.start.R, state.R)
-        change = [turn, state.centre - self.start.centre, state.intrinsics - self.start.intrinsics]
+        rotation = rotation_vectors_from(self.start.R, state.R)
+        change = [rotation, state.centre - self.start.centre, state.intrinsics - self.start.intrinsics]
         return np.concatenate(change, axis=1)
 
     def _prior_cost(self, state: State) -> float:
@@ -183,7 +184,7 @@ class _Iterate:
         return self._cost
 
     def step(self, damping: float) -> tuple[State, float]:
-        """Return the state after a damped step, and by how much the cost should fall."""
+        """Return the state after a damped step, and the predicted decrease of the cost."""
         problem, normal = self.fit.problem, self.linearisation.normal
         reduced, side, factors, back = normal.reduce(damping)
         step = np.zeros(0)
@@ -192,18 +193,18 @@ class _Iterate:
         other = np.zeros(0)
         if factors is not None:
             other = factors.solve(normal.other_rhs) - back @ step
-        promised = normal.camera_rhs @ step + normal.other_rhs @ other
+        predicted = normal.camera_rhs @ step + normal.other_rhs @ other
         squares = step @ normal.cameras @ step + other @ (normal.others @ other)
-        promised -= squares / 2 + step @ normal.coupling @ other
-        return apply_step(problem, self.state, step, other), float(promised)
+        predicted -= squares / 2 + step @ normal.coupling @ other
+        return apply_step(problem, self.state, step, other), float(predicted)
 
 
 def _design_effect(scores: Array, cluster: Ints) -> float:
-    """Return how many observations are worth one: squared sums over clusters against sums of squares; 1 at least."""
-    own = cluster >= 0
-    total = float(np.sum(scores[own] ** 2))
+    """Return Kish's design effect: squared sums over clusters over sums of squares; 1 at least."""
+    is_clustered = cluster >= 0
+    total = float(np.sum(scores[is_clustered] ** 2))
     if total == 0:
         return 1.0
     sums = np.zeros((int(cluster.max()) + 1, 2))
-    np.add.at(sums, cluster[own], scores[own])
+    np.add.at(sums, cluster[is_clustered], scores[is_clustered])
     return max(float(np.sum(sums**2)) / total, 1.0)

@@ -1,4 +1,4 @@
-"""What is measured and what is free: values that say one bundle adjustment's whole task."""
+"""What is measured and what is free: the input of one bundle adjustment."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ _TERMS = {0: (), 1: (0,), 2: (0, 1), 3: (0, 1, 4), 4: (0, 1, 2, 3), 5: (0, 1, 2,
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreeParameters:
-    """Which numbers of a camera are found; the others keep the values of the start."""
+    """Which parameters of a camera are estimated; the others keep their initial values."""
 
     extrinsics: bool = True  # position and orientation
     focal: bool = True
-    shares_focal: str = ""  # cameras with the same word here have one focal length in common
-    square_pixels: bool = True  # both focal lengths change alike
+    shares_focal: str = ""  # cameras with the same word here share one focal length
+    square_pixels: bool = True  # the ratio of both focal lengths is fixed
     principal_point: bool = False
     n_terms: int = 0  # lens terms: k1 | k1 k2 | k1 k2 k3 | k1 k2 p1 p2 | all five; of a fisheye the first n of four
 
     def parameters(self, lens: Literal["brown", "fisheye"] = "brown") -> tuple[int, ...]:
-        """Return which of a camera's 15 numbers (see `lenses.NUMBERS`) are free, fy not beside a square fx."""
+        """Return which of `lenses.CAMERA_PARAMETERS` are free, by index; of square pixels fx, without fy."""
         terms = _TERMS[self.n_terms] if lens == "brown" else tuple(range(min(self.n_terms, 4)))
         return (
             *(range(6) if self.extrinsics else ()),
@@ -43,7 +43,7 @@ ALL_FIXED = FreeParameters(extrinsics=False, focal=False)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Lengths:
-    """Known distances between a source's points that stand in the world, one a row."""
+    """Known distances between a source's points in the world, one a row."""
 
     first: Ints  # (k,) rows of the source's points
     second: Ints  # (k,)
@@ -53,36 +53,36 @@ class Lengths:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ObservationLags:
-    """Cameras that do not look at the same instant: each group of observations of moving targets has its own lag.
+    """Cameras that do not expose at the same instant: each group of observations of moving targets has its own lag.
 
-    A target's velocity comes from its places at the moments before and after.
+    A target's velocity comes from its poses at the moments before and after.
     """
 
-    group: Ints  # (n,) observations of one group, such as a camera's picture, share a lag; -1: none
+    group: Ints  # (n,) observations of one group, such as a camera's image, share a lag; -1: none
     time_s: Array  # (m,) of every moment [s]
-    sd_s: float  # of a lag, thought to be about zero [s]
+    sd_s: float  # prior standard deviation of a lag about zero [s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Source:
-    """What one kind of evidence says, and where its unknowns start; one row an observation.
+    """Observations of one kind with the initial values of their unknowns; one row an observation.
 
-    A point stands in the world (its moment is -1), known or free, or on a rigid target: then it is known in the
-    target's axes, and the target's place is free at every moment.
+    A point is fixed in the world (its moment is -1), known or free, or lies on a rigid target: then it is known in the
+    target's axes, and the target's pose is free at every moment.
     """
 
     name: str
     camera: Ints  # (n,) rows of the rig
     point: Ints  # (n,) rows of points
     px: Array  # (n, 2) [px], pixel centres at whole numbers
-    points: Array  # (p, 3) [m]: known, or the start where free
+    points: Array  # (p, 3) [m]: known, or initial values where free
     is_free: NDArray[np.bool_] | None = None  # (p,) or each coordinate (p, 3); None: all points are known
     moment: Ints | None = None  # (n,) rows of world_from_target, -1 for points in the world; None: all in the world
-    world_from_target: RigidTransform | None = None  # (m,), the start of every target
-    is_fixed: NDArray[np.bool_] | None = None  # (m,) targets that stay as they start; None: none
+    world_from_target: RigidTransform | None = None  # (m,), the initial pose of every target
+    is_fixed: NDArray[np.bool_] | None = None  # (m,) targets whose pose is fixed; None: none
     sd_px: float | Array = 1.0  # of a coordinate, of all or each (n,) [px]
     sd_is_known: bool = False  # False: sd_px is scaled to the residuals
-    cluster: Ints | None = None  # (n,) observations of one cluster share errors; None: every error is its own
+    cluster: Ints | None = None  # (n,) observations of one cluster have correlated errors; None: independent
     lengths: Lengths | None = None
     lags: ObservationLags | None = None
 
@@ -92,10 +92,12 @@ class Source:
         if any(len(column) != n for column in columns):
             raise CalibrationError(f"source '{self.name}': camera, point, moment and px have different lengths")
         if n and (self.point.max() >= p or self.moments.max() >= m or not np.isfinite(self.px).all()):
-            raise CalibrationError(f"source '{self.name}': a point or moment is not there, or a pixel is no number")
+            raise CalibrationError(
+                f"source '{self.name}': a point or moment does not exist, or a pixel is NaN or infinite"
+            )
 
     def select(self, rows: NDArray[np.bool_]) -> Source:
-        """Return the source with some of its observations (n,); points and targets keep their numbers."""
+        """Return the source with some of its observations (n,); points and targets keep their indices."""
         lags, sd_px = self.lags, np.asarray(self.sd_px)
         return replace(
             self,
@@ -120,7 +122,7 @@ class Source:
 
     @property
     def free_coordinates(self) -> NDArray[np.bool_]:
-        """Which coordinates of the points are found: (p, 3)."""
+        """Which coordinates of the points are estimated: (p, 3)."""
         if self.is_free is None:
             return np.zeros((len(self.points), 3), bool)
         free = np.asarray(self.is_free, bool)
@@ -128,12 +130,12 @@ class Source:
 
     @property
     def fixed_targets(self) -> NDArray[np.bool_]:
-        """Which targets stay as they start: (m,)."""
+        """Which targets have a fixed pose: (m,)."""
         return np.zeros(self.n_moments, bool) if self.is_fixed is None else np.asarray(self.is_fixed, bool)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CameraPrior:
-    """What is known of the cameras beforehand: their numbers at the start, each with a standard deviation."""
+    """A normal prior of the cameras about their initial parameters."""
 
-    sd: Array  # (cameras, 15), in the units of `lenses.NUMBERS`; inf: nothing is known
+    sd: Array  # (cameras, 15), in the units of `lenses.CAMERA_PARAMETERS`; inf: no prior

@@ -1,7 +1,7 @@
-"""What is wrong with a calibration, in plain words: pure functions that look at evidence and return `Finding`s.
+"""What is wrong with a calibration, in plain words: pure functions `check_*` that return `Finding`s.
 
-In come pictures, pixels, rigs, clocks; out come sentences, each with the number that shows it and what to do. A sound
-recording gives none. Errors and warnings about control points stand in `points`.
+In come images, pixels, rigs, time stamps; out come sentences, each with the number that shows it and what to do; none
+for a good recording. Errors and warnings about control points are in `control_points`.
 """
 
 from airborne.calibration.diagnosis.control_points import (

@@ -1,4 +1,4 @@
-"""Clocks and counters that do not run on: restarts, repeats, lost pictures; and rows that are read one by one."""
+"""Checks of clocks and counters: restarts, repeats, lost frames; and of rolling shutters."""
 
 from __future__ import annotations
 
@@ -11,16 +11,20 @@ from airborne.cameras.finding import Finding, join_names
 from airborne.geometry.robust import SD_OF_MEDIAN_DEVIATION
 from airborne.types import Array
 
-_SAME_TIME = 0.1  # of a period: two times closer than this are one
-_GAP = 1.5  # periods: further apart, a picture is missing
-_NAMED = 3  # pictures told by their number; of more only how many
-_FEWEST_TIMES = 5  # times that tell a period
-_READOUT_S, _READOUT_SDS, _READOUT_PX = 0.002, 5.0, 0.3  # a readout is told that is longer, surer, shifts more
+_SAME_TIME = 0.1  # of a period: times closer than this are equal
+_GAP = 1.5  # periods: a larger step is a lost frame
+_NAMED = 3  # frames listed by number; of more only how many
+_FEWEST_TIMES = 5  # time stamps that determine a period
+_READOUT_S, _READOUT_SDS, _READOUT_PX = (
+    0.002,
+    5.0,
+    0.3,
+)  # least readout time, significance and displacement that are reported
 _MOST_READOUT_S = 0.1
 
 
 def check_times(camera: str, times_s: Array) -> list[Finding]:
-    """Say where a camera's time stamps (n,) [s], in the order of its pictures, go back, repeat or leave one out."""
+    """Report where a camera's time stamps (n,) [s], in the order of its frames, go back, repeat or skip one."""
     times_s = np.asarray(times_s, float)
     if len(times_s) < _FEWEST_TIMES:
         return []
@@ -28,27 +32,27 @@ def check_times(camera: str, times_s: Array) -> list[Finding]:
 
 
 def check_counter(camera: str, counts: NDArray[np.integer]) -> list[Finding]:
-    """Say where a camera's own picture counter (n,), in the order of its pictures, rolls over, repeats or jumps."""
+    """Report where a camera's own frame counter (n,), in the order of its frames, rolls over, repeats or jumps."""
     if len(counts) < _FEWEST_TIMES:
         return []
     return list(_check_steps(camera, counts.astype(float), "picture numbers", period=1.0))
 
 
 def check_image_counts(n_pictures: Mapping[str, int], n_least: int = 1) -> list[Finding]:
-    """Say which videos have another number of pictures than most; n_least: a difference that counts."""
+    """Report videos with another number of frames than most; n_least: the least difference that counts."""
     values, how_often = np.unique(list(n_pictures.values()), return_counts=True)
     if len(values) < 2:
         return []
-    usual = int(values[np.argmax(how_often)])
-    odd = {name: n for name, n in n_pictures.items() if abs(n - usual) >= n_least}
+    most_common = int(values[np.argmax(how_often)])
+    odd = {name: n for name, n in n_pictures.items() if abs(n - most_common) >= n_least}
     if not odd:
         return []
-    told = join_names([f"{name} has {n}" for name, n in odd.items()])
+    description = join_names([f"{name} has {n}" for name, n in odd.items()])
     others = join_names([name for name in n_pictures if name not in odd])
     return [
         Finding(
             kind="clock",
-            what=f"{told} pictures, {others} {usual}",
+            what=f"{description} pictures, {others} {most_common}",
             advice=(
                 "started late, ended early or lost some; without time stamps that is not known, so compare an event "
                 "that all cameras see near the end (airborne sync)"
@@ -64,18 +68,21 @@ def _check_steps(camera: str, values: Array, what: str, *, period: float | None)
     if period <= 0:
         yield _finding(camera, f"its {what} never go forward", "they are no times; leave them out and give the rate")
         return
-    back, same = np.flatnonzero(steps < -_SAME_TIME * period), np.flatnonzero(np.abs(steps) <= _SAME_TIME * period)
+    backward, repeated = (
+        np.flatnonzero(steps < -_SAME_TIME * period),
+        np.flatnonzero(np.abs(steps) <= _SAME_TIME * period),
+    )
     gaps = np.flatnonzero(steps > _GAP * period)
-    if len(back):
+    if len(backward):
         yield _finding(
             camera,
-            f"its {what} fall from {values[back[0]]:g} to {values[back[0] + 1]:g} {_at(back)}",
+            f"its {what} fall from {values[backward[0]]:g} to {values[backward[0] + 1]:g} {_at(backward)}",
             "a counter rolled over or the camera started anew; let it run on from there, or cut the recording there",
         )
-    if len(same):
+    if len(repeated):
         yield _finding(
             camera,
-            f"its {what} stand still {_at(same)}",
+            f"its {what} stand still {_at(repeated)}",
             "pictures were stored twice; leave the repeats out",
         )
     if len(gaps):
@@ -88,10 +95,10 @@ def _check_steps(camera: str, values: Array, what: str, *, period: float | None)
 
 
 def _at(rows: NDArray[np.integer]) -> str:
-    """Say after which pictures, counted from 0."""
-    shown = ", ".join(str(row) for row in rows[:_NAMED])
+    """Return a phrase: after which frames, counted from 0."""
+    listed = ", ".join(str(row) for row in rows[:_NAMED])
     more = f" and {len(rows) - _NAMED} more" if len(rows) > _NAMED else ""
-    return f"after picture{'s' * (len(rows) > 1)} {shown}{more}"
+    return f"after picture{'s' * (len(rows) > 1)} {listed}{more}"
 
 
 def _finding(camera: str, what: str, advice: str) -> Finding:
@@ -99,26 +106,26 @@ def _finding(camera: str, what: str, advice: str) -> Finding:
 
 
 def check_rolling_shutter(
-    camera: str, residual_px: Array, velocity_px_per_s: Array, row_px: Array, height_px: int
+    camera: str, residual_px: Array, velocity_px_per_s: Array, *, row_px: Array, height_px: int
 ) -> list[Finding]:
-    """Say whether a camera reads its rows one after another: moving points are then seen late, the lower the later.
+    """Report a rolling shutter: moving points are displaced in proportion to their row.
 
-    residual_px (n, 2), measured minus projected; velocity (n, 2) of the points in the picture [px/s]; row_px (n,). Fits
+    residual_px (n, 2), measured minus projected; velocity (n, 2) of the image points [px/s]; row_px (n,). Robust fit of
     `residual = velocity (offset + readout (row / height - 1/2))`.
     """
-    known = np.isfinite(np.column_stack([residual_px, velocity_px_per_s, row_px])).all(axis=1)
-    r, v = residual_px[known], velocity_px_per_s[known]
-    if known.sum() < 10 * _FEWEST_TIMES or not v.any():
+    is_valid = np.isfinite(np.column_stack([residual_px, velocity_px_per_s, row_px])).all(axis=1)
+    r, v = residual_px[is_valid], velocity_px_per_s[is_valid]
+    if is_valid.sum() < 10 * _FEWEST_TIMES or not v.any():
         return []
-    depth = row_px[known] / height_px - 0.5
-    A, b = np.column_stack([v.ravel(), (v * depth[:, None]).ravel()]), r.ravel()
+    relative_row = row_px[is_valid] / height_px - 0.5
+    A, b = np.column_stack([v.ravel(), (v * relative_row[:, None]).ravel()]), r.ravel()
     weights = np.ones(len(b))
     for _ in range(10):
         root = np.sqrt(weights)
         x = np.linalg.lstsq(A * root[:, None], b * root, rcond=None)[0]
-        off = b - A @ x
-        scale = max(SD_OF_MEDIAN_DEVIATION * float(np.median(np.abs(off))), 1e-9)
-        weights = 1 / (1 + (off / (2 * scale)) ** 2)
+        residual = b - A @ x
+        scale = max(SD_OF_MEDIAN_DEVIATION * float(np.median(np.abs(residual))), 1e-9)
+        weights = 1 / (1 + (residual / (2 * scale)) ** 2)
     information = A.T @ (weights[:, None] * A)
     if np.linalg.cond(information) > 1e10:
         return []

@@ -1,4 +1,4 @@
-"""What is wrong with control points: errors where no camera can be found, plain warnings where one can."""
+"""What is wrong with control points: errors where a camera cannot be estimated, plain warnings where it can."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from airborne.types import Array
 _FLAT_ERROR, _FLAT_WARNING = 0.01, 0.1  # thickness over extent of the points that one camera sees
 _LARGEST_EXTENT_M, _LARGE_EXTENT_M = 500.0, 100.0
 _ROUGH_FIT_PX = 3.0  # careful clicks give about one pixel
-_OFF_CENTRE = 0.15  # of the picture's diagonal
+_OFF_CENTRE = 0.15  # of the image's diagonal
 _NOT_SQUARE = 0.03
 _MOST_ROLL = np.radians(60)
-_SIGNIFICANCE = 1e-4  # of calling a good set of points wrong
+_SIGNIFICANCE = 1e-4  # of rejecting a point of a good set
 _MOST_OUTLIERS = 3
 
 
 def check_points(points: ControlPoints, sizes: Mapping[str, tuple[int, int]]) -> None:
-    """Raise CalibrationError where a camera cannot be found: sizes, number, unit, picture borders, flatness."""
+    """Raise CalibrationError where a camera cannot be estimated: size, number, unit, image borders, flatness."""
     missing = [camera for camera in points.cameras if camera not in sizes]
     if missing:
         raise CalibrationError(f"no picture size for camera '{missing[0]}'; sizes are given for: {', '.join(sizes)}")
@@ -35,13 +35,14 @@ def check_points(points: ControlPoints, sizes: Mapping[str, tuple[int, int]]) ->
             f"the control points span {extent:.0f} m, expected a scene in metres: divide by 1000 if they are in mm"
         )
     for camera in points.cameras:
-        seen = points.is_seen_by(camera)
-        if seen.sum() < FEWEST_DLT_POINTS:
+        is_seen = points.is_seen_by(camera)
+        if is_seen.sum() < FEWEST_DLT_POINTS:
             raise CalibrationError(
-                f"camera '{camera}' sees {seen.sum()} control points, at least {FEWEST_DLT_POINTS} are needed: click more"
+                f"camera '{camera}' sees {is_seen.sum()} control points, at least {FEWEST_DLT_POINTS} are needed: "
+                "click more"
             )
         _check_inside(points, camera, sizes[camera])
-        ratio = flatness(points.world[seen])
+        ratio = flatness(points.world[is_seen])
         if ratio < _FLAT_ERROR:
             raise CalibrationError(
                 f"the control points of camera '{camera}' lie in one plane (thickness / extent {ratio:.4f}, "
@@ -68,19 +69,19 @@ def _check_inside(points: ControlPoints, camera: str, size: tuple[int, int]) -> 
 
 
 def flatness(world: Array) -> float:
-    """Return thickness over extent of points (n, 3): the ratio of the smallest to the largest singular spread."""
+    """Return thickness over extent of points (n, 3): the ratio of the smallest to the largest singular value."""
     spread = np.linalg.svd(world - world.mean(axis=0), compute_uv=False)
     return float(spread[2] / spread[0]) if spread[0] > 0 else 0.0
 
 
 def decompose_cameras(points: ControlPoints) -> dict[str, Decomposition]:
     """Return every camera's DLT decomposition; raise CalibrationError where one is mirrored."""
-    found = {}
+    decompositions = {}
     for i, camera in enumerate(points.cameras):
-        seen = points.is_seen_by(camera)
-        found[camera] = decompose(fit_dlt(points.world[seen], points.px[seen, i]))
-    mirrored = [camera for camera, decomposition in found.items() if decomposition.is_mirrored]
-    if mirrored and len(mirrored) == len(found):
+        is_seen = points.is_seen_by(camera)
+        decompositions[camera] = decompose(fit_dlt(points.world[is_seen], points.px[is_seen, i]))
+    mirrored = [camera for camera, decomposition in decompositions.items() if decomposition.is_mirrored]
+    if mirrored and len(mirrored) == len(decompositions):
         raise CalibrationError(
             "every camera comes out left-handed, so the world is mirrored: two of x_m, y_m, z_m are exchanged, one has "
             "the wrong sign, or every v counts up from the bottom instead of down from the top"
@@ -90,7 +91,7 @@ def decompose_cameras(points: ControlPoints) -> dict[str, Decomposition]:
             f"camera '{mirrored[0]}' comes out left-handed while others do not: its u and v are exchanged, "
             "or one of them counts from the wrong side"
         )
-    return found
+    return decompositions
 
 
 def warnings_about(
@@ -99,13 +100,13 @@ def warnings_about(
     decompositions: Mapping[str, Decomposition],
     solutions: Mapping[str, Solution],
 ) -> tuple[str, ...]:
-    """Return plain sentences about what makes the calibration doubtful; empty when nothing does."""
+    """Return plain sentences about what casts doubt on the calibration."""
     warnings = []
     extent = np.linalg.norm(np.ptp(points.world, axis=0))
     if extent > _LARGE_EXTENT_M:
         warnings.append(f"the control points span {extent:.0f} m: are they in metres?")
-    wrong = {camera: find_outliers(solutions[camera]) for camera in points.cameras}
-    warnings += _outlier_warnings(points, wrong)
+    outliers = {camera: find_outliers(solutions[camera]) for camera in points.cameras}
+    warnings += _outlier_warnings(points, outliers)
     for camera in points.cameras:
         warnings += _image_warnings(camera, sizes[camera], decompositions[camera])
         ratio = flatness(solutions[camera].world)
@@ -115,7 +116,7 @@ def warnings_about(
                 "depth and focal length are poorly told apart; spread them more"
             )
         rms = np.sqrt(np.mean(np.sum(solutions[camera].residual_px ** 2, axis=1)))
-        if rms > _ROUGH_FIT_PX and len(wrong[camera]) in (0, _MOST_OUTLIERS):  # else the named points explain it
+        if rms > _ROUGH_FIT_PX and len(outliers[camera]) in (0, _MOST_OUTLIERS):  # else the named points explain it
             warnings.append(
                 f"camera '{camera}' fits its control points only to {rms:.1f} px (careful clicks give about 1): "
                 "check its points, their coordinates and the picture size"
@@ -144,38 +145,38 @@ def _image_warnings(camera: str, size: tuple[int, int], decomposition: Decomposi
 
 
 def find_outliers(solution: Solution) -> dict[int, float]:
-    """Return the points that do not belong: index among the camera's points -> held-out error [px], worst first.
+    """Return outliers: index among the camera's points -> held-out error [px], worst first.
 
-    A point is called wrong when leaving it out lowers the sum of squares by more than chance allows: an F test with 2
-    and `2 (n - 1) - k` degrees of freedom, at `CHANCE` over all points; then again without it.
+    A point is an outlier if leaving it out lowers the sum of squares significantly: an F test with 2 and
+    `2 (n - 1) - k` degrees of freedom, at `_SIGNIFICANCE` over all points; then again without it.
     """
-    found: dict[int, float] = {}
+    outliers: dict[int, float] = {}
     index = np.arange(len(solution.world))
-    while len(found) < _MOST_OUTLIERS:
+    while len(outliers) < _MOST_OUTLIERS:
         dof = 2 * (len(index) - 1) - solution.model.n_parameters
         if dof < 2:
-            return found
+            return outliers
         total = np.sum(solution.residual_px**2)
         others = solution.px - np.array([pinhole.px_from_world(solution.world) for pinhole in solution.refits])
-        without = np.sum(others**2, axis=(1, 2)) - np.sum(solution.held_out_px**2, axis=1)
-        worst = int(np.argmin(without))
-        statistic = (total - without[worst]) / 2 / max(without[worst] / dof, 1e-12)
+        cost_without = np.sum(others**2, axis=(1, 2)) - np.sum(solution.held_out_px**2, axis=1)
+        worst = int(np.argmin(cost_without))
+        statistic = (total - cost_without[worst]) / 2 / max(cost_without[worst] / dof, 1e-12)
         if fdtrc(2, dof, statistic) * len(index) > _SIGNIFICANCE:
-            return found
-        found[int(index[worst])] = float(np.linalg.norm(solution.held_out_px[worst]))
+            return outliers
+        outliers[int(index[worst])] = float(np.linalg.norm(solution.held_out_px[worst]))
         keep = np.arange(len(index)) != worst
         index = index[keep]
         world, px = solution.world[keep], solution.px[keep]
         pinhole = fit_pinhole(solution.refits[worst], solution.model, world, px)
         solution = leave_one_out(pinhole, solution.model, world, px)
-    return found
+    return outliers
 
 
-def _outlier_warnings(points: ControlPoints, wrong: Mapping[str, Mapping[int, float]]) -> list[str]:
+def _outlier_warnings(points: ControlPoints, outliers: Mapping[str, Mapping[int, float]]) -> list[str]:
     errors: dict[str, dict[str, float]] = {}
-    for camera, found in wrong.items():
+    for camera, errors_of_camera in outliers.items():
         names = np.array(points.names)[points.is_seen_by(camera)]
-        for i, error in found.items():
+        for i, error in errors_of_camera.items():
             errors.setdefault(str(names[i]), {})[camera] = error
     warnings = []
     for name, by_camera in errors.items():

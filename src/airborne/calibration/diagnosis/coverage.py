@@ -1,4 +1,4 @@
-"""Are there enough views, and where they are needed? Counts, places in the picture, tilts, shared moments."""
+"""Checks of coverage: number of views, coverage of the image, tilts of the board, moments shared by cameras."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from airborne.cameras.finding import Finding, join_names
 from airborne.types import Array
 
 _FEWEST_VIEWS = 8  # of a board, for a lens
-_CELLS = (6, 4)  # of the picture, across and down
-_LEAST_COVERAGE = 0.25  # share of them that should show something
-_EMPTY = 0.15  # of the cells of a third or a quarter of the picture: below it that part is named
-_LEAST_TILT = np.radians(20)  # a board should be turned this far away from facing the camera now and then
+_CELLS = (6, 4)  # of the image, across and down
+_LEAST_COVERAGE = 0.25  # least share of them with points
+_EMPTY = 0.15  # of the cells of a side of the image: a side with fewer is named
+_LEAST_TILT = np.radians(20)  # from facing the camera, that a board should reach now and then
 _TILTED_SHARE = 0.9  # quantile of the tilts that must reach it
-_FEWEST_POINTS = 60  # that could fill a picture
-_FEWEST_SHARED = 5  # moments that tie two cameras
+_FEWEST_POINTS = 60  # that could cover an image
+_FEWEST_SHARED = 5  # moments that link two cameras
 
 
 def check_view_count(camera: str, n_views: int) -> list[Finding]:
-    """Say where too few pictures show the board."""
+    """Report too few views of the board."""
     if n_views >= _FEWEST_VIEWS:
         return []
     return [
@@ -35,7 +35,7 @@ def check_view_count(camera: str, n_views: int) -> list[Finding]:
 
 
 def check_coverage(camera: str, px: Array, size: tuple[int, int]) -> list[Finding]:
-    """Say where points (n, 2) [px] leave much of a picture (width, height) empty; a few clicks cannot fill one."""
+    """Report points (n, 2) [px] that leave much of an image (width, height) empty; a few clicks are exempt."""
     px = px[np.isfinite(px).all(axis=1)]
     if len(px) < _FEWEST_POINTS:
         return []
@@ -61,7 +61,7 @@ def check_coverage(camera: str, px: Array, size: tuple[int, int]) -> list[Findin
 
 
 def check_tilts(camera: str, tilts_rad: Array) -> list[Finding]:
-    """Say where a board nearly always faces the camera; tilts (n,) from facing it [rad]."""
+    """Report a board that nearly always faces the camera; tilts (n,) from facing it [rad]."""
     if len(tilts_rad) < _FEWEST_VIEWS or np.quantile(tilts_rad, _TILTED_SHARE) >= _LEAST_TILT:
         return []
     return [
@@ -75,26 +75,32 @@ def check_tilts(camera: str, tilts_rad: Array) -> list[Finding]:
 
 
 def check_links(names: Sequence[str], n_shared: Array, what: str = "moments") -> list[Finding]:
-    """Say which cameras are not tied to the others; n_shared (cameras, cameras) counts what two see at once."""
+    """Report cameras that are not linked to the others; n_shared (cameras, cameras) counts what two see at once."""
     n_groups, group = connected_components(np.asarray(n_shared) >= _FEWEST_SHARED, directed=False)
-    return list(_missing_links(names, np.asarray(n_shared), group, n_groups, what)) if n_groups > 1 else []
+    return (
+        list(_missing_links(names, np.asarray(n_shared), group=group, n_groups=n_groups, what=what))
+        if n_groups > 1
+        else []
+    )
 
 
-def _missing_links(names: Sequence[str], n_shared: Array, group: Array, n_groups: int, what: str) -> Iterator[Finding]:
+def _missing_links(
+    names: Sequence[str], n_shared: Array, *, group: Array, n_groups: int, what: str
+) -> Iterator[Finding]:
     main = int(np.argmax(np.bincount(group)))
     for other in (g for g in range(n_groups) if g != main):
         here, there = np.flatnonzero(group == main), np.flatnonzero(group == other)
         between = n_shared[np.ix_(here, there)]
         i, j = divmod(int(np.argmax(between)), len(there))
         a, b, most = names[int(here[i])], names[int(there[j])], int(between[i, j])
-        apart = tuple(names[int(k)] for k in there)
+        separate = tuple(names[int(k)] for k in there)
         nearest = f"; {a} and {b} come nearest" if most else ""
         yield Finding(
             kind="bridge",
             what=(
-                f"{join_names(apart)} and {join_names([names[int(k)] for k in here])} share {most} {what}, "
+                f"{join_names(separate)} and {join_names([names[int(k)] for k in here])} share {most} {what}, "
                 f"expected {_FEWEST_SHARED} or more between two of them{nearest}"
             ),
             advice=f"film board or wand where {a if most else 'one'} and {b if most else 'another'} both see it",
-            cameras=apart,
+            cameras=separate,
         )

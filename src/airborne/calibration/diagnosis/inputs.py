@@ -1,4 +1,4 @@
-"""What is wrong with recordings before anything is calibrated: another board than described, odd clocks."""
+"""Checks of recordings before calibration: the board's description, the clocks."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ Grey = NDArray[np.uint8]
 
 
 def check_board(views: Views, samples: Mapping[str, Sequence[Grey]]) -> tuple[Finding, ...]:
-    """Return what does not match the board's description, by some of each camera's pictures.
+    """Report what does not match the board's description, from a sample of each camera's images.
 
-    Raises CalibrationError, with the reason, where a camera shows the board too seldom for anything.
+    Raises CalibrationError, with the reason, where a camera shows the board too rarely to fit its lens.
     """
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for name, row in zip(views.cameras, views.detections, strict=True):
         own = check_board_print(views.board, samples[name], name)
         if own and sum(len(sighting.corner) > 0 for sighting in row) < FEWEST_LENS_VIEWS:
             raise CalibrationError(own[0].sentence)
-        found += own
-    return tuple(found)
+        findings += own
+    return tuple(findings)
 
 
 def check_time_stamps(camera: str, rows: Sequence[Mapping[str, str]]) -> Iterator[Finding]:
-    """Yield what is odd about a camera's rows of a table of time stamps, in the order of the moments."""
+    """Report what is wrong with a camera's rows of a table of time stamps, in the order of the moments."""
     yield from check_times(camera, np.array([float(row["frame_time"]) for row in rows]))
     numbers = [row.get("frame_index") or "" for row in rows]
     if all(number.isdigit() for number in numbers):

@@ -1,4 +1,4 @@
-"""Did a camera move while it filmed? Its place is found block by block from the points that the others see."""
+"""Did a camera move while it filmed? Its displacement, block by block, from the points that the others triangulate."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from airborne.cameras.finding import Finding
 from airborne.types import Array
 
 _MOST_MOMENTS = 400
-_FEWEST_IN_A_BLOCK, _MOST_BLOCKS = 30, 12  # points that place a camera; blocks of the recording
-_MOVED_PX, _TIMES_SPREAD = 2.0, 4.0  # a step is told that is larger than both: px, and times the blocks' own spread
-_TYPICAL = 0.6  # quantile of distances, above what most points have and below what strays have
-_LEAST_GAIN, _LEAST_GAIN_PX = 0.3, 0.3  # share, and px, by which the others must agree better without a camera
+_FEWEST_IN_A_BLOCK, _MOST_BLOCKS = 30, 12  # observations of a block; blocks of the recording
+_MOVED_PX, _TIMES_SPREAD = 2.0, 4.0  # a step is reported above both: px, and multiples of the scatter of the blocks
+_TYPICAL = 0.6  # quantile of distances, below the outliers
+_LEAST_GAIN, _LEAST_GAIN_PX = 0.3, 0.3  # share, and px, by which the misfit must fall without a camera
 _N_STEPS = 15
-_SCALE_PX = 2.0  # residuals much beyond this count ever less
+_SCALE_PX = 2.0  # of the Cauchy loss
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Track:
-    """What one camera sees of the points that the others agree on: one row an observation."""
+    """A camera's observations of the points that the others agree on, one a row."""
 
     moment: NDArray[np.integer]  # (n,)
     residual_px: Array  # (n, 2)
-    jacobian: Array  # (n, 2, 6) by turn [rad] and shift [m] of the camera
+    jacobian: Array  # (n, 2, 6) by rotation [rad] and shift [m] of the camera
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Displacement:
-    """A camera's jump."""
+    """A sudden displacement of a camera."""
 
     moment: int  # the first after it
     shift_px: float
@@ -45,28 +45,32 @@ class _Displacement:
 
 
 def check_moved_cameras(rig: Rig, px: Array, times_s: Array | None = None) -> list[Finding]:
-    """Say which cameras moved, when, and how far, by points px (moments, points, cameras, 2) [px], NaN where not seen.
+    """Report cameras that moved, when and how far, from px (moments, points, cameras, 2) [px], NaN where not seen.
 
-    times_s (moments,) [s]; without them the moments' numbers are told.
-    Three cameras or more: those that agree say where the points are. A slow drift is told as one step.
+    times_s (moments,) [s]; without them the moments are given by number. Needs three cameras: those that agree
+    triangulate the points. A slow drift is reported as one step.
     """
     rows = np.unique(np.linspace(0, len(px) - 1, min(len(px), _MOST_MOMENTS)).astype(int)) if len(px) else []
     if len(rig) < 3 or not len(px):
         return []
-    px, when = px[rows], [f"frame {row}" if times_s is None else f"{times_s[row]:.2f} s" for row in rows]
+    px, time_texts = px[rows], [f"frame {row}" if times_s is None else f"{times_s[row]:.2f} s" for row in rows]
     suspects = _suspects(rig, px)
     others = [name for name in rig.names if name not in suspects]
-    steps = {name: _find_displacement(rig, others, name, px) for name in suspects}
-    return [_moved_finding(name, step, when) for name, step in steps.items() if step is not None]
+    displacements = {name: _find_displacement(rig, others, name, px) for name in suspects}
+    return [
+        _moved_finding(name, displacement, time_texts)
+        for name, displacement in displacements.items()
+        if displacement is not None
+    ]
 
 
-def _moved_finding(name: str, step: _Displacement, when: Sequence[str]) -> Finding:
+def _moved_finding(name: str, displacement: _Displacement, times: Sequence[str]) -> Finding:
     return Finding(
         kind="moved",
         what=(
-            f"{name} moved between {when[step.moment - 1]} and {when[step.moment]}: its picture jumps by "
-            f"{step.shift_px:.1f} px (turned by {np.degrees(step.turn_rad):.2f} degrees, shifted by "
-            f"{step.shift_m * 1e3:.0f} mm)"
+            f"{name} moved between {times[displacement.moment - 1]} and {times[displacement.moment]}: its picture "
+            f"jumps by {displacement.shift_px:.1f} px (turned by {np.degrees(displacement.turn_rad):.2f} degrees, "
+            f"shifted by {displacement.shift_m * 1e3:.0f} mm)"
         ),
         advice=(
             "fix it better and film again, or calibrate only with the side of the jump on which the trial was filmed"
@@ -76,7 +80,7 @@ def _moved_finding(name: str, step: _Displacement, when: Sequence[str]) -> Findi
 
 
 def _suspects(rig: Rig, px: Array) -> tuple[str, ...]:
-    """Return the cameras without which the others agree clearly better; more where that is clearly better again."""
+    """Return the cameras without which the others agree clearly better; more while each one more clearly helps."""
     best, suspects = _misfit(rig, px), ()
     for n in range(1, len(rig) - 1):
         misfits = {
@@ -95,17 +99,17 @@ def _without(rig: Rig, px: Array, names: Sequence[str]) -> Array:
 
 
 def _misfit(rig: Rig, px: Array) -> float:
-    """Return how far cameras disagree [px], per degree of freedom: the mean over the recording's parts of a quantile.
+    """Return the cameras' misfit [px] per degree of freedom: a quantile of each part of the recording, averaged.
 
-    A few strays do not count, a part of the recording does.
+    A few outliers do not count, a part of the recording does.
     """
     points = rig.points_from_px(px)
-    off = np.linalg.norm(np.stack([camera.px_from_world(points) for camera in rig], axis=2) - px, axis=-1)
-    n_views = np.isfinite(off).sum(axis=2, keepdims=True)
-    off = off / np.sqrt(np.where(n_views >= 2, 1 - 1.5 / np.maximum(n_views, 2), np.nan))
-    parts = [part[np.isfinite(part)] for part in np.array_split(off, _MOST_BLOCKS)]
-    typical = [np.quantile(part, _TYPICAL) for part in parts if part.size]
-    return float(np.mean(typical)) if typical else np.inf
+    distances = np.linalg.norm(np.stack([camera.px_from_world(points) for camera in rig], axis=2) - px, axis=-1)
+    n_views = np.isfinite(distances).sum(axis=2, keepdims=True)
+    distances = distances / np.sqrt(np.where(n_views >= 2, 1 - 1.5 / np.maximum(n_views, 2), np.nan))
+    parts = [part[np.isfinite(part)] for part in np.array_split(distances, _MOST_BLOCKS)]
+    quantiles = [np.quantile(part, _TYPICAL) for part in parts if part.size]
+    return float(np.mean(quantiles)) if quantiles else np.inf
 
 
 def _find_displacement(rig: Rig, others: Sequence[str], name: str, px: Array) -> _Displacement | None:
@@ -113,22 +117,22 @@ def _find_displacement(rig: Rig, others: Sequence[str], name: str, px: Array) ->
     blocks = list(_blocks(track.moment))
     if len(blocks) < 4:
         return None
-    places = np.array([_fit_displacement(track, rows) for rows in blocks])  # (blocks, 6)
-    reference = track.jacobian[np.linspace(0, len(track.jacobian) - 1, 50).astype(int)].reshape(-1, 6)
-    shifts = places @ reference.T  # (blocks, 100) px
+    displacements = np.array([_fit_displacement(track, rows) for rows in blocks])  # (blocks, 6)
+    jacobian = track.jacobian[np.linspace(0, len(track.jacobian) - 1, 50).astype(int)].reshape(-1, 6)
+    shifts = displacements @ jacobian.T  # (blocks, 100) px
     best = (-1.0, 0, 0.0, 0.0)
     for k in range(2, len(blocks) - 1):
         before, after = np.median(shifts[:k], axis=0), np.median(shifts[k:], axis=0)
-        spread = _rms(np.concatenate([shifts[:k] - before, shifts[k:] - after]), quantile=0.5)
+        scatter = _rms(np.concatenate([shifts[:k] - before, shifts[k:] - after]), quantile=0.5)
         step_px = _rms((after - before)[None], quantile=0.5)
-        best = max(best, (step_px / (spread + 0.1), k, step_px, spread))
-    _, k, step_px, spread = best
-    if step_px < max(_MOVED_PX, _TIMES_SPREAD * spread):
+        best = max(best, (step_px / (scatter + 0.1), k, step_px, scatter))
+    _, k, step_px, scatter = best
+    if step_px < max(_MOVED_PX, _TIMES_SPREAD * scatter):
         return None
-    before, after = np.median(places[:k], axis=0), np.median(places[k:], axis=0)
+    before, after = np.median(displacements[:k], axis=0), np.median(displacements[k:], axis=0)
     moment = _first_moment_after(track, before, after)
     change = after - before
-    return _Displacement(moment, step_px, spread, float(np.linalg.norm(change[:3])), float(np.linalg.norm(change[3:])))
+    return _Displacement(moment, step_px, scatter, float(np.linalg.norm(change[:3])), float(np.linalg.norm(change[3:])))
 
 
 def _rms(shifts: Array, *, quantile: float) -> float:
@@ -138,33 +142,33 @@ def _rms(shifts: Array, *, quantile: float) -> float:
 
 def _track(rig: Rig, others: Sequence[str], name: str, px: Array) -> _Track:
     columns = [rig.names.index(other) for other in others]
-    seen = px[:, :, columns]
-    points = triangulate_consensus(rig.select(others), seen, np.ones(seen.shape[:-1])).points
+    others_px = px[:, :, columns]
+    points = triangulate_consensus(rig.select(others), others_px, np.ones(others_px.shape[:-1])).points
     own = px[:, :, rig.names.index(name)]
     moment, point = np.nonzero(np.isfinite(points).all(axis=-1) & np.isfinite(own).all(axis=-1))
-    projected, slopes = _project(rig[name], points[moment, point])
+    projected, jacobian = _project(rig[name], points[moment, point])
     residual = own[moment, point] - projected
-    known = np.isfinite(residual).all(axis=1)
-    return _Track(moment[known], residual[known], slopes[known])
+    is_valid = np.isfinite(residual).all(axis=1)
+    return _Track(moment[is_valid], residual[is_valid], jacobian[is_valid])
 
 
 def _project(camera: Camera, points: Array) -> tuple[Array, Array]:
     n = len(points)
-    place = camera.camera_from_world.rotation.as_matrix()
+    R = camera.camera_from_world.rotation.as_matrix()
     terms = np.pad(camera.distortion, (0, 5 - len(camera.distortion)))
-    inner = np.array([camera.K[0, 0], camera.K[1, 1], camera.K[0, 2], camera.K[1, 2], *terms])
-    px, slopes, _ = project_with_jacobian(
-        np.broadcast_to(place, (n, 3, 3)),
+    intrinsics = np.array([camera.K[0, 0], camera.K[1, 1], camera.K[0, 2], camera.K[1, 2], *terms])
+    px, jacobian, _ = project_with_jacobian(
+        np.broadcast_to(R, (n, 3, 3)),
         np.broadcast_to(camera.centre, (n, 3)),
-        np.broadcast_to(inner, (n, 9)),
-        np.full(n, camera.lens == "fisheye"),
-        points,
+        np.broadcast_to(intrinsics, (n, 9)),
+        is_fisheye=np.full(n, camera.lens == "fisheye"),
+        world=points,
     )
-    return px, slopes[:, :, :6]
+    return px, jacobian[:, :, :6]
 
 
 def _blocks(moment: NDArray[np.integer]) -> Iterator[NDArray[np.integer]]:
-    """Yield rows of successive blocks of whole moments, alike in size."""
+    """Yield rows of successive blocks of whole moments, of about equal size."""
     n_blocks = min(_MOST_BLOCKS, len(moment) // _FEWEST_IN_A_BLOCK)
     if n_blocks < 1:
         return
@@ -177,28 +181,30 @@ def _blocks(moment: NDArray[np.integer]) -> Iterator[NDArray[np.integer]]:
 
 
 def _fit_displacement(track: _Track, rows: NDArray[np.integer]) -> Array:
-    """Return the small turn and shift (6,) that explains the residuals of some rows, robustly (Cauchy).
+    """Return the small rotation and shift (6,) that explain the residuals of some rows, robustly (Cauchy).
 
-    A little damping keeps what the points do not tell (turns against shifts) small.
+    A little damping keeps poorly determined directions (rotation against shift) small.
     """
     J, r = track.jacobian[rows], track.residual_px[rows]
-    weights, place = np.ones(len(rows)), np.zeros(6)
+    weights, displacement = np.ones(len(rows)), np.zeros(6)
     for _ in range(_N_STEPS):
         information = np.einsum("nij,n,nik->jk", J, weights, J)
         damping = 1e-6 * np.diag(np.diag(information))
-        place = np.linalg.solve(information + damping + 1e-12 * np.eye(6), np.einsum("nij,n,ni->j", J, weights, r))
-        off = np.linalg.norm(r - J @ place, axis=1)
-        scale = max(1.5 * float(np.median(off)), _SCALE_PX / 4)
-        weights = 1 / (1 + (off / scale) ** 2)
-    return place
+        displacement = np.linalg.solve(
+            information + damping + 1e-12 * np.eye(6), np.einsum("nij,n,ni->j", J, weights, r)
+        )
+        distances = np.linalg.norm(r - J @ displacement, axis=1)
+        scale = max(1.5 * float(np.median(distances)), _SCALE_PX / 4)
+        weights = 1 / (1 + (distances / scale) ** 2)
+    return displacement
 
 
 def _first_moment_after(track: _Track, before: Array, after: Array) -> int:
-    """Return the first moment at which the later place fits better, as a whole."""
+    """Return the change point: the first moment at which the later displacement fits better."""
 
-    def cost(place: Array) -> Array:
-        off = np.sum((track.residual_px - track.jacobian @ place) ** 2, axis=1)
-        return np.bincount(track.moment, np.log1p(off / _SCALE_PX**2)).astype(float)
+    def cost(displacement: Array) -> Array:
+        squares = np.sum((track.residual_px - track.jacobian @ displacement) ** 2, axis=1)
+        return np.bincount(track.moment, np.log1p(squares / _SCALE_PX**2)).astype(float)
 
     gain = np.cumsum(cost(before) - cost(after))  # falls until the jump, then rises
     return int(np.argmin(gain[:-1])) + 1

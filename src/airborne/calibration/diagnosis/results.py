@@ -1,4 +1,4 @@
-"""What is wrong with a calibration from any sources, looked for after it: each diagnosis with its evidence."""
+"""Diagnosis of a calibration from any sources, after it: each check with its data."""
 
 from __future__ import annotations
 
@@ -18,37 +18,37 @@ from airborne.cameras.units import check_baselines
 from airborne.types import Array
 
 _UP = np.array([0.0, 0.0, 1.0])
-_MISFIT_PX, _MISFIT_SHARE = 4.0, 0.002  # RMS of clicked points; share of the pictures' longer sides
+_MISFIT_PX, _MISFIT_SHARE = 4.0, 0.002  # RMS of clicked points; share of the images' longer sides
 
 
-def diagnose(found: RigCalibration) -> tuple[Finding, ...]:
-    """Return everything that is wrong, the gravest first; empty for a sound recording."""
-    inputs, rig = found.inputs, found.rig
+def diagnose(calibration: RigCalibration) -> tuple[Finding, ...]:
+    """Return everything that is wrong, the most serious first; empty for a good recording."""
+    inputs, rig = calibration.inputs, calibration.rig
     is_level = bool(inputs.points) or inputs.sources.world.points is not None
-    told = [
+    checks = [
         inputs.findings,
-        _check_swapped_files(found),
+        _check_swapped_files(calibration),
         check_floor(rig) if "court" in inputs.points else (),
         check_baselines(rig),
-        _check_clicks(found),
+        _check_clicks(calibration),
         check_roll(rig, _UP if is_level else None),
-        _check_moved_cameras(found),
-        _check_links(found),
-        _check_lens_views(found),
+        _check_moved_cameras(calibration),
+        _check_links(calibration),
+        _check_lens_views(calibration),
         chain.from_iterable(
-            check_coverage(camera.name, _all_px(found, i), camera.size) for i, camera in enumerate(rig)
+            check_coverage(camera.name, _all_px(calibration, i), camera.size) for i, camera in enumerate(rig)
         ),
-        _check_rolling_shutter(found),
+        _check_rolling_shutter(calibration),
     ]
-    return tuple(chain.from_iterable(told))
+    return tuple(chain.from_iterable(checks))
 
 
-def _check_clicks(found: RigCalibration) -> Iterator[Finding]:
-    """Doubt clicked points that fit much less well than clicks are made."""
-    adjusted, sides = found.adjustment, [max(camera.size) for camera in found.rig]
+def _check_clicks(calibration: RigCalibration) -> Iterator[Finding]:
+    """Report clicked points that fit much worse than clicks are accurate."""
+    adjusted, sides = calibration.adjustment, [max(camera.size) for camera in calibration.rig]
     for i, source in enumerate(adjusted.sources):
         rms_px = adjusted.rms_px(source=i)
-        if source.name in found.inputs.points and rms_px > max(_MISFIT_PX, _MISFIT_SHARE * float(np.mean(sides))):
+        if source.name in calibration.inputs.points and rms_px > max(_MISFIT_PX, _MISFIT_SHARE * float(np.mean(sides))):
             yield Finding(
                 kind="misfit",
                 what=f"{source.name}: the points fit to {rms_px:.1f} px only, and clicks are good to 1 or 2 px",
@@ -56,9 +56,9 @@ def _check_clicks(found: RigCalibration) -> Iterator[Finding]:
             )
 
 
-def _tracks(found: RigCalibration) -> Iterator[tuple[Array, Array | None]]:
-    """Yield what was seen of each thing that moves: (moments, points, cameras of the rig, 2) [px], and times [s]."""
-    inputs, names = found.inputs, found.rig.names
+def _tracks(calibration: RigCalibration) -> Iterator[tuple[Array, Array | None]]:
+    """Yield the observations of each moving object: (moments, points, cameras of the rig, 2) [px], and times [s]."""
+    inputs, names = calibration.inputs, calibration.rig.names
     if inputs.board_detections is not None:
         yield _board_px(inputs.board_detections.views, names), inputs.board_detections.time_s
     for tracks in (inputs.wand, inputs.detections):
@@ -77,72 +77,74 @@ def _board_px(views: Views, names: tuple[str, ...]) -> Array:
     return px
 
 
-def _all_px(found: RigCalibration, camera: int) -> Array:
-    return np.concatenate([source.px[source.camera == camera] for source in found.adjustment.sources])
+def _all_px(calibration: RigCalibration, camera: int) -> Array:
+    return np.concatenate([source.px[source.camera == camera] for source in calibration.adjustment.sources])
 
 
-def _check_swapped_files(found: RigCalibration) -> list[Finding]:
-    """Ask the calibration at the start whether two cameras' recordings are exchanged."""
-    given = found.inputs.start_rig
-    if given is None or found.resections:
+def _check_swapped_files(calibration: RigCalibration) -> list[Finding]:
+    """Check with the initial calibration whether two cameras' recordings are exchanged."""
+    start_rig = calibration.inputs.start_rig
+    if start_rig is None or calibration.resections:
         return []
-    tracks = [px.reshape(-1, *px.shape[2:]) for px, _ in _tracks(found)]
-    return check_swapped_files(given, np.concatenate(tracks)) if tracks else []
+    tracks = [px.reshape(-1, *px.shape[2:]) for px, _ in _tracks(calibration)]
+    return check_swapped_files(start_rig, np.concatenate(tracks)) if tracks else []
 
 
-def _check_moved_cameras(found: RigCalibration) -> Iterator[Finding]:
-    for px, time_s in _tracks(found):
-        yield from check_moved_cameras(found.rig, px, time_s)
+def _check_moved_cameras(calibration: RigCalibration) -> Iterator[Finding]:
+    for px, time_s in _tracks(calibration):
+        yield from check_moved_cameras(calibration.rig, px, time_s)
 
 
-def _check_links(found: RigCalibration) -> list[Finding]:
-    """Count what two cameras see at once, and the known points that tie each to the world."""
-    names = found.rig.names
+def _check_links(calibration: RigCalibration) -> list[Finding]:
+    """Count what two cameras see at once; known points link a camera to the world."""
+    names = calibration.rig.names
     shared = np.zeros((len(names), len(names)))
-    for px, _ in _tracks(found):
-        sees = np.isfinite(px[..., 0]).any(axis=1).astype(float)
-        shared += sees.T @ sees
-    for points in found.inputs.points.values():
-        tied = [i for i, name in enumerate(names) if name in points.cameras]
-        shared[np.ix_(tied, tied)] += np.inf
-    if found.inputs.start_rig is not None:
+    for px, _ in _tracks(calibration):
+        is_seen = np.isfinite(px[..., 0]).any(axis=1).astype(float)
+        shared += is_seen.T @ is_seen
+    for points in calibration.inputs.points.values():
+        linked = [i for i, name in enumerate(names) if name in points.cameras]
+        shared[np.ix_(linked, linked)] += np.inf
+    if calibration.inputs.start_rig is not None:
         return []
     return check_links(names, shared)
 
 
-def _check_lens_views(found: RigCalibration) -> Iterator[Finding]:
-    """Look at the views of the board that tell a lens: their number and tilts."""
-    for i, source in enumerate(found.adjustment.sources):
+def _check_lens_views(calibration: RigCalibration) -> Iterator[Finding]:
+    """Check the views of the board that determine a lens: their number and tilts."""
+    for i, source in enumerate(calibration.adjustment.sources):
         targets = source.world_from_target
         if targets is None:
             continue
-        for c, camera in enumerate(found.rig):
-            if camera.name not in found.inputs.lenses or (
-                source.name == "board" and camera.name in found.inputs.lens_views
+        for c, camera in enumerate(calibration.rig):
+            if camera.name not in calibration.inputs.lenses or (
+                source.name == "board" and camera.name in calibration.inputs.lens_views
             ):
                 continue
             moments = np.unique(
-                source.moments[(source.camera == c) & np.isfinite(found.adjustment.residual_px[i][:, 0])]
+                source.moments[(source.camera == c) & np.isfinite(calibration.adjustment.residual_px[i][:, 0])]
             )
             if not len(moments):
                 continue
             yield from check_view_count(camera.name, len(moments))
-            turns = targets[moments].rotation
-            middles = targets[moments].apply(source.points.mean(axis=0)) - camera.centre
-            away = np.sum(turns.apply(_UP) * middles, axis=1) / np.linalg.norm(middles, axis=1)
-            yield from check_tilts(camera.name, np.arccos(np.clip(np.abs(away), 0, 1)))
+            rotations = targets[moments].rotation
+            rays = targets[moments].apply(source.points.mean(axis=0)) - camera.centre
+            cosines = np.sum(rotations.apply(_UP) * rays, axis=1) / np.linalg.norm(rays, axis=1)
+            yield from check_tilts(camera.name, np.arccos(np.clip(np.abs(cosines), 0, 1)))
 
 
-def _check_rolling_shutter(found: RigCalibration) -> Iterator[Finding]:
-    """Ask the moving board, where all pictures are of the same instants, whether rows are read one by one."""
-    seen = found.inputs.board_detections
-    if seen is None or seen.time_s is None or found.lag_s or len(seen.time_s) < 3:
+def _check_rolling_shutter(calibration: RigCalibration) -> Iterator[Finding]:
+    """Check for rolling shutters with the moving board, if the cameras are synchronous."""
+    board = calibration.inputs.board_detections
+    if board is None or board.time_s is None or calibration.lag_s or len(board.time_s) < 3:
         return
-    row = [source.name for source in found.adjustment.sources].index("board")
-    source, residual = found.adjustment.sources[row], found.adjustment.residual_px[row]
-    px = _board_px(seen.views, found.rig.names)
-    velocity = np.gradient(px, seen.time_s, axis=0)
-    for c, camera in enumerate(found.rig):
+    row = [source.name for source in calibration.adjustment.sources].index("board")
+    source, residual = calibration.adjustment.sources[row], calibration.adjustment.residual_px[row]
+    px = _board_px(board.views, calibration.rig.names)
+    velocity = np.gradient(px, board.time_s, axis=0)
+    for c, camera in enumerate(calibration.rig):
         own = source.camera == c
         v = velocity[source.moments[own], source.point[own], c]
-        yield from check_rolling_shutter(camera.name, residual[own], v, source.px[own, 1], camera.size[1])
+        yield from check_rolling_shutter(
+            camera.name, residual[own], v, row_px=source.px[own, 1], height_px=camera.size[1]
+        )

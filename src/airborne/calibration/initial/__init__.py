@@ -1,1 +1,1 @@
-"""Initial values: where each camera begins, before anything is adjusted."""
+"""Initial values of the cameras, before the bundle adjustment."""

@@ -1,6 +1,6 @@
-"""Where cameras start from what they see of a board: each lens by itself, then the cameras, linked by shared views.
+"""Initial cameras from views of a board: each lens by itself, then the poses, chained along shared views.
 
-Starts only; the bundle adjustment makes them exact.
+Initial values only; the bundle adjustment refines them.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from airborne.cameras.camera import Camera, Lens, Rig
 from airborne.errors import CalibrationError
 from airborne.types import Array, Ints
 
-_FOCALS = np.geomspace(0.4, 4.0, 14)  # of a picture's longer side: where the search for a focal length begins
-FEWEST_LENS_VIEWS = 3  # that tell a focal length
+_FOCALS = np.geomspace(0.4, 4.0, 14)  # of an image's longer side: initial focal lengths
+FEWEST_LENS_VIEWS = 3  # that determine a focal length
 _IDENTITY = RigidTransform.from_components(np.zeros(3), Rotation.identity())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Views:
-    """What every camera saw of a board at every moment; a moment is the same instant for all of them."""
+    """What every camera sees of a board at every moment; a moment is the same instant for all of them."""
 
     board: Board
     cameras: tuple[str, ...]
@@ -64,22 +64,22 @@ class Views:
 def board_source(
     views: Views, world_from_board: RigidTransform, *, name: str = "board", rows: Sequence[int] | None = None
 ) -> Source:
-    """Return the views as a source, targets beginning at `world_from_board` (moments,).
+    """Return the views as a source, the targets' initial poses `world_from_board` (moments,).
 
     rows: the rig's row of each camera of the views; None: they are the rig's cameras.
     """
-    seen = [
+    columns = [
         (np.full(len(s.corner), c), s.corner, np.full(len(s.corner), m), s.px)
         for c, row in zip(rows or range(len(views.cameras)), views.detections, strict=True)
         for m, s in enumerate(row)
     ]
-    camera, point, moment = (np.concatenate([row[i] for row in seen]).astype(int) for i in range(3))
+    camera, point, moment = (np.concatenate([row[i] for row in columns]).astype(int) for i in range(3))
     return Source(
         name=name,
         camera=camera,
         point=point,
         moment=moment,
-        px=np.concatenate([row[3] for row in seen]),
+        px=np.concatenate([row[3] for row in columns]),
         points=views.board.corners,
         world_from_target=world_from_board,
         cluster=moment,
@@ -87,22 +87,22 @@ def board_source(
 
 
 def initial_lens(views: Views, size: tuple[int, int], *, lens: Lens) -> tuple[Camera, RigidTransform]:
-    """Begin one camera (the only one of the views): the focal length that fits the board's views best, and the boards.
+    """Return the views' only camera with the focal length that fits them best, and the board's poses.
 
-    The camera stands in the world's origin. Raises CalibrationError where too few views show the board.
+    The camera is at the world's origin. Raises CalibrationError where too few views show the board.
     """
     name = views.cameras[0]
     row = views.detections[0]
     if len(row) < FEWEST_LENS_VIEWS:
         raise CalibrationError(
-            f"camera '{name}' shows the board in {len(row)} pictures, at least {FEWEST_LENS_VIEWS} are needed: show it more "
-            "often, nearer, and check the board's columns, rows and dictionary"
+            f"camera '{name}' shows the board in {len(row)} pictures, at least {FEWEST_LENS_VIEWS} are needed: show it "
+            "more often, nearer, and check the board's columns, rows and dictionary"
         )
-    spread = np.unique(np.linspace(0, len(row) - 1, min(len(row), 12)).astype(int))
+    sample = np.unique(np.linspace(0, len(row) - 1, min(len(row), 12)).astype(int))
     best, best_error = None, np.inf
-    for share in _FOCALS:
-        camera = _pinhole(name, size, share * max(size), lens)
-        errors = [_board_pose(camera, views.board, row[i])[1] for i in spread]
+    for ratio in _FOCALS:
+        camera = _pinhole(name, size, ratio * max(size), lens)
+        errors = [_board_pose(camera, views.board, row[i])[1] for i in sample]
         if np.median(errors) < best_error:
             best, best_error = camera, float(np.median(errors))
     if best is None:
@@ -113,39 +113,49 @@ def initial_lens(views: Views, size: tuple[int, int], *, lens: Lens) -> tuple[Ca
 
 
 def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTransform]:
-    """Place cameras with known lenses by the moments at which two of them see the board, along the best tree.
+    """Chain the poses of cameras with known lenses along the spanning tree with the most shared moments.
 
-    The camera with the most links is the world's origin. Return the rig, and the board at every moment. Raises
-    CalibrationError naming the cameras that share no view with the others.
+    The camera with the most shared moments is the world's origin. Return the rig, and the board's pose at every moment.
+    Raises CalibrationError naming the cameras that share no view with the others.
     """
     n = len(cameras)
-    places = [
+    camera_from_board = [
         [_board_pose(camera, views.board, s)[0] if len(s.corner) else None for s in row]
         for camera, row in zip(cameras, views.detections, strict=True)
     ]
     n_shared = _n_shared_moments(views)
     root = int(np.argmax(n_shared.sum(axis=1)))
     tree = minimum_spanning_tree(np.where(n_shared > 0, 1 / np.maximum(n_shared, 1), 0.0))
-    order, before = breadth_first_order(tree, root, directed=False)
+    order, parent = breadth_first_order(tree, root, directed=False)
     if len(order) < n:
         _refuse_unlinked(views, n_shared, order)
     from_world: dict[int, RigidTransform] = {root: _IDENTITY}
     for i in order[1:]:
-        j = int(before[i])
+        j = int(parent[i])
         from_world[int(i)] = (
-            _relative_pose(cameras[i], cameras[j], views, places[i], places[j], (int(i), j)) * from_world[j]
+            _relative_pose(
+                cameras[i],
+                cameras[j],
+                views,
+                poses=camera_from_board[i],
+                other_poses=camera_from_board[j],
+                pair=(int(i), j),
+            )
+            * from_world[j]
         )
     rig = Rig(tuple(replace(camera, camera_from_world=from_world[i]) for i, camera in enumerate(cameras)))
-    return rig, stack_transforms([_consensus_board_pose(rig, views, places, m) for m in range(views.n_moments)])
+    return rig, stack_transforms(
+        [_consensus_board_pose(rig, views, camera_from_board, m) for m in range(views.n_moments)]
+    )
 
 
 def board_poses(rig: Rig, views: Views) -> RigidTransform:
-    """Place the board at every moment by a rig that is known: (moments,); the identity where nobody sees it."""
-    places = [
+    """Return the board's pose at every moment from a known rig: (moments,); the identity where no camera sees it."""
+    camera_from_board = [
         [_board_pose(camera, views.board, s)[0] if len(s.corner) else None for s in row]
         for camera, row in zip(rig, views.detections, strict=True)
     ]
-    return stack_transforms([_consensus_board_pose(rig, views, places, m) for m in range(views.n_moments)])
+    return stack_transforms([_consensus_board_pose(rig, views, camera_from_board, m) for m in range(views.n_moments)])
 
 
 def _pinhole(name: str, size: tuple[int, int], focal_px: float, lens: Lens) -> Camera:
@@ -161,28 +171,32 @@ def _pinhole(name: str, size: tuple[int, int], focal_px: float, lens: Lens) -> C
 
 
 def _board_pose(camera: Camera, board: Board, sighting: DetectedCorners) -> tuple[RigidTransform, float]:
-    """Return camera_from_board of one view and its RMS [px]; the camera's own place does not matter."""
+    """Return camera_from_board of one view and its RMS [px], by perspective-n-point; the camera's pose is ignored."""
     corners = board.corners[sighting.corner]
-    straight = camera.undistort_px(sighting.px)
-    known = np.isfinite(straight).all(axis=1)
-    if known.sum() < 4:
+    ideal = camera.undistort_px(sighting.px)
+    is_valid = np.isfinite(ideal).all(axis=1)
+    if is_valid.sum() < 4:
         return _IDENTITY, np.inf
-    found, turns, shifts, errors = cv2.solvePnPGeneric(
-        corners[known], straight[known], camera.K, None, flags=cv2.SOLVEPNP_IPPE
+    is_solved, rotations, translations, errors = cv2.solvePnPGeneric(
+        corners[is_valid], ideal[is_valid], camera.K, None, flags=cv2.SOLVEPNP_IPPE
     )
-    if not found:
+    if not is_solved:
         return _IDENTITY, np.inf
     best = int(np.argmin(np.ravel(errors)))
-    place = RigidTransform.from_components(shifts[best].ravel(), Rotation.from_rotvec(turns[best].ravel()))
-    off = replace(camera, camera_from_world=_IDENTITY).px_from_world(place.apply(corners)) - sighting.px
-    error = np.sqrt(np.mean(np.sum(off**2, axis=1)))
-    return (place, float(error)) if np.isfinite(error) else (_IDENTITY, np.inf)
+    camera_from_board = RigidTransform.from_components(
+        translations[best].ravel(), Rotation.from_rotvec(rotations[best].ravel())
+    )
+    residual = (
+        replace(camera, camera_from_world=_IDENTITY).px_from_world(camera_from_board.apply(corners)) - sighting.px
+    )
+    error = np.sqrt(np.mean(np.sum(residual**2, axis=1)))
+    return (camera_from_board, float(error)) if np.isfinite(error) else (_IDENTITY, np.inf)
 
 
 def _n_shared_moments(views: Views) -> Array:
     """Return how many moments every two cameras share: (cameras, cameras), 0 on the diagonal."""
-    sees = (views.n_corners > 0).astype(float)
-    shared = sees @ sees.T
+    is_seen = (views.n_corners > 0).astype(float)
+    shared = is_seen @ is_seen.T
     np.fill_diagonal(shared, 0)
     return shared
 
@@ -191,61 +205,64 @@ def _relative_pose(
     one: Camera,
     other: Camera,
     views: Views,
-    places: Sequence[RigidTransform | None],
-    others: Sequence[RigidTransform | None],
+    *,
+    poses: Sequence[RigidTransform | None],
+    other_poses: Sequence[RigidTransform | None],
     pair: tuple[int, int],
 ) -> RigidTransform:
-    """Return one_from_other: of all shared moments' answers the one that most of them come near."""
-    shared = [(a, b, m) for m, (a, b) in enumerate(zip(places, others, strict=True)) if a is not None and b is not None]
-    answers = [a * b.inv() for a, b, _ in shared]
-    plain = replace(one, camera_from_world=_IDENTITY)
+    """Return one_from_other: of the shared moments' candidates the one that fits most of them."""
+    shared = [
+        (a, b, m) for m, (a, b) in enumerate(zip(poses, other_poses, strict=True)) if a is not None and b is not None
+    ]
+    candidates = [a * b.inv() for a, b, _ in shared]
+    at_origin = replace(one, camera_from_world=_IDENTITY)
 
-    def misfit(answer: RigidTransform) -> float:
-        off = []
+    def misfit(candidate: RigidTransform) -> float:
+        distances = []
         for _, b, m in shared:
             sighting = views.detections[pair[0]][m]
-            seen = plain.px_from_world((answer * b).apply(views.board.corners[sighting.corner]))
-            off.append(np.median(np.nan_to_num(np.linalg.norm(seen - sighting.px, axis=1), nan=1e6)))
-        return float(np.median(off))
+            projected = at_origin.px_from_world((candidate * b).apply(views.board.corners[sighting.corner]))
+            distances.append(np.median(np.nan_to_num(np.linalg.norm(projected - sighting.px, axis=1), nan=1e6)))
+        return float(np.median(distances))
 
-    return min(answers, key=misfit)
+    return min(candidates, key=misfit)
 
 
 def _consensus_board_pose(
-    rig: Rig, views: Views, places: Sequence[Sequence[RigidTransform | None]], moment: int
+    rig: Rig, views: Views, poses: Sequence[Sequence[RigidTransform | None]], moment: int
 ) -> RigidTransform:
-    """Return world_from_board at a moment: of the cameras' answers the one that suits all of them."""
-    answers = [
-        camera.camera_from_world.inv() * place
-        for camera, row in zip(rig, places, strict=True)
-        if (place := row[moment]) is not None
+    """Return world_from_board at a moment: of the cameras' candidates the one that fits all of them."""
+    candidates = [
+        camera.camera_from_world.inv() * pose
+        for camera, row in zip(rig, poses, strict=True)
+        if (pose := row[moment]) is not None
     ]
-    if len(answers) < 2:
-        return answers[0] if answers else _IDENTITY
+    if len(candidates) < 2:
+        return candidates[0] if candidates else _IDENTITY
 
-    def misfit(answer: RigidTransform) -> float:
-        off = []
+    def misfit(candidate: RigidTransform) -> float:
+        distances = []
         for camera, row in zip(rig, views.detections, strict=True):
             if len(row[moment].corner):
-                seen = camera.px_from_world(answer.apply(views.board.corners[row[moment].corner]))
-                off.append(np.mean(np.nan_to_num(np.linalg.norm(seen - row[moment].px, axis=1), nan=1e6)))
-        return float(np.sum(off))
+                projected = camera.px_from_world(candidate.apply(views.board.corners[row[moment].corner]))
+                distances.append(np.mean(np.nan_to_num(np.linalg.norm(projected - row[moment].px, axis=1), nan=1e6)))
+        return float(np.sum(distances))
 
-    return min(answers, key=misfit)
+    return min(candidates, key=misfit)
 
 
 def _refuse_unlinked(views: Views, n_shared: Array, reached: Ints) -> None:
-    away = [views.cameras[i] for i in range(len(views.cameras)) if i not in set(reached.tolist())]
-    linked_names = [views.cameras[i] for i in reached]
+    apart = [views.cameras[i] for i in range(len(views.cameras)) if i not in set(reached.tolist())]
+    linked = [views.cameras[i] for i in reached]
     raise CalibrationError(
-        f"no view of the board is shared between {', '.join(away)} and {', '.join(linked_names)}: show the board to "
+        f"no view of the board is shared between {', '.join(apart)} and {', '.join(linked)}: show the board to "
         "two cameras at once, one of each group"
     )
 
 
-def stack_transforms(places: Sequence[RigidTransform]) -> RigidTransform:
-    """Return single places as one value (n,)."""
+def stack_transforms(transforms: Sequence[RigidTransform]) -> RigidTransform:
+    """Stack single transforms into one value (n,)."""
     return RigidTransform.from_components(
-        np.stack([place.translation for place in places]),
-        Rotation.from_quat(np.stack([place.rotation.as_quat() for place in places])),
+        np.stack([transform.translation for transform in transforms]),
+        Rotation.from_quat(np.stack([transform.rotation.as_quat() for transform in transforms])),
     )

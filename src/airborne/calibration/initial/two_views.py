@@ -1,7 +1,7 @@
-"""How two cameras stand to each other, from the same points seen by both: epipolar geometry. Arrays only.
+"""Relative pose of two cameras from corresponding points: epipolar geometry. Arrays only.
 
-`x_b^T F x_a = 0` for pixels of the same point; with the cameras' matrices `E = K_b^T F K_a = [t]x R`. The four places
-that one E allows are told apart by the points, which lie in front of both cameras. (Hartley and Zisserman 2004, 9.)
+`x_b^T F x_a = 0` for pixels of the same point; with the cameras' matrices `E = K_b^T F K_a = [t]x R`. Of the four poses
+that one E allows, the points lie in front of both cameras in one (cheirality). (Hartley and Zisserman 2004, 9.)
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from airborne.types import Array
 
-_FEWEST_POINTS = 8  # the fewest that a fundamental matrix is looked for in
+_FEWEST_POINTS = 8  # of a fundamental matrix
 _CONFIDENCE, _MOST_TRIES = 0.9999, 5000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EpipolarGeometry:
-    """The fundamental matrix of two pictures and the points that keep to it."""
+    """The fundamental matrix of two images and its inliers."""
 
     F: Array  # (3, 3)
     is_inlier: NDArray[np.bool_]  # (n,)
@@ -28,19 +28,19 @@ class EpipolarGeometry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RelativePose:
-    """Where camera b stands in camera a's axes, as long as the distance between them is 1."""
+    """The pose of camera b in camera a's axes, up to scale: the baseline has length 1."""
 
     R: Array  # (3, 3), b from a
     t: Array  # (3,), of length 1
     points: Array  # (n, 3) in a's axes
-    front_share: float  # how many of the points lie in front of both cameras, 0 to 1
+    front_share: float  # share of the points in front of both cameras, 0 to 1
     parallax_rad: float  # median angle between the two rays to a point [rad]
 
 
 def fit_epipolar_geometry(px_a: Array, px_b: Array, *, limit_px: float) -> EpipolarGeometry | None:
-    """Return what most of the pixels (n, 2) of two pictures agree on to limit_px [px]; None where nothing is found.
+    """Fit the fundamental matrix to corresponding pixels (n, 2) of two images, inliers within limit_px; None if none.
 
-    Both without distortion and without NaN. Points in one plane, or all on one line, have no single answer.
+    Pixels without distortion and without NaN. Points in one plane, or on one line, are degenerate.
     """
     if len(px_a) < _FEWEST_POINTS:
         return None
@@ -50,31 +50,31 @@ def fit_epipolar_geometry(px_a: Array, px_b: Array, *, limit_px: float) -> Epipo
     return EpipolarGeometry(F.astype(float), mask.ravel().astype(bool))
 
 
-def relative_pose(F: Array, K_a: Array, K_b: Array, px_a: Array, px_b: Array) -> RelativePose:
-    """Return the place of camera b that puts most of the points (n, 2) [px] in front of both cameras."""
+def relative_pose(F: Array, K_a: Array, K_b: Array, *, px_a: Array, px_b: Array) -> RelativePose:
+    """Return the pose of camera b with most of the points (n, 2) [px] in front of both cameras."""
     R_1, R_2, t = (np.asarray(part, float) for part in cv2.decomposeEssentialMat(K_b.T @ F @ K_a))
     rays_a, rays_b = _rays(px_a, K_a), _rays(px_b, K_b)
     candidates = [
         _triangulate_midpoints(R, sign * t.ravel(), rays_a, rays_b) for R in (R_1, R_2) for sign in (1.0, -1.0)
     ]
-    return max(candidates, key=lambda place: place.front_share)
+    return max(candidates, key=lambda pose: pose.front_share)
 
 
 def _triangulate_midpoints(R: Array, t: Array, rays_a: Array, rays_b: Array) -> RelativePose:
-    """Put every point in the middle of where its two rays pass each other."""
-    along = rays_b @ R  # b's rays in a's axes
+    """Triangulate every point as the midpoint of its two rays' closest approach."""
+    rays_b_in_a = rays_b @ R
     centre = -t @ R
-    cosine = np.sum(rays_a * along, axis=1)
-    apart = np.maximum(1 - cosine**2, 1e-12)
-    depth_a = (rays_a @ centre - cosine * (along @ centre)) / apart
-    depth_b = (cosine * (rays_a @ centre) - along @ centre) / apart
-    points = (depth_a[:, None] * rays_a + centre + depth_b[:, None] * along) / 2
+    cosine = np.sum(rays_a * rays_b_in_a, axis=1)
+    sine2 = np.maximum(1 - cosine**2, 1e-12)
+    depth_a = (rays_a @ centre - cosine * (rays_b_in_a @ centre)) / sine2
+    depth_b = (cosine * (rays_a @ centre) - rays_b_in_a @ centre) / sine2
+    points = (depth_a[:, None] * rays_a + centre + depth_b[:, None] * rays_b_in_a) / 2
     is_front = (depth_a > 0) & (depth_b > 0)
     parallax = np.arccos(np.clip(cosine[is_front], -1, 1)) if is_front.any() else np.zeros(1)
     return RelativePose(R, t, points, float(np.mean(is_front)), float(np.median(parallax)))
 
 
 def _rays(px: Array, K: Array) -> Array:
-    """Return the unit directions (n, 3) in the camera's axes in which pixels (n, 2) are seen."""
+    """Return the unit rays (n, 3) of pixels (n, 2) in the camera's axes."""
     rays = np.column_stack([(px - K[:2, 2]) @ np.linalg.inv(K[:2, :2]).T, np.ones(len(px))])
     return rays / np.linalg.norm(rays, axis=1)[:, None]

@@ -1,4 +1,4 @@
-"""Where every camera begins, from whatever sources can say it."""
+"""Initial values of every camera, from whatever sources determine them."""
 
 from __future__ import annotations
 
@@ -26,38 +26,42 @@ from airborne.cameras.units import check_scales
 from airborne.errors import CalibrationError
 from airborne.types import Progress
 
-Progress = Callable[[str, int, int | None], None]
+StageProgress = Callable[[str, int, int | None], None]  # stage, steps done, steps expected
 
-_MANY_OBSERVATIONS = 200  # observations of a camera that tell two lens terms without a board
+_MANY_OBSERVATIONS = 200  # observations of a camera that determine two lens terms without a board
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Inputs:
-    """Everything read, and where the cameras begin."""
+    """Everything read, and the initial cameras."""
 
     sources: Sources
     rig: Rig  # in the order of the file
     free: dict[str, FreeParameters]
     lenses: dict[str, LensFit]
-    start_rig: Rig | None  # the calibration that was there before
+    start_rig: Rig | None  # the calibration of [start]
     board_detections: BoardDetections | None
-    lens_views: dict[str, Views]  # by camera, board views for its lens only
+    lens_views: dict[str, Views]  # by camera, views of the board for its lens only
     points: dict[str, ControlPoints]  # by source
     wand: WandTracks | None
     detections: Detections | None
     notes: tuple[str, ...]
-    findings: tuple[Finding, ...]  # what is wrong with the recordings and starts
+    findings: tuple[Finding, ...]  # what is wrong with the recordings and initial values
 
 
-def read_inputs(sources: Sources, progress: Progress) -> Inputs:
-    """Read all sources and place the cameras roughly; raises an AirborneError for what cannot be used."""
-    given = _read_start(sources) if sources.start is not None else None
-    sizes = _sizes(sources, given)
+def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
+    """Read all sources and find initial cameras; raises an AirborneError for what cannot be used."""
+    start_rig = _read_start(sources) if sources.start is not None else None
+    sizes = _sizes(sources, start_rig)
     board = _board(sources)
-    seen, alone = None, {}
+    board_detections, lens_views = None, {}
     if board is not None:
-        seen, alone = _detect_boards(sources, board, lambda done, n: progress("looking for the board", done, n))
-    lenses = _fit_lenses(sources, seen, alone, sizes, progress)
+        board_detections, lens_views = _detect_boards(
+            sources, board, lambda done, n: progress("looking for the board", done, n)
+        )
+    lenses = _fit_lenses(
+        sources, board_detections=board_detections, lens_views=lens_views, sizes=sizes, progress=progress
+    )
     points = {}
     if sources.control_points is not None:
         points["control points"] = read_control_points(sources.path(sources.control_points.file))
@@ -67,28 +71,32 @@ def read_inputs(sources: Sources, progress: Progress) -> Inputs:
     detections = None
     if sources.detections is not None:
         detections = read_detections(sources.path(sources.detections.file), sources.names, sources.detections.cameras)
-    known = {name: fit.camera for name, fit in lenses.items()}
-    if given is not None:
-        known |= {camera.name: camera for camera in given if camera.name not in known}
-    told_by = {
-        name: initial_rig_from_points(table.select(_common(table.cameras, sizes)), sizes, known)
+    known_lenses = {name: fit.camera for name, fit in lenses.items()}
+    if start_rig is not None:
+        known_lenses |= {camera.name: camera for camera in start_rig if camera.name not in known_lenses}
+    start_of = {
+        name: initial_rig_from_points(table.select(_common(table.cameras, sizes)), sizes, known_lenses)
         for name, table in points.items()
     }
-    told_by |= {"calibration at the start": given} if given is not None else {}
+    start_of |= {"calibration at the start": start_rig} if start_rig is not None else {}
     if wand is not None:
-        told_by["wand"] = initial_rig_from_wand(wand, {name: sizes[name] for name in wand.cameras}, known)
-    starts = list(told_by.values())
-    if seen is not None:
-        starts += _board_starts(seen.views, known, alone_is_enough=sources.kinds == ["board"] and given is None)
+        start_of["wand"] = initial_rig_from_wand(wand, {name: sizes[name] for name in wand.cameras}, known_lenses)
+    starts = list(start_of.values())
+    if board_detections is not None:
+        starts += _board_starts(
+            board_detections.views, known_lenses, alone_is_enough=sources.kinds == ["board"] and start_rig is None
+        )
     starts = [start for start in starts if len(start)]
     if not starts:
-        raise CalibrationError("no source places any camera; each needs four known points, or board or wand views")
+        raise CalibrationError(
+            "no source determines the pose of any camera; each needs four known points, or views of board or wand"
+        )
     rig = merge_rigs(starts)
     missing = [name for name in sources.names if name not in rig.names]
     if missing:
         raise CalibrationError(
-            f"no source says where {', '.join(missing)} stands; show it the board or the wand together with another "
-            "camera, or click four known points in its picture"
+            f"no source determines where {', '.join(missing)} stands; show it the board or the wand together with "
+            "another camera, or click four known points in its picture"
         )
     rig = Rig(tuple(_with_lens(rig[name], lenses.get(name)) for name in sources.names))
     counts = {name: _n_observations(name, points, wand) for name in sources.names}
@@ -96,34 +104,40 @@ def read_inputs(sources: Sources, progress: Progress) -> Inputs:
         sources=sources,
         rig=rig,
         free={
-            c.name: _free_parameters(c, lenses.get(c.name), given is not None, counts[c.name]) for c in sources.camera
+            c.name: _free_parameters(c, lenses.get(c.name), start_rig is not None, counts[c.name])
+            for c in sources.camera
         },
         lenses=lenses,
-        start_rig=given,
-        board_detections=seen,
-        lens_views=alone,
+        start_rig=start_rig,
+        board_detections=board_detections,
+        lens_views=lens_views,
         points=points,
         wand=wand,
         detections=detections,
-        notes=(*(seen.notes if seen is not None else ()), *(detections.notes if detections is not None else ())),
-        findings=(*(seen.findings if seen is not None else ()), *check_scales(told_by)),
+        notes=(
+            *(board_detections.notes if board_detections is not None else ()),
+            *(detections.notes if detections is not None else ()),
+        ),
+        findings=(*(board_detections.findings if board_detections is not None else ()), *check_scales(start_of)),
     )
 
 
-def pixel_convention(said: PixelConventionName) -> PixelConvention:
-    """Return where a table of pixels counts from."""
-    corner, _, base = said.rpartition("-")
+def pixel_convention(name: PixelConventionName) -> PixelConvention:
+    """Return the pixel convention of a name."""
+    corner, _, base = name.rpartition("-")
     return PixelConvention("lower-left" if corner == "lower-left" else "upper-left", int(base))
 
 
-def _detect_boards(sources: Sources, board: Board, told: Progress) -> tuple[BoardDetections | None, dict[str, Views]]:
-    """Return what the cameras saw of the board together, and what those alone that have a recording for it."""
-    alone = {camera.name: detect_lens_board(sources, camera, board, told) for camera in sources.camera}
+def _detect_boards(
+    sources: Sources, board: Board, progress: Progress
+) -> tuple[BoardDetections | None, dict[str, Views]]:
+    """Detect the board in the common recordings, and in those for one camera's lens."""
+    lens_views = {camera.name: detect_lens_board(sources, camera, board, progress) for camera in sources.camera}
     is_together = any(camera.video or camera.pictures for camera in sources.camera)
-    found = {name: views for name, views in alone.items() if views is not None}
-    if not is_together and not found:
+    seen_alone = {name: views for name, views in lens_views.items() if views is not None}
+    if not is_together and not seen_alone:
         raise CalibrationError("[board] needs recordings: add video, pictures or lens_video to each [[camera]]")
-    return detect_boards(sources, board, told) if is_together else None, found
+    return detect_boards(sources, board, progress) if is_together else None, seen_alone
 
 
 def _board(sources: Sources) -> Board | None:
@@ -137,27 +151,27 @@ def _board(sources: Sources) -> Board | None:
 
 
 def _read_start(sources: Sources) -> Rig:
-    """Return the calibration of [start] as that of the recordings' own pixels."""
+    """Return the calibration of [start] in the recordings' own pixels."""
     rig = read_rig(sources.path(sources.start.file if sources.start else ""))
-    found = []
+    cameras = []
     for camera in sources.camera:
-        old = replace(rig[camera.calibrated_as or camera.name], name=camera.name)
+        calibrated = replace(rig[camera.calibrated_as or camera.name], name=camera.name)
         size = image_size(sources, camera)
         du, dv = camera.saved_offset_px
         if camera.saved_scale != 1 or (du, dv) != (0, 0):
             scale = (camera.saved_scale, camera.saved_scale)
-            width, height = (round(length / camera.saved_scale) for length in old.size)
-            old = old.resample(scale=scale, offset=(du, dv), size=size or (width, height))
-        for finding in check_image_size(camera.name, old.size, size or old.size):
+            width, height = (round(length / camera.saved_scale) for length in calibrated.size)
+            calibrated = calibrated.resample(scale=scale, offset=(du, dv), size=size or (width, height))
+        for finding in check_image_size(camera.name, calibrated.size, size or calibrated.size):
             raise CalibrationError(finding.sentence)
-        found.append(old)
-    return Rig(tuple(found))
+        cameras.append(calibrated)
+    return Rig(tuple(cameras))
 
 
-def _sizes(sources: Sources, given: Rig | None) -> dict[str, tuple[int, int]]:
+def _sizes(sources: Sources, start_rig: Rig | None) -> dict[str, tuple[int, int]]:
     sizes = {}
     for camera in sources.camera:
-        size = given[camera.name].size if given is not None else image_size(sources, camera)
+        size = start_rig[camera.name].size if start_rig is not None else image_size(sources, camera)
         if size is None:
             raise CalibrationError(f"camera '{camera.name}': give its video, or size = [width, height] in pixels")
         sizes[camera.name] = size
@@ -166,62 +180,66 @@ def _sizes(sources: Sources, given: Rig | None) -> dict[str, tuple[int, int]]:
 
 def _fit_lenses(
     sources: Sources,
-    seen: BoardDetections | None,
-    alone: dict[str, Views],
+    *,
+    board_detections: BoardDetections | None,
+    lens_views: dict[str, Views],
     sizes: dict[str, tuple[int, int]],
-    told: Progress,
+    progress: StageProgress,
 ) -> dict[str, LensFit]:
-    """Find the lens of every camera that sees the board, by its own recording for that or by the common one."""
+    """Fit the lens of every camera that sees the board, from its own lens recording or from the common one."""
     wanted = {}
     for camera in sources.camera:
-        views = alone.get(camera.name)
-        if views is None and seen is not None and camera.name in seen.views.cameras:
-            views = seen.views.of_camera(seen.views.cameras.index(camera.name))
+        views = lens_views.get(camera.name)
+        if views is None and board_detections is not None and camera.name in board_detections.views.cameras:
+            views = board_detections.views.of_camera(board_detections.views.cameras.index(camera.name))
         if views is not None and not (camera.focal == "fixed" and sources.start is not None):
             wanted[camera.name] = (camera, views)
-    found = {}
+    fits = {}
     total, done = sum(len(LENS_MODELS[camera.lens]) for camera, _ in wanted.values()), 0
     for name, (camera, views) in wanted.items():
 
         def step() -> None:
             nonlocal done
             done += 1
-            told("fitting the lenses", done, total)
+            progress("fitting the lenses", done, total)
 
-        found[name] = choose_lens(views, sizes[name], lens=camera.lens, progress=step)
-    return found
+        fits[name] = choose_lens(views, sizes[name], lens=camera.lens, progress=step)
+    return fits
 
 
-def _board_starts(views: Views, known: dict[str, Camera], *, alone_is_enough: bool) -> list[Rig]:
+def _board_starts(views: Views, known_lenses: dict[str, Camera], *, alone_is_enough: bool) -> list[Rig]:
     if views.board.is_ambiguous and len(views.cameras) > 1:
         raise CalibrationError(
-            "this chessboard looks the same when turned by half, so cameras cannot be linked by it: use a board with "
-            "an even and an odd number of inner corners, or a ChArUco board"
+            "this chessboard looks the same after half a revolution, so cameras cannot be linked by it: use a board "
+            "with an even and an odd number of inner corners, or a ChArUco board"
         )
     groups = [list(range(len(views.cameras)))] if alone_is_enough else views.groups()
-    return [chain_cameras([known[views.cameras[c]] for c in group], views.select_cameras(group))[0] for group in groups]
+    return [
+        chain_cameras([known_lenses[views.cameras[c]] for c in group], views.select_cameras(group))[0]
+        for group in groups
+    ]
 
 
 def _wand(sources: Sources, sizes: dict[str, tuple[int, int]]) -> WandTracks | None:
     table = sources.wand
     if table is None:
         return None
-    given = FileOptions(size=dict(sizes), pixels=pixel_convention(table.pixels))
+    options = FileOptions(size=dict(sizes), pixels=pixel_convention(table.pixels))
     lengths = table.lengths_m or [table.length_m or 0.0]
-    return read_wand(sources.path(table.file), table.cameras or sources.names, given, lengths)
+    return read_wand(sources.path(table.file), table.cameras or sources.names, options, lengths)
 
 
 def _common(cameras: tuple[str, ...], sizes: dict[str, tuple[int, int]]) -> list[str]:
-    found = [name for name in cameras if name in sizes]
-    if not found:
+    names = [name for name in cameras if name in sizes]
+    if not names:
         raise CalibrationError(
             f"the points are clicked in {', '.join(cameras)}; the cameras are {', '.join(sizes)}: use the same names"
         )
-    return found
+    return names
 
 
 def _with_lens(camera: Camera, fit: LensFit | None) -> Camera:
-    """Return the camera with the lens that the board told, at its place."""
+    """Return the camera with the lens fitted to the board, in its pose."""
     return camera if fit is None else replace(fit.camera, camera_from_world=camera.camera_from_world)
 
 
@@ -232,14 +250,14 @@ def _n_observations(name: str, points: dict[str, ControlPoints], wand: WandTrack
     return n
 
 
-def _free_parameters(camera: CameraSource, fit: LensFit | None, is_given: bool, n_seen: int) -> FreeParameters:
-    """Return what may change: the lens as the board's pictures support it, else as much as there is data for."""
+def _free_parameters(camera: CameraSource, fit: LensFit | None, has_start: bool, n_observations: int) -> FreeParameters:
+    """Return the free parameters: the lens model that the board supports, else as many as the data support."""
     if fit is not None:
         own = fit.free
-    elif is_given and camera.focal in ("auto", "fixed"):
+    elif has_start and camera.focal in ("auto", "fixed"):
         return FreeParameters(focal=False)
     else:
-        own = FreeParameters(n_terms=0 if is_given else 2 if n_seen >= _MANY_OBSERVATIONS else 0)
+        own = FreeParameters(n_terms=0 if has_start else 2 if n_observations >= _MANY_OBSERVATIONS else 0)
     if camera.focal == "fixed":
         return replace(own, focal=False)
     return replace(own, shares_focal="shared") if camera.focal == "shared" else own

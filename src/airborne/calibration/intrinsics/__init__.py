@@ -1,1 +1,1 @@
-"""Lenses: how many numbers of them the evidence supports."""
+"""Intrinsics: how many lens parameters the observations support."""

@@ -1,4 +1,4 @@
-"""How much of a lens its board pictures tell: from few numbers to many, the fewest that predict pictures left out."""
+"""Model selection for a lens from its views of a board: the simplest model that predicts held-out views as well."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ LENS_MODELS: dict[Lens, tuple[tuple[str, FreeParameters], ...]] = {
     ),
 }
 _N_FOLDS = 3
-MOST_VIEWS = 30  # pictures that decide; more take longer and change nothing
-_FEWEST_TO_CHOOSE = 9  # pictures; with fewer the focal length and k1 are found and nothing is chosen
+MOST_VIEWS = 30  # views that decide; more take longer and change nothing
+_FEWEST_TO_CHOOSE = 9  # views; with fewer only the focal length and k1 are estimated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LensFit:
-    """One camera's lens as its board pictures tell it; the camera stands in the world's origin."""
+    """One camera's lens fitted to its views of a board; the camera is at the world's origin."""
 
     camera: Camera
     model: str  # what is free, in words
@@ -48,10 +48,10 @@ class LensFit:
 def choose_lens(
     views: Views, size: tuple[int, int], *, lens: Lens = "brown", progress: Callable[[], None] | None = None
 ) -> LensFit:
-    """Find the lens of the only camera of the views, with the fewest numbers that predict held-out pictures as well.
+    """Fit the lens of the views' only camera, with the fewest parameters that predict held-out views as well.
 
-    As well: the mean over the pictures of the difference to the best is within its own standard error.
-    Raises CalibrationError where too few pictures show the board.
+    As well: the mean over the views of the difference to the best model is within its standard error.
+    Raises CalibrationError where too few views show the board.
     """
     row = views.detections[0]
     views = views.select_moments(np.unique(np.linspace(0, len(row) - 1, min(len(row), MOST_VIEWS)).astype(int)))
@@ -60,8 +60,8 @@ def choose_lens(
     fold = np.arange(n) % _N_FOLDS
     scores, fits = {}, {}
     models = LENS_MODELS[lens] if n >= _FEWEST_TO_CHOOSE else LENS_MODELS[lens][1:2]
-    for name, freedom in models:
-        fit = adjust(Rig((camera,)), [board_source(views, boards)], freedom)
+    for name, free in models:
+        fit = adjust(Rig((camera,)), [board_source(views, boards)], free)
         camera, boards = fit.rig.cameras[0], fit.sources[0].world_from_target or boards
         fits[name] = fit
         if n >= _FEWEST_TO_CHOOSE:
@@ -81,16 +81,16 @@ def choose_lens(
 
 
 def _cross_validate(fit: Adjustment, fold: NDArray[np.integer]) -> Array:
-    """Return each view's RMS [px] by a lens fitted to the other folds; the board's place comes from the view."""
+    """Return each view's RMS [px] with a lens fitted to the other folds; the board's pose is fitted to the view."""
     (source,) = fit.with_estimated_noise()
     score = np.zeros(len(fold))
     for k in range(_N_FOLDS):
-        is_left = fold[source.moments] == k
-        fitted = adjust(fit.rig, [source.select(~is_left)], fit.free)
-        out = source.select(is_left)
-        squares = np.sum(adjust(fitted.rig, [out], ALL_FIXED).residual_px[0] ** 2, axis=1)
+        is_held_out = fold[source.moments] == k
+        fitted = adjust(fit.rig, [source.select(~is_held_out)], fit.free)
+        held_out = source.select(is_held_out)
+        squares = np.sum(adjust(fitted.rig, [held_out], ALL_FIXED).residual_px[0] ** 2, axis=1)
         for m in np.flatnonzero(fold == k):
-            score[m] = np.sqrt(np.nanmean(squares[out.moments == m]))
+            score[m] = np.sqrt(np.nanmean(squares[held_out.moments == m]))
     return score
 
 

@@ -1,4 +1,4 @@
-"""Which camera model do the control points support? Leave-one-out errors decide. Arrays only."""
+"""Model selection for cameras from control points, by leave-one-out cross-validation. Arrays only."""
 
 from __future__ import annotations
 
@@ -28,32 +28,32 @@ class Solution:
 
     @property
     def shift_sd_px(self) -> float:
-        """How far the fit leaves a projected point open, in one direction, on average over the points [px]."""
+        """Standard deviation of a projected point's coordinate due to the fit, RMS over the points [px]."""
         n, p = 2 * len(self.world), self.model.n_parameters
         return float(np.sqrt(np.sum(self.residual_px**2) / max(n - p, 1) * p / n))
 
     @property
     def held_out_px(self) -> Array:
-        """The same for the camera that has not seen the point (n, 2) [px]."""
+        """The same for the camera fitted without the point (n, 2) [px]."""
         return self.px - np.array([p.px_from_world(x) for p, x in zip(self.refits, self.world, strict=True)])
 
 
 def leave_one_out(pinhole: Pinhole, model: PinholeModel, world: Array, px: Array) -> Solution:
-    """Return the solution of a fitted pinhole: refits by least squares without each point, starting from it."""
+    """Refit a pinhole by least squares without each point, starting from the fit to all."""
     keep = ~np.eye(len(world), dtype=bool)
     refits = tuple(fit_pinhole(pinhole, model, world[k], px[k]) for k in keep)
     return Solution(model, pinhole, refits, world, px)
 
 
 def supported_models(models: Sequence[PinholeModel], n_points: int) -> list[PinholeModel]:
-    """Return the models whose free numbers are fewer than the coordinates that remain without one point."""
+    """Return the models with fewer free parameters than the coordinates that remain without one point."""
     return [model for model in models if model.n_parameters < 2 * (n_points - 1)]
 
 
 def choose_simplest(solutions: Sequence[Solution]) -> Solution:
     """Return the first (simplest) solution that is not clearly worse than the best on held-out points.
 
-    Clearly: the mean difference of squared held-out errors, point by point, exceeds its own standard error.
+    Clearly: the mean difference of squared held-out errors, point by point, exceeds its standard error.
     """
     squares = [np.sum(solution.held_out_px**2, axis=1) for solution in solutions]
     best = min(squares, key=np.mean)

@@ -14,13 +14,13 @@ from airborne.types import Array
 
 _ANNEALING_BOUNDS = np.array(
     [*[np.radians(10)] * 3, *[0.5] * 3, 0.2]
-)  # turn [rad], shift [m], share of the focal length
+)  # rotation [rad], shift [m], share of the focal length
 _ANNEALING_ROUNDS = 100
 
 
 @dataclass(frozen=True, slots=True)
 class PinholeModel:
-    """Which numbers of a physical camera are free beside position (3), orientation (3) and focal length."""
+    """Which parameters of a physical camera are free beside position (3), orientation (3) and focal length."""
 
     name: str
     frees_principal_point: bool = False
@@ -28,7 +28,7 @@ class PinholeModel:
 
     @property
     def n_parameters(self) -> int:
-        """How many numbers are fitted."""
+        """How many parameters are free."""
         return 7 + 2 * self.frees_principal_point + self.frees_k1
 
 
@@ -70,15 +70,15 @@ class Pinhole:
         return self.focal_px * distort(xy, np.array([self.k1])) + self.principal_point
 
     def undistort_px(self, px: Array) -> Array:
-        """Take the distortion out of pixels (..., 2) [px]."""
+        """Undistort pixels (..., 2) [px]."""
         xy = (px - self.principal_point) / self.focal_px
         return self.focal_px * undistort(xy, np.array([self.k1])) + self.principal_point
 
     def apply_step(self, model: PinholeModel, step: Array) -> Pinhole:
-        """Return the camera with the model's free numbers changed by step (n_parameters,).
+        """Return the camera with the model's free parameters changed by step (n_parameters,).
 
-        The order is that of `PARAMETERS`, without those the model fixes; the turn is a rotation vector about the
-        camera's own axes.
+        The order is that of `_PARAMETERS`, without those the model fixes; the rotation vector is about the camera's own
+        axes.
         """
         return Pinhole(
             Rotation.from_rotvec(step[:3]).as_matrix() @ self.R,
@@ -90,7 +90,7 @@ class Pinhole:
 
 
 def parameter_names(model: PinholeModel) -> tuple[str, ...]:
-    """Return the names, with units, of the numbers that the model frees, in the order of `Pinhole.moved`."""
+    """Return the names, with units, of the model's free parameters, in the order of `Pinhole.apply_step`."""
     return _PARAMETERS[:7] + _PARAMETERS[7:9] * model.frees_principal_point + _PARAMETERS[9:] * model.frees_k1
 
 
@@ -118,7 +118,7 @@ def anneal_pinhole(start: Pinhole, world: Array, px: Array, *, seed: int) -> Pin
 
 
 def parameter_sd(pinhole: Pinhole, model: PinholeModel, world: Array, px: Array) -> Array:
-    """Return the standard deviations (n_parameters,) of a fitted camera's free numbers, from the Jacobian.
+    """Return the standard deviations (n_parameters,) of a fitted camera's free parameters, from the Jacobian.
 
     `sqrt(diag((J^T J)^-1) s^2)` with `s^2 = |residual|^2 / (2 n - n_parameters)`.
     """

@@ -1,1 +1,1 @@
-"""What is there to calibrate from: points, boards, wands, courts, people; each read and made evidence."""
+"""The sources of a calibration: points, boards, wands, courts, people; read, and made observations."""

@@ -1,4 +1,4 @@
-"""The board in videos and pictures: which frames belong together, and what each shows."""
+"""Detection of the board in videos and images, and which frames belong to the same moment."""
 
 from __future__ import annotations
 
@@ -25,43 +25,43 @@ from airborne.video import VideoSource, inspect
 from airborne.video.decoding import decode, rgb_from_decoded
 
 Grey = NDArray[np.uint8]
-Progress = Progress
 
-_MOST_MOMENTS = 240  # that the board is looked for at, spread over a recording
+
+_MOST_MOMENTS = 240  # at which the board is searched for, evenly spaced over a recording
 _IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 _LARGEST_PICTURE_BYTES = 200_000_000
-_N_SAMPLES = 12  # pictures of a camera that tell how the board was printed
-_ODD_PICTURES = 2  # more or fewer than the other cameras' are told
+_N_SAMPLES = 12  # images of a camera that test how the board was printed
+_ODD_PICTURES = 2  # a larger difference to the other cameras is reported
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardDetections:
-    """What the cameras saw of the board together."""
+    """The board in the cameras' common recordings."""
 
     views: Views
-    time_s: Array | None  # (moments,) [s]; None for pictures, which have no times
+    time_s: Array | None  # (moments,) [s]; None for images, which have no times
     sizes: dict[str, tuple[int, int]]
-    examples: dict[str, Grey]  # by camera, the picture with most corners
+    examples: dict[str, Grey]  # by camera, the image with most corners
     notes: tuple[str, ...]
     findings: tuple[Finding, ...]
 
 
 def detect_boards(sources: Sources, board: Board, progress: Progress) -> BoardDetections:
-    """Find the board in all cameras' recordings; raises VideoError or CalibrationError for what cannot be read."""
+    """Detect the board in all cameras' recordings; raises VideoError or CalibrationError for what cannot be read."""
     cameras = [camera for camera in sources.camera if camera.video or camera.pictures]
     if not cameras:
         raise CalibrationError("[board] needs a video or pictures of the cameras; add video = ... to each [[camera]]")
     if all(camera.video for camera in cameras):
-        moments, time_s, odd = _moments(sources, cameras)
+        moments, time_s, findings = _moments(sources, cameras)
     elif all(camera.pictures for camera in cameras):
         counts = [len(_image_paths(sources, camera.pictures or "")) for camera in cameras]
         if len(cameras) > 1 and len(set(counts)) > 1:
-            said = ", ".join(f"{camera.name} {n}" for camera, n in zip(cameras, counts, strict=True))
+            counts_text = ", ".join(f"{camera.name} {n}" for camera, n in zip(cameras, counts, strict=True))
             raise CalibrationError(
-                f"pictures that belong together stand at the same place of every folder, but there are: {said}; "
+                f"pictures that belong together stand at the same place of every folder, but there are: {counts_text}; "
                 "use lens_pictures for pictures of one camera alone"
             )
-        moments, time_s, odd = [{i: i for i in range(n)} for n in counts], None, ()
+        moments, time_s, findings = [{i: i for i in range(n)} for n in counts], None, ()
     else:
         raise CalibrationError("some cameras have a video and some pictures; give the same kind for all")
     samples = {camera.name: _sample_images(sources, camera) for camera in cameras}
@@ -81,37 +81,37 @@ def detect_boards(sources: Sources, board: Board, progress: Progress) -> BoardDe
             progress(done, total)
         rows.append(tuple(row))
     views = Views(board, tuple(camera.name for camera in cameras), tuple(rows))
-    return BoardDetections(views, time_s, sizes, examples, notes, (*odd, *check_board(views, samples)))
+    return BoardDetections(views, time_s, sizes, examples, notes, (*findings, *check_board(views, samples)))
 
 
 def detect_lens_board(sources: Sources, camera: CameraSource, board: Board, progress: Progress) -> Views | None:
-    """Find the board in the recording for one camera's lens, if there is one."""
+    """Detect the board in the recording for one camera's lens, if there is one."""
     name = camera.lens_video or camera.lens_pictures
     if name is None:
         return None
-    alone = camera.model_copy(update={"video": camera.lens_video, "pictures": camera.lens_pictures})
+    lens_camera = camera.model_copy(update={"video": camera.lens_video, "pictures": camera.lens_pictures})
     detect = board_detector(board)
-    found: list[DetectedCorners] = []
-    n = _n_images(sources, alone) or _MOST_MOMENTS
-    wanted = range(0, n, math.ceil(n / _MOST_MOMENTS))
-    for _, grey in _read_grey_images(sources, alone, wanted):
-        found.append(detect(grey))
-        progress(len(found), len(wanted))
-    views = Views(board, (camera.name,), (tuple(found),))
-    if not any(len(sighting.corner) for sighting in found):
-        check_board(views, {camera.name: _sample_images(sources, alone)})
+    detections: list[DetectedCorners] = []
+    n = _n_images(sources, lens_camera) or _MOST_MOMENTS
+    indices = range(0, n, math.ceil(n / _MOST_MOMENTS))
+    for _, grey in _read_grey_images(sources, lens_camera, indices):
+        detections.append(detect(grey))
+        progress(len(detections), len(indices))
+    views = Views(board, (camera.name,), (tuple(detections),))
+    if not any(len(sighting.corner) for sighting in detections):
+        check_board(views, {camera.name: _sample_images(sources, lens_camera)})
     return views.of_camera(0)
 
 
 def first_image(sources: Sources, camera: CameraSource) -> Grey | None:
-    """Return the first picture of a camera's recording, if it has one."""
+    """Return the first image of a camera's recording, if it has one."""
     if not (camera.video or camera.pictures):
         return None
     return next((grey for _, grey in _read_grey_images(sources, camera, range(1))), None)
 
 
 def image_size(sources: Sources, camera: CameraSource) -> tuple[int, int] | None:
-    """Return a camera's picture size (width, height) [px], where anything tells it."""
+    """Return a camera's image size (width, height) [px]; None where nothing determines it."""
     if camera.size is not None:
         return camera.size[0], camera.size[1]
     if camera.video is not None:
@@ -128,7 +128,7 @@ def image_size(sources: Sources, camera: CameraSource) -> tuple[int, int] | None
 def _moments(
     sources: Sources, cameras: Sequence[CameraSource]
 ) -> tuple[list[dict[int, int]], Array, tuple[Finding, ...]]:
-    """Return by camera which of its frames belongs to which moment, the moments' times, and what is odd about them."""
+    """Return by camera the moment of each of its frames, the moments' times, and what is wrong with them."""
     if sources.board is not None and sources.board.timestamps is not None:
         return _moments_by_time_stamps(sources.path(sources.board.timestamps), cameras)
     facts = [inspect(VideoSource(c.name, sources.path(c.video or ""))) for c in cameras]
@@ -138,16 +138,16 @@ def _moments(
     stride = max(1, math.ceil(n / _MOST_MOMENTS))
     index = np.arange(0, n, stride)
     time_s = index / rate + cameras[0].offset_s
-    found = []
+    moments = []
     for camera, fact in zip(cameras, facts, strict=True):
         frames = np.rint((time_s - camera.offset_s) * float(fact.frame_rate)).astype(int)
-        off = np.abs(frames / float(fact.frame_rate) + camera.offset_s - time_s)
-        is_there = (frames >= 0) & (off <= 0.5 / rate + 1e-9)
-        found.append({int(f): m for m, f in enumerate(frames) if is_there[m]})
+        error_s = np.abs(frames / float(fact.frame_rate) + camera.offset_s - time_s)
+        is_present = (frames >= 0) & (error_s <= 0.5 / rate + 1e-9)
+        moments.append({int(f): m for m, f in enumerate(frames) if is_present[m]})
     if len({fact.frame_rate for fact in facts}) > 1 or any(camera.offset_s for camera in cameras):
-        return found, time_s, ()
+        return moments, time_s, ()
     counts = {c.name: _n_images(sources, c) or 0 for c in cameras}
-    return found, time_s, tuple(check_image_counts(counts, _ODD_PICTURES))
+    return moments, time_s, tuple(check_image_counts(counts, _ODD_PICTURES))
 
 
 def _moments_by_time_stamps(
@@ -168,16 +168,16 @@ def _moments_by_time_stamps(
     ids = {row[1] for row in rows}
     moment = {sync: m for m, sync in enumerate(sorted({row[0] for row in rows}))}
     time_s = np.array([np.mean([row[2] for row in rows if moment[row[0]] == m]) for m in range(len(moment))])
-    found, odd = [], []
+    moments, findings = [], []
     for camera in cameras:
         key = _stamp_id(camera.name, ids)
         if key is None:
             raise CalibrationError(f"{path} has no rows of camera '{camera.name}'; its cam_id are: {', '.join(ids)}")
-        told = sorted((r for r in table if r["cam_id"].strip() == key), key=lambda r: int(r["sync_index"]))
-        odd += check_time_stamps(camera.name, told)
+        stamps = sorted((r for r in table if r["cam_id"].strip() == key), key=lambda r: int(r["sync_index"]))
+        findings += check_time_stamps(camera.name, stamps)
         own = sorted((row for row in rows if row[1] == key), key=lambda row: row[2])
-        found.append({n: moment[row[0]] for n, row in enumerate(own)})
-    return found, time_s - time_s[0], tuple(odd)
+        moments.append({n: moment[row[0]] for n, row in enumerate(own)})
+    return moments, time_s - time_s[0], tuple(findings)
 
 
 def _stamp_id(name: str, ids: set[str]) -> str | None:
@@ -187,8 +187,8 @@ def _stamp_id(name: str, ids: set[str]) -> str | None:
 
 def _sample_images(sources: Sources, camera: CameraSource) -> list[Grey]:
     n = _n_images(sources, camera) or _N_SAMPLES
-    wanted = set(np.linspace(0, max(n - 1, 0), _N_SAMPLES).astype(int).tolist())
-    return [grey for _, grey in _read_grey_images(sources, camera, wanted)]
+    indices = set(np.linspace(0, max(n - 1, 0), _N_SAMPLES).astype(int).tolist())
+    return [grey for _, grey in _read_grey_images(sources, camera, indices)]
 
 
 def _n_images(sources: Sources, camera: CameraSource) -> int | None:
@@ -198,31 +198,31 @@ def _n_images(sources: Sources, camera: CameraSource) -> int | None:
     return None if facts.duration_s is None else round(facts.duration_s * facts.frame_rate)
 
 
-def _read_grey_images(sources: Sources, camera: CameraSource, wanted: Container[int]) -> Iterator[tuple[int, Grey]]:
-    """Yield the wanted pictures of a recording in grey, with their numbers."""
+def _read_grey_images(sources: Sources, camera: CameraSource, indices: Container[int]) -> Iterator[tuple[int, Grey]]:
+    """Yield some images of a recording in grey, with their indices."""
     if camera.pictures is not None:
         for index, path in enumerate(_image_paths(sources, camera.pictures)):
-            if index in wanted:
+            if index in indices:
                 yield index, _read_grey_image(path)
         return
     source = VideoSource(camera.name, sources.path(camera.video or ""))
     facts = inspect(source)
     for picture in decode(source, facts):
         index = round(picture.time_s * facts.frame_rate)
-        if index in wanted:
+        if index in indices:
             grey = cv2.cvtColor(rgb_from_decoded(picture, facts), cv2.COLOR_RGB2GRAY)
             yield index, np.asarray(grey, np.uint8)
 
 
 def _image_paths(sources: Sources, pattern: str) -> list[Path]:
-    given = sources.path(pattern)
-    if given.is_dir():
-        found = sorted(path for path in given.iterdir() if path.suffix.lower() in _IMAGE_SUFFIXES)
+    location = sources.path(pattern)
+    if location.is_dir():
+        paths = sorted(path for path in location.iterdir() if path.suffix.lower() in _IMAGE_SUFFIXES)
     else:
-        found = sorted(path for path in given.parent.glob(given.name) if path.suffix.lower() in _IMAGE_SUFFIXES)
-    if not found:
-        raise CalibrationError(f"no pictures at {given}; give a folder or a pattern such as left/*.png")
-    return found
+        paths = sorted(path for path in location.parent.glob(location.name) if path.suffix.lower() in _IMAGE_SUFFIXES)
+    if not paths:
+        raise CalibrationError(f"no pictures at {location}; give a folder or a pattern such as left/*.png")
+    return paths
 
 
 def _read_grey_image(path: Path) -> Grey:

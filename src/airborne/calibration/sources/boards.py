@@ -1,4 +1,4 @@
-"""Calibration boards: what they look like, and their corners in pictures."""
+"""Calibration boards: their geometry, and the detection of their corners in images."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from airborne.errors import CalibrationError, one_line
 from airborne.io.text import read_toml
 from airborne.types import Array, Ints
 
-_FEWEST_CORNERS = 6  # of a view that says where the board is
-_THINNEST = 0.05  # width over length of the corners seen: on one line they leave the board free to turn
-_ENOUGH_CORNERS = 2  # corners a picture, on average: the board is printed as described
+_FEWEST_CORNERS = 6  # of a view that determines the board's pose
+_THINNEST = 0.05  # width over length of the detected corners: corners on one line leave a rotation free
+_ENOUGH_CORNERS = 2  # corners an image, on average, from which on the board is as described
 DICTIONARIES = tuple(sorted(name for name in dir(cv2.aruco) if re.match(r"DICT_[0-9A]", name)))
 
 
@@ -46,12 +46,12 @@ class Board:
 
     @property
     def inner_size(self) -> tuple[int, int]:
-        """How many inner corners a row and a column have."""
+        """The number of inner corners in a row and in a column."""
         return (self.columns - 1, self.rows - 1) if self.kind == "charuco" else (self.columns, self.rows)
 
     @property
     def is_ambiguous(self) -> bool:
-        """Whether the board looks the same when turned by half."""
+        """Whether the board looks the same after half a revolution."""
         return self.kind == "chessboard" and (self.columns + self.rows) % 2 == 0
 
     def neighbours(self) -> Ints:
@@ -64,7 +64,7 @@ class Board:
 
 
 class _BoardTable(BaseModel):
-    """A board's file: ours, or Caliscope's `charuco.toml` with its own words for the sizes."""
+    """A board's file: ours, or Caliscope's `charuco.toml` with its own keys for the sizes."""
 
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
 
@@ -98,37 +98,41 @@ def read_board(path: str | Path) -> Board:
 def board_from_table(table: dict, where: str) -> Board:
     """Return the board that a table describes; raises CalibrationError, naming `where`."""
     try:
-        given = _BoardTable.model_validate(table)
+        checked = _BoardTable.model_validate(table)
     except ValidationError as error:
         raise CalibrationError(f"{where}: {one_line(error)}") from None
-    square_m = given.square_m or (given.square_size_override_cm or 0.0) / 100
+    square_m = checked.square_m or (checked.square_size_override_cm or 0.0) / 100
     if not square_m:
         raise CalibrationError(f"{where}: the size of a square is missing; measure the print and give square_m")
-    if given.dictionary not in DICTIONARIES:
-        known = ", ".join(name for name in DICTIONARIES if name.startswith(given.dictionary[:8])) or "DICT_4X4_50, ..."
-        raise CalibrationError(f"{where}: dictionary '{given.dictionary}' is not known; expected one of: {known}")
-    marker_m = given.marker_m or given.aruco_scale * square_m
+    if checked.dictionary not in DICTIONARIES:
+        dictionaries = (
+            ", ".join(name for name in DICTIONARIES if name.startswith(checked.dictionary[:8])) or "DICT_4X4_50, ..."
+        )
+        raise CalibrationError(
+            f"{where}: dictionary '{checked.dictionary}' is not known; expected one of: {dictionaries}"
+        )
+    marker_m = checked.marker_m or checked.aruco_scale * square_m
     if marker_m >= square_m:
         raise CalibrationError(f"{where}: marker_m {marker_m} is not below square_m {square_m}; exchange them?")
-    if min(given.columns, given.rows) < 3:
+    if min(checked.columns, checked.rows) < 3:
         raise CalibrationError(
-            f"{where}: {given.columns}×{given.rows} is too small; a board has 3 columns and rows at least"
+            f"{where}: {checked.columns}×{checked.rows} is too small; a board has 3 columns and rows at least"
         )
     return Board(
-        kind=given.kind,
-        columns=given.columns,
-        rows=given.rows,
+        kind=checked.kind,
+        columns=checked.columns,
+        rows=checked.rows,
         square_m=square_m,
         marker_m=marker_m,
-        dictionary=given.dictionary,
-        is_inverted=given.inverted,
-        is_legacy=given.legacy,
+        dictionary=checked.dictionary,
+        is_inverted=checked.inverted,
+        is_legacy=checked.legacy,
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DetectedCorners:
-    """The corners that one picture shows."""
+    """The corners detected in one image."""
 
     corner: Ints  # (n,) rows of the board's corners
     px: Array  # (n, 2) [px]
@@ -139,40 +143,41 @@ Detector = Callable[[NDArray[np.uint8]], DetectedCorners]
 
 
 def board_detector(board: Board) -> Detector:
-    """Return what finds the board in a grey picture (h, w): too few corners, or all on a line, count as none."""
+    """Return a detector of the board in grey images (h, w); too few corners, or all on a line, count as none."""
     find = _charuco_finder(board) if board.kind == "charuco" else _chessboard_finder(board)
     corners = board.corners[:, :2]
 
     def detect(grey: NDArray[np.uint8]) -> DetectedCorners:
-        sighting = find(255 - grey if board.is_inverted else grey)
-        if len(sighting.corner) < _FEWEST_CORNERS:
+        detected = find(255 - grey if board.is_inverted else grey)
+        if len(detected.corner) < _FEWEST_CORNERS:
             return NO_CORNERS
-        spread = np.linalg.svd(corners[sighting.corner] - corners[sighting.corner].mean(axis=0), compute_uv=False)
-        return sighting if spread[1] > _THINNEST * spread[0] else NO_CORNERS
+        extent = np.linalg.svd(corners[detected.corner] - corners[detected.corner].mean(axis=0), compute_uv=False)
+        return detected if extent[1] > _THINNEST * extent[0] else NO_CORNERS
 
     return detect
 
 
 def match_print(board: Board, pictures: Sequence[NDArray[np.uint8]]) -> tuple[Board, tuple[str, ...]]:
-    """Return the board with the pattern (legacy or not, inverted or not) that shows most corners in some pictures.
+    """Return the board with the pattern (legacy or not, inverted or not) of which most corners are detected.
 
-    The notes tell what differs from what was said; where nothing is found at all the board stays as it is.
+    The notes say what differs from the description; without any detection the board stays as it is.
     """
     if board.kind != "charuco" or not pictures:
         return board, ()
-    said = (board.is_inverted, board.is_legacy)
-    counts = {said: _n_corners(board, pictures)}
+    described = (board.is_inverted, board.is_legacy)
+    counts = {described: _n_corners(board, pictures)}
     kinds = [(inverted, legacy) for inverted in (False, True) for legacy in {False, board.rows % 2 == 0}]
-    for inverted, legacy in kinds if counts[said] < _ENOUGH_CORNERS * len(pictures) else ():
+    for inverted, legacy in kinds if counts[described] < _ENOUGH_CORNERS * len(pictures) else ():
         if (inverted, legacy) not in counts:
             counts[inverted, legacy] = _n_corners(replace(board, is_inverted=inverted, is_legacy=legacy), pictures)
     best = max(counts, key=counts.__getitem__)
-    if counts[best] <= 1.5 * counts[said]:
+    if counts[best] <= 1.5 * counts[described]:
         return board, ()
-    names = zip(("inverted", "legacy"), best, said, strict=True)
-    told = " and ".join(f"{name} = {str(new).lower()}" for name, new, old in names if new != old)
+    names = zip(("inverted", "legacy"), best, described, strict=True)
+    settings = " and ".join(f"{name} = {str(new).lower()}" for name, new, old in names if new != old)
     return replace(board, is_inverted=best[0], is_legacy=best[1]), (
-        f"the board shows {counts[best]} corners with {told}, {counts[said]} as described; went on with {told}",
+        f"the board shows {counts[best]} corners with {settings}, {counts[described]} as described; "
+        f"went on with {settings}",
     )
 
 
@@ -226,12 +231,12 @@ def _chessboard_finder(board: Board) -> Detector:
 
 
 def _half_a_square(grid: Array) -> int:
-    """Return a window for refining corners that reaches no other corner: half of the shortest gap [px]."""
+    """Return half a window for refining corners that contains no other corner: from the shortest gap [px]."""
     gaps = [np.linalg.norm(np.diff(grid, axis=axis), axis=-1).min() for axis in (0, 1)]
     return int(np.clip(min(gaps) / 2.5, 2, 11))
 
 
 def _brightness(grey: NDArray[np.uint8], square: Array) -> float:
-    """Return the grey level in the middle of a square with corners (2, 2, 2) [px]."""
+    """Return the grey level at the centre of a square with corners (2, 2, 2) [px]."""
     u, v = np.clip(np.rint(square.mean(axis=(0, 1))).astype(int), 0, np.array(grey.shape[::-1]) - 1)
     return float(grey[max(v - 1, 0) : v + 2, max(u - 1, 0) : u + 2].mean())

@@ -1,4 +1,4 @@
-"""Control points: surveyed places and where each camera's picture shows them."""
+"""Control points: surveyed positions and their pixels in each camera."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ControlPoints:
     world: Array  # (n, 3) [m]
     cameras: tuple[str, ...]
     px: Array  # (n, cameras, 2) [px]
-    sd_m: Array | None = None  # (n, 3) how exactly each coordinate is known [m]; None: exactly
+    sd_m: Array | None = None  # (n, 3) standard deviation of each coordinate [m]; None: exact
 
     def is_seen_by(self, camera: str) -> NDArray[np.bool_]:
         """Say which points the named camera sees: (n,)."""
@@ -37,17 +37,17 @@ class ControlPoints:
         return replace(self, cameras=tuple(cameras), px=self.px[:, [self.cameras.index(name) for name in cameras]])
 
 
-def read_control_points(path: str | Path, known: dict[str, ScenePoint] | None = None) -> ControlPoints:
+def read_control_points(path: str | Path, scene_points: dict[str, ScenePoint] | None = None) -> ControlPoints:
     """Read a table `point,x_m,y_m,z_m,<camera>_u,<camera>_v,...`; blank (or NaN) pixels where a point is not seen.
 
     World coordinates in metres, pixels with (0, 0) at the centre of the top-left pixel. Columns may stand in any
-    order. Points that are `known` by name (a court's) need no coordinates: blank, or no such columns at all. Raises
+    order. Points with a name in `scene_points` (a court's) need no coordinates: blank, or no such columns. Raises
     CalibrationError, with the row and column, for a file that does not say this.
     """
     path = Path(path)
     header, *rows = _read_rows(path)
     column = {name: i for i, name in enumerate(header)}
-    cameras = _check_header(path, header, needs_world=not known)
+    cameras = _check_header(path, header, needs_world=not scene_points)
     n = len(header)
     names: dict[str, int] = {}
     for line, row in rows:
@@ -59,10 +59,10 @@ def read_control_points(path: str | Path, known: dict[str, ScenePoint] | None = 
         if name in names:
             raise CalibrationError(f"{path}: point '{name}' stands in rows {names[name]} and {line}; remove one")
         names[name] = line
-    places = [_scene_point(path, line, {c: row[column[c]] for c in column}, known or {}) for line, row in rows]
-    if known and not any(place is known.get(name) for name, place in zip(names, places, strict=True)):
+    points = [_scene_point(path, line, {c: row[column[c]] for c in column}, scene_points or {}) for line, row in rows]
+    if scene_points and not any(point is scene_points.get(name) for name, point in zip(names, points, strict=True)):
         raise CalibrationError(
-            f"{path}: not one point has its place from the court, as all have coordinates of their own; "
+            f"{path}: no point takes its position from the court, as all have coordinates of their own; "
             "give such a table as control points, without a court"
         )
     px = np.array(
@@ -73,24 +73,24 @@ def read_control_points(path: str | Path, known: dict[str, ScenePoint] | None = 
     )
     return ControlPoints(
         names=tuple(names),
-        world=np.array([place.position_m for place in places]),
+        world=np.array([point.position_m for point in points]),
         cameras=cameras,
         px=px,
-        sd_m=np.array([place.sd_m for place in places]) if known else None,
+        sd_m=np.array([point.sd_m for point in points]) if scene_points else None,
     )
 
 
-def _scene_point(path: Path, line: int, row: Mapping[str, str], known: dict[str, ScenePoint]) -> ScenePoint:
-    """Return a row's own coordinates; where it has none, those of the known point of its name."""
-    if not known or any(row.get(c, "").lower() not in ("", "nan") for c in _WORLD_COLUMNS):
-        place = np.array([_number(path, line, c, row.get(c, "")) for c in _WORLD_COLUMNS])
-        return ScenePoint(place, np.zeros(3))
-    if row["point"] not in known:
+def _scene_point(path: Path, line: int, row: Mapping[str, str], scene_points: dict[str, ScenePoint]) -> ScenePoint:
+    """Return a row's own coordinates or, without any, those of the scene point of its name."""
+    if not scene_points or any(row.get(c, "").lower() not in ("", "nan") for c in _WORLD_COLUMNS):
+        position_m = np.array([_number(path, line, c, row.get(c, "")) for c in _WORLD_COLUMNS])
+        return ScenePoint(position_m, np.zeros(3))
+    if row["point"] not in scene_points:
         raise CalibrationError(
             f"{path}, row {line}: point '{row['point']}' has no x_m, y_m, z_m and is none of the court's; "
-            f"nearest names: {closest_names(row['point'], known)}"
+            f"nearest names: {closest_names(row['point'], scene_points)}"
         )
-    return known[row["point"]]
+    return scene_points[row["point"]]
 
 
 def _read_rows(path: Path) -> list:
@@ -112,9 +112,9 @@ def _check_header(path: Path, header: Sequence[str], *, needs_world: bool) -> tu
     if missing:
         raise CalibrationError(f"{path}: no column {', '.join(missing)}; found {','.join(header)[:80]}; {_EXPECTED}")
     others = [name for name in header if name not in ("point", *_WORLD_COLUMNS)]
-    strange = [name for name in others if len(name) < 3 or name[-2:] not in ("_u", "_v")]
-    if strange:
-        raise CalibrationError(f"{path}: column '{strange[0]}' is not <camera>_u or <camera>_v; {_EXPECTED}")
+    unknown = [name for name in others if len(name) < 3 or name[-2:] not in ("_u", "_v")]
+    if unknown:
+        raise CalibrationError(f"{path}: column '{unknown[0]}' is not <camera>_u or <camera>_v; {_EXPECTED}")
     cameras = tuple(dict.fromkeys(name[:-2] for name in others))
     if not cameras:
         raise CalibrationError(f"{path}: no camera columns; add <camera>_u and <camera>_v for each camera")

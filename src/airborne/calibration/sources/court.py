@@ -1,4 +1,4 @@
-"""A volleyball court with its net as points of known places, by name (FIVB Official Rules, 1.1, 1.3, 2.1 to 2.5).
+"""A volleyball court with its net as named points of known positions (FIVB Official Rules, 1.1, 1.3, 2.1 to 2.5).
 
 The world is that of the synthetic halls: origin on the floor in the middle of the court, x along the net to the right
 as seen from the near half (y < 0), y across the net to the far half, z up. The court's 18 m × 9 m reach to the
@@ -27,19 +27,19 @@ _NET_RANGE_M = (1.5, 3.0)  # of a net's height in play, children's and standing 
 _NET_RISE_M = 0.01  # at the sidelines over the middle: between 0 and 2 cm are allowed
 _POST_OUTSIDE_M = 0.75  # of the sideline: between 0.5 and 1 m are allowed
 
-_PAINT_SD_M = 0.01  # how exactly a court is laid
-_RISE_SD_M = 0.006  # of 0 to 2 cm, all alike likely
-_BAND_SD_M = 0.02  # where a side band or an antenna hangs along the net, and how far antennas stand off it
-_POST_SD_M = 0.15  # of 0.5 to 1 m, all alike likely
+_PAINT_SD_M = 0.01  # of a court's lines
+_RISE_SD_M = 0.006  # uniform over 0 to 2 cm
+_BAND_SD_M = 0.02  # of a side band or an antenna along the net, and of an antenna across it
+_POST_SD_M = 0.15  # uniform over 0.5 to 1 m
 _MOST_NAMES = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScenePoint:
-    """A point of a known place."""
+    """A point of a known position."""
 
     position_m: Array  # (3,) world [m]
-    sd_m: Array  # (3,) how exactly each coordinate is known [m]
+    sd_m: Array  # (3,) standard deviation of each coordinate [m]
 
 
 def court_points(net: Net | float = "men") -> dict[str, ScenePoint]:
@@ -52,20 +52,21 @@ def court_points(net: Net | float = "men") -> dict[str, ScenePoint]:
     height = _NET_M.get(net, np.nan) if isinstance(net, str) else float(net)
     if not _NET_RANGE_M[0] <= height <= _NET_RANGE_M[1]:
         raise CalibrationError(
-            f'net = {net}: expected "men", "women" or a height in metres between {_NET_RANGE_M[0]} and {_NET_RANGE_M[1]}'
+            f'net = {net}: expected "men", "women" or a height in metres between {_NET_RANGE_M[0]} and '
+            f"{_NET_RANGE_M[1]}"
         )
-    found: dict[str, ScenePoint] = {}
+    points: dict[str, ScenePoint] = {}
     for side, sign_x in (("left", -1), ("right", 1)):
         for name, x, y in _floor_points(side):
-            found[name] = _point((sign_x * x, y, 0.0), (_PAINT_SD_M, _PAINT_SD_M, _PAINT_SD_M))
-        for name, place, sd in _net_points(side, height):
-            found[name] = _point((sign_x * place[0], *place[1:]), sd)
-    return found
+            points[name] = _point((sign_x * x, y, 0.0), (_PAINT_SD_M, _PAINT_SD_M, _PAINT_SD_M))
+        for name, position, sd in _net_points(side, height):
+            points[name] = _point((sign_x * position[0], *position[1:]), sd)
+    return points
 
 
-def closest_names(name: str, known: dict[str, ScenePoint]) -> str:
-    """Return the names most like one that is not known, for an error."""
-    return ", ".join(get_close_matches(name.lower(), known, n=_MOST_NAMES, cutoff=0.0))
+def closest_names(name: str, names: dict[str, ScenePoint]) -> str:
+    """Return the names most like an unknown one, for an error message."""
+    return ", ".join(get_close_matches(name.lower(), names, n=_MOST_NAMES, cutoff=0.0))
 
 
 def _floor_points(side: str) -> Iterator[tuple[str, float, float]]:
@@ -96,5 +97,5 @@ def _net_points(
     yield f"post_{side}_top", (x + _POST_OUTSIDE_M, 0.0, _POST_M), (_POST_SD_M, 2 * _BAND_SD_M, _BAND_SD_M)
 
 
-def _point(place: tuple[float, ...], sd: tuple[float, ...]) -> ScenePoint:
-    return ScenePoint(np.array(place), np.array(sd))
+def _point(position: tuple[float, ...], sd: tuple[float, ...]) -> ScenePoint:
+    return ScenePoint(np.array(position), np.array(sd))

@@ -1,4 +1,4 @@
-"""What is there to calibrate from: one TOML file that names cameras and sources; paths are relative to it."""
+"""The file of sources: one TOML file that names cameras and sources; paths are relative to it."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class _Strict(BaseModel):
 
 
 class CameraSource(_Strict):
-    """One camera: its recording, or only its picture size."""
+    """One camera: its recording, or only its image size."""
 
     name: str
     video: str | None = None  # shows the board together with the other cameras
-    pictures: str | None = None  # the same as pictures: a folder or a pattern such as "left/*.png"
+    pictures: str | None = None  # the same as images: a folder or a pattern such as "left/*.png"
     lens_video: str | None = None  # shows the board to this camera alone, for its lens
     lens_pictures: str | None = None
     size: Annotated[list[Annotated[int, Field(ge=16, le=20000)]], Field(min_length=2, max_length=2)] | None = None
@@ -37,7 +37,7 @@ class CameraSource(_Strict):
 
 
 class StartSource(_Strict):
-    """A calibration that exists: where the search begins."""
+    """An existing calibration: the initial values."""
 
     file: str
 
@@ -46,7 +46,7 @@ class BoardSource(_Strict):
     """A printed board that is moved about."""
 
     file: str | None = None
-    kind: Literal["charuco", "chessboard"] | None = None  # these, or a file that says them
+    kind: Literal["charuco", "chessboard"] | None = None  # these, or a file with them
     columns: int | None = None
     rows: int | None = None
     square_m: Positive | None = None
@@ -55,7 +55,7 @@ class BoardSource(_Strict):
     inverted: bool | None = None
     legacy: bool | None = None
     timestamps: str | None = None  # which frames belong together: sync_index,cam_id,frame_time
-    sync: Literal["auto", "exact", "loose"] = "auto"  # loose: every picture may lag behind the others
+    sync: Literal["auto", "exact", "loose"] = "auto"  # loose: every image may lag behind the others
 
     @model_validator(mode="after")
     def _one_way(self) -> BoardSource:
@@ -65,7 +65,7 @@ class BoardSource(_Strict):
 
 
 class PointsSource(_Strict):
-    """Points whose places were surveyed."""
+    """Points with surveyed positions."""
 
     file: str
 
@@ -84,7 +84,7 @@ class WandSource(_Strict):
     length_m: Positive | None = None
     lengths_m: list[Positive] | None = None
     pixels: PixelConventionName = "upper-left-1"
-    cameras: list[str] | None = None  # whose columns the file has, in order; all cameras where it does not say
+    cameras: list[str] | None = None  # of the file's columns, in order; None: all cameras
 
     @model_validator(mode="after")
     def _one_length(self) -> WandSource:
@@ -94,22 +94,22 @@ class WandSource(_Strict):
 
 
 class DetectionsSource(_Strict):
-    """Points of a moving person, as a pose network saw them."""
+    """Keypoints of a moving person, detected by a pose network."""
 
     file: str
     cameras: dict[str, str] = {}
 
 
 class WorldTable(_Strict):
-    """Where the world's origin and axes are; without this table the sources decide."""
+    """The world's origin and axes; without this table the sources decide."""
 
     frame: Literal["auto", "board", "camera", "start"] = "auto"
-    moment: Annotated[int, Field(ge=0)] | None = None  # board: at which frame it lies in the origin
+    moment: Annotated[int, Field(ge=0)] | None = None  # of the board: the frame at which it defines the world
     points: str | None = None  # clicked points: point,<camera>_u,<camera>_v,...
     origin: str | None = None
     along_x: str | None = None
     in_xy: str | None = None
-    throw: str | None = None  # tracks of a thrown thing: DLTdv's xypts
+    throw: str | None = None  # tracks of a thrown object: DLTdv's xypts
     rate_hz: Positive | None = None  # of the throw
     pixels: PixelConventionName = "upper-left-1"
 
@@ -155,7 +155,7 @@ class Sources(_Strict):
 
     @property
     def kinds(self) -> list[str]:
-        """The kinds of evidence that are given."""
+        """The kinds of sources in the file."""
         kinds = ("board", "control_points", "court", "wand", "detections")
         return [kind for kind in kinds if getattr(self, kind) is not None]
 

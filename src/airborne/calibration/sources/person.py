@@ -1,8 +1,8 @@
-"""A moving person's 2D detections as evidence, and a rig refined by them: which is wrong, and all a little better.
+"""A moving person's 2D detections as a source, and a rig refined by them: misplaced cameras resected, all adjusted.
 
-What a network takes for a joint errs steadily, so all detections of one point by one camera count as one cluster, and
-cameras that were not found wrong keep what their calibration is worth: detections alone would bend a good rig. The rig
-stays as a whole where these cameras were, and keeps their scale.
+A network's joints have systematic errors, so all detections of one point by one camera count as one cluster, and the
+other cameras have a prior about their calibration: detections alone would deform a good rig. The rig as a whole keeps
+the position and the scale of these cameras.
 """
 
 from __future__ import annotations
@@ -27,46 +27,45 @@ from airborne.cameras.consensus import triangulate_consensus
 from airborne.cameras.detections import Detections
 from airborne.types import Array
 
-_CALIBRATION_SD_PX = MISPLACED_PX / 2  # how far, one standard deviation, a camera may be off that was not found wrong
+_CALIBRATION_SD_PX = MISPLACED_PX / 2  # prior standard deviation of a camera that is not misplaced
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RigRefinement:
-    """A rig that agrees better with what it sees."""
+    """A rig refined by detections."""
 
     rig: Rig
-    resections: tuple[Resection, ...]  # cameras that were clearly elsewhere, placed anew first
+    resections: tuple[Resection, ...]  # of the misplaced cameras, before the adjustment
     adjustment: Adjustment
     before_px: float  # median distance of all detections from their triangulated points [px]
     after_px: float
 
 
 def refine_rig(rig: Rig, detections: Detections, free: FreeParameters | None = None) -> RigRefinement:
-    """Name and mend the cameras that are clearly wrong, then adjust the places of all; lenses stay unless freed.
+    """Resect the misplaced cameras, then adjust the poses of all; lenses stay fixed unless free.
 
     detections: one moment a row. Raises CalibrationError where too little is seen.
     """
-    seen = detections.select(rig.names)
-    wrong = find_misplaced_cameras(rig, seen)
-    start, _ = resect_cameras(rig, seen, [m.camera.name for m in wrong]) if wrong else (rig, ())
-    trusted = [name for name in rig.names if name not in {m.camera.name for m in wrong}]
-    source = person_source(start, seen)
-    prior = calibration_prior(start, trusted, source.points)
-    adjusted = adjust(start, [source], free or FreeParameters(focal=False), prior=prior)
+    detections_of_rig = detections.select(rig.names)
+    misplaced = find_misplaced_cameras(rig, detections_of_rig)
+    initial, _ = resect_cameras(rig, detections_of_rig, [m.camera.name for m in misplaced]) if misplaced else (rig, ())
+    trusted = [name for name in rig.names if name not in {m.camera.name for m in misplaced}]
+    source = person_source(initial, detections_of_rig)
+    prior = calibration_prior(initial, trusted, source.points)
+    adjusted = adjust(initial, [source], free or FreeParameters(focal=False), prior=prior)
     return RigRefinement(
         rig=adjusted.rig,
-        resections=wrong,
+        resections=misplaced,
         adjustment=adjusted,
-        before_px=median_reprojection_px(rig, seen),
-        after_px=median_reprojection_px(adjusted.rig, seen),
+        before_px=median_reprojection_px(rig, detections_of_rig),
+        after_px=median_reprojection_px(adjusted.rig, detections_of_rig),
     )
 
 
 def calibration_prior(rig: Rig, trusted: Sequence[str], points: Array) -> CameraPrior:
-    """Return what a calibration is worth that its cameras were not found wrong in: GIVEN_PX at points (n, 3) [m].
+    """Return the prior of a calibration's trusted cameras: _CALIBRATION_SD_PX at points (n, 3) [m].
 
-    Half of it by each camera's place and half by its direction; nothing is known of cameras that are not trusted, and
-    nothing of lenses.
+    Half of the variance by each camera's position and half by its rotation; no prior on other cameras, nor on lenses.
     """
     sd = np.full((len(rig), 15), np.inf)
     middle = np.median(points, axis=0)
@@ -79,13 +78,13 @@ def calibration_prior(rig: Rig, trusted: Sequence[str], points: Array) -> Camera
 
 
 def person_source(rig: Rig, detections: Detections, *, name: str = "detections") -> Source:
-    """Return sure detections that the cameras agree on as free points; starts are triangulated with the rig."""
-    sure = sample_moments(detections).above_visibility(LEAST_RESECTION_VISIBILITY).select(rig.names)
-    agreed = triangulate_consensus(rig, sure.px, sure.visibility)
-    n_points, n_cameras = sure.px.shape[1:3]
-    points = agreed.points.reshape(-1, 3)
+    """Return confident detections that the cameras agree on as free points, triangulated with the rig."""
+    confident = sample_moments(detections).above_visibility(LEAST_RESECTION_VISIBILITY).select(rig.names)
+    consensus = triangulate_consensus(rig, confident.px, confident.visibility)
+    n_points, n_cameras = confident.px.shape[1:3]
+    points = consensus.points.reshape(-1, 3)
     is_known = np.asarray(np.isfinite(points).all(axis=1))
-    px = sure.px.reshape(-1, n_cameras, 2)
+    px = confident.px.reshape(-1, n_cameras, 2)
     row, camera = np.nonzero(np.isfinite(px).all(axis=-1) & is_known[:, None])
     return Source(
         name=name,
@@ -105,16 +104,22 @@ def median_reprojection_px(rig: Rig, detections: Detections) -> float:
     return float(np.nanmedian(np.linalg.norm(projected - detections.px, axis=-1)))
 
 
-def align_rigs(rig: Rig, wanted: Rig, names: Sequence[str], *, fits_scale: bool = True) -> tuple[RigidTransform, float]:
-    """Return the move, and the scale before it, that bring the named cameras nearest to where `wanted` has them.
+def align_rigs(
+    rig: Rig, target_rig: Rig, names: Sequence[str], *, fits_scale: bool = True
+) -> tuple[RigidTransform, float]:
+    """Return the rigid transform, and the scale before it, that align the named cameras of a rig with a target rig.
 
-    Directions settle the turn (Markley's mean), places the scale and the shift; the scale is 1 unless `scaled`.
+    The rotation is Markley's mean of the cameras', scale and shift follow from their positions; the scale is 1 unless
+    `fits_scale`.
     """
-    pairs = [(rig[name].camera_from_world, wanted[name].camera_from_world) for name in names]
-    turn = Rotation.concatenate([b.rotation.inv() * a.rotation for a, b in pairs]).mean()
-    here = np.stack([rig[name].centre for name in names])
-    there = np.stack([wanted[name].centre for name in names])
-    spread, target = turn.apply(here - here.mean(axis=0)), there - there.mean(axis=0)
-    size = float(np.sum(spread**2))
-    scale = float(np.sum(spread * target)) / size if fits_scale and size > 0 else 1.0
-    return RigidTransform.from_components(there.mean(axis=0) - turn.apply(here.mean(axis=0)) * scale, turn), scale
+    pairs = [(rig[name].camera_from_world, target_rig[name].camera_from_world) for name in names]
+    rotation = Rotation.concatenate([b.rotation.inv() * a.rotation for a, b in pairs]).mean()
+    centres = np.stack([rig[name].centre for name in names])
+    target_centres = np.stack([target_rig[name].centre for name in names])
+    offsets = rotation.apply(centres - centres.mean(axis=0))
+    target_offsets = target_centres - target_centres.mean(axis=0)
+    size = float(np.sum(offsets**2))
+    scale = float(np.sum(offsets * target_offsets)) / size if fits_scale and size > 0 else 1.0
+    return RigidTransform.from_components(
+        target_centres.mean(axis=0) - rotation.apply(centres.mean(axis=0)) * scale, rotation
+    ), scale

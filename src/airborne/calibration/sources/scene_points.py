@@ -1,7 +1,7 @@
-"""Points of the scene whose places are known, court or survey: as evidence, and as a start for each camera.
+"""Known points of the scene, court or survey: as a source, and for initial values of each camera.
 
-A start needs four points a camera, which may all lie on the floor, and no focal length: the focal length is the one of
-a range of guesses with which the points fit best.
+Initial values need four points a camera, which may all lie on the floor, and no focal length: the best of a range of
+focal lengths is taken.
 """
 
 from __future__ import annotations
@@ -19,42 +19,44 @@ from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras.camera import Camera, Rig
 from airborne.types import Array
 
-_N_POINTS = 4  # the fewest that place a camera
-_FOCAL_RATIOS = np.geomspace(0.4, 5.0, 14)  # focal length over the picture's longer side
-_SCALE_PX = 3.0  # residuals much beyond this count ever less
-_FAR_M = 1000.0  # an anchor stands so far off that its distance changes with one coordinate only
+_N_POINTS = 4  # of a resection
+_FOCAL_RATIOS = np.geomspace(0.4, 5.0, 14)  # focal length over the image's longer side
+_SCALE_PX = 3.0  # of the Cauchy loss
+_FAR_M = 1000.0  # of an anchor: so far off that its distance changes with one coordinate only
 _EXACT_SD_M = 1e-6
-_LARGEST_LOG_CHANGE = 5.0  # by which a logarithm of the focal length never changes
+_LARGEST_LOG_CHANGE = 5.0  # bound of a step of the focal length's logarithm
 
 
 def initial_rig_from_points(
     points: ControlPoints, sizes: Mapping[str, tuple[int, int]], lenses: Mapping[str, Camera] | None = None
 ) -> Rig:
-    """Place every camera that sees four known points or more, roughly: a start for the adjustment.
+    """Return initial values of every camera that sees four known points or more.
 
-    lenses: cameras whose K and distortion are known; the others are pinholes with the axis in the picture's middle.
-    A few wrong clicks do not spoil it. Cameras with too few points are left out.
+    lenses: cameras whose K and distortion are known; the others are pinholes with the principal point in the image's
+    middle. Robust against a few wrong clicks. Cameras with too few points are left out.
     """
-    found = []
+    cameras = []
     for i, name in enumerate(points.cameras):
-        seen = points.is_seen_by(name)
-        if seen.sum() >= _N_POINTS:
+        is_seen = points.is_seen_by(name)
+        if is_seen.sum() >= _N_POINTS:
             lens = (lenses or {}).get(name)
             guesses = [lens] if lens is not None else _focal_guesses(name, sizes[name])
-            found.append(_best_camera(guesses, points.world[seen], points.px[seen, i], is_lens_known=lens is not None))
-    return Rig(tuple(camera for camera in found if camera is not None))
+            cameras.append(
+                _best_camera(guesses, points.world[is_seen], points.px[is_seen, i], is_lens_known=lens is not None)
+            )
+    return Rig(tuple(camera for camera in cameras if camera is not None))
 
 
 def scene_source(rig_names: Sequence[str], points: ControlPoints, *, name: str) -> Source:
-    """Return known points as evidence; those known to a standard deviation only (`sd_m`) are free to move by it.
+    """Return known points as a source; coordinates with a standard deviation (`sd_m`) are free within it.
 
-    A free coordinate is tied by a length to an anchor: a known point far off along that axis.
+    A length ties a free coordinate to an anchor: a known point far off along that axis.
     """
     columns = [(i, rig_names.index(camera)) for i, camera in enumerate(points.cameras) if camera in rig_names]
     row, column = np.nonzero(np.isfinite(points.px[:, [i for i, _ in columns]]).all(axis=-1))
-    kept, number = np.unique(row, return_inverse=True)  # points that no camera sees say nothing
-    world = points.world[kept]
-    sd_m = np.zeros(world.shape) if points.sd_m is None else points.sd_m[kept]
+    seen_points, number = np.unique(row, return_inverse=True)  # without points that no camera sees
+    world = points.world[seen_points]
+    sd_m = np.zeros(world.shape) if points.sd_m is None else points.sd_m[seen_points]
     is_free = sd_m > _EXACT_SD_M
     point, axis = np.nonzero(is_free)
     anchors = world[point] + _FAR_M * np.eye(3)[axis]
@@ -90,38 +92,38 @@ def _focal_guesses(name: str, size: tuple[int, int]) -> list[Camera]:
 
 
 def _best_camera(guesses: Sequence[Camera], world: Array, px: Array, *, is_lens_known: bool) -> Camera | None:
-    """Return the guess, placed and polished, with which most of the points (n, 3) [m] lie near their pixels (n, 2)."""
-    placed = [camera for guess in guesses for camera in _resect_by_points(guess, world, px)]
-    if not placed:
+    """Resect every guess from points (n, 3) [m] and their pixels (n, 2), refine the best three, return the best."""
+    candidates = [camera for guess in guesses for camera in _resect_by_points(guess, world, px)]
+    if not candidates:
         return None
-    best = sorted(placed, key=lambda camera: _misfit(camera, world, px))[:3]
-    polished = [_refine_camera(camera, world, px, is_focal_free=not is_lens_known) for camera in best]
-    return min(polished, key=lambda camera: _misfit(camera, world, px))
+    best = sorted(candidates, key=lambda camera: _misfit(camera, world, px))[:3]
+    refined = [_refine_camera(camera, world, px, is_focal_free=not is_lens_known) for camera in best]
+    return min(refined, key=lambda camera: _misfit(camera, world, px))
 
 
 def _resect_by_points(camera: Camera, world: Array, px: Array) -> Iterator[Camera]:
-    straight = camera.undistort_px(px)
-    is_usable = np.isfinite(straight).all(axis=1)
+    ideal = camera.undistort_px(px)
+    is_usable = np.isfinite(ideal).all(axis=1)
     if is_usable.sum() < _N_POINTS:
         return
-    xyz, uv = world[is_usable], straight[is_usable]
+    xyz, uv = world[is_usable], ideal[is_usable]
     cv2.setRNGSeed(0)
-    tries = [cv2.solvePnPGeneric(xyz, uv, camera.K, None, flags=cv2.SOLVEPNP_SQPNP)[1:3]]
+    solutions = [cv2.solvePnPGeneric(xyz, uv, camera.K, None, flags=cv2.SOLVEPNP_SQPNP)[1:3]]
     if len(xyz) > _N_POINTS:
         limit = 0.01 * max(camera.size)
-        found, turn, t, _ = cv2.solvePnPRansac(
+        is_solved, rotvec, t, _ = cv2.solvePnPRansac(
             xyz, uv, camera.K, None, reprojectionError=limit, iterationsCount=200, flags=cv2.SOLVEPNP_SQPNP
         )
-        tries.append(([turn], [t]) if found else ([], []))
-    for turns, shifts in tries:
-        for turn, t in zip(turns, shifts, strict=True):
-            if np.all(np.isfinite([turn, t])):
-                place = RigidTransform.from_components(t.ravel(), Rotation.from_rotvec(turn.ravel()))
-                yield replace(camera, camera_from_world=place)
+        solutions.append(([rotvec], [t]) if is_solved else ([], []))
+    for rotvecs, translations in solutions:
+        for rotvec, t in zip(rotvecs, translations, strict=True):
+            if np.all(np.isfinite([rotvec, t])):
+                pose = RigidTransform.from_components(t.ravel(), Rotation.from_rotvec(rotvec.ravel()))
+                yield replace(camera, camera_from_world=pose)
 
 
 def _misfit(camera: Camera, world: Array, px: Array) -> float:
-    """Return the robust mean (Cauchy) of the squared distances; points behind the camera count as far off."""
+    """Return the mean Cauchy loss; points behind the camera have a large residual."""
     return float(np.mean(np.log1p(np.sum((_residual(camera, world, px) / _SCALE_PX) ** 2, axis=1))))
 
 
@@ -130,20 +132,20 @@ def _residual(camera: Camera, world: Array, px: Array) -> Array:
 
 
 def _refine_camera(camera: Camera, world: Array, px: Array, *, is_focal_free: bool) -> Camera:
-    """Fit the place, and the focal length where it is free, by robust least squares."""
+    """Refine the pose, and the focal length if it is free, by robust least squares."""
 
-    def moved(step: Array) -> Camera:
-        turn = RigidTransform.from_components(step[3:6], Rotation.from_rotvec(step[:3]))
+    def apply_step(step: Array) -> Camera:
+        pose_step = RigidTransform.from_components(step[3:6], Rotation.from_rotvec(step[:3]))
         K = camera.K.copy()
         K[[0, 1], [0, 1]] *= (
             np.exp(np.clip(step[6], -_LARGEST_LOG_CHANGE, _LARGEST_LOG_CHANGE)) if is_focal_free else 1.0
         )
-        return replace(camera, K=K, camera_from_world=turn * camera.camera_from_world)
+        return replace(camera, K=K, camera_from_world=pose_step * camera.camera_from_world)
 
     free = 7 if is_focal_free and 2 * len(world) >= 7 else 6
 
     def residual(step: Array) -> Array:
-        return (_residual(moved(np.append(step, 0.0)), world, px) / _SCALE_PX).ravel()
+        return (_residual(apply_step(np.append(step, 0.0)), world, px) / _SCALE_PX).ravel()
 
     fit = least_squares(residual, np.zeros(free), loss="cauchy", x_scale="jac", max_nfev=100)
-    return min((camera, moved(np.append(fit.x, 0.0))), key=lambda each: _misfit(each, world, px))
+    return min((camera, apply_step(np.append(fit.x, 0.0))), key=lambda each: _misfit(each, world, px))

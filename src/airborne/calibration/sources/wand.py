@@ -1,4 +1,4 @@
-"""A moving wand: two or more markers at known distances, seen by several cameras frame by frame."""
+"""A waved wand: two or more markers at known distances, seen by several cameras frame by frame."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from airborne.errors import CalibrationError
 from airborne.io.text import read_csv
 from airborne.types import Array
 
-_LENGTH_SD_M = 5e-4  # how well a wand's length is usually measured
-LENGTH_RANGE_M = (0.02, 20.0)  # no wand is shorter or longer
-_LENGTH_SHARE = 0.15  # a wand that comes out further off its length is not the wand
+_LENGTH_SD_M = 5e-4  # of a wand's measured length
+LENGTH_RANGE_M = (0.02, 20.0)  # of plausible wands
+_LENGTH_SHARE = 0.15  # relative error of length from which on markers are outliers
 _MOST_MARKERS = 20
 _COLUMNS = {"frame", "marker", "camera", "u_px", "v_px"}
 _EXPECTED = "expected frame,marker,camera,u_px,v_px or DLTdv's pt1_cam1_U,pt1_cam1_V,pt1_cam2_U,..."
@@ -28,7 +28,7 @@ _EXPECTED = "expected frame,marker,camera,u_px,v_px or DLTdv's pt1_cam1_U,pt1_ca
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WandTracks:
-    """The markers of a wand in the pictures of several cameras; NaN where not seen."""
+    """The markers of a wand in the images of several cameras; NaN where not seen."""
 
     cameras: tuple[str, ...]
     px: Array  # (frames, markers, cameras, 2) [px]
@@ -56,16 +56,16 @@ class WandTracks:
         return replace(self, cameras=tuple(cameras), px=self.px[:, :, columns])
 
 
-def read_wand(path: Path, cameras: Sequence[str], given: FileOptions, lengths_m: Sequence[float]) -> WandTracks:
+def read_wand(path: Path, cameras: Sequence[str], options: FileOptions, lengths_m: Sequence[float]) -> WandTracks:
     """Read a wand's tracks: DLTdv's or easyWand's `xypts.csv`, or a table `frame,marker,camera,u_px,v_px`.
 
-    cameras name the first's columns, in their order; `given` says where its pixels count from. The other has markers
-    from 1 and our own pixels. lengths_m are those between marker 1 and 2, 2 and 3, and so on [m]. Raises
+    cameras name the columns of xypts, in their order; the options give its pixel convention. The table counts markers
+    from 1 and has our own pixels. lengths_m [m] are those between markers 1 and 2, 2 and 3, and so on. Raises
     CalibrationError.
     """
     rows = read_csv(path, _EXPECTED, CalibrationError)
     header = ",".join(rows[0][1]) if rows else ""
-    px = read_xypts(path, given, cameras).px if is_xypts(header) else _tracks(path, rows, cameras)
+    px = read_xypts(path, options, cameras).px if is_xypts(header) else _tracks(path, rows, cameras)
     if px.shape[1] != len(lengths_m) + 1:
         raise CalibrationError(
             f"{path} holds {px.shape[1]} markers; expected {len(lengths_m) + 1}, one more than lengths are given: keep "
@@ -80,17 +80,17 @@ def _tracks(path: Path, rows: Sequence[tuple[int, list[str]]], cameras: Sequence
     (_, header), *rows = rows or [(1, [])]
     if not rows or not set(header) >= _COLUMNS:
         raise CalibrationError(f"{path}: found {','.join(header)[:80] or 'nothing'}; {_EXPECTED}")
-    places: dict[tuple[int, int, int], tuple[float, float]] = {}
+    pixels: dict[tuple[int, int, int], tuple[float, float]] = {}
     for line, cells in rows:
         if len(cells) != len(header):
             raise CalibrationError(f"{path}, row {line}: {len(cells)} values, expected {len(header)} as in the header")
-        place, px = _row(f"{path}, row {line}", dict(zip(header, cells, strict=True)), cameras)
-        if place in places:
+        key, px = _row(f"{path}, row {line}", dict(zip(header, cells, strict=True)), cameras)
+        if key in pixels:
             raise CalibrationError(f"{path}, row {line}: this frame, marker and camera stand twice; remove one")
-        places[place] = px
-    frames = {frame: i for i, frame in enumerate(sorted({frame for frame, _, _ in places}))}
-    px = np.full((len(frames), 1 + max(marker for _, marker, _ in places), len(cameras), 2), np.nan)
-    for (frame, marker, camera), uv in places.items():
+        pixels[key] = px
+    frames = {frame: i for i, frame in enumerate(sorted({frame for frame, _, _ in pixels}))}
+    px = np.full((len(frames), 1 + max(marker for _, marker, _ in pixels), len(cameras), 2), np.nan)
+    for (frame, marker, camera), uv in pixels.items():
         px[frames[frame], marker, camera] = uv
     return px
 
@@ -114,47 +114,47 @@ def _row(
 
 
 def wand_source(rig: Rig, tracks: WandTracks) -> Source:
-    """Return the wand as evidence: its markers as free points, triangulated with the rig, tied by the known lengths.
+    """Return the wand as a source: its markers as free points, triangulated with the rig, with their known lengths.
 
-    Places that do not fit the other cameras' are left out (see `agreed_points`), and so are two markers whose distance
-    comes out far from what is known.
+    Outlier views are left out (see `triangulate_consensus`), and so are two markers whose distance is far from the
+    known length.
     """
     tracks = tracks.select([name for name in rig.names if name in tracks.cameras])
     rows = np.array([rig.names.index(name) for name in tracks.cameras])
-    agreed = triangulate_consensus(rig.select(tracks.cameras), tracks.px, np.ones(tracks.px.shape[:-1]))
-    is_known = np.isfinite(agreed.points[..., 0]) & ~_has_wrong_length(tracks, agreed.points)
-    number = np.full(is_known.shape, -1)
-    number[is_known] = np.arange(is_known.sum())
-    frame, marker, column = np.nonzero(agreed.is_used & is_known[..., None])
+    consensus = triangulate_consensus(rig.select(tracks.cameras), tracks.px, np.ones(tracks.px.shape[:-1]))
+    is_known = np.isfinite(consensus.points[..., 0]) & ~_has_wrong_length(tracks, consensus.points)
+    index_of_point = np.full(is_known.shape, -1)
+    index_of_point[is_known] = np.arange(is_known.sum())
+    frame, marker, column = np.nonzero(consensus.is_used & is_known[..., None])
     return Source(
         name="wand",
         camera=rows[column],
-        point=number[frame, marker],
+        point=index_of_point[frame, marker],
         px=tracks.px[frame, marker, column],
-        points=agreed.points[is_known],
+        points=consensus.points[is_known],
         is_free=np.ones(is_known.sum(), bool),
         sd_px=0.5,
-        lengths=_lengths(tracks, number),
+        lengths=_lengths(tracks, index_of_point),
     )
 
 
 def _has_wrong_length(tracks: WandTracks, points: Array) -> NDArray[np.bool_]:
-    """Say which markers (frames, markers) are at a wrong distance from another; points (frames, markers, 3) [m]."""
-    astray = np.zeros(points.shape[:2], bool)
+    """Say which markers (frames, markers) have a wrong distance to another; points (frames, markers, 3) [m]."""
+    is_wrong = np.zeros(points.shape[:2], bool)
     for (a, b), length_m in tracks.lengths_m.items():
-        found = np.linalg.norm(points[:, a] - points[:, b], axis=-1)
-        is_off = np.abs(found / length_m - 1) > _LENGTH_SHARE  # NaN compares as right
-        astray[:, a] |= is_off
-        astray[:, b] |= is_off
-    return astray
+        distance = np.linalg.norm(points[:, a] - points[:, b], axis=-1)
+        is_off = np.abs(distance / length_m - 1) > _LENGTH_SHARE  # NaN compares as right
+        is_wrong[:, a] |= is_off
+        is_wrong[:, b] |= is_off
+    return is_wrong
 
 
-def _lengths(tracks: WandTracks, number: NDArray[np.integer]) -> Lengths:
+def _lengths(tracks: WandTracks, index_of_point: NDArray[np.integer]) -> Lengths:
     first, second, length = [], [], []
     for (a, b), length_m in tracks.lengths_m.items():
-        both = (number[:, a] >= 0) & (number[:, b] >= 0)
-        first.append(number[both, a])
-        second.append(number[both, b])
+        both = (index_of_point[:, a] >= 0) & (index_of_point[:, b] >= 0)
+        first.append(index_of_point[both, a])
+        second.append(index_of_point[both, b])
         length.append(np.full(both.sum(), length_m))
     return Lengths(
         first=np.concatenate(first), second=np.concatenate(second), length_m=np.concatenate(length), sd_m=tracks.sd_m

@@ -1,1 +1,1 @@
-"""The world's frame of a calibration: which source decides it, and how rigs are brought into it."""
+"""The world frame of a calibration: which source defines it, and how rigs are aligned with it."""

@@ -1,6 +1,6 @@
-"""Where the world is: frames by three points or by a thrown body's fall, and starts of several sources joined.
+"""World frames by three points or by a thrown body's fall, and rigs of several sources merged.
 
-A frame is given as `new_from_old`, the rigid map from the world that the cameras stand in to the one that is wanted.
+A frame is given as `new_from_old`, the rigid map from the cameras' present world to the requested one.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from airborne.geometry.robust import SD_OF_MEDIAN_DEVIATION
 from airborne.types import Array
 
 _STANDARD_GRAVITY = 9.80665  # [m/s^2]
-_NEAREST_M = 0.05  # points that are to fix an axis stand further apart than this
+_NEAREST_M = 0.05  # least distance of points that define an axis
 _LEAST_ANGLE = np.radians(5)  # between the axis and the third point
 _FEWEST_TIMES = 6  # of a throw
-_SHORTEST_FALL_M = 0.1  # a throw whose path is bent less says little about down
+_SHORTEST_FALL_M = 0.1  # least sagitta of a throw that determines down
 
 
 def frame_of_three_points(origin: Array, along_x: Array, in_xy: Array) -> RigidTransform:
-    """Return new_from_old of the world with this origin, x toward the second point and the third on the side of y > 0.
+    """Return new_from_old of the world with this origin, x toward the second point and the third with y > 0.
 
-    Points (3,) in the old world [m]; z = x cross y. Raises CalibrationError where they nearly stand on one line.
+    Points (3,) in the old world [m]; z = x cross y. Raises CalibrationError where they are nearly collinear.
     """
     x, side = np.asarray(along_x - origin, float), np.asarray(in_xy - origin, float)
     lengths = np.linalg.norm(x), np.linalg.norm(side)
@@ -47,44 +47,46 @@ def frame_of_three_points(origin: Array, along_x: Array, in_xy: Array) -> RigidT
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gravity:
-    """Up, as a flying body tells it."""
+    """The vertical and gravity, estimated from bodies in free flight."""
 
-    up: Array  # (3,) unit vector, in the world that the body was seen in
-    tilt_sd_rad: float  # of up, in the direction in which it is known least [rad]
-    magnitude: float  # [m/s^2]; 9.81 where the scale and the frame rate are right
+    up: Array  # (3,) unit vector, in the present world
+    tilt_sd_rad: float  # of up, in its least certain direction [rad]
+    magnitude: float  # [m/s^2]; 9.81 if scale and frame rate are right
     magnitude_sd: float
     n_throws: int
 
     def describe(self) -> str:
-        """Say in one line what was found and whether length and time fit together."""
+        """Say in one line what was estimated and whether lengths and times are consistent."""
         ratio = self.magnitude / _STANDARD_GRAVITY
-        off = abs(self.magnitude - _STANDARD_GRAVITY)
-        said = (
+        error = abs(self.magnitude - _STANDARD_GRAVITY)
+        sentence = (
             f"up from {self.n_throws} throw{'s' * (self.n_throws > 1)}: known to {np.degrees(self.tilt_sd_rad):.2f} "
             f"degrees; the fall is {self.magnitude:.2f} m/s2 (sd {self.magnitude_sd:.2f}), expected 9.81"
         )
-        if off <= max(3 * self.magnitude_sd, 0.01 * _STANDARD_GRAVITY):
-            return said
+        if error <= max(3 * self.magnitude_sd, 0.01 * _STANDARD_GRAVITY):
+            return sentence
         return (
-            f"{said}, so lengths come out as {ratio:.3f} of the truth or times as {ratio**-0.5:.3f} of it; check the "
-            "length of the wand or the board, and the frame rate"
+            f"{sentence}, so lengths come out as {ratio:.3f} of the truth or times as {ratio**-0.5:.3f} of it; check "
+            "the length of the wand or the board, and the frame rate"
         )
 
 
 def estimate_gravity(times_s: Array, throws: Sequence[Array]) -> Gravity:
-    """Find up from bodies in free flight: parabolas with one common acceleration, fitted robustly.
+    """Estimate gravity from bodies in free flight: parabolas with one common acceleration, fitted robustly.
 
     times_s (t,) [s], throws: each (t, 3) [m] in the old world, NaN where not seen or not in the air; a ball is good, of
-    a tumbling body take the centre of mass. Air is neglected. Raises CalibrationError where they fly too little.
+    a tumbling body take the centre of mass. Drag is neglected. Raises CalibrationError where the flight is too short.
     """
     times_s = np.asarray(times_s, float)
-    flights = [(times_s[seen], throw[seen]) for throw in throws if (seen := np.isfinite(throw).all(axis=1)).any()]
+    flights = [
+        (times_s[is_seen], throw[is_seen]) for throw in throws if (is_seen := np.isfinite(throw).all(axis=1)).any()
+    ]
     flights = [(t - t.mean(), x) for t, x in flights if len(t) >= _FEWEST_TIMES]
     longest = max((float(np.ptp(t)) for t, _ in flights), default=0.0)
     if _STANDARD_GRAVITY * longest**2 / 8 < _SHORTEST_FALL_M:
         raise CalibrationError(
             f"the throw is seen for {longest:.2f} s at most; {np.sqrt(8 * _SHORTEST_FALL_M / _STANDARD_GRAVITY):.2f} s "
-            f"and {_FEWEST_TIMES} places are needed to tell which way is up: throw higher"
+            f"and {_FEWEST_TIMES} positions are needed to tell which way is up: throw higher"
         )
     g, covariance = _common_acceleration(flights)
     magnitude = float(np.linalg.norm(g))
@@ -95,7 +97,7 @@ def estimate_gravity(times_s: Array, throws: Sequence[Array]) -> Gravity:
 
 
 def frame_of_gravity(gravity: Gravity, origin: Array, along_x: Array) -> RigidTransform:
-    """Return new_from_old of the world with z up, this origin, and x toward a second point (3,) [m] seen from above."""
+    """Return new_from_old of the world with z up, this origin, and x toward a second point (3,) [m], made level."""
     x = np.asarray(along_x - origin, float)
     level = x - (x @ gravity.up) * gravity.up
     if not np.isfinite(level).all() or np.linalg.norm(level) < _NEAREST_M:
@@ -106,42 +108,41 @@ def frame_of_gravity(gravity: Gravity, origin: Array, along_x: Array) -> RigidTr
 
 
 def merge_rigs(rigs: Sequence[Rig]) -> Rig:
-    """Join starts that different sources gave: the first rig's world stays, the others are moved onto it, one by one.
+    """Merge the initial rigs of several sources: the first rig's world stays, the others are aligned with it in turn.
 
-    Two rigs join through cameras that both hold: by one camera's place and direction or, where there are more, by the
-    places of all and the mean direction; both must be in metres. Raises CalibrationError naming the cameras that stay
-    apart.
+    Rigs are aligned by the cameras that both hold: by one camera's pose or, if there are more, by all positions and the
+    mean rotation; both must be in metres. Raises CalibrationError naming the cameras that stay unconnected.
     """
-    known = {camera.name: camera for camera in rigs[0]}
-    waiting = list(rigs[1:])
-    while waiting:
-        most = max(waiting, key=lambda rig: len(set(rig.names) & set(known)))
-        shared = [name for name in most.names if name in known]
+    merged = {camera.name: camera for camera in rigs[0]}
+    remaining = list(rigs[1:])
+    while remaining:
+        next_rig = max(remaining, key=lambda rig: len(set(rig.names) & set(merged)))
+        shared = [name for name in next_rig.names if name in merged]
         if not shared:
             raise CalibrationError(
-                f"nothing ties {', '.join(most.names)} to {', '.join(known)}: let one camera at least take part in "
-                "both sources (board, wand, court, points)"
+                f"nothing ties {', '.join(next_rig.names)} to {', '.join(merged)}: let one camera at least take part "
+                "in both sources (board, wand, court, points)"
             )
-        new_from_old = _align_rig([known[name].camera_from_world for name in shared], most.select(shared))
-        for camera in most:
+        new_from_old = _align_rig([merged[name].camera_from_world for name in shared], next_rig.select(shared))
+        for camera in next_rig:
             moved = replace(camera, camera_from_world=camera.camera_from_world * new_from_old.inv())
-            known.setdefault(camera.name, moved)
-        waiting.remove(most)
-    return Rig(tuple(known.values()))
+            merged.setdefault(camera.name, moved)
+        remaining.remove(next_rig)
+    return Rig(tuple(merged.values()))
 
 
-def _align_rig(wanted: Sequence[RigidTransform], rig: Rig) -> RigidTransform:
-    """Return new_from_old that brings the rig's cameras to where they are wanted."""
-    answers = [place.inv() * camera.camera_from_world for place, camera in zip(wanted, rig, strict=True)]
-    turn = Rotation.concatenate([answer.rotation for answer in answers]).mean()
-    centres = np.array([place.inv().translation for place in wanted]), np.array([camera.centre for camera in rig])
-    if len(rig) >= 3:  # directions of starts are worse known than places far apart
+def _align_rig(targets: Sequence[RigidTransform], rig: Rig) -> RigidTransform:
+    """Return new_from_old that aligns the rig's cameras with their target poses."""
+    candidates = [target.inv() * camera.camera_from_world for target, camera in zip(targets, rig, strict=True)]
+    rotation = Rotation.concatenate([candidate.rotation for candidate in candidates]).mean()
+    centres = np.array([target.inv().translation for target in targets]), np.array([camera.centre for camera in rig])
+    if len(rig) >= 3:  # rotations of initial values are less certain than positions far apart
         directions = [c - c.mean(axis=0) for c in centres]
         sizes = np.linalg.svd(directions[1], compute_uv=False)
         if sizes[1] > 0.1 * sizes[0]:
-            turn = Rotation.align_vectors(*directions)[0]
-    shift = np.mean(centres[0] - turn.apply(centres[1]), axis=0)
-    return RigidTransform.from_components(shift, turn)
+            rotation = Rotation.align_vectors(*directions)[0]
+    shift = np.mean(centres[0] - rotation.apply(centres[1]), axis=0)
+    return RigidTransform.from_components(shift, rotation)
 
 
 def _frame(origin: Array, x: Array, z: Array) -> RigidTransform:
@@ -159,8 +160,8 @@ def _common_acceleration(flights: Sequence[tuple[Array, Array]]) -> tuple[Array,
         sides.append(x)
     A, b = np.concatenate(rows), np.concatenate(sides)
     start = np.linalg.lstsq(A, b, rcond=None)[0]
-    off = np.linalg.norm(b - A @ start, axis=1)
-    scale = max(SD_OF_MEDIAN_DEVIATION * float(np.median(off)), 1e-9)
+    distances = np.linalg.norm(b - A @ start, axis=1)
+    scale = max(SD_OF_MEDIAN_DEVIATION * float(np.median(distances)), 1e-9)
     fit = least_squares(
         lambda p: ((b - A @ p.reshape(start.shape)) / scale).ravel(), start.ravel(), loss="cauchy", x_scale="jac"
     )
@@ -168,5 +169,5 @@ def _common_acceleration(flights: Sequence[tuple[Array, Array]]) -> tuple[Array,
     weights = 1 / (1 + np.sum(((b - A @ p) / scale) ** 2, axis=1))
     information = A.T @ (weights[:, None] * A)
     residual = (b - A @ p) * np.sqrt(weights)[:, None]
-    spare = max(weights.sum() - A.shape[1], 1.0)
-    return p[0], float(np.linalg.inv(information)[0, 0]) * (residual.T @ residual) / spare
+    n_redundant = max(weights.sum() - A.shape[1], 1.0)
+    return p[0], float(np.linalg.inv(information)[0, 0]) * (residual.T @ residual) / n_redundant

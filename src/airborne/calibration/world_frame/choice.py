@@ -1,4 +1,4 @@
-"""The world's frame: by known points, by the calibration before, by the board, by clicked points, a throw, a camera."""
+"""The choice of the world frame: known points, the initial calibration, a board, clicked points, a throw, a camera."""
 
 from __future__ import annotations
 
@@ -19,40 +19,42 @@ from airborne.cameras.formats.options import FileOptions
 from airborne.errors import CalibrationError
 
 _IDENTITY = RigidTransform.from_components(np.zeros(3), Rotation.identity())
-_FACE_UP = Rotation.from_matrix(np.diag([1.0, -1.0, -1.0]))  # the board's z goes into the paper, the world's up from it
+_FACE_UP = Rotation.from_matrix(
+    np.diag([1.0, -1.0, -1.0])
+)  # the board's z points into the paper, the world's out of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WorldFrame:
-    """Where the world is to be, and what defines it."""
+    """The requested world frame, and what defines it."""
 
     new_from_old: RigidTransform = _IDENTITY
     scale: float = 1.0
     description: str = ""
-    fixed_moment: int | None = None  # of the board, which stays where it is
+    fixed_moment: int | None = None  # of the board, whose pose is then fixed
     fixed_camera: str | None = None
-    is_unchanged: bool = False  # the adjustment has been in this world already
+    is_unchanged: bool = False  # the adjustment is in this world already
 
 
-def choose_world_frame(inputs: Inputs, adjusted: Adjustment, wrong: Sequence[str]) -> WorldFrame:
-    """Find the world's frame as asked; `wrong` cameras do not say where the calibration before was.
+def choose_world_frame(inputs: Inputs, adjustment: Adjustment, misplaced: Sequence[str]) -> WorldFrame:
+    """Choose the world frame that the sources ask for; `misplaced` cameras do not align it with the initial rig.
 
-    Raises CalibrationError where what is asked for is not there.
+    Raises CalibrationError where its definition is missing.
     """
     table = inputs.sources.world
     if table.points is not None:
-        return _frame_by_points(inputs, adjusted)
+        return _frame_by_points(inputs, adjustment)
     if table.frame == "board" or (table.frame == "auto" and _has_only_board(inputs)):
-        return _frame_by_board(inputs, adjusted)
-    if adjusted.prior is not None and table.frame in ("auto", "start"):
+        return _frame_by_board(inputs, adjustment)
+    if adjustment.prior is not None and table.frame in ("auto", "start"):
         return WorldFrame(description=f"as {_start_file(inputs)} has it, scale and all", is_unchanged=True)
     if table.frame == "start" or (table.frame == "auto" and inputs.start_rig is not None and not inputs.points):
-        return _frame_by_start(inputs, adjusted, wrong)
+        return _frame_by_start(inputs, adjustment, misplaced)
     if table.frame == "auto" and inputs.points:
         return WorldFrame(description=f"that of the {' and the '.join(inputs.points)}", is_unchanged=True)
-    first = adjusted.rig.cameras[0]
-    said = f"the origin is camera {first.name}, z is where it looks: give [world] for z up"
-    return WorldFrame(new_from_old=first.camera_from_world, description=said, fixed_camera=first.name)
+    first = adjustment.rig.cameras[0]
+    description = f"the origin is camera {first.name}, z is where it looks: give [world] for z up"
+    return WorldFrame(new_from_old=first.camera_from_world, description=description, fixed_camera=first.name)
 
 
 def _start_file(inputs: Inputs) -> str:
@@ -63,10 +65,10 @@ def _has_only_board(inputs: Inputs) -> bool:
     return inputs.board_detections is not None and inputs.start_rig is None and not inputs.points
 
 
-def _frame_by_board(inputs: Inputs, adjusted: Adjustment) -> WorldFrame:
+def _frame_by_board(inputs: Inputs, adjustment: Adjustment) -> WorldFrame:
     if inputs.board_detections is None:
         raise CalibrationError('[world] frame = "board" needs a board that the cameras see together')
-    source = next(source for source in adjusted.sources if source.name == "board")
+    source = next(source for source in adjustment.sources if source.name == "board")
     n_corners = inputs.board_detections.views.n_corners
     moment = inputs.sources.world.moment
     if moment is None:
@@ -75,48 +77,52 @@ def _frame_by_board(inputs: Inputs, adjusted: Adjustment) -> WorldFrame:
         raise CalibrationError(f"[world] moment = {moment}: no camera sees the board then; choose another")
     if source.world_from_target is None:
         raise CalibrationError("the board was not found")
-    turn = RigidTransform.from_rotation(_FACE_UP)
+    rotation = RigidTransform.from_rotation(_FACE_UP)
     return WorldFrame(
-        new_from_old=turn * source.world_from_target[moment].inv(),
+        new_from_old=rotation * source.world_from_target[moment].inv(),
         description=f"the board at moment {moment}: origin its first corner, x along a row, z out of its face",
         fixed_moment=moment,
     )
 
 
-def _frame_by_start(inputs: Inputs, adjusted: Adjustment, wrong: Sequence[str]) -> WorldFrame:
+def _frame_by_start(inputs: Inputs, adjustment: Adjustment, misplaced: Sequence[str]) -> WorldFrame:
     if inputs.start_rig is None:
         raise CalibrationError('[world] frame = "start" needs [start] file = "..."')
-    trusted = [name for name in inputs.start_rig.names if name not in wrong]
-    move, scale = align_rigs(adjusted.rig, inputs.start_rig, trusted)
+    trusted = [name for name in inputs.start_rig.names if name not in misplaced]
+    transform, scale = align_rigs(adjustment.rig, inputs.start_rig, trusted)
     has_scale = bool({"board", "wand"} & set(inputs.sources.kinds))
     if has_scale:
-        move, scale = align_rigs(adjusted.rig, inputs.start_rig, trusted, fits_scale=False)
-    said = f"as {_start_file(inputs)} has it, by {', '.join(trusted)}"
-    return WorldFrame(new_from_old=move, scale=scale, description=said if has_scale else f"{said}, its scale kept")
+        transform, scale = align_rigs(adjustment.rig, inputs.start_rig, trusted, fits_scale=False)
+    description = f"as {_start_file(inputs)} has it, by {', '.join(trusted)}"
+    return WorldFrame(
+        new_from_old=transform, scale=scale, description=description if has_scale else f"{description}, its scale kept"
+    )
 
 
-def _frame_by_points(inputs: Inputs, adjusted: Adjustment) -> WorldFrame:
-    """Set the frame by clicked points, the third of them or a throw telling the plane."""
-    table, rig = inputs.sources.world, adjusted.rig
+def _frame_by_points(inputs: Inputs, adjustment: Adjustment) -> WorldFrame:
+    """Define the frame by clicked points; the third of them, or a throw, gives the plane."""
+    table, rig = inputs.sources.world, adjustment.rig
     names, px = read_clicks(inputs.sources.path(table.points or ""), rig.names)
-    places = dict(zip(names, triangulate_consensus(rig, px, np.ones(px.shape[:-1])).points, strict=True))
-    wanted = [name for name in (table.origin, table.along_x, table.in_xy) if name is not None]
-    for name in wanted:
-        if name not in places or not np.isfinite(places[name]).all():
+    position_of = dict(zip(names, triangulate_consensus(rig, px, np.ones(px.shape[:-1])).points, strict=True))
+    axis_names = [name for name in (table.origin, table.along_x, table.in_xy) if name is not None]
+    for name in axis_names:
+        if name not in position_of or not np.isfinite(position_of[name]).all():
             raise CalibrationError(
                 f"[world] point '{name}' is not clicked in two cameras that agree; {table.points} has: "
                 f"{', '.join(names)}"
             )
-    origin, along_x = places[wanted[0]], places[wanted[1]]
+    origin, along_x = position_of[axis_names[0]], position_of[axis_names[1]]
     if table.throw is None:
-        said = f"origin {wanted[0]}, x toward {wanted[1]}, {wanted[2]} in the plane of x and y"
-        return WorldFrame(new_from_old=frame_of_three_points(origin, along_x, places[wanted[2]]), description=said)
+        description = f"origin {axis_names[0]}, x toward {axis_names[1]}, {axis_names[2]} in the plane of x and y"
+        return WorldFrame(
+            new_from_old=frame_of_three_points(origin, along_x, position_of[axis_names[2]]), description=description
+        )
     sizes = {camera.name: camera.size for camera in rig}
     tracks = read_xypts(
         inputs.sources.path(table.throw), FileOptions(size=sizes, pixels=pixel_convention(table.pixels)), rig.names
     )
-    agreed = triangulate_consensus(rig, tracks.px, np.ones(tracks.px.shape[:-1])).points
-    times_s = np.arange(len(agreed)) / (table.rate_hz or 1.0)
-    gravity = estimate_gravity(times_s, list(np.swapaxes(agreed, 0, 1)))
-    said = f"{gravity.describe()}; origin {wanted[0]}, x toward {wanted[1]}"
-    return WorldFrame(new_from_old=frame_of_gravity(gravity, origin, along_x), description=said)
+    points = triangulate_consensus(rig, tracks.px, np.ones(tracks.px.shape[:-1])).points
+    times_s = np.arange(len(points)) / (table.rate_hz or 1.0)
+    gravity = estimate_gravity(times_s, list(np.swapaxes(points, 0, 1)))
+    description = f"{gravity.describe()}; origin {axis_names[0]}, x toward {axis_names[1]}"
+    return WorldFrame(new_from_old=frame_of_gravity(gravity, origin, along_x), description=description)

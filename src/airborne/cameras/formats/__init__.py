@@ -1,7 +1,7 @@
 """One file a calibration format, each reading and writing what the format holds.
 
-In come a file's text and what the file does not say about itself (`Given`); out goes a `Rig`. Out of a `Rig` comes a
-text, with sentences on what the format cannot hold. Which file is which is told in `cameras/files.py`.
+A reader takes a file's text and what it does not say about itself (`FileOptions`) and returns a `Rig`. A writer takes a
+`Rig` and returns a text, with phrases on what the format cannot hold. `cameras/files.py` recognises the format.
 """
 
 from airborne.cameras.formats.options import FileOptions, PixelConvention, Size, Unit

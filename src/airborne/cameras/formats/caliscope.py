@@ -1,6 +1,6 @@
 """Caliscope's `camera_array.toml`: tables [cameras.0], [cameras.1], ... in metres.
 
-`rotation_count` turns pictures only for its pose networks; the calibration is that of the pictures as recorded.
+`rotation_count` rotates images only for its pose networks; the calibration is that of the images as recorded.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from airborne.errors import CalibrationError
 _ABSENT = (None, "null")
 
 
-def rig_from_caliscope(document: dict, where: str, given: FileOptions) -> Rig:
-    """Return the cameras that have a place, named cam_<number> as Caliscope names their videos."""
+def rig_from_caliscope(document: dict, where: str, options: FileOptions) -> Rig:
+    """Return the cameras that have a pose, named cam_<number> as Caliscope names their videos."""
     tables = {key: table for key, table in document["cameras"].items() if isinstance(table, dict)}
-    placed = {key: table for key, table in tables.items() if table.get("rotation") not in _ABSENT}
-    if not placed:
-        raise CalibrationError(f"{where}: none of its {len(tables)} cameras has a place; calibrate their extrinsics")
-    metres = given.metres("m")
+    posed = {key: table for key, table in tables.items() if table.get("rotation") not in _ABSENT}
+    if not posed:
+        raise CalibrationError(f"{where}: none of its {len(tables)} cameras has a pose; calibrate their extrinsics")
+    metres = options.metres("m")
     return Rig(
         tuple(
             camera_from_table(f"{where}, [cameras.{key[:60]}]", f"cam_{key}", table, metres)
-            for key, table in placed.items()
+            for key, table in posed.items()
         )
     )
 
@@ -48,16 +48,16 @@ def caliscope_text(rig: Rig, errors_px: Mapping[str, float] | None = None) -> st
 
 def caliscope_numbers(rig: Rig) -> list[int]:
     """Return the cameras' numbers: those of their names where all are cam_<number>, else 0, 1, 2, ..."""
-    found = [name.removeprefix("cam_") for name in rig.names]
-    if all(text.isascii() and text.isdigit() and text == str(int(text)) for text in found if len(text) < 10):
-        own = [f"cam_{text}" for text in found]
-        if own == list(rig.names) and max(map(len, found)) < 10:
-            return [int(text) for text in found]
+    digits = [name.removeprefix("cam_") for name in rig.names]
+    if all(text.isascii() and text.isdigit() and text == str(int(text)) for text in digits if len(text) < 10):
+        own = [f"cam_{text}" for text in digits]
+        if own == list(rig.names) and max(map(len, digits)) < 10:
+            return [int(text) for text in digits]
     return list(range(len(rig)))
 
 
 def caliscope_losses(rig: Rig) -> tuple[str, ...]:
-    """Say what a Caliscope file cannot hold."""
+    """Return what a Caliscope file cannot hold, a phrase each."""
     pairs = zip(rig.names, caliscope_numbers(rig), strict=True)
     renamed = [f"{name} is {number}" for name, number in pairs if name != f"cam_{number}"]
     return (f"names: Caliscope numbers its cameras: {', '.join(renamed)}",) if renamed else ()

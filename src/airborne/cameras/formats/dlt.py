@@ -24,23 +24,23 @@ def is_dlt(text: str) -> bool:
     return bool(first) and all(np.isfinite(parse_number(cell)) for cell in _cells(first))
 
 
-def rig_from_dlt(text: str, where: str, given: FileOptions) -> Rig:
-    """Return the cameras cam1, cam2, ... of a table of coefficients, metres unless given otherwise.
+def rig_from_dlt(text: str, where: str, options: FileOptions) -> Rig:
+    """Return the cameras cam1, cam2, ... of a table of coefficients, in metres unless the options say otherwise.
 
-    `u = (L1 X + L2 Y + L3 Z + L4) / (L9 X + L10 Y + L11 Z + 1)`, v with L5 to L8, in pixels as `given.pixels` counts
+    `u = (L1 X + L2 Y + L3 Z + L4) / (L9 X + L10 Y + L11 Z + 1)`, v with L5 to L8, in pixels as `options.pixels` counts
     them. All eleven numbers are kept: the fifth of the intrinsics is the skew. Raises CalibrationError where the
-    cameras look away from each other, which is how a wrong corner of the picture shows.
+    cameras look away from each other, the sign of a wrong pixel corner.
     """
     rows = [_cells(line) for line in text.splitlines() if line.strip()]
     widths = {len(row) for row in rows}
     if len(rows) != _N_ROWS or len(widths) != 1:
-        found = f"{len(rows)} rows of {' or '.join(map(str, sorted(widths)[:3]))} numbers"
-        raise CalibrationError(f"{where}: {found}; expected 11 rows, one column a camera")
+        shape_text = f"{len(rows)} rows of {' or '.join(map(str, sorted(widths)[:3]))} numbers"
+        raise CalibrationError(f"{where}: {shape_text}; expected 11 rows, one column a camera")
     L = np.array([[parse_number(cell) for cell in row] for row in rows])
     if not np.all(np.abs(L) <= LARGEST_NUMBER):
         raise CalibrationError(f"{where}: a coefficient is not a number, or too large; expected 11 rows of numbers")
-    rig = Rig(tuple(_camera(f"{where}, column {k + 1}", f"cam{k + 1}", L[:, k], given) for k in range(L.shape[1])))
-    _check_view(rig, where, given.pixels)
+    rig = Rig(tuple(_camera(f"{where}, column {k + 1}", f"cam{k + 1}", L[:, k], options) for k in range(L.shape[1])))
+    _check_view(rig, where, options.pixels)
     return rig
 
 
@@ -61,31 +61,41 @@ def dlt_text(rig: Rig, pixels: PixelConvention, unit: Unit = "m") -> str:
 
 
 def dlt_losses(rig: Rig) -> tuple[str, ...]:
-    """Say what DLT coefficients cannot hold: names, picture sizes, and distortion, with what it moves at most."""
+    """Return what DLT coefficients cannot hold: names, image sizes, and distortion with its largest displacement."""
     notes = [f"names: cam1, cam2, ... for {', '.join(rig.names)}", "picture sizes"]
-    bent = [f"{camera.name} (up to {_corner_shift_px(camera):.1f} px)" for camera in rig if camera.is_distorted]
-    return (*notes, f"lens distortion of {', '.join(bent)}: straighten pixels first") if bent else tuple(notes)
+    distorted = [f"{camera.name} (up to {_corner_shift_px(camera):.1f} px)" for camera in rig if camera.is_distorted]
+    return (
+        (*notes, f"lens distortion of {', '.join(distorted)}: straighten pixels first") if distorted else tuple(notes)
+    )
 
 
-def _camera(where: str, name: str, L: Array, given: FileOptions) -> Camera:
-    size = parse_size(where, given.size_of(name, where))
-    to_ours = np.linalg.inv(given.pixels.theirs_from_ours(size[1]))
+def _camera(where: str, name: str, L: Array, options: FileOptions) -> Camera:
+    size = parse_size(where, options.size_of(name, where))
+    to_ours = np.linalg.inv(options.pixels.theirs_from_ours(size[1]))
     P = to_ours @ np.append(L, 1.0).reshape(3, 4)
-    P[:, :3] /= given.metres("m")
+    P[:, :3] /= options.metres("m")
     length = np.linalg.norm(P[:, :3])
     if length == 0 or np.linalg.svd(P[:, :3] / length, compute_uv=False)[-1] < _SMALLEST_AXIS:
         raise CalibrationError(f"{where}: {_NO_CAMERA}")
-    found = decompose_with_skew(P)
-    if not (np.all(np.abs(found.K) <= LARGEST_NUMBER) and np.all(np.abs(found.centre) <= LARGEST_NUMBER)):
+    decomposition = decompose_with_skew(P)
+    if not (
+        np.all(np.abs(decomposition.K) <= LARGEST_NUMBER) and np.all(np.abs(decomposition.centre) <= LARGEST_NUMBER)
+    ):
         raise CalibrationError(f"{where}: {_NO_CAMERA}")
-    translation = -found.R @ found.centre
+    translation = -decomposition.R @ decomposition.centre
     return build_camera(
-        where, name, K=found.K, size=size, rotation=found.R, translation=translation, distortion=np.zeros(5)
+        where,
+        name,
+        K=decomposition.K,
+        size=size,
+        rotation=decomposition.R,
+        translation=translation,
+        distortion=np.zeros(5),
     )
 
 
 def _check_view(rig: Rig, where: str, pixels: PixelConvention) -> None:
-    """Refuse cameras that all have the place nearest to their lines of sight behind them."""
+    """Raise CalibrationError if the point nearest to all optical axes lies behind every camera."""
     if len(rig) < 2:
         return
     axes = np.stack([camera.camera_from_world.rotation.as_matrix()[2] for camera in rig])

@@ -21,12 +21,12 @@ from airborne.types import Array
 
 _COLUMN = re.compile(r"(.+)_cam_?(\d{1,4})_([uvxyUVXY])")  # DLTdv pt1_cam1_X, Argus track_cam_1_x
 _EXPECTED = "expected DLTdv's table pt1_cam1_U,pt1_cam1_V,pt1_cam2_U,..."
-_DEGREES_OF_FREEDOM = 3  # that a place in space takes from the 2 numbers of each camera
+_DEGREES_OF_FREEDOM = 3  # of a position in space, against 2 coordinates in each camera
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Digitisation:
-    """What DLTdv knows of a recording: pixels, and where it has them places, residuals, offsets and intervals."""
+    """What DLTdv stores of a recording: pixels and, optionally, positions, residuals, offsets and intervals."""
 
     points: Detections  # visibility 1 where digitised
     world: Array | None = None  # (frames, points, 3) [m]; NaN where not known
@@ -41,14 +41,14 @@ def is_xypts(header: str) -> bool:
     return len(names) > 1 and all(_COLUMN.fullmatch(name) for name in names)
 
 
-def read_digitisation(path: Path, given: FileOptions, cameras: Sequence[str] | None = None) -> Digitisation:
-    """Read `<prefix>xypts.csv` and its siblings that are there; lengths are metres unless given otherwise.
+def read_digitisation(path: Path, options: FileOptions, cameras: Sequence[str] | None = None) -> Digitisation:
+    """Read `<prefix>xypts.csv` and the siblings beside it; lengths are metres unless the options say otherwise.
 
     Cameras are named cam1, cam2, ... unless named here. Raises CalibrationError.
     """
-    points = read_xypts(path, given, cameras)
+    points = read_xypts(path, options, cameras)
     n, n_points, n_cameras = points.visibility.shape
-    stem, found = path.name.removesuffix("xypts.csv"), {}
+    stem, tables = path.name.removesuffix("xypts.csv"), {}
     shapes = {"xyzpts": (n_points, 3), "xyzres": (n_points,), "offsets": (n_cameras,), "xyzCI": (n_points, 3)}
     for sibling, shape in shapes.items():
         other = path.with_name(f"{stem}{sibling}.csv")
@@ -59,19 +59,19 @@ def read_digitisation(path: Path, given: FileOptions, cameras: Sequence[str] | N
                     f"{other} has {len(values)} rows of {values.shape[1]}; expected {n} of {np.prod(shape)}, "
                     f"as {path.name} has"
                 )
-            found[sibling] = values.reshape(n, *shape)
-    metres = given.metres("m")
+            tables[sibling] = values.reshape(n, *shape)
+    metres = options.metres("m")
     return Digitisation(
         points=points,
-        world=_scale(found.get("xyzpts"), metres),
-        residual_px=found.get("xyzres"),
-        offset_frames=found.get("offsets"),
-        interval=_scale(found.get("xyzCI"), metres),
+        world=_scale(tables.get("xyzpts"), metres),
+        residual_px=tables.get("xyzres"),
+        offset_frames=tables.get("offsets"),
+        interval=_scale(tables.get("xyzCI"), metres),
     )
 
 
-def read_xypts(path: Path, given: FileOptions, cameras: Sequence[str] | None = None) -> Detections:
-    """Read `xypts.csv`, pixels as `given.pixels` counts them; from below sizes are needed. Raises CalibrationError."""
+def read_xypts(path: Path, options: FileOptions, cameras: Sequence[str] | None = None) -> Detections:
+    """Read `xypts.csv` in the pixels of `options.pixels`; a lower corner needs sizes. Raises CalibrationError."""
     header, values = _read_table(path)
     keys = [key for name in header if (key := _parse_column(name)) is not None]
     if not header or len(keys) < len(header):
@@ -79,19 +79,21 @@ def read_xypts(path: Path, given: FileOptions, cameras: Sequence[str] | None = N
     names, numbers = list(dict.fromkeys(key[0] for key in keys)), sorted({key[1] for key in keys})
     if len(set(keys)) < len(keys) or len(keys) != 2 * len(names) * len(numbers):
         raise CalibrationError(f"{path}: not every point has one U and one V in every camera; {_EXPECTED}")
-    called = list(cameras or [f"cam{number}" for number in numbers])
-    if len(called) != len(numbers) or len(set(called)) != len(called):
-        raise CalibrationError(f"{path} has {len(numbers)} cameras; name as many, each once: found {', '.join(called)}")
+    camera_names = list(cameras or [f"cam{number}" for number in numbers])
+    if len(camera_names) != len(numbers) or len(set(camera_names)) != len(camera_names):
+        raise CalibrationError(
+            f"{path} has {len(numbers)} cameras; name as many, each once: found {', '.join(camera_names)}"
+        )
     px = np.full((len(values), len(names), len(numbers), 2), np.nan)
     for column, (name, number, axis) in enumerate(keys):
         px[:, names.index(name), numbers.index(number), "uv".index(axis)] = values[:, column]
-    for k, camera in enumerate(called):
-        px[:, :, k] = given.pixels.ours(px[:, :, k], _height(given, camera, str(path)))
-    return Detections.from_clicks(called, names, px)
+    for k, camera in enumerate(camera_names):
+        px[:, :, k] = options.pixels.ours(px[:, :, k], _height(options, camera, str(path)))
+    return Detections.from_clicks(camera_names, names, px)
 
 
-def write_digitisation(path: Path, digitisation: Digitisation, given: FileOptions) -> tuple[Path, ...]:
-    """Write `<prefix>xypts.csv` and the siblings that are known; returns what was written. 17 digits; NaN is NaN.
+def write_digitisation(path: Path, digitisation: Digitisation, options: FileOptions) -> tuple[Path, ...]:
+    """Write `<prefix>xypts.csv` and the siblings that have values; return the paths. 17 digits; NaN is NaN.
 
     Points are named pt1, pt2, ... as DLTdv does. Raises CalibrationError for a name that does not end in xypts.csv, and
     where pixels are to count from below and a camera's size was not given.
@@ -99,23 +101,23 @@ def write_digitisation(path: Path, digitisation: Digitisation, given: FileOption
     if not path.name.endswith("xypts.csv"):
         raise CalibrationError(f"{path}: DLTdv wants a name that ends in xypts.csv, such as throw_xypts.csv")
     points = digitisation.points
-    heights = [_height(given, name, str(path)) for name in points.cameras]
-    px = [given.pixels.theirs(points.px[:, :, k], height) for k, height in enumerate(heights)]
+    heights = [_height(options, name, str(path)) for name in points.cameras]
+    px = [options.pixels.theirs(points.px[:, :, k], height) for k, height in enumerate(heights)]
     numbers, cameras = range(1, len(points.points) + 1), range(1, len(points.cameras) + 1)
     header = [f"pt{p}_cam{c}_{axis}" for p in numbers for c in cameras for axis in "UV"]
-    written = [_write_table(path, header, np.stack(px, axis=2))]
-    places, scale = [f"pt{p}_{axis}" for p in numbers for axis in "XYZ"], 1 / given.metres("m")
+    paths = [_write_table(path, header, np.stack(px, axis=2))]
+    coordinates, scale = [f"pt{p}_{axis}" for p in numbers for axis in "XYZ"], 1 / options.metres("m")
     siblings = {
-        "xyzpts": (places, _scale(digitisation.world, scale)),
+        "xyzpts": (coordinates, _scale(digitisation.world, scale)),
         "xyzres": ([f"pt{p}_dltres" for p in numbers], digitisation.residual_px),
         "offsets": ([f"cam{c}_offset" for c in cameras], digitisation.offset_frames),
-        "xyzCI": ([f"{place}+-CI" for place in places], _scale(digitisation.interval, scale)),
+        "xyzCI": ([f"{coordinate}+-CI" for coordinate in coordinates], _scale(digitisation.interval, scale)),
     }
     stem = path.name.removesuffix("xypts.csv")
     for sibling, (names, values) in siblings.items():
         if values is not None:
-            written.append(_write_table(path.with_name(f"{stem}{sibling}.csv"), names, values))
-    return tuple(written)
+            paths.append(_write_table(path.with_name(f"{stem}{sibling}.csv"), names, values))
+    return tuple(paths)
 
 
 def triangulate_digitisation(points: Detections, rig: Rig) -> Digitisation:
@@ -136,13 +138,13 @@ def triangulate_digitisation(points: Detections, rig: Rig) -> Digitisation:
 
 def _parse_column(column: str) -> tuple[str, int, str] | None:
     """Return a column's point, number of the camera and axis."""
-    found = _COLUMN.fullmatch(column)
-    return (found[1], int(found[2]), "u" if found[3] in "uUxX" else "v") if found else None
+    match = _COLUMN.fullmatch(column)
+    return (match[1], int(match[2]), "u" if match[3] in "uUxX" else "v") if match else None
 
 
-def _height(given: FileOptions, camera: str, where: str) -> int:
-    """Return a picture's height [px]; any will do where pixels count from above."""
-    return 0 if given.pixels.corner == "upper-left" else given.size_of(camera, where)[1]
+def _height(options: FileOptions, camera: str, where: str) -> int:
+    """Return an image's height [px]; 0 where pixels count from the top and it does not matter."""
+    return 0 if options.pixels.corner == "upper-left" else options.size_of(camera, where)[1]
 
 
 def _scale(values: Array | None, scale: float) -> Array | None:

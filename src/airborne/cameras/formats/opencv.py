@@ -23,7 +23,7 @@ _KEY = re.compile(r"[A-Za-z0-9_-]+")  # what OpenCV allows in a key, behind K_
 def parse_opencv(text: str, where: str) -> dict[str, Any]:
     """Return an OpenCV YAML file's nodes, numbers still as text: a scalar, a list, or a matrix's fields.
 
-    Of YAML only what OpenCV writes is understood, which is read in one pass. Raises CalibrationError.
+    Understands only the YAML that OpenCV writes. Raises CalibrationError.
     """
     blocks = (block.partition(":") for block in _BLOCK.split(text))
     document = {key.strip(): _parse_node(rest) for key, colon, rest in blocks if colon and not key.startswith("%")}
@@ -37,15 +37,15 @@ def halves_in(document: dict[str, Any]) -> set[str]:
     return {key[:2] for key in document if isinstance(key, str) and key[:2] in ("K_", "T_")}
 
 
-def rig_from_opencv(document: dict[str, Any], where: str, given: FileOptions) -> Rig:
-    """Return the rig of one file's nodes, or of two files' together; metres unless given otherwise.
+def rig_from_opencv(document: dict[str, Any], where: str, options: FileOptions) -> Rig:
+    """Return the rig of one file's nodes, or of two files' together; in metres unless the options say otherwise.
 
-    `Rot_<camera>` is the rotation as a matrix, `R_<camera>` as a Rodrigues vector (or a matrix). Picture sizes stand in
+    `Rot_<camera>` is the rotation as a matrix, `R_<camera>` as a Rodrigues vector (or a matrix). Image sizes stand in
     `W_<camera>` and `H_<camera>`, else they must be given. Raises CalibrationError.
     """
-    listed = document.get("names")
-    if isinstance(listed, list) and listed:
-        names = [str(name) for name in listed]
+    names_node = document.get("names")
+    if isinstance(names_node, list) and names_node:
+        names = [str(name) for name in names_node]
     else:
         names = [key.removeprefix("K_") for key in document if isinstance(key, str) and key.startswith("K_")]
     keys = {name: name for name in names}
@@ -53,7 +53,7 @@ def rig_from_opencv(document: dict[str, Any], where: str, given: FileOptions) ->
         keys = {name: str(number) for number, name in enumerate(names, 1)}
     if not names:
         raise CalibrationError(f"{where} has no cameras; {_EXPECTED}")
-    return Rig(tuple(_camera(document, where, name, keys[name], given) for name in names))
+    return Rig(tuple(_camera(document, where, name, key=keys[name], options=options) for name in names))
 
 
 def opencv_text(rig: Rig, unit: Unit = "m") -> str:
@@ -87,30 +87,30 @@ def _items(text: str) -> list[str]:
     return [item.strip().strip("\"'") for item in inner.split(",")] if inner else []
 
 
-def _camera(document: dict[str, Any], where: str, name: str, key: str, given: FileOptions) -> Camera:
+def _camera(document: dict[str, Any], where: str, name: str, *, key: str, options: FileOptions) -> Camera:
     where = f"{where}, camera '{name[:60]}'"
     return build_camera(
         where,
         name,
         K=_matrix(document, where, f"K_{key}", (3, 3)),
-        size=_size(document, where, name, key, given),
+        size=_size(document, where, name, key=key, options=options),
         rotation=_rotation(document, where, key),
-        translation=given.metres("m") * _matrix(document, where, f"T_{key}", (3, 1), (1, 3)).ravel(),
+        translation=options.metres("m") * _matrix(document, where, f"T_{key}", (3, 1), (1, 3)).ravel(),
         distortion=_matrix(document, where, f"dist_{key}", (1, 4), (4, 1), (1, 5), (5, 1)).ravel(),
     )
 
 
-def _size(document: dict[str, Any], where: str, name: str, key: str, given: FileOptions) -> Size | Array:
+def _size(document: dict[str, Any], where: str, name: str, *, key: str, options: FileOptions) -> Size | Array:
     if f"W_{key}" in document and f"H_{key}" in document:
         return np.array([parse_array(where, f"{side}_{key}", document[f"{side}_{key}"], ()) for side in "WH"])
-    return given.size_of(name, where)
+    return options.size_of(name, where)
 
 
 def _rotation(document: dict[str, Any], where: str, key: str) -> Array:
     if f"Rot_{key}" in document:
         return _matrix(document, where, f"Rot_{key}", (3, 3))
-    found = _matrix(document, where, f"R_{key}", (3, 1), (1, 3), (3, 3))
-    return found if found.shape == (3, 3) else found.ravel()
+    rotation = _matrix(document, where, f"R_{key}", (3, 1), (1, 3), (3, 3))
+    return rotation if rotation.shape == (3, 3) else rotation.ravel()
 
 
 def _matrix(document: dict[str, Any], where: str, key: str, *shapes: tuple[int, ...]) -> Array:
@@ -120,11 +120,11 @@ def _matrix(document: dict[str, Any], where: str, key: str, *shapes: tuple[int, 
         expected = " or ".join("×".join(map(str, shape)) for shape in shapes)
         raise CalibrationError(f"{where}: no {key}; expected an OpenCV matrix of {expected} numbers")
     sides = node.get("sizes", [node.get("rows"), node.get("cols")])  # OpenCV 5 writes a vector with one size
-    found = "×".join(str(side)[:9] for side in sides) if isinstance(sides, list) else "nothing"
+    shape = "×".join(str(side)[:9] for side in sides) if isinstance(sides, list) else "nothing"
     for rows, cols in shapes:
-        if found == f"{rows}×{cols}" or (found == f"{rows}" and cols == 1):
+        if shape == f"{rows}×{cols}" or (shape == f"{rows}" and cols == 1):
             return parse_array(where, key, node.get("data"), (rows * cols,)).reshape(rows, cols)
-    raise CalibrationError(f"{where}: {key} is {found}, expected " + " or ".join(f"{a}×{b}" for a, b in shapes))
+    raise CalibrationError(f"{where}: {key} is {shape}, expected " + " or ".join(f"{a}×{b}" for a, b in shapes))
 
 
 def _names(rig: Rig) -> str:
@@ -144,11 +144,11 @@ def _intrinsics(camera: Camera) -> str:
 
 
 def _extrinsics(camera: Camera, unit: Unit) -> str:
-    name, place = camera.name, camera.camera_from_world
+    name, camera_from_world = camera.name, camera.camera_from_world
     nodes = {
-        f"R_{name}": place.rotation.as_rotvec()[:, None],
-        f"Rot_{name}": place.rotation.as_matrix(),
-        f"T_{name}": place.translation[:, None] / METRES[unit],
+        f"R_{name}": camera_from_world.rotation.as_rotvec()[:, None],
+        f"Rot_{name}": camera_from_world.rotation.as_matrix(),
+        f"T_{name}": camera_from_world.translation[:, None] / METRES[unit],
     }
     return "".join(_node(key, values) for key, values in nodes.items())
 

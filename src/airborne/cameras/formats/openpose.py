@@ -1,4 +1,4 @@
-"""OpenPose's detections as Pose2Sim keeps them: a folder a camera, a JSON file a frame."""
+"""OpenPose's detections in Pose2Sim's layout: a folder a camera, a JSON file a frame."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from airborne.errors import CalibrationError
 from airborne.io.text import read_json
 from airborne.types import Array
 
-_LARGEST_FILE_BYTES = 5_000_000  # a picture of a thousand people
+_LARGEST_FILE_BYTES = 5_000_000  # an image of a thousand people
 _MOST_NUMBERS = 10_000_000  # frames times points
-_AMBIGUOUS_SHARE = 0.8  # of the surest person's confidence: a second one this sure makes the choice a guess
+_AMBIGUOUS_SHARE = 0.8  # of the highest confidence: a second person with more makes the choice ambiguous
 
 
 def camera_folders(path: Path) -> dict[str, Path]:
@@ -23,10 +23,10 @@ def camera_folders(path: Path) -> dict[str, Path]:
 
 
 def read_folder(folder: Path, person: int | None = None) -> tuple[Array, int]:
-    """Read a camera's JSON files: (frames, points, 3), NaN where nobody is; and the most people in one picture.
+    """Read a camera's JSON files: (frames, points, 3), NaN where nobody is; and the most people in one image.
 
-    person: the place of the person in every file's list, from 0; None takes the one detected most surely. Raises
-    CalibrationError where two are about equally sure.
+    person: the person's index in every file, from 0; None takes the one with the highest confidence. Raises
+    CalibrationError where two have about the same.
     """
     files = {number_at_end(path.stem.removesuffix("_keypoints")): path for path in sorted(folder.glob("*.json"))}
     if not files or None in files:
@@ -34,24 +34,24 @@ def read_folder(folder: Path, person: int | None = None) -> tuple[Array, int]:
             f"{folder} holds no detections; expected JSON files whose names end in the frame's number"
         )
     last = max(number for number in files if number is not None)
-    found: dict[int, Array] = {}
+    keypoints: dict[int, Array] = {}
     n_people = 0
     for frame, path in files.items():
         people = _people(path)
         n_people = max(n_people, len(people))
-        chosen = _choose_person(people, person, path)
-        if chosen is not None and frame is not None:
-            found[frame] = chosen
-    if not found:
+        one_person = _choose_person(people, person, path)
+        if one_person is not None and frame is not None:
+            keypoints[frame] = one_person
+    if not keypoints:
         raise CalibrationError(f"{folder}: there is nobody in any picture; give the detections of a person")
-    counts = {len(one) for one in found.values()}
+    counts = {len(one) for one in keypoints.values()}
     if len(counts) > 1:
         raise CalibrationError(f"{folder}: people of {sorted(counts)} points; expected one list of points throughout")
     n_points = counts.pop()
     if last * n_points > _MOST_NUMBERS:
         raise CalibrationError(f"{folder}: a file is of frame {last}; expected the frame's number at the names' end")
     table = np.full((last + 1, n_points, 3), np.nan)
-    for frame, one in found.items():
+    for frame, one in keypoints.items():
         table[frame] = one
     return table, n_people
 
@@ -71,8 +71,8 @@ def write_folders(path: Path, tables: dict[str, Array]) -> None:
 
 def number_at_end(name: str) -> int | None:
     """Return the number that a name ends in; None where there is none."""
-    found = re.search(r"([0-9]{1,18})$", name)
-    return int(found[1]) if found else None
+    match = re.search(r"([0-9]{1,18})$", name)
+    return int(match[1]) if match else None
 
 
 def _choose_person(people: list[Array], person: int | None, path: Path) -> Array | None:

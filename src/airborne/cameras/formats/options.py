@@ -1,4 +1,4 @@
-"""What a calibration file or a table of pixels does not say: unit, picture sizes, where pixels count from."""
+"""What a calibration file or a table of pixels does not say: unit, image sizes, pixel convention."""
 
 from __future__ import annotations
 
@@ -29,36 +29,36 @@ class PixelConvention:
     base: int = 1
 
     def theirs_from_ours(self, height: int) -> Array:
-        """Return the homogeneous map (3, 3) from our pixels to theirs in a picture of this height [px]."""
+        """Return the homogeneous map (3, 3) from our pixels to theirs in an image of this height [px]."""
         if self.corner == "upper-left":
             return np.array([[1.0, 0, self.base], [0, 1, self.base], [0, 0, 1]])
         return np.array([[1.0, 0, self.base], [0, -1, height - 1 + self.base], [0, 0, 1]])
 
     def ours(self, px: Array, height: int) -> Array:
-        """Turn their pixels (..., 2) into ours: (0, 0) the centre of the top-left pixel."""
+        """Convert their pixels (..., 2) to ours: (0, 0) is the centre of the top-left pixel."""
         u, v = px[..., 0] - self.base, px[..., 1] - self.base
         return np.stack([u, v if self.corner == "upper-left" else height - 1 - v], axis=-1)
 
     def theirs(self, px: Array, height: int) -> Array:
-        """Turn our pixels (..., 2) into theirs."""
+        """Convert our pixels (..., 2) to theirs."""
         u, v = px[..., 0], px[..., 1]
         return np.stack([u, v if self.corner == "upper-left" else height - 1 - v], axis=-1) + self.base
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileOptions:
-    """What the user says about a file."""
+    """What the user adds to a file."""
 
     unit: Unit | None = None  # of lengths; None: what the format defines
-    size: Size | Mapping[str, Size] | None = None  # of all pictures, or by camera [px]
+    size: Size | Mapping[str, Size] | None = None  # of all images, or by camera [px]
     pixels: PixelConvention = PixelConvention()
 
     def metres(self, default: Unit) -> float:
-        """Return how many metres one of the file's lengths is."""
+        """Return the file's unit of length in metres."""
         return METRES[self.unit or default]
 
     def size_of(self, camera: str, where: str) -> Size:
-        """Return the camera's picture size; raises CalibrationError where it was not given."""
+        """Return the camera's image size; raises CalibrationError where it was not given."""
         size = self.size.get(camera) if isinstance(self.size, Mapping) else self.size
         if size is None:
             raise CalibrationError(

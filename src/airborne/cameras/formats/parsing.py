@@ -17,17 +17,17 @@ _ROTATION_TOLERANCE = 1e-3  # how far nine numbers may be from a rotation
 _N_TERMS = {"brown": 5, "fisheye": 4}
 
 
-def parse_array(where: str, name: str, given: object, *shapes: tuple[int, ...]) -> Array:
-    """Return what a file gives as an array of finite numbers with one of the shapes; raises CalibrationError."""
+def parse_array(where: str, name: str, value: object, *shapes: tuple[int, ...]) -> Array:
+    """Return a file's value as an array of finite numbers with one of the shapes; raises CalibrationError."""
     expected = " or ".join("×".join(map(str, shape)) for shape in shapes)
-    if given is None:
+    if value is None:
         raise CalibrationError(f"{where}: no {name}; expected {expected} numbers")
     try:
-        values = np.array(given, float)
+        values = np.array(value, float)
     except (TypeError, ValueError, OverflowError, RecursionError):
         values = np.array(np.nan)
     if values.shape not in shapes or not np.all(np.abs(values) <= LARGEST_NUMBER):
-        raise CalibrationError(f"{where}: {name} = {_short(given)}, expected {expected} numbers")
+        raise CalibrationError(f"{where}: {name} = {_short(value)}, expected {expected} numbers")
     return values
 
 
@@ -42,7 +42,7 @@ def build_camera(
     distortion: Array,
     is_fisheye: bool = False,
 ) -> Camera:
-    """Build a camera from checked numbers; raises CalibrationError where they are no camera's.
+    """Build a camera from checked numbers; raises CalibrationError where they describe no camera.
 
     size (width, height) [px]; rotation (3,) Rodrigues or (3, 3), camera from world; translation (3,) [m]; distortion up
     to five Brown terms k1, k2, p1, p2, k3, or the four of a fisheye.
@@ -63,7 +63,7 @@ def build_camera(
 
 
 def parse_size(where: str, size: ArrayLike) -> Size:
-    """Return (width, height) [px]; raises CalibrationError where they are no whole numbers of pixels."""
+    """Return (width, height) [px]; raises CalibrationError where they are not whole numbers."""
     values = np.asarray(size, float)
     if not (np.all(values >= 1) and np.all(values <= _LARGEST_SIZE_PX) and np.array_equal(values, np.round(values))):
         raise CalibrationError(f"{where}: size = {values.tolist()}, expected width and height in whole pixels")
@@ -76,7 +76,7 @@ def distortion_terms(camera: Camera, n: int) -> list[float]:
 
 
 def refuse_fisheye(camera: Camera, name_of_format: str) -> None:
-    """Raise CalibrationError for a fisheye lens in a format that has no place for one."""
+    """Raise CalibrationError for a fisheye lens in a format that cannot hold one."""
     if camera.lens == "fisheye":
         raise CalibrationError(
             f"camera '{camera.name}' has a fisheye lens, which {name_of_format} cannot hold; "
@@ -84,16 +84,16 @@ def refuse_fisheye(camera: Camera, name_of_format: str) -> None:
         )
 
 
-def _rotation(where: str, given: Array) -> Rotation:
-    if given.shape == (3,):
-        return Rotation.from_rotvec(given)
-    if np.abs(given @ given.T - np.eye(3)).max() > _ROTATION_TOLERANCE or np.linalg.det(given) < 0:
+def _rotation(where: str, value: Array) -> Rotation:
+    if value.shape == (3,):
+        return Rotation.from_rotvec(value)
+    if np.abs(value @ value.T - np.eye(3)).max() > _ROTATION_TOLERANCE or np.linalg.det(value) < 0:
         raise CalibrationError(f"{where}: the rotation is not one: its rows are not at right angles, or it mirrors")
-    return Rotation.from_matrix(given)
+    return Rotation.from_matrix(value)
 
 
-def _short(given: object) -> str:
+def _short(value: object) -> str:
     try:
-        return str(given)[:60]
+        return str(value)[:60]
     except (RecursionError, ValueError):  # nested too deeply, or a number of too many digits
         return "something unreadable"

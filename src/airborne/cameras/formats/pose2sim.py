@@ -15,10 +15,10 @@ _CAMERA_KEYS = {"matrix", "rotation", "translation"}
 _NOT_CAMERAS = ("metadata", "capture_volume", "charuco", "checkerboard")
 
 
-def rig_from_tables(document: dict, where: str, given: FileOptions) -> Rig:
+def rig_from_tables(document: dict, where: str, options: FileOptions) -> Rig:
     """Return the rig of the tables at the top level, in their order; a camera is named by its `name`, else by its key.
 
-    Metres unless given otherwise: the file does not say, and a board in millimetres makes it millimetres.
+    Metres unless the options say otherwise: the file has no unit, and a board in millimetres gives millimetres.
     """
     tables = {key: table for key, table in document.items() if key not in _NOT_CAMERAS and isinstance(table, dict)}
     if not any(_CAMERA_KEYS & table.keys() for table in tables.values()):
@@ -26,7 +26,7 @@ def rig_from_tables(document: dict, where: str, given: FileOptions) -> Rig:
             f"{where} has no cameras (found {list_keys(document)}); "
             "expected a table such as [cam1] with matrix, rotation, ..."
         )
-    metres = given.metres("m")
+    metres = options.metres("m")
     return Rig(
         tuple(
             camera_from_table(f"{where}, [{key[:60]}]", str(table.get("name", key)), table, metres)

@@ -1,4 +1,4 @@
-"""Qualisys `.qca.txt`: XML, lengths in mm, intrinsics in 64ths of a pixel, attitudes with the axes turned."""
+"""Qualisys `.qca.txt`: XML, lengths in mm, intrinsics in 64ths of a pixel, camera axes with y up and z backward."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ _OURS_FROM_QUALISYS = np.diag([1.0, -1.0, -1.0])  # its cameras have y up and lo
 _ATTITUDE = "r11 r12 r13 r21 r22 r23 r31 r32 r33"
 
 
-def rig_from_qualisys(root: ElementTree.Element, where: str, given: FileOptions) -> Rig:
+def rig_from_qualisys(root: ElementTree.Element, where: str, options: FileOptions) -> Rig:
     """Return the rig of a Qualisys calibration; `where` names the file in errors. Cameras are named by their serial.
 
     `x_camera = diag(1, -1, -1) M (x - C)` with `M = r11..r33` row by row and C in mm. Focal lengths, centre and
-    skew are divided by 64; the centre counts from the sensor's corner, the picture from fov_video's. The distortion
-    terms have no unit and stay as they are: pictures of a board bear that out, while Pose2Sim divides them by 64 too
-    and so keeps almost no distortion. Raises CalibrationError.
+    skew are divided by 64; the centre counts from the sensor's corner, the image from fov_video's. The distortion
+    terms have no unit and stay as they are: images of a board confirm it, while Pose2Sim divides them by 64 too and so
+    loses almost all distortion. Raises CalibrationError.
     """
     elements = root.findall("./cameras/camera")
     if not elements:
         raise CalibrationError(f"{where} has no cameras; expected a Qualisys <calibration> with <cameras><camera ...>")
-    return Rig(tuple(_camera(where, number, element, given) for number, element in enumerate(elements, 1)))
+    return Rig(tuple(_camera(where, number, element, options) for number, element in enumerate(elements, 1)))
 
 
 def qualisys_text(rig: Rig) -> str:
@@ -39,8 +39,8 @@ def qualisys_text(rig: Rig) -> str:
     cameras = ElementTree.SubElement(root, "cameras")
     for camera in rig:
         refuse_fisheye(camera, "a Qualisys file")
-        given = {"active": "1", "avg-residual": "nan", "model": "none", "serial": camera.name, "viewrotation": "0"}
-        element = ElementTree.SubElement(cameras, "camera", given)
+        attributes = {"active": "1", "avg-residual": "nan", "model": "none", "serial": camera.name, "viewrotation": "0"}
+        element = ElementTree.SubElement(cameras, "camera", attributes)
         right, bottom = camera.size[0] - 1, camera.size[1] - 1
         fov = {"left": "0", "top": "0", "right": str(right), "bottom": str(bottom)}
         for tag in ("fov_marker", "fov_marker_max", "fov_video", "fov_video_max"):
@@ -51,7 +51,7 @@ def qualisys_text(rig: Rig) -> str:
     return xml_text(root)
 
 
-def _camera(where: str, number: int, element: ElementTree.Element, given: FileOptions) -> Camera:
+def _camera(where: str, number: int, element: ElementTree.Element, options: FileOptions) -> Camera:
     name = element.get("serial") or f"camera {number}"
     where = f"{where}, camera '{name[:60]}'"
     if "fisheye" in element.get("model", "").lower():
@@ -76,7 +76,7 @@ def _camera(where: str, number: int, element: ElementTree.Element, given: FileOp
         K=np.array([[f_u, skew, u0 - left], [0, f_v, v0 - top], [0, 0, 1]]),
         size=parse_size(where, np.round([right - left + 1, bottom - top + 1])),
         rotation=rotation.as_matrix(),
-        translation=-rotation.apply(given.metres("mm") * np.array([x, y, z])),
+        translation=-rotation.apply(options.metres("mm") * np.array([x, y, z])),
         distortion=np.array([*radial[:2], *tangential, radial[2]]),
     )
 

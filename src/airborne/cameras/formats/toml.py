@@ -17,9 +17,9 @@ _TERM_SHAPES = {False: ((4,), (5,)), True: ((4,),)}  # by whether the lens is a 
 def camera_from_table(where: str, name: str, table: dict, metres: float) -> Camera:
     """Return the camera of a table; lengths are multiplied by metres. Raises CalibrationError."""
     is_fisheye = table.get("fisheye") is True
-    terms_given = table.get("distortions")
-    if isinstance(terms_given, list) and len(terms_given) == 1:  # OpenCV returns them as a row
-        terms_given = terms_given[0]
+    terms = table.get("distortions")
+    if isinstance(terms, list) and len(terms) == 1:  # OpenCV returns them as a row
+        terms = terms[0]
     return build_camera(
         where,
         name,
@@ -27,19 +27,19 @@ def camera_from_table(where: str, name: str, table: dict, metres: float) -> Came
         size=parse_size(where, parse_array(where, "size", table.get("size"), (2,))),
         rotation=parse_array(where, "rotation", table.get("rotation"), *_ROTATION_SHAPES),
         translation=metres * parse_array(where, "translation", table.get("translation"), (3,)),
-        distortion=parse_array(where, "distortions", terms_given, *_TERM_SHAPES[is_fisheye]),
+        distortion=parse_array(where, "distortions", terms, *_TERM_SHAPES[is_fisheye]),
         is_fisheye=is_fisheye,
     )
 
 
 def table_lines(camera: Camera, *, n_terms: int, metres: float = 1.0) -> list[str]:
     """Return a camera's lines of a table: matrix to fisheye; lengths are divided by metres."""
-    place = camera.camera_from_world
+    extrinsics = camera.camera_from_world
     return [
         f"matrix = {toml_value(camera.K.tolist())}",
         f"distortions = {toml_value(distortion_terms(camera, n_terms))}",
-        f"rotation = {toml_value(place.rotation.as_rotvec().tolist())}",
-        f"translation = {toml_value((place.translation / metres).tolist())}",
+        f"rotation = {toml_value(extrinsics.rotation.as_rotvec().tolist())}",
+        f"translation = {toml_value((extrinsics.translation / metres).tolist())}",
         f"fisheye = {'true' if camera.lens == 'fisheye' else 'false'}",
     ]
 

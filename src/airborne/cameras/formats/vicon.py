@@ -16,7 +16,7 @@ from airborne.errors import CalibrationError
 _QUATERNION_TOLERANCE = 1e-3  # how far four numbers may be from unit length
 
 
-def rig_from_vicon(root: ElementTree.Element, where: str, given: FileOptions) -> Rig:
+def rig_from_vicon(root: ElementTree.Element, where: str, options: FileOptions) -> Rig:
     """Return the cameras that have a key frame, named by their DEVICEID.
 
     `x_camera = R (x - C)`: ORIENTATION is R, camera from world, as a quaternion x, y, z, w; POSITION is C in mm.
@@ -26,7 +26,7 @@ def rig_from_vicon(root: ElementTree.Element, where: str, given: FileOptions) ->
     elements = [element for element in root.findall("Camera") if element.find("KeyFrames/KeyFrame") is not None]
     if not elements:
         raise CalibrationError(f"{where} has no calibrated cameras; expected <Camera> with <KeyFrames><KeyFrame ...>")
-    return Rig(tuple(_camera(where, number, element, given) for number, element in enumerate(elements, 1)))
+    return Rig(tuple(_camera(where, number, element, options) for number, element in enumerate(elements, 1)))
 
 
 def vicon_text(rig: Rig) -> str:
@@ -41,10 +41,10 @@ def vicon_text(rig: Rig) -> str:
 
 
 def vicon_losses(rig: Rig) -> tuple[str, ...]:
-    """Say what a Vicon file cannot hold: tangential distortion and skew."""
-    bent = [camera.name for camera in rig if np.any(camera.distortion[2:4])]
+    """Return what a Vicon file cannot hold: tangential distortion and skew."""
+    tangential = [camera.name for camera in rig if np.any(camera.distortion[2:4])]
     skewed = [camera.name for camera in rig if camera.K[0, 1]]
-    notes = (f"tangential distortion of {', '.join(bent)}",) if bent else ()
+    notes = (f"tangential distortion of {', '.join(tangential)}",) if tangential else ()
     return notes + ((f"skew of {', '.join(skewed)}",) if skewed else ())
 
 
@@ -76,7 +76,7 @@ def _text(values) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def _camera(where: str, number: int, element: ElementTree.Element, given: FileOptions) -> Camera:
+def _camera(where: str, number: int, element: ElementTree.Element, options: FileOptions) -> Camera:
     name = element.get("DEVICEID") or element.get("USERID") or f"camera {number}"
     where = f"{where}, camera '{name[:60]}'"
     frame = element.find("KeyFrames/KeyFrame")
@@ -92,7 +92,7 @@ def _camera(where: str, number: int, element: ElementTree.Element, given: FileOp
     if abs(np.linalg.norm(quaternion) - 1) > _QUATERNION_TOLERANCE:
         raise CalibrationError(f"{where}: ORIENTATION is not a unit quaternion; export the calibration again")
     rotation = Rotation.from_quat(quaternion)
-    centre = given.metres("mm") * _list(where, frame, "POSITION", 3)
+    centre = options.metres("mm") * _list(where, frame, "POSITION", 3)
     k1, k2, k3 = _radial(where, frame)
     return build_camera(
         where,
@@ -109,8 +109,8 @@ def _radial(where: str, frame: ElementTree.Element) -> np.ndarray:
     """Return k1, k2, k3: of the newer model, else of the older, which has no k3."""
     fields = (frame.get("VICON_RADIAL2") or "").split()[3:]
     name = "VICON_RADIAL2" if fields else "VICON_RADIAL"
-    found = parse_array(where, name, fields or (frame.get(name) or "0 0").split(), (2,), (3,))
-    return np.pad(found, (0, 3 - len(found)))
+    coefficients = parse_array(where, name, fields or (frame.get(name) or "0 0").split(), (2,), (3,))
+    return np.pad(coefficients, (0, 3 - len(coefficients)))
 
 
 def _list(where: str, element: ElementTree.Element, name: str, n: int) -> np.ndarray:

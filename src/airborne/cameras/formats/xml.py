@@ -1,4 +1,4 @@
-"""XML read with care: no entities, no document types, numbers checked."""
+"""XML, read with care: no entities, no document types, numbers checked."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def attribute_numbers(where: str, element: ElementTree.Element, attributes: str)
         text = element.get(attribute)
         value = parse_number(text)
         if not abs(value) <= LARGEST_NUMBER:
-            found = "is missing" if text is None else f"is '{text[:60]}'"
-            raise CalibrationError(f"{where}: {attribute} of <{element.tag}> {found}, expected a number")
+            problem = "is missing" if text is None else f"is '{text[:60]}'"
+            raise CalibrationError(f"{where}: {attribute} of <{element.tag}> {problem}, expected a number")
         values.append(value)
     return values
 
 
 def parse_number(text: str | None) -> float:
-    """Return the number that a text is; NaN where it is none."""
+    """Parse a number; NaN for anything else."""
     try:
         return float(text) if text is not None else np.nan
     except ValueError:

@@ -10,7 +10,7 @@ import xarray as xr
 from airborne.body import BodyModel
 from airborne.errors import BodyError
 from airborne.motion.angles import root_angles
-from airborne.motion.flight.momentum import WINDOW, angular_momenta, limit_rotation_variance, centre_of_mass
+from airborne.motion.flight.momentum import WINDOW, angular_momenta, centre_of_mass, limit_rotation_variance
 from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
 from airborne.motion.uncertainty import propagate_variances, standard_deviation

@@ -44,7 +44,7 @@ class StandingPosture:
 class Jump:
     """One flight of one player. Heights are rises in metres, times in seconds; what is not observed is NaN.
 
-    The four definitions of jump height do not measure the same thing: see docs/jumps.md before comparing them.
+    The four definitions of jump height do not measure the same thing: see docs/explanation/jumps.md before comparing.
     """
 
     player: str

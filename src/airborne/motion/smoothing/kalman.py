@@ -12,10 +12,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from airborne.kernels import kernel
 from airborne.motion.free_fall import GENERIC_NOISE
 from airborne.motion.smoothing.segments import SmoothedPaths, finite_rows
 from airborne.types import Array
@@ -142,7 +142,7 @@ def kalman_filter(model: StateSpaceModel, values: Array) -> tuple[Array, Array, 
     return *results[:4], float(results[4] - scale)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _filter_kernel(
     F: Array, Q: Array, H: Array, z: Array, is_measured: NDArray[np.bool_], mean: Array, P: Array
 ) -> tuple[Array, Array, Array, Array, float]:
@@ -173,7 +173,7 @@ def _filter_kernel(
     return before, P_before, after, P_after, log_likelihood
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _predict_mean(F: Array, mean: Array) -> Array:
     predicted = np.zeros_like(mean)
     for a in range(len(mean)):
@@ -182,7 +182,7 @@ def _predict_mean(F: Array, mean: Array) -> Array:
     return predicted
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _predict_covariance(F: Array, P: Array, Q: Array) -> Array:
     """Return F P F' + Q."""
     d = len(P)

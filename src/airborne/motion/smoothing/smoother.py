@@ -149,20 +149,11 @@ def smooth_landmarks(
         points = np.concatenate([points, com[:, None]], axis=1)
         diagonal = np.where(np.eye(3, dtype=bool), com_sd[:, None, :] ** 2, 0.0)
         covariance, names = np.concatenate([covariance, diagonal[:, None]], axis=1), [*names, CENTRE_OF_MASS]
-    paths = _smooth_points(
-        motion.time_s,
-        points,
-        covariance,
-        smoothing=smoothing,
-        boundaries_s=[boundaries_s] * len(names),
-        progress=progress,
-    )
+    own = [boundaries_s] * len(names)
+    segments = _smooth_points(motion.time_s, points, covariance, smoothing, boundaries_s=own, progress=progress)
     coordinates = _coordinates(motion.time_s, motion.index) | {"joint": names, "space": list("xyz")}
-    return xr.Dataset(
-        _position_variables(paths, ("time", "joint", "space")),
-        coordinates,
-        {"history": smoothing.history(boundaries_s)},
-    )
+    variables = _position_variables(segments, ("time", "joint", "space"))
+    return xr.Dataset(variables, coordinates, {"history": smoothing.history(boundaries_s)})
 
 
 def smooth_joint_angles(
@@ -215,26 +206,20 @@ def smooth_players(
     """
     n, n_players, n_joints = motion.points.shape[:3]
     own = [boundaries_s[name] for name in motion.players for _ in motion.joints]
-    paths = _smooth_points(
-        motion.time_s,
-        motion.points.reshape(n, -1, 3),
-        motion.covariance.reshape(n, -1, 3, 3),
-        smoothing=smoothing,
-        boundaries_s=own,
-        progress=progress,
-    )
+    points, covariance = motion.points.reshape(n, -1, 3), motion.covariance.reshape(n, -1, 3, 3)
+    segments = _smooth_points(motion.time_s, points, covariance, smoothing, boundaries_s=own, progress=progress)
     shape = (n, n_players, n_joints)
-    paths = SmoothedSegments(
-        SmoothedPaths(*(getattr(paths.paths, field.name).reshape(*shape, 3) for field in fields(SmoothedPaths))),
-        paths.segment.reshape(shape),
-        paths.is_filled.reshape(shape),
+    segments = SmoothedSegments(
+        SmoothedPaths(*(getattr(segments.paths, field.name).reshape(*shape, 3) for field in fields(SmoothedPaths))),
+        segments.segment.reshape(shape),
+        segments.is_filled.reshape(shape),
     )
     coordinates = _coordinates(motion.time_s, motion.index) | {
         "player": list(motion.players),
         "joint": list(motion.joints),
         "space": list("xyz"),
     }
-    variables = _position_variables(paths, ("time", "player", "joint", "space"))
+    variables = _position_variables(segments, ("time", "player", "joint", "space"))
     return xr.Dataset(variables, coordinates, {"history": smoothing.history(boundaries_s)})
 
 
@@ -242,8 +227,8 @@ def _smooth_points(
     time_s: Array,
     points: Array,
     covariance: Array,
-    *,
     smoothing: Smoothing,
+    *,
     boundaries_s: Sequence[Sequence[float]],
     progress: Progress | None,
 ) -> SmoothedSegments:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 
-_KERNEL: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": True}
+from airborne.kernels import kernel
 
 
-@njit(**_KERNEL)
+@kernel(fastmath=True)
 def cast_shadows(patch, x0, y0, floor_from_px, shadows, boxes, tint):
     """Darken the floor in a patch (h, w, 3), whose top left is the pixel x0, y0, under shadows (k, 4).
 
@@ -33,7 +30,7 @@ def cast_shadows(patch, x0, y0, floor_from_px, shadows, boxes, tint):
                         patch[v, u, c] *= 1 - tint[c] * shadows[k, 3] * d * d
 
 
-@njit(**_KERNEL)
+@kernel(fastmath=True)
 def composite(patch, x0, y0, colour, part):
     """Composite a body over a patch at its pixel x0, y0: colour (h, 2 w, 3) and part (h, 2 w) hold two samples a pixel.
 
@@ -50,7 +47,7 @@ def composite(patch, x0, y0, colour, part):
                     patch[y0 + v, x0 + u, c] = bare * patch[y0 + v, x0 + u, c] + half * body
 
 
-@njit(**_KERNEL)
+@kernel(fastmath=True)
 def blend_layer(patch, colour, alpha):
     """Blend a layer (h, w, 3) of opacity `alpha` (h, w), 0 to 255, over a patch."""
     height, width, _ = patch.shape
@@ -62,7 +59,7 @@ def blend_layer(patch, colour, alpha):
                     patch[v, u, c] += share * (colour[v, u, c] - patch[v, u, c])
 
 
-@njit(**_KERNEL)
+@kernel(fastmath=True)
 def expose(patch, gain, noise, out):
     """Write a patch (h, w, 3) as recorded: times `gain` (3,), plus noise (h, w, 3), to whole grey levels."""
     height, width, _ = patch.shape

@@ -29,8 +29,8 @@ def hall_rig(rng: np.random.Generator, n_cameras: int) -> Rig:
                 f"cam{k + 1}",
                 position + rng.normal(0, _POSITION_SD_M, 3),
                 _TARGET_M + rng.normal(0, _TARGET_SD_M, 3),
-                rng.uniform(*_FOCAL_PX),
-                SIZE,
+                focal_px=rng.uniform(*_FOCAL_PX),
+                size=SIZE,
             )
             for k, position in enumerate(_POSITIONS_M[:n_cameras])
         )

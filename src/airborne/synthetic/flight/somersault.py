@@ -164,7 +164,12 @@ def somersault_scene(
     scene = Scene(
         name=f"half-twisting somersault, {preset}, {target}, {style}",
         seed=seed,
-        rig=Rig(tuple(camera_looking_at(name, *view, PICTURE_SIZE) for name, view in _CAMERAS.items())),
+        rig=Rig(
+            tuple(
+                camera_looking_at(name, position, target_m, focal_px=focal_px, size=PICTURE_SIZE)
+                for name, (position, target_m, focal_px) in _CAMERAS.items()
+            )
+        ),
         body=skin_of(model) if target == "skin" else model,
         flight=skill,
         surroundings=None,

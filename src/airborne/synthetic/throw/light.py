@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from airborne.body import Box, Ellipsoid, Part, PosedBody
+from airborne.kernels import kernel
 from airborne.types import Array
 
 _CLEARANCE_M = 1e-3  # a surface does not occlude itself
@@ -106,7 +106,7 @@ def _to_unit(unit_from_world: Array, position: Array) -> Array:
     return np.column_stack([unit_from_world, -unit_from_world @ position])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _trace_boxes(points, target, boxes, out):
     for i in range(len(points)):
         out[i] = True
@@ -131,7 +131,7 @@ def _trace_boxes(points, target, boxes, out):
                 break
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _trace_ellipsoids(points, target, ellipsoids, out):
     ends = np.empty((len(ellipsoids), 3))  # the target, in the frame of each ellipsoid
     for e in range(len(ellipsoids)):

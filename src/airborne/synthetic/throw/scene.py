@@ -128,7 +128,8 @@ def thrown_cross(preset: ThrowPreset = "half-twist", *, seed: int = 0, clutter: 
         seed=seed,
         rig=Rig(
             tuple(
-                camera_looking_at(f"cam{i}", *place, PICTURE_SIZE) for i, place in enumerate(_CAMERAS.values(), start=1)
+                camera_looking_at(f"cam{i}", position, target, focal_px=focal_px, size=PICTURE_SIZE)
+                for i, (position, target, focal_px) in enumerate(_CAMERAS.values(), start=1)
             )
         ),
         body=body,

@@ -6,14 +6,13 @@ A state is one array (35,): the pose (18,), the lengths (9,) and the radii (8,) 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from airborne.kernels import kernel
 from airborne.tracking.capsules.evidence import capsule_evidence
 from airborne.tracking.capsules.jumper import CAPSULES, N_DOF, SURFACE_CLASSES, border_shares, pose_capsules
 from airborne.tracking.capsules.kernel_arguments import Capsules
 from airborne.tracking.capsules.outlines import BEHIND_M, project
-from airborne.tracking.capsules.spans import EXACT
 
 N_LENGTHS, N_CAPSULES, N_POINTS = 9, 10, 9
 _STEP = 1e-4  # [m, rad] of the finite differences
@@ -25,7 +24,7 @@ def classes_with(others: Capsules) -> NDArray[np.int64]:
     return np.concatenate([CAPSULES[:, :2], np.full((len(others.ends), 2), len(SURFACE_CLASSES))])
 
 
-@njit(**EXACT)
+@kernel
 def pose_state(state, points, ends, end_radii, share):
     """Pose a state: fill points (9, 3) [m], the capsules' ends (10, 2, 3) and radii (10, 2) [m], and shares (10,)."""
     lengths, radii = state[N_DOF : N_DOF + N_LENGTHS], state[N_DOF + N_LENGTHS :]
@@ -33,7 +32,7 @@ def pose_state(state, points, ends, end_radii, share):
     border_shares(lengths, radii, share)
 
 
-@njit(**EXACT)
+@kernel
 def accumulate_equations(state, n_free, images, owned, equations):
     """Sum a jumper's evidence over the views and return it [nats times pixels].
 
@@ -81,7 +80,7 @@ def accumulate_equations(state, n_free, images, owned, equations):
     return total
 
 
-@njit(**EXACT)
+@kernel
 def _chain_to_world(ends, discs, depth, camera, g, H, capsule_gradient, capsule_curvature, offset_gradient):
     """Chain a capsule's gradient (7,) and curvature (7, 7) by its discs and share to its parameters in the world.
 
@@ -115,7 +114,7 @@ def _chain_to_world(ends, discs, depth, camera, g, H, capsule_gradient, capsule_
             offset_gradient[p, k] = px_per_m * (HJ[p, k] + HJ[p + 3, k])
 
 
-@njit(**EXACT)
+@kernel
 def _differentiate(state, points, ends, end_radii, share, jacobian, capsule_jacobian):
     """Fill the Jacobians of points (27, n_free) and capsules (10, 9, n_free) by the first numbers of a state."""
     n, n_free = N_CAPSULES, jacobian.shape[1]

@@ -10,12 +10,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from airborne.kernels import kernel
 from airborne.tracking.capsules.outlines import BEHIND_M, border_in_row, outline, part_at
 from airborne.tracking.capsules.spans import (
-    EXACT,
-    INLINE,
     MOST_SPANS,
     Border,
     add_span,
@@ -53,7 +51,7 @@ class _Nearer(NamedTuple):
     x: Any  # (n, 2, h) outlines, see `outline`
 
 
-@njit(**EXACT)
+@kernel
 def capsule_evidence(discs, depth, classes, share, sums, contrast, origin, work, out, gradient, curvature):
     """Sum maps under the capsules, and differentiate the sum by their discs.
 
@@ -130,13 +128,13 @@ def capsule_evidence(discs, depth, classes, share, sums, contrast, origin, work,
                 curvature[i, q, p] = curvature[i, p, q]
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def _row_interval(top, bottom, y):
     """Return which part of a height interval counts for the row at y: half way to its neighbours, or to the end."""
     return top if y - 1 < top else y - 0.5, bottom if y + 1 > bottom else y + 0.5
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def _edge_derivative(discs, tangents, who, piece, y, outward):
     """Differentiate an end of a span of capsule `who` by its discs: (x0, x1, t, by_y, by_r).
 
@@ -160,7 +158,7 @@ def _edge_derivative(discs, tangents, who, piece, y, outward):
     return cx + outward * h_top, cx + outward * h_bottom, float(piece), -outward * (h_bottom - h_top), by_r
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def _add_edge(discs, tangents, edge, ox, map_0, map_1, border, gradient, curvature):
     """Add the derivatives at the end of a span by its capsule's discs; ox is the region's first column.
 
@@ -182,7 +180,7 @@ def _add_edge(discs, tangents, edge, ox, map_0, map_1, border, gradient, curvatu
     _accumulate(1.0, by_y, by_r, t, value, facing, gradient[who], curvature[who])
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def _accumulate(by_x, by_y, by_r, t, value, facing, gradient, curvature):
     """Add an edge with derivatives by_x, by_y, by_r by x, y, radius: 1 - t of disc a, t of b; `value`: its gain."""
     of_a, of_b, by = 1 - t, t, (by_x, by_y, by_r)
@@ -202,13 +200,13 @@ def _accumulate(by_x, by_y, by_r, t, value, facing, gradient, curvature):
                     curvature[3 + p, q] += facing * of_a * of_b * by[p] * by[q]
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def _is_level(tangent):
     """Return whether a tangent runs across rather than down; False where there is none."""
     return abs(tangent[6] - tangent[0]) > _LEVEL_RATIO * abs(tangent[2] - tangent[1])
 
 
-@njit(**EXACT)
+@kernel
 def _add_level_edges(discs, share, tangents, classes, sums, contrast, nearer, origin, out, gradient, curvature):
     """Correct the sums along a capsule's level tangents column by column, and add their derivatives.
 
@@ -255,7 +253,7 @@ def _add_level_edges(discs, share, tangents, classes, sums, contrast, nearer, or
                     _accumulate(-m, 1.0, 1 / ny, t, outward * step * value, facing, gradient[i], curvature[i])
 
 
-@njit(**EXACT)
+@kernel
 def _is_occluded(nearer, u, row):
     """Return whether a nearer capsule covers a point of a row."""
     order, i, first, last, x = nearer
@@ -267,7 +265,7 @@ def _is_occluded(nearer, u, row):
     return False
 
 
-@njit(**EXACT)
+@kernel
 def _add_border(disc, share, maps, contrast, nearer, origin, gradient, curvature):
     """Add the derivatives of the border across a capsule as it moves along the axis."""
     ux, uy = disc[1, 0] - disc[0, 0], disc[1, 1] - disc[0, 1]

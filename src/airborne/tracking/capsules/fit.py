@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from airborne.kernels import kernel
 from airborne.tracking.capsules.equations import N_CAPSULES, N_POINTS, accumulate_equations, classes_with
 from airborne.tracking.capsules.jumper import FOOT_HEIGHT_M, LIMITS_RAD, N_DOF
 from airborne.tracking.capsules.kernel_arguments import Capsules, Equations, Images, SummedMaps, Workspace
-from airborne.tracking.capsules.spans import EXACT
 from airborne.tracking.capsules.views import RegionMaps
 from airborne.types import Array
 
@@ -127,7 +126,7 @@ def _allocate_iterate(state: Array, n: int, owned: Array) -> _Iterate:
     return _Iterate(state.copy(), np.empty(2), np.empty(n), np.empty((n, n)), owned.copy(), Equations.of(N_POINTS, n))
 
 
-@njit(**EXACT)
+@kernel
 def _maximise(best, trial, priors, images, weight, most_steps):
     """Climb from the iterate `best` to the nearest maximum; return whichever of the two iterates holds it."""
     n, damping = len(best.gradient), _DAMPING
@@ -151,7 +150,7 @@ def _maximise(best, trial, priors, images, weight, most_steps):
     return best
 
 
-@njit(**EXACT)
+@kernel
 def _evaluate(iterate, priors, images, weight):
     """Evaluate the evidence at an iterate's state, add the priors, and fill the rest of the iterate."""
     anchors, anchor_sd_m = priors.anchors, priors.anchor_sd_m
@@ -188,7 +187,7 @@ def _evaluate(iterate, priors, images, weight):
     iterate.totals[0], iterate.totals[1] = nats, nats - cost
 
 
-@njit(**EXACT)
+@kernel
 def _add(row, target, weight, A, b):
     """Add an observation to the normal equations: row (n,) times the step is `target`."""
     for i in range(len(row)):

@@ -7,12 +7,10 @@ x, y, z, the knee's and the ankle's flexion. Axes and signs are those of `human`
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 
 from airborne.body.legs import LEG_POINTS
+from airborne.kernels import kernel
 
 N_DOF = 18
 JOINTS = (*LEG_POINTS, "foot_left", "foot_right", "torso")
@@ -34,7 +32,6 @@ LIMITS_RAD = np.radians(  # (18, 2) least and greatest; the right leg mirrors y 
     + list(_LEG_LIMITS_DEG)
     + [tuple(-x for x in limits[::-1]) if i in (1, 2) else limits for i, limits in enumerate(_LEG_LIMITS_DEG)]
 )
-_KERNEL: dict[str, Any] = {"nogil": True, "error_model": "numpy", "cache": True}
 
 
 # the two surface classes and the leg (0 trunk, 1 left, 2 right) of each capsule
@@ -45,7 +42,7 @@ CAPSULES = np.array(
 )
 
 
-@njit(**_KERNEL)
+@kernel
 def _rotate(R, axis, angle, out):
     """Fill out (3, 3) with R times a rotation about one of its axes."""
     c, s = np.cos(angle), np.sin(angle)
@@ -56,7 +53,7 @@ def _rotate(R, axis, angle, out):
         out[i, j], out[i, k] = c * a + s * b, c * b - s * a
 
 
-@njit(**_KERNEL)
+@kernel
 def pose_capsules(pose, lengths, radii, points, ends, end_radii):
     """Pose a jumper: pose (18,), lengths (9,), radii (8,) [m].
 
@@ -88,7 +85,7 @@ def pose_capsules(pose, lengths, radii, points, ends, end_radii):
         _pose_leg(pose, lengths, radii, side, pelvis, points, ends, end_radii)
 
 
-@njit(**_KERNEL)
+@kernel
 def _pose_leg(pose, lengths, radii, side, pelvis, points, ends, end_radii):
     first, c = 8 + 5 * side, 4 + 3 * side
     R, thigh, shank = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -113,7 +110,7 @@ def _pose_leg(pose, lengths, radii, side, pelvis, points, ends, end_radii):
     end_radii[c + 2, 0] = end_radii[c + 2, 1] = radii[R_FOOT]
 
 
-@njit(**_KERNEL)
+@kernel
 def border_shares(lengths, radii, out):
     """Fill out (10,) with how far along its axis the first class of each capsule reaches.
 

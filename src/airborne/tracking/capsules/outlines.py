@@ -6,14 +6,13 @@ Along its axis a capsule may change from one surface class to another (shorts to
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from airborne.tracking.capsules.spans import EXACT, INLINE
+from airborne.kernels import kernel
 
 BEHIND_M = 1e9  # depth of what is not in front of the camera [m]
 
 
-@njit(**EXACT)
+@kernel
 def project(ends, radii, camera, discs, depth):
     """Project capsules: ends (n, 2, 3) world [m], radii (n, 2) [m], camera (4, 4): K [R t], then the focal length [px].
 
@@ -35,7 +34,7 @@ def project(ends, radii, camera, discs, depth):
         depth[i] = mean if nearest > 0.1 else BEHIND_M
 
 
-@njit(**EXACT)
+@kernel
 def outline(disc_a, disc_b, y_first, x, pieces, tangents):
     """Outline the hull of two discs (x, y, radius) [px] in rows at y_first, y_first + 1, ...
 
@@ -85,7 +84,7 @@ def outline(disc_a, disc_b, y_first, x, pieces, tangents):
     return first, last
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def border_in_row(disc, share, y, x_middle):
     """Return where a row meets the border across a capsule, at a share of its axis: (x, weight, split).
 
@@ -103,7 +102,7 @@ def border_in_row(disc, share, y, x_middle):
     return cx, min(max(0.5 - beyond, 0.0), 1.0), 0
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def part_at(disc, share, u, y):
     """Return which of a capsule's two classes lies at a point."""
     ux, uy = disc[1, 0] - disc[0, 0], disc[1, 1] - disc[0, 1]
@@ -111,7 +110,7 @@ def part_at(disc, share, u, y):
     return 0 if share >= 1 or (u - cx) * ux + (y - cy) * uy < 0 else 1
 
 
-@njit(**EXACT)
+@kernel
 def draw_labels(discs, depth, classes, share, out):
     """Fill out (h, w) with the class of the nearest capsule at each pixel, -1 where none; see `capsule_evidence`."""
     h, w = out.shape

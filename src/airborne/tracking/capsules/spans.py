@@ -8,11 +8,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
-# no fast maths: sums keep their order, so that a run is the same to the last bit however the code was compiled
-EXACT: dict[str, Any] = {"nogil": True, "error_model": "numpy", "cache": True}
-INLINE: dict[str, Any] = {**EXACT, "inline": "always"}  # for what is called for every span: passing arrays costs more
+from airborne.kernels import kernel
 
 MOST_SPANS = 64  # disjoint ones in one row
 
@@ -25,7 +22,7 @@ class Border(NamedTuple):
     split: Any  # 0: the border lies along the row; 1: the first map lies left of cut; -1: right
 
 
-@njit(**EXACT)
+@kernel
 def cumulative_sums(maps, out):
     """Fill out (k, h, w + 1) with the sums of maps (k, h, w) over all pixels to the left of each pixel's left side."""
     k, h, w = maps.shape
@@ -38,14 +35,14 @@ def cumulative_sums(maps, out):
                 out[c, y, x + 1] = total
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def sum_at(row, x):
     """Interpolate cumulative sums between pixels: pixel i reaches from i - 0.5 to i + 0.5."""
     i = int(x + np.float32(0.5))
     return row[i] + (x + np.float32(0.5) - i) * (row[i + 1] - row[i])
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def value_at(row, x):
     """Interpolate the map itself from its cumulative sums: linear between pixel centres."""
     i = int(x)
@@ -53,13 +50,13 @@ def value_at(row, x):
     return (1 - f) * (row[i + 1] - row[i]) + f * (row[i + 2] - row[i + 1])
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def value_between(sums, x, y, above):
     """Interpolate a map between its rows, of which `above` is the upper one."""
     return (above + 1 - y) * value_at(sums[above], x) + (y - above) * value_at(sums[above + 1], x)
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def border_sum_at(map_0, map_1, x, border):
     """Interpolate the cumulative sums of the maps that apply left of x, up to a constant."""
     cut, weight, split = border
@@ -72,7 +69,7 @@ def border_sum_at(map_0, map_1, x, border):
     return sum_at(on_left, middle) + sum_at(on_right, x) - sum_at(on_right, middle)
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def border_value_at(map_0, map_1, edge, border):
     """Interpolate the map that applies at an edge of a span."""
     cut, weight, split = border
@@ -81,7 +78,7 @@ def border_value_at(map_0, map_1, edge, border):
     return value_at(map_0, edge) if (edge < cut) == (split > 0) else value_at(map_1, edge)
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def contrast_at(contrast, class_0, class_1, edge, border):
     """Return the contrast of the map that applies at an edge of a span."""
     cut, weight, split = border
@@ -90,7 +87,7 @@ def contrast_at(contrast, class_0, class_1, edge, border):
     return contrast[class_0] if (edge < cut) == (split > 0) else contrast[class_1]
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def add_span(map_0, map_1, at, end, border, out):
     """Add the sums and the areas from `at` to `end` of a row of cumulative sums to out (2, 2)."""
     cut, weight, split = border
@@ -111,7 +108,7 @@ def add_span(map_0, map_1, at, end, border, out):
     out[j, 1] += end - middle
 
 
-@njit(**INLINE)
+@kernel(inline="always")
 def merge_span(taken_x, taken_by, taken, a, b, owner):
     """Merge a span into the ordered, disjoint ones taken so far, each end with its owner; return their number."""
     left_by, right_by, n = owner, owner, 0

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from airborne.rendering.shapes import KERNEL
+from airborne.kernels import kernel
 
 RADIUS_PX = 4  # radius of the blur: three sds of the widest one used
 
@@ -16,7 +15,7 @@ def gaussian_taps(sigma_px: float) -> np.ndarray:
     return (taps / (2 * taps.sum() - taps[0])).astype(np.float32)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def blur(planes, taps_u, taps_v, out):
     """Blur planes (c, h, w) with separable symmetric taps (5,) into out; outside the planes the border is repeated."""
     c, h, w = planes.shape

@@ -7,18 +7,17 @@ Each adds one view's equations to `sums` and `blocks`; see `accumulate` for them
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from airborne.appearance.lighting import fit_light, flatten_shading, shade_body
+from airborne.kernels import kernel
 from airborne.rendering.drawing import draw_maps
 from airborne.rendering.maps import surface_maps
-from airborne.rendering.shapes import KERNEL
 from airborne.tracking.model_based.blur import blur
 from airborne.tracking.model_based.owners import find_owners
 from airborne.tracking.model_based.twist_equations import accumulate
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def silhouette_equations(body, projection, observation, comparison, maps, sums, blocks):
     """Add one view's equations of `blurred posterior - blurred mask`.
 
@@ -37,7 +36,7 @@ def silhouette_equations(body, projection, observation, comparison, maps, sums, 
     return accumulate(residual, shape, coverage[0], owner, nearness, projection, observation, comparison, sums, blocks)
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def photometric_equations(body, projection, observation, comparison, maps, paint, light, iterations, sums, blocks):
     """Add one view's equations of `blurred observed - blurred composite`, in linear light.
 
@@ -53,7 +52,7 @@ def photometric_equations(body, projection, observation, comparison, maps, paint
     )
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def known_light_equations(body, projection, observation, comparison, maps, is_faceted, lamps, ambient, sums, blocks):
     """Add one view's equations under known lights, in shares of full sRGB; lamps (l, 8), ambient as in `draw_maps`."""
     x0, y0, x1, y1 = comparison.window
@@ -73,7 +72,7 @@ def known_light_equations(body, projection, observation, comparison, maps, is_fa
     )
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _draw(body, projection, maps, window):
     """Draw the maps of a view; return the segment that owns each pixel of the window, and its inverse depth."""
     R, t, view = projection.R, projection.t, projection.packed_view
@@ -84,7 +83,7 @@ def _draw(body, projection, maps, window):
     return owner, nearness
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _mask_coverage(part, comparison):
     x0, y0, x1, y1 = comparison.window
     mask, coverage = np.empty((1, y1 - y0, x1 - x0), np.float32), np.empty((1, y1 - y0, x1 - x0), np.float32)
@@ -95,7 +94,7 @@ def _mask_coverage(part, comparison):
     return coverage
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _composite_equations(lit, is_faceted, part, owner, nearness, projection, observation, comparison, sums, blocks):
     """Compare the image with the lit body (3, h, w) in front of the background."""
     observed, background = observation.observed, observation.background

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from airborne.rendering.shapes import KERNEL
+from airborne.kernels import kernel
 from airborne.tracking.model_based.blur import RADIUS_PX
 from airborne.tracking.model_based.kernel_arguments import Window
 
@@ -13,7 +12,7 @@ REACH_PX = 3  # an edge matters this far away: most of the blur's weight
 _PAD_PX = RADIUS_PX + 3  # beyond it, the blurred mask is zero
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def mask_window(part):
     """Return the padded window around the body's pixels of a map of parts (h, w); all 0 where there is none."""
     h, w = part.shape
@@ -28,7 +27,7 @@ def mask_window(part):
     return Window(max(x0 - _PAD_PX, 0), max(y0 - _PAD_PX, 0), min(x1 + _PAD_PX + 1, w), min(y1 + _PAD_PX + 1, h))
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
     """Assign each pixel to the segment whose edge moves it: of those within REACH_PX, the one nearest to the camera.
 
@@ -58,7 +57,7 @@ def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
                         owner[y, x], nearness[y, x], distance[y, x] = own, near, d
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def _is_front_edge(part, inverse_depth, segment_of_part, v, u):
     """Return whether a pixel of the body borders on a segment behind it, or on the background."""
     height, width = part.shape

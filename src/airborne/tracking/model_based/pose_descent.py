@@ -91,7 +91,7 @@ class _Iterate:
         return self.equations.objective(reference.noise, self.dofs.prior_cost(self.equations.pose, self.prior))
 
     def step(self, share: float) -> tuple[Pose, float]:
-        """Return the pose after a share of the step, and what the images promise of the whole."""
+        """Return the pose after a share of the step, and the decrease that the images predict of the whole."""
         pose = self.dofs.update(self.equations.pose, share * self.delta)
         return pose, 0.5 * float(self.delta @ self.equations.A @ self.delta) / self.noise
 
@@ -116,7 +116,7 @@ def descend_pose(
         lambda pose: _Iterate(evaluate(pose, False), dofs, prior),
         BacktrackingRule(overstep, _SHORTER),
         most_steps=most_steps - 1,
-        least_promise=(0.5 * tolerance * len(dofs.columns), 0.0),
+        least_predicted=(0.5 * tolerance * len(dofs.columns), 0.0),
         slack=_SLACK,
     )
     best = descent.best

@@ -8,9 +8,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
-from airborne.rendering.shapes import KERNEL
+from airborne.kernels import kernel
 
 BLOCK_PX = 16  # residuals this close are correlated: the side of a block of the covariance's sandwich
 _EDGE = 0.01  # blurred coverage below which a pixel is not used
@@ -42,7 +41,7 @@ def new_blocks(width: int, height: int, n_segments: int) -> np.ndarray:
     return np.zeros((height // BLOCK_PX + 1, width // BLOCK_PX + 1, n_segments, 6))
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def accumulate(residual, shape, coverage, owner, nearness, projection, observation, comparison, sums, blocks):
     """Add one view's normal equations for the twist of each segment about the projection's origin: A twist = g.
 
@@ -129,7 +128,7 @@ def accumulate(residual, shape, coverage, owner, nearness, projection, observati
     return cost, total, weight_sum
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def map_equations(A, g, jacobians, H, gradient):
     """Add the segments' equations, A (s, 6, 6) and g (s, 6), mapped by the jacobians (s, 6, d), to H (d, d) and (d,).
 
@@ -160,7 +159,7 @@ def map_equations(A, g, jacobians, H, gradient):
                             H[i, j] += J[p, i] * AJ[p, j]
 
 
-@njit(**KERNEL)
+@kernel(fastmath=True)
 def add_score_covariance(blocks, jacobians, S):
     """Add to S (d, d) the sum of G G' over the blocks (n, s, 6), G a block's gradient mapped by jacobians (s, 6, d)."""
     d = len(S)

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from airborne.appearance.hue_saturation import HSV_BINS, OUTSIDE
+from airborne.kernels import kernel
 
 N_ALONG, N_ACROSS = 15, 7
 N_SAMPLES = N_ALONG * N_ACROSS
@@ -23,7 +23,7 @@ _FIXED = float(1 << _FIXED_BITS)  # pixels are stepped through in whole numbers:
 _ROOT_STEPS = np.diff(np.sqrt(np.arange(N_SAMPLES + 1) / N_SAMPLES)).astype(np.float32)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sampling_grid(ends, projection, focal_px, width_m, grid):
     """Fill grid (6,): the pixel of one corner's cell, the step along, the step across; False behind the camera."""
     ua, va, wa = 0.0, 0.0, 0.0
@@ -53,7 +53,7 @@ def _sampling_grid(ends, projection, focal_px, width_m, grid):
     return abs(grid[0]) < _FAR_PX and abs(grid[1]) < _FAR_PX and length + width < _FAR_PX
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def compare_rods(codes, corner, projection, focal_px, ends, widths_m, roots, classes, overlap, share):
     """Compare many rods with their references in one image.
 
@@ -91,7 +91,7 @@ def compare_rods(codes, corner, projection, focal_px, ends, widths_m, roots, cla
             overlap[i, r], share[i, r] = total, hits / N_SAMPLES
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_rods(codes, corner, projection, focal_px, ends, widths_m, counts):
     """Add to counts (rods, 111) the bins of the rods' samples: ends (rods, 2, 3) [m], the rest as in `read_rods`."""
     h, w = codes.shape

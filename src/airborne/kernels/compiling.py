@@ -1,0 +1,86 @@
+"""The decorator of all kernels, and what makes their machine code independent of what else a process compiled.
+
+A kernel's object code holds copies of the kernels that it calls, compiled anew among its own code. Numba leaves these
+copies visible, as weak symbols, and the linker then takes one copy for all: the one that was loaded first. That is the
+called kernel's own in a process that compiles, and a caller's copy in one that loads from the cache. Under fast maths
+the two differ in the last digits. So a kernel here keeps its copies to itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba import config, njit
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+
+from airborne.kernels.cache import KernelCache
+
+
+def kernel(
+    function: Callable | None = None,
+    *,
+    fastmath: bool = False,
+    inline: str = "never",
+    is_inner: bool = False,
+    signature: str | None = None,
+) -> Any:
+    """Compile a function of arrays at its first call; it lets go of Python's lock and divides as NumPy does.
+
+    `fastmath` lets sums change their order, `inline="always"` copies the function into the kernels that call it. What
+    `is_inner` is called by kernels only, and cached only as a part of them. With a `signature` the function is compiled
+    for these types, and when it is imported.
+    """
+    if function is None:
+        return lambda f: kernel(f, fastmath=fastmath, inline=inline, is_inner=is_inner, signature=signature)
+    # every option is set: what is not, Numba takes over from the kernel that happens to call it first
+    options = {
+        "nogil": True,
+        "error_model": "numpy",
+        "fastmath": fastmath,
+        "forceinline": False,
+        "inline": inline,
+        "no_cpython_wrapper": is_inner,
+        "no_cfunc_wrapper": is_inner,
+    }
+    compiled: Any = njit(pipeline_class=_Compiler, **options)(function)
+    if config.DISABLE_JIT:  # type: ignore[attr-defined]
+        return compiled
+    if not is_inner:
+        compiled._cache = KernelCache(compiled)
+    if signature is not None:
+        compiled.compile(signature)
+        compiled.disable_compile()
+    return compiled
+
+
+class _Library(JITCodeLibrary):
+    """The machine code of one kernel, with private copies of what it calls."""
+
+    def _finalize_final_module(self) -> None:
+        shared = [f for f in self._final_module.functions if not f.is_declaration and f.linkage == _SHARED]
+        for function in shared:
+            function.linkage = llvm.Linkage.internal
+        super()._finalize_final_module()  # here the machine code is made
+        for function in shared:
+            function.linkage = _SHARED  # for kernels that call this one: they need one copy of each function only
+
+    def _get_module_for_linking(self) -> Any:
+        """Return what callers copy: read back from its bytes, as it is where this kernel comes from the cache."""
+        if self._shared_module is None:
+            self._shared_module = llvm.parse_bitcode(super()._get_module_for_linking().as_bitcode())
+        return self._shared_module
+
+
+_SHARED = llvm.Linkage.linkonce_odr
+
+
+class _Compiler(Compiler):
+    """Numba's compiler, with libraries of our own."""
+
+    def compile_extra(self, func: Callable) -> Any:
+        self.state.library = _Library(self.state.targetctx.codegen(), func.__qualname__)
+        self.state.library.enable_object_caching()
+        return super().compile_extra(func)

@@ -1,0 +1,76 @@
+"""The tutorial is done from its first line to its last: every file written, every command and snippet run."""
+
+import re
+import shlex
+import shutil
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from airborne.cli import app
+from tests.support.places import ROOT
+
+PAGE = ROOT / "docs" / "tutorials" / "first-trial.md"
+STEPS = re.compile(r"(?:`([\w./-]+)`[^`\n]*:\n\n)?^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FILES = {"my-throw/body.toml", "my-throw/start.csv", "my-throw/trial.toml"}
+
+
+def run(line):
+    """Run one line of a shell block: a copy, or a command of ours."""
+    program, *words = shlex.split(line)
+    if program == "cp":
+        shutil.copytree(ROOT / words[1], words[2])
+        return ""
+    assert program == "airborne", line
+    done = CliRunner().invoke(app, words, catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """The folder in which everything was done, and what each command printed."""
+    folder, printed, written = tmp_path_factory.mktemp("tutorial"), {}, set()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        mpl.use("Agg")
+        for name, language, text in STEPS.findall(PAGE.read_text(encoding="utf-8")):
+            if language == "bash":
+                printed |= {line: run(line) for line in text.splitlines()}
+            elif language == "python":
+                exec(compile(text, str(PAGE), "exec"), {})
+            else:
+                (folder / name).write_text(text, encoding="utf-8")
+                written.add(name)
+    assert written == FILES
+    return folder, printed
+
+
+def test_the_tutorial_leaves_what_it_says(done):
+    folder, printed = done
+    for name in ("calib.toml", "results/report.html", "results/agreement_methods.txt", "results/smooth_motion.csv"):
+        assert (folder / name).is_file(), name
+    assert (folder / "results" / "export" / "results.c3d").is_file()
+    assert (folder / "angles.png").stat().st_size > 10_000
+    assert "34 tracked" in printed["airborne track my-throw/trial.toml -o results"]
+
+
+def test_the_tutorial_states_its_errors_rightly(done):
+    _, printed = done
+    text = printed["airborne evaluate results --digitised my-throw/digitised.csv"]
+    mm = [float(each) for each in re.findall(r"^  [xyz] +([\d.]+) ", text, re.MULTILINE)][:3]
+    deg = [float(each) for each in re.findall(r"^  (?:somersault|tilt|twist) +([\d.]+) ", text, re.MULTILINE)][:3]
+    np.testing.assert_allclose(mm, 2.0, atol=0.5)
+    np.testing.assert_allclose(deg, 0.5, atol=0.15)
+
+
+def test_every_file_that_the_tutorial_leaves_is_documented(done):
+    folder, _ = done
+    page = (ROOT / "docs" / "reference" / "results.md").read_text(encoding="utf-8")
+    cells = " ".join(re.findall(r"^\| (`.*?) \|", page, re.MULTILINE))
+    known = re.escape(" ".join(re.findall(r"`([^`]+)`", cells))).replace("<camera>", "cam\\d")
+    known = re.sub("<reference>", "(truth|digitised)", known).split("\\ ")
+    left = [path.name + "/" * path.is_dir() for path in (folder / "results").iterdir()]
+    assert [name for name in sorted(left) if not any(re.fullmatch(each, name) for each in known)] == []
