@@ -23,6 +23,10 @@ class BackgroundPixels(NamedTuple):
     sd: NDArray[np.float32]  # (h, w)
     n_observations: NDArray[np.uint8]  # (h, w)
 
+    def copy(self) -> BackgroundPixels:
+        """Copy the arrays."""
+        return BackgroundPixels(self.mean.copy(), self.sd.copy(), self.n_observations.copy())
+
 
 _UNKNOWN = BackgroundPixels(
     np.zeros((_TILE_PX, _TILE_PX, 3), np.float32),
@@ -54,7 +58,7 @@ class BackgroundModel:
         """Learn from a region's image rgb (h, w, 3); covered (h, w) where the body may be."""
         learned = dict(self.tiles)
         for at, in_region, in_tile in _tiles_of(corner, covered.shape):
-            learned[at] = BackgroundPixels(*(each.copy() for each in self.tiles.get(at, _UNKNOWN)))
+            learned[at] = self.tiles.get(at, _UNKNOWN).copy()
             update_background(rgb[in_region], covered[in_region], *(each[in_tile] for each in learned[at]))
         return BackgroundModel(learned)
 

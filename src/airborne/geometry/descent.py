@@ -23,7 +23,10 @@ class Outcome(StrEnum):
 class Rule(Protocol):
     """How a number, the damping of the equations or the share of the step, follows from the steps tried before."""
 
-    first: float
+    @property
+    def first(self) -> float:
+        """The number of the first step."""
+        ...
 
     def after_gain(self, value: float, ratio: float) -> float:
         """Return the number after a step that gained `ratio` times the predicted decrease."""
@@ -106,11 +109,11 @@ class BacktrackingRule:
 class Iterate(Protocol):
     """Where a descent may be."""
 
-    def cost(self, reference: Any) -> float:
+    def cost(self, reference: Any, /) -> float:
         """Return the cost here, as measured with what the reference, another iterate, says of the noise."""
         ...
 
-    def step(self, value: float) -> tuple[Any, float]:
+    def step(self, value: float, /) -> tuple[Any, float]:
         """Return where a step leads, damped or shortened by the rule, and the predicted decrease of the cost."""
         ...
 
