@@ -16,8 +16,8 @@ from rows import append
 from airborne.body.files import read_body
 from airborne.body.symmetry import symmetries
 from airborne.evaluation import (
-    compare_motion,
     compare_digitised,
+    compare_motion,
     fit_digitised_poses,
     is_recovered,
     perturb,
@@ -28,10 +28,11 @@ from airborne.evaluation.basin import Basin
 from airborne.motion import Motion
 from airborne.run.body_tracking import open_trial
 from airborne.tracking.methods import tracker_of
-from airborne.tracking.model_based.refined import RefinedTracker, RefinedState
+from airborne.tracking.model_based.refined import RefinedState, RefinedTracker
 from airborne.tracking.tracker import step
+from airborne.trial.calibration import CalibrationTable
 from airborne.trial.examples import example_trial
-from airborne.trial.file import CalibrationTable, Trial, read_trial
+from airborne.trial.file import Trial, read_trial
 
 FOLDER = example_trial("thrown_cross").parent
 MODEL = read_body(FOLDER / "cross.toml")

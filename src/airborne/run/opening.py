@@ -21,7 +21,8 @@ from airborne.export import write_json
 from airborne.motion.run_folder import RUN_RECORD, read_record
 from airborne.run.first_pose import resect_moved_cameras
 from airborne.tracking.methods import FIELD_MODES
-from airborne.trial.file import CameraTable, Trial
+from airborne.trial.cameras import CameraTable
+from airborne.trial.file import Trial
 from airborne.video import (
     LiveRecording,
     Recording,
@@ -155,7 +156,7 @@ def run_identity(trial: Trial, *, live: bool = False) -> dict[str, Any]:
     """Return what two runs share if one can resume the other."""
     settings = {
         "inputs": input_hashes(trial, live=live),
-        "settings": trial.track.method_settings,
+        "settings": trial.track.model_dump(),
         "version": __version__,
     }
     return json.loads(json.dumps(settings))
@@ -184,7 +185,7 @@ def provenance(
     return {
         "warnings": [_EXACT_CALIBRATION] if calibration is None else list(calibration.warnings),
         "events": recording.events,
-        "method": trial.track.method_settings,
+        "method": trial.track.model_dump(),
         "cameras": cameras,
         "versions": versions(),
         "inputs": inputs,
@@ -199,14 +200,7 @@ def versions() -> dict[str, str]:
 
 def input_hashes(trial: Trial, *, live: bool = False) -> dict[str, str]:
     """Return the SHA-256 of each input file, by the name that the trial gives it; live video has none."""
-    optional = (
-        trial.body.source_file,
-        trial.calibration.file,
-        trial.calibration.control_points,
-        trial.track.torso,
-        *trial.start.source_files,
-    )
-    names = [*(camera.video for camera in trial.camera if not live), *(name for name in optional if name)]
+    names = [*(camera.video for camera in trial.camera if not live), *trial.input_files]
     rest = [trial.start, trial.lights, trial.calibration, trial.body, *trial.camera]
     start = json.dumps([table and table.model_dump() for table in rest])
     hashes = {name: _sha256(trial.path(name)) for name in names}

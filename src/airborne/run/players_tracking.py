@@ -144,7 +144,7 @@ def _artists(
 ) -> Iterator[PlayersOverlayVideos]:
     if pictures:
         yield PlayersOverlayVideos(
-            folder, recording.rig, recording.rate, style=trial.track.overlay, starts=trial.players
+            folder, recording.rig, recording.rate, style=trial.track.model_dump()["overlay"], starts=trial.players
         )
 
 
