@@ -23,8 +23,9 @@ from airborne.evaluation.players import PartErrors
 from airborne.export import write_figures
 from airborne.motion import covariance_file, flight_summary
 from airborne.motion.files import _header
-from airborne.run import body_tracking
+from airborne.run.body import write_tables
 from airborne.run.evaluate import assess
+from airborne.run.track import track_trial
 from airborne.trial.body import BodyTable
 from airborne.trial.calibration import CalibrationTable
 from airborne.trial.cameras import CameraTable
@@ -218,7 +219,7 @@ def run(tmp_path_factory):
     """The folder of a short run with everything that a run can leave."""
     example = ROOT / "examples" / "thrown_cross"
     folder = tmp_path_factory.mktemp("docs") / "run"
-    body_tracking.track(read_trial(example / "trial.toml", {"stop": 2}), folder)
+    track_trial(read_trial(example / "trial.toml", {"stop": 2}), folder)
     assess(folder, example / "truth.csv", example / "digitised.csv")
     return folder
 
@@ -255,7 +256,7 @@ def person(tmp_path_factory):
     """The folder of the tables and figures of a body with joints and masses, and its motion."""
     folder, motion = tmp_path_factory.mktemp("docs") / "person", person_run(4)
     folder.mkdir()
-    body_tracking._write_tables(folder, motion, PERSON)
+    write_tables(folder, motion, PERSON)
     write_figures(folder, motion, PERSON)
     return folder, motion
 
