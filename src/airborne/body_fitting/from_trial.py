@@ -19,8 +19,9 @@ from airborne.cameras.clicks import read_positions
 from airborne.errors import TrialError
 from airborne.export.views import crop_camera, resample_view
 from airborne.rendering import FLAT, render
-from airborne.run.body_tracking import open_trial
-from airborne.run.first_pose import LANDMARK_WEIGHTS, landmarks_over_time
+from airborne.run.detections import landmarks_over_time
+from airborne.run.opening import Opened, open_trial
+from airborne.tracking.first_pose import LANDMARK_WEIGHTS
 from airborne.trial.file import Trial
 from airborne.types import Array
 from airborne.video import Frames, Recording
@@ -52,8 +53,9 @@ def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: Stage
         raise TrialError(f"frames is {n_frames}; expected at least 1 frame to fit the body to")
     report = progress or (lambda what, done, total: None)
     model = trial.model()
-    recording, _ = open_trial(trial)
-    landmarks = _landmarks_by_frame(trial, recording)
+    opened = open_trial(trial)
+    recording = opened.recording
+    landmarks = _landmarks_by_frame(trial, opened)
     chosen, around = _choose_frames(trial, landmarks, n_frames)
     observations = _read(recording, landmarks, sorted({*chosen, *around}), report)
     missing = [index for index in chosen if index not in observations]
@@ -96,10 +98,11 @@ def describe_fit(person: PersonFit) -> str:
     return "\n".join(lines)
 
 
-def _landmarks_by_frame(trial: Trial, recording: Recording) -> dict[int, dict[str, Array]]:
+def _landmarks_by_frame(trial: Trial, opened: Opened[Recording]) -> dict[int, dict[str, Array]]:
     """Return the landmarks of each frame of the recording: frame -> landmark -> (3,) [m]."""
-    if trial.start.detections is not None:
-        over_time = landmarks_over_time(trial, recording.rig)
+    recording = opened.recording
+    if opened.detections is not None:
+        over_time = landmarks_over_time(recording.rig, opened.detections)
         facts, n = recording.facts[0], len(next(iter(over_time.values())))
         per_frame = round(facts.image_rate / facts.frame_rate)
         stop = n * per_frame if trial.track.stop is None else min(n * per_frame, trial.track.stop)

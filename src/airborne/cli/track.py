@@ -14,8 +14,7 @@ from airborne.cli.results import evaluate_command
 from airborne.errors import AirborneError
 
 if TYPE_CHECKING:
-    from airborne.run.body_tracking import Run
-    from airborne.run.players_tracking import PlayersRun
+    from airborne.run.track import Run
 
 
 def demo_command(
@@ -40,7 +39,7 @@ def demo_command(
 
 def _clear_demo(path: Path, output: Path) -> None:
     """Let the demo run again in its own folder; a folder with any other run is left alone."""
-    from airborne.run.body_tracking import holds_run_of
+    from airborne.run.folder import holds_run_of
     from airborne.trial.file import read_trial
 
     if holds_run_of(read_trial(path), output):
@@ -91,9 +90,8 @@ def _track(
     changes: dict | None = None,
     cameras: str | None = None,
     live: bool = False,
-) -> Run | PlayersRun:
-    from airborne.run.body_tracking import track as track_body
-    from airborne.run.players_tracking import track_players
+) -> Run:
+    from airborne.run.track import track_trial
     from airborne.trial.file import read_trial
 
     names = None if cameras is None else [name.strip() for name in cameras.split(",") if name.strip()]
@@ -104,9 +102,7 @@ def _track(
         raise AirborneError('--live is for players; this trial has no body preset = "legs"')
     try:
         with progress(f"tracking {trial.name}") as report:
-            if trial.has_players:
-                return track_players(trial, output, resume=resume, live=live, pictures=pictures, progress=report)
-            return track_body(trial, output, resume=resume, pictures=pictures, progress=report)
+            return track_trial(trial, output, resume=resume, live=live, pictures=pictures, progress=report)
     except KeyboardInterrupt:
         if live and not output.exists():
             stop("not every camera had delivered a frame yet, so nothing is written")

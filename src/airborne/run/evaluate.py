@@ -56,7 +56,7 @@ from airborne.export.analysis_figures import write_bland_altman, write_identity
 from airborne.io.text import read_json
 from airborne.motion import Motion
 from airborne.motion.run_folder import check_record, holds_players, read_body_run, read_players_run
-from airborne.run.opening import versions
+from airborne.run.provenance import versions
 
 Comparisons = Mapping[str, Comparison | DigitisedComparison | JointComparison | PlayersComparison]
 

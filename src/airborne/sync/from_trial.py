@@ -12,7 +12,7 @@ import numpy as np
 
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, TrialError
-from airborne.run.opening import cameras_of, video_source
+from airborne.run.opening import open_cameras, video_source
 from airborne.sync import Offsets, offsets_by_flash, offsets_by_motion, offsets_by_sound
 from airborne.sync.from_tracking import offsets_by_tracking
 from airborne.trial.file import Trial
@@ -48,13 +48,13 @@ def synchronise(
     if by == "flash":
         offsets = offsets_by_flash(sources, with_drift=with_drift, progress=progress)
     elif by == "sound":
-        apart_m = _largest_distance_m(cameras_of(trial)[0])
+        apart_m = _largest_distance_m(open_cameras(trial).rig)
         offsets = offsets_by_sound(sources, microphones_apart_m=apart_m, with_drift=with_drift, progress=progress)
     elif by == "tracking":
         present = np.array([camera.offset_s for camera in trial.camera])
         offsets = offsets_by_tracking(trial, present, with_drift=with_drift, progress=progress)
     else:
-        offsets = offsets_by_motion(sources, cameras_of(trial)[0], within_s=within_s, progress=progress)
+        offsets = offsets_by_motion(sources, open_cameras(trial).rig, within_s=within_s, progress=progress)
         if by == "auto" and not trial.has_players:
             offsets = _refine(trial, offsets, progress)
     return round_to_images(offsets, sources) if whole_pictures else offsets

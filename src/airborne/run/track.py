@@ -1,0 +1,127 @@
+"""One recording from files, or live, to results: the loop over its frames, the same for a body and for players."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
+from functools import partial
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airborne.cameras import write_pose2sim
+from airborne.errors import ResultError
+from airborne.export import write_json
+from airborne.motion import Motion, PlayersMotion
+from airborne.run.body import BodyRun
+from airborne.run.folder import prepare_folder, run_identity
+from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
+from airborne.run.players import PlayersRun
+from airborne.run.players_tracker import compile_kernels
+from airborne.run.provenance import provenance
+from airborne.tracking.tracker import track_frames
+from airborne.trial.file import Trial
+from airborne.types import Progress
+from airborne.video import LiveRecording, Outages
+
+Subject = BodyRun | PlayersRun
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """The results of a finished run; its folder holds the same."""
+
+    motion: Motion | PlayersMotion
+    summary: dict[str, Any]
+
+
+def track_trial(
+    trial: Trial,
+    folder: Path,
+    *,
+    resume: bool = False,
+    live: bool = False,
+    pictures: bool = True,
+    progress: Progress | None = None,
+) -> Run:
+    """Track a trial, a body or players, and write the results into a folder.
+
+    `resume` continues a run that was killed, to the same result; of players by tracking again from the start, their
+    rows stay. `live`, for players, reads pipes, capture devices, or files at their own speed, drops frames rather than
+    fall behind, and ends with them or with KeyboardInterrupt. `pictures=False` leaves out videos, figures and report.
+    Raises an AirborneError for input that cannot be used, and for a folder that holds another run.
+    """
+    if live and resume:
+        raise ResultError("a live run cannot be resumed: its frames are gone; track into a new folder")
+    started_s = time.monotonic()
+    with ExitStack() as stack:
+        opened = _open(trial, stack, progress) if live else open_trial(trial)
+        subject = PlayersRun.open(trial, opened) if trial.has_players else BodyRun.open(trial, opened)
+        identity = run_identity(trial, live=live)
+        goes_on = prepare_folder(folder, identity, subject.table, resume=resume)
+        write_pose2sim(folder / "calib.toml", opened.recording.rig)
+        subject.copy_inputs(folder)
+        read_s = time.monotonic()
+        subject, delays_s = _track(subject, folder, resume=goes_on, pictures=pictures, progress=progress)
+    tracked_s = time.monotonic()
+    motion, summary = subject.finish(folder)
+    summary |= provenance(trial, opened, identity["inputs"])
+    summary["warnings"] += subject.warnings()
+    if pictures:
+        subject.draw_figures(folder, motion)
+    if isinstance(opened.recording, LiveRecording):
+        summary["live"] = {
+            "cameras": opened.recording.image_counts(),
+            "median_delay_s": float(np.median(delays_s)),
+            "largest_delay_s": max(delays_s),
+        }
+    summary["timings_s"] = {
+        "opening": read_s - started_s,
+        "tracking": tracked_s - read_s,
+        "writing": time.monotonic() - tracked_s,
+        "tracking_a_frame": (tracked_s - read_s) / len(motion),
+    }
+    write_json(folder / "summary.json", summary)
+    if pictures:
+        subject.write_report(folder, summary, motion)
+    return Run(motion, summary)
+
+
+def _open(trial: Trial, stack: ExitStack, progress: Progress | None) -> Opened[LiveRecording]:
+    """Open a trial's live cameras for as long as the stack is."""
+    compile_kernels(trial)
+    return stack.enter_context(open_live(trial, (lambda: None) if progress is None else (lambda: progress(0, None))))
+
+
+def _track(
+    subject: Subject, folder: Path, *, resume: bool, pictures: bool, progress: Progress | None
+) -> tuple[Subject, list[float]]:
+    """Track every frame, written and drawn at once; return the subject as seen, and live frames' delays [s]."""
+    recording, delays_s = subject.opened.recording, []
+    outages = Outages(recording.rig.names)
+    with ExitStack() as stack:
+        frames = stack.enter_context(closing(iter(recording)))
+        first = next(frames, None)
+        if first is None:
+            raise past_the_end_error(subject.trial)
+        subject = subject.see(first)
+        done = subject.read_done(folder) if resume else ()
+        writer = stack.enter_context(subject.writer(folder, resume=resume))
+        artists = [stack.enter_context(artist) for artist in subject.artists(folder)] if pictures else []
+        tracked = track_frames(subject.tracker(), chain([first], frames), partial(subject.write, writer), done)
+        try:
+            for number, (observed, estimate) in enumerate(tracked, start=1):
+                if isinstance(recording, LiveRecording):
+                    delays_s.append(time.monotonic() - recording.arrival_s)
+                outages.add(observed)
+                subject.draw(artists, observed, estimate)
+                if progress is not None:
+                    progress(number, recording.n_frames)
+        except KeyboardInterrupt:
+            if not delays_s:  # only a live run ends like this
+                raise
+    recording.events.extend(outages.describe())
+    return subject, delays_s
