@@ -46,6 +46,7 @@ from airborne.run.opening import (
     cameras_of,
     holds_run_of,
     input_hashes,
+    list_tables,
     open_trial,
     past_the_end_error,
     prepare_folder,
@@ -101,6 +102,7 @@ def track(
     motion = read_motion(folder / "motion.csv")
     _write_tables(folder, motion, model)
     summary = _summary(trial, calibration, recording, motion=motion, model=model, inputs=identity["inputs"])
+    summary["tables"] = list_tables(folder)
     if pictures:
         write_figures(folder, motion, model)
     summary["timings_s"] = {

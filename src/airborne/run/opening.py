@@ -191,6 +191,11 @@ def provenance(
     }
 
 
+def list_tables(folder: Path) -> list[str]:
+    """Return the names of the tables in a run's folder."""
+    return sorted(path.name for path in folder.iterdir() if path.suffix in (".csv", ".parquet"))
+
+
 def versions() -> dict[str, str]:
     """Return the versions of everything that a result may depend on."""
     packages = ("numpy", "scipy", "numba", "av", "opencv-python-headless")

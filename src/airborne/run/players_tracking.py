@@ -19,7 +19,15 @@ from airborne.export import PlayersOverlayVideos, write_json, write_players_repo
 from airborne.motion import PlayersMotion, PlayersWriter, read_players, write_players_parquet
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.table import jump_row, write_jumps
-from airborne.run.opening import open_live, open_trial, past_the_end_error, prepare_folder, provenance, run_identity
+from airborne.run.opening import (
+    list_tables,
+    open_live,
+    open_trial,
+    past_the_end_error,
+    prepare_folder,
+    provenance,
+    run_identity,
+)
 from airborne.run.players_tracker import compile_kernels, players_tracker_of
 from airborne.tracking import Status
 from airborne.trial.file import Trial
@@ -83,6 +91,7 @@ def track_players(
     write_jumps(folder / "jumps.csv", found_jumps)
     summary = _summary(trial, calibration, recording, motion=motion, inputs=identity["inputs"])
     summary["jumps"] = [jump_row(jump) for jump in found_jumps]
+    summary["tables"] = list_tables(folder)
     if isinstance(recording, LiveRecording):
         summary["live"] = {
             "cameras": recording.image_counts(),
