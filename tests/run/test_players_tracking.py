@@ -57,6 +57,13 @@ def test_a_run_leaves_every_players_joints_at_every_frame(path, tmp_path):
     assert read_rig(tmp_path / "run" / "calib.toml").names == ("left", "right")
 
 
+def test_without_pyarrow_a_run_leaves_no_parquet(path, tmp_path, monkeypatch):
+    monkeypatch.setattr("airborne.motion.players.CAN_WRITE_PARQUET", False)
+    run = track_players(read_trial(path), tmp_path / "run", pictures=False)
+    assert {file.name for file in (tmp_path / "run").iterdir()} == TABLES - {"joints.parquet"}
+    assert run.summary["tables"] == ["joints.csv", "jumps.csv"]
+
+
 def test_the_summary_counts_each_player_and_names_the_inputs(path, tmp_path):
     track_trial(read_trial(path), tmp_path / "run", pictures=False)
     summary = summary_of(tmp_path / "run")
@@ -71,6 +78,7 @@ def test_the_summary_counts_each_player_and_names_the_inputs(path, tmp_path):
     assert summary["events"] == []
     assert set(summary["inputs"]) == {"left.mkv", "right.mkv", "calib.toml", "start and lights"}
     assert summary["timings_s"]["tracking_a_frame"] * 12 == pytest.approx(summary["timings_s"]["tracking"])
+    assert summary["tables"] == ["joints.csv", "joints.parquet", "jumps.csv"]
     assert "live" not in summary
 
 

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from airborne.export import page, panels
+from airborne.export import panels
+from airborne.export.page import UNKNOWN_TEXT, render_report
 from airborne.export.palette import STATUS_RGB, hex_colour
-from airborne.export.report import DEFINITIONS, records_table, status_bar
+from airborne.export.report import DEFINITIONS
 from airborne.export.summary import json_ready
 from airborne.motion import PlayersMotion
 from airborne.tracking import Status
@@ -55,7 +56,20 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
     _write_heights(folder / FIGURE, motion)
     path = folder / "report.html"
     summary = json_ready(summary)
-    path.write_text(page.document(summary["name"], _sections(folder, summary)), encoding="utf-8")
+    uncertainty = f"{_DEFINITIONS['Uncertainty']} {summary['uncertainty']}"
+    html = render_report(
+        "players_report.html.j2",
+        summary,
+        alarms=[*players_warnings(summary), *summary["warnings"]],
+        fine_text="Every player was tracked in every frame.",
+        definitions={**_DEFINITIONS, "Uncertainty": uncertainty},
+        players=[{"player": name, **player} for name, player in summary["players"].items()],
+        jumps=[_jump_record(row) for row in summary["jumps"]],
+        jumps_caption=_JUMPS_CAPTION,
+        heights=folder / FIGURE,
+        heights_caption=_FIGURE_CAPTION,
+    )
+    path.write_text(html, encoding="utf-8")
     return path
 
 
@@ -83,7 +97,7 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
     for name, player in summary["players"].items():
         counts = ", ".join(f"{player[f'n_{status}']} {status}" for status in Status)
         sd_mm = player["median_sd_mm"]
-        yield f"{name}: {counts}; median sd of a joint {page.UNKNOWN_TEXT if sd_mm is None else f'{sd_mm:.0f} mm'}"
+        yield f"{name}: {counts}; median sd of a joint {UNKNOWN_TEXT if sd_mm is None else f'{sd_mm:.0f} mm'}"
     for jump in summary["jumps"]:
         feet, flight = (_interval_cm(jump, what) for what in ("feet", "flight time"))
         warning = f"; {jump['n_uncertain']} of its frames are uncertain" if jump["n_uncertain"] else ""
@@ -91,62 +105,34 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
     yield from _drop_notes(summary)
 
 
-def _jumps_table(rows: list[Mapping[str, Any]]) -> str:
-    """Return the table of all jumps, each number with its 95 % interval."""
-    table = [
-        {
-            "player": row["player"],
-            "jump": row["jump"],
-            "status": row["status"],
-            **{name: _with_interval(row, *quantity) for name, quantity in _JUMP_QUANTITIES.items()},
-            "uncertain frames": row["n_uncertain"],
-        }
-        for row in rows
-    ]
-    return records_table(table) + page.bullets([_JUMPS_CAPTION])
+def _jump_record(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the report shows of a jump, each number with its 95 % interval."""
+    return {
+        "player": row["player"],
+        "jump": row["jump"],
+        "status": row["status"],
+        **{name: _with_interval(row, *quantity) for name, quantity in _JUMP_QUANTITIES.items()},
+        "uncertain frames": row["n_uncertain"],
+    }
 
 
 def _with_interval(row: Mapping[str, Any], name: str, scale: float, digits: int) -> str:
     numbers = [row[name + end] for end in ("", "_low", "_high")]
     if any(number is None or not np.isfinite(number) for number in numbers):
-        return page.UNKNOWN_TEXT
+        return UNKNOWN_TEXT
     middle, low, high = (f"{scale * number:.{digits}f}" for number in numbers)
     return f"{middle} ({low} to {high})"
 
 
 def _interval_cm(row: Mapping[str, Any], what: str) -> str:
     text = _with_interval(row, *_JUMP_QUANTITIES[what])
-    return text if text == page.UNKNOWN_TEXT else f"{text} cm"
+    return text if text == UNKNOWN_TEXT else f"{text} cm"
 
 
 def _drop_notes(summary: Mapping[str, Any]) -> Iterator[str]:
     if live := summary.get("live"):
         counts = ", ".join(f"{c['name']} {c['n_dropped']} of {c['n_received']}" for c in live["cameras"])
         yield f"live: frames dropped to keep up: {counts}; delay {1e3 * live['median_delay_s']:.0f} ms (median)"
-
-
-def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
-    yield page.heading(summary["name"], 1)
-    yield status_bar(summary)
-    alarms = [*players_warnings(summary), *summary["warnings"]]
-    if alarms:
-        yield page.box("warnings", "<b>Read this first</b>" + page.bullets(alarms))
-    else:
-        yield page.box("fine", "Every player was tracked in every frame.")
-    if summary["events"]:
-        yield page.heading("The recording") + page.bullets(summary["events"])
-    yield page.heading("Players") + records_table([{"player": name, **p} for name, p in summary["players"].items()])
-    if summary["jumps"]:
-        yield page.heading("Jumps") + _jumps_table(summary["jumps"])
-    yield page.heading("Heights")
-    yield page.figure(folder / FIGURE, _FIGURE_CAPTION)
-    yield page.heading("Method") + page.settings(summary["method"])
-    yield page.heading("Cameras") + records_table(summary["cameras"])
-    yield page.heading("What the numbers mean")
-    uncertainty = f"{_DEFINITIONS['Uncertainty']} {summary['uncertainty']}"
-    yield page.definitions({**_DEFINITIONS, "Uncertainty": uncertainty})
-    for key, title in (("timings_s", "Time taken [s]"), ("versions", "Versions"), ("inputs", "Inputs (SHA-256)")):
-        yield page.heading(title) + page.table(summary[key].items())
 
 
 def _write_heights(path: Path, motion: PlayersMotion) -> None:

@@ -78,3 +78,8 @@ def _sha256(path: Path) -> str:
             digest.update(file.read())
             digest.update(str(size).encode())
     return digest.hexdigest()
+
+
+def list_tables(folder: Path) -> list[str]:
+    """Return the names of the tables in a run's folder."""
+    return sorted(path.name for path in folder.iterdir() if path.suffix in (".csv", ".parquet"))

@@ -17,7 +17,7 @@ from airborne.errors import ResultError
 from airborne.export import write_json
 from airborne.motion import Motion, PlayersMotion
 from airborne.run.body import BodyRun
-from airborne.run.folder import prepare_folder, run_identity
+from airborne.run.folder import list_tables, prepare_folder, run_identity
 from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
 from airborne.run.players import PlayersRun
 from airborne.run.players_tracker import compile_kernels
@@ -70,6 +70,7 @@ def track_trial(
     motion, summary = subject.finish(folder)
     summary |= provenance(trial, opened, identity["inputs"])
     summary["warnings"] += subject.warnings()
+    summary["tables"] = list_tables(folder)
     if pictures:
         subject.draw_figures(folder, motion)
     if isinstance(opened.recording, LiveRecording):
