@@ -15,12 +15,12 @@ from airborne.body import (
     Segment,
     human18,
     human18_from_measurements,
-    total_inertia,
     total_inertias,
 )
 from airborne.body.anthropometry import measurements_of, segment_properties
 from airborne.body.inertia import combine_inertias, transform_inertia
 from airborne.errors import BodyError
+from tests.support.bodies import total_inertia
 from tests.support.tolerances import EXACT, ROUNDTRIP
 from tests.support.yeadon_oracle import random_configuration, same_pose, whole_by_slices, yeadon_person
 

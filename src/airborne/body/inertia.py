@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airborne.body.model import BodyModel, Inertia, PosedBody
+from airborne.body.model import BodyModel, Inertia
 from airborne.errors import BodyError
 from airborne.types import Array
 
@@ -25,19 +25,11 @@ def transform_inertia(inertia: Inertia, R: Array, t: Array) -> Inertia:
     return Inertia(inertia.mass_kg, R @ inertia.centre_m + t, R @ inertia.tensor_kg_m2 @ R.T)
 
 
-def total_inertia(posed: PosedBody) -> Inertia:
-    """Find a posed body's mass, centre of mass [m] and inertia tensor about it [kg m^2], in world axes.
-
-    Raises BodyError for a body with a segment of unknown inertia.
-    """
-    mass, centre, tensor = total_inertias(posed.model, posed.R[None], posed.t[None])
-    return Inertia(mass, centre[0], tensor[0])
-
-
 def total_inertias(model: BodyModel, R: Array, t: Array) -> tuple[float, Array, Array]:
     """Find the mass [kg], the centres of mass (n, 3) [m] and the tensors about them (n, 3, 3) [kg m^2] of n poses.
 
-    R (n, s, 3, 3), t (n, s, 3) [m]: world from segment. World axes. Raises BodyError as `total_inertia`.
+    R (n, s, 3, 3), t (n, s, 3) [m]: world from segment. World axes. Raises BodyError for a body with a segment of
+    unknown inertia.
     """
     mass, local_centres, local_tensors = segment_inertias(model)
     centres = np.einsum("nsij,sj->nsi", R, local_centres) + t

@@ -1,12 +1,12 @@
 """Synthetic recordings with truth: in comes a `Scene`, out come its frames or a whole trial; knows no tracker."""
 
 from airborne.synthetic.block.pictures import block_frames
-from airborne.synthetic.block.scene import DIFFICULTIES, BlockScene, Difficulty, block_scene, paper_sequences
+from airborne.synthetic.block.scene import DIFFICULTIES, BlockScene, Difficulty, block_scene
 from airborne.synthetic.block.truth import jump_truth, noisy_starts, torso_input, true_joints
 from airborne.synthetic.block.writing import write_block
 from airborne.synthetic.flight.articulated import Takeoff, fly_articulated
 from airborne.synthetic.flight.rigid import Launch, MassProperties, SampledFlight, fly, mass_properties
-from airborne.synthetic.flight.somersault import PoseRanges, half_twist, pose_ranges, somersault_scene
+from airborne.synthetic.flight.somersault import PoseRanges, half_twist, somersault_scene
 from airborne.synthetic.throw.light import Ambient, Spot
 from airborne.synthetic.throw.pictures import scene_frames
 from airborne.synthetic.throw.scene import Scene, thrown_cross
@@ -34,8 +34,6 @@ __all__ = [
     "jump_truth",
     "mass_properties",
     "noisy_starts",
-    "paper_sequences",
-    "pose_ranges",
     "scene_frames",
     "somersault_scene",
     "thrown_cross",

@@ -11,7 +11,6 @@ from airborne.errors import BodyError
 from airborne.geometry.rotations import geodesic
 from airborne.synthetic.flight.articulated import (
     Takeoff,
-    constant_joints,
     fly_articulated,
     joint_motion,
     mass_at_angles,
@@ -20,6 +19,7 @@ from airborne.synthetic.flight.articulated import (
     with_fixed_joints,
 )
 from airborne.synthetic.flight.rigid import GRAVITY_M_S2, Launch, MassProperties, fly
+from tests.support.synthetic import constant_joints
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
 TIMES = np.arange(0, 0.61, 0.05)

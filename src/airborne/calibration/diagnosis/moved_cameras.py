@@ -39,7 +39,6 @@ class _Displacement:
 
     moment: int  # the first after it
     shift_px: float
-    spread_px: float
     turn_rad: float
     shift_m: float
 
@@ -132,7 +131,7 @@ def _find_displacement(rig: Rig, others: Sequence[str], name: str, px: Array) ->
     before, after = np.median(displacements[:k], axis=0), np.median(displacements[k:], axis=0)
     moment = _first_moment_after(track, before, after)
     change = after - before
-    return _Displacement(moment, step_px, scatter, float(np.linalg.norm(change[:3])), float(np.linalg.norm(change[3:])))
+    return _Displacement(moment, step_px, float(np.linalg.norm(change[:3])), float(np.linalg.norm(change[3:])))
 
 
 def _rms(shifts: Array, *, quantile: float) -> float:

@@ -136,18 +136,6 @@ def block_scene(
     )
 
 
-def paper_sequences(seed: int = 0, *, difficulty: Difficulty | None = None) -> list[BlockScene]:
-    """Draw as many sequences as the block-jump paper has: 22, of them 5 with two or three blockers, 1798 frames."""
-    rate = (difficulty or Difficulty()).frame_rate
-    counts, n_blockers = paper_lengths(np.random.default_rng([seed, 20]))
-    return [
-        block_scene(
-            1000 * (seed + 1) + k, n_blockers=int(n), difficulty=difficulty, n_frames=round(int(count) * rate / 60)
-        )
-        for k, (n, count) in enumerate(zip(n_blockers, counts, strict=True))
-    ]
-
-
 def paper_lengths(rng: np.random.Generator) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
     """Draw how many frames at 60 a second the paper's sequences have, (22,), and how many blockers, (22,)."""
     lengths = np.clip(rng.normal(_MEAN_FRAMES, 6, _PAPER_SCENES), _FEWEST_FRAMES + 4, 100)

@@ -44,11 +44,6 @@ class MassDistribution(NamedTuple):
     momentum: Array  # (n, 3) angular, of the joints' motion about the centre of mass [kg m^2/s]
 
 
-def constant_joints(joint_angles: Array) -> PPoly:
-    """Return the motion of joints with constant angles (joints, 3) [rad]."""
-    return PPoly(np.asarray(joint_angles, float)[None, None], [0.0, 1.0])
-
-
 def joint_motion(time_s: Array, joint_angles: Array) -> PPoly:
     """Return the motion of joints that rest at the angles (n, joints, 3) [rad] at the times (n,), increasing [s].
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from typing import Literal, get_args
@@ -104,14 +104,6 @@ class Skill:
     def poses_s(self) -> Array:
         """The times of the paper's poses, evenly from take-off to landing: (11,) [s]."""
         return np.linspace(0, self.duration_s, N_POSES)
-
-
-def pose_ranges(flight: SampledFlight) -> PoseRanges:
-    """Return the ranges of a flight's root over its samples: along z, y and x, and of its three angles."""
-    lateral, forward, vertical = np.ptp(flight.position, axis=0)
-    angles = np.ptp(unwrap(angles_from_matrix(flight.R), flight.time_s), axis=0)
-    values = (vertical, forward, lateral, *angles)
-    return PoseRanges(**{field.name: float(value) for field, value in zip(fields(PoseRanges), values, strict=True)})
 
 
 @lru_cache(maxsize=8)

@@ -151,7 +151,7 @@ class TorsoTracker:
         if not observation.used.any():
             return None
         overlap, _ = observation.compare(_window(values), [0])
-        return reweight(uniform_particles(values), detection(overlap)[:, 0, observation.used[0]].sum(axis=-1))[0].mean
+        return reweight(uniform_particles(values), detection(overlap)[:, 0, observation.used[0]].sum(axis=-1)).mean
 
     def _free_views(self, torsos: Array, i: int) -> NDArray[np.bool_]:
         others = np.delete(torsos, i, axis=0)
