@@ -13,8 +13,8 @@ from airborne.calibration import calibrate_from, sources_from
 from airborne.calibration.sources.court import court_points
 from tests.support.places import ROOT
 
-TEXT = (ROOT / "docs" / "calibrate-your-cameras.md").read_text(encoding="utf-8")
-DIAGNOSIS = ROOT / "src" / "airborne" / "cameras" / "diagnosis"
+TEXT = (ROOT / "docs" / "how-to" / "calibrate-your-cameras.md").read_text(encoding="utf-8")
+DIAGNOSIS = ROOT / "src" / "airborne" / "calibration" / "diagnosis"
 
 
 def fences(language):

@@ -189,7 +189,7 @@ def test_every_number_is_documented(run, tmp_path):
     evaluate_agreement(
         run, joints=run.parent / "higher.csv", repeats=[shutil.copytree(run, tmp_path / "again")], out=tmp_path
     )
-    text = (DOCS / "agreement.md").read_text(encoding="utf-8")
+    text = (DOCS / "how-to" / "agreement.md").read_text(encoding="utf-8")
     for name in ("agreement.csv", "repeatability.csv"):
         header = (tmp_path / name).read_text().splitlines()[0].split(",")
         stems = {column.removesuffix("_low").removesuffix("_high") for column in header}

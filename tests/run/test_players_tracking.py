@@ -100,7 +100,7 @@ def test_videos_and_report_are_written_on_request(path, tmp_path):
 
 def test_everything_that_a_run_leaves_is_documented(path, tmp_path):
     run = track_trial(read_trial(path, {"stop": 2}), tmp_path / "run")
-    page = DOCS / "results.md"
+    page = DOCS / "reference" / "results.md"
     left = {re.sub(r"_(left|right)\.mp4", "_<camera>.mp4", file.name) for file in (tmp_path / "run").iterdir()}
     assert left == {name for row in table_of(page, "Files of a run of players") for name in named(row[0])}
     documented = [name for row in table_of(page, "`joints.csv` of players") for name in named(row[0])]

@@ -10,7 +10,7 @@ from airborne.calibration.sources.files import Sources, read_sources
 from airborne.errors import CalibrationError
 from tests.support.places import ROOT
 
-PAGE = ROOT / "docs" / "calibration.md"
+PAGE = ROOT / "docs" / "reference" / "calibration.md"
 MODELS = {
     "[[camera]]": tables.CameraSource,
     "[start]": tables.StartSource,
