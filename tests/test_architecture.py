@@ -169,6 +169,14 @@ def test_every_package_says_what_it_is_and_what_is_public(package):
     assert len(set(names)) == len(names)
 
 
+def test_the_command_line_opens_without_numbers_and_figures():
+    heavy = ["numpy", "scipy", "numba", "cv2", "pydantic", "matplotlib"]
+    code = f"import sys, airborne.cli; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stderr == ""
+    assert done.stdout.strip() == "[]"
+
+
 def test_tracking_loads_no_figures_and_no_windows():
     code = f"import sys, airborne.tracking, airborne.tracking.methods; print([m for m in {HEAVY} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)

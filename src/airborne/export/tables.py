@@ -78,7 +78,8 @@ def write_csv(path: Path, columns: Columns) -> None:
 
 def write_parquet(path: Path, columns: Columns) -> None:
     """Write columns as Parquet, units in the metadata; NaN is null. Needs *pyarrow*."""
-    values, units = ({name: column[k] for name, column in columns.items()} for k in (0, 1))
+    values = {name: column.values for name, column in columns.items()}
+    units = {name: column.unit for name, column in columns.items()}
     parquet.write_parquet(path, values, units, _CONVENTIONS)
 
 

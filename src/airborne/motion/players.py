@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -213,7 +214,9 @@ def _whole_lines_end(path: Path) -> int:
 
 
 def _table(path: Path, n_bytes: int) -> pd.DataFrame:
-    types = {name: "category" if name in _TEXTS else int if name in _WHOLE else float for name in PLAYERS_COLUMNS}
+    types: dict[Hashable, Any] = {
+        name: "category" if name in _TEXTS else int if name in _WHOLE else float for name in PLAYERS_COLUMNS
+    }
     with path.open("rb") as file:
         data = file.read(n_bytes)
     header = data[: data.find(b"\n")].decode(errors="replace").strip()
