@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.appearance.background import START_SD, BackgroundModel, inpaint, update_background
+from airborne.appearance.background import START_SD, BackgroundModel, inpaint
 from tests.support.tolerances import sampled
 
 SINGLE = 1e-4  # float32, of grey levels in the hundreds
@@ -17,10 +17,11 @@ def images(n, sd, mean=120.0, seed=0):
 
 
 def learn(observed, covered=NOWHERE):
-    model = BackgroundModel(*SHAPE)
+    """What is known of the background after some images."""
+    model = BackgroundModel()
     for rgb in observed:
-        update_background(rgb, covered, model.mean, model.sd, model.n_observations)
-    return model
+        model = model.learn(rgb, covered, (0, 0))
+    return model.crop((0, 0), SHAPE)
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 20])
@@ -72,6 +73,29 @@ def test_covered_pixels_are_not_learned():
 def test_number_of_observations_does_not_overflow():
     model = learn(images(1, 0.0).repeat(260, axis=0))
     np.testing.assert_array_equal(model.n_observations, 250)
+
+
+def test_a_region_is_learned_where_it_lies_and_nowhere_else():
+    rng, corner, size = np.random.default_rng(2), (100, 117), (150, 161)  # over six tiles
+    image = rng.integers(0, 256, (*size, 3)).astype(np.uint8)
+    model = BackgroundModel().learn(image, np.zeros(size, bool), corner)
+    np.testing.assert_array_equal(model.crop(corner, size).mean, image)
+    around = model.crop((corner[0] - 40, corner[1] - 30), (size[0] + 60, size[1] + 80))
+    np.testing.assert_array_equal(around.mean[30:180, 40:201], image)
+    assert np.count_nonzero(around.n_observations) == size[0] * size[1]
+    assert np.all(around.sd == START_SD)
+    np.testing.assert_array_equal(model.crop((110, 130), (20, 30)).mean, image[13:33, 10:40])
+
+
+def test_learning_leaves_the_model_as_it_was_and_shares_what_it_did_not_touch():
+    whole = np.full((300, 400, 3), 90, np.uint8)
+    first = BackgroundModel().learn(whole, np.zeros((300, 400), bool), (0, 0))
+    later = first.learn(whole[:40, :50] + 20, np.zeros((40, 50), bool), (10, 20))
+    assert np.all(first.crop((0, 0), (300, 400)).mean == 90)
+    assert np.all(first.crop((0, 0), (300, 400)).n_observations == 1)
+    assert np.all(later.crop((10, 20), (40, 50)).mean == 100)
+    assert np.all(later.crop((10, 20), (40, 50)).n_observations == 2)
+    assert {at for at in first.tiles if later.tiles[at] is not first.tiles[at]} == {(0, 0)}
 
 
 def test_inpainting_keeps_observed_pixels_and_grows_them_into_the_rest():

@@ -40,8 +40,7 @@ class LearnedFrame:
             body = self.render_model.with_pose(SCENE.start(index))
             for region in crop_regions([body], self.render_model.geometry, SCENE.frames(index), 32):
                 mask = self.render_model.draw_parts(body, region) >= 0
-                self._appearance.learn_colours(region, mask)
-                self._appearance.learn_background(region, mask)
+                self._appearance = self._appearance.learn_colours(region, mask).learn_background(region, mask)
 
     def views(self, pose):
         """The regions that hold the truth and a pose, and their posteriors."""

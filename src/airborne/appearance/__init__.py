@@ -3,13 +3,14 @@
 Knows no body and no search.
 """
 
-from airborne.appearance.background import BackgroundModel, inpaint, update_background
+from airborne.appearance.background import BackgroundModel, BackgroundPixels, inpaint, update_background
 from airborne.appearance.foreground import count_colours, posterior, posterior_sums
 from airborne.appearance.hue_saturation import bin_table, hsv_bins, look_up, root_histograms
 from airborne.appearance.lighting import fit_light, flatten_shading, light_planes, shade_body
 
 __all__ = [
     "BackgroundModel",
+    "BackgroundPixels",
     "bin_table",
     "count_colours",
     "fit_light",

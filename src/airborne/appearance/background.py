@@ -2,24 +2,86 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from airborne.kernels import kernel
 
 START_SD = 6.0  # [grey levels] of a pixel that was observed once
+_TILE_PX = 128  # side of the tiles that a learned background shares with the one before
 _MIN_RATE = 0.05  # least weight of a pixel's newest observation, so that slow changes of light are followed
 
 
+class BackgroundPixels(NamedTuple):
+    """What is known of the background of some pixels [sRGB grey levels]."""
+
+    mean: NDArray[np.float32]  # (h, w, 3)
+    sd: NDArray[np.float32]  # (h, w)
+    n_observations: NDArray[np.uint8]  # (h, w)
+
+    @classmethod
+    def unknown(cls, height: int, width: int) -> BackgroundPixels:
+        """Return pixels of which nothing is known."""
+        shape = height, width
+        return cls(np.zeros((*shape, 3), np.float32), np.full(shape, START_SD, np.float32), np.zeros(shape, np.uint8))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class BackgroundModel:
-    """Running mean and sd of one camera's background pixels [sRGB grey levels]; owned and updated by its tracker."""
+    """The background in one camera; a value, kept in tiles: one that has learned shares all other tiles with the old.
 
-    __slots__ = ("mean", "n_observations", "sd")
+    A region is its first pixel (x, y) and its size (height, width).
+    """
 
-    def __init__(self, height: int, width: int) -> None:
-        self.mean = np.zeros((height, width, 3), np.float32)
-        self.sd = np.full((height, width), START_SD, np.float32)
-        self.n_observations: NDArray[np.uint8] = np.zeros((height, width), np.uint8)
+    tiles: Mapping[tuple[int, int], BackgroundPixels] = field(default_factory=dict)  # by row and column; none: unknown
+
+    def crop(self, corner: tuple[int, int], size: tuple[int, int]) -> BackgroundPixels:
+        """Copy what is known of a region."""
+        pixels = BackgroundPixels.unknown(*size)
+        for at, in_region, in_tile in _tiles_of(corner, size):
+            if at in self.tiles:
+                _copy(self.tiles[at], in_tile, pixels, in_region)
+        return pixels
+
+    def learn(self, rgb: NDArray[np.uint8], covered: NDArray[np.bool_], corner: tuple[int, int]) -> BackgroundModel:
+        """Learn from a region's image rgb (h, w, 3); covered (h, w) where the body may be."""
+        size = covered.shape[0], covered.shape[1]
+        pixels, learned = self.crop(corner, size), dict(self.tiles)
+        update_background(rgb, covered, *pixels)
+        for at, in_region, in_tile in _tiles_of(corner, size):
+            learned[at] = BackgroundPixels.unknown(_TILE_PX, _TILE_PX)
+            if at in self.tiles:
+                _copy(self.tiles[at], np.s_[:, :], learned[at], np.s_[:, :])
+            _copy(pixels, in_region, learned[at], in_tile)
+        return BackgroundModel(learned)
+
+
+_Slices = tuple[slice, slice]
+
+
+def _tiles_of(corner: tuple[int, int], size: tuple[int, int]) -> Iterator[tuple[tuple[int, int], _Slices, _Slices]]:
+    """Return the tiles that a region touches: row and column, and what they share, in the region and in the tile."""
+    (x0, y0), (height, width) = corner, size
+    for row in range(y0 // _TILE_PX, -(-(y0 + height) // _TILE_PX)):
+        v = _TILE_PX * row
+        top, bottom = max(y0, v), min(y0 + height, v + _TILE_PX)
+        for column in range(x0 // _TILE_PX, -(-(x0 + width) // _TILE_PX)):
+            u = _TILE_PX * column
+            left, right = max(x0, u), min(x0 + width, u + _TILE_PX)
+            yield (
+                (row, column),
+                np.s_[top - y0 : bottom - y0, left - x0 : right - x0],
+                np.s_[top - v : bottom - v, left - u : right - u],
+            )
+
+
+def _copy(source: BackgroundPixels, at: _Slices, target: BackgroundPixels, to: _Slices) -> None:
+    for old, new in zip(source, target, strict=True):
+        new[to] = old[at]
 
 
 # one signature for whole images and for regions of them: rounding is the same whichever a process meets first

@@ -1,17 +1,15 @@
-"""What a tracker has learned from the images: the colours of body and background, and background models.
-
-One `Appearance` a tracker; its arrays are its own and are updated in place as frames go by.
-"""
+"""What a tracker has learned from the images: the colours of body and background, and background models."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.appearance.background import START_SD, BackgroundModel, update_background
+from airborne.appearance.background import BackgroundModel, BackgroundPixels
 from airborne.appearance.foreground import BINS_PER_CHANNEL, count_colours, posterior
 from airborne.cameras import Camera
 
@@ -44,19 +42,28 @@ class Region:
         return whole[y0 : y0 + height, x0 : x0 + width]
 
 
-@dataclass(frozen=True, slots=True)
-class Appearance:
-    """Colour histograms by camera name, background models by source."""
+Histograms = Mapping[str, NDArray[np.float32]]  # camera name -> (32, 32, 32) probabilities
 
-    body_histograms: dict[str, NDArray[np.float32]] = field(default_factory=dict)  # (32, 32, 32) probabilities
-    background_histograms: dict[str, NDArray[np.float32]] = field(default_factory=dict)
-    backgrounds: dict[tuple[str, bytes], BackgroundModel] = field(default_factory=dict)
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Appearance:
+    """Colours and background models; a value: to learn is to return a new one."""
+
+    body_histograms: Histograms = field(default_factory=dict)
+    background_histograms: Histograms = field(default_factory=dict)
+    backgrounds: Mapping[tuple[str, bytes], BackgroundModel] = field(default_factory=dict)  # by source
 
     def has_colours(self, region: Region) -> bool:
         """Whether this camera's colours have been learned."""
         return region.camera.name in self.body_histograms
 
-    def learn_colours(self, region: Region, mask: NDArray[np.bool_], *, body: NDArray[np.bool_] | None = None) -> None:
+    def has_background(self, region: Region) -> bool:
+        """Whether a background model of this region's source has been learned."""
+        return region.source in self.backgrounds
+
+    def learn_colours(
+        self, region: Region, mask: NDArray[np.bool_], *, body: NDArray[np.bool_] | None = None
+    ) -> Appearance:
         """Learn the colours inside the mask's core and clear of it; mask (h, w) of the region.
 
         `body` (h, w) says which pixels of the core to take, if not all of them.
@@ -66,48 +73,48 @@ class Appearance:
         if body is not None:
             core &= body
         clear = cv2.dilate(solid, _kernel(_CLEAR_PX + 1, region.aspect)) == 0
-        name = region.camera.name
-        for histograms, chosen in ((self.body_histograms, core), (self.background_histograms, clear)):
-            counts = np.zeros((BINS_PER_CHANNEL, BINS_PER_CHANNEL, BINS_PER_CHANNEL), np.float32)
-            stride = max(1, int(np.count_nonzero(chosen)) // _SAMPLES)
-            taken = count_colours(region.rgb, chosen, stride, counts)
-            if taken * stride < _FEWEST:
-                continue
-            counts /= taken
-            old = histograms.get(name)
-            histograms[name] = counts if old is None else np.asarray(old + _COLOUR_RATE * (counts - old), np.float32)
+        return replace(
+            self,
+            body_histograms=_learn_histogram(self.body_histograms, region, core),
+            background_histograms=_learn_histogram(self.background_histograms, region, clear),
+        )
 
-    def learn_background(self, region: Region, mask: NDArray[np.bool_]) -> None:
+    def learn_background(self, region: Region, mask: NDArray[np.bool_]) -> Appearance:
         """Learn the background wherever the body is not: in the whole view at first, in the region from then on."""
         covered = cv2.dilate(mask.astype(np.uint8), _kernel(_CLEAR_PX, region.aspect)) > 0
-        background = self.backgrounds.get(region.source)
-        if background is None:
-            background = self.backgrounds[region.source] = BackgroundModel(*region.view_rgb.shape[:2])
+        if self.has_background(region):
+            background = self.backgrounds[region.source].learn(region.rgb, covered, region.corner)
+        else:
             everywhere = np.zeros(region.view_rgb.shape[:2], bool)
             region.crop(everywhere)[:] = covered
-            update_background(region.view_rgb, everywhere, background.mean, background.sd, background.n_observations)
-        else:
-            crops = (region.crop(whole) for whole in (background.mean, background.sd, background.n_observations))
-            update_background(region.rgb, covered, *crops)
+            background = BackgroundModel().learn(region.view_rgb, everywhere, (0, 0))
+        return replace(self, backgrounds={**self.backgrounds, region.source: background})
 
-    def background_model(self, region: Region) -> tuple[NDArray, NDArray, NDArray]:
-        """Return the background model of a region: mean (h, w, 3), sd (h, w), n_observations (h, w)."""
-        background = self.backgrounds.get(region.source)
-        if background is None:
-            height, width = region.rgb.shape[:2]
-            never = np.zeros((height, width), np.uint8)
-            return np.zeros((height, width, 3), np.float32), np.full((height, width), START_SD, np.float32), never
-        whole = background.mean, background.sd, background.n_observations
-        mean, sd, n_observations = (np.ascontiguousarray(region.crop(each)) for each in whole)
-        return mean, sd, n_observations
+    def background_pixels(self, region: Region) -> BackgroundPixels:
+        """Return what is known of the background of a region."""
+        background = self.backgrounds.get(region.source, BackgroundModel())
+        return background.crop(region.corner, region.rgb.shape[:2])
 
     def posterior(self, region: Region) -> NDArray[np.float32]:
         """Return each pixel's probability (h, w) to be body, at even odds."""
         out = np.empty(region.rgb.shape[:2], np.float32)
         name = region.camera.name
         colours = self.body_histograms[name], self.background_histograms[name]
-        posterior(region.rgb, *colours, *self.background_model(region), out)
+        posterior(region.rgb, *colours, *self.background_pixels(region), out)
         return out
+
+
+def _learn_histogram(histograms: Histograms, region: Region, chosen: NDArray[np.bool_]) -> Histograms:
+    """Return the histograms with the region's camera's updated by its chosen pixels (h, w), where these are enough."""
+    counts = np.zeros((BINS_PER_CHANNEL, BINS_PER_CHANNEL, BINS_PER_CHANNEL), np.float32)
+    stride = max(1, int(np.count_nonzero(chosen)) // _SAMPLES)
+    taken = count_colours(region.rgb, chosen, stride, counts)
+    if taken * stride < _FEWEST:
+        return histograms
+    counts /= taken
+    old = histograms.get(region.camera.name)
+    new = counts if old is None else np.asarray(old + _COLOUR_RATE * (counts - old), np.float32)
+    return {**histograms, region.camera.name: new}
 
 
 def _kernel(radius_px: int, aspect: float) -> NDArray[np.uint8]:

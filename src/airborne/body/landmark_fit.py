@@ -11,12 +11,14 @@ from scipy.spatial.transform import Rotation
 
 from airborne.body.chain import point_jacobian
 from airborne.body.model import BodyModel, PosedBody
+from airborne.geometry.descent import MarquardtRule, descend
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.types import Array
 
 _ANGLE_SD_RAD = 1.0  # prior sd of an angle about neutral
 _FINE_GAIN, COARSE_GAIN = 1e-6, 1e-4  # shares of the cost; a smaller gain ends the iteration
-_N_STEPS = 100
+_MOST_STEPS = 100
+_DAMPING = MarquardtRule(first=1e-4, down=5, up=4, least=1e-9, most=4e8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,31 +71,44 @@ def minimise(
     problem: LandmarkProblem, state: PoseState, free: NDArray[np.bool_], least_gain: float = _FINE_GAIN
 ) -> tuple[PoseState, float]:
     """Minimise the cost over the free variables (6 + 3 joints,); return the state and its cost."""
-    free_m = np.full((6, 2), [-np.inf, np.inf])
-    low, high = np.concatenate([free_m, problem.limits.reshape(-1, 2)]).T
-    cost, gradient, hessian = _equations(problem, state)
-    damping = 1e-4
-    for _ in range(_N_STEPS):
-        now = np.concatenate([np.zeros(6), state.angles.ravel()])
-        down, up = np.where(free, low - now, 0.0), np.where(free, high - now, 0.0)
+    first = _Iterate(problem, state, free)
+    best = descend(
+        first,
+        lambda state: _Iterate(problem, state, free),
+        _DAMPING,
+        most_steps=_MOST_STEPS,
+        least_gain=least_gain,
+    ).best
+    return best.state, best.equations[0]
+
+
+@dataclass(frozen=True, eq=False)
+class _Iterate:
+    """A state in the descent."""
+
+    problem: LandmarkProblem
+    state: PoseState
+    free: NDArray[np.bool_]  # (6 + 3 joints,)
+
+    @cached_property
+    def equations(self) -> tuple[float, Array, Array]:
+        """The cost, its gradient and its Hessian here."""
+        return _equations(self.problem, self.state)
+
+    def cost(self, reference: _Iterate) -> float:
+        """Return the cost."""
+        return self.equations[0]
+
+    def step(self, damping: float) -> tuple[PoseState, float]:
+        """Return the state after a damped step; one that stops at the limits makes no exact promise."""
+        _, gradient, hessian = self.equations
+        low, high = np.concatenate([np.full((6, 2), [-np.inf, np.inf]), self.problem.limits.reshape(-1, 2)]).T
+        now = np.concatenate([np.zeros(6), self.state.angles.ravel()])
+        down, up = np.where(self.free, low - now, 0.0), np.where(self.free, high - now, 0.0)
         step = _step(gradient, hessian, damping, low=down, high=up)
-        trial = PoseState(
-            Rotation.from_rotvec(step[3:6]).as_matrix() @ state.R,
-            state.t + step[:3],
-            np.clip(now + step, low, high)[6:].reshape(-1, 3),
-        )
-        there = _equations(problem, trial)
-        if there[0] < cost:
-            gain = cost - there[0]
-            state, (cost, gradient, hessian) = trial, there
-            damping = max(damping / 5, 1e-9)
-            if gain < least_gain * cost:
-                break
-        elif damping > 1e8:
-            break
-        else:
-            damping *= 4
-    return state, cost
+        R = Rotation.from_rotvec(step[3:6]).as_matrix() @ self.state.R
+        angles = np.clip(now + step, low, high)[6:].reshape(-1, 3)
+        return PoseState(R, self.state.t + step[:3], angles), np.inf
 
 
 def _step(gradient: Array, hessian: Array, damping: float, *, low: Array, high: Array) -> Array:

@@ -161,6 +161,21 @@ class BodyModel:
         names = [segment.name for segment in self.segments]
         return np.array([-1 if s.parent is None else names.index(s.parent) for s in self.segments])
 
+    @property
+    def n_joints(self) -> int:
+        """The number of joints: every segment but the root has one."""
+        return len(self.segments) - 1
+
+    @property
+    def has_joints(self) -> bool:
+        """Whether the body is more than one rigid piece."""
+        return self.n_joints > 0
+
+    @property
+    def n_dofs(self) -> int:
+        """The number of degrees of freedom: six of the root, three of each joint."""
+        return 6 + 3 * self.n_joints
+
     @cached_property
     def limits_rad(self) -> Array:
         """The least and greatest angles of every joint: (segments - 1, 3, 2) [rad]; infinite where a joint is free."""
@@ -193,9 +208,9 @@ class BodyModel:
 
     def with_pose(self, pose: Pose) -> PosedBody:
         """Pose the body in the world (forward kinematics)."""
-        angles = pose.joint_angles if pose.joint_angles.size else np.zeros((len(self.segments) - 1, 3))
-        if angles.shape != (len(self.segments) - 1, 3):
-            raise BodyError(f"body '{self.name}' has {len(self.segments) - 1} joints, the pose {len(angles)}")
+        angles = pose.joint_angles if pose.joint_angles.size else np.zeros((self.n_joints, 3))
+        if angles.shape != (self.n_joints, 3):
+            raise BodyError(f"body '{self.name}' has {self.n_joints} joints, the pose {len(angles)}")
         transforms = [pose.world_from_root]
         for segment, parent, xyz in zip(self.segments[1:], self.parents[1:], angles, strict=True):
             parent_from_segment = RigidTransform.from_components(segment.joint_m, Rotation.from_euler("XYZ", xyz))

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from airborne.appearance.lighting import fit_light, shade_body
 from airborne.body import PosedBody
 from airborne.rendering.maps import surface_maps
-from airborne.tracking.model_based.normal_equations import BLOCK_PX, RADIUS_PX, blur, gaussian_taps
+from airborne.tracking.model_based.blur import RADIUS_PX, blur, gaussian_taps
 from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers
+from airborne.tracking.model_based.twist_equations import BLOCK_PX
 from airborne.types import Array
 
 _SIGMA_PX = 1.2  # of the blur
@@ -83,7 +84,7 @@ def composite_equations(
     here = _compose(render_model, posed, view)
     residual = _residual(view, here)
     total, weights = _weigh(view, residual)
-    near = cv2.dilate((view.maps[0] >= 0).astype(np.uint8), np.ones((2 * _NEAR_PX + 1,) * 2, np.uint8)) > 0
+    near = cv2.dilate((view.maps.part >= 0).astype(np.uint8), np.ones((2 * _NEAR_PX + 1,) * 2, np.uint8)) > 0
     rows, across = _box(near)
     columns = np.zeros((len(steps), 3, rows.stop - rows.start, across.stop - across.start), np.float32)
     for column, (above, below, step) in zip(columns, steps, strict=True):
@@ -107,7 +108,9 @@ def _fit_light(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -
     part, _, normals = view.maps
     surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, view.packed_view, *view.maps)
     height, width = part.shape
-    fit_light(view.observation[0], part, normals, render_model.albedo, view.light, _LIGHT_ROUNDS, 0, 0, width, height)
+    fit_light(
+        view.observation.observed, part, normals, render_model.albedo, view.light, _LIGHT_ROUNDS, 0, 0, width, height
+    )
 
 
 def _compose(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -> NDArray[np.float32]:
@@ -116,18 +119,18 @@ def _compose(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -> 
     surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, view.packed_view, *view.maps)
     lit = np.zeros((3, *part.shape), np.float32)
     shade_body(part, normals, render_model.albedo, view.light, 0, 0, lit)
-    return np.where(part >= 0, lit, view.observation[1])
+    return np.where(part >= 0, lit, view.observation.background)
 
 
 def _residual(view: ViewBuffers, composite: NDArray[np.float32]) -> NDArray[np.float32]:
     out = np.empty_like(composite)
-    blur(view.observation[0] - composite, *_taps(view), out)
+    blur(view.observation.observed - composite, *_taps(view), out)
     return out
 
 
 def _weigh(view: ViewBuffers, residual: NDArray[np.float32]) -> tuple[Misfit, NDArray[np.float32]]:
     """Return the misfit and each pixel's weight (h, w), with the body already in the view's maps."""
-    certainty, covered = view.observation[2], view.maps[0] >= 0
+    certainty, covered = view.observation.certainty, view.maps.part >= 0
     e2 = np.einsum("khw,khw->hw", residual, residual)
     attenuation = 1 / (1 + e2 / _SCALE_LIGHT**2)
     weights = certainty * attenuation**2

@@ -27,7 +27,7 @@ def learn_background(
     for frames, pose in zip(images, poses, strict=True):
         posed = render_model.with_pose(pose)
         for region in crop_regions([posed], render_model.geometry, frames, margin_px):
-            appearance.learn_background(region, render_model.draw_parts(posed, region) >= 0)
+            appearance = appearance.learn_background(region, render_model.draw_parts(posed, region) >= 0)
     return appearance
 
 

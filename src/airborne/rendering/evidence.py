@@ -76,7 +76,8 @@ def _sum_evidence(shapes, geometry, R, t, views, sizes, sums, out):
         pose_shapes(shapes, geometry, R[h], t[h])
         for i in range(len(views)):
             width, height, offset = sizes[i, 0], sizes[i, 1], sizes[i, 2]
-            row_start, row_stop, ends, _ = list_spans(shapes, geometry, views[i], width, height)
+            spans = list_spans(shapes, geometry, views[i], width, height)
+            row_start, row_stop, ends = spans.row_start, spans.row_stop, spans.ends
             total = 0.0
             for v in range(height):
                 start, stop = row_start[v], row_stop[v]

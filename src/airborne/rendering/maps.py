@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,10 +12,18 @@ from airborne.rendering.rows import BLOCK, LANES, NX, NY, NZ, SHAPE, W, block_ra
 from airborne.rendering.shapes import B_1, B_U, B_V, pose_shapes
 
 
-def empty_maps(size: tuple[int, int]) -> tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.float32]]:
-    """Allocate part, inverse depth and normals for a view of (width, height)."""
+class SurfaceMaps(NamedTuple):
+    """What each pixel of a view shows; see `surface_maps`."""
+
+    part: NDArray[np.int16]  # (h, w)
+    inverse_depth: NDArray[np.float32]  # (h, w) [1/m]
+    normals: NDArray[np.float32]  # (3, h, w)
+
+
+def empty_maps(size: tuple[int, int]) -> SurfaceMaps:
+    """Allocate the maps of a view of (width, height)."""
     width, height = size
-    return (
+    return SurfaceMaps(
         np.empty((height, width), np.int16),
         np.empty((height, width), np.float32),
         np.zeros((3, height, width), np.float32),

@@ -10,6 +10,7 @@ change.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,6 +43,15 @@ W, NX, NY, NZ, RED, GREEN, BLUE, SHAPE, SHADE, BLOCK = 0, 16, 32, 48, 64, 80, 96
 f4 = np.float32
 
 
+class Spans(NamedTuple):
+    """The pixels of every shape in every row: row v's spans are row_start[v] to row_stop[v] - 1."""
+
+    row_start: Any  # (height + 1,)
+    row_stop: Any  # (height,)
+    ends: Any  # (spans, 3) first pixel, last pixel, shape
+    curves: Any  # (spans, 2) the middle and the half width squared [px]
+
+
 @kernel(fastmath=True, is_inner=True)
 def new_row(width):
     """Allocate the blocks of one row, all empty."""
@@ -71,11 +81,7 @@ def _count_rows(shapes, row_start):
 
 @kernel(fastmath=True, is_inner=True)
 def _find_spans(shapes, geometry, width, row_start, row_stop, ends, curves):
-    """List the pixels of every shape in every row.
-
-    Row v's spans are `row_start[v]` to `row_stop[v] - 1`: `ends` (spans, 3) holds first pixel, last pixel, shape;
-    `curves` (spans, 2) the middle and the half width squared [px].
-    """
+    """List the pixels of every shape in every row; see `Spans`."""
     for v in range(len(row_stop)):
         row_stop[v] = row_start[v]
     n_ellipsoids = len(geometry.ellipsoid_segment)
@@ -186,13 +192,13 @@ def _beyond(outline, height, v, middle, half):
 
 @kernel(fastmath=True, is_inner=True)
 def list_spans(shapes, geometry, view, width, height):
-    """Outline the posed shapes in a view and list their spans: row_start, row_stop, ends, curves of `_find_spans`."""
+    """Outline the posed shapes in a view and list their spans."""
     outline_all(shapes, geometry, view, width, height)
     row_start, row_stop = np.empty(height + 1, np.int64), np.empty(height, np.int64)
     n_spans = _count_rows(shapes, row_start)
     ends, curves = np.empty((n_spans, 3), np.int64), np.empty((n_spans, 2))
     _find_spans(shapes, geometry, width, row_start, row_stop, ends, curves)
-    return row_start, row_stop, ends, curves
+    return Spans(row_start, row_stop, ends, curves)
 
 
 @kernel(fastmath=True, is_inner=True)

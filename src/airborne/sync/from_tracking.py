@@ -14,10 +14,11 @@ from airborne.errors import TrialError
 from airborne.run.first_pose import find_first_pose
 from airborne.run.opening import open_trial, past_the_end_error
 from airborne.sync import Offsets, image_counter
+from airborne.sync.camera_equations import root_equations, share_equations
 from airborne.sync.lags import CameraLags, LagEquations, find_lags
+from airborne.sync.mixed_frames import Blend, blend_of
 from airborne.tracking import Status
 from airborne.tracking.methods import sample_body_colours
-from airborne.tracking.model_based.mixed_frames import Blend, blend_of
 from airborne.tracking.model_based.refined import RefinedState, RefinedTracker
 from airborne.tracking.time_offsets import CompensatedState, CompensatedTracker, compensate_offsets
 from airborne.trial.file import Trial
@@ -127,7 +128,7 @@ class _Measure:
                     at = [last.pose_at(float(frames.time_s) + view.delay_s + s, gap_s) for s in moments_s[i]]
                     poses = [pose for pose in at if pose is not None]
                     if len(poses) == len(at) and (
-                        each := last.refined.blend_equations(self._appearance_state, view, poses)
+                        each := share_equations(last.refined, self._appearance_state, view, poses)
                     ):
                         systems[i].append(each)
             self._on_image()
@@ -161,9 +162,8 @@ class _Measure:
                 state = tracked.state
                 tracked.time_s.append(float(frames.time_s))
                 tracked.poses.append(estimate.pose)
-                tracked.equations.append(
-                    refined.view_equations(state.inner, compensate_offsets(frames, state.past), estimate.pose)
-                )
+                compensated = compensate_offsets(frames, state.past)
+                tracked.equations.append(root_equations(refined, state.inner, compensated, estimate.pose))
             self._on_image()
         if tracked is None:
             raise past_the_end_error(trial)

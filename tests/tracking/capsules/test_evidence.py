@@ -7,6 +7,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras import Camera
 from airborne.tracking.capsules.evidence import capsule_evidence
+from airborne.tracking.capsules.kernel_arguments import Workspace
 from airborne.tracking.capsules.outlines import BEHIND_M, draw_labels, outline, project
 from airborne.tracking.capsules.spans import cumulative_sums
 from tests.support.tolerances import SOLVED
@@ -152,7 +153,7 @@ def summed(discs, maps, share=SHARE, depth=DEPTH, classes=CLASSES, origin=(0.0, 
     sums = np.empty((k, h, w + 1), np.float32)
     cumulative_sums(maps, sums)
     owned, gradient, curvature = np.empty((n, 2, 2)), np.empty((n, 7)), np.empty((n, 7, 7))
-    work = np.empty((n, 2, h)), np.empty((n, 2, h), np.int64), np.empty((n, 2, 7))
+    work = Workspace.of(n, h)
     capsule_evidence(discs, depth, classes, share, sums, np.ones(k), np.array(origin), work, owned, gradient, curvature)
     return owned, gradient, curvature
 
@@ -333,7 +334,7 @@ def test_sums_without_a_gradient_are_the_same():
     owned, _, _ = summed(DISCS, maps)
     sums = np.empty((3, H, W + 1), np.float32)
     cumulative_sums(maps, sums)
-    again, work = np.empty_like(owned), (np.empty((4, 2, H)), np.empty((4, 2, H), np.int64), np.empty((4, 2, 7)))
+    again, work = np.empty_like(owned), Workspace.of(4, H)
     capsule_evidence(
         DISCS, DEPTH, CLASSES, SHARE, sums, np.ones(3), np.zeros(2), work, again, np.empty((0, 7)), np.empty((0, 7, 7))
     )

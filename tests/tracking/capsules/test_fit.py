@@ -9,10 +9,10 @@ from airborne.tracking.capsules.dynamics import N_FREE
 from airborne.tracking.capsules.first_frame import fit_first_frame, points_of, start_state
 from airborne.tracking.capsules.fit import JumperPrior, evidence_of, fit_jumper
 from airborne.tracking.capsules.jumper import LIMITS_RAD, N_DOF
+from airborne.tracking.capsules.kernel_arguments import NOBODY, Capsules
 from airborne.tracking.capsules.views import map_evidence, player_regions
 from tests.support.jumping_scenes import LENGTHS, RADII, hop
 
-NOBODY = np.empty((0, 2, 3)), np.empty((0, 2))
 UPRIGHT = np.zeros(N_DOF)  # upright, both legs bent alike
 UPRIGHT[5], UPRIGHT[[8, 13]], UPRIGHT[[11, 16]] = 0.25, -0.4, 0.6
 
@@ -147,10 +147,10 @@ def test_other_players_capsules_occlude_what_lies_behind_them(hall, region_maps)
     truth = hop()(6 / 50)
     ahead = truth[:3] + 0.3 * (hall.cameras[1].camera_from_world.inv().translation - truth[:3]) / 9
     wall = np.stack([ahead + np.array([[x, 0, -1.2], [x, 0, 1.2]]) for x in (-0.4, 0.0, 0.4)])
-    others = wall, np.full((3, 2), 0.25)
+    others = Capsules(wall, np.full((3, 2), 0.25))
     assert evidence_of(truth, region_maps, others) < 0.9 * evidence_of(truth, region_maps, NOBODY)
     behind = wall + 20 * (truth[:3] - ahead)
-    assert evidence_of(truth, region_maps, (behind, others[1])) == pytest.approx(
+    assert evidence_of(truth, region_maps, others._replace(ends=behind)) == pytest.approx(
         evidence_of(truth, region_maps, NOBODY), rel=0.1
     )
 

@@ -8,10 +8,9 @@ import pytest
 
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.capsules.first_frame import fit_first_frame
+from airborne.tracking.capsules.kernel_arguments import NOBODY
 from airborne.video import Frames, View
 from tests.support.jumping_scenes import CAMERAS, Hall, hop
-
-NOBODY = np.empty((0, 2, 3)), np.empty((0, 2))
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras import Camera
-from airborne.tracking.capsules.equations import NOBODY
 from airborne.tracking.capsules.jumper import N_DOF, SHIRT, SHOE, SHORTS, SKIN, SURFACE_CLASSES
+from airborne.tracking.capsules.kernel_arguments import NOBODY, Capsules
 from airborne.tracking.capsules.surface_colours import ClassImages, class_image, learn_colours, update_colours
 from airborne.tracking.capsules.views import PlayerRegion
 from tests.support.jumping_scenes import LENGTHS, RADII
@@ -105,7 +105,7 @@ def test_nothing_is_learned_of_occluded_shoes():
 
 def test_nothing_is_learned_of_another_players_leg_in_front():
     feet = np.array([[[0.3, 0.5, 0.08], [-0.3, 0.5, 0.08]]])
-    others = feet, np.full((1, 2), 0.3)
+    others = Capsules(feet, np.full((1, 2), 0.3))
     assert np.count_nonzero(dressed(WORN[SHOE], others).rgb == GREEN) > 1000
     later = update_colours(at_first(), STANDING, [dressed(WORN[SHOE], others)], others)
     assert evidence_of(later, GREEN[0], SHOE) < 1

@@ -5,6 +5,7 @@ import pytest
 
 from airborne.tracking.capsules import Blocker
 from tests.support.jumping_scenes import Hall, hop, tracked
+from tests.support.states import assert_same, leaves
 
 N = 4
 
@@ -47,6 +48,9 @@ def test_a_player_far_away_does_not_matter(far_apart, estimates):
 def test_step_leaves_its_state_as_it_was(far_apart):
     blocker = Blocker(far_apart.starts())
     state, _ = blocker.step(blocker.init(), far_apart.frames(0))
-    _, once = blocker.step(state, far_apart.frames(1))
-    _, again = blocker.step(state, far_apart.frames(1))
+    before = leaves(state)
+    later, once = blocker.step(state, far_apart.frames(1))
+    later_again, again = blocker.step(state, far_apart.frames(1))
     assert_equal(once, again)
+    assert_same(leaves(later), leaves(later_again))
+    assert_same(leaves(state), before)

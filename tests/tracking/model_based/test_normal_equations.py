@@ -10,20 +10,13 @@ from airborne.appearance.lighting import LIGHT_FROM_SRGB, LIGHT_TERMS, light_pla
 from airborne.body.chain import move_pose
 from airborne.rendering.maps import empty_maps
 from airborne.tracking.image_regions import crop_regions
+from airborne.tracking.model_based.blur import RADIUS_PX, blur, gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, root_only
-from airborne.tracking.model_based.normal_equations import (
-    RADIUS_PX,
-    REACH_PX,
-    Sums,
-    blur,
-    find_owners,
-    gaussian_taps,
-    mask_window,
-    new_blocks,
-    photometric_equations,
-    silhouette_equations,
-)
+from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, Paint, Projection, Window
+from airborne.tracking.model_based.normal_equations import photometric_equations, silhouette_equations
+from airborne.tracking.model_based.owners import REACH_PX, find_owners, mask_window
 from airborne.tracking.model_based.render_model import RenderModel
+from airborne.tracking.model_based.twist_equations import Sums, new_blocks
 from tests.support.scenes import FIGURE, Scene, standing
 
 SINGLE = 1e-5  # float32
@@ -100,9 +93,9 @@ class SingleView:
     def photometric(self, pose, iterations=0, clip=NO_CLIP):
         """The equations and the squared residual; the light stays as it was fitted at the truth."""
         render_model, certainty = self._render_model, np.ones(self._region.rgb.shape[:2], np.float32)
-        observation = self._observed, self._background, certainty
+        observation = Observation(self._observed, self._background, certainty)
         body, projection, comparison, maps = self._common(pose, clip)
-        paint = render_model.albedo, render_model.is_faceted
+        paint = Paint(render_model.albedo, render_model.is_faceted)
         sums, blocks = Sums.zero(len(render_model.model.segments)), self._blocks()
         _, total, _ = photometric_equations(
             body, projection, observation, comparison, maps, paint, self._light, iterations, sums, blocks
@@ -113,16 +106,16 @@ class SingleView:
         """The equations against the true mask, as probabilities."""
         mask = (self._render_model.draw_parts(self.with_pose(self.truth), self._region) >= 0).astype(np.float32)
         body, projection, comparison, maps = self._common(pose, 0.5)
-        observation = mask[None], np.zeros((1, *mask.shape), np.float32), np.ones_like(mask)
+        observation = Observation(mask[None], np.zeros((1, *mask.shape), np.float32), np.ones_like(mask))
         sums, blocks = Sums.zero(len(self._render_model.model.segments)), self._blocks()
         silhouette_equations(body, projection, observation, comparison, maps, sums, blocks)
         return self._map_to_dofs(pose, sums)
 
     def _common(self, pose, clip):
         posed, region, taps = self.with_pose(pose), self._region, gaussian_taps(1.2)
-        projection = posed.R, posed.t, region.packed_view, region.camera.K, posed.t[0]
-        window = (0, 0, *region.camera.size)
-        return self._render_model.body, projection, (window, taps, taps, clip), empty_maps(region.camera.size)
+        projection = Projection(posed.R, posed.t, region.packed_view, region.camera.K, posed.t[0])
+        comparison = Comparison(Window(0, 0, *region.camera.size), taps, taps, clip)
+        return self._render_model.body, projection, comparison, empty_maps(region.camera.size)
 
     def _blocks(self):
         return new_blocks(*self._region.camera.size, len(self._render_model.model.segments))

@@ -11,6 +11,7 @@ from airborne.errors import BodyError, TrialError
 from airborne.tracking.particle import LegsSettings, legs_tracker
 from airborne.tracking.players import PlayerStart
 from tests.support.courts import BLUE, RED, RIG, Court, Player, errors_m, jump, track
+from tests.support.states import assert_same, leaves
 
 METHODS = ("framework", "mixture", "block-jump")
 EVERY = pytest.mark.parametrize("method", METHODS)
@@ -122,6 +123,18 @@ def test_one_seed_gives_one_result_and_another_another(method):
     assert np.array_equal(first.points, again.points)
     assert np.array_equal(first.covariance, again.covariance)
     assert not np.array_equal(first.points, other.points)
+
+
+@EVERY
+def test_step_leaves_its_state_as_it_was(method):
+    tracker = legs_tracker(settings(method), COURT.rig, COURT.starts())
+    state = tracker.init()
+    for index in range(3):
+        before, frames = leaves(state), COURT.frames(index)
+        later, _ = tracker.step(state, frames)
+        assert_same(leaves(tracker.step(state, frames)[0]), leaves(later))
+        assert_same(leaves(state), before)
+        state = later
 
 
 def neighbours():

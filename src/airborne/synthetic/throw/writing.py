@@ -225,7 +225,7 @@ def _body_file_name(scene: Scene) -> str:
 
 
 def _has_joints(scene: Scene) -> bool:
-    return len(scene.model.segments) > 1
+    return scene.model.has_joints
 
 
 def _pixel(value: float) -> str:

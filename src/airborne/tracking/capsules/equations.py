@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 from airborne.kernels import kernel
 from airborne.tracking.capsules.evidence import capsule_evidence
 from airborne.tracking.capsules.jumper import CAPSULES, N_DOF, SURFACE_CLASSES, border_shares, pose_capsules
+from airborne.tracking.capsules.kernel_arguments import Capsules
 from airborne.tracking.capsules.outlines import BEHIND_M, project
 
 N_LENGTHS, N_CAPSULES, N_POINTS = 9, 10, 9
-NOBODY = np.empty((0, 2, 3)), np.empty((0, 2))  # the capsules of no other players
 _STEP = 1e-4  # [m, rad] of the finite differences
 _N_PARAMETERS = 9  # parameters of a capsule: both ends (6), both radii [m], the share
 
 
-def classes_with(others: tuple[NDArray, NDArray]) -> NDArray[np.int64]:
+def classes_with(others: Capsules) -> NDArray[np.int64]:
     """Return the surface classes of a jumper's capsules and of others' (10 + m, 2), which share one of their own."""
-    return np.concatenate([CAPSULES[:, :2], np.full((len(others[0]), 2), len(SURFACE_CLASSES))])
+    return np.concatenate([CAPSULES[:, :2], np.full((len(others.ends), 2), len(SURFACE_CLASSES))])
 
 
 @kernel
@@ -33,25 +33,22 @@ def pose_state(state, points, ends, end_radii, share):
 
 
 @kernel
-def accumulate_equations(state, n_free, cameras, classes, maps, others, work, owned, equations):
+def accumulate_equations(state, n_free, images, owned, equations):
     """Sum a jumper's evidence over the views and return it [nats times pixels].
 
-    cameras (v, 4, 4) see the regions of maps: sums (v, k + 1, h, w + 1), the last empty, and contrast (v, k + 1), as
-    `capsule_evidence` takes them. The empty map belongs to `others`, capsules ends (m, 2, 3) and radii (m, 2) [m] of
-    other players, who occlude what lies behind them. classes (10 + m, 2).
-    Fills owned (v, 10 + m, 2, 2), see there, and equations: points (9, 3) [m], and with n_free > 0 their Jacobian
-    (27, n_free), and for the first numbers of the state the gradient (n_free,), the curvature (n_free, n_free) and the
-    score covariance (n_free, n_free): that of the gradient if every capsule's outline is offset from the player's with
-    a sd of one metre, right and down, independently in each view.
+    Fills owned (v, 10 + m, 2, 2), as `capsule_evidence` does for each view, and the points of the equations; with
+    n_free > 0 their Jacobian, and for the first numbers of the state the gradient, the curvature and the score
+    covariance: that of the gradient if every capsule's outline is offset from the player's with a sd of one metre,
+    right and down, independently in each view.
 
     Views are summed per capsule in the world, 9 parameters each; only the sums are mapped to the state.
     """
     points, jacobian, gradient, curvature, score_covariance = equations
-    sums, contrast = maps
-    other_ends, other_radii = others
-    n, all_n, n_views = N_CAPSULES, N_CAPSULES + len(other_ends), len(cameras)
+    cameras, others, classes, work = images.cameras, images.others, images.classes, images.work
+    sums, contrast = images.maps.sums, images.maps.contrast
+    n, all_n, n_views = N_CAPSULES, N_CAPSULES + len(others.ends), len(cameras)
     ends, end_radii, share = np.empty((all_n, 2, 3)), np.empty((all_n, 2)), np.ones(all_n)
-    ends[n:], end_radii[n:] = other_ends, other_radii
+    ends[n:], end_radii[n:] = others.ends, others.radii
     discs, depth = np.empty((all_n, 2, 3)), np.empty(all_n)
     m = n if n_free > 0 else 0
     g, H = np.empty((m, 7)), np.empty((m, 7, 7))

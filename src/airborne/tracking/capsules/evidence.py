@@ -7,12 +7,15 @@ two maps, pixels change owner.
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from airborne.kernels import kernel
 from airborne.tracking.capsules.outlines import BEHIND_M, border_in_row, outline, part_at
 from airborne.tracking.capsules.spans import (
     MOST_SPANS,
+    Border,
     add_span,
     border_sum_at,
     border_value_at,
@@ -26,6 +29,28 @@ _BORDER_SAMPLES = 5
 _LEVEL_RATIO = 2.0  # tangents that run this much further across than down are integrated over columns, not rows
 
 
+class _Edge(NamedTuple):
+    """An end of a span."""
+
+    who: Any  # the capsule whose outline it is
+    piece: Any  # of the outline, see `outline`
+    y: Any  # of the row [px]
+    side: Any  # 0: the span begins here; 1: it ends
+    at: Any  # x in the region [px]
+    gain: Any  # sign of what the span gains when the edge moves right
+    contrast: Any  # of the map there
+
+
+class _Nearer(NamedTuple):
+    """A capsule, and what may be nearer."""
+
+    order: Any  # (n,) capsules from near to far
+    i: Any  # the capsule
+    first: Any  # (n,) row of each outline
+    last: Any  # (n,) one past the last row
+    x: Any  # (n, 2, h) outlines, see `outline`
+
+
 @kernel
 def capsule_evidence(discs, depth, classes, share, sums, contrast, origin, work, out, gradient, curvature):
     """Sum maps under the capsules, and differentiate the sum by their discs.
@@ -33,10 +58,10 @@ def capsule_evidence(discs, depth, classes, share, sums, contrast, origin, work,
     discs (n, 2, 3) and depth (n,) as `project` gives them, in the pixels of the maps; classes (n, 2) the map at either
     end of each capsule and share (n,) how far along its axis the first one reaches; sums (k, h, w + 1) running sums of
     the maps over a region whose first pixel is origin (x, y); contrast (k,) by how much each map falls across an edge
-    of what it shows. What lies outside the region counts as 0. work is x (n, 2, h), pieces (n, 2, h) and tangents
-    (n, 2, 7). Fills out (n, 2, 2), the sum and the area [px] that each capsule owns of its first and its second map;
-    and of the first m capsules the gradient (m, 7) and the curvature (m, 7, 7), which is what maps have that fall by
-    their contrast within a pixel of every edge, by (x, y, radius) of both discs and the share.
+    of what it shows. What lies outside the region counts as 0. Fills out (n, 2, 2), the sum and the area [px] that each
+    capsule owns of its first and its second map; and of the first m capsules the gradient (m, 7) and the curvature
+    (m, 7, 7), which is what maps have that fall by their contrast within a pixel of every edge, by (x, y, radius) of
+    both discs and the share.
     """
     n, (_, h, w) = len(discs), sums.shape
     n_moving = len(gradient)
@@ -44,7 +69,7 @@ def capsule_evidence(discs, depth, classes, share, sums, contrast, origin, work,
     out[:], gradient[:], curvature[:] = 0, 0, 0
     first, last = np.zeros(n, np.int64), np.zeros(n, np.int64)
     top, bottom = h, 0
-    x, pieces, tangents = work
+    x, pieces, tangents = work.x, work.pieces, work.tangents
     for i in range(n):
         if depth[i] < BEHIND_M:
             first[i], last[i] = outline(discs[i, 0], discs[i, 1], origin[1], x[i], pieces[i], tangents[i])
@@ -63,8 +88,7 @@ def capsule_evidence(discs, depth, classes, share, sums, contrast, origin, work,
             if b <= a:
                 continue
             cut, weight, split = border_in_row(discs[i], share[i], y, 0.5 * (a + b) + ox)
-            cut -= ox
-            border = cut, weight, split
+            border = Border(cut - ox, weight, split)
             map_0, map_1 = sums[classes[i, 0], row], sums[classes[i, 1], row]
             at, from_k = a, -1  # the gaps that nearer capsules have left
             for k in range(taken + 1):
@@ -73,18 +97,18 @@ def capsule_evidence(discs, depth, classes, share, sums, contrast, origin, work,
                 is_open = k >= taken or taken_x[k, 0] >= b
                 end = b if is_open else taken_x[k, 0]
                 if end > at:
-                    add_span(map_0, map_1, at, end, cut, weight, split, out[i])
+                    add_span(map_0, map_1, at, end, border, out[i])
                     if n_moving > 0:
                         who, side = (i, 0) if from_k < 0 else (taken_by[from_k, 1], 1)
                         if at > least and who < n_moving:
-                            edge = who, pieces[who, side, row], y, side, at, ox
-                            gain = -1.0, contrast_at(contrast, classes[i, 0], classes[i, 1], at, border)
-                            _add_edge(discs, tangents, edge, map_0, map_1, border, gain, gradient, curvature)
+                            facing = contrast_at(contrast, classes[i, 0], classes[i, 1], at, border)
+                            edge = _Edge(who, pieces[who, side, row], y, side, at, -1.0, facing)
+                            _add_edge(discs, tangents, edge, ox, map_0, map_1, border, gradient, curvature)
                         who, side = (i, 1) if is_open else (taken_by[k, 0], 0)
                         if end < most and who < n_moving:
-                            edge = who, pieces[who, side, row], y, side, end, ox
-                            gain = 1.0, contrast_at(contrast, classes[i, 0], classes[i, 1], end, border)
-                            _add_edge(discs, tangents, edge, map_0, map_1, border, gain, gradient, curvature)
+                            facing = contrast_at(contrast, classes[i, 0], classes[i, 1], end, border)
+                            edge = _Edge(who, pieces[who, side, row], y, side, end, 1.0, facing)
+                            _add_edge(discs, tangents, edge, ox, map_0, map_1, border, gradient, curvature)
                 if is_open:
                     break
                 at, from_k = max(at, taken_x[k, 1]), k
@@ -92,7 +116,7 @@ def capsule_evidence(discs, depth, classes, share, sums, contrast, origin, work,
     for i in range(n):
         if last[i] <= first[i]:
             continue
-        nearer = order, i, first, last, x
+        nearer = _Nearer(order, i, first, last, x)
         _add_level_edges(discs, share, tangents[i], classes, sums, contrast, nearer, origin, out, gradient, curvature)
         if i < n_moving and classes[i, 0] != classes[i, 1]:
             sums_of = sums[classes[i, 0]], sums[classes[i, 1]]
@@ -135,28 +159,25 @@ def _edge_derivative(discs, tangents, who, piece, y, outward):
 
 
 @kernel(inline="always")
-def _add_edge(discs, tangents, edge, map_0, map_1, border, gain, gradient, curvature):
-    """Add the derivatives at the end of a span by its capsule's discs: `gain` is its sign and the contrast there.
+def _add_edge(discs, tangents, edge, ox, map_0, map_1, border, gradient, curvature):
+    """Add the derivatives at the end of a span by its capsule's discs; ox is the region's first column.
 
     A flat edge gains all along the interval that it covers within the row. Level ones are left to `_add_level_edges`.
     """
-    who, piece, y, side, at, ox = edge
+    who, piece = edge.who, edge.piece
     if piece >= 2 and _is_level(tangents[who, piece - 2]):
         return
-    cut, weight, split = border
-    sign, contrast = gain
-    x0, x1, t, by_y, by_r = _edge_derivative(discs, tangents, who, piece, y, 2.0 * side - 1.0)
+    x0, x1, t, by_y, by_r = _edge_derivative(discs, tangents, who, piece, edge.y, 2.0 * edge.side - 1.0)
     last = np.float32(len(map_0) - 2.0)
     left = min(max(np.float32(min(x0, x1)) - ox, np.float32(0)), last)
     right = min(max(np.float32(max(x0, x1)) - ox, np.float32(0)), last)
     if right - left > 1:
-        inside = border_sum_at(map_0, map_1, right, cut, weight, split) - border_sum_at(
-            map_0, map_1, left, cut, weight, split
-        )
-        value = sign * inside / (right - left)
+        inside = border_sum_at(map_0, map_1, right, border) - border_sum_at(map_0, map_1, left, border)
+        value = edge.gain * inside / (right - left)
     else:
-        value = sign * border_value_at(map_0, map_1, at, cut, weight, split)
-    _accumulate(1.0, by_y, by_r, t, value, contrast / np.sqrt(1 + by_y * by_y), gradient[who], curvature[who])
+        value = edge.gain * border_value_at(map_0, map_1, edge.at, border)
+    facing = edge.contrast / np.sqrt(1 + by_y * by_y)
+    _accumulate(1.0, by_y, by_r, t, value, facing, gradient[who], curvature[who])
 
 
 @kernel(inline="always")
@@ -193,7 +214,7 @@ def _add_level_edges(discs, share, tangents, classes, sums, contrast, nearer, or
     the map there, less that of what lies behind; where a nearer capsule covers it, it is 0.
     """
     order, i, first, last, x = nearer
-    _, h, w = sums.shape
+    h, w = sums.shape[1:]
     for k in range(2):
         tangent = tangents[k]
         if not _is_level(tangent):

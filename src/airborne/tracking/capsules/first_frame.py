@@ -13,6 +13,7 @@ from airborne.errors import TrialError
 from airborne.tracking.capsules.equations import N_CAPSULES, N_LENGTHS, N_POINTS, pose_state
 from airborne.tracking.capsules.fit import JumperFit, JumperPrior, evidence_of, fit_jumper
 from airborne.tracking.capsules.jumper import JOINTS, N_DOF, PELVIS, SHANK, SHORTS_END, SOCK_END, THIGH, TRUNK, WAIST
+from airborne.tracking.capsules.kernel_arguments import Capsules
 from airborne.tracking.capsules.surface_colours import SurfaceColours, learn_unoccluded
 from airborne.tracking.capsules.views import MapScale, RegionMaps, map_evidence, map_scale, player_regions
 from airborne.types import Array
@@ -78,9 +79,7 @@ def start_state(name: str, joints_m: Mapping[str, Array]) -> Array:
     return state
 
 
-def fit_first_frame(
-    name: str, joints_m: Mapping[str, Array], frames: Frames, others: tuple[Array, Array]
-) -> FirstFrameFit:
+def fit_first_frame(name: str, joints_m: Mapping[str, Array], frames: Frames, others: Capsules) -> FirstFrameFit:
     """Fit pose and shape to the first frame, with the colours relearned in each round.
 
     Raises TrialError where no camera shows the player.
@@ -107,7 +106,7 @@ def fit_first_frame(
     return FirstFrameFit(fitted, colours, scale)
 
 
-def _search_borders(state: Array, region_maps: RegionMaps, others: tuple[Array, Array]) -> Array:
+def _search_borders(state: Array, region_maps: RegionMaps, others: Capsules) -> Array:
     """Search where shorts and socks end, on a grid."""
     for border in (SHORTS_END, SOCK_END):
         candidates = []

@@ -10,7 +10,8 @@ import numpy as np
 from airborne.kernels import kernel
 from airborne.tracking.capsules.equations import N_CAPSULES, N_POINTS, accumulate_equations, classes_with
 from airborne.tracking.capsules.jumper import FOOT_HEIGHT_M, LIMITS_RAD, N_DOF
-from airborne.tracking.capsules.views import RegionMaps, workspace
+from airborne.tracking.capsules.kernel_arguments import Capsules, Equations, Images, SummedMaps, Workspace
+from airborne.tracking.capsules.views import RegionMaps
 from airborne.types import Array
 
 _NATS_PER_M2 = 240.0  # weight of an area on the body per nat of its pixels, whose errors are correlated
@@ -56,6 +57,16 @@ class JumperFit:
     owned: Array  # (v, 10, 2, 2) evidence and area [px of the maps] of each capsule's two classes
 
 
+class _Priors(NamedTuple):
+    """What is known of a state beside the images; see `JumperPrior`."""
+
+    mean: Array
+    information: Array
+    anchors: Array
+    anchor_sd_m: Array
+    posture: Array  # (18, 18) information about the resting pose
+
+
 class _Iterate(NamedTuple):
     """A state, with the objective and its normal equations there."""
 
@@ -64,44 +75,47 @@ class _Iterate(NamedTuple):
     gradient: Array  # (n_free,) of the second
     information: Array  # (n_free, n_free) its Gauss-Newton curvature
     owned: Array  # (v, 10 + others, 2, 2)
-    equations: tuple[Array, Array, Array, Array, Array]  # see `accumulate_equations`
+    equations: Equations
 
 
 def fit_jumper(
-    state: Array, prior: JumperPrior, region_maps: RegionMaps, others: tuple[Array, Array], *, most_steps: int = 10
+    state: Array, prior: JumperPrior, region_maps: RegionMaps, others: Capsules, *, most_steps: int = 10
 ) -> JumperFit:
     """Move the first len(prior.mean) numbers of a state to the nearest maximum of evidence and prior."""
     n = len(prior.mean)
-    work, owned = workspace(region_maps, len(others[0]))
-    images = region_maps.cameras, classes_with(others), region_maps.maps, others, work
+    images, owned = _images(region_maps, others)
     anchors = np.full((N_POINTS, 3), np.nan) if prior.anchors is None else prior.anchors
     sd_m = np.ones(N_POINTS) if prior.anchor_sd_m is None else prior.anchor_sd_m
-    priors = prior.mean, np.ascontiguousarray(prior.information), anchors, sd_m, _POSTURE_INFORMATION
+    priors = _Priors(prior.mean, np.ascontiguousarray(prior.information), anchors, sd_m, _POSTURE_INFORMATION)
     weight = _pixel_weight(region_maps)
     best = _maximise(
         _allocate_iterate(state, n, owned), _allocate_iterate(state, n, owned), priors, images, weight, most_steps
     )
-    points, jacobian, _, _, score_covariance = best.equations
-    inverse = np.linalg.inv(best.information)
+    inverse, equations = np.linalg.inv(best.information), best.equations
     return JumperFit(
         state=best.state,
         information=best.information,
-        model_error_covariance=(_OUTLINE_SD_M * weight * _SLOPE) ** 2 * inverse @ score_covariance @ inverse,
-        points=points,
-        jacobian=jacobian,
+        model_error_covariance=(_OUTLINE_SD_M * weight * _SLOPE) ** 2 * inverse @ equations.score_covariance @ inverse,
+        points=equations.points,
+        jacobian=equations.jacobian,
         nats=float(best.totals[0]),
         total=float(best.totals[1]),
         owned=best.owned[:, :N_CAPSULES],
     )
 
 
-def evidence_of(state: Array, region_maps: RegionMaps, others: tuple[Array, Array]) -> float:
+def evidence_of(state: Array, region_maps: RegionMaps, others: Capsules) -> float:
     """Return the evidence of a state [nat], without any prior."""
-    work, owned = workspace(region_maps, len(others[0]))
-    no_equations = np.empty((N_POINTS, 3)), np.empty((27, 0)), np.empty(0), np.empty((0, 0)), np.empty((0, 0))
-    return _pixel_weight(region_maps) * accumulate_equations(
-        state, 0, region_maps.cameras, classes_with(others), region_maps.maps, others, work, owned, no_equations
-    )
+    images, owned = _images(region_maps, others)
+    return _pixel_weight(region_maps) * accumulate_equations(state, 0, images, owned, Equations.of(N_POINTS, 0))
+
+
+def _images(region_maps: RegionMaps, others: Capsules) -> tuple[Images, Array]:
+    """Return the kernels' images, and an array for what each capsule owns of them."""
+    n, (v, _, h, _) = N_CAPSULES + len(others.ends), region_maps.sums.shape
+    maps = SummedMaps(region_maps.sums, region_maps.contrast)
+    images = Images(region_maps.cameras, maps, others, classes_with(others), Workspace.of(n, h))
+    return images, np.zeros((v, n, 2, 2))
 
 
 def _pixel_weight(region_maps: RegionMaps) -> float:
@@ -109,8 +123,7 @@ def _pixel_weight(region_maps: RegionMaps) -> float:
 
 
 def _allocate_iterate(state: Array, n: int, owned: Array) -> _Iterate:
-    equations = np.empty((N_POINTS, 3)), np.empty((3 * N_POINTS, n)), np.empty(n), np.empty((n, n)), np.empty((n, n))
-    return _Iterate(state.copy(), np.empty(2), np.empty(n), np.empty((n, n)), owned.copy(), equations)
+    return _Iterate(state.copy(), np.empty(2), np.empty(n), np.empty((n, n)), owned.copy(), Equations.of(N_POINTS, n))
 
 
 @kernel
@@ -140,20 +153,17 @@ def _maximise(best, trial, priors, images, weight, most_steps):
 @kernel
 def _evaluate(iterate, priors, images, weight):
     """Evaluate the evidence at an iterate's state, add the priors, and fill the rest of the iterate."""
-    mean, information, anchors, anchor_sd_m, posture = priors
-    cameras, classes, maps, others, work = images
-    points, jacobian, gradient, curvature, _ = iterate.equations
-    state, n, A, b = iterate.state, len(mean), iterate.information, iterate.gradient
-    nats = weight * accumulate_equations(
-        state, n, cameras, classes, maps, others, work, iterate.owned, iterate.equations
-    )
-    deviation = state[:n] - mean
-    prior_gradient = information @ deviation
+    anchors, anchor_sd_m = priors.anchors, priors.anchor_sd_m
+    points, jacobian = iterate.equations.points, iterate.equations.jacobian
+    state, n, A, b = iterate.state, len(priors.mean), iterate.information, iterate.gradient
+    nats = weight * accumulate_equations(state, n, images, iterate.owned, iterate.equations)
+    deviation = state[:n] - priors.mean
+    prior_gradient = priors.information @ deviation
     posture_deviation = _REST_POSE - state[:N_DOF]
-    posture_gradient = posture @ posture_deviation
-    A[:] = weight * _SLOPE * curvature + information
-    b[:] = weight * gradient - prior_gradient
-    A[:N_DOF, :N_DOF] += posture
+    posture_gradient = priors.posture @ posture_deviation
+    A[:] = weight * _SLOPE * iterate.equations.curvature + priors.information
+    b[:] = weight * iterate.equations.gradient - prior_gradient
+    A[:N_DOF, :N_DOF] += priors.posture
     b[:N_DOF] += posture_gradient
     cost = 0.5 * (deviation @ prior_gradient + posture_deviation @ posture_gradient)
     for k in range(N_DOF):

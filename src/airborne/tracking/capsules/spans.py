@@ -1,15 +1,25 @@
 """Spans of rows over maps stored as cumulative sums: the sum over a span costs two reads, however long it is.
 
-Where a row crosses from one map to another, `cut`, `weight` and `split` say how, as `outlines.border_in_row` returns.
+Where a row crosses from one map to another, a `Border` says how.
 """
 
 from __future__ import annotations
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from airborne.kernels import kernel
 
 MOST_SPANS = 64  # disjoint ones in one row
+
+
+class Border(NamedTuple):
+    """Where a row meets the border between the first and the second map of a capsule."""
+
+    cut: Any  # x [px]
+    weight: Any  # with split 0: the first map's share of the row
+    split: Any  # 0: the border lies along the row; 1: the first map lies left of cut; -1: right
 
 
 @kernel
@@ -47,8 +57,9 @@ def value_between(sums, x, y, above):
 
 
 @kernel(inline="always")
-def border_sum_at(map_0, map_1, x, cut, weight, split):
+def border_sum_at(map_0, map_1, x, border):
     """Interpolate the cumulative sums of the maps that apply left of x, up to a constant."""
+    cut, weight, split = border
     if split == 0:
         return weight * sum_at(map_0, x) + (1 - weight) * sum_at(map_1, x)
     on_left, on_right = (map_0, map_1) if split > 0 else (map_1, map_0)
@@ -59,8 +70,9 @@ def border_sum_at(map_0, map_1, x, cut, weight, split):
 
 
 @kernel(inline="always")
-def border_value_at(map_0, map_1, edge, cut, weight, split):
+def border_value_at(map_0, map_1, edge, border):
     """Interpolate the map that applies at an edge of a span."""
+    cut, weight, split = border
     if split == 0:
         return weight * value_at(map_0, edge) + (1 - weight) * value_at(map_1, edge)
     return value_at(map_0, edge) if (edge < cut) == (split > 0) else value_at(map_1, edge)
@@ -76,8 +88,9 @@ def contrast_at(contrast, class_0, class_1, edge, border):
 
 
 @kernel(inline="always")
-def add_span(map_0, map_1, at, end, cut, weight, split, out):
+def add_span(map_0, map_1, at, end, border, out):
     """Add the sums and the areas from `at` to `end` of a row of cumulative sums to out (2, 2)."""
+    cut, weight, split = border
     if split == 0:
         if weight > 0:
             out[0, 0] += weight * (sum_at(map_0, end) - sum_at(map_0, at))

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from airborne.appearance.foreground import BINS_PER_CHANNEL, count_colours
 from airborne.appearance.surface_classes import log_ratio_table
 from airborne.cameras import Camera
-from airborne.tracking.capsules.equations import N_CAPSULES, N_LENGTHS, N_POINTS, NOBODY, classes_with, pose_state
+from airborne.tracking.capsules.equations import N_CAPSULES, N_LENGTHS, N_POINTS, classes_with, pose_state
 from airborne.tracking.capsules.jumper import N_DOF, SHOE, SKIN, SOCK, SURFACE_CLASSES
+from airborne.tracking.capsules.kernel_arguments import NOBODY, Capsules
 from airborne.tracking.capsules.outlines import draw_labels, project
 from airborne.tracking.capsules.views import EvidenceTable, PlayerRegion, pack_camera
 from airborne.types import Array
@@ -60,16 +61,13 @@ class SurfaceColours:
         return EvidenceTable(assumed, evidence, expected, expected - self.background[view].ravel() @ evidence[:, :n])
 
 
-def class_image(
-    state: Array, camera: Camera, thickness: float, others: tuple[Array, Array] = NOBODY
-) -> NDArray[np.int8]:
+def class_image(state: Array, camera: Camera, thickness: float, others: Capsules = NOBODY) -> NDArray[np.int8]:
     """Draw the class of each pixel of a camera's image: (h, w), -1 where none, 5 where one of the others is."""
     state = state.copy()
     state[_THICKNESSES] *= thickness
-    other_ends, other_radii = others
-    n = N_CAPSULES + len(other_ends)
+    n = N_CAPSULES + len(others.ends)
     ends, end_radii, share = np.empty((n, 2, 3)), np.empty((n, 2)), np.ones(n)
-    ends[N_CAPSULES:], end_radii[N_CAPSULES:] = other_ends, other_radii
+    ends[N_CAPSULES:], end_radii[N_CAPSULES:] = others
     discs, depth = np.empty((n, 2, 3)), np.empty(n)
     pose_state(state, np.empty((N_POINTS, 3)), ends, end_radii, share)
     project(ends, end_radii, pack_camera(camera), discs, depth)
@@ -102,7 +100,7 @@ def learn_colours(
 
 
 def update_colours(
-    colours: SurfaceColours, state: Array, regions: Sequence[PlayerRegion], others: tuple[Array, Array]
+    colours: SurfaceColours, state: Array, regions: Sequence[PlayerRegion], others: Capsules
 ) -> SurfaceColours:
     """Update the colours of socks and shoes from the views in which they are visible.
 
@@ -137,9 +135,7 @@ def _separate_classes(raw: Array, around: Array) -> Array:
     return distributions
 
 
-def learn_unoccluded(
-    state: Array, regions: Sequence[PlayerRegion], n_cameras: int, others: tuple[Array, Array]
-) -> SurfaceColours:
+def learn_unoccluded(state: Array, regions: Sequence[PlayerRegion], n_cameras: int, others: Capsules) -> SurfaceColours:
     """Learn as `learn_colours` does, from the views in which the player is not occluded, and estimate the occlusion.
 
     A class in one view is judged by its colours in the other views. others as in `fit_jumper`.

@@ -13,6 +13,7 @@ from airborne.tracking.capsules.equations import N_CAPSULES, N_LENGTHS, N_POINTS
 from airborne.tracking.capsules.first_frame import fit_first_frame, points_of, start_state
 from airborne.tracking.capsules.fit import JumperFit, JumperPrior, fit_jumper
 from airborne.tracking.capsules.jumper import CAPSULES, FOOT_HEIGHT_M, JOINTS, N_DOF, PELVIS, SKIN, SURFACE_CLASSES
+from airborne.tracking.capsules.kernel_arguments import Capsules
 from airborne.tracking.capsules.surface_colours import (
     COLOUR_UPDATE_S,
     SurfaceColours,
@@ -123,8 +124,8 @@ class Blocker:
         return tracks, tuple(estimates)
 
 
-def occluding_capsules(state: Array, others: Sequence[Array]) -> tuple[Array, Array]:
-    """Return what may occlude a jumper: the capsules of others nearby, ends (m, 2, 3) and radii (m, 2) [m].
+def occluding_capsules(state: Array, others: Sequence[Array]) -> Capsules:
+    """Return what may occlude a jumper: the capsules of others nearby.
 
     state (35,) is the jumper's, others (35,) each.
     """
@@ -132,7 +133,7 @@ def occluding_capsules(state: Array, others: Sequence[Array]) -> tuple[Array, Ar
     ends, end_radii = np.empty((len(others), N_CAPSULES, 2, 3)), np.empty((len(others), N_CAPSULES, 2))
     for other, each_ends, each_radii in zip(others, ends, end_radii, strict=True):
         pose_state(other, np.empty((N_POINTS, 3)), each_ends, each_radii, np.empty(N_CAPSULES))
-    return ends.reshape(-1, 2, 3), end_radii.reshape(-1, 2)
+    return Capsules(ends.reshape(-1, 2, 3), end_radii.reshape(-1, 2))
 
 
 def _predict_track(track: Track, time_s: Fraction) -> tuple[GaussianState, Array]:
@@ -148,7 +149,7 @@ def _track_player(
     frames: Frames,
     *,
     predicted: tuple[GaussianState, Array],
-    occluders: tuple[Array, Array],
+    occluders: Capsules,
 ) -> tuple[Track, PlayerEstimate]:
     """Fit a player from the prediction of `_predict_track`."""
     expected, state = predicted

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from airborne.appearance.surface_classes import blur_maps, class_evidence
 from airborne.cameras import Camera
-from airborne.tracking.capsules.equations import N_CAPSULES
 from airborne.tracking.capsules.jumper import SURFACE_CLASSES
 from airborne.tracking.capsules.spans import cumulative_sums
 from airborne.types import Array
@@ -62,11 +61,6 @@ class RegionMaps:
     cameras: Array  # (v, 4, 4): K [R t] of the reduced region, then the focal length
     sums: NDArray[np.float32]  # (v, classes + 1, h, w + 1); the last map is empty
     contrast: Array  # (v, classes + 1) drop of evidence from inside to outside [nat]
-
-    @property
-    def maps(self) -> tuple[NDArray[np.float32], Array]:
-        """Argument `maps` of `accumulate_equations`."""
-        return self.sums, self.contrast
 
 
 def player_regions(frames: Frames, hips: Array) -> tuple[PlayerRegion, ...]:
@@ -131,9 +125,3 @@ def pack_camera(camera: Camera, reduction: int = 1, offset: tuple[float, float] 
     matrix[2] *= reduction
     matrix[3, 0] = (camera.K[0, 0] + camera.K[1, 1]) / (2 * reduction)
     return matrix
-
-
-def workspace(region_maps: RegionMaps, n_others: int) -> tuple[tuple, Array]:
-    """Allocate the work arrays of `accumulate_equations`: (x, pieces, tangents) and owned."""
-    n, (v, _, h, _) = N_CAPSULES + n_others, region_maps.sums.shape
-    return (np.empty((n, 2, h)), np.empty((n, 2, h), np.int64), np.empty((n, 2, 7))), np.zeros((v, n, 2, 2))

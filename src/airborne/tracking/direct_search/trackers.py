@@ -131,13 +131,14 @@ class DirectTracker:
         """Return the state after the frames, given their estimate."""
         if estimate.pose is None:
             return state
+        appearance = state.appearance
         if self._rule.counts_missed and estimate.status is Status.TRACKED:
-            self._learn_colours(state.appearance, estimate.pose, frames)
+            appearance = self._learn_colours(appearance, estimate.pose, frames)
         past = (*state.past, (frames.time_s, estimate.pose))[-_HISTORY:]
         scores = state.scores
         if estimate.status is Status.TRACKED:
             scores = (*scores, estimate.score)[-_SCORE_HISTORY:]
-        return DirectState(past, scores, state.appearance)
+        return DirectState(past, scores, appearance)
 
     def _objective(self, observed: Targets) -> Objective:
         return lambda vectors: score(self._geometry, observed, *self._pose_segments(vectors), rule=self._rule)
@@ -154,8 +155,7 @@ class DirectTracker:
             return pack_targets(views, self._lights, scale=self._scale), [view.camera for view in views]
         appearance = state.appearance
         if not state.past:
-            appearance = Appearance()
-            self._learn_colours(appearance, start, frames)
+            appearance = self._learn_colours(Appearance(), start, frames)
         regions = crop_regions([self._model.with_pose(start)], self._geometry, frames, _MARGIN_PX)
         region_of = {region.camera.name: region for region in regions if appearance.has_colours(region)}
         views = [view for view in frames.views if view is not None and view.camera.name in region_of]
@@ -167,10 +167,12 @@ class DirectTracker:
         packed = pack_targets(views, self._lights, scale=self._scale, evidence=maps or None)
         return packed, [view.camera for view in views]
 
-    def _learn_colours(self, appearance: Appearance, pose: Pose, frames: Frames) -> None:
+    def _learn_colours(self, appearance: Appearance, pose: Pose, frames: Frames) -> Appearance:
         posed = self._model.with_pose(pose)
         for region in crop_regions([posed], self._geometry, frames, _MARGIN_PX):
-            appearance.learn_colours(region, render(self._geometry, posed, region.camera, FLAT).mask)
+            mask = render(self._geometry, posed, region.camera, FLAT).mask
+            appearance = appearance.learn_colours(region, mask)
+        return appearance
 
     def _covariance(
         self, observed: Targets, cameras: Sequence[Camera], pose: Pose, *, value: float, pixels: float
@@ -206,8 +208,7 @@ class DirectTracker:
 
     def _embed(self, covariance: Array) -> Array:
         """Embed the covariance of the root (6, 6) in that of all degrees of freedom; the joints do not move."""
-        n_joints = len(self._model.segments) - 1
-        return np.pad(covariance, (0, 3 * n_joints))
+        return np.pad(covariance, (0, self._model.n_dofs - 6))
 
     def _gradient(self, observed: Targets, posed: PosedBody) -> Array:
         steps = np.diag(_PROBE)

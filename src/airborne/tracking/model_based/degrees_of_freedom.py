@@ -44,6 +44,11 @@ class DegreesOfFreedom:
     columns: NDArray[np.int64]  # (d,) indices into a delta
 
     @property
+    def moves_joints(self) -> bool:
+        """Whether any joint may move, not the root alone."""
+        return bool(np.any(self.columns >= 6))
+
+    @property
     def _damping(self) -> Array:
         """Inverse variances (d,) of a step, that hold what the images do not show."""
         return 1 / np.where(self.columns < 3, _DAMPING_SD_M, _DAMPING_SD_RAD) ** 2
@@ -54,7 +59,7 @@ class DegreesOfFreedom:
 
     def embed(self, delta: Array) -> Array:
         """Return a delta (d,) as a whole one (6 + 3 joints,), which is zero elsewhere."""
-        full = np.zeros(6 + 3 * (len(self.model.segments) - 1))
+        full = np.zeros(self.model.n_dofs)
         full[self.columns] = delta
         return full
 
@@ -142,13 +147,13 @@ def root_only(model: BodyModel) -> DegreesOfFreedom:
 
 def all_joints(model: BodyModel) -> DegreesOfFreedom:
     """Free everything."""
-    return DegreesOfFreedom(model, np.arange(6 + 3 * (len(model.segments) - 1)))
+    return DegreesOfFreedom(model, np.arange(model.n_dofs))
 
 
 def proximal_to_distal(model: BodyModel) -> list[DegreesOfFreedom]:
     """Free the trunk first, then what hangs on it, then distally (paper B, "Discussion"): one set a stage."""
     distance = _distance_from_trunk(model)
-    columns = np.arange(6 + 3 * (len(model.segments) - 1))
+    columns = np.arange(model.n_dofs)
     of_segment = np.concatenate([np.zeros(6, int), np.arange(1, len(model.segments)).repeat(3)])
     return [DegreesOfFreedom(model, columns[distance[of_segment] <= stage]) for stage in range(distance.max() + 1)]
 

@@ -14,18 +14,15 @@ import numpy as np
 
 from airborne.appearance.model import Appearance, Region
 from airborne.body import Pose, PosedBody
-from airborne.tracking.covariance import covariance_of
+from airborne.tracking.model_based.blur import gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, PosePrior
+from airborne.tracking.model_based.kernel_arguments import Comparison, Paint
 from airborne.tracking.model_based.normal_equations import (
-    Sums,
-    add_score_covariance,
-    gaussian_taps,
     known_light_equations,
-    map_equations,
-    new_blocks,
     photometric_equations,
     silhouette_equations,
 )
+from airborne.tracking.model_based.pose_descent import PoseEquations, descend_pose, map_to_dofs
 from airborne.tracking.model_based.render_model import (
     RenderModel,
     ViewBuffers,
@@ -33,6 +30,7 @@ from airborne.tracking.model_based.render_model import (
     shift_sds_px,
     silhouette_buffers,
 )
+from airborne.tracking.model_based.twist_equations import Sums, new_blocks
 from airborne.types import Array
 
 PyramidLevels = Sequence[tuple[int, int]]
@@ -49,32 +47,6 @@ _MOST_STEPS = 12
 _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
 _CONVERGED = 1 / 3  # squared length of the last step, in sds of the pose, for each degree of freedom
 SHAPE_SD_M = 0.007  # model error: how far a person's segment lies from the ellipsoid that fits its image
-_SHORTER = 0.4
-_SLACK = 1e-3  # of the objective: the refitted light makes it fluctuate
-
-
-@dataclass(frozen=True, slots=True)
-class PoseEquations:
-    """The normal equations at one pose, mapped to the free degrees of freedom."""
-
-    pose: Pose
-    A: Array  # (d, d)
-    g: Array  # (d,)
-    J: Array  # (segments, 6, d)
-    patches: Sequence[Array]  # (n, segments, 6) gradients that vary together: of blocks, of shifted images
-    cost: float  # robust squared residual
-    noise: float  # mean square of the weighted residual, times how many pixels share it
-
-    def covariance(self) -> Array:
-        """Return the covariance (d, d) of the free degrees of freedom."""
-        score_covariance = np.zeros_like(self.A)
-        for each in self.patches:
-            add_score_covariance(np.ascontiguousarray(each), self.J, score_covariance)
-        return covariance_of(self.A, noise=self.noise, score_covariance=score_covariance)
-
-    def objective(self, noise: float, prior_cost: float) -> float:
-        """Return minus the log-posterior, for a given variance of the noise."""
-        return 0.5 * self.cost / noise + prior_cost
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +57,6 @@ class Fit:
     dofs: DegreesOfFreedom
     equations: PoseEquations  # before the last step
     rms_light: float  # blurred residual, linear light 0..1
-    steps: int
 
     @property
     def covariance(self) -> Array:
@@ -117,15 +88,15 @@ def fit_silhouettes(
         ]
         views = [view for view in views if view.is_visible]
 
-        def evaluate(pose: Pose, _: int, views: list[ViewBuffers] = views) -> PoseEquations:
+        def evaluate(pose: Pose, _: bool, views: list[ViewBuffers] = views) -> PoseEquations:
             posed, n = render_model.with_pose(pose), len(render_model.model.segments)
             sums, totals, blocks = Sums.zero(n), np.zeros(3), []
             for view in views:
                 blocks.append(_blocks(view, n))
-                comparison = view.window, taps, taps, _CLIP_MASK
-                args = render_model.body, _projection(posed, view), view.observation, comparison, view.maps
+                comparison = Comparison(view.window, taps, taps, _CLIP_MASK)
+                args = render_model.body, view.projection(posed), view.observation, comparison, view.maps
                 totals += np.array(silhouette_equations(*args, sums, blocks[-1]))
-            return _map_to_dofs(
+            return map_to_dofs(
                 render_model,
                 dofs,
                 pose,
@@ -137,7 +108,7 @@ def fit_silhouettes(
                 correlated=correlated,
             )
 
-        pose = _descend(evaluate, dofs, pose, prior, most_steps=steps, overstep=1.0).pose
+        pose, _ = descend_pose(evaluate, dofs, pose, prior, most_steps=steps, overstep=1.0)
     return pose
 
 
@@ -155,14 +126,14 @@ def fit_images(
     Of several starts, the one that ends in the best agreement with images and prior is returned.
     """
     evaluate, correlated = _image_evaluator(render_model, poses, regions, appearance, dofs=dofs)
-    most_steps = _MOST_STEPS_STIFF if len(dofs.columns) <= 6 else _MOST_STEPS
+    most_steps = _MOST_STEPS if dofs.moves_joints else _MOST_STEPS_STIFF
     ends = [
-        _descend(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, tolerance=_CONVERGED)
+        descend_pose(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, tolerance=_CONVERGED)
         for pose in poses
     ]
-    noise = min(end.equations.noise for end in ends)
-    best = min(ends, key=lambda end: end.equations.objective(noise, dofs.prior_cost(end.equations.pose, prior)))
-    return Fit(best.pose, dofs, best.equations, (best.equations.noise / correlated) ** 0.5, best.steps)
+    noise = min(equations.noise for _, equations in ends)
+    pose, best = min(ends, key=lambda end: end[1].objective(noise, dofs.prior_cost(end[1].pose, prior)))
+    return Fit(pose, dofs, best, (best.noise / correlated) ** 0.5)
 
 
 def linearise_images(
@@ -170,7 +141,7 @@ def linearise_images(
 ) -> PoseEquations:
     """Return the normal equations of the images at one pose, without moving it."""
     evaluate, _ = _image_evaluator(render_model, [pose], regions, appearance, dofs=dofs)
-    return evaluate(pose, 1)
+    return evaluate(pose, True)
 
 
 def _image_evaluator(
@@ -180,8 +151,11 @@ def _image_evaluator(
     appearance: Appearance,
     *,
     dofs: DegreesOfFreedom,
-) -> tuple[Callable[[Pose, int], PoseEquations], float]:
-    """Return the normal equations as a function of poses near the given ones, and how many pixels share their noise."""
+) -> tuple[Callable[[Pose, bool], PoseEquations], float]:
+    """Return the normal equations as a function of poses near the given ones, and how many pixels share their noise.
+
+    The function's second argument says whether the light is fitted for the first time.
+    """
     bodies = [render_model.with_pose(pose) for pose in poses]
     views_and_regions = [(image_buffers(render_model, bodies, region, appearance), region) for region in regions]
     views_and_regions = [(view, region) for view, region in views_and_regions if view.is_visible]
@@ -190,20 +164,20 @@ def _image_evaluator(
     correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px or [_FINE_SIGMA_PX]))
     shifts = [shift_sds_px(region) for _, region in views_and_regions]
 
-    def evaluate(pose: Pose, step: int) -> PoseEquations:
+    def evaluate(pose: Pose, is_first: bool) -> PoseEquations:
         posed, n = render_model.with_pose(pose), len(render_model.model.segments)
         sums, totals, blocks, shifted = Sums.zero(n), np.zeros(3), [], []
         for (view, _), each_taps, shift in zip(views_and_regions, taps, shifts, strict=True):
             sums.B[:] = 0
             blocks.append(_blocks(view, n))
-            iterations = 3 if step == 1 else 1
+            iterations = 3 if is_first else 1
             totals += _add_image_equations(
                 render_model, posed, view, taps=each_taps, iterations=iterations, sums=sums, blocks=blocks[-1]
             )
             shifted.append(np.moveaxis(sums.B * shift, 2, 0))
-            if len(dofs.columns) > 6:
+            if dofs.moves_joints:
                 shifted.append(_shape_error_gradients(sums.B, posed, view))
-        return _map_to_dofs(
+        return map_to_dofs(
             render_model,
             dofs,
             pose,
@@ -229,20 +203,13 @@ def _add_image_equations(
     blocks: Array,
 ) -> Array:
     """Add one view's equations; return the cost, the weighted squared residual and the weight."""
-    comparison = view.window, *taps, _CLIP if render_model.lights is None else _CLIP_LIT
-    args = render_model.body, _projection(posed, view), view.observation, comparison, view.maps
+    comparison = Comparison(view.window, *taps, _CLIP if render_model.lights is None else _CLIP_LIT)
+    args = render_model.body, view.projection(posed), view.observation, comparison, view.maps
     if render_model.lights is None:
-        paint = render_model.albedo, render_model.is_faceted
+        paint = Paint(render_model.albedo, render_model.is_faceted)
         return np.array(photometric_equations(*args, paint, view.light, iterations, sums, blocks))
-    size = view.maps[0].shape
-    workspace = (
-        np.empty(size, np.int16),
-        np.empty(size, np.int16),
-        np.empty(size, np.float32),
-        np.empty((*size, 3), np.float32),
-    )
     lamps, ambient = view.light
-    return np.array(known_light_equations(*args, workspace, render_model.is_faceted, lamps, ambient, sums, blocks))
+    return np.array(known_light_equations(*args, render_model.is_faceted, lamps, ambient, sums, blocks))
 
 
 def _shape_error_gradients(B: Array, posed: PosedBody, view: ViewBuffers) -> Array:
@@ -258,70 +225,6 @@ def _shape_error_gradients(B: Array, posed: PosedBody, view: ViewBuffers) -> Arr
     return rows.reshape(2 * n, n, 6)
 
 
-def _projection(posed: PosedBody, view: ViewBuffers) -> tuple:
-    return posed.R, posed.t, view.packed_view, view.K, posed.t[0]
-
-
 def _blocks(view: ViewBuffers, n_segments: int) -> Array:
     x0, y0, x1, y1 = view.window
     return new_blocks(x1 - x0, y1 - y0, n_segments)
-
-
-@dataclass(frozen=True, slots=True)
-class _Descent:
-    pose: Pose  # after the last step
-    equations: PoseEquations  # before it
-    steps: int
-
-
-def _descend(
-    evaluate: Callable[[Pose, int], PoseEquations],
-    dofs: DegreesOfFreedom,
-    pose: Pose,
-    prior: PosePrior | None,
-    *,
-    most_steps: int,
-    overstep: float,
-    tolerance: float = 0.0,
-) -> _Descent:
-    """Step downhill; a step that increases the objective is taken back and shortened."""
-    best, delta, share, objective = None, np.zeros(0), overstep, np.inf
-    for step in range(1, most_steps + 1):
-        trial = evaluate(pose, step)
-        noise = max(trial.noise if best is None else best.noise, 1e-9)
-        value = trial.objective(noise, dofs.prior_cost(pose, prior))
-        if best is not None and value > objective * (1 + _SLACK):
-            share *= _SHORTER
-            pose = dofs.update(best.pose, share * delta)
-            continue
-        best, share, noise = trial, overstep, max(trial.noise, 1e-9)
-        objective = best.objective(noise, dofs.prior_cost(pose, prior))
-        delta = dofs.solve_step(best.pose, best.A / noise, best.g / noise, prior)
-        pose = dofs.update(best.pose, share * delta)
-        if delta @ best.A @ delta <= tolerance * len(delta) * noise:
-            break
-    assert best is not None
-    return _Descent(pose if share == overstep else best.pose, best, step)
-
-
-def _map_to_dofs(
-    render_model: RenderModel,
-    dofs: DegreesOfFreedom,
-    pose: Pose,
-    posed: PosedBody,
-    *,
-    sums: Sums,
-    blocks: Sequence[Array],
-    shifted: Sequence[Array],
-    totals: Array,
-    correlated: float,
-) -> PoseEquations:
-    """Map the segments' equations through the chain of joints."""
-    J = np.ascontiguousarray(render_model.jacobian(posed, dofs))
-    d = J.shape[-1]
-    A, g = np.zeros((d, d)), np.zeros(d)
-    map_equations(sums.curvature, sums.g, J, A, g)
-    cost, total, weight = totals
-    noise = correlated * (total / weight if weight > 0 else 1.0)
-    rows = [each.reshape(-1, *J.shape[:2]) for each in blocks] + list(shifted)
-    return PoseEquations(pose, A, g, J, rows, float(cost), float(noise))

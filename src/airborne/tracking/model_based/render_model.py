@@ -17,16 +17,15 @@ from airborne.body import BodyModel, Pose, PosedBody, SurfaceArrays, has_flat_si
 from airborne.body.symmetry import continuous_axes
 from airborne.cameras import Camera
 from airborne.rendering import Lights, pose_segments
-from airborne.rendering.maps import empty_maps, surface_maps
+from airborne.rendering.maps import SurfaceMaps, empty_maps, surface_maps
 from airborne.rendering.packing import pack_lights, pack_view
 from airborne.rendering.shapes import new_shapes
 from airborne.rendering.srgb import light_from_srgb
 from airborne.tracking.covariance import SHIFT_SD_PX
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom
-from airborne.tracking.model_based.normal_equations import mask_window
+from airborne.tracking.model_based.kernel_arguments import Observation, PackedBody, Projection, Window
+from airborne.tracking.model_based.owners import mask_window
 from airborne.types import Array
-
-_Window = tuple[int, int, int, int]  # x0, y0, x1, y1 in a region [px]
 
 _ROOM_PX = 12  # by which a body may move within a window, beyond the blur's radius
 _TO_SHARE = (np.arange(1024) / 1023).astype(np.float32)  # sRGB as shares of full, for `light_planes`
@@ -56,14 +55,14 @@ class RenderModel:
         return cls(model, flat, shapes, np.array(owners, np.int16), albedo, is_faceted, axes, lights)
 
     @property
-    def body(self) -> tuple:
-        """What the kernels take of the body."""
-        return self.shapes, self.geometry, self.segment_of_part
+    def body(self) -> PackedBody:
+        """The body as the kernels take it."""
+        return PackedBody(self.shapes, self.geometry, self.segment_of_part)
 
     def with_pose(self, pose: Pose) -> PosedBody:
         """Pose the body; the same as `BodyModel.with_pose`."""
         root = pose.world_from_root
-        joints = pose.joint_angles if pose.joint_angles.size else np.zeros((len(self.model.segments) - 1, 3))
+        joints = pose.joint_angles if pose.joint_angles.size else np.zeros((self.model.n_joints, 3))
         R, t = pose_segments(self.model, root.rotation.as_matrix()[None], root.translation[None], joints[None])
         return PosedBody(self.model, R[0], t[0])
 
@@ -81,22 +80,22 @@ class RenderModel:
         """Draw which part each pixel of a region shows: (h, w), -1 where none."""
         maps = empty_maps(region.camera.size)
         surface_maps(self.shapes, self.geometry, posed.R, posed.t, region.packed_view, *maps)
-        return maps[0]
+        return maps.part
 
-    def window(self, bodies: Sequence[PosedBody], camera: Camera, packed: Array) -> _Window:
+    def window(self, bodies: Sequence[PosedBody], camera: Camera, packed: Array) -> Window:
         """Return the part of an image that holds the bodies with room to move; empty where none is visible."""
         maps = empty_maps(camera.size)
         windows = []
         for posed in bodies:
             surface_maps(self.shapes, self.geometry, posed.R, posed.t, packed, *maps)
-            windows.append(mask_window(maps[0]))
+            windows.append(mask_window(maps.part))
         windows = np.array([window for window in windows if window[2] > window[0]])
         if not len(windows):
-            return 0, 0, 0, 0
+            return Window(0, 0, 0, 0)
         (x0, y0), (x1, y1) = windows[:, :2].min(axis=0).tolist(), windows[:, 2:].max(axis=0).tolist()
         width, height = camera.size
         room_v = round(_ROOM_PX * camera.K[1, 1] / camera.K[0, 0])
-        return max(x0 - _ROOM_PX, 0), max(y0 - room_v, 0), min(x1 + _ROOM_PX, width), min(y1 + room_v, height)
+        return Window(max(x0 - _ROOM_PX, 0), max(y0 - room_v, 0), min(x1 + _ROOM_PX, width), min(y1 + room_v, height))
 
 
 def _symmetry_axes(model: BodyModel) -> dict[int, Array]:
@@ -111,13 +110,13 @@ def _symmetry_axes(model: BodyModel) -> dict[int, Array]:
 
 
 class ViewBuffers(NamedTuple):
-    """A view as the kernels take it; see `normal_equations`."""
+    """A view as the kernels take it; see `kernel_arguments`."""
 
     packed_view: Array
     K: Array
-    observation: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]
-    maps: Any
-    window: _Window
+    observation: Observation
+    maps: SurfaceMaps  # workspace
+    window: Window
     light: Any = None  # (3, LIGHT_TERMS) to be fitted, or lamps (l, 8) and the ambient light
 
     @property
@@ -126,12 +125,16 @@ class ViewBuffers(NamedTuple):
         x0, y0, x1, y1 = self.window
         return x1 - x0 >= 3 and y1 - y0 >= 3
 
+    def projection(self, posed: PosedBody) -> Projection:
+        """Project a body to this view; twists are about its root's origin."""
+        return Projection(posed.R, posed.t, self.packed_view, self.K, posed.t[0])
+
 
 def image_buffers(
     render_model: RenderModel, bodies: Sequence[PosedBody], region: Region, appearance: Appearance
 ) -> ViewBuffers:
     """Prepare a region: in linear light where the lights are unknown, in shares of full sRGB where they are known."""
-    mean, sd, n_observations = appearance.background_model(region)
+    mean, sd, n_observations = appearance.background_pixels(region)
     background = np.empty_like(mean)
     if not inpaint(mean, n_observations, background):
         background[:] = region.rgb
@@ -147,9 +150,8 @@ def image_buffers(
         light = pack_lights(render_model.lights, region.camera), np.float32(render_model.lights.ambient)
     window = render_model.window(bodies, region.camera, region.packed_view)
     maps = empty_maps(region.camera.size)
-    return ViewBuffers(
-        region.packed_view, region.camera.K, (observed, background_light, certainty), maps, window, light
-    )
+    observation = Observation(observed, background_light, certainty)
+    return ViewBuffers(region.packed_view, region.camera.K, observation, maps, window, light)
 
 
 def silhouette_buffers(
@@ -157,7 +159,7 @@ def silhouette_buffers(
 ) -> ViewBuffers:
     """Prepare a region and its posterior, reduced."""
     camera, plane = reduce_region(region, posterior, reduction)
-    observation = plane[None], np.zeros((1, *plane.shape), np.float32), np.ones_like(plane)
+    observation = Observation(plane[None], np.zeros((1, *plane.shape), np.float32), np.ones_like(plane))
     packed = pack_view(camera)
     window = render_model.window([posed], camera, packed)
     return ViewBuffers(packed, camera.K, observation, empty_maps(camera.size), window)

@@ -50,7 +50,7 @@ def blend_equations(
 
     The bodies have their own colours, unlit: a wrong brightness scales all shares alike.
     """
-    mean, _, n_observations = appearance.background_model(region)
+    mean, _, n_observations = appearance.background_pixels(region)
     is_learned = (n_observations > 0)[..., None]
     differences = []
     for posed in bodies:

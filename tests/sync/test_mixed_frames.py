@@ -5,7 +5,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from airborne.tracking.model_based.mixed_frames import blend_of
+from airborne.sync.camera_equations import share_equations
+from airborne.sync.mixed_frames import blend_of
 from airborne.tracking.model_based.refined import RefinedTracker
 from airborne.tracking.tracker import step
 from airborne.video import View
@@ -31,7 +32,7 @@ def blends():
             mixed = (1 - share) * now.views[0].rgb + share * later.views[0].rgb
             view = View(now.views[0].camera, np.rint(mixed).astype(np.uint8))
             poses = [thrown(now.time_s + Fraction(float(s))) for s in INSTANTS_S]
-            equations.append(tracker.blend_equations(state, view, poses))
+            equations.append(share_equations(tracker, state, view, poses))
         return blend_of(INSTANTS_S, *(np.array(each) for each in zip(*equations, strict=True)))
 
     return {share: blend(share) for share in (0.0, 0.3, 0.5, 1.0)}

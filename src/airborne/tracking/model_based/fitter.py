@@ -1,0 +1,140 @@
+"""Which degrees of freedom are fitted at which level: by silhouettes from coarse to fine, then by the images."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.appearance.model import Appearance, Region
+from airborne.body import BodyModel, Pose
+from airborne.tracking.model_based.degrees_of_freedom import (
+    DegreesOfFreedom,
+    PosePrior,
+    joints_of,
+    proximal_to_distal,
+    root_only,
+)
+from airborne.tracking.model_based.gauss_newton import NEAR, Fit, PyramidLevels, fit_images, fit_silhouettes
+from airborne.tracking.model_based.global_search import region_evidence
+from airborne.tracking.model_based.learning import learn_missing_backgrounds
+from airborne.tracking.model_based.left_right_swap import swap_limbs
+from airborne.tracking.model_based.misplaced_limbs import find_misplaced_limbs, search_limb
+from airborne.tracking.model_based.render_model import RenderModel
+from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
+from airborne.types import Array
+
+Order = Literal["refined", "joint", "hierarchical"]
+
+_TRUNK_AT = 4  # images at this reduction show the limbs of a body with joints; more reduced ones, its trunk alone
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LearnedRegions:
+    """The regions of one time whose colours have been learned."""
+
+    regions: Sequence[Region]
+    posteriors: Sequence[Array]  # (h, w) each pixel's probability to be body
+    appearance: Appearance
+
+    @classmethod
+    def of(cls, regions: Sequence[Region], appearance: Appearance) -> LearnedRegions:
+        """Take those of the regions whose colours have been learned."""
+        learned = [region for region in regions if appearance.has_colours(region)]
+        return cls(learned, [appearance.posterior(region) for region in learned], appearance)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JudgedFit:
+    """Where a fit ended, and how well its mask agrees with the images."""
+
+    fit: Fit
+    agreement: MaskAgreement
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitter:
+    """A body, and the stages in which its degrees of freedom are set free: the trunk first, at last everything."""
+
+    render_model: RenderModel
+    stages: Sequence[DegreesOfFreedom]
+    order: Order
+
+    @classmethod
+    def of(cls, render_model: RenderModel, order: Order, *, fixed_shape: bool) -> Fitter:
+        """Let everything move, or with a fixed shape the root alone."""
+        model = render_model.model
+        return cls(render_model, [root_only(model)] if fixed_shape else proximal_to_distal(model), order)
+
+    @property
+    def model(self) -> BodyModel:
+        """The body."""
+        return self.render_model.model
+
+    @property
+    def moves_joints(self) -> bool:
+        """Whether more than the root is fitted."""
+        return self.stages[-1].moves_joints
+
+    def swap_limbs(self, pose: Pose) -> list[Pose]:
+        """Return the poses with a pair of limbs swapped; none where no joint moves."""
+        return swap_limbs(self.model, pose) if self.moves_joints else []
+
+    def agreement(self, pose: Pose, learned: LearnedRegions) -> MaskAgreement:
+        """Compare a pose's mask with the images."""
+        posed = self.render_model.with_pose(pose)
+        return mask_agreement(self.render_model, posed, learned.regions, learned.posteriors)
+
+    def fit_silhouettes(
+        self, pose: Pose, learned: LearnedRegions, levels: PyramidLevels, prior: PosePrior | None
+    ) -> Pose:
+        """Fit the masks level by level: on the coarser ones, the trunk first."""
+        for level in levels:
+            for dofs in self._stages_at(level[0]):
+                args = self.render_model, pose, learned.regions, learned.posteriors
+                pose = fit_silhouettes(*args, levels=[level], dofs=dofs, prior=prior)
+        return pose
+
+    def fit_images(self, poses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> Fit:
+        """Fit the images from several poses; return the best fit."""
+        posed = self.render_model.with_pose(poses[0])
+        appearance = learn_missing_backgrounds(self.render_model, posed, learned.regions, learned.appearance)
+        *before, last = self.stages if self.order == "hierarchical" else self.stages[-1:]
+        for dofs in before:
+            fit = fit_images(self.render_model, poses, learned.regions, appearance, dofs=dofs, prior=prior)
+            poses = [fit.pose]
+        return fit_images(self.render_model, poses, learned.regions, appearance, dofs=last, prior=prior)
+
+    def judge(self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> JudgedFit:
+        """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it."""
+        if not self.moves_joints:
+            return JudgedFit(fit, self.agreement(fit.pose, learned))
+        maps, seen = None, (learned.regions, learned.posteriors)
+        for limb in find_misplaced_limbs(self.render_model, fit.pose, *seen):
+            maps = maps or region_evidence(*seen)
+            expected = [replace(fit.pose, joint_angles=_with_limb(fit.pose, guess, limb)) for guess in guesses]
+            dofs = joints_of(self.model, limb)
+            poses = [
+                fit_silhouettes(self.render_model, pose, *seen, levels=NEAR, dofs=dofs)
+                for pose in search_limb(self.render_model, [fit.pose, *expected], limb, maps)
+            ]
+            fit = self.fit_images([fit.pose, *poses], learned, None if prior is None else prior.widen(dofs.columns))
+        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *seen)
+        segments = tuple(int(segment) for limb in misplaced for segment in limb)
+        return JudgedFit(fit, replace(self.agreement(fit.pose, learned), misplaced=segments))
+
+    def _stages_at(self, reduction: int) -> list[DegreesOfFreedom]:
+        trunk, everything = self.stages[0], self.stages[-1]
+        if self.order == "joint" or not self.moves_joints:
+            return [everything]
+        return [trunk] * (reduction >= _TRUNK_AT) + [everything] * (reduction <= _TRUNK_AT)
+
+
+def _with_limb(pose: Pose, other: Pose, limb: NDArray[np.int64]) -> Array:
+    """Return the joint angles of a pose, with one limb's from another pose."""
+    angles = pose.joint_angles.copy()
+    angles[limb - 1] = other.joint_angles[limb - 1]
+    return angles

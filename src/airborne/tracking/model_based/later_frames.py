@@ -1,0 +1,46 @@
+"""Every later frame: from the predicted poses to a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from airborne.appearance.model import Appearance
+from airborne.body import Pose
+from airborne.tracking.image_regions import crop_regions
+from airborne.tracking.model_based.degrees_of_freedom import PosePrior
+from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegions
+from airborne.tracking.model_based.gauss_newton import CLOSE, NEAR
+from airborne.tracking.model_based.left_right_swap import is_nearer
+from airborne.tracking.model_based.status import Reference
+from airborne.video import Frames
+
+MARGIN_PX = 32  # of a full frame
+
+
+def regions_near(fitter: Fitter, poses: Sequence[Pose], frames: Frames, appearance: Appearance) -> LearnedRegions:
+    """Crop the images around a body in several poses."""
+    bodies = [fitter.render_model.with_pose(pose) for pose in poses]
+    return LearnedRegions.of(crop_regions(bodies, fitter.render_model.geometry, frames, MARGIN_PX), appearance)
+
+
+def fit_next(
+    fitter: Fitter,
+    predicted: Sequence[Pose],
+    frames: Frames,
+    appearance: Appearance,
+    *,
+    reference: Reference,
+    prior: PosePrior | None,
+) -> JudgedFit | None:
+    """Fit from the predicted pose of most evidence; None where no view shows any of them."""
+    learned = regions_near(fitter, predicted, frames, appearance)
+    if not learned.regions:
+        return None
+    judged = [(pose, fitter.agreement(pose, learned)) for pose in predicted]
+    expected, agreement = max(judged, key=lambda each: each[1].evidence)
+    levels = NEAR if fitter.moves_joints or agreement.is_suspect(reference) else CLOSE
+    fit = fitter.fit_images([fitter.fit_silhouettes(expected, learned, levels, prior)], learned, prior)
+    swaps = [pose for pose in fitter.swap_limbs(fit.pose) if is_nearer(fitter.model, pose, fit.pose, expected)]
+    if swaps:
+        fit = fitter.fit_images([fit.pose, *swaps], learned, prior)
+    return fitter.judge(fit, predicted, learned, prior)

@@ -1,0 +1,36 @@
+"""What images teach of the body's appearance, given its pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.appearance.model import Appearance, Region
+from airborne.body import PosedBody
+from airborne.tracking.model_based.render_model import RenderModel
+
+
+def learn_appearance(
+    render_model: RenderModel, posed: PosedBody, regions: Sequence[Region], appearance: Appearance
+) -> Appearance:
+    """Learn colours and backgrounds from regions that show a body."""
+    for region in regions:
+        mask = _mask(render_model, posed, region)
+        appearance = appearance.learn_colours(region, mask).learn_background(region, mask)
+    return appearance
+
+
+def learn_missing_backgrounds(
+    render_model: RenderModel, posed: PosedBody, regions: Sequence[Region], appearance: Appearance
+) -> Appearance:
+    """Give every region a background model: where none has been learned, this image outside the mask."""
+    for region in regions:
+        if not appearance.has_background(region):
+            appearance = appearance.learn_background(region, _mask(render_model, posed, region))
+    return appearance
+
+
+def _mask(render_model: RenderModel, posed: PosedBody, region: Region) -> NDArray[np.bool_]:
+    return render_model.draw_parts(posed, region) >= 0

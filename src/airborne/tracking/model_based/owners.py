@@ -1,0 +1,71 @@
+"""Which pixels a body moves, and by which of its segments. Kernels on the maps of `surface_maps`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from airborne.kernels import kernel
+from airborne.tracking.model_based.blur import RADIUS_PX
+from airborne.tracking.model_based.kernel_arguments import Window
+
+REACH_PX = 3  # an edge matters this far away: most of the blur's weight
+_PAD_PX = RADIUS_PX + 3  # beyond it, the blurred mask is zero
+
+
+@kernel(fastmath=True)
+def mask_window(part):
+    """Return the padded window around the body's pixels of a map of parts (h, w); all 0 where there is none."""
+    h, w = part.shape
+    x0, y0, x1, y1 = w, h, -1, -1
+    for y in range(h):
+        for x in range(w):
+            if part[y, x] >= 0:
+                x0, x1 = min(x0, x), max(x1, x)
+                y0, y1 = min(y0, y), max(y1, y)
+    if x1 < 0:
+        return Window(0, 0, 0, 0)
+    return Window(max(x0 - _PAD_PX, 0), max(y0 - _PAD_PX, 0), min(x1 + _PAD_PX + 1, w), min(y1 + _PAD_PX + 1, h))
+
+
+@kernel(fastmath=True)
+def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
+    """Assign each pixel to the segment whose edge moves it: of those within REACH_PX, the one nearest to the camera.
+
+    An occluding contour moves with the surface in front, never with the one behind. part, inverse_depth (H, W) maps of
+    a region; owner (h, w) segment or -1, nearness (h, w) its inverse depth near there [1/m], both of the window at
+    (x0, y0).
+    """
+    h, w = owner.shape
+    height, width = part.shape
+    distance = np.zeros((h, w), np.int16)  # squared, to the edge that owns a pixel; 0 inside
+    for y in range(h):
+        for x in range(w):
+            p = part[y + y0, x + x0]
+            owner[y, x] = segment_of_part[p] if p >= 0 else -1
+            nearness[y, x] = inverse_depth[y + y0, x + x0]
+    for v in range(max(y0 - REACH_PX, 0), min(y0 + h + REACH_PX, height)):
+        for u in range(max(x0 - REACH_PX, 0), min(x0 + w + REACH_PX, width)):
+            p = part[v, u]
+            if p < 0 or not _is_front_edge(part, inverse_depth, segment_of_part, v, u):
+                continue
+            own, near = segment_of_part[p], inverse_depth[v, u]
+            for y in range(max(v - y0 - REACH_PX, 0), min(v - y0 + REACH_PX + 1, h)):
+                for x in range(max(u - x0 - REACH_PX, 0), min(u - x0 + REACH_PX + 1, w)):
+                    d = (v - y0 - y) ** 2 + (u - x0 - x) ** 2
+                    is_closer = d < distance[y, x] if owner[y, x] == own else near > nearness[y, x]
+                    if is_closer:
+                        owner[y, x], nearness[y, x], distance[y, x] = own, near, d
+
+
+@kernel(fastmath=True)
+def _is_front_edge(part, inverse_depth, segment_of_part, v, u):
+    """Return whether a pixel of the body borders on a segment behind it, or on the background."""
+    height, width = part.shape
+    own, near = segment_of_part[part[v, u]], inverse_depth[v, u]
+    for dv, du in ((0, -1), (0, 1), (-1, 0), (1, 0)):
+        y, x = v + dv, u + du
+        if 0 <= y < height and 0 <= x < width:
+            p = part[y, x]
+            if p < 0 or (segment_of_part[p] != own and inverse_depth[y, x] < near):
+                return True
+    return False

@@ -1,0 +1,123 @@
+"""Descent of a pose on its normal equations, whose sum over all views and segments is mapped to the pose here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from airborne.body import Pose, PosedBody
+from airborne.geometry.descent import BacktrackingRule, descend
+from airborne.tracking.covariance import covariance_of
+from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, PosePrior
+from airborne.tracking.model_based.render_model import RenderModel
+from airborne.tracking.model_based.twist_equations import Sums, add_score_covariance, map_equations
+from airborne.types import Array
+
+_SHORTER = 0.4
+_SLACK = 1e-3  # of the objective: the refitted light makes it fluctuate
+
+
+@dataclass(frozen=True, slots=True)
+class PoseEquations:
+    """The normal equations at one pose, mapped to the free degrees of freedom."""
+
+    pose: Pose
+    A: Array  # (d, d)
+    g: Array  # (d,)
+    J: Array  # (segments, 6, d)
+    patches: Sequence[Array]  # (n, segments, 6) gradients that vary together: of blocks, of shifted images
+    cost: float  # robust squared residual
+    noise: float  # mean square of the weighted residual, times how many pixels share it
+
+    def covariance(self) -> Array:
+        """Return the covariance (d, d) of the free degrees of freedom."""
+        score_covariance = np.zeros_like(self.A)
+        for each in self.patches:
+            add_score_covariance(np.ascontiguousarray(each), self.J, score_covariance)
+        return covariance_of(self.A, noise=self.noise, score_covariance=score_covariance)
+
+    def objective(self, noise: float, prior_cost: float) -> float:
+        """Return minus the log-posterior, for a given variance of the noise."""
+        return 0.5 * self.cost / noise + prior_cost
+
+
+def map_to_dofs(
+    render_model: RenderModel,
+    dofs: DegreesOfFreedom,
+    pose: Pose,
+    posed: PosedBody,
+    *,
+    sums: Sums,
+    blocks: Sequence[Array],
+    shifted: Sequence[Array],
+    totals: Array,
+    correlated: float,
+) -> PoseEquations:
+    """Map the segments' equations through the chain of joints."""
+    J = np.ascontiguousarray(render_model.jacobian(posed, dofs))
+    d = J.shape[-1]
+    A, g = np.zeros((d, d)), np.zeros(d)
+    map_equations(sums.curvature, sums.g, J, A, g)
+    cost, total, weight = totals
+    noise = correlated * (total / weight if weight > 0 else 1.0)
+    rows = [each.reshape(-1, *J.shape[:2]) for each in blocks] + list(shifted)
+    return PoseEquations(pose, A, g, J, rows, float(cost), float(noise))
+
+
+@dataclass(frozen=True, eq=False)
+class _Iterate:
+    """A pose in a descent."""
+
+    equations: PoseEquations
+    dofs: DegreesOfFreedom
+    prior: PosePrior | None
+
+    @property
+    def noise(self) -> float:
+        """Variance of the residual here."""
+        return max(self.equations.noise, 1e-9)
+
+    @cached_property
+    def delta(self) -> Array:
+        """The whole step: (d,)."""
+        equations = self.equations
+        return self.dofs.solve_step(equations.pose, equations.A / self.noise, equations.g / self.noise, self.prior)
+
+    def cost(self, reference: _Iterate) -> float:
+        """Return minus the log-posterior, with the noise of the reference."""
+        return self.equations.objective(reference.noise, self.dofs.prior_cost(self.equations.pose, self.prior))
+
+    def step(self, share: float) -> tuple[Pose, float]:
+        """Return the pose after a share of the step, and what the images promise of the whole."""
+        pose = self.dofs.update(self.equations.pose, share * self.delta)
+        return pose, 0.5 * float(self.delta @ self.equations.A @ self.delta) / self.noise
+
+
+def descend_pose(
+    evaluate: Callable[[Pose, bool], PoseEquations],
+    dofs: DegreesOfFreedom,
+    pose: Pose,
+    prior: PosePrior | None,
+    *,
+    most_steps: int,
+    overstep: float,
+    tolerance: float = 0.0,
+) -> tuple[Pose, PoseEquations]:
+    """Step downhill; return where the last step leads, which is not evaluated any more, and the equations before it.
+
+    evaluate takes a pose, and whether it is the first. tolerance: squared length of the last step, in sds of the pose,
+    for each degree of freedom.
+    """
+    descent = descend(
+        _Iterate(evaluate(pose, True), dofs, prior),
+        lambda pose: _Iterate(evaluate(pose, False), dofs, prior),
+        BacktrackingRule(overstep, _SHORTER),
+        most_steps=most_steps - 1,
+        least_promise=(0.5 * tolerance * len(dofs.columns), 0.0),
+        slack=_SLACK,
+    )
+    best = descent.best
+    return best.equations.pose if descent.n_losses else best.step(overstep)[0], best.equations
