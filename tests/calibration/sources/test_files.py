@@ -63,7 +63,7 @@ def test_a_file_that_is_none_is_refused_in_one_line(tmp_path, text):
         read_sources(tmp_path / "none.toml")
 
 
-def test_another_kind_of_file_is_told(tmp_path):
+def test_another_kind_of_file_is_reported(tmp_path):
     path = tmp_path / "sources.toml"
     for text, found in (("[cam1]\nmatrix = 1", "cam1"), ('name = "x"\n[[camera]]\n[body]', "name, camera, body")):
         path.write_text(text)
