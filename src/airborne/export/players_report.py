@@ -13,6 +13,7 @@ from airborne.export.palette import STATUS_RGB, hex_colour
 from airborne.export.report import DEFINITIONS, records_table, status_bar
 from airborne.export.summary import json_ready
 from airborne.motion import PlayersMotion
+from airborne.motion.run_folder import REPORT, figures_of
 from airborne.tracking import Status
 
 FIGURE = "heights.png"
@@ -52,8 +53,8 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
 
     `summary` is the content of summary.json.
     """
-    _write_heights(folder / FIGURE, motion)
-    path = folder / "report.html"
+    _write_heights(figures_of(folder) / FIGURE, motion)
+    path = folder / REPORT
     summary = json_ready(summary)
     path.write_text(page.document(summary["name"], _sections(folder, summary)), encoding="utf-8")
     return path
@@ -139,7 +140,7 @@ def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
     if summary["jumps"]:
         yield page.heading("Jumps") + _jumps_table(summary["jumps"])
     yield page.heading("Heights")
-    yield page.figure(folder / FIGURE, _FIGURE_CAPTION)
+    yield page.figure(figures_of(folder) / FIGURE, _FIGURE_CAPTION)
     yield page.heading("Method") + page.settings(summary["method"])
     yield page.heading("Cameras") + records_table(summary["cameras"])
     yield page.heading("What the numbers mean")

@@ -12,6 +12,7 @@ from airborne.export.palette import STATUS_RGB, hex_colour
 from airborne.export.summary import body_warnings, headline, json_ready
 from airborne.motion import Motion
 from airborne.motion.flight.momentum_table import GRAVITY_M_S2
+from airborne.motion.run_folder import REPORT, figures_of
 from airborne.tracking import Status
 
 _FIGURES = {  # titles and captions, in the order of the page
@@ -107,7 +108,7 @@ def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
     missing = sorted({"name", *headline(Motion.collect([]))} - set(summary))
     if missing:
         raise ResultError(f"the summary of {folder} has no {', '.join(missing[:3])}; track again")
-    path = folder / "report.html"
+    path = folder / REPORT
     path.write_text(page.document(summary["name"], _sections(folder, summary)), encoding="utf-8")
     return path
 
@@ -129,8 +130,9 @@ def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
     if summary.get("joints"):
         yield page.heading("Against the paths of the joints") + _joint_comparison(summary["joints"])
     for name, (title, caption) in _FIGURES.items():
-        if (folder / name).is_file():
-            yield page.heading(title) + page.figure(folder / name, caption)
+        figure = figures_of(folder) / name
+        if figure.is_file():
+            yield page.heading(title) + page.figure(figure, caption)
         if name == "flight.png" and summary.get("flight"):
             yield _flight(summary["flight"])
     if summary.get("method"):
@@ -139,7 +141,7 @@ def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
     if summary.get("cameras"):
         yield page.heading("Cameras") + records_table(summary["cameras"])
     yield page.heading("What the numbers mean")
-    of_joints = {"Joint angles": _JOINT_ANGLES} if (folder / "joints.png").is_file() else {}
+    of_joints = {"Joint angles": _JOINT_ANGLES} if (figures_of(folder) / "joints.png").is_file() else {}
     uncertainty = {"Uncertainty": f"{_UNCERTAINTY} {summary.get('uncertainty', '')}"}
     yield page.definitions({**DEFINITIONS, **of_joints, **uncertainty})
     for key, title in (("timings_s", "Time taken [s]"), ("versions", "Versions"), ("inputs", "Inputs (SHA-256)")):

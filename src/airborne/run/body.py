@@ -14,6 +14,7 @@ import numpy as np
 from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
 from airborne.body.files import body_toml, mesh_files
 from airborne.export import ContactSheet, MatchingPicture, OverlayVideos, headline, write_figures, write_report
+from airborne.export.overlays import OverlaysAs
 from airborne.motion import (
     Motion,
     MotionWriter,
@@ -27,6 +28,7 @@ from airborne.motion import (
     write_joints,
     write_motion_parquet,
 )
+from airborne.motion.run_folder import BODY, JOINTS, MOTION, figures_of, tables_of, videos_of
 from airborne.rendering import FLAT, render
 from airborne.run.first_pose import find_first_pose
 from airborne.run.opening import Opened
@@ -52,7 +54,7 @@ class BodyRun:
     model: BodyModel
     start: Pose
 
-    table = "motion.csv"
+    table = MOTION
 
     @classmethod
     def open(cls, trial: Trial, opened: Opened[Recording]) -> BodyRun:
@@ -69,10 +71,10 @@ class BodyRun:
     def copy_inputs(self, folder: Path) -> None:
         """Write the body beside the results, for `airborne evaluate` and for other tools."""
         if self.trial.body.file is None:
-            (folder / "body.toml").write_text(body_toml(self.model), encoding="utf-8")
+            (folder / BODY).write_text(body_toml(self.model), encoding="utf-8")
             return
         body = self.trial.path(self.trial.body.file)
-        shutil.copyfile(body, folder / "body.toml")
+        shutil.copyfile(body, folder / BODY)
         for name in mesh_files(body):
             target = folder / name
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -100,12 +102,12 @@ class BodyRun:
         """Write one time's estimate."""
         writer.append(estimate)
 
-    def artists(self, folder: Path) -> Iterator[AbstractContextManager[Any]]:
+    def artists(self, folder: Path, drawn: OverlaysAs) -> Iterator[AbstractContextManager[Any]]:
         """Return what draws the frames while they are tracked."""
-        recording = self.opened.recording
-        yield OverlayVideos(folder, recording.rig, recording.rate)
-        yield ContactSheet(folder / "through_mask.png", recording.rig)
-        yield MatchingPicture(folder / "matching.png", recording.rig)
+        recording, folder_of = self.opened.recording, videos_of if drawn == "videos" else figures_of
+        yield OverlayVideos(folder_of(folder), recording.rig, recording.rate, drawn=drawn)
+        yield ContactSheet(figures_of(folder) / "through_mask.png", recording.rig)
+        yield MatchingPicture(figures_of(folder) / "matching.png", recording.rig)
 
     def draw(self, artists: Sequence[Any], frames: Frames, estimate: Estimate) -> None:
         """Let the artists draw one time; a start that failed is shown where it was set."""
@@ -129,7 +131,7 @@ class BodyRun:
 
     def draw_figures(self, folder: Path, motion: Motion) -> None:
         """Draw the figures of the whole motion."""
-        write_figures(folder, motion, self.model)
+        write_figures(figures_of(folder), motion, self.model)
 
     def write_report(self, folder: Path, summary: dict[str, Any], motion: Motion) -> None:
         """Write the report."""
@@ -142,13 +144,14 @@ class BodyRun:
 
 def write_tables(folder: Path, motion: Motion, model: BodyModel) -> None:
     """Write what is made of a motion: the same as parquet, angles, joints, the flight."""
-    write_motion_parquet(folder / "motion.parquet", motion)
-    write_angles(folder / "angles.csv", motion)
-    write_joints(folder / "joints.csv", motion, model)
+    tables = tables_of(folder)
+    write_joints(folder / JOINTS, motion, model)
+    write_motion_parquet(tables / "motion.parquet", motion)
+    write_angles(tables / "angles.csv", motion)
     if motion.joints:
-        write_joint_angles(folder / "joint_angles.csv", motion, model)
+        write_joint_angles(tables / "joint_angles.csv", motion, model)
     if _has_flight(motion, model):
-        write_flight(folder / "flight.csv", motion, model)
+        write_flight(tables / "flight.csv", motion, model)
 
 
 def _has_flight(motion: Motion, model: BodyModel) -> bool:

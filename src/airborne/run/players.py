@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from airborne.export import PlayersOverlayVideos, write_players_report
+from airborne.export.overlays import OverlaysAs
 from airborne.motion import PlayersMotion, PlayersWriter, read_players, write_players_parquet
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.table import jump_row, write_jumps
+from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, videos_of
 from airborne.run.opening import Opened
 from airborne.run.players_tracker import players_tracker_of
 from airborne.tracking import Status
@@ -41,7 +43,7 @@ class PlayersRun:
     opened: Opened[Recording | LiveRecording]
     players: PlayersTracker
 
-    table = "joints.csv"
+    table = JOINTS
 
     @classmethod
     def open(cls, trial: Trial, opened: Opened[Recording | LiveRecording]) -> PlayersRun:
@@ -71,12 +73,18 @@ class PlayersRun:
         """Write one time's estimates."""
         writer.append(estimate.players)
 
-    def artists(self, folder: Path) -> Iterator[AbstractContextManager[Any]]:
+    def artists(self, folder: Path, drawn: OverlaysAs) -> Iterator[AbstractContextManager[Any]]:
         """Return what draws the frames while they are tracked."""
         recording, track = self.opened.recording, self.trial.track
+        folder_of = videos_of if drawn == "videos" else figures_of
         assert not isinstance(track, BodySettings), "checked with the trial"
         yield PlayersOverlayVideos(
-            folder, recording.rig, recording.rate, style=track.overlay, starts=self.trial.players
+            folder_of(folder),
+            recording.rig,
+            recording.rate,
+            style=track.overlay,
+            starts=self.trial.players,
+            drawn=drawn,
         )
 
     def draw(self, artists: Sequence[Any], frames: Frames, estimate: PlayersStep) -> None:
@@ -87,9 +95,9 @@ class PlayersRun:
     def finish(self, folder: Path) -> tuple[PlayersMotion, dict[str, Any]]:
         """Write the tables; return the motion and the beginning of the summary."""
         motion = read_players(folder / self.table)
-        write_players_parquet(folder / "joints.parquet", folder / self.table)
+        write_players_parquet(tables_of(folder) / "joints.parquet", folder / self.table)
         jumps = measure_jumps(motion)
-        write_jumps(folder / "jumps.csv", jumps)
+        write_jumps(folder / JUMPS, jumps)
         return motion, {**self._summary(motion), "jumps": [jump_row(jump) for jump in jumps]}
 
     def draw_figures(self, folder: Path, motion: PlayersMotion) -> None:

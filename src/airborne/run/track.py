@@ -15,7 +15,9 @@ import numpy as np
 from airborne.cameras import write_pose2sim
 from airborne.errors import ResultError
 from airborne.export import write_json
+from airborne.export.overlays import OverlaysAs
 from airborne.motion import Motion, PlayersMotion
+from airborne.motion.run_folder import CALIBRATION, SUMMARY
 from airborne.run.body import BodyRun
 from airborne.run.folder import prepare_folder, run_identity
 from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
@@ -43,8 +45,10 @@ def track_trial(
     folder: Path,
     *,
     resume: bool = False,
+    overwrite: bool = False,
     live: bool = False,
     pictures: bool = True,
+    first_frame: bool = False,
     progress: Progress | None = None,
 ) -> Run:
     """Track a trial, a body or players, and write the results into a folder.
@@ -52,25 +56,33 @@ def track_trial(
     `resume` continues a run that was killed, to the same result; of players by tracking again from the start, their
     rows stay. `live`, for players, reads pipes, capture devices, or files at their own speed, drops frames rather than
     fall behind, and ends with them or with KeyboardInterrupt. `pictures=False` leaves out videos, figures and report.
+    `overwrite` replaces the run that the folder holds. `first_frame` tracks one frame and draws it, without a report.
     Raises an AirborneError for input that cannot be used, and for a folder that holds another run.
     """
     if live and resume:
         raise ResultError("a live run cannot be resumed: its frames are gone; track into a new folder")
+    if live and first_frame:
+        raise ResultError("a live run has no first frame to come back to; leave --live or --first-frame out")
+    if overwrite and resume:
+        raise ResultError("a run is either resumed or overwritten; give one of --resume and --overwrite")
+    if first_frame:
+        trial = trial.model_copy(update={"track": trial.track.model_copy(update={"stop": trial.start.frame + 1})})
     started_s = time.monotonic()
     with ExitStack() as stack:
         opened = _open(trial, stack, progress) if live else open_trial(trial)
         subject = PlayersRun.open(trial, opened) if trial.has_players else BodyRun.open(trial, opened)
         identity = run_identity(trial, live=live)
-        goes_on = prepare_folder(folder, identity, subject.table, resume=resume)
-        write_pose2sim(folder / "calib.toml", opened.recording.rig)
+        goes_on = prepare_folder(folder, identity, subject.table, resume=resume, overwrite=overwrite)
+        write_pose2sim(folder / CALIBRATION, opened.recording.rig)
         subject.copy_inputs(folder)
         read_s = time.monotonic()
-        subject, delays_s = _track(subject, folder, resume=goes_on, pictures=pictures, progress=progress)
+        drawn = None if not pictures else "stills" if first_frame else "videos"
+        subject, delays_s = _track(subject, folder, resume=goes_on, drawn=drawn, progress=progress)
     tracked_s = time.monotonic()
     motion, summary = subject.finish(folder)
     summary |= provenance(trial, opened, identity["inputs"])
     summary["warnings"] += subject.warnings()
-    if pictures:
+    if pictures and not first_frame:
         subject.draw_figures(folder, motion)
     if isinstance(opened.recording, LiveRecording):
         summary["live"] = {
@@ -84,8 +96,8 @@ def track_trial(
         "writing": time.monotonic() - tracked_s,
         "tracking_a_frame": (tracked_s - read_s) / len(motion),
     }
-    write_json(folder / "summary.json", summary)
-    if pictures:
+    write_json(folder / SUMMARY, summary)
+    if pictures and not first_frame:
         subject.write_report(folder, summary, motion)
     return Run(motion, summary)
 
@@ -97,7 +109,7 @@ def _open(trial: Trial, stack: ExitStack, progress: Progress | None) -> Opened[L
 
 
 def _track(
-    subject: Subject, folder: Path, *, resume: bool, pictures: bool, progress: Progress | None
+    subject: Subject, folder: Path, *, resume: bool, drawn: OverlaysAs | None, progress: Progress | None
 ) -> tuple[Subject, list[float]]:
     """Track every frame, written and drawn at once; return the subject as seen, and live frames' delays [s]."""
     recording, delays_s = subject.opened.recording, []
@@ -110,7 +122,7 @@ def _track(
         subject = subject.see(first)
         done = subject.read_done(folder) if resume else ()
         writer = stack.enter_context(subject.writer(folder, resume=resume))
-        artists = [stack.enter_context(artist) for artist in subject.artists(folder)] if pictures else []
+        artists = [stack.enter_context(artist) for artist in subject.artists(folder, drawn)] if drawn else []
         tracked = track_frames(subject.tracker(), chain([first], frames), partial(subject.write, writer), done)
         try:
             for number, (observed, estimate) in enumerate(tracked, start=1):
