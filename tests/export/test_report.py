@@ -5,7 +5,7 @@ import pytest
 
 from airborne.errors import ResultError
 from airborne.evaluation import JointPaths, Truth, compare_joints, compare_motion
-from airborne.export import headline, write_figures, write_report
+from airborne.export import headline, page, write_figures, write_report
 from airborne.export.page import format_value, label
 from airborne.motion import Motion, flight_summary, landmarks
 from airborne.motion.run_folder import figures_of
@@ -136,3 +136,11 @@ def test_values_are_shown_as_a_reader_would_write_them():
         "768, 576",
         "x",
     ]
+
+
+def test_the_method_shows_only_the_settings_that_it_used():
+    record = {"method": "refined", "every": 1, "stop": None, "prediction": "smooth", "steps_mm": [50], "colour": "raw"}
+    shown = page.settings(record)
+    assert "prediction" in shown and "every" in shown
+    assert "steps" not in shown and "colour" not in shown
+    assert "steps" in page.settings({**record, "method": "stepping"})

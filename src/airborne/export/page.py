@@ -8,6 +8,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from airborne.tracking.methods import UNREAD_SETTINGS
+
 UNKNOWN_TEXT = "not known"
 _UNITS = {"_m": "m", "_mm": "mm", "_s": "s", "_hz": "1/s", "_px": "px", "_deg": "°", "_rev": "turns"}
 
@@ -104,8 +106,9 @@ def label(key: str) -> str:
 
 
 def settings(values: Mapping[str, Any]) -> str:
-    """Show the settings of a method; those that are not set are left out."""
-    return table((label(key), value) for key, value in values.items() if value is not None)
+    """Show the settings of a method; those that are not set, or that it makes no use of, are left out."""
+    unread = UNREAD_SETTINGS.get(values.get("method", ""), frozenset())
+    return table((label(key), value) for key, value in values.items() if value is not None and key not in unread)
 
 
 def format_value(value: Any) -> str:

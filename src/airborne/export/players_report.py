@@ -21,17 +21,19 @@ _JOINT_COLOURS = {"hip": "#0072b2", "knee": "#cc79a7", "ankle": "#009e73"}
 _UNCERTAIN_STYLE = {"facecolor": hex_colour(STATUS_RGB[Status.UNCERTAIN]), "edgecolor": "none", "alpha": 0.25}
 
 _JUMP_QUANTITIES = {  # columns of jumps.csv that the report shows: name, factor, digits
+    "hips": ("hip_height_m", 100.0, 1),  # the height to quote: docs/jumps.md says why
     "feet": ("foot_height_m", 100.0, 1),
-    "hips": ("hip_height_m", 100.0, 1),
     "flight time": ("flight_time_height_m", 100.0, 1),
     "take-off speed": ("takeoff_speed_height_m", 100.0, 1),
     "take-off [frame]": ("takeoff_frame", 1.0, 1),
     "landing [frame]": ("landing_frame", 1.0, 1),
     "flight [ms]": ("flight_s", 1000.0, 0),
 }
+_HEIGHTS = ("hips", "feet", "flight time", "take-off speed")
 _JUMPS_CAPTION = (
-    "Heights are in cm, each with its 95 % interval: of feet and hips over standing, and what flight time and take-off "
-    "speed come to. jumps.csv has more."
+    "Heights are in cm, each with its 95 % interval. Quote that of the hips over standing: it needs neither the moment "
+    "of take-off nor that of landing, and tucked legs do not add to it. Never compare it with a height of another "
+    "definition: of the feet over standing, or what flight time and take-off speed come to. jumps.csv has more."
 )
 _FIGURE_CAPTION = (
     "Height of the middle of both hips, knees and ankles over time, with two standard deviations; amber where "
@@ -86,14 +88,15 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
         sd_mm = player["median_sd_mm"]
         yield f"{name}: {counts}; median sd of a joint {page.UNKNOWN_TEXT if sd_mm is None else f'{sd_mm:.0f} mm'}"
     for jump in summary["jumps"]:
-        feet, flight = (_interval_cm(jump, what) for what in ("feet", "flight time"))
+        hips, *others = (_interval_cm(jump, what) for what in _HEIGHTS)
         warning = f"; {jump['n_uncertain']} of its frames are uncertain" if jump["n_uncertain"] else ""
-        yield f"{jump['player']}, jump {jump['jump']}: feet {feet}, by flight time {flight} (95 % intervals){warning}"
+        yield f"{jump['player']}, jump {jump['jump']}: {hips}, hips over standing (95 % interval){warning}"
+        yield "  by other definitions: " + ", ".join(f"{n} {cm}" for n, cm in zip(_HEIGHTS[1:], others, strict=True))
     yield from _drop_notes(summary)
 
 
 def _jumps_table(rows: list[Mapping[str, Any]]) -> str:
-    """Return the table of all jumps, each number with its 95 % interval."""
+    """Return the height to quote of each jump, and below it the table of all numbers with their 95 % intervals."""
     table = [
         {
             "player": row["player"],
@@ -104,7 +107,8 @@ def _jumps_table(rows: list[Mapping[str, Any]]) -> str:
         }
         for row in rows
     ]
-    return records_table(table) + page.bullets([_JUMPS_CAPTION])
+    tiles = [page.tile(_interval_cm(row, "hips"), f"{row['player']}, jump {row['jump']}: hips") for row in rows]
+    return page.box("tiles", "".join(tiles)) + records_table(table) + page.bullets([_JUMPS_CAPTION])
 
 
 def _with_interval(row: Mapping[str, Any], name: str, scale: float, digits: int) -> str:
