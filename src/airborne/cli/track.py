@@ -108,8 +108,6 @@ def _track(
     if names == []:
         raise AirborneError("--cameras names no camera; give their names, separated by commas")
     trial = read_trial(path, changes or {}, names)
-    if live and not trial.has_players:
-        raise AirborneError('--live is for players; this trial has no body preset = "legs"')
     try:
         with progress(f"tracking {trial.name}") as report:
             return track_trial(

@@ -13,6 +13,7 @@ import numpy as np
 
 from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
 from airborne.body.files import body_toml, mesh_files
+from airborne.calibration.from_points import Calibration
 from airborne.export import ContactSheet, MatchingPicture, OverlayVideos, headline, write_figures, write_report
 from airborne.export.overlays import OverlaysAs
 from airborne.motion import (
@@ -47,10 +48,11 @@ _CALIBRATION_UNCERTAINTY = " They hold how far the control points leave each cam
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyRun:
-    """One body, to be tracked from its first pose; a `run.track.Subject`."""
+    """One body, to be tracked from its first pose; a `Subject`."""
 
     trial: Trial
-    opened: Opened[Recording]
+    recording: Recording
+    calibration: Calibration | None
     model: BodyModel
     start: Pose
 
@@ -62,7 +64,7 @@ class BodyRun:
         model = trial.model()
         first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
         opened.recording.events.extend(first.notes)
-        return cls(trial, opened, model, first.pose)
+        return cls(trial, opened.recording, opened.calibration, model, first.pose)
 
     def read_done(self, folder: Path) -> list[Estimate]:
         """Return the estimates that a killed run left: from their frames the tracker only learns."""
@@ -84,7 +86,7 @@ class BodyRun:
         """Return the body with the colours that the first frames show; an event says where they do not show it."""
         model = sample_body_colours(self.model, self.start, first)
         if not np.any([_is_visible(view, model.with_pose(self.start)) for view in first.views]):
-            self.opened.recording.events.append(
+            self.recording.events.append(
                 "the start pose lies in no camera's picture; check start.position_m, in metres"
             )
         return replace(self, model=model)
@@ -104,7 +106,7 @@ class BodyRun:
 
     def artists(self, folder: Path, drawn: OverlaysAs) -> Iterator[AbstractContextManager[Any]]:
         """Return what draws the frames while they are tracked."""
-        recording, folder_of = self.opened.recording, videos_of if drawn == "videos" else figures_of
+        recording, folder_of = self.recording, videos_of if drawn == "videos" else figures_of
         yield OverlayVideos(folder_of(folder), recording.rig, recording.rate, drawn=drawn)
         yield ContactSheet(figures_of(folder) / "through_mask.png", recording.rig)
         yield MatchingPicture(figures_of(folder) / "matching.png", recording.rig)
@@ -121,7 +123,7 @@ class BodyRun:
         """Write the tables; return the motion and the beginning of the summary."""
         motion, model = read_motion(folder / self.table), self.model
         write_tables(folder, motion, model)
-        is_exact = self.opened.calibration is None
+        is_exact = self.calibration is None
         return motion, {
             "name": self.trial.name,
             **headline(motion),
@@ -129,12 +131,9 @@ class BodyRun:
             "uncertainty": _UNCERTAINTY if is_exact else _UNCERTAINTY + _CALIBRATION_UNCERTAINTY,
         }
 
-    def draw_figures(self, folder: Path, motion: Motion) -> None:
-        """Draw the figures of the whole motion."""
-        write_figures(figures_of(folder), motion, self.model)
-
     def write_report(self, folder: Path, summary: dict[str, Any], motion: Motion) -> None:
-        """Write the report."""
+        """Draw the figures and write the report."""
+        write_figures(figures_of(folder), motion, self.model)
         write_report(folder, summary)
 
     def warnings(self) -> list[str]:

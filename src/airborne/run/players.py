@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from airborne.calibration.from_points import Calibration
 from airborne.export import PlayersOverlayVideos, write_players_report
 from airborne.export.overlays import OverlaysAs
 from airborne.motion import PlayersMotion, PlayersWriter, read_players, write_players_parquet
@@ -37,10 +38,11 @@ _OVERCONFIDENT = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayersRun:
-    """The players of a trial; a `run.track.Subject`. Their tracker's state is in no table, so nothing is resumed."""
+    """The players of a trial; a `Subject`. Their tracker's state is in no table, so nothing is resumed."""
 
     trial: Trial
-    opened: Opened[Recording | LiveRecording]
+    recording: Recording | LiveRecording
+    calibration: Calibration | None
     players: PlayersTracker
 
     table = JOINTS
@@ -48,7 +50,7 @@ class PlayersRun:
     @classmethod
     def open(cls, trial: Trial, opened: Opened[Recording | LiveRecording]) -> PlayersRun:
         """Make the tracker, which checks the players' starts against the cameras."""
-        return cls(trial, opened, players_tracker_of(trial, opened.recording.rig))
+        return cls(trial, opened.recording, opened.calibration, players_tracker_of(trial, opened.recording.rig))
 
     def read_done(self, folder: Path) -> tuple[PlayersStep, ...]:
         """Return nothing: a killed run is tracked again from its start, to the same result."""
@@ -75,7 +77,7 @@ class PlayersRun:
 
     def artists(self, folder: Path, drawn: OverlaysAs) -> Iterator[AbstractContextManager[Any]]:
         """Return what draws the frames while they are tracked."""
-        recording, track = self.opened.recording, self.trial.track
+        recording, track = self.recording, self.trial.track
         folder_of = videos_of if drawn == "videos" else figures_of
         assert not isinstance(track, BodySettings), "checked with the trial"
         yield PlayersOverlayVideos(
@@ -100,9 +102,6 @@ class PlayersRun:
         write_jumps(folder / JUMPS, jumps)
         return motion, {**self._summary(motion), "jumps": [jump_row(jump) for jump in jumps]}
 
-    def draw_figures(self, folder: Path, motion: PlayersMotion) -> None:
-        """Draw nothing here: the report draws what it shows."""
-
     def write_report(self, folder: Path, summary: dict[str, Any], motion: PlayersMotion) -> None:
         """Write the report."""
         write_players_report(folder, summary, motion)
@@ -110,7 +109,7 @@ class PlayersRun:
     def _summary(self, motion: PlayersMotion) -> dict[str, Any]:
         is_tracked, is_lost = (motion.status == status.value for status in (Status.TRACKED, Status.LOST))
         n_tracked, n_lost = int(is_tracked.all(axis=1).sum()), int(is_lost.all(axis=1).sum())
-        recording = self.opened.recording
+        recording = self.recording
         return {
             "name": self.trial.name,
             "n_frames": len(motion),
