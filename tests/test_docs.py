@@ -25,6 +25,7 @@ from airborne.evaluation.players import PartErrors
 from airborne.export import write_figures
 from airborne.motion import covariance_file, flight_summary
 from airborne.motion.files import _header
+from airborne.motion.run_folder import SMOOTH_RECORD, figures_of
 from airborne.run import smooth
 from airborne.run.body import write_tables
 from airborne.run.evaluate import assess
@@ -39,6 +40,7 @@ from airborne.trial.settings import PLAYERS_METHODS, BodySettings, ParticleSetti
 from airborne.trial.start import StartTable
 from tests.support.export_scenes import PERSON, person_run
 from tests.support.places import ROOT
+from tests.support.run_files import files_of
 
 DOCS = ROOT / "docs"
 RESULTS = DOCS / "reference" / "results.md"
@@ -244,13 +246,13 @@ def run(tmp_path_factory):
 
 
 def test_every_file_of_a_run_is_documented(run):
-    left = {re.sub(r"_cam\d", "_<camera>", path.name) for path in run.iterdir()}
+    left = {re.sub(r"_cam\d", "_<camera>", name) for name in files_of(run)}
     assert left == {name for row in table_of(RESULTS, "Files") for name in named(row[0])}
 
 
 def test_every_file_of_a_smoothed_run_is_documented():
     documented = {name for row in table_of(RESULTS, "Files added to a finished run") for name in named(row[0])}
-    assert {smooth.MOTION, smooth.JOINTS, smooth.ANGLES, smooth.EVENTS, smooth.FIGURE, smooth.RECORD} <= documented
+    assert {smooth.MOTION, smooth.JOINTS, smooth.ANGLES, smooth.EVENTS, smooth.FIGURE, SMOOTH_RECORD} <= documented
     assert f"`{PICTURE}`" in RESULTS.read_text(encoding="utf-8")
 
 
@@ -262,7 +264,7 @@ def test_every_number_of_the_summary_is_documented(run):
 
 @pytest.mark.parametrize("name", ["angles.csv", "joints.csv"])
 def test_every_column_is_documented(run, name):
-    with (run / name).open(encoding="utf-8") as file:
+    with next(run.rglob(name)).open(encoding="utf-8") as file:
         header = next(csv.reader(file))
     assert header == [column for row in table_of(RESULTS, f"`{name}`") for column in named(row[0])]
 
@@ -282,19 +284,19 @@ def person(tmp_path_factory):
     folder, motion = tmp_path_factory.mktemp("docs") / "person", person_run(4)
     folder.mkdir()
     write_tables(folder, motion, PERSON)
-    write_figures(folder, motion, PERSON)
+    write_figures(figures_of(folder), motion, PERSON)
     return folder, motion
 
 
 def test_every_file_of_a_body_with_joints_is_documented(person, run):
-    left = {path.name for path in person[0].iterdir()} - {path.name for path in run.iterdir()}
+    left = set(files_of(person[0])) - set(files_of(run))
     rows = table_of(RESULTS, "Files of a body with joints")
     assert left | {covariance_file.COVARIANCE_FILE} == {name for row in rows for name in named(row[0])}
 
 
 @pytest.mark.parametrize("name", ["joint_angles.csv", "flight.csv"])
 def test_every_column_of_a_body_with_joints_is_documented(person, name):
-    header = (person[0] / name).read_text(encoding="utf-8").splitlines()[0].split(",")
+    header = (person[0] / "tables" / name).read_text(encoding="utf-8").splitlines()[0].split(",")
     assert header == [column for row in table_of(RESULTS, f"`{name}`") for column in named(row[0])]
 
 

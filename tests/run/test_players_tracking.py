@@ -22,13 +22,14 @@ from airborne.trial.file import read_trial
 from tests.cli.test_cli import in_process
 from tests.support.clips import write_clip
 from tests.support.players_trial import BYSTANDER, PLAYERS, StandIn, pictures, points_of, write_trial
+from tests.support.run_files import files_of
 from tests.test_docs import DOCS, named, table_of
 
 TABLES = {
-    *("joints.csv", "joints.parquet", "jumps.csv"),
+    *("joints.csv", "tables/joints.parquet", "jumps.csv"),
     *("summary.json", "run.json", "calib.toml"),
 }
-PICTURES = {"report.html", "heights.png", "overlay_left.mp4", "overlay_right.mp4"}
+PICTURES = {"report.html", "figures/heights.png", "videos/overlay_left.mp4", "videos/overlay_right.mp4"}
 
 
 @pytest.fixture(autouse=True)
@@ -47,7 +48,7 @@ def summary_of(folder):
 
 def test_a_run_leaves_every_players_joints_at_every_frame(path, tmp_path):
     run = track_trial(read_trial(path), tmp_path / "run", pictures=False)
-    assert {file.name for file in (tmp_path / "run").iterdir()} == TABLES
+    assert set(files_of(tmp_path / "run")) == TABLES
     motion = read_players(tmp_path / "run" / "joints.csv")
     assert motion.players == tuple(PLAYERS)
     assert motion.index.tolist() == list(range(12))
@@ -78,7 +79,7 @@ def test_the_summary_counts_each_player_and_names_the_inputs(path, tmp_path):
     assert summary["events"] == []
     assert set(summary["inputs"]) == {"left.mkv", "right.mkv", "calib.toml", "start and lights"}
     assert summary["timings_s"]["tracking_a_frame"] * 12 == pytest.approx(summary["timings_s"]["tracking"])
-    assert summary["tables"] == ["joints.csv", "joints.parquet", "jumps.csv"]
+    assert summary["tables"] == ["joints.csv", "jumps.csv", "tables/joints.parquet"]
     assert "live" not in summary
 
 
@@ -92,7 +93,7 @@ def test_particle_filters_warn_that_their_deviations_are_too_small(path, tmp_pat
 
 def test_videos_and_report_are_written_on_request(path, tmp_path):
     track_trial(read_trial(path, {"overlay": "broadcast"}), tmp_path / "run")
-    assert {file.name for file in (tmp_path / "run").iterdir()} == TABLES | PICTURES
+    assert set(files_of(tmp_path / "run")) == TABLES | PICTURES
     report = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     assert "number 7: 3 of 12 frames are uncertain" in report
     assert report.count("<img") == 1 and "http" not in report.split("<style>")[0]
@@ -101,7 +102,7 @@ def test_videos_and_report_are_written_on_request(path, tmp_path):
 def test_everything_that_a_run_leaves_is_documented(path, tmp_path):
     run = track_trial(read_trial(path, {"stop": 2}), tmp_path / "run")
     page = DOCS / "reference" / "results.md"
-    left = {re.sub(r"_(left|right)\.mp4", "_<camera>.mp4", file.name) for file in (tmp_path / "run").iterdir()}
+    left = {re.sub(r"_(left|right)\.mp4", "_<camera>.mp4", name) for name in files_of(tmp_path / "run")}
     assert left == {name for row in table_of(page, "Files of a run of players") for name in named(row[0])}
     documented = [name for row in table_of(page, "`joints.csv` of players") for name in named(row[0])]
     assert sorted(documented) == sorted(PLAYERS_COLUMNS)
@@ -228,7 +229,7 @@ def test_live_pipes_end_with_an_interrupt_and_keep_whole_results(tmp_path, monke
     for thread in sent:
         thread.join(5)
     assert len(run.motion) >= 1 and run.motion.index[-1] < 40
-    assert {file.name for file in (tmp_path / "run").iterdir()} == TABLES | PICTURES
+    assert set(files_of(tmp_path / "run")) == TABLES | PICTURES
     assert set(run.summary["inputs"]) == {"calib.toml", "start and lights"}
 
 

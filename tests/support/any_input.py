@@ -158,7 +158,7 @@ def trials(folder):
 
     def whole(path):
         trial = read_trial(path)
-        return (trial.settings, trial.players, trial.has_players or trial.model())
+        return trial.players if trial.has_players else (trial.settings, trial.model())
 
     yield example_case("trial", folder, "trial.toml", whole)
     legs = folder / "legs"

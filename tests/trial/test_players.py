@@ -1,13 +1,17 @@
 """Trials of several players: what is read, and what is refused in one line."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from airborne.errors import TrialError
 from airborne.run.players_tracker import players_tracker_of, read_torsos
 from airborne.tracking.capsules import Blocker
+from airborne.tracking.methods import UNREAD_SETTINGS
 from airborne.tracking.particle import LegsTracker
 from airborne.trial.file import read_trial
+from airborne.trial.settings import BodySettings, ParticleSettings
 from tests.support.players_trial import BYSTANDER, PLAYERS, rig, trial_text
 
 
@@ -208,3 +212,10 @@ def test_a_table_of_torsos_that_cannot_serve_is_refused_in_one_line(folder, text
     with pytest.raises(TrialError) as caught:
         players_tracker_of(trial, rig())
     assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_every_setting_named_as_unread_is_one_of_its_method():
+    kinds = (BodySettings, ParticleSettings)
+    for method, unread in UNREAD_SETTINGS.items():
+        (kind,) = (kind for kind in kinds if method in get_args(kind.model_fields["method"].annotation))
+        assert unread <= set(kind.model_fields)

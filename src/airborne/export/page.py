@@ -12,6 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from airborne.export.palette import STATUS_RGB, hex_colour
 from airborne.tracking import Status
+from airborne.tracking.methods import UNREAD_SETTINGS
 
 UNKNOWN_TEXT = "not known"
 _UNITS = {"_m": "m", "_mm": "mm", "_s": "s", "_hz": "1/s", "_px": "px", "_deg": "°", "_rev": "turns"}
@@ -71,7 +72,8 @@ def _records_table(records: Sequence[Mapping[str, Any]]) -> Table:
 
 def _settings_table(values: Mapping[str, Any]) -> Table:
     """Return the settings of a method; those that are not set are left out."""
-    return Table([(label(key), value) for key, value in values.items() if value is not None])
+    unread = UNREAD_SETTINGS.get(values.get("method", ""), frozenset())
+    return Table([(label(key), value) for key, value in values.items() if value is not None and key not in unread])
 
 
 def _base64(path: Path) -> str:

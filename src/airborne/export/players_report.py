@@ -14,6 +14,7 @@ from airborne.export.palette import STATUS_RGB, hex_colour
 from airborne.export.report import DEFINITIONS
 from airborne.export.summary import json_ready
 from airborne.motion import PlayersMotion
+from airborne.motion.run_folder import REPORT, figures_of
 from airborne.tracking import Status
 
 FIGURE = "heights.png"
@@ -21,17 +22,19 @@ _JOINT_COLOURS = {"hip": "#0072b2", "knee": "#cc79a7", "ankle": "#009e73"}
 _UNCERTAIN_STYLE = {"facecolor": hex_colour(STATUS_RGB[Status.UNCERTAIN]), "edgecolor": "none", "alpha": 0.25}
 
 _JUMP_QUANTITIES = {  # columns of jumps.csv that the report shows: name, factor, digits
+    "hips": ("hip_height_m", 100.0, 1),  # the height to quote: docs/jumps.md says why
     "feet": ("foot_height_m", 100.0, 1),
-    "hips": ("hip_height_m", 100.0, 1),
     "flight time": ("flight_time_height_m", 100.0, 1),
     "take-off speed": ("takeoff_speed_height_m", 100.0, 1),
     "take-off [frame]": ("takeoff_frame", 1.0, 1),
     "landing [frame]": ("landing_frame", 1.0, 1),
     "flight [ms]": ("flight_s", 1000.0, 0),
 }
+_HEIGHTS = ("hips", "feet", "flight time", "take-off speed")
 _JUMPS_CAPTION = (
-    "Heights are in cm, each with its 95 % interval: of feet and hips over standing, and what flight time and take-off "
-    "speed come to. jumps.csv has more."
+    "Heights are in cm, each with its 95 % interval. Quote that of the hips over standing: it needs neither the moment "
+    "of take-off nor that of landing, and tucked legs do not add to it. Never compare it with a height of another "
+    "definition: of the feet over standing, or what flight time and take-off speed come to. jumps.csv has more."
 )
 _FIGURE_CAPTION = (
     "Height of the middle of both hips, knees and ankles over time, with two standard deviations; amber where "
@@ -53,8 +56,8 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
 
     `summary` is the content of summary.json.
     """
-    _write_heights(folder / FIGURE, motion)
-    path = folder / "report.html"
+    _write_heights(figures_of(folder) / FIGURE, motion)
+    path = folder / REPORT
     summary = json_ready(summary)
     uncertainty = f"{_DEFINITIONS['Uncertainty']} {summary['uncertainty']}"
     html = render_report(
@@ -65,8 +68,11 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
         definitions={**_DEFINITIONS, "Uncertainty": uncertainty},
         players=[{"player": name, **player} for name, player in summary["players"].items()],
         jumps=[_jump_record(row) for row in summary["jumps"]],
+        heights_to_quote=[
+            (_interval_cm(row, "hips"), f"{row['player']}, jump {row['jump']}: hips") for row in summary["jumps"]
+        ],
         jumps_caption=_JUMPS_CAPTION,
-        heights=folder / FIGURE,
+        heights=figures_of(folder) / FIGURE,
         heights_caption=_FIGURE_CAPTION,
     )
     path.write_text(html, encoding="utf-8")
@@ -99,9 +105,10 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
         sd_mm = player["median_sd_mm"]
         yield f"{name}: {counts}; median sd of a joint {UNKNOWN_TEXT if sd_mm is None else f'{sd_mm:.0f} mm'}"
     for jump in summary["jumps"]:
-        feet, flight = (_interval_cm(jump, what) for what in ("feet", "flight time"))
+        hips, *others = (_interval_cm(jump, what) for what in _HEIGHTS)
         warning = f"; {jump['n_uncertain']} of its frames are uncertain" if jump["n_uncertain"] else ""
-        yield f"{jump['player']}, jump {jump['jump']}: feet {feet}, by flight time {flight} (95 % intervals){warning}"
+        yield f"{jump['player']}, jump {jump['jump']}: {hips}, hips over standing (95 % interval){warning}"
+        yield "  by other definitions: " + ", ".join(f"{n} {cm}" for n, cm in zip(_HEIGHTS[1:], others, strict=True))
     yield from _drop_notes(summary)
 
 

@@ -11,6 +11,7 @@ from airborne.export.page import UNKNOWN_TEXT, Table, render_report
 from airborne.export.summary import body_warnings, headline, json_ready
 from airborne.motion import Motion
 from airborne.motion.flight.momentum_table import GRAVITY_M_S2
+from airborne.motion.run_folder import REPORT, figures_of
 
 
 class _Comparison(NamedTuple):
@@ -114,8 +115,8 @@ def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
     missing = sorted({"name", *headline(Motion.collect([]))} - set(summary))
     if missing:
         raise ResultError(f"the summary of {folder} has no {', '.join(missing[:3])}; track again")
-    path = folder / "report.html"
-    of_joints = {"Joint angles": _JOINT_ANGLES} if (folder / "joints.png").is_file() else {}
+    path = folder / REPORT
+    of_joints = {"Joint angles": _JOINT_ANGLES} if (figures_of(folder) / "joints.png").is_file() else {}
     uncertainty = {"Uncertainty": f"{_UNCERTAINTY} {summary.get('uncertainty', '')}"}
     html = render_report(
         "report.html.j2",
@@ -126,7 +127,7 @@ def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
         tiles=list(_tiles(summary)),
         comparisons=list(_comparisons(summary)),
         figures=[(name, *texts) for name, texts in _FIGURES.items()],
-        folder=folder,
+        folder=figures_of(folder),
         flight_table=_flight_table(summary["flight"]) if summary.get("flight") else None,
     )
     path.write_text(html, encoding="utf-8")

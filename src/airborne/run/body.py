@@ -13,7 +13,9 @@ import numpy as np
 
 from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
 from airborne.body.files import body_toml, mesh_files
+from airborne.calibration.from_points import Calibration
 from airborne.export import ContactSheet, MatchingPicture, OverlayVideos, headline, write_figures, write_report
+from airborne.export.overlays import OverlaysAs
 from airborne.motion import (
     Motion,
     MotionWriter,
@@ -27,6 +29,7 @@ from airborne.motion import (
     write_joints,
     write_motion_parquet,
 )
+from airborne.motion.run_folder import BODY, JOINTS, MOTION, figures_of, tables_of, videos_of
 from airborne.rendering import FLAT, render
 from airborne.run.first_pose import find_first_pose
 from airborne.run.opening import Opened
@@ -45,14 +48,15 @@ _CALIBRATION_UNCERTAINTY = " They hold how far the control points leave each cam
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyRun:
-    """One body, to be tracked from its first pose; a `run.track.Subject`."""
+    """One body, to be tracked from its first pose; a `Subject`."""
 
     trial: Trial
-    opened: Opened[Recording]
+    recording: Recording
+    calibration: Calibration | None
     model: BodyModel
     start: Pose
 
-    table = "motion.csv"
+    table = MOTION
 
     @classmethod
     def open(cls, trial: Trial, opened: Opened[Recording]) -> BodyRun:
@@ -60,7 +64,7 @@ class BodyRun:
         model = trial.model()
         first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
         opened.recording.events.extend(first.notes)
-        return cls(trial, opened, model, first.pose)
+        return cls(trial, opened.recording, opened.calibration, model, first.pose)
 
     def read_done(self, folder: Path) -> list[Estimate]:
         """Return the estimates that a killed run left: from their frames the tracker only learns."""
@@ -69,10 +73,10 @@ class BodyRun:
     def copy_inputs(self, folder: Path) -> None:
         """Write the body beside the results, for `airborne evaluate` and for other tools."""
         if self.trial.body.file is None:
-            (folder / "body.toml").write_text(body_toml(self.model), encoding="utf-8")
+            (folder / BODY).write_text(body_toml(self.model), encoding="utf-8")
             return
         body = self.trial.path(self.trial.body.file)
-        shutil.copyfile(body, folder / "body.toml")
+        shutil.copyfile(body, folder / BODY)
         for name in mesh_files(body):
             target = folder / name
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -82,7 +86,7 @@ class BodyRun:
         """Return the body with the colours that the first frames show; an event says where they do not show it."""
         model = sample_body_colours(self.model, self.start, first)
         if not np.any([_is_visible(view, model.with_pose(self.start)) for view in first.views]):
-            self.opened.recording.events.append(
+            self.recording.events.append(
                 "the start pose lies in no camera's picture; check start.position_m, in metres"
             )
         return replace(self, model=model)
@@ -100,12 +104,12 @@ class BodyRun:
         """Write one time's estimate."""
         writer.append(estimate)
 
-    def artists(self, folder: Path) -> Iterator[AbstractContextManager[Any]]:
+    def artists(self, folder: Path, drawn: OverlaysAs) -> Iterator[AbstractContextManager[Any]]:
         """Return what draws the frames while they are tracked."""
-        recording = self.opened.recording
-        yield OverlayVideos(folder, recording.rig, recording.rate)
-        yield ContactSheet(folder / "through_mask.png", recording.rig)
-        yield MatchingPicture(folder / "matching.png", recording.rig)
+        recording, folder_of = self.recording, videos_of if drawn == "videos" else figures_of
+        yield OverlayVideos(folder_of(folder), recording.rig, recording.rate, drawn=drawn)
+        yield ContactSheet(figures_of(folder) / "through_mask.png", recording.rig)
+        yield MatchingPicture(figures_of(folder) / "matching.png", recording.rig)
 
     def draw(self, artists: Sequence[Any], frames: Frames, estimate: Estimate) -> None:
         """Let the artists draw one time; a start that failed is shown where it was set."""
@@ -119,7 +123,7 @@ class BodyRun:
         """Write the tables; return the motion and the beginning of the summary."""
         motion, model = read_motion(folder / self.table), self.model
         write_tables(folder, motion, model)
-        is_exact = self.opened.calibration is None
+        is_exact = self.calibration is None
         return motion, {
             "name": self.trial.name,
             **headline(motion),
@@ -127,12 +131,9 @@ class BodyRun:
             "uncertainty": _UNCERTAINTY if is_exact else _UNCERTAINTY + _CALIBRATION_UNCERTAINTY,
         }
 
-    def draw_figures(self, folder: Path, motion: Motion) -> None:
-        """Draw the figures of the whole motion."""
-        write_figures(folder, motion, self.model)
-
     def write_report(self, folder: Path, summary: dict[str, Any], motion: Motion) -> None:
-        """Write the report."""
+        """Draw the figures and write the report."""
+        write_figures(figures_of(folder), motion, self.model)
         write_report(folder, summary)
 
     def warnings(self) -> list[str]:
@@ -142,13 +143,14 @@ class BodyRun:
 
 def write_tables(folder: Path, motion: Motion, model: BodyModel) -> None:
     """Write what is made of a motion: the same as parquet, angles, joints, the flight."""
-    write_motion_parquet(folder / "motion.parquet", motion)
-    write_angles(folder / "angles.csv", motion)
-    write_joints(folder / "joints.csv", motion, model)
+    tables = tables_of(folder)
+    write_joints(folder / JOINTS, motion, model)
+    write_motion_parquet(tables / "motion.parquet", motion)
+    write_angles(tables / "angles.csv", motion)
     if motion.joints:
-        write_joint_angles(folder / "joint_angles.csv", motion, model)
+        write_joint_angles(tables / "joint_angles.csv", motion, model)
     if _has_flight(motion, model):
-        write_flight(folder / "flight.csv", motion, model)
+        write_flight(tables / "flight.csv", motion, model)
 
 
 def _has_flight(motion: Motion, model: BodyModel) -> bool:

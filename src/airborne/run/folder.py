@@ -4,29 +4,51 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
 from airborne import __version__
 from airborne.errors import ResultError
 from airborne.export import write_json
-from airborne.motion.run_folder import RUN_RECORD, read_record
+from airborne.motion.covariance_file import COVARIANCE_FILE
+from airborne.motion.run_folder import (
+    BODY,
+    CALIBRATION,
+    FOLDERS,
+    JOINTS,
+    JUMPS,
+    MOTION,
+    REPORT,
+    RUN_RECORD,
+    SMOOTH_RECORD,
+    SUMMARY,
+    read_record,
+)
 from airborne.trial.file import Trial
 
 _HASHED_BYTES = 8 << 20  # larger files are identified by their first and last so many bytes and their length
 
 
-def prepare_folder(folder: Path, identity: dict[str, Any], table: str, *, resume: bool) -> bool:
+def prepare_folder(
+    folder: Path, identity: dict[str, Any], table: str, *, resume: bool = False, overwrite: bool = False
+) -> bool:
     """Prepare a run's folder; return whether it holds rows of its `table` from which to resume.
 
-    Raises ResultError for a folder that holds something else, a run without `resume`, or a run of other inputs.
+    `overwrite` removes the run that the folder holds, finished or not. Raises ResultError for a folder that holds
+    something else, a run with neither `resume` nor `overwrite`, or a run of other inputs.
     """
     rows, record = folder / table, folder / RUN_RECORD
     folder.mkdir(parents=True, exist_ok=True)
-    if not record.exists() and not rows.exists() and any(folder.iterdir()):
+    if overwrite and record.exists():
+        read_record(record)
+        _remove_run(folder)
+    elif not record.exists() and not rows.exists() and any(folder.iterdir()):
         raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
     if rows.exists() and not resume:
-        raise ResultError(f"{folder} already holds a run; give --resume to go on with it, or another folder")
+        raise ResultError(
+            f"{folder} already holds a run; give --resume to go on, --overwrite to replace it, or another folder"
+        )
     if not rows.exists():
         write_json(record, identity)
         return False
@@ -35,6 +57,15 @@ def prepare_folder(folder: Path, identity: dict[str, Any], table: str, *, resume
     if changed:
         raise ResultError(f"{folder} holds another run (other {', other '.join(changed)}); track into another folder")
     return True
+
+
+def _remove_run(folder: Path) -> None:
+    """Remove what commands leave in a run's folder; exports and what others put there stay."""
+    for name in (MOTION, JOINTS, JUMPS, SUMMARY, REPORT, CALIBRATION, BODY, COVARIANCE_FILE, SMOOTH_RECORD):
+        (folder / name).unlink(missing_ok=True)
+    for name in FOLDERS:
+        shutil.rmtree(folder / name, ignore_errors=True)
+    (folder / RUN_RECORD).unlink()
 
 
 def holds_run_of(trial: Trial, folder: Path) -> bool:
@@ -81,5 +112,7 @@ def _sha256(path: Path) -> str:
 
 
 def list_tables(folder: Path) -> list[str]:
-    """Return the names of the tables in a run's folder."""
-    return sorted(path.name for path in folder.iterdir() if path.suffix in (".csv", ".parquet"))
+    """Return the paths of the tables in a run's folder, relative to it."""
+    return sorted(
+        path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.suffix in (".csv", ".parquet")
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
@@ -49,13 +49,14 @@ class Opened(Generic[AnyRecording]):
     detections: TrialDetections | None = None
 
 
-def open_trial(trial: Trial) -> Opened[Recording]:
+def open_trial(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Opened[Recording]:
     """Open a trial's videos with its cameras, fields as its method takes them.
 
-    Images of players are decoded lazily: only the regions that are used.
+    Images of players are decoded lazily: only the regions that are used. `facts` are the videos', where `inspect` has
+    been called before.
     """
     sources = [video_source(trial, camera) for camera in trial.camera]
-    cameras = open_cameras(trial)
+    cameras = open_cameras(trial, facts)
     recording = open_recording(
         sources,
         cameras.rig,
@@ -75,18 +76,18 @@ def open_live(trial: Trial, waiting: Callable[[], None] = lambda: None) -> Itera
     """Connect to a trial's live cameras and find where they are; `waiting` is called until all deliver frames."""
     with connect([video_source(trial, camera) for camera in trial.camera], waiting) as cameras:
         sizes = {camera.source.name: camera.facts.size for camera in cameras if camera.facts is not None}
-        rig, calibration = _calibrated_cameras(trial, sizes)
+        rig, calibration = calibrated_cameras(trial, sizes)
         recording = live_recording(
             cameras, rig, every=trial.track.every, start=trial.start.frame, stop=trial.track.stop
         )
         yield Opened(recording, calibration)
 
 
-def open_cameras(trial: Trial) -> Cameras:
+def open_cameras(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Cameras:
     """Inspect a trial's videos and read its cameras and detections, each once."""
-    facts = tuple(inspect(video_source(trial, camera)) for camera in trial.camera)
+    facts = tuple(facts or (inspect(video_source(trial, camera)) for camera in trial.camera))
     sizes = {camera.name: each.size for camera, each in zip(trial.camera, facts, strict=True)}
-    rig, calibration = _calibrated_cameras(trial, sizes)
+    rig, calibration = calibrated_cameras(trial, sizes)
     detections = read_trial_detections(trial, facts)
     notes: tuple[str, ...] = ()
     if detections is not None:
@@ -94,7 +95,7 @@ def open_cameras(trial: Trial) -> Cameras:
     return Cameras(rig, calibration, detections, facts, notes)
 
 
-def _calibrated_cameras(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[Rig, Calibration | None]:
+def calibrated_cameras(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[Rig, Calibration | None]:
     """Return the calibrated cameras of images of these sizes (width, height) [px]."""
     if trial.calibration.control_points is not None:
         points = read_control_points(trial.path(trial.calibration.control_points))

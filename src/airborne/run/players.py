@@ -10,10 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from airborne.calibration.from_points import Calibration
 from airborne.export import PlayersOverlayVideos, write_players_report
+from airborne.export.overlays import OverlaysAs
 from airborne.motion import PlayersMotion, PlayersWriter, read_players, write_players_parquet
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.table import jump_row, write_jumps
+from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, videos_of
 from airborne.run.opening import Opened
 from airborne.run.players_tracker import players_tracker_of
 from airborne.tracking import Status
@@ -35,18 +38,19 @@ _OVERCONFIDENT = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayersRun:
-    """The players of a trial; a `run.track.Subject`. Their tracker's state is in no table, so nothing is resumed."""
+    """The players of a trial; a `Subject`. Their tracker's state is in no table, so nothing is resumed."""
 
     trial: Trial
-    opened: Opened[Recording | LiveRecording]
+    recording: Recording | LiveRecording
+    calibration: Calibration | None
     players: PlayersTracker
 
-    table = "joints.csv"
+    table = JOINTS
 
     @classmethod
     def open(cls, trial: Trial, opened: Opened[Recording | LiveRecording]) -> PlayersRun:
         """Make the tracker, which checks the players' starts against the cameras."""
-        return cls(trial, opened, players_tracker_of(trial, opened.recording.rig))
+        return cls(trial, opened.recording, opened.calibration, players_tracker_of(trial, opened.recording.rig))
 
     def read_done(self, folder: Path) -> tuple[PlayersStep, ...]:
         """Return nothing: a killed run is tracked again from its start, to the same result."""
@@ -71,12 +75,18 @@ class PlayersRun:
         """Write one time's estimates."""
         writer.append(estimate.players)
 
-    def artists(self, folder: Path) -> Iterator[AbstractContextManager[Any]]:
+    def artists(self, folder: Path, drawn: OverlaysAs) -> Iterator[AbstractContextManager[Any]]:
         """Return what draws the frames while they are tracked."""
-        recording, track = self.opened.recording, self.trial.track
+        recording, track = self.recording, self.trial.track
+        folder_of = videos_of if drawn == "videos" else figures_of
         assert not isinstance(track, BodySettings), "checked with the trial"
         yield PlayersOverlayVideos(
-            folder, recording.rig, recording.rate, style=track.overlay, starts=self.trial.players
+            folder_of(folder),
+            recording.rig,
+            recording.rate,
+            style=track.overlay,
+            starts=self.trial.players,
+            drawn=drawn,
         )
 
     def draw(self, artists: Sequence[Any], frames: Frames, estimate: PlayersStep) -> None:
@@ -87,13 +97,10 @@ class PlayersRun:
     def finish(self, folder: Path) -> tuple[PlayersMotion, dict[str, Any]]:
         """Write the tables; return the motion and the beginning of the summary."""
         motion = read_players(folder / self.table)
-        write_players_parquet(folder / "joints.parquet", folder / self.table)
+        write_players_parquet(tables_of(folder) / "joints.parquet", folder / self.table)
         jumps = measure_jumps(motion)
-        write_jumps(folder / "jumps.csv", jumps)
+        write_jumps(folder / JUMPS, jumps)
         return motion, {**self._summary(motion), "jumps": [jump_row(jump) for jump in jumps]}
-
-    def draw_figures(self, folder: Path, motion: PlayersMotion) -> None:
-        """Draw nothing here: the report draws what it shows."""
 
     def write_report(self, folder: Path, summary: dict[str, Any], motion: PlayersMotion) -> None:
         """Write the report."""
@@ -102,7 +109,7 @@ class PlayersRun:
     def _summary(self, motion: PlayersMotion) -> dict[str, Any]:
         is_tracked, is_lost = (motion.status == status.value for status in (Status.TRACKED, Status.LOST))
         n_tracked, n_lost = int(is_tracked.all(axis=1).sum()), int(is_lost.all(axis=1).sum())
-        recording = self.opened.recording
+        recording = self.recording
         return {
             "name": self.trial.name,
             "n_frames": len(motion),

@@ -7,17 +7,19 @@ from importlib.metadata import version
 from typing import Any
 
 from airborne import __version__
-from airborne.run.opening import AnyRecording, Opened
+from airborne.calibration.from_points import Calibration
 from airborne.trial.file import Trial
+from airborne.video import LiveRecording, Recording
 
 _EXACT_CALIBRATION = (
     "the calibration comes from a file that does not say how good it is; the standard deviations take it as exact"
 )
 
 
-def provenance(trial: Trial, opened: Opened[AnyRecording], inputs: dict[str, str]) -> dict[str, Any]:
+def provenance(
+    trial: Trial, recording: Recording | LiveRecording, calibration: Calibration | None, inputs: dict[str, str]
+) -> dict[str, Any]:
     """Return the end of every summary: warnings, events, method, cameras, versions, inputs."""
-    recording, calibration = opened.recording, opened.calibration
     fits = {} if calibration is None else {fit.name: fit for fit in calibration.fits}
     cameras = [
         {

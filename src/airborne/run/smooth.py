@@ -15,7 +15,14 @@ from airborne.export import write_json
 from airborne.export.analysis_figures import write_residuals
 from airborne.motion import landmarks
 from airborne.motion.flight.phases import Event, body_events, player_events
-from airborne.motion.run_folder import holds_players, read_body_run, read_players_run
+from airborne.motion.run_folder import (
+    SMOOTH_RECORD,
+    figures_of,
+    holds_players,
+    read_body_run,
+    read_players_run,
+    tables_of,
+)
 from airborne.motion.smoothing import ResidualAnalysis, is_evenly_sampled, residual_analysis
 from airborne.motion.smoothing.smoother import (
     Smoothing,
@@ -34,8 +41,9 @@ from airborne.types import Array, Progress
 
 Events = dict[str, tuple[Event, ...]]  # by player; of one body under ""
 
-MOTION, JOINTS, ANGLES = "smooth_motion.csv", "smooth_joints.csv", "smooth_joint_angles.csv"
-EVENTS, FIGURE, RECORD = "smooth_events.csv", "residuals.png", "smooth.json"
+MOTION, JOINTS = "tables/smooth_motion.csv", "tables/smooth_joints.csv"
+ANGLES, EVENTS = "tables/smooth_joint_angles.csv", "tables/smooth_events.csv"
+FIGURE = "figures/residuals.png"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,12 +117,14 @@ def smooth_run(
         smoothing = replace(smoothing, cutoff_hz=_choose_cutoff(analysis))
     out = folder if out is None else out
     out.mkdir(parents=True, exist_ok=True)
+    tables_of(out)
     history, files = run.write(out, smoothing, events, progress)
     if analysis is not None:
+        figures_of(out)
         write_residuals(out / FIGURE, analysis, smoothing.cutoff_hz)
         files = (*files, FIGURE)
-    result = SmoothRun(smoothing, events, analysis, history, (*files, RECORD))
-    write_json(out / RECORD, result.to_dict())
+    result = SmoothRun(smoothing, events, analysis, history, (*files, SMOOTH_RECORD))
+    write_json(out / SMOOTH_RECORD, result.to_dict())
     return result
 
 

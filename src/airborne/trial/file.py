@@ -142,12 +142,8 @@ class Trial(Table):
         return self._folder / name
 
 
-def read_trial(path: Path, track: dict[str, Any] | None = None, cameras: Sequence[str] | None = None) -> Trial:
-    """Read a trial file; raises TrialError, naming the file and what is wrong, for anything unusable.
-
-    `track` replaces entries of its [track] table, as options of `airborne track` do; `cameras` selects cameras by
-    name.
-    """
+def parse_trial(path: Path, track: dict[str, Any] | None = None) -> Trial:
+    """Read a trial's tables, but look for none of the files that they name; raises TrialError."""
     try:
         trial = _validate(read_toml(path), track or {}, path.name)
     except OSError as error:
@@ -155,7 +151,17 @@ def read_trial(path: Path, track: dict[str, Any] | None = None, cameras: Sequenc
     except tomllib.TOMLDecodeError as error:
         raise TrialError(f"{path.name}: not a TOML file: {error}; expected a trial's TOML") from error
     trial._folder = path.parent
-    mistakes = _list_wrong_names(trial)
+    return trial
+
+
+def read_trial(path: Path, track: dict[str, Any] | None = None, cameras: Sequence[str] | None = None) -> Trial:
+    """Read a trial file; raises TrialError, naming the file and what is wrong, for anything unusable.
+
+    `track` replaces entries of its [track] table, as options of `airborne track` do; `cameras` selects cameras by
+    name.
+    """
+    trial = parse_trial(path, track)
+    mistakes = list_wrong_names(trial)
     if mistakes:
         raise MistakesError(path.name, mistakes)
     return trial if cameras is None else _select_cameras(path, trial, cameras)
@@ -182,7 +188,7 @@ def _validate(table: dict[str, Any], changes: dict[str, Any], where: str) -> Tri
     raise MistakesError(where, mistakes)
 
 
-def _list_wrong_names(trial: Trial) -> list[str]:
+def list_wrong_names(trial: Trial) -> list[str]:
     """List names of cameras that are not unique, and of files that do not exist."""
     names = [camera.name for camera in trial.camera]
     same = [f"two cameras share a name: {', '.join(names)}; give each its own"]
