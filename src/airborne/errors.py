@@ -61,14 +61,14 @@ def one_line(error: ValidationError) -> str:
         by_place.setdefault(".".join(step for step in steps if not _KIND.fullmatch(step)), []).append(one)
     places = [place for place in by_place if not any(other.startswith(f"{place}.") for other in by_place)]
     place, more = places[0], len(places) - 1
-    first, said = by_place[place][0], ", or ".join(dict.fromkeys(map(_said, by_place[place])))
+    first, said = by_place[place][0], ", or ".join(dict.fromkeys(map(_phrase, by_place[place])))
     is_whole_table = isinstance(first["input"], dict) or first["type"] == "missing"
     given = "" if is_whole_table else f" (found {str(first['input'])[:60]!r})"
     others = f"; and {more} more mistake{'s' * (more > 1)}" if more else ""
     return f"{place}{': ' if place else ''}{said}{given}{others}"
 
 
-def _said(one: ErrorDetails) -> str:
+def _phrase(one: ErrorDetails) -> str:
     if one["type"] in ("too_short", "too_long"):
         limits = one.get("ctx", {})
         asked = limits.get("min_length", limits.get("max_length"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,10 +22,8 @@ from airborne.rendering import FLAT, render
 from airborne.run.body_tracking import open_trial
 from airborne.run.first_pose import LANDMARK_WEIGHTS, landmarks_over_time
 from airborne.trial.file import Trial
-from airborne.types import Array
+from airborne.types import Array, StageProgress
 from airborne.video import Frames, Recording
-
-StageProgress = Callable[[str, int, int], None]  # what is being done, how far, of how many
 
 _N_SCENERY = 10  # further frames that show the scene without the person
 PICTURE = "fit_body.png"

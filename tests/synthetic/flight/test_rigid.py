@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import BodyModel, Box, Ellipsoid, Part, Segment
 from airborne.errors import BodyError
 from airborne.synthetic.flight.rigid import GRAVITY_M_S2, Launch, MassProperties, fly, mass_properties
-from airborne.synthetic.throw.scene import thrown_cross
+from airborne.synthetic.throw.scene import cross_scene
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
 TIMES = np.arange(40) / 50
@@ -26,7 +26,7 @@ def throw(**changes):
 
 
 def cross_mass():
-    return mass_properties(thrown_cross().body, 500.0)
+    return mass_properties(cross_scene().body, 500.0)
 
 
 def body(*parts):

@@ -57,13 +57,13 @@ def check_moved_cameras(rig: Rig, px: Array, times_s: Array | None = None) -> li
     others = [name for name in rig.names if name not in suspects]
     displacements = {name: _find_displacement(rig, others, name, px) for name in suspects}
     return [
-        _moved_finding(name, displacement, time_texts)
+        _displacement_finding(name, displacement, time_texts)
         for name, displacement in displacements.items()
         if displacement is not None
     ]
 
 
-def _moved_finding(name: str, displacement: _Displacement, times: Sequence[str]) -> Finding:
+def _displacement_finding(name: str, displacement: _Displacement, times: Sequence[str]) -> Finding:
     return Finding(
         kind="moved",
         what=(

@@ -14,9 +14,7 @@ from airborne.motion.flight.momentum import WINDOW, angular_momenta, centre_of_m
 from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
 from airborne.motion.uncertainty import propagate_variances, standard_deviation
-from airborne.types import Array
-
-Triple = tuple[float, float, float]
+from airborne.types import Array, Triple
 
 GRAVITY_M_S2 = 9.81  # world z points up
 

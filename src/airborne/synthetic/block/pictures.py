@@ -22,7 +22,7 @@ from airborne.synthetic.block.scene import BlockScene
 from airborne.types import Array, Image
 from airborne.video import Frames, View
 
-Box = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]
+_Rectangle = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]
 Boxes = NDArray[np.int64]  # (..., 4) of them
 
 HALL_LIGHTS = Lights(0.50, (Lamp(np.array([-5.0, -9.0, 10.0]), 0.36), Lamp(np.array([6.0, -4.0, 10.0]), 0.34)))
@@ -117,11 +117,11 @@ def _draw_image(
             shadows, boxes = drawable.shadows[index], bounds.shadows[index]
             cast_shadows(patch, x0, y0, setup.floor_from_px, shadows, boxes, _SHADOW_TINT)
         for drawable, bounds in (each for each in inside if each[0].player.side > 0):
-            _composite_body(patch, box, setup.camera, drawable, bounds, index=index)
+            _composite_body(patch, box, setup.camera, drawable, bounds=bounds, index=index)
         blend_layer(patch, setup.net.colour[y0:y1, x0:x1], setup.net.alpha[y0:y1, x0:x1])
         for drawable, bounds in (each for each in inside if each[0].player.side < 0):
-            _composite_body(patch, box, setup.camera, drawable, bounds, index=index)
-        recorded[y0:y1, x0:x1] = _record(rng, patch, setup.gain, pool, quality)
+            _composite_body(patch, box, setup.camera, drawable, bounds=bounds, index=index)
+        recorded[y0:y1, x0:x1] = _record(rng, patch, setup.gain, pool, quality=quality)
     return recorded
 
 
@@ -146,7 +146,7 @@ def _camera_setup(
         net=net,
         gain=gain,
         recorded_backgrounds=[
-            _record(rng, with_net, gain, pool, scene.difficulty.jpeg_quality) for _ in range(_N_BACKGROUNDS)
+            _record(rng, with_net, gain, pool, quality=scene.difficulty.jpeg_quality) for _ in range(_N_BACKGROUNDS)
         ],
         floor_from_px=np.linalg.inv(camera.P[:, [0, 1, 3]]),
         bounds=[_image_bounds(camera, drawable) for drawable in drawables],
@@ -196,13 +196,13 @@ def _boxes(camera: Camera, low: Array, high: Array, step: int = 1) -> Boxes:
     return np.clip(rounded, 0, [*camera.size, *camera.size]).astype(np.int64)
 
 
-def _overlap(a: Box, b: Box) -> bool:
+def _overlap(a: _Rectangle, b: _Rectangle) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def _merge(boxes: list[NDArray[np.int64]]) -> list[Box]:
+def _merge(boxes: list[NDArray[np.int64]]) -> list[_Rectangle]:
     """Merge overlapping boxes until none overlap; empty ones are left out."""
-    merged: list[Box] = []
+    merged: list[_Rectangle] = []
     for x0, y0, x1, y1 in (map(int, each) for each in boxes if each[2] > each[0] and each[3] > each[1]):
         box = (x0, y0, x1, y1)
         while overlapping := next((other for other in merged if _overlap(box, other)), None):
@@ -214,7 +214,7 @@ def _merge(boxes: list[NDArray[np.int64]]) -> list[Box]:
 
 
 def _composite_body(
-    patch: NDArray[np.float32], box: Box, camera: Camera, each: Drawable, bounds: ImageBounds, *, index: int
+    patch: NDArray[np.float32], box: _Rectangle, camera: Camera, each: Drawable, *, bounds: ImageBounds, index: int
 ) -> None:
     """Composite a body over the patch, with two samples a pixel side by side, as limbs are mostly upright."""
     x0, y0, x1, y1 = (int(c) for c in bounds.body[index])
@@ -227,7 +227,7 @@ def _composite_body(
 
 
 def _record(
-    rng: np.random.Generator, patch: NDArray[np.float32], gain: Array, pool: NDArray[np.int8], quality: int
+    rng: np.random.Generator, patch: NDArray[np.float32], gain: Array, pool: NDArray[np.int8], *, quality: int
 ) -> Image:
     """Return a patch (h, w, 3) after sensor noise and compression."""
     height, width, _ = patch.shape

@@ -182,7 +182,7 @@ def draw_bystander(
 
 def _move_clear_of_net(player: Player, duration_s: float) -> Player:
     """Move the player far enough from the net; raises TrialError for an impossible movement."""
-    time_s, centre_z = check_times(duration_s), player.movement.before.centre_z
+    time_s, centre_z = sample_times(duration_s), player.movement.before.centre_z
     margins = margins_of(player.movement.person, player.poses(time_s), side=player.side)
     largest_acceleration = np.abs(centre_z(np.linspace(centre_z.x[0], centre_z.x[-1], 200), 2)).max()
     if not (
@@ -192,11 +192,11 @@ def _move_clear_of_net(player: Player, duration_s: float) -> Player:
     return player.translate(np.array([0.0, player.side * max(CLEARANCE_M - margins.net_m, 0.0)]))
 
 
-def occupied_volume(player: Player, duration_s: float) -> Capsules:
+def volume_over(player: Player, duration_s: float) -> Capsules:
     """Return the volume of a player over a recording."""
-    return capsules_of(player.movement.person, player.poses(check_times(duration_s)), player.stature_m)
+    return capsules_of(player.movement.person, player.poses(sample_times(duration_s)), player.stature_m)
 
 
-def check_times(duration_s: float) -> Array:
+def sample_times(duration_s: float) -> Array:
     """Return the times (n,) [s] at which movements are checked: a recording and a little more at both ends."""
     return np.arange(-_CHECK_S, duration_s + _CHECK_S, _CHECK_S)

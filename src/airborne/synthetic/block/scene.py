@@ -19,7 +19,7 @@ from airborne.synthetic.block.players import (
     draw_attacker,
     draw_blocker,
     draw_bystander,
-    occupied_volume,
+    volume_over,
 )
 from airborne.synthetic.block.rig import hall_rig, perturb_calibration
 from airborne.synthetic.block.steps import Approach
@@ -159,10 +159,7 @@ def _draw_block(rng: np.random.Generator, n_blockers: int, duration_s: float) ->
                 rng, name, x, takeoff_s=takeoff_s, approach=approach, direction=direction, duration_s=duration_s
             )
         )
-        while (
-            blockers
-            and gap_m(occupied_volume(player, duration_s), occupied_volume(blockers[-1], duration_s)) < CLEARANCE_M
-        ):
+        while blockers and gap_m(volume_over(player, duration_s), volume_over(blockers[-1], duration_s)) < CLEARANCE_M:
             player = player.translate(np.array([_WIDER_M, 0.0]))
             x += _WIDER_M
         blockers.append(player)
@@ -193,11 +190,11 @@ def _add_others(
 
     draws = [spiker, *(partial(decoy, f"opponent{k}") for k in range(2, 3 + int(rng.integers(1, 3))))]
     draws += [partial(mate, f"mate{k}") for k in (1, 2, 3)]
-    volumes = [occupied_volume(player, duration_s) for player in players]
+    volumes = [volume_over(player, duration_s) for player in players]
     for draw in draws:
-        player = _draw_until(draw, lambda drawn: _is_clear(occupied_volume(drawn, duration_s), volumes))
+        player = _draw_until(draw, lambda drawn: _is_clear(volume_over(drawn, duration_s), volumes))
         players.append(player)
-        volumes.append(occupied_volume(player, duration_s))
+        volumes.append(volume_over(player, duration_s))
     return tuple(players)
 
 

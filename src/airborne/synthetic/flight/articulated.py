@@ -94,7 +94,7 @@ def fly_articulated(
         times, back = np.unique(time_s[selected], return_inverse=True)
         if len(times):
             order = slice(None, None, 1 if times[-1] > 0 else -1)
-            quaternions[selected] = _integrate(turning, start, joints.x, times[order], tolerance)[order][back]
+            quaternions[selected] = _integrate(turning, start, joints.x, times[order], tolerance=tolerance)[order][back]
     R = Rotation.from_quat(quaternions).as_matrix()
     angles, rates = _state(joints, time_s)
     t = time_s[:, None]
@@ -185,7 +185,7 @@ class _Segments:
         return np.linalg.solve(shape.inertia, own[..., None])[..., 0]
 
 
-def _integrate(turning: Rate, start: Array, breaks: Array, times: Array, tolerance: float) -> Array:
+def _integrate(turning: Rate, start: Array, breaks: Array, times: Array, *, tolerance: float) -> Array:
     """Integrate quaternions from time 0 to the times (n,), which all lie on one side of it, nearest first: (n, 4).
 
     Integrated from break to break: a long step would miss a short movement.

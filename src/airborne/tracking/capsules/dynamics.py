@@ -48,7 +48,7 @@ class GaussianState:
         return self.mean[N_FREE : N_FREE + 3]
 
 
-def initial_state(free: Array, covariance: Array) -> GaussianState:
+def state_at_rest(free: Array, covariance: Array) -> GaussianState:
     """Return a state at rest: free (22,), covariance (22, 22)."""
     full_covariance = np.zeros((N_FILTERED, N_FILTERED))
     full_covariance[:N_FREE, :N_FREE] = covariance

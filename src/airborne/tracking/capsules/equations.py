@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from airborne.kernels import kernel
 from airborne.tracking.capsules.evidence import capsule_evidence
 from airborne.tracking.capsules.jumper import CAPSULES, N_DOF, SURFACE_CLASSES, border_shares, pose_capsules
-from airborne.tracking.capsules.outlines import BEHIND_M, project
+from airborne.tracking.capsules.outlines import BEHIND_M, project_capsules
 
 N_LENGTHS, N_CAPSULES, N_POINTS = 9, 10, 9
 NOBODY = np.empty((0, 2, 3)), np.empty((0, 2))  # the capsules of no other players
@@ -60,7 +60,7 @@ def accumulate_equations(state, n_free, cameras, classes, maps, others, work, ow
     pose_state(state, points, ends, end_radii, share)
     total, origin = 0.0, np.zeros(2)
     for v in range(n_views):
-        project(ends, end_radii, cameras[v], discs, depth)
+        project_capsules(ends, end_radii, cameras[v], discs, depth)
         capsule_evidence(discs, depth, classes, share, sums[v], contrast[v], origin, work, owned[v], g, H)
         for i in range(n):
             total += owned[v, i, 0, 0] + owned[v, i, 1, 0]

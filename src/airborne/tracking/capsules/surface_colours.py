@@ -14,7 +14,7 @@ from airborne.appearance.surface_classes import log_ratio_table
 from airborne.cameras import Camera
 from airborne.tracking.capsules.equations import N_CAPSULES, N_LENGTHS, N_POINTS, NOBODY, classes_with, pose_state
 from airborne.tracking.capsules.jumper import N_DOF, SHOE, SKIN, SOCK, SURFACE_CLASSES
-from airborne.tracking.capsules.outlines import draw_labels, project
+from airborne.tracking.capsules.outlines import draw_labels, project_capsules
 from airborne.tracking.capsules.views import EvidenceTable, PlayerRegion, pack_camera
 from airborne.types import Array
 
@@ -72,7 +72,7 @@ def class_image(
     ends[N_CAPSULES:], end_radii[N_CAPSULES:] = other_ends, other_radii
     discs, depth = np.empty((n, 2, 3)), np.empty(n)
     pose_state(state, np.empty((N_POINTS, 3)), ends, end_radii, share)
-    project(ends, end_radii, pack_camera(camera), discs, depth)
+    project_capsules(ends, end_radii, pack_camera(camera), discs, depth)
     out = np.empty(camera.size[::-1], np.int8)
     draw_labels(discs, depth, classes_with(others), share, out)
     return out

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from airborne.tracking.capsules.dynamics import N_FREE, N_SLIDING, GaussianState, initial_state, predict, update
+from airborne.tracking.capsules.dynamics import N_FREE, N_SLIDING, GaussianState, predict, state_at_rest, update
 from airborne.tracking.capsules.equations import N_CAPSULES, N_LENGTHS, N_POINTS, pose_state
 from airborne.tracking.capsules.first_frame import fit_first_frame, points_of, start_state
 from airborne.tracking.capsules.fit import JumperFit, JumperPrior, fit_jumper
@@ -98,7 +98,7 @@ class Blocker:
             state, covariance = first.fit.state, np.linalg.inv(first.fit.information)
             tracks[start.name] = Track(
                 frames.time_s,
-                initial_state(state[:N_FREE], covariance[:N_FREE, :N_FREE]),
+                state_at_rest(state[:N_FREE], covariance[:N_FREE, :N_FREE]),
                 state,
                 state[N_DOF : N_DOF + N_SLIDING],
                 covariance[np.ix_(_SHAPE, _SHAPE)],

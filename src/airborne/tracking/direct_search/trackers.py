@@ -182,7 +182,7 @@ class DirectTracker:
         posed = self._model.with_pose(pose)
         rows, columns = np.triu_indices(6)
         i, j = np.eye(6)[rows] * _PROBE, np.eye(6)[columns] * _PROBE
-        squared = self._squared_scores(observed, posed, np.concatenate([i + j, i - j, j - i, -i - j])).reshape(4, -1)
+        squared = self._score_squares(observed, posed, np.concatenate([i + j, i - j, j - i, -i - j])).reshape(4, -1)
         gradient = self._gradient(observed, posed)
         if not (np.isfinite(squared).all() and np.isfinite(gradient).all()):  # at the images' edge
             return self._embed(np.diag(np.full(6, np.inf)))
@@ -211,10 +211,10 @@ class DirectTracker:
 
     def _gradient(self, observed: Targets, posed: PosedBody) -> Array:
         steps = np.diag(_PROBE)
-        squared = self._squared_scores(observed, posed, np.concatenate([steps, -steps])).reshape(2, 6)
+        squared = self._score_squares(observed, posed, np.concatenate([steps, -steps])).reshape(2, 6)
         return (squared[0] - squared[1]) / (2 * _PROBE)
 
-    def _squared_scores(self, observed: Targets, posed: PosedBody, deltas: Array) -> Array:
+    def _score_squares(self, observed: Targets, posed: PosedBody, deltas: Array) -> Array:
         """Return the squared score (n,) of a body moved by deltas (n, 6)."""
         moved = [posed.move(delta) for delta in deltas]
         R, t = np.stack([p.R for p in moved]), np.stack([p.t for p in moved])
