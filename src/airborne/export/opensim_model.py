@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from airborne.body import BodyModel, Box, Ellipsoid, Part, Segment
+from airborne.constants import STANDARD_GRAVITY_M_S2
 from airborne.export.part_meshes import part_colour
 from airborne.export.takes import portable_names
 from airborne.geometry.rotations import angles_from_matrix
@@ -41,7 +42,7 @@ def write_osim(path: Path, model: BodyModel) -> None:
     root = ET.SubElement(document, "Model", name=portable_names([model.name])[0])
     ET.SubElement(root, "length_units").text = "meters"
     ET.SubElement(root, "force_units").text = "N"
-    ET.SubElement(root, "gravity").text = "0 -9.80665 0"
+    ET.SubElement(root, "gravity").text = f"0 {-STANDARD_GRAVITY_M_S2} 0"
     names = portable_names([segment.name for segment in model.segments])
     bodies, joints, markers = (_set(root, kind) for kind in ("BodySet", "JointSet", "MarkerSet"))
     for segment, name, parent in zip(model.segments, names, model.parents, strict=True):

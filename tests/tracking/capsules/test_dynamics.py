@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from airborne.constants import GRAVITY_M_S2
 from airborne.tracking.capsules.dynamics import (
-    GRAVITY_M_S2,
     N_FILTERED,
     N_FREE,
     N_SLIDING,

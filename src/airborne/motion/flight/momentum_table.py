@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from airborne.body import BodyModel
+from airborne.constants import GRAVITY_M_S2
 from airborne.errors import BodyError
 from airborne.motion.angles import root_angles
 from airborne.motion.flight.momentum import WINDOW, angular_momenta, centre_of_mass, limit_rotation_variance
@@ -15,8 +16,6 @@ from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
 from airborne.motion.uncertainty import propagate_variances, standard_deviation
 from airborne.types import Array, Triple
-
-GRAVITY_M_S2 = 9.81  # world z points up
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel
+from airborne.constants import GRAVITY_M_S2
 from airborne.motion.flight.momentum_table import has_inertias, measure_flight
-from airborne.motion.free_fall import GENERIC_NOISE, GRAVITY_M_S2, combine_sides, noise_covariance, side_likelihood
+from airborne.motion.free_fall import GENERIC_NOISE, combine_sides, noise_covariance, side_likelihood
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.motion import Motion
 from airborne.motion.players import PlayersMotion

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from airborne.constants import GRAVITY_M_S2
 from airborne.motion.free_fall import (
-    GRAVITY_M_S2,
     SWAY_M,
     SideLikelihood,
     combine_sides,

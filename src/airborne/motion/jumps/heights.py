@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.motion.free_fall import GRAVITY_M_S2
+from airborne.constants import GRAVITY_M_S2
 from airborne.motion.jumps.events import FlightPosterior, find_flights, sample_flight
 from airborne.motion.jumps.jump import UNKNOWN, Jump, Measurement
 from airborne.motion.jumps.leg_track import LegTrack, extract_legs

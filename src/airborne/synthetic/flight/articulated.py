@@ -18,9 +18,10 @@ from scipy.interpolate import BPoly, PPoly
 from scipy.spatial.transform import Rotation
 
 from airborne.body import BodyModel
+from airborne.constants import FREE_FALL_M_S2
 from airborne.errors import BodyError
 from airborne.rendering import pose_segments
-from airborne.synthetic.flight.rigid import GRAVITY_M_S2, MassProperties, SampledFlight
+from airborne.synthetic.flight.rigid import MassProperties, SampledFlight
 from airborne.types import Array
 
 Rate = Callable[[float, Array], Array]  # time and state to the state's rate
@@ -98,7 +99,7 @@ def fly_articulated(
     R = Rotation.from_quat(quaternions).as_matrix()
     angles, rates = _state(joints, time_s)
     t = time_s[:, None]
-    centre = takeoff.centre + takeoff.velocity * t + GRAVITY_M_S2 * t**2 / 2
+    centre = takeoff.centre + takeoff.velocity * t + FREE_FALL_M_S2 * t**2 / 2
     shape = segments.mass_distribution(angles, rates)
     w = segments.angular_velocity(R, takeoff, angles, rates)
     spin = np.einsum("nij,nj->ni", shape.inertia, w) + shape.momentum

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from airborne.constants import GRAVITY_M_S2
 from airborne.tracking.capsules.jumper import N_DOF, SHORTS_END, SOCK_END, TRUNK, WAIST
 from airborne.types import Array
 
@@ -18,7 +19,6 @@ N_FREE = N_DOF + N_SLIDING
 N_FILTERED = N_FREE + N_DOF
 assert {WAIST, SHORTS_END, SOCK_END, TRUNK} == set(range(N_SLIDING)), "the sliding lengths come first"
 
-GRAVITY_M_S2 = 9.81
 _CORRELATION = 2.0  # accelerations previous several frames n: white noise of sqrt(n) times their sd disperses as far
 _ACCELERATION_SD = _CORRELATION * np.array(  # [m/s2], [rad/s2]
     [30.0] * 3 + [150.0] * 3 + [80.0, 60.0] + [150.0, 80.0, 80.0, 200.0, 200.0] * 2
