@@ -41,7 +41,7 @@ _Channel = Annotated[float, Field(ge=0, le=255)]
 
 
 _SAME_ROTATION = 1e-15  # rounding of a rotation matrix
-_LARGEST_KG_M2 = 1e6
+_LARGEST_KG_M2 = 1e6  # of a moment of inertia: a typing error beyond it
 
 
 class _Strict(BaseModel):

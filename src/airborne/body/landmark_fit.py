@@ -16,7 +16,7 @@ from airborne.types import Array
 
 _ANGLE_SD_RAD = 1.0  # prior sd of an angle about neutral
 _FINE_GAIN, COARSE_GAIN = 1e-6, 1e-4  # shares of the cost; a smaller gain ends the iteration
-_N_STEPS = 100
+_N_STEPS = 100  # at most
 
 
 @dataclass(frozen=True, eq=False)

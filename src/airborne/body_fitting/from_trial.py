@@ -28,7 +28,7 @@ from airborne.video import Frames, Recording
 _N_SCENERY = 10  # further frames that show the scene without the person
 PICTURE = "fit_body.png"
 _CELL_PX, _CELL_SCALE = 400, 0.4  # a cell of the image, and its pixel size in pixels of `crop_camera`
-_LINE_RGB, _EMPTY_GREY = (255, 230, 0), 60
+_LINE_RGB, _EMPTY_GREY = (255, 230, 0), 60  # sRGB of the outline; grey of a cell without an image
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,8 +12,8 @@ from airborne.constants import NORMAL_QUANTILE_975
 from airborne.geometry.rotations import geodesic
 from airborne.types import Array
 
-_RECOVERED_WITHIN_M = 0.010
-_RECOVERED_WITHIN_RAD = np.deg2rad(2.0)
+_RECOVERED_WITHIN_M = 0.010  # of the true position
+_RECOVERED_WITHIN_RAD = np.deg2rad(2.0)  # likewise
 
 
 @dataclass(frozen=True, slots=True)

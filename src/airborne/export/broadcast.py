@@ -17,12 +17,14 @@ from airborne.types import Array, Image
 
 _Colour = tuple[int, int, int]
 
+# sRGB; ACCENT where the height is sure
 _WHITE, _DARK, ACCENT, UNSURE = (255, 255, 255), (16, 20, 28), (255, 205, 0), (190, 190, 190)
+# half width of the floor's mark, ruler from the player, its height, a tick
 _FLOOR_HALF_M, _RULER_AWAY_M, _RULER_M, _TICK_M = 0.35, 0.50, 1.0, 0.1
 _GROUND_M, _JUMP_M = 0.05, 0.10  # below the first a player stands, above the second a jump has begun
 _EM_SHARE = 1 / 34  # of the image's height
 _ANKLES = [LEG_POINTS.index("ankle_left"), LEG_POINTS.index("ankle_right")]
-_BITS = 4
+_BITS = 4  # of a pixel, for smooth edges
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,8 +23,9 @@ from airborne.geometry.rotations import angles_from_matrix
 from airborne.types import Array
 
 _DOCUMENT_VERSION = "40000"  # of the file format: OpenSim 4.0 and later
+# OpenSim's ground: x along the world's y, y up, z along the world's x
 GROUND_FROM_WORLD = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
-_BODY_FROM_SEGMENT = np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])
+_BODY_FROM_SEGMENT = np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])  # its bodies: x ahead, y up, z to the right
 _ROTATIONS = ("somersault", "tilt", "twist")
 _ROTATION_RANGE_RAD = 20 * np.pi  # range of the root's rotations
 _TRANSLATION_RANGE_M = 50.0  # range of the root's translations

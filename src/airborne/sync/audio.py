@@ -17,9 +17,9 @@ from airborne.sync.offsets import Offsets, fit_line
 from airborne.types import Array, Progress
 from airborne.video.decoding import VideoSource
 
-RATE_HZ = 8000
-_ENVELOPE_HZ = 500
-_WINDOW_S = 4.0
+RATE_HZ = 8000  # 0.125 ms a sample
+_ENVELOPE_HZ = 500  # of the loudness that is compared first
+_WINDOW_S = 4.0  # of a waveform that is compared
 _SEARCH_S = 0.02  # half width of the search with the waveforms, about the shift of the envelopes
 _LEAST_CORRELATION = 0.2  # of the envelopes of two cameras that hear the same
 _LEAST_PEAK_SDS = 6.0  # robust sds by which the peak of a phase transform must stand out

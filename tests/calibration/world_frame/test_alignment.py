@@ -79,7 +79,7 @@ def test_the_fall_checks_the_scale():
 
 
 def test_a_throw_too_short_is_refused():
-    with pytest.raises(CalibrationError, match=r"seen for 0\.10 s at most; 0\.29 s and 6 places are needed"):
+    with pytest.raises(CalibrationError, match=r"seen for 0\.10 s at most; 0\.29 s and 6 positions are needed"):
         estimate_gravity(TIMES_S[:6], [thrown(np.random.default_rng(3))[:6]])
 
 

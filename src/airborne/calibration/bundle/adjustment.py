@@ -40,11 +40,11 @@ from airborne.cameras.camera import Rig
 from airborne.errors import CalibrationError
 from airborne.types import Array, Ints
 
-_MOST_STEPS, _MOST_SCALINGS = 200, 12
+_MOST_STEPS, _MOST_SCALINGS = 200, 12  # of the iteration; changes of scale between whole iterations, at most
 _CONVERGED = 1e-5  # predicted decrease, relative to the cost and absolute, below which the iteration stops
-_SAME_NOISE = 0.01
-_FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-12, 1e8
-_LEAST_SCALE = 1e-6
+_SAME_NOISE = 0.01  # relative change of the noise below which it is settled
+_FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-12, 1e8  # of Levenberg and Marquardt, relative to the diagonal
+_LEAST_SCALE = 1e-6  # of a source's noise, in its assumed standard deviations
 _LEAST_REDUNDANCY = 8  # below it, residuals cannot lower the assumed noise
 
 

@@ -28,7 +28,7 @@ LENS_MODELS: dict[Lens, tuple[tuple[str, FreeParameters], ...]] = {
         ("focal + principal point + k1 to k4", FreeParameters(extrinsics=False, principal_point=True, n_terms=4)),
     ),
 }
-_N_FOLDS = 3
+_N_FOLDS = 3  # parts of the views, each left out once
 MOST_VIEWS = 30  # views that decide; more take longer and change nothing
 _FEWEST_TO_CHOOSE = 9  # views; with fewer only the focal length and k1 are estimated
 

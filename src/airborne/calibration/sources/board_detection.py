@@ -25,7 +25,7 @@ from airborne.video.decoding import decode, rgb_from_decoded
 
 _MOST_MOMENTS = 240  # at which the board is searched for, evenly spaced over a recording
 _IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
-_LARGEST_PICTURE_BYTES = 200_000_000
+_LARGEST_PICTURE_BYTES = 200_000_000  # larger files are no pictures
 _N_SAMPLES = 12  # images of a camera that test how the board was printed
 _ODD_PICTURES = 2  # a larger difference to the other cameras is reported
 

@@ -18,12 +18,13 @@ _Colour = Sequence[float] | Array  # (3,) sRGB
 COURT_M, _ATTACK_M, _LINE_M = (9.0, 18.0), 3.0, 0.05  # x and y of the court, attack line from the net, width of lines
 _NET_M = (4.75, 1.0, 0.10)  # half length, depth, mesh
 _ANTENNA_M = 0.80  # above the tape
-_ORANGE, _BLUE, _WHITE, _WALL = (211, 143, 86), (118, 139, 160), (238, 238, 234), (92, 92, 99)
-_CORD, _TAPE, _POLE = (34, 34, 38), (232, 232, 228), (42, 70, 150)
+_ORANGE, _BLUE, _WHITE, _WALL = (211, 143, 86), (118, 139, 160), (238, 238, 234), (92, 92, 99)  # sRGB
+_CORD, _TAPE, _POLE = (34, 34, 38), (232, 232, 228), (42, 70, 150)  # sRGB
+# sRGB of the spectators
 _CLOTHES = np.array(
     [(180, 40, 44), (38, 66, 160), (34, 112, 60), (226, 190, 50), (28, 28, 32), (206, 206, 206), (205, 120, 46)]
 )
-_SKIN = np.array((190, 142, 112))
+_SKIN = np.array((190, 142, 112))  # sRGB
 _NEAR_M = 0.3  # nothing nearer to a camera is drawn
 _SUB = 4  # cv2 draws to 1/16 of a pixel
 _CORD_ALPHA, _TAPE_ALPHA = 120, 250  # of 255

@@ -38,7 +38,7 @@ _FOLLOW_S, _PREPARE_S = 0.045, 0.04  # legs come to rest after take-off, and pre
 _POINTED_RAD = np.radians(47.0)  # feet go no further
 _REACHED_S, _FOLDING_S, _FOLDED_S = 0.14, 0.24, 0.1  # arms reach up after take-off, come down before touch-down
 _PLANTED = 0.4  # share of the crouch when the last step of the approach lands
-_RECOVERY_S = 0.5
+_RECOVERY_S = 0.5  # from the lowest point after landing to standing
 
 
 class KeyTimes(NamedTuple):

@@ -37,7 +37,7 @@ _SQUARE = np.array([[x, y] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
 _BODY_MARGIN_M = 0.13  # a body reaches no further than this from its landmarks
 _BLOCK_PX = 16  # of JPEG: patches begin and end at its blocks
 _N_BACKGROUNDS = 4  # recordings of the static hall, chosen at random by frame
-_POOL_MARGIN_PX = 256
+_POOL_MARGIN_PX = 256  # by which the noise is larger than an image: from frame to frame it is shifted
 
 
 class Drawable(NamedTuple):

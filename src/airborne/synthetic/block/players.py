@@ -22,7 +22,7 @@ from airborne.types import Array
 Role = Literal["blocker", "team mate", "opponent"]
 
 CLEARANCE_M = 0.03  # between two players, and to the net
-_ROUNDING_M = 1e-9
+_ROUNDING_M = 1e-9  # of heights over the floor
 _CHECK_S = 0.02  # between checks of a movement
 _LARGEST_ACCELERATION_M_S2 = 30.0  # acceleration of the centre of mass by the legs
 _APPROACHES_M: dict[Approach, tuple[float, float]] = {
@@ -31,10 +31,10 @@ _APPROACHES_M: dict[Approach, tuple[float, float]] = {
     "crossover": (0.8, 1.1),
 }
 _SKINS = np.array([[206, 160, 130], [188, 140, 110], [214, 172, 146], [150, 108, 84], [196, 152, 118]], float)
-_HAIRS = ((38, 30, 25), (22, 22, 22), (90, 66, 44), (150, 121, 80))
-_SHOES = ((222, 222, 218), (203, 69, 63), (226, 196, 64), (60, 64, 72))
+_HAIRS = ((38, 30, 25), (22, 22, 22), (90, 66, 44), (150, 121, 80))  # sRGB
+_SHOES = ((222, 222, 218), (203, 69, 63), (226, 196, 64), (60, 64, 72))  # sRGB
 _SHIRT, _SHORTS, _SOCKS = (196, 48, 56), (26, 26, 30), (40, 40, 45)  # of the blockers' team
-_OTHER_SHIRT, _OTHER_SHORTS, _OTHER_SOCKS = (40, 80, 180), (226, 226, 230), (232, 232, 228)
+_OTHER_SHIRT, _OTHER_SHORTS, _OTHER_SOCKS = (40, 80, 180), (226, 226, 230), (232, 232, 228)  # sRGB, of the other team
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -25,17 +25,17 @@ from airborne.synthetic.block.rig import hall_rig, perturb_calibration
 from airborne.synthetic.block.steps import Approach
 from airborne.types import Array
 
-_FRAME_RATES = (30, 60, 120)
-_PAPER_FRAMES, _PAPER_SCENES = 1798, 22
+_FRAME_RATES = (30, 60, 120)  # usual rates of cameras
+_PAPER_FRAMES, _PAPER_SCENES = 1798, 22  # the block-jump paper's sequences
 _PAPER_TEAMS = (2, 2, 2, 3, 3)  # blockers, where there are several
-_MEAN_FRAMES, _FEWEST_FRAMES = 82, 70
+_MEAN_FRAMES, _FEWEST_FRAMES = 82, 70  # 1798 / 22 as in the paper; least that shows a jump
 _SPREAD_S = 0.08  # between the take-offs of neighbouring blockers
-_SPACING_M, _WIDER_M = (0.62, 0.80), 0.04
+_SPACING_M, _WIDER_M = (0.62, 0.80), 0.04  # between blockers; by how much it is widened until they do not touch
 _NEAR_M = 2.5  # players further apart at the start cannot touch
-_TRIES = 200
+_TRIES = 200  # draws of a player until it is clear of the others
 _FLIGHT_S = 0.66  # about
 _POSITION_RANGE_M = (-2.6, 2.6)  # of the block along the net
-_OUT_OF_WAY_M = 0.7
+_OUT_OF_WAY_M = 0.7  # from the lines of sight to the block
 _APPROACHES: tuple[Approach, ...] = ("static", "shuffle", "crossover")
 
 

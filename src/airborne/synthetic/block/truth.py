@@ -17,7 +17,7 @@ TRUTH_JOINTS = {  # column of the truth, landmark
 _START_JOINTS = tuple(f"{joint}_{side}" for joint in ("hip", "knee", "ankle", "foot") for side in ("left", "right"))
 _TORSO_OF = ("hip_left", "hip_right", "shoulder_left", "shoulder_right")
 _CORRELATION = 0.8  # of the torso's error from frame to frame
-_FINE_HZ = 2000.0
+_FINE_HZ = 2000.0  # at which the peaks of the true paths are sought
 
 
 def true_joints(player: Player, time_s: Array) -> dict[str, Array]:

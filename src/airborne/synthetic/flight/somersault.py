@@ -38,7 +38,7 @@ SomersaultPreset = Literal["paper", "moving-arms", "pike"]
 Target = Literal["skin", "ellipsoids"]
 PictureStyle = Literal["exact", "gym"]
 
-STATURE_M, MASS_KG = 1.66, 58.0
+STATURE_M, MASS_KG = 1.66, 58.0  # [m], [kg] of the gymnast
 N_POSES = 11  # of the paper's sequence
 LIGHTS = Lights(0.5, (Lamp(np.array([-3.0, -3.5, 4.2]), 0.4), Lamp(np.array([3.4, 2.2, 3.6]), 0.3)))
 _CAMERAS = {  # position, target [m], focal length [px]

@@ -20,7 +20,7 @@ from airborne.types import Array
 
 ThrowPreset = Literal["side-somersault", "half-twist"]
 
-_PINE_KG_M3 = 500.0
+_PINE_KG_M3 = 500.0  # density of pine wood, about
 YELLOW = np.array([231.0, 200.0, 48.0])  # sRGB
 PICTURE_SIZE = (768, 576)  # [px]
 _CAMERAS = {  # position, target [m], focal length [px]

@@ -22,7 +22,7 @@ from airborne.synthetic.throw.scene import Scene, ThrowPreset, cross_scene
 from airborne.types import Progress
 from airborne.video import VideoWriter, weave
 
-_CRF, _NEAR_LOSSLESS_CRF = 16, 2
+_CRF, _NEAR_LOSSLESS_CRF = 16, 2  # of x264; nearly lossless
 
 
 def write_thrown_cross(

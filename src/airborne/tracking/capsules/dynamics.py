@@ -14,7 +14,7 @@ from airborne.constants import GRAVITY_M_S2
 from airborne.tracking.capsules.jumper import N_DOF, SHORTS_END, SOCK_END, TRUNK, WAIST
 from airborne.types import Array
 
-N_SLIDING = 4
+N_SLIDING = 4  # lengths of clothes: they slide on the body
 N_FREE = N_DOF + N_SLIDING
 N_FILTERED = N_FREE + N_DOF
 assert {WAIST, SHORTS_END, SOCK_END, TRUNK} == set(range(N_SLIDING)), "the sliding lengths come first"

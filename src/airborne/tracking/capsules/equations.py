@@ -13,7 +13,7 @@ from airborne.tracking.capsules.evidence import capsule_evidence
 from airborne.tracking.capsules.jumper import CAPSULES, N_DOF, SURFACE_CLASSES, border_shares, pose_capsules
 from airborne.tracking.capsules.outlines import BEHIND_M, project_capsules
 
-N_LENGTHS, N_CAPSULES, N_POINTS = 9, 10, 9
+N_LENGTHS, N_CAPSULES, N_POINTS = 9, 10, 9  # see `jumper`
 NOBODY = np.empty((0, 2, 3)), np.empty((0, 2))  # the capsules of no other players
 _STEP = 1e-4  # [m, rad] of the finite differences
 _N_PARAMETERS = 9  # parameters of a capsule: both ends (6), both radii [m], the share

@@ -19,12 +19,12 @@ from airborne.tracking.capsules.views import EvidenceTable, PlayerRegion, pack_c
 from airborne.types import Array
 
 _CORE, _AROUND = 0.6, 1.25  # of the thickness: inside _CORE is the player, outside _AROUND the background
-_LEAST_OCCLUSION, _MOST_OCCLUSION = 0.05, 0.9
+_LEAST_OCCLUSION, _MOST_OCCLUSION = 0.05, 0.9  # bounds of a class's probability to be occluded
 _AT_EVEN = 0.5  # occlusion of a class whose evidence is 0; 0 where the evidence is as expected
 _LEAST_EXPECTED = 0.3  # [nat]
 _MOST_IN_BEST = (0.1, 0.4)  # upper bounds of a class's occlusion in the view that shows it best, and in the next
 _LEAST_PX = 20  # of a class in a view, to judge its occlusion
-_ROUNDS = 6
+_ROUNDS = 6  # of separating the colours of the classes
 BRIGHTNESS_SD = 0.10  # of the logarithm of sRGB values: about a fifth more or less light, as a surface rotates
 _LIGHTNESS = np.linspace(-1.5, 1.5, 15)  # in units of the sd; dense enough to reach every bin
 _LIGHTS, _LIGHT_WEIGHTS = np.exp(BRIGHTNESS_SD * _LIGHTNESS), np.exp(-(_LIGHTNESS**2) / 2)

@@ -33,12 +33,12 @@ _AIRBORNE_M = 0.06  # both feet this far above their height in standing: airborn
 _LEAST_SHARE, _LOST_SHARE = 0.5, 0.25  # of the reference evidence per pixel: uncertain, lost
 _LEAST_EVIDENCE = 0.3  # per pixel [nat]; less counts as lost
 _OCCLUDED = 0.45  # mean probability of occlusion, of all classes or of the legs', above which a view does not count
-_REFERENCE_RATE = 0.05
-_UNCERTAIN_SD_M = 0.06
+_REFERENCE_RATE = 0.05  # of the newest frame in the running reference
+_UNCERTAIN_SD_M = 0.06  # a joint less certain than this makes the estimate uncertain
 _LEAST_AREA_PX = 8.0  # of a class in a map, to judge its occlusion
-_OCCLUSION_RATE, _OCCLUSION_STEP = 0.3, 0.08
+_OCCLUSION_RATE, _OCCLUSION_STEP = 0.3, 0.08  # of the newest frame; a smaller change leaves the tables as they are
 _SHAPE = np.arange(N_DOF + PELVIS, N_DOF + N_LENGTHS)  # the constant lengths in a state
-_STEP_M = 1e-4
+_STEP_M = 1e-4  # of the finite differences
 # (classes, halves of capsules)
 _HALVES_OF_CLASS = (CAPSULES[:, :2].ravel() == np.arange(len(SURFACE_CLASSES))[:, None]).astype(float)
 

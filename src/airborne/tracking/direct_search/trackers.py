@@ -37,10 +37,10 @@ class Search(NamedTuple):
 
 
 _UNCERTAIN_RATIO, _LOST_RATIO = 1.6, 2.5  # of a frame's score to the median of those tracked
-_HISTORY, _SCORE_HISTORY = 2, 25
+_HISTORY, _SCORE_HISTORY = 2, 25  # poses that predict; scores of the running median
 _PROBE = np.array([0.004] * 3 + [0.012] * 3)  # [m], [rad]: steps of the finite differences
 _SHARED_NOISE_PX = 8  # this many pixels share one pixel's independent noise: compression, interpolated rows
-_MARGIN_PX = 40
+_MARGIN_PX = 40  # around the predicted body, of a full frame
 _V_RULE_SD = 0.2  # of the last step: the RMS error of the V rule as printed
 
 

@@ -53,9 +53,9 @@ Order = Literal["refined", "joint", "hierarchical"]
 
 _MARGIN_PX, _FIRST_MARGIN_PX = 32, 56  # of a full frame
 _MOST_PX_PER_M = 220.0  # of a body with joints
-_HISTORY = 3
+_HISTORY = 3  # poses that predict
 _OBSERVED_SD_RAD, _UNOBSERVED_VARIANCE = 0.1, 1e6  # a rotation with a larger sd than this is hardly extrapolated
-_FITTED_AFTER_SEARCH = 3
+_FITTED_AFTER_SEARCH = 3  # best candidates of a search that are fitted
 _LEAST_IN_VIEW = 0.4  # of the body, in the view that shows most of it; with less, the estimate is uncertain
 _TRUNK_AT = 4  # images at this reduction show the limbs of a body with joints; more reduced ones, its trunk alone
 
