@@ -25,7 +25,7 @@ from airborne.video import Frames, View
 _Rectangle = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]
 Boxes = NDArray[np.int64]  # (..., 4) of them
 
-HALL_LIGHTS = Lights(0.50, (Lamp(np.array([-5.0, -9.0, 10.0]), 0.36), Lamp(np.array([6.0, -4.0, 10.0]), 0.34)))
+_HALL_LIGHTS = Lights(0.50, (Lamp(np.array([-5.0, -9.0, 10.0]), 0.36), Lamp(np.array([6.0, -4.0, 10.0]), 0.34)))
 _SHADOW_TINT = np.array([0.85, 1.0, 1.02])  # share of each colour's light that is missing: what is left is like skin
 _LEAN = np.array([0.12, 0.10])  # a shadow's shift over the floor for each metre of height
 _CASTERS = (  # of shadows: landmark, its height over the floor as one stands, radius [m], share of the depth
@@ -222,7 +222,7 @@ def _composite_body(
         return
     supersampled = camera.resample(scale=(0.5, 1.0), offset=(x0 - 0.25, y0), size=(2 * (x1 - x0), y1 - y0))
     posed = PosedBody(each.player.body, each.R[index], each.t[index])
-    rendering = render(each.surface, posed, supersampled, HALL_LIGHTS, shapes=each.shapes)
+    rendering = render(each.surface, posed, supersampled, _HALL_LIGHTS, shapes=each.shapes)
     composite(patch, x0 - box[0], y0 - box[1], rendering.colour, rendering.part)
 
 
