@@ -22,7 +22,8 @@ Net = Literal["men", "women"]
 
 _LENGTH_M, _WIDTH_M, _ATTACK_M, _LINE_M = 18.0, 9.0, 3.0, 0.05  # FIVB rules of volleyball, 1.1, 1.4.1 and 1.3.1
 _NET_M = {"men": 2.43, "women": 2.24}  # height in the middle
-_NET_DEPTH_M, _ANTENNA_M, _POST_M = 1.0, 0.80, 2.55  # the net's own height; antenna above the net; post (FIVB 2.2, 2.4, 2.5.1)
+# the net's own height; antenna above the net; height of a post (FIVB 2.2, 2.4, 2.5.1)
+_NET_DEPTH_M, _ANTENNA_M, _POST_M = 1.0, 0.80, 2.55
 _NET_RANGE_M = (1.5, 3.0)  # of a net's height in play, children's and standing volleyball's among them
 _NET_RISE_M = 0.01  # at the sidelines over the middle: between 0 and 2 cm are allowed (FIVB 2.1.2)
 _POST_OUTSIDE_M = 0.75  # of the sideline: between 0.5 and 1 m are allowed (FIVB 2.5.1)
