@@ -52,7 +52,7 @@ def clicked(rng, rig, names=None, *, noise_px=0.5) -> ControlPoints:
     """The court's points as every camera sees them, painted as exactly as courts are."""
     known = court_points("men")
     names = tuple(names or known)
-    world, sd_m = (np.array([getattr(known[name], key) for name in names]) for key in ("place_m", "sd_m"))
+    world, sd_m = (np.array([getattr(known[name], key) for name in names]) for key in ("position_m", "sd_m"))
     px = seen(rng, rig, world + sd_m * rng.standard_normal(world.shape), noise_px=noise_px)
     return ControlPoints(names=names, world=world, cameras=rig.names, px=px, sd_m=sd_m)
 

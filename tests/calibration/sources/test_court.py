@@ -69,7 +69,7 @@ def test_own_surveyed_points_stand_beside_the_courts(tmp_path):
 
 def test_a_table_without_a_point_of_the_court_is_refused(tmp_path):
     (tmp_path / "points.csv").write_text("point,x_m,y_m,z_m,a_u,a_v\nP1,5,1,0.4,3,4\nnet_left_top,1,2,3,4,5\n")
-    with pytest.raises(CalibrationError, match="not one point has its place from the court"):
+    with pytest.raises(CalibrationError, match="no point takes its position from the court"):
         read_control_points(tmp_path / "points.csv", court_points("men"))
 
 
