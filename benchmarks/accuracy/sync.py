@@ -23,7 +23,7 @@ from rows import ROOT, append
 from airborne.run.opening import open_cameras, video_source
 from airborne.sync import offsets_by_motion
 from airborne.sync.from_trial import synchronise
-from airborne.synthetic.throw.scene import thrown_cross
+from airborne.synthetic.throw.scene import cross_scene
 from airborne.synthetic.throw.writing import write_trial
 from airborne.trial.file import read_trial
 from airborne.video import VideoWriter, fill_rows, weave
@@ -107,7 +107,7 @@ def main() -> None:
         at = Path(scratch)
         generated = []
         for seed, late_ms in LATE_MS:
-            scene = replace(thrown_cross(seed=seed), time_offsets_s=(0.0, 0.0, late_ms / 1000))
+            scene = replace(cross_scene(seed=seed), time_offsets_s=(0.0, 0.0, late_ms / 1000))
             write_trial(scene, at / f"g{seed}")
             generated.append(errors_ms(at / f"g{seed}", late_ms / 1000))
         mixed = [errors_ms(resampled(at / f"r{ms}", ms / 1000), ms / 1000) for ms in RESAMPLED_MS]

@@ -78,11 +78,11 @@ def list_mistakes(error: ValidationError, tags: Collection[str] = ()) -> list[st
             steps.append(one.get("ctx", {})["discriminator"].strip("'"))
         by_place.setdefault(".".join(steps), []).append(one)
     places = [place for place in by_place if not any(other.startswith(f"{place}.") for other in by_place)]
-    return [_say_place(place, by_place[place]) for place in places]
+    return [_describe_place(place, by_place[place]) for place in places]
 
 
-def _say_place(place: str, errors: Sequence[ErrorDetails]) -> str:
-    said = ", or ".join(dict.fromkeys(map(_said, errors)))
+def _describe_place(place: str, errors: Sequence[ErrorDetails]) -> str:
+    said = ", or ".join(dict.fromkeys(map(_phrase, errors)))
     is_whole_table = isinstance(errors[0]["input"], dict) or errors[0]["type"] == "missing"
     given = "" if is_whole_table else f" (found {str(errors[0]['input'])[:60]!r})"
     return f"{place}{': ' if place else ''}{said}{given}"
@@ -93,7 +93,7 @@ def _count_others(mistakes: Sequence[str]) -> str:
     return mistakes[0] + (f"; and {more} more mistake{'s' * (more > 1)}" if more else "")
 
 
-def _said(one: ErrorDetails) -> str:
+def _phrase(one: ErrorDetails) -> str:
     if one["type"] in ("too_short", "too_long"):
         limits = one.get("ctx", {})
         asked = limits.get("min_length", limits.get("max_length"))

@@ -7,12 +7,12 @@ from scipy.interpolate import PPoly
 
 from airborne.cameras import Rig
 from airborne.geometry.rotations import angles_from_matrix, unwrap
-from airborne.synthetic import PoseRanges, thrown_cross
+from airborne.synthetic import PoseRanges, cross_scene
 
 
 def small_scene(preset="half-twist", *, scale=4, **changes):
     """Return a preset's scene with images smaller by `scale`, four pictures long."""
-    scene = thrown_cross(preset, seed=3, clutter=6)
+    scene = cross_scene(preset, seed=3, clutter=6)
     small = Rig(
         tuple(
             camera.resample(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,15 +23,13 @@ from airborne.run.detections import landmarks_over_time
 from airborne.run.opening import Opened, open_trial
 from airborne.tracking.first_pose import LANDMARK_WEIGHTS
 from airborne.trial.file import Trial
-from airborne.types import Array
+from airborne.types import Array, StageProgress
 from airborne.video import Frames, Recording
-
-StageProgress = Callable[[str, int, int], None]  # what is being done, how far, of how many
 
 _N_SCENERY = 10  # further frames that show the scene without the person
 PICTURE = "fit_body.png"
 _CELL_PX, _CELL_SCALE = 400, 0.4  # a cell of the image, and its pixel size in pixels of `crop_camera`
-_LINE_RGB, _EMPTY_GREY = (255, 230, 0), 60
+_LINE_RGB, _EMPTY_GREY = (255, 230, 0), 60  # sRGB of the outline; grey of a cell without an image
 
 
 @dataclass(frozen=True, slots=True, eq=False)

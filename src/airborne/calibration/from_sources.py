@@ -22,7 +22,7 @@ from airborne.types import Array
 
 _LONGEST_GAP_S = 0.26  # between images of which the board's motion can be interpolated
 _LOOSE_SYNC_NOISE_SHARE = 0.75  # lags are accepted where they lower the noise to less than this share
-_FEWEST_MOMENTS = 10
+_FEWEST_MOMENTS = 10  # with a board, to estimate lags
 _LAG_SD = 0.5  # of the time between images
 
 

@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from airborne.errors import AirborneError
 
 STOPPED = 130  # the exit code
-_SECONDS_A_LINE = 5.0
+_SECONDS_A_LINE = 5.0  # between lines of progress where no terminal shows a bar
 _SIDES_PX = range(16, 20_001)  # of an image
 
 errors = Console(stderr=True, highlight=False, soft_wrap=True)

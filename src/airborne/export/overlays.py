@@ -26,8 +26,8 @@ OverlaysAs = Literal["videos", "stills"]
 
 LONGEST_SIDE_PX = 1280  # larger images are reduced to it
 _LINE_SHARE = 1 / 240  # of the image's height
-_TEXT_SHARE = 1 / 30
-_MISSING_GREY = 40
+_TEXT_SHARE = 1 / 30  # of the image's height
+_MISSING_GREY = 40  # stands in for an image that is missing
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 

@@ -17,9 +17,9 @@ from airborne.motion import Motion
 from airborne.tracking import Status
 from airborne.types import Array, Mask
 
-WIDTH_IN = 7.6
-DPI = 150
-FONT_PT = 9
+WIDTH_IN = 7.6  # of a figure
+DPI = 150  # of a figure
+FONT_PT = 9  # of labels
 _LEGEND_CHARACTERS = 85  # that fit into one row
 ANGLES = ("somersault", "tilt", "twist")
 TEXT, LINE, FAINT = hex_colour(TEXT_RGB), hex_colour(ESTIMATE_RGB), "#dddddd"

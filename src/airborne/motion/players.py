@@ -21,7 +21,7 @@ from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate
 from airborne.types import Array
 
-_UPPER = np.triu_indices(3)
+_UPPER = np.triu_indices(3)  # of the covariance of a position
 _POSITION = ("x_m", "y_m", "z_m")
 _COVARIANCE = tuple(f"cov_{'xyz'[i]}{'xyz'[j]}_m2" for i, j in zip(*_UPPER, strict=True))
 PLAYERS_COLUMNS = ("player", "frame", "time_s", "status", "joint", *_POSITION, "sd_m", *_COVARIANCE, "score", "n_views")

@@ -27,7 +27,7 @@ EXPORT_FORMATS = ("c3d", "trc", "mot", "osim", "gltf", "bvh", "csv", "parquet")
 _TABLE_FORMATS = ("csv", "parquet")
 _UNIFORM_FORMATS = ("c3d", "bvh")  # uniform sampling: hold a rate and no times
 _LARGEST_JITTER = 0.05  # of a frame: how far such a file may shift one in time
-_ROWS_AT_A_TIME = 10
+_ROWS_AT_A_TIME = 10  # poses in memory at once
 _NO_PARQUET = "Parquet needs pyarrow, which is not installed: pip install 'airborne[parquet]'"
 
 

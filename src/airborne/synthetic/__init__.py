@@ -9,7 +9,7 @@ from airborne.synthetic.flight.rigid import Launch, MassProperties, SampledFligh
 from airborne.synthetic.flight.somersault import PoseRanges, half_twist, somersault_scene
 from airborne.synthetic.throw.light import Ambient, Spot
 from airborne.synthetic.throw.pictures import scene_frames
-from airborne.synthetic.throw.scene import Scene, thrown_cross
+from airborne.synthetic.throw.scene import Scene, cross_scene
 from airborne.synthetic.throw.surroundings import gym
 from airborne.synthetic.throw.writing import write_somersault, write_thrown_cross, write_trial
 
@@ -27,6 +27,7 @@ __all__ = [
     "Takeoff",
     "block_frames",
     "block_scene",
+    "cross_scene",
     "fly",
     "fly_articulated",
     "gym",
@@ -36,7 +37,6 @@ __all__ = [
     "noisy_starts",
     "scene_frames",
     "somersault_scene",
-    "thrown_cross",
     "torso_input",
     "true_joints",
     "write_block",

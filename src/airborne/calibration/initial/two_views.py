@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from airborne.types import Array
 
 _FEWEST_POINTS = 8  # of a fundamental matrix
-_CONFIDENCE, _MOST_TRIES = 0.9999, 5000
+_CONFIDENCE, _MOST_TRIES = 0.9999, 5000  # of finding a sample without outliers; samples drawn at most
 
 
 @dataclass(frozen=True, slots=True, eq=False)
