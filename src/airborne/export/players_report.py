@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from airborne.export import page, panels
 from airborne.export.palette import STATUS_RGB, hex_colour
@@ -52,7 +53,7 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
 
     `summary` is the content of summary.json.
     """
-    _write_heights(folder / FIGURE, motion)
+    heights_figure(motion).savefig(folder / FIGURE)
     path = folder / "report.html"
     summary = json_ready(summary)
     path.write_text(page.document(summary["name"], _sections(folder, summary)), encoding="utf-8")
@@ -149,7 +150,7 @@ def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
         yield page.heading(title) + page.table(summary[key].items())
 
 
-def _write_heights(path: Path, motion: PlayersMotion) -> None:
+def heights_figure(motion: PlayersMotion) -> Figure:
     """Draw the height of the middle of each player's hips, knees and ankles."""
     figure, grid = panels.panel_figure(len(motion.players), 1, row_in=2.2)
     for k, (player, (axes,)) in enumerate(zip(motion.players, grid, strict=True)):
@@ -169,4 +170,4 @@ def _write_heights(path: Path, motion: PlayersMotion) -> None:
         handles, labels, loc="outside upper center", ncols=len(_JOINT_COLOURS), fontsize=panels.FONT_PT, frameon=False
     )
     figure.align_ylabels()
-    figure.savefig(path)
+    return figure
