@@ -20,7 +20,6 @@ from airborne.calibration import (
     read_sources,
 )
 from airborne.calibration import calibrate as calibrate_points
-from airborne.calibration.initial.values import StageProgress
 from airborne.errors import AirborneError
 from airborne.motion.smoothing.smoother import Smoothing
 from airborne.run import body_tracking, players_tracking
@@ -34,7 +33,7 @@ from airborne.terminal import Stages
 from airborne.terminal import progress as progress_bar
 from airborne.trial.file import Trial
 from airborne.trial.file import read_trial as read_trial_file
-from airborne.types import Progress
+from airborne.types import Progress, StageProgress
 
 __all__ = ["calibrate", "evaluate", "export_run", "fit_body", "read_run", "read_trial", "smooth", "synthesise", "track"]
 
@@ -113,7 +112,7 @@ def calibrate(
             return calibrate_from(read_sources(Path(sources)), report)
     if sizes is None:
         raise AirborneError("sizes is missing: give the image size in pixels, such as sizes=(768, 576)")
-    table = read_control_points(sources)
+    table = read_control_points(Path(sources))
     by_camera = sizes if isinstance(sizes, Mapping) else dict.fromkeys(table.cameras, sizes)
     missing = [name for name in table.cameras if name not in by_camera]
     if missing:

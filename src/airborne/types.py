@@ -12,3 +12,4 @@ Ints = NDArray[np.integer]
 Mask = NDArray[np.bool_]
 Image = NDArray[np.uint8]  # (h, w, 3) sRGB, or (h, w) grey
 Progress = Callable[[int, int | None], None]  # steps done, steps expected or None where nobody knows
+StageProgress = Callable[[str, int, int | None], None]  # the same with the name of the stage before

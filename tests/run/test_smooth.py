@@ -107,7 +107,7 @@ def test_a_motion_too_short_to_choose_by_is_refused(tmp_path):
 
 
 def documented_columns(page, heading):
-    return [name for row in table_of(DOCS / page, heading) for name in named(row[0])]
+    return [name for row in table_of(DOCS / "how-to" / page, heading) for name in named(row[0])]
 
 
 def test_every_column_is_documented(run, tmp_path):
@@ -116,5 +116,5 @@ def test_every_column_is_documented(run, tmp_path):
     smooth_run(players, Smoothing(method="spline"), events_s=[])
     assert set(table(run / "smooth_motion.csv")[0]) == set(documented_columns("signals.md", "`smooth_motion.csv`"))
     assert set(table(players / "smooth_joints.csv")[0]) == set(documented_columns("signals.md", "`smooth_joints.csv`"))
-    text = (DOCS / "signals.md").read_text(encoding="utf-8")
+    text = (DOCS / "how-to" / "signals.md").read_text(encoding="utf-8")
     assert all(f"`{name}`" in text for name in (run / "smooth_events.csv").read_text().splitlines()[0].split(","))
