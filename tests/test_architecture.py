@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+import airborne
+
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "airborne"
 ORDER = [
     "kernels",
@@ -30,9 +32,10 @@ ORDER = [
     "run",
     "body_fitting",
     "sync",
+    "interface",
     "cli",
 ]  # a room may import what stands before it, and itself
-PACKAGES = [room for room in ORDER if room not in ("io", "trial", "run", "body_fitting", "cli")]
+PACKAGES = [room for room in ORDER if room not in ("io", "trial", "run", "body_fitting", "interface", "cli")]
 FOR_ALL = {"", "errors", "types", "constants"}  # the package's own name holds its version
 NOUNS = ("cameras", "video", "body")  # packages whose public names are values with a meaning, not arrays
 KERNELS = [
@@ -166,10 +169,20 @@ def test_every_module_has_its_place_in_the_order():
 
 @pytest.mark.parametrize("path", FILES, ids=name_of)
 def test_imports_only_go_down_the_page(path):
-    if layer_of(path) in FOR_ALL:
-        assert layers_of(path.read_text()) == set(), "errors and the package itself import nothing of it"
+    if path == SOURCE / "__init__.py":
+        assert layers_of(path.read_text().split("if TYPE_CHECKING:")[0]) == set(), "the package loads nothing at first"
+    elif layer_of(path) in FOR_ALL:
+        assert layers_of(path.read_text()) == set(), "errors, types and constants import nothing of the package"
     else:
         assert upward_arrows(layer_of(path), path.read_text()) == set()
+
+
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_no_room_imports_the_public_interface(path):
+    public = {*airborne.__all__, "interface"}
+    assert {imported[0] for imported in imports_of(path.read_text()) if imported} & public == set() or name_of(
+        path
+    ) == "__init__.py"
 
 
 @pytest.mark.parametrize("name", KERNELS)

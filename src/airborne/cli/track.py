@@ -14,7 +14,7 @@ from airborne.cli.results import evaluate_command
 from airborne.errors import AirborneError
 
 if TYPE_CHECKING:
-    from airborne.run.track import Run
+    from airborne.run.track import TrackResult
 
 
 def demo_command(
@@ -100,7 +100,7 @@ def _track(
     changes: dict | None = None,
     cameras: str | None = None,
     live: bool = False,
-) -> Run:
+) -> TrackResult:
     from airborne.run.track import track_trial
     from airborne.trial.file import read_trial
 

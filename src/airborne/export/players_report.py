@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from airborne.export import panels
 from airborne.export.page import UNKNOWN_TEXT, render_report
@@ -56,7 +57,7 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
 
     `summary` is the content of summary.json.
     """
-    _write_heights(figures_of(folder) / FIGURE, motion)
+    heights_figure(motion).savefig(figures_of(folder) / FIGURE)
     path = folder / REPORT
     summary = json_ready(summary)
     uncertainty = f"{_DEFINITIONS['Uncertainty']} {summary['uncertainty']}"
@@ -142,7 +143,7 @@ def _drop_notes(summary: Mapping[str, Any]) -> Iterator[str]:
         yield f"live: frames dropped to keep up: {counts}; delay {1e3 * live['median_delay_s']:.0f} ms (median)"
 
 
-def _write_heights(path: Path, motion: PlayersMotion) -> None:
+def heights_figure(motion: PlayersMotion) -> Figure:
     """Draw the height of the middle of each player's hips, knees and ankles."""
     figure, grid = panels.panel_figure(len(motion.players), 1, row_in=2.2)
     for k, (player, (axes,)) in enumerate(zip(motion.players, grid, strict=True)):
@@ -162,4 +163,4 @@ def _write_heights(path: Path, motion: PlayersMotion) -> None:
         handles, labels, loc="outside upper center", ncols=len(_JOINT_COLOURS), fontsize=panels.FONT_PT, frameon=False
     )
     figure.align_ylabels()
-    figure.savefig(path)
+    return figure

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from airborne import __version__
 from airborne.errors import ResultError
@@ -53,8 +54,13 @@ class SmoothRun:
     smoothing: Smoothing
     events: Events
     analysis: ResidualAnalysis | None  # None where times are not even, or no stretch is long enough
-    history: list[str]
+    tables: dict[str, xr.Dataset]  # "joints"; of a body also "root" and, if it has joints, "angles"
     files: tuple[str, ...]
+
+    @property
+    def history(self) -> list[str]:
+        """What was done, one step each."""
+        return next(iter(self.tables.values())).attrs["history"]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the numbers for a JSON file."""
@@ -118,12 +124,12 @@ def smooth_run(
     out = folder if out is None else out
     out.mkdir(parents=True, exist_ok=True)
     tables_of(out)
-    history, files = run.write(out, smoothing, events, progress)
+    tables, files = run.write(out, smoothing, events, progress)
     if analysis is not None:
         figures_of(out)
         write_residuals(out / FIGURE, analysis, smoothing.cutoff_hz)
         files = (*files, FIGURE)
-    result = SmoothRun(smoothing, events, analysis, history, (*files, SMOOTH_RECORD))
+    result = SmoothRun(smoothing, events, analysis, tables, (*files, SMOOTH_RECORD))
     write_json(out / SMOOTH_RECORD, result.to_dict())
     return result
 
@@ -136,7 +142,7 @@ class _Run:
     paths: Array  # (n, paths, 3) [m], those that the residual analysis looks at
     owners: tuple[str, ...]  # of each path
     find: Callable[[], Events]
-    write: Callable[[Path, Smoothing, Events, Progress | None], tuple[list[str], tuple[str, ...]]]
+    write: Callable[[Path, Smoothing, Events, Progress | None], tuple[dict[str, xr.Dataset], tuple[str, ...]]]
 
 
 def _players_run(folder: Path) -> _Run:
@@ -144,12 +150,12 @@ def _players_run(folder: Path) -> _Run:
 
     def write(
         out: Path, smoothing: Smoothing, events: Events, progress: Progress | None
-    ) -> tuple[list[str], tuple[str, ...]]:
+    ) -> tuple[dict[str, xr.Dataset], tuple[str, ...]]:
         times = {name: [event.time_s for event in events[name]] for name in motion.players}
         joints = smooth_players(motion, smoothing, times, progress)
         write_smooth_joints(out / JOINTS, joints)
         write_smooth_events(out / EVENTS, events, joints)
-        return joints.attrs["history"], (JOINTS, EVENTS)
+        return {"joints": joints}, (JOINTS, EVENTS)
 
     paths = motion.points.reshape(len(motion), -1, 3)
     owners = tuple(name for name in motion.players for _ in motion.joints)
@@ -161,7 +167,7 @@ def _body_run(folder: Path) -> _Run:
 
     def write(
         out: Path, smoothing: Smoothing, events: Events, progress: Progress | None
-    ) -> tuple[list[str], tuple[str, ...]]:
+    ) -> tuple[dict[str, xr.Dataset], tuple[str, ...]]:
         times = [event.time_s for event in events[""]]
         root = smooth_root(motion, smoothing, times)
         joints = smooth_landmarks(motion, model, smoothing, times, progress=progress)
@@ -169,9 +175,10 @@ def _body_run(folder: Path) -> _Run:
         write_smooth_joints(out / JOINTS, joints)
         write_smooth_events(out / EVENTS, events, joints)
         if not motion.joints:
-            return root.attrs["history"], (MOTION, JOINTS, EVENTS)
-        write_smooth_joint_angles(out / ANGLES, smooth_joint_angles(motion, model, smoothing, times))
-        return root.attrs["history"], (MOTION, JOINTS, ANGLES, EVENTS)
+            return {"root": root, "joints": joints}, (MOTION, JOINTS, EVENTS)
+        angles = smooth_joint_angles(motion, model, smoothing, times)
+        write_smooth_joint_angles(out / ANGLES, angles)
+        return {"root": root, "joints": joints, "angles": angles}, (MOTION, JOINTS, ANGLES, EVENTS)
 
     points, _ = landmarks(motion, model)
     return _Run(motion.time_s, points, ("",) * points.shape[1], lambda: {"": body_events(motion, model)}, write)

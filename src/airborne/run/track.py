@@ -32,7 +32,7 @@ from airborne.video import LiveRecording, Outages
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Run:
+class TrackResult:
     """The results of a finished run; its folder holds the same."""
 
     motion: Motion | PlayersMotion
@@ -49,7 +49,7 @@ def track_trial(
     pictures: bool = True,
     first_frame: bool = False,
     progress: Progress | None = None,
-) -> Run:
+) -> TrackResult:
     """Track a trial, a body or players, and write the results into a folder.
 
     `resume` continues a run that was killed, to the same result; of players by tracking again from the start, their
@@ -89,7 +89,7 @@ class _Options:
     progress: Progress | None
 
 
-def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> Run:
+def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> TrackResult:
     """Track an opened subject and write its results; the connection to live cameras ends with the tracking."""
     folder, recording = options.folder, subject.recording
     identity = run_identity(subject.trial, live=options.live)
@@ -119,7 +119,7 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     write_json(folder / SUMMARY, summary)
     if options.drawn == "videos":
         subject.write_report(folder, summary, motion)
-    return Run(motion, summary)
+    return TrackResult(motion, summary)
 
 
 def _open_live(trial: Trial, stack: ExitStack, progress: Progress | None) -> Opened[LiveRecording]:

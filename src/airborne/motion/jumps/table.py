@@ -42,7 +42,7 @@ def _column_names() -> tuple[str, ...]:
     return ("player", "jump", "status", *numbers, *posture, "block_level_m", "noise_scale", "n_lost", "n_uncertain")
 
 
-_JUMP_COLUMNS = _column_names()
+JUMP_COLUMNS = _column_names()
 
 
 def jump_row(jump: Jump) -> dict[str, str | int | float]:
@@ -67,7 +67,7 @@ def write_jumps(path: Path, jumps: Sequence[Jump]) -> None:
 
     Without jumps the file holds only its header.
     """
-    lines = [",".join(_JUMP_COLUMNS)]
+    lines = [",".join(JUMP_COLUMNS)]
     lines += [",".join(_text(value) for value in jump_row(jump).values()) for jump in jumps]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
