@@ -17,8 +17,8 @@ from airborne.body import (
     Segment,
     SurfaceArrays,
     surface_arrays,
-    total_inertias,
 )
+from airborne.body.inertia import combine_inertias, transform_inertia
 from airborne.cameras import Camera
 from airborne.rendering import Lamp, Lights
 from airborne.video import View
@@ -114,5 +114,5 @@ def batch(model: BodyModel, n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 def total_inertia(posed: PosedBody) -> Inertia:
     """A posed body's mass, centre of mass [m] and inertia tensor about it [kg m^2], in world axes."""
-    mass, centre, tensor = total_inertias(posed.model, posed.R[None], posed.t[None])
-    return Inertia(mass, centre[0], tensor[0])
+    segments = zip(posed.model.segments, posed.R, posed.t, strict=True)
+    return combine_inertias([transform_inertia(segment.inertia, R, t) for segment, R, t in segments])
