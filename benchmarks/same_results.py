@@ -1,6 +1,6 @@
 """Do two revisions give the same bytes? `python benchmarks/same_results.py record DIR`, then `... compare DIR DIR`.
 
-`record` tracks a reference set with the code that is imported: the bundled cross by two methods, a synthetic somersault,
+`record` tracks a reference set with the code that is imported: the example by two methods, a synthetic somersault,
 and where shared/data lies beside the project the recordings block_jump and balance, the latter with a fitted body. Set
 PYTHONPATH to another checkout's `src` to record that one. Run it twice on a fresh checkout of a revision from before
 kernels gave the same bytes compiled or loaded. `compare` names every table that differs, and by how much.
