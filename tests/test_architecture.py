@@ -1,11 +1,15 @@
 """The code keeps to its plan: imports go down the page, kernels know no nouns, files and functions stay short."""
 
 import ast
+import io
 import subprocess
 import sys
+import tokenize
 from pathlib import Path
 
 import pytest
+
+import airborne
 
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "airborne"
 ORDER = [
@@ -28,9 +32,10 @@ ORDER = [
     "run",
     "body_fitting",
     "sync",
+    "interface",
     "cli",
 ]  # a room may import what stands before it, and itself
-PACKAGES = [room for room in ORDER if room not in ("io", "trial", "run", "body_fitting", "cli")]
+PACKAGES = [room for room in ORDER if room not in ("io", "trial", "run", "body_fitting", "interface", "cli")]
 FOR_ALL = {"", "errors", "types", "constants"}  # the package's own name holds its version
 NOUNS = ("cameras", "video", "body")  # packages whose public names are values with a meaning, not arrays
 KERNELS = [
@@ -121,6 +126,35 @@ def functions_of(source):
             yield node.name, length
 
 
+def is_number(node):
+    """Whether an expression is made of numbers alone: 3, (0.1, 2), np.radians(20), np.array([1, 2]), 1 / 480."""
+    if isinstance(node, ast.Constant):
+        return isinstance(node.value, int | float) and not isinstance(node.value, bool)
+    if isinstance(node, ast.UnaryOp):
+        return is_number(node.operand)
+    if isinstance(node, ast.BinOp):
+        return is_number(node.left) and is_number(node.right)
+    parts = node.elts if isinstance(node, ast.Tuple | ast.List) else []
+    if isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1].islower():  # a class names its fields
+        parts = node.args
+    return bool(parts) and all(map(is_number, parts))
+
+
+def numbers_without_a_word(source):
+    """The module's numbers that have no comment on their lines or on the line above."""
+    lines, tokens = source.splitlines(), tokenize.generate_tokens(io.StringIO(source).readline)
+    comments = {token.start[0] for token in tokens if token.type == tokenize.COMMENT}
+    comments |= {row + 1 for row in comments if lines[row - 1].startswith("#")}
+    return [
+        lines[node.lineno - 1]
+        for node in ast.parse(source).body
+        if isinstance(node, ast.Assign | ast.AnnAssign)
+        and node.value is not None
+        and is_number(node.value)
+        and comments.isdisjoint(range(node.lineno, node.end_lineno + 1))
+    ]
+
+
 def test_arrows_are_told_apart():
     assert upward_arrows("body", "from airborne.tracking.loss import x\nimport airborne.cameras") == {"tracking"}
     assert upward_arrows("video", "from airborne import body, errors") == {"body"}
@@ -135,10 +169,20 @@ def test_every_module_has_its_place_in_the_order():
 
 @pytest.mark.parametrize("path", FILES, ids=name_of)
 def test_imports_only_go_down_the_page(path):
-    if layer_of(path) in FOR_ALL:
-        assert layers_of(path.read_text()) == set(), "errors and the package itself import nothing of it"
+    if path == SOURCE / "__init__.py":
+        assert layers_of(path.read_text().split("if TYPE_CHECKING:")[0]) == set(), "the package loads nothing at first"
+    elif layer_of(path) in FOR_ALL:
+        assert layers_of(path.read_text()) == set(), "errors, types and constants import nothing of the package"
     else:
         assert upward_arrows(layer_of(path), path.read_text()) == set()
+
+
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_no_room_imports_the_public_interface(path):
+    public = {*airborne.__all__, "interface"}
+    assert {imported[0] for imported in imports_of(path.read_text()) if imported} & public == set() or name_of(
+        path
+    ) == "__init__.py"
 
 
 @pytest.mark.parametrize("name", KERNELS)
@@ -151,6 +195,20 @@ def test_files_and_functions_are_short(path):
     source = path.read_text()
     assert len(source.splitlines()) <= MOST_LINES_A_FILE
     assert {name: length for name, length in functions_of(source) if length > MOST_LINES_A_FUNCTION} == {}
+
+
+def test_numbers_without_a_word_are_found():
+    source = 'A = 1  # px\n# px\nB = (1, -2.0)\nC = "#"\nD = np.array([\n    1,  # px\n])\nE = len("#")\n'
+    assert numbers_without_a_word(source) == []
+    assert numbers_without_a_word("# px\n\nA = 1 / 480\nB: float = np.radians(2)\n") == [
+        "A = 1 / 480",
+        "B: float = np.radians(2)",
+    ]
+
+
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_every_number_of_a_module_says_what_it_is(path):
+    assert numbers_without_a_word(path.read_text()) == [], "say beside it what it is, its unit, and its source"
 
 
 def test_length_of_a_function_leaves_its_docstring_out():
@@ -167,6 +225,14 @@ def test_every_package_says_what_it_is_and_what_is_public(package):
     names = ast.literal_eval(lists[0])
     assert names
     assert len(set(names)) == len(names)
+
+
+def test_the_command_line_opens_without_numbers_and_figures():
+    heavy = ["numpy", "scipy", "numba", "cv2", "pydantic", "matplotlib"]
+    code = f"import sys, airborne.cli; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stderr == ""
+    assert done.stdout.strip() == "[]"
 
 
 def test_tracking_loads_no_figures_and_no_windows():

@@ -9,11 +9,9 @@ import shlex
 import subprocess
 import tomllib
 from dataclasses import fields
-from typing import get_args
 
 import pytest
 import typer
-from pydantic import BaseModel
 from typer.testing import CliRunner
 
 from airborne.body import files as bodies
@@ -27,12 +25,22 @@ from airborne.evaluation.players import PartErrors
 from airborne.export import write_figures
 from airborne.motion import covariance_file, flight_summary
 from airborne.motion.files import _header
-from airborne.run import body_tracking, smooth
+from airborne.motion.run_folder import SMOOTH_RECORD, figures_of
+from airborne.run import smooth
+from airborne.run.body import write_tables
 from airborne.run.evaluate import assess
-from airborne.trial import file as trials
-from airborne.trial.file import PlayersMethod, Trial, read_trial
+from airborne.run.track import track_trial
+from airborne.trial.body import BodyTable
+from airborne.trial.calibration import CalibrationTable
+from airborne.trial.cameras import CameraTable
+from airborne.trial.file import Trial, read_trial
+from airborne.trial.lights import LampTable, LightsTable
+from airborne.trial.players import PlayerTable
+from airborne.trial.settings import PLAYERS_METHODS, BodySettings, ParticleSettings
+from airborne.trial.start import StartTable
 from tests.support.export_scenes import PERSON, person_run
 from tests.support.places import ROOT
+from tests.support.run_files import files_of
 
 DOCS = ROOT / "docs"
 RESULTS = DOCS / "reference" / "results.md"
@@ -165,14 +173,13 @@ def test_images_are_small():
 
 
 MODELS = {
-    "`[[camera]]`": trials.CameraTable,
-    "`[calibration]`": trials.CalibrationTable,
-    "`[body]`": trials.BodyTable,
-    "`[start]`": trials.StartTable,
-    "`[[start.player]]`": trials.PlayerTable,
-    "`[lights]`": trials.LightsTable,
-    "`[[lights.lamp]]`": trials.LampTable,
-    "`[track]`": trials.TrackTable,
+    "`[[camera]]`": CameraTable,
+    "`[calibration]`": CalibrationTable,
+    "`[body]`": BodyTable,
+    "`[start]`": StartTable,
+    "`[[start.player]]`": PlayerTable,
+    "`[lights]`": LightsTable,
+    "`[[lights.lamp]]`": LampTable,
     "Body": bodies._BodyTable,
     "`[[segment]]`": bodies._SegmentTable,
     "`[[segment.part]]`": bodies._PartTable,
@@ -183,10 +190,17 @@ MODELS = {
 
 @pytest.mark.parametrize("heading", MODELS)
 def test_every_key_is_documented_with_its_default(heading):
-    model: type[BaseModel] = MODELS[heading]
+    check_keys(heading, MODELS[heading].model_fields)
+
+
+def test_every_setting_of_a_method_is_documented_with_its_default():
+    check_keys("`[track]`", {**ParticleSettings.model_fields, **BodySettings.model_fields})
+
+
+def check_keys(heading, expected):
     documented = {row[0].strip("`"): row[1].strip("`") for row in table_of(TRIAL, heading)}
-    assert list(documented) == list(model.model_fields)
-    for key, field in model.model_fields.items():
+    assert set(documented) == set(expected)
+    for key, field in expected.items():
         if field.is_required():
             assert documented[key] == "required", key
         elif field.default is None:
@@ -226,19 +240,19 @@ def run(tmp_path_factory):
     """The folder of a short run with everything that a run can leave."""
     example = ROOT / "examples" / "thrown_cross"
     folder = tmp_path_factory.mktemp("docs") / "run"
-    body_tracking.track(read_trial(example / "trial.toml", {"stop": 2}), folder)
+    track_trial(read_trial(example / "trial.toml", {"stop": 2}), folder)
     assess(folder, example / "truth.csv", example / "digitised.csv")
     return folder
 
 
 def test_every_file_of_a_run_is_documented(run):
-    left = {re.sub(r"_cam\d", "_<camera>", path.name) for path in run.iterdir()}
+    left = {re.sub(r"_cam\d", "_<camera>", name) for name in files_of(run)}
     assert left == {name for row in table_of(RESULTS, "Files") for name in named(row[0])}
 
 
 def test_every_file_of_a_smoothed_run_is_documented():
     documented = {name for row in table_of(RESULTS, "Files added to a finished run") for name in named(row[0])}
-    assert {smooth.MOTION, smooth.JOINTS, smooth.ANGLES, smooth.EVENTS, smooth.FIGURE, smooth.RECORD} <= documented
+    assert {smooth.MOTION, smooth.JOINTS, smooth.ANGLES, smooth.EVENTS, smooth.FIGURE, SMOOTH_RECORD} <= documented
     assert f"`{PICTURE}`" in RESULTS.read_text(encoding="utf-8")
 
 
@@ -250,7 +264,7 @@ def test_every_number_of_the_summary_is_documented(run):
 
 @pytest.mark.parametrize("name", ["angles.csv", "joints.csv"])
 def test_every_column_is_documented(run, name):
-    with (run / name).open(encoding="utf-8") as file:
+    with next(run.rglob(name)).open(encoding="utf-8") as file:
         header = next(csv.reader(file))
     assert header == [column for row in table_of(RESULTS, f"`{name}`") for column in named(row[0])]
 
@@ -269,20 +283,20 @@ def person(tmp_path_factory):
     """The folder of the tables and figures of a body with joints and masses, and its motion."""
     folder, motion = tmp_path_factory.mktemp("docs") / "person", person_run(4)
     folder.mkdir()
-    body_tracking._write_tables(folder, motion, PERSON)
-    write_figures(folder, motion, PERSON)
+    write_tables(folder, motion, PERSON)
+    write_figures(figures_of(folder), motion, PERSON)
     return folder, motion
 
 
 def test_every_file_of_a_body_with_joints_is_documented(person, run):
-    left = {path.name for path in person[0].iterdir()} - {path.name for path in run.iterdir()}
+    left = set(files_of(person[0])) - set(files_of(run))
     rows = table_of(RESULTS, "Files of a body with joints")
     assert left | {covariance_file.COVARIANCE_FILE} == {name for row in rows for name in named(row[0])}
 
 
 @pytest.mark.parametrize("name", ["joint_angles.csv", "flight.csv"])
 def test_every_column_of_a_body_with_joints_is_documented(person, name):
-    header = (person[0] / name).read_text(encoding="utf-8").splitlines()[0].split(",")
+    header = (person[0] / "tables" / name).read_text(encoding="utf-8").splitlines()[0].split(",")
     assert header == [column for row in table_of(RESULTS, f"`{name}`") for column in named(row[0])]
 
 
@@ -326,7 +340,7 @@ def test_every_method_of_players_stands_in_the_page_on_legs():
         for line in (DOCS / "explanation" / "legs.md").read_text(encoding="utf-8").splitlines()
         if line.startswith("| |")
     )
-    assert set(named(header)) == set(get_args(PlayersMethod))
+    assert set(named(header)) == set(PLAYERS_METHODS)
 
 
 @pytest.mark.parametrize(("page", "least"), [("methods.md", 8), ("human.md", 9), ("legs.md", 7)])

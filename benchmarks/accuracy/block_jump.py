@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from rows import ROOT, append
 
 from airborne.evaluation.players import assess_players
-from airborne.run.players_tracking import track_players
+from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
 
 
@@ -24,7 +24,7 @@ def main(data: Path, method: str) -> None:
     """Track, compare, append the rows."""
     trial = read_trial(data / "trial.toml", {"method": method})
     with tempfile.TemporaryDirectory() as name:
-        track_players(trial, Path(name), pictures=False)
+        track_trial(trial, Path(name), pictures=False)
         found = assess_players(Path(name), data / "truth.csv").to_dict()
     player, jump = found["players"]["blocker1"], found["jumps"][0]
     base = {"data": "block_jump, recorded", "method": method, "n": found["n_matched"]}

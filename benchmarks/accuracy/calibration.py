@@ -21,11 +21,18 @@ from rows import ROOT, append
 
 from airborne.calibration import RigCalibration, calibrate_from, sources_from
 from airborne.calibration.report import calibration_to_dict
-from airborne.calibration.sources.person import median_reprojection_px
-from airborne.cameras.detections import read_detections
+from airborne.cameras import Rig
+from airborne.cameras.detections import Detections, read_detections
 
 DATA = ROOT.parent / "shared" / "data"
 SAVED = {"saved_scale": 1.00741, "saved_offset_px": [0.0, -7.11]}
+
+
+def median_reprojection_px(rig: Rig, detections: Detections) -> float:
+    """Return the median distance of all detections from their triangulated points' projections [px]."""
+    points = rig.points_from_px(detections.px, detections.visibility)
+    projected = np.stack([camera.px_from_world(points) for camera in rig], axis=-2)
+    return float(np.nanmedian(np.linalg.norm(projected - detections.px, axis=-1)))
 
 
 def silent(what: str, done: int, total: int | None) -> None:

@@ -20,10 +20,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rows import ROOT, append
 
-from airborne.run.opening import cameras_of, video_source
+from airborne.run.opening import open_cameras, video_source
 from airborne.sync import offsets_by_motion
 from airborne.sync.from_trial import synchronise
-from airborne.synthetic.throw.scene import thrown_cross
+from airborne.synthetic.throw.scene import cross_scene
 from airborne.synthetic.throw.writing import write_trial
 from airborne.trial.file import read_trial
 from airborne.video import VideoWriter, fill_rows, weave
@@ -39,7 +39,7 @@ EXAMPLE = ROOT / "examples" / "thrown_cross"
 def errors_ms(folder: Path, late_s: float) -> dict[str, float]:
     """Return the errors of the third camera's offset, and the sd that tracking states."""
     trial = read_trial(folder / "trial.toml")
-    rig, _ = cameras_of(trial)
+    rig = open_cameras(trial).rig
     motion = offsets_by_motion([video_source(trial, camera) for camera in trial.camera], rig, within_s=0.3)
     tracking = synchronise(trial, within_s=0.3)
     print(folder.name, late_s, motion.describe(), tracking.describe(), sep="\n", flush=True)
@@ -107,7 +107,7 @@ def main() -> None:
         at = Path(scratch)
         generated = []
         for seed, late_ms in LATE_MS:
-            scene = replace(thrown_cross(seed=seed), time_offsets_s=(0.0, 0.0, late_ms / 1000))
+            scene = replace(cross_scene(seed=seed), time_offsets_s=(0.0, 0.0, late_ms / 1000))
             write_trial(scene, at / f"g{seed}")
             generated.append(errors_ms(at / f"g{seed}", late_ms / 1000))
         mixed = [errors_ms(resampled(at / f"r{ms}", ms / 1000), ms / 1000) for ms in RESAMPLED_MS]

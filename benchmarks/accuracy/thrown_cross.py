@@ -26,12 +26,13 @@ from airborne.evaluation import (
 )
 from airborne.evaluation.basin import Basin
 from airborne.motion import Motion
-from airborne.run.body_tracking import open_trial
+from airborne.run.opening import open_trial
 from airborne.tracking.methods import tracker_of
 from airborne.tracking.model_based.refined import RefinedState, RefinedTracker
 from airborne.tracking.tracker import step
+from airborne.trial.calibration import CalibrationTable
 from airborne.trial.examples import example_trial
-from airborne.trial.file import CalibrationTable, Trial, read_trial
+from airborne.trial.file import Trial, read_trial
 
 FOLDER = example_trial("thrown_cross").parent
 MODEL = read_body(FOLDER / "cross.toml")
@@ -47,7 +48,7 @@ def trial(*, exact: bool, cameras: list[str] | None = None, **track) -> Trial:
 
 def run(settings: Trial) -> tuple[Motion, list[float]]:
     """Track a trial; return the motion and each frame's CPU time [s], without decoding."""
-    recording, _ = open_trial(settings)
+    recording = open_trial(settings).recording
     tracker = tracker_of(settings.settings, MODEL, settings.start.pose)
     state, estimates, times = tracker.init(), [], []
     for frames in recording:
@@ -101,7 +102,7 @@ def paper_rows() -> list[dict]:
         ("refined", {}),
     ):
         settings = trial(exact=False, method=method, **extra)
-        recording, _ = open_trial(settings)
+        recording = open_trial(settings).recording
         motion, times = run(settings)
         clicked = fit_digitised_poses(read_digitised(FOLDER / "digitised.csv", recording.rig), recording.rig, MODEL)
         found = compare_digitised(motion, clicked, ALIKE).tracked_minus_digitised
@@ -124,7 +125,7 @@ def paper_rows() -> list[dict]:
 def basin_rows(n: int = 100) -> list[dict]:
     """Start one step from poses that are off by exactly so much; count how many are found again."""
     settings = trial(exact=True)
-    recording, _ = open_trial(settings)
+    recording = open_trial(settings).recording
     motion, _ = run(settings)
     rows = []
     for distance_m, angle_deg, floor in ((0.1, 10, 98), (0.15, 15, 90), (0.2, 20, 50), (0.3, 30, None)):

@@ -22,7 +22,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body.legs import LEG_POINTS
 from airborne.cameras import Camera, Rig, write_pose2sim
-from airborne.run import players_tracking
+from airborne.run import players
+from airborne.run.track import track_trial
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate
 from airborne.trial.file import read_trial
@@ -114,11 +115,11 @@ def main() -> None:
     given = parser.parse_args()
     width, height = map(int, given.size.split("x"))
     tracker = Still()
-    players_tracking.players_tracker_of = lambda trial, rig: tracker
+    players.players_tracker_of = lambda trial, rig: tracker
     with tempfile.TemporaryDirectory() as name:
         trial = read_trial(write_trial(Path(name), (width, height), round(60 * given.minutes)))
         begun_s = time.monotonic()
-        run = players_tracking.track_players(trial, Path(name) / "run", pictures=False)
+        run = track_trial(trial, Path(name) / "run", pictures=False)
         taken_s = time.monotonic() - begun_s
     settled = [mb for index, mb in tracker.resident_mb if index >= 10 * RATE]
     found = {

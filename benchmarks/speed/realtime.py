@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from rows import ROOT, append
 
 from airborne.run.opening import open_trial
-from airborne.run.players_tracking import track_players
+from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
 from airborne.video import VideoWriter
 
@@ -49,10 +49,10 @@ def measure(folder: Path) -> tuple[float, float]:
     for number in range(REPEATS + 1):
         with tempfile.TemporaryDirectory() as name:
             begun = time.monotonic()
-            run = track_players(trial, Path(name), pictures=False)
+            run = track_trial(trial, Path(name), pictures=False)
             whole_s = time.monotonic() - begun
         begun = time.monotonic()
-        n = sum(1 for _ in open_trial(trial)[0])
+        n = sum(1 for _ in open_trial(trial).recording)
         if number:
             runs.append(len(run.motion) / 60 / whole_s)
             decoding.append(n / 60 / (time.monotonic() - begun))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -38,6 +39,15 @@ class TrialError(AirborneError):
     """A trial file is unusable."""
 
 
+class MistakesError(TrialError):
+    """A trial file with mistakes: the message says the first and counts the others, `mistakes` has a line for each."""
+
+    def __init__(self, where: str, mistakes: Sequence[str]) -> None:
+        """Take where they are, a file or options of the command line, and what each is."""
+        self.mistakes = tuple(f"{where}: {mistake}" for mistake in mistakes)
+        super().__init__(f"{where}: {_count_others(mistakes)}")
+
+
 class ResultError(AirborneError):
     """A run folder or truth file is unusable."""
 
@@ -55,23 +65,41 @@ _KIND = re.compile(r"(literal|dict|list|constrained|function)\W.*|str|int|float|
 
 def one_line(error: ValidationError) -> str:
     """Say a pydantic error's first complaint in one line: where, what, what was given."""
+    return _count_others(list_mistakes(error))
+
+
+def list_mistakes(error: ValidationError, tags: Collection[str] = ()) -> list[str]:
+    """List a pydantic error's complaints, a line for each place; `tags` tell kinds of one table apart."""
     by_place: dict[str, list[ErrorDetails]] = {}
     for one in error.errors(include_url=False):
         steps = [str(step)[:60] for step in one["loc"]]
-        by_place.setdefault(".".join(step for step in steps if not _KIND.fullmatch(step)), []).append(one)
+        steps = [step for step in steps if not _KIND.fullmatch(step) and step not in tags]
+        if one["type"] == "union_tag_invalid":
+            steps.append(one.get("ctx", {})["discriminator"].strip("'"))
+        by_place.setdefault(".".join(steps), []).append(one)
     places = [place for place in by_place if not any(other.startswith(f"{place}.") for other in by_place)]
-    place, more = places[0], len(places) - 1
-    first, said = by_place[place][0], ", or ".join(dict.fromkeys(map(_said, by_place[place])))
-    is_whole_table = isinstance(first["input"], dict) or first["type"] == "missing"
-    given = "" if is_whole_table else f" (found {str(first['input'])[:60]!r})"
-    others = f"; and {more} more mistake{'s' * (more > 1)}" if more else ""
-    return f"{place}{': ' if place else ''}{said}{given}{others}"
+    return [_describe_place(place, by_place[place]) for place in places]
 
 
-def _said(one: ErrorDetails) -> str:
+def _describe_place(place: str, errors: Sequence[ErrorDetails]) -> str:
+    said = ", or ".join(dict.fromkeys(map(_phrase, errors)))
+    is_whole_table = isinstance(errors[0]["input"], dict) or errors[0]["type"] == "missing"
+    given = "" if is_whole_table else f" (found {str(errors[0]['input'])[:60]!r})"
+    return f"{place}{': ' if place else ''}{said}{given}"
+
+
+def _count_others(mistakes: Sequence[str]) -> str:
+    more = len(mistakes) - 1
+    return mistakes[0] + (f"; and {more} more mistake{'s' * (more > 1)}" if more else "")
+
+
+def _phrase(one: ErrorDetails) -> str:
     if one["type"] in ("too_short", "too_long"):
         limits = one.get("ctx", {})
         asked = limits.get("min_length", limits.get("max_length"))
         return f"holds {limits.get('actual_length')} values, expected {asked}"
+    if one["type"] == "union_tag_invalid":
+        limits = one.get("ctx", {})
+        return f"expected {limits['expected_tags']} (found {limits['tag']!r})"
     said = one["msg"].removeprefix("Value error, ").replace("Input should be", "expected")
     return _PLAIN.get(one["type"], said)

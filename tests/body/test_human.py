@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import SAMPLED, Ellipsoid, Pose, human18, human18_from_measurements, total_inertia
+from airborne.body import SAMPLED, Ellipsoid, Pose, human18, human18_from_measurements
 from airborne.body.anthropometry import measurements_of, segment_properties
 from airborne.body.human import PARENTS
 from airborne.errors import BodyError
+from tests.support.bodies import total_inertia
 from tests.support.tolerances import EXACT, ROUNDTRIP
 from tests.support.yeadon_oracle import ANGLES, SEGMENTS, random_configuration, same_pose, yeadon_person
 

@@ -15,12 +15,11 @@ from airborne.body import (
     Segment,
     human18,
     human18_from_measurements,
-    total_inertia,
-    total_inertias,
 )
 from airborne.body.anthropometry import measurements_of, segment_properties
-from airborne.body.inertia import combine_inertias, transform_inertia
+from airborne.body.inertia import combine_inertias, segment_inertias, transform_inertia
 from airborne.errors import BodyError
+from tests.support.bodies import total_inertia
 from tests.support.tolerances import EXACT, ROUNDTRIP
 from tests.support.yeadon_oracle import random_configuration, same_pose, whole_by_slices, yeadon_person
 
@@ -82,20 +81,11 @@ def test_moving_the_whole_body_moves_its_centre_and_turns_its_tensor(seed):
     same(after, transform_inertia(before, turn.as_matrix(), step))
 
 
-def test_many_poses_at_once_are_each_alone():
-    model, bodies = human18(), [human18().with_pose(random_pose(seed)) for seed in range(4)]
-    mass, centres, tensors = total_inertias(model, np.stack([b.R for b in bodies]), np.stack([b.t for b in bodies]))
-    for body, centre, tensor in zip(bodies, centres, tensors, strict=True):
-        same(Inertia(mass, centre, tensor), total_inertia(body), EXACT * 10)
-        pieces = [transform_inertia(s.inertia, R, t) for s, R, t in zip(model.segments, body.R, body.t, strict=True)]
-        same(Inertia(mass, centre, tensor), combine_inertias(pieces), EXACT * 10)
-
-
 def test_body_of_unknown_mass_is_refused():
     part = Part("stick", Box(np.ones(3)), RigidTransform.identity(), None)
     model = BodyModel("cross", (Segment("bar", None, np.zeros(3), (part,)),))
     with pytest.raises(BodyError, match="body 'cross': the mass of segment 'bar' is not known"):
-        total_inertia(model.with_pose(Pose(world_from_root=RigidTransform.identity())))
+        segment_inertias(model)
 
 
 @pytest.mark.parametrize("seed", range(6))

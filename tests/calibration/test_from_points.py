@@ -5,7 +5,7 @@ from airborne.calibration.from_points import calibrate
 from airborne.calibration.sources.control_points import read_control_points
 from airborne.cameras import read_rig
 from airborne.errors import CalibrationError
-from tests.support.cameras import seen_only_by
+from tests.support.cameras import restrict_to_cameras
 from tests.support.tolerances import EXACT, ROUNDTRIP, SOLVED
 
 
@@ -43,12 +43,12 @@ def test_annealing_agrees_with_least_squares_on_seven_parameters(calibration, an
 
 
 def test_the_same_seed_gives_the_same_camera(points, sizes, annealed):
-    again = calibrate(seen_only_by(points, "cam3"), sizes, method="annealing")
+    again = calibrate(restrict_to_cameras(points, "cam3"), sizes, method="annealing")
     assert np.array_equal(again.rig["cam3"].P, annealed.rig["cam3"].P)
 
 
 def test_one_camera_alone_is_calibrated_the_same_but_measures_nothing(points, sizes, calibration):
-    alone = calibrate(seen_only_by(points, "cam2"), sizes)
+    alone = calibrate(restrict_to_cameras(points, "cam2"), sizes)
     assert np.allclose(alone.rig["cam2"].P, calibration.rig["cam2"].P, rtol=ROUNDTRIP)
     assert np.isnan(alone.held_out_3d_m)
 
@@ -76,6 +76,6 @@ def test_points_that_nobody_sees_are_no_trouble(shared_data):
     assert np.isnan(calibration.held_out_points_m[points.names.index("near_corner_L")]).all()
 
 
-def test_an_unknown_method_is_told(points, sizes):
+def test_an_unknown_method_is_reported(points, sizes):
     with pytest.raises(CalibrationError, match="'genetic'; expected 'lm' or 'annealing'"):
         calibrate(points, sizes, method="genetic")  # type: ignore[arg-type]

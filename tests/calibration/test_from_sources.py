@@ -13,7 +13,7 @@ from airborne.errors import AirborneError
 from tests.support.calibration_scenes import (
     board_pictures,
     three_side_by_side,
-    waved,
+    wave_board,
     write_clicks,
     write_control_points,
     write_pictures,
@@ -34,7 +34,7 @@ def silent(what, done, total):
 def recordings(tmp_path_factory):
     """A folder with videos and pictures of a board, control points and a calibration."""
     folder = tmp_path_factory.mktemp("recordings")
-    pictures = board_pictures(RIG, waved(24))
+    pictures = board_pictures(RIG, wave_board(24))
     write_videos(folder, pictures)
     (folder / "pictures").mkdir()
     write_pictures(folder / "pictures", pictures)
@@ -80,7 +80,7 @@ def test_the_report_has_every_number(by_board):
     assert not told["sd_is_within_the_rig"]
 
 
-def test_pictures_do_as_well_as_videos(recordings):
+def test_images_do_as_well_as_videos(recordings):
     document = {
         "camera": [{"name": name, "pictures": f"pictures/{name}", "focal": "fixed"} for name in RIG.names],
         "start": {"file": "calib.toml"},
@@ -151,11 +151,11 @@ def test_a_start_keeps_its_lenses_and_its_world(recordings):
         np.testing.assert_allclose(camera.centre, RIG[camera.name].centre, atol=0.02)
 
 
-def test_the_command_writes_the_rig_a_report_and_a_picture_a_camera(tmp_path, capsys, monkeypatch):
+def test_the_command_writes_the_rig_a_report_and_an_image_a_camera(tmp_path, capsys, monkeypatch):
     folder = tmp_path / "short"
     folder.mkdir()
     two = Rig(RIG.cameras[:2])
-    write_videos(folder, board_pictures(two, waved(8)))
+    write_videos(folder, board_pictures(two, wave_board(8)))
     output = tmp_path / "calib.toml"
     words = ["calibrate", "--board", "board.toml", *(f"{name}.mp4" for name in two.names), "-o", str(output)]
     monkeypatch.chdir(folder)

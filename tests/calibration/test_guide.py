@@ -13,8 +13,9 @@ from airborne.calibration import calibrate_from, sources_from
 from airborne.calibration.sources.court import court_points
 from tests.support.places import ROOT
 
-TEXT = (ROOT / "docs" / "calibrate-your-cameras.md").read_text(encoding="utf-8")
-DIAGNOSIS = ROOT / "src" / "airborne" / "cameras" / "diagnosis"
+TEXT = (ROOT / "docs" / "how-to" / "calibrate-your-cameras.md").read_text(encoding="utf-8")
+SOURCES = ROOT / "src" / "airborne"
+DIAGNOSIS = [*(SOURCES / "calibration" / "diagnosis").glob("*.py"), SOURCES / "cameras" / "units.py"]
 
 
 def fences(language):
@@ -58,7 +59,7 @@ def test_four_points_a_camera_do_not_claim_more_than_clicks_can_say(tmp_path):
 
 def test_every_kind_of_finding_is_explained():
     kinds = set()
-    for path in DIAGNOSIS.glob("*.py"):
+    for path in DIAGNOSIS:
         kinds |= set(re.findall(r'kind(?:, advice)? ?= ?"([a-z ]+)"', path.read_text(encoding="utf-8")))
     explained = set(re.findall(r"^\| `([a-z ]+)` \|", TEXT, re.MULTILINE))
     assert kinds == explained

@@ -5,7 +5,7 @@ import pytest
 
 from airborne.calibration.from_points import calibrate
 from airborne.calibration.points_report import describe_points_calibration, points_calibration_to_dict
-from tests.support.cameras import seen_only_by
+from tests.support.cameras import restrict_to_cameras
 
 
 def test_the_table_has_a_row_for_every_camera_with_its_errors(calibration):
@@ -41,12 +41,12 @@ def test_the_dictionary_survives_json_and_holds_what_the_table_says(calibration)
         assert set(data["cameras"][fit.name]["sd"]) == set(fit.sd)
 
 
-def test_height_angle_is_what_the_picture_spans(calibration):
+def test_height_angle_is_what_the_image_spans(calibration):
     angle = points_calibration_to_dict(calibration)["cameras"]["cam3"]["height_angle_deg"]
     assert angle == pytest.approx(30.5, abs=0.1)  # 576 rows at 1055 px
 
 
 def test_one_camera_has_no_error_in_space(points, sizes):
-    alone = calibrate(seen_only_by(points, "cam1"), sizes, method="annealing")
+    alone = calibrate(restrict_to_cameras(points, "cam1"), sizes, method="annealing")
     assert points_calibration_to_dict(alone)["held_out_3d_rms_mm"] is None
     assert "in 3D" not in describe_points_calibration(alone)

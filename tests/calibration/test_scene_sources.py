@@ -50,15 +50,15 @@ def clicks(names, px):
 def hall(tmp_path_factory):
     """A folder with a court's clicks, a wand's tracks, corners of a frame, a throw, and the true cameras."""
     folder, rng = tmp_path_factory.mktemp("hall"), np.random.default_rng(0)
-    points = waving.clicked(rng, RIG, CLICKED)
+    points = waving.click_court(rng, RIG, CLICKED)
     (folder / "court.csv").write_text(clicks(points.names, points.px))
-    wand = waving.seen(rng, RIG, waving.waved(rng, N, (0.6, 0.4)), stray_share=0.03)
+    wand = waving.observe(rng, RIG, waving.wave_wand(rng, N, (0.6, 0.4)), stray_share=0.03)
     (folder / "wand_xypts.csv").write_text(xypts(wand))
     corners = np.array([[0.5, 0.3, 0], [2.5, 0.3, 0], [0.5, 1.8, 0]])
-    (folder / "frame.csv").write_text(clicks("ABC", waving.seen(rng, RIG, corners)))
+    (folder / "frame.csv").write_text(clicks("ABC", waving.observe(rng, RIG, corners)))
     times_s = np.arange(40) / RATE_HZ
     thrown = np.array([-1, 0, 1.0]) + times_s[:, None] * [2, 0.5, 3.9] + times_s[:, None] ** 2 / 2 * [0, 0, -9.81]
-    (folder / "throw_xypts.csv").write_text(xypts(waving.seen(rng, RIG, thrown[:, None])))
+    (folder / "throw_xypts.csv").write_text(xypts(waving.observe(rng, RIG, thrown[:, None])))
     write_pose2sim(folder / "truth.toml", RIG)
     return folder
 
@@ -196,10 +196,10 @@ def test_names_of_left_and_right_exchanged_put_cameras_below_the_floor(hall, tmp
 
 def test_a_knocked_camera_is_named_by_the_report(hall, tmp_path):
     rng = np.random.default_rng(3)
-    points = waving.waved(rng, N, (0.6, 0.4))
-    px = waving.seen(rng, RIG, points)
+    points = waving.wave_wand(rng, N, (0.6, 0.4))
+    px = waving.observe(rng, RIG, points)
     turn = RigidTransform.from_rotation(Rotation.from_euler("y", 0.6, degrees=True))
-    late = waving.seen(rng, type(RIG)(tuple(_turned(camera, turn) for camera in RIG)), points)
+    late = waving.observe(rng, type(RIG)(tuple(_rotate(camera, turn) for camera in RIG)), points)
     px[50:, :, 1] = late[50:, :, 1]
     (tmp_path / "wand_xypts.csv").write_text(xypts(px))
     (tmp_path / "court.csv").write_text((hall / "court.csv").read_text())
@@ -209,13 +209,13 @@ def test_a_knocked_camera_is_named_by_the_report(hall, tmp_path):
     assert "between frame 49 and frame 50" in moved[0]["sentence"]
 
 
-def _turned(camera, turn):
+def _rotate(camera, turn):
     return replace(camera, camera_from_world=turn * camera.camera_from_world)
 
 
 def test_exchanged_columns_are_named_by_the_calibration_before(hall, tmp_path):
     rng = np.random.default_rng(4)
-    px = waving.seen(rng, RIG, waving.waved(rng, N, (0.6, 0.4)))[:, :, [0, 3, 2, 1]]
+    px = waving.observe(rng, RIG, waving.wave_wand(rng, N, (0.6, 0.4)))[:, :, [0, 3, 2, 1]]
     (tmp_path / "wand_xypts.csv").write_text(xypts(px))
     (tmp_path / "truth.toml").write_text((hall / "truth.toml").read_text())
     start = '[start]\nfile = "truth.toml"\n'

@@ -22,7 +22,7 @@ def test_a_rig_gives_back_the_points_that_it_sees(distortion):
     assert np.allclose(rig.points_from_px(px), points, atol=ROUNDTRIP)
 
 
-def test_a_scaled_and_cropped_picture_has_the_calibration_pixels_at_their_places():
+def test_a_scaled_and_cropped_image_has_the_calibration_pixels_at_their_places():
     """The first cameras of the balance trial: image = (x / 1.00741, (y + 7.11) / 1.00741) of calibration pixels."""
     camera = camera_at((-4, -5, 1.5), distortion=LENS)
     saved = camera.resample(scale=(1.00741, 1.00741), offset=(0.0, -7.11), size=(1080, 1920))

@@ -22,7 +22,7 @@ def test_exact_detections_give_the_points_with_every_camera():
 
 
 @pytest.mark.parametrize("camera", range(4))
-def test_one_wild_detection_is_left_out_and_its_distance_told(camera):
+def test_one_wild_detection_is_left_out_and_its_distance_returned(camera):
     px = PX.copy()
     px[1, 5, camera] += [3 * LIMIT_PX, 4 * LIMIT_PX]
     agreed = triangulate_consensus(RIG, px, ALIKE)

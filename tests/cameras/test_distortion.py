@@ -59,5 +59,5 @@ def test_straightening_a_fisheye_takes_back_its_bending(batch):
     assert np.allclose(undistort_fisheye(np.zeros(2), FISHEYE), 0)
 
 
-def test_what_a_fisheye_sees_beside_and_behind_itself_has_no_place_in_a_pinhole_picture():
+def test_what_a_fisheye_sees_beside_and_behind_itself_has_no_place_in_a_pinhole_image():
     assert np.isnan(undistort_fisheye(np.array([1.6, 0.0]), np.zeros(4))).all()

@@ -1,13 +1,17 @@
 import cv2
 import numpy as np
 
-from airborne.cameras.dlt import compose, decompose, decompose_with_skew, dlt_coefficients, fit_dlt
+from airborne.cameras.dlt import decompose, decompose_with_skew, dlt_coefficients, fit_dlt
 from tests.support.cameras import camera_at, scattered
 from tests.support.tolerances import ROUNDTRIP
 
 CAMERA = camera_at((-4, -5, 1.5))
 WORLD = scattered(12)
 PX = CAMERA.px_from_world(WORLD)
+
+
+def compose(K, R, centre):
+    return K @ R @ np.column_stack([np.eye(3), -centre])
 
 
 def test_exact_points_give_the_camera_back():
@@ -60,7 +64,7 @@ def test_a_camera_beside_the_origin_still_has_a_matrix():
     assert np.allclose(decompose(fit_dlt(world, camera.px_from_world(world))).centre, 0, atol=1e2 * ROUNDTRIP)
 
 
-def test_a_mirrored_world_or_picture_is_seen_as_such():
+def test_a_mirrored_world_or_image_is_seen_as_such():
     for world, px in ((WORLD * [-1, 1, 1], PX), (WORLD[:, [1, 0, 2]], PX), (WORLD, PX[:, ::-1])):
         assert decompose(fit_dlt(world, px)).is_mirrored
     assert not decompose(fit_dlt(WORLD[:, [1, 2, 0]], PX)).is_mirrored

@@ -54,7 +54,7 @@ def test_a_camera_without_a_name_has_its_key(tmp_path):
     assert read_rig(written(tmp_path, TOML.replace('name = "cam one"', ""))).names == ("left",)
 
 
-def test_the_bundled_rig_sees_the_middle_of_its_pictures(thrown_cross):
+def test_the_bundled_rig_sees_the_middle_of_its_images(thrown_cross):
     rig = read_rig(thrown_cross / "calib_true.toml")
     assert rig.names == ("cam1", "cam2", "cam3")
     for camera in rig:
@@ -79,7 +79,7 @@ def test_the_two_files_of_the_balance_trial_describe_the_same_cameras(shared_dat
         assert 1.8 < np.sqrt(np.mean(apart**2)) < 2.2  # pixels, from that division alone
 
 
-def test_pictures_of_a_board_bear_out_the_distortion_of_the_qualisys_file(shared_data):
+def test_images_of_a_board_bear_out_the_distortion_of_the_qualisys_file(shared_data):
     """Corners 60 mm apart fit better with the terms as written than with a 64th of them."""
     folder = shared_data("balance")
     camera = read_rig(folder / "Calib.qca.txt")["cam01"]
@@ -173,7 +173,7 @@ def test_a_qualisys_camera_looks_down_its_own_negative_z(tmp_path):
         (QUALISYS.replace('"none"', '"fisheye"'), "a fisheye lens, whose terms Qualisys does not publish"),
     ],
 )
-def test_a_malformed_file_is_told_in_one_line(tmp_path, content, message):
+def test_a_malformed_file_is_reported_in_one_line(tmp_path, content, message):
     with pytest.raises(CalibrationError) as error:
         read_rig(written(tmp_path, content))
     assert message in str(error.value)

@@ -28,7 +28,7 @@ def test_a_hall_and_a_table_are_plausible():
 
 
 @pytest.mark.parametrize(("scale", "told"), [(1000.0, "2.19e+04 m apart"), (0.0005, "0.011 m apart")])
-def test_cameras_implausibly_far_or_near_are_told(scale, told):
+def test_cameras_implausibly_far_or_near_are_reported(scale, told):
     [found] = check_baselines(grown(RIG, scale))
     assert told in found.sentence
     assert "not in metres" in found.sentence
@@ -43,7 +43,7 @@ def test_the_unit_of_one_source_is_guessed(scale, unit, is_wand):
     assert f"the lengths of the {large} seem to be in {unit}" in found.sentence
 
 
-def test_a_wrong_length_without_a_unit_is_told_as_that():
+def test_a_wrong_length_without_a_unit_is_reported_as_that():
     [found] = check_scales({"wand": grown(RIG, 1.5), "board": RIG})
     assert "cameras are 1.5 times as far apart" in found.sentence
     assert "one length is wrong" in found.sentence

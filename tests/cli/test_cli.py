@@ -16,6 +16,7 @@ from airborne import cli
 from airborne.motion import read_motion
 from tests.support.places import THROWN_CROSS
 from tests.support.players_trial import write_run, write_truth
+from tests.support.run_files import files_of
 
 SHORT = 3  # fields that are tracked where the length does not matter
 LONG = 12
@@ -90,9 +91,9 @@ def test_track_prints_what_was_found_and_leaves_every_table(trial, tmp_path, cap
     out, err = capsys.readouterr()
     assert f"{SHORT} frames at 50 Hz: {SHORT} tracked, 0 uncertain, 0 lost" in out
     assert all(line.startswith("tracking ") for line in err.splitlines())
-    names = {path.name for path in (tmp_path / "run").iterdir()}
+    names = set(files_of(tmp_path / "run"))
     assert names == {
-        *("motion.csv", "motion.parquet", "angles.csv", "joints.csv"),
+        *("motion.csv", "tables/motion.parquet", "tables/angles.csv", "joints.csv"),
         *("summary.json", "run.json", "calib.toml", "body.toml"),
     }
     assert list(tomllib.loads((tmp_path / "run" / "calib.toml").read_text())) == ["cam1", "cam2", "metadata"]
@@ -116,11 +117,14 @@ def test_json_of_track_is_the_summary_file(trial, tmp_path, capsys):
 
 def test_pictures_and_report_are_written_and_then_show_the_errors(trial, tmp_path, capsys):
     assert in_process("track", trial, "-o", tmp_path / "run") == 0
-    names = {path.name for path in (tmp_path / "run").iterdir()}
-    assert names >= {"report.html", "through_mask.png", "pose.png", "score.png", "overlay_cam1.mp4"}
-    assert "errors.png" not in names
+    names = set(files_of(tmp_path / "run"))
+    assert names >= {
+        *("report.html", "figures/through_mask.png", "figures/pose.png", "figures/score.png"),
+        "videos/overlay_cam1.mp4",
+    }
+    assert "figures/errors.png" not in names
     assert in_process("evaluate", tmp_path / "run", trial.parent / "truth.csv") == 0
-    assert "errors.png" in {path.name for path in (tmp_path / "run").iterdir()}
+    assert "figures/errors.png" in files_of(tmp_path / "run")
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["truth"]["n_matched"] == SHORT
 
 
@@ -230,7 +234,7 @@ def test_a_killed_run_is_readable_and_resumes_to_the_same_bytes(trial, tmp_path)
     resumed = start_command("track", long, "-o", tmp_path / "killed", "--no-pictures", "--resume")
     resumed.communicate()
     assert resumed.returncode == 0
-    for name in ("motion.csv", "angles.csv", "joints.csv"):
+    for name in ("motion.csv", "tables/angles.csv", "joints.csv"):
         assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 

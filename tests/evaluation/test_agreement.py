@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from airborne.constants import NORMAL_QUANTILE_975
 from airborne.evaluation import Series, analyse_agreement
-from airborne.evaluation.agreement import Z, effective_number, limits_of_agreement, variance_components
+from airborne.evaluation.agreement import effective_number, limits_of_agreement, variance_components
 from tests.support.tolerances import ROUNDTRIP, sampled
 
 
@@ -50,7 +51,7 @@ def test_limits_hold_95_of_100_differences_of_new_individuals():
 
 def test_intervals_of_bias_and_limits_hold_the_truth_in_95_of_100():
     rng, held = np.random.default_rng(3), []
-    true = 0.5 + Z * np.hypot(1.0, 0.7)
+    true = 0.5 + NORMAL_QUANTILE_975 * np.hypot(1.0, 0.7)
     for _ in range(400):
         own = [0.5 + rng.normal() + 0.7 * rng.normal(size=8) for _ in range(10)]
         who = np.repeat([f"player {k}" for k in range(10)], 8)

@@ -1,10 +1,12 @@
 """Intraclass correlations: the published worked example, and what they mean."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from airborne.evaluation import reliability
 from airborne.evaluation.icc import mean_squares
+from tests.conftest import imported
 from tests.support.tolerances import ROUNDTRIP
 
 # Shrout and Fleiss 1979, table 2: six targets, four judges
@@ -23,6 +25,21 @@ PUBLISHED = {
 @pytest.mark.parametrize("model", PUBLISHED)
 def test_the_worked_example_of_shrout_and_fleiss_is_reproduced(model):
     assert tuple(getattr(reliability(JUDGES), model)) == pytest.approx(PUBLISHED[model], abs=0.006)
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
+@pytest.mark.parametrize(("n", "k", "bias"), [(6, 4, 0.0), (15, 3, 0.8), (40, 2, 2.0)])
+def test_values_and_intervals_are_those_of_pingouin(n, k, bias, monkeypatch):
+    pingouin = imported("pingouin")
+    monkeypatch.setitem(pingouin.options, "round.column.CI95", 12)
+    rng = np.random.default_rng(n)
+    ratings = rng.normal(size=(n, 1)) + 0.7 * rng.normal(size=(n, k)) + bias * np.arange(k)
+    target, method = np.indices((n, k)).reshape(2, -1)
+    table = pd.DataFrame({"target": target, "method": method, "rating": ratings.ravel()})
+    theirs = pingouin.intraclass_corr(table, "target", "method", "rating").set_index("Type")
+    for model, name in zip(PUBLISHED, ("1,1", "A,1", "C,1", "1,k", "A,k", "C,k"), strict=True):
+        expected = (theirs.loc[f"ICC({name})", "ICC"], *theirs.loc[f"ICC({name})", "CI95"])
+        assert tuple(getattr(reliability(ratings), model)) == pytest.approx(expected, abs=1e-9)
 
 
 def test_mean_squares_are_those_of_the_published_table():

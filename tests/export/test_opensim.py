@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import BodyModel, Box, Ellipsoid, Inertia, Mesh, Part, Segment, total_inertia
+from airborne.body import BodyModel, Box, Ellipsoid, Inertia, Mesh, Part, Segment
 from airborne.export.opensim_model import coordinate_names, write_osim
 from airborne.export.opensim_motion import write_mot
 from airborne.export.takes import player_takes
 from airborne.export.trc import write_trc
+from tests.support.bodies import total_inertia
 from tests.support.export_scenes import BOX, PERSON
 from tests.support.takes import jumping, take_of, tumbling
 from tests.support.tolerances import ROUNDTRIP

@@ -5,9 +5,10 @@ import pytest
 
 from airborne.errors import ResultError
 from airborne.evaluation import JointPaths, Truth, compare_joints, compare_motion
-from airborne.export import headline, write_figures, write_report
+from airborne.export import headline, page, write_figures, write_report
 from airborne.export.page import format_value, label
 from airborne.motion import Motion, flight_summary, landmarks
+from airborne.motion.run_folder import figures_of
 from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run
 
 
@@ -16,7 +17,7 @@ def html_of(folder, motion, **more):
 
 
 def test_the_page_needs_nothing_but_itself(tmp_path):
-    write_figures(tmp_path, run(), BOX)
+    write_figures(figures_of(tmp_path), run(), BOX)
     html = html_of(tmp_path, run())
     sources = re.findall(r'(?:src|href)\s*=\s*"([^"]{0,30})', html)
     assert len(sources) == 2
@@ -80,7 +81,7 @@ def test_a_comparison_with_the_truth_becomes_a_table(tmp_path):
 
 def test_a_body_with_joints_gets_their_angles_and_its_flight_and_another_does_not(tmp_path):
     motion = person_run()
-    write_figures(tmp_path, motion, PERSON)
+    write_figures(figures_of(tmp_path), motion, PERSON)
     html = html_of(tmp_path, motion, flight=flight_summary(motion, PERSON).to_dict())
     words = (
         "<h2>Joints</h2>",
@@ -91,13 +92,13 @@ def test_a_body_with_joints_gets_their_angles_and_its_flight_and_another_does_no
     assert [word for word in words if word not in html] == []
     assert html.count("<img") == 4
     (tmp_path / "rigid").mkdir()
-    write_figures(tmp_path / "rigid", run(), BOX)
+    write_figures(figures_of(tmp_path / "rigid"), run(), BOX)
     assert [word for word in words if word in html_of(tmp_path / "rigid", run())] == []
 
 
 def test_unknown_numbers_of_a_flight_are_shown_as_not_known(tmp_path):
     motion = person_run(2)
-    write_figures(tmp_path, motion, PERSON)
+    write_figures(figures_of(tmp_path), motion, PERSON)
     html = html_of(tmp_path, motion, flight=flight_summary(motion, PERSON).to_dict())
     assert "fitted, free fall</th><td>not known</td><td>9.81</td>" in html
 
@@ -135,3 +136,11 @@ def test_values_are_shown_as_a_reader_would_write_them():
         "768, 576",
         "x",
     ]
+
+
+def test_the_method_shows_only_the_settings_that_it_used():
+    record = {"method": "refined", "every": 1, "stop": None, "prediction": "smooth", "steps_mm": [50], "colour": "raw"}
+    shown = page.settings(record)
+    assert "prediction" in shown and "every" in shown
+    assert "steps" not in shown and "colour" not in shown
+    assert "steps" in page.settings({**record, "method": "stepping"})

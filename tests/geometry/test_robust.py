@@ -5,7 +5,7 @@ import numpy as np
 from airborne.geometry.robust import covariance_of_sum, robust_sd
 
 
-def test_robust_sd_is_that_of_normal_noise_however_far_strays_are():
+def test_robust_sd_is_that_of_normal_noise_however_far_outliers_are():
     rng = np.random.default_rng(1)
     values = rng.normal(5.0, 0.3, 20_000)
     clean = robust_sd(values)

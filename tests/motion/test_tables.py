@@ -143,7 +143,7 @@ def test_columns_of_a_jointed_body_are_documented(tmp_path, name):
     model = figure()
     write = {"joint_angles.csv": write_joint_angles, "flight.csv": write_flight}[name]
     write(tmp_path / name, motion_of(model, swinging(model, [0.0, 0.02])), model)
-    page = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "results.md").read_text(encoding="utf-8")
     table = re.search(rf"^## `{re.escape(name)}`\n\n((?:\|.*\n)+)", page, re.MULTILINE)[1]
     documented = [column for line in table.splitlines()[2:] for column in re.findall(r"`(\w+)`", line.split("|")[1])]
     assert (tmp_path / name).read_text().splitlines()[0].split(",") == documented

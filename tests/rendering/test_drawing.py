@@ -8,8 +8,9 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Pose, Segment, surface_arrays
 from airborne.cameras import Camera
 from airborne.errors import CalibrationError
-from airborne.rendering import FLAT, render, render_reference
+from airborne.rendering import FLAT, render
 from tests.support.bodies import LIGHTS, camera, in_slabs, posed_random
+from tests.support.ray_casting import render_reference
 from tests.support.tolerances import SOLVED
 
 GREY = 1e-2  # grey levels between float32 kernels and float64 rays

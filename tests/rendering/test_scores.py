@@ -10,7 +10,6 @@ from airborne.rendering import (
     mask_evidence,
     pack_targets,
     render,
-    render_reference,
     score,
     scores_from_sums,
 )
@@ -18,6 +17,7 @@ from airborne.rendering.reduction import reduce_camera, reduce_image
 from airborne.rendering.scores import GAINS, MISSED_GREY
 from airborne.video import View
 from tests.support.bodies import LIGHTS, batch, camera, noise_view, posed_random, random_body
+from tests.support.ray_casting import render_reference
 from tests.support.tolerances import SOLVED
 
 GREY = 1e-2  # grey levels between float32 kernels and float64 rays

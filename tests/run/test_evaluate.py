@@ -15,6 +15,7 @@ from airborne.motion import Motion, MotionWriter, write_joints
 from airborne.run.evaluate import assess, evaluate_agreement
 from tests.support.motions import estimate
 from tests.support.players_trial import PLAYERS, write_run, write_truth
+from tests.support.run_files import contents_of, files_of
 from tests.test_docs import DOCS
 
 
@@ -96,26 +97,26 @@ def agreements(found, against):
 
 
 def test_agreement_of_joints_is_reported_in_tables_figures_and_a_paragraph(run, tmp_path):
-    before = {path.name: path.read_bytes() for path in run.iterdir()}
+    before = contents_of(run)
     result = evaluate_agreement(run, joints=run.parent / "higher.csv", out=tmp_path / "agreement")
     rows = agreements(result, "the joints")
     assert rows["all joints z"].bias.value == pytest.approx(-10)
     assert rows["all joints x"].rmse.value == pytest.approx(0, abs=1e-9)
-    assert {path.name for path in (tmp_path / "agreement").iterdir()} == set(result.files)
+    assert set(files_of(tmp_path / "agreement")) == set(result.files)
     assert set(result.files) == {
-        "agreement.csv",
-        "agreement_joints.png",
-        "identity_joints.png",
+        "tables/agreement.csv",
+        "figures/agreement_joints.png",
+        "figures/identity_joints.png",
         "agreement_methods.txt",
     }
     text = (tmp_path / "agreement" / "agreement_methods.txt").read_text()
     assert "Bland" in text and "McGraw" in text and "bias -10.00" in text and "airborne" in text
-    assert {path.name: path.read_bytes() for path in run.iterdir()} == before
+    assert contents_of(run) == before
 
 
 def test_each_number_of_the_table_has_its_interval(run, tmp_path):
     evaluate_agreement(run, joints=run.parent / "higher.csv", out=tmp_path)
-    with (tmp_path / "agreement.csv").open() as file:
+    with (tmp_path / "tables/agreement.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert rows[0]["against"] == "the joints"
     for name in ("bias", "lower_limit", "upper_limit", "rmse", "nrmse_percent", "icc_a1", "icc_c1", "sem", "mdc"):
@@ -189,8 +190,8 @@ def test_every_number_is_documented(run, tmp_path):
     evaluate_agreement(
         run, joints=run.parent / "higher.csv", repeats=[shutil.copytree(run, tmp_path / "again")], out=tmp_path
     )
-    text = (DOCS / "agreement.md").read_text(encoding="utf-8")
+    text = (DOCS / "how-to" / "agreement.md").read_text(encoding="utf-8")
     for name in ("agreement.csv", "repeatability.csv"):
-        header = (tmp_path / name).read_text().splitlines()[0].split(",")
+        header = (tmp_path / "tables" / name).read_text().splitlines()[0].split(",")
         stems = {column.removesuffix("_low").removesuffix("_high") for column in header}
         assert {stem for stem in stems if f"`{stem}`" not in text} <= {"against", "between", "variable", "unit"}

@@ -1,6 +1,7 @@
 """`airborne export`: whatever a run holds, finished or not, goes out; what is no run is refused in one line."""
 
 import json
+import re
 import sys
 from fractions import Fraction
 
@@ -115,6 +116,16 @@ def test_uneven_times_are_kept_out_of_files_without_times(tmp_path):
     )
     with pytest.raises(ResultError, match=r"0\.15 frames, and c3d hold no times; give --trc"):
         export_run(folder, formats=["c3d", "trc"])
+
+
+def test_without_pyarrow_parquet_is_left_out_and_refused_where_asked_for(players_run, tmp_path, monkeypatch):
+    monkeypatch.setattr("airborne.run.export.CAN_WRITE_PARQUET", False)
+    exported = export_run(players_run, tmp_path)
+    assert "block.parquet" not in names(exported) and "block.csv" in names(exported)
+    mend = "Parquet needs pyarrow, which is not installed: pip install 'airborne[parquet]'"
+    assert exported.notes == (f"left out parquet. {mend}",)
+    with pytest.raises(ResultError, match=re.escape(mend)):
+        export_run(players_run, tmp_path, ["csv", "parquet"])
 
 
 def test_where_nothing_was_found_there_is_nothing_to_export(tmp_path):

@@ -15,25 +15,26 @@ from airborne.cameras import read_rig
 from airborne.errors import AirborneError, ResultError, TrialError
 from airborne.motion import read_players
 from airborne.motion.players import PLAYERS_COLUMNS
-from airborne.run import players_tracking
-from airborne.run.players_tracking import track_players
+from airborne.run import players
+from airborne.run.track import track_trial
 from airborne.tracking import Status
 from airborne.trial.file import read_trial
 from tests.cli.test_cli import in_process
 from tests.support.clips import write_clip
 from tests.support.players_trial import BYSTANDER, PLAYERS, StandIn, pictures, points_of, write_trial
+from tests.support.run_files import files_of
 from tests.test_docs import DOCS, named, table_of
 
 TABLES = {
-    *("joints.csv", "joints.parquet", "jumps.csv"),
+    *("joints.csv", "tables/joints.parquet", "jumps.csv"),
     *("summary.json", "run.json", "calib.toml"),
 }
-PICTURES = {"report.html", "heights.png", "overlay_left.mp4", "overlay_right.mp4"}
+PICTURES = {"report.html", "figures/heights.png", "videos/overlay_left.mp4", "videos/overlay_right.mp4"}
 
 
 @pytest.fixture(autouse=True)
 def _stand_in(monkeypatch):
-    monkeypatch.setattr(players_tracking, "players_tracker_of", lambda trial, rig: StandIn())
+    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: StandIn())
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +47,8 @@ def summary_of(folder):
 
 
 def test_a_run_leaves_every_players_joints_at_every_frame(path, tmp_path):
-    run = track_players(read_trial(path), tmp_path / "run", pictures=False)
-    assert {file.name for file in (tmp_path / "run").iterdir()} == TABLES
+    run = track_trial(read_trial(path), tmp_path / "run", pictures=False)
+    assert set(files_of(tmp_path / "run")) == TABLES
     motion = read_players(tmp_path / "run" / "joints.csv")
     assert motion.players == tuple(PLAYERS)
     assert motion.index.tolist() == list(range(12))
@@ -57,8 +58,15 @@ def test_a_run_leaves_every_players_joints_at_every_frame(path, tmp_path):
     assert read_rig(tmp_path / "run" / "calib.toml").names == ("left", "right")
 
 
+def test_without_pyarrow_a_run_leaves_no_parquet(path, tmp_path, monkeypatch):
+    monkeypatch.setattr("airborne.motion.players.CAN_WRITE_PARQUET", False)
+    run = track_trial(read_trial(path), tmp_path / "run", pictures=False)
+    assert {file.name for file in (tmp_path / "run").iterdir()} == TABLES - {"joints.parquet"}
+    assert run.summary["tables"] == ["joints.csv", "jumps.csv"]
+
+
 def test_the_summary_counts_each_player_and_names_the_inputs(path, tmp_path):
-    track_players(read_trial(path), tmp_path / "run", pictures=False)
+    track_trial(read_trial(path), tmp_path / "run", pictures=False)
     summary = summary_of(tmp_path / "run")
     assert (summary["n_frames"], summary["n_tracked"], summary["n_uncertain"], summary["n_lost"]) == (12, 9, 3, 0)
     assert (summary["rate_hz"], summary["start_s"], summary["duration_s"]) == (50, 0, 0.22)
@@ -71,29 +79,30 @@ def test_the_summary_counts_each_player_and_names_the_inputs(path, tmp_path):
     assert summary["events"] == []
     assert set(summary["inputs"]) == {"left.mkv", "right.mkv", "calib.toml", "start and lights"}
     assert summary["timings_s"]["tracking_a_frame"] * 12 == pytest.approx(summary["timings_s"]["tracking"])
+    assert summary["tables"] == ["joints.csv", "jumps.csv", "tables/joints.parquet"]
     assert "live" not in summary
 
 
 @pytest.mark.parametrize(("method", "n"), [("blocker", 1), ("block-jump", 2), ("mixture", 2), ("framework", 2)])
 def test_particle_filters_warn_that_their_deviations_are_too_small(path, tmp_path, method, n):
-    run = track_players(read_trial(path, {"method": method, "stop": 2}), tmp_path / "run", pictures=False)
+    run = track_trial(read_trial(path, {"method": method, "stop": 2}), tmp_path / "run", pictures=False)
     warnings = run.summary["warnings"]
     assert len(warnings) == n
     assert n == 1 or (method in warnings[1] and "far too small" in warnings[1])
 
 
 def test_videos_and_report_are_written_on_request(path, tmp_path):
-    track_players(read_trial(path, {"overlay": "broadcast"}), tmp_path / "run")
-    assert {file.name for file in (tmp_path / "run").iterdir()} == TABLES | PICTURES
+    track_trial(read_trial(path, {"overlay": "broadcast"}), tmp_path / "run")
+    assert set(files_of(tmp_path / "run")) == TABLES | PICTURES
     report = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     assert "number 7: 3 of 12 frames are uncertain" in report
     assert report.count("<img") == 1 and "http" not in report.split("<style>")[0]
 
 
 def test_everything_that_a_run_leaves_is_documented(path, tmp_path):
-    run = track_players(read_trial(path, {"stop": 2}), tmp_path / "run")
-    page = DOCS / "results.md"
-    left = {re.sub(r"_(left|right)\.mp4", "_<camera>.mp4", file.name) for file in (tmp_path / "run").iterdir()}
+    run = track_trial(read_trial(path, {"stop": 2}), tmp_path / "run")
+    page = DOCS / "reference" / "results.md"
+    left = {re.sub(r"_(left|right)\.mp4", "_<camera>.mp4", name) for name in files_of(tmp_path / "run")}
     assert left == {name for row in table_of(page, "Files of a run of players") for name in named(row[0])}
     documented = [name for row in table_of(page, "`joints.csv` of players") for name in named(row[0])]
     assert sorted(documented) == sorted(PLAYERS_COLUMNS)
@@ -103,20 +112,20 @@ def test_everything_that_a_run_leaves_is_documented(path, tmp_path):
 
 def test_start_every_and_stop_are_respected(tmp_path):
     trial = write_trial(tmp_path / "trial", 12, track="every = 2\nstop = 9", start="frame = 3")
-    motion = track_players(read_trial(trial), tmp_path / "run", pictures=False).motion
+    motion = track_trial(read_trial(trial), tmp_path / "run", pictures=False).motion
     assert motion.index.tolist() == [3, 5, 7]
     assert motion.rate == pytest.approx(25)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.71])
 def test_a_killed_run_keeps_its_frames_and_goes_on_to_the_same_result(path, tmp_path, share):
-    track_players(read_trial(path), tmp_path / "whole", pictures=False)
+    track_trial(read_trial(path), tmp_path / "whole", pictures=False)
     whole = (tmp_path / "whole" / "joints.csv").read_bytes()
     (tmp_path / "killed").mkdir()
     for name in ("run.json", "calib.toml"):
         (tmp_path / "killed" / name).write_bytes((tmp_path / "whole" / name).read_bytes())
     (tmp_path / "killed" / "joints.csv").write_bytes(whole[: int(share * len(whole))])
-    track_players(read_trial(path), tmp_path / "killed", resume=True, pictures=False)
+    track_trial(read_trial(path), tmp_path / "killed", resume=True, pictures=False)
     assert (tmp_path / "killed" / "joints.csv").read_bytes() == whole
 
 
@@ -129,23 +138,23 @@ def test_rows_are_out_before_the_next_frame_is_tracked(path, tmp_path, monkeypat
             seen.append(len(table.read_text().splitlines()) - 1)
             return super().step(state, frames)
 
-    monkeypatch.setattr(players_tracking, "players_tracker_of", lambda trial, rig: Watched())
-    track_players(read_trial(path), tmp_path / "run", pictures=False)
+    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: Watched())
+    track_trial(read_trial(path), tmp_path / "run", pictures=False)
     assert seen == [12 * k for k in range(12)]
 
 
 def test_folders_of_other_runs_are_left_alone(path, tmp_path):
-    track_players(read_trial(path, {"stop": 2}), tmp_path / "run", pictures=False)
+    track_trial(read_trial(path, {"stop": 2}), tmp_path / "run", pictures=False)
     with pytest.raises(ResultError, match="already holds a run"):
-        track_players(read_trial(path, {"stop": 2}), tmp_path / "run", pictures=False)
+        track_trial(read_trial(path, {"stop": 2}), tmp_path / "run", pictures=False)
     with pytest.raises(ResultError, match="other settings"):
-        track_players(read_trial(path, {"stop": 3}), tmp_path / "run", resume=True, pictures=False)
+        track_trial(read_trial(path, {"stop": 3}), tmp_path / "run", resume=True, pictures=False)
 
 
 def test_a_start_past_the_end_is_refused(tmp_path):
     trial = write_trial(tmp_path / "trial", 4, start="frame = 30")
     with pytest.raises(TrialError, match="there is no frame 30"):
-        track_players(read_trial(trial), tmp_path / "run", pictures=False)
+        track_trial(read_trial(trial), tmp_path / "run", pictures=False)
 
 
 def test_cameras_that_end_or_go_dark_are_reported_with_their_frames(tmp_path):
@@ -154,7 +163,7 @@ def test_cameras_that_end_or_go_dark_are_reported_with_their_frames(tmp_path):
     write_clip(folder / "left.mkv", pictures(5), codec="libx264", pix_fmt="yuv420p")
     dark = [image if k not in (3, 4) else np.zeros_like(image) for k, image in enumerate(pictures(12))]
     write_clip(folder / "right.mkv", dark, codec="libx264", pix_fmt="yuv420p")
-    run = track_players(read_trial(trial), tmp_path / "run")
+    run = track_trial(read_trial(trial), tmp_path / "run")
     assert len(run.motion) == 12
     assert "left: no picture at 7 of 12 frames: frames 5 to 11" in run.summary["events"]
     assert "right: dark at 2 of 12 frames: frames 3 to 4" in run.summary["events"]
@@ -179,11 +188,11 @@ def test_an_interrupt_leaves_the_tracked_frames_and_says_so(path, tmp_path, caps
                 raise KeyboardInterrupt
             return super().step(state, frames)
 
-    monkeypatch.setattr(players_tracking, "players_tracker_of", lambda trial, rig: Interrupted())
+    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: Interrupted())
     assert in_process("track", path, "-o", tmp_path / "run", "--no-pictures") == 130
     assert "--resume goes on" in capsys.readouterr().err
     assert len(read_players(tmp_path / "run" / "joints.csv")) == 5
-    monkeypatch.setattr(players_tracking, "players_tracker_of", lambda trial, rig: StandIn())
+    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: StandIn())
     assert in_process("track", path, "-o", tmp_path / "run", "--no-pictures", "--resume") == 0
     assert len(read_players(tmp_path / "run" / "joints.csv")) == 12
 
@@ -215,12 +224,12 @@ def test_live_pipes_end_with_an_interrupt_and_keep_whole_results(tmp_path, monke
                 raise KeyboardInterrupt
             return super().step(state, frames)
 
-    monkeypatch.setattr(players_tracking, "players_tracker_of", lambda trial, rig: Interrupted())
-    run = track_players(read_trial(trial), tmp_path / "run", live=True)
+    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: Interrupted())
+    run = track_trial(read_trial(trial), tmp_path / "run", live=True)
     for thread in sent:
         thread.join(5)
     assert len(run.motion) >= 1 and run.motion.index[-1] < 40
-    assert {file.name for file in (tmp_path / "run").iterdir()} == TABLES | PICTURES
+    assert set(files_of(tmp_path / "run")) == TABLES | PICTURES
     assert set(run.summary["inputs"]) == {"calib.toml", "start and lights"}
 
 
@@ -232,7 +241,7 @@ def _send(folder, name):
 
 def test_live_runs_cannot_be_resumed_and_bodies_cannot_be_live(path, tmp_path, thrown_cross, capsys):
     with pytest.raises(AirborneError, match="cannot be resumed"):
-        track_players(read_trial(path), tmp_path / "run", live=True, resume=True)
+        track_trial(read_trial(path), tmp_path / "run", live=True, resume=True)
     assert in_process("track", "--live", thrown_cross / "trial.toml", "-o", tmp_path / "run") == 2
     assert "--live is for players" in capsys.readouterr().err
 
@@ -244,7 +253,7 @@ def test_a_run_in_which_everybody_is_lost_says_so_and_exits_with_one(path, tmp_p
             nothing = {"points": np.full((6, 3), np.nan), "covariance": np.full((6, 3, 3), np.nan), "score": np.nan}
             return state, tuple(replace(each, status=Status.LOST, n_views=0, **nothing) for each in estimates)
 
-    monkeypatch.setattr(players_tracking, "players_tracker_of", lambda trial, rig: Lost())
+    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: Lost())
     assert in_process("track", path, "-o", tmp_path / "run") == 1
     assert "Anna: 0 tracked, 0 uncertain, 12 lost; median sd of a joint not known" in capsys.readouterr().out
     assert "Anna was found in no frame" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")

@@ -15,9 +15,13 @@ from airborne.run.smooth import smooth_run
 from tests.cli.test_cli import in_process, refusal
 from tests.support.motions import somersault
 from tests.support.players_trial import write_run
+from tests.support.run_files import contents_of, files_of
 from tests.test_docs import DOCS, named, table_of
 
-NEW = {"smooth_motion.csv", "smooth_joints.csv", "smooth_events.csv", "residuals.png", "smooth.json"}
+NEW = {
+    *("tables/smooth_motion.csv", "tables/smooth_joints.csv", "tables/smooth_events.csv"),
+    *("figures/residuals.png", "smooth.json"),
+}
 
 
 @pytest.fixture
@@ -41,13 +45,13 @@ def table(path):
 
 
 def test_new_tables_lie_beside_the_raw_ones_which_stay(run, capsys):
-    before = {path.name: path.read_bytes() for path in run.iterdir()}
+    before = contents_of(run)
     assert in_process("smooth", run, "--butterworth", "10") == 0
     output = capsys.readouterr().out
     assert "-3 dB of both at 10 Hz" in output and "no gap filled" in output and "Winter" in output
-    assert {path.name: path.read_bytes() for path in run.iterdir() if path.name in before} == before
-    assert {path.name for path in run.iterdir()} - set(before) == NEW
-    rows = table(run / "smooth_motion.csv")
+    assert before.items() <= contents_of(run).items()
+    assert set(files_of(run)) - set(before) == NEW
+    rows = table(run / "tables/smooth_motion.csv")
     assert len(rows) == 40
     assert rows[20]["x_m"] == rows[21]["vz_m_s"] == "" and rows[20]["status"] == "lost"
     assert float(rows[10]["vx_m_s"]) == pytest.approx(5.0, abs=0.2)
@@ -57,8 +61,8 @@ def test_new_tables_lie_beside_the_raw_ones_which_stay(run, capsys):
 def test_gaps_are_filled_on_request_into_another_folder(run, tmp_path):
     out = tmp_path / "new" / "out"
     assert in_process("smooth", run, "--spline", "--fill", "0.1", "-o", out) == 0
-    assert {path.name for path in out.iterdir()} == NEW
-    rows = table(out / "smooth_motion.csv")
+    assert set(files_of(out)) == NEW
+    rows = table(out / "tables/smooth_motion.csv")
     assert rows[20]["is_filled"] == "1" and float(rows[20]["x_m"]) == pytest.approx(2.0, abs=0.05)
 
 
@@ -68,17 +72,17 @@ def test_auto_takes_the_cutoff_of_the_residual_analysis_and_json_says_all(run, c
     assert result == json.loads((run / "smooth.json").read_text())
     assert result["cutoff_hz"] == result["residual_analysis"]["chosen_hz"]
     assert result["events"] == {"": [{"name": "given", "time_s": 0.2}]}
-    assert [row["segment"] for row in table(run / "smooth_motion.csv")[8:12]] == ["0", "0", "1", "1"]
+    assert [row["segment"] for row in table(run / "tables/smooth_motion.csv")[8:12]] == ["0", "0", "1", "1"]
 
 
 def test_players_are_smoothed_too(tmp_path, capsys):
     run = write_run(tmp_path / "run")
     assert in_process("smooth", run, "--kalman", "--events", "none") == 0
-    rows = table(run / "smooth_joints.csv")
+    rows = table(run / "tables/smooth_joints.csv")
     assert len(rows) == 12 * 2 * 6
     assert {row["player"] for row in rows} == {"Anna", "number 7"}
     assert float(rows[0]["sd_m"]) < 0.02
-    events = table(run / "smooth_events.csv")
+    events = table(run / "tables/smooth_events.csv")
     assert {row["event"] for row in events if row["player"] == "Anna"} == {"highest"}
 
 
@@ -107,14 +111,20 @@ def test_a_motion_too_short_to_choose_by_is_refused(tmp_path):
 
 
 def documented_columns(page, heading):
-    return [name for row in table_of(DOCS / page, heading) for name in named(row[0])]
+    return [name for row in table_of(DOCS / "how-to" / page, heading) for name in named(row[0])]
 
 
 def test_every_column_is_documented(run, tmp_path):
     smooth_run(run, Smoothing(method="spline"))
     players = write_run(tmp_path / "players")
     smooth_run(players, Smoothing(method="spline"), events_s=[])
-    assert set(table(run / "smooth_motion.csv")[0]) == set(documented_columns("signals.md", "`smooth_motion.csv`"))
-    assert set(table(players / "smooth_joints.csv")[0]) == set(documented_columns("signals.md", "`smooth_joints.csv`"))
-    text = (DOCS / "signals.md").read_text(encoding="utf-8")
-    assert all(f"`{name}`" in text for name in (run / "smooth_events.csv").read_text().splitlines()[0].split(","))
+    assert set(table(run / "tables/smooth_motion.csv")[0]) == set(
+        documented_columns("signals.md", "`smooth_motion.csv`")
+    )
+    assert set(table(players / "tables/smooth_joints.csv")[0]) == set(
+        documented_columns("signals.md", "`smooth_joints.csv`")
+    )
+    text = (DOCS / "how-to" / "signals.md").read_text(encoding="utf-8")
+    assert all(
+        f"`{name}`" in text for name in (run / "tables/smooth_events.csv").read_text().splitlines()[0].split(",")
+    )

@@ -42,7 +42,7 @@ from airborne.evaluation.variables import read_joint_angles
 from airborne.export.conversion import ConversionOptions, convert
 from airborne.motion import MotionWriter, read_estimates, read_players
 from airborne.run.evaluate import assess
-from airborne.run.opening import holds_run_of
+from airborne.run.folder import holds_run_of
 from airborne.run.players_tracker import read_torsos
 from airborne.tracking.players import PlayerStart
 from airborne.trial.file import read_trial
@@ -158,7 +158,7 @@ def trials(folder):
 
     def whole(path):
         trial = read_trial(path)
-        return (trial.settings, trial.players, trial.has_players or trial.model())
+        return trial.players if trial.has_players else (trial.settings, trial.model())
 
     yield example_case("trial", folder, "trial.toml", whole)
     legs = folder / "legs"

@@ -5,7 +5,20 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Pose, PosedBody, Segment, SurfaceArrays, surface_arrays
+from airborne.body import (
+    BodyModel,
+    Box,
+    Ellipsoid,
+    Inertia,
+    Mesh,
+    Part,
+    Pose,
+    PosedBody,
+    Segment,
+    SurfaceArrays,
+    surface_arrays,
+)
+from airborne.body.inertia import combine_inertias, transform_inertia
 from airborne.cameras import Camera
 from airborne.rendering import Lamp, Lights
 from airborne.video import View
@@ -97,3 +110,9 @@ def batch(model: BodyModel, n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     bodies = [model.with_pose(random_pose(rng)) for _ in range(n)]
     return np.stack([body.R for body in bodies]), np.stack([body.t for body in bodies])
+
+
+def total_inertia(posed: PosedBody) -> Inertia:
+    """A posed body's mass, centre of mass [m] and inertia tensor about it [kg m^2], in world axes."""
+    segments = zip(posed.model.segments, posed.R, posed.t, strict=True)
+    return combine_inertias([transform_inertia(segment.inertia, R, t) for segment, R, t in segments])

@@ -28,7 +28,7 @@ def three_side_by_side() -> Rig:
     )
 
 
-def waved(n: int) -> RigidTransform:
+def wave_board(n: int) -> RigidTransform:
     """A board that is turned and moved in front of the cameras, frame by frame."""
     t = np.linspace(0, 6, n)
     turn = np.column_stack([0.5 * np.sin(2.1 * t), 0.6 * np.cos(1.7 * t), 0.4 * np.sin(1.3 * t)])

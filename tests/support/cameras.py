@@ -46,6 +46,6 @@ def clicked(points: ControlPoints, camera: str, change) -> ControlPoints:
     return replace(points, px=px)
 
 
-def seen_only_by(points: ControlPoints, *cameras: str) -> ControlPoints:
+def restrict_to_cameras(points: ControlPoints, *cameras: str) -> ControlPoints:
     """Return the points with these cameras' columns only."""
     return replace(points, cameras=cameras, px=points.px[:, [points.cameras.index(camera) for camera in cameras]])

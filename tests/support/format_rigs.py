@@ -58,6 +58,6 @@ def assert_same(found: Rig, rig: Rig, *, with_names=True):
         np.testing.assert_allclose(ours.centre, theirs.centre, rtol=ROUNDTRIP, atol=10 * ROUNDTRIP)
 
 
-def seen_points(rig: Rig) -> np.ndarray:
+def visible_points(rig: Rig) -> np.ndarray:
     """Points (n, 3) [m] near the place that all cameras look at."""
     return TARGET + np.random.default_rng(0).uniform(-0.2, 0.2, (8, 3))

@@ -33,7 +33,7 @@ def boards(rng, n=40):
     return RigidTransform.from_components(rng.uniform(-0.5, 0.5, (n, 3)) + MIDDLE, Rotation.random(n, rng=rng))
 
 
-def seen_board(rng, rig, places, *, noise_px=0.3, board=BOARD, moving=None):
+def observe_board(rng, rig, places, *, noise_px=0.3, board=BOARD, moving=None):
     """What the rig sees of the board's front; moving: each camera's own places instead."""
     rows = []
     for i, camera in enumerate(rig):
@@ -50,7 +50,7 @@ def seen_board(rng, rig, places, *, noise_px=0.3, board=BOARD, moving=None):
     return Views(board, rig.names, tuple(rows))
 
 
-def seen_points(rng, rig, points, *, noise_px=0.5, name="points", is_free=None, start=None):
+def observe_points(rng, rig, points, *, noise_px=0.5, name="points", is_free=None, start=None):
     """World points (n, 3) as every camera sees them."""
     px = np.stack([camera.px_from_world(points) for camera in rig], axis=1)
     point, camera = np.nonzero(np.isfinite(px).all(axis=-1))

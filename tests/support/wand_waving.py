@@ -24,7 +24,7 @@ def hall(focals_px=FOCALS_PX, k1=0.0) -> Rig:
     return Rig(tuple(replace(camera, distortion=np.array([k1, 0, 0, 0, 0])) for camera in rig))
 
 
-def waved(rng, n, lengths_m=(1.0,), middle=(0.0, 0.0, 1.6)):
+def wave_wand(rng, n, lengths_m=(1.0,), middle=(0.0, 0.0, 1.6)):
     """Markers of a wand on one line (n, markers, 3) [m], anywhere in the middle, pointing anywhere."""
     first = np.array(middle) + rng.uniform((-3, -2, -1.2), (3, 2, 1.2), (n, 3))
     along = rng.normal(size=(n, 3))
@@ -32,7 +32,7 @@ def waved(rng, n, lengths_m=(1.0,), middle=(0.0, 0.0, 1.6)):
     return np.stack([first + length * along for length in (0, *np.cumsum(lengths_m))], axis=1)
 
 
-def seen(rng, rig, points, *, noise_px=0.5, stray_share=0.0):
+def observe(rng, rig, points, *, noise_px=0.5, stray_share=0.0):
     """Pixels (..., cameras, 2) of points (..., 3), NaN outside the picture; some anywhere instead."""
     px = np.stack([camera.px_from_world(points) for camera in rig], axis=-2)
     px[~((px >= 0) & (px <= np.array(SIZE) - 1)).all(axis=-1)] = np.nan
@@ -44,16 +44,16 @@ def seen(rng, rig, points, *, noise_px=0.5, stray_share=0.0):
 
 def tracks(rng, rig, n=200, *, lengths_m=(1.0,), stray_share=0.0, noise_px=0.5) -> WandTracks:
     """The wand as every camera sees it."""
-    px = seen(rng, rig, waved(rng, n, lengths_m), noise_px=noise_px, stray_share=stray_share)
+    px = observe(rng, rig, wave_wand(rng, n, lengths_m), noise_px=noise_px, stray_share=stray_share)
     return WandTracks(cameras=rig.names, px=px, lengths_m={(i, i + 1): length for i, length in enumerate(lengths_m)})
 
 
-def clicked(rng, rig, names=None, *, noise_px=0.5) -> ControlPoints:
+def click_court(rng, rig, names=None, *, noise_px=0.5) -> ControlPoints:
     """The court's points as every camera sees them, painted as exactly as courts are."""
     known = court_points("men")
     names = tuple(names or known)
     world, sd_m = (np.array([getattr(known[name], key) for name in names]) for key in ("position_m", "sd_m"))
-    px = seen(rng, rig, world + sd_m * rng.standard_normal(world.shape), noise_px=noise_px)
+    px = observe(rng, rig, world + sd_m * rng.standard_normal(world.shape), noise_px=noise_px)
     return ControlPoints(names=names, world=world, cameras=rig.names, px=px, sd_m=sd_m)
 
 

@@ -103,11 +103,41 @@ def test_cameras_in_a_list_get_their_offsets_in_their_entries(tmp_path):
     assert [camera.get("offset_s") for camera in tomllib.loads(path.read_text())["camera"]] == [None, 0.001, 0.002]
 
 
-def test_cameras_written_in_another_way_are_left_to_the_user(tmp_path):
+COMMENTED = """# measured in May
+[[camera]]
+name = "cam1"  # the clock
+
+# beside the board
+  [[camera]]
+  name = 'cam2'
+  offset_s = 0.5  # as seen by eye
+  drift_ppm = 3.0
+
+[[camera]]
+"name" = "cam3"
+# the last one
+
+[calibration]
+file = "calib.toml"
+"""
+
+
+def test_comments_order_and_layout_stay(tmp_path):
     path = tmp_path / "trial.toml"
-    path.write_text(LISTED.replace("camera = [", "'camera' = ["))
-    with pytest.raises(TrialError, match="write the offsets by hand"):
+    path.write_text(COMMENTED)
+    write_offsets(path, offsets((0, -0.004, 0.007)))
+    clock = "  offset_s = -0.004  # as seen by eye\n  offset_sd_s = 0.001\n"
+    expected = COMMENTED.replace("  offset_s = 0.5  # as seen by eye\n  drift_ppm = 3.0\n", clock)
+    expected = expected.replace('"cam3"\n', '"cam3"\noffset_s = 0.007\noffset_sd_s = 0.002\n')
+    assert path.read_text() == expected
+
+
+def test_a_file_that_has_other_cameras_by_now_is_left_alone(tmp_path):
+    path = tmp_path / "trial.toml"
+    path.write_text(LISTED.replace("cam3", "cam4"))
+    with pytest.raises(TrialError, match=r"'cam4'.*run sync again"):
         write_offsets(path, offsets((0, 0, 0)))
+    assert path.read_text() == LISTED.replace("cam3", "cam4")
 
 
 def test_whole_images_are_rounded_to_and_doubts_noted():

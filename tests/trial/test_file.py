@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from airborne.body import write_measurements
 from airborne.body.anthropometry import measurements_of
-from airborne.errors import TrialError
+from airborne.errors import MistakesError, TrialError
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.trial.file import read_trial
 from tests.support.tolerances import EXACT
@@ -122,9 +122,8 @@ def test_entries_of_the_track_table_can_be_replaced(folder):
     [
         ({"every": 0}, "--every 0: track.every: expected greater than or equal to 1"),
         ({"method": "magic"}, "--method magic: track.method: expected 'refined', 'joint'"),
-        ({"method": "blocker"}, "--method blocker: track.method = 'blocker' does not go with this body"),
-        ({"overlay": "magic"}, "--overlay magic: track.overlay: expected 'paper' or 'broadcast'"),
-        ({"overlay": "paper"}, "--overlay paper: overlay under"),
+        ({"method": "blocker"}, "--method blocker: track: method 'blocker' does not go with this body"),
+        ({"overlay": "paper"}, "--overlay paper: track: overlay: not read by method 'stepping'; remove it"),
     ],
 )
 def test_a_change_that_cannot_be_is_named_instead_of_the_file(folder, changes, said):
@@ -137,6 +136,15 @@ def test_a_change_that_cannot_be_is_named_instead_of_the_file(folder, changes, s
 def test_cameras_can_be_chosen_by_name(folder):
     assert [camera.name for camera in read(folder, cameras=["right"]).camera] == ["right"]
     assert "no camera top; it has: left, right" in complaint(folder, GOOD, cameras=["right", "top"])
+
+
+def test_every_mistake_of_a_file_is_listed(folder):
+    text = GOOD.replace("every = 2", "every = 0").replace("frame = 3", "frame = -1").replace('"top-first"', '"odd"')
+    with pytest.raises(MistakesError) as caught:
+        read(folder, text)
+    places = ["camera.0.fields", "start.frame", "track.every"]
+    assert [line.split(": ")[1] for line in caught.value.mistakes] == places
+    assert str(caught.value) == f"{caught.value.mistakes[0]}; and 2 more mistakes"
 
 
 def test_bundled_example_is_a_good_trial(thrown_cross):

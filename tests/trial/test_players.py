@@ -1,13 +1,17 @@
 """Trials of several players: what is read, and what is refused in one line."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from airborne.errors import TrialError
 from airborne.run.players_tracker import players_tracker_of, read_torsos
 from airborne.tracking.capsules import Blocker
+from airborne.tracking.methods import UNREAD_SETTINGS
 from airborne.tracking.particle import LegsTracker
 from airborne.trial.file import read_trial
+from airborne.trial.settings import BodySettings, ParticleSettings
 from tests.support.players_trial import BYSTANDER, PLAYERS, rig, trial_text
 
 
@@ -47,16 +51,19 @@ def test_legs_are_tracked_by_blocker_by_default(folder):
 
 
 def test_a_method_gets_only_the_settings_it_reads(folder):
-    of_filter = read(
-        folder, trial_text(track='method = "block-jump"\nseed = 3\nn_particles = 200')
-    ).track.method_settings
+    of_filter = read(folder, trial_text(track='method = "block-jump"\nseed = 3\nn_particles = 200')).track.model_dump()
     assert set(of_filter) == {
         *("method", "every", "stop", "overlay"),
         *("n_particles", "seed", "swing", "estimate", "views", "tempered"),
         *("torso_shift", "resample", "resample_when", "torso"),
     }
     assert (of_filter["seed"], of_filter["n_particles"], of_filter["estimate"]) == (3, 200, None)
-    assert set(read(folder, trial_text()).track.method_settings) == {"method", "every", "stop", "overlay"}
+    assert set(read(folder, trial_text()).track.model_dump()) == {"method", "every", "stop", "overlay"}
+
+
+def test_settings_of_the_filters_may_stay_in_a_file_tracked_by_blocker(folder):
+    text = trial_text(track='method = "mixture"\nseed = 3')
+    assert "seed" not in read(folder, text, track={"method": "blocker"}).track.model_dump()
 
 
 def test_the_shared_clip_is_read_as_it_is(shared_data):
@@ -75,13 +82,13 @@ def test_the_shared_clip_is_read_as_it_is(shared_data):
         ),
         ('preset = "legs"', 'preset = "legs"\nstature_m = 1.8', "takes no stature_m"),
         ("[track]", '[track]\nmethod = "refined"', 'does not go with preset "legs"; use one of: blocker, block-jump'),
-        ("[track]", '[track]\nv_rule = "v_sym"', "v_rule under [track]: not read by method 'blocker'"),
+        ("[track]", '[track]\nv_rule = "v_sym"', "track: v_rule: not read by method 'blocker'; remove it"),
         ("[track]", "[lights]\nambient = 0.5\n[track]", "[lights]"),
-        ("[track]", "[track]\nn_particles = 3", "track.n_particles"),
-        ("[track]", "[track]\nseed = -1", "track.seed"),
-        ("[track]", '[track]\nswing = "wild"', "track.swing"),
+        ("[track]", "[track]\nmethod = 'mixture'\nn_particles = 3", "track.n_particles"),
+        ("[track]", "[track]\nmethod = 'mixture'\nseed = -1", "track.seed"),
+        ("[track]", '[track]\nmethod = "mixture"\nswing = "wild"', "track.swing"),
         ("[track]", '[track]\noverlay = "fancy"', "track.overlay"),
-        ("[track]", '[track]\ntorso = "torso.csv"', "torso.csv not found beside it"),
+        ("[track]", '[track]\nmethod = "mixture"\ntorso = "torso.csv"', "torso.csv not found beside it"),
         ('"number 7"', '"Anna"', "two players share a name: Anna, Anna, referee"),
         (
             '"number 7"',
@@ -127,7 +134,7 @@ def test_settings_of_legs_are_refused_for_a_body(folder, thrown_cross):
     text = (thrown_cross / "trial.toml").read_text(encoding="utf-8").replace("[track]", "[track]\nseed = 1", 1)
     for name in ("control_points.csv", "cross.toml"):
         (folder / name).write_bytes((thrown_cross / name).read_bytes() if (thrown_cross / name).exists() else b"")
-    assert "seed under [track]: not read by method 'refined'" in complaint(folder, text)
+    assert "track: seed: not read by method 'refined'" in complaint(folder, text)
 
 
 def test_a_trial_of_players_has_no_body(folder):
@@ -205,3 +212,10 @@ def test_a_table_of_torsos_that_cannot_serve_is_refused_in_one_line(folder, text
     with pytest.raises(TrialError) as caught:
         players_tracker_of(trial, rig())
     assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_every_setting_named_as_unread_is_one_of_its_method():
+    kinds = (BodySettings, ParticleSettings)
+    for method, unread in UNREAD_SETTINGS.items():
+        (kind,) = (kind for kind in kinds if method in get_args(kind.model_fields["method"].annotation))
+        assert unread <= set(kind.model_fields)

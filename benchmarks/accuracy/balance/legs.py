@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from run import ROOT, append, trial_text
 
 from airborne.body.legs import LEG_POINTS
-from airborne.run.first_pose import landmarks_over_time
+from airborne.run.detections import landmarks_over_time
 from airborne.run.opening import open_trial
 from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
@@ -34,13 +34,13 @@ def main(data: Path) -> None:
         path = Path(name) / "trial.toml"
         path.write_text(trial_text(data, 'preset = "human18"\nstature_m = 1.72\nmass_kg = 66.0'))
         trial = read_trial(path)
-        recording, _ = open_trial(trial)
-        seen = landmarks_over_time(trial, recording.rig)
+        opened = open_trial(trial)
+        seen = landmarks_over_time(opened.recording.rig, opened.detections)
     first = {joint: seen[joint][0] for joint in (*LEG_POINTS, "foot_left", "foot_right")}
     first["torso"] = np.mean([seen[joint][0] for joint in TRUNK], axis=0)
     tracker = Blocker([PlayerStart(name="man", joints_m=first)])
     state, off, lost, spent_s = tracker.init(), [], 0, []
-    for frames in recording:
+    for frames in opened.recording:
         begun = time.thread_time()
         state, (estimate,) = tracker.step(state, frames)
         spent_s.append(time.thread_time() - begun)

@@ -23,9 +23,9 @@ from rows import ROOT, append
 from airborne.body.files import read_body
 from airborne.body_fitting.from_trial import fit_person
 from airborne.evaluation import compare_joints, landmark_of, read_joint_paths
-from airborne.run.body_tracking import track
-from airborne.run.first_pose import landmarks_over_time
+from airborne.run.detections import landmarks_over_time
 from airborne.run.opening import open_trial
+from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
 
 SIDES = ("left", "right")
@@ -62,9 +62,9 @@ def main(data: Path, body: Path | None) -> None:
             fit_person(read_trial(folder / "fit.toml"), body)
         (folder / "trial.toml").write_text(trial_text(data, f'file = "{body.resolve().as_posix()}"'))
         trial = read_trial(folder / "trial.toml")
-        recording, _ = open_trial(trial)
-        seen = landmarks_over_time(trial, recording.rig)
-        run = track(trial, folder / "run", pictures=False)
+        opened = open_trial(trial)
+        seen = landmarks_over_time(opened.recording.rig, opened.detections)
+        run = track_trial(trial, folder / "run", pictures=False)
         model = read_body(folder / "run" / "body.toml")
     motion, base = run.motion, {"data": "balance, whole body", "method": trial.track.method, "n": len(run.motion)}
     trc = read_joint_paths(data / "Pose2Sim_markers.trc")

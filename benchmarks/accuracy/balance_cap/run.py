@@ -18,8 +18,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from rows import ROOT, append
 
 from airborne.geometry.triangulation import triangulate
-from airborne.run.body_tracking import track
-from airborne.run.opening import cameras_of
+from airborne.run.opening import open_cameras
+from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
 
 CAMERAS = ("cam01", "cam02", "cam04")
@@ -73,10 +73,10 @@ def main(data: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trial.toml"
         path.write_text(trial_text(data, [0, 0, 0]))
-        rig, _ = cameras_of(read_trial(path))
+        rig = open_cameras(read_trial(path)).rig
         start = rig.points_from_px(np.array(CLICKED_PX, float))
         path.write_text(trial_text(data, [round(float(x), 4) for x in start]))
-        motion = track(read_trial(path), Path(folder) / "run", pictures=False).motion
+        motion = track_trial(read_trial(path), Path(folder) / "run", pictures=False).motion
     detections = np.load(data / "detections_2d.npz")
     px = np.stack([detections["c" + name[3:]][:, EARS, :2] for name in CAMERAS], axis=2)
     ears = triangulate(rig.P, px).mean(axis=1)

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from airborne.kernels import kernel
 
-BINS_PER_CHANNEL = 32
+BINS_PER_CHANNEL = 32  # of sRGB: 5 of its 8 bits
 EVIDENCE_LIMIT = 5.0  # [nats] bound of a single pixel's evidence
 _FLOOR = np.float32(2e-5)  # probability of a bin that was never observed
 _BIN_AT_PEAK = np.float32(37.1)  # a bin's volume times the Student density's peak at an sd of one grey level
-_HALF = np.float32(0.5)
+_HALF = np.float32(0.5)  # a float32, so that the kernel computes in single precision
 _KERNEL = np.array([0.25, 0.5, 0.25], np.float32)  # a colour also counts in its neighbours' bins
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from airborne.kernels import kernel
 
-HSV_BINS = 110
+HSV_BINS = 110  # 10 hues x 10 saturations, and 10 values of what has no colour (Pérez et al. 2002)
 OUTSIDE = HSV_BINS  # the bin of what no image shows
 CODES = 1 << 15  # RGB with 5 bits a channel
 

@@ -1,7 +1,6 @@
 """Body models: body files in, `BodyModel`, `Pose` and `PosedBody` out; independent of cameras and images."""
 
 from airborne.body.human import human18, human18_from_measurements
-from airborne.body.inertia import total_inertia, total_inertias
 from airborne.body.inverse_kinematics import PoseFit, fit_lengths, fit_pose
 from airborne.body.measurements import Measurements, read_measurements, write_measurements
 from airborne.body.model import (
@@ -46,8 +45,6 @@ __all__ = [
     "human18_from_measurements",
     "read_measurements",
     "surface_arrays",
-    "total_inertia",
-    "total_inertias",
     "with_girths",
     "with_segment_lengths",
     "write_measurements",

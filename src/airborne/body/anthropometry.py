@@ -36,6 +36,7 @@ _DENSITIES = {  # [kg/m^3], Dempster's, as in Yeadon (1990-II)
     "shank": 1090.0,
     "foot": 1100.0,
 }
+# plausible statures [m], masses [kg] and girths relative to the average
 _STATURES_M, _MASSES_KG, _GIRTHS = (0.8, 2.5), (10.0, 300.0), (0.6, 1.7)
 _ACROMION_PER_SHOULDER = 0.57  # depth of the trunk at the acromia over that at the shoulder joints (Yeadon's program)
 _PALM_INWARD = Rotation.from_euler("z", 90, degrees=True).as_matrix()

@@ -33,15 +33,15 @@ from airborne.errors import BodyError, one_line
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.io.text import list_keys, read_toml
 
-Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
-_Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
+_Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+_Matrix = Annotated[list[_Vector], Field(min_length=3, max_length=3)]
 _Bound = Annotated[float, Field(allow_inf_nan=True)]  # inf: no bound
 _Range = Annotated[list[_Bound], Field(min_length=2, max_length=2)]
 _Channel = Annotated[float, Field(ge=0, le=255)]
 
 
 _SAME_ROTATION = 1e-15  # rounding of a rotation matrix
-_LARGEST_KG_M2 = 1e6
+_LARGEST_KG_M2 = 1e6  # of a moment of inertia: a typing error beyond it
 
 
 class _Strict(BaseModel):
@@ -51,12 +51,12 @@ class _Strict(BaseModel):
 class _PartTable(_Strict):
     name: str
     shape: Literal["box", "ellipsoid", "mesh"]
-    size_m: Vector | None = None
-    semi_axes_m: Vector | None = None
+    size_m: _Vector | None = None
+    semi_axes_m: _Vector | None = None
     file: str | None = None
     scale: float = Field(1.0, gt=0)  # metres per unit of the mesh file
-    centre_m: Vector = [0.0, 0.0, 0.0]
-    rotation_deg: Vector = [0.0, 0.0, 0.0]  # about the segment's x, then the new y, then the new z
+    centre_m: _Vector = [0.0, 0.0, 0.0]
+    rotation_deg: _Vector = [0.0, 0.0, 0.0]  # about the segment's x, then the new y, then the new z
     colour_srgb: Annotated[list[_Channel], Field(min_length=3, max_length=3)] | None = None
     colour: Literal["sample"] | None = None
     slab_m: _Range | None = None  # along the part's own z
@@ -64,20 +64,20 @@ class _PartTable(_Strict):
 
 class _InertiaTable(_Strict):
     mass_kg: float = Field(gt=0)
-    centre_m: Vector
+    centre_m: _Vector
     tensor_kg_m2: _Matrix
 
 
 class _LandmarkTable(_Strict):
     name: str
     segment: str
-    position_m: Vector = [0.0, 0.0, 0.0]
+    position_m: _Vector = [0.0, 0.0, 0.0]
 
 
 class _SegmentTable(_Strict):
     name: str
     parent: str | None = None
-    joint_m: Vector = [0.0, 0.0, 0.0]
+    joint_m: _Vector = [0.0, 0.0, 0.0]
     limits_deg: Annotated[list[_Range], Field(min_length=3, max_length=3)] | None = None  # about x, y, z
     part: list[_PartTable] = []
     inertia: _InertiaTable | None = None

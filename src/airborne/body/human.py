@@ -71,7 +71,7 @@ _JOINT_LANDMARKS = {  # named for the joint at a segment's origin
 }
 _LIMB_LANDMARKS = ("hip", "knee", "ankle", "foot", "shoulder", "elbow", "wrist", "hand")
 _ROUNDING = 0.5  # an ellipsoid reaches beyond its joints by this share of the segment's mean radius
-_HEAD_WIDTH_PER_DEPTH = 0.79
+_HEAD_WIDTH_PER_DEPTH = 0.79  # of the head's ellipsoid
 _SOLE_PER_BALL = 0.039 / 0.0735  # depth of the sole below the ankle, over the distance from the ankle to the ball
 _HEEL_PER_TOE = 0.42  # how far the heel reaches behind the ankle, over how far the toes reach in front of it
 

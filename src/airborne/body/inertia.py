@@ -1,4 +1,4 @@
-"""Mass, centre of mass and inertia tensor: of combined pieces, and of a whole body in a pose."""
+"""Mass, centre of mass and inertia tensor of combined pieces, and of a body's segments."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airborne.body.model import BodyModel, Inertia, PosedBody
+from airborne.body.model import BodyModel, Inertia
 from airborne.errors import BodyError
 from airborne.types import Array
 
@@ -16,34 +16,16 @@ def combine_inertias(pieces: Sequence[Inertia]) -> Inertia:
     mass = np.array([piece.mass_kg for piece in pieces])
     centres = np.array([piece.centre_m for piece in pieces])
     tensors = np.array([piece.tensor_kg_m2 for piece in pieces])
-    centre, tensor = _combine(mass, centres, tensors)
-    return Inertia(float(mass.sum()), centre, tensor)
+    centre = np.einsum("s,si->i", mass, centres) / mass.sum()
+    arm = centres - centre
+    square = np.einsum("s,si,si->", mass, arm, arm)
+    parallel = square * np.eye(3) - np.einsum("s,si,sj->ij", mass, arm, arm)
+    return Inertia(float(mass.sum()), centre, tensors.sum(axis=0) + parallel)
 
 
 def transform_inertia(inertia: Inertia, R: Array, t: Array) -> Inertia:
     """Express an inertia in another frame: R (3, 3) and t (3,) [m] take its frame to that one."""
     return Inertia(inertia.mass_kg, R @ inertia.centre_m + t, R @ inertia.tensor_kg_m2 @ R.T)
-
-
-def total_inertia(posed: PosedBody) -> Inertia:
-    """Find a posed body's mass, centre of mass [m] and inertia tensor about it [kg m^2], in world axes.
-
-    Raises BodyError for a body with a segment of unknown inertia.
-    """
-    mass, centre, tensor = total_inertias(posed.model, posed.R[None], posed.t[None])
-    return Inertia(mass, centre[0], tensor[0])
-
-
-def total_inertias(model: BodyModel, R: Array, t: Array) -> tuple[float, Array, Array]:
-    """Find the mass [kg], the centres of mass (n, 3) [m] and the tensors about them (n, 3, 3) [kg m^2] of n poses.
-
-    R (n, s, 3, 3), t (n, s, 3) [m]: world from segment. World axes. Raises BodyError as `total_inertia`.
-    """
-    mass, local_centres, local_tensors = segment_inertias(model)
-    centres = np.einsum("nsij,sj->nsi", R, local_centres) + t
-    tensors = np.einsum("nsij,sjk,nslk->nsil", R, local_tensors, R)
-    centre, tensor = _combine(mass, centres, tensors)
-    return float(mass.sum()), centre, tensor
 
 
 def segment_inertias(model: BodyModel) -> tuple[Array, Array, Array]:
@@ -63,12 +45,3 @@ def segment_inertias(model: BodyModel) -> tuple[Array, Array, Array]:
         np.array([inertia.centre_m for inertia in inertias]),
         np.array([inertia.tensor_kg_m2 for inertia in inertias]),
     )
-
-
-def _combine(mass: Array, centres: Array, tensors: Array) -> tuple[Array, Array]:
-    """Combine s pieces, mass (s,), centres (..., s, 3), tensors (..., s, 3, 3): centre (..., 3), tensor (..., 3, 3)."""
-    centre = np.einsum("s,...si->...i", mass, centres) / mass.sum()
-    arm = centres - centre[..., None, :]
-    square = np.einsum("s,...si,...si->...", mass, arm, arm)
-    parallel = square[..., None, None] * np.eye(3) - np.einsum("s,...si,...sj->...ij", mass, arm, arm)
-    return centre, tensors.sum(axis=-3) + parallel

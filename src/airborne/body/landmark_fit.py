@@ -17,7 +17,7 @@ from airborne.types import Array
 
 _ANGLE_SD_RAD = 1.0  # prior sd of an angle about neutral
 _FINE_GAIN, COARSE_GAIN = 1e-6, 1e-4  # shares of the cost; a smaller gain ends the iteration
-_MOST_STEPS = 100
+_MOST_STEPS = 100  # at most
 _DAMPING = MarquardtRule(first=1e-4, down=5, up=4, least=1e-9, most=4e8)
 
 

@@ -91,7 +91,7 @@ _ASCENDING = (  # levels along one axis, from the joint outward
     *(tuple(f"L{side}{level}L" for level in levels) for side in "ab" for levels in ("234", "567")),
     *(tuple(f"L{side}{level}L" for level in levels) for side in "jk" for levels in ("1345", "689")),
 )
-_TYPICAL_STATURE_M = 1.7
+_TYPICAL_STATURE_M = 1.7  # only for the range in which a measurement is plausible
 _LEAST_RATIO, _GREATEST_RATIO = 0.125, 4.0  # to the typical value; beyond, the unit is wrong
 _FLATTEST, _DEEPEST = 2.0, 4.0  # a section's perimeter over its width; above pi it is deeper than wide
 _UNITS = "measurementconversionfactor = 1 for metres, 0.01 for centimetres, 0.001 for millimetres"

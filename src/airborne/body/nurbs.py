@@ -13,11 +13,13 @@ from airborne.types import Array
 
 # a stadium from the middle of its lower straight side, counter-clockwise, as multiples of (half flat, radius)
 _FLAT = np.array([0, 0.5, 1, 1, 1, 1, 1, 0, -1, -1, -1, -1, -1, -0.5, 0])
+# see above: multiples of the radius, along the straight sides
 _ACROSS = np.array([0, 0, 0, 1, 1, 1, 0, 0, 0, -1, -1, -1, 0, 0, 0])
+# see above: multiples of the radius, across them
 _DEEP = np.array([-1, -1, -1, -1, 0, 1, 1, 1, 1, 1, 0, -1, -1, -1, -1])
 _STADIUM_WEIGHTS = np.where((_ACROSS != 0) & (_DEEP != 0), np.sqrt(0.5), 1.0)  # corners of quarter circles
 _LEAST_FLAT, _LEAST_SPAN = 1e-6, 1e-3  # of the radius: a circle's straight sides, so that it has normals all around
-_POINT_M = 1e-9
+_POINT_M = 1e-9  # [m] points closer than this are one
 _OFF_POLE = 1e-6  # of the range of v
 
 

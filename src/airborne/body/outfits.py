@@ -17,7 +17,7 @@ Colour = tuple[float, float, float] | None  # sRGB 0..255; None: to be sampled f
 
 _BACKWARD = Rotation.from_euler("x", -90, degrees=True)  # a part whose own z points backward
 _TOWARD = (Rotation.from_euler("y", 90, degrees=True), _BACKWARD, Rotation.identity())  # own z points along x, y, z
-_ALIGNED = 1e-9
+_ALIGNED = 1e-9  # rounding of axes and of solids
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,8 +22,10 @@ _CAP_RAD = np.radians([60.0, 30.0])  # sections of a rounded end, besides its ti
 
 # the loft's axes as rows, in the segment's frame: x along the straight sides, y across them, z along the segment
 _WIDE, _DEEP = np.eye(3), np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+# likewise, for feet and their soles
 _SIDEWAYS, _FORWARD = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]]), np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
+# of an oval section: length along its straight sides over width across
 _THIGH, _KNEE, _CALF, _UPPER_ARM, _ELBOW, _FOREARM, _NECK, _SKULL = 1.06, 1.06, 1.08, 1.10, 1.04, 1.12, 1.06, 1.27
 _FOOT = (  # share of the way from heel to toe; half width over the ball's; height over the ankle's
     (0.10, 0.62, 0.75),

@@ -13,7 +13,7 @@ from airborne.errors import BodyError
 from airborne.types import Array
 
 _RANGE = (0.1, 10.0)  # a scale beyond these is a mistake
-_ALIGNED = 1e-9
+_ALIGNED = 1e-9  # rounding: axes this near to whole numbers are those of the segment
 
 
 def with_segment_lengths(model: BodyModel, scales: Mapping[str, float]) -> BodyModel:

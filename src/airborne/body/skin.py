@@ -45,8 +45,8 @@ _STATIONS = {  # the two ends of a segment's loft; neighbouring segments share t
     "foot": ("heel", "toes"),
 }
 _LEVELS = sorted({name for ends in _STATIONS.values() for name in ends})
-_SAME_JOINT_M, _SAME_MASS = 5e-4, 5e-3
-_FEWEST_ALONG, _MOST_ALONG = 24, 48
+_SAME_JOINT_M, _SAME_MASS = 5e-4, 5e-3  # [m], relative: a body this close to the preset's has the same person's skin
+_FEWEST_ALONG, _MOST_ALONG = 24, 48  # rings of vertices along a segment
 
 
 def skin_of(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from airborne.body.model import Mesh
 from airborne.types import Array
 
-_ON_CUT_M = 1e-9
+_ON_CUT_M = 1e-9  # rounding: vertices this near to the cut lie on it
 
 
 def split_at(mesh: Mesh, heights_m: Array) -> Mesh:

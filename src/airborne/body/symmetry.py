@@ -12,8 +12,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body.model import BodyModel, Box, Ellipsoid, Part, Pose
 from airborne.types import Array
 
-_SAME_POINT_M = 1e-6
-_SAME_MOMENT_M2 = 1e-7
+_SAME_POINT_M = 1e-6  # rounding of coordinates in body files
+_SAME_MOMENT_M2 = 1e-7  # rounding of second moments of area
 _SAME_COLOUR = 1.0  # grey levels
 
 

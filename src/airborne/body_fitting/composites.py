@@ -24,7 +24,7 @@ from airborne.types import Array
 _SIGMA_PX = 1.2  # of the blur
 _SCALE_LIGHT = 0.1  # linear light, 0..1, of the robust cost: a residual this large has a quarter of the weight
 _CORRELATED_PX = BLOCK_PX**2  # pixels that share the error of an approximate shape
-_LIGHT_ROUNDS = 3
+_LIGHT_ROUNDS = 3  # reweightings of the light
 _NEAR_PX = 4  # beyond this from the mask, a small step changes nothing
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,18 +19,17 @@ from airborne.cameras.clicks import read_positions
 from airborne.errors import TrialError
 from airborne.export.views import crop_camera, resample_view
 from airborne.rendering import FLAT, render
-from airborne.run.body_tracking import open_trial
-from airborne.run.first_pose import LANDMARK_WEIGHTS, landmarks_over_time
+from airborne.run.detections import landmarks_over_time
+from airborne.run.opening import Opened, open_trial
+from airborne.tracking.first_pose import LANDMARK_WEIGHTS
 from airborne.trial.file import Trial
-from airborne.types import Array
+from airborne.types import Array, StageProgress
 from airborne.video import Frames, Recording
-
-StageProgress = Callable[[str, int, int], None]  # what is being done, how far, of how many
 
 _N_SCENERY = 10  # further frames that show the scene without the person
 PICTURE = "fit_body.png"
 _CELL_PX, _CELL_SCALE = 400, 0.4  # a cell of the image, and its pixel size in pixels of `crop_camera`
-_LINE_RGB, _EMPTY_GREY = (255, 230, 0), 60
+_LINE_RGB, _EMPTY_GREY = (255, 230, 0), 60  # sRGB of the outline; grey of a cell without an image
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,8 +51,9 @@ def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: Stage
         raise TrialError(f"frames is {n_frames}; expected at least 1 frame to fit the body to")
     report = progress or (lambda what, done, total: None)
     model = trial.model()
-    recording, _ = open_trial(trial)
-    landmarks = _landmarks_by_frame(trial, recording)
+    opened = open_trial(trial)
+    recording = opened.recording
+    landmarks = _landmarks_by_frame(trial, opened)
     chosen, around = _choose_frames(trial, landmarks, n_frames)
     observations = _read(recording, landmarks, sorted({*chosen, *around}), report)
     missing = [index for index in chosen if index not in observations]
@@ -96,10 +96,11 @@ def describe_fit(person: PersonFit) -> str:
     return "\n".join(lines)
 
 
-def _landmarks_by_frame(trial: Trial, recording: Recording) -> dict[int, dict[str, Array]]:
+def _landmarks_by_frame(trial: Trial, opened: Opened[Recording]) -> dict[int, dict[str, Array]]:
     """Return the landmarks of each frame of the recording: frame -> landmark -> (3,) [m]."""
-    if trial.start.detections is not None:
-        over_time = landmarks_over_time(trial, recording.rig)
+    recording = opened.recording
+    if opened.detections is not None:
+        over_time = landmarks_over_time(recording.rig, opened.detections)
         facts, n = recording.facts[0], len(next(iter(over_time.values())))
         per_frame = round(facts.image_rate / facts.frame_rate)
         stop = n * per_frame if trial.track.stop is None else min(n * per_frame, trial.track.stop)

@@ -12,7 +12,7 @@ from airborne.calibration.bundle import ALL_FIXED, Adjustment, Source, adjust
 from airborne.errors import CalibrationError
 from airborne.types import Array, Ints
 
-_N_FOLDS = 3
+_N_FOLDS = 3  # parts of the recording, each left out once
 _BLOCK_MOMENTS = 8  # successive moments in one fold, where lags relate them by the board's motion
 
 

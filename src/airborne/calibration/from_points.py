@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.diagnosis import check_points, decompose_cameras, warnings_about
-from airborne.calibration.intrinsics.model_selection import Solution, choose_simplest, leave_one_out, supported_models
+from airborne.calibration.intrinsics.model_selection import Solution, choose_simplest, leave_one_out, models_for
 from airborne.calibration.intrinsics.physical import (
     PINHOLE_MODELS,
     SEVEN_PARAMETERS,
@@ -106,7 +106,7 @@ def calibrate(
         rig=Rig(tuple(cameras)),
         method=method,
         fits=tuple(fits),
-        held_out_points_m=_held_out_point_errors(points, solutions),
+        held_out_points_m=_point_errors_left_out(points, solutions),
         warnings=warnings_about(points, sizes, decompositions, solutions),
     )
 
@@ -133,7 +133,7 @@ def _solve(
         return [leave_one_out(pinhole, SEVEN_PARAMETERS, world, px)]
     return [
         leave_one_out(fit_pinhole(initial, model, world, px), model, world, px)
-        for model in supported_models(PINHOLE_MODELS, len(world))
+        for model in models_for(PINHOLE_MODELS, len(world))
     ]
 
 
@@ -168,7 +168,7 @@ def _describe_fit(points: ControlPoints, name: str, best: Solution, candidates: 
     )
 
 
-def _held_out_point_errors(points: ControlPoints, solutions: Mapping[str, Solution]) -> Array:
+def _point_errors_left_out(points: ControlPoints, solutions: Mapping[str, Solution]) -> Array:
     """Triangulate each point with cameras fitted without it: (n, 3) [m] minus the surveyed points."""
     n, c = points.px.shape[:2]
     P, px = np.zeros((n, c, 3, 4)), np.full((n, c, 2), np.nan)

@@ -11,18 +11,18 @@ from airborne.calibration.bundle import Adjustment, FreeParameters, ObservationL
 from airborne.calibration.cross_validation import cross_validate
 from airborne.calibration.initial.chaining import board_poses, board_source
 from airborne.calibration.initial.resection import Resection, find_misplaced_cameras, resect_cameras
-from airborne.calibration.initial.values import Inputs, Progress, read_inputs
+from airborne.calibration.initial.values import Inputs, read_inputs
 from airborne.calibration.sources.files import Sources
 from airborne.calibration.sources.person import calibration_prior, person_source
 from airborne.calibration.sources.scene_points import scene_source
 from airborne.calibration.sources.wand import wand_source
 from airborne.calibration.world_frame.choice import WorldFrame, choose_world_frame
 from airborne.cameras import Rig
-from airborne.types import Array
+from airborne.types import Array, StageProgress
 
 _LONGEST_GAP_S = 0.26  # between images of which the board's motion can be interpolated
 _LOOSE_SYNC_NOISE_SHARE = 0.75  # lags are accepted where they lower the noise to less than this share
-_FEWEST_MOMENTS = 10
+_FEWEST_MOMENTS = 10  # with a board, to estimate lags
 _LAG_SD = 0.5  # of the time between images
 
 
@@ -44,7 +44,7 @@ class RigCalibration:
         return self.adjustment.rig
 
 
-def calibrate_from(sources: Sources, progress: Progress) -> RigCalibration:
+def calibrate_from(sources: Sources, progress: StageProgress) -> RigCalibration:
     """Read all sources and adjust the cameras to all of them at once; raises an AirborneError in one line.
 
     progress is called with the stage, the steps done, and the steps expected.
@@ -90,7 +90,7 @@ def _resect_misplaced(inputs: Inputs) -> tuple[Rig, tuple[Resection, ...]]:
 
 
 def _adjust(
-    inputs: Inputs, rig: Rig, free: Mapping[str, FreeParameters], *, lag_sd_s: float | None, progress: Progress
+    inputs: Inputs, rig: Rig, free: Mapping[str, FreeParameters], *, lag_sd_s: float | None, progress: StageProgress
 ) -> Adjustment:
     sources = _sources(inputs, rig, lag_sd_s)
     prior = None
@@ -140,7 +140,7 @@ def _lag_sd_s(inputs: Inputs) -> float | None:
     return _LAG_SD * gap_s if is_dense else None
 
 
-def _adjust_in_world(adjustment: Adjustment, frame: WorldFrame, progress: Progress) -> Adjustment:
+def _adjust_in_world(adjustment: Adjustment, frame: WorldFrame, progress: StageProgress) -> Adjustment:
     """Transform everything to the requested world frame, and estimate the standard deviations there."""
     rig, sources = adjustment.transform(frame.new_from_old, frame.scale)
     if frame.fixed_moment is not None:

@@ -9,9 +9,9 @@ import numpy as np
 from airborne.calibration.from_sources import RigCalibration
 from airborne.calibration.sources.board_detection import first_image
 
-_INCHES, _LEAST_INCHES = 9.0, 6.0
+_INCHES, _LEAST_INCHES = 9.0, 6.0  # of a figure's longer side; least width, for the title
 _ARROW_SHARE = 0.06  # of an image's longer side: the length of an arrow of the median residual
-_MOST_ARROWS = 1500
+_MOST_ARROWS = 1500  # in a figure, drawn at random
 _COLOURS = ("#d95f02", "#1b9e77", "#7570b3", "#e7298a", "#66a61e", "#e6ab02")
 
 

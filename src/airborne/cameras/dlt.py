@@ -63,8 +63,8 @@ def dlt_coefficients(P: Array) -> Array:
 def decompose(P: Array) -> Decomposition:
     """Split P (3, 4) into K, R and centre, in the classical closed form.
 
-    The axes are the rows of P without their component along the optical axis. Skew is dropped and R made orthogonal, so
-    `compose` restores a P without skew exactly.
+    The axes are the rows of P without their component along the optical axis. Skew is dropped and R made orthogonal; a
+    P without skew is `K R [I | -centre]` exactly.
     """
     r3 = P[2, :3] / np.linalg.norm(P[2, :3])
     P = P / np.linalg.norm(P[2, :3])
@@ -91,8 +91,3 @@ def decompose_with_skew(P: Array) -> Decomposition:
     r1 = np.cross(r2, r3)
     K = np.array([[right @ r1, skew, u0], [0, np.linalg.norm(down), v0], [0, 0, 1]])
     return Decomposition(K, np.stack([r1, r2, r3]), -np.linalg.solve(P[:, :3], P[:, 3]))
-
-
-def compose(K: Array, R: Array, centre: Array) -> Array:
-    """Return `P = K R [I | -centre]` (3, 4), the inverse of `decompose`."""
-    return K @ R @ np.column_stack([np.eye(3), -centre])

@@ -11,6 +11,7 @@ import typer
 from airborne import __version__
 from airborne.cli import reproduce, results, synth, track
 from airborne.cli.calibrate import calibrate_command
+from airborne.cli.check import check_command
 from airborne.cli.console import STOPPED, refuse, stop
 from airborne.cli.convert import convert_command
 from airborne.cli.export import export_command
@@ -21,6 +22,7 @@ from airborne.errors import AirborneError
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
 _COMMANDS = {
     "demo": track.demo_command,
+    "check": check_command,
     "track": track.track_command,
     "calibrate": calibrate_command,
     "sync": sync_command,

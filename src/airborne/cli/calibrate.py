@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 
-from airborne.cli.console import Json, progress, sizes_px
+from airborne.cli.console import Json, sizes_px
 from airborne.errors import AirborneError
+from airborne.io.terminal import Stages
 
 
 def calibrate_command(
@@ -155,8 +155,8 @@ def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> No
     from airborne.calibration.residual_figures import write_residual_figures
     from airborne.cameras import write_pose2sim
 
-    with _Phases() as phases:
-        calibration = calibrate_from(sources, phases)
+    with Stages() as stages:
+        calibration = calibrate_from(sources, stages)
     report = calibration_to_dict(calibration)
     write_pose2sim(
         output,
@@ -168,20 +168,6 @@ def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> No
     print(json.dumps(report) if as_json else describe_calibration(calibration))
     if not as_json:
         print(f"written: {output}\nreport: {folder / 'report.json'} and {len(pictures)} pictures beside it")
-
-
-class _Phases(ExitStack):
-    """A progress bar for each phase, one after the other."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._what, self._report = "", lambda done, total: None
-
-    def __call__(self, what: str, done: int, total: int | None) -> None:
-        if what != self._what:
-            self.close()
-            self._what, self._report = what, self.enter_context(progress(what))
-        self._report(done, total)
 
 
 def _sizes(text: str, names: tuple[str, ...]) -> dict[str, tuple[int, int]]:

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, NoReturn
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from airborne.errors import AirborneError
+from airborne.io.terminal import errors
+from airborne.io.terminal import progress as progress
 
 STOPPED = 130  # the exit code
-_SECONDS_A_LINE = 5.0
 _SIDES_PX = range(16, 20_001)  # of an image
-
-errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Out = Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.")]
@@ -50,27 +44,3 @@ def sizes_px(text: str) -> dict[str, tuple[int, int]]:
     if any(side not in _SIDES_PX for size in sizes.values() for side in size):
         raise AirborneError(f"--size {text}: expected sides of {_SIDES_PX[0]} to {_SIDES_PX[-1]} pixels")
     return sizes
-
-
-@contextmanager
-def progress(what: str) -> Iterator:
-    """Show a progress bar on stderr; where stderr is no terminal, a line every few seconds."""
-    if not errors.is_terminal:
-        yield _ProgressLines(what)
-        return
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=errors, transient=True) as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
-
-
-class _ProgressLines:
-    """Progress as plain lines."""
-
-    def __init__(self, what: str) -> None:
-        self._what, self._next_s = what, time.monotonic() + _SECONDS_A_LINE
-
-    def __call__(self, done: int, total: int | None) -> None:
-        if time.monotonic() >= self._next_s:
-            self._next_s = time.monotonic() + _SECONDS_A_LINE
-            errors.print(f"{self._what}: {done} of {total or 'unknown'}", markup=False)

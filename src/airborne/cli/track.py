@@ -14,8 +14,7 @@ from airborne.cli.results import evaluate_command
 from airborne.errors import AirborneError
 
 if TYPE_CHECKING:
-    from airborne.run.body_tracking import Run
-    from airborne.run.players_tracking import PlayersRun
+    from airborne.run.track import TrackResult
 
 
 def demo_command(
@@ -26,11 +25,13 @@ def demo_command(
 
     Example: airborne demo
     """
+    from airborne.run.folder import holds_run_of
     from airborne.trial.examples import example_trial
+    from airborne.trial.file import read_trial
 
     trial = example_trial("thrown_cross")
-    _clear_demo(trial, output)
-    run = _track(trial, output, resume=False, pictures=True)
+    overwrite = holds_run_of(read_trial(trial), output)  # a folder with any other run is left alone
+    run = _track(trial, output, resume=False, overwrite=overwrite, pictures=True)
     if not as_json:
         print(_describe(run.summary))
     evaluate_command(output, trial.parent / "truth.csv", trial.parent / "digitised.csv", as_json=as_json)
@@ -38,19 +39,15 @@ def demo_command(
         print(f"report: {output / 'report.html'}")
 
 
-def _clear_demo(path: Path, output: Path) -> None:
-    """Let the demo run again in its own folder; a folder with any other run is left alone."""
-    from airborne.run.body_tracking import holds_run_of
-    from airborne.trial.file import read_trial
-
-    if holds_run_of(read_trial(path), output):
-        (output / "motion.csv").unlink(missing_ok=True)
-
-
 def track_command(
     trial: Annotated[Path, typer.Argument(help="The trial's TOML file.")],
     output: Out,
     resume: Annotated[bool, typer.Option(help="Resume a run that was stopped.")] = False,
+    overwrite: Annotated[bool, typer.Option(help="Replace the run that the folder holds.")] = False,
+    first_frame: Annotated[
+        bool,
+        typer.Option("--first-frame", help="Track one frame and draw it in every camera: is [start] right?"),
+    ] = False,
     method: Annotated[
         str | None,
         typer.Option(
@@ -73,7 +70,17 @@ def track_command(
     """
     options = {"method": method, "every": every, "overlay": overlay}
     changes = {key: value for key, value in options.items() if value is not None}
-    run = _track(trial, output, resume=resume, pictures=pictures, changes=changes, cameras=cameras, live=live)
+    run = _track(
+        trial,
+        output,
+        resume=resume,
+        overwrite=overwrite,
+        pictures=pictures,
+        first_frame=first_frame,
+        changes=changes,
+        cameras=cameras,
+        live=live,
+    )
     if as_json:
         print((output / "summary.json").read_text(encoding="utf-8"), end="")
     else:
@@ -87,26 +94,32 @@ def _track(
     output: Path,
     *,
     resume: bool,
+    overwrite: bool,
     pictures: bool,
+    first_frame: bool = False,
     changes: dict | None = None,
     cameras: str | None = None,
     live: bool = False,
-) -> Run | PlayersRun:
-    from airborne.run.body_tracking import track as track_body
-    from airborne.run.players_tracking import track_players
+) -> TrackResult:
+    from airborne.run.track import track_trial
     from airborne.trial.file import read_trial
 
     names = None if cameras is None else [name.strip() for name in cameras.split(",") if name.strip()]
     if names == []:
         raise AirborneError("--cameras names no camera; give their names, separated by commas")
     trial = read_trial(path, changes or {}, names)
-    if live and not trial.has_players:
-        raise AirborneError('--live is for players; this trial has no body preset = "legs"')
     try:
         with progress(f"tracking {trial.name}") as report:
-            if trial.has_players:
-                return track_players(trial, output, resume=resume, live=live, pictures=pictures, progress=report)
-            return track_body(trial, output, resume=resume, pictures=pictures, progress=report)
+            return track_trial(
+                trial,
+                output,
+                resume=resume,
+                overwrite=overwrite,
+                live=live,
+                pictures=pictures,
+                first_frame=first_frame,
+                progress=report,
+            )
     except KeyboardInterrupt:
         if live and not output.exists():
             stop("not every camera had delivered a frame yet, so nothing is written")

@@ -19,14 +19,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm, t
+from scipy.stats import chi2, t
 
+from airborne.constants import NORMAL_QUANTILE_975
 from airborne.evaluation.compare import nan_to_none
 from airborne.evaluation.icc import Reliability, reliability
 from airborne.motion.jumps.jump import UNKNOWN, Measurement
 from airborne.types import Array
-
-Z = float(norm.ppf(0.975))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +114,7 @@ def analyse_agreement(series: Series) -> Agreement:
         nrmse_percent=scale_measurement(rmse, 100 / span) if span > 0 else UNKNOWN,
         icc=icc,
         sem=icc.sem,
-        mdc=scale_measurement(icc.sem, Z * math.sqrt(2)),
+        mdc=scale_measurement(icc.sem, NORMAL_QUANTILE_975 * math.sqrt(2)),
     )
 
 
@@ -167,8 +166,8 @@ def limits_of_agreement(components: VarianceComponents) -> tuple[Measurement, Me
     narrower = sd - math.sqrt(max(components.total - less, 0.0))
     wider = math.sqrt(components.total + more) - sd
     shift = float(t.ppf(0.975, components.mean_freedom)) * components.mean_se
-    inner, outer = math.hypot(shift, Z * narrower), math.hypot(shift, Z * wider)
-    low, high = components.mean - Z * sd, components.mean + Z * sd
+    inner, outer = math.hypot(shift, NORMAL_QUANTILE_975 * narrower), math.hypot(shift, NORMAL_QUANTILE_975 * wider)
+    low, high = components.mean - NORMAL_QUANTILE_975 * sd, components.mean + NORMAL_QUANTILE_975 * sd
     return Measurement(low, low - outer, low + inner), Measurement(high, high - inner, high + outer)
 
 
@@ -194,7 +193,7 @@ def _rmse(difference: Array, count: float) -> Measurement:
     if count < 2 or value == 0:
         return Measurement(value, math.nan, math.nan)
     se = math.sqrt((2 * variance**2 + 4 * bias**2 * variance) / count) / (2 * mean_square)
-    return Measurement(value, value * math.exp(-Z * se), value * math.exp(Z * se))
+    return Measurement(value, value * math.exp(-NORMAL_QUANTILE_975 * se), value * math.exp(NORMAL_QUANTILE_975 * se))
 
 
 def plain_numbers(value: Any) -> Any:

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from airborne.body import Pose
+from airborne.constants import NORMAL_QUANTILE_975
 from airborne.geometry.rotations import geodesic
 from airborne.types import Array
 
-_RECOVERED_WITHIN_M = 0.010
-_RECOVERED_WITHIN_RAD = np.deg2rad(2.0)
-_Z_95 = 1.959963984540054  # the normal distribution's 97.5 % quantile
+_RECOVERED_WITHIN_M = 0.010  # of the true position
+_RECOVERED_WITHIN_RAD = np.deg2rad(2.0)  # likewise
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +28,9 @@ class Basin:
         """The 95 % interval of the success rate (Wilson's score interval); (0, 1) for no trial."""
         if not self.n:
             return 0.0, 1.0
-        share, z2 = self.n_recovered / self.n, _Z_95**2
+        share, z2 = self.n_recovered / self.n, NORMAL_QUANTILE_975**2
         middle = (share + z2 / (2 * self.n)) / (1 + z2 / self.n)
-        half = _Z_95 / (1 + z2 / self.n) * np.sqrt(share * (1 - share) / self.n + z2 / (4 * self.n**2))
+        half = NORMAL_QUANTILE_975 / (1 + z2 / self.n) * np.sqrt(share * (1 - share) / self.n + z2 / (4 * self.n**2))
         return max(0.0, float(middle - half)), min(1.0, float(middle + half))
 
     def describe(self) -> str:

@@ -16,12 +16,10 @@ from airborne.evaluation.truth import Truth
 from airborne.geometry.rotations import angles_from_matrix, geodesic, is_near_singular, wrap
 from airborne.motion import Motion
 from airborne.tracking import Status
-from airborne.types import Array
-
-Triple = tuple[float, float, float]
+from airborne.types import Array, Triple
 
 _SAME_TIME_S = 1e-6  # where neither table has two times, so that no period is known
-_HARDLY_ANY = 0.2
+_HARDLY_ANY = 0.2  # share within two sds; 0.95 is expected
 _SAME_SHARE = 0.1  # of the shorter period: times further apart do not match
 
 

@@ -13,9 +13,7 @@ from airborne.evaluation.compare import SdCalibration, match_times, nan_to_none,
 from airborne.evaluation.joint_files import JointPaths, landmark_of
 from airborne.motion import Motion, landmarks
 from airborne.tracking import Status
-from airborne.types import Array
-
-Triple = tuple[float, float, float]
+from airborne.types import Array, Triple
 
 _FARTHEST_SHIFT = 3  # periods by which the clocks are shifted relative to each other
 _CLEARLY_BETTER = 0.98  # of the unshifted distance

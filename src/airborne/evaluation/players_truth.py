@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from airborne.constants import GRAVITY_M_S2
 from airborne.errors import ResultError
 from airborne.evaluation.table import read_table
 from airborne.io.text import read_json
@@ -86,7 +87,7 @@ def reference_jump(jump: Mapping[str, float]) -> dict[str, float]:
     """Convert the facts of a jump, as a scene generator states them, to numbers of our jump table."""
     reference = {name: float(jump[key]) for name, key in (_EVENTS | _HEIGHTS).items() if key in jump}
     if "flight_s" in jump:
-        reference["flight_time_height_m"] = 9.81 * float(jump["flight_s"]) ** 2 / 8
+        reference["flight_time_height_m"] = GRAVITY_M_S2 * float(jump["flight_s"]) ** 2 / 8
     return reference
 
 

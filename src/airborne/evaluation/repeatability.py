@@ -12,7 +12,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from airborne.evaluation.agreement import Series, Z, effective_number, plain_numbers, scale_measurement
+from airborne.constants import NORMAL_QUANTILE_975
+from airborne.evaluation.agreement import Series, effective_number, plain_numbers, scale_measurement
 from airborne.evaluation.icc import Reliability, mean_squares, reliability, sd_with_interval
 from airborne.motion.jumps.jump import UNKNOWN, Measurement
 
@@ -55,11 +56,11 @@ def analyse_repeatability(series: Series) -> Repeatability:
         n_ways=k,
         n_effective=count,
         within_sd=within_sd,
-        coefficient=scale_measurement(within_sd, Z * math.sqrt(2)),
+        coefficient=scale_measurement(within_sd, NORMAL_QUANTILE_975 * math.sqrt(2)),
         biases=biases,
         icc=icc,
         sem=icc.sem,
-        mdc=scale_measurement(icc.sem, Z * math.sqrt(2)),
+        mdc=scale_measurement(icc.sem, NORMAL_QUANTILE_975 * math.sqrt(2)),
     )
 
 

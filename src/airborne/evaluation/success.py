@@ -17,8 +17,8 @@ from airborne.cameras import Rig
 from airborne.types import Array
 
 _WIDTH_M = {"hip": THIGH_WIDTH_M, "knee": SHANK_WIDTH_M, "ankle": SHANK_WIDTH_M, "foot": SHANK_WIDTH_M}
-_MARGIN_PX = 5.0
-_FEWEST_VIEWS = 2
+_MARGIN_PX = 5.0  # beside the reach in metres
+_FEWEST_VIEWS = 2  # in which a joint must be seen, and hit, to count
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,14 +15,16 @@ from airborne.tracking import Status
 from airborne.tracking.players import PlayerStart
 from airborne.types import Array, Image
 
-Colour = tuple[int, int, int]
+_Colour = tuple[int, int, int]
 
+# sRGB; ACCENT where the height is sure
 _WHITE, _DARK, ACCENT, UNSURE = (255, 255, 255), (16, 20, 28), (255, 205, 0), (190, 190, 190)
+# half width of the floor's mark, ruler from the player, its height, a tick
 _FLOOR_HALF_M, _RULER_AWAY_M, _RULER_M, _TICK_M = 0.35, 0.50, 1.0, 0.1
 _GROUND_M, _JUMP_M = 0.05, 0.10  # below the first a player stands, above the second a jump has begun
 _EM_SHARE = 1 / 34  # of the image's height
 _ANKLES = [LEG_POINTS.index("ankle_left"), LEG_POINTS.index("ankle_right")]
-_BITS = 4
+_BITS = 4  # of a pixel, for smooth edges
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +71,7 @@ class Jumper:
     is_sure: bool
 
     @property
-    def rgb(self) -> Colour:
+    def rgb(self) -> _Colour:
         """The colour of the player's height."""
         return ACCENT if self.is_sure else UNSURE
 
@@ -148,7 +150,7 @@ def _cm(height_m: float) -> int:
     return max(round(height_m * 100), 0)
 
 
-def _draw_outlined_text(image: Image, text: str, at: tuple[float, float], *, size_px: float, rgb: Colour) -> None:
+def _draw_outlined_text(image: Image, text: str, at: tuple[float, float], *, size_px: float, rgb: _Colour) -> None:
     """Write bold text with a dark rim, legible on any background."""
     rim = max(size_px / 14, 0.7)
     for dx, dy in ((-rim, 0), (rim, 0), (0, -rim), (0, rim)):
@@ -156,6 +158,6 @@ def _draw_outlined_text(image: Image, text: str, at: tuple[float, float], *, siz
     draw_text(image, text, at, size_px=size_px, rgb=rgb, bold=True)
 
 
-def _draw_line(image: Image, a: Array, b: Array, rgb: Colour, *, thickness: float) -> None:
+def _draw_line(image: Image, a: Array, b: Array, rgb: _Colour, *, thickness: float) -> None:
     ends = [tuple(np.rint(end * (1 << _BITS)).astype(int).tolist()) for end in (a, b)]
     cv2.line(image, ends[0], ends[1], rgb, max(round(thickness), 1), cv2.LINE_AA, _BITS)

@@ -13,7 +13,7 @@ from airborne.body import BodyModel
 from airborne.export.takes import Take, part_paths, portable_names
 from airborne.types import Array
 
-_CM = 100.0
+_CM = 100.0  # to a metre: the usual unit of BVH files
 _Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # x, z, -y: at rest the body looks along z
 _CHANNELS = "Xrotation Zrotation Yrotation"  # our x, -y and z, in our order, so that no angle ever jumps
 

@@ -19,11 +19,12 @@ from airborne.export.takes import Take
 from airborne.types import Array
 
 LARGEST_RESIDUAL_MM = 100.0  # larger ones, and infinite ones, are written as this
+# bytes of a block, the processor code of Intel, the key of a C3D file (C3D format manual)
 _BLOCK, _INTEL, _KEY = 512, 84, 0x50
 _LARGEST_WORD = 0xFFFF  # of the frame counts in the header
 _LARGEST_INTEGER = 32000  # of a coordinate, should the file be converted to integers
-_LABELS_A_PARAMETER = 255
-_MOST_BLOCKS = 255
+_LABELS_A_PARAMETER = 255  # a dimension is one byte
+_MOST_BLOCKS = 255  # their count is one byte
 Value = str | list[str] | float | list[int]
 
 

@@ -15,8 +15,8 @@ from airborne.export.palette import ESTIMATE_RGB, hex_colour
 from airborne.types import Array, Image
 
 _LINE_STYLES = (("-", hex_colour(ESTIMATE_RGB)), ("--", "#d55e00"))
-_TITLE_PX, _GAP_PX, _FONT_SCALE = 18, 2, 0.42
-_GREY = (210, 210, 210)
+_TITLE_PX, _GAP_PX, _FONT_SCALE = 18, 2, 0.42  # of a title line, between pictures; of OpenCV's font
+_GREY = (210, 210, 210)  # sRGB of the text
 
 
 class ScoreCurve(NamedTuple):

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
@@ -70,6 +71,11 @@ def write_figures(
 
 
 def write_pose(path: Path, motion: Motion) -> None:
+    """Write `pose_figure` as a PNG."""
+    pose_figure(motion).savefig(path)
+
+
+def pose_figure(motion: Motion) -> Figure:
     """Draw x, y, z [m] and somersault, tilt, twist [deg] over time with bands of two standard deviations.
 
     Lost frames are gaps, shaded; frames in which some direction is unobservable are hatched.
@@ -89,7 +95,7 @@ def write_pose(path: Path, motion: Motion) -> None:
         if angle != "tilt":
             panels.shade_spans(right, motion.time_s, singular, panels.SINGULAR_STYLE)
     handles = [*panels.unobservable_handles(unobservable[0] | unobservable[1]), *panels.singular_handles(singular)]
-    panels.save_figure(figure, path, motion, [panels.band_handle("± 2 standard deviations"), *handles])
+    return panels.add_legend(figure, motion, [panels.band_handle("± 2 standard deviations"), *handles])
 
 
 def write_score(path: Path, motion: Motion) -> None:
@@ -115,6 +121,11 @@ def write_score(path: Path, motion: Motion) -> None:
 
 
 def write_joints_figure(path: Path, motion: Motion, model: BodyModel) -> None:
+    """Write `joints_figure` as a PNG."""
+    joints_figure(motion, model).savefig(path)
+
+
+def joints_figure(motion: Motion, model: BodyModel) -> Figure:
     """Draw the angles of the main joints over time [deg], left beside right, with bands of two standard deviations.
 
     Of a person shoulders, elbows, hips and knees: the x angle, with its sign such that flexion is positive. Of another
@@ -140,7 +151,7 @@ def write_joints_figure(path: Path, motion: Motion, model: BodyModel) -> None:
         *panels.unobservable_handles(unobservable),
         *panels.singular_handles(singular, "y near ±90°: x and z mix"),
     ]
-    panels.save_figure(figure, path, motion, [panels.band_handle("± 2 standard deviations"), *handles])
+    return panels.add_legend(figure, motion, [panels.band_handle("± 2 standard deviations"), *handles])
 
 
 def _joint_panels(joints: Sequence[str]) -> list[tuple[str, str, float]]:
@@ -155,6 +166,11 @@ def _joint_panels(joints: Sequence[str]) -> list[tuple[str, str, float]]:
 
 
 def write_flight_figure(path: Path, motion: Motion, model: BodyModel) -> None:
+    """Write `flight_figure` as a PNG."""
+    flight_figure(motion, model).savefig(path)
+
+
+def flight_figure(motion: Motion, model: BodyModel) -> Figure:
     """Draw the height of the centre of mass [m] and the angular momentum [kg m^2/s] over time, with bands of two sd.
 
     Raises BodyError where a segment has no inertia, ResultError where the motion is another body's.
@@ -177,7 +193,7 @@ def write_flight_figure(path: Path, motion: Motion, model: BodyModel) -> None:
     low, high = zip(*(axes.get_ylim() for axes in momenta), strict=True)
     for axes in momenta:  # one scale, so that the components can be compared
         axes.set_ylim(min(low), max(high))
-    panels.save_figure(figure, path, motion, [panels.band_handle("± 2 standard deviations")])
+    return panels.add_legend(figure, motion, [panels.band_handle("± 2 standard deviations")])
 
 
 def write_errors(path: Path, motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> None:

@@ -24,11 +24,12 @@ from airborne.export.takes import Take
 from airborne.rendering.srgb import light_from_srgb
 from airborne.types import Array
 
-_FLOAT, _INDEX = 5126, 5125
-_VERTICES, _FACES = 34962, 34963
+_FLOAT, _INDEX = 5126, 5125  # accessor.componentType: FLOAT, UNSIGNED_INT (glTF 2.0, section 5.1)
+_VERTICES, _FACES = 34962, 34963  # bufferView.target: ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER (glTF 2.0, section 5.11)
 _KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 _MATT = 0.9  # roughness of a material
 _Y_UP = Rotation.from_euler("x", -90, degrees=True).as_quat().tolist()
+# "glTF", "JSON", "BIN" as little-endian numbers (glTF 2.0, section 4.4)
 _MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 
 

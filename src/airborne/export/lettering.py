@@ -13,7 +13,7 @@ from airborne.types import Image
 Outline = NDArray[np.floating]
 
 _BITS = 4  # of a pixel, for smooth edges
-_EM = 100.0
+_EM = 100.0  # size at which outlines are kept
 
 
 def draw_text(

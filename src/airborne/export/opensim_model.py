@@ -16,14 +16,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from airborne.body import BodyModel, Box, Ellipsoid, Part, Segment
+from airborne.constants import STANDARD_GRAVITY_M_S2
 from airborne.export.part_meshes import part_colour
 from airborne.export.takes import portable_names
 from airborne.geometry.rotations import angles_from_matrix
 from airborne.types import Array
 
 _DOCUMENT_VERSION = "40000"  # of the file format: OpenSim 4.0 and later
+# OpenSim's ground: x along the world's y, y up, z along the world's x
 GROUND_FROM_WORLD = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
-_BODY_FROM_SEGMENT = np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])
+_BODY_FROM_SEGMENT = np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])  # its bodies: x ahead, y up, z to the right
 _ROTATIONS = ("somersault", "tilt", "twist")
 _ROTATION_RANGE_RAD = 20 * np.pi  # range of the root's rotations
 _TRANSLATION_RANGE_M = 50.0  # range of the root's translations
@@ -41,7 +43,7 @@ def write_osim(path: Path, model: BodyModel) -> None:
     root = ET.SubElement(document, "Model", name=portable_names([model.name])[0])
     ET.SubElement(root, "length_units").text = "meters"
     ET.SubElement(root, "force_units").text = "N"
-    ET.SubElement(root, "gravity").text = "0 -9.80665 0"
+    ET.SubElement(root, "gravity").text = f"0 {-STANDARD_GRAVITY_M_S2} 0"
     names = portable_names([segment.name for segment in model.segments])
     bodies, joints, markers = (_set(root, kind) for kind in ("BodySet", "JointSet", "MarkerSet"))
     for segment, name, parent in zip(model.segments, names, model.parents, strict=True):

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Literal, Self
 
 import cv2
 import numpy as np
@@ -21,25 +22,41 @@ from airborne.tracking import Status
 from airborne.types import Image
 from airborne.video import Frames, VideoWriter, View
 
+OverlaysAs = Literal["videos", "stills"]
+
 LONGEST_SIDE_PX = 1280  # larger images are reduced to it
 _LINE_SHARE = 1 / 240  # of the image's height
-_TEXT_SHARE = 1 / 30
-_MISSING_GREY = 40
+_TEXT_SHARE = 1 / 30  # of the image's height
+_MISSING_GREY = 40  # stands in for an image that is missing
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+
+@dataclass(frozen=True, slots=True)
+class _Still:
+    """A picture file in the place of a video: the last image written stays."""
+
+    path: Path
+
+    def write(self, image: Image) -> None:
+        self.path.write_bytes(cv2.imencode(".png", image[..., ::-1])[1].tobytes())
 
 
 class CameraVideos:
     """`overlay_<camera>.mp4` of each camera, written frame by frame; use it in a `with` block."""
 
-    def __init__(self, folder: Path, rig: Rig, rate: Fraction) -> None:
-        """Start a file for each camera of the rig, whose sizes are those of whole frames.
+    def __init__(self, folder: Path, rig: Rig, rate: Fraction, drawn: OverlaysAs = "videos") -> None:
+        """Start a file for each camera of the rig, whose sizes are those of whole frames; "stills" as PNG.
 
         rate: frames per second. Raises VideoError where a file cannot be written.
         """
         self.cameras = tuple(_reduce_camera(camera.without_distortion()) for camera in rig)  # of the images to write
         with ExitStack() as stack:
             self._writers = [
-                stack.enter_context(VideoWriter(folder / f"overlay_{camera.name}.mp4", size=camera.size, rate=rate))
+                stack.enter_context(
+                    VideoWriter(folder / f"overlay_{camera.name}.mp4", size=camera.size, rate=rate)
+                    if drawn == "videos"
+                    else nullcontext(_Still(folder / f"overlay_{camera.name}.png"))
+                )
                 for camera in self.cameras
             ]
             self._stack = stack.pop_all()
@@ -65,12 +82,12 @@ class OverlayVideos:
     A killed run leaves videos that can be played up to about a second before its end.
     """
 
-    def __init__(self, folder: Path, rig: Rig, rate: Fraction) -> None:
+    def __init__(self, folder: Path, rig: Rig, rate: Fraction, drawn: OverlaysAs = "videos") -> None:
         """Start the videos of the rig's cameras, whose sizes are those of whole frames.
 
         rate: frames per second. Raises VideoError where a file cannot be written.
         """
-        self._videos = CameraVideos(folder, rig, rate)
+        self._videos = CameraVideos(folder, rig, rate, drawn)
 
     def write(self, frames: Frames, posed: PosedBody | None, status: Status) -> None:
         """Append what every camera saw at one time; no outline is drawn where `posed` is None."""

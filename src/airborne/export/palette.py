@@ -5,9 +5,9 @@ from __future__ import annotations
 from airborne.tracking import Status
 
 STATUS_RGB = {Status.TRACKED: (0, 158, 115), Status.UNCERTAIN: (230, 159, 0), Status.LOST: (213, 94, 0)}
-ESTIMATE_RGB = (0, 114, 178)
-REFERENCE_RGB = (30, 30, 30)
-TEXT_RGB = (51, 51, 51)
+ESTIMATE_RGB = (0, 114, 178)  # the blue of Okabe and Ito, which the colour-blind tell apart
+REFERENCE_RGB = (30, 30, 30)  # nearly black
+TEXT_RGB = (51, 51, 51)  # softer than black
 
 
 def hex_colour(rgb: tuple[int, int, int]) -> str:

@@ -17,9 +17,9 @@ from airborne.motion import Motion
 from airborne.tracking import Status
 from airborne.types import Array, Mask
 
-WIDTH_IN = 7.6
-DPI = 150
-FONT_PT = 9
+WIDTH_IN = 7.6  # of a figure
+DPI = 150  # of a figure
+FONT_PT = 9  # of labels
 _LEGEND_CHARACTERS = 85  # that fit into one row
 ANGLES = ("somersault", "tilt", "twist")
 TEXT, LINE, FAINT = hex_colour(TEXT_RGB), hex_colour(ESTIMATE_RGB), "#dddddd"
@@ -82,6 +82,11 @@ def begin_at_zero(axes: Axes) -> None:
 
 def save_figure(figure: Figure, path: Path, motion: Motion, extra: Sequence[Artist] = ()) -> None:
     """Add the legend on top and write the PNG."""
+    add_legend(figure, motion, extra).savefig(path)
+
+
+def add_legend(figure: Figure, motion: Motion, extra: Sequence[Artist] = ()) -> Figure:
+    """Add the legend on top: the statuses with their numbers of frames, and what else is given."""
     counts = {status: motion.count(status) for status in Status}
     handles: list[Artist] = [
         Line2D([], [], color=LINE, marker=marker, markerfacecolor=hex_colour(STATUS_RGB[status]), markeredgewidth=0,
@@ -98,7 +103,7 @@ def save_figure(figure: Figure, path: Path, motion: Motion, extra: Sequence[Arti
         labelcolor=TEXT,
     )  # fmt: skip
     figure.align_ylabels()
-    figure.savefig(path)
+    return figure
 
 
 def draw_band(axes: Axes, time_s: Array, middle: Array, sd: Array) -> None:

@@ -15,7 +15,7 @@ from airborne.body.legs import LEG_POINTS, RODS, SHANK_WIDTH_M, THIGH_WIDTH_M
 from airborne.cameras import Camera, Rig
 from airborne.export.broadcast import Heights, Jumper, draw_heights
 from airborne.export.lettering import draw_text
-from airborne.export.overlays import CameraVideos, draw_label, line_px, time_label, view_image
+from airborne.export.overlays import CameraVideos, OverlaysAs, draw_label, line_px, time_label, view_image
 from airborne.export.palette import STATUS_RGB
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate, PlayerStart
@@ -34,7 +34,14 @@ class PlayersOverlayVideos:
     """One video per camera, written frame by frame; use it in a `with` block."""
 
     def __init__(
-        self, folder: Path, rig: Rig, rate: Fraction, *, style: OverlayStyle, starts: Sequence[PlayerStart]
+        self,
+        folder: Path,
+        rig: Rig,
+        rate: Fraction,
+        *,
+        style: OverlayStyle,
+        starts: Sequence[PlayerStart],
+        drawn: OverlaysAs = "videos",
     ) -> None:
         """Start the videos of the rig's cameras; heights count from the feet in `starts`.
 
@@ -42,7 +49,7 @@ class PlayersOverlayVideos:
         """
         self._style = style
         self._heights = Heights(starts)
-        self._videos = CameraVideos(folder, rig, rate)
+        self._videos = CameraVideos(folder, rig, rate, drawn)
 
     def write(self, frames: Frames, joints: Sequence[str], estimates: Sequence[PlayerEstimate]) -> None:
         """Append what every camera saw at one time, with every player drawn who is not lost."""

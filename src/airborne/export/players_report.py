@@ -7,12 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from airborne.export import page, panels
+from airborne.export import panels
+from airborne.export.page import UNKNOWN_TEXT, render_report
 from airborne.export.palette import STATUS_RGB, hex_colour
-from airborne.export.report import DEFINITIONS, records_table, status_bar
+from airborne.export.report import DEFINITIONS
 from airborne.export.summary import json_ready
 from airborne.motion import PlayersMotion
+from airborne.motion.run_folder import REPORT, figures_of
 from airborne.tracking import Status
 
 FIGURE = "heights.png"
@@ -20,17 +23,19 @@ _JOINT_COLOURS = {"hip": "#0072b2", "knee": "#cc79a7", "ankle": "#009e73"}
 _UNCERTAIN_STYLE = {"facecolor": hex_colour(STATUS_RGB[Status.UNCERTAIN]), "edgecolor": "none", "alpha": 0.25}
 
 _JUMP_QUANTITIES = {  # columns of jumps.csv that the report shows: name, factor, digits
+    "hips": ("hip_height_m", 100.0, 1),  # the height to quote: docs/jumps.md says why
     "feet": ("foot_height_m", 100.0, 1),
-    "hips": ("hip_height_m", 100.0, 1),
     "flight time": ("flight_time_height_m", 100.0, 1),
     "take-off speed": ("takeoff_speed_height_m", 100.0, 1),
     "take-off [frame]": ("takeoff_frame", 1.0, 1),
     "landing [frame]": ("landing_frame", 1.0, 1),
     "flight [ms]": ("flight_s", 1000.0, 0),
 }
+_HEIGHTS = ("hips", "feet", "flight time", "take-off speed")
 _JUMPS_CAPTION = (
-    "Heights are in cm, each with its 95 % interval: of feet and hips over standing, and what flight time and take-off "
-    "speed come to. jumps.csv has more."
+    "Heights are in cm, each with its 95 % interval. Quote that of the hips over standing: it needs neither the moment "
+    "of take-off nor that of landing, and tucked legs do not add to it. Never compare it with a height of another "
+    "definition: of the feet over standing, or what flight time and take-off speed come to. jumps.csv has more."
 )
 _FIGURE_CAPTION = (
     "Height of the middle of both hips, knees and ankles over time, with two standard deviations; amber where "
@@ -52,10 +57,26 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
 
     `summary` is the content of summary.json.
     """
-    _write_heights(folder / FIGURE, motion)
-    path = folder / "report.html"
+    heights_figure(motion).savefig(figures_of(folder) / FIGURE)
+    path = folder / REPORT
     summary = json_ready(summary)
-    path.write_text(page.document(summary["name"], _sections(folder, summary)), encoding="utf-8")
+    uncertainty = f"{_DEFINITIONS['Uncertainty']} {summary['uncertainty']}"
+    html = render_report(
+        "players_report.html.j2",
+        summary,
+        alarms=[*players_warnings(summary), *summary["warnings"]],
+        fine_text="Every player was tracked in every frame.",
+        definitions={**_DEFINITIONS, "Uncertainty": uncertainty},
+        players=[{"player": name, **player} for name, player in summary["players"].items()],
+        jumps=[_jump_record(row) for row in summary["jumps"]],
+        heights_to_quote=[
+            (_interval_cm(row, "hips"), f"{row['player']}, jump {row['jump']}: hips") for row in summary["jumps"]
+        ],
+        jumps_caption=_JUMPS_CAPTION,
+        heights=figures_of(folder) / FIGURE,
+        heights_caption=_FIGURE_CAPTION,
+    )
+    path.write_text(html, encoding="utf-8")
     return path
 
 
@@ -83,40 +104,37 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
     for name, player in summary["players"].items():
         counts = ", ".join(f"{player[f'n_{status}']} {status}" for status in Status)
         sd_mm = player["median_sd_mm"]
-        yield f"{name}: {counts}; median sd of a joint {page.UNKNOWN_TEXT if sd_mm is None else f'{sd_mm:.0f} mm'}"
+        yield f"{name}: {counts}; median sd of a joint {UNKNOWN_TEXT if sd_mm is None else f'{sd_mm:.0f} mm'}"
     for jump in summary["jumps"]:
-        feet, flight = (_interval_cm(jump, what) for what in ("feet", "flight time"))
+        hips, *others = (_interval_cm(jump, what) for what in _HEIGHTS)
         warning = f"; {jump['n_uncertain']} of its frames are uncertain" if jump["n_uncertain"] else ""
-        yield f"{jump['player']}, jump {jump['jump']}: feet {feet}, by flight time {flight} (95 % intervals){warning}"
+        yield f"{jump['player']}, jump {jump['jump']}: {hips}, hips over standing (95 % interval){warning}"
+        yield "  by other definitions: " + ", ".join(f"{n} {cm}" for n, cm in zip(_HEIGHTS[1:], others, strict=True))
     yield from _drop_notes(summary)
 
 
-def _jumps_table(rows: list[Mapping[str, Any]]) -> str:
-    """Return the table of all jumps, each number with its 95 % interval."""
-    table = [
-        {
-            "player": row["player"],
-            "jump": row["jump"],
-            "status": row["status"],
-            **{name: _with_interval(row, *quantity) for name, quantity in _JUMP_QUANTITIES.items()},
-            "uncertain frames": row["n_uncertain"],
-        }
-        for row in rows
-    ]
-    return records_table(table) + page.bullets([_JUMPS_CAPTION])
+def _jump_record(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the report shows of a jump, each number with its 95 % interval."""
+    return {
+        "player": row["player"],
+        "jump": row["jump"],
+        "status": row["status"],
+        **{name: _with_interval(row, *quantity) for name, quantity in _JUMP_QUANTITIES.items()},
+        "uncertain frames": row["n_uncertain"],
+    }
 
 
 def _with_interval(row: Mapping[str, Any], name: str, scale: float, digits: int) -> str:
     numbers = [row[name + end] for end in ("", "_low", "_high")]
     if any(number is None or not np.isfinite(number) for number in numbers):
-        return page.UNKNOWN_TEXT
+        return UNKNOWN_TEXT
     middle, low, high = (f"{scale * number:.{digits}f}" for number in numbers)
     return f"{middle} ({low} to {high})"
 
 
 def _interval_cm(row: Mapping[str, Any], what: str) -> str:
     text = _with_interval(row, *_JUMP_QUANTITIES[what])
-    return text if text == page.UNKNOWN_TEXT else f"{text} cm"
+    return text if text == UNKNOWN_TEXT else f"{text} cm"
 
 
 def _drop_notes(summary: Mapping[str, Any]) -> Iterator[str]:
@@ -125,31 +143,7 @@ def _drop_notes(summary: Mapping[str, Any]) -> Iterator[str]:
         yield f"live: frames dropped to keep up: {counts}; delay {1e3 * live['median_delay_s']:.0f} ms (median)"
 
 
-def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
-    yield page.heading(summary["name"], 1)
-    yield status_bar(summary)
-    alarms = [*players_warnings(summary), *summary["warnings"]]
-    if alarms:
-        yield page.box("warnings", "<b>Read this first</b>" + page.bullets(alarms))
-    else:
-        yield page.box("fine", "Every player was tracked in every frame.")
-    if summary["events"]:
-        yield page.heading("The recording") + page.bullets(summary["events"])
-    yield page.heading("Players") + records_table([{"player": name, **p} for name, p in summary["players"].items()])
-    if summary["jumps"]:
-        yield page.heading("Jumps") + _jumps_table(summary["jumps"])
-    yield page.heading("Heights")
-    yield page.figure(folder / FIGURE, _FIGURE_CAPTION)
-    yield page.heading("Method") + page.settings(summary["method"])
-    yield page.heading("Cameras") + records_table(summary["cameras"])
-    yield page.heading("What the numbers mean")
-    uncertainty = f"{_DEFINITIONS['Uncertainty']} {summary['uncertainty']}"
-    yield page.definitions({**_DEFINITIONS, "Uncertainty": uncertainty})
-    for key, title in (("timings_s", "Time taken [s]"), ("versions", "Versions"), ("inputs", "Inputs (SHA-256)")):
-        yield page.heading(title) + page.table(summary[key].items())
-
-
-def _write_heights(path: Path, motion: PlayersMotion) -> None:
+def heights_figure(motion: PlayersMotion) -> Figure:
     """Draw the height of the middle of each player's hips, knees and ankles."""
     figure, grid = panels.panel_figure(len(motion.players), 1, row_in=2.2)
     for k, (player, (axes,)) in enumerate(zip(motion.players, grid, strict=True)):
@@ -169,4 +163,4 @@ def _write_heights(path: Path, motion: PlayersMotion) -> None:
         handles, labels, loc="outside upper center", ncols=len(_JOINT_COLOURS), fontsize=panels.FONT_PT, frameon=False
     )
     figure.align_ylabels()
-    figure.savefig(path)
+    return figure

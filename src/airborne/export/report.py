@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from airborne.errors import ResultError
-from airborne.export import page
-from airborne.export.palette import STATUS_RGB, hex_colour
+from airborne.export.page import UNKNOWN_TEXT, Table, render_report
 from airborne.export.summary import body_warnings, headline, json_ready
 from airborne.motion import Motion
 from airborne.motion.flight.momentum_table import GRAVITY_M_S2
-from airborne.tracking import Status
+from airborne.motion.run_folder import REPORT, figures_of
+
+
+class _Comparison(NamedTuple):
+    """A table of errors with notes below it."""
+
+    title: str
+    table: Table
+    notes: list[str]
+
 
 _FIGURES = {  # titles and captions, in the order of the page
     "pose.png": (
@@ -107,52 +115,23 @@ def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
     missing = sorted({"name", *headline(Motion.collect([]))} - set(summary))
     if missing:
         raise ResultError(f"the summary of {folder} has no {', '.join(missing[:3])}; track again")
-    path = folder / "report.html"
-    path.write_text(page.document(summary["name"], _sections(folder, summary)), encoding="utf-8")
-    return path
-
-
-def _sections(folder: Path, summary: Mapping[str, Any]) -> Iterator[str]:
-    yield page.heading(summary["name"], 1)
-    yield status_bar(summary)
-    yield page.box("tiles", "".join(page.tile(value, name) for value, name in _tiles(summary)))
-    alarms = [*body_warnings(summary), *summary.get("warnings", [])]
-    if alarms:
-        yield page.box("warnings", "<b>Read this first</b>" + page.bullets(alarms))
-    else:
-        yield page.box("fine", "Every frame was tracked, and every direction could be seen.")
-    if summary.get("events"):
-        yield page.heading("The recording") + page.bullets(summary["events"])
-    for key, title in (("truth", "Against the truth"), ("digitised", "Against digitising by hand")):
-        if summary.get(key):
-            yield page.heading(title) + _comparison(summary[key])
-    if summary.get("joints"):
-        yield page.heading("Against the paths of the joints") + _joint_comparison(summary["joints"])
-    for name, (title, caption) in _FIGURES.items():
-        if (folder / name).is_file():
-            yield page.heading(title) + page.figure(folder / name, caption)
-        if name == "flight.png" and summary.get("flight"):
-            yield _flight(summary["flight"])
-    if summary.get("method"):
-        yield page.heading("Method")
-        yield page.settings(summary["method"])
-    if summary.get("cameras"):
-        yield page.heading("Cameras") + records_table(summary["cameras"])
-    yield page.heading("What the numbers mean")
-    of_joints = {"Joint angles": _JOINT_ANGLES} if (folder / "joints.png").is_file() else {}
+    path = folder / REPORT
+    of_joints = {"Joint angles": _JOINT_ANGLES} if (figures_of(folder) / "joints.png").is_file() else {}
     uncertainty = {"Uncertainty": f"{_UNCERTAINTY} {summary.get('uncertainty', '')}"}
-    yield page.definitions({**DEFINITIONS, **of_joints, **uncertainty})
-    for key, title in (("timings_s", "Time taken [s]"), ("versions", "Versions"), ("inputs", "Inputs (SHA-256)")):
-        if summary.get(key):
-            yield page.heading(title) + page.table(summary[key].items())
-
-
-def status_bar(head: Mapping[str, Any]) -> str:
-    """Return a bar of the number of frames with each status."""
-    shares = [(head[f"n_{status}"], hex_colour(STATUS_RGB[status])) for status in Status]
-    bar = "".join(f'<div style="flex: {n} 0 0; background: {colour}"></div>' for n, colour in shares)
-    counts = ", ".join(f"{head[f'n_{status}']} {status}" for status in Status)
-    return page.box("bar", bar) + f"<p>{head['n_frames']} frames: {counts}</p>"
+    html = render_report(
+        "report.html.j2",
+        summary,
+        alarms=[*body_warnings(summary), *summary.get("warnings", [])],
+        fine_text="Every frame was tracked, and every direction could be seen.",
+        definitions={**DEFINITIONS, **of_joints, **uncertainty},
+        tiles=list(_tiles(summary)),
+        comparisons=list(_comparisons(summary)),
+        figures=[(name, *texts) for name, texts in _FIGURES.items()],
+        folder=figures_of(folder),
+        flight_table=_flight_table(summary["flight"]) if summary.get("flight") else None,
+    )
+    path.write_text(html, encoding="utf-8")
+    return path
 
 
 def _tiles(head: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -165,10 +144,10 @@ def _tiles(head: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield _with_unit(head["somersault_rev"], "{:.2f} turns"), "somersault, first to last pose"
         yield _with_unit(head["twist_rev"], "{:.2f} turns"), "twist, first to last pose"
         low, high = head["tilt_range_deg"]
-        yield page.UNKNOWN_TEXT if low is None else f"{low:.0f}° to {high:.0f}°".replace("-", "−"), "tilt"
+        yield UNKNOWN_TEXT if low is None else f"{low:.0f}° to {high:.0f}°".replace("-", "−"), "tilt"
     ranges = head["range_m"]
     yield (
-        page.UNKNOWN_TEXT if ranges[0] is None else " · ".join(f"{r:.2f}" for r in ranges) + " m",
+        UNKNOWN_TEXT if ranges[0] is None else " · ".join(f"{r:.2f}" for r in ranges) + " m",
         "range of motion in x, y, z",
     )
     yield _with_unit(head["median_score"], "{:.1f}"), "median score in grey levels"
@@ -177,15 +156,23 @@ def _tiles(head: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 def _median_sd(head: Mapping[str, Any], what: str, unit: str) -> str:
     value = head[f"median_{what}_sd_{unit}"]
     if value is None:
-        return "cannot be seen" if head[f"n_{what}_unobservable"] else page.UNKNOWN_TEXT
+        return "cannot be seen" if head[f"n_{what}_unobservable"] else UNKNOWN_TEXT
     return f"± {value:.2g} mm" if unit == "mm" else f"± {value:.2g}°"
 
 
 def _with_unit(value: float | None, form: str) -> str:
-    return page.UNKNOWN_TEXT if value is None else form.format(value).replace("-", "−")
+    return UNKNOWN_TEXT if value is None else form.format(value).replace("-", "−")
 
 
-def _comparison(comparison: Mapping[str, Any]) -> str:
+def _comparisons(summary: Mapping[str, Any]) -> Iterator[_Comparison]:
+    for key, title in (("truth", "Against the truth"), ("digitised", "Against digitising by hand")):
+        if summary.get(key):
+            yield _pose_comparison(title, summary[key])
+    if summary.get("joints"):
+        yield _joint_comparison("Against the paths of the joints", summary["joints"])
+
+
+def _pose_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
     errors = comparison.get("tracked_minus_digitised", comparison)
     position, orientation = errors["position"], errors["modulo_run"]
     rows = [(f"{axis} [mm]", position["rms_mm"][k], position["largest_mm"][k]) for k, axis in enumerate("xyz")]
@@ -207,27 +194,27 @@ def _comparison(comparison: Mapping[str, Any]) -> str:
                 f"Of the {what} errors, {share['within_1sd']:.0%} lie within one standard deviation (normal: 68%) "
                 f"and {share['within_2sd']:.0%} within two (95%)."
             )
-    table = page.table(((name, f"{rms:.2f}", f"{most:.2f}") for name, rms, most in rows), ("", "RMS", "largest"))
-    return table + page.bullets(lines)
+    table = Table([(name, f"{rms:.2f}", f"{most:.2f}") for name, rms, most in rows], ("", "RMS", "largest"))
+    return _Comparison(title, table, lines)
 
 
-def _joint_comparison(comparison: Mapping[str, Any]) -> str:
+def _joint_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
     rows = {**comparison["joints"], "all": comparison["whole"]}
     if comparison["tracked"]:
         rows["all, tracked frames"] = comparison["tracked"]
     keys = ("mean_mm", "rms_mm", "largest_mm", "mean_without_offset_mm")
-    table = page.table(
-        ((name, *(each[key] for key in keys)) for name, each in rows.items()),
+    table = Table(
+        [(name, *(each[key] for key in keys)) for name, each in rows.items()],
         ("", "mean [mm]", "RMS [mm]", "largest [mm]", "mean without offset [mm]"),
     )
     lines = [
         f"{comparison['n_matched']} of {comparison['n_reference']} reference times matched.",
         "Without offset: less a constant offset in the segment, as two definitions of a joint have.",
     ]
-    return table + page.bullets(lines)
+    return _Comparison(title, table, lines)
 
 
-def _flight(flight: Mapping[str, Any]) -> str:
+def _flight_table(flight: Mapping[str, Any]) -> Table:
     mean, sd = flight["angular_momentum_kg_m2_s"], flight["angular_momentum_spread_kg_m2_s"]
     rows = [
         (f"angular momentum about {axis} [kg m²/s]: mean, standard deviation over the frames", mean[k], sd[k])
@@ -241,11 +228,4 @@ def _flight(flight: Mapping[str, Any]) -> str:
         )
     )
     rows.append(("distance of the centre of mass from a free fall [mm], RMS", flight["ballistic_rms_mm"], ""))
-    return page.table(rows)
-
-
-def records_table(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return dictionaries as the rows of a table."""
-    keys = list(dict.fromkeys(key for row in rows for key in row))
-    cells = [[row.get(key, "") for key in keys] for row in rows]
-    return page.table(cells, [page.label(key) for key in keys])
+    return Table(rows)

@@ -21,10 +21,10 @@ from airborne.tracking import Status
 from airborne.types import Image
 from airborne.video import Frames, View
 
-_N_COLUMNS = 8
+_N_COLUMNS = 8  # moments shown
 N_BUFFERED = 32  # columns buffered while tracking; when full, every second one is dropped
-SHEET_DPI = 200
-BACKGROUND_GREY = 205
+SHEET_DPI = 200  # of a sheet in print
+BACKGROUND_GREY = 205  # around the model
 
 
 class _Column(NamedTuple):

@@ -15,9 +15,10 @@ from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.types import Array
 
 ROOT = "hips"
-_UP, _DOWN, _AHEAD = (0, 0, 1), (0, 0, -1), (0, -1, 0)
+_UP, _DOWN, _AHEAD = (0, 0, 1), (0, 0, -1), (0, -1, 0)  # directions at rest, in the segment's frame
+# blue and vermilion of Okabe and Ito; grey
 _LEFT_SRGB, _RIGHT_SRGB, _MIDDLE_SRGB = (0, 114, 178), (213, 94, 0), (150, 150, 150)
-_HIPS_RADIUS_M = 0.07
+_HIPS_RADIUS_M = 0.07  # of the ellipsoid drawn between the hips
 
 
 class _Stick(NamedTuple):

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel
+from airborne.io import parquet
 from airborne.motion import Motion, PlayersMotion, joint_angles, root_angles
 from airborne.motion.angles import ROOT_ANGLES
+from airborne.motion.tables import cell
 
 _CONVENTIONS = {"world": "metres, z up", "angles": "successive turns about moving x, y, z, running on over time"}
 
@@ -71,13 +71,16 @@ def players_columns(motion: PlayersMotion) -> Columns:
 
 def write_csv(path: Path, columns: Columns) -> None:
     """Write columns as CSV; floats read back to the last bit, NaN is an empty cell."""
-    options = pyarrow.csv.WriteOptions(quoting_style="needed")
-    pyarrow.csv.write_csv(_table(columns), path, options)
+    rows = zip(*(map(cell, column.values.tolist()) for column in columns.values()), strict=True)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([list(columns), *rows])
 
 
 def write_parquet(path: Path, columns: Columns) -> None:
-    """Write columns as Parquet, units in the metadata; NaN is null."""
-    pq.write_table(_table(columns), path)
+    """Write columns as Parquet, units in the metadata; NaN is null. Needs *pyarrow*."""
+    values = {name: column.values for name, column in columns.items()}
+    units = {name: column.unit for name, column in columns.items()}
+    parquet.write_parquet(path, values, units, _CONVENTIONS)
 
 
 def _point_columns(names: list[str] | tuple[str, ...], points: NDArray, sd: NDArray) -> dict[str, Column]:
@@ -86,12 +89,3 @@ def _point_columns(names: list[str] | tuple[str, ...], points: NDArray, sd: NDAr
         columns |= {f"{name}_{axis}_m": Column(points[:, j, k], "m") for k, axis in enumerate("xyz")}
         columns[f"{name}_m_sd"] = Column(sd[:, j], "m")
     return columns
-
-
-def _table(columns: Columns) -> pa.Table:
-    arrays = [pa.array(column.values, from_pandas=True) for column in columns.values()]  # NaN becomes null
-    fields = [
-        pa.field(name, array.type, metadata={"units": column.unit})
-        for (name, column), array in zip(columns.items(), arrays, strict=True)
-    ]
-    return pa.table(arrays, schema=pa.schema(fields, metadata=_CONVENTIONS))

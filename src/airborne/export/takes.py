@@ -21,9 +21,9 @@ from airborne.motion.joints import continuous_angles
 from airborne.types import Array
 
 _AXIS_MARKER_M = 0.1  # distance of the added markers from the root's origin
-_MOST_FRAMES = 2_000_000
-FARTHEST_M = 1e6
-_LONGEST_NAME = 60
+_MOST_FRAMES = 2_000_000  # of a run: nine hours at 60 a second
+FARTHEST_M = 1e6  # from the origin: a typing error beyond it
+_LONGEST_NAME = 60  # characters of a file name
 _LARGEST_DENOMINATOR = 1001  # 60000/1001 frames per second and similar rates
 
 

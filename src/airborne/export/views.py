@@ -14,7 +14,7 @@ from airborne.cameras import Camera
 from airborne.types import Image
 from airborne.video import View
 
-CELL_PX = 160
+CELL_PX = 160  # side of a view in the report
 CROP_MARGIN = 1.1  # a crop's side over the body's diameter
 
 cached_surface_arrays = lru_cache(maxsize=2)(surface_arrays)  # converted once per body, not once per image

@@ -1,4 +1,4 @@
-"""Points from pixels: linear triangulation, the maximum-likelihood point, its covariance. Arrays only."""
+"""Points from pixels: linear triangulation, the maximum-likelihood point. Arrays only."""
 
 from __future__ import annotations
 
@@ -56,20 +56,6 @@ def triangulate_linear(P: Array, px: Array) -> Array:
     w = homogeneous[..., 3:]
     is_finite = (_is_seen(px).sum(-1) >= 2)[..., None] & (np.abs(w) > 1e-12)
     return np.where(is_finite, homogeneous[..., :3] / np.where(is_finite, w, 1.0), np.nan)
-
-
-def point_covariance(P: Array, points: Array, px: Array, *, sd_px: float) -> Array:
-    """Return the covariance (..., 3, 3) [m^2] of triangulated points, for clicks with standard deviation sd_px [px].
-
-    P, points, px as in `triangulate`: px says which cameras saw the point. First order: `sd^2 (J^T J)^-1`.
-    """
-    _, jacobian = _residual_and_jacobian(P, np.asarray(points, float), np.asarray(px, float))
-    return sd_px**2 * _inverse(jacobian)
-
-
-def reprojection_residual(P: Array, points: Array, px: Array) -> Array:
-    """Return `px - projection` (..., c, 2) [px]; NaN where a camera does not see the point."""
-    return np.asarray(px, float) - px_from_points(P, points)
 
 
 def _homogeneous_px(P: Array, points: Array) -> Array:

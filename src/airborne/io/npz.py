@@ -13,7 +13,7 @@ from pathlib import Path
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-_MOST_BYTES = 256_000_000
+_MOST_BYTES = 256_000_000  # of an unpacked archive
 
 _BROKEN = (zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, EOFError, KeyError, TypeError)
 _BROKEN += (NotImplementedError, RuntimeError, SyntaxError, MemoryError, OverflowError, AssertionError)

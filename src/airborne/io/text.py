@@ -9,9 +9,9 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-_LARGEST_TOML_BYTES = 5_000_000
-_LARGEST_JSON_BYTES = 50_000_000
-_LARGEST_CSV_BYTES = 50_000_000
+_LARGEST_TOML_BYTES = 5_000_000  # larger files are refused
+_LARGEST_JSON_BYTES = 50_000_000  # likewise
+_LARGEST_CSV_BYTES = 50_000_000  # likewise
 
 _DEEP_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){64}""")  # a.a.a...: takes quadratic time
 

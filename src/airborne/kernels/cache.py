@@ -25,7 +25,7 @@ from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 from numba.misc.appdirs import AppDirs
 
-from airborne.kernels.digest import digest
+from airborne.kernels.digest import digest_of
 
 _PYTHON = f"py{sys.version_info.major}{sys.version_info.minor}"
 _KERNELS_OF: dict[Path, list[Dispatcher]] = defaultdict(list)  # by source file
@@ -96,7 +96,7 @@ def _stem(kernel: Dispatcher) -> str:
     """Return how the names of a kernel's files begin: module.function-python-digest."""
     function: Any = kernel.py_func
     name = function.__qualname__.replace("<", "").replace(">", "")
-    return f"{Path(function.__code__.co_filename).stem}.{name}-{_PYTHON}-{digest(kernel)}"
+    return f"{Path(function.__code__.co_filename).stem}.{name}-{_PYTHON}-{digest_of(kernel)}"
 
 
 @functools.cache

@@ -23,7 +23,7 @@ _TOOLS = (platform.python_version(), numba.__version__, llvmlite.__version__, ha
 
 
 @functools.cache
-def digest(kernel: Dispatcher) -> str:
+def digest_of(kernel: Dispatcher) -> str:
     """Return 16 letters and digits that change with anything that the kernel's machine code is made from."""
     found = {kernel: None}  # in the order in which they are met
     waiting = [kernel]

@@ -22,7 +22,7 @@ from airborne.motion.motion import Motion, rigid_transform
 from airborne.motion.tables import cell, motion_columns
 from airborne.tracking import Estimate, Status
 
-_UPPER = np.triu_indices(6)
+_UPPER = np.triu_indices(6)  # of the covariance of position and rotation
 _COVARIANCE = [f"cov_{i}{j}" for i, j in zip(*_UPPER, strict=True)]
 _ROTATION = [f"r{i}{j}" for i in range(3) for j in range(3)]
 

@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from airborne.constants import GRAVITY_M_S2
 from airborne.types import Array
 
-GRAVITY_M_S2 = 9.81
 SWAY_M, _SWAY_S = 0.005, 0.15  # of a centre of mass computed from the tracked joints alone, and its correlation time
 _PUSH_M_S2, _PUSH_SD_M_S2 = 20.0, 10.0  # mean force of a push-off about three body weights, as force plates show
-_PUSH_CHANGE_S, _PUSH_FADE_S = 0.04, 0.02
-_LONGEST_CONTACT_S = 0.6
-_STEP_S = 1 / 1200
+_PUSH_CHANGE_S, _PUSH_FADE_S = 0.04, 0.02  # time in which the force changes, and in which it ends at take-off
+_LONGEST_CONTACT_S = 0.6  # contact before or after a flight that is modelled
+_STEP_S = 1 / 1200  # of the integration
 
 
 class CorrelatedNoise(NamedTuple):

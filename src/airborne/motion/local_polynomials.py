@@ -8,7 +8,7 @@ from airborne.motion.free_fall import noise_covariance
 from airborne.types import Array
 
 N_DRAWS = 1000  # from a posterior
-_NEAREST, _LEAST, _FARTHEST_S = 9, 5, 0.12
+_NEAREST, _LEAST, _FARTHEST_S = 9, 5, 0.12  # frames of a parabola, at least, and how far off they may lie
 
 
 def local_fits(time_s: Array, values: Array, variance: Array, at_s: Array) -> tuple[Array, Array]:

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+import io
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
+import pandas as pd
 from numpy.typing import NDArray
-from pyarrow import csv
 
 from airborne.errors import ResultError
+from airborne.io.parquet import CAN_WRITE_PARQUET, write_parquet
 from airborne.motion.tables import cell
 from airborne.motion.uncertainty import standard_deviation
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate
 from airborne.types import Array
 
-_UPPER = np.triu_indices(3)
+_UPPER = np.triu_indices(3)  # of the covariance of a position
 _POSITION = ("x_m", "y_m", "z_m")
 _COVARIANCE = tuple(f"cov_{'xyz'[i]}{'xyz'[j]}_m2" for i, j in zip(*_UPPER, strict=True))
 PLAYERS_COLUMNS = ("player", "frame", "time_s", "status", "joint", *_POSITION, "sd_m", *_COVARIANCE, "score", "n_views")
@@ -143,10 +144,10 @@ def read_players(path: Path) -> PlayersMotion:
     n_rows = int(ends[0]) if len(ends) else len(frame)
     if not len(frame):
         raise ResultError(f"{path} holds no finished frame; track again")
-    names, joints = (np.array(table[name].to_pylist()[:n_rows], np.str_) for name in ("player", "joint"))
+    names, joints = (np.array(table[name].iloc[:n_rows], np.str_) for name in ("player", "joint"))
     players = tuple(dict.fromkeys(names.tolist()))
     n, n_joints = len(frame) // n_rows, n_rows // len(players)
-    table = table.slice(0, n * n_rows)
+    table = table.iloc[: n * n_rows]
     _check_order(path, table, frame[: n * n_rows].reshape(n, n_rows), n_joints)
     numbers = {
         name: table[name].to_numpy().reshape(n, len(players), n_joints)
@@ -156,7 +157,7 @@ def read_players(path: Path) -> PlayersMotion:
     covariance = np.empty((n, len(players), n_joints, 3, 3))
     for name, i, j in zip(_COVARIANCE, *_UPPER, strict=True):
         covariance[..., i, j] = covariance[..., j, i] = numbers[name]
-    status = np.array(table["status"].to_pylist()[::n_joints], np.str_)
+    status = np.array(table["status"].iloc[::n_joints], np.str_)
     time_s = numbers["time_s"][:, 0, 0]
     return PlayersMotion(
         index=numbers["frame"][:, 0, 0],
@@ -173,14 +174,18 @@ def read_players(path: Path) -> PlayersMotion:
 
 
 def write_players_parquet(path: Path, table_csv: Path) -> None:
-    """Write the table of a joints.csv as Parquet, with its units in the metadata; empty cells become null."""
+    """Write the table of a joints.csv as Parquet, with its units in the metadata; empty cells become null.
+
+    Without *pyarrow* nothing is written.
+    """
+    if not CAN_WRITE_PARQUET:
+        return
     table = _table(table_csv, _whole_lines_end(table_csv))
     units = (
         {"time_s": "s", "sd_m": "m", "score": "nat"} | dict.fromkeys(_POSITION, "m") | dict.fromkeys(_COVARIANCE, "m2")
     )
-    fields = [field.with_metadata({"units": units.get(field.name, "1")}) for field in table.schema]
-    conventions = {"world": "metres, z up", "cov": "of each joint for itself"}
-    pq.write_table(table.cast(pa.schema(fields, metadata=conventions)), path)
+    columns = {str(name): column for name, column in table.items()}
+    write_parquet(path, columns, units, {"world": "metres, z up", "cov": "of each joint for itself"})
 
 
 def _lines(motion: PlayersMotion) -> list[str]:
@@ -208,26 +213,33 @@ def _whole_lines_end(path: Path) -> int:
         raise ResultError(f"{path} cannot be read ({error.strerror}); {_EXPECTED}") from error
 
 
-def _table(path: Path, n_bytes: int) -> pa.Table:
-    text, whole = pa.dictionary(pa.int32(), pa.string()), pa.int64()
-    types = {name: text if name in _TEXTS else whole if name in _WHOLE else pa.float64() for name in PLAYERS_COLUMNS}
+def _table(path: Path, n_bytes: int) -> pd.DataFrame:
+    types: dict[Hashable, Any] = {
+        name: "category" if name in _TEXTS else int if name in _WHOLE else float for name in PLAYERS_COLUMNS
+    }
     with path.open("rb") as file:
-        header = file.readline().decode(errors="replace").strip()
+        data = file.read(n_bytes)
+    header = data[: data.find(b"\n")].decode(errors="replace").strip()
     if header != ",".join(PLAYERS_COLUMNS):
         raise ResultError(
             f"{path} begins with '{header[:60]}'; {_EXPECTED}, which begins with '{PLAYERS_COLUMNS[0]},...'"
         )
-    options = csv.ConvertOptions(column_types=types, null_values=[""], strings_can_be_null=False)
+    unknown = {name: [""] for name in PLAYERS_COLUMNS if name not in _TEXTS}
     try:
-        with pa.memory_map(str(path)) as file:
-            return csv.read_csv(pa.BufferReader(file.read_buffer(n_bytes)), convert_options=options)
-    except pa.ArrowInvalid as error:
+        return pd.read_csv(
+            io.BytesIO(data),
+            dtype=types,
+            na_values=unknown,
+            keep_default_na=False,
+            low_memory=False,
+        )
+    except ValueError as error:
         raise ResultError(f"{path}: {str(error).splitlines()[0][:200]}; correct the line or track again") from None
 
 
-def _check_order(path: Path, table: pa.Table, frame: NDArray[np.int64], n_joints: int) -> None:
+def _check_order(path: Path, table: pd.DataFrame, frame: NDArray[np.int64], n_joints: int) -> None:
     """Raise ResultError unless every frame has the rows of the first, in the same order, and time increases."""
-    codes = (table[name].unify_dictionaries().combine_chunks().indices.to_numpy() for name in ("player", "joint"))
+    codes = (table[name].cat.codes.to_numpy() for name in ("player", "joint"))
     tiled = [np.reshape(each, frame.shape) for each in codes]
     is_regular = all((each == each[0]).all() for each in tiled) and (frame == frame[:, :1]).all()
     n_names = len(set(tiled[0][0].tolist())) * n_joints

@@ -1,4 +1,4 @@
-"""Reading back the folder of a run: which run it holds, and its motion."""
+"""The folder of a run: the names of its files, which run it holds, and its motion read back."""
 
 from __future__ import annotations
 
@@ -13,12 +13,37 @@ from airborne.motion.files import read_motion
 from airborne.motion.motion import Motion
 from airborne.motion.players import PlayersMotion, read_players
 
-RUN_RECORD = "run.json"
+# at the top: what is read first, and what `--resume` and other commands need
+MOTION, JOINTS, JUMPS = "motion.csv", "joints.csv", "jumps.csv"
+SUMMARY, REPORT, RUN_RECORD = "summary.json", "report.html", "run.json"
+CALIBRATION, BODY = "calib.toml", "body.toml"
+SMOOTH_RECORD = "smooth.json"
+FOLDERS = ("tables", "figures", "videos")
+
+
+def tables_of(folder: Path) -> Path:
+    """Return where a run's further tables lie, made if need be."""
+    return _made(folder / FOLDERS[0])
+
+
+def figures_of(folder: Path) -> Path:
+    """Return where a run's figures lie, made if need be."""
+    return _made(folder / FOLDERS[1])
+
+
+def videos_of(folder: Path) -> Path:
+    """Return where a run's videos lie, made if need be."""
+    return _made(folder / FOLDERS[2])
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 def holds_players(folder: Path) -> bool:
     """Tell whether a folder holds a run of several players, finished or not."""
-    return (folder / "joints.csv").is_file() and not (folder / "motion.csv").is_file()
+    return (folder / JOINTS).is_file() and not (folder / MOTION).is_file()
 
 
 def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:
@@ -26,22 +51,22 @@ def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:
 
     Raises ResultError if the folder holds none, the body is missing, or its record is damaged.
     """
-    if not (folder / "motion.csv").is_file():
+    if not (folder / MOTION).is_file():
         raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
     check_record(folder)
-    motion = read_motion(folder / "motion.csv")
-    if not (folder / "body.toml").is_file():
+    motion = read_motion(folder / MOTION)
+    if not (folder / BODY).is_file():
         raise ResultError(
             f"{folder / 'body.toml'} is missing, the body that was tracked; put the trial's body file there, "
             "or track again"
         )
-    return motion, read_body(folder / "body.toml")
+    return motion, read_body(folder / BODY)
 
 
 def read_players_run(folder: Path) -> PlayersMotion:
     """Return the motion of the run of players in a folder. Raises ResultError as `read_body_run` does."""
     check_record(folder)
-    return read_players(folder / "joints.csv")
+    return read_players(folder / JOINTS)
 
 
 def check_record(folder: Path) -> None:

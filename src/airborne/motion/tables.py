@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel
+from airborne.io.parquet import CAN_WRITE_PARQUET, write_parquet
 from airborne.motion.angles import ROOT_ANGLES, root_angles
 from airborne.motion.flight.momentum_table import measure_flight
 from airborne.motion.joints import joint_angles, landmarks
@@ -34,16 +33,17 @@ def motion_columns(motion: Motion) -> dict[str, NDArray]:
 
 
 def write_motion_parquet(path: Path, motion: Motion) -> None:
-    """Write the columns of motion.csv, and joint angles in degrees, with their units in the metadata."""
+    """Write the columns of motion.csv, and joint angles in degrees, with their units in the metadata.
+
+    Without *pyarrow* nothing is written.
+    """
+    if not CAN_WRITE_PARQUET:
+        return
     columns = motion_columns(motion)
     for k, joint in enumerate(motion.joints):
         columns |= {f"{joint}_{axis}_deg": np.rad2deg(motion.joint_angles[:, k, i]) for i, axis in enumerate("xyz")}
-    arrays = [pa.array(column, from_pandas=True) for column in columns.values()]  # NaN becomes null
-    fields = [
-        pa.field(name, array.type, metadata={"units": _unit(name)}) for name, array in zip(columns, arrays, strict=True)
-    ]
     conventions = {"world": "metres, z up", "quaternion": "x, y, z, w; world from root", "rotation_sd": "world axes"}
-    pq.write_table(pa.table(arrays, schema=pa.schema(fields, metadata=conventions)), path)
+    write_parquet(path, columns, {name: _unit(name) for name in columns}, conventions)
 
 
 def write_angles(path: Path, motion: Motion) -> None:

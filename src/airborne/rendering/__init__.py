@@ -5,7 +5,6 @@ from airborne.rendering.evidence import EvidenceMaps, evidence_maps, mask_eviden
 from airborne.rendering.kinematics import pose_segments
 from airborne.rendering.lights import FLAT, Lamp, Lights
 from airborne.rendering.pictures import mask_picture, match_picture, model_picture, through_mask
-from airborne.rendering.reference import render_reference
 from airborne.rendering.scores import RULES, ScoreRule, colour_sums, score, scores_from_sums
 from airborne.rendering.targets import Targets, pack_targets
 
@@ -27,7 +26,6 @@ __all__ = [
     "pack_targets",
     "pose_segments",
     "render",
-    "render_reference",
     "score",
     "scores_from_sums",
     "through_mask",

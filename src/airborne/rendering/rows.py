@@ -37,7 +37,7 @@ from airborne.rendering.shapes import (
     outline_all,
 )
 
-LANES = 16
+LANES = 16  # pixels computed together: a vector register of 512 bits holds as many floats
 # planes of a block, as offsets: inverse depth, normal (3), colour (3), shape, light
 W, NX, NY, NZ, RED, GREEN, BLUE, SHAPE, SHADE, BLOCK = 0, 16, 32, 48, 64, 80, 96, 112, 128, 144
 f4 = np.float32

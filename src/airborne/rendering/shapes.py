@@ -27,8 +27,8 @@ from airborne.kernels import kernel
 
 _SEAM_PX = 1e-7  # polygons reach this far beyond their edges, so that no pixel falls between two of a mesh
 
-# columns of a packed view: world to camera (R row by row, t), then the two rows of K^-1
-_VIEW_T, VIEW_K, VIEW_COLUMNS = 9, 12, 18
+# the 18 columns of a packed view: world to camera (R row by row, t), then the two rows of K^-1
+_VIEW_T, VIEW_K = 9, 12
 # columns of an outline (float64)
 B_U, B_V, B_1, MID_V, MID_1, HALF_1, HALF_V, HALF_VV, NORMAL = 0, 1, 2, 3, 4, 5, 6, 7, 8
 HEIGHT, CENTRE_HEIGHT, BEND, _OUTLINE_COLUMNS = 17, 20, 21, 22  # a.K^-1, a.c and alpha, for slabs

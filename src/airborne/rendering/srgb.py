@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from airborne.types import Array
 
-_LEVELS = 1 << 14
+_LEVELS = 1 << 14  # of linear light in the table
 
 
 def light_from_srgb(colours: Array | NDArray[np.uint8]) -> Array:

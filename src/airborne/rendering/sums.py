@@ -73,7 +73,7 @@ def _compare_chroma_row(row, n_blocks, images, offset, totals):
 def sum_hypotheses(shapes, geometry, R, t, views, sizes, lights, ambient, images, with_chroma, out):
     """Fill `out` (n, views, SUMS) for the hypotheses R (n, s, 3, 3), t (n, s, 3) [m].
 
-    `shapes` is the thread's workspace; `views` (v, VIEW_COLUMNS); `sizes` (v, 3): pixels a row, rows, offset in
+    `shapes` is the thread's workspace; `views` (v, 18); `sizes` (v, 3): pixels a row, rows, offset in
     `images`, which holds, view by view and row by row, blocks of 16 reds, 16 greens, 16 blues; `lights` (v, l, 8).
     """
     row = new_row(_largest_width(sizes))

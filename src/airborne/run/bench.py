@@ -8,7 +8,7 @@ import numpy as np
 
 from airborne.body import surface_arrays
 from airborne.rendering import FLAT, RULES, pack_targets, score
-from airborne.run.body_tracking import open_trial
+from airborne.run.opening import open_trial
 from airborne.tracking.methods import tracker_of
 from airborne.tracking.tracker import step
 from airborne.trial.examples import example_trial
@@ -26,7 +26,7 @@ def measure_speed() -> dict[str, float]:
 
 def _tracking_ms(method: str) -> float:
     trial = read_trial(example_trial("thrown_cross"), {"method": method})
-    recording, _ = open_trial(trial)
+    recording = open_trial(trial).recording
     tracker = tracker_of(trial.settings, trial.model(), trial.start.pose)
     recorded = list(recording)
     times: list[float] = []
@@ -42,7 +42,7 @@ def _tracking_ms(method: str) -> float:
 def _scoring_us(n: int = 200, rounds: int = 15) -> float:
     trial = read_trial(example_trial("thrown_cross"), {"method": "stepping"})
     model = trial.model()
-    frames = next(iter(open_trial(trial)[0]))
+    frames = next(iter(open_trial(trial).recording))
     posed, views, flat = model.with_pose(trial.start.pose), pack_targets(frames.views, FLAT), surface_arrays(model)
     R, t = np.repeat(posed.R[None], n, axis=0), np.repeat(posed.t[None], n, axis=0)
     times = []

@@ -54,9 +54,9 @@ from airborne.evaluation.variables import (
 from airborne.export import write_figures, write_json, write_report
 from airborne.export.analysis_figures import write_bland_altman, write_identity
 from airborne.io.text import read_json
-from airborne.motion import Motion
+from airborne.motion import Motion, run_folder
 from airborne.motion.run_folder import check_record, holds_players, read_body_run, read_players_run
-from airborne.run.opening import versions
+from airborne.run.provenance import versions
 
 Comparisons = Mapping[str, Comparison | DigitisedComparison | JointComparison | PlayersComparison]
 
@@ -81,14 +81,16 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
         true_poses = read_truth(truth)
         comparisons["truth"] = compare_motion(motion, true_poses, symmetry)
     if digitised is not None:
-        rig = read_rig(folder / "calib.toml")
+        rig = read_rig(folder / run_folder.CALIBRATION)
         clicked = fit_digitised_poses(read_digitised(digitised, rig), rig, model)
         comparisons["digitised"] = compare_digitised(motion, clicked, symmetry)
     if joints is not None:
         comparisons["joints"] = compare_joints(motion, model, read_joint_paths(joints))
     summary = _add_to_summary(folder, comparisons)
-    if summary and (folder / "report.html").is_file():
-        write_figures(folder, motion, model, truth=true_poses, digitised=clicked, symmetries=symmetry)
+    if summary and (folder / run_folder.REPORT).is_file():
+        write_figures(
+            run_folder.figures_of(folder), motion, model, truth=true_poses, digitised=clicked, symmetries=symmetry
+        )
         write_report(folder, summary)
     return comparisons
 
@@ -107,7 +109,7 @@ def _assess_players(folder: Path, truth: Path | None, *, is_alone: bool) -> Comp
 
 def _add_to_summary(folder: Path, comparisons: Comparisons) -> dict:
     """Put comparisons into the run's summary and return it; {} where the run has none."""
-    path = folder / "summary.json"
+    path = folder / run_folder.SUMMARY
     if not path.is_file():
         return {}
     try:
@@ -191,20 +193,20 @@ def evaluate_agreement(
     )
     files = []
     if agreements:
-        write_agreements(out / "agreement.csv", agreements)
-        files.append("agreement.csv")
+        write_agreements(run_folder.tables_of(out) / "agreement.csv", agreements)
+        files.append("tables/agreement.csv")
     if repeatable:
-        write_repeatability(out / "repeatability.csv", repeatable)
-        files.append("repeatability.csv")
+        write_repeatability(run_folder.tables_of(out) / "repeatability.csv", repeatable)
+        files.append("tables/repeatability.csv")
     for name, series in references.items():
         word = name.split()[-1]
         plotted = [
             (one, row) for one, row in zip(series, agreements[name], strict=True) if one.name in first and row.n > 1
         ]
         if plotted:
-            write_bland_altman(out / f"agreement_{word}.png", plotted)
-            write_identity(out / f"identity_{word}.png", plotted)
-            files += [f"agreement_{word}.png", f"identity_{word}.png"]
+            write_bland_altman(run_folder.figures_of(out) / f"agreement_{word}.png", plotted)
+            write_identity(run_folder.figures_of(out) / f"identity_{word}.png", plotted)
+            files += [f"figures/agreement_{word}.png", f"figures/identity_{word}.png"]
     text = methods_text(
         {name: [row for row in rows if row.name in first] for name, rows in agreements.items()},
         {name: [row for row in rows if row.name in first] for name, rows in repeatable.items()},
@@ -270,7 +272,7 @@ def _body_series(
             [motion_variables(motion, model), true_angles], "the run and the joint angles"
         )
     if digitised is not None:
-        rig = read_rig(folder / "calib.toml")
+        rig = read_rig(folder / run_folder.CALIBRATION)
         clicked = [
             _clicked_poses(path, rig, model, motion=motion, symmetry=symmetry) for path in (digitised, *operators)
         ]

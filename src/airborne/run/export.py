@@ -18,6 +18,7 @@ from airborne.export.opensim_motion import write_mot
 from airborne.export.tables import Columns, body_columns, players_columns, write_csv, write_parquet
 from airborne.export.takes import Take, body_take, player_takes, portable_names, with_axis_markers
 from airborne.export.trc import write_trc
+from airborne.io.parquet import CAN_WRITE_PARQUET
 from airborne.motion import Motion, has_inertias, landmarks, measure_flight
 from airborne.motion.run_folder import holds_players, read_body_run, read_players_run
 from airborne.types import Array, Progress
@@ -26,7 +27,8 @@ EXPORT_FORMATS = ("c3d", "trc", "mot", "osim", "gltf", "bvh", "csv", "parquet")
 _TABLE_FORMATS = ("csv", "parquet")
 _UNIFORM_FORMATS = ("c3d", "bvh")  # uniform sampling: hold a rate and no times
 _LARGEST_JITTER = 0.05  # of a frame: how far such a file may shift one in time
-_ROWS_AT_A_TIME = 10
+_ROWS_AT_A_TIME = 10  # poses in memory at once
+_NO_PARQUET = "Parquet needs pyarrow, which is not installed: pip install 'airborne[parquet]'"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,9 +57,14 @@ def export_run(
     tracked stay gaps. Raises ResultError where the folder holds no run, nothing was found in it, or a requested
     format cannot hold it.
     """
+    if "parquet" in formats and not CAN_WRITE_PARQUET:
+        raise ResultError(f"{_NO_PARQUET}, or give --csv")
     wanted = [format for format in EXPORT_FORMATS if format in formats] or list(EXPORT_FORMATS)
     read = _read(folder, any(format in _TABLE_FORMATS for format in wanted), progress or (lambda done, total: None))
     jitter, notes = max(take.jitter_s * float(take.rate) for take in read.takes), list(read.notes)
+    if "parquet" in wanted and not CAN_WRITE_PARQUET:
+        wanted.remove("parquet")
+        notes.append(f"left out parquet. {_NO_PARQUET}")
     if jitter > _LARGEST_JITTER:
         unfit = [format for format in wanted if format in _UNIFORM_FORMATS]
         reason = f"frames stray from an even beat by up to {jitter:.2f} frames"

@@ -1,27 +1,20 @@
-"""How every run begins: a trial's videos and cameras, its identity, and the rules of its folder."""
+"""Opening a trial: every file once, and what was found in it as a value."""
 
 from __future__ import annotations
 
-import hashlib
-import json
-import platform
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
-from importlib.metadata import version
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
-from airborne import __version__
 from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.control_points import read_control_points
 from airborne.cameras import Camera, Rig, read_rig
-from airborne.errors import ResultError, TrialError
-from airborne.export import write_json
-from airborne.motion.run_folder import RUN_RECORD, read_record
-from airborne.run.first_pose import resect_moved_cameras
+from airborne.errors import TrialError
+from airborne.run.detections import TrialDetections, read_trial_detections, resect_moved_cameras
 from airborne.tracking.methods import FIELD_MODES
-from airborne.trial.file import CameraTable, Trial
+from airborne.trial.cameras import CameraTable
+from airborne.trial.file import Trial
 from airborne.video import (
     LiveRecording,
     Recording,
@@ -33,62 +26,76 @@ from airborne.video import (
     open_recording,
 )
 
-_EXACT_CALIBRATION = (
-    "the calibration comes from a file that does not say how good it is; the standard deviations take it as exact"
-)
-_HASHED_BYTES = 8 << 20  # larger files are identified by their first and last so many bytes and their length
+AnyRecording = TypeVar("AnyRecording", bound=Recording | LiveRecording, covariant=True)
 
 
-def open_trial(trial: Trial) -> tuple[Recording, Calibration | None]:
-    """Open a trial's videos with its cameras, fields as its method takes them; and the calibration, if one is made.
+@dataclass(frozen=True, slots=True, eq=False)
+class Cameras:
+    """The cameras of a trial's videos, and what they come from."""
 
-    Images of players are decoded lazily: only the regions that are used.
+    rig: Rig  # in the trial's order, resected where the trial asks for it
+    calibration: Calibration | None  # if it was made from control points
+    detections: TrialDetections | None
+    facts: tuple[VideoFacts, ...]
+    notes: tuple[str, ...]  # of the resection
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Opened(Generic[AnyRecording]):
+    """A trial's recording, and what was read to open it."""
+
+    recording: AnyRecording
+    calibration: Calibration | None = None
+    detections: TrialDetections | None = None
+
+
+def open_trial(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Opened[Recording]:
+    """Open a trial's videos with its cameras, fields as its method takes them.
+
+    Images of players are decoded lazily: only the regions that are used. `facts` are the videos', where `inspect` has
+    been called before.
     """
     sources = [video_source(trial, camera) for camera in trial.camera]
-    facts = [inspect(source) for source in sources]
-    rig, calibration, notes = _cameras_of(trial, facts)
+    cameras = open_cameras(trial, facts)
     recording = open_recording(
         sources,
-        rig,
-        facts=facts,
+        cameras.rig,
+        facts=cameras.facts,
         fields_as="rows" if trial.has_players else FIELD_MODES[trial.settings.method],
         every=trial.track.every,
         start=trial.start.frame,
         stop=trial.track.stop,
         lazy=trial.has_players,
     )
-    recording.events.extend(notes)
-    return recording, calibration
+    recording.events.extend(cameras.notes)
+    return Opened(recording, cameras.calibration, cameras.detections)
 
 
 @contextmanager
-def open_live(
-    trial: Trial, waiting: Callable[[], None] = lambda: None
-) -> Iterator[tuple[LiveRecording, Calibration | None]]:
+def open_live(trial: Trial, waiting: Callable[[], None] = lambda: None) -> Iterator[Opened[LiveRecording]]:
     """Connect to a trial's live cameras and find where they are; `waiting` is called until all deliver frames."""
     with connect([video_source(trial, camera) for camera in trial.camera], waiting) as cameras:
         sizes = {camera.source.name: camera.facts.size for camera in cameras if camera.facts is not None}
-        rig, calibration = _calibrated_cameras(trial, sizes)
-        yield (
-            live_recording(cameras, rig, every=trial.track.every, start=trial.start.frame, stop=trial.track.stop),
-            calibration,
+        rig, calibration = calibrated_cameras(trial, sizes)
+        recording = live_recording(
+            cameras, rig, every=trial.track.every, start=trial.start.frame, stop=trial.track.stop
         )
+        yield Opened(recording, calibration)
 
 
-def cameras_of(trial: Trial) -> tuple[Rig, Calibration | None]:
-    """Return the cameras of the trial's videos in its order, and the calibration if it was made from control points."""
-    return _cameras_of(trial, [inspect(video_source(trial, camera)) for camera in trial.camera])[:2]
-
-
-def _cameras_of(trial: Trial, facts: Sequence[VideoFacts]) -> tuple[Rig, Calibration | None, tuple[str, ...]]:
-    """Return also the notes of the resection."""
+def open_cameras(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Cameras:
+    """Inspect a trial's videos and read its cameras and detections, each once."""
+    facts = tuple(facts or (inspect(video_source(trial, camera)) for camera in trial.camera))
     sizes = {camera.name: each.size for camera, each in zip(trial.camera, facts, strict=True)}
-    rig, calibration = _calibrated_cameras(trial, sizes)
-    rig, notes = resect_moved_cameras(trial, rig)
-    return rig, calibration, notes
+    rig, calibration = calibrated_cameras(trial, sizes)
+    detections = read_trial_detections(trial, facts)
+    notes: tuple[str, ...] = ()
+    if detections is not None:
+        rig, notes = resect_moved_cameras(rig, detections, trial.calibration.mend)
+    return Cameras(rig, calibration, detections, facts, notes)
 
 
-def _calibrated_cameras(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[Rig, Calibration | None]:
+def calibrated_cameras(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[Rig, Calibration | None]:
     """Return the calibrated cameras of images of these sizes (width, height) [px]."""
     if trial.calibration.control_points is not None:
         points = read_control_points(trial.path(trial.calibration.control_points))
@@ -124,108 +131,6 @@ def video_source(trial: Trial, camera: CameraTable) -> VideoSource:
     return VideoSource(camera.name, trial.path(camera.video), camera.fields, camera.offset_s, camera.drift_ppm)
 
 
-def prepare_folder(folder: Path, identity: dict[str, Any], table: str, *, resume: bool) -> bool:
-    """Prepare a run's folder; return whether it holds rows of its `table` from which to resume.
-
-    Raises ResultError for a folder that holds something else, a run without `resume`, or a run of other inputs.
-    """
-    rows, record = folder / table, folder / RUN_RECORD
-    folder.mkdir(parents=True, exist_ok=True)
-    if not record.exists() and not rows.exists() and any(folder.iterdir()):
-        raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
-    if rows.exists() and not resume:
-        raise ResultError(f"{folder} already holds a run; give --resume to go on with it, or another folder")
-    if not rows.exists():
-        write_json(record, identity)
-        return False
-    recorded = read_record(record)
-    changed = [name for name in identity if recorded.get(name) != identity[name]]
-    if changed:
-        raise ResultError(f"{folder} holds another run (other {', other '.join(changed)}); track into another folder")
-    return True
-
-
-def holds_run_of(trial: Trial, folder: Path) -> bool:
-    """Say whether a folder holds a run of exactly this trial, finished or not."""
-    record = folder / RUN_RECORD
-    return record.is_file() and read_record(record) == run_identity(trial)
-
-
-def run_identity(trial: Trial, *, live: bool = False) -> dict[str, Any]:
-    """Return what two runs share if one can resume the other."""
-    settings = {
-        "inputs": input_hashes(trial, live=live),
-        "settings": trial.track.method_settings,
-        "version": __version__,
-    }
-    return json.loads(json.dumps(settings))
-
-
 def past_the_end_error(trial: Trial) -> TrialError:
     """Return the error of a recording that ends before its first frame to track."""
     return TrialError(f"{trial.name}: there is no frame {trial.start.frame}; start.frame lies past the end")
-
-
-def provenance(
-    trial: Trial, calibration: Calibration | None, recording: Recording | LiveRecording, inputs: dict[str, str]
-) -> dict[str, Any]:
-    """Return the end of every summary: warnings, events, method, cameras, versions, inputs."""
-    fits = {} if calibration is None else {fit.name: fit for fit in calibration.fits}
-    cameras = [
-        {
-            "name": camera.name,
-            "position_m": [round(float(x), 4) for x in camera.centre],
-            "focal_px": round(float(camera.K[0, 0]), 2),
-            "calibration_rms_px": fits[camera.name].rms_px if camera.name in fits else None,
-            "held_out_rms_mm": fits[camera.name].held_out_m * 1e3 if camera.name in fits else None,
-        }
-        for camera in recording.rig
-    ]
-    return {
-        "warnings": [_EXACT_CALIBRATION] if calibration is None else list(calibration.warnings),
-        "events": recording.events,
-        "method": trial.track.method_settings,
-        "cameras": cameras,
-        "versions": versions(),
-        "inputs": inputs,
-    }
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of everything that a result may depend on."""
-    packages = ("numpy", "scipy", "numba", "av", "opencv-python-headless")
-    return {"airborne": __version__, "python": platform.python_version(), **{name: version(name) for name in packages}}
-
-
-def input_hashes(trial: Trial, *, live: bool = False) -> dict[str, str]:
-    """Return the SHA-256 of each input file, by the name that the trial gives it; live video has none."""
-    optional = (
-        trial.body.source_file,
-        trial.calibration.file,
-        trial.calibration.control_points,
-        trial.track.torso,
-        *trial.start.source_files,
-    )
-    names = [*(camera.video for camera in trial.camera if not live), *(name for name in optional if name)]
-    rest = [trial.start, trial.lights, trial.calibration, trial.body, *trial.camera]
-    start = json.dumps([table and table.model_dump() for table in rest])
-    hashes = {name: _sha256(trial.path(name)) for name in names}
-    return {**hashes, "start and lights": hashlib.sha256(start.encode()).hexdigest()}
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    if path.is_dir():
-        for file in sorted(path.rglob("*.json")):
-            digest.update(f"{file.relative_to(path).as_posix()} {_sha256(file)}\n".encode())
-        return digest.hexdigest()
-    size = path.stat().st_size
-    with path.open("rb") as file:
-        if size <= 2 * _HASHED_BYTES:
-            digest.update(file.read())
-        else:
-            digest.update(file.read(_HASHED_BYTES))
-            file.seek(-_HASHED_BYTES, 2)
-            digest.update(file.read())
-            digest.update(str(size).encode())
-    return digest.hexdigest()

@@ -7,16 +7,16 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
 from airborne.cameras import Rig, camera_looking_at
 from airborne.errors import TrialError
 from airborne.tracking.capsules import Blocker
-from airborne.tracking.particle import GivenTorsos, LegsMethod, LegsSettings, legs_tracker
+from airborne.tracking.particle import GivenTorsos, legs_tracker
 from airborne.tracking.players import PlayerStart, PlayersTracker
 from airborne.trial.file import Trial
+from airborne.trial.settings import ParticleSettings
 from airborne.video import Frames, View
 
 _AWAY = np.array([0, -4.0, 0])  # of the artificial cameras [m]
@@ -32,23 +32,10 @@ def players_tracker_of(trial: Trial, rig: Rig) -> PlayersTracker:
     starts = trial.players
     for start in starts:
         _check_visible(trial, start, rig)
-    track = trial.track
-    if track.method == "blocker":
+    if not isinstance(trial.track, ParticleSettings):
         return Blocker(starts)
-    torso = None if track.torso is None else read_torsos(trial.path(track.torso), starts, first=trial.start.frame)
-    optional = {"n_particles": track.n_particles, "estimate": track.estimate}
-    settings = LegsSettings(
-        method=cast(LegsMethod, track.method),
-        seed=track.seed,
-        swing=track.swing,
-        views=track.views,
-        tempered=track.tempered,
-        torso_shift=track.torso_shift,
-        resample=track.resample,
-        resample_when=track.resample_when,
-        **{name: value for name, value in optional.items() if value is not None},
-    )
-    return legs_tracker(settings, rig, starts, torso)
+    torso = None if trial.torso is None else read_torsos(trial.path(trial.torso), starts, first=trial.start.frame)
+    return legs_tracker(trial.track.filter, rig, starts, torso)
 
 
 def compile_kernels(trial: Trial) -> None:

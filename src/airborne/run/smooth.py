@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from airborne import __version__
 from airborne.errors import ResultError
@@ -15,7 +16,14 @@ from airborne.export import write_json
 from airborne.export.analysis_figures import write_residuals
 from airborne.motion import landmarks
 from airborne.motion.flight.phases import Event, body_events, player_events
-from airborne.motion.run_folder import holds_players, read_body_run, read_players_run
+from airborne.motion.run_folder import (
+    SMOOTH_RECORD,
+    figures_of,
+    holds_players,
+    read_body_run,
+    read_players_run,
+    tables_of,
+)
 from airborne.motion.smoothing import ResidualAnalysis, is_evenly_sampled, residual_analysis
 from airborne.motion.smoothing.smoother import (
     Smoothing,
@@ -34,8 +42,9 @@ from airborne.types import Array, Progress
 
 Events = dict[str, tuple[Event, ...]]  # by player; of one body under ""
 
-MOTION, JOINTS, ANGLES = "smooth_motion.csv", "smooth_joints.csv", "smooth_joint_angles.csv"
-EVENTS, FIGURE, RECORD = "smooth_events.csv", "residuals.png", "smooth.json"
+MOTION, JOINTS = "tables/smooth_motion.csv", "tables/smooth_joints.csv"
+ANGLES, EVENTS = "tables/smooth_joint_angles.csv", "tables/smooth_events.csv"
+FIGURE = "figures/residuals.png"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,8 +54,13 @@ class SmoothRun:
     smoothing: Smoothing
     events: Events
     analysis: ResidualAnalysis | None  # None where times are not even, or no stretch is long enough
-    history: list[str]
+    tables: dict[str, xr.Dataset]  # "joints"; of a body also "root" and, if it has joints, "angles"
     files: tuple[str, ...]
+
+    @property
+    def history(self) -> list[str]:
+        """What was done, one step each."""
+        return next(iter(self.tables.values())).attrs["history"]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the numbers for a JSON file."""
@@ -109,12 +123,14 @@ def smooth_run(
         smoothing = replace(smoothing, cutoff_hz=_choose_cutoff(analysis))
     out = folder if out is None else out
     out.mkdir(parents=True, exist_ok=True)
-    history, files = run.write(out, smoothing, events, progress)
+    tables_of(out)
+    tables, files = run.write(out, smoothing, events, progress)
     if analysis is not None:
+        figures_of(out)
         write_residuals(out / FIGURE, analysis, smoothing.cutoff_hz)
         files = (*files, FIGURE)
-    result = SmoothRun(smoothing, events, analysis, history, (*files, RECORD))
-    write_json(out / RECORD, result.to_dict())
+    result = SmoothRun(smoothing, events, analysis, tables, (*files, SMOOTH_RECORD))
+    write_json(out / SMOOTH_RECORD, result.to_dict())
     return result
 
 
@@ -126,7 +142,7 @@ class _Run:
     paths: Array  # (n, paths, 3) [m], those that the residual analysis looks at
     owners: tuple[str, ...]  # of each path
     find: Callable[[], Events]
-    write: Callable[[Path, Smoothing, Events, Progress | None], tuple[list[str], tuple[str, ...]]]
+    write: Callable[[Path, Smoothing, Events, Progress | None], tuple[dict[str, xr.Dataset], tuple[str, ...]]]
 
 
 def _players_run(folder: Path) -> _Run:
@@ -134,12 +150,12 @@ def _players_run(folder: Path) -> _Run:
 
     def write(
         out: Path, smoothing: Smoothing, events: Events, progress: Progress | None
-    ) -> tuple[list[str], tuple[str, ...]]:
+    ) -> tuple[dict[str, xr.Dataset], tuple[str, ...]]:
         times = {name: [event.time_s for event in events[name]] for name in motion.players}
         joints = smooth_players(motion, smoothing, times, progress)
         write_smooth_joints(out / JOINTS, joints)
         write_smooth_events(out / EVENTS, events, joints)
-        return joints.attrs["history"], (JOINTS, EVENTS)
+        return {"joints": joints}, (JOINTS, EVENTS)
 
     paths = motion.points.reshape(len(motion), -1, 3)
     owners = tuple(name for name in motion.players for _ in motion.joints)
@@ -151,7 +167,7 @@ def _body_run(folder: Path) -> _Run:
 
     def write(
         out: Path, smoothing: Smoothing, events: Events, progress: Progress | None
-    ) -> tuple[list[str], tuple[str, ...]]:
+    ) -> tuple[dict[str, xr.Dataset], tuple[str, ...]]:
         times = [event.time_s for event in events[""]]
         root = smooth_root(motion, smoothing, times)
         joints = smooth_landmarks(motion, model, smoothing, times, progress=progress)
@@ -159,9 +175,10 @@ def _body_run(folder: Path) -> _Run:
         write_smooth_joints(out / JOINTS, joints)
         write_smooth_events(out / EVENTS, events, joints)
         if not motion.joints:
-            return root.attrs["history"], (MOTION, JOINTS, EVENTS)
-        write_smooth_joint_angles(out / ANGLES, smooth_joint_angles(motion, model, smoothing, times))
-        return root.attrs["history"], (MOTION, JOINTS, ANGLES, EVENTS)
+            return {"root": root, "joints": joints}, (MOTION, JOINTS, EVENTS)
+        angles = smooth_joint_angles(motion, model, smoothing, times)
+        write_smooth_joint_angles(out / ANGLES, angles)
+        return {"root": root, "joints": joints, "angles": angles}, (MOTION, JOINTS, ANGLES, EVENTS)
 
     points, _ = landmarks(motion, model)
     return _Run(motion.time_s, points, ("",) * points.shape[1], lambda: {"": body_events(motion, model)}, write)

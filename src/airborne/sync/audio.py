@@ -10,19 +10,19 @@ from av.audio.resampler import AudioResampler
 from av.error import FFmpegError
 from scipy.signal import butter, correlate, correlation_lags, sosfilt
 
+from airborne.constants import SPEED_OF_SOUND_M_S
 from airborne.errors import VideoError
 from airborne.geometry.robust import robust_sd
 from airborne.sync.offsets import Offsets, fit_line
 from airborne.types import Array, Progress
 from airborne.video.decoding import VideoSource
 
-RATE_HZ = 8000
-_ENVELOPE_HZ = 500
-_WINDOW_S = 4.0
+RATE_HZ = 8000  # 0.125 ms a sample
+_ENVELOPE_HZ = 500  # of the loudness that is compared first
+_WINDOW_S = 4.0  # of a waveform that is compared
 _SEARCH_S = 0.02  # half width of the search with the waveforms, about the shift of the envelopes
 _LEAST_CORRELATION = 0.2  # of the envelopes of two cameras that hear the same
 _LEAST_PEAK_SDS = 6.0  # robust sds by which the peak of a phase transform must stand out
-_SPEED_OF_SOUND_M_S = 343.0
 _N_WINDOWS = 12  # windows compared, the loudest
 
 
@@ -45,7 +45,7 @@ def offsets_by_sound(
         sounds.append(read_sound(source))
         if progress is not None:
             progress(number, len(sources))
-    travel_s = microphones_apart_m / _SPEED_OF_SOUND_M_S / np.sqrt(3)
+    travel_s = microphones_apart_m / SPEED_OF_SOUND_M_S / np.sqrt(3)
     rows = [(0.0, 0.0, 0.0, 0.0)]
     for source, sound in zip(sources[1:], sounds[1:], strict=True):
         shift = shift_between(sounds[0], sound)

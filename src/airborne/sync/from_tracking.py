@@ -99,8 +99,9 @@ class _Measure:
 
     def __init__(self, trial: Trial, start_s: Array, on_image: Callable[[], None]) -> None:
         self._trial, self._start_s, self._on_image = trial, start_s, on_image
-        self._recording, _ = open_trial(trial)
-        self._start = find_first_pose(trial, trial.model(), self._recording.rig).pose
+        opened = open_trial(trial)
+        self._recording = opened.recording
+        self._start = find_first_pose(trial, trial.model(), opened.recording.rig, opened.detections).pose
         self._last: _TrackedPath | None = None
         self._appearance_state: RefinedState | None = None  # of the last pass with all cameras
         self.excluded: Collection[int] = ()  # cameras left out of the tracking

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+import tomlkit
 
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, TrialError
-from airborne.run.opening import cameras_of, video_source
+from airborne.run.opening import open_cameras, video_source
 from airborne.sync import Offsets, offsets_by_flash, offsets_by_motion, offsets_by_sound
 from airborne.sync.from_tracking import offsets_by_tracking
 from airborne.trial.file import Trial
@@ -22,7 +22,7 @@ from airborne.video import VideoSource, inspect
 By = Literal["auto", "flash", "sound", "motion", "tracking"]
 
 _DECIMALS = 6  # of seconds, as written
-_KEYS = "offset_s|offset_sd_s|drift_ppm"
+_KEYS = ("offset_s", "offset_sd_s", "drift_ppm")
 
 
 def synchronise(
@@ -48,13 +48,13 @@ def synchronise(
     if by == "flash":
         offsets = offsets_by_flash(sources, with_drift=with_drift, progress=progress)
     elif by == "sound":
-        apart_m = _largest_distance_m(cameras_of(trial)[0])
+        apart_m = _largest_distance_m(open_cameras(trial).rig)
         offsets = offsets_by_sound(sources, microphones_apart_m=apart_m, with_drift=with_drift, progress=progress)
     elif by == "tracking":
         present = np.array([camera.offset_s for camera in trial.camera])
         offsets = offsets_by_tracking(trial, present, with_drift=with_drift, progress=progress)
     else:
-        offsets = offsets_by_motion(sources, cameras_of(trial)[0], within_s=within_s, progress=progress)
+        offsets = offsets_by_motion(sources, open_cameras(trial).rig, within_s=within_s, progress=progress)
         if by == "auto" and not trial.has_players:
             offsets = _refine(trial, offsets, progress)
     return round_to_images(offsets, sources) if whole_pictures else offsets
@@ -82,56 +82,42 @@ def round_to_images(offsets: Offsets, sources: Sequence[VideoSource]) -> Offsets
 def write_offsets(path: Path, offsets: Offsets) -> None:
     """Write offsets, their sds and drifts into a trial file; all else in it stays as it is, comments too.
 
-    Raises TrialError where the cameras' tables are not found in the file.
+    Raises TrialError where the file's cameras are not those of the offsets.
     """
-    text = path.read_text(encoding="utf-8-sig")
-    written = _edit_tables(text, offsets) or _edit_list(text, offsets)
-    if written is None:
-        raise TrialError(f"{path.name}: its cameras are not written as [[camera]] tables; write the offsets by hand")
+    document = tomlkit.parse(path.read_text(encoding="utf-8-sig"))
+    cameras: Any = document.get("camera", [])
+    names = [camera.get("name") for camera in cameras]
+    if names != list(offsets.names):
+        raise TrialError(f"{path}: has the cameras {names}, but offsets are of {list(offsets.names)}; run sync again")
+    for number, camera in enumerate(cameras):
+        _set_keys(camera, _entries(offsets, number))
     part_file = path.with_name(path.name + ".part")
-    part_file.write_text(written, encoding="utf-8")
+    part_file.write_text(tomlkit.dumps(document), encoding="utf-8")
     part_file.replace(path)
 
 
-def _edit_tables(text: str, offsets: Offsets) -> str | None:
-    """Set the lines of [[camera]] tables; None where there are not as many as cameras."""
-    lines = text.splitlines()
-    heads = [k for k, line in enumerate(lines) if re.match(r"\s*\[\[\s*camera\s*\]\]", line)]
-    if len(heads) != len(offsets.names):
-        return None
-    for number in reversed(range(len(heads))):
-        end = next((k for k in range(heads[number] + 1, len(lines)) if lines[k].lstrip().startswith("[")), len(lines))
-        table_lines = [line for line in lines[heads[number] : end] if not re.match(rf"\s*({_KEYS})\s*=", line)]
-        last = max(k for k, line in enumerate(table_lines) if line.strip())
-        lines[heads[number] : end] = [*table_lines[: last + 1], *_entries(offsets, number), *table_lines[last + 1 :]]
-    return "\n".join(lines) + "\n"
+def _set_keys(table: Any, entries: dict[str, float]) -> None:
+    """Set the keys of a camera's clock, new ones below its last key; what follows in the file stays below."""
+    for key in _KEYS:
+        if key not in entries:
+            table.pop(key, None)
+    body = table.value.body
+    end = 1 + max(k for k, (key, _) in enumerate(body) if key is not None)
+    rest = body[end:]
+    del body[end:]
+    table.update(entries)
+    body.extend(rest)
 
 
-def _edit_list(text: str, offsets: Offsets) -> str | None:
-    """Set the entries of `camera = [{ ... }, ...]`; None where there are not as many as cameras."""
-    opening = re.search(r"^\s*camera\s*=\s*\[", text, re.MULTILINE)
-    entries = [] if opening is None else list(re.finditer(r"\{[^{}]*\}", text[opening.end() :]))[: len(offsets.names)]
-    if opening is None or len(entries) != len(offsets.names):
-        return None
-    names = [re.search(r"\bname\s*=\s*[\"']([^\"']*)", entry.group()) for entry in entries]
-    if [name and name.group(1) for name in names] != list(offsets.names):
-        return None
-    for number, entry in reversed(list(enumerate(entries))):
-        entry_text = re.sub(rf",\s*({_KEYS})\s*=\s*[^,}}]*", "", entry.group()[:-1]).rstrip()
-        start, end = (opening.end() + each for each in entry.span())
-        text = text[:start] + ", ".join([entry_text, *_entries(offsets, number)]) + " }" + text[end:]
-    return text
-
-
-def _entries(offsets: Offsets, number: int) -> list[str]:
+def _entries(offsets: Offsets, number: int) -> dict[str, float]:
     """Return the entries of one camera's clock; none for a first camera without an offset."""
-    entries = {
-        "offset_s": round(float(offsets.offset_s[number]), _DECIMALS) + 0.0,
-        "offset_sd_s": round(float(offsets.offset_sd_s[number]), _DECIMALS),
-        "drift_ppm": round(1e6 * float(offsets.drift[number]), 3),
-    }
-    is_needed = number > 0 or any(entries.values())
-    return [f"{key} = {value!r}" for key, value in entries.items() if is_needed and (value or key == "offset_s")]
+    values = (
+        round(float(offsets.offset_s[number]), _DECIMALS) + 0.0,
+        round(float(offsets.offset_sd_s[number]), _DECIMALS),
+        round(1e6 * float(offsets.drift[number]), 3),
+    )
+    is_needed = number > 0 or any(values)
+    return {key: value for key, value in zip(_KEYS, values, strict=True) if is_needed and (value or key == "offset_s")}
 
 
 def _refine(trial: Trial, offsets: Offsets, progress: Progress | None) -> Offsets:

@@ -16,10 +16,10 @@ from airborne.types import Array
 
 _N_CORRELATED = 2  # neighbouring frames whose errors are correlated
 _GAIN = 1.6  # a first step is too short by about this factor, as those of the poses are
-_MOST_GAIN = 6.0
-_MOST_PASSES = 8
-_CONVERGED_S = 2e-5
-_CONVERGED_SDS = 0.1
+_MOST_GAIN = 6.0  # on a step, however nearly parallel the steps before
+_MOST_PASSES = 8  # over the recording
+_CONVERGED_S = 2e-5  # a step below it, or below ...
+_CONVERGED_SDS = 0.1  # ... this share of the lag's sd, ends the iteration
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,7 @@ from airborne.types import Array
 
 SHIFT_SD_PX = 0.12  # of a full frame: light and edges that are not quite as modelled may displace an image by this
 _LEVER_M = 0.3  # the length that makes metres and radians comparable
-_MOST_SWEEPS = 30
+_MOST_SWEEPS = 30  # of the iteration
 _UNOBSERVED_SD_M = 0.15  # a direction with a larger sd than this, at the lever's length, counts as unobserved
 
 

@@ -32,6 +32,13 @@ FIELD_MODES: dict[Method, Literal["rows", "interpolated"]] = {
     "stepping": "interpolated",
     "simplex": "interpolated",
 }
+_DIRECT = frozenset({"colour", "scale", "v_rule", "steps_mm", "steps_deg"})
+UNREAD_SETTINGS: dict[str, frozenset[str]] = {  # keys of a run's record that its method makes no use of
+    **dict.fromkeys(("refined", "joint", "hierarchical"), _DIRECT),
+    "stepping": frozenset({"fixed_shape"}),
+    "simplex": frozenset({"fixed_shape", "v_rule", "steps_mm", "steps_deg"}),
+    **dict.fromkeys(("mixture", "framework"), frozenset({"swing"})),
+}
 _SIMPLEX_SIZE = np.array([0.03] * 3 + [0.06] * 3)  # [m], [rad]
 
 

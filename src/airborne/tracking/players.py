@@ -1,10 +1,10 @@
-"""The estimates of several players at one time, and the protocol of their trackers."""
+"""The estimates of several players at one time, the protocol of their trackers, and these as a `Tracker`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -69,3 +69,29 @@ class PlayersTracker(Protocol):
     def step(self, state: Any, frames: Frames) -> tuple[Any, tuple[PlayerEstimate, ...]]:
         """Track one time; one estimate for each player with legs, in the order of the start."""
         ...
+
+
+class PlayersStep(NamedTuple):
+    """One time's step of a players' tracker: what it found, and its state after it, which no table holds."""
+
+    state: Any
+    players: tuple[PlayerEstimate, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StepTracker:
+    """A players' tracker, which searches and learns at once, as a `Tracker`."""
+
+    tracker: PlayersTracker
+
+    def init(self) -> Any:
+        """Return the state before the first frame."""
+        return self.tracker.init()
+
+    def search(self, state: Any, frames: Frames) -> PlayersStep:
+        """Take the step."""
+        return PlayersStep(*self.tracker.step(state, frames))
+
+    def learn(self, state: Any, frames: Frames, estimate: PlayersStep) -> Any:
+        """Return the state after the step."""
+        return estimate.state

@@ -12,8 +12,7 @@ import numpy as np
 
 from airborne.body import Pose
 from airborne.body.chain import delta_between, move_pose
-
-GRAVITY = np.array([0.0, 0.0, -9.81])  # [m/s2], world z up
+from airborne.constants import FREE_FALL_M_S2
 
 _ROTATION = slice(3, 6)  # the root's rotation vector in a delta
 
@@ -53,4 +52,4 @@ def ballistic(past: PoseHistory, time_s: Fraction) -> Pose:
         return constant(past, time_s)
     now, before = past[-1][0], past[-2][0]
     ahead, step = float(time_s - now), float(now - before)
-    return quadratic(past, time_s).move(0.5 * GRAVITY * ahead * (ahead + step), np.zeros(3))
+    return quadratic(past, time_s).move(0.5 * FREE_FALL_M_S2 * ahead * (ahead + step), np.zeros(3))

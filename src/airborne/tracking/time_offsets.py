@@ -24,7 +24,7 @@ from airborne.video import Frames, View
 
 _NEGLIGIBLE_S = 1e-5  # [s] in which nothing that is filmed moves by a pixel
 _TOLERABLE_S = 2e-3  # [s] in which it moves a centimetre: accurate enough until its motion is known
-_HISTORY = 5
+_HISTORY = 5  # poses from which the motion within a frame is taken
 
 
 @dataclass(frozen=True, slots=True)

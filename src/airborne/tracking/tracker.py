@@ -1,30 +1,53 @@
-"""The protocol of trackers: a first state, and a step from one state and one time's frames to the next."""
+"""The protocol of trackers: a first state, and search and learning from one state and one time's frames to the next."""
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from collections.abc import Callable, Iterable, Iterator
+from typing import Protocol, TypeVar
 
-from airborne.tracking.estimate import Estimate
 from airborne.video import Frames
 
+State = TypeVar("State")
+Found = TypeVar("Found")
 
-class Tracker(Protocol):
-    """A tracker holds its settings; what it learns is in the states it returns."""
 
-    def init(self) -> Any:
+class Tracker(Protocol[State, Found]):
+    """A tracker holds its settings; what it learns is in the states it returns. `search` and `learn` are pure.
+
+    What it finds at one time is an `Estimate` of a body, or a `PlayersStep`.
+    """
+
+    def init(self) -> State:
         """Return the state before the first frame."""
         ...
 
-    def search(self, state: Any, frames: Frames) -> Estimate:
-        """Find the body in the frames, without learning from them."""
+    def search(self, state: State, frames: Frames) -> Found:
+        """Find the body or the players in the frames, without learning from them."""
         ...
 
-    def learn(self, state: Any, frames: Frames, estimate: Estimate) -> Any:
+    def learn(self, state: State, frames: Frames, estimate: Found) -> State:
         """Return the state after the frames, given their estimate: a run is resumed by learning alone."""
         ...
 
 
-def step(tracker: Tracker, state: Any, frames: Frames) -> tuple[Any, Estimate]:
+def step(tracker: Tracker[State, Found], state: State, frames: Frames) -> tuple[State, Found]:
     """Track one time: search, then learn."""
     estimate = tracker.search(state, frames)
     return tracker.learn(state, frames, estimate), estimate
+
+
+def track_frames(
+    tracker: Tracker[State, Found], frames: Iterable[Frames], write: Callable[[Found], None], done: Iterable[Found] = ()
+) -> Iterator[tuple[Frames, Found]]:
+    """Yield each time's frames with their estimate, written as soon as it is found.
+
+    The first estimates may be `done`, written by a run that was stopped: from their frames the tracker only learns.
+    """
+    state, known = tracker.init(), iter(done)
+    for observed in frames:
+        estimate = next(known, None)
+        if estimate is None:
+            estimate = tracker.search(state, observed)
+            write(estimate)
+        state = tracker.learn(state, observed, estimate)
+        yield observed, estimate

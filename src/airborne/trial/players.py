@@ -1,18 +1,17 @@
-"""The table of a trial file that sets a player's start, and the settings that all its tables share."""
+"""[[start.player]]: where a player is at the first frame."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, model_validator
 
 from airborne.body.legs import LEG_POINTS, Legs
 from airborne.errors import BodyError
+from airborne.tracking.players import PlayerStart
+from airborne.trial.table import Table, Vector
 
-Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
-
-STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)  # of every table
 _FEET = ("foot_left", "foot_right")
 _FARTHEST_M = 100.0  # no court is larger
 _MOST_UNDER_FLOOR_M = 0.3  # by how much a calibration's floor may be off
@@ -26,10 +25,8 @@ def _check_name(name: str) -> str:
     return name
 
 
-class PlayerTable(BaseModel):
+class PlayerTable(Table):
     """A player's joints at the first frame; a player with a torso only is a bystander."""
-
-    model_config = STRICT
 
     name: Annotated[str, AfterValidator(_check_name)]
     joints_m: dict[str, Vector]
@@ -69,3 +66,8 @@ class PlayerTable(BaseModel):
     def has_legs(self) -> bool:
         """Whether the player is tracked, not a bystander."""
         return set(self.joints_m) != {"torso"}
+
+    @property
+    def start(self) -> PlayerStart:
+        """The start as the trackers take it."""
+        return PlayerStart(name=self.name, joints_m={name: np.array(point) for name, point in self.joints_m.items()})

@@ -22,7 +22,7 @@ _LUMA_WEIGHTS = {  # red's and blue's share of the luma: BT.709, and BT.601 unde
     6: (0.299, 0.114),
 }
 _SITINGS = ((0, 2), (1, 1))  # quarters of the neighbour's chroma: in even and in odd columns or rows
-_PROBE_PX = 32
+_PROBE_PX = 32  # side of the image that tests whether a crop converts as the whole does
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -69,7 +69,7 @@ class VideoFacts:
         return self.frame_rate * len(self.parities)
 
     @property
-    def stored_size(self) -> tuple[int, int]:
+    def size_before_rotation(self) -> tuple[int, int]:
         """The size before rotation."""
         width, height = self.size
         return (height, width) if self.rotation_deg % 180 else (width, height)
@@ -129,7 +129,7 @@ def decode(source: VideoSource, facts: VideoFacts) -> Generator[DecodedImage]:
     """
     with _open(source) as (container, stream):
         tick = stream.time_base or Fraction(1, 1_000_000)
-        for n_ticks, frame in intact_frames(container, stream, size=facts.stored_size):
+        for n_ticks, frame in intact_frames(container, stream, size=facts.size_before_rotation):
             time_s = snap_to_grid(n_ticks * tick, facts.frame_rate, tick)
             for j, parity in enumerate(facts.parities):
                 yield DecodedImage(time_s + j / facts.image_rate, frame, parity)

@@ -21,7 +21,7 @@ from airborne.video.undistortion import Undistortion, undistortion_of
 
 _BUFFER_LENGTH = 16  # images of a camera that wait to be matched, the newest
 _LONGEST_WAIT_S, _LONGEST_WAIT_PERIODS = 0.25, _BUFFER_LENGTH - 4  # of an image, for those of the other cameras
-_MICRO = 1_000_000
+_MICRO = 1_000_000  # to a second: the clock of a stream that has none
 
 
 @dataclass(slots=True, eq=False)

@@ -10,7 +10,7 @@ from av.video.reformatter import ColorRange, Colorspace, Interpolation
 from airborne.types import Image
 
 _SD_SIDE_PX = 576  # [px] up to this shorter side an untagged video is BT.601, above it BT.709
-UNSPECIFIED_MATRIX = 2  # a frame's colour matrix where the file does not state one
+UNSPECIFIED_MATRIX = 2  # a frame's colour matrix where the file does not state one (ITU-T H.273)
 _EXACT_COLOUR = Interpolation.BILINEAR | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT
 
 

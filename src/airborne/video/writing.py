@@ -21,7 +21,7 @@ from airborne.video.pixels import frame_from_rgb, matrix_for, weave_frame
 
 _N_THREADS = 4  # fixed: the encoder's output depends on it
 _FRAGMENTED = {"movflags": "frag_keyframe+empty_moov+default_base_moof", "flush_packets": "1"}
-_BT709, _SMPTE170M = 1, 6  # colour matrix tags
+_BT709, _SMPTE170M = 1, 6  # colour matrix tags (ITU-T H.273)
 _CODED_FIELD_ORDER = {"top-first": 2, "bottom-first": 3}  # FFmpeg's AV_FIELD_TT, AV_FIELD_BB
 
 

@@ -12,7 +12,7 @@ from airborne.calibration.initial.chaining import board_source
 from airborne.calibration.intrinsics.physical import PINHOLE_MODELS, Pinhole, fit_pinhole
 from airborne.cameras import Rig
 from airborne.errors import CalibrationError
-from tests.support.rigs import BROWN, FISHEYE, MIDDLE, apart, boards, ring, seen_board, seen_points, shaken
+from tests.support.rigs import BROWN, FISHEYE, MIDDLE, apart, boards, observe_board, observe_points, ring, shaken
 from tests.support.tolerances import SOLVED
 
 ALL = FreeParameters(principal_point=True, n_terms=5)
@@ -20,7 +20,7 @@ ALL = FreeParameters(principal_point=True, n_terms=5)
 
 def board_of(rng, rig, n=40, noise_px=0.3):
     places = boards(rng, n)
-    return board_source(seen_board(rng, rig, places, noise_px=noise_px), places)
+    return board_source(observe_board(rng, rig, places, noise_px=noise_px), places)
 
 
 @pytest.mark.parametrize(("lens", "distortion", "n_terms"), [("brown", BROWN, 4), ("fisheye", FISHEYE, 4)])
@@ -41,7 +41,7 @@ def test_one_lens_is_that_of_opencv():
     rng = np.random.default_rng(1)
     rig = Rig((ring(1).cameras[0],))
     places = boards(rng, 60)
-    views = seen_board(rng, rig, places)
+    views = observe_board(rng, rig, places)
     own = views.of_camera(0)
     corners = [views.board.corners[s.corner].astype(np.float32) for s in own.detections[0]]
     px = [s.px.astype(np.float32)[:, None] for s in own.detections[0]]
@@ -62,7 +62,7 @@ def test_two_cameras_are_those_of_opencv():
     )
     rig = Rig((first, second))
     places = boards(rng, 60)
-    views = seen_board(rng, rig, places)
+    views = observe_board(rng, rig, places)
     both = [m for m in range(60) if len(views.detections[0][m].corner) == len(views.detections[1][m].corner) == 30]
     views = views.select_moments(both)
     px = [[s.px.astype(np.float32)[:, None] for s in row] for row in views.detections]
@@ -86,7 +86,7 @@ def test_one_camera_by_known_points_is_that_of_the_control_points_fit():
     rng = np.random.default_rng(3)
     camera = ring(1, distortion=np.array([-0.1, 0, 0, 0, 0])).cameras[0]
     points = rng.uniform(-1, 1, (40, 3)) + MIDDLE
-    source = seen_points(rng, Rig((camera,)), points)
+    source = observe_points(rng, Rig((camera,)), points)
     place = camera.camera_from_world
     start = Pinhole(place.rotation.as_matrix(), camera.centre, camera.K[0, 0], camera.K[:2, 2])
     expected = fit_pinhole(start, PINHOLE_MODELS[-1], points[source.point], source.px)
@@ -105,8 +105,8 @@ def test_errors_lie_within_two_standard_deviations_as_often_as_they_should():
         points = rng.uniform(-0.8, 0.8, (20, 3)) + MIDDLE
         free = rng.uniform(-0.8, 0.8, (40, 3)) + MIDDLE
         sources = [
-            seen_points(rng, rig, points, noise_px=0.5, name="survey"),
-            seen_points(rng, rig, free, noise_px=2.0, name="person", is_free=np.ones(40, bool)),
+            observe_points(rng, rig, points, noise_px=0.5, name="survey"),
+            observe_points(rng, rig, free, noise_px=2.0, name="person", is_free=np.ones(40, bool)),
         ]
         found = adjust(rig, sources, FreeParameters())
         centres = np.stack([c.centre for c in found.rig]) - np.stack([c.centre for c in rig])
@@ -121,8 +121,8 @@ def test_each_sources_noise_is_found():
     rng = np.random.default_rng(5)
     rig = ring(4)
     points = rng.uniform(-0.8, 0.8, (150, 3)) + MIDDLE
-    sharp = seen_points(rng, rig, points, noise_px=0.2, name="survey")
-    blurred = seen_points(rng, rig, points, noise_px=4.0, name="person", is_free=np.ones(150, bool))
+    sharp = observe_points(rng, rig, points, noise_px=0.2, name="survey")
+    blurred = observe_points(rng, rig, points, noise_px=4.0, name="person", is_free=np.ones(150, bool))
     found = adjust(rig, [sharp, blurred], FreeParameters(n_terms=2))
     assert found.noise_px == pytest.approx((0.2, 4.0), rel=0.1)
 
@@ -157,7 +157,7 @@ def test_cameras_that_look_late_are_found_out():
     rig = Rig(tuple(replace(c, camera_from_world=rig.cameras[0].camera_from_world) for c in rig))
     shifted = [RigidTransform.from_translation([0.5 * i, 0, 0]) for i in range(3)]
     rig = Rig(tuple(replace(c, camera_from_world=s * c.camera_from_world) for c, s in zip(rig, shifted, strict=True)))
-    views = seen_board(rng, rig, places(times), noise_px=0.2, moving=[places(times + late) for late in late_s])
+    views = observe_board(rng, rig, places(times), noise_px=0.2, moving=[places(times + late) for late in late_s])
     source = board_source(views, places(times))
     lags = ObservationLags(group=source.camera * 40 + source.moments, time_s=times, sd_s=0.05)
     exact = adjust(rig, [source], FreeParameters(focal=False))
@@ -189,7 +189,7 @@ def test_the_length_of_a_wand_is_the_scale():
     ends = np.concatenate([middle - half, middle + half])
     lengths = Lengths(first=np.arange(60), second=np.arange(60, 120), length_m=np.full(60, 0.6))
     start = 1.2 * ends + rng.normal(0, 0.02, ends.shape)
-    source = seen_points(rng, rig, ends, is_free=np.ones(120, bool), start=start)
+    source = observe_points(rng, rig, ends, is_free=np.ones(120, bool), start=start)
     grown = Rig(
         tuple(
             replace(
@@ -209,7 +209,7 @@ def test_errors_in_common_make_the_standard_deviations_larger():
     rng = np.random.default_rng(10)
     rig = ring(3, distortion=np.zeros(5))
     points = np.tile(rng.uniform(-0.8, 0.8, (20, 3)) + MIDDLE, (10, 1))
-    source = seen_points(rng, rig, points, noise_px=0.1)
+    source = observe_points(rng, rig, points, noise_px=0.1)
     steady = rng.normal(0, 2.0, (20, 3, 2))
     px = source.px + steady[source.point % 20, source.camera]
     cluster = source.point % 20 * 3 + source.camera
@@ -244,10 +244,10 @@ def test_moving_the_world_changes_no_pixel():
 
 def test_nothing_seen_is_refused():
     rig = ring(3)
-    alone = seen_points(
+    alone = observe_points(
         np.random.default_rng(0), Rig(rig.cameras[:1]), np.array([[0, 0, 1.0]]), is_free=np.ones(1, bool)
     )
     with pytest.raises(CalibrationError, match="no point is seen by enough cameras"):
         adjust(rig, [alone])
     with pytest.raises(CalibrationError, match="camera 'cam1'"):
-        adjust(rig, [seen_points(np.random.default_rng(0), rig, np.zeros((5, 3)))], {"cam0": FreeParameters()})
+        adjust(rig, [observe_points(np.random.default_rng(0), rig, np.zeros((5, 3)))], {"cam0": FreeParameters()})

@@ -14,21 +14,21 @@ from airborne.calibration.bundle.equations import (
 )
 from airborne.calibration.bundle.problem import apply_step, build_problem, initial_state
 from airborne.calibration.initial.chaining import board_source
-from tests.support.rigs import MIDDLE, boards, ring, seen_board, seen_points
+from tests.support.rigs import MIDDLE, boards, observe_board, observe_points, ring
 
 
 def everything(rng):
     """A rig and sources with every kind of unknown."""
     rig = ring(3)
     places = boards(rng, 8)
-    board = board_source(seen_board(rng, rig, places), places)
+    board = board_source(observe_board(rng, rig, places), places)
     group = 8 * board.camera + board.moments
     board = replace(board, lags=ObservationLags(group=group, time_s=np.arange(8) / 10, sd_s=0.02))
     points = rng.uniform(-0.5, 0.5, (10, 3)) + MIDDLE
     lengths = Lengths(first=np.arange(5), second=np.arange(5, 10), length_m=np.full(5, 0.5))
-    free = replace(seen_points(rng, rig, points, is_free=np.ones(10, bool)), lengths=lengths)
+    free = replace(observe_points(rng, rig, points, is_free=np.ones(10, bool)), lengths=lengths)
     floor = np.repeat([[True, True, False]], 4, axis=0)
-    known = seen_points(rng, rig, points[:4], name="known", is_free=floor)
+    known = observe_points(rng, rig, points[:4], name="known", is_free=floor)
     return rig, (board, free, known), FreeParameters(principal_point=True, n_terms=5, shares_focal="all")
 
 
@@ -59,7 +59,7 @@ def test_slopes_are_those_of_differences():
 def test_elimination_solves_the_same_equations():
     rng = np.random.default_rng(2)
     rig, sources, _ = everything(rng)
-    sources = (*sources, seen_points(rng, rig, rng.uniform(-0.5, 0.5, (20, 3)) + MIDDLE, name="survey"))
+    sources = (*sources, observe_points(rng, rig, rng.uniform(-0.5, 0.5, (20, 3)) + MIDDLE, name="survey"))
     task = build_problem(rig, sources, dict.fromkeys(rig.names, FreeParameters()))
     state = initial_state(rig, sources, task)
     slopes = jacobian_of(task, state)
@@ -88,16 +88,16 @@ def test_the_world_is_as_free_as_the_sources_leave_it():
     rng = np.random.default_rng(3)
     rig = ring(3)
     points = rng.uniform(-0.5, 0.5, (30, 3)) + MIDDLE
-    loose = seen_points(rng, rig, points, is_free=np.ones(30, bool))
+    loose = observe_points(rng, rig, points, is_free=np.ones(30, bool))
     lengths = Lengths(first=np.array([0]), second=np.array([1]), length_m=np.array([0.5]))
     all_free = dict.fromkeys(rig.names, FreeParameters())
     assert frame_of(rig, [loose], all_free) == 7
     assert frame_of(rig, [replace(loose, lengths=lengths)], all_free) == 6
-    assert frame_of(rig, [seen_points(rng, rig, points)], all_free) == 0
+    assert frame_of(rig, [observe_points(rng, rig, points)], all_free) == 0
     one_held = all_free | {"cam0": FreeParameters(extrinsics=False)}
     assert frame_of(rig, [loose], one_held) == 1  # only the scale, about the held camera
     places = boards(rng, 20)
-    board = board_source(seen_board(rng, rig, places), places)
+    board = board_source(observe_board(rng, rig, places), places)
     assert frame_of(rig, [board], all_free) == 6
     assert frame_of(rig, [replace(board, is_fixed=np.arange(20) == 4)], all_free) == 0
 

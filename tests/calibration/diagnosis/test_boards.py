@@ -39,7 +39,7 @@ def sentence(described, shown):
 @pytest.mark.parametrize(
     "board", [CHARUCO, CHESS, replace(CHARUCO, is_inverted=True), replace(CHARUCO, is_legacy=True)]
 )
-def test_the_right_board_is_not_doubted(board):
+def test_the_right_board_is_not_flagged(board):
     assert check_board_print(board, pictures(board), "cam1") == []
 
 
@@ -70,17 +70,17 @@ def test_another_size_of_markers_is_named():
     assert 0.064 < float(said.rsplit("= ", 1)[1]) < 0.074
 
 
-def test_mirrored_pictures_are_named():
+def test_mirrored_images_are_named():
     mirrored = [np.ascontiguousarray(picture[:, ::-1]) for picture in pictures(CHARUCO)]
     assert "the pictures are mirrored" in sentence(CHARUCO, mirrored)
 
 
-def test_squares_counted_for_inner_corners_are_told():
+def test_squares_counted_for_inner_corners_are_reported():
     said = sentence(replace(CHESS, columns=8, rows=5), pictures(CHESS))
     assert "squares were counted, not the inner corners; set columns = 7 and rows = 4" in said
 
 
-def test_nothing_in_the_pictures_is_told_as_that():
+def test_nothing_in_the_images_is_reported_as_that():
     empty = [np.full((400, 560), 90, np.uint8)] * 3
     assert "found in 0 of 3 pictures, with 0 of its 12 corners at most" in sentence(CHARUCO, empty)
     assert "no other board is either" in sentence(CHESS, empty)
@@ -97,7 +97,7 @@ def real(shared_data):
     return read_board(folder / "charuco.toml"), greys[::12]
 
 
-def test_a_real_board_is_not_doubted(real):
+def test_a_real_board_is_not_flagged(real):
     assert check_board_print(*real, "cam_1") == []
 
 

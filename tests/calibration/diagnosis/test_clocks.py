@@ -8,20 +8,20 @@ from airborne.calibration.diagnosis.clocks import check_counter, check_image_cou
 TIMES_S = np.arange(200) / 50 + np.random.default_rng(0).normal(0, 5e-4, 200)
 
 
-def test_a_clock_that_runs_on_is_not_doubted():
+def test_a_clock_that_runs_on_is_not_flagged():
     assert check_times("cam1", TIMES_S) == []
     assert check_counter("cam1", np.arange(7, 300)) == []
     assert check_times("cam1", TIMES_S[:3]) == []
 
 
 @pytest.mark.parametrize("modulus", [256, 65536, 1000])
-def test_a_counter_that_rolls_over_is_told(modulus):
+def test_a_counter_that_rolls_over_is_reported(modulus):
     counts = np.arange(modulus - 60, modulus + 40) % modulus
     [found] = check_counter("cam1", counts)
     assert f"picture numbers fall from {modulus - 1:g} to 0 after picture 59" in found.sentence
 
 
-def test_a_clock_that_starts_anew_is_told():
+def test_a_clock_that_starts_anew_is_reported():
     times_s = TIMES_S.copy()
     times_s[120:] -= times_s[120]
     [found] = check_times("cam1", times_s)
@@ -29,13 +29,13 @@ def test_a_clock_that_starts_anew_is_told():
     assert "to 0 after picture 119" in found.sentence
 
 
-def test_pictures_stored_twice_are_told():
+def test_images_stored_twice_are_reported():
     times_s = np.insert(TIMES_S, [50, 90], TIMES_S[[50, 90]])
     [found] = check_times("cam1", times_s)
     assert "time stamps stand still after pictures 50, 91" in found.sentence
 
 
-def test_lost_pictures_are_counted():
+def test_lost_images_are_counted():
     [found] = check_times("cam1", np.delete(TIMES_S, [30, 31, 32, 100]))
     assert found.sentence.startswith("cam1: 4 pictures are missing by its time stamps, after pictures 29, 96")
     [found] = check_counter("cam1", np.delete(np.arange(100), [40]))
@@ -47,11 +47,11 @@ def test_many_places_are_not_all_listed():
     assert "and 6 more" in found.sentence
 
 
-def test_stamps_that_are_no_times_are_told():
+def test_stamps_that_are_no_times_are_reported():
     assert "never go forward" in check_times("cam1", np.zeros(20))[0].sentence
 
 
-def test_the_camera_with_another_number_of_pictures_is_named():
+def test_the_camera_with_another_number_of_images_is_named():
     assert check_image_counts({"cam1": 100, "cam2": 100}) == []
     assert check_image_counts({"cam1": 100, "cam2": 99}, 2) == []
     [found] = check_image_counts({"cam1": 100, "cam2": 100, "cam3": 95})
@@ -66,14 +66,14 @@ def rows_read_late(readout_s, *, offset_s=0.0, n=400):
     return late_s[:, None] * velocity + rng.normal(0, 0.5, (n, 2)), velocity, row
 
 
-def test_rows_read_one_by_one_are_told_with_their_time():
+def test_rows_read_one_by_one_are_reported_with_their_time():
     residual, velocity, row = rows_read_late(0.020, offset_s=0.004)
     residual[::17] += 30
     [found] = check_rolling_shutter("cam1", residual, velocity, row_px=row, height_px=1080)
     assert float(found.sentence.split("over ")[1].split(" ms")[0]) == pytest.approx(20, abs=2)
 
 
-def test_a_shutter_that_opens_at_once_is_not_doubted():
+def test_a_shutter_that_opens_at_once_is_not_flagged():
     residual, velocity, row = rows_read_late(0.0, offset_s=0.004)
     assert check_rolling_shutter("cam1", residual, velocity, row_px=row, height_px=1080) == []
     residual, velocity, row = rows_read_late(0.02)

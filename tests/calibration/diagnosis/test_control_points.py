@@ -8,7 +8,7 @@ import pytest
 from airborne.calibration.diagnosis import flatness
 from airborne.calibration.from_points import calibrate
 from airborne.errors import CalibrationError
-from tests.support.cameras import clicked, seen_only_by
+from tests.support.cameras import clicked, restrict_to_cameras
 
 
 def exchanged(px):
@@ -16,7 +16,7 @@ def exchanged(px):
 
 
 def warnings_of(points, sizes, *cameras):
-    return calibrate(seen_only_by(points, *cameras), sizes).warnings
+    return calibrate(restrict_to_cameras(points, *cameras), sizes).warnings
 
 
 def error_of(points, sizes):
@@ -29,7 +29,7 @@ def error_of(points, sizes):
 def test_too_few_points_are_counted_per_camera(points, sizes):
     some = np.isin(points.names, ["P01", "P04", "P05", "P13", "P20", "P23"])[:, None]
     enough = clicked(points, "cam2", lambda px: np.where(some, px, np.nan))
-    assert calibrate(seen_only_by(enough, "cam2"), sizes).fits[0].n_points == 6
+    assert calibrate(restrict_to_cameras(enough, "cam2"), sizes).fits[0].n_points == 6
     few = clicked(points, "cam2", lambda px: np.where(np.arange(24)[:, None] < 5, px, np.nan))
     assert "camera 'cam2' sees 5 control points, at least 6 are needed" in error_of(few, sizes)
 
@@ -45,14 +45,14 @@ def test_points_in_one_plane_are_refused(points, sizes):
     assert "the control points of camera 'cam1' lie in one plane (thickness / extent 0.0000" in message
 
 
-def test_points_near_one_plane_are_doubted(points, sizes):
+def test_points_near_one_plane_are_flagged(points, sizes):
     front = clicked(points, "cam1", lambda px: np.where(points.world[:, 1:2] < 0, px, np.nan))
     ratio = flatness(points.world[front.is_seen_by("cam1")])
     assert 0.01 < ratio < 0.1
     assert f"nearly flat (thickness / extent {ratio:.3f})" in " ".join(warnings_of(front, sizes, "cam1"))
 
 
-def test_exchanged_u_and_v_are_seen_from_the_picture_border(points, sizes):
+def test_exchanged_u_and_v_are_seen_from_the_image_border(points, sizes):
     message = error_of(clicked(points, "cam1", exchanged), sizes)
     assert "camera 'cam1'" in message
     assert "with width and height exchanged they would fit" in message
@@ -80,7 +80,7 @@ def test_axes_turned_round_leave_the_camera_on_its_side(points, sizes):
     assert "'cam1' comes out on its side" in " ".join(warnings_of(turned, sizes, "cam1"))
 
 
-def test_points_outside_the_picture_are_counted_and_named(points, sizes):
+def test_points_outside_the_image_are_counted_and_named(points, sizes):
     assert "1 control points lie outside its 768×576 picture (first 'P03' at u=900, v=154.43)" in error_of(
         clicked(points, "cam1", lambda px: np.where(np.arange(24)[:, None] == 2, [900, 154.43], px)), sizes
     )
@@ -114,22 +114,22 @@ def test_millimetres_given_as_metres_are_refused(points, sizes):
     assert message == ("the control points span 3368 m, expected a scene in metres: divide by 1000 if they are in mm")
 
 
-def test_a_hundred_metres_are_doubted(points, sizes):
+def test_a_hundred_metres_are_flagged(points, sizes):
     warnings = warnings_of(replace(points, world=points.world * 100), sizes, "cam3")
     assert "the control points span 337 m: are they in metres?" in warnings
 
 
-def test_a_wrong_picture_size_shows_as_an_axis_off_the_middle(points):
+def test_a_wrong_image_size_shows_as_an_axis_off_the_middle(points):
     [warning] = warnings_of(points, {"cam1": (1536, 1152)}, "cam1")
     assert "expected near the middle (768, 576): is 1536×1152 its size" in warning
 
 
-def test_pixels_that_are_not_square_are_told(points):
+def test_pixels_that_are_not_square_are_reported(points):
     stretched = clicked(points, "cam1", lambda px: px * [720 / 768, 1])
     assert "pixels that are not square" in " ".join(warnings_of(stretched, {"cam1": (720, 576)}, "cam1"))
 
 
-def test_a_rough_fit_is_told(points, sizes):
+def test_a_rough_fit_is_reported(points, sizes):
     noise = np.random.default_rng(0).normal(0, 4, (24, 2))
     rough = clicked(points, "cam1", lambda px: np.clip(px + noise, 0, [767, 575]))
     assert "fits its control points only to" in " ".join(warnings_of(rough, sizes, "cam1"))

@@ -16,7 +16,7 @@ def test_few_views_are_counted():
     )
 
 
-def test_points_all_over_the_picture_are_enough():
+def test_points_all_over_the_image_are_enough():
     px = np.random.default_rng(0).uniform((0, 0), SIZE, (200, 2))
     assert check_coverage("cam1", px, SIZE) == []
 
@@ -36,12 +36,12 @@ def test_where_points_are_missing_is_named(low, high, where):
     assert "% of its picture" in found.sentence
 
 
-def test_a_few_clicks_are_not_blamed_for_leaving_the_picture_empty():
+def test_a_few_clicks_are_not_blamed_for_leaving_the_image_empty():
     assert check_coverage("cam1", np.full((20, 2), 500.0), SIZE) == []
     assert check_coverage("cam1", np.full((200, 2), np.nan), SIZE) == []
 
 
-def test_a_board_that_always_faces_the_camera_is_told():
+def test_a_board_that_always_faces_the_camera_is_reported():
     rng = np.random.default_rng(1)
     assert check_tilts("cam1", np.radians(rng.uniform(0, 45, 30))) == []
     [found] = check_tilts("cam1", np.radians(rng.uniform(0, 9, 30)))
@@ -55,7 +55,7 @@ def shared(*pairs):
     return counts
 
 
-def test_cameras_that_are_chained_are_not_doubted():
+def test_cameras_that_are_chained_are_not_flagged():
     assert check_links(NAMES, shared((0, 1, 20), (1, 2, 9), (2, 3, 40))) == []
 
 

@@ -22,8 +22,8 @@ UP = np.array([0, 0, 1.0])
 
 def points_and_px(seed=0, **kinds):
     rng = np.random.default_rng(seed)
-    points = waving.waved(rng, 100).reshape(-1, 3)
-    return points, waving.seen(rng, RIG, points, **kinds)
+    points = waving.wave_wand(rng, 100).reshape(-1, 3)
+    return points, waving.observe(rng, RIG, points, **kinds)
 
 
 def changed(k, camera):
@@ -34,7 +34,7 @@ def changed(k, camera):
 
 @pytest.mark.parametrize("k", range(4))
 @pytest.mark.parametrize("stray_share", [0.0, 0.1])
-def test_a_mirrored_picture_is_told_from_a_sound_one(k, stray_share):
+def test_a_mirrored_image_is_told_from_a_sound_one(k, stray_share):
     points, px = points_and_px(stray_share=stray_share)
     assert check_mirroring("cam", waving.SIZE, points, px[:, k]) == []
     mirrored = px[:, k] * [-1, 1] + [waving.SIZE[0] - 1, 0]
@@ -51,7 +51,7 @@ def test_pixels_that_fit_nothing_are_not_called_mirrored():
 
 
 @pytest.mark.parametrize("up", [None, UP])
-def test_level_cameras_are_not_doubted(up):
+def test_level_cameras_are_not_flagged(up):
     assert check_roll(RIG, up) == []
 
 

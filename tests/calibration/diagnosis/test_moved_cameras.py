@@ -20,21 +20,21 @@ TIMES_S = np.arange(N) / 50
 def knocked(seed, moment, names=("cam2",), degrees=0.5):
     """The wand as seen by cameras of which some are turned and shifted at a moment."""
     rng = np.random.default_rng(seed)
-    points = waving.waved(rng, N)
+    points = waving.wave_wand(rng, N)
     turn = Rotation.from_euler("y", degrees, degrees=True)
     knock = RigidTransform.from_components(degrees * np.array([0.04, 0, 0.02]), turn)
     after = Rig(tuple(replace(c, camera_from_world=knock * c.camera_from_world) if c.name in names else c for c in RIG))
-    px = [waving.seen(rng, rig, points, stray_share=0.03) for rig in (RIG, after)]
+    px = [waving.observe(rng, rig, points, stray_share=0.03) for rig in (RIG, after)]
     return np.where((np.arange(N) < moment)[:, None, None, None], *px)
 
 
-def test_cameras_that_stand_still_are_not_doubted():
+def test_cameras_that_stand_still_are_not_flagged():
     assert check_moved_cameras(RIG, knocked(0, N), TIMES_S) == []
 
 
 @pytest.mark.parametrize("name", ["cam1", "cam4"])
 @pytest.mark.parametrize("moment", [60, 140])
-def test_the_camera_the_time_and_the_way_are_told(name, moment):
+def test_the_camera_the_time_and_the_way_are_reported(name, moment):
     [found] = check_moved_cameras(RIG, knocked(1, moment, (name,)), TIMES_S)
     assert found.cameras == (name,)
     assert f"between {TIMES_S[moment - 1]:.2f} s and {TIMES_S[moment]:.2f} s" in found.sentence

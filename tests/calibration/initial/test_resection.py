@@ -45,7 +45,7 @@ def test_new_place_is_as_near_as_its_standard_deviation_says(seed):
     assert 0 < rig["side"].shift_sd_px < 1, "26 points whose steady errors average out"
 
 
-def test_mending_twice_changes_nothing():
+def test_resection_twice_changes_nothing():
     detections = seen(TRUE, walking(), sd_px=2.0)
     rig, _ = resect_cameras(knocked(TRUE, "back"), detections, ["back"])
     _, (again,) = resect_cameras(rig, detections, ["back"])
@@ -85,7 +85,7 @@ def test_unsure_detections_and_faces_do_not_move_a_camera():
     np.testing.assert_array_equal(rig["side"].centre, without["side"].centre)
 
 
-def test_two_cameras_may_be_mended_at_once_by_two_others():
+def test_two_cameras_may_be_resected_at_once_by_two_others():
     wrong = knocked(knocked(TRUE, "side"), "back", (-0.05, 0.04, 0.05), (-1.0, 0.5, 0.4))
     rig, done = resect_cameras(wrong, seen(TRUE, walking(), sd_px=0.5), ["side", "back"])
     assert [mending.camera.name for mending in done] == ["side", "back"]
@@ -93,7 +93,7 @@ def test_two_cameras_may_be_mended_at_once_by_two_others():
         assert miss(rig[mending.camera.name], mending.camera.name)[0] < 3 * mending.shift_sd_m < 0.15
 
 
-def test_mending_is_told_in_one_line_with_its_numbers():
+def test_resection_is_reported_in_one_line_with_its_numbers():
     _, (mending,) = resect_cameras(knocked(TRUE, "side"), seen(TRUE, walking()), ["side"])
     said = mending.describe()
     assert "\n" not in said
@@ -123,7 +123,7 @@ def test_two_cameras_cannot_tell():
     assert find_misplaced_cameras(pair, seen(TRUE, walking())) == ()
 
 
-def test_what_cannot_be_mended_is_refused():
+def test_what_cannot_be_resected_is_refused():
     detections = seen(TRUE, walking())
     with pytest.raises(CalibrationError, match="leaves 1 of 4 cameras; two others at least"):
         resect_cameras(TRUE, detections, ["left", "right", "side"])

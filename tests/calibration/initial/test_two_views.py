@@ -37,7 +37,7 @@ def test_the_parallax_is_the_angle_between_the_rays():
     assert place.parallax_rad == pytest.approx(np.median(np.arccos(cosine)), abs=1e-4)
 
 
-def test_strays_are_told_from_what_agrees():
+def test_outliers_are_told_from_what_agrees():
     rng = np.random.default_rng(2)
     _, px_a, px_b = pair(rng, 200)
     is_stray = rng.random(200) < 0.3

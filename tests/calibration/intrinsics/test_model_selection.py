@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from airborne.calibration.intrinsics.model_selection import choose_simplest, leave_one_out, supported_models
+from airborne.calibration.intrinsics.model_selection import choose_simplest, leave_one_out, models_for
 from airborne.calibration.intrinsics.physical import PINHOLE_MODELS, SEVEN_PARAMETERS, fit_pinhole
 from tests.calibration.intrinsics.test_physical import STRAIGHT, TRUTH, WORLD
 from tests.support.tolerances import ROUNDTRIP
@@ -40,5 +40,5 @@ def test_an_axis_off_the_middle_gets_its_principal_point():
 
 
 def test_few_points_support_few_numbers():
-    assert [model.n_parameters for model in supported_models(PINHOLE_MODELS, 6)] == [7, 8, 9]
-    assert [model.n_parameters for model in supported_models(PINHOLE_MODELS, 7)] == [7, 8, 9, 10]
+    assert [model.n_parameters for model in models_for(PINHOLE_MODELS, 6)] == [7, 8, 9]
+    assert [model.n_parameters for model in models_for(PINHOLE_MODELS, 7)] == [7, 8, 9, 10]

@@ -49,7 +49,7 @@ def test_the_full_model_finds_principal_point_and_distortion():
 
 
 @pytest.mark.parametrize("model", PINHOLE_MODELS)
-def test_every_free_number_has_a_name_and_moves_the_picture(model):
+def test_every_free_number_has_a_name_and_moves_the_image(model):
     names = parameter_names(model)
     assert len(names) == model.n_parameters
     for i in range(len(names)):

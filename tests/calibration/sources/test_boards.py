@@ -38,13 +38,13 @@ def test_corners_are_where_the_board_has_them(board, turn_deg):
     assert off.max() < 1.2
 
 
-def test_a_picture_without_the_board_shows_nothing():
+def test_an_image_without_the_board_shows_nothing():
     grey = np.random.default_rng(0).integers(0, 255, (200, 300), dtype=np.uint8)
     for board in (CHARUCO, CHESS):
         assert len(board_detector(board)(grey).corner) == 0
 
 
-def test_a_board_printed_otherwise_is_told():
+def test_a_board_printed_otherwise_is_reported():
     picture = photographed(replace(CHARUCO, is_inverted=True, is_legacy=True), CAMERA, facing((10, 10, 10)))
     board, notes = match_print(CHARUCO, [picture])
     assert board == replace(CHARUCO, is_inverted=True, is_legacy=True)

@@ -63,7 +63,7 @@ def test_the_bundled_points_are_seen_by_three_cameras(points):
         (GOOD + '"' + "x" * 200_000, "not a table with commas"),
     ],
 )
-def test_a_malformed_file_is_told_in_one_line(tmp_path, content, message):
+def test_a_malformed_file_is_reported_in_one_line(tmp_path, content, message):
     with pytest.raises(CalibrationError) as error:
         read_control_points(written(tmp_path, content))
     assert message in str(error.value)

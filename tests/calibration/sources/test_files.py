@@ -10,7 +10,7 @@ from airborne.calibration.sources.files import Sources, read_sources
 from airborne.errors import CalibrationError
 from tests.support.places import ROOT
 
-PAGE = ROOT / "docs" / "calibration.md"
+PAGE = ROOT / "docs" / "reference" / "calibration.md"
 MODELS = {
     "[[camera]]": tables.CameraSource,
     "[start]": tables.StartSource,
@@ -63,7 +63,7 @@ def test_a_file_that_is_none_is_refused_in_one_line(tmp_path, text):
         read_sources(tmp_path / "none.toml")
 
 
-def test_another_kind_of_file_is_told(tmp_path):
+def test_another_kind_of_file_is_reported(tmp_path):
     path = tmp_path / "sources.toml"
     for text, found in (("[cam1]\nmatrix = 1", "cam1"), ('name = "x"\n[[camera]]\n[body]', "name, camera, body")):
         path.write_text(text)

@@ -24,7 +24,7 @@ def off_m(found):
 
 @pytest.mark.parametrize("names", [None, FLOOR, SOME], ids=["all", "floor only", "eight"])
 def test_cameras_start_near_their_places_whatever_their_focal_length(names):
-    points = waving.clicked(np.random.default_rng(0), RIG, names)
+    points = waving.click_court(np.random.default_rng(0), RIG, names)
     start = initial_rig_from_points(points, waving.SIZES)
     assert start.names == RIG.names
     assert off_m(start).max() < 0.6  # court lines are known to a centimetre
@@ -32,7 +32,7 @@ def test_cameras_start_near_their_places_whatever_their_focal_length(names):
 
 
 def test_exact_points_give_exact_cameras():
-    points = waving.clicked(np.random.default_rng(1), RIG, noise_px=0.0)
+    points = waving.click_court(np.random.default_rng(1), RIG, noise_px=0.0)
     known = court_points("men")
     px = np.stack([c.px_from_world(np.array([known[n].position_m for n in points.names])) for c in RIG], axis=1)
     points = replace(points, px=np.where(np.isnan(points.px), np.nan, px), sd_m=None)
@@ -42,21 +42,21 @@ def test_exact_points_give_exact_cameras():
 
 
 def test_a_known_lens_is_kept_and_four_points_are_enough():
-    points = waving.clicked(np.random.default_rng(2), RIG, SOME[:4])
+    points = waving.click_court(np.random.default_rng(2), RIG, SOME[:4])
     start = initial_rig_from_points(points, waving.SIZES, {camera.name: camera for camera in RIG})
     assert all(np.array_equal(start[name].K, RIG[name].K) for name in start.names)
     assert off_m(start).max() < 0.3
 
 
 def test_a_camera_with_too_few_points_is_left_out():
-    points = waving.clicked(np.random.default_rng(3), RIG)
+    points = waving.click_court(np.random.default_rng(3), RIG)
     px = points.px.copy()
     px[3:, 1] = np.nan
     assert "cam2" not in initial_rig_from_points(replace(points, px=px), waving.SIZES).names
 
 
 def test_a_wrong_click_does_not_spoil_the_start():
-    points = waving.clicked(np.random.default_rng(4), RIG)
+    points = waving.click_court(np.random.default_rng(4), RIG)
     px = points.px.copy()
     px[np.flatnonzero(points.is_seen_by("cam1"))[:3], 0] += [150, -80]
     start = initial_rig_from_points(replace(points, px=px), waving.SIZES)
@@ -65,11 +65,11 @@ def test_a_wrong_click_does_not_spoil_the_start():
 
 def test_the_nets_own_uncertainty_lets_it_sag():
     rng = np.random.default_rng(5)
-    points = waving.clicked(rng, RIG, noise_px=0.2)
+    points = waving.click_court(rng, RIG, noise_px=0.2)
     known, names = court_points("men"), list(points.names)
     true = np.array([known[name].position_m for name in names])
     true[[names.index("net_left_top"), names.index("net_right_top")], 2] -= 0.015
-    px = waving.seen(rng, RIG, true, noise_px=0.2)
+    px = waving.observe(rng, RIG, true, noise_px=0.2)
     free = scene_source(RIG.names, replace(points, px=px), name="court")
     held = scene_source(RIG.names, replace(points, px=px, sd_m=None), name="court")
     sagging = adjust(RIG, [free], FreeParameters())
@@ -80,7 +80,7 @@ def test_the_nets_own_uncertainty_lets_it_sag():
 
 
 def test_points_that_nobody_sees_are_no_evidence():
-    points = waving.clicked(np.random.default_rng(6), RIG)
+    points = waving.click_court(np.random.default_rng(6), RIG)
     px = points.px.copy()
     px[5:] = np.nan
     source = scene_source(RIG.names, replace(points, px=px, sd_m=None), name="court")

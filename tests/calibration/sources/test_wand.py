@@ -96,10 +96,10 @@ def test_lengths_that_cannot_be_are_refused(lengths, said):
         WandTracks(cameras=("a",), px=np.zeros((1, 2, 1, 2)), lengths_m=lengths)
 
 
-def test_strays_are_no_evidence():
+def test_outliers_are_no_evidence():
     rng, rig = np.random.default_rng(1), waving.hall()
-    points = waving.waved(rng, 100)
-    px = waving.seen(rng, rig, points)
+    points = waving.wave_wand(rng, 100)
+    px = waving.observe(rng, rig, points)
     true = px.copy()
     is_stray = rng.random(px.shape[:-1]) < 0.1
     px[is_stray] = rng.uniform((0, 0), waving.SIZE, (is_stray.sum(), 2))

@@ -46,7 +46,7 @@ def test_points_that_fix_no_frame_are_refused(points, said):
         frame_of_three_points(*np.array(points))
 
 
-def test_up_is_found_within_its_standard_deviation_and_strays_do_not_matter():
+def test_up_is_found_within_its_standard_deviation_and_outliers_do_not_matter():
     rng, up = np.random.default_rng(0), OLD_FROM_NEW.rotation.apply([0, 0, 1.0])
     tilts, sds, magnitudes = [], [], []
     for k in range(40):
@@ -92,14 +92,16 @@ def test_the_frame_of_gravity_has_z_up_and_x_level():
         frame_of_gravity(gravity, *OLD_FROM_NEW.apply([[0, 0, 0], [0, 0, 1.0]]))
 
 
-def moved(rig, new_from_old):
+def transform_rig(rig, new_from_old):
     return Rig(tuple(replace(c, camera_from_world=c.camera_from_world * new_from_old.inv()) for c in rig))
 
 
 @pytest.mark.parametrize("shared", [["cam2"], ["cam1", "cam2"], ["cam1", "cam2", "cam3"]])
 def test_starts_join_through_the_cameras_that_both_hold(shared):
     rig = waving.hall()
-    joined = merge_rigs([rig.select(["cam1", "cam2", "cam3"]), moved(rig.select([*shared, "cam4"]), OLD_FROM_NEW)])
+    joined = merge_rigs(
+        [rig.select(["cam1", "cam2", "cam3"]), transform_rig(rig.select([*shared, "cam4"]), OLD_FROM_NEW)]
+    )
     assert set(joined.names) == set(rig.names)
     assert all(np.allclose(joined[name].centre, rig[name].centre) for name in rig.names)
 
@@ -108,7 +110,7 @@ def test_starts_join_one_after_the_other_in_any_order():
     rig = waving.hall()
     parts = [
         rig.select(["cam1", "cam2"]),
-        moved(rig.select(["cam3", "cam4"]), OLD_FROM_NEW),
+        transform_rig(rig.select(["cam3", "cam4"]), OLD_FROM_NEW),
         rig.select(["cam2", "cam3"]),
     ]
     assert all(np.allclose(camera.centre, rig[camera.name].centre) for camera in merge_rigs(parts))

@@ -112,7 +112,7 @@ def test_points_are_placed_where_they_were_and_residuals_are_those_of_dltdv():
         ("pt1_cam1_U,pt1_cam1_V\n1,2\n1\n", "row 3: expected 2 numbers"),
     ],
 )
-def test_another_table_is_told_in_one_line(tmp_path, text, message):
+def test_another_table_is_reported_in_one_line(tmp_path, text, message):
     (tmp_path / "xypts.csv").write_text(text)
     with pytest.raises(CalibrationError) as error:
         read_digitisation(tmp_path / "xypts.csv", FileOptions())
@@ -120,7 +120,7 @@ def test_another_table_is_told_in_one_line(tmp_path, text, message):
     assert "\n" not in str(error.value)
 
 
-def test_what_does_not_fit_together_is_told(tmp_path):
+def test_what_does_not_fit_together_is_reported(tmp_path):
     write_digitisation(tmp_path / "t_xypts.csv", triangulate_digitisation(clicked(RIG.names), RIG), FileOptions())
     with pytest.raises(CalibrationError, match="has 3 cameras; name as many"):
         read_digitisation(tmp_path / "t_xypts.csv", FileOptions(), ("left", "right"))

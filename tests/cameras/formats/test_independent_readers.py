@@ -17,12 +17,12 @@ from airborne.cameras import PixelConvention, Rig, read_rig, write_rig
 from airborne.errors import CalibrationError
 from tests.cameras.formats.test_round_trips import FISHEYE_LENS, fisheye_rig
 from tests.support.cameras import LENS, three_cameras
-from tests.support.format_rigs import assert_same, seen_points
+from tests.support.format_rigs import assert_same, visible_points
 from tests.support.tolerances import ROUNDTRIP
 
 PX = 1e3 * ROUNDTRIP  # of pixels that count in hundreds
 RIG = three_cameras(LENS)
-POINTS = seen_points(RIG)
+POINTS = visible_points(RIG)
 
 
 def imported(name):
@@ -184,7 +184,7 @@ def test_qualisys_formula_by_hand_gives_our_pixels(tmp_path):
         np.testing.assert_allclose(np.column_stack([u, v]), RIG[element.get("serial")].px_from_world(POINTS), atol=PX)
 
 
-def test_a_cropped_qualisys_picture_has_its_centre_moved(tmp_path):
+def test_a_cropped_qualisys_image_has_its_centre_moved(tmp_path):
     write_rig(tmp_path / "whole.qca.txt", RIG)
     text = (tmp_path / "whole.qca.txt").read_text()
     (tmp_path / "cropped.qca.txt").write_text(text.replace('left="0" top="0"', 'left="100" top="50"'))

@@ -82,7 +82,7 @@ def test_a_cameras_order_is_not_that_of_sorted_keys(tmp_path, text_of):
         ("qualisys", "<?xml", XML_BOMB + "<?xml", "declares a document type or entities"),
     ],
 )
-def test_what_is_wrong_is_told_in_one_line(tmp_path, text_of, kind, old, new, message):
+def test_what_is_wrong_is_reported_in_one_line(tmp_path, text_of, kind, old, new, message):
     text = text_of(kind)
     assert old in text
     with pytest.raises(CalibrationError) as error:
@@ -101,7 +101,7 @@ def test_what_is_wrong_is_told_in_one_line(tmp_path, text_of, kind, old, new, me
         ("0\n" * 11, "these coefficients are no camera's"),
     ],
 )
-def test_a_table_that_is_no_cameras_is_told(tmp_path, text, message):
+def test_a_table_that_is_no_cameras_is_reported(tmp_path, text, message):
     with pytest.raises(CalibrationError) as error:
         read(tmp_path, text, size=(768, 576))
     assert message in str(error.value)
@@ -112,6 +112,6 @@ def test_a_file_larger_than_any_calibration_is_not_read(tmp_path):
         read(tmp_path, " " * 2_000_001)
 
 
-def test_a_folder_without_yaml_is_told(tmp_path):
+def test_a_folder_without_yaml_is_reported(tmp_path):
     with pytest.raises(CalibrationError, match="is a folder without OpenCV YAML"):
         read_rig(tmp_path)

@@ -36,7 +36,7 @@ def test_detections_come_back(tmp_path, as_folder):
     np.testing.assert_array_equal(back.visibility, some().visibility)
 
 
-def test_a_picture_with_nobody_has_no_people(tmp_path):
+def test_an_image_with_nobody_has_no_people(tmp_path):
     write_detections(tmp_path, some(), as_folder=True)
     document = json.loads((tmp_path / "left_json" / "left_000002.json").read_text())
     assert document["people"] == []

@@ -126,7 +126,7 @@ def test_a_name_that_no_file_can_hold_is_refused(tmp_path):
         ("rig.xcp", {"unit": "m"}, "vicon files are always in mm"),
     ],
 )
-def test_a_format_that_does_not_exist_or_fit_is_told(tmp_path, name, options, message):
+def test_a_format_that_does_not_exist_or_fit_is_reported(tmp_path, name, options, message):
     with pytest.raises(CalibrationError) as error:
         write_rig(tmp_path / name, three_cameras(), **options)
     assert message in str(error.value)

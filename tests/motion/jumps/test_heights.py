@@ -9,7 +9,6 @@ from airborne.errors import ResultError
 from airborne.motion.free_fall import free_fall_height, noise_covariance
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.standing_posture import leg_lengths
-from airborne.motion.jumps.table import describe_jumps
 from airborne.motion.local_polynomials import local_fits
 from tests.support.jumping import FLAT_M, HEEL_M, LEG_M, SHARE, G, Jumper, first_legs, motion_of, noise, players_motion
 from tests.support.tolerances import ROUNDTRIP
@@ -290,7 +289,6 @@ def test_uncertain_frames_of_the_flight_are_counted_and_those_of_the_floor_are_n
     status[at : at + 4] = status[0] = "uncertain"
     jump = only(replace(motion, status=status))
     assert (only(motion).n_uncertain, jump.n_uncertain) == (0, 4)
-    assert "4 frames of the flight are uncertain" in describe_jumps([jump])
 
 
 def test_a_covariance_that_is_not_given_counts_as_20_mm():

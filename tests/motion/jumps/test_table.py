@@ -1,4 +1,4 @@
-"""jumps.csv and the text for the terminal: every number with its interval, unknown ones empty."""
+"""jumps.csv: every number with its interval, unknown ones empty."""
 
 import csv
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.motion.jumps.heights import measure_jumps
-from airborne.motion.jumps.table import describe_jumps, write_jumps
+from airborne.motion.jumps.table import write_jumps
 from tests.support.jumping import Jumper, motion_of, players_motion
 
 CLEAN = Jumper()
@@ -52,14 +52,3 @@ def test_no_jump_leaves_a_table_with_its_first_line_alone(whole, tmp_path):
     none, one = ((tmp_path / name).read_text().splitlines() for name in ("none.csv", "one.csv"))
     assert none == one[:1]
     assert len(one) == 2
-    assert describe_jumps(()) == "no jump found"
-
-
-def test_text_shows_every_definition_in_centimetres_and_says_what_is_missing(whole, cut):
-    text = describe_jumps(whole + cut)
-    height = whole[0].foot_height_m
-    assert f"{100 * height.value:.1f} +-{50 * (height.high - height.low):.1f}" in text
-    for title in ("feet over standing", "hips over standing", "by flight time", "by take-off speed"):
-        assert title in text
-    assert "one 1: the landing is not seen" in text
-    assert "nan" not in text

@@ -23,7 +23,7 @@ from airborne.synthetic import (
 )
 from airborne.synthetic.block.margins import gap_m, margins_of
 from airborne.synthetic.block.pictures import _merge
-from airborne.synthetic.block.players import occupied_volume
+from airborne.synthetic.block.players import volume_over
 from airborne.synthetic.block.rig import hall_rig, perturb_calibration
 from airborne.synthetic.block.scene import paper_lengths
 from airborne.trial.file import read_trial
@@ -71,7 +71,7 @@ def test_every_player_respects_floor_net_and_joint_limits(scene):
 
 
 def test_no_two_players_touch(scene):
-    rooms = [occupied_volume(player, scene.n_frames / 60) for player in scene.players]
+    rooms = [volume_over(player, scene.n_frames / 60) for player in scene.players]
     gaps = [gap_m(a, b) for i, a in enumerate(rooms) for b in rooms[i + 1 :]]
     assert min(gaps) >= 0.03 - 1e-9
 

@@ -7,11 +7,11 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Inertia, Part, Segment, human18
+from airborne.constants import FREE_FALL_M_S2
 from airborne.errors import BodyError
 from airborne.geometry.rotations import geodesic
 from airborne.synthetic.flight.articulated import (
     Takeoff,
-    constant_joints,
     fly_articulated,
     joint_motion,
     mass_at_angles,
@@ -19,7 +19,8 @@ from airborne.synthetic.flight.articulated import (
     sum_motions,
     with_fixed_joints,
 )
-from airborne.synthetic.flight.rigid import GRAVITY_M_S2, Launch, MassProperties, fly
+from airborne.synthetic.flight.rigid import Launch, MassProperties, fly
+from tests.support.synthetic import constant_joints
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
 TIMES = np.arange(0, 0.61, 0.05)
@@ -107,7 +108,7 @@ def test_momentum_recomputed_from_the_poses_stays_the_same(middle):
     given = takeoff()
     np.testing.assert_allclose(angular, given.angular_momentum, atol=1e-9 * np.linalg.norm(given.angular_momentum))
     mass = sum(s.inertia.mass_kg for s in BODY.segments)
-    np.testing.assert_allclose(linear, mass * (given.velocity + GRAVITY_M_S2 * middle), rtol=ROUNDTRIP)
+    np.testing.assert_allclose(linear, mass * (given.velocity + FREE_FALL_M_S2 * middle), rtol=ROUNDTRIP)
 
 
 def test_momentum_of_a_gymnast_stays_the_same_too():
@@ -135,7 +136,7 @@ def test_second_difference_of_the_centre_of_mass_of_the_segments_is_gravity():
         result.append(mass @ (np.einsum("sij,sj->si", posed.R, local) + posed.t) / mass.sum())
     np.testing.assert_allclose(result, flight.centre, atol=EXACT)
     acceleration = np.diff(result, 2, axis=0) / 0.05**2
-    np.testing.assert_allclose(acceleration, np.broadcast_to(GRAVITY_M_S2, acceleration.shape), atol=ROUNDTRIP)
+    np.testing.assert_allclose(acceleration, np.broadcast_to(FREE_FALL_M_S2, acceleration.shape), atol=ROUNDTRIP)
 
 
 def test_body_with_fixed_joints_flies_as_the_rigid_body_of_that_shape():

@@ -7,9 +7,10 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Ellipsoid, Part, Segment
+from airborne.constants import FREE_FALL_M_S2
 from airborne.errors import BodyError
-from airborne.synthetic.flight.rigid import GRAVITY_M_S2, Launch, MassProperties, fly, mass_properties
-from airborne.synthetic.throw.scene import thrown_cross
+from airborne.synthetic.flight.rigid import Launch, MassProperties, fly, mass_properties
+from airborne.synthetic.throw.scene import cross_scene
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
 TIMES = np.arange(40) / 50
@@ -26,7 +27,7 @@ def throw(**changes):
 
 
 def cross_mass():
-    return mass_properties(thrown_cross().body, 500.0)
+    return mass_properties(cross_scene().body, 500.0)
 
 
 def body(*parts):
@@ -67,7 +68,7 @@ def test_top_precesses_at_the_rate_of_its_angular_momentum_over_its_transverse_i
 def test_second_difference_of_the_centre_of_mass_is_gravity():
     flight = fly(cross_mass(), throw(), TIMES)
     acceleration = np.diff(flight.centre, 2, axis=0) * 50**2
-    np.testing.assert_allclose(acceleration, np.broadcast_to(GRAVITY_M_S2, acceleration.shape), atol=ROUNDTRIP)
+    np.testing.assert_allclose(acceleration, np.broadcast_to(FREE_FALL_M_S2, acceleration.shape), atol=ROUNDTRIP)
 
 
 def test_centre_of_mass_stays_where_it_is_in_the_body():
@@ -93,7 +94,7 @@ def test_flight_is_the_same_in_any_order_of_times_and_runs_backward():
     np.testing.assert_allclose(flight.R[2], launch.R, atol=EXACT)
     earlier = Launch(
         centre=flight.centre[1],
-        velocity=launch.velocity + GRAVITY_M_S2 * -0.2,
+        velocity=launch.velocity + FREE_FALL_M_S2 * -0.2,
         R=flight.R[1],
         angular_velocity=flight.angular_velocity[1],
     )

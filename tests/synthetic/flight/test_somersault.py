@@ -16,14 +16,14 @@ from airborne.cameras import Rig, read_rig
 from airborne.errors import BodyError, TrialError
 from airborne.evaluation.truth import read_truth
 from airborne.geometry.rotations import angles_from_matrix, geodesic, matrix_from_angles, unwrap
-from airborne.synthetic import half_twist, pose_ranges, scene_frames, somersault_scene, write_trial
-from airborne.synthetic.flight.articulated import constant_joints
+from airborne.synthetic import half_twist, scene_frames, somersault_scene, write_trial
 from airborne.synthetic.flight.somersault import MASS_KG, PAPER_RANGES, STATURE_M
 from airborne.synthetic.throw.measurements import start_pose
 from airborne.synthetic.throw.pictures import background, linear_image
 from airborne.trial.file import read_trial
 from airborne.video import open_recording
 from airborne.video.decoding import VideoSource
+from tests.support.synthetic import constant_joints, pose_ranges
 from tests.support.tolerances import EXACT, ROUNDTRIP, SOLVED
 
 PRESETS = ["paper", "moving-arms", "pike"]

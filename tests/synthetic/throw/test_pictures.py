@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform
 
 from airborne.body import BodyModel, Ellipsoid, Part, Segment, surface_arrays
 from airborne.rendering.srgb import light_from_srgb
-from airborne.synthetic import scene_frames, thrown_cross
+from airborne.synthetic import cross_scene, scene_frames
 from airborne.synthetic.throw.pictures import background, linear_image, visible_surface
 from tests.support.synthetic import small_scene
 from tests.support.tolerances import sampled
@@ -63,8 +63,8 @@ def test_fields_have_their_own_rows_cameras_and_times():
 
 
 def test_fields_fill_whole_frames_where_the_truth_covers_an_odd_number():
-    assert thrown_cross("side-somersault").n_pictures == 39
-    assert thrown_cross("side-somersault").n_recorded == 40
+    assert cross_scene("side-somersault").n_pictures == 39
+    assert cross_scene("side-somersault").n_recorded == 40
     assert len(list(scene_frames(small_scene(n_pictures=3)))) == 4
 
 

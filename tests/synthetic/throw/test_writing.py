@@ -13,7 +13,7 @@ from airborne.cameras import read_rig
 from airborne.errors import TrialError
 from airborne.evaluation.digitised import fit_digitised_poses, read_digitised
 from airborne.evaluation.truth import read_truth
-from airborne.synthetic import scene_frames, thrown_cross, write_thrown_cross, write_trial
+from airborne.synthetic import cross_scene, scene_frames, write_thrown_cross, write_trial
 from airborne.synthetic.throw.measurements import control_points
 from airborne.trial.file import read_trial
 from airborne.video import inspect, open_recording
@@ -57,7 +57,7 @@ def test_truth_is_the_flight_at_the_times_of_the_fields(written):
 
 
 def test_cameras_are_recovered_from_the_control_points():
-    scene = thrown_cross(seed=5)
+    scene = cross_scene(seed=5)
     points = control_points(scene)
     sizes = {camera.name: camera.size for camera in scene.rig}
     result = calibrate(points, sizes)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from airborne.constants import GRAVITY_M_S2
 from airborne.tracking.capsules.dynamics import (
-    GRAVITY_M_S2,
     N_FILTERED,
     N_FREE,
     N_SLIDING,
     GaussianState,
-    initial_state,
     predict,
+    state_at_rest,
     update,
 )
 from airborne.tracking.capsules.jumper import N_DOF
@@ -38,7 +38,7 @@ def assert_covariance(covariance):
 def test_it_starts_at_rest_where_it_is_put():
     rng = np.random.default_rng(0)
     free, covariance = rng.normal(size=N_FREE), spread(rng, N_FREE)
-    start = initial_state(free, covariance)
+    start = state_at_rest(free, covariance)
     np.testing.assert_array_equal(start.free, free)
     np.testing.assert_array_equal(start.mean[SPEED], 0)
     np.testing.assert_array_equal(start.covariance[:N_FREE, :N_FREE], covariance)
@@ -47,7 +47,7 @@ def test_it_starts_at_rest_where_it_is_put():
 
 @pytest.mark.parametrize("is_flying", [False, True])
 def test_covariances_stay_covariances_over_a_long_run(is_flying):
-    rng, now = np.random.default_rng(1), initial_state(np.zeros(N_FREE), spread(np.random.default_rng(2), N_FREE, 1e-3))
+    rng, now = np.random.default_rng(1), state_at_rest(np.zeros(N_FREE), spread(np.random.default_rng(2), N_FREE, 1e-3))
     for _ in range(120):
         expected = predict(now, 1 / 60, SLIDING, is_airborne=is_flying)
         assert_covariance(expected.covariance)

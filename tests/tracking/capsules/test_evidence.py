@@ -8,7 +8,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.cameras import Camera
 from airborne.tracking.capsules.evidence import capsule_evidence
 from airborne.tracking.capsules.kernel_arguments import Workspace
-from airborne.tracking.capsules.outlines import BEHIND_M, draw_labels, outline, project
+from airborne.tracking.capsules.outlines import BEHIND_M, draw_labels, outline, project_capsules
 from airborne.tracking.capsules.spans import cumulative_sums
 from tests.support.tolerances import SOLVED
 
@@ -113,13 +113,13 @@ def test_projected_centres_are_the_cameras_and_radii_shrink_with_depth():
     packed = np.zeros((4, 4))
     packed[:3], packed[3, 0] = seen_by.P, 120.0
     discs, depth = np.empty((5, 2, 3)), np.empty(5)
-    project(ends, radii, packed, discs, depth)
+    project_capsules(ends, radii, packed, discs, depth)
     z = seen_by.camera_from_world.apply(ends.reshape(-1, 3))[:, 2].reshape(5, 2)
     np.testing.assert_allclose(discs[..., :2], seen_by.px_from_world(ends))
     np.testing.assert_allclose(discs[..., 2], 12 / z)
     np.testing.assert_allclose(depth, z.mean(axis=1))
     ends[2, 1] = seen_by.camera_from_world.inv().apply([0, 0, -1.0])
-    project(ends, radii, packed, discs, depth)
+    project_capsules(ends, radii, packed, discs, depth)
     assert depth[2] == BEHIND_M
     assert np.all(np.isfinite(discs))
 

@@ -56,10 +56,8 @@ def test_equal_weights_keep_every_particle_where_the_scheme_is_balanced(scheme):
 @EVERY
 @pytest.mark.parametrize("weights", [np.full(5, -np.inf), np.full(5, np.nan)])
 def test_uninformative_weights_count_as_equal(scheme, weights):
-    log_weights, log_sum, says_something = normalise(weights)
+    log_weights = normalise(weights)
     assert np.allclose(np.exp(log_weights), 0.2, atol=EXACT)
-    assert log_sum == -np.inf
-    assert not says_something
     counts = np.zeros(5)
     for seed in range(2000):
         counts += np.bincount(SCHEMES[scheme](np.random.default_rng(seed), weights, 5), minlength=5)
@@ -71,17 +69,15 @@ def test_uninformative_weights_count_as_equal(scheme, weights):
     "weights", [[np.nan, 0.0, -np.inf], [np.inf, 3.0, 0.0], [-1e300, -1e305, -np.inf], [1e300, 0, 1]]
 )
 def test_hopeless_weights_give_no_nan(scheme, weights):
-    log_weights, _, says_something = normalise(np.array(weights, float))
+    log_weights = normalise(np.array(weights, float))
     assert np.isclose(np.exp(log_weights).sum(), 1)
-    assert says_something
     assert (SCHEMES[scheme](np.random.default_rng(0), np.array(weights, float), 9) == np.argmax(log_weights)).all()
 
 
 def test_weights_of_any_size_are_normalised_exactly():
     log_weights = logs(WEIGHTS) - 7000
-    scaled, log_sum, _ = normalise(log_weights)
+    scaled = normalise(log_weights)
     assert np.allclose(np.exp(scaled), WEIGHTS, atol=1e-9)
-    assert log_sum == pytest.approx(-7000)
 
 
 def test_effective_sample_size_lies_between_one_and_all():

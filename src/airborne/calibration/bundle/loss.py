@@ -12,7 +12,7 @@ from airborne.types import Array
 Loss = Literal["cauchy", "huber", "squares"]
 
 _CAUCHY, _HUBER = 2.4, 1.5  # tuning constants in standard deviations; 95 % efficient under normal errors
-_N_QUANTILES = 100_000
+_N_QUANTILES = 100_000  # at which the expected squared distance is summed
 BEHIND_CAMERA = 1e4  # squared distance, in standard deviations, of a point behind its camera
 
 

@@ -82,7 +82,7 @@ def build_problem(rig: Rig, sources: Sequence[Source], free_parameters: Mapping[
     length_ends = np.concatenate([np.zeros((0, 2), int), *ends])
     free = np.concatenate([np.zeros((0, 3), bool), *(s.free_coordinates for s in sources)])
     free &= _is_determined(free, camera=camera, moment=moment, point=point, ends=length_ends)[:, None]
-    is_fixed = np.concatenate([np.zeros(0, bool), *(s.fixed_targets for s in sources)])
+    is_fixed = np.concatenate([np.zeros(0, bool), *(s.targets_of_fixed_points for s in sources)])
     target_columns, point_columns, n_others = _other_columns(is_fixed, free, moment)
     lag, lag_sd_s, lag_source = _lags(sources)
     source_of_column = np.concatenate([np.zeros(n_others, int), lag_source])

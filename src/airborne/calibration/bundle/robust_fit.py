@@ -26,11 +26,11 @@ from airborne.calibration.bundle.uncertainty import gauge_fixed_inverse, redunda
 from airborne.geometry.descent import Descent, NielsenRule, Outcome, descend
 from airborne.types import Array, Ints
 
-_MOST_STEPS, _MOST_SCALINGS = 200, 12
+_MOST_STEPS, _MOST_SCALINGS = 200, 12  # of the iteration; changes of scale between whole iterations, at most
 _CONVERGED = 1e-5, 1e-10  # predicted decrease, absolute and relative to the cost, below which the iteration stops
-_SAME_NOISE = 0.01
+_SAME_NOISE = 0.01  # relative change of the noise below which it is settled
 _DAMPING = NielsenRule(first=1e-3, least=1e-12, most=1e8, least_factor=1 / 10)
-_LEAST_SCALE = 1e-6
+_LEAST_SCALE = 1e-6  # of a source's noise, in its assumed standard deviations
 _LEAST_REDUNDANCY = 8  # below it, residuals cannot lower the assumed noise
 
 

@@ -129,7 +129,7 @@ class Source:
         return np.repeat(free[:, None], 3, axis=1) if free.ndim == 1 else free
 
     @property
-    def fixed_targets(self) -> NDArray[np.bool_]:
+    def targets_of_fixed_points(self) -> NDArray[np.bool_]:
         """Which targets have a fixed pose: (m,)."""
         return np.zeros(self.n_moments, bool) if self.is_fixed is None else np.asarray(self.is_fixed, bool)
 

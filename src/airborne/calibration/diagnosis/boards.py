@@ -16,7 +16,7 @@ from airborne.types import Array, Image
 _MOST_PICTURES, _MOST_SEARCHED = 12, 6  # evenly spaced; the latter are searched for every dictionary
 _DETECTED_SHARE = 0.3  # share of the images, and of the corners in them, from which on the board is as described
 _FEWEST_MARKERS = 4  # in an image that determines a layout
-_FEWEST_PICTURES = 2
+_FEWEST_PICTURES = 2  # with the same finding, before it is reported
 _CLEAR_RATIO = 2.0  # ratio of markers from which on another dictionary is the right one
 _WIDEST, _MOST_COMPARED = 15, 3  # most columns or rows tried, images that they are tried on
 _STRAIGHT_PX = 5.0  # how far a marker's centre may lie off its position on the board

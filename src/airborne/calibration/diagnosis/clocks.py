@@ -20,7 +20,7 @@ _READOUT_S, _READOUT_SDS, _READOUT_PX = (
     5.0,
     0.3,
 )  # least readout time, significance and displacement that are reported
-_MOST_READOUT_S = 0.1
+_MOST_READOUT_S = 0.1  # longer than any image period of video: another error
 
 
 def check_times(camera: str, times_s: Array) -> list[Finding]:

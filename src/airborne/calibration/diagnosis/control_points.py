@@ -15,13 +15,14 @@ from airborne.errors import CalibrationError
 from airborne.types import Array
 
 _FLAT_ERROR, _FLAT_WARNING = 0.01, 0.1  # thickness over extent of the points that one camera sees
+# of the control points: beyond it an error, a warning: the unit is wrong
 _LARGEST_EXTENT_M, _LARGE_EXTENT_M = 500.0, 100.0
 _ROUGH_FIT_PX = 3.0  # careful clicks give about one pixel
 _OFF_CENTRE = 0.15  # of the image's diagonal
-_NOT_SQUARE = 0.03
-_MOST_ROLL = np.radians(60)
+_NOT_SQUARE = 0.03  # relative difference of the focal lengths that is reported
+_MOST_ROLL = np.radians(60)  # about the optical axis: cameras stand roughly upright
 _SIGNIFICANCE = 1e-4  # of rejecting a point of a good set
-_MOST_OUTLIERS = 3
+_MOST_OUTLIERS = 3  # named for each camera
 
 
 def check_points(points: ControlPoints, sizes: Mapping[str, tuple[int, int]]) -> None:

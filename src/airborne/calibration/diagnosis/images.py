@@ -17,11 +17,11 @@ _LIMIT_SHARE = 0.01  # of an image's longer side: the largest error of a mirrore
 _FEWEST_POINTS = 15  # of a mirrored fit
 _INLIER_SHARE, _N_TRIMS = 0.8, 10  # share of the points that must fit; rounds of trimming
 _FAR_PX = 1e6  # distance of points behind a camera
-_MOST_ROLL = np.radians(60)
+_MOST_ROLL = np.radians(60)  # about the optical axis: cameras stand roughly upright
 _STEEPEST = np.radians(70)  # a camera that looks further up or down has no roll
 _SWAPPED_PX, _SWAPPED_SHARE = 8.0, 0.4  # least median distance, and the most that exchanging may leave of it
-_MOST_POINTS = 500
-_SAME_SHAPE = 0.01
+_MOST_POINTS = 500  # evenly spaced, that are compared
+_SAME_SHAPE = 0.01  # relative difference of two ratios of width to height
 
 
 def check_mirroring(camera: str, size: tuple[int, int], points: Array, px: Array) -> list[Finding]:

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.calibration.diagnosis.boards import check_board_print
 from airborne.calibration.diagnosis.clocks import check_counter, check_times
 from airborne.calibration.initial.chaining import FEWEST_LENS_VIEWS, Views
 from airborne.cameras.finding import Finding
 from airborne.errors import CalibrationError
+from airborne.types import Image
 
-Grey = NDArray[np.uint8]
 
-
-def check_board(views: Views, samples: Mapping[str, Sequence[Grey]]) -> tuple[Finding, ...]:
+def check_board(views: Views, samples: Mapping[str, Sequence[Image]]) -> tuple[Finding, ...]:
     """Report what does not match the board's description, from a sample of each camera's images.
 
     Raises CalibrationError, with the reason, where a camera shows the board too rarely to fit its lens.

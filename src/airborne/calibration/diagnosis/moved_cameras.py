@@ -15,12 +15,12 @@ from airborne.cameras.consensus import triangulate_consensus
 from airborne.cameras.finding import Finding
 from airborne.types import Array
 
-_MOST_MOMENTS = 400
+_MOST_MOMENTS = 400  # evenly spaced, that are looked at
 _FEWEST_IN_A_BLOCK, _MOST_BLOCKS = 30, 12  # observations of a block; blocks of the recording
 _MOVED_PX, _TIMES_SPREAD = 2.0, 4.0  # a step is reported above both: px, and multiples of the scatter of the blocks
 _TYPICAL = 0.6  # quantile of distances, below the outliers
 _LEAST_GAIN, _LEAST_GAIN_PX = 0.3, 0.3  # share, and px, by which the misfit must fall without a camera
-_N_STEPS = 15
+_N_STEPS = 15  # of Gauss and Newton
 _SCALE_PX = 2.0  # of the Cauchy loss
 
 
@@ -39,7 +39,6 @@ class _Displacement:
 
     moment: int  # the first after it
     shift_px: float
-    spread_px: float
     turn_rad: float
     shift_m: float
 
@@ -58,13 +57,13 @@ def check_moved_cameras(rig: Rig, px: Array, times_s: Array | None = None) -> li
     others = [name for name in rig.names if name not in suspects]
     displacements = {name: _find_displacement(rig, others, name, px) for name in suspects}
     return [
-        _moved_finding(name, displacement, time_texts)
+        _displacement_finding(name, displacement, time_texts)
         for name, displacement in displacements.items()
         if displacement is not None
     ]
 
 
-def _moved_finding(name: str, displacement: _Displacement, times: Sequence[str]) -> Finding:
+def _displacement_finding(name: str, displacement: _Displacement, times: Sequence[str]) -> Finding:
     return Finding(
         kind="moved",
         what=(
@@ -132,7 +131,7 @@ def _find_displacement(rig: Rig, others: Sequence[str], name: str, px: Array) ->
     before, after = np.median(displacements[:k], axis=0), np.median(displacements[k:], axis=0)
     moment = _first_moment_after(track, before, after)
     change = after - before
-    return _Displacement(moment, step_px, scatter, float(np.linalg.norm(change[:3])), float(np.linalg.norm(change[3:])))
+    return _Displacement(moment, step_px, float(np.linalg.norm(change[:3])), float(np.linalg.norm(change[3:])))
 
 
 def _rms(shifts: Array, *, quantile: float) -> float:

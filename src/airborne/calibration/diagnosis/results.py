@@ -17,7 +17,7 @@ from airborne.cameras.finding import Finding
 from airborne.cameras.units import check_baselines
 from airborne.types import Array
 
-_UP = np.array([0.0, 0.0, 1.0])
+_UP = np.array([0.0, 0.0, 1.0])  # the world's z
 _MISFIT_PX, _MISFIT_SHARE = 4.0, 0.002  # RMS of clicked points; share of the images' longer sides
 
 

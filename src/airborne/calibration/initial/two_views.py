@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from airborne.types import Array
 
 _FEWEST_POINTS = 8  # of a fundamental matrix
-_CONFIDENCE, _MOST_TRIES = 0.9999, 5000
+_CONFIDENCE, _MOST_TRIES = 0.9999, 5000  # of finding a sample without outliers; samples drawn at most
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,29 +52,10 @@ def fit_epipolar_geometry(px_a: Array, px_b: Array, *, limit_px: float) -> Epipo
 
 def relative_pose(F: Array, K_a: Array, K_b: Array, *, px_a: Array, px_b: Array) -> RelativePose:
     """Return the pose of camera b with most of the points (n, 2) [px] in front of both cameras."""
-    R_1, R_2, t = (np.asarray(part, float) for part in cv2.decomposeEssentialMat(K_b.T @ F @ K_a))
-    rays_a, rays_b = _rays(px_a, K_a), _rays(px_b, K_b)
-    candidates = [
-        _triangulate_midpoints(R, sign * t.ravel(), rays_a, rays_b) for R in (R_1, R_2) for sign in (1.0, -1.0)
-    ]
-    return max(candidates, key=lambda pose: pose.front_share)
-
-
-def _triangulate_midpoints(R: Array, t: Array, rays_a: Array, rays_b: Array) -> RelativePose:
-    """Triangulate every point as the midpoint of its two rays' closest approach."""
-    rays_b_in_a = rays_b @ R
-    centre = -t @ R
-    cosine = np.sum(rays_a * rays_b_in_a, axis=1)
-    sine2 = np.maximum(1 - cosine**2, 1e-12)
-    depth_a = (rays_a @ centre - cosine * (rays_b_in_a @ centre)) / sine2
-    depth_b = (cosine * (rays_a @ centre) - rays_b_in_a @ centre) / sine2
-    points = (depth_a[:, None] * rays_a + centre + depth_b[:, None] * rays_b_in_a) / 2
-    is_front = (depth_a > 0) & (depth_b > 0)
+    on_planes = (cv2.undistortPoints(np.ascontiguousarray(px), K, None) for px, K in ((px_a, K_a), (px_b, K_b)))
+    _, R, t, is_front, homogeneous = cv2.recoverPose(K_b.T @ F @ K_a, *on_planes, np.eye(3), distanceThresh=np.inf)
+    is_front, points = is_front.ravel() > 0, (homogeneous[:3] / homogeneous[3]).T
+    from_b = points + t.T @ R
+    cosine = np.sum(points * from_b, axis=1) / (np.linalg.norm(points, axis=1) * np.linalg.norm(from_b, axis=1))
     parallax = np.arccos(np.clip(cosine[is_front], -1, 1)) if is_front.any() else np.zeros(1)
-    return RelativePose(R, t, points, float(np.mean(is_front)), float(np.median(parallax)))
-
-
-def _rays(px: Array, K: Array) -> Array:
-    """Return the unit rays (n, 3) of pixels (n, 2) in the camera's axes."""
-    rays = np.column_stack([(px - K[:2, 2]) @ np.linalg.inv(K[:2, :2]).T, np.ones(len(px))])
-    return rays / np.linalg.norm(rays, axis=1)[:, None]
+    return RelativePose(R, t.ravel(), points, float(np.mean(is_front)), float(np.median(parallax)))

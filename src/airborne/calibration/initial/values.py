@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from airborne.calibration.bundle import FreeParameters
@@ -24,9 +23,7 @@ from airborne.cameras.finding import Finding
 from airborne.cameras.formats.options import FileOptions
 from airborne.cameras.units import check_scales
 from airborne.errors import CalibrationError
-from airborne.types import Progress
-
-StageProgress = Callable[[str, int, int | None], None]  # stage, steps done, steps expected
+from airborne.types import Progress, StageProgress
 
 _MANY_OBSERVATIONS = 200  # observations of a camera that determine two lens terms without a board
 

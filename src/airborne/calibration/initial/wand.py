@@ -55,7 +55,7 @@ def initial_rig_from_wand(
     image's middle. The world is the axes of the first camera of the best pair. Raises CalibrationError where cameras
     share too few markers, naming them, or where an image seems to be mirrored.
     """
-    cameras = [_unposed_camera(name, sizes[name], lenses or {}) for name in tracks.cameras]
+    cameras = [_camera_without_pose(name, sizes[name], lenses or {}) for name in tracks.cameras]
     ideal = np.stack([camera.undistort_px(tracks.px[:, :, i]) for i, camera in enumerate(cameras)], axis=2)
     pairs = _pairs(ideal, cameras)
     _check_linked(tracks, pairs)
@@ -64,7 +64,7 @@ def initial_rig_from_wand(
     return _chain_cameras(cameras, pairs, replace(tracks, px=_without_outliers(ideal, pairs)))
 
 
-def _unposed_camera(name: str, size: tuple[int, int], lenses: Mapping[str, Camera]) -> Camera:
+def _camera_without_pose(name: str, size: tuple[int, int], lenses: Mapping[str, Camera]) -> Camera:
     identity = RigidTransform.identity()
     if name in lenses:
         return replace(lenses[name], camera_from_world=identity)

@@ -28,8 +28,8 @@ LENS_MODELS: dict[Lens, tuple[tuple[str, FreeParameters], ...]] = {
         ("focal + principal point + k1 to k4", FreeParameters(extrinsics=False, principal_point=True, n_terms=4)),
     ),
 }
-_N_FOLDS = 3
-MOST_VIEWS = 30  # views that decide; more take longer and change nothing
+_N_FOLDS = 3  # parts of the views, each left out once
+_MOST_VIEWS = 30  # views that decide; more take longer and change nothing
 _FEWEST_TO_CHOOSE = 9  # views; with fewer only the focal length and k1 are estimated
 
 
@@ -54,7 +54,7 @@ def choose_lens(
     Raises CalibrationError where too few views show the board.
     """
     row = views.detections[0]
-    views = views.select_moments(np.unique(np.linspace(0, len(row) - 1, min(len(row), MOST_VIEWS)).astype(int)))
+    views = views.select_moments(np.unique(np.linspace(0, len(row) - 1, min(len(row), _MOST_VIEWS)).astype(int)))
     camera, boards = initial_lens(views, size, lens=lens)
     n = views.n_moments
     fold = np.arange(n) % _N_FOLDS

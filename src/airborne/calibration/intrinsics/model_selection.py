@@ -45,7 +45,7 @@ def leave_one_out(pinhole: Pinhole, model: PinholeModel, world: Array, px: Array
     return Solution(model, pinhole, refits, world, px)
 
 
-def supported_models(models: Sequence[PinholeModel], n_points: int) -> list[PinholeModel]:
+def models_for(models: Sequence[PinholeModel], n_points: int) -> list[PinholeModel]:
     """Return the models with fewer free parameters than the coordinates that remain without one point."""
     return [model for model in models if model.n_parameters < 2 * (n_points - 1)]
 

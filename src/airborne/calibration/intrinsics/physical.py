@@ -15,7 +15,7 @@ from airborne.types import Array
 _ANNEALING_BOUNDS = np.array(
     [*[np.radians(10)] * 3, *[0.5] * 3, 0.2]
 )  # rotation [rad], shift [m], share of the focal length
-_ANNEALING_ROUNDS = 100
+_ANNEALING_ROUNDS = 100  # of the global search
 
 
 @dataclass(frozen=True, slots=True)

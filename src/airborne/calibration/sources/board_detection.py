@@ -11,7 +11,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.calibration.diagnosis.clocks import check_image_counts
 from airborne.calibration.diagnosis.inputs import check_board, check_time_stamps
@@ -20,16 +19,13 @@ from airborne.calibration.sources.boards import NO_CORNERS, Board, DetectedCorne
 from airborne.calibration.sources.files import CameraSource, Sources
 from airborne.cameras.finding import Finding
 from airborne.errors import CalibrationError
-from airborne.types import Array, Progress
+from airborne.types import Array, Image, Progress
 from airborne.video import VideoSource, inspect
 from airborne.video.decoding import decode, rgb_from_decoded
 
-Grey = NDArray[np.uint8]
-
-
 _MOST_MOMENTS = 240  # at which the board is searched for, evenly spaced over a recording
 _IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
-_LARGEST_PICTURE_BYTES = 200_000_000
+_LARGEST_PICTURE_BYTES = 200_000_000  # larger files are no pictures
 _N_SAMPLES = 12  # images of a camera that test how the board was printed
 _ODD_PICTURES = 2  # a larger difference to the other cameras is reported
 
@@ -41,7 +37,7 @@ class BoardDetections:
     views: Views
     time_s: Array | None  # (moments,) [s]; None for images, which have no times
     sizes: dict[str, tuple[int, int]]
-    examples: dict[str, Grey]  # by camera, the image with most corners
+    examples: dict[str, Image]  # by camera, the image with most corners
     notes: tuple[str, ...]
     findings: tuple[Finding, ...]
 
@@ -103,7 +99,7 @@ def detect_lens_board(sources: Sources, camera: CameraSource, board: Board, prog
     return views.of_camera(0)
 
 
-def first_image(sources: Sources, camera: CameraSource) -> Grey | None:
+def first_image(sources: Sources, camera: CameraSource) -> Image | None:
     """Return the first image of a camera's recording, if it has one."""
     if not (camera.video or camera.pictures):
         return None
@@ -185,7 +181,7 @@ def _stamp_id(name: str, ids: set[str]) -> str | None:
     return name if name in ids else number[1] if number and number[1] in ids else None
 
 
-def _sample_images(sources: Sources, camera: CameraSource) -> list[Grey]:
+def _sample_images(sources: Sources, camera: CameraSource) -> list[Image]:
     n = _n_images(sources, camera) or _N_SAMPLES
     indices = set(np.linspace(0, max(n - 1, 0), _N_SAMPLES).astype(int).tolist())
     return [grey for _, grey in _read_grey_images(sources, camera, indices)]
@@ -198,7 +194,7 @@ def _n_images(sources: Sources, camera: CameraSource) -> int | None:
     return None if facts.duration_s is None else round(facts.duration_s * facts.frame_rate)
 
 
-def _read_grey_images(sources: Sources, camera: CameraSource, indices: Container[int]) -> Iterator[tuple[int, Grey]]:
+def _read_grey_images(sources: Sources, camera: CameraSource, indices: Container[int]) -> Iterator[tuple[int, Image]]:
     """Yield some images of a recording in grey, with their indices."""
     if camera.pictures is not None:
         for index, path in enumerate(_image_paths(sources, camera.pictures)):
@@ -225,7 +221,7 @@ def _image_paths(sources: Sources, pattern: str) -> list[Path]:
     return paths
 
 
-def _read_grey_image(path: Path) -> Grey:
+def _read_grey_image(path: Path) -> Image:
     if path.stat().st_size > _LARGEST_PICTURE_BYTES:
         raise CalibrationError(f"{path} is larger than {_LARGEST_PICTURE_BYTES // 10**6} MB; is it a picture?")
     try:

@@ -20,18 +20,19 @@ from airborne.types import Array
 
 Net = Literal["men", "women"]
 
-_LENGTH_M, _WIDTH_M, _ATTACK_M, _LINE_M = 18.0, 9.0, 3.0, 0.05
+_LENGTH_M, _WIDTH_M, _ATTACK_M, _LINE_M = 18.0, 9.0, 3.0, 0.05  # FIVB rules of volleyball, 1.1, 1.4.1 and 1.3.1
 _NET_M = {"men": 2.43, "women": 2.24}  # height in the middle
-_NET_DEPTH_M, _ANTENNA_M, _POST_M = 1.0, 0.80, 2.55  # the net's own height; antenna above the net; height of a post
+# the net's own height; antenna above the net; height of a post (FIVB 2.2, 2.4, 2.5.1)
+_NET_DEPTH_M, _ANTENNA_M, _POST_M = 1.0, 0.80, 2.55
 _NET_RANGE_M = (1.5, 3.0)  # of a net's height in play, children's and standing volleyball's among them
-_NET_RISE_M = 0.01  # at the sidelines over the middle: between 0 and 2 cm are allowed
-_POST_OUTSIDE_M = 0.75  # of the sideline: between 0.5 and 1 m are allowed
+_NET_RISE_M = 0.01  # at the sidelines over the middle: between 0 and 2 cm are allowed (FIVB 2.1.2)
+_POST_OUTSIDE_M = 0.75  # of the sideline: between 0.5 and 1 m are allowed (FIVB 2.5.1)
 
 _PAINT_SD_M = 0.01  # of a court's lines
 _RISE_SD_M = 0.006  # uniform over 0 to 2 cm
 _BAND_SD_M = 0.02  # of a side band or an antenna along the net, and of an antenna across it
 _POST_SD_M = 0.15  # uniform over 0.5 to 1 m
-_MOST_NAMES = 3
+_MOST_NAMES = 3  # suggested for a misspelt one
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""A moving person's 2D detections as a source, and a rig refined by them: misplaced cameras resected, all adjusted.
+"""A moving person's 2D detections as a source, and the prior of a rig that they refine.
 
 A network's joints have systematic errors, so all detections of one point by one camera count as one cluster, and the
 other cameras have a prior about their calibration: detections alone would deform a good rig. The rig as a whole keeps
@@ -8,18 +8,14 @@ the position and the scale of these cameras.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.bundle import Adjustment, CameraPrior, FreeParameters, Source, adjust
+from airborne.calibration.bundle import CameraPrior, Source
 from airborne.calibration.initial.resection import (
     LEAST_RESECTION_VISIBILITY,
     MISPLACED_PX,
-    Resection,
-    find_misplaced_cameras,
-    resect_cameras,
     sample_moments,
 )
 from airborne.cameras.camera import Rig
@@ -28,38 +24,6 @@ from airborne.cameras.detections import Detections
 from airborne.types import Array
 
 _CALIBRATION_SD_PX = MISPLACED_PX / 2  # prior standard deviation of a camera that is not misplaced
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class RigRefinement:
-    """A rig refined by detections."""
-
-    rig: Rig
-    resections: tuple[Resection, ...]  # of the misplaced cameras, before the adjustment
-    adjustment: Adjustment
-    before_px: float  # median distance of all detections from their triangulated points [px]
-    after_px: float
-
-
-def refine_rig(rig: Rig, detections: Detections, free: FreeParameters | None = None) -> RigRefinement:
-    """Resect the misplaced cameras, then adjust the poses of all; lenses stay fixed unless free.
-
-    detections: one moment a row. Raises CalibrationError where too little is seen.
-    """
-    detections_of_rig = detections.select(rig.names)
-    misplaced = find_misplaced_cameras(rig, detections_of_rig)
-    initial, _ = resect_cameras(rig, detections_of_rig, [m.camera.name for m in misplaced]) if misplaced else (rig, ())
-    trusted = [name for name in rig.names if name not in {m.camera.name for m in misplaced}]
-    source = person_source(initial, detections_of_rig)
-    prior = calibration_prior(initial, trusted, source.points)
-    adjusted = adjust(initial, [source], free or FreeParameters(focal=False), prior=prior)
-    return RigRefinement(
-        rig=adjusted.rig,
-        resections=misplaced,
-        adjustment=adjusted,
-        before_px=median_reprojection_px(rig, detections_of_rig),
-        after_px=median_reprojection_px(adjusted.rig, detections_of_rig),
-    )
 
 
 def calibration_prior(rig: Rig, trusted: Sequence[str], points: Array) -> CameraPrior:
@@ -95,13 +59,6 @@ def person_source(rig: Rig, detections: Detections, *, name: str = "detections")
         is_free=np.ones(is_known.sum(), bool),
         cluster=(row % n_points) * n_cameras + camera,
     )
-
-
-def median_reprojection_px(rig: Rig, detections: Detections) -> float:
-    """Return the median distance of all detections from their triangulated points' projections [px]."""
-    points = rig.points_from_px(detections.px, detections.visibility)
-    projected = np.stack([camera.px_from_world(points) for camera in rig], axis=-2)
-    return float(np.nanmedian(np.linalg.norm(projected - detections.px, axis=-1)))
 
 
 def align_rigs(

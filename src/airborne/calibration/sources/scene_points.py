@@ -23,7 +23,7 @@ _N_POINTS = 4  # of a resection
 _FOCAL_RATIOS = np.geomspace(0.4, 5.0, 14)  # focal length over the image's longer side
 _SCALE_PX = 3.0  # of the Cauchy loss
 _FAR_M = 1000.0  # of an anchor: so far off that its distance changes with one coordinate only
-_EXACT_SD_M = 1e-6
+_EXACT_SD_M = 1e-6  # a point measured better than this stays fixed
 _LARGEST_LOG_CHANGE = 5.0  # bound of a step of the focal length's logarithm
 
 

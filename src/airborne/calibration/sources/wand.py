@@ -21,7 +21,7 @@ from airborne.types import Array
 _LENGTH_SD_M = 5e-4  # of a wand's measured length
 LENGTH_RANGE_M = (0.02, 20.0)  # of plausible wands
 _LENGTH_SHARE = 0.15  # relative error of length from which on markers are outliers
-_MOST_MARKERS = 20
+_MOST_MARKERS = 20  # of a wand: a larger number is a frame or a coordinate
 _COLUMNS = {"frame", "marker", "camera", "u_px", "v_px"}
 _EXPECTED = "expected frame,marker,camera,u_px,v_px or DLTdv's pt1_cam1_U,pt1_cam1_V,pt1_cam2_U,..."
 

@@ -13,11 +13,11 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras.camera import Rig
+from airborne.constants import STANDARD_GRAVITY_M_S2
 from airborne.errors import CalibrationError
 from airborne.geometry.robust import SD_OF_MEDIAN_DEVIATION
 from airborne.types import Array
 
-_STANDARD_GRAVITY = 9.80665  # [m/s^2]
 _NEAREST_M = 0.05  # least distance of points that define an axis
 _LEAST_ANGLE = np.radians(5)  # between the axis and the third point
 _FEWEST_TIMES = 6  # of a throw
@@ -57,13 +57,13 @@ class Gravity:
 
     def describe(self) -> str:
         """Say in one line what was estimated and whether lengths and times are consistent."""
-        ratio = self.magnitude / _STANDARD_GRAVITY
-        error = abs(self.magnitude - _STANDARD_GRAVITY)
+        ratio = self.magnitude / STANDARD_GRAVITY_M_S2
+        error = abs(self.magnitude - STANDARD_GRAVITY_M_S2)
         sentence = (
             f"up from {self.n_throws} throw{'s' * (self.n_throws > 1)}: known to {np.degrees(self.tilt_sd_rad):.2f} "
             f"degrees; the fall is {self.magnitude:.2f} m/s2 (sd {self.magnitude_sd:.2f}), expected 9.81"
         )
-        if error <= max(3 * self.magnitude_sd, 0.01 * _STANDARD_GRAVITY):
+        if error <= max(3 * self.magnitude_sd, 0.01 * STANDARD_GRAVITY_M_S2):
             return sentence
         return (
             f"{sentence}, so lengths come out as {ratio:.3f} of the truth or times as {ratio**-0.5:.3f} of it; check "
@@ -83,9 +83,10 @@ def estimate_gravity(times_s: Array, throws: Sequence[Array]) -> Gravity:
     ]
     flights = [(t - t.mean(), x) for t, x in flights if len(t) >= _FEWEST_TIMES]
     longest = max((float(np.ptp(t)) for t, _ in flights), default=0.0)
-    if _STANDARD_GRAVITY * longest**2 / 8 < _SHORTEST_FALL_M:
+    if STANDARD_GRAVITY_M_S2 * longest**2 / 8 < _SHORTEST_FALL_M:
+        needed_s = np.sqrt(8 * _SHORTEST_FALL_M / STANDARD_GRAVITY_M_S2)
         raise CalibrationError(
-            f"the throw is seen for {longest:.2f} s at most; {np.sqrt(8 * _SHORTEST_FALL_M / _STANDARD_GRAVITY):.2f} s "
+            f"the throw is seen for {longest:.2f} s at most; {needed_s:.2f} s "
             f"and {_FEWEST_TIMES} positions are needed to tell which way is up: throw higher"
         )
     g, covariance = _common_acceleration(flights)

@@ -12,7 +12,7 @@ from airborne.cameras.formats.xml import parse_number
 from airborne.errors import CalibrationError
 from airborne.types import Array
 
-_N_ROWS = 11
+_N_ROWS = 11  # L1 to L11
 _NO_CAMERA = "these coefficients are no camera's; give the table that DLTdv wrote"
 _SMALLEST_AXIS = 1e-12  # of the largest: below, the three axes lie in a plane
 _SMALLEST_DEPTH = 1e-6  # of the camera's distance: nearer to its plane the world's origin has no depth to divide by

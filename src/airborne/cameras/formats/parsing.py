@@ -12,7 +12,7 @@ from airborne.errors import CalibrationError
 from airborne.types import Array
 
 LARGEST_NUMBER = 1e9  # of any number in a calibration: metres, millimetres or pixels
-_LARGEST_SIZE_PX = 65_535
+_LARGEST_SIZE_PX = 65_535  # what 16 bits hold
 _ROTATION_TOLERANCE = 1e-3  # how far nine numbers may be from a rotation
 _N_TERMS = {"brown": 5, "fisheye": 4}
 

@@ -13,7 +13,7 @@ from airborne.cameras.formats.parsing import build_camera, parse_size, refuse_fi
 from airborne.cameras.formats.xml import attribute_numbers, xml_text
 from airborne.errors import CalibrationError
 
-_SUBPIXELS = 64
+_SUBPIXELS = 64  # to a pixel: the unit of its lengths in the image
 _ATTITUDE_TOLERANCE = 1e-3  # how far the nine numbers may be from a rotation
 _OURS_FROM_QUALISYS = np.diag([1.0, -1.0, -1.0])  # its cameras have y up and look along -z
 _ATTITUDE = "r11 r12 r13 r21 r22 r23 r31 r32 r33"

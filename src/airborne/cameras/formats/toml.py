@@ -10,7 +10,7 @@ import numpy as np
 from airborne.cameras.camera import Camera
 from airborne.cameras.formats.parsing import build_camera, distortion_terms, parse_array, parse_size
 
-_ROTATION_SHAPES = ((3,), (3, 3))
+_ROTATION_SHAPES = ((3,), (3, 3))  # a rotation vector or a matrix
 _TERM_SHAPES = {False: ((4,), (5,)), True: ((4,),)}  # by whether the lens is a fisheye
 
 

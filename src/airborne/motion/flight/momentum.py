@@ -22,7 +22,7 @@ from airborne.types import Array
 WINDOW = 5  # frames per fitted parabola: less noise than two, and no lag
 _UNOBSERVED_ROTATION_SD_RAD = 2 * np.pi / np.sqrt(12)  # standard deviation of an angle uniform over the circle
 _LARGEST_ROTATION_RAD = 2.0  # frames rotated further from the middle one are left out of a fit
-_STEP_RAD = 1e-5
+_STEP_RAD = 1e-5  # of the central difference
 _SAME_PERIOD = 1.5  # times more than so many periods apart are a gap
 
 

@@ -8,17 +8,14 @@ import numpy as np
 import xarray as xr
 
 from airborne.body import BodyModel
+from airborne.constants import GRAVITY_M_S2
 from airborne.errors import BodyError
 from airborne.motion.angles import root_angles
 from airborne.motion.flight.momentum import WINDOW, angular_momenta, centre_of_mass, limit_rotation_variance
 from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
 from airborne.motion.uncertainty import propagate_variances, standard_deviation
-from airborne.types import Array
-
-Triple = tuple[float, float, float]
-
-GRAVITY_M_S2 = 9.81  # world z points up
+from airborne.types import Array, Triple
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

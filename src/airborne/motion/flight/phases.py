@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel
+from airborne.constants import GRAVITY_M_S2
 from airborne.motion.flight.momentum_table import has_inertias, measure_flight
-from airborne.motion.free_fall import GENERIC_NOISE, GRAVITY_M_S2, combine_sides, noise_covariance, side_likelihood
+from airborne.motion.free_fall import GENERIC_NOISE, combine_sides, noise_covariance, side_likelihood
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.motion import Motion
 from airborne.motion.players import PlayersMotion
@@ -20,10 +21,11 @@ from airborne.types import Array
 _WINDOW_S = 0.16  # of the parabolas that measure the acceleration
 _FREE_M_S2, _MOST_M_S2 = 2.5, 5.5  # deviation from free fall: of any flight, and with noise
 _SUPPORTED_M_S2 = -5.0  # a body that falls clearly slower is supported
-_SHORTEST_S = 0.1
+_SHORTEST_S = 0.1  # of a flight: about its peak a body falls 1 cm in it
+# of a flight from which the centre of mass is found; frames in it; ridge
 _SPAN_S, _FEWEST_OF_SPAN, _REGULARISATION = 0.4, 8, 0.05
-_SEEK_S, _GRID_S = 0.12, 1 / 480
-_CONTACT_S = 0.15
+_SEEK_S, _GRID_S = 0.12, 1 / 480  # search window of an event about the threshold, and its grid
+_CONTACT_S = 0.15  # of contact that is used
 _UNKNOWN_SD_M = 0.02  # of a height without a covariance
 _FEWEST = 4  # known frames of contact that an event needs
 

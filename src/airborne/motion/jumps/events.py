@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from airborne.constants import GRAVITY_M_S2
 from airborne.motion.free_fall import (
-    GRAVITY_M_S2,
     SWAY_M,
     SideLikelihood,
     combine_sides,
@@ -24,15 +24,16 @@ from airborne.types import Array
 _SURELY_OFF_M = (
     0.12  # of both ankles over their standing height: a heel rises by some 0.10 m while the toes still touch
 )
+# of a flight; a dip below the level that is bridged; the same where joints are lost
 _SHORTEST_S, _DIP_S, _BRIDGE_S = 0.1, 0.06, 0.3
 _EARLIER_S, _LATER_S = 0.14, 0.06  # search window of an event, about the time at which the ankles pass that height
 _CONTACT_S = 0.15  # of contact that is used
-_GRID_S = 1 / 480
+_GRID_S = 1 / 480  # at which the posterior of an event is computed
 _MOST_SD_S = 0.03  # events with a larger standard deviation are not reported
-_SLOWEST_FALL_M_S2 = -5.0
+_SLOWEST_FALL_M_S2 = -5.0  # about half of gravity: a body that falls more slowly is supported
 _ANKLE_RISE_M = {True: (0.09, 0.02), False: (0.06, 0.025)}  # at take-off, at landing: mean, standard deviation
 _FOREFOOT_RISE_M = {True: (0.02, 0.01), False: (0.012, 0.01)}  # the toes are the last to leave
-_STANDING_WINDOW_S, _STANDING_QUANTILE = 0.25, 0.2
+_STANDING_WINDOW_S, _STANDING_QUANTILE = 0.25, 0.2  # means over such windows; quantile of them that is standing
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.motion.free_fall import GRAVITY_M_S2
+from airborne.constants import GRAVITY_M_S2
 from airborne.motion.jumps.events import FlightPosterior, find_flights, sample_flight
 from airborne.motion.jumps.jump import UNKNOWN, Jump, Measurement
 from airborne.motion.jumps.leg_track import LegTrack, extract_legs
@@ -14,12 +14,12 @@ from airborne.motion.local_polynomials import N_DRAWS, local_fits, peak_draws
 from airborne.motion.players import PlayersMotion
 from airborne.types import Array
 
-_BLOCK_LEVEL_M = 0.3
-_SEED = 0
-_PEAK_HALF_S = 0.1
+_BLOCK_LEVEL_M = 0.3  # rise of the feet over which a blocker counts as up, unless given
+_SEED = 0  # any number: results repeat
+_PEAK_HALF_S = 0.1  # half width of the parabola at the peak
 _HIPS_ACCELERATION_PRIOR = (-GRAVITY_M_S2, 3.0, 30.0)  # at the peak: mean and sd [m/s2], sd of the jerk [m/s3]
 _FEET_ACCELERATION_PRIOR = (-GRAVITY_M_S2, 6.0, 100.0)
-_BEFORE_S = 0.3
+_BEFORE_S = 0.3  # of take-off: speeds are sought from there
 _UNTRACKED_LIMBS_M_S = 0.05  # sd of the body's speed due to arms and trunk, a tenth and half of the mass
 _NEAR_S = 5.0  # of the flight: where a standing posture is sought
 

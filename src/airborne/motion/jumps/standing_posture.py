@@ -13,7 +13,7 @@ from airborne.motion.jumps.leg_track import LegTrack
 from airborne.motion.local_polynomials import N_DRAWS
 from airborne.types import Array
 
-_WINDOW_S = 0.25
+_WINDOW_S = 0.25  # of standing still
 _QUIET_M_S = 0.15  # of hips and ankles, at most
 _STRAIGHT = 0.98  # hip-ankle distance in leg lengths: a knee flexed by no more than 20 degrees
 _LEG_SHARE, _LEG_SHARE_SD = 0.985, 0.01  # standing height of hips over ankles, in leg lengths

@@ -1,4 +1,4 @@
-"""The table of jumps: jumps.csv, and a short text for the terminal."""
+"""The table of jumps: jumps.csv."""
 
 from __future__ import annotations
 
@@ -29,13 +29,6 @@ _MEASUREMENTS = (
     "reach_m",
 )
 _POSITIONS = ("takeoff_position_m", "landing_position_m")
-_HEIGHTS = {
-    "foot_height_m": "feet over standing",
-    "hip_height_m": "hips over standing",
-    "flight_time_height_m": "by flight time",
-    "takeoff_speed_height_m": "by take-off speed",
-    "hip_rise_m": "hips from take-off",
-}
 
 
 def _column_names() -> tuple[str, ...]:
@@ -79,51 +72,9 @@ def write_jumps(path: Path, jumps: Sequence[Jump]) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
-def describe_jumps(jumps: Sequence[Jump]) -> str:
-    """Return the jumps as a short plain table: heights in cm with half their 95 % intervals."""
-    if not jumps:
-        return "no jump found"
-    names = [f"{jump.player} {jump.number}" for jump in jumps]
-    width = max(14, *(len(name) + 2 for name in names))
-    lines = [f"{'jump height [cm]':<22}" + "".join(f"{name:>{width}}" for name in names)]
-    for field, title in _HEIGHTS.items():
-        lines.append(_line(title, [_plus_minus(getattr(jump, field), 100.0, 1) for jump in jumps], width))
-    lines.append(_line("take-off [frame]", [_plus_minus(jump.takeoff_frame, 1.0, 1) for jump in jumps], width))
-    lines.append(_line("landing [frame]", [_plus_minus(jump.landing_frame, 1.0, 1) for jump in jumps], width))
-    lines.append(_line("flight [ms]", [_plus_minus(jump.flight_s, 1e3, 0) for jump in jumps], width))
-    lines.append(_line("standing from", [jump.standing.source for jump in jumps], width))
-    for jump, name in zip(jumps, names, strict=True):
-        if jump.status != "whole":
-            lines.append(f"{name}: {_STATUS_TEXTS[jump.status]}; numbers that need it are left out")
-        if jump.n_lost:
-            lines.append(f"{name}: hips or ankles unknown in {jump.n_lost} frames of the flight")
-        if jump.n_uncertain:
-            lines.append(f"{name}: {jump.n_uncertain} frames of the flight are uncertain; check them before use")
-    lines.append("after +-: half of the 95 % interval")
-    return "\n".join(lines)
-
-
-_STATUS_TEXTS = {
-    "no take-off": "the take-off is not seen",
-    "no landing": "the landing is not seen",
-    "neither": "neither take-off nor landing is seen",
-}
-
-
 def _with_interval(name: str, measured: Measurement) -> dict[str, str | int | float]:
     return {name: measured.value, f"{name}_low": measured.low, f"{name}_high": measured.high}
 
 
 def _text(value: str | int | float) -> str:
     return cell(value) if isinstance(value, float) else str(value)
-
-
-def _line(title: str, cells: Sequence[str], width: int) -> str:
-    return f"  {title:<20}" + "".join(f"{text:>{width}}" for text in cells)
-
-
-def _plus_minus(measured: Measurement, scale: float, digits: int) -> str:
-    if not np.isfinite(measured.value):
-        return "-"
-    half = scale * (measured.high - measured.low) / 2
-    return f"{scale * measured.value:.{digits}f} +-{half:.{digits}f}"

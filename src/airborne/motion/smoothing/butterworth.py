@@ -18,7 +18,7 @@ from airborne.motion.smoothing.propagation import apply_operator
 from airborne.motion.smoothing.segments import SmoothedPaths
 from airborne.types import Array
 
-_ORDER, _PASSES = 2, 2
+_ORDER, _PASSES = 2, 2  # second order, forward and back: no lag
 _LARGEST_UPSAMPLING = 4  # the median rate, to which uneven frames may be resampled
 UNEVEN = 0.05  # of a period: tolerance of time steps
 

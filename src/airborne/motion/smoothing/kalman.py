@@ -22,9 +22,9 @@ from airborne.types import Array
 
 PRIOR_SD = (10.0, 30.0, 300.0)  # of value, velocity, acceleration at the first frame [unit, unit/s, ...]: weak
 _LOG_DENSITY = (-6.0, 9.0)  # search range: powers of ten of q [unit2/s5]
-_LOG_STEP = 0.02
+_LOG_STEP = 0.02  # tolerance of the search, powers of ten
 _UNOBSERVED_SD = 10.0  # of a direction with an infinite variance
-_LEAST_VARIANCE = 1e-12
+_LEAST_VARIANCE = 1e-12  # [unit2] keeps the root finite
 
 
 class StateSpaceModel(NamedTuple):

@@ -20,7 +20,7 @@ from airborne.types import Array
 
 LINE = (0.3, 0.6)  # of half the rate: where residuals are taken as pure noise
 _LARGEST = 0.9  # of half the rate
-_N_CUTOFFS = 60
+_N_CUTOFFS = 60  # points of the curve
 _LONGEST_LAG = 10  # frames
 _SHORTEST = 12  # frames of a usable stretch
 

@@ -35,7 +35,7 @@ from airborne.motion.smoothing import (
 )
 from airborne.types import Array, Progress
 
-_LONGEST_FILL_S = 0.5
+_LONGEST_FILL_S = 0.5  # of a gap that may be filled
 CENTRE_OF_MASS = "centre_of_mass"
 _DESCRIPTIONS = {
     "butterworth": "zero-lag Butterworth low-pass, second order forward and back, -3 dB of both at {cutoff:g} Hz",

@@ -14,9 +14,9 @@ from airborne.motion.smoothing.segments import SmoothedPaths
 from airborne.types import Array
 
 _UNIT_FRAMES = 4.0  # unit of time: SciPy searches penalties from 0 to n, which suits usual motions in this unit
-_WIDER = 4.0
-_MOST_TRIES = 6
-_AT_THE_END = 0.98
+_WIDER = 4.0  # factor on the unit of time where the penalty lies at the end of its range
+_MOST_TRIES = 6  # of that
+_AT_THE_END = 0.98  # share of the range of penalties
 
 
 def spline_smoother(time_s: Array, values: Array, covariance: Array) -> SmoothedPaths:

@@ -11,11 +11,11 @@ from airborne.body.legs import RODS
 from airborne.types import Array
 
 OFF_M = 0.10  # beyond this a part is off
-TORSO_OFF_M = 0.10
-_AT_ANOTHER_M = 0.15
-_HALF_OCCLUDED = 0.5
-_LAG_FRAMES = 9
-_ALONG_COS = np.cos(np.radians(20))
+TORSO_OFF_M = 0.10  # beyond this the torso is off
+_AT_ANOTHER_M = 0.15  # an estimate this near to another part is that part's
+_HALF_OCCLUDED = 0.5  # share of a part
+_LAG_FRAMES = 9  # at most, that an estimate is compared with
+_ALONG_COS = np.cos(np.radians(20))  # an error within 20 degrees of the limb lies along it
 _OTHER_SIDE = (1, 0, 3, 2, 5, 4)  # of PARTS
 CAUSES = (
     "no estimate",

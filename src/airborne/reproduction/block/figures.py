@@ -15,7 +15,7 @@ from airborne.reproduction.block.summary import Record, Summary, by_sequence, su
 
 _COLOURS = {"framework": "#999999", "mixture": "#e69f00", "block-jump": "#0072b2", "blocker": "#009e73"}
 _TITLES = ("left hip", "right hip", "left knee", "right knee", "left foot", "right foot")
-_LEAST_MM = 3.0
+_LEAST_MM = 3.0  # lower end of a logarithmic axis
 
 
 def write_block_figures(folder: Path, summary: Summary, records: Sequence[Record]) -> None:

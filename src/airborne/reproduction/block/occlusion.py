@@ -15,7 +15,7 @@ _RODS_AT = ((2,), (3,), (0, 4), (1, 5), (2,), (3,))  # of PARTS: the other ends 
 _ALONG_M = (0.0, 0.05, 0.10)  # from the joint, along each of its rods
 _ACROSS = (-0.45, 0.0, 0.45)  # of a rod's width, along_ray from the camera
 _WIDTH_M = (THIGH_WIDTH_M, THIGH_WIDTH_M, SHANK_WIDTH_M, SHANK_WIDTH_M, SHANK_WIDTH_M, SHANK_WIDTH_M)
-FULLY_OCCLUDED = 0.999
+FULLY_OCCLUDED = 0.999  # share from which on a part is hidden
 
 
 def occlusion_shares(scene: BlockScene) -> Array:

@@ -13,17 +13,18 @@ from airborne.cameras import Camera
 from airborne.synthetic.block.margins import NET_TOP_M
 from airborne.types import Array, Image
 
-Colour = Sequence[float] | Array  # (3,) sRGB
+_Colour = Sequence[float] | Array  # (3,) sRGB
 
 COURT_M, _ATTACK_M, _LINE_M = (9.0, 18.0), 3.0, 0.05  # x and y of the court, attack line from the net, width of lines
 _NET_M = (4.75, 1.0, 0.10)  # half length, depth, mesh
 _ANTENNA_M = 0.80  # above the tape
-_ORANGE, _BLUE, _WHITE, _WALL = (211, 143, 86), (118, 139, 160), (238, 238, 234), (92, 92, 99)
-_CORD, _TAPE, _POLE = (34, 34, 38), (232, 232, 228), (42, 70, 150)
+_ORANGE, _BLUE, _WHITE, _WALL = (211, 143, 86), (118, 139, 160), (238, 238, 234), (92, 92, 99)  # sRGB
+_CORD, _TAPE, _POLE = (34, 34, 38), (232, 232, 228), (42, 70, 150)  # sRGB
+# sRGB of the spectators
 _CLOTHES = np.array(
     [(180, 40, 44), (38, 66, 160), (34, 112, 60), (226, 190, 50), (28, 28, 32), (206, 206, 206), (205, 120, 46)]
 )
-_SKIN = np.array((190, 142, 112))
+_SKIN = np.array((190, 142, 112))  # sRGB
 _NEAR_M = 0.3  # nothing nearer to a camera is drawn
 _SUB = 4  # cv2 draws to 1/16 of a pixel
 _CORD_ALPHA, _TAPE_ALPHA = 120, 250  # of 255
@@ -36,7 +37,7 @@ class Layer(NamedTuple):
     alpha: Image
 
 
-def hall_image(rng: np.random.Generator, camera: Camera, objects: Sequence[tuple[Array, Colour]]) -> Image:
+def hall_image(rng: np.random.Generator, camera: Camera, objects: Sequence[tuple[Array, _Colour]]) -> Image:
     """Draw everything static except the net: (h, w, 3) sRGB; `objects` as of `draw_clutter`."""
     width, height = camera.size
     image = np.full((height, width, 3), _WALL, np.uint8)
@@ -65,9 +66,9 @@ def net_layer(camera: Camera) -> Layer:
     return Layer(colour, alpha)
 
 
-def draw_clutter(rng: np.random.Generator) -> list[tuple[Array, Colour]]:
+def draw_clutter(rng: np.random.Generator) -> list[tuple[Array, _Colour]]:
     """Draw upright rectangles behind the court at random: steps, spectators, boards, boxes on the floor."""
-    objects: list[tuple[Array, Colour]] = []
+    objects: list[tuple[Array, _Colour]] = []
     for row in range(7):
         y, z = 14.0 + 0.9 * row, 0.5 + 0.45 * row
         objects.append(
@@ -94,13 +95,13 @@ def draw_clutter(rng: np.random.Generator) -> list[tuple[Array, Colour]]:
     return objects
 
 
-def _walls() -> Iterator[tuple[Array, Colour]]:
+def _walls() -> Iterator[tuple[Array, _Colour]]:
     for side, shade in ((-1, 0.86), (1, 0.94)):
         corners = np.array([[side * 15.0, y, z] for y, z in ((-20, 0), (24, 0), (24, 12), (-20, 12))])
         yield corners, tuple(shade * c for c in _WALL)
 
 
-def _floor() -> Iterator[tuple[Array, Colour]]:
+def _floor() -> Iterator[tuple[Array, _Colour]]:
     yield _floor_rectangle(0.0, 2.0, 30.0, 44.0), _BLUE
     (width, length), line_width = COURT_M, _LINE_M
     yield _floor_rectangle(0.0, 0.0, width, length), _ORANGE
@@ -110,12 +111,12 @@ def _floor() -> Iterator[tuple[Array, Colour]]:
         yield _floor_rectangle(x, 0.0, line_width, length), _WHITE
 
 
-def _tapes(half: float, top: float, bottom: float) -> Iterator[tuple[Array, Colour]]:
+def _tapes(half: float, top: float, bottom: float) -> Iterator[tuple[Array, _Colour]]:
     yield _upright_rectangle(0.0, 0.0, top - 0.07, 2 * half, 0.07), _TAPE
     yield _upright_rectangle(0.0, 0.0, bottom, 2 * half, 0.05), _TAPE
 
 
-def _antennae(top: float, bottom: float) -> Iterator[tuple[Array, Colour]]:
+def _antennae(top: float, bottom: float) -> Iterator[tuple[Array, _Colour]]:
     for x in (-COURT_M[0] / 2, COURT_M[0] / 2):
         yield _upright_rectangle(x, 0.0, bottom, 0.05, top - bottom), _TAPE
         for k in range(8):
@@ -123,7 +124,7 @@ def _antennae(top: float, bottom: float) -> Iterator[tuple[Array, Colour]]:
             yield _upright_rectangle(x, 0.0, top + k * height, 0.02, height), (_TAPE, (196, 44, 44))[k % 2]
 
 
-def _poles() -> Iterator[tuple[Array, Colour]]:
+def _poles() -> Iterator[tuple[Array, _Colour]]:
     for x in (-5.3, 5.3):
         yield _upright_rectangle(x, 0.0, 0.0, 0.12, 2.55), _POLE
 
@@ -136,13 +137,13 @@ def _upright_rectangle(x: float, y: float, z: float, width: float, height: float
     return np.array([[x + a * width / 2, y, z + b * height] for a, b in ((-1, 0), (1, 0), (1, 1), (-1, 1))])
 
 
-def _fill(image: Image, camera: Camera, corners: Array, colour: Colour) -> None:
+def _fill(image: Image, camera: Camera, corners: Array, colour: _Colour) -> None:
     px = _project(camera, corners, is_closed=True)
     if len(px) > 2:
         cv2.fillConvexPoly(image, px, [float(c) for c in colour], cv2.LINE_AA, _SUB)
 
 
-def _draw_line(image: Image, camera: Camera, ends: Sequence[Sequence[float]], colour: Colour) -> None:
+def _draw_line(image: Image, camera: Camera, ends: Sequence[Sequence[float]], colour: _Colour) -> None:
     px = _project(camera, np.array(ends, float), is_closed=False)
     if len(px) == 2:
         cv2.line(image, px[0].tolist(), px[1].tolist(), [float(c) for c in colour], 1, cv2.LINE_AA, _SUB)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.interpolate import PPoly
 
 from airborne.body import BodyModel
+from airborne.constants import FREE_FALL_M_S2, GRAVITY_M_S2
 from airborne.synthetic.block.motion import (
     FlightPhase,
     Movement,
@@ -28,10 +29,8 @@ from airborne.synthetic.block.plan import (
 )
 from airborne.synthetic.block.posture import Person, measure_person
 from airborne.synthetic.block.steps import Step, approach_steps, body_yaw, feet_midpoints, foot_path, foot_placements
-from airborne.synthetic.flight.rigid import GRAVITY_M_S2
 from airborne.types import Array
 
-_G = float(-GRAVITY_M_S2[2])
 _BOTTOM_ACCELERATIONS_M_S2 = np.arange(4.0, 22.0, 3.0)  # upward, of the centre of mass at its lowest point
 _HEELS_LEFT = (-0.09, np.radians(13.0), 2.5, 30.0)  # heels on their way up [s, rad, rad/s, rad/s^2]
 _HEELS_DOWN_S = 0.1  # after touch-down
@@ -39,7 +38,7 @@ _FOLLOW_S, _PREPARE_S = 0.045, 0.04  # legs come to rest after take-off, and pre
 _POINTED_RAD = np.radians(47.0)  # feet go no further
 _REACHED_S, _FOLDING_S, _FOLDED_S = 0.14, 0.24, 0.1  # arms reach up after take-off, come down before touch-down
 _PLANTED = 0.4  # share of the crouch when the last step of the approach lands
-_RECOVERY_S = 0.5
+_RECOVERY_S = 0.5  # from the lowest point after landing to standing
 
 
 class KeyTimes(NamedTuple):
@@ -59,9 +58,10 @@ def build_jump(model: BodyModel, plan: JumpPlan) -> Movement:
     """
     person = measure_person(model)
     levels = centre_heights(person, plan)
-    velocity = np.append(plan.drift_m_s, np.sqrt(2 * _G * plan.rise_m))
-    duration = float((velocity[2] + np.sqrt(velocity[2] ** 2 + 2 * _G * (levels.takeoff - levels.touch))) / _G)
-    landing = velocity + GRAVITY_M_S2 * duration
+    velocity = np.append(plan.drift_m_s, np.sqrt(2 * GRAVITY_M_S2 * plan.rise_m))
+    touch_m_s = np.sqrt(velocity[2] ** 2 + 2 * GRAVITY_M_S2 * (levels.takeoff - levels.touch))
+    duration = float((velocity[2] + touch_m_s) / GRAVITY_M_S2)
+    landing = velocity + FREE_FALL_M_S2 * duration
     push_s, pushing = _least_peak_acceleration(levels.takeoff - levels.bottom, velocity[2])
     yield_s, yielding = _least_peak_acceleration(levels.touch - levels.low, -landing[2])
     low_s = duration + yield_s
@@ -73,7 +73,7 @@ def build_jump(model: BodyModel, plan: JumpPlan) -> Movement:
     times = KeyTimes(crouch_s, -push_s, duration, low_s, low_s + _RECOVERY_S)
 
     takeoff = np.append(plan.position + CENTRE_AHEAD_TAKEOFF_M * plan.forward, levels.takeoff)
-    touch = takeoff + velocity * duration + GRAVITY_M_S2 * duration**2 / 2
+    touch = takeoff + velocity * duration + FREE_FALL_M_S2 * duration**2 / 2
     landed = touch[:2] - plan.touch_offset_m
     heels_up = [(-push_s, 0.0, 0.0, 0.0), _HEELS_LEFT, (0.0, *TAKEOFF_PITCH)]
     heels_down = [(duration, *TOUCH_PITCH), (duration + _HEELS_DOWN_S, 0.0, 0.0, 0.0)]
@@ -84,7 +84,7 @@ def build_jump(model: BodyModel, plan: JumpPlan) -> Movement:
             [
                 (times.crouch, levels.ready, 0.0, 0.0),
                 (times.bottom, levels.bottom, 0.0, pushing),
-                (0.0, levels.takeoff, velocity[2], -_G),
+                (0.0, levels.takeoff, velocity[2], -GRAVITY_M_S2),
             ]
         ),
         tuple(foot_path(side, first[side], steps, heels_up) for side in (0, 1)),
@@ -99,7 +99,7 @@ def build_jump(model: BodyModel, plan: JumpPlan) -> Movement:
         ),
         quintic(
             [
-                (duration, levels.touch, landing[2], -_G),
+                (duration, levels.touch, landing[2], -GRAVITY_M_S2),
                 (times.low, levels.low, 0.0, yielding),
                 (times.end, levels.end, 0.0, 0.0),
             ]
@@ -121,7 +121,8 @@ def _least_peak_acceleration(distance_m: float, speed_m_s: float) -> tuple[float
     for time_s in np.linspace(1.2, 2.6, 29) * distance_m / speed_m_s:
         for bottom in _BOTTOM_ACCELERATIONS_M_S2:
             start = np.array([0.0, 0.0, bottom * time_s**2 / 2])
-            remaining = np.array([distance_m, speed_m_s * time_s, -_G * time_s**2]) - start[2] * np.array([1, 2, 2])
+            end = np.array([distance_m, speed_m_s * time_s, -GRAVITY_M_S2 * time_s**2])
+            remaining = end - start[2] * np.array([1, 2, 2])
             rise = np.concatenate([start, np.linalg.solve(ends[3:].T, remaining)])
             if np.polynomial.polynomial.polyval(s, rise).min() >= 0:
                 double = np.polynomial.polynomial.polyval(s, np.arange(2, 6) * np.arange(1, 5) * rise[2:]) / time_s**2

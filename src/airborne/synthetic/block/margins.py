@@ -11,7 +11,7 @@ from airborne.body import surface_arrays
 from airborne.synthetic.block.posture import Person, Poses
 from airborne.types import Array
 
-NET_TOP_M = 2.43
+NET_TOP_M = 2.43  # men's net (FIVB rules of volleyball 2.1.1)
 _NET_CLEAR_M = 0.03  # hands pass this far above the tape
 _LATTICE = np.array([p for p in product((-1.0, 0.0, 1.0), repeat=3) if any(p)])
 _SPHERE = _LATTICE / np.linalg.norm(_LATTICE, axis=1, keepdims=True)  # (26, 3)

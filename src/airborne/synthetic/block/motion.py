@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.interpolate import BPoly, PchipInterpolator, PPoly
 
+from airborne.constants import FREE_FALL_M_S2
 from airborne.synthetic.block.legs import axis_rotation, roll_foot
 from airborne.synthetic.block.posture import Feet, Person, Poses, solve_stance
-from airborne.synthetic.flight.rigid import GRAVITY_M_S2
 from airborne.types import Array
 
 Knot = tuple[float, Any, Any, Any]  # time [s], value, its first and second derivatives
@@ -79,7 +79,7 @@ class FlightPhase(NamedTuple):
     def centre_at(self, time_s: Array) -> Array:
         """Return the centre of mass at the times (n,) [s] after take-off: (n, 3) world [m]."""
         t = np.asarray(time_s, float)[:, None]
-        return self.centre + self.velocity * t + GRAVITY_M_S2 * t**2 / 2
+        return self.centre + self.velocity * t + FREE_FALL_M_S2 * t**2 / 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -22,10 +22,10 @@ from airborne.synthetic.block.scene import BlockScene
 from airborne.types import Array, Image
 from airborne.video import Frames, View
 
-Box = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]
+_Rectangle = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]
 Boxes = NDArray[np.int64]  # (..., 4) of them
 
-HALL_LIGHTS = Lights(0.50, (Lamp(np.array([-5.0, -9.0, 10.0]), 0.36), Lamp(np.array([6.0, -4.0, 10.0]), 0.34)))
+_HALL_LIGHTS = Lights(0.50, (Lamp(np.array([-5.0, -9.0, 10.0]), 0.36), Lamp(np.array([6.0, -4.0, 10.0]), 0.34)))
 _SHADOW_TINT = np.array([0.85, 1.0, 1.02])  # share of each colour's light that is missing: what is left is like skin
 _LEAN = np.array([0.12, 0.10])  # a shadow's shift over the floor for each metre of height
 _CASTERS = (  # of shadows: landmark, its height over the floor as one stands, radius [m], share of the depth
@@ -37,7 +37,7 @@ _SQUARE = np.array([[x, y] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
 _BODY_MARGIN_M = 0.13  # a body reaches no further than this from its landmarks
 _BLOCK_PX = 16  # of JPEG: patches begin and end at its blocks
 _N_BACKGROUNDS = 4  # recordings of the static hall, chosen at random by frame
-_POOL_MARGIN_PX = 256
+_POOL_MARGIN_PX = 256  # by which the noise is larger than an image: from frame to frame it is shifted
 
 
 class Drawable(NamedTuple):
@@ -117,11 +117,11 @@ def _draw_image(
             shadows, boxes = drawable.shadows[index], bounds.shadows[index]
             cast_shadows(patch, x0, y0, setup.floor_from_px, shadows, boxes, _SHADOW_TINT)
         for drawable, bounds in (each for each in inside if each[0].player.side > 0):
-            _composite_body(patch, box, setup.camera, drawable, bounds, index=index)
+            _composite_body(patch, box, setup.camera, drawable, bounds=bounds, index=index)
         blend_layer(patch, setup.net.colour[y0:y1, x0:x1], setup.net.alpha[y0:y1, x0:x1])
         for drawable, bounds in (each for each in inside if each[0].player.side < 0):
-            _composite_body(patch, box, setup.camera, drawable, bounds, index=index)
-        recorded[y0:y1, x0:x1] = _record(rng, patch, setup.gain, pool, quality)
+            _composite_body(patch, box, setup.camera, drawable, bounds=bounds, index=index)
+        recorded[y0:y1, x0:x1] = _record(rng, patch, setup.gain, pool, quality=quality)
     return recorded
 
 
@@ -146,7 +146,7 @@ def _camera_setup(
         net=net,
         gain=gain,
         recorded_backgrounds=[
-            _record(rng, with_net, gain, pool, scene.difficulty.jpeg_quality) for _ in range(_N_BACKGROUNDS)
+            _record(rng, with_net, gain, pool, quality=scene.difficulty.jpeg_quality) for _ in range(_N_BACKGROUNDS)
         ],
         floor_from_px=np.linalg.inv(camera.P[:, [0, 1, 3]]),
         bounds=[_image_bounds(camera, drawable) for drawable in drawables],
@@ -196,13 +196,13 @@ def _boxes(camera: Camera, low: Array, high: Array, step: int = 1) -> Boxes:
     return np.clip(rounded, 0, [*camera.size, *camera.size]).astype(np.int64)
 
 
-def _overlap(a: Box, b: Box) -> bool:
+def _overlap(a: _Rectangle, b: _Rectangle) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def _merge(boxes: list[NDArray[np.int64]]) -> list[Box]:
+def _merge(boxes: list[NDArray[np.int64]]) -> list[_Rectangle]:
     """Merge overlapping boxes until none overlap; empty ones are left out."""
-    merged: list[Box] = []
+    merged: list[_Rectangle] = []
     for x0, y0, x1, y1 in (map(int, each) for each in boxes if each[2] > each[0] and each[3] > each[1]):
         box = (x0, y0, x1, y1)
         while overlapping := next((other for other in merged if _overlap(box, other)), None):
@@ -214,7 +214,7 @@ def _merge(boxes: list[NDArray[np.int64]]) -> list[Box]:
 
 
 def _composite_body(
-    patch: NDArray[np.float32], box: Box, camera: Camera, each: Drawable, bounds: ImageBounds, *, index: int
+    patch: NDArray[np.float32], box: _Rectangle, camera: Camera, each: Drawable, *, bounds: ImageBounds, index: int
 ) -> None:
     """Composite a body over the patch, with two samples a pixel side by side, as limbs are mostly upright."""
     x0, y0, x1, y1 = (int(c) for c in bounds.body[index])
@@ -222,12 +222,12 @@ def _composite_body(
         return
     supersampled = camera.resample(scale=(0.5, 1.0), offset=(x0 - 0.25, y0), size=(2 * (x1 - x0), y1 - y0))
     posed = PosedBody(each.player.body, each.R[index], each.t[index])
-    rendering = render(each.surface, posed, supersampled, HALL_LIGHTS, shapes=each.shapes)
+    rendering = render(each.surface, posed, supersampled, _HALL_LIGHTS, shapes=each.shapes)
     composite(patch, x0 - box[0], y0 - box[1], rendering.colour, rendering.part)
 
 
 def _record(
-    rng: np.random.Generator, patch: NDArray[np.float32], gain: Array, pool: NDArray[np.int8], quality: int
+    rng: np.random.Generator, patch: NDArray[np.float32], gain: Array, pool: NDArray[np.int8], *, quality: int
 ) -> Image:
     """Return a patch (h, w, 3) after sensor noise and compression."""
     height, width, _ = patch.shape

@@ -15,12 +15,12 @@ from airborne.types import Array
 Arms = Literal["block", "attack", "low"]
 
 TAKEOFF_PITCH = (np.radians(35.0), 13.0, -60.0)  # of the feet [rad, rad/s, rad/s^2]
-TOUCH_PITCH = (np.radians(26.0), -11.0, 0.0)
+TOUCH_PITCH = (np.radians(26.0), -11.0, 0.0)  # likewise, at touch-down
 CENTRE_AHEAD_M, CENTRE_AHEAD_LOW_M = (
     0.02,
     -0.01,
 )  # of the centre of mass ahead of the feet's midpoint: standing, at its lowest
-CENTRE_AHEAD_TAKEOFF_M, _CENTRE_AHEAD_TOUCH_M = 0.085, 0.05
+CENTRE_AHEAD_TAKEOFF_M, _CENTRE_AHEAD_TOUCH_M = 0.085, 0.05  # likewise, at take-off and touch-down
 _HEIGHTS_PER_REACH, _N_HEIGHTS = (0.75, 1.5), 48  # of the centre of mass, sampled, over a leg's length
 _DRIFT_LEAD_S = 0.1  # feet land ahead of a drifting body by its drift in this time
 

@@ -22,7 +22,7 @@ from airborne.types import Array
 Role = Literal["blocker", "team mate", "opponent"]
 
 CLEARANCE_M = 0.03  # between two players, and to the net
-_ROUNDING_M = 1e-9
+_ROUNDING_M = 1e-9  # of heights over the floor
 _CHECK_S = 0.02  # between checks of a movement
 _LARGEST_ACCELERATION_M_S2 = 30.0  # acceleration of the centre of mass by the legs
 _APPROACHES_M: dict[Approach, tuple[float, float]] = {
@@ -31,10 +31,10 @@ _APPROACHES_M: dict[Approach, tuple[float, float]] = {
     "crossover": (0.8, 1.1),
 }
 _SKINS = np.array([[206, 160, 130], [188, 140, 110], [214, 172, 146], [150, 108, 84], [196, 152, 118]], float)
-_HAIRS = ((38, 30, 25), (22, 22, 22), (90, 66, 44), (150, 121, 80))
-_SHOES = ((222, 222, 218), (203, 69, 63), (226, 196, 64), (60, 64, 72))
+_HAIRS = ((38, 30, 25), (22, 22, 22), (90, 66, 44), (150, 121, 80))  # sRGB
+_SHOES = ((222, 222, 218), (203, 69, 63), (226, 196, 64), (60, 64, 72))  # sRGB
 _SHIRT, _SHORTS, _SOCKS = (196, 48, 56), (26, 26, 30), (40, 40, 45)  # of the blockers' team
-_OTHER_SHIRT, _OTHER_SHORTS, _OTHER_SOCKS = (40, 80, 180), (226, 226, 230), (232, 232, 228)
+_OTHER_SHIRT, _OTHER_SHORTS, _OTHER_SOCKS = (40, 80, 180), (226, 226, 230), (232, 232, 228)  # sRGB, of the other team
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -182,7 +182,7 @@ def draw_bystander(
 
 def _move_clear_of_net(player: Player, duration_s: float) -> Player:
     """Move the player far enough from the net; raises TrialError for an impossible movement."""
-    time_s, centre_z = check_times(duration_s), player.movement.before.centre_z
+    time_s, centre_z = sample_times(duration_s), player.movement.before.centre_z
     margins = margins_of(player.movement.person, player.poses(time_s), side=player.side)
     largest_acceleration = np.abs(centre_z(np.linspace(centre_z.x[0], centre_z.x[-1], 200), 2)).max()
     if not (
@@ -192,11 +192,11 @@ def _move_clear_of_net(player: Player, duration_s: float) -> Player:
     return player.translate(np.array([0.0, player.side * max(CLEARANCE_M - margins.net_m, 0.0)]))
 
 
-def occupied_volume(player: Player, duration_s: float) -> Capsules:
+def volume_over(player: Player, duration_s: float) -> Capsules:
     """Return the volume of a player over a recording."""
-    return capsules_of(player.movement.person, player.poses(check_times(duration_s)), player.stature_m)
+    return capsules_of(player.movement.person, player.poses(sample_times(duration_s)), player.stature_m)
 
 
-def check_times(duration_s: float) -> Array:
+def sample_times(duration_s: float) -> Array:
     """Return the times (n,) [s] at which movements are checked: a recording and a little more at both ends."""
     return np.arange(-_CHECK_S, duration_s + _CHECK_S, _CHECK_S)

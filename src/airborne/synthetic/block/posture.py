@@ -17,6 +17,7 @@ from airborne.synthetic.block.legs import LegSizes, leg_angles
 from airborne.types import Array
 
 _SIDES = ("left", "right")
+# at most; residual that ends them; by which a leg may be too short
 _MOST_ITERATIONS, _TOLERANCE_M, _TOO_SHORT_M = 60, 1e-13, 1e-6
 _OVER_RELAXATION = 1.2  # the centre of mass follows the root by less than its step
 

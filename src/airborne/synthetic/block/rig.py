@@ -11,12 +11,12 @@ from airborne.cameras import Camera, Rig, camera_looking_at
 from airborne.errors import TrialError
 
 SIZE = (1920, 1080)  # [px]
-_TARGET_M = np.array([0.0, -0.7, 1.6])
+_TARGET_M = np.array([0.0, -0.7, 1.6])  # where the cameras look: the middle of the block
 _POSITIONS_M = np.array(  # [m]; the block-jump paper's three first
     [[-7.0, -13.0, 4.5], [7.0, -13.0, 4.5], [0.0, -15.0, 5.0], [-10.5, -5.0, 4.0], [10.5, -5.0, 4.0], [3.0, -13.5, 7.0]]
 )
-_POSITION_SD_M, _TARGET_SD_M = 0.15, 0.05
-_FOCAL_PX = (1600.0, 1720.0)
+_POSITION_SD_M, _TARGET_SD_M = 0.15, 0.05  # of the cameras and their targets about these
+_FOCAL_PX = (1600.0, 1720.0)  # range of the focal lengths
 
 
 def hall_rig(rng: np.random.Generator, n_cameras: int) -> Rig:

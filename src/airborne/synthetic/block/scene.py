@@ -19,23 +19,23 @@ from airborne.synthetic.block.players import (
     draw_attacker,
     draw_blocker,
     draw_bystander,
-    occupied_volume,
+    volume_over,
 )
 from airborne.synthetic.block.rig import hall_rig, perturb_calibration
 from airborne.synthetic.block.steps import Approach
 from airborne.types import Array
 
-_FRAME_RATES = (30, 60, 120)
-_PAPER_FRAMES, _PAPER_SCENES = 1798, 22
+_FRAME_RATES = (30, 60, 120)  # usual rates of cameras
+_PAPER_FRAMES, _PAPER_SCENES = 1798, 22  # the block-jump paper's sequences
 _PAPER_TEAMS = (2, 2, 2, 3, 3)  # blockers, where there are several
-_MEAN_FRAMES, _FEWEST_FRAMES = 82, 70
+_MEAN_FRAMES, _FEWEST_FRAMES = 82, 70  # 1798 / 22 as in the paper; least that shows a jump
 _SPREAD_S = 0.08  # between the take-offs of neighbouring blockers
-_SPACING_M, _WIDER_M = (0.62, 0.80), 0.04
+_SPACING_M, _WIDER_M = (0.62, 0.80), 0.04  # between blockers; by how much it is widened until they do not touch
 _NEAR_M = 2.5  # players further apart at the start cannot touch
-_TRIES = 200
+_TRIES = 200  # draws of a player until it is clear of the others
 _FLIGHT_S = 0.66  # about
 _POSITION_RANGE_M = (-2.6, 2.6)  # of the block along the net
-_OUT_OF_WAY_M = 0.7
+_OUT_OF_WAY_M = 0.7  # from the lines of sight to the block
 _APPROACHES: tuple[Approach, ...] = ("static", "shuffle", "crossover")
 
 
@@ -136,18 +136,6 @@ def block_scene(
     )
 
 
-def paper_sequences(seed: int = 0, *, difficulty: Difficulty | None = None) -> list[BlockScene]:
-    """Draw as many sequences as the block-jump paper has: 22, of them 5 with two or three blockers, 1798 frames."""
-    rate = (difficulty or Difficulty()).frame_rate
-    counts, n_blockers = paper_lengths(np.random.default_rng([seed, 20]))
-    return [
-        block_scene(
-            1000 * (seed + 1) + k, n_blockers=int(n), difficulty=difficulty, n_frames=round(int(count) * rate / 60)
-        )
-        for k, (n, count) in enumerate(zip(n_blockers, counts, strict=True))
-    ]
-
-
 def paper_lengths(rng: np.random.Generator) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
     """Draw how many frames at 60 a second the paper's sequences have, (22,), and how many blockers, (22,)."""
     lengths = np.clip(rng.normal(_MEAN_FRAMES, 6, _PAPER_SCENES), _FEWEST_FRAMES + 4, 100)
@@ -171,10 +159,7 @@ def _draw_block(rng: np.random.Generator, n_blockers: int, duration_s: float) ->
                 rng, name, x, takeoff_s=takeoff_s, approach=approach, direction=direction, duration_s=duration_s
             )
         )
-        while (
-            blockers
-            and gap_m(occupied_volume(player, duration_s), occupied_volume(blockers[-1], duration_s)) < CLEARANCE_M
-        ):
+        while blockers and gap_m(volume_over(player, duration_s), volume_over(blockers[-1], duration_s)) < CLEARANCE_M:
             player = player.translate(np.array([_WIDER_M, 0.0]))
             x += _WIDER_M
         blockers.append(player)
@@ -205,11 +190,11 @@ def _add_others(
 
     draws = [spiker, *(partial(decoy, f"opponent{k}") for k in range(2, 3 + int(rng.integers(1, 3))))]
     draws += [partial(mate, f"mate{k}") for k in (1, 2, 3)]
-    volumes = [occupied_volume(player, duration_s) for player in players]
+    volumes = [volume_over(player, duration_s) for player in players]
     for draw in draws:
-        player = _draw_until(draw, lambda drawn: _is_clear(occupied_volume(drawn, duration_s), volumes))
+        player = _draw_until(draw, lambda drawn: _is_clear(volume_over(drawn, duration_s), volumes))
         players.append(player)
-        volumes.append(occupied_volume(player, duration_s))
+        volumes.append(volume_over(player, duration_s))
     return tuple(players)
 
 

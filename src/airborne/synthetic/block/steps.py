@@ -14,7 +14,7 @@ from airborne.types import Array
 Approach = Literal["static", "shuffle", "crossover"]
 
 STEP_S = 0.2  # a foot's time off the floor
-_LIFT_M = 0.07
+_LIFT_M = 0.07  # of a foot in a step
 _HEEL_RISE_S, _HEEL_RISE_RAD = 0.1, np.radians(22.0)  # the heel rises before a step
 _LONG_S = 100.0  # beyond any recording
 _LONGEST_SHUFFLE_M = 0.38  # of one pair of steps

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from airborne.constants import GRAVITY_M_S2
 from airborne.synthetic.block.players import Player
 from airborne.synthetic.block.scene import BlockScene
 from airborne.types import Array
@@ -16,7 +17,7 @@ TRUTH_JOINTS = {  # column of the truth, landmark
 _START_JOINTS = tuple(f"{joint}_{side}" for joint in ("hip", "knee", "ankle", "foot") for side in ("left", "right"))
 _TORSO_OF = ("hip_left", "hip_right", "shoulder_left", "shoulder_right")
 _CORRELATION = 0.8  # of the torso's error from frame to frame
-_FINE_HZ = 2000.0
+_FINE_HZ = 2000.0  # at which the peaks of the true paths are sought
 
 
 def true_joints(player: Player, time_s: Array) -> dict[str, Array]:
@@ -71,7 +72,7 @@ def jump_truth(player: Player, rate_hz: float) -> dict[str, float]:
     joints = true_joints(player, np.linspace(player.takeoff_s, player.touch_s, round(flight.duration_s * _FINE_HZ)))
     hips = (joints["hip_left"] + joints["hip_right"])[:, 2] / 2
     ankles = (joints["ankle_left"] + joints["ankle_right"])[:, 2] / 2
-    rise_s = float(flight.velocity[2]) / 9.81
+    rise_s = float(flight.velocity[2]) / GRAVITY_M_S2
     return {
         "last_contact_frame": player.takeoff_s * rate_hz,
         "first_contact_frame": player.touch_s * rate_hz,
@@ -80,8 +81,8 @@ def jump_truth(player: Player, rate_hz: float) -> dict[str, float]:
         "first_contact_s": player.touch_s,
         "flight_s": flight.duration_s,
         "takeoff_speed_m_s": float(flight.velocity[2]),
-        "com_rise_from_takeoff_m": float(flight.velocity[2] ** 2 / (2 * 9.81)),
-        "com_acceleration": -9.81,
+        "com_rise_from_takeoff_m": float(flight.velocity[2] ** 2 / (2 * GRAVITY_M_S2)),
+        "com_acceleration": -GRAVITY_M_S2,
         "hip_apex_m": float(hips.max()),
         "hip_rise_from_takeoff_m": float(hips.max() - hips[0]),
         "hip_rise_over_standing_m": float(hips.max() - hips_standing),

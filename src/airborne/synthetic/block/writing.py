@@ -19,7 +19,7 @@ from airborne.synthetic.throw.writing import require_empty
 from airborne.types import Array, Progress
 from airborne.video import VideoWriter
 
-_CRF = 20
+_CRF = 20  # of x264
 _TRUTH_NAMES = {**{landmark: column for column, landmark in TRUTH_JOINTS.items()}, "torso": "torso"}
 
 

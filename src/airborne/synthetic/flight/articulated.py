@@ -18,9 +18,10 @@ from scipy.interpolate import BPoly, PPoly
 from scipy.spatial.transform import Rotation
 
 from airborne.body import BodyModel
+from airborne.constants import FREE_FALL_M_S2
 from airborne.errors import BodyError
 from airborne.rendering import pose_segments
-from airborne.synthetic.flight.rigid import GRAVITY_M_S2, MassProperties, SampledFlight
+from airborne.synthetic.flight.rigid import MassProperties, SampledFlight
 from airborne.types import Array
 
 Rate = Callable[[float, Array], Array]  # time and state to the state's rate
@@ -42,11 +43,6 @@ class MassDistribution(NamedTuple):
     centre: Array  # (n, 3) centre of mass [m]
     inertia: Array  # (n, 3, 3) about the centre of mass [kg m^2]
     momentum: Array  # (n, 3) angular, of the joints' motion about the centre of mass [kg m^2/s]
-
-
-def constant_joints(joint_angles: Array) -> PPoly:
-    """Return the motion of joints with constant angles (joints, 3) [rad]."""
-    return PPoly(np.asarray(joint_angles, float)[None, None], [0.0, 1.0])
 
 
 def joint_motion(time_s: Array, joint_angles: Array) -> PPoly:
@@ -99,11 +95,11 @@ def fly_articulated(
         times, back = np.unique(time_s[selected], return_inverse=True)
         if len(times):
             order = slice(None, None, 1 if times[-1] > 0 else -1)
-            quaternions[selected] = _integrate(turning, start, joints.x, times[order], tolerance)[order][back]
+            quaternions[selected] = _integrate(turning, start, joints.x, times[order], tolerance=tolerance)[order][back]
     R = Rotation.from_quat(quaternions).as_matrix()
     angles, rates = _state(joints, time_s)
     t = time_s[:, None]
-    centre = takeoff.centre + takeoff.velocity * t + GRAVITY_M_S2 * t**2 / 2
+    centre = takeoff.centre + takeoff.velocity * t + FREE_FALL_M_S2 * t**2 / 2
     shape = segments.mass_distribution(angles, rates)
     w = segments.angular_velocity(R, takeoff, angles, rates)
     spin = np.einsum("nij,nj->ni", shape.inertia, w) + shape.momentum
@@ -190,7 +186,7 @@ class _Segments:
         return np.linalg.solve(shape.inertia, own[..., None])[..., 0]
 
 
-def _integrate(turning: Rate, start: Array, breaks: Array, times: Array, tolerance: float) -> Array:
+def _integrate(turning: Rate, start: Array, breaks: Array, times: Array, *, tolerance: float) -> Array:
     """Integrate quaternions from time 0 to the times (n,), which all lie on one side of it, nearest first: (n, 4).
 
     Integrated from break to break: a long step would miss a short movement.

@@ -9,10 +9,10 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Pose
+from airborne.constants import FREE_FALL_M_S2
 from airborne.errors import BodyError
 from airborne.types import Array
 
-GRAVITY_M_S2 = np.array([0.0, 0.0, -9.81])
 _RELATIVE, _ABSOLUTE = 1e-11, 1e-12  # tolerances of the integration
 
 
@@ -103,7 +103,7 @@ def fly(mass: MassProperties, launch: Launch, time_s: Array) -> SampledFlight:
             states[selected] = solved.y.T[order][back]
     R = Rotation.from_quat(states[:, :4]).as_matrix()
     t = time_s[:, None]
-    centre = launch.centre + launch.velocity * t + GRAVITY_M_S2 * t**2 / 2
+    centre = launch.centre + launch.velocity * t + FREE_FALL_M_S2 * t**2 / 2
     w = states[:, 4:]
     return SampledFlight(
         time_s=time_s,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from typing import Literal, get_args
@@ -16,6 +16,7 @@ from airborne.body import BodyModel, Pose, human18
 from airborne.body.outfits import with_flat_colours
 from airborne.body.skin import skin_of
 from airborne.cameras import Rig, camera_looking_at
+from airborne.constants import FREE_FALL_M_S2, GRAVITY_M_S2
 from airborne.errors import BodyError, TrialError
 from airborne.geometry.rotations import angles_from_matrix, unwrap
 from airborne.rendering import Lamp, Lights
@@ -28,7 +29,7 @@ from airborne.synthetic.flight.articulated import (
     sum_motions,
     with_fixed_joints,
 )
-from airborne.synthetic.flight.rigid import GRAVITY_M_S2, SampledFlight
+from airborne.synthetic.flight.rigid import SampledFlight
 from airborne.synthetic.throw.scene import HALL_AMBIENT, PICTURE_SIZE, Scene, hall_spots
 from airborne.synthetic.throw.surroundings import gym
 from airborne.types import Array
@@ -37,7 +38,7 @@ SomersaultPreset = Literal["paper", "moving-arms", "pike"]
 Target = Literal["skin", "ellipsoids"]
 PictureStyle = Literal["exact", "gym"]
 
-STATURE_M, MASS_KG = 1.66, 58.0
+STATURE_M, MASS_KG = 1.66, 58.0  # [m], [kg] of the gymnast
 N_POSES = 11  # of the paper's sequence
 LIGHTS = Lights(0.5, (Lamp(np.array([-3.0, -3.5, 4.2]), 0.4), Lamp(np.array([3.4, 2.2, 3.6]), 0.3)))
 _CAMERAS = {  # position, target [m], focal length [px]
@@ -104,14 +105,6 @@ class Skill:
     def poses_s(self) -> Array:
         """The times of the paper's poses, evenly from take-off to landing: (11,) [s]."""
         return np.linspace(0, self.duration_s, N_POSES)
-
-
-def pose_ranges(flight: SampledFlight) -> PoseRanges:
-    """Return the ranges of a flight's root over its samples: along z, y and x, and of its three angles."""
-    lateral, forward, vertical = np.ptp(flight.position, axis=0)
-    angles = np.ptp(unwrap(angles_from_matrix(flight.R), flight.time_s), axis=0)
-    values = (vertical, forward, lateral, *angles)
-    return PoseRanges(**{field.name: float(value) for field, value in zip(fields(PoseRanges), values, strict=True)})
 
 
 @lru_cache(maxsize=8)
@@ -254,7 +247,7 @@ def _launch(skill: Skill, flight: SampledFlight) -> Skill:
 
     The flight is that of the paper's poses. Take-off and landing have the root at one height; the middle is x = y = 0.
     """
-    time, g = flight.time_s, -GRAVITY_M_S2[2]
+    time, g = flight.time_s, GRAVITY_M_S2
     about = flight.position - flight.centre  # of the root about the centre of mass, whatever the duration
 
     def path(x: Array) -> Array:
@@ -274,7 +267,7 @@ def _launch(skill: Skill, flight: SampledFlight) -> Skill:
     middle = (root.min(axis=0) + root.max(axis=0)) / 2
     takeoff = Takeoff(
         centre=np.array([-middle[0], -middle[1], _CLEARANCE_M - lowest - about[0, 2]]),
-        velocity=np.array([lateral, -forward, about[0, 2] - about[-1, 2]]) / duration - GRAVITY_M_S2 * duration / 2,
+        velocity=np.array([lateral, -forward, about[0, 2] - about[-1, 2]]) / duration - FREE_FALL_M_S2 * duration / 2,
         R=np.eye(3),
         angular_momentum=skill.takeoff.angular_momentum / duration,
     )

@@ -14,7 +14,7 @@ from airborne.types import Array
 
 _CLEARANCE_M = 1e-3  # a surface does not occlude itself
 _CORE = 0.93  # share of an ellipsoid's size that blocks light: a smooth skin lies partly inside its ellipsoid
-_NOTHING = np.zeros((0, 3, 4))
+_NOTHING = np.zeros((0, 3, 4))  # no body that could occlude
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

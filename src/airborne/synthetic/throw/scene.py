@@ -20,7 +20,7 @@ from airborne.types import Array
 
 ThrowPreset = Literal["side-somersault", "half-twist"]
 
-_PINE_KG_M3 = 500.0
+_PINE_KG_M3 = 500.0  # density of pine wood, about
 YELLOW = np.array([231.0, 200.0, 48.0])  # sRGB
 PICTURE_SIZE = (768, 576)  # [px]
 _CAMERAS = {  # position, target [m], focal length [px]
@@ -104,7 +104,7 @@ class Scene:
         return index % 2
 
 
-def thrown_cross(preset: ThrowPreset = "half-twist", *, seed: int = 0, clutter: int = 14) -> Scene:
+def cross_scene(preset: ThrowPreset = "half-twist", *, seed: int = 0, clutter: int = 14) -> Scene:
     """Return paper B's video experiment: a yellow wooden cross thrown before three cameras, 50 fields/s, 768 x 576.
 
     "side-somersault": 39 fields, rotating in the plane of its bars; "half-twist": 34 fields, rotating about its short

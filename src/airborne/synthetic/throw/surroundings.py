@@ -14,7 +14,7 @@ _WALLS = {  # centre, size [m], sRGB
     "wall_right": ((4.55, -1.5, 3.0), (0.1, 10.0, 6.0), (128, 135, 131)),
 }
 _BOARDS = np.arange(-4.0, 4.1, 1.0)  # their middles along x [m]
-_BOARD_SRGB = np.array([152.0, 119.0, 90.0])
+_BOARD_SRGB = np.array([152.0, 119.0, 90.0])  # wood
 _COLOURS = np.array(
     [  # every third one is a yellow or near to it
         (206, 176, 92),

@@ -18,11 +18,11 @@ from airborne.synthetic.flight.rigid import SampledFlight
 from airborne.synthetic.flight.somersault import PictureStyle, Skill, SomersaultPreset, Target, somersault_scene
 from airborne.synthetic.throw.measurements import control_points, digitise, lights_table, start_pose
 from airborne.synthetic.throw.pictures import scene_frames
-from airborne.synthetic.throw.scene import Scene, ThrowPreset, thrown_cross
+from airborne.synthetic.throw.scene import Scene, ThrowPreset, cross_scene
 from airborne.types import Progress
 from airborne.video import VideoWriter, weave
 
-_CRF, _NEAR_LOSSLESS_CRF = 16, 2
+_CRF, _NEAR_LOSSLESS_CRF = 16, 2  # of x264; nearly lossless
 
 
 def write_thrown_cross(
@@ -33,8 +33,8 @@ def write_thrown_cross(
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> None:
-    """Write a trial of a `thrown_cross` preset; see `write_trial`."""
-    write_trial(thrown_cross(preset, seed=seed), folder, overwrite=overwrite, progress=progress)
+    """Write a trial of a `cross_scene` preset; see `write_trial`."""
+    write_trial(cross_scene(preset, seed=seed), folder, overwrite=overwrite, progress=progress)
 
 
 def write_somersault(

@@ -12,9 +12,9 @@ from airborne.kernels import kernel
 from airborne.tracking.capsules.evidence import capsule_evidence
 from airborne.tracking.capsules.jumper import CAPSULES, N_DOF, SURFACE_CLASSES, border_shares, pose_capsules
 from airborne.tracking.capsules.kernel_arguments import Capsules
-from airborne.tracking.capsules.outlines import BEHIND_M, project
+from airborne.tracking.capsules.outlines import BEHIND_M, project_capsules
 
-N_LENGTHS, N_CAPSULES, N_POINTS = 9, 10, 9
+N_LENGTHS, N_CAPSULES, N_POINTS = 9, 10, 9  # see `jumper`
 _STEP = 1e-4  # [m, rad] of the finite differences
 _N_PARAMETERS = 9  # parameters of a capsule: both ends (6), both radii [m], the share
 
@@ -57,7 +57,7 @@ def accumulate_equations(state, n_free, images, owned, equations):
     pose_state(state, points, ends, end_radii, share)
     total, origin = 0.0, np.zeros(2)
     for v in range(n_views):
-        project(ends, end_radii, cameras[v], discs, depth)
+        project_capsules(ends, end_radii, cameras[v], discs, depth)
         capsule_evidence(discs, depth, classes, share, sums[v], contrast[v], origin, work, owned[v], g, H)
         for i in range(n):
             total += owned[v, i, 0, 0] + owned[v, i, 1, 0]

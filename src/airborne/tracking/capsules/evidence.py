@@ -25,7 +25,7 @@ from airborne.tracking.capsules.spans import (
     value_between,
 )
 
-_BORDER_SAMPLES = 5
+_BORDER_SAMPLES = 5  # across an outline, of which a pixel is the mean
 _LEVEL_RATIO = 2.0  # tangents that run this much further across than down are integrated over columns, not rows
 
 

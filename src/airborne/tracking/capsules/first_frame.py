@@ -22,7 +22,7 @@ from airborne.video import Frames
 _STATURE_PER_LEG = 1 / 0.491  # thigh and shank are this share of the stature: 0.245 and 0.246 (Drillis and Contini)
 # of a stature of 1 m: waist, (shorts, socks: shares), trunk, pelvis, thigh, shank, foot, sole
 _LENGTHS = np.array([0.094, 0.5, 0.35, 0.24, 0.065, 0.245, 0.246, 0.075, 0.035])
-_RADII = np.array([0.054, 0.051, 0.048, 0.031, 0.0226, 0.0242, 0.043, 0.027])
+_RADII = np.array([0.054, 0.051, 0.048, 0.031, 0.0226, 0.0242, 0.043, 0.027])  # the same of the radii
 _LENGTH_SD = np.array([0.06, 0.15, 0.10, 0.05, 0.004, 0.015, 0.015, 0.01, 0.01])  # [m], shares
 _RADIUS_SD = 0.10  # of the radius
 _POSE_SD = np.array([0.1] * 3 + [0.5] * 5 + [0.5, 0.5, 0.6, 0.5, 0.5] * 2)  # beside the anchors [m, rad]
@@ -30,8 +30,8 @@ _ANCHOR_SD_M = np.array([0.02] * 6 + [0.03] * 2 + [0.04])  # of hand-set joints
 _IK_WEIGHT = 0.3  # of the feet and the torso, which the legs' lengths do not determine
 _CROUCH = np.array([0, 0, 0, 0, 0, 0.2, 0, 0] + [-0.3, 0, 0, 0.5, 0] * 2)  # a slight crouch [rad]
 _CROUCH_WEIGHT_M = np.array([0] * 4 + [0.003] * 2 + [0.01] * 2 + [0.003, 0.003, 0.01, 0, 0.01] * 2)  # per rad
-_ROUNDS, _MOST_STEPS = 4, 12
-_BORDER_SHARES = np.linspace(0.05, 0.95, 19)
+_ROUNDS, _MOST_STEPS = 4, 12  # of colours and pose in turn; steps of a pose
+_BORDER_SHARES = np.linspace(0.05, 0.95, 19)  # of a segment, where the border of a sock or of the shorts is tried
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,9 +12,9 @@ import numpy as np
 from airborne.body.legs import LEG_POINTS
 from airborne.kernels import kernel
 
-N_DOF = 18
+N_DOF = 18  # degrees of freedom: position (3), rotation and trunk (5), legs (2 x 5)
 JOINTS = (*LEG_POINTS, "foot_left", "foot_right", "torso")
-SHIRT, SHORTS, SKIN, SOCK, SHOE = range(5)
+SHIRT, SHORTS, SKIN, SOCK, SHOE = range(5)  # surface classes
 SURFACE_CLASSES = ("shirt", "shorts", "skin", "socks", "shoes")
 # columns of the lengths
 WAIST, SHORTS_END, SOCK_END, TRUNK, PELVIS, THIGH, SHANK, FOOT, SOLE = range(9)

@@ -13,7 +13,7 @@ BEHIND_M = 1e9  # depth of what is not in front of the camera [m]
 
 
 @kernel
-def project(ends, radii, camera, discs, depth):
+def project_capsules(ends, radii, camera, discs, depth):
     """Project capsules: ends (n, 2, 3) world [m], radii (n, 2) [m], camera (4, 4): K [R t], then the focal length [px].
 
     Fills discs (n, 2, 3), the centre (x, y) and the radius of each end's disc [px], and depth (n,) [m], BEHIND for a

@@ -15,21 +15,23 @@ from airborne.cameras import Camera
 from airborne.tracking.capsules.equations import N_CAPSULES, N_LENGTHS, N_POINTS, classes_with, pose_state
 from airborne.tracking.capsules.jumper import N_DOF, SHOE, SKIN, SOCK, SURFACE_CLASSES
 from airborne.tracking.capsules.kernel_arguments import NOBODY, Capsules
-from airborne.tracking.capsules.outlines import draw_labels, project
+from airborne.tracking.capsules.outlines import draw_labels, project_capsules
 from airborne.tracking.capsules.views import EvidenceTable, PlayerRegion, pack_camera
 from airborne.types import Array
 
 _CORE, _AROUND = 0.6, 1.25  # of the thickness: inside _CORE is the player, outside _AROUND the background
-_LEAST_OCCLUSION, _MOST_OCCLUSION = 0.05, 0.9
+_LEAST_OCCLUSION, _MOST_OCCLUSION = 0.05, 0.9  # bounds of a class's probability to be occluded
 _AT_EVEN = 0.5  # occlusion of a class whose evidence is 0; 0 where the evidence is as expected
 _LEAST_EXPECTED = 0.3  # [nat]
 _MOST_IN_BEST = (0.1, 0.4)  # upper bounds of a class's occlusion in the view that shows it best, and in the next
 _LEAST_PX = 20  # of a class in a view, to judge its occlusion
-_ROUNDS = 6
+_ROUNDS = 6  # of separating the colours of the classes
+# chosen by hand; without it the joints err by 20.2 mm, not 18.8: blocker_variants.csv, colours as lit at first
 BRIGHTNESS_SD = 0.10  # of the logarithm of sRGB values: about a fifth more or less light, as a surface rotates
 _LIGHTNESS = np.linspace(-1.5, 1.5, 15)  # in units of the sd; dense enough to reach every bin
 _LIGHTS, _LIGHT_WEIGHTS = np.exp(BRIGHTNESS_SD * _LIGHTNESS), np.exp(-(_LIGHTNESS**2) / 2)
 _THICKNESSES = slice(N_DOF + N_LENGTHS, N_DOF + N_LENGTHS + 6)  # the radii among a state
+# not sensitive: without it the joints err by the same 18.8 mm: blocker_variants.csv, socks and shoes as at first
 COLOUR_UPDATE_S = 0.2  # period of relearning socks and shoes: in the air they show other sides than on the floor
 _UPDATE_RATE, _FIRST_WEIGHT = 0.35, 0.5  # of each update; in it, of the first frame's colours
 _MOST_OCCLUDED = 0.3  # in a view to learn from
@@ -70,7 +72,7 @@ def class_image(state: Array, camera: Camera, thickness: float, others: Capsules
     ends[N_CAPSULES:], end_radii[N_CAPSULES:] = others
     discs, depth = np.empty((n, 2, 3)), np.empty(n)
     pose_state(state, np.empty((N_POINTS, 3)), ends, end_radii, share)
-    project(ends, end_radii, pack_camera(camera), discs, depth)
+    project_capsules(ends, end_radii, pack_camera(camera), discs, depth)
     out = np.empty(camera.size[::-1], np.int8)
     draw_labels(discs, depth, classes_with(others), share, out)
     return out

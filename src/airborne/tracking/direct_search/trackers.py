@@ -37,10 +37,10 @@ class Search(NamedTuple):
 
 
 _UNCERTAIN_RATIO, _LOST_RATIO = 1.6, 2.5  # of a frame's score to the median of those tracked
-_HISTORY, _SCORE_HISTORY = 2, 25
+_HISTORY, _SCORE_HISTORY = 2, 25  # poses that predict; scores of the running median
 _PROBE = np.array([0.004] * 3 + [0.012] * 3)  # [m], [rad]: steps of the finite differences
 _SHARED_NOISE_PX = 8  # this many pixels share one pixel's independent noise: compression, interpolated rows
-_MARGIN_PX = 40
+_MARGIN_PX = 40  # around the predicted body, of a full frame
 _V_RULE_SD = 0.2  # of the last step: the RMS error of the V rule as printed
 
 
@@ -184,7 +184,7 @@ class DirectTracker:
         posed = self._model.with_pose(pose)
         rows, columns = np.triu_indices(6)
         i, j = np.eye(6)[rows] * _PROBE, np.eye(6)[columns] * _PROBE
-        squared = self._squared_scores(observed, posed, np.concatenate([i + j, i - j, j - i, -i - j])).reshape(4, -1)
+        squared = self._score_squares(observed, posed, np.concatenate([i + j, i - j, j - i, -i - j])).reshape(4, -1)
         gradient = self._gradient(observed, posed)
         if not (np.isfinite(squared).all() and np.isfinite(gradient).all()):  # at the images' edge
             return self._embed(np.diag(np.full(6, np.inf)))
@@ -212,10 +212,10 @@ class DirectTracker:
 
     def _gradient(self, observed: Targets, posed: PosedBody) -> Array:
         steps = np.diag(_PROBE)
-        squared = self._squared_scores(observed, posed, np.concatenate([steps, -steps])).reshape(2, 6)
+        squared = self._score_squares(observed, posed, np.concatenate([steps, -steps])).reshape(2, 6)
         return (squared[0] - squared[1]) / (2 * _PROBE)
 
-    def _squared_scores(self, observed: Targets, posed: PosedBody, deltas: Array) -> Array:
+    def _score_squares(self, observed: Targets, posed: PosedBody, deltas: Array) -> Array:
         """Return the squared score (n,) of a body moved by deltas (n, 6)."""
         moved = [posed.move(delta) for delta in deltas]
         R, t = np.stack([p.R for p in moved]), np.stack([p.t for p in moved])

@@ -16,7 +16,7 @@ from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.twist_equations import Sums, add_score_covariance, map_equations
 from airborne.types import Array
 
-_SHORTER = 0.4
+_SHORTER = 0.4  # factor on a step that does not lower the objective
 _SLACK = 1e-3  # of the objective: the refitted light makes it fluctuate
 
 

@@ -32,7 +32,7 @@ from airborne.types import Array
 from airborne.video import Frames
 
 _MOST_PX_PER_M = 220.0  # of a body with joints
-_HISTORY = 3
+_HISTORY = 3  # poses that predict
 _OBSERVED_SD_RAD, _UNOBSERVED_VARIANCE = 0.1, 1e6  # a rotation with a larger sd than this is hardly extrapolated
 _LEAST_IN_VIEW = 0.4  # of the body, in the view that shows most of it; with less, the estimate is uncertain
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -25,13 +24,6 @@ class Particles(NamedTuple):
         return np.tensordot(np.exp(self.log_weights), self.values, 1)
 
 
-class WeightUpdate(NamedTuple):
-    """What a weight update yields besides the weights."""
-
-    log_evidence: float  # log p(observation | past observations) [nat]; -inf if no particle explains it
-    is_informative: bool  # False: all weights were zero and have been reset to uniform
-
-
 def uniform_particles(values: Array) -> Particles:
     """Return particles of uniform weight: values (n, ...)."""
     return Particles(values, np.full(len(values), -np.log(len(values))))
@@ -47,25 +39,6 @@ def resample(
     return uniform_particles(particles.values[scheme(rng, particles.log_weights, n)])
 
 
-def reweight(particles: Particles, log_likelihood: Array) -> tuple[Particles, WeightUpdate]:
+def reweight(particles: Particles, log_likelihood: Array) -> Particles:
     """Multiply the weights by likelihoods, as logs (n,)."""
-    log_weights, log_sum, says_something = normalise(particles.log_weights + log_likelihood)
-    return Particles(particles.values, log_weights), WeightUpdate(log_sum, says_something)
-
-
-def bootstrap_step(
-    rng: np.random.Generator,
-    particles: Particles,
-    *,
-    propagate: Callable[[np.random.Generator, Array], Array],
-    log_likelihood: Callable[[Array], Array],
-    scheme: Resampler = systematic,
-    when: ResampleWhen = "always",
-) -> tuple[Particles, WeightUpdate]:
-    """Advance one time step: resample by the last weights, propagate every particle, reweight by the new observation.
-
-    `propagate` maps values (n, ...) to values; `log_likelihood` maps them to (n,) [nat].
-    """
-    resampled = resample(rng, particles, scheme=scheme, when=when)
-    values = propagate(rng, resampled.values)
-    return reweight(Particles(values, resampled.log_weights), log_likelihood(values))
+    return Particles(particles.values, normalise(particles.log_weights + log_likelihood))

@@ -12,6 +12,7 @@ from airborne.types import Array
 
 LENGTH_SD_M, TORSO_LENGTH_SD_M = 0.03, 0.05  # of rods; of the distance from the torso to the hips
 _GAP_SD_M, GAP_LEAST_M = 0.15, 0.08  # of the distances between the knees and between the feet
+# width of the step of probability toward another player; how near that one must be
 _OTHER_SCALE_M, _OTHER_REACH_M = 0.10, 1.5
 _OVERLAP_NATS = -50.0  # nats for overlapping legs; finite, so that bad hypotheses can still be ranked
 

@@ -39,6 +39,6 @@ class Framework:
     def update(self, particles: Particles, observation: Observation, now: Situation) -> tuple[Particles, LegsEstimate]:
         """Reweight by the colours of all parts."""
         log_likelihood = observation.log_likelihood(ends_of(particles.values), range(N_PARTS)).sum(axis=-1)
-        particles, _ = reweight(particles, log_likelihood)
+        particles = reweight(particles, log_likelihood)
         points = point_estimate(particles, self.settings.estimate)
         return particles, LegsEstimate(points, second_moments(particles.values, np.exp(particles.log_weights), points))

@@ -8,7 +8,7 @@ from airborne.types import Array
 
 SPEED_FRAMES = 7  # with 2 cm of noise the speed then has sd 0.23 m/s at 60 fps
 _TURN_M_S = 0.5  # faster than this is rising or falling
-_SHARE_RISING, _SHARE_GROUND, _SHARE_FALLING = 0.75, 0.5, 0.25
+_SHARE_RISING, _SHARE_GROUND, _SHARE_FALLING = 0.75, 0.5, 0.25  # of the particles above the reference
 
 
 def vertical_speed(times_s: Array, heights_m: Array) -> float:

@@ -123,7 +123,7 @@ class Mixture:
     ) -> tuple[MixtureParticles, LegsEstimate]:
         """Reweight the hips, then each leg given the best hip, then every combination of the best of them."""
         hips_log_likelihood = observation.log_likelihood(hip_ends(particles.hips.values), PELVIS).sum(axis=-1)
-        hips, _ = reweight(particles.hips, hips_log_likelihood + self.model.hips_terms(particles.hips.values, now))
+        hips = reweight(particles.hips, hips_log_likelihood + self.model.hips_terms(particles.hips.values, now))
         best = hips.values[np.argmax(hips.log_weights)]
         left, right = (
             self._update_leg(leg, s, hip=best[s], observation=observation, now=now)
@@ -137,7 +137,7 @@ class Mixture:
         values = leg.values
         leg_log_likelihood = observation.log_likelihood(leg_ends(values), leg_parts(side)).sum(axis=-1)
         thighs = self.model.thigh_terms(hip, values[:, 0], now)
-        return reweight(leg, leg_log_likelihood + self.model.leg_terms(values, side, now) + thighs)[0]
+        return reweight(leg, leg_log_likelihood + self.model.leg_terms(values, side, now) + thighs)
 
     def _combine(
         self, hips: Particles, left: Particles, right: Particles, *, best: Array, now: Situation

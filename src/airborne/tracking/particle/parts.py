@@ -9,9 +9,9 @@ from airborne.tracking.particle.references import Parts
 from airborne.types import Array
 
 PELVIS, SHANKS, SHOES = (0, 1), (4, 5), (6, 7)  # left, right; 2 and 3 are the thighs
-N_PARTS = 8
+N_PARTS = 8  # both sides of hips, thighs, shanks and shoes
 
-_SHORTS_WIDTH_M = 0.20
+_SHORTS_WIDTH_M = 0.20  # of the pelvis's rectangle in the images
 _SHOE_HEIGHT_M, _SHOE_LENGTH_M = 0.10, 0.28  # of an upright box below the ankle: a shoe's heading is unknown
 WIDTHS_M = np.repeat([_SHORTS_WIDTH_M, THIGH_WIDTH_M, SHANK_WIDTH_M, _SHOE_LENGTH_M], 2)
 

@@ -18,25 +18,20 @@ Scheme = Literal["systematic", "stratified", "residual", "multinomial"]
 Resampler = Callable[[np.random.Generator, Array, int], NDArray[np.intp]]
 
 
-def normalise(log_weights: Array) -> tuple[Array, float, bool]:
-    """Normalise weights to sum 1: return log-weights (n,), the log of their sum, and whether they are informative.
-
-    NaN counts as -inf. If every weight is zero, the weights become equal, the log of their sum is -inf, and the flag
-    is False.
-    """
+def normalise(log_weights: Array) -> Array:
+    """Normalise weights to sum 1: return log-weights (n,). NaN counts as -inf; weights all zero become equal."""
     log_weights = np.where(np.isnan(log_weights), -np.inf, log_weights)
     most = log_weights.max()
     if not np.isfinite(most):
         if most == np.inf:
             return normalise(np.where(log_weights == np.inf, 0.0, -np.inf))
-        return np.full(len(log_weights), -np.log(len(log_weights))), -np.inf, False
-    log_sum = float(most + np.log(np.sum(np.exp(log_weights - most))))
-    return log_weights - log_sum, log_sum, True
+        return np.full(len(log_weights), -np.log(len(log_weights)))
+    return log_weights - float(most + np.log(np.sum(np.exp(log_weights - most))))
 
 
 def effective_sample_size(log_weights: Array) -> float:
     """Return 1 / sum w²; n for uninformative weights."""
-    return float(1 / np.sum(np.exp(2 * normalise(log_weights)[0])))
+    return float(1 / np.sum(np.exp(2 * normalise(log_weights))))
 
 
 def multinomial(rng: np.random.Generator, log_weights: Array, n: int) -> NDArray[np.intp]:
@@ -56,7 +51,7 @@ def systematic(rng: np.random.Generator, log_weights: Array, n: int) -> NDArray[
 
 def residual(rng: np.random.Generator, log_weights: Array, n: int) -> NDArray[np.intp]:
     """Take floor(n w) copies of each particle, and draw the rest from the remainders."""
-    shares = n * np.exp(normalise(log_weights)[0])
+    shares = n * np.exp(normalise(log_weights))
     copies = np.floor(shares + 1e-9).astype(int)  # a share of 3 - 1e-16 is 3
     copied = np.repeat(np.arange(len(shares)), copies)
     missing = n - len(copied)
@@ -77,7 +72,7 @@ SCHEMES: dict[Scheme, Resampler] = {
 
 def _invert(points: Array, log_weights: Array) -> NDArray[np.intp]:
     """Invert the cumulative distribution at points (n,) of the unit interval."""
-    edges = np.cumsum(np.exp(normalise(log_weights)[0]))
+    edges = np.cumsum(np.exp(normalise(log_weights)))
     edges /= edges[-1]
     last = np.searchsorted(edges, edges[-1])  # the last particle that has a weight
     return np.minimum(np.searchsorted(edges, points, side="right"), last)

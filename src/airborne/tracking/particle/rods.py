@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from airborne.appearance.hue_saturation import HSV_BINS, OUTSIDE
 from airborne.kernels import kernel
 
-N_ALONG, N_ACROSS = 15, 7
+N_ALONG, N_ACROSS = 15, 7  # samples of a rod's rectangle
 N_SAMPLES = N_ALONG * N_ACROSS
 CLASS_SHIFT = 8  # a code holds the bin in its low byte and one bit for each class above
 _FAR_PX = 1e6  # no image is this large
-_FIXED_BITS = 16
+_FIXED_BITS = 16  # of a pixel, after the binary point
 _FIXED = float(1 << _FIXED_BITS)  # pixels are stepped through in whole numbers: a third faster
 _ROOT_STEPS = np.diff(np.sqrt(np.arange(N_SAMPLES + 1) / N_SAMPLES)).astype(np.float32)
 

@@ -14,7 +14,7 @@ LegsMethod = Literal["framework", "mixture", "block-jump"]
 EstimateAs = Literal["max", "mean", "top10_mean"]
 ViewsAs = Literal["all", "visible", "robust"]
 
-_LEAST_PARTICLES = 50
+_LEAST_PARTICLES = 50  # of a filter of legs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,7 +14,7 @@ from airborne.types import Array
 
 Swing = Literal["literal", "consistent"]
 
-SECTORS = 16
+SECTORS = 16  # horizontal directions (block-jump paper, equation 12)
 _LEAST_REACH_M, _CLEARANCE_M = 0.01, 0.04  # of a step towards the other leg
 _SIDEWAYS = 0.2  # below this cosine a direction is fore or aft
 _MAX_RHO = 0.999  # of the rod's length

@@ -25,7 +25,7 @@ from airborne.tracking.players import PlayerStart
 from airborne.types import Array
 from airborne.video import Frames
 
-_N_PARTICLES = 200
+_N_PARTICLES = 200  # of a torso, each frame
 _PROPOSAL_SD_M = np.array([0.04, 0.04, 0.06])  # of the particles about the prediction
 _WINDOW_M = (0.45, 0.65)  # width and height of the upright window
 MEMORY = 6  # frames that the prediction fits
@@ -151,7 +151,7 @@ class TorsoTracker:
         if not observation.used.any():
             return None
         overlap, _ = observation.compare(_window(values), [0])
-        return reweight(uniform_particles(values), detection(overlap)[:, 0, observation.used[0]].sum(axis=-1))[0].mean
+        return reweight(uniform_particles(values), detection(overlap)[:, 0, observation.used[0]].sum(axis=-1)).mean
 
     def _free_views(self, torsos: Array, i: int) -> NDArray[np.bool_]:
         others = np.delete(torsos, i, axis=0)

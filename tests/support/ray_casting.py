@@ -1,4 +1,4 @@
-"""The same maps by one ray a pixel, in float64 and plain NumPy: slow, and independent of the kernels it verifies."""
+"""The maps of `render` by one ray a pixel, in float64 and plain NumPy: slow, independent of the kernels."""
 
 from __future__ import annotations
 

@@ -1,0 +1,243 @@
+"""The public functions of `import airborne`: what the commands do, with values instead of files where that is shorter.
+
+Paths may be text. `progress=True` shows a bar; a function is called with the steps done and expected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal
+
+from airborne.body_fitting.from_trial import PersonFit, fit_person
+from airborne.calibration import (
+    Calibration,
+    RigCalibration,
+    calibrate_from,
+    read_control_points,
+    read_sources,
+)
+from airborne.calibration import calibrate as calibrate_points
+from airborne.errors import AirborneError
+from airborne.io.terminal import Stages
+from airborne.io.terminal import progress as progress_bar
+from airborne.motion.smoothing.smoother import Smoothing
+from airborne.run.evaluate import Comparisons, assess
+from airborne.run.export import EXPORT_FORMATS, ExportResult
+from airborne.run.export import export_run as write_export
+from airborne.run.result import Run
+from airborne.run.smooth import SmoothRun, smooth_run
+from airborne.run.track import track_trial
+from airborne.synthetic import block_scene, write_block, write_somersault, write_thrown_cross
+from airborne.trial.file import Trial
+from airborne.trial.file import read_trial as read_trial_file
+from airborne.types import Progress, StageProgress
+
+__all__ = ["calibrate", "evaluate", "export_run", "fit_body", "read_run", "read_trial", "smooth", "synthesise", "track"]
+
+FilePath = str | PathLike[str]
+Size = tuple[int, int]  # (width, height) [px]
+
+
+def read_trial(path: FilePath, *, cameras: Sequence[str] | None = None, **track: Any) -> Trial:
+    """Read a trial file; keywords replace entries of its [track] table, `cameras` selects cameras by name.
+
+    Raises TrialError, naming the file and what is wrong.
+
+    >>> trial = read_trial("trial.toml", stop=3, method="refined")
+    >>> trial.track.stop
+    3
+    """
+    return read_trial_file(Path(path), track, cameras)
+
+
+def track(
+    trial: Trial | FilePath,
+    folder: FilePath,
+    *,
+    resume: bool = False,
+    pictures: bool = True,
+    progress: bool | Progress = False,
+) -> Run:
+    """Track a trial, a body or players, and write the results into a folder; as `airborne track` does.
+
+    `resume` continues a run that was stopped, to the same result. `pictures=False` leaves out videos, figures and
+    report. Raises an AirborneError for input that cannot be used, and for a folder that holds another run.
+
+    >>> run = track("trial.toml", "again", pictures=False, progress=True)
+    >>> run
+    Run('again'): thrown cross, half-twisting somersault, 3 frames: 3 tracked, 0 uncertain, 0 lost
+    """
+    trial = trial if isinstance(trial, Trial) else read_trial(trial)
+    with _reporting(progress, f"tracking {trial.name}") as report:
+        track_trial(trial, Path(folder), resume=resume, pictures=pictures, progress=report)
+    return read_run(folder)
+
+
+def read_run(folder: FilePath) -> Run:
+    """Return the run in a folder, finished or not; raises ResultError where there is none.
+
+    >>> read_run("results").summary["n_frames"]
+    3
+    """
+    return Run(Path(folder))
+
+
+def calibrate(
+    sources: FilePath,
+    *,
+    sizes: Size | Mapping[str, Size] | None = None,
+    method: Literal["lm", "annealing"] = "lm",
+    progress: bool | StageProgress = False,
+) -> Calibration | RigCalibration:
+    """Calibrate cameras from a file of sources (.toml), or from a table of control points (.csv); `.rig` has them.
+
+    A table needs `sizes`, (width, height) [px] of all images, or by camera; `method` is for tables too. Raises an
+    AirborneError where cameras cannot be estimated.
+
+    >>> rig = calibrate("control_points.csv", sizes=(768, 576)).rig
+    >>> rig["cam1"].px_from_world([0.0, 0.0, 1.3]).shape
+    (2,)
+    """
+    if Path(sources).suffix.lower() == ".toml":
+        if sizes is not None:
+            raise AirborneError("sizes go with a table of control points; a file of sources has size = [width, height]")
+        with _reporting_stages(progress) as report:
+            return calibrate_from(read_sources(Path(sources)), report)
+    if sizes is None:
+        raise AirborneError("sizes is missing: give the image size in pixels, such as sizes=(768, 576)")
+    table = read_control_points(Path(sources))
+    by_camera = sizes if isinstance(sizes, Mapping) else dict.fromkeys(table.cameras, sizes)
+    missing = [name for name in table.cameras if name not in by_camera]
+    if missing:
+        raise AirborneError(f"sizes gives no size for {', '.join(missing)}; add (width, height) in pixels")
+    return calibrate_points(table, by_camera, method=method)
+
+
+def fit_body(
+    trial: Trial | FilePath, output: FilePath, *, n_frames: int = 5, progress: bool | StageProgress = False
+) -> PersonFit:
+    """Fit a trial's body to the person in its images, and write the body file; as `airborne fit-body` does.
+
+    The trial's [start] has detections or joints_m. Raises an AirborneError for input that cannot be used.
+
+    >>> fit_body("trial.toml", "person.toml")
+    Traceback (most recent call last):
+    airborne.errors.TrialError: thrown cross, half-twisting somersault: fitting the body needs known joints; ...
+    """
+    trial = trial if isinstance(trial, Trial) else read_trial(trial)
+    with _reporting_stages(progress) as report:
+        return fit_person(trial, Path(output), n_frames=n_frames, progress=report)
+
+
+def evaluate(
+    run: Run | FilePath,
+    truth: FilePath | None = None,
+    *,
+    digitised: FilePath | None = None,
+    joints: FilePath | None = None,
+) -> Comparisons:
+    """Compare a run with the truth, with clicked points, with paths of joints; into its summary too.
+
+    Returns a comparison for each, by name, which describes itself (`.describe()`). Raises
+    ResultError where a file cannot be read, or is of another recording.
+
+    >>> evaluate("results", "truth.csv")["truth"].n_matched
+    3
+    """
+    paths = (None if path is None else Path(path) for path in (truth, digitised, joints))
+    return assess(_folder(run), *paths)
+
+
+def smooth(
+    run: Run | FilePath,
+    method: Literal["butterworth", "spline", "kalman"] = "butterworth",
+    *,
+    cutoff_hz: float | None = None,
+    fill_s: float = 0.0,
+    resample_hz: float | None = None,
+    events_s: Sequence[float] | None = None,
+    output: FilePath | None = None,
+    progress: bool | Progress = False,
+) -> SmoothRun:
+    """Smooth a run and compute velocities and accelerations: new tables beside the raw ones, and in `.tables`.
+
+    A Butterworth filter without a cut-off gets that of the residual analysis; gaps up to `fill_s` [s] are filled;
+    `events_s` are the times [s] that no filter crosses, None those that are found. Raises ResultError for what cannot
+    be smoothed so.
+
+    >>> smooth("results", cutoff_hz=10, events_s=[]).tables["joints"]["velocity"].attrs["units"]
+    'm/s'
+    """
+    settings = Smoothing(method=method, cutoff_hz=cutoff_hz, resample_hz=resample_hz, fill_s=fill_s)
+    out = None if output is None else Path(output)
+    with _reporting(progress, "smoothing") as report:
+        return smooth_run(_folder(run), settings, events_s=events_s, out=out, progress=report)
+
+
+def export_run(
+    run: Run | FilePath, *formats: str, output: FilePath | None = None, progress: bool | Progress = False
+) -> ExportResult:
+    """Write a run for other programs: c3d, trc, mot, osim, gltf, bvh, csv, parquet; without formats all of them.
+
+    Files go into `output`, or into the run's folder `export`. Raises ResultError for a format that cannot hold the run.
+
+    >>> export_run("results", "c3d").files[0].name
+    'results.c3d'
+    """
+    unknown = [format for format in formats if format not in EXPORT_FORMATS]
+    if unknown:
+        raise AirborneError(f"no format {', '.join(unknown)}; there are: {', '.join(EXPORT_FORMATS)}")
+    with _reporting(progress, "exporting") as report:
+        return write_export(_folder(run), None if output is None else Path(output), formats, report)
+
+
+def synthesise(
+    scene: Literal["cross", "somersault", "block"],
+    folder: FilePath,
+    *,
+    seed: int = 0,
+    progress: bool | Progress = False,
+    **options: Any,
+) -> Path:
+    """Write a synthetic trial with its truth into a new folder, and return the trial file; as `airborne synth` does.
+
+    Options are those of `write_thrown_cross`, `write_somersault` and `block_scene` in `airborne.synthetic`. Raises
+    TrialError for a folder that holds anything.
+
+    >>> read_trial(synthesise("somersault", "practice", preset="paper")).has_players
+    False
+    """
+    folder = Path(folder)
+    with _reporting(progress, "rendering") as report:
+        if scene == "block":
+            write_block(folder, block_scene(seed, **options), progress=report)
+        else:
+            write = write_thrown_cross if scene == "cross" else write_somersault
+            write(folder, seed=seed, progress=report, **options)
+    return folder / "trial.toml"
+
+
+def _folder(run: Run | FilePath) -> Path:
+    return run.folder if isinstance(run, Run) else Path(run)
+
+
+@contextmanager
+def _reporting(progress: bool | Progress, what: str) -> Iterator[Progress | None]:
+    """Yield what is told of each step: a bar for True, nothing for False, or the function given."""
+    if progress is True:
+        with progress_bar(what) as bar:
+            yield bar
+    else:
+        yield progress or None
+
+
+@contextmanager
+def _reporting_stages(progress: bool | StageProgress) -> Iterator[StageProgress]:
+    if progress is True:
+        with Stages() as bars:
+            yield bars
+    else:
+        yield progress or (lambda what, done, total: None)

@@ -1,0 +1,53 @@
+"""Progress of long work: a bar on stderr, or lines where stderr is no terminal."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+_SECONDS_A_LINE = 5.0  # between lines of progress where no terminal shows a bar
+
+errors = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def progress(what: str) -> Iterator:
+    """Show a progress bar on stderr; where stderr is no terminal, a line every few seconds."""
+    if not errors.is_terminal:
+        yield _ProgressLines(what)
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=errors, transient=True) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+class _ProgressLines:
+    """Progress as plain lines."""
+
+    def __init__(self, what: str) -> None:
+        self._what, self._next_s = what, time.monotonic() + _SECONDS_A_LINE
+
+    def __call__(self, done: int, total: int | None) -> None:
+        if time.monotonic() >= self._next_s:
+            self._next_s = time.monotonic() + _SECONDS_A_LINE
+            errors.print(f"{self._what}: {done} of {total or 'unknown'}", markup=False)
+
+
+class Stages(ExitStack):
+    """A progress bar for each stage, one after the other."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._what, self._report = "", lambda done, total: None
+
+    def __call__(self, what: str, done: int, total: int | None) -> None:
+        """Report a stage; a new one gets a new bar."""
+        if what != self._what:
+            self.close()
+            self._what, self._report = what, self.enter_context(progress(what))
+        self._report(done, total)

@@ -1,0 +1,98 @@
+"""Joints, angles and jumps as labelled arrays: time in seconds, joints by name, units in the attributes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from airborne.body import BodyModel
+from airborne.motion.angles import root_angles
+from airborne.motion.joints import joint_angles, landmarks
+from airborne.motion.jumps.jump import Jump
+from airborne.motion.jumps.table import JUMP_COLUMNS, jump_row
+from airborne.motion.motion import Motion
+from airborne.motion.players import PlayersMotion
+
+_METRES = {"units": "m", "frame": "world"}
+_SD = {"units": "m", "of": "root mean square of the three axes"}
+_UNITS = {"_m_s": "m/s", "_m": "m", "_s": "s", "_frame": "frames"}  # by the end of a name; the longest first
+_TEXTS = ("status", "standing_source")
+
+
+def label_joints(motion: Motion, model: BodyModel) -> xr.Dataset:
+    """Label a body's landmarks: `position` (time, joint, space) [m], `position_sd` (time, joint) [m], `status` (time).
+
+    NaN where lost; see `landmarks` for the standard deviations. Raises ResultError for another body's motion.
+    """
+    points, sd = landmarks(motion, model)
+    variables = {
+        "position": (("time", "joint", "space"), points, _METRES),
+        "position_sd": (("time", "joint"), sd, _SD),
+        "status": (("time",), motion.status),
+    }
+    coordinates = {
+        "time": ("time", motion.time_s, {"units": "s"}),
+        "frame": ("time", motion.index),
+        "joint": [landmark.name for landmark in model.landmarks],
+        "space": list("xyz"),
+    }
+    return xr.Dataset(variables, coordinates)
+
+
+def label_players(motion: PlayersMotion) -> xr.Dataset:
+    """Label players' joints: as of a body with a dimension `player` after time, and with `covariance` [m2].
+
+    `covariance` (time, player, joint, space, space_2) is that of each joint for itself.
+    """
+    per_player = ("time", "player")
+    variables = {
+        "position": ((*per_player, "joint", "space"), motion.points, _METRES),
+        "position_sd": ((*per_player, "joint"), motion.sd, _SD),
+        "covariance": ((*per_player, "joint", "space", "space_2"), motion.covariance, {"units": "m2"}),
+        "status": (per_player, motion.status),
+    }
+    coordinates = {
+        "time": ("time", motion.time_s, {"units": "s"}),
+        "frame": ("time", motion.index),
+        "player": list(motion.players),
+        "joint": list(motion.joints),
+        "space": list("xyz"),
+        "space_2": list("xyz"),
+    }
+    return xr.Dataset(variables, coordinates)
+
+
+def label_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
+    """Label a body's angles [deg]: `somersault`, `tilt`, `twist` (time) of the root, each with `_sd`; and its joints'.
+
+    `angle` and `angle_sd` (time, joint, axis) are those of `joint_angles`; `is_singular` (time) tells where the root's
+    are ambiguous, `joint_is_singular` (time, joint) where a joint's are. Raises ResultError for another body's motion.
+    """
+    joints = joint_angles(motion, model)
+    return root_angles(motion).assign(joints.rename(is_singular="joint_is_singular").data_vars)
+
+
+def label_jumps(jumps: Sequence[Jump]) -> xr.Dataset:
+    """Label jumps (jump), each a `player` and a `number`: the columns of jumps.csv; NaN where unknown."""
+    rows = [jump_row(jump) for jump in jumps]
+    variables = {
+        name: ("jump", np.array([row[name] for row in rows], str if name in _TEXTS else float), _attributes(name))
+        for name in JUMP_COLUMNS
+        if name not in ("player", "jump")
+    }
+    coordinates = {
+        "player": ("jump", np.array([jump.player for jump in jumps], str)),
+        "number": ("jump", np.array([jump.number for jump in jumps], int)),
+    }
+    return xr.Dataset(variables, coordinates)
+
+
+def _attributes(name: str) -> dict[str, str]:
+    if name in _TEXTS:
+        return {}
+    stem = name.removesuffix("_low").removesuffix("_high")
+    unit = next((unit for end, unit in _UNITS.items() if stem.endswith(end)), "1")
+    bound = {"_low": "2.5 %", "_high": "97.5 %"}.get(name.removeprefix(stem))
+    return {"units": unit} | ({} if bound is None else {"quantile": bound})

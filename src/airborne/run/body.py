@@ -1,0 +1,162 @@
+"""A run of one body: its tracker, its tables and pictures, its summary."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
+from airborne.body.files import body_toml, mesh_files
+from airborne.calibration.from_points import Calibration
+from airborne.export import ContactSheet, MatchingPicture, OverlayVideos, headline, write_figures, write_report
+from airborne.export.overlays import OverlaysAs
+from airborne.motion import (
+    Motion,
+    MotionWriter,
+    flight_summary,
+    has_inertias,
+    read_estimates,
+    read_motion,
+    write_angles,
+    write_flight,
+    write_joint_angles,
+    write_joints,
+    write_motion_parquet,
+)
+from airborne.motion.run_folder import BODY, JOINTS, MOTION, figures_of, tables_of, videos_of
+from airborne.rendering import FLAT, render
+from airborne.run.first_pose import find_first_pose
+from airborne.run.opening import Opened
+from airborne.tracking import Estimate
+from airborne.tracking.methods import sample_body_colours, tracker_of
+from airborne.tracking.tracker import Tracker
+from airborne.trial.file import Trial
+from airborne.video import Frames, Recording, View
+
+_UNCERTAINTY = (
+    "Standard deviations hold what the pictures leave open: noise, light, and edges that are not where the drawn body "
+    "has them. They do not hold a body measured wrongly all over, or wrong times of the cameras."
+)
+_CALIBRATION_UNCERTAINTY = " They hold how far the control points leave each camera's picture open."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyRun:
+    """One body, to be tracked from its first pose; a `Subject`."""
+
+    trial: Trial
+    recording: Recording
+    calibration: Calibration | None
+    model: BodyModel
+    start: Pose
+
+    table = MOTION
+
+    @classmethod
+    def open(cls, trial: Trial, opened: Opened[Recording]) -> BodyRun:
+        """Read the body and find its first pose, whose notes become events of the recording."""
+        model = trial.model()
+        first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
+        opened.recording.events.extend(first.notes)
+        return cls(trial, opened.recording, opened.calibration, model, first.pose)
+
+    def read_done(self, folder: Path) -> list[Estimate]:
+        """Return the estimates that a killed run left: from their frames the tracker only learns."""
+        return read_estimates(folder / self.table)
+
+    def copy_inputs(self, folder: Path) -> None:
+        """Write the body beside the results, for `airborne evaluate` and for other tools."""
+        if self.trial.body.file is None:
+            (folder / BODY).write_text(body_toml(self.model), encoding="utf-8")
+            return
+        body = self.trial.path(self.trial.body.file)
+        shutil.copyfile(body, folder / BODY)
+        for name in mesh_files(body):
+            target = folder / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(body.parent / name, target)
+
+    def see(self, first: Frames) -> BodyRun:
+        """Return the body with the colours that the first frames show; an event says where they do not show it."""
+        model = sample_body_colours(self.model, self.start, first)
+        if not np.any([_is_visible(view, model.with_pose(self.start)) for view in first.views]):
+            self.recording.events.append(
+                "the start pose lies in no camera's picture; check start.position_m, in metres"
+            )
+        return replace(self, model=model)
+
+    def tracker(self) -> Tracker[Any, Estimate]:
+        """Return the tracker of the trial's method."""
+        return tracker_of(self.trial.settings, self.model, self.start)
+
+    def writer(self, folder: Path, *, resume: bool) -> MotionWriter:
+        """Return what writes the estimates."""
+        joints = tuple(segment.name for segment in self.model.segments[1:])
+        return MotionWriter(folder / self.table, joints, resume=resume)
+
+    def write(self, writer: MotionWriter, estimate: Estimate) -> None:
+        """Write one time's estimate."""
+        writer.append(estimate)
+
+    def artists(self, folder: Path, drawn: OverlaysAs) -> Iterator[AbstractContextManager[Any]]:
+        """Return what draws the frames while they are tracked."""
+        recording, folder_of = self.recording, videos_of if drawn == "videos" else figures_of
+        yield OverlayVideos(folder_of(folder), recording.rig, recording.rate, drawn=drawn)
+        yield ContactSheet(figures_of(folder) / "through_mask.png", recording.rig)
+        yield MatchingPicture(figures_of(folder) / "matching.png", recording.rig)
+
+    def draw(self, artists: Sequence[Any], frames: Frames, estimate: Estimate) -> None:
+        """Let the artists draw one time; a start that failed is shown where it was set."""
+        is_first = frames.index == self.trial.start.frame
+        pose = self.start if is_first and estimate.pose is None else estimate.pose
+        posed = None if pose is None else self.model.with_pose(pose)
+        for artist in artists:
+            artist.write(frames, posed, estimate.status)
+
+    def finish(self, folder: Path) -> tuple[Motion, dict[str, Any]]:
+        """Write the tables; return the motion and the beginning of the summary."""
+        motion, model = read_motion(folder / self.table), self.model
+        write_tables(folder, motion, model)
+        is_exact = self.calibration is None
+        return motion, {
+            "name": self.trial.name,
+            **headline(motion),
+            **({"flight": flight_summary(motion, model).to_dict()} if _has_flight(motion, model) else {}),
+            "uncertainty": _UNCERTAINTY if is_exact else _UNCERTAINTY + _CALIBRATION_UNCERTAINTY,
+        }
+
+    def write_report(self, folder: Path, summary: dict[str, Any], motion: Motion) -> None:
+        """Draw the figures and write the report."""
+        write_figures(figures_of(folder), motion, self.model)
+        write_report(folder, summary)
+
+    def warnings(self) -> list[str]:
+        """Return what a reader of the numbers must know beside the uncertainty."""
+        return []
+
+
+def write_tables(folder: Path, motion: Motion, model: BodyModel) -> None:
+    """Write what is made of a motion: the same as parquet, angles, joints, the flight."""
+    tables = tables_of(folder)
+    write_joints(folder / JOINTS, motion, model)
+    write_motion_parquet(tables / "motion.parquet", motion)
+    write_angles(tables / "angles.csv", motion)
+    if motion.joints:
+        write_joint_angles(tables / "joint_angles.csv", motion, model)
+    if _has_flight(motion, model):
+        write_flight(tables / "flight.csv", motion, model)
+
+
+def _has_flight(motion: Motion, model: BodyModel) -> bool:
+    return bool(motion.joints) and has_inertias(model)
+
+
+def _is_visible(view: View | None, posed: PosedBody) -> bool:
+    """Say whether a view shows any part of the body."""
+    return view is not None and bool(render(surface_arrays(posed.model), posed, view.camera, FLAT).mask.any())

@@ -1,0 +1,125 @@
+"""Everything about a trial that can be found wrong before it is tracked, all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from airborne.errors import AirborneError, MistakesError
+from airborne.run.detections import read_trial_detections
+from airborne.run.first_pose import find_first_pose
+from airborne.run.opening import Opened, calibrated_cameras, open_trial, past_the_end_error, video_source
+from airborne.run.players_tracker import players_tracker_of
+from airborne.trial.file import Trial, list_wrong_names, parse_trial
+from airborne.video import Recording, VideoFacts, inspect
+
+Value = TypeVar("Value")
+
+
+class Checks:
+    """What was found: a line for each thing that is well, and a line for each mistake."""
+
+    def __init__(self) -> None:
+        """Start with nothing found."""
+        self.well: list[str] = []
+        self.mistakes: list[str] = []
+
+    def attempt(self, read: Callable[[], Value], describe: Callable[[Value], str]) -> Value | None:
+        """Read something and describe it; None where it has a mistake."""
+        try:
+            value = read()
+        except MistakesError as error:
+            self.mistakes += error.mistakes
+        except AirborneError as error:
+            self.mistakes.append(str(error))
+        else:
+            self.well.append(describe(value))
+            return value
+        return None
+
+
+def check_trial(path: Path) -> Checks:
+    """Read everything that a trial names, and track nothing."""
+    checks = Checks()
+    trial = checks.attempt(lambda: parse_trial(path), lambda trial: f"{path.name}: {_describe(trial)}")
+    if trial is None:
+        return checks
+    checks.mistakes += [f"{path.name}: {mistake}" for mistake in list_wrong_names(trial)]
+    facts = _check_videos(checks, trial)
+    _check_files(checks, trial, facts)
+    if not checks.mistakes:
+        _check_start(checks, trial, tuple(facts.values()))
+    return checks
+
+
+def _check_videos(checks: Checks, trial: Trial) -> dict[str, VideoFacts]:
+    """Inspect every video; return the facts of the good ones by camera."""
+    found = {}
+    for camera in trial.camera:
+        facts = checks.attempt(
+            partial(inspect, video_source(trial, camera)),
+            lambda facts, name=camera.name: f"{name}: {_describe_video(facts)}",
+        )
+        if facts is not None:
+            found[camera.name] = facts
+    return found
+
+
+def _check_files(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> None:
+    """Read the calibration, the body and the detections; those that do not exist are listed already."""
+    calibration, body, detections = trial.calibration, trial.body, trial.start.detections
+    shown = trial.model_copy(update={"camera": [camera for camera in trial.camera if camera.name in facts]})
+    if facts and _exists(trial, calibration.file or calibration.control_points):
+        sizes = {name: each.size for name, each in facts.items()}
+        checks.attempt(
+            lambda: calibrated_cameras(shown, sizes), lambda cameras: f"calibration: {', '.join(cameras[0].names)}"
+        )
+    if not trial.has_players and _exists(trial, body.source_file):
+        checks.attempt(trial.model, lambda model: f"body: {model.name}, {len(model.segments)} segments")
+    if detections is not None and facts and _exists(trial, detections):
+        checks.attempt(
+            lambda: read_trial_detections(shown, tuple(facts.values())), lambda _: f"detections: {detections}"
+        )
+    if trial.lights is not None:
+        checks.well.append(f"lights: {len(trial.lights.lamp)} lamps, ambient {trial.lights.ambient:g}")
+
+
+def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> None:
+    """Find the start in good files, and look whether there are frames to track."""
+    opened = checks.attempt(lambda: open_trial(trial, facts), lambda opened: f"frames: {_describe_frames(opened)}")
+    if opened is None:
+        return
+    recording = opened.recording
+    if recording.n_frames == 0:
+        checks.mistakes.append(str(past_the_end_error(trial)))
+    elif trial.has_players:
+        checks.attempt(
+            lambda: players_tracker_of(trial, recording.rig),
+            lambda _: f"start: frame {trial.start.frame}, {', '.join(player.name for player in trial.players)}",
+        )
+    else:
+        checks.attempt(
+            lambda: find_first_pose(trial, trial.model(), recording.rig, opened.detections),
+            lambda first: "; ".join([f"start: frame {trial.start.frame}", *first.notes]),
+        )
+    checks.well += [f"note: {event}" for event in recording.events]
+
+
+def _exists(trial: Trial, name: str | None) -> bool:
+    return name is None or trial.path(name).exists()
+
+
+def _describe_frames(opened: Opened[Recording]) -> str:
+    n = opened.recording.n_frames
+    return "to the videos' end" if n is None else f"{n} to track"
+
+
+def _describe(trial: Trial) -> str:
+    return f"{trial.name}, {len(trial.camera)} cameras, method {trial.track.method}"
+
+
+def _describe_video(facts: VideoFacts) -> str:
+    width, height = facts.size
+    return f"{width}×{height} px, {float(facts.image_rate):.5g} pictures a second, {facts.fields}"

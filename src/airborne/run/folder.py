@@ -1,0 +1,118 @@
+"""The rules of a run's folder: whose run it holds, and who may write into it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+from airborne import __version__
+from airborne.errors import ResultError
+from airborne.export import write_json
+from airborne.motion.covariance_file import COVARIANCE_FILE
+from airborne.motion.run_folder import (
+    BODY,
+    CALIBRATION,
+    FOLDERS,
+    JOINTS,
+    JUMPS,
+    MOTION,
+    REPORT,
+    RUN_RECORD,
+    SMOOTH_RECORD,
+    SUMMARY,
+    read_record,
+)
+from airborne.trial.file import Trial
+
+_HASHED_BYTES = 8 << 20  # larger files are identified by their first and last so many bytes and their length
+
+
+def prepare_folder(
+    folder: Path, identity: dict[str, Any], table: str, *, resume: bool = False, overwrite: bool = False
+) -> bool:
+    """Prepare a run's folder; return whether it holds rows of its `table` from which to resume.
+
+    `overwrite` removes the run that the folder holds, finished or not. Raises ResultError for a folder that holds
+    something else, a run with neither `resume` nor `overwrite`, or a run of other inputs.
+    """
+    rows, record = folder / table, folder / RUN_RECORD
+    folder.mkdir(parents=True, exist_ok=True)
+    if overwrite and record.exists():
+        read_record(record)
+        _remove_run(folder)
+    elif not record.exists() and not rows.exists() and any(folder.iterdir()):
+        raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
+    if rows.exists() and not resume:
+        raise ResultError(
+            f"{folder} already holds a run; give --resume to go on, --overwrite to replace it, or another folder"
+        )
+    if not rows.exists():
+        write_json(record, identity)
+        return False
+    recorded = read_record(record)
+    changed = [name for name in identity if recorded.get(name) != identity[name]]
+    if changed:
+        raise ResultError(f"{folder} holds another run (other {', other '.join(changed)}); track into another folder")
+    return True
+
+
+def _remove_run(folder: Path) -> None:
+    """Remove what commands leave in a run's folder; exports and what others put there stay."""
+    for name in (MOTION, JOINTS, JUMPS, SUMMARY, REPORT, CALIBRATION, BODY, COVARIANCE_FILE, SMOOTH_RECORD):
+        (folder / name).unlink(missing_ok=True)
+    for name in FOLDERS:
+        shutil.rmtree(folder / name, ignore_errors=True)
+    (folder / RUN_RECORD).unlink()
+
+
+def holds_run_of(trial: Trial, folder: Path) -> bool:
+    """Say whether a folder holds a run of exactly this trial, finished or not."""
+    record = folder / RUN_RECORD
+    return record.is_file() and read_record(record) == run_identity(trial)
+
+
+def run_identity(trial: Trial, *, live: bool = False) -> dict[str, Any]:
+    """Return what two runs share if one can resume the other."""
+    settings = {
+        "inputs": input_hashes(trial, live=live),
+        "settings": trial.track.model_dump(),
+        "version": __version__,
+    }
+    return json.loads(json.dumps(settings))
+
+
+def input_hashes(trial: Trial, *, live: bool = False) -> dict[str, str]:
+    """Return the SHA-256 of each input file, by the name that the trial gives it; live video has none."""
+    names = [*(camera.video for camera in trial.camera if not live), *trial.input_files]
+    rest = [trial.start, trial.lights, trial.calibration, trial.body, *trial.camera]
+    start = json.dumps([table and table.model_dump() for table in rest])
+    hashes = {name: _sha256(trial.path(name)) for name in names}
+    return {**hashes, "start and lights": hashlib.sha256(start.encode()).hexdigest()}
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    if path.is_dir():
+        for file in sorted(path.rglob("*.json")):
+            digest.update(f"{file.relative_to(path).as_posix()} {_sha256(file)}\n".encode())
+        return digest.hexdigest()
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        if size <= 2 * _HASHED_BYTES:
+            digest.update(file.read())
+        else:
+            digest.update(file.read(_HASHED_BYTES))
+            file.seek(-_HASHED_BYTES, 2)
+            digest.update(file.read())
+            digest.update(str(size).encode())
+    return digest.hexdigest()
+
+
+def list_tables(folder: Path) -> list[str]:
+    """Return the paths of the tables in a run's folder, relative to it."""
+    return sorted(
+        path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.suffix in (".csv", ".parquet")
+    )

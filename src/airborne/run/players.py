@@ -1,0 +1,143 @@
+"""A run of several players, from files or live: their tracker, their tables and videos, their summary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airborne.calibration.from_points import Calibration
+from airborne.export import PlayersOverlayVideos, write_players_report
+from airborne.export.overlays import OverlaysAs
+from airborne.motion import PlayersMotion, PlayersWriter, read_players, write_players_parquet
+from airborne.motion.jumps.heights import measure_jumps
+from airborne.motion.jumps.table import jump_row, write_jumps
+from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, videos_of
+from airborne.run.opening import Opened
+from airborne.run.players_tracker import players_tracker_of
+from airborne.tracking import Status
+from airborne.tracking.players import PlayersStep, PlayersTracker, StepTracker
+from airborne.tracking.tracker import Tracker
+from airborne.trial.file import Trial
+from airborne.trial.settings import BodySettings
+from airborne.video import Frames, LiveRecording, Recording
+
+_UNCERTAINTY = (
+    "Standard deviations hold what the method itself leaves open, joint by joint. They do not hold joints that were "
+    "set wrongly at the start, nor errors of the cameras' calibration or times."
+)
+_OVERCONFIDENT = (
+    "the standard deviations are only the spread of the particles of {method} and far too small: in trials with a "
+    "known truth, their 95 % regions held 30 to 70 % of it"
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlayersRun:
+    """The players of a trial; a `Subject`. Their tracker's state is in no table, so nothing is resumed."""
+
+    trial: Trial
+    recording: Recording | LiveRecording
+    calibration: Calibration | None
+    players: PlayersTracker
+
+    table = JOINTS
+
+    @classmethod
+    def open(cls, trial: Trial, opened: Opened[Recording | LiveRecording]) -> PlayersRun:
+        """Make the tracker, which checks the players' starts against the cameras."""
+        return cls(trial, opened.recording, opened.calibration, players_tracker_of(trial, opened.recording.rig))
+
+    def read_done(self, folder: Path) -> tuple[PlayersStep, ...]:
+        """Return nothing: a killed run is tracked again from its start, to the same result."""
+        return ()
+
+    def copy_inputs(self, folder: Path) -> None:
+        """Write nothing: players have no body file."""
+
+    def see(self, first: Frames) -> PlayersRun:
+        """Return the players as they are; their trackers learn from the first frames themselves."""
+        return self
+
+    def tracker(self) -> Tracker[Any, PlayersStep]:
+        """Return the tracker of the trial's method."""
+        return StepTracker(self.players)
+
+    def writer(self, folder: Path, *, resume: bool) -> PlayersWriter:
+        """Return what writes the estimates; rows that are there already stay."""
+        return PlayersWriter(folder / self.table, self.players.joints, resume=resume)
+
+    def write(self, writer: PlayersWriter, estimate: PlayersStep) -> None:
+        """Write one time's estimates."""
+        writer.append(estimate.players)
+
+    def artists(self, folder: Path, drawn: OverlaysAs) -> Iterator[AbstractContextManager[Any]]:
+        """Return what draws the frames while they are tracked."""
+        recording, track = self.recording, self.trial.track
+        folder_of = videos_of if drawn == "videos" else figures_of
+        assert not isinstance(track, BodySettings), "checked with the trial"
+        yield PlayersOverlayVideos(
+            folder_of(folder),
+            recording.rig,
+            recording.rate,
+            style=track.overlay,
+            starts=self.trial.players,
+            drawn=drawn,
+        )
+
+    def draw(self, artists: Sequence[Any], frames: Frames, estimate: PlayersStep) -> None:
+        """Let the artists draw one time."""
+        for artist in artists:
+            artist.write(frames, self.players.joints, estimate.players)
+
+    def finish(self, folder: Path) -> tuple[PlayersMotion, dict[str, Any]]:
+        """Write the tables; return the motion and the beginning of the summary."""
+        motion = read_players(folder / self.table)
+        write_players_parquet(tables_of(folder) / "joints.parquet", folder / self.table)
+        jumps = measure_jumps(motion)
+        write_jumps(folder / JUMPS, jumps)
+        return motion, {**self._summary(motion), "jumps": [jump_row(jump) for jump in jumps]}
+
+    def write_report(self, folder: Path, summary: dict[str, Any], motion: PlayersMotion) -> None:
+        """Write the report."""
+        write_players_report(folder, summary, motion)
+
+    def _summary(self, motion: PlayersMotion) -> dict[str, Any]:
+        is_tracked, is_lost = (motion.status == status.value for status in (Status.TRACKED, Status.LOST))
+        n_tracked, n_lost = int(is_tracked.all(axis=1).sum()), int(is_lost.all(axis=1).sum())
+        recording = self.recording
+        return {
+            "name": self.trial.name,
+            "n_frames": len(motion),
+            "n_tracked": n_tracked,
+            "n_uncertain": len(motion) - n_tracked - n_lost,
+            "n_lost": n_lost,
+            "start_s": float(motion.time_s[0]),
+            "duration_s": float(motion.time_s[-1] - motion.time_s[0]),
+            "rate_hz": round(float(recording.rate), 6),
+            "players": {name: _player(motion, k, len(recording.rig)) for k, name in enumerate(motion.players)},
+            "bystanders": [start.name for start in self.trial.players if not start.has_legs],
+            "uncertainty": _UNCERTAINTY,
+        }
+
+    def warnings(self) -> list[str]:
+        """Return what a reader of the numbers must know."""
+        method = self.trial.track.method
+        return [] if method == "blocker" else [_OVERCONFIDENT.format(method=method)]
+
+
+def _player(motion: PlayersMotion, k: int, n_cameras: int) -> dict[str, Any]:
+    """Reduce one player's motion to its headline numbers."""
+    is_found = motion.status[:, k] != Status.LOST.value
+    sd, score = motion.sd[is_found, k], motion.score[is_found, k]
+    return {
+        **{f"n_{status}": motion.count(motion.players[k], status) for status in Status},
+        "median_sd_mm": 1e3 * float(np.nanmedian(sd)) if np.isfinite(sd).any() else None,
+        "median_score": float(np.nanmedian(score)) if np.isfinite(score).any() else None,
+        "n_fewer_cameras": int((motion.n_views[:, k] < n_cameras).sum()),
+        "n_below_two_cameras": int((motion.n_views[:, k] < 2).sum()),
+    }

@@ -1,0 +1,140 @@
+"""A run as a value: what lies in its folder, read when it is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from airborne.body import BodyModel
+from airborne.cameras import Rig, read_rig
+from airborne.errors import AirborneError, ResultError
+from airborne.export.figures import flight_figure, joints_figure, pose_figure
+from airborne.export.players_report import heights_figure
+from airborne.io.text import read_json
+from airborne.motion import Motion, PlayersMotion, measure_flight, measure_jumps
+from airborne.motion.labelled import label_angles, label_joints, label_jumps, label_players
+from airborne.motion.motion import dataset
+from airborne.motion.run_folder import holds_players, read_body_run, read_players_run
+
+_FIGURES = {"joints": joints_figure, "flight": flight_figure}
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run of one body or of players, finished or not: what `airborne track` leaves in a folder.
+
+    Tables are labelled arrays (xarray): time in seconds, joints and axes by name, units in the attributes, the standard
+    deviation of `x` in `x_sd`, NaN where the body was lost. Raises ResultError, here for a folder without a run, later
+    for files that are missing or damaged, and for what this run does not hold.
+
+    >>> run = Run(Path("results"))
+    >>> run.joints["position"].sel(joint="cross", space="z").attrs["units"]
+    'm'
+    """
+
+    folder: Path
+
+    def __post_init__(self) -> None:
+        if not ((self.folder / "motion.csv").is_file() or self.has_players):
+            raise ResultError(f"{self.folder} holds no run; expected the output folder of a run")
+
+    def __repr__(self) -> str:
+        try:
+            return f"Run({str(self.folder)!r}): {self._state()}"
+        except AirborneError as error:
+            return f"Run({str(self.folder)!r}): {error}"
+
+    def _state(self) -> str:
+        if not (self.folder / "summary.json").is_file():
+            return f"not finished, {len(self.players if self.has_players else self.motion)} frames"
+        summary = self.summary
+        counts = ", ".join(f"{summary[f'n_{status}']} {status}" for status in ("tracked", "uncertain", "lost"))
+        return f"{summary['name']}, {summary['n_frames']} frames: {counts}"
+
+    @property
+    def has_players(self) -> bool:
+        """Whether this is a run of several players, and not of one body."""
+        return holds_players(self.folder)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What summary.json holds now: headline numbers, method, versions; and comparisons with references."""
+        path = self.folder / "summary.json"
+        try:
+            return read_json(path)
+        except (OSError, ValueError) as error:
+            raise ResultError(f"{path} cannot be read ({error}); finish the run, or track again") from None
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The body's motion, with the full covariance: arrays in metres and radians."""
+        return self._motion_and_body[0]
+
+    @cached_property
+    def players(self) -> PlayersMotion:
+        """The players' motion, with the covariance of each joint: arrays in metres."""
+        if not self.has_players:
+            raise ResultError(f"{self.folder} holds a run of one body, not of players; use .motion")
+        return read_players_run(self.folder)
+
+    @property
+    def body(self) -> BodyModel:
+        """The body that was tracked."""
+        return self._motion_and_body[1]
+
+    @cached_property
+    def rig(self) -> Rig:
+        """The cameras of the run."""
+        return read_rig(self.folder / "calib.toml")
+
+    @cached_property
+    def root(self) -> xr.Dataset:
+        """The body's root: `position` (time, space) [m], `quaternion` (time, component), their sd, `score`."""
+        return dataset(self.motion)
+
+    @cached_property
+    def joints(self) -> xr.Dataset:
+        """The joints and other landmarks: `position` (time, joint, space) [m], `position_sd` (time, joint), `status`.
+
+        Of players, `player` comes after `time`, and there is a `covariance`.
+        """
+        return label_players(self.players) if self.has_players else label_joints(self.motion, self.body)
+
+    @cached_property
+    def angles(self) -> xr.Dataset:
+        """The body's angles [deg]: `somersault`, `tilt`, `twist` (time), `angle` (time, joint, axis), with `_sd`."""
+        return label_angles(self.motion, self.body)
+
+    @cached_property
+    def flight(self) -> xr.Dataset:
+        """The body in flight: `com` (time, space) [m], `angular_momentum` [kg m2/s], with `_sd`, and revolutions.
+
+        Raises BodyError for a body without masses.
+        """
+        return measure_flight(self.motion, self.body)
+
+    @cached_property
+    def jumps(self) -> xr.Dataset:
+        """The jumps of players (jump): the columns of jumps.csv; `x` has the 95 % interval `x_low`, `x_high`."""
+        return label_jumps(measure_jumps(self.players))
+
+    def plot(self, what: Literal["pose", "joints", "flight"] = "pose") -> Figure:
+        """Draw curves over time with bands of two standard deviations.
+
+        Of a body its pose, or the angles of its joints, or its flight; of players the heights of hips, knees and
+        ankles.
+        """
+        if self.has_players:
+            return heights_figure(self.players)
+        return pose_figure(self.motion) if what == "pose" else _FIGURES[what](self.motion, self.body)
+
+    @cached_property
+    def _motion_and_body(self) -> tuple[Motion, BodyModel]:
+        if self.has_players:
+            raise ResultError(f"{self.folder} holds a run of players, not of one body; use .players, .joints or .jumps")
+        return read_body_run(self.folder)

@@ -1,0 +1,85 @@
+"""What the loop of a run asks of what it tracks, a body or players."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any, Protocol, Self, TypeVar
+
+from airborne.calibration.from_points import Calibration
+from airborne.export.overlays import OverlaysAs
+from airborne.motion import Motion, PlayersMotion
+from airborne.tracking.tracker import Found, Tracker
+from airborne.trial.file import Trial
+from airborne.video import Frames, LiveRecording, Recording
+
+AnyMotion = TypeVar("AnyMotion", Motion, PlayersMotion)
+
+
+class Subject(Protocol[Found, AnyMotion]):
+    """What is tracked: how its tracker begins, what it writes and draws at each time, and what a run of it leaves."""
+
+    @property
+    def trial(self) -> Trial:
+        """The trial."""
+        ...
+
+    @property
+    def recording(self) -> Recording | LiveRecording:
+        """Its frames."""
+        ...
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """How its cameras were found, if from control points."""
+        ...
+
+    @property
+    def table(self) -> str:
+        """The table that is written as the run goes."""
+        ...
+
+    def read_done(self, folder: Path) -> Iterable[Found]:
+        """Return what a killed run found, from which the tracker only learns."""
+        ...
+
+    def copy_inputs(self, folder: Path) -> None:
+        """Write beside the results what other commands need."""
+        ...
+
+    def see(self, first: Frames) -> Self:
+        """Return the subject with what the first frames show of it."""
+        ...
+
+    def tracker(self) -> Tracker[Any, Found]:
+        """Return its tracker."""
+        ...
+
+    def writer(self, folder: Path, *, resume: bool) -> AbstractContextManager[Any]:
+        """Return what writes the table."""
+        ...
+
+    def write(self, writer: Any, estimate: Found) -> None:
+        """Write one time."""
+        ...
+
+    def artists(self, folder: Path, drawn: OverlaysAs) -> Iterable[AbstractContextManager[Any]]:
+        """Return what draws the frames while they are tracked."""
+        ...
+
+    def draw(self, artists: Sequence[Any], frames: Frames, estimate: Found) -> None:
+        """Let the artists draw one time."""
+        ...
+
+    def finish(self, folder: Path) -> tuple[AnyMotion, dict[str, Any]]:
+        """Write the other tables; return the motion and the beginning of the summary."""
+        ...
+
+    def warnings(self) -> list[str]:
+        """Return what a reader of the numbers must know."""
+        ...
+
+    def write_report(self, folder: Path, summary: dict[str, Any], motion: AnyMotion) -> None:
+        """Draw the figures and write the report."""
+        ...

@@ -1,0 +1,160 @@
+"""One recording from files, or live, to results: the loop over its frames, the same for a body and for players."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
+from functools import partial
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airborne.cameras import write_pose2sim
+from airborne.errors import ResultError
+from airborne.export import write_json
+from airborne.export.overlays import OverlaysAs
+from airborne.motion import Motion, PlayersMotion
+from airborne.motion.run_folder import CALIBRATION, SUMMARY
+from airborne.run.body import BodyRun
+from airborne.run.folder import list_tables, prepare_folder, run_identity
+from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
+from airborne.run.players import PlayersRun
+from airborne.run.players_tracker import compile_kernels
+from airborne.run.provenance import provenance
+from airborne.run.subject import AnyMotion, Subject
+from airborne.tracking.tracker import Found, track_frames
+from airborne.trial.file import Trial
+from airborne.types import Progress
+from airborne.video import LiveRecording, Outages
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackResult:
+    """The results of a finished run; its folder holds the same."""
+
+    motion: Motion | PlayersMotion
+    summary: dict[str, Any]
+
+
+def track_trial(
+    trial: Trial,
+    folder: Path,
+    *,
+    resume: bool = False,
+    overwrite: bool = False,
+    live: bool = False,
+    pictures: bool = True,
+    first_frame: bool = False,
+    progress: Progress | None = None,
+) -> TrackResult:
+    """Track a trial, a body or players, and write the results into a folder.
+
+    `resume` continues a run that was killed, to the same result; of players by tracking again from the start, their
+    rows stay. `live`, for players, reads pipes, capture devices, or files at their own speed, drops frames rather than
+    fall behind, and ends with them or with KeyboardInterrupt. `pictures=False` leaves out videos, figures and report.
+    `overwrite` replaces the run that the folder holds. `first_frame` tracks one frame and draws it, without a report.
+    Raises an AirborneError for input that cannot be used, and for a folder that holds another run.
+    """
+    if live and resume:
+        raise ResultError("a live run cannot be resumed: its frames are gone; track into a new folder")
+    if live and not trial.has_players:
+        raise ResultError('--live is for players; this trial has no body preset = "legs"')
+    if live and first_frame:
+        raise ResultError("a live run has no first frame to come back to; leave --live or --first-frame out")
+    if overwrite and resume:
+        raise ResultError("a run is either resumed or overwritten; give one of --resume and --overwrite")
+    if first_frame:
+        trial = trial.model_copy(update={"track": trial.track.model_copy(update={"stop": trial.start.frame + 1})})
+    started_s = time.monotonic()
+    drawn = None if not pictures else "stills" if first_frame else "videos"
+    options = _Options(folder, started_s, resume, overwrite, live, drawn, progress)
+    with ExitStack() as stack:
+        if trial.has_players:
+            opened = _open_live(trial, stack, progress) if live else open_trial(trial)
+            return _run(PlayersRun.open(trial, opened), options, stack)
+        return _run(BodyRun.open(trial, open_trial(trial)), options, stack)
+
+
+@dataclass(frozen=True, slots=True)
+class _Options:
+    folder: Path
+    started_s: float
+    resume: bool
+    overwrite: bool
+    live: bool
+    drawn: OverlaysAs | None  # None: no pictures
+    progress: Progress | None
+
+
+def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> TrackResult:
+    """Track an opened subject and write its results; the connection to live cameras ends with the tracking."""
+    folder, recording = options.folder, subject.recording
+    identity = run_identity(subject.trial, live=options.live)
+    goes_on = prepare_folder(folder, identity, subject.table, resume=options.resume, overwrite=options.overwrite)
+    write_pose2sim(folder / CALIBRATION, recording.rig)
+    subject.copy_inputs(folder)
+    read_s = time.monotonic()
+    subject, delays_s = _track(subject, options, resume=goes_on)
+    connection.close()
+    tracked_s = time.monotonic()
+    motion, summary = subject.finish(folder)
+    summary |= provenance(subject.trial, recording, subject.calibration, identity["inputs"])
+    summary["warnings"] += subject.warnings()
+    summary["tables"] = list_tables(folder)
+    if isinstance(recording, LiveRecording):
+        summary["live"] = {
+            "cameras": recording.image_counts(),
+            "median_delay_s": float(np.median(delays_s)),
+            "largest_delay_s": max(delays_s),
+        }
+    summary["timings_s"] = {
+        "opening": read_s - options.started_s,
+        "tracking": tracked_s - read_s,
+        "writing": time.monotonic() - tracked_s,
+        "tracking_a_frame": (tracked_s - read_s) / len(motion),
+    }
+    write_json(folder / SUMMARY, summary)
+    if options.drawn == "videos":
+        subject.write_report(folder, summary, motion)
+    return TrackResult(motion, summary)
+
+
+def _open_live(trial: Trial, stack: ExitStack, progress: Progress | None) -> Opened[LiveRecording]:
+    """Open a trial's live cameras for as long as the stack is."""
+    compile_kernels(trial)
+    return stack.enter_context(open_live(trial, (lambda: None) if progress is None else (lambda: progress(0, None))))
+
+
+def _track(
+    subject: Subject[Found, AnyMotion], options: _Options, *, resume: bool
+) -> tuple[Subject[Found, AnyMotion], list[float]]:
+    """Track every frame, written and drawn at once; return the subject as seen, and live frames' delays [s]."""
+    folder, drawn, recording = options.folder, options.drawn, subject.recording
+    delays_s: list[float] = []
+    outages = Outages(recording.rig.names)
+    with ExitStack() as stack:
+        frames = stack.enter_context(closing(iter(recording)))
+        first = next(frames, None)
+        if first is None:
+            raise past_the_end_error(subject.trial)
+        subject = subject.see(first)
+        done = subject.read_done(folder) if resume else ()
+        writer = stack.enter_context(subject.writer(folder, resume=resume))
+        artists = [stack.enter_context(artist) for artist in subject.artists(folder, drawn)] if drawn else []
+        tracked = track_frames(subject.tracker(), chain([first], frames), partial(subject.write, writer), done)
+        try:
+            for number, (observed, estimate) in enumerate(tracked, start=1):
+                if isinstance(recording, LiveRecording):
+                    delays_s.append(time.monotonic() - recording.arrival_s)
+                outages.add(observed)
+                subject.draw(artists, observed, estimate)
+                if options.progress is not None:
+                    options.progress(number, recording.n_frames)
+        except KeyboardInterrupt:
+            if not delays_s:  # only a live run ends like this
+                raise
+    recording.events.extend(outages.describe())
+    return subject, delays_s

@@ -1,0 +1,113 @@
+"""The first pose of a body from angles, from positions of its landmarks, or from points in the cameras' images."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from airborne.body import BodyModel, Pose
+from airborne.body.inverse_kinematics import fit_pose
+from airborne.cameras import Rig
+from airborne.cameras.consensus import triangulate_consensus
+from airborne.cameras.detections import LANDMARK_RECIPES, NETWORKS, Detections, landmarks_from_points
+from airborne.errors import BodyError, TrialError
+from airborne.types import Array
+
+LEAST_VISIBILITY = 0.3  # detections with a lower confidence are ignored
+LANDMARK_WEIGHTS = {  # of points that only lie near the landmark they stand for
+    "head": 0.1,
+    **dict.fromkeys(("hand_left", "hand_right", "foot_left", "foot_right"), 0.3),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FirstPose:
+    """The body's pose at the first frame."""
+
+    pose: Pose
+    notes: tuple[str, ...] = ()  # what the user should know, one line each
+
+
+def pose_by_hand(
+    model: BodyModel, world_from_root: RigidTransform, joint_angles_deg: Mapping[str, Sequence[float]]
+) -> FirstPose:
+    """Return a pose set by hand: segment -> x, y, z [deg], other joints straight. Raises TrialError."""
+    joints = [segment.name for segment in model.segments[1:]]
+    angles = np.zeros((len(joints), 3))
+    for name, xyz in joint_angles_deg.items():
+        if name not in joints:
+            raise TrialError(
+                f"start.joint_angles_deg: body '{model.name}' has no joint '{name}'; "
+                f"it has: {', '.join(joints) or 'none'}"
+            )
+        angles[joints.index(name)] = np.radians(xyz)
+    is_out = np.any((angles < model.limits_rad[..., 0]) | (angles > model.limits_rad[..., 1]), axis=1)
+    beyond = [name for name, out in zip(joints, is_out, strict=True) if out and name in joint_angles_deg]
+    notes = (f"start.joint_angles_deg: {', '.join(beyond)} beyond the body's joint limits",) if beyond else ()
+    return FirstPose(Pose(world_from_root=world_from_root, joint_angles=angles), notes)
+
+
+def fit_to_detections(model: BodyModel, rig: Rig, where: str, detections: Detections) -> FirstPose:
+    """Fit to detections at one time, their only row; those of low confidence count as not seen. Raises TrialError."""
+    confident = detections.above_visibility(LEAST_VISIBILITY)
+    first = fit_to_pixels(
+        model, rig, where, names=confident.points, px=confident.px[0], weights=confident.visibility[0]
+    )
+    return FirstPose(first.pose, (*detections.notes, *first.notes))
+
+
+def fit_to_pixels(
+    model: BodyModel, rig: Rig, where: str, *, names: Sequence[str], px: Array, weights: Array
+) -> FirstPose:
+    """Fit to image points: px (points, cameras, 2) [px], NaN where missing; weights (points, cameras)."""
+    needed = _required_points(model, where, names)
+    names = [names[i] for i in needed]
+    agreed = triangulate_consensus(rig, px[needed], weights[needed])
+    is_left_out = np.isfinite(agreed.distance_px) & ~agreed.is_used & (weights[needed] > 0)
+    left_out = [
+        f"{where}: {camera} left out at {', '.join(name for name, is_out in zip(names, out, strict=True) if is_out)}, "
+        f"up to {distance_px[out].max():.0f} px from where the other cameras see them"
+        for camera, out, distance_px in zip(rig.names, is_left_out.T, agreed.distance_px.T, strict=True)
+        if out.any()
+    ]
+    first = fit_to_points(model, where, names, agreed.points)
+    return FirstPose(first.pose, (*left_out, *first.notes))
+
+
+def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Array) -> FirstPose:
+    """Fit to points (points, 3) [m] of these names."""
+    needed = _required_points(model, where, names)
+    landmarks = landmarks_from_points([names[i] for i in needed], points[needed])
+    targets = {landmark.name: landmarks[landmark.name] for landmark in model.landmarks if landmark.name in landmarks}
+    try:
+        fit = fit_pose(model, targets, weights=LANDMARK_WEIGHTS)
+    except BodyError as error:
+        raise TrialError(f"{where}: {error}") from error
+    off_m = {name: distance for name, distance in fit.residual_m.items() if np.isfinite(distance)}
+    worst = max(off_m, key=off_m.__getitem__)
+    missing = ", ".join(name for name, point in targets.items() if np.isnan(point).any())
+    notes = [
+        f"{where}: first pose found, landmarks {fit.rms_m * 1e3:.0f} mm off (RMS), "
+        f"most {worst}, {off_m[worst] * 1e3:.0f} mm",
+        f"{where}: no place of {missing}; there the first pose is as near to straight as it can be" if missing else "",
+        f"{where}: {fit.note}" if fit.note else "",
+    ]
+    return FirstPose(fit.pose, tuple(note for note in notes if note))
+
+
+def _required_points(model: BodyModel, where: str, names: Sequence[str]) -> list[int]:
+    """Return which points determine landmarks of the body; raises TrialError for an unknown name."""
+    landmarks = [landmark.name for landmark in model.landmarks]
+    of_networks = {*chain.from_iterable(NETWORKS.values())}
+    unknown = [name for name in names if name not in landmarks and name not in of_networks]
+    if unknown:
+        raise TrialError(
+            f"{where}: body '{model.name}' has no landmark {', '.join(unknown)}; it has: {', '.join(landmarks)}"
+        )
+    recipes = chain.from_iterable(LANDMARK_RECIPES[landmark] for landmark in landmarks if landmark in LANDMARK_RECIPES)
+    parts = {*landmarks, *chain.from_iterable(recipes)}
+    return [i for i, name in enumerate(names) if name in parts]

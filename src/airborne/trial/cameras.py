@@ -1,0 +1,23 @@
+"""[[camera]]: one camera's video."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from airborne.trial.table import Table
+
+
+class CameraTable(Table):
+    """One camera's video, and how its pixels lie in the calibration's image."""
+
+    name: str
+    video: str
+    fields: Literal["progressive", "top-first", "bottom-first", "auto"] = "progressive"
+    offset_s: float = 0.0  # added to this camera's times
+    offset_sd_s: float = Field(0.0, ge=0)  # its standard deviation
+    drift_ppm: float = Field(0.0, gt=-1e4, lt=1e4)  # by how much its clock runs slow, in parts per million
+    calibrated_as: str | None = None  # the camera's name in the calibration file, where it differs
+    saved_scale: float = Field(1.0, gt=0)  # calibration px = saved_scale * video px + saved_offset_px
+    saved_offset_px: Annotated[list[float], Field(min_length=2, max_length=2)] = [0.0, 0.0]

@@ -1,0 +1,117 @@
+"""[track]: the settings of a method, one model for each kind of method."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, get_args
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from airborne.rendering import Lights
+from airborne.tracking.direct_search.stepping import VRule
+from airborne.tracking.methods import ColourRule, Method, Prediction, Settings
+from airborne.tracking.particle import LegsMethod, LegsSettings
+from airborne.tracking.particle.bootstrap import ResampleWhen
+from airborne.tracking.particle.resampling import Scheme
+from airborne.tracking.particle.settings import EstimateAs, ViewsAs
+from airborne.tracking.particle.swing import Swing
+from airborne.trial.table import Table
+
+StepSizes = list[Annotated[float, Field(gt=0)]]
+CapsuleMethod = Literal["blocker"]
+Overlay = Literal["paper", "broadcast"]
+
+
+class _Settings(Table):
+    """What every method reads."""
+
+    method: str
+    every: Annotated[int, Field(ge=1)] = 1  # track every n-th frame or field
+    stop: Annotated[int, Field(ge=1)] | None = None  # one past the last frame or field
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check_unread(cls, table: Any) -> Any:
+        """Refuse keys that only other methods read, by a better name than unknown."""
+        known = {key for settings in _Settings.__subclasses__() for key in settings.model_fields}
+        unread = sorted(key for key in table if key in known - set(cls.model_fields)) if isinstance(table, dict) else []
+        if unread:
+            raise ValueError(f"{', '.join(unread)}: not read by method '{table['method']}'; remove it")
+        return table
+
+
+class BodySettings(_Settings):
+    """Methods of one body. A file may set what its method leaves unread, so that methods can be compared on it."""
+
+    method: Method = "refined"
+    prediction: Prediction = "smooth"
+    fixed_shape: bool = False  # joint angles stay those of the start; stepping and simplex never change them
+    colour: ColourRule = "normalised"  # stepping and simplex: paper B's score
+    v_rule: VRule = "v_sym"  # stepping
+    steps_mm: StepSizes = [50, 30, 20, 10, 10, 5, 5]  # stepping: one loop each
+    steps_deg: StepSizes = [5, 3, 2, 1, 1, 0.5, 0.5]
+    scale: Literal[1, 2, 4] = 1  # stepping and simplex: reduction of the images
+
+    @model_validator(mode="after")
+    def _check_steps(self) -> BodySettings:
+        if len(self.steps_mm) != len(self.steps_deg) or not self.steps_mm:
+            raise ValueError("steps_mm and steps_deg need one number each for every loop, equally many")
+        return self
+
+    def with_lights(self, lights: Lights | None, *, is_exact: bool) -> Settings:
+        """Return the settings as the trackers take them, in metres and radians; lights None where unknown."""
+        steps = zip(self.steps_mm, self.steps_deg, strict=True)
+        return Settings(
+            method=self.method,
+            prediction=self.prediction,
+            fixed_shape=self.fixed_shape,
+            colour=self.colour,
+            v_rule=self.v_rule,
+            loops=tuple((mm / 1000, float(np.radians(deg))) for mm, deg in steps),
+            scale=self.scale,
+            lights=lights,
+            is_light_exact=is_exact,
+        )
+
+
+class CapsuleSettings(_Settings):
+    """Players as capsules. A file may also set what the particle filters read: that stays unread."""
+
+    method: CapsuleMethod = "blocker"
+    overlay: Overlay = "paper"  # what the overlay videos show
+
+    @model_validator(mode="before")
+    @classmethod
+    def _leave_filters_out(cls, table: Any) -> Any:
+        unread = set(ParticleSettings.model_fields) - set(cls.model_fields)
+        return {key: value for key, value in table.items() if key not in unread} if isinstance(table, dict) else table
+
+
+class ParticleSettings(_Settings):
+    """The particle filters of players' legs."""
+
+    method: LegsMethod = "block-jump"
+    n_particles: Annotated[int, Field(ge=50, le=100_000)] | None = None  # None: the method's own
+    seed: Annotated[int, Field(ge=0)] = 0  # of the random numbers
+    swing: Swing = "literal"  # block-jump: how rods swing
+    estimate: EstimateAs | None = None  # None: the method's own
+    views: ViewsAs = "all"  # which cameras count
+    tempered: bool = False  # a softer comparison of histograms, the more cameras
+    torso_shift: bool = False  # the whole body moves along with the torso
+    resample: Scheme = "systematic"
+    resample_when: ResampleWhen = "always"
+    torso: str | None = None  # a table of torsos; None: they are tracked
+    overlay: Overlay = "paper"  # what the overlay videos show
+
+    @property
+    def filter(self) -> LegsSettings:
+        """The settings as the trackers take them."""
+        own = self.model_dump(exclude={"every", "stop", "torso", "overlay"}, exclude_none=True)
+        return LegsSettings(**own)
+
+
+TrackSettings = Annotated[BodySettings | CapsuleSettings | ParticleSettings, Field(discriminator="method")]
+
+BODY_METHODS: tuple[str, ...] = get_args(Method)
+PLAYERS_METHODS: tuple[str, ...] = (*get_args(CapsuleMethod), *reversed(get_args(LegsMethod)))
+METHODS = (*BODY_METHODS, *PLAYERS_METHODS)

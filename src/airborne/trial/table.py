@@ -1,0 +1,15 @@
+"""What all tables of a trial file share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+
+class Table(BaseModel):
+    """A table of a trial file: an unknown key, a number that is not finite, or a change afterwards is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

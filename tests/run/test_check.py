@@ -1,0 +1,96 @@
+"""`airborne check`: all mistakes of a trial at once, and nothing tracked; and the first frame alone."""
+
+import shutil
+
+import pytest
+
+from airborne.cli import main
+from airborne.errors import ResultError
+from airborne.run.check import check_trial
+from airborne.run.track import track_trial
+from airborne.trial.file import read_trial
+from tests.support.places import ROOT
+from tests.support.players_trial import write_trial
+from tests.support.run_files import files_of
+
+EXAMPLE = ROOT / "examples" / "thrown_cross"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A copy of the example without its control points to fit."""
+    shutil.copytree(EXAMPLE, tmp_path / "trial")
+    path = tmp_path / "trial" / "trial.toml"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace('control_points = "control_points.csv"', 'file = "calib_true.toml"'), encoding="utf-8")
+    return path.parent
+
+
+def edit(folder, *changes):
+    path = folder / "trial.toml"
+    text = path.read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_good_trial_has_a_line_for_each_thing(folder):
+    checks = check_trial(folder / "trial.toml")
+    assert checks.mistakes == []
+    heads = ["trial.toml", "cam1", "cam2", "cam3", "calibration", "body", "frames", "start"]
+    assert [line.split(": ")[0] for line in checks.well] == heads
+
+
+def test_every_mistake_of_the_tables_is_listed(folder, capsys, monkeypatch):
+    path = edit(folder, ('"top-first"', '"odd"'), ("[track]", "[track]\nevery = 0"))
+    assert [line.split(": ")[1] for line in check_trial(path).mistakes] == ["camera.0.fields", "track.every"]
+    monkeypatch.setattr("sys.argv", ["airborne", "check", str(path)])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    assert stopped.value.code == 2
+    assert len(capsys.readouterr().err.splitlines()) == 2
+
+
+def test_every_unusable_file_is_listed(folder):
+    (folder / "cam1.mp4").write_text("no video")
+    (folder / "cross.toml").write_text("no body")
+    path = edit(folder, ("cam2.mp4", "cam9.mp4"), ("calib_true.toml", "none.toml"))
+    mistakes = check_trial(path).mistakes
+    assert len(mistakes) == 4
+    for said in ("none.toml not found beside it", "cam1.mp4 cannot be opened", "cam9.mp4 not found", "cross.toml"):
+        assert sum(said in line for line in mistakes) == 1, said
+
+
+def test_a_start_past_the_end_is_a_mistake(folder):
+    path = edit(folder, ("frame = 0", "frame = 900"))
+    assert "start.frame lies past the end" in " ".join(check_trial(path).mistakes)
+
+
+def test_players_are_checked_against_the_cameras(tmp_path):
+    path = write_trial(tmp_path / "trial", 3)
+    assert check_trial(path).well[-1].startswith("start: frame 0, Anna")
+
+
+def test_the_first_frame_is_drawn_and_then_replaced_by_the_whole_run(folder, tmp_path):
+    trial, out = read_trial(folder / "trial.toml", {"stop": 2}), tmp_path / "run"
+    run = track_trial(trial, out, first_frame=True)
+    assert run.summary["n_frames"] == 1
+    drawn = {f"figures/overlay_cam{i}.png" for i in (1, 2, 3)}
+    assert drawn <= set(files_of(out))
+    assert not (out / "report.html").exists() and not (out / "videos").exists()
+    (out / "notes.txt").write_text("mine")
+    with pytest.raises(ResultError, match="--overwrite to replace it"):
+        track_trial(trial, out, pictures=False)
+    assert track_trial(trial, out, overwrite=True, pictures=False).summary["n_frames"] == 2
+    assert not drawn & set(files_of(out))
+    assert (out / "notes.txt").read_text() == "mine"
+
+
+def test_only_a_folder_that_holds_a_run_is_overwritten(folder, tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "motion.csv").write_text("mine")
+    with pytest.raises(ResultError):
+        track_trial(read_trial(folder / "trial.toml"), tmp_path / "mine", overwrite=True)
+    assert (tmp_path / "mine" / "motion.csv").read_text() == "mine"

@@ -1,0 +1,124 @@
+"""`import airborne` in scripts and notebooks: quick to open, and every snippet that is shown runs."""
+
+import ast
+import doctest
+import inspect
+import json
+import re
+import shutil
+import subprocess
+import sys
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+import airborne as ab
+from airborne import interface
+from airborne.run import result
+from tests.support.places import ROOT, THROWN_CROSS
+
+PAGE = ROOT / "docs" / "reference" / "python.md"
+STUDY = ROOT / "examples" / "study.ipynb"
+HEAVY = ("cv2", "matplotlib", "numba", "numpy", "pydantic", "rich", "scipy", "xarray")
+
+
+def snippets():
+    """The page's Python blocks."""
+    return re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+
+
+def cells():
+    """The notebook's code cells."""
+    cells = json.loads(STUDY.read_text(encoding="utf-8"))["cells"]
+    return ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+
+
+def run_all(blocks, where):
+    """Run blocks one after the other in one namespace, and return it."""
+    names = {}
+    for block in blocks:
+        exec(compile(block, str(where), "exec"), names)
+    return names
+
+
+def test_the_package_opens_at_once():
+    code = f"import sys, airborne; print([m for m in {HEAVY} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert (done.stdout.strip(), done.stderr) == ("[]", "")
+
+
+def test_every_public_name_is_there_and_says_what_it_is():
+    assert set(ab.__all__) <= set(dir(ab))
+    for name in ab.__all__:
+        assert (inspect.getdoc(getattr(ab, name)) or "").strip(), name
+    with pytest.raises(AttributeError, match="no attribute 'measure'"):
+        ab.measure  # noqa: B018
+
+
+def test_types_are_those_that_are_loaded():
+    tree = ast.parse(inspect.getsource(ab))
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    homes = {alias.name: node.module for node in imports if "airborne." in node.module for alias in node.names}
+    assert set(homes) == set(ab.__all__)
+    for name, home in homes.items():
+        assert getattr(ab, name) is getattr(sys.modules[home], name)
+
+
+@pytest.mark.parametrize("text", [PAGE.read_text(encoding="utf-8"), ab.__doc__], ids=["page", "help"])
+def test_every_public_name_is_shown(text):
+    assert [name for name in ab.__all__ if not re.search(rf"\b{name}\b", text)] == []
+
+
+def test_the_page_uses_every_public_name():
+    used = set(re.findall(r"\bab\.(\w+)", "".join(snippets())))
+    assert used | {"Run"} == set(ab.__all__)  # a Run is what track returns
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """The folder in which the page's snippets ran, and the names that they left."""
+    folder = tmp_path_factory.mktemp("page")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        mpl.use("Agg")
+        return folder, run_all(snippets(), PAGE)
+
+
+def test_the_page_runs_from_top_to_bottom(done):
+    folder, names = done
+    assert names["compared"].position.rms_3d_mm < 3.0
+    assert np.isfinite(names["velocity"]).any()
+    assert isinstance(names["run"], ab.Run)
+    assert (folder / "pose.png").stat().st_size > 10_000
+    assert (folder / "results" / "export" / "results.c3d").is_file()
+
+
+def test_examples_of_docstrings_run(done, tmp_path, monkeypatch):
+    folder, _ = done
+    shutil.copytree(THROWN_CROSS, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    trial = tmp_path / "trial.toml"
+    trial.write_text(trial.read_text(encoding="utf-8") + "stop = 3\n", encoding="utf-8")
+    shutil.copytree(folder / "in-code", "results")
+    functions = {name: getattr(interface, name) for name in interface.__all__}
+    finder, runner = doctest.DocTestFinder(recurse=False), doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
+    for name, thing in {**functions, "Run": ab.Run}.items():
+        tests = finder.find(thing, name, globs=functions | vars(result))
+        assert sum(len(test.examples) for test in tests), f"{name} shows no example"
+        for test in tests:
+            assert runner.run(test).failed == 0, name
+
+
+def test_the_study_runs_from_top_to_bottom(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    mpl.use("Agg")
+    names = run_all(cells(), STUDY)
+    assert (tmp_path / "results" / "report.html").is_file()
+    assert all(path.is_file() for path in names["exported"].files)
+
+
+def test_the_study_holds_no_outputs():
+    notebook = json.loads(STUDY.read_text(encoding="utf-8"))
+    code = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert [cell for cell in code if cell["outputs"] or cell["execution_count"] is not None] == []
