@@ -52,10 +52,13 @@ def fit_epipolar_geometry(px_a: Array, px_b: Array, *, limit_px: float) -> Epipo
 
 def relative_pose(F: Array, K_a: Array, K_b: Array, *, px_a: Array, px_b: Array) -> RelativePose:
     """Return the pose of camera b with most of the points (n, 2) [px] in front of both cameras."""
-    on_planes = (cv2.undistortPoints(np.ascontiguousarray(px), K, None) for px, K in ((px_a, K_a), (px_b, K_b)))
-    _, R, t, is_front, homogeneous = cv2.recoverPose(K_b.T @ F @ K_a, *on_planes, np.eye(3), distanceThresh=np.inf)
+    plane_a, plane_b = (cv2.undistortPoints(np.ascontiguousarray(px), K, None) for px, K in ((px_a, K_a), (px_b, K_b)))
+    E = K_b.T @ F @ K_a
+    _, R, t, is_front, homogeneous = cv2.recoverPose(E, plane_a, plane_b, np.eye(3), distanceThresh=np.inf)
     is_front, points = is_front.ravel() > 0, (homogeneous[:3] / homogeneous[3]).T
     from_b = points + t.T @ R
     cosine = np.sum(points * from_b, axis=1) / (np.linalg.norm(points, axis=1) * np.linalg.norm(from_b, axis=1))
     parallax = np.arccos(np.clip(cosine[is_front], -1, 1)) if is_front.any() else np.zeros(1)
-    return RelativePose(R, t.ravel(), points, float(np.mean(is_front)), float(np.median(parallax)))
+    return RelativePose(
+        np.asarray(R, float), np.asarray(t, float).ravel(), points, float(np.mean(is_front)), float(np.median(parallax))
+    )
