@@ -50,7 +50,12 @@ def done(tmp_path_factory):
 
 def test_the_tutorial_leaves_what_it_says(done):
     folder, printed = done
-    for name in ("calib.toml", "results/report.html", "results/agreement_methods.txt", "results/smooth_motion.csv"):
+    for name in (
+        "calib.toml",
+        "results/report.html",
+        "results/agreement_methods.txt",
+        "results/tables/smooth_motion.csv",
+    ):
         assert (folder / name).is_file(), name
     assert (folder / "results" / "export" / "results.c3d").is_file()
     assert (folder / "angles.png").stat().st_size > 10_000
@@ -72,5 +77,9 @@ def test_every_file_that_the_tutorial_leaves_is_documented(done):
     cells = " ".join(re.findall(r"^\| (`.*?) \|", page, re.MULTILINE))
     known = re.escape(" ".join(re.findall(r"`([^`]+)`", cells))).replace("<camera>", "cam\\d")
     known = re.sub("<reference>", "(truth|digitised)", known).split("\\ ")
-    left = [path.name + "/" * path.is_dir() for path in (folder / "results").iterdir()]
+    left = [
+        path.relative_to(folder / "results").as_posix()
+        for path in (folder / "results").rglob("*")
+        if path.is_file() and path.parent.name != "export"
+    ]
     assert [name for name in sorted(left) if not any(re.fullmatch(each, name) for each in known)] == []

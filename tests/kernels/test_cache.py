@@ -40,7 +40,8 @@ import sys
 import numpy as np
 
 from airborne.kernels import kernel
-from airborne.tracking.model_based.normal_equations import accumulate
+from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, Projection, Window
+from airborne.tracking.model_based.twist_equations import Sums, accumulate
 
 @kernel(fastmath=True)
 def through_a_caller(residual, shape, coverage, owner, nearness, place, seen, window, sums, blocks):
@@ -51,10 +52,11 @@ h, w, s = 40, 50, 3
 residual, shape, coverage, scene, certainty = rng.random((5, 1, h, w)).astype(np.float32)
 owner, nearness = rng.integers(-1, s, (h, w)).astype(np.int16), 1 + coverage
 K, taps = np.array([[300.0, 0, 25], [0, 310, 20], [0, 0, 1]]), np.ones(5, np.float32)
-place, seen = (0, 0, rng.random(18), K, np.zeros(3)), (0, scene, certainty[0])
-sums = np.zeros((s, 6, 6)), np.zeros((s, 6)), np.zeros((s, 6, 3))
+place = Projection(np.zeros((s, 3, 3)), np.zeros((s, 3)), rng.random(18), K, np.zeros(3))
+seen = Observation(scene, scene, certainty[0])
+sums = Sums(np.zeros((s, 6, 6)), np.zeros((s, 6)), np.zeros((s, 6, 3)))
 call = accumulate if sys.argv[1] == "directly" else through_a_caller
-window, blocks = ((0, 0, w, h), taps, taps, 0.5), np.zeros((3, 4, s, 6))
+window, blocks = Comparison(Window(0, 0, w, h), taps, taps, 0.5), np.zeros((3, 4, s, 6))
 call(residual, shape, coverage[0], owner, nearness[0], place, seen, window, sums, blocks)
 print(hashlib.sha256(b"".join(part.tobytes() for part in sums)).hexdigest())
 """

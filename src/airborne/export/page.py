@@ -70,7 +70,7 @@ def _records_table(records: Sequence[Mapping[str, Any]]) -> Table:
     return Table([[record.get(key, "") for key in keys] for record in records], [label(key) for key in keys])
 
 
-def _settings_table(values: Mapping[str, Any]) -> Table:
+def settings_table(values: Mapping[str, Any]) -> Table:
     """Return the settings of a method; those that are not set are left out."""
     unread = UNREAD_SETTINGS.get(values.get("method", ""), frozenset())
     return Table([(label(key), value) for key, value in values.items() if value is not None and key not in unread])
@@ -94,6 +94,6 @@ def _environment() -> Environment:
         "text": format_value,
         "base64": _base64,
         "records_table": _records_table,
-        "settings_table": _settings_table,
+        "settings_table": settings_table,
     }
     return environment
