@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from airborne.body.model import BodyModel, Pose, PosedBody
 from airborne.geometry.joint_rotations import compose_rotation_vectors, rotation_vectors_between
-from airborne.geometry.rotations import angles_from_matrix
+from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.types import Array
 
 _LOCKED = 1e-8  # cosine of the middle angle below which the other two are one angle
@@ -46,13 +46,24 @@ def delta_between(earlier: Pose, later: Pose) -> Array:
     return np.concatenate([root, rotations.ravel()])
 
 
+def clamp_to_limits(model: BodyModel, pose: Pose) -> Pose:
+    """Return the pose with every joint clamped to its limits; joints within are left as they are, bit for bit."""
+    if not pose.joint_angles.size:
+        return pose
+    R = matrix_from_angles(pose.joint_angles)
+    clamped = model.limits.clamp(R)
+    is_out = np.any(clamped != R, axis=(1, 2))
+    angles = np.where(is_out[:, None], angles_near(clamped, pose.joint_angles), pose.joint_angles)
+    return replace(pose, joint_angles=angles)
+
+
 def joint_angles_of(model: BodyModel, R: Array, near: Array | None = None) -> Array:
     """Read the joint angles (..., joints, 3) [rad] off the rotations, world from segment, (..., segments, 3, 3).
 
     `near` (..., joints, 3) are angles that fix the branch; without it y lies in [-pi/2, pi/2].
     """
     parent_from_segment = np.swapaxes(R[..., model.parents[1:], :, :], -1, -2) @ R[..., 1:, :, :]
-    return angles_from_matrix(parent_from_segment) if near is None else _angles_near(parent_from_segment, near)
+    return angles_from_matrix(parent_from_segment) if near is None else angles_near(parent_from_segment, near)
 
 
 def nearest_angles(angles: Array, near: Array) -> Array:
@@ -113,7 +124,7 @@ def _is_carried(model: BodyModel) -> NDArray[np.bool_]:
     return carried[:, 1:]
 
 
-def _angles_near(matrix: Array, near: Array) -> Array:
+def angles_near(matrix: Array, near: Array) -> Array:
     """Read x-y-z angles off matrices on the branch nearest to `near`; where y is +-90 degrees, x stays as it was."""
     angles = angles_from_matrix(matrix)
     x = np.where(np.hypot(matrix[..., 1, 2], matrix[..., 2, 2]) < _LOCKED, near[..., 0], angles[..., 0])

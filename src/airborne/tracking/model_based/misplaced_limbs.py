@@ -12,7 +12,10 @@ from scipy.stats import qmc
 
 from airborne.appearance.model import Region
 from airborne.body import Pose
+from airborne.body.chain import angles_near
+from airborne.body.limits import JointLimits
 from airborne.geometry.joint_rotations import compose_rotation_vectors
+from airborne.geometry.rotations import matrix_from_angles
 from airborne.rendering import EvidenceMaps, mask_evidence, pose_segments
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
 from airborne.tracking.model_based.render_model import RenderModel
@@ -52,16 +55,15 @@ def search_limb(
     model, joints = render_model.model, limb - 1
     root = poses[0].world_from_root
     angles = np.stack([pose.joint_angles for pose in poses])  # (candidates, joints, 3)
-    half = np.diff(model.limits_rad[joints], axis=-1).ravel() / 2  # a hinge is searched about its one axis
-    reach = np.minimum(half / 2, _REACH_RAD)
+    limits = JointLimits.stack(model.segments[segment].limits for segment in limb)
+    reach = np.minimum(limits.half_rad.ravel() / 2, _REACH_RAD)  # a hinge is searched about its one axis
     for number, (n_proposals, n_survivors) in enumerate(_ROUNDS):
         steps = ndtri(qmc.Sobol(3 * len(limb), rng=number).random(n_proposals)) * reach / 2**number
         proposed = angles[np.arange(n_proposals) % len(angles)]
         angles_of_limb = np.ascontiguousarray(proposed[:, joints]).reshape(-1, 3)
-        proposed[:, joints] = compose_rotation_vectors(angles_of_limb, steps.reshape(-1, 3)).reshape(
-            n_proposals, len(limb), 3
-        )
-        angles = np.concatenate([angles, np.clip(proposed, *np.moveaxis(model.limits_rad, -1, 0))])
+        turned = compose_rotation_vectors(angles_of_limb, steps.reshape(-1, 3)).reshape(n_proposals, len(limb), 3)
+        proposed[:, joints] = angles_near(limits.clamp(matrix_from_angles(turned)), turned)
+        angles = np.concatenate([angles, proposed])
         R = np.broadcast_to(root.rotation.as_matrix(), (len(angles), 3, 3))
         t = np.broadcast_to(root.translation, (len(angles), 3))
         scores = mask_evidence(render_model.geometry, maps, *pose_segments(model, R, t, angles)).sum(axis=1)
