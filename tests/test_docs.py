@@ -183,6 +183,7 @@ MODELS = {
     "Body": bodies._BodyTable,
     "`[[segment]]`": bodies._SegmentTable,
     "`[[segment.part]]`": bodies._PartTable,
+    "`[segment.limits]`": bodies._LimitsTable,
     "`[segment.inertia]`": bodies._InertiaTable,
     "`[[landmark]]`": bodies._LandmarkTable,
 }

@@ -31,7 +31,7 @@ def move_pose(pose: Pose, delta: Array) -> Pose:
     if not n_joints:
         return root
     return replace(
-        root, joint_angles=compose_rotation_vectors(_angles_of(pose, n_joints), np.reshape(delta[6:], (n_joints, 3)))
+        root, joint_angles=compose_rotation_vectors(angles_of(pose, n_joints), np.reshape(delta[6:], (n_joints, 3)))
     )
 
 
@@ -42,7 +42,7 @@ def delta_between(earlier: Pose, later: Pose) -> Array:
     n_joints = max(len(earlier.joint_angles), len(later.joint_angles))
     if not n_joints:
         return root
-    rotations = rotation_vectors_between(_angles_of(earlier, n_joints), _angles_of(later, n_joints))
+    rotations = rotation_vectors_between(angles_of(earlier, n_joints), angles_of(later, n_joints))
     return np.concatenate([root, rotations.ravel()])
 
 
@@ -110,7 +110,7 @@ def point_jacobian(posed: PosedBody, segment: int | NDArray[np.integer], points:
     return np.concatenate([np.broadcast_to(np.eye(3), (*shape, 3, 3)), columns], axis=-1)
 
 
-def _angles_of(pose: Pose, n_joints: int) -> Array:
+def angles_of(pose: Pose, n_joints: int) -> Array:
     """Return the joint angles (joints, 3) of a pose, where an empty array stands for straight joints."""
     return np.asarray(pose.joint_angles, float) if pose.joint_angles.size else np.zeros((n_joints, 3))
 

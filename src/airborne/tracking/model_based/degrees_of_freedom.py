@@ -12,12 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose, PosedBody
-from airborne.body.chain import delta_between, move_pose, segment_jacobians
+from airborne.body.chain import angles_of, delta_between, move_pose, point_jacobian, segment_jacobians
+from airborne.body.contact import contact_model, overlaps
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.geometry.swing_twist import swing_twist, swing_twist_jacobian
+from airborne.rendering import pose_segments
 from airborne.types import Array
 
 _LIMIT_SD_RAD = np.radians(3.0)  # sd of how far a joint may go beyond its limits
+_OVERLAP_SD_M = 0.01  # sd of how far segments may pass through each other, beyond what flesh gives way
 _LIMIT_ROUNDS = 3  # of finding which limits a step reaches
 _BEYOND_RAD = 1e-6  # rounding
 _WIDE_SD = 1.5  # [m, rad]
@@ -74,7 +77,8 @@ class DegreesOfFreedom:
 
         H (d, d), g (d,) in units of the noise's variance.
         """
-        H, g = H + np.diag(self._damping), g.copy()
+        rows, depth = self._overlap_residuals(pose)
+        H, g = H + np.diag(self._damping) + rows.T @ rows, g - rows.T @ depth
         if prior is not None:
             precision = 1 / prior.sd[self.columns] ** 2
             H[np.diag_indices(len(g))] += precision
@@ -90,19 +94,22 @@ class DegreesOfFreedom:
         return delta
 
     def prior_cost(self, pose: Pose, prior: PosePrior | None) -> float:
-        """Return minus the log prior: half the squared distances, in sds, beyond limits and to the expected pose."""
-        excess = self.model.limits.excess(matrix_from_angles(pose.joint_angles)) if self.moves_joints else np.zeros(0)
-        cost = 0.5 * float(np.sum(excess**2)) / _LIMIT_SD_RAD**2
+        """Return minus the log prior: half the squared distances, in sds, beyond the possible and to the expected."""
+        if not self.moves_joints:
+            possible = np.zeros(0)
+        else:
+            excess = self.model.limits.excess(_rotations(self.model, pose))
+            depth = overlaps(contact_model(self.model), *self._segments(pose)).depth_m
+            possible = np.concatenate([excess.ravel() / _LIMIT_SD_RAD, depth / _OVERLAP_SD_M])
         if prior is None:
-            return cost
+            return 0.5 * float(possible @ possible)
         away = delta_between(prior.expected, pose)[self.columns] / prior.sd[self.columns]
         rest = self.rest_residuals(pose)[1]
-        return cost + 0.5 * float(away @ away + rest @ rest)
+        return 0.5 * float(away @ away + rest @ rest + possible @ possible)
 
     def rest_residuals(self, pose: Pose) -> tuple[Array, Array]:
         """Return how far limited joints are from the zero pose, in half ranges: rows (k, d), values (k,)."""
-        limits = self.model.limits
-        R = matrix_from_angles(pose.joint_angles)
+        limits, R = self.model.limits, _rotations(self.model, pose)
         away = limits.coordinates(R) - limits.nearest(limits.coordinates(np.eye(3)))
         used = np.isfinite(limits.half_rad) & (limits.half_rad > 0)
         joints, axes = np.nonzero(used)
@@ -113,17 +120,36 @@ class DegreesOfFreedom:
         rows[np.arange(len(joints))[:, None], columns] = jacobian[joints, axes] / sd[:, None]
         return rows[:, self.columns], away[joints, axes] / sd
 
+    def _segments(self, pose: Pose) -> tuple[Array, Array]:
+        """Return the segments in the world, R (segments, 3, 3) and t (segments, 3) [m]."""
+        root, joints = pose.world_from_root, angles_of(pose, self.model.n_joints)
+        R, t = pose_segments(self.model, root.rotation.as_matrix()[None], root.translation[None], joints[None])
+        return R[0], t[0]
+
+    def _overlap_residuals(self, pose: Pose) -> tuple[Array, Array]:
+        """Return how deep segments pass through each other, in sds: rows (k, d), values (k,)."""
+        if not self.moves_joints:
+            return np.zeros((0, len(self.columns))), np.zeros(0)
+        R, t = self._segments(pose)
+        found = overlaps(contact_model(self.model), R, t)
+        if not len(found.depth_m):
+            return np.zeros((0, len(self.columns))), np.zeros(0)
+        posed = PosedBody(self.model, R, t)
+        sphere, other = (point_jacobian(posed, found.segments[:, k], found.point) for k in (0, 1))
+        rows = -np.einsum("ki,kij->kj", found.normal, sphere - other)
+        return rows[:, self.columns] / _OVERLAP_SD_M, found.depth_m / _OVERLAP_SD_M
+
     def _walls(self, pose: Pose, delta: Array) -> tuple[Array, Array]:
         """Return rows (k, d) and targets (k,), in sds, of the joints that the delta would take past a limit."""
         limits = self.model.limits
         if not self.moves_joints or not limits.is_limited.any():
             return np.zeros((0, len(self.columns))), np.zeros(0)
-        after = limits.coordinates(matrix_from_angles(self.update(pose, delta).joint_angles))
+        after = limits.coordinates(_rotations(self.model, self.update(pose, delta)))
         bound = limits.nearest(after)
         beyond = np.linalg.norm(after - bound, axis=1)
         joints = np.flatnonzero(beyond > _BEYOND_RAD)
         normal = (after - bound)[joints] / beyond[joints, None]
-        relative = limits.relative(matrix_from_angles(pose.joint_angles))
+        relative = limits.relative(_rotations(self.model, pose))
         rows = np.zeros((len(joints), 6 + 3 * len(after)))
         columns = 6 + 3 * joints[:, None] + np.arange(3)
         jacobian = swing_twist_jacobian(relative[joints])
@@ -158,6 +184,13 @@ def limb_of_segment(model: BodyModel) -> NDArray[np.int64]:
     return limb
 
 
+def limbs_of(model: BodyModel) -> list[NDArray[np.int64]]:
+    """Return the segments of each limb of more than one segment."""
+    limb = limb_of_segment(model)
+    limbs = [np.flatnonzero(limb == each) for each in np.unique(limb[limb >= 0])]
+    return [each for each in limbs if len(each) > 1]
+
+
 def joints_of(model: BodyModel, segments: NDArray[np.integer]) -> DegreesOfFreedom:
     """Free the joints of some segments."""
     return DegreesOfFreedom(model, (3 + 3 * np.asarray(segments)[:, None] + np.arange(3)).ravel())
@@ -175,3 +208,8 @@ def _distance_from_trunk(model: BodyModel) -> NDArray[np.int64]:
     for segment in range(1, len(parents)):
         distance[segment] = 0 if is_trunk[segment] else distance[parents[segment]] + 1
     return distance
+
+
+def _rotations(model: BodyModel, pose: Pose) -> Array:
+    """Return the joints' rotations, parent from segment: (joints, 3, 3)."""
+    return matrix_from_angles(angles_of(pose, model.n_joints))

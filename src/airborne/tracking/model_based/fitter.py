@@ -15,6 +15,7 @@ from airborne.tracking.model_based.degrees_of_freedom import (
     DegreesOfFreedom,
     PosePrior,
     joints_of,
+    limbs_of,
     proximal_to_distal,
     root_only,
 )
@@ -25,10 +26,12 @@ from airborne.tracking.model_based.left_right_swap import swap_limbs
 from airborne.tracking.model_based.misplaced_limbs import find_misplaced_limbs, search_limb
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
+from airborne.tracking.model_based.uncovered import uncovered_pixels
 from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
 
+_FEWEST_VIEWS = 2  # in which something uncovered asks for a limb
 _TRUNK_AT = 4  # images at this reduction show the limbs of a body with joints; more reduced ones, its trunk alone
 
 
@@ -112,19 +115,43 @@ class Fitter:
         """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it."""
         if not self.moves_joints:
             return JudgedFit(fit, self.agreement(fit.pose, learned))
-        maps, seen = None, (learned.regions, learned.posteriors)
-        for limb in find_misplaced_limbs(self.render_model, fit.pose, *seen):
-            maps = maps or region_evidence(*seen)
-            expected = [replace(fit.pose, joint_angles=_with_limb(fit.pose, guess, limb)) for guess in guesses]
-            dofs = joints_of(self.model, limb)
-            poses = [
-                fit_silhouettes(self.render_model, pose, *seen, levels=NEAR, dofs=dofs)
-                for pose in search_limb(self.render_model, [fit.pose, *expected], limb, maps)
-            ]
-            fit = self.fit_images([fit.pose, *poses], learned, None if prior is None else prior.widen(dofs.columns))
+        seen = learned.regions, learned.posteriors
+        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *seen)
+        for limb in misplaced:
+            fit = self._refit_limb(fit, limb, guesses, learned, prior, wide=False)
+        for limb in limbs_of(self.model):
+            if self._n_views_uncovered(fit.pose, learned) < _FEWEST_VIEWS:
+                break
+            fit = self._refit_limb(fit, limb, guesses, learned, prior, wide=True)
         misplaced = find_misplaced_limbs(self.render_model, fit.pose, *seen)
         segments = tuple(int(segment) for limb in misplaced for segment in limb)
         return JudgedFit(fit, replace(self.agreement(fit.pose, learned), misplaced=segments))
+
+    def _refit_limb(
+        self,
+        fit: Fit,
+        limb: NDArray[np.int64],
+        guesses: Sequence[Pose],
+        learned: LearnedRegions,
+        prior: PosePrior | None,
+        *,
+        wide: bool,
+    ) -> Fit:
+        """Search for a limb, from where the fit and the guesses have it; return the best fit of all."""
+        seen = learned.regions, learned.posteriors
+        expected = [replace(fit.pose, joint_angles=_with_limb(fit.pose, guess, limb)) for guess in guesses]
+        dofs = joints_of(self.model, limb)
+        poses = [
+            fit_silhouettes(self.render_model, pose, *seen, levels=NEAR, dofs=dofs)
+            for pose in search_limb(self.render_model, [fit.pose, *expected], limb, region_evidence(*seen), wide=wide)
+        ]
+        return self.fit_images([fit.pose, *poses], learned, None if prior is None else prior.widen(dofs.columns))
+
+    def _n_views_uncovered(self, pose: Pose, learned: LearnedRegions) -> int:
+        """Count the views in which something like a limb stands out that the body does not cover."""
+        posed = self.render_model.with_pose(pose)
+        uncovered = uncovered_pixels(self.render_model, posed, learned.regions, learned.posteriors)
+        return sum(bool(each.any()) for each in uncovered)
 
     def _stages_at(self, reduction: int) -> list[DegreesOfFreedom]:
         trunk, everything = self.stages[0], self.stages[-1]
