@@ -18,7 +18,7 @@ from airborne.errors import BodyError, TrialError
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.types import Array
 
-_ROUNDING_RAD = 1e-9
+_ROUNDING_RAD = 1e-9  # an angle beyond its limit by less is at it
 LEAST_VISIBILITY = 0.3  # detections with a lower confidence are ignored
 LANDMARK_WEIGHTS = {  # of points that only lie near the landmark they stand for
     "head": 0.1,
