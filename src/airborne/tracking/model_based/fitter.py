@@ -26,6 +26,7 @@ from airborne.tracking.model_based.left_right_swap import swap_limbs
 from airborne.tracking.model_based.misplaced_limbs import find_misplaced_limbs, search_limb
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
+from airborne.tracking.model_based.support import count_views
 from airborne.tracking.model_based.uncovered import uncovered_pixels
 from airborne.types import Array
 
@@ -103,8 +104,7 @@ class Fitter:
 
     def fit_images(self, poses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> Fit:
         """Fit the images from several poses; return the best fit."""
-        posed = self.render_model.with_pose(poses[0])
-        appearance = learn_missing_backgrounds(self.render_model, posed, learned.regions, learned.appearance)
+        appearance = self._complete(poses[0], learned)
         *before, last = self.stages if self.order == "hierarchical" else self.stages[-1:]
         for dofs in before:
             fit = fit_images(self.render_model, poses, learned.regions, appearance, dofs=dofs, prior=prior)
@@ -118,14 +118,21 @@ class Fitter:
         seen = learned.regions, learned.posteriors
         misplaced = find_misplaced_limbs(self.render_model, fit.pose, *seen)
         for limb in misplaced:
-            fit = self._refit_limb(fit, limb, guesses, learned, prior, wide=False)
+            fit = self._refit_limb(fit, limb, guesses, learned, prior)
         for limb in limbs_of(self.model):
             if self._n_views_uncovered(fit.pose, learned) < _FEWEST_VIEWS:
                 break
-            fit = self._refit_limb(fit, limb, guesses, learned, prior, wide=True)
+            fit = self._refit_limb(fit, limb, guesses, learned, prior)
         misplaced = find_misplaced_limbs(self.render_model, fit.pose, *seen)
         segments = tuple(int(segment) for limb in misplaced for segment in limb)
-        return JudgedFit(fit, replace(self.agreement(fit.pose, learned), misplaced=segments))
+        n_views_of = count_views(self.render_model, fit.pose, learned.regions, self._complete(fit.pose, learned))
+        agreement = replace(self.agreement(fit.pose, learned), misplaced=segments, n_views_of=n_views_of)
+        return JudgedFit(fit, agreement)
+
+    def _complete(self, pose: Pose, learned: LearnedRegions) -> Appearance:
+        """Return the appearance with a background in every region."""
+        posed = self.render_model.with_pose(pose)
+        return learn_missing_backgrounds(self.render_model, posed, learned.regions, learned.appearance)
 
     def _refit_limb(
         self,
@@ -134,16 +141,14 @@ class Fitter:
         guesses: Sequence[Pose],
         learned: LearnedRegions,
         prior: PosePrior | None,
-        *,
-        wide: bool,
     ) -> Fit:
-        """Search for a limb, from where the fit and the guesses have it; return the best fit of all."""
+        """Search for a limb, from where the fit and the guesses have it and from anywhere; return the best fit."""
         seen = learned.regions, learned.posteriors
         expected = [replace(fit.pose, joint_angles=_with_limb(fit.pose, guess, limb)) for guess in guesses]
         dofs = joints_of(self.model, limb)
         poses = [
             fit_silhouettes(self.render_model, pose, *seen, levels=NEAR, dofs=dofs)
-            for pose in search_limb(self.render_model, [fit.pose, *expected], limb, region_evidence(*seen), wide=wide)
+            for pose in search_limb(self.render_model, [fit.pose, *expected], limb, region_evidence(*seen))
         ]
         return self.fit_images([fit.pose, *poses], learned, None if prior is None else prior.widen(dofs.columns))
 

@@ -48,19 +48,18 @@ def find_misplaced_limbs(
 
 
 def search_limb(
-    render_model: RenderModel, poses: Sequence[Pose], limb: NDArray[np.int64], maps: EvidenceMaps, *, wide: bool = False
+    render_model: RenderModel, poses: Sequence[Pose], limb: NDArray[np.int64], maps: EvidenceMaps
 ) -> list[Pose]:
     """Return the poses with the most evidence when one limb moves from where the given poses have it.
 
-    The poses differ in that limb only. A wide search starts from all over the joints' ranges too.
+    The poses differ in that limb only. The search starts from all over the joints' ranges too.
     """
     joints, root = limb - 1, poses[0].world_from_root
     angles = np.stack([pose.joint_angles for pose in poses])  # (candidates, joints, 3)
     limits = JointLimits.stack(render_model.model.segments[segment].limits for segment in limb)
     reach = np.minimum(limits.half_rad.ravel() / 2, _REACH_RAD)  # a hinge is searched about its one axis
-    if wide:
-        anywhere = np.concatenate([angles, _all_over(limits, joints, angles[0])])
-        angles = _best(render_model, root, anywhere, maps, _ROUNDS[0][1])
+    anywhere = np.concatenate([angles, _all_over(limits, joints, angles[0])])
+    angles = _best(render_model, root, anywhere, maps, _ROUNDS[0][1])
     for number, (n_proposals, n_survivors) in enumerate(_ROUNDS):
         steps = ndtri(qmc.Sobol(3 * len(limb), rng=number).random(n_proposals)) * reach / 2**number
         proposed = angles[np.arange(n_proposals) % len(angles)]
