@@ -4,10 +4,6 @@ import os
 import warnings
 from pathlib import Path
 
-for threads in ("OPENBLAS_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"):  # else libraries fight with the workers for cores
-    os.environ.setdefault(threads, "1")
-
-import cv2
 import pytest
 
 from airborne.calibration.from_points import Calibration, calibrate
