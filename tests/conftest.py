@@ -11,7 +11,7 @@ from airborne.calibration.sources.control_points import ControlPoints, read_cont
 from tests.support.places import ROOT
 
 SKIPPED = "airborne/skipped"  # where pytest's cache keeps what the last run skipped
-SLOW_FILES = Path(__file__).with_name("slow_files.txt")  # CPU seconds and file, kernels compiled
+SLOW_FILES = Path(__file__).with_name("slow_files.txt")  # CPU seconds and file, kernels not yet compiled
 
 
 def pytest_addoption(parser):
