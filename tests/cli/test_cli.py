@@ -74,6 +74,7 @@ def wait_for_rows(process: subprocess.Popen, motion: Path, rows: int) -> None:
         time.sleep(0.005)
 
 
+@pytest.mark.quick
 def test_track_prints_what_was_found_and_leaves_every_table(trial, tmp_path, capsys):
     assert in_process("track", trial, "-o", tmp_path / "run", "--no-pictures", "--cameras", "cam1, cam2") == 0
     out, err = capsys.readouterr()
