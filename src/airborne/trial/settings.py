@@ -15,14 +15,14 @@ from airborne.tracking.particle.bootstrap import ResampleWhen
 from airborne.tracking.particle.resampling import Scheme
 from airborne.tracking.particle.settings import EstimateAs, ViewsAs
 from airborne.tracking.particle.swing import Swing
-from airborne.trial.table import Table
+from airborne.trial.table import SettingsTable
 
 StepSizes = list[Annotated[float, Field(gt=0)]]
 CapsuleMethod = Literal["blocker"]
 Overlay = Literal["paper", "broadcast"]
 
 
-class _Settings(Table):
+class _Settings(SettingsTable):
     """What every method reads."""
 
     method: str
