@@ -11,13 +11,17 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.diagnosis import check_points, decompose_cameras, warnings_about
-from airborne.calibration.intrinsics.model_selection import Solution, choose_simplest, leave_one_out, models_for
+from airborne.calibration.intrinsics.model_selection import (
+    Solution,
+    candidates_for,
+    choose_simplest,
+    leave_one_out,
+    place_sd,
+)
 from airborne.calibration.intrinsics.physical import (
-    PINHOLE_MODELS,
     SEVEN_PARAMETERS,
     Pinhole,
     anneal_pinhole,
-    fit_pinhole,
     parameter_names,
     parameter_sd,
 )
@@ -131,10 +135,7 @@ def _solve(
     if method == "annealing":
         pinhole = anneal_pinhole(initial, world, px, seed=seed)
         return [leave_one_out(pinhole, SEVEN_PARAMETERS, world, px)]
-    return [
-        leave_one_out(fit_pinhole(initial, model, world, px), model, world, px)
-        for model in models_for(PINHOLE_MODELS, len(world))
-    ]
+    return candidates_for(initial, world, px)
 
 
 def _camera(name: str, size: tuple[int, int], solution: Solution) -> Camera:
@@ -145,7 +146,8 @@ def _camera(name: str, size: tuple[int, int], solution: Solution) -> Camera:
         K=np.array([[f, 0, u0], [0, f, v0], [0, 0, 1]]),
         size=size,
         camera_from_world=RigidTransform.from_components(-pinhole.R @ pinhole.centre, Rotation.from_matrix(pinhole.R)),
-        distortion=np.array([pinhole.k1, 0, 0, 0, 0]),
+        distortion=pinhole.terms,
+        lens=pinhole.lens,
         shift_sd_px=solution.shift_sd_px,
     )
 
@@ -154,6 +156,7 @@ def _describe_fit(points: ControlPoints, name: str, best: Solution, candidates: 
     is_seen = points.is_seen_by(name)
     P_dlt = fit_dlt(best.world, best.px)
     sd = parameter_sd(best.pinhole, best.model, best.world, best.px)
+    sd[3:6] = place_sd(best, candidates)
     return CameraFit(
         name=name,
         model=best.model.name,
