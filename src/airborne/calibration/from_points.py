@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.diagnosis import check_points, decompose_cameras, warnings_about
 from airborne.calibration.intrinsics.model_selection import (
@@ -26,7 +25,7 @@ from airborne.calibration.intrinsics.physical import (
     parameter_sd,
 )
 from airborne.calibration.sources.control_points import ControlPoints
-from airborne.cameras.camera import Camera, Rig
+from airborne.cameras.camera import Rig
 from airborne.cameras.dlt import Decomposition, dlt_coefficients, fit_dlt
 from airborne.errors import CalibrationError
 from airborne.geometry.triangulation import px_from_points, triangulate
@@ -104,7 +103,7 @@ def calibrate(
             points, name, size=sizes[name], decomposition=decompositions[name], method=method, seed=seed
         )
         solutions[name] = choose_simplest(candidates)
-        cameras.append(_camera(name, sizes[name], solutions[name]))
+        cameras.append(solutions[name].pinhole.camera(name, sizes[name], solutions[name].shift_sd_px))
         fits.append(_describe_fit(points, name, solutions[name], candidates))
     return Calibration(
         rig=Rig(tuple(cameras)),
@@ -136,20 +135,6 @@ def _solve(
         pinhole = anneal_pinhole(initial, world, px, seed=seed)
         return [leave_one_out(pinhole, SEVEN_PARAMETERS, world, px)]
     return candidates_for(initial, world, px)
-
-
-def _camera(name: str, size: tuple[int, int], solution: Solution) -> Camera:
-    pinhole = solution.pinhole
-    f, (u0, v0) = pinhole.focal_px, pinhole.principal_point
-    return Camera(
-        name=name,
-        K=np.array([[f, 0, u0], [0, f, v0], [0, 0, 1]]),
-        size=size,
-        camera_from_world=RigidTransform.from_components(-pinhole.R @ pinhole.centre, Rotation.from_matrix(pinhole.R)),
-        distortion=pinhole.terms,
-        lens=pinhole.lens,
-        shift_sd_px=solution.shift_sd_px,
-    )
 
 
 def _describe_fit(points: ControlPoints, name: str, best: Solution, candidates: list[Solution]) -> CameraFit:

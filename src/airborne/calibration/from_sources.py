@@ -66,6 +66,8 @@ def calibrate_from(sources: Sources, progress: StageProgress) -> RigCalibration:
         )  # triangulated anew by better cameras
     frame = choose_world_frame(inputs, adjustment, [m.camera.name for m in mended])
     final = adjustment if frame.is_unchanged else _adjust_in_world(adjustment, frame, progress)
+    if frame.is_unchanged and sources.kinds == ["control_points"]:
+        final = _with_lens_model_error(inputs, final)
     held_out_px = cross_validate(final, lambda done, n: progress("leaving out and predicting", done, n))
     lags = _lags(final) if lag_sd_s is not None else {}
     return RigCalibration(
@@ -153,6 +155,16 @@ def _adjust_in_world(adjustment: Adjustment, frame: WorldFrame, progress: StageP
     if frame.fixed_camera is not None:
         free[frame.fixed_camera] = replace(free[frame.fixed_camera], extrinsics=False)
     return adjust(rig, sources, free, progress=lambda step, _: progress("adjusting", step, None))
+
+
+def _with_lens_model_error(inputs: Inputs, adjustment: Adjustment) -> Adjustment:
+    """Widen the standard deviations of places to those that hold the error of the lens model."""
+    camera_sd = adjustment.camera_sd.copy()
+    for row, name in zip(camera_sd, adjustment.rig.names, strict=True):
+        fit = inputs.lenses.get(name)
+        if fit is not None and fit.place_sd_m is not None:
+            row[3:6] = np.maximum(row[3:6], fit.place_sd_m)
+    return replace(adjustment, camera_sd=camera_sd)
 
 
 def _lags(adjustment: Adjustment) -> dict[str, Array]:

@@ -109,7 +109,8 @@ def warnings_about(
     outliers = {camera: find_outliers(solutions[camera]) for camera in points.cameras}
     warnings += _outlier_warnings(points, outliers)
     for camera in points.cameras:
-        warnings += _image_warnings(camera, sizes[camera], decompositions[camera])
+        if len(solutions[camera].model.terms) < 2:  # else the decomposition, of a straight lens, says little
+            warnings += _image_warnings(camera, sizes[camera], decompositions[camera])
         ratio = flatness(solutions[camera].world)
         if ratio < _FLAT_WARNING:
             warnings.append(

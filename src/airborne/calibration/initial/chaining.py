@@ -14,12 +14,13 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, mini
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.bundle import Source
-from airborne.calibration.sources.boards import Board, DetectedCorners
+from airborne.calibration.sources.boards import Board, DetectedCorners, mirror_corners
 from airborne.cameras.camera import Camera, Lens, Rig
 from airborne.errors import CalibrationError
 from airborne.types import Array, Ints
 
 _FOCALS = np.geomspace(0.4, 4.0, 14)  # of an image's longer side: initial focal lengths
+_CLEAR_MISFIT = 2.0  # ratio of misfits from which on a camera's images are mirrored
 FEWEST_LENS_VIEWS = 3  # that determine a focal length
 _IDENTITY = RigidTransform.from_components(np.zeros(3), Rotation.identity())
 
@@ -49,6 +50,14 @@ class Views:
     def select_cameras(self, cameras: Sequence[int]) -> Views:
         """Return the views of some cameras."""
         return Views(self.board, tuple(self.cameras[c] for c in cameras), tuple(self.detections[c] for c in cameras))
+
+    def mirror(self, camera: int, cameras: Sequence[Camera]) -> Views:
+        """Return the views as if one camera's images were mirrored, and showed the board's other side."""
+        n = self.board.inner_size[0] * self.board.inner_size[1]
+        row = tuple(
+            replace(mirror_corners(s, cameras[camera].size[0]), corner=s.corner % n) for s in self.detections[camera]
+        )
+        return replace(self, detections=(*self.detections[:camera], row, *self.detections[camera + 1 :]))
 
     def groups(self) -> list[list[int]]:
         """Return the cameras that are linked by shared moments, group by group, the largest first."""
@@ -140,13 +149,39 @@ def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTr
                 poses=camera_from_board[i],
                 other_poses=camera_from_board[j],
                 pair=(int(i), j),
-            )
+            )[0]
             * from_world[j]
         )
     rig = Rig(tuple(replace(camera, camera_from_world=from_world[i]) for i, camera in enumerate(cameras)))
     return rig, stack_transforms(
         [_consensus_board_pose(rig, views, camera_from_board, m) for m in range(views.n_moments)]
     )
+
+
+def find_mirrored_cameras(cameras: Sequence[Camera], views: Views) -> list[str]:
+    """Return the cameras that seem to stand behind a two-sided board but whose images are mirrored.
+
+    Mirrored images of the front look like the back in every single image; only over several moments do their cameras
+    fail to keep one place among the others.
+    """
+    shared = _n_shared_moments(views)
+    is_behind = [all(s.is_back for s in row if len(s.corner)) for row in views.detections]
+    mirrored = []
+    for c in np.flatnonzero(is_behind):
+        o = int(np.argmax(np.where(is_behind, 0, shared[c])))
+        if is_behind[o] or shared[c, o] < FEWEST_LENS_VIEWS:
+            continue
+        as_seen, flipped = (_pair_misfit(cameras, each, (int(c), o)) for each in (views, views.mirror(int(c), cameras)))
+        if _CLEAR_MISFIT * flipped < as_seen:
+            mirrored.append(views.cameras[c])
+    return mirrored
+
+
+def _pair_misfit(cameras: Sequence[Camera], views: Views, pair: tuple[int, int]) -> float:
+    one, other = (
+        [_board_pose(cameras[i], views.board, s)[0] if len(s.corner) else None for s in views.detections[i]] for i in pair
+    )
+    return _relative_pose(cameras[pair[0]], cameras[pair[1]], views, poses=one, other_poses=other, pair=pair)[1]
 
 
 def board_poses(rig: Rig, views: Views) -> RigidTransform:
@@ -209,8 +244,8 @@ def _relative_pose(
     poses: Sequence[RigidTransform | None],
     other_poses: Sequence[RigidTransform | None],
     pair: tuple[int, int],
-) -> RigidTransform:
-    """Return one_from_other: of the shared moments' candidates the one that fits most of them."""
+) -> tuple[RigidTransform, float]:
+    """Return one_from_other, of the shared moments' candidates the one that fits most of them, and its misfit [px]."""
     shared = [
         (a, b, m) for m, (a, b) in enumerate(zip(poses, other_poses, strict=True)) if a is not None and b is not None
     ]
@@ -225,7 +260,8 @@ def _relative_pose(
             distances.append(np.median(np.nan_to_num(np.linalg.norm(projected - sighting.px, axis=1), nan=1e6)))
         return float(np.median(distances))
 
-    return min(candidates, key=misfit)
+    best = min(candidates, key=misfit)
+    return best, misfit(best)
 
 
 def _consensus_board_pose(

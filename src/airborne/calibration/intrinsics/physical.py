@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import dual_annealing, least_squares
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.bundle.lenses import cross_matrices, project_with_jacobian
-from airborne.cameras.camera import Lens
+from airborne.cameras.camera import Camera, Lens
 from airborne.cameras.distortion import distort, distort_fisheye, undistort, undistort_fisheye
 from airborne.types import Array
 
@@ -77,6 +77,19 @@ class Pinhole:
         f, (u0, v0) = self.focal_px, self.principal_point
         K = np.array([[f, 0, u0], [0, f, v0], [0, 0, 1]])
         return K @ np.column_stack([self.R, -self.R @ self.centre])
+
+    def camera(self, name: str, size: tuple[int, int], shift_sd_px: float = 0.0) -> Camera:
+        """Return the camera of a name and size (width, height) [px]."""
+        f, (u0, v0) = self.focal_px, self.principal_point
+        return Camera(
+            name=name,
+            K=np.array([[f, 0, u0], [0, f, v0], [0, 0, 1]]),
+            size=size,
+            camera_from_world=RigidTransform.from_components(-self.R @ self.centre, Rotation.from_matrix(self.R)),
+            distortion=self.terms,
+            lens=self.lens,
+            shift_sd_px=shift_sd_px,
+        )
 
     def depth(self, world: Array) -> Array:
         """Return how far in front of the camera points (..., 3) lie: (...) [m]."""
