@@ -56,10 +56,9 @@ def calibrate_from(sources: Sources, progress: StageProgress) -> RigCalibration:
     adjustment, lag_sd_s = without_lags, _lag_sd_s(inputs)
     if lag_sd_s is not None:
         with_lags = _adjust(inputs, without_lags.rig, free, lag_sd_s=lag_sd_s, progress=progress)
-        row = [source.name for source in with_lags.sources].index("board")
-        is_better = with_lags.noise_px[row] < _LOOSE_SYNC_NOISE_SHARE * without_lags.noise_px[row]
         is_requested = sources.board is not None and sources.board.sync == "loose"
-        adjustment, lag_sd_s = (with_lags, lag_sd_s) if is_better or is_requested else (without_lags, None)
+        is_better = is_requested or _is_looser_better(without_lags, with_lags, progress)
+        adjustment, lag_sd_s = (with_lags, lag_sd_s) if is_better else (without_lags, None)
     elif inputs.wand is not None or (inputs.detections is not None and without_lags.prior is None):
         adjustment = _adjust(
             inputs, without_lags.rig, free, lag_sd_s=None, progress=progress
@@ -140,6 +139,20 @@ def _lag_sd_s(inputs: Inputs) -> float | None:
     gap_s = float(np.median(np.diff(detections.time_s))) if len(detections.time_s) > 1 else np.inf
     is_dense = gap_s <= _LONGEST_GAP_S and (detections.views.n_corners > 0).any(axis=0).sum() >= _FEWEST_MOMENTS
     return _LAG_SD * gap_s if is_dense else None
+
+
+def _is_looser_better(without_lags: Adjustment, with_lags: Adjustment, progress: StageProgress) -> bool:
+    """Say whether lags come to rest, clearly lower the board's noise, and predict left-out moments as well."""
+    row = [source.name for source in with_lags.sources].index("board")
+    noise_share = with_lags.noise_px[row] / without_lags.noise_px[row]
+    if not with_lags.has_converged or noise_share >= _LOOSE_SYNC_NOISE_SHARE:
+        return False
+    held_out = [
+        cross_validate(adjustment, lambda done, n: progress("comparing the clocks", done, n))["board"]
+        for adjustment in (without_lags, with_lags)
+    ]
+    exact, loose = (float(np.sqrt(np.nanmean(distances**2))) for distances in held_out)
+    return not loose > exact
 
 
 def _adjust_in_world(adjustment: Adjustment, frame: WorldFrame, progress: StageProgress) -> Adjustment:
