@@ -43,6 +43,11 @@ class RigCalibration:
         """The cameras."""
         return self.adjustment.rig
 
+    def held_out_px_of(self, camera: str) -> Array:
+        """Return the distances of a camera's held-out observations from their predictions, of all sources [px]."""
+        i = self.rig.names.index(camera)
+        return np.concatenate([self.held_out_px[s.name][s.camera == i] for s in self.adjustment.sources])
+
 
 def calibrate_from(sources: Sources, progress: StageProgress) -> RigCalibration:
     """Read all sources and adjust the cameras to all of them at once; raises an AirborneError in one line.

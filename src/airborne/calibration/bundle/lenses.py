@@ -20,7 +20,8 @@ _NEAREST_DEPTH_M = 1e-9  # a point at a smaller depth counts as behind the camer
 def project(R: Array, centre: Array, intrinsics: Array, *, is_fisheye: NDArray[np.bool_], world: Array) -> Array:
     """Project one world point a row: (n, 2) [px]; NaN behind the camera.
 
-    R (n, 3, 3) camera from world, centre (n, 3) [m], intrinsics (n, 12) fx, fy, cx, cy and lens terms, world (n, 3) [m].
+    R (n, 3, 3) camera from world, centre (n, 3) [m], intrinsics (n, 12) fx, fy, cx, cy and lens terms,
+    world (n, 3) [m].
     """
     xyz = np.einsum("nij,nj->ni", R, world - centre)
     z = np.where(xyz[:, 2:] > _NEAREST_DEPTH_M, xyz[:, 2:], np.nan)

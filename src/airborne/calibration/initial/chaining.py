@@ -179,7 +179,8 @@ def find_mirrored_cameras(cameras: Sequence[Camera], views: Views) -> list[str]:
 
 def _pair_misfit(cameras: Sequence[Camera], views: Views, pair: tuple[int, int]) -> float:
     one, other = (
-        [_board_pose(cameras[i], views.board, s)[0] if len(s.corner) else None for s in views.detections[i]] for i in pair
+        [_board_pose(cameras[i], views.board, s)[0] if len(s.corner) else None for s in views.detections[i]]
+        for i in pair
     )
     return _relative_pose(cameras[pair[0]], cameras[pair[1]], views, poses=one, other_poses=other, pair=pair)[1]
 

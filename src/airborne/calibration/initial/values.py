@@ -81,12 +81,16 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
     if start_rig is not None:
         known_lenses |= {camera.name: camera for camera in start_rig if camera.name not in known_lenses}
     start_of = {
-        name: initial_rig_from_points(table.select(_common(table.cameras, sizes)), sizes, known_lenses, fisheyes=fisheyes)
+        name: initial_rig_from_points(
+            table.select(_common(table.cameras, sizes)), sizes, known_lenses, fisheyes=fisheyes
+        )
         for name, table in points.items()
     }
     start_of |= {"calibration at the start": start_rig} if start_rig is not None else {}
     if wand is not None:
-        start_of["wand"] = initial_rig_from_wand(wand, {name: sizes[name] for name in wand.cameras}, known_lenses, fisheyes)
+        start_of["wand"] = initial_rig_from_wand(
+            wand, {name: sizes[name] for name in wand.cameras}, known_lenses, fisheyes
+        )
     starts = list(start_of.values())
     if board_detections is not None:
         starts += _board_starts(
@@ -152,7 +156,18 @@ def _board(sources: Sources) -> Board | None:
         return None
     if table.file is not None:
         return read_board(sources.path(table.file))
-    keys = ("kind", "columns", "rows", "square_m", "marker_m", "dictionary", "inverted", "legacy", "two_sided", "thickness_m")
+    keys = (
+        "kind",
+        "columns",
+        "rows",
+        "square_m",
+        "marker_m",
+        "dictionary",
+        "inverted",
+        "legacy",
+        "two_sided",
+        "thickness_m",
+    )
     return board_from_table({key: v for key in keys if (v := getattr(table, key)) is not None}, "[board]")
 
 
@@ -223,8 +238,8 @@ def _board_starts(views: Views, known_lenses: dict[str, Camera], *, alone_is_eno
         mirrored = find_mirrored_cameras([known_lenses[name] for name in views.cameras], views)
         if mirrored:
             raise CalibrationError(
-                f"{', '.join(mirrored)}: the board is seen mirrored, but no place behind it fits all moments: its pictures "
-                "are mirrored; switch off the camera's mirror image and record or convert anew"
+                f"{', '.join(mirrored)}: the board is seen mirrored, but no place behind it fits all moments: its "
+                "pictures are mirrored; switch off the camera's mirror image and record or convert anew"
             )
     groups = [list(range(len(views.cameras)))] if alone_is_enough else views.groups()
     return [

@@ -56,7 +56,8 @@ def initial_rig_from_wand(
     """Return initial values of the cameras that see the wand, in metres.
 
     lenses: cameras whose K and distortion are known; the others are taken as pinholes with the principal point in the
-    image's middle, or as `fisheyes`: of some focal lengths, alike for all, that which keeps the wand's length. The world is the axes of the first camera of the best pair. Raises CalibrationError where cameras
+    image's middle, or as `fisheyes`: of some focal lengths, alike for all, that which keeps the wand's length. The
+    world is the axes of the first camera of the best pair. Raises CalibrationError where cameras
     share too few markers, naming them, or where an image seems to be mirrored.
     """
     unknown = [name for name in tracks.cameras if name in fisheyes and name not in (lenses or {})]

@@ -47,7 +47,9 @@ class LensFit:
     free: FreeParameters
     n_views: int  # of a board; or points
     rms_px: float
-    held_out_rms_px: dict[str, float]  # by model, over what was left out: RMS of a view's corners, mean over views; or of points
+    held_out_rms_px: dict[
+        str, float
+    ]  # by model, over what was left out: RMS of a view's corners, mean over views; or of points
     place_sd_m: Array | None = None  # (3,) of control points: with the lens model's error
 
 
@@ -87,7 +89,7 @@ def choose_lens(
 
 
 def lenses_from_points(rig: Rig, points: ControlPoints, progress: Progress) -> dict[str, LensFit]:
-    """Fit the lenses of cameras that see many control points, from their initial values; those with few are left out."""
+    """Fit the lenses of cameras that see many control points, from initial values; those with few are left out."""
     fits = {}
     for done, camera in enumerate(rig):
         is_seen = points.is_seen_by(camera.name)

@@ -72,7 +72,9 @@ def candidates_for(initial: Pinhole, world: Array, px: Array) -> list[Solution]:
     for model in FISHEYE_MODELS if initial.lens == "fisheye" else WIDE_MODELS:
         is_supported = _COORDINATES_PER_PARAMETER * model.n_parameters <= 2 * len(world)
         if is_supported or not (solutions or model is not FISHEYE_MODELS[0]):
-            within = [s.pinhole for s in solutions if s.model.lens == model.lens and set(s.model.terms) <= {*model.terms}]
+            within = [
+                s.pinhole for s in solutions if s.model.lens == model.lens and set(s.model.terms) <= {*model.terms}
+            ]
             pinhole = fit_pinhole(within[-1] if within else start, model, world, px)
             solutions.append(leave_one_out(pinhole, model, world, px))
     return sorted(solutions, key=lambda solution: solution.model.n_parameters)
@@ -101,8 +103,8 @@ def as_good_as_best(solutions: Sequence[Solution]) -> list[Solution]:
 def place_sd(chosen: Solution, candidates: Sequence[Solution]) -> Array:
     """Return the standard deviation of a camera's position (3,) [m], with the error of its lens model.
 
-    The larger of that of independent errors and that of a jackknife over parts of the image, where a lens that fits badly
-    errs alike; and the differences to the models that predict held-out points as well.
+    The larger of that of independent errors and that of a jackknife over parts of the image, where a lens that fits
+    badly errs alike; and the differences to the models that predict held-out points as well.
     """
     sd = parameter_sd(chosen.pinhole, chosen.model, chosen.world, chosen.px)[3:6]
     others = [s.pinhole.centre - chosen.pinhole.centre for s in as_good_as_best(candidates)]

@@ -109,7 +109,7 @@ class Pinhole:
         return self.focal_px * inverse(xy, self.terms) + self.principal_point
 
     def with_lens(self, model: PinholeModel) -> Pinhole:
-        """Return the camera with room for the model's lens terms; a lens of the other kind starts without distortion."""
+        """Return the camera with room for the model's lens terms; one of the other kind starts without distortion."""
         n = 1 + max(model.terms, default=0)
         terms = np.zeros(n) if model.lens != self.lens else np.pad(self.terms, (0, max(n - len(self.terms), 0)))
         return replace(self, terms=np.pad(terms, (0, max(_FEWEST_TERMS[model.lens] - len(terms), 0))), lens=model.lens)

@@ -15,7 +15,14 @@ import numpy as np
 from airborne.calibration.diagnosis.clocks import check_image_counts
 from airborne.calibration.diagnosis.inputs import check_board, check_time_stamps
 from airborne.calibration.initial.chaining import Views
-from airborne.calibration.sources.boards import NO_CORNERS, Board, DetectedCorners, board_detector, match_print, match_sides
+from airborne.calibration.sources.boards import (
+    NO_CORNERS,
+    Board,
+    DetectedCorners,
+    board_detector,
+    match_print,
+    match_sides,
+)
 from airborne.calibration.sources.files import CameraSource, Sources
 from airborne.cameras.finding import Finding
 from airborne.errors import CalibrationError
@@ -78,7 +85,9 @@ def detect_boards(sources: Sources, board: Board, progress: Progress) -> BoardDe
             progress(done, total)
         rows.append(tuple(row))
     views = Views(board, tuple(camera.name for camera in cameras), tuple(rows))
-    return BoardDetections(views, time_s, sizes, examples, (*notes, *side_notes), (*findings, *check_board(views, samples)))
+    return BoardDetections(
+        views, time_s, sizes, examples, (*notes, *side_notes), (*findings, *check_board(views, samples))
+    )
 
 
 def detect_lens_board(sources: Sources, camera: CameraSource, board: Board, progress: Progress) -> Views | None:

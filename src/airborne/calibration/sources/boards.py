@@ -45,11 +45,11 @@ class Board:
 
     @property
     def corners(self) -> Array:
-        """The inner corners (n, 3) [m], row by row; of a thick two-sided board those of the back behind them (2 n, 3)."""
+        """The inner corners (n, 3) [m], row by row; of a thick two-sided board then those of its back (2 n, 3)."""
         nx, ny = self.inner_size
         grid = np.stack(np.meshgrid(np.arange(nx), np.arange(ny)), axis=-1).reshape(-1, 2) * self.square_m
         front = np.column_stack([grid, np.zeros(len(grid))])
-        return np.concatenate([front, front + [0, 0, self.thickness_m]]) if self.thickness_m else front
+        return np.concatenate([front, front + np.array([0, 0, self.thickness_m])]) if self.thickness_m else front
 
     @property
     def inner_size(self) -> tuple[int, int]:
@@ -125,7 +125,7 @@ def board_from_table(table: dict, where: str) -> Board:
         raise CalibrationError(f"{where}: marker_m {marker_m} is not below square_m {square_m}; exchange them?")
     if checked.kind == "chessboard" and (checked.two_sided or checked.thickness_m):
         raise CalibrationError(
-            f"{where}: a chessboard has no sides that could be told apart; leave two_sided and thickness_m out, or print a charuco"
+            f"{where}: a chessboard looks the same from behind; leave two_sided and thickness_m out, or print a charuco"
         )
     if min(checked.columns, checked.rows) < 3:
         raise CalibrationError(

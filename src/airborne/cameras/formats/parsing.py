@@ -81,8 +81,9 @@ def distortion_terms(camera: Camera, n: int) -> list[float]:
 def refuse_lens(camera: Camera, name_of_format: str, *, is_rational_held: bool = False) -> None:
     """Raise CalibrationError for a fisheye lens, or the rational model, in a format that cannot hold it."""
     if camera.lens == "fisheye" or (camera.is_rational and not is_rational_held):
+        lens = "fisheye lens" if camera.lens == "fisheye" else "rational lens model"
         raise CalibrationError(
-            f"camera '{camera.name}' has a {'fisheye lens' if camera.lens == 'fisheye' else 'rational lens model'}, which {name_of_format} cannot hold; "
+            f"camera '{camera.name}' has a {lens}, which {name_of_format} cannot hold; "
             "write pose2sim, aniposelib or caliscope"
         )
 
