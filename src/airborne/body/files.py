@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-import trimesh
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from airborne.body.mesh_files import read_mesh
 from airborne.body.model import (
-    LONGEST_M,
     UNLIMITED,
     WHOLE,
     BodyModel,
@@ -32,7 +31,6 @@ from airborne.body.model import (
 from airborne.errors import BodyError, one_line
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.io.text import list_keys, read_toml
-from airborne.types import Array
 
 _Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 _Matrix = Annotated[list[_Vector], Field(min_length=3, max_length=3)]
@@ -42,8 +40,6 @@ _Channel = Annotated[float, Field(ge=0, le=255)]
 
 
 _SAME_ROTATION = 1e-15  # rounding of a rotation matrix
-_MOST_BAD_EDGES = 0.02  # of a mesh's edges; with more, inside and outside cannot be told
-_MOST_PLACES = 3  # of bad edges that a note names
 _LARGEST_KG_M2 = 1e6  # of a moment of inertia: a typing error beyond it
 
 
@@ -169,49 +165,7 @@ def _shape(table: _PartTable, path: Path) -> Shape:
         raise BodyError(
             f"{path.name}: part '{table.name}': mesh file {value} must lie beside the body file or below it"
         )
-    return _mesh(path.parent / value, table.scale)
-
-
-def _mesh(path: Path, scale: float) -> Mesh:
-    if not path.is_file():
-        raise BodyError(f"mesh file {path.name} not found beside the body file")
-    try:
-        with np.errstate(all="ignore"):
-            mesh = trimesh.load_mesh(path)
-            bad, volume = _bad_edges(mesh), mesh.volume
-            vertices, faces = np.asarray(mesh.vertices, float) * scale, np.asarray(mesh.faces, np.int64)
-    except Exception as error:  # trimesh raises whatever its parsers raise
-        raise BodyError(f"{path.name}: not a readable OBJ, PLY or STL mesh ({error})") from error
-    if not len(faces) or not np.all(np.isfinite(vertices)):
-        raise BodyError(f"{path.name}: the mesh has no faces, or corners that are not numbers")
-    n_edges = len(mesh.edges_unique)
-    if len(bad) > _MOST_BAD_EDGES * n_edges:
-        raise BodyError(
-            f"{path.name}: the mesh is not closed, {len(bad)} of its {n_edges} edges do not have two faces; fill its "
-            "holes, so that inside and outside can be told"
-        )
-    if np.ptp(vertices, axis=0).max() > LONGEST_M:
-        raise BodyError(
-            f"{path.name}: the mesh is over {LONGEST_M:.0f} m long; give scale = 0.001 if it is in millimetres"
-        )
-    note = _bad_edges_note(path.name, vertices[bad].mean(axis=1), n_edges) if len(bad) else ""
-    return Mesh(vertices, faces if volume >= 0 else faces[:, ::-1], note=note)
-
-
-def _bad_edges(mesh: trimesh.Trimesh) -> NDArray[np.integer]:
-    """Return the edges (n, 2), rows of the vertices, that do not have exactly two faces."""
-    counts = np.bincount(mesh.edges_unique_inverse, minlength=len(mesh.edges_unique))
-    return mesh.edges_unique[counts != 2]
-
-
-def _bad_edges_note(name: str, middles_m: Array, n_edges: int) -> str:
-    """Say how many edges (n, 3) [m] are bad, and where some of them are."""
-    places = [f"({x:.3f}, {y:.3f}, {z:.3f})" for x, y, z in middles_m[:_MOST_PLACES]]
-    more = ", ..." if len(middles_m) > _MOST_PLACES else ""
-    return (
-        f"{name}: {len(middles_m)} of {n_edges} edges do not have two faces, at {', '.join(places)}{more} m; the mesh "
-        "is taken as it is, with small holes there"
-    )
+    return read_mesh(path.parent / value, table.scale)
 
 
 def mesh_files(path: Path) -> list[str]:

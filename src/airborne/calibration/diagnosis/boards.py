@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from airborne.calibration.sources.board_print import turn_to_front
 from airborne.calibration.sources.boards import DICTIONARIES, Board, board_detector, mirror_image
 from airborne.cameras.finding import Finding, join_names
 from airborne.types import Array, Image
@@ -42,10 +43,7 @@ def check_board_print(board: Board, pictures: Sequence[Image], camera: str = "")
     if not len(pictures):
         return []
     sample = [pictures[i] for i in np.unique(np.linspace(0, len(pictures) - 1, _MOST_PICTURES).astype(int))]
-    if board.is_two_sided:
-        detect = board_detector(board)
-        sample = [mirror_image(picture) if detect(picture).is_back else picture for picture in sample]
-        board = replace(board, is_two_sided=False, thickness_m=0.0)
+    board, sample = turn_to_front(board, sample)
     where = f"{camera}: " if camera else ""
     counts = _corner_counts(board, sample)
     n_corners = board.inner_size[0] * board.inner_size[1]

@@ -14,13 +14,12 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, mini
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.bundle import Source
-from airborne.calibration.sources.boards import Board, DetectedCorners, mirror_corners
+from airborne.calibration.sources.boards import Board, DetectedCorners
 from airborne.cameras.camera import Camera, Lens, Rig
 from airborne.errors import CalibrationError
 from airborne.types import Array, Ints
 
 _FOCALS = np.geomspace(0.4, 4.0, 14)  # of an image's longer side: initial focal lengths
-_CLEAR_MISFIT = 2.0  # ratio of misfits from which on a camera's images are mirrored
 FEWEST_LENS_VIEWS = 3  # that determine a focal length
 _IDENTITY = RigidTransform.from_components(np.zeros(3), Rotation.identity())
 
@@ -51,17 +50,9 @@ class Views:
         """Return the views of some cameras."""
         return Views(self.board, tuple(self.cameras[c] for c in cameras), tuple(self.detections[c] for c in cameras))
 
-    def mirror(self, camera: int, cameras: Sequence[Camera]) -> Views:
-        """Return the views as if one camera's images were mirrored, and showed the board's other side."""
-        n = self.board.inner_size[0] * self.board.inner_size[1]
-        row = tuple(
-            replace(mirror_corners(s, cameras[camera].size[0]), corner=s.corner % n) for s in self.detections[camera]
-        )
-        return replace(self, detections=(*self.detections[:camera], row, *self.detections[camera + 1 :]))
-
     def groups(self) -> list[list[int]]:
         """Return the cameras that are linked by shared moments, group by group, the largest first."""
-        n, label = connected_components(_n_shared_moments(self), directed=False)
+        n, label = connected_components(n_shared_moments(self), directed=False)
         return sorted((np.flatnonzero(label == i).tolist() for i in range(n)), key=len, reverse=True)
 
     def of_camera(self, camera: int) -> Views:
@@ -111,14 +102,14 @@ def initial_lens(views: Views, size: tuple[int, int], *, lens: Lens) -> tuple[Ca
     best, best_error = None, np.inf
     for ratio in _FOCALS:
         camera = _pinhole(name, size, ratio * max(size), lens)
-        errors = [_board_pose(camera, views.board, row[i])[1] for i in sample]
+        errors = [board_pose(camera, views.board, row[i])[1] for i in sample]
         if np.median(errors) < best_error:
             best, best_error = camera, float(np.median(errors))
     if best is None:
         raise CalibrationError(
             f"camera '{name}': no focal length fits its views of the board; is the board's file right?"
         )
-    return best, stack_transforms([_board_pose(best, views.board, sighting)[0] for sighting in row])
+    return best, stack_transforms([board_pose(best, views.board, sighting)[0] for sighting in row])
 
 
 def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTransform]:
@@ -129,10 +120,10 @@ def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTr
     """
     n = len(cameras)
     camera_from_board = [
-        [_board_pose(camera, views.board, s)[0] if len(s.corner) else None for s in row]
+        [board_pose(camera, views.board, s)[0] if len(s.corner) else None for s in row]
         for camera, row in zip(cameras, views.detections, strict=True)
     ]
-    n_shared = _n_shared_moments(views)
+    n_shared = n_shared_moments(views)
     root = int(np.argmax(n_shared.sum(axis=1)))
     tree = minimum_spanning_tree(np.where(n_shared > 0, 1 / np.maximum(n_shared, 1), 0.0))
     order, parent = breadth_first_order(tree, root, directed=False)
@@ -142,7 +133,7 @@ def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTr
     for i in order[1:]:
         j = int(parent[i])
         from_world[int(i)] = (
-            _relative_pose(
+            linked_pose(
                 cameras[i],
                 cameras[j],
                 views,
@@ -158,37 +149,10 @@ def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTr
     )
 
 
-def find_mirrored_cameras(cameras: Sequence[Camera], views: Views) -> list[str]:
-    """Return the cameras that seem to stand behind a two-sided board but whose images are mirrored.
-
-    Mirrored images of the front look like the back in every single image; only over several moments do their cameras
-    fail to keep one place among the others.
-    """
-    shared = _n_shared_moments(views)
-    is_behind = [all(s.is_back for s in row if len(s.corner)) for row in views.detections]
-    mirrored = []
-    for c in np.flatnonzero(is_behind):
-        o = int(np.argmax(np.where(is_behind, 0, shared[c])))
-        if is_behind[o] or shared[c, o] < FEWEST_LENS_VIEWS:
-            continue
-        as_seen, flipped = (_pair_misfit(cameras, each, (int(c), o)) for each in (views, views.mirror(int(c), cameras)))
-        if _CLEAR_MISFIT * flipped < as_seen:
-            mirrored.append(views.cameras[c])
-    return mirrored
-
-
-def _pair_misfit(cameras: Sequence[Camera], views: Views, pair: tuple[int, int]) -> float:
-    one, other = (
-        [_board_pose(cameras[i], views.board, s)[0] if len(s.corner) else None for s in views.detections[i]]
-        for i in pair
-    )
-    return _relative_pose(cameras[pair[0]], cameras[pair[1]], views, poses=one, other_poses=other, pair=pair)[1]
-
-
 def board_poses(rig: Rig, views: Views) -> RigidTransform:
     """Return the board's pose at every moment from a known rig: (moments,); the identity where no camera sees it."""
     camera_from_board = [
-        [_board_pose(camera, views.board, s)[0] if len(s.corner) else None for s in row]
+        [board_pose(camera, views.board, s)[0] if len(s.corner) else None for s in row]
         for camera, row in zip(rig, views.detections, strict=True)
     ]
     return stack_transforms([_consensus_board_pose(rig, views, camera_from_board, m) for m in range(views.n_moments)])
@@ -206,7 +170,7 @@ def _pinhole(name: str, size: tuple[int, int], focal_px: float, lens: Lens) -> C
     )
 
 
-def _board_pose(camera: Camera, board: Board, sighting: DetectedCorners) -> tuple[RigidTransform, float]:
+def board_pose(camera: Camera, board: Board, sighting: DetectedCorners) -> tuple[RigidTransform, float]:
     """Return camera_from_board of one view and its RMS [px], by perspective-n-point; the camera's pose is ignored."""
     corners = board.corners[sighting.corner]
     ideal = camera.undistort_px(sighting.px)
@@ -229,7 +193,7 @@ def _board_pose(camera: Camera, board: Board, sighting: DetectedCorners) -> tupl
     return (camera_from_board, float(error)) if np.isfinite(error) else (_IDENTITY, np.inf)
 
 
-def _n_shared_moments(views: Views) -> Array:
+def n_shared_moments(views: Views) -> Array:
     """Return how many moments every two cameras share: (cameras, cameras), 0 on the diagonal."""
     is_seen = (views.n_corners > 0).astype(float)
     shared = is_seen @ is_seen.T
@@ -237,7 +201,7 @@ def _n_shared_moments(views: Views) -> Array:
     return shared
 
 
-def _relative_pose(
+def linked_pose(
     one: Camera,
     other: Camera,
     views: Views,

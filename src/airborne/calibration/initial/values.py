@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 
 from airborne.calibration.bundle import FreeParameters
 from airborne.calibration.diagnosis.images import check_image_size
-from airborne.calibration.initial.chaining import Views, chain_cameras, find_mirrored_cameras
+from airborne.calibration.initial.chaining import Views, chain_cameras
+from airborne.calibration.initial.mirrored import find_mirrored_cameras
 from airborne.calibration.initial.wand import initial_rig_from_wand
+from airborne.calibration.initial.wand_fisheyes import initial_rig_from_wand_and_fisheyes
 from airborne.calibration.intrinsics.lens_selection import LENS_MODELS, LensFit, choose_lens, lenses_from_points
 from airborne.calibration.sources.board_detection import BoardDetections, detect_boards, detect_lens_board, image_size
 from airborne.calibration.sources.boards import Board, board_from_table, read_board
@@ -88,8 +90,12 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
     }
     start_of |= {"calibration at the start": start_rig} if start_rig is not None else {}
     if wand is not None:
-        start_of["wand"] = initial_rig_from_wand(
-            wand, {name: sizes[name] for name in wand.cameras}, known_lenses, fisheyes
+        unknown = [name for name in wand.cameras if name in fisheyes and name not in known_lenses]
+        wand_sizes = {name: sizes[name] for name in wand.cameras}
+        start_of["wand"] = (
+            initial_rig_from_wand_and_fisheyes(wand, wand_sizes, known_lenses, unknown)
+            if unknown
+            else initial_rig_from_wand(wand, wand_sizes, known_lenses)
         )
     starts = list(start_of.values())
     if board_detections is not None:

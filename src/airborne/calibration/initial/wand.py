@@ -6,7 +6,7 @@ there. The known length also gives the scale.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -29,7 +29,6 @@ _LEAST_SHARED, _LEAST_FRAMES = 15, 10  # markers that two cameras must both see,
 _FOCAL_RATIOS = np.geomspace(
     0.45, 3.6, 10
 )  # focal length over the image's longer side: fields of view of 96 to 16 degrees
-_FISHEYE_RATIOS = np.geomspace(0.25, 1.0, 8)  # the same of fisheyes: 230 to 57 degrees
 _N_SAMPLE_FRAMES = 120  # frames that test a focal length
 _RESECTION_LIMIT_SHARE = 0.02  # of the longer side: how far a marker may lie off in a resection
 _INLIER_SHARE = 0.8  # least share of the markers within it
@@ -48,21 +47,14 @@ class _Pair:
 
 
 def initial_rig_from_wand(
-    tracks: WandTracks,
-    sizes: Mapping[str, tuple[int, int]],
-    lenses: Mapping[str, Camera] | None = None,
-    fisheyes: Collection[str] = (),
+    tracks: WandTracks, sizes: Mapping[str, tuple[int, int]], lenses: Mapping[str, Camera] | None = None
 ) -> Rig:
     """Return initial values of the cameras that see the wand, in metres.
 
     lenses: cameras whose K and distortion are known; the others are taken as pinholes with the principal point in the
-    image's middle, or as `fisheyes`: of some focal lengths, alike for all, that which keeps the wand's length. The
-    world is the axes of the first camera of the best pair. Raises CalibrationError where cameras
+    image's middle. The world is the axes of the first camera of the best pair. Raises CalibrationError where cameras
     share too few markers, naming them, or where an image seems to be mirrored.
     """
-    unknown = [name for name in tracks.cameras if name in fisheyes and name not in (lenses or {})]
-    if unknown:
-        return _rig_of_fisheyes(tracks, sizes, lenses or {}, unknown)
     cameras = [_camera_without_pose(name, sizes[name], lenses or {}) for name in tracks.cameras]
     ideal = np.stack([camera.undistort_px(tracks.px[:, :, i]) for i, camera in enumerate(cameras)], axis=2)
     pairs = _pairs(ideal, cameras)
@@ -70,28 +62,6 @@ def initial_rig_from_wand(
     unknown = [i for i, camera in enumerate(cameras) if camera.name not in (lenses or {})]
     cameras = _with_focal_lengths(cameras, unknown, pairs, replace(tracks, px=ideal))
     return _chain_cameras(cameras, pairs, replace(tracks, px=_without_outliers(ideal, pairs)))
-
-
-def _rig_of_fisheyes(
-    tracks: WandTracks, sizes: Mapping[str, tuple[int, int]], lenses: Mapping[str, Camera], unknown: Sequence[str]
-) -> Rig:
-    """Try focal lengths for the unknown fisheyes; return the rig in which the wand's length varies least."""
-    best, least, refusal = None, np.inf, None
-    for ratio in _FISHEYE_RATIOS:
-        plain = [_camera_without_pose(name, sizes[name], {}) for name in unknown]
-        guesses = {
-            c.name: replace(_with_focal(c, ratio * max(c.size)), distortion=np.zeros(4), lens="fisheye") for c in plain
-        }
-        try:
-            rig = initial_rig_from_wand(tracks, sizes, {**lenses, **guesses})
-        except CalibrationError as error:
-            refusal = refusal or error
-            continue
-        _, variation = _scale(rig.points_from_px(tracks.px), np.isfinite(tracks.px[..., 0]).sum(axis=2) > 1, tracks)
-        best, least = (rig, variation) if variation < least else (best, least)
-    if best is None:
-        raise refusal or CalibrationError("no focal length fits the wand; are the lenses fisheyes?")
-    return best
 
 
 def _camera_without_pose(name: str, size: tuple[int, int], lenses: Mapping[str, Camera]) -> Camera:
@@ -212,7 +182,7 @@ def _length_variation(
         return 0.0
     K_a, K_b = (_with_focal(cameras[i], focals[i]).K for i in (pair.a, pair.b))
     pose, points = _relative_pose(pair, rows, tracks, K_a=K_a, K_b=K_b)
-    _, variation = _scale(points, pair.is_inlier[rows], tracks)
+    _, variation = wand_scale(points, pair.is_inlier[rows], tracks)
     return min(variation + 1 - pose.front_share, _MOST_LENGTH_VARIATION)
 
 
@@ -228,7 +198,7 @@ def _relative_pose(
     return pose, points
 
 
-def _scale(points: Array, is_seen: NDArray[np.bool_], tracks: WandTracks) -> tuple[float, float]:
+def wand_scale(points: Array, is_seen: NDArray[np.bool_], tracks: WandTracks) -> tuple[float, float]:
     """Return the factor that gives the wand its lengths, and their relative standard deviation (robust)."""
     factors = [
         length / np.linalg.norm(points[:, a] - points[:, b], axis=1)[is_seen[:, a] & is_seen[:, b]]
@@ -301,7 +271,7 @@ def _links(cameras: Sequence[Camera], pairs: Sequence[_Pair], tracks: WandTracks
     for pair in pairs:
         rows = np.flatnonzero(pair.is_inlier.any(axis=1))
         pose, points = _relative_pose(pair, rows, tracks, K_a=cameras[pair.a].K, K_b=cameras[pair.b].K)
-        factor, variation = _scale(points, pair.is_inlier[rows], tracks)
+        factor, variation = wand_scale(points, pair.is_inlier[rows], tracks)
         least_variation = min(least_variation, variation)
         if pose.front_share < _LEAST_FRONT or variation > _MOST_LENGTH_VARIATION:
             continue

@@ -15,14 +15,8 @@ import numpy as np
 from airborne.calibration.diagnosis.clocks import check_image_counts
 from airborne.calibration.diagnosis.inputs import check_board, check_time_stamps
 from airborne.calibration.initial.chaining import Views
-from airborne.calibration.sources.boards import (
-    NO_CORNERS,
-    Board,
-    DetectedCorners,
-    board_detector,
-    match_print,
-    match_sides,
-)
+from airborne.calibration.sources.board_print import match_print, match_sides
+from airborne.calibration.sources.boards import NO_CORNERS, Board, DetectedCorners, board_detector
 from airborne.calibration.sources.files import CameraSource, Sources
 from airborne.cameras.finding import Finding
 from airborne.errors import CalibrationError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -18,10 +18,8 @@ from airborne.errors import CalibrationError, one_line
 from airborne.io.text import read_toml
 from airborne.types import Array, Ints
 
-_FEWEST_CORNERS = 6  # of a view that determines the board's pose
+FEWEST_CORNERS = 6  # of a view that determines the board's pose
 _THINNEST = 0.05  # width over length of the detected corners: corners on one line leave a rotation free
-_CLEAR_RATIO = 2.0  # ratio of corners from which on a board is seen mirrored
-_ENOUGH_CORNERS = 2  # corners an image, on average, from which on the board is as described
 DICTIONARIES = tuple(sorted(name for name in dir(cv2.aruco) if re.match(r"DICT_[0-9A]", name)))
 
 
@@ -169,7 +167,7 @@ def board_detector(board: Board) -> Detector:
 
     def detect(grey: NDArray[np.uint8]) -> DetectedCorners:
         detected = find(255 - grey if board.is_inverted else grey)
-        if len(detected.corner) < _FEWEST_CORNERS:
+        if len(detected.corner) < FEWEST_CORNERS:
             return NO_CORNERS
         extent = np.linalg.svd(corners[detected.corner] - corners[detected.corner].mean(axis=0), compute_uv=False)
         return detected if extent[1] > _THINNEST * extent[0] else NO_CORNERS
@@ -202,57 +200,6 @@ def _two_sided_finder(board: Board, find: Detector) -> Detector:
         return replace(mirror_corners(back, grey.shape[1]), corner=back.corner + (n if board.thickness_m else 0))
 
     return find_side
-
-
-def match_sides(board: Board, pictures: Mapping[str, Sequence[NDArray[np.uint8]]]) -> tuple[Board, tuple[str, ...]]:
-    """Return the board as two-sided where some cameras see it mirrored and others do not, with a note that says so.
-
-    pictures: by camera. Where every camera sees it mirrored, it stays as it is: then the pictures are mirrored.
-    """
-    if board.kind != "charuco" or board.is_two_sided:
-        return board, ()
-    front = {name: _n_corners(board, own) for name, own in pictures.items()}
-    back = {
-        name: _n_corners(board, [mirror_image(picture) for picture in own])
-        for name, own in pictures.items()
-        if front[name] < _ENOUGH_CORNERS * len(own)
-    }
-    behind = [name for name, n in back.items() if n >= _CLEAR_RATIO * max(front[name], _FEWEST_CORNERS)]
-    if not behind or not any(front[name] >= _FEWEST_CORNERS for name in pictures if name not in behind):
-        return board, ()
-    return replace(board, is_two_sided=True), (
-        f"{', '.join(behind)} sees the board mirrored and others do not: it counts as printed on both sides, seen from "
-        "behind; of a thick board give thickness_m",
-    )
-
-
-def match_print(board: Board, pictures: Sequence[NDArray[np.uint8]]) -> tuple[Board, tuple[str, ...]]:
-    """Return the board with the pattern (legacy or not, inverted or not) of which most corners are detected.
-
-    The notes say what differs from the description; without any detection the board stays as it is.
-    """
-    if board.kind != "charuco" or not pictures:
-        return board, ()
-    described = (board.is_inverted, board.is_legacy)
-    counts = {described: _n_corners(board, pictures)}
-    kinds = [(inverted, legacy) for inverted in (False, True) for legacy in {False, board.rows % 2 == 0}]
-    for inverted, legacy in kinds if counts[described] < _ENOUGH_CORNERS * len(pictures) else ():
-        if (inverted, legacy) not in counts:
-            counts[inverted, legacy] = _n_corners(replace(board, is_inverted=inverted, is_legacy=legacy), pictures)
-    best = max(counts, key=counts.__getitem__)
-    if counts[best] <= 1.5 * counts[described]:
-        return board, ()
-    names = zip(("inverted", "legacy"), best, described, strict=True)
-    settings = " and ".join(f"{name} = {str(new).lower()}" for name, new, old in names if new != old)
-    return replace(board, is_inverted=best[0], is_legacy=best[1]), (
-        f"the board shows {counts[best]} corners with {settings}, {counts[described]} as described; "
-        f"went on with {settings}",
-    )
-
-
-def _n_corners(board: Board, pictures: Sequence[NDArray[np.uint8]]) -> int:
-    detect = board_detector(board)
-    return sum(len(detect(picture).corner) for picture in pictures)
 
 
 def _charuco_finder(board: Board) -> Detector:
