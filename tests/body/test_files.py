@@ -238,7 +238,7 @@ def test_file_says_limits_slabs_inertia_and_landmarks(tmp_path):
     assert not thigh.limits.is_limited
     np.testing.assert_allclose(shank.limits.half_rad, np.radians([72.5, 0, 95]), atol=EXACT)
     np.testing.assert_allclose(shank.limits.centre_angles_rad, np.radians([67.5, 0, -85]), atol=EXACT)
-    assert model.notes == ("body.toml: limits_deg of shank are read as swing and twist",)
+    assert model.notes == ("body: limits_deg of shank are read as a swing and a twist",)
     assert shank.parts[0].slab_m == (-np.inf, 0.05)
     assert thigh.inertia is None
     assert shank.inertia.mass_kg == 3.5

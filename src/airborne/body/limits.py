@@ -28,6 +28,7 @@ class JointLimits:
     centre: Array  # (..., 3, 3) the middle of the range, parent from segment
     half_rad: Array  # (..., 3) swing about the centre's x and y, twist, to either side [rad]; inf: free
     is_ball: NDArray[np.bool_]  # (...) the swing ends on an ellipse, else on a rectangle
+    is_from_angles: bool = False  # given as ranges of angles, in an older body file
 
     @classmethod
     def from_angles(cls, ranges_rad: Array) -> JointLimits:
@@ -35,7 +36,7 @@ class JointLimits:
         ranges = np.clip(ranges_rad, -np.pi, np.pi)
         middle, half = ranges.mean(axis=1), np.minimum(np.diff(ranges, axis=1)[:, 0] / 2, _MOST_RAD)
         half = np.where(np.isfinite(ranges_rad).any(axis=1), half, np.inf)
-        return cls(matrix_from_angles(middle), half, np.asarray(half[:2].min() > _BALL_RAD))
+        return cls(matrix_from_angles(middle), half, np.asarray(half[:2].min() > _BALL_RAD), is_from_angles=True)
 
     @classmethod
     def stack(cls, limits: Iterable[JointLimits]) -> JointLimits:

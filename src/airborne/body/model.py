@@ -42,6 +42,7 @@ class Mesh:
     vertices_m: Array  # (v, 3) [m]
     faces: NDArray[np.integer]  # (f, 3)
     normals: Array | None = None  # (v, 3) unit, outward, for smooth shading; None: each face has its own
+    note: str = ""  # what its file had that was not as it should be
 
 
 Shape = Ellipsoid | Box | Mesh
@@ -127,7 +128,6 @@ class BodyModel:
     name: str
     segments: tuple[Segment, ...]  # parents before children; the first is the root
     landmarks: tuple[Landmark, ...] = ()  # empty: the origin of every segment, under the segment's name
-    notes: tuple[str, ...] = ()  # what the user should know of the body, one line each
 
     def __post_init__(self) -> None:
         names: list[str] = []
@@ -197,6 +197,13 @@ class BodyModel:
     def parts(self) -> tuple[Part, ...]:
         """Every part, in the order of the segments."""
         return tuple(part for segment in self.segments for part in segment.parts)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What its file had in an older form, and those of its meshes that was not as it should be."""
+        of_meshes = tuple(part.shape.note for part in self.parts if isinstance(part.shape, Mesh) and part.shape.note)
+        older = ", ".join(segment.name for segment in self.segments if segment.limits.is_from_angles)
+        return (*of_meshes, f"body: limits_deg of {older} are read as a swing and a twist") if older else of_meshes
 
     @property
     def needs_colours(self) -> bool:
