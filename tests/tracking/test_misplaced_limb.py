@@ -36,18 +36,18 @@ class LearnedFrame:
 
     def __init__(self):
         self.render_model, self.truth, self.frames = RenderModel.of(HUMAN), SCENE.start(1), SCENE.frames(1)
-        self._appearance = Appearance()
+        self.appearance = Appearance()
         for index in (0, 1):
             body = self.render_model.with_pose(SCENE.start(index))
             for region in crop_regions([body], self.render_model.geometry, SCENE.frames(index), 32):
                 mask = self.render_model.draw_parts(body, region) >= 0
-                self._appearance = self._appearance.learn_colours(region, mask).learn_background(region, mask)
+                self.appearance = self.appearance.learn_colours(region, mask).learn_background(region, mask)
 
     def views(self, pose):
         """The regions that hold the truth and a pose, and their posteriors."""
         bodies = [self.render_model.with_pose(each) for each in (pose, self.truth)]
         regions = crop_regions(bodies, self.render_model.geometry, self.frames, 32)
-        return regions, [self._appearance.posterior(region) for region in regions]
+        return regions, [self.appearance.posterior(region) for region in regions]
 
     def off_mm(self, pose, limb):
         """How far the limb's joints are from the truth, at most."""

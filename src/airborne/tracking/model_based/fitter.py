@@ -32,6 +32,7 @@ from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
 
+_MOVED_NATS = 7.0  # by which a limb's new place must be likelier: one limb in a thousand is lost in a frame
 _FEWEST_VIEWS = 2  # in which something uncovered asks for a limb
 _TRUNK_AT = 4  # images at this reduction show the limbs of a body with joints; more reduced ones, its trunk alone
 
@@ -142,7 +143,7 @@ class Fitter:
         learned: LearnedRegions,
         prior: PosePrior | None,
     ) -> Fit:
-        """Search for a limb, from where the fit and the guesses have it and from anywhere; return the best fit."""
+        """Search for a limb, from where the fit and the guesses have it and from anywhere; return the better fit."""
         seen = learned.regions, learned.posteriors
         expected = [replace(fit.pose, joint_angles=_with_limb(fit.pose, guess, limb)) for guess in guesses]
         dofs = joints_of(self.model, limb)
@@ -150,7 +151,10 @@ class Fitter:
             fit_silhouettes(self.render_model, pose, *seen, levels=NEAR, dofs=dofs)
             for pose in search_limb(self.render_model, [fit.pose, *expected], limb, region_evidence(*seen))
         ]
-        return self.fit_images([fit.pose, *poses], learned, None if prior is None else prior.widen(dofs.columns))
+        widened = None if prior is None else prior.widen(dofs.columns)
+        moved = self.fit_images(poses, learned, widened)
+        noise = min(fit.equations.noise, moved.equations.noise)
+        return moved if moved.objective(noise, widened) + _MOVED_NATS < fit.objective(noise, widened) else fit
 
     def _n_views_uncovered(self, pose: Pose, learned: LearnedRegions) -> int:
         """Count the views in which something like a limb stands out that the body does not cover."""

@@ -58,6 +58,10 @@ class Fit:
     equations: PoseEquations  # before the last step
     rms_light: float  # blurred residual, linear light 0..1
 
+    def objective(self, noise: float, prior: PosePrior | None) -> float:
+        """Return minus the log-posterior before the last step, for a given variance of the noise."""
+        return self.equations.objective(noise, self.dofs.prior_cost(self.equations.pose, prior))
+
     @property
     def covariance(self) -> Array:
         """Of position [m] and rotation vectors [rad], (6 + 3 joints,) squared; infinite where unobserved."""

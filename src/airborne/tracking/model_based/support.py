@@ -44,15 +44,16 @@ def widen_unseen(covariance: Array, model: BodyModel, n_views: NDArray[np.intege
     """Widen a pose's covariance for the joints of segments that fewer than two views show (segments,).
 
     One view alone leaves open how near the segment's end is; the joint of a segment that none shows is unobserved. A
-    segment without a landmark or a joint at its end is left out.
+    view that shows the next segment shows where this one ends. A segment without a landmark or a joint is left out.
     """
-    covariance = covariance.copy()
-    for segment in np.flatnonzero((n_views < 2) & (limb_of_segment(model) >= 0)):
+    covariance, of_end = covariance.copy(), n_views.copy()
+    np.maximum.at(of_end, model.parents[1:], n_views[1:])
+    for segment in np.flatnonzero((of_end < 2) & (limb_of_segment(model) >= 0)):
         own = slice(3 + 3 * segment, 6 + 3 * segment)
         length_m = _length_m(model, int(segment))
         if length_m == 0:
             continue
-        if n_views[segment] == 1:
+        if of_end[segment] == 1:
             covariance[own, own] += (_ONE_VIEW_SD_M / length_m) ** 2 * np.eye(3)
         else:
             covariance = mark_unobserved(covariance, np.arange(own.start, own.stop))
