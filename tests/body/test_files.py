@@ -1,5 +1,7 @@
 """Body files: what is read, and what is refused in one line."""
 
+import re
+
 import numpy as np
 import pytest
 import trimesh
@@ -223,6 +225,19 @@ def test_open_mesh_is_refused(tmp_path):
     box.update_faces(np.arange(len(box.faces)) > 2)
     box.export(tmp_path / "lump.obj")
     assert "lump.obj: the mesh is not closed" in complaint(tmp_path, MESH.replace("FILE", "lump.obj"))
+
+
+def test_a_mesh_with_a_few_bad_edges_is_taken_with_a_note_that_counts_and_places_them(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+    hole = ball.triangles_center[0]
+    ball.update_faces(np.arange(len(ball.faces)) > 0)
+    ball.export(tmp_path / "lump.obj")
+    (note,) = read(tmp_path, MESH.replace("FILE", "lump.obj")).notes
+    assert note.startswith("lump.obj: 3 of 1920 edges do not have two faces, at (")
+    places = np.array([[float(x) for x in each.split(",")] for each in re.findall(r"\(([^)]*)\)", note)])
+    assert np.linalg.norm(places - hole, axis=1).max() < 0.02
+    trimesh.creation.icosphere(subdivisions=3, radius=0.1).export(tmp_path / "lump.obj")
+    assert read(tmp_path, MESH.replace("FILE", "lump.obj")).notes == ()
 
 
 def test_measures_in_millimetres_are_noticed(tmp_path):
