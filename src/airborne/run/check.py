@@ -16,7 +16,7 @@ from airborne.run.players_tracker import players_tracker_of
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
 from airborne.video import Recording, VideoFacts, inspect
 
-Value = TypeVar("Value")
+_T = TypeVar("_T")
 
 
 class Checks:
@@ -27,7 +27,7 @@ class Checks:
         self.well: list[str] = []
         self.mistakes: list[str] = []
 
-    def attempt(self, read: Callable[[], Value], describe: Callable[[Value], str]) -> Value | None:
+    def attempt(self, read: Callable[[], _T], describe: Callable[[_T], str]) -> _T | None:
         """Read something and describe it; None where it has a mistake."""
         try:
             value = read()

@@ -24,7 +24,7 @@ from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files
 from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
 from airborne.run.players import PlayersRun
 from airborne.run.players_tracker import compile_kernels
-from airborne.run.provenance import provenance
+from airborne.run.provenance import provenance_of
 from airborne.run.subject import AnyMotion, Subject
 from airborne.tracking.tracker import Found, track_frames
 from airborne.trial.file import Trial
@@ -106,7 +106,7 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     connection.close()
     tracked_s = time.monotonic()
     motion, summary = subject.finish(folder)
-    summary |= provenance(subject.trial, recording, subject.calibration, identity["inputs"])
+    summary |= provenance_of(subject.trial, recording, subject.calibration, identity["inputs"])
     summary["warnings"] += subject.warnings()
     summary["tables"] = list_tables(folder)
     if isinstance(recording, LiveRecording):

@@ -49,11 +49,8 @@ def check_board_print(board: Board, pictures: Sequence[Image], camera: str = "")
     n_corners = board.inner_size[0] * board.inner_size[1]
     detected = [count for count in counts if count]
     if board.kind == "chessboard":
-        return (
-            []
-            if len(detected) >= max(_DETECTED_SHARE * len(sample), 1)
-            else _wrong_chessboard(board, sample, where, camera)
-        )
+        is_found = len(detected) >= max(_DETECTED_SHARE * len(sample), 1)
+        return [] if is_found else _wrong_chessboard(board, sample, where, camera)
     is_found = len(detected) >= _DETECTED_SHARE * len(sample) and bool(
         np.median(detected) >= _DETECTED_SHARE * n_corners
     )

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from airborne.cameras.camera import Camera, Rig
-from airborne.cameras.formats.options import METRES, FileOptions, Size, Unit
+from airborne.cameras.formats.options import METRES, FileOptions, Unit
 from airborne.cameras.formats.parsing import build_camera, distortion_terms, parse_array, refuse_lens
 from airborne.errors import CalibrationError
-from airborne.types import Array
+from airborne.types import Array, Size
 
 _EXPECTED = "expected OpenCV's YAML with K_<camera>, dist_<camera>, R_<camera>, T_<camera>"
 _HEADER = "%YAML:1.0\n---\n"

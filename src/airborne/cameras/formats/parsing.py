@@ -7,9 +7,8 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras.camera import Camera
-from airborne.cameras.formats.options import Size
 from airborne.errors import CalibrationError
-from airborne.types import Array
+from airborne.types import Array, Size
 
 LARGEST_NUMBER = 1e9  # of any number in a calibration: metres, millimetres or pixels
 _LARGEST_SIZE_PX = 65_535  # what 16 bits hold
