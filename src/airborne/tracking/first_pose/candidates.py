@@ -23,6 +23,7 @@ _SHARE_SD = 0.02  # share of the evidence by which silhouettes of right and wron
 _CHROMA_SD, _GREY_SD = 4.0, 12.0  # [grey levels] the same of colours, less their brightness, and with it
 _LEAST_PRECISION, _LEAST_RECALL = 0.6, 0.45  # of a mask over what stands out
 _MOST_MOMENTS, _MOST_PLACES, _MOST_CANDIDATES = 3, 3, 6
+_AS_WELL = 0.7  # share of the largest picture of the body that counts as large as any
 _LEAST_SHOWN = 0.01  # probability of a candidate that is listed
 
 
@@ -65,13 +66,24 @@ def find_thing(model: BodyModel, moments: Sequence[Moment]) -> Finding:
         raise TrialError(
             "[start] is missing, and nothing is seen to move in two cameras at once; give the pose under [start]"
         )
-    seen.sort(key=lambda each: each[1][0].rank, reverse=True)
     findings = []
-    for moment, places in islice(seen, _MOST_MOMENTS):
+    for moment, places in islice(_best_first(seen), _MOST_MOMENTS):
         findings.append(_find_at(thing, moment, places))
         if findings[-1].is_decided:
             return findings[-1]
     return max(findings, key=lambda finding: finding.candidates[0].precision * finding.candidates[0].recall)
+
+
+def _best_first(seen: Sequence[tuple[Moment, list[Place]]]) -> list[tuple[Moment, list[Place]]]:
+    """Sort moments by how well the body is seen; those in which it is seen about as well as ever by time."""
+    most_views, most_px = max(places[0].rank for _, places in seen)
+
+    def order(each: tuple[Moment, list[Place]]) -> tuple[float, float, float]:
+        views, px = each[1][0].rank
+        is_among_best = views == most_views and px >= _AS_WELL * most_px
+        return (0, 0, each[0].frames.time_s) if is_among_best else (1, -views, -px)
+
+    return sorted(seen, key=order)
 
 
 def _find_at(thing: Thing, moment: Moment, places: Sequence[Place]) -> Finding:
