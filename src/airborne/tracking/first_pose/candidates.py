@@ -21,7 +21,7 @@ LEAST_PROBABILITY = 0.95  # of the best candidate, with which it is taken
 # chosen on `benchmarks/accuracy/find_start.py --seeds 1000-1039`
 _SHARE_SD = 0.02  # share of the evidence by which silhouettes of right and wrong poses differ by chance
 _CHROMA_SD, _GREY_SD = 4.0, 12.0  # [grey levels] the same of colours, less their brightness, and with it
-_LEAST_PRECISION, _LEAST_RECALL = 0.6, 0.45  # of a mask over what stands out
+_LEAST_PRECISION, _LEAST_RECALL = 0.75, 0.6  # of a mask over what stands out
 _MOST_MOMENTS, _MOST_PLACES, _MOST_CANDIDATES = 3, 3, 6
 _AS_WELL = 0.7  # share of the largest picture of the body that counts as large as any
 _LEAST_SHOWN = 0.01  # probability of a candidate that is listed
