@@ -100,6 +100,7 @@ def _thing(rng: np.random.Generator) -> BodyModel:
         boxes = [(bar, (0, 0, 0)), ((short, thick[0], thick[1]), (0, 0, 0)), ((thick[0], thick[1], short), (0, 0, 0.2))]
     else:
         size = rng.uniform(0.2, 0.5, 3)
+        colours[1] = (colours[0] + 110) % 230
         boxes = [(tuple(size), (0, 0, 0)), ((size[0], size[1], 0.06), (0, 0, size[2] / 2 + 0.03))]
     parts = tuple(
         Part(f"part_{i}", Box(np.array(size, float)), RigidTransform.from_components(centre, Rotation.identity()), colour)
@@ -114,7 +115,7 @@ def verdict(seed: int) -> tuple[str, float]:
     scene = throw(seed)
     frames = list(scene_frames(scene))
     start_s = time.process_time()
-    sample = spread_sample(frames)
+    sample = spread_sample(frames, len(frames))
     finding = find_thing(scene.body, look(sample, empty_scenes(sample)))
     cpu_s = time.process_time() - start_s
     index, best = finding.moment.frames.index, finding.candidates[0]

@@ -63,8 +63,10 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
             f"{trial.name}: [start] is missing; a body with joints is not found by itself yet: give joints_m, "
             "points_px or detections under [start]"
         )
+    if len(trial.camera) < 2:
+        raise TrialError(f"{trial.name}: [start] is missing; finding the body needs two cameras: give its pose")
     recording, facts = _open(trial)
-    sample = spread_sample(_counted(recording, progress))
+    sample = spread_sample(_counted(recording, progress), recording.n_frames)
     if not sample:
         raise past_the_end_error(trial)
     scenes = empty_scenes(sample)

@@ -32,9 +32,9 @@ class Moment:
         return tuple(None if nats is None else 1 / (1 + np.exp(-nats)) for nats in self.evidence)
 
 
-def spread_sample(recording: Iterable[Frames]) -> list[Frames]:
-    """Keep 12 to 24 times, spread evenly over a recording of any length, as small pictures."""
-    stride, kept = 1, []
+def spread_sample(recording: Iterable[Frames], n_expected: int | None) -> list[Frames]:
+    """Keep 12 to 24 times, spread evenly over a recording of about so many, or any number, as small pictures."""
+    stride, kept = max(1, -(-(n_expected or 0) // _MOST_MOMENTS)), []
     for number, frames in enumerate(recording):
         if number % stride:
             continue
