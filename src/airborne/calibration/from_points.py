@@ -8,21 +8,24 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.diagnosis import check_points, decompose_cameras, warnings_about
-from airborne.calibration.intrinsics.model_selection import Solution, choose_simplest, leave_one_out, models_for
+from airborne.calibration.intrinsics.model_selection import (
+    Solution,
+    candidates_for,
+    choose_simplest,
+    leave_one_out,
+    place_sd,
+)
 from airborne.calibration.intrinsics.physical import (
-    PINHOLE_MODELS,
     SEVEN_PARAMETERS,
     Pinhole,
     anneal_pinhole,
-    fit_pinhole,
     parameter_names,
     parameter_sd,
 )
 from airborne.calibration.sources.control_points import ControlPoints
-from airborne.cameras.camera import Camera, Rig
+from airborne.cameras.camera import Rig
 from airborne.cameras.dlt import Decomposition, dlt_coefficients, fit_dlt
 from airborne.errors import CalibrationError
 from airborne.geometry.triangulation import px_from_points, triangulate
@@ -100,7 +103,7 @@ def calibrate(
             points, name, size=sizes[name], decomposition=decompositions[name], method=method, seed=seed
         )
         solutions[name] = choose_simplest(candidates)
-        cameras.append(_camera(name, sizes[name], solutions[name]))
+        cameras.append(solutions[name].pinhole.camera(name, sizes[name], solutions[name].shift_sd_px))
         fits.append(_describe_fit(points, name, solutions[name], candidates))
     return Calibration(
         rig=Rig(tuple(cameras)),
@@ -131,29 +134,14 @@ def _solve(
     if method == "annealing":
         pinhole = anneal_pinhole(initial, world, px, seed=seed)
         return [leave_one_out(pinhole, SEVEN_PARAMETERS, world, px)]
-    return [
-        leave_one_out(fit_pinhole(initial, model, world, px), model, world, px)
-        for model in models_for(PINHOLE_MODELS, len(world))
-    ]
-
-
-def _camera(name: str, size: tuple[int, int], solution: Solution) -> Camera:
-    pinhole = solution.pinhole
-    f, (u0, v0) = pinhole.focal_px, pinhole.principal_point
-    return Camera(
-        name=name,
-        K=np.array([[f, 0, u0], [0, f, v0], [0, 0, 1]]),
-        size=size,
-        camera_from_world=RigidTransform.from_components(-pinhole.R @ pinhole.centre, Rotation.from_matrix(pinhole.R)),
-        distortion=np.array([pinhole.k1, 0, 0, 0, 0]),
-        shift_sd_px=solution.shift_sd_px,
-    )
+    return candidates_for(initial, world, px)
 
 
 def _describe_fit(points: ControlPoints, name: str, best: Solution, candidates: list[Solution]) -> CameraFit:
     is_seen = points.is_seen_by(name)
     P_dlt = fit_dlt(best.world, best.px)
     sd = parameter_sd(best.pinhole, best.model, best.world, best.px)
+    sd[3:6] = place_sd(best, candidates)
     return CameraFit(
         name=name,
         model=best.model.name,

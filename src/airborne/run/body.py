@@ -65,7 +65,8 @@ class BodyRun:
         """Read the body and find its first pose, whose notes become events of the recording."""
         model = trial.model()
         first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
-        opened.recording.events.extend(first.notes if found is None else (found.note, *first.notes))
+        found_notes = () if found is None else (found.note,)
+        opened.recording.events.extend([*model.notes, *found_notes, *first.notes])
         return cls(trial, opened.recording, opened.calibration, model, first.pose, found)
 
     def read_done(self, folder: Path) -> list[Estimate]:

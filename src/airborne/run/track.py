@@ -21,6 +21,7 @@ from airborne.motion.run_folder import CALIBRATION, SUMMARY
 from airborne.run.body import BodyRun
 from airborne.run.find import find_start
 from airborne.run.folder import list_tables, prepare_folder, run_identity
+from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files
 from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
 from airborne.run.players import PlayersRun
 from airborne.run.players_tracker import compile_kernels
@@ -69,6 +70,8 @@ def track_trial(
         raise ResultError("a live run has no first frame to come back to; leave --live or --first-frame out")
     if overwrite and resume:
         raise ResultError("a run is either resumed or overwritten; give one of --resume and --overwrite")
+    if not live:
+        refuse_same_files(trial)
     started_s = time.monotonic()
     found = None
     if trial.start.find:
@@ -85,7 +88,9 @@ def track_trial(
             opened = _open_live(trial, stack, progress) if live else open_trial(trial)
             return _run(PlayersRun.open(trial, opened), options, stack)
         opened = open_trial(trial, None if found is None else found.facts)
-        return _run(BodyRun.open(trial, opened, found), options, stack)
+        body = BodyRun.open(trial, opened, found)
+        refuse_mix_ups(body.recording, body.model, body.start)
+        return _run(body, options, stack)
 
 
 @dataclass(frozen=True, slots=True)

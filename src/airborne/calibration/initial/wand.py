@@ -179,7 +179,7 @@ def _length_variation(
         return 0.0
     K_a, K_b = (_with_focal(cameras[i], focals[i]).K for i in (pair.a, pair.b))
     pose, points = _relative_pose(pair, rows, tracks, K_a=K_a, K_b=K_b)
-    _, variation = _scale(points, pair.is_inlier[rows], tracks)
+    _, variation = wand_scale(points, pair.is_inlier[rows], tracks)
     return min(variation + 1 - pose.front_share, _MOST_LENGTH_VARIATION)
 
 
@@ -195,7 +195,7 @@ def _relative_pose(
     return pose, points
 
 
-def _scale(points: Array, is_seen: NDArray[np.bool_], tracks: WandTracks) -> tuple[float, float]:
+def wand_scale(points: Array, is_seen: NDArray[np.bool_], tracks: WandTracks) -> tuple[float, float]:
     """Return the factor that gives the wand its lengths, and their relative standard deviation (robust)."""
     factors = [
         length / np.linalg.norm(points[:, a] - points[:, b], axis=1)[is_seen[:, a] & is_seen[:, b]]
@@ -268,7 +268,7 @@ def _links(cameras: Sequence[Camera], pairs: Sequence[_Pair], tracks: WandTracks
     for pair in pairs:
         rows = np.flatnonzero(pair.is_inlier.any(axis=1))
         pose, points = _relative_pose(pair, rows, tracks, K_a=cameras[pair.a].K, K_b=cameras[pair.b].K)
-        factor, variation = _scale(points, pair.is_inlier[rows], tracks)
+        factor, variation = wand_scale(points, pair.is_inlier[rows], tracks)
         least_variation = min(least_variation, variation)
         if pose.front_share < _LEAST_FRONT or variation > _MOST_LENGTH_VARIATION:
             continue
