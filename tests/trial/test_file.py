@@ -326,7 +326,7 @@ def test_value_where_a_table_belongs_is_refused(folder, wrong):
 
 
 def test_empty_missing_or_binary_file_is_refused(folder):
-    assert "no trial file, as [[camera]], [calibration], [body], [start] are missing" in complaint(folder, "")
+    assert "no trial file, as [[camera]], [calibration], [body] are missing" in complaint(folder, "")
     assert "(found segment)" in complaint(folder, "[[segment]]")
     with pytest.raises(TrialError, match=r"none\.toml: cannot be read \(No such file or directory\)"):
         read_trial(folder / "none.toml")

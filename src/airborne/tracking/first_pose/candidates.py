@@ -1,4 +1,4 @@
-"""Finding a thing without being told where: the moments in which it is seen best, its candidate poses, and a decision."""
+"""Finding a thing: the moments in which it is seen best, its candidate poses there, and a decision."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _best_first(seen: Sequence[tuple[Moment, list[Place]]]) -> list[tuple[Moment
     def order(each: tuple[Moment, list[Place]]) -> tuple[float, float, float]:
         views, px = each[1][0].rank
         is_among_best = views == most_views and px >= _AS_WELL * most_px
-        return (0, 0, each[0].frames.time_s) if is_among_best else (1, -views, -px)
+        return (0, 0, each[0].frames.index) if is_among_best else (1, -views, -px)
 
     return sorted(seen, key=order)
 
@@ -116,9 +116,7 @@ def _probabilities(thing: Thing, moment: Moment, found: Sequence[Posed], R: Arra
     return likelihood / likelihood.sum()
 
 
-def _agreement(
-    thing: Thing, moment: Moment, places: Sequence[Place], R: Array, t: Array
-) -> tuple[Array, Array]:
+def _agreement(thing: Thing, moment: Moment, places: Sequence[Place], R: Array, t: Array) -> tuple[Array, Array]:
     """Return precision and recall (n,) of the candidates' masks, over all views."""
     geometry = thing.render_model.geometry
     probable = full_maps(moment, moment.probability)
@@ -127,4 +125,3 @@ def _agreement(
     area = mask_evidence(geometry, ones, R, t).sum(axis=1)
     total = np.array([sum(region.area_px for region in place.regions if region is not None) for place in places])
     return inside / np.maximum(area, 1), np.minimum(inside / np.maximum(total, 1), 1.0)
-

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene, empty_scene
 from airborne.types import Array
@@ -29,7 +30,7 @@ class Moment:
     @property
     def probability(self) -> tuple[NDArray[np.float32] | None, ...]:
         """Each pixel's probability (h, w) to show what is not in the empty scene, at even odds."""
-        return tuple(None if nats is None else 1 / (1 + np.exp(-nats)) for nats in self.evidence)
+        return tuple(None if nats is None else np.asarray(expit(nats), np.float32) for nats in self.evidence)
 
 
 def spread_sample(recording: Iterable[Frames], n_expected: int | None) -> list[Frames]:
