@@ -35,6 +35,7 @@ from airborne.run.find import FoundStart
 from airborne.run.first_pose import find_first_pose
 from airborne.run.opening import Opened
 from airborne.tracking import Estimate
+from airborne.tracking.estimate import unknown_segments
 from airborne.tracking.methods import sample_body_colours, tracker_of
 from airborne.tracking.tracker import Tracker
 from airborne.trial.file import Trial
@@ -120,7 +121,10 @@ class BodyRun:
         pose = self.start if is_first and estimate.pose is None else estimate.pose
         posed = None if pose is None else self.model.with_pose(pose)
         for artist in artists:
-            artist.write(frames, posed, estimate.status)
+            if isinstance(artist, OverlayVideos):
+                artist.write(frames, posed, estimate.status, unknown_segments(estimate, self.model))
+            else:
+                artist.write(frames, posed, estimate.status)
 
     def finish(self, folder: Path) -> tuple[Motion, dict[str, Any]]:
         """Write the tables; return the motion and the beginning of the summary."""
