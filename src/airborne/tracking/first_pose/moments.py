@@ -14,7 +14,7 @@ from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene, empty_s
 from airborne.types import Array
 from airborne.video import Frames, View
 
-_MOST_MOMENTS = 24
+_MOST_MOMENTS = 24  # enough for a median, and to meet a body that is seen for a tenth of the time
 _WIDTH_PX = 640  # about the width of the small pictures
 
 Source = tuple[str, bytes]  # camera name and intrinsics: pictures that share them show the scene by the same pixels
