@@ -1,4 +1,4 @@
-"""Commands before the first pose is known: `airborne find` looks for the body, `airborne frame` shows where to click."""
+"""Commands before the first pose is known: one looks for the body, the other writes the picture to click in."""
 
 from __future__ import annotations
 

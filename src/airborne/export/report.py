@@ -25,8 +25,8 @@ class _Comparison(NamedTuple):
 _FIGURES = {  # titles and captions, in the order of the page
     "empty_scene.png": (
         "How the start was found",
-        "For each camera the empty scene, the median of pictures spread over the recording; what stands out from it at the "
-        "moment in which the body is seen best; and the outline of the body found there.",
+        "For each camera the empty scene, the median of pictures spread over the recording; what stands out from it at "
+        "the moment in which the body is seen well; and the outline of the body found there.",
     ),
     "pose.png": (
         "The motion",
