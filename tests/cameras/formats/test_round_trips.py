@@ -132,7 +132,7 @@ def test_a_name_that_no_file_can_hold_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("rig.txt", {}, "the name asks for no format; end it in .toml, .qca.txt, .xcp"),
+        ("rig.txt", {}, "the name names no format; end it in .toml, .qca.txt, .xcp"),
         ("rig.toml", {"format": "anipose"}, "no calibration format 'anipose'; choose from pose2sim, aniposelib"),
         ("rig.toml", {"unit": "mm"}, "pose2sim files are always in m"),
         ("rig.xcp", {"unit": "m"}, "vicon files are always in mm"),
