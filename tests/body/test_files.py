@@ -1,5 +1,7 @@
 """Body files: what is read, and what is refused in one line."""
 
+import re
+
 import numpy as np
 import pytest
 import trimesh
@@ -112,21 +114,25 @@ def test_file_holds_segments_parts_positions_and_colours(tmp_path):
     ("old", "new", "expected"),
     [
         ('name = "leg"', 'name = "leg"\nheight = 3', "height: unknown key"),
-        ('name = "leg"', "", "name: is missing"),
-        ("centre_m", "center_m", "segment.0.part.0.center_m: unknown key"),
+        ('name = "leg"', "", "name is missing"),
+        ("centre_m", "center_m", "part 'upper': center_m: unknown key; did you mean centre_m?"),
         ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, -0.2, 0.4]", "part 'upper': size_m is [0.1, -0.2, 0.4]"),
-        ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2, nan]", "segment.0.part.0.size_m.2: expected a finite"),
-        ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2]", "segment.0.part.0.size_m"),
+        (
+            "size_m = [0.1, 0.2, 0.4]",
+            "size_m = [0.1, 0.2, nan]",
+            "part 'upper': size_m.2: expected a finite",
+        ),
+        ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2]", "segment 'thigh': part 'upper': size_m"),
         ("size_m = [0.1, 0.2, 0.4]", "", "part 'upper' is a box and needs size_m"),
         ("size_m = [0.1, 0.2, 0.4]", "semi_axes_m = [1, 1, 1]", "part 'upper' is a box and needs size_m"),
         ("semi_axes_m = [0.05, 0.06, 0.2]", 'semi_axes_m = [1, 1, 1]\nfile = "a.obj"', "file does not belong to it"),
         ("semi_axes_m = [0.05, 0.06, 0.2]", "semi_axes_m = [1, 0, 1]", "part 'lower': semi_axes_m is [1.0, 0.0, 1.0]"),
-        ('shape = "box"', 'shape = "cone"', "segment.0.part.0.shape"),
+        ('shape = "box"', 'shape = "cone"', "part 'upper': shape"),
         ("colour_srgb = [10, 20, 30]", "", "part 'upper' needs colour_srgb"),
         ('colour = "sample"', 'colour = "sample"\ncolour_srgb = [1, 2, 3]', "part 'lower' needs colour_srgb"),
         ("colour_srgb = [10, 20, 30]", "colour_srgb = [10, 20, 256]", "colour_srgb.2"),
-        ("colour_srgb = [10, 20, 30]", "colour_srgb = [10, 20]", "segment.0.part.0.colour_srgb"),
-        ('colour = "sample"', 'colour = "guess"', "segment.1.part.0.colour"),
+        ("colour_srgb = [10, 20, 30]", "colour_srgb = [10, 20]", "part 'upper': colour_srgb"),
+        ('colour = "sample"', 'colour = "guess"', "part 'lower': colour"),
         ('parent = "thigh"', 'parent = "hip"', "parent 'hip' must stand before it; so far: thigh"),
         ('parent = "thigh"', "", "exactly the first segment has no parent"),
         ('name = "shank"', 'name = "thigh"', "two segments are named 'thigh'"),
@@ -226,6 +232,19 @@ def test_open_mesh_is_refused(tmp_path):
     assert "lump.obj: the mesh is not closed" in complaint(tmp_path, MESH.replace("FILE", "lump.obj"))
 
 
+def test_a_mesh_with_a_few_bad_edges_is_taken_with_a_note_that_counts_and_places_them(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+    hole = ball.triangles_center[0]
+    ball.update_faces(np.arange(len(ball.faces)) > 0)
+    ball.export(tmp_path / "lump.obj")
+    (note,) = read(tmp_path, MESH.replace("FILE", "lump.obj")).notes
+    assert note.startswith("lump.obj: 3 of 1920 edges do not have two faces, at (")
+    places = np.array([[float(x) for x in each.split(",")] for each in re.findall(r"\(([^)]*)\)", note)])
+    assert np.linalg.norm(places - hole, axis=1).max() < 0.02
+    trimesh.creation.icosphere(subdivisions=3, radius=0.1).export(tmp_path / "lump.obj")
+    assert read(tmp_path, MESH.replace("FILE", "lump.obj")).notes == ()
+
+
 def test_measures_in_millimetres_are_noticed(tmp_path):
     trimesh.creation.box(extents=[100, 200, 300]).export(tmp_path / "lump.stl")
     assert "is in millimetres" in complaint(tmp_path, MESH.replace("FILE", "lump.stl"))
@@ -253,25 +272,25 @@ def test_file_says_limits_slabs_inertia_and_landmarks(tmp_path):
     [
         ("[[-5, 140], ", "[[140, -5], ", "segment 'shank': each joint limit needs a least and a greatest angle"),
         ("[[-5, 140], ", "[[nan, 140], ", "segment 'shank': each joint limit needs a least and a greatest angle"),
-        ("[[-5, 140], ", "[", "segment.1.limits_deg"),
-        ("[[-5, 140], ", "[[-5], ", "segment.1.limits_deg.0"),
+        ("[[-5, 140], ", "[", "segment 'shank': limits_deg"),
+        ("[[-5, 140], ", "[[-5], ", "segment 'shank': limits_deg.0"),
         ("slab_m = [-inf, 0.05]", "slab_m = [0.05, -0.05]", "part 'lower': slab_m is [0.05, -0.05]"),
         ("slab_m = [-inf, 0.05]", "slab_m = [nan, 0.05]", "part 'lower': slab_m"),
-        ("slab_m = [-inf, 0.05]", "slab_m = [0.05]", "segment.1.part.0.slab_m"),
+        ("slab_m = [-inf, 0.05]", "slab_m = [0.05]", "slab_m"),
         ("rotation_deg = [10", "slab_m = [0, 0.1]\nrotation_deg = [10", "part 'upper': only an ellipsoid can be cut"),
-        ("mass_kg = 3.5", "mass_kg = 0", "segment.1.inertia.mass_kg"),
-        ("mass_kg = 3.5", "", "segment.1.inertia.mass_kg: is missing"),
+        ("mass_kg = 3.5", "mass_kg = 0", "segment 'shank': inertia.mass_kg"),
+        ("mass_kg = 3.5", "", "inertia.mass_kg is missing"),
         ("[[0.05, 0.0, 0.0], ", "[[0.05, 0.01, 0.0], ", "segment 'shank': tensor_kg_m2 belongs to no solid"),
         ("[[0.05, 0.0, 0.0], ", "[[0.5, 0.0, 0.0], ", "segment 'shank': tensor_kg_m2 belongs to no solid"),
         ("[[0.05, 0.0, 0.0], ", "[[-0.05, 0.0, 0.0], ", "segment 'shank': tensor_kg_m2 belongs to no solid"),
-        ("[[0.05, 0.0, 0.0], ", "[", "segment.1.inertia.tensor_kg_m2"),
+        ("[[0.05, 0.0, 0.0], ", "[", "segment 'shank': inertia.tensor_kg_m2"),
         (
             'name = "ankle"\nsegment = "shank"',
             'name = "ankle"\nsegment = "foot"',
             "landmark 'ankle': no segment 'foot'",
         ),
         ('name = "ankle"', 'name = "knee"', "two landmarks of body 'leg' share a name"),
-        ("position_m = [0.0, 0.0, -0.4]", "position_m = [0.0, inf, -0.4]", "landmark.1.position_m"),
+        ("position_m = [0.0, 0.0, -0.4]", "position_m = [0.0, inf, -0.4]", "position_m"),
     ],
 )
 def test_faulty_limit_slab_inertia_or_landmark_is_refused_in_one_line(tmp_path, old, new, expected):
