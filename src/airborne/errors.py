@@ -40,6 +40,10 @@ class TrialError(AirborneError):
     """A trial file is unusable."""
 
 
+class UndecidedError(TrialError):
+    """The pictures do not decide where the body is; the command line exits with 3."""
+
+
 class MistakesError(TrialError):
     """A trial file with mistakes: the message says the first and counts the others, `mistakes` has a line for each."""
 

@@ -1,5 +1,7 @@
 """Body files: what is read, and what is refused in one line."""
 
+import re
+
 import numpy as np
 import pytest
 import trimesh
@@ -19,6 +21,7 @@ from airborne.body import (
     surface_arrays,
 )
 from airborne.body.files import body_toml, mesh_files, read_body, write_body
+from airborne.body.limits import JointLimits
 from airborne.errors import BodyError
 from tests.support.tolerances import EXACT
 
@@ -229,6 +232,19 @@ def test_open_mesh_is_refused(tmp_path):
     assert "lump.obj: the mesh is not closed" in complaint(tmp_path, MESH.replace("FILE", "lump.obj"))
 
 
+def test_a_mesh_with_a_few_bad_edges_is_taken_with_a_note_that_counts_and_places_them(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+    hole = ball.triangles_center[0]
+    ball.update_faces(np.arange(len(ball.faces)) > 0)
+    ball.export(tmp_path / "lump.obj")
+    (note,) = read(tmp_path, MESH.replace("FILE", "lump.obj")).notes
+    assert note.startswith("lump.obj: 3 of 1920 edges do not have two faces, at (")
+    places = np.array([[float(x) for x in each.split(",")] for each in re.findall(r"\(([^)]*)\)", note)])
+    assert np.linalg.norm(places - hole, axis=1).max() < 0.02
+    trimesh.creation.icosphere(subdivisions=3, radius=0.1).export(tmp_path / "lump.obj")
+    assert read(tmp_path, MESH.replace("FILE", "lump.obj")).notes == ()
+
+
 def test_measures_in_millimetres_are_noticed(tmp_path):
     trimesh.creation.box(extents=[100, 200, 300]).export(tmp_path / "lump.stl")
     assert "is in millimetres" in complaint(tmp_path, MESH.replace("FILE", "lump.stl"))
@@ -238,8 +254,10 @@ def test_measures_in_millimetres_are_noticed(tmp_path):
 
 def test_file_says_limits_slabs_inertia_and_landmarks(tmp_path):
     thigh, shank = (model := read(tmp_path, FULL)).segments
-    np.testing.assert_array_equal(thigh.limits_rad, np.tile([-np.inf, np.inf], (3, 1)))
-    np.testing.assert_allclose(shank.limits_rad, np.radians([[-5, 140], [0, 0], [-np.inf, 10]]), atol=EXACT)
+    assert not thigh.limits.is_limited
+    np.testing.assert_allclose(shank.limits.half_rad, np.radians([72.5, 0, 95]), atol=EXACT)
+    np.testing.assert_allclose(shank.limits.centre_angles_rad, np.radians([67.5, 0, -85]), atol=EXACT)
+    assert model.notes == ("body: limits_deg of shank are read as a swing and a twist",)
     assert shank.parts[0].slab_m == (-np.inf, 0.05)
     assert thigh.inertia is None
     assert shank.inertia.mass_kg == 3.5
@@ -290,7 +308,7 @@ def same(a, b):
     pairs = [(m.position_m, n.position_m) for m, n in zip(a.landmarks, b.landmarks, strict=True)]
     for s, u in zip(a.segments, b.segments, strict=True):
         assert (s.name, s.inertia is None) == (u.name, u.inertia is None)
-        pairs += [(s.joint_m, u.joint_m), (s.limits_rad, u.limits_rad)]
+        pairs += [(s.joint_m, u.joint_m), (s.limits.half_rad, u.limits.half_rad), (s.limits.centre, u.limits.centre)]
         if s.inertia is not None:
             pairs += [(getattr(s.inertia, k), getattr(u.inertia, k)) for k in ("mass_kg", "centre_m", "tensor_kg_m2")]
         for p, q in zip(s.parts, u.parts, strict=True):
@@ -335,7 +353,7 @@ def random_body(seed):
     inertia = Inertia(float(rng.uniform(1, 9)), rng.normal(size=3), np.diag(rng.uniform(0.6, 1, 3)))
     segments = (
         Segment("root", None, np.zeros(3), parts[:2], inertia=inertia),
-        Segment("limb", "root", rng.normal(size=3), (), limits),
+        Segment("limb", "root", rng.normal(size=3), (), JointLimits.from_angles(limits)),
         Segment("tip", "limb", rng.normal(size=3), parts[2:]),
     )
     landmarks = (Landmark("end", "tip", rng.normal(size=3)), Landmark("root", "limb", np.zeros(3)))

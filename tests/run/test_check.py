@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from airborne.cli import main
-from airborne.errors import ResultError
+from airborne.errors import MistakesError, ResultError
 from airborne.run.check import check_trial
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
@@ -61,6 +61,26 @@ def test_every_unusable_file_is_listed(folder):
     assert len(mistakes) == 4
     for said in ("none.toml not found beside it", "cam1.mp4 cannot be opened", "cam9.mp4 not found", "cross.toml"):
         assert sum(said in line for line in mistakes) == 1, said
+
+
+def test_cameras_with_the_same_video_are_named_whatever_the_file_is_called(folder):
+    shutil.copyfile(folder / "cam1.mp4", folder / "cam3.mp4")
+    said = "the videos: cameras cam1 and cam3 have the same video (cam1.mp4 and cam3.mp4); give each camera its own"
+    assert said.removeprefix("the videos: ") in check_trial(folder / "trial.toml").mistakes[0]
+    with pytest.raises(MistakesError, match="cam1 and cam3 have the same video"):
+        track_trial(read_trial(folder / "trial.toml"), folder / "out")
+    assert not (folder / "out").exists()
+
+
+def test_exchanged_videos_and_a_mirrored_one_are_named_before_anything_is_tracked(folder):
+    (folder / "cam2.mp4").rename(folder / "other.mp4")
+    (folder / "cam3.mp4").rename(folder / "cam2.mp4")
+    (folder / "other.mp4").rename(folder / "cam3.mp4")
+    (mistake,) = check_trial(folder / "trial.toml").mistakes
+    assert "the videos of cam2 and cam3 are exchanged" in mistake
+    with pytest.raises(MistakesError, match="the videos of cam2 and cam3 are exchanged"):
+        track_trial(read_trial(folder / "trial.toml"), folder / "out")
+    assert not (folder / "out").exists()
 
 
 def test_a_start_past_the_end_is_a_mistake(folder):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.calibration.diagnosis import check_points, decompose_cameras, warnings_about
+from airborne.calibration.intrinsics.common_lens import common_lens_shifts
 from airborne.calibration.intrinsics.model_selection import (
     Solution,
     candidates_for,
@@ -97,14 +98,14 @@ def calibrate(
         raise CalibrationError(f"unknown calibration method '{method}'; expected 'lm' or 'annealing'")
     check_points(points, sizes)
     decompositions = decompose_cameras(points)
-    cameras, fits, solutions = [], [], {}
-    for name in points.cameras:
-        candidates = _solve(
-            points, name, size=sizes[name], decomposition=decompositions[name], method=method, seed=seed
-        )
-        solutions[name] = choose_simplest(candidates)
-        cameras.append(solutions[name].pinhole.camera(name, sizes[name], solutions[name].shift_sd_px))
-        fits.append(_describe_fit(points, name, solutions[name], candidates))
+    candidates = {
+        name: _solve(points, name, size=sizes[name], decomposition=decompositions[name], method=method, seed=seed)
+        for name in points.cameras
+    }
+    solutions = {name: choose_simplest(each) for name, each in candidates.items()}
+    shifts = common_lens_shifts(candidates, sizes)
+    cameras = [each.pinhole.camera(name, sizes[name], each.shift_sd_px) for name, each in solutions.items()]
+    fits = [_describe_fit(points, name, solutions[name], candidates[name], shifts.get(name)) for name in solutions]
     return Calibration(
         rig=Rig(tuple(cameras)),
         method=method,
@@ -137,11 +138,13 @@ def _solve(
     return candidates_for(initial, world, px)
 
 
-def _describe_fit(points: ControlPoints, name: str, best: Solution, candidates: list[Solution]) -> CameraFit:
+def _describe_fit(
+    points: ControlPoints, name: str, best: Solution, candidates: list[Solution], common_lens_shift: Array | None
+) -> CameraFit:
     is_seen = points.is_seen_by(name)
     P_dlt = fit_dlt(best.world, best.px)
     sd = parameter_sd(best.pinhole, best.model, best.world, best.px)
-    sd[3:6] = place_sd(best, candidates)
+    sd[3:6] = place_sd(best, candidates, common_lens_shift)
     return CameraFit(
         name=name,
         model=best.model.name,

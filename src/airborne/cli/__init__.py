@@ -12,17 +12,20 @@ from airborne import __version__
 from airborne.cli import reproduce, results, synth, track
 from airborne.cli.calibrate import calibrate_command
 from airborne.cli.check import check_command
-from airborne.cli.console import STOPPED, refuse, stop
+from airborne.cli.console import STOPPED, UNDECIDED, refuse, stop
 from airborne.cli.convert import convert_command
 from airborne.cli.export import export_command
+from airborne.cli.find import find_command, frame_command
 from airborne.cli.smooth import smooth_command
 from airborne.cli.sync import sync_command
-from airborne.errors import AirborneError
+from airborne.errors import AirborneError, UndecidedError
 
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
 _COMMANDS = {
     "demo": track.demo_command,
     "check": check_command,
+    "find": find_command,
+    "frame": frame_command,
     "track": track.track_command,
     "calibrate": calibrate_command,
     "sync": sync_command,
@@ -74,6 +77,8 @@ def main() -> None:
         refuse(f"{' '.join(message.split()).rstrip('.')}; see {context.command_path if context else 'airborne'} --help")
     except (KeyboardInterrupt, typer.Abort):
         stop()
+    except UndecidedError as error:
+        refuse(str(error), code=UNDECIDED)
     except AirborneError as error:
         refuse(str(error))
     except OSError as error:

@@ -52,6 +52,10 @@ def track_command(
         bool,
         typer.Option("--first-frame", help="Track one frame and draw it in every camera: is [start] right?"),
     ] = False,
+    take: Annotated[
+        int | None,
+        typer.Option(min=1, help="Without [start]: which of the poses in candidates.json, where these are undecided."),
+    ] = None,
     method: Annotated[
         str | None,
         typer.Option(
@@ -81,6 +85,7 @@ def track_command(
         overwrite=overwrite,
         pictures=pictures,
         first_frame=first_frame,
+        take=take,
         changes=changes,
         cameras=cameras,
         live=live,
@@ -101,6 +106,7 @@ def _track(
     overwrite: bool,
     pictures: bool,
     first_frame: bool = False,
+    take: int | None = None,
     changes: dict | None = None,
     cameras: str | None = None,
     live: bool = False,
@@ -123,6 +129,7 @@ def _track(
                 live=live,
                 pictures=pictures,
                 first_frame=first_frame,
+                take=take,
                 progress=partial(report, f"tracking {trial.name}"),
             )
     except KeyboardInterrupt:

@@ -120,8 +120,10 @@ def write_joints_figure(path: Path, motion: Motion, model: BodyModel) -> None:
 def joints_figure(motion: Motion, model: BodyModel) -> Figure:
     """Draw the angles of the main joints over time [deg], left beside right, with bands of two standard deviations.
 
-    Of a person shoulders, elbows, hips and knees: the x angle, with its sign such that flexion is positive. Of another
-    body the x angles of its first joints. Raises ResultError where the motion is another body's.
+    Where the images do not show an angle, it is left out. Of a person shoulders, elbows, hips and knees: the x angle,
+    flexion positive. Of another body the x angles of its first joints.
+
+    Raises ResultError where the motion is another body's.
     """
     table, joint_panels = joint_angles(motion, model), _joint_panels(motion.joints)
     unobservable, singular = np.zeros((2, len(motion)), bool)
@@ -131,6 +133,7 @@ def joints_figure(motion: Motion, model: BodyModel) -> Figure:
         of_joint = table.sel(joint=segment)
         values, sd = (of_joint[name].sel(axis="x").to_numpy() for name in ("angle", "angle_sd"))
         is_unobservable, is_singular = np.isinf(sd), of_joint["is_singular"].to_numpy() & motion.has_pose
+        values = np.where(is_unobservable, np.nan, values)
         panels.draw_band(axes, motion.time_s, sign * values, sd)
         panels.draw_estimate(axes, motion, sign * values)
         panels.shade_spans(axes, motion.time_s, is_unobservable, panels.UNOBSERVABLE_STYLE)

@@ -23,6 +23,11 @@ class _Comparison(NamedTuple):
 
 
 _FIGURES = {  # titles and captions, in the order of the page
+    "empty_scene.png": (
+        "How the start was found",
+        "For each camera the empty scene, the median of pictures spread over the recording; what stands out from it at the "
+        "moment in which the body is seen best; and the outline of the body found there.",
+    ),
     "pose.png": (
         "The motion",
         "Position of the body's root in the world, and its somersault, tilt and twist, over time.",

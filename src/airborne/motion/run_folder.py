@@ -18,6 +18,7 @@ MOTION, JOINTS, JUMPS = "motion.csv", "joints.csv", "jumps.csv"
 SUMMARY, REPORT, RUN_RECORD = "summary.json", "report.html", "run.json"
 CALIBRATION, BODY = "calib.toml", "body.toml"
 SMOOTH_RECORD = "smooth.json"
+CANDIDATES, CANDIDATES_PICTURE = "candidates.json", "candidates.png"  # of a start that is undecided
 FOLDERS = ("tables", "figures", "videos")
 
 

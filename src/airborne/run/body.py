@@ -30,9 +30,11 @@ from airborne.motion import (
 )
 from airborne.motion.run_folder import BODY, JOINTS, MOTION, figures_of, tables_of, videos_of
 from airborne.rendering import FLAT, render
+from airborne.run.find import FoundStart
 from airborne.run.first_pose import find_first_pose
 from airborne.run.opening import Opened
 from airborne.tracking import Estimate
+from airborne.tracking.estimate import unknown_segments
 from airborne.tracking.methods import sample_body_colours, tracker_of
 from airborne.tracking.tracker import Tracker
 from airborne.trial.file import Trial
@@ -55,16 +57,18 @@ class BodyRun:
     calibration: Calibration | None
     model: BodyModel
     start: Pose
+    found: FoundStart | None = None  # where the start was looked for
 
     table = MOTION
 
     @classmethod
-    def open(cls, trial: Trial, opened: Opened[Recording]) -> BodyRun:
+    def open(cls, trial: Trial, opened: Opened[Recording], found: FoundStart | None = None) -> BodyRun:
         """Read the body and find its first pose, whose notes become events of the recording."""
         model = trial.model()
         first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
-        opened.recording.events.extend([*model.notes, *first.notes])
-        return cls(trial, opened.recording, opened.calibration, model, first.pose)
+        found_notes = () if found is None else (found.note,)
+        opened.recording.events.extend([*model.notes, *found_notes, *first.notes])
+        return cls(trial, opened.recording, opened.calibration, model, first.pose, found)
 
     def read_done(self, folder: Path) -> list[Estimate]:
         """Return the estimates that a killed run left: from their frames the tracker only learns."""
@@ -115,7 +119,10 @@ class BodyRun:
         pose = self.start if is_first and estimate.pose is None else estimate.pose
         posed = None if pose is None else self.model.with_pose(pose)
         for artist in artists:
-            artist.write(frames, posed, estimate.status)
+            if isinstance(artist, OverlayVideos):
+                artist.write(frames, posed, estimate.status, unknown_segments(estimate, self.model))
+            else:
+                artist.write(frames, posed, estimate.status)
 
     def finish(self, folder: Path) -> tuple[Motion, dict[str, Any]]:
         """Write the tables; return the motion and the beginning of the summary."""
@@ -132,6 +139,8 @@ class BodyRun:
     def write_report(self, folder: Path, summary: dict[str, Any], motion: Motion) -> None:
         """Draw the figures and write the report."""
         write_figures(figures_of(folder), motion, self.model)
+        if self.found is not None:
+            self.found.draw(folder)
         write_report(folder, summary)
 
     def warnings(self) -> list[str]:

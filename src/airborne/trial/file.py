@@ -38,7 +38,7 @@ class Trial(SettingsTable):
     camera: Annotated[list[CameraTable], Field(min_length=1)]
     calibration: CalibrationTable
     body: BodyTable
-    start: StartTable
+    start: StartTable = Field(default_factory=lambda: StartTable(find=True))
     lights: LightsTable | None = None
     track: TrackSettings = Field(default_factory=BodySettings, validate_default=True)
 
@@ -187,7 +187,7 @@ def read_trial(
 
 def _validate(table: dict[str, Any], changes: dict[str, Any], where: str, given_as: str) -> Trial:
     """Return the trial of a table with changes to its settings; an error names the changes where they cause it."""
-    heads = ("[[camera]]", "[calibration]", "[body]", "[start]")
+    heads = ("[[camera]]", "[calibration]", "[body]")
     missing = [head for head in heads if head.strip("[]") not in table]
     if len(missing) > 1:
         raise TrialError(f"{where}: no trial file, as {', '.join(missing)} are missing (found {list_keys(table)})")
