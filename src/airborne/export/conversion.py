@@ -21,7 +21,7 @@ from airborne.cameras.formats.dltdv import (
 )
 from airborne.cameras.formats.options import FileOptions
 from airborne.cameras.units import check_baselines
-from airborne.errors import AirborneError, CalibrationError
+from airborne.errors import AirborneError, CalibrationError, count
 from airborne.evaluation import DigitisedPoints, read_clicked_frames, write_clicked_frames
 from airborne.io.text import read_toml
 
@@ -131,7 +131,7 @@ def _convert_rig(file: CalibrationFile, target: Path, options: ConversionOptions
     rig = build_rig(file, options.source)
     lost = write_rig(target, rig, format=to, unit=options.target.unit, pixels=options.target.pixels)
     return Conversion(
-        read=f"{file.where}, {file.format}, {len(rig)} cameras: {', '.join(rig.names)}",
+        read=f"{file.where}, {file.format}, {count(len(rig), 'camera')}: {', '.join(rig.names)}",
         written=f"{target}, {to}{_convention(to, options.target)}",
         lost=lost,
         notes=tuple(f"{finding.what}; is --unit {options.source.unit} right?" for finding in check_baselines(rig)),
@@ -158,7 +158,7 @@ def _convert_points(source: Path, kind: str, target: Path, options: ConversionOp
     if to != "dltdv" and read.world is not None:
         lost = (*lost, "places in the world and their residuals")
     n_frames, n_points, n_cameras = read.points.visibility.shape
-    counts = f"{n_frames} frames, {n_points} points, {n_cameras} cameras: {', '.join(read.points.cameras)}"
+    counts = f"{count(n_frames, 'frame')}, {count(n_points, 'point')}, {count(n_cameras, 'camera')}: {', '.join(read.points.cameras)}"
     notes = "".join(f"; {note}" for note in read.points.notes)
     return Conversion(
         read=f"{source}, {kind}, {counts}{notes}",
