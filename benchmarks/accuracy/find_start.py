@@ -1,8 +1,8 @@
 """Measure how often the start of a thrown thing is found without `[start]`: `python benchmarks/accuracy/find_start.py`.
 
-40 synthetic throws, each with its own body, hall and two to four cameras, and the bundled thrown cross (about 10 minutes,
-nearly all of it rendering); `--quick` takes 5 throws, `--seeds 100-139` others, and neither writes rows. Right is up to
-the body's symmetries, within 50 mm and 10 degrees.
+40 synthetic throws, each with its own body, hall and two to four cameras, and the bundled thrown cross (about 10
+minutes, nearly all of it rendering); `--quick` takes 5 throws, `--seeds 100-139` others, and neither writes rows. Right
+is up to the body's symmetries, within 50 mm and 10 degrees.
 """
 
 from __future__ import annotations
@@ -103,11 +103,12 @@ def _thing(rng: np.random.Generator) -> BodyModel:
         colours[1] = (colours[0] + 110) % 230
         boxes = [(tuple(size), (0, 0, 0)), ((size[0], size[1], 0.06), (0, 0, size[2] / 2 + 0.03))]
     parts = tuple(
-        Part(f"part_{i}", Box(np.array(size, float)), RigidTransform.from_components(centre, Rotation.identity()), colour)
+        Part(
+            f"part_{i}", Box(np.array(size, float)), RigidTransform.from_components(centre, Rotation.identity()), colour
+        )
         for i, ((size, centre), colour) in enumerate(zip(boxes, colours, strict=False))
     )
     return BodyModel(("cross", "T", "L", "tripod", "box")[kind], (Segment("thing", None, np.zeros(3), parts),))
-
 
 
 def verdict(seed: int) -> tuple[str, float]:

@@ -188,7 +188,7 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
             'file = "calib.toml"\nmend = ["top"]',
             "calibration.mend: no camera top; there are: left",
         ),
-        ("frame = 3", 'joints_m = "joints.csv"', "or joints_m, points_px or detections, one of them"),
+        ("frame = 3", 'joints_m = "joints.csv"', "or joints_m, points_px, detections or find = true, one of them"),
         ("frame = 3", 'detections_cameras = {left = "c1"}', "detections_cameras goes with detections"),
         ("position_m = [0.1, 0.2, 1.3]", "", "position_m is missing: give where the root's origin is"),
         ("frame = 3", "joint_angles_deg = {knee = [1, 2]}", "start.joint_angles_deg.knee"),
@@ -257,7 +257,10 @@ def test_start_can_be_given_by_positions_clicks_or_detections(folder):
 @pytest.mark.parametrize(
     ("start", "said"),
     [
-        ("frame = 3", "give a position_m and a rotation, or joints_m, points_px or detections, one of them"),
+        (
+            "frame = 3",
+            "give a position_m and a rotation, or joints_m, points_px, detections or find = true, one of them",
+        ),
         (f'{PLACES}\npoints_px = "clicks.csv"', "one of them"),
         (f"{PLACES}\nposition_m = [1, 2, 3]", "one of them"),
         (f"{PLACES}\njoint_angles_deg = {{a = [1, 2, 3]}}", "one of them"),
@@ -326,7 +329,7 @@ def test_value_where_a_table_belongs_is_refused(folder, wrong):
 
 
 def test_empty_missing_or_binary_file_is_refused(folder):
-    assert "no trial file, as [[camera]], [calibration], [body], [start] are missing" in complaint(folder, "")
+    assert "no trial file, as [[camera]], [calibration], [body] are missing" in complaint(folder, "")
     assert "(found segment)" in complaint(folder, "[[segment]]")
     with pytest.raises(TrialError, match=r"none\.toml: cannot be read \(No such file or directory\)"):
         read_trial(folder / "none.toml")

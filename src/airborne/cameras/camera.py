@@ -175,6 +175,6 @@ class Rig:
         """
         px = np.asarray(px, float)
         if px.shape[-2:] != (len(self), 2):
-            raise CalibrationError(f"pixels have the shape {px.shape}; expected (..., {len(self)}, 2): one row a camera")
+            raise CalibrationError(f"pixels have the shape {px.shape}; expected (..., {len(self)}, 2), a row a camera")
         undistorted = [camera.undistort_px(px[..., i, :]) for i, camera in enumerate(self.cameras)]
         return triangulate(self.P, np.stack(undistorted, axis=-2), weights)

@@ -1,11 +1,10 @@
-"""The start of a trial found in its videos: the empty scene, what stands out from it, the body's pose, its first frame."""
+"""The start of a trial found in its videos: the empty scene, what stands out from it, the body's pose and frame."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import islice
 from pathlib import Path
 from typing import Any
 

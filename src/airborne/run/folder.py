@@ -64,7 +64,18 @@ def prepare_folder(
 
 def _remove_run(folder: Path) -> None:
     """Remove what commands leave in a run's folder; exports and what others put there stay."""
-    for name in (MOTION, JOINTS, JUMPS, SUMMARY, REPORT, CALIBRATION, BODY, COVARIANCE_FILE, SMOOTH_RECORD, *_BEFORE_A_RUN):
+    for name in (
+        MOTION,
+        JOINTS,
+        JUMPS,
+        SUMMARY,
+        REPORT,
+        CALIBRATION,
+        BODY,
+        COVARIANCE_FILE,
+        SMOOTH_RECORD,
+        *_BEFORE_A_RUN,
+    ):
         (folder / name).unlink(missing_ok=True)
     for name in FOLDERS:
         shutil.rmtree(folder / name, ignore_errors=True)

@@ -35,7 +35,12 @@ class StartTable(SettingsTable):
     def _check_start(self) -> StartTable:
         by_hand = {"position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg"}
         ways = [self.joints_m, self.points_px, self.detections]
-        given = sum(value is not None for value in ways) + bool(by_hand & self.model_fields_set) + bool(self.player) + self.find
+        given = (
+            sum(value is not None for value in ways)
+            + bool(by_hand & self.model_fields_set)
+            + bool(self.player)
+            + self.find
+        )
         if given != 1:
             raise ValueError(
                 "give a position_m and a rotation, or joints_m, points_px, detections or find = true, one of them; "

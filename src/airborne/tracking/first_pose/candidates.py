@@ -1,4 +1,4 @@
-"""Finding a thing without being told where: the moments in which it is seen best, its candidate poses, and a decision."""
+"""Finding a thing: the moments in which it is seen best, its candidate poses there, and a decision."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
 LEAST_PROBABILITY = 0.95  # of the best candidate, with which it is taken
-# chosen on `benchmarks/accuracy/find_start.py --seeds 1000-1039`
-_SHARE_SD = 0.02  # share of the evidence by which silhouettes of right and wrong poses differ by chance
-_CHROMA_SD, _GREY_SD = 4.0, 12.0  # [grey levels] the same of colours, less their brightness, and with it
+# the next five: `benchmarks/accuracy/find_start.py --seeds 1000-1029`, none of which its rows are measured on
+_SHARE_PER_NAT = 0.02  # share of the evidence that makes a silhouette e times likelier
+_CHROMA_SD, _GREY_SD = 4.0, 12.0  # of colours, less their brightness, and with it [grey levels]
 _LEAST_PRECISION, _LEAST_RECALL = 0.75, 0.6  # of a mask over what stands out
-_MOST_MOMENTS, _MOST_PLACES, _MOST_CANDIDATES = 3, 3, 6
+_MOST_MOMENTS, _MOST_PLACES = 3, 3  # that are searched: about a second each
+_MOST_CANDIDATES = 6  # whose colours are compared: the rest covers far less
 _AS_WELL = 0.7  # share of the largest picture of the body that counts as large as any
 _LEAST_SHOWN = 0.01  # probability of a candidate that is listed
 
@@ -81,7 +82,7 @@ def _best_first(seen: Sequence[tuple[Moment, list[Place]]]) -> list[tuple[Moment
     def order(each: tuple[Moment, list[Place]]) -> tuple[float, float, float]:
         views, px = each[1][0].rank
         is_among_best = views == most_views and px >= _AS_WELL * most_px
-        return (0, 0, each[0].frames.time_s) if is_among_best else (1, -views, -px)
+        return (0, 0, each[0].frames.index) if is_among_best else (1, -views, -px)
 
     return sorted(seen, key=order)
 
@@ -106,7 +107,7 @@ def _find_at(thing: Thing, moment: Moment, places: Sequence[Place]) -> Finding:
 def _probabilities(thing: Thing, moment: Moment, found: Sequence[Posed], R: Array, t: Array) -> Array:
     """Return the candidates' probabilities (n,) by silhouettes and colours; R (n, 1, 3, 3), t (n, 1, 3) [m]."""
     evidence = np.array([posed.evidence for posed in found])
-    nats = (evidence / max(evidence.max(), 1e-9) - 1) / _SHARE_SD
+    nats = (evidence / max(evidence.max(), 1e-9) - 1) / _SHARE_PER_NAT
     if not thing.model.needs_colours:
         targets = pack_targets(moment.frames.views, FLAT)
         for rule, sd in ((ScoreRule(normalised=1.0), _CHROMA_SD), (ScoreRule(fits_gain=True), _GREY_SD)):
@@ -116,9 +117,7 @@ def _probabilities(thing: Thing, moment: Moment, found: Sequence[Posed], R: Arra
     return likelihood / likelihood.sum()
 
 
-def _agreement(
-    thing: Thing, moment: Moment, places: Sequence[Place], R: Array, t: Array
-) -> tuple[Array, Array]:
+def _agreement(thing: Thing, moment: Moment, places: Sequence[Place], R: Array, t: Array) -> tuple[Array, Array]:
     """Return precision and recall (n,) of the candidates' masks, over all views."""
     geometry = thing.render_model.geometry
     probable = full_maps(moment, moment.probability)
@@ -127,4 +126,3 @@ def _agreement(
     area = mask_evidence(geometry, ones, R, t).sum(axis=1)
     total = np.array([sum(region.area_px for region in place.regions if region is not None) for place in places])
     return inside / np.maximum(area, 1), np.minimum(inside / np.maximum(total, 1), 1.0)
-

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene, empty_scene
 from airborne.types import Array
 from airborne.video import Frames, View
 
-_MOST_MOMENTS = 24
+_MOST_MOMENTS = 24  # enough for a median, and to meet a body that is seen for a tenth of the time
 _WIDTH_PX = 640  # about the width of the small pictures
 
 Source = tuple[str, bytes]  # camera name and intrinsics: pictures that share them show the scene by the same pixels
@@ -29,7 +30,7 @@ class Moment:
     @property
     def probability(self) -> tuple[NDArray[np.float32] | None, ...]:
         """Each pixel's probability (h, w) to show what is not in the empty scene, at even odds."""
-        return tuple(None if nats is None else 1 / (1 + np.exp(-nats)) for nats in self.evidence)
+        return tuple(None if nats is None else np.asarray(expit(nats), np.float32) for nats in self.evidence)
 
 
 def spread_sample(recording: Iterable[Frames], n_expected: int | None) -> list[Frames]:

@@ -64,9 +64,7 @@ def find_places(moment: Moment, radius_m: float) -> list[Place]:
     return apart
 
 
-def _match(
-    regions: list[list[MovingRegion]], pair: dict[int, MovingRegion], radius_m: float
-) -> Place | None:
+def _match(regions: list[list[MovingRegion]], pair: dict[int, MovingRegion], radius_m: float) -> Place | None:
     """Triangulate two regions and take the nearest one of every other view; None where their rays do not meet."""
     chosen = dict(pair)
     position = _triangulate(chosen)

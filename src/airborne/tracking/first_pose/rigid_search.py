@@ -32,9 +32,9 @@ _N_KEPT = 64  # orientations that are searched around
 _N_AROUND = 32  # proposals around each, at every blur after the first
 _WIDTH_M, _WIDTH_RAD = 0.12, 0.16  # sds of the first of these, in body radii and radians; halved each time
 _APART_RAD = 0.35  # orientations that are closer count as one
-_N_FITTED = 20
-_LEVELS: PyramidLevels = ((4, 4), (2, 3), (1, 4))
-_MARGIN_PX = 24
+_N_FITTED = 20  # of the best, to the silhouettes
+_LEVELS: PyramidLevels = ((4, 4), (2, 3), (1, 4))  # reduction of the small pictures, steps
+_MARGIN_PX = 24  # around the poses, of the small pictures
 
 
 @dataclass(frozen=True, slots=True)
