@@ -99,7 +99,7 @@ def test_examples_of_docstrings_run(done, tmp_path, monkeypatch):
     shutil.copytree(THROWN_CROSS, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     trial = tmp_path / "trial.toml"
-    trial.write_text(trial.read_text(encoding="utf-8") + "stop = 3\n", encoding="utf-8")
+    trial.write_text(trial.read_text(encoding="utf-8") + "stop = 5\n", encoding="utf-8")
     shutil.copytree(folder / "in-code", "results")
     functions = {name: getattr(interface, name) for name in interface.__all__}
     finder, runner = doctest.DocTestFinder(recurse=False), doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)

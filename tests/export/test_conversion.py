@@ -159,9 +159,9 @@ def test_detections_go_to_openpose_and_back(tmp_path, shared_data, airborne):
         (("calib.toml", "x.toml", "--to", "bvh"), "--to bvh: no such format"),
         (("clicks.csv", "x_xypts.csv"), "say which cameras its columns are of: --cameras"),
         (("clicks.csv", "x.toml", "--cameras", "a"), "give a name ending in xypts.csv, .csv or .npz"),
-        (("clicks.csv", "x.toml", "--cameras", "a", "--to", "vicon"), "holds points in pictures, not cameras"),
+        (("clicks.csv", "x.toml", "--cameras", "a", "--to", "vicon"), "holds points in images, not cameras"),
         (("none.toml", "x.toml"), "none.toml cannot be read"),
-        (("coefficients.csv", "x.toml"), "does not say how large the pictures of 'cam1' are; give --size"),
+        (("coefficients.csv", "x.toml"), "does not say how large the images of 'cam1' are; give --size"),
         (("coefficients.csv", "x.toml", "--size", "768"), "--size 768: expected WIDTHxHEIGHT"),
     ],
 )

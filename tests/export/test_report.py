@@ -109,7 +109,7 @@ def test_a_comparison_with_paths_of_joints_becomes_a_table(tmp_path):
     names = tuple(mark.name for mark in PERSON.landmarks)
     paths = JointPaths(time_s=motion.time_s, names=names, points=points - [0.004, 0, 0])
     html = html_of(tmp_path, motion, joints=compare_joints(motion, PERSON, paths).to_dict())
-    assert "Against the paths of the joints" in html
+    assert "Compared with the paths of the joints" in html
     assert html.count("<td>4</td><td>4</td><td>4</td>") == len(names) + 2  # all, and all tracked
 
 

@@ -174,5 +174,7 @@ class Rig:
         Lens distortion is taken out first; NaN where fewer than two cameras see the point (see `triangulate`).
         """
         px = np.asarray(px, float)
+        if px.shape[-2:] != (len(self), 2):
+            raise CalibrationError(f"pixels have the shape {px.shape}; expected (..., {len(self)}, 2), a row a camera")
         undistorted = [camera.undistort_px(px[..., i, :]) for i, camera in enumerate(self.cameras)]
         return triangulate(self.P, np.stack(undistorted, axis=-2), weights)

@@ -74,7 +74,7 @@ def build_rig(file: CalibrationFile, options: FileOptions) -> Rig:
         if size not in (None, camera.size):
             size_text = f"{camera.size[0]}x{camera.size[1]}"
             raise CalibrationError(
-                f"{file.where} says that '{camera.name}' has pictures of {size_text}; leave --size out"
+                f"{file.where} says that '{camera.name}' has images of {size_text}; leave --size out"
             )
     if options.unit is None and check_baselines(rig):
         question = (

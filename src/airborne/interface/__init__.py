@@ -70,7 +70,7 @@ def track(
 
     >>> run = track("trial.toml", "again", pictures=False, progress=True)
     >>> run
-    Run('again'): thrown cross, half-twisting somersault, 3 frames: 3 tracked, 0 uncertain, 0 lost
+    Run('again'): thrown cross, half-twisting somersault, 5 frames: 5 tracked, 0 uncertain, 0 lost
     """
     trial = trial if isinstance(trial, Trial) else read_trial(trial)
     with _reporting(progress, f"tracking {trial.name}") as report:
@@ -82,7 +82,7 @@ def read_run(folder: FilePath) -> Run:
     """Return the run in a folder, finished or not; raises ResultError where there is none.
 
     >>> read_run("results").summary["n_frames"]
-    3
+    5
     """
     return Run(Path(folder))
 
@@ -147,7 +147,7 @@ def evaluate(
     ResultError where a file cannot be read, or is of another recording.
 
     >>> evaluate("results", "truth.csv")["truth"].n_matched
-    3
+    5
     """
     if truth is None and digitised is None and joints is None:
         raise AirborneError("nothing to compare with; give truth, digitised or joints, the path of a table")

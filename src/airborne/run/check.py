@@ -124,7 +124,7 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
             lambda _: f"start: frame {trial.start.frame}, {', '.join(player.name for player in trial.players)}",
         )
     elif trial.start.find:
-        checks.well.append("start: not given; the body is looked for when the trial is tracked")
+        checks.add("start: not given; the body is looked for when the trial is tracked")
     else:
         model = trial.model()
         first = checks.attempt(

@@ -87,7 +87,7 @@ def mix_ups_in(names: tuple[str, ...], images: list[Mask | None], silhouettes: l
                 Finding(
                     kind="mirrored",
                     what=_compare(name, own[i], mirrored, "once it is mirrored"),
-                    advice="its pictures are mirrored; switch that off in the camera, and record or convert anew",
+                    advice="its images are mirrored; switch that off in the camera, and record or convert anew",
                     cameras=(name,),
                 )
             )

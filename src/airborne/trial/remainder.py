@@ -32,14 +32,14 @@ def parse_remainder(path: Path) -> Trial | None:
 
 
 def _remove(tables: dict[str, Any], place: Sequence[int | str]) -> bool:
-    """Remove the innermost item on the way to a place; False where the way leads nowhere, or to all of it."""
+    """Remove the innermost item on the way to a place; False where the way leads nowhere."""
     here: Any = tables
     holder, key = None, None
     for step in place:
         is_index = isinstance(here, list) and isinstance(step, int) and step < len(here)
         if is_index or (isinstance(here, dict) and step in here):
             holder, key, here = here, step, here[step]
-    if holder is None or (holder is tables and key != "track"):
+    if holder is None:
         return False
     del holder[key]
     return True

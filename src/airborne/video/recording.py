@@ -115,15 +115,15 @@ class Recording:
                 time_s = source.trial_time(image.time_s)
                 if time_s > expected_s + period_s / 2:
                     self._note(
-                        f"{source.name}: no picture from {float(expected_s):.3f} s to {float(time_s):.3f} s (damaged "
-                        "or missing); pictures after it may carry damage up to the next key frame"
+                        f"{source.name}: no image from {float(expected_s):.3f} s to {float(time_s):.3f} s (damaged "
+                        "or missing); images after it may carry damage up to the next key frame"
                     )
                 yield image._replace(time_s=time_s)
                 expected_s = time_s + period_s
         end_s = source.trial_time(facts.duration_s or Fraction(0))
         if facts.duration_s and expected_s < end_s - period_s / 2:
             self._note(
-                f"{source.name}: the pictures end at {float(expected_s):.3f} s; the file promises {float(end_s):.3f} s"
+                f"{source.name}: the images end at {float(expected_s):.3f} s; the file promises {float(end_s):.3f} s"
             )
 
     def _note(self, event: str) -> None:

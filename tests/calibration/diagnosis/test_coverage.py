@@ -33,7 +33,7 @@ def test_where_points_are_missing_is_named(low, high, where):
     px = np.random.default_rng(0).uniform(low, high, (200, 2))
     [found] = check_coverage("cam1", px, SIZE)
     assert where in found.sentence
-    assert "% of its picture" in found.sentence
+    assert "% of its image" in found.sentence
 
 
 def test_a_few_clicks_are_not_blamed_for_leaving_the_image_empty():

@@ -29,7 +29,7 @@ def check_view_count(camera: str, n_views: int) -> list[Finding]:
         Finding(
             kind="coverage",
             what=f"{camera} shows the board in {count(n_views, 'image')}, expected {_FEWEST_VIEWS}",
-            advice="film it longer, in all parts of the picture, near and far",
+            advice="film it longer, in all parts of the image, near and far",
             cameras=(camera,),
         )
     ]
@@ -54,8 +54,8 @@ def check_coverage(camera: str, px: Array, size: tuple[int, int]) -> list[Findin
     return [
         Finding(
             kind="coverage",
-            what=f"{camera} has points in {filled.mean():.0%} of its picture{where}",
-            advice="the lens and the place are guessed where there is nothing; cover the whole picture",
+            what=f"{camera} has points in {filled.mean():.0%} of its image{where}",
+            advice="the lens and the place are guessed where there is nothing; cover the whole image",
             cameras=(camera,),
         )
     ]
