@@ -17,7 +17,7 @@ from airborne.export.panels import FONT_PT, WIDTH_IN
 from airborne.export.sheet import SHEET_DPI, draw_cell
 from airborne.export.views import cached_surface_arrays
 from airborne.rendering import FLAT, render
-from airborne.tracking.first_pose.moments import Moment, Source, source_of
+from airborne.tracking.first_pose.moments import Moment, SourceKey, source_of
 from airborne.types import Image
 from airborne.video import View
 
@@ -25,7 +25,7 @@ _TITLES = ("empty scene", "what stands out", "where the body was found")
 _MARGIN = 0.6  # around a candidate, as a share of its size
 
 
-def draw_empty_scene(path: Path, moment: Moment, scenes: Mapping[Source, EmptyScene], posed: PosedBody) -> None:
+def draw_empty_scene(path: Path, moment: Moment, scenes: Mapping[SourceKey, EmptyScene], posed: PosedBody) -> None:
     """Draw for every camera the empty scene, what stands out from it at one moment, and the body's outline."""
     rows, names = [], []
     for view, shown in zip(moment.frames.views, moment.probability, strict=True):

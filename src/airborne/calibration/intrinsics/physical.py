@@ -162,7 +162,7 @@ def fit_pinhole(start: Pinhole, model: PinholeModel, world: Array, px: Array) ->
     return start.apply_step(model, solution.x)
 
 
-def fit_pose(start: Pinhole, world: Array, px: Array) -> Pinhole:
+def fit_pinhole_pose(start: Pinhole, world: Array, px: Array) -> Pinhole:
     """Return the camera near start with its lens kept that projects world (n, 3) [m] closest to px (n, 2) [px]."""
     residual = _residual_of_step(start, SEVEN_PARAMETERS, world, px)
     solution = least_squares(lambda step: residual(np.append(step, 0.0)), np.zeros(6), method="lm", x_scale="jac")

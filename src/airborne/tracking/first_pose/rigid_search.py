@@ -119,7 +119,7 @@ def _fit(thing: Thing, moment: Moment, R: Array, t: Array) -> list[Posed]:
         Pose(world_from_root=RigidTransform.from_components(position, Rotation.from_matrix(rotation)))
         for rotation, position in zip(R, t, strict=True)
     ]
-    regions, probabilities = regions_of(thing, moment, poses)
+    regions, probabilities = candidate_regions(thing, moment, poses)
     dofs = root_only(thing.model)
     poses = [
         fit_silhouettes(thing.render_model, pose, regions, probabilities, levels=_LEVELS, dofs=dofs) for pose in poses
@@ -130,7 +130,7 @@ def _fit(thing: Thing, moment: Moment, R: Array, t: Array) -> list[Posed]:
     return [Posed(poses[i], float(scores[i])) for i in _apart(thing, R, t, scores, _N_FITTED)]
 
 
-def regions_of(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> tuple[list[Region], list[Array]]:
+def candidate_regions(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> tuple[list[Region], list[Array]]:
     """Cut out what holds the poses in every view; return the regions and the probabilities in them."""
     bodies = [thing.render_model.with_pose(pose) for pose in poses]
     seen = {
