@@ -16,6 +16,7 @@ from airborne.export.palette import ESTIMATE_RGB, TEXT_RGB, hex_colour
 from airborne.export.panels import FONT_PT, WIDTH_IN
 from airborne.export.sheet import SHEET_DPI, draw_cell
 from airborne.export.views import cached_surface_arrays
+from airborne.io.figures import save_png
 from airborne.rendering import FLAT, render
 from airborne.tracking.first_pose.moments import Moment, SourceKey, source_of
 from airborne.types import Image
@@ -36,7 +37,7 @@ def draw_empty_scene(path: Path, moment: Moment, scenes: Mapping[SourceKey, Empt
         grey = np.repeat((255 * shown).astype(np.uint8)[..., None], 3, axis=2)
         square = [_square_pixels(image, view.camera) for image in (empty, grey, _with_outline(view, posed))]
         rows.append(square)
-    _figure(rows, names, _TITLES).savefig(path)
+    save_png(_figure(rows, names, _TITLES), path)
 
 
 def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, PosedBody]]) -> None:
@@ -44,7 +45,7 @@ def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, 
     views = [view for view in moment.frames.views if view is not None]
     rows = [[_near(_with_outline(view, posed), view.camera, posed) for view in views] for _, posed in candidates]
     names = [f"{number}: {label}" for number, (label, _) in enumerate(candidates, start=1)]
-    _figure(rows, names, [view.camera.name for view in views]).savefig(path)
+    save_png(_figure(rows, names, [view.camera.name for view in views]), path)
 
 
 def _with_outline(view: View, posed: PosedBody) -> Image:

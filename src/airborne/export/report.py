@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from airborne.errors import ResultError
 from airborne.export.page import UNKNOWN_TEXT, HtmlTable, render_report
 from airborne.export.summary import body_warnings, headline, json_ready
+from airborne.io.writing import write_text
 from airborne.motion import Motion
 from airborne.motion.flight.momentum_table import GRAVITY_M_S2
 from airborne.motion.run_folder import REPORT, figures_of
@@ -135,7 +136,7 @@ def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
         folder=figures_of(folder),
         flight_table=_flight_table(summary["flight"]) if summary.get("flight") else None,
     )
-    path.write_text(html, encoding="utf-8")
+    write_text(path, html)
     return path
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from airborne.body import Pose
 from airborne.errors import ResultError
+from airborne.io.writing import explain_full_disk
 from airborne.motion.covariance_file import COVARIANCE_FILE, CovarianceWriter, read_covariances
 from airborne.motion.motion import Motion, rigid_transform
 from airborne.motion.tables import cell, motion_columns
@@ -45,7 +46,7 @@ class MotionWriter:
         if file_joints != joints:
             listed = ", ".join(joints) or "none"
             raise ResultError(f"{path} was written for another body; joints here: {listed}; start in a new folder")
-        self._joints = joints
+        self._path, self._joints = path, joints
         self._covariances = None
         if joints:
             past = Motion.collect(estimates, joints).covariance
@@ -75,9 +76,10 @@ class MotionWriter:
         self._write_line([*public, *covariance, str(estimate.time_s), *pose])
 
     def _write_line(self, cells: list[str]) -> None:
-        self._file.write((",".join(cells) + "\n").encode())
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        with explain_full_disk(self._path):
+            self._file.write((",".join(cells) + "\n").encode())
+            self._file.flush()
+            os.fsync(self._file.fileno())
 
 
 def read_estimates(path: Path) -> list[Estimate]:

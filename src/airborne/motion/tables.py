@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.io.parquet import CAN_WRITE_PARQUET, write_parquet
+from airborne.io.writing import write_text
 from airborne.motion.angles import ROOT_ANGLES, root_angles
 from airborne.motion.flight.momentum_table import measure_flight
 from airborne.motion.joints import joint_angles, joint_statuses, landmarks
@@ -124,4 +125,4 @@ def _unit(name: str) -> str:
 def _write_csv(path: Path, columns: dict[str, NDArray]) -> None:
     rows = zip(*columns.values(), strict=True)
     lines = [",".join(columns), *(",".join(map(cell, row)) for row in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_text(path, "\n".join(lines) + "\n")

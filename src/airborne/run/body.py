@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
-from airborne.body.files import body_toml, mesh_files
+from airborne.body.files import mesh_files, write_body
 from airborne.calibration.from_points import Calibration
 from airborne.cameras import Camera
 from airborne.export import ContactSheet, MatchingPicture, OverlayVideos, headline, write_figures, write_report
@@ -70,21 +70,22 @@ class BodyRun:
         opened.recording.events.extend([*model.notes, *found_notes, *first.notes])
         return cls(trial, opened.recording, opened.calibration, model, first.pose, found)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names that figures show."""
+        return tuple(segment.name for segment in self.model.segments)
+
     def read_done(self, folder: Path) -> list[Estimate]:
         """Return the estimates that a killed run left: from their frames the tracker only learns."""
         return read_estimates(folder / self.table)
 
     def copy_inputs(self, folder: Path) -> None:
         """Write the body beside the results, for `airborne evaluate` and for other tools."""
-        if self.trial.body.file is None:
-            (folder / BODY).write_text(body_toml(self.model), encoding="utf-8")
-            return
-        body = self.trial.path(self.trial.body.file)
-        shutil.copyfile(body, folder / BODY)
-        for name in mesh_files(body):
-            target = folder / name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(body.parent / name, target)
+        file = self.trial.body.file
+        if file is None or mesh_files(self.trial.path(file)):  # meshes get names of our own, beside the body's
+            write_body(folder / BODY, self.model)
+        else:
+            shutil.copyfile(self.trial.path(file), folder / BODY)
 
     def see(self, first: Frames) -> BodyRun:
         """Return the body with the colours that the first frames show; an event says where they do not show it."""

@@ -55,8 +55,10 @@ from airborne.evaluation.variables import (
 from airborne.export import write_figures, write_json, write_report
 from airborne.export.analysis_figures import write_bland_altman, write_identity
 from airborne.io.text import read_json
+from airborne.io.writing import write_text
 from airborne.motion import Motion, run_folder
 from airborne.motion.run_folder import check_record, holds_players, read_body_run, read_players_run
+from airborne.run.folder import open_results
 from airborne.run.provenance import versions
 
 Comparisons = Mapping[str, MotionComparison | DigitisedComparison | JointComparison | PlayersComparison]
@@ -87,12 +89,13 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
         comparisons["digitised"] = compare_digitised(motion, clicked, symmetry)
     if joints is not None:
         comparisons["joints"] = compare_joints(motion, model, read_joint_paths(joints))
-    summary = _add_to_summary(folder, comparisons)
-    if summary and (folder / run_folder.REPORT).is_file():
-        write_figures(
-            run_folder.figures_of(folder), motion, model, truth=true_poses, digitised=clicked, symmetries=symmetry
-        )
-        write_report(folder, summary)
+    with open_results(folder):
+        summary = _add_to_summary(folder, comparisons)
+        if summary and (folder / run_folder.REPORT).is_file():
+            write_figures(
+                run_folder.figures_of(folder), motion, model, truth=true_poses, digitised=clicked, symmetries=symmetry
+            )
+            write_report(folder, summary)
     return comparisons
 
 
@@ -104,7 +107,8 @@ def _assess_players(folder: Path, truth: Path | None, *, is_alone: bool) -> Comp
         )
     check_record(folder)
     comparisons = {"truth": assess_players(folder, truth)}
-    _add_to_summary(folder, comparisons)
+    with open_results(folder):
+        _add_to_summary(folder, comparisons)
     return comparisons
 
 
@@ -188,33 +192,31 @@ def evaluate_agreement(
         )
     agreements = {name: [analyse_agreement(one) for one in series] for name, series in references.items()}
     repeatable = {name: [analyse_repeatability(one) for one in series] for name, series in repeated.items()}
-    out = folder if out is None else out
-    out.mkdir(parents=True, exist_ok=True)
     first = frozenset(
         one.name for series in (*references.values(), *repeated.values()) for one in headline_series(series)
     )
-    files = []
-    if agreements:
-        write_agreements(run_folder.tables_of(out) / "agreement.csv", agreements)
-        files.append("tables/agreement.csv")
-    if repeatable:
-        write_repeatability(run_folder.tables_of(out) / "repeatability.csv", repeatable)
-        files.append("tables/repeatability.csv")
-    for name, series in references.items():
-        word = name.split()[-1]
-        plotted = [
-            (one, row) for one, row in zip(series, agreements[name], strict=True) if one.name in first and row.n > 1
-        ]
-        if plotted:
-            write_bland_altman(run_folder.figures_of(out) / f"agreement_{word}.png", plotted)
-            write_identity(run_folder.figures_of(out) / f"identity_{word}.png", plotted)
-            files += [f"figures/agreement_{word}.png", f"figures/identity_{word}.png"]
-    text = methods_text(
-        {name: [row for row in rows if row.name in first] for name, rows in agreements.items()},
-        {name: [row for row in rows if row.name in first] for name, rows in repeatable.items()},
-        versions(),
-    )
-    (out / "agreement_methods.txt").write_text(text, encoding="utf-8", newline="\n")
+    with open_results(out := out or folder):
+        files = []
+        if agreements:
+            write_agreements(run_folder.tables_of(out) / "agreement.csv", agreements)
+            files.append("tables/agreement.csv")
+        if repeatable:
+            write_repeatability(run_folder.tables_of(out) / "repeatability.csv", repeatable)
+            files.append("tables/repeatability.csv")
+        for name, series in references.items():
+            word = name.split()[-1]
+            pairs = zip(series, agreements[name], strict=True)
+            plotted = [(one, row) for one, row in pairs if one.name in first and row.n > 1]
+            if plotted:
+                write_bland_altman(run_folder.figures_of(out) / f"agreement_{word}.png", plotted)
+                write_identity(run_folder.figures_of(out) / f"identity_{word}.png", plotted)
+                files += [f"figures/agreement_{word}.png", f"figures/identity_{word}.png"]
+        text = methods_text(
+            {name: [row for row in rows if row.name in first] for name, rows in agreements.items()},
+            {name: [row for row in rows if row.name in first] for name, rows in repeatable.items()},
+            versions(),
+        )
+        write_text(out / "agreement_methods.txt", text)
     return AgreementReport(agreements, repeatable, first, out, (*files, "agreement_methods.txt"))
 
 

@@ -17,6 +17,7 @@ from airborne.export import write_json
 from airborne.export.finding import draw_candidates, draw_empty_scene
 from airborne.geometry.rotations import angles_from_matrix
 from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE, figures_of
+from airborne.run.folder import open_results
 from airborne.run.opening import open_cameras, past_the_end_error, video_source
 from airborne.tracking import Status
 from airborne.tracking.first_pose.candidates import StartSearch, find_thing
@@ -123,14 +124,14 @@ def _take(trial: Trial, finding: StartSearch, number: int) -> StartSearch:
 
 def _undecided(trial: Trial, model: BodyModel, finding: StartSearch, folder: Path) -> UndecidedError:
     """Write the candidates and return the error that names them."""
-    folder.mkdir(parents=True, exist_ok=True)
     frame, best = finding.moment.frames.index, finding.candidates[0]
-    write_json(folder / CANDIDATES, _describe(finding))
-    draw_candidates(
-        folder / CANDIDATES_PICTURE,
-        finding.moment,
-        [(f"{each.probability:.0%}", model.with_pose(each.pose)) for each in finding.candidates],
-    )
+    with open_results(folder):
+        write_json(folder / CANDIDATES, _describe(finding))
+        draw_candidates(
+            folder / CANDIDATES_PICTURE,
+            finding.moment,
+            [(f"{each.probability:.0%}", model.with_pose(each.pose)) for each in finding.candidates],
+        )
     if not best.is_plausible:
         reason = (
             f"what moves in frame {frame} does not look like the body ({best.precision:.0%} of its outline stands out, "

@@ -52,6 +52,11 @@ class PlayersRun:
         """Make the tracker, which checks the players' starts against the cameras."""
         return cls(trial, opened.recording, opened.calibration, players_tracker_of(trial, opened.recording.rig))
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names that figures and videos show."""
+        return tuple(player.name for player in self.trial.players)
+
     def read_done(self, folder: Path) -> tuple[PlayersStep, ...]:
         """Return nothing: a killed run is tracked again from its start, to the same result."""
         return ()

@@ -40,6 +40,11 @@ class Subject(Protocol[Found, AnyMotion]):
         """The table that is written as the run goes."""
         ...
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names that figures and videos show."""
+        ...
+
     def read_done(self, folder: Path) -> Iterable[Found]:
         """Return what a killed run found, from which the tracker only learns."""
         ...

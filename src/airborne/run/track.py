@@ -16,6 +16,8 @@ from airborne.cameras import write_pose2sim
 from airborne.errors import ResultError
 from airborne.export import write_json
 from airborne.export.overlays import OverlaysAs
+from airborne.io.figures import names_not_drawn
+from airborne.io.folder_lock import sole_writer
 from airborne.motion import Motion, PlayersMotion
 from airborne.motion.run_folder import CALIBRATION, SUMMARY
 from airborne.run.body import BodyRun
@@ -106,6 +108,11 @@ class _Options:
 
 def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> TrackResult:
     """Track an opened subject and write its results; the connection to live cameras ends with the tracking."""
+    with sole_writer(options.folder):
+        return _run_alone(subject, options, connection)
+
+
+def _run_alone(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> TrackResult:
     folder, recording = options.folder, subject.recording
     identity = run_identity(subject.trial, live=options.live)
     goes_on = prepare_folder(folder, identity, subject.table, resume=options.resume, overwrite=options.overwrite)
@@ -118,6 +125,8 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     motion, summary = subject.finish(folder)
     summary |= provenance_of(subject.trial, recording, subject.calibration, identity["inputs"])
     summary["warnings"] += subject.warnings()
+    if options.drawn is not None:
+        summary["warnings"] += names_not_drawn([subject.trial.name, *recording.rig.names, *subject.names])
     summary["tables"] = list_tables(folder)
     if isinstance(recording, LiveRecording):
         summary["live"] = {

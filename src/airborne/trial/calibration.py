@@ -6,14 +6,15 @@ from typing import Literal
 
 from pydantic import model_validator
 
+from airborne.io.names import FilePath
 from airborne.trial.table import SettingsTable
 
 
 class CalibrationTable(SettingsTable):
     """Where the cameras come from: a calibration file, or control points."""
 
-    file: str | None = None
-    control_points: str | None = None
+    file: FilePath | None = None
+    control_points: FilePath | None = None
     method: Literal["lm", "annealing"] = "lm"
     mend: list[str] = []  # cameras to re-resect from the detections of [start]
 
