@@ -18,8 +18,8 @@ from airborne.calibration.intrinsics.physical import (
     Pinhole,
     anneal_pinhole,
     fit_pinhole,
+    parameter_covariance,
     parameter_names,
-    parameter_sd,
 )
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras.camera import Camera, Rig
@@ -43,6 +43,7 @@ class CameraFit:
     m_per_px: Array  # (n,) [m/px], at the point's depth
     held_out_rms_px: dict[str, float]  # [px] for every model tried
     sd: dict[str, float]  # standard deviations of the fitted numbers, units in the names
+    covariance: Array  # (7, 7) of turn [rad] and place [m], both in the camera's axes, and focal length [share]
     dlt_rms_px: float  # the 11-parameter DLT's own residual [px]
     dlt: Array  # (11,), L1..L11
 
@@ -153,7 +154,7 @@ def _camera(name: str, size: tuple[int, int], solution: Solution) -> Camera:
 def _describe_fit(points: ControlPoints, name: str, best: Solution, candidates: list[Solution]) -> CameraFit:
     is_seen = points.is_seen_by(name)
     P_dlt = fit_dlt(best.world, best.px)
-    sd = parameter_sd(best.pinhole, best.model, best.world, best.px)
+    covariance = parameter_covariance(best.pinhole, best.model, best.world, best.px)
     return CameraFit(
         name=name,
         model=best.model.name,
@@ -162,10 +163,18 @@ def _describe_fit(points: ControlPoints, name: str, best: Solution, candidates: 
         held_out_px=_spread_over_points(is_seen, best.held_out_px),
         m_per_px=_spread_over_points(is_seen, best.pinhole.depth(best.world) / best.pinhole.focal_px),
         held_out_rms_px={solution.model.name: _rms(solution.held_out_px) for solution in candidates},
-        sd=dict(zip(parameter_names(best.model), sd.tolist(), strict=True)),
+        sd=dict(zip(parameter_names(best.model), np.sqrt(np.diag(covariance)).tolist(), strict=True)),
+        covariance=_covariance_in_camera(best.pinhole, covariance),
         dlt_rms_px=_rms(best.px - px_from_points(P_dlt[None], best.world)[:, 0]),
         dlt=dlt_coefficients(P_dlt),
     )
+
+
+def _covariance_in_camera(pinhole: Pinhole, covariance: Array) -> Array:
+    """Take the covariance (n, n) of `Pinhole.apply_step` to turn and place in the camera's axes, and focal share."""
+    J = np.zeros((7, 7))
+    J[:3, :3], J[3:6, 3:6], J[6, 6] = np.eye(3), pinhole.R, 1 / pinhole.focal_px
+    return J @ covariance[:7, :7] @ J.T
 
 
 def _point_errors_left_out(points: ControlPoints, solutions: Mapping[str, Solution]) -> Array:
