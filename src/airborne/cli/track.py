@@ -144,6 +144,9 @@ def _describe(summary: dict) -> str:
             f"median sd: position {_describe_sd(position, 'mm')}, rotation {_describe_sd(rotation, 'degrees')}; "
             "summary.json says which errors it holds"
         )
+    if (findings := summary.get("self_check")) and not any(each["is_alarm"] for each in findings):
+        sizes = "; ".join(each["sentence"] for each in findings[:2])
+        lines.append(f"self-check: nothing seems wrong ({sizes}; cameras: see summary.json)")
     lines += [f"note: {text}" for text in [*summary["warnings"], *summary["events"]]]
     return "\n".join(lines)
 

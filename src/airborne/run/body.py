@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from airborne.motion import (
     has_inertias,
     read_estimates,
     read_motion,
+    revise_motion,
     write_angles,
     write_flight,
     write_joint_angles,
@@ -33,7 +34,9 @@ from airborne.motion.run_folder import BODY, JOINTS, MOTION, figures_of, tables_
 from airborne.rendering import FLAT, render
 from airborne.run.first_pose import find_first_pose
 from airborne.run.opening import Opened
+from airborne.run.self_check import check_run, describe, write_split
 from airborne.tracking import Estimate
+from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.methods import sample_body_colours, tracker_of
 from airborne.tracking.tracker import Tracker
 from airborne.trial.file import Trial
@@ -55,6 +58,7 @@ class BodyRun:
     calibration: Calibration | None
     model: BodyModel
     start: Pose
+    kept: KeptFrames = field(default_factory=KeptFrames)  # grows while the run is tracked
 
     table = MOTION
 
@@ -119,15 +123,24 @@ class BodyRun:
         for artist in artists:
             artist.write(frames, posed, estimate.status)
 
+    def keep(self, frames: Frames) -> None:
+        """Keep some frames, spread over the run, for the self-check."""
+        self.kept.add(frames)
+
     def finish(self, folder: Path) -> tuple[Motion, dict[str, Any]]:
-        """Write the tables; return the motion and the beginning of the summary."""
+        """Check the run and write the tables; return the motion and the beginning of the summary."""
         motion, model = read_motion(folder / self.table), self.model
+        is_preset, rig = self.trial.body.file is None, self.recording.rig
+        motion, found = check_run(motion, model, rig, self.kept, self.calibration, is_preset=is_preset)
+        revise_motion(folder / self.table, motion)
+        write_split(tables_of(folder) / "uncertainty.csv", motion, found)
         write_tables(folder, motion, model)
         is_exact = self.calibration is None
         return motion, {
             "name": self.trial.name,
             **headline(motion),
             **({"flight": flight_summary(motion, model).to_dict()} if _has_flight(motion, model) else {}),
+            "self_check": describe(found),
             "uncertainty": _UNCERTAINTY if is_exact else _UNCERTAINTY + _CALIBRATION_UNCERTAINTY,
         }
 

@@ -11,7 +11,7 @@ from typing import Any
 from airborne import __version__
 from airborne.errors import ResultError
 from airborne.export import write_json
-from airborne.motion.covariance_file import COVARIANCE_FILE
+from airborne.motion.covariance_file import COVARIANCE_FILE, LASTING_FILE
 from airborne.motion.run_folder import (
     BODY,
     CALIBRATION,
@@ -61,7 +61,7 @@ def prepare_folder(
 
 def _remove_run(folder: Path) -> None:
     """Remove what commands leave in a run's folder; exports and what others put there stay."""
-    for name in (MOTION, JOINTS, JUMPS, SUMMARY, REPORT, CALIBRATION, BODY, COVARIANCE_FILE, SMOOTH_RECORD):
+    for name in (MOTION, JOINTS, JUMPS, SUMMARY, REPORT, CALIBRATION, BODY, COVARIANCE_FILE, LASTING_FILE, SMOOTH_RECORD):
         (folder / name).unlink(missing_ok=True)
     for name in FOLDERS:
         shutil.rmtree(folder / name, ignore_errors=True)

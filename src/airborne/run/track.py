@@ -24,6 +24,7 @@ from airborne.run.opening import Opened, open_live, open_trial, past_the_end_err
 from airborne.run.players import PlayersRun
 from airborne.run.players_tracker import compile_kernels
 from airborne.run.provenance import provenance
+from airborne.run.self_check import alarms
 from airborne.run.subject import AnyMotion, Subject
 from airborne.tracking.tracker import Found, track_frames
 from airborne.trial.file import Trial
@@ -102,7 +103,7 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     tracked_s = time.monotonic()
     motion, summary = subject.finish(folder)
     summary |= provenance(subject.trial, recording, subject.calibration, identity["inputs"])
-    summary["warnings"] += subject.warnings()
+    summary["warnings"] += [*subject.warnings(), *alarms(summary.get("self_check", []))]
     summary["tables"] = list_tables(folder)
     if isinstance(recording, LiveRecording):
         summary["live"] = {
@@ -150,6 +151,7 @@ def _track(
                 if isinstance(recording, LiveRecording):
                     delays_s.append(time.monotonic() - recording.arrival_s)
                 outages.add(observed)
+                subject.keep(observed)
                 subject.draw(artists, observed, estimate)
                 if options.progress is not None:
                     options.progress(number, recording.n_frames)

@@ -24,38 +24,13 @@ from airborne.tracking.self_check.nuisances import (
     widen,
 )
 from airborne.tracking.self_check.registration import Registration, draw_silhouette, foreground, register
-from airborne.tracking.self_check.solution import Evidence, Solution, pose_errors, solve
+from airborne.tracking.self_check.solution import Evidence, PoseErrors, Solution, pose_errors, solve
 from airborne.types import Array
 from airborne.video import Frames, View
 
-_MOST_BYTES = 160e6  # of the frames that are kept
-_MOST_KEPT, _FEWEST_KEPT = 24, 8
 _MOST_MOMENTS = 16  # at which silhouettes are registered
 _FEWEST_MOMENTS = 3  # with fewer, nothing is said
 _FEWEST_VIEWS = 4  # images of one camera from which the empty scene can be told
-
-
-class KeptFrames:
-    """Frames of a run, spread evenly over all of it: every second one is let go whenever there are too many."""
-
-    def __init__(self) -> None:
-        self._stride, self._n, self._most = 1, 0, 0
-        self._kept: list[tuple[int, Frames]] = []
-
-    def add(self, frames: Frames) -> None:
-        """Keep the frames, or not."""
-        if not self._most:
-            size = sum(view.rgb.nbytes for view in frames.views if view is not None)
-            self._most = int(np.clip(_MOST_BYTES / max(size, 1), _FEWEST_KEPT, _MOST_KEPT))
-        if self._n % self._stride == 0:
-            self._kept.append((self._n, frames))
-        self._n += 1
-        if len(self._kept) > self._most:
-            self._stride *= 2
-            self._kept = [each for each in self._kept if each[0] % self._stride == 0]
-
-    def __iter__(self):
-        return (frames for _, frames in self._kept)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,6 +67,14 @@ class SelfCheck:
     constant: Array  # (m, 6, 6) covariance of the pose's errors that last all run long [m, rad]
     added: Array  # (m, 6, 6) of it, what the tracker's own covariances do not hold
 
+    def lasting_at(self, index: NDArray[np.int64]) -> Array:
+        """Interpolate `added` to other frames: (n, 6, 6)."""
+        return _interpolate(index, self.index, self.added)
+
+    def constant_at(self, index: NDArray[np.int64]) -> Array:
+        """Interpolate `constant` to other frames: (n, 6, 6)."""
+        return _interpolate(index, self.index, self.constant)
+
 
 def self_check(
     model: BodyModel,
@@ -119,15 +102,20 @@ def self_check(
     for nuisance in nuisances:
         wide = widen(wide, nuisance)
     solution, weights = solve(evidence, wide)
-    solution = _with_fall(solution, evidence, weights, path, rows)
+    errors = pose_errors(evidence, weights)
+    solution = _with_fall(solution, errors, path, rows)
     diagnosis = diagnose(solution, nuisances, prior)
-    errors = pose_errors(evidence, weights, diagnosis.theta)
     K = errors.by_parameter
     constant = K @ diagnosis.covariance @ np.swapaxes(K, 1, 2)
-    mean = errors.shown if diagnosis.has_alarm else K @ diagnosis.theta
+    mean = errors.shown(diagnosis.theta) if diagnosis.has_alarm else K @ diagnosis.theta
     constant = constant + mean[:, :, None] * mean[:, None, :]
     added = _positive(constant - K @ shift_covariance(rig) @ np.swapaxes(K, 1, 2))
     return SelfCheck(diagnosis, path.index[rows], constant, added)
+
+
+def _interpolate(index: NDArray[np.int64], known: NDArray[np.int64], values: Array) -> Array:
+    columns = [np.interp(index, known, column) for column in values.reshape(len(known), -1).T]
+    return np.stack(columns, axis=1).reshape(len(index), 6, 6)
 
 
 def _positive(matrices: Array) -> Array:
@@ -147,7 +135,12 @@ def _gather(
     """Register every view of the moments."""
     n, c, k = len(moments), len(rig), n_parameters(rig)
     evidence = Evidence(
-        np.zeros((n, c, 4)), np.zeros((n, c, 4, 6)), np.zeros((n, c, 4, k)), np.zeros((n, c), bool)
+        offset=np.zeros((n, c, 4)),
+        by_twist=np.zeros((n, c, 4, 6)),
+        by_parameter=np.zeros((n, c, 4, k)),
+        is_seen=np.zeros((n, c), bool),
+        edge=np.zeros((n, c, 6, 6)),
+        edge_by_parameter=np.zeros((n, c, 6, k)),
     )
     empty = _EmptyScenes(kept)
     for i, (row, frames) in enumerate(zip(rows, moments, strict=True)):
@@ -158,9 +151,11 @@ def _gather(
             posed = render_model.with_pose(path.pose_after(row, view.delay_s))
             found = _register_view(render_model, posed, view, empty, j)
             if found is not None:
+                columns, shifts = twists(rig, j, posed.t[0], velocity), biases(rig, j)
                 evidence.offset[i, j], evidence.by_twist[i, j], evidence.is_seen[i, j] = found.offset, found.by_twist, True
-                columns = twists(rig, j, posed.t[0], velocity)
-                evidence.by_parameter[i, j] = found.by_twist @ columns + biases(rig, j)
+                evidence.by_parameter[i, j] = found.by_twist @ columns + shifts
+                evidence.edge[i, j] = found.edge
+                evidence.edge_by_parameter[i, j] = found.edge @ columns + found.edge_by_offset @ shifts
     return evidence
 
 
@@ -197,15 +192,14 @@ class _EmptyScenes:
         return np.partition(stack, middle, axis=0)[middle]
 
 
-def _with_fall(solution: Solution, evidence: Evidence, weights: Array, path: TrackedPath, rows: Sequence[int]) -> Solution:
+def _with_fall(solution: Solution, errors: PoseErrors, path: TrackedPath, rows: Sequence[int]) -> Solution:
     """Add what the fall says of the sizes, where the body falls freely."""
     poses = [path.poses[row].world_from_root for row in rows]
     position = np.array([pose.translation for pose in poses])
     R = np.array([pose.rotation.as_matrix() for pose in poses])
-    found = fall(path.time_s[list(rows)], position, R)
+    found = fall(path.time_s[list(rows)], position + errors.seen[:, :3], R)
     if found is None:
         return solution
     by_position, acceleration, sd = found
-    K = pose_errors(evidence, weights, np.zeros(evidence.by_parameter.shape[-1])).by_parameter
-    row = by_position @ K[:, :3].reshape(-1, K.shape[-1])
+    row = by_position @ errors.seen_by_parameter[:, :3].reshape(len(by_position), -1)
     return solution.with_row(row, -excess(acceleration), sd)

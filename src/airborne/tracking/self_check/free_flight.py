@@ -8,7 +8,7 @@ from airborne.constants import GRAVITY_M_S2
 from airborne.types import Array
 
 _LEAST_MOMENTS, _LEAST_S = 7, 0.25
-_MOST_RMS_M = 0.004  # about the parabola: more is no free flight, or not of the centre of mass
+_MOST_RMS_M = 0.008  # about the parabola: more is no free flight, or not of the centre of mass
 _MOST_TILT = 0.15  # horizontal acceleration, as a share of the vertical one
 _LEAST_M_S2, _MOST_M_S2 = 6.0, 15.0  # a fall that a wrong scale can explain
 _LEAST_SD_M_S2 = 0.03  # air, and a centre of mass that is not quite where it is taken to be

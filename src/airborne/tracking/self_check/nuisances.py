@@ -128,6 +128,8 @@ def prior_covariance(rig: Rig, calibrated: Mapping[str, Array], body_sd: float) 
             covariance[known, known] = calibrated[camera.name]
     bias = np.arange(2 + _PER_CAMERA * len(rig), len(covariance))
     covariance[bias, bias] = np.tile(_BIAS_SD**2, len(rig))
+    times = np.arange(len(rig)) * _PER_CAMERA + 9
+    covariance[np.ix_(times, times)] -= _CAMERA_SD["time_s"] ** 2 / len(rig)  # the clock is theirs together
     return covariance if calibrated else _without_common_motion(covariance, rig)
 
 

@@ -53,6 +53,8 @@ class Registration:
 
     offset: Array  # (4,) see N_SIMILARITY; positive: the foreground lies right, down, turned clockwise, is larger
     by_twist: Array  # (4, 6) how a twist of the body about its root changes the offset [per m, per rad]
+    edge: Array  # (6, 6) information of the whole outline for such a twist, in no unit
+    edge_by_offset: Array  # (6, 4) the same for an outline that is offset as a whole
     overlap: float  # correlation of foreground and registered silhouette
 
 
@@ -124,7 +126,10 @@ def register(silhouette: Silhouette, shown: NDArray[np.float32], posed: PosedBod
     if overlap < _LEAST_OVERLAP or not np.all(np.isfinite(offset)):
         return None
     to_px = np.array([silhouette.to_view[0], silhouette.to_view[0], 1, 1])
-    return Registration(offset[:4] * to_px, _offset_by_twist(silhouette, posed) * to_px[:, None], overlap)
+    C, B = _outline_derivatives(silhouette, posed)
+    by_twist = np.linalg.lstsq(B.T, C.T, rcond=1e-6)[0][:N_SIMILARITY]
+    per_px = C @ B[:N_SIMILARITY].T / to_px
+    return Registration(offset[:N_SIMILARITY] * to_px, by_twist * to_px[:, None], C @ C.T, per_px, overlap)
 
 
 def _search(silhouette: Silhouette, shown: NDArray[np.float32]) -> tuple[Array, float]:
@@ -187,11 +192,8 @@ def _warp(silhouette: Silhouette, offset: Array, plane: NDArray[np.float32]) -> 
     return np.asarray(cv2.warpAffine(plane, np.column_stack([A, shift]), size, flags=cv2.INTER_LINEAR))
 
 
-def _offset_by_twist(silhouette: Silhouette, posed: PosedBody) -> Array:
-    """Return how a twist of the body changes the offset that would be found: (4, 6).
-
-    Each pixel of the outline moves along its normal; the offsets, with an outline of any width, fit this best.
-    """
+def _outline_derivatives(silhouette: Silhouette, posed: PosedBody) -> tuple[Array, Array]:
+    """Return how the m pixels of the outline change by a twist of the body (6, m), and by offset and width (5, m)."""
     camera = silhouette.camera
     mask = _blur(silhouette.mask, _SIGMA_PX[-1])
     gx, gy = cv2.Sobel(mask, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(mask, cv2.CV_32F, 0, 1, scale=1 / 8)
@@ -209,8 +211,7 @@ def _offset_by_twist(silhouette: Silhouette, posed: PosedBody) -> Array:
     turning = np.cross(arms.T, normal.T).T
     C = np.concatenate([R.T @ normal, R.T @ turning])  # (6, n)
     dx, dy = x - silhouette.middle[0], y - silhouette.middle[1]
-    B = np.stack([gx, gy, gy * dx - gx * dy, gx * dx + gy * dy, -np.hypot(gx, gy)])
-    return np.linalg.lstsq(B.T, C.T, rcond=1e-6)[0][:4]
+    return C, np.stack([gx, gy, gy * dx - gx * dy, gx * dx + gy * dy, -np.hypot(gx, gy)])
 
 
 def _blur(plane: NDArray[np.float32], sigma: float) -> NDArray[np.float32]:

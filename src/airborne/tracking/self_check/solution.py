@@ -24,6 +24,8 @@ class Evidence:
     by_twist: Array  # (n, c, 4, 6) of the pose at that moment
     by_parameter: Array  # (n, c, 4, k)
     is_seen: NDArray[np.bool_]  # (n, c)
+    edge: Array  # (n, c, 6, 6) information of the whole outline for the pose, as a tracker uses it
+    edge_by_parameter: Array  # (n, c, 6, k)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,10 +54,15 @@ class Solution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseErrors:
-    """How far each moment's pose is off: by the pictures themselves, and by the parameters."""
+    """How far each moment's tracked pose is from the true one [m, rad]: by the silhouettes, and by the parameters."""
 
-    shown: Array  # (n, 6) true minus tracked pose, given theta [m, rad]
-    by_parameter: Array  # (n, 6, k)
+    seen: Array  # (n, 6) by the silhouettes if all parameters are zero
+    seen_by_parameter: Array  # (n, 6, k)
+    by_parameter: Array  # (n, 6, k) of a pose tracked by the whole outline
+
+    def shown(self, theta: Array) -> Array:
+        """Return by how much the silhouettes show the poses off, given the parameters (k,): (n, 6)."""
+        return self.seen + self.seen_by_parameter @ theta
 
 
 def solve(evidence: Evidence, wide: Array) -> tuple[Solution, Array]:
@@ -68,9 +75,9 @@ def solve(evidence: Evidence, wide: Array) -> tuple[Solution, Array]:
     trust = evidence.is_seen.astype(float)
     for _ in range(_ROUNDS):
         theta = solution.posterior(wide)[0]
-        errors = pose_errors(evidence, weights, theta)
+        errors = pose_errors(evidence, weights)
         residual = evidence.offset - np.einsum("ncak,k->nca", evidence.by_parameter, theta)
-        residual -= np.einsum("ncai,ni->nca", evidence.by_twist, errors.shown)
+        residual -= np.einsum("ncai,ni->nca", evidence.by_twist, errors.shown(theta))
         residual *= evidence.is_seen[..., None]
         inverse = np.linalg.inv(_pose_information(evidence, weights))
         leverage = np.einsum("ncai,nij,ncaj,nca->nca", evidence.by_twist, inverse, evidence.by_twist, weights)
@@ -84,13 +91,15 @@ def solve(evidence: Evidence, wide: Array) -> tuple[Solution, Array]:
     return solution, weights
 
 
-def pose_errors(evidence: Evidence, weights: Array, theta: Array) -> PoseErrors:
-    """Return how far the tracked poses are off, given the parameters theta (k,)."""
+def pose_errors(evidence: Evidence, weights: Array) -> PoseErrors:
+    """Return how far the tracked poses are off."""
     S, A = evidence.by_twist, _pose_information(evidence, weights)
-    C = np.einsum("ncai,nca,ncak->nik", S, weights, evidence.by_parameter)
     b = np.einsum("ncai,nca,nca->ni", S, weights, evidence.offset)
-    by_parameter = -np.linalg.solve(A, C)
-    return PoseErrors(np.linalg.solve(A, b[..., None])[..., 0] + by_parameter @ theta, by_parameter)
+    C = np.einsum("ncai,nca,ncak->nik", S, weights, evidence.by_parameter)
+    edge = evidence.edge.sum(axis=1)
+    floor = 1e-4 * np.trace(edge, axis1=1, axis2=2)[:, None, None] * np.eye(6) / 6
+    by_parameter = -np.linalg.solve(edge + floor, evidence.edge_by_parameter.sum(axis=1))
+    return PoseErrors(np.linalg.solve(A, b[..., None])[..., 0], -np.linalg.solve(A, C), by_parameter)
 
 
 def _pose_information(evidence: Evidence, weights: Array) -> Array:
