@@ -31,13 +31,14 @@ from airborne.motion import (
     write_motion_parquet,
 )
 from airborne.motion.run_folder import BODY, JOINTS, MOTION, figures_of, tables_of, videos_of
+from airborne.motion.tables import write_uncertainty
 from airborne.rendering import FLAT, render
 from airborne.run.first_pose import find_first_pose
 from airborne.run.opening import Opened
-from airborne.run.self_check import check_run, describe, write_split
+from airborne.run.self_check import check_run
 from airborne.tracking import Estimate
-from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.methods import sample_body_colours, tracker_of
+from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.tracker import Tracker
 from airborne.trial.file import Trial
 from airborne.video import Frames, Recording, View
@@ -89,6 +90,10 @@ class BodyRun:
     def see(self, first: Frames) -> BodyRun:
         """Return the body with the colours that the first frames show; an event says where they do not show it."""
         model = sample_body_colours(self.model, self.start, first)
+        if self.model.needs_colours:  # once more where the first frames show the body to be
+            tracker = tracker_of(self.trial.settings, model, self.start)
+            found = tracker.search(tracker.init(), first)
+            model = model if found.pose is None else sample_body_colours(self.model, found.pose, first)
         if not np.any([_is_visible(view, model.with_pose(self.start)) for view in first.views]):
             self.recording.events.append(
                 "the start pose lies in no camera's picture; check start.position_m, in metres"
@@ -130,17 +135,27 @@ class BodyRun:
     def finish(self, folder: Path) -> tuple[Motion, dict[str, Any]]:
         """Check the run and write the tables; return the motion and the beginning of the summary."""
         motion, model = read_motion(folder / self.table), self.model
-        is_preset, rig = self.trial.body.file is None, self.recording.rig
-        motion, found = check_run(motion, model, rig, self.kept, self.calibration, is_preset=is_preset)
+        checked = check_run(
+            motion,
+            model,
+            self.recording.rig,
+            self.start,
+            self.kept,
+            self.calibration,
+            is_preset=self.trial.body.file is None,
+        )
+        motion = checked.motion
         revise_motion(folder / self.table, motion)
-        write_split(tables_of(folder) / "uncertainty.csv", motion, found)
+        if checked.found is not None:
+            write_uncertainty(tables_of(folder) / "uncertainty.csv", motion, checked.found.constant_at(motion.index))
         write_tables(folder, motion, model)
+        self.recording.events.extend(checked.doubts)
         is_exact = self.calibration is None
         return motion, {
             "name": self.trial.name,
             **headline(motion),
             **({"flight": flight_summary(motion, model).to_dict()} if _has_flight(motion, model) else {}),
-            "self_check": describe(found),
+            "self_check": checked.findings,
             "uncertainty": _UNCERTAINTY if is_exact else _UNCERTAINTY + _CALIBRATION_UNCERTAINTY,
         }
 

@@ -61,7 +61,8 @@ def prepare_folder(
 
 def _remove_run(folder: Path) -> None:
     """Remove what commands leave in a run's folder; exports and what others put there stay."""
-    for name in (MOTION, JOINTS, JUMPS, SUMMARY, REPORT, CALIBRATION, BODY, COVARIANCE_FILE, LASTING_FILE, SMOOTH_RECORD):
+    binary = COVARIANCE_FILE, LASTING_FILE
+    for name in (MOTION, JOINTS, JUMPS, SUMMARY, REPORT, CALIBRATION, BODY, *binary, SMOOTH_RECORD):
         (folder / name).unlink(missing_ok=True)
     for name in FOLDERS:
         shutil.rmtree(folder / name, ignore_errors=True)

@@ -149,7 +149,9 @@ def _describe(subject: str, kind: Kind, value: float, sd: float) -> str:
         return f"camera {subject} seems to stand {1e3 * size:.0f} ± {1e3 * sd:.0f} mm beside its place"
     if kind == "focal":
         how = "longer" if value > 0 else "shorter"
-        return f"the focal length of {subject} seems {100 * size:.1f} ± {100 * sd:.1f} % {how} than the calibration says"
+        return (
+            f"the focal length of {subject} seems {100 * size:.1f} ± {100 * sd:.1f} % {how} than the calibration says"
+        )
     return f"camera {subject} seems {1e3 * size:.1f} ± {1e3 * sd:.1f} ms {'late' if value > 0 else 'early'}"
 
 

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body import BodyModel, Pose, PosedBody
-from airborne.body.chain import delta_between, move_pose
+from airborne.body import BodyModel, Pose
 from airborne.cameras import Rig
 from airborne.tracking.model_based.render_model import RenderModel
+from airborne.tracking.self_check.absolute import has_stayed, lies_elsewhere, spread, too_fast
 from airborne.tracking.self_check.causes import Diagnosis, diagnose
+from airborne.tracking.self_check.empty_scenes import EmptyScenes
 from airborne.tracking.self_check.free_flight import excess, fall
 from airborne.tracking.self_check.nuisances import (
     biases,
@@ -23,39 +24,18 @@ from airborne.tracking.self_check.nuisances import (
     twists,
     widen,
 )
-from airborne.tracking.self_check.registration import Registration, draw_silhouette, foreground, register
+from airborne.tracking.self_check.path import TrackedPath
+from airborne.tracking.self_check.registration import draw_silhouette, foreground, outline_of, register
 from airborne.tracking.self_check.solution import Evidence, PoseErrors, Solution, pose_errors, solve
 from airborne.types import Array
-from airborne.video import Frames, View
+from airborne.video import Frames
 
 _MOST_MOMENTS = 16  # at which silhouettes are registered
 _FEWEST_MOMENTS = 3  # with fewer, nothing is said
-_FEWEST_VIEWS = 4  # images of one camera from which the empty scene can be told
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TrackedPath:
-    """The tracked poses of a run."""
-
-    index: NDArray[np.int64]  # (n,) of the frames with a pose
-    time_s: Array  # (n,)
-    poses: Sequence[Pose]
-
-    def row(self, index: int) -> int | None:
-        """Return the row of a frame; None where it has no pose."""
-        row = int(np.searchsorted(self.index, index))
-        return row if row < len(self.index) and self.index[row] == index else None
-
-    def velocity(self, row: int) -> Array:
-        """Return the root's velocity by the poses beside: (6,) [m/s, rad/s]."""
-        a, b = max(row - 1, 0), min(row + 1, len(self.poses) - 1)
-        return delta_between(self.poses[a], self.poses[b])[:6] / max(self.time_s[b] - self.time_s[a], 1e-6)
-
-    def pose_after(self, row: int, delay_s: float) -> Pose:
-        """Return the pose a little later than a frame's."""
-        delta = np.zeros(6 + self.poses[row].joint_angles.size)
-        delta[:6] = delay_s * self.velocity(row)
-        return move_pose(self.poses[row], delta) if delay_s else self.poses[row]
+STAYED = "what the body covered at its start, and does not cover any more, looks as it did then"
+ELSEWHERE = "what stands out from the empty scene lies beside the body by more than its interval"
+FAST = "the body moves faster than bodies do"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,6 +46,7 @@ class SelfCheck:
     index: NDArray[np.int64]  # (m,) frames at which silhouettes were registered
     constant: Array  # (m, 6, 6) covariance of the pose's errors that last all run long [m, rad]
     added: Array  # (m, 6, 6) of it, what the tracker's own covariances do not hold
+    lies_elsewhere: NDArray[np.bool_]  # (m,) the silhouettes show the body beside its interval
 
     def lasting_at(self, index: NDArray[np.int64]) -> Array:
         """Interpolate `added` to other frames: (n, 6, 6)."""
@@ -96,7 +77,11 @@ def self_check(
     chosen = np.unique(np.linspace(0, len(seen) - 1, _MOST_MOMENTS).round().astype(int))
     rows, moments = [rows[i] for i in chosen], [seen[i] for i in chosen]
     evidence = _gather(RenderModel.of(model), rig, path, rows, moments, kept)
-    prior = prior_covariance(rig, calibrated, body_sd)
+    is_drawn = evidence.edge.any(axis=(1, 2, 3))
+    if np.count_nonzero(is_drawn) < _FEWEST_MOMENTS:
+        return None
+    evidence, rows = evidence.select(is_drawn), list(np.array(rows)[is_drawn])
+    prior = prior_covariance(rig, calibrated, body_sd, is_person=model.has_joints)
     nuisances = nuisances_of(rig)
     wide = prior
     for nuisance in nuisances:
@@ -104,13 +89,37 @@ def self_check(
     solution, weights = solve(evidence, wide)
     errors = pose_errors(evidence, weights)
     solution = _with_fall(solution, errors, path, rows)
-    diagnosis = diagnose(solution, nuisances, prior)
+    if np.count_nonzero(evidence.is_seen.any(axis=1)) < _FEWEST_MOMENTS:
+        diagnosis = Diagnosis((), np.zeros(len(prior)), prior)
+    else:
+        diagnosis = diagnose(solution, nuisances, prior)
     K = errors.by_parameter
     constant = K @ diagnosis.covariance @ np.swapaxes(K, 1, 2)
     mean = errors.shown(diagnosis.theta) if diagnosis.has_alarm else K @ diagnosis.theta
     constant = constant + mean[:, :, None] * mean[:, None, :]
     added = _positive(constant - K @ shift_covariance(rig) @ np.swapaxes(K, 1, 2))
-    return SelfCheck(diagnosis, path.index[rows], constant, added)
+    covariance = added[:, :3, :3] + path.covariance[rows, :3, :3]
+    is_seen = (evidence.is_seen.sum(axis=1) > 1) & np.isfinite(covariance).all(axis=(1, 2)) & (not model.has_joints)
+    elsewhere = np.zeros(len(rows), bool)
+    shown = errors.shown(diagnosis.theta)[is_seen, :3]
+    elsewhere[is_seen] = lies_elsewhere(shown, errors.noise[is_seen, :3, :3], covariance[is_seen])
+    return SelfCheck(diagnosis, path.index[rows], constant, added, elsewhere)
+
+
+def doubts(
+    model: BodyModel, path: TrackedPath, kept: Sequence[Frames], start: Pose, found: SelfCheck | None
+) -> dict[str, NDArray[np.bool_]]:
+    """Return which frames of a path are in doubt (n,), by what speaks against them; reasons without a frame too."""
+    render_model, rows = RenderModel.of(model), [path.row(frames.index) for frames in kept]
+    pairs = [(row, frames) for row, frames in zip(rows, kept, strict=True) if row is not None]
+    stayed = [has_stayed(render_model, start, path.poses[row], kept[0], frames) for row, frames in pairs]
+    at = path.index[[row for row, _ in pairs]]
+    none = np.zeros(len(path.index), bool)
+    return {
+        STAYED: spread(np.array(stayed), at, path.index) if pairs else none,
+        ELSEWHERE: none if found is None else spread(found.lies_elsewhere, found.index, path.index),
+        FAST: too_fast(path.time_s, path.positions, path.turns) if len(path.poses) > 1 else none,
+    }
 
 
 def _interpolate(index: NDArray[np.int64], known: NDArray[np.int64], values: Array) -> Array:
@@ -142,54 +151,26 @@ def _gather(
         edge=np.zeros((n, c, 6, 6)),
         edge_by_parameter=np.zeros((n, c, 6, k)),
     )
-    empty = _EmptyScenes(kept)
+    empty = EmptyScenes(kept, render_model, path)
     for i, (row, frames) in enumerate(zip(rows, moments, strict=True)):
         velocity = path.velocity(row)
         for j, view in enumerate(frames.views):
             if view is None:
                 continue
             posed = render_model.with_pose(path.pose_after(row, view.delay_s))
-            found = _register_view(render_model, posed, view, empty, j)
-            if found is not None:
-                columns, shifts = twists(rig, j, posed.t[0], velocity), biases(rig, j)
-                evidence.offset[i, j], evidence.by_twist[i, j], evidence.is_seen[i, j] = found.offset, found.by_twist, True
-                evidence.by_parameter[i, j] = found.by_twist @ columns + shifts
-                evidence.edge[i, j] = found.edge
-                evidence.edge_by_parameter[i, j] = found.edge @ columns + found.edge_by_offset @ shifts
+            silhouette = draw_silhouette(render_model, posed, view.camera)
+            if silhouette is None:
+                continue
+            outline = outline_of(silhouette, posed)
+            columns, shifts = twists(rig, j, posed.t[0], velocity), biases(rig, j)
+            evidence.edge[i, j] = outline.edge
+            evidence.edge_by_parameter[i, j] = outline.edge @ columns + outline.edge_by_offset @ shifts
+            scene = empty.behind(j, view, silhouette)
+            offset = None if scene is None else register(silhouette, foreground(view.rgb, scene, silhouette))
+            if offset is not None:
+                evidence.offset[i, j], evidence.by_twist[i, j], evidence.is_seen[i, j] = offset, outline.by_twist, True
+                evidence.by_parameter[i, j] = outline.by_twist @ columns + shifts
     return evidence
-
-
-def _register_view(
-    render_model: RenderModel, posed: PosedBody, view: View, empty: _EmptyScenes, number: int
-) -> Registration | None:
-    silhouette = draw_silhouette(render_model, posed, view.camera)
-    if silhouette is None:
-        return None
-    scene = empty.crop(number, view, silhouette.box)
-    if scene is None:
-        return None
-    return register(silhouette, foreground(view.rgb, scene, silhouette), posed)
-
-
-class _EmptyScenes:
-    """The median picture of each camera (and field) over the kept frames, where it is asked for."""
-
-    def __init__(self, kept: Sequence[Frames]) -> None:
-        self._images: dict[tuple[int, bytes], list[NDArray[np.uint8]]] = {}
-        for frames in kept:
-            for number, view in enumerate(frames.views):
-                if view is not None:
-                    self._images.setdefault((number, view.camera.K.tobytes()), []).append(view.rgb)
-
-    def crop(self, number: int, view: View, box: tuple[int, int, int, int]) -> NDArray[np.uint8] | None:
-        """Return the empty scene in a box of a view; None where too few pictures tell it."""
-        images = self._images[number, view.camera.K.tobytes()]
-        if len(images) < _FEWEST_VIEWS:
-            return None
-        x0, y0, x1, y1 = box
-        stack = np.stack([image[y0:y1, x0:x1] for image in images])
-        middle = len(images) // 2
-        return np.partition(stack, middle, axis=0)[middle]
 
 
 def _with_fall(solution: Solution, errors: PoseErrors, path: TrackedPath, rows: Sequence[int]) -> Solution:

@@ -35,6 +35,7 @@ _GROSS_SD: Mapping[Kind, float] = {
 }
 # sds of what a silhouette is off all run long without any such cause: light, shadow, the body's shape
 _BIAS_SD = np.array([0.2, 0.2, np.radians(0.05), 0.003])  # [px, px, rad, log scale]
+_PERSON_BIAS_SD = np.array([1.5, 1.5, np.radians(0.3), 0.015])  # the same of a person: ellipsoids are not skin
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +112,7 @@ def _camera_twists(camera: Camera, root: Array, velocity: Array) -> Array:
     return columns
 
 
-def prior_covariance(rig: Rig, calibrated: Mapping[str, Array], body_sd: float) -> Array:
+def prior_covariance(rig: Rig, calibrated: Mapping[str, Array], body_sd: float, *, is_person: bool) -> Array:
     """Return the covariance (n_parameters, n_parameters) of what is usual; it may be singular.
 
     calibrated: of the cameras that the calibration knows, the covariance (7, 7) of turn, place [in camera axes] and
@@ -127,7 +128,7 @@ def prior_covariance(rig: Rig, calibrated: Mapping[str, Array], body_sd: float) 
             known = slice(block.start, block.start + 7)
             covariance[known, known] = calibrated[camera.name]
     bias = np.arange(2 + _PER_CAMERA * len(rig), len(covariance))
-    covariance[bias, bias] = np.tile(_BIAS_SD**2, len(rig))
+    covariance[bias, bias] = np.tile((_PERSON_BIAS_SD if is_person else _BIAS_SD) ** 2, len(rig))
     times = np.arange(len(rig)) * _PER_CAMERA + 9
     covariance[np.ix_(times, times)] -= _CAMERA_SD["time_s"] ** 2 / len(rig)  # the clock is theirs together
     return covariance if calibrated else _without_common_motion(covariance, rig)

@@ -48,14 +48,12 @@ class Silhouette:
 
 
 @dataclass(frozen=True, slots=True)
-class Registration:
-    """Where one view's foreground lies relative to the silhouette."""
+class Outline:
+    """How a silhouette's outline changes by a twist of the body about its root [per m, per rad]."""
 
-    offset: Array  # (4,) see N_SIMILARITY; positive: the foreground lies right, down, turned clockwise, is larger
-    by_twist: Array  # (4, 6) how a twist of the body about its root changes the offset [per m, per rad]
+    by_twist: Array  # (4, 6) its offset
     edge: Array  # (6, 6) information of the whole outline for such a twist, in no unit
     edge_by_offset: Array  # (6, 4) the same for an outline that is offset as a whole
-    overlap: float  # correlation of foreground and registered silhouette
 
 
 def draw_silhouette(render_model: RenderModel, posed: PosedBody, camera: Camera) -> Silhouette | None:
@@ -116,23 +114,33 @@ def foreground(rgb: NDArray[np.uint8], empty: NDArray[np.uint8], silhouette: Sil
     return np.asarray(cv2.warpAffine(share, M, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE))
 
 
-def register(silhouette: Silhouette, shown: NDArray[np.float32], posed: PosedBody) -> Registration | None:
-    """Register a silhouette against the foreground `shown` (h, w); None where the two have too little in common."""
-    start, overlap = _search(silhouette, shown)
-    offset = np.append(start, 0.0)  # the last: how much wider the outline is [px]
+def register(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array | None:
+    """Find the offset (4,) of the foreground `shown` (h, w) from a silhouette; None where they are not alike.
+
+    Positive: the foreground lies right, down [px of the view's columns], turned clockwise [rad], is larger [log].
+    """
+    offset = np.append(_search(silhouette, shown), 0.0)  # the last: how much wider the outline is [px]
     for sigma in _SIGMA_PX:
         offset = _refine(silhouette, shown, offset, sigma)
-    overlap = _correlation(_warp(silhouette, offset, _blur(silhouette.mask, 1.2)), _blur(shown, 1.2))
-    if overlap < _LEAST_OVERLAP or not np.all(np.isfinite(offset)):
+    if not np.all(np.isfinite(offset)):
         return None
-    to_px = np.array([silhouette.to_view[0], silhouette.to_view[0], 1, 1])
+    overlap = _correlation(_warp(silhouette, offset, _blur(silhouette.mask, 1.2)), _blur(shown, 1.2))
+    return offset[:N_SIMILARITY] * _to_px(silhouette) if overlap > _LEAST_OVERLAP else None
+
+
+def outline_of(silhouette: Silhouette, posed: PosedBody) -> Outline:
+    """Differentiate a silhouette's outline."""
     C, B = _outline_derivatives(silhouette, posed)
+    to_px = _to_px(silhouette)
     by_twist = np.linalg.lstsq(B.T, C.T, rcond=1e-6)[0][:N_SIMILARITY]
-    per_px = C @ B[:N_SIMILARITY].T / to_px
-    return Registration(offset[:N_SIMILARITY] * to_px, by_twist * to_px[:, None], C @ C.T, per_px, overlap)
+    return Outline(by_twist * to_px[:, None], C @ C.T, C @ B[:N_SIMILARITY].T / to_px)
 
 
-def _search(silhouette: Silhouette, shown: NDArray[np.float32]) -> tuple[Array, float]:
+def _to_px(silhouette: Silhouette) -> Array:
+    return np.array([silhouette.to_view[0], silhouette.to_view[0], 1, 1])
+
+
+def _search(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array:
     """Find shift, turn and scale on reduced images by normalised correlation."""
     height, width = shown.shape
     size = (max(width // _COARSE, 8), max(height // _COARSE, 8))
@@ -146,14 +154,12 @@ def _search(silhouette: Silhouette, shown: NDArray[np.float32]) -> tuple[Array, 
             template = cv2.resize(_warp(silhouette, candidate, silhouette.mask), size, interpolation=cv2.INTER_AREA)
             scores = cv2.matchTemplate(padded, template, cv2.TM_CCOEFF_NORMED)
             _, score, _, (x, y) = cv2.minMaxLoc(scores)
-            at_rest = turn == 0 and abs(np.log(scale)) < 1e-9
-            score = float(scores[pad, pad]) + _LEAST_GAIN if at_rest and scores[pad, pad] + _LEAST_GAIN > score else score
-            if at_rest and score == float(scores[pad, pad]) + _LEAST_GAIN:
-                x, y = pad, pad
+            if turn == 0 and np.isclose(scale, 1) and scores[pad, pad] + _LEAST_GAIN > score:
+                score, (x, y) = float(scores[pad, pad]) + _LEAST_GAIN, (pad, pad)
             if score > best_score:
                 shift = np.array([(x - pad) * width / size[0], (y - pad) * height / size[1]])
                 best, best_score = np.array([*shift, turn, np.log(scale)]), score
-    return best, best_score
+    return best
 
 
 def _refine(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array, sigma: float) -> Array:

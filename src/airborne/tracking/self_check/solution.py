@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,10 @@ class Evidence:
     is_seen: NDArray[np.bool_]  # (n, c)
     edge: Array  # (n, c, 6, 6) information of the whole outline for the pose, as a tracker uses it
     edge_by_parameter: Array  # (n, c, 6, k)
+
+    def select(self, chosen: NDArray[np.bool_]) -> Evidence:
+        """Return some of the moments, chosen (n,)."""
+        return Evidence(*(getattr(self, each.name)[chosen] for each in fields(self)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +63,7 @@ class PoseErrors:
     seen: Array  # (n, 6) by the silhouettes if all parameters are zero
     seen_by_parameter: Array  # (n, 6, k)
     by_parameter: Array  # (n, 6, k) of a pose tracked by the whole outline
+    noise: Array  # (n, 6, 6) covariance of what the silhouettes show
 
     def shown(self, theta: Array) -> Array:
         """Return by how much the silhouettes show the poses off, given the parameters (k,): (n, 6)."""
@@ -99,7 +104,8 @@ def pose_errors(evidence: Evidence, weights: Array) -> PoseErrors:
     edge = evidence.edge.sum(axis=1)
     floor = 1e-4 * np.trace(edge, axis1=1, axis2=2)[:, None, None] * np.eye(6) / 6
     by_parameter = -np.linalg.solve(edge + floor, evidence.edge_by_parameter.sum(axis=1))
-    return PoseErrors(np.linalg.solve(A, b[..., None])[..., 0], -np.linalg.solve(A, C), by_parameter)
+    inverse = np.linalg.inv(A)
+    return PoseErrors((inverse @ b[..., None])[..., 0], -inverse @ C, by_parameter, inverse)
 
 
 def _pose_information(evidence: Evidence, weights: Array) -> Array:
