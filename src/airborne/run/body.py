@@ -44,8 +44,9 @@ from airborne.trial.file import Trial
 from airborne.video import Frames, Recording, View
 
 _UNCERTAINTY = (
-    "Standard deviations hold what the pictures leave open: noise, light, and edges that are not where the drawn body "
-    "has them. They do not hold a body measured wrongly all over, or wrong times of the cameras."
+    "Standard deviations of position and orientation hold what the pictures leave open: noise, light, and edges that "
+    "are not where the drawn body has them; and what the self-check leaves open: the sizes of body and world, and the "
+    "cameras' places and times. They do not hold the lengths and girths of single segments."
 )
 _CALIBRATION_UNCERTAINTY = " They hold how far the control points leave each camera's picture open."
 

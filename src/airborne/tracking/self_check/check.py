@@ -31,7 +31,7 @@ from airborne.types import Array
 from airborne.video import Frames
 
 _MOST_MOMENTS = 16  # at which silhouettes are registered
-_FEWEST_MOMENTS = 3  # with fewer, nothing is said
+_FEWEST_MOMENTS = 3  # with fewer, nothing is said of causes
 
 STAYED = "what the body covered at its start, and does not cover any more, looks as it did then"
 ELSEWHERE = "what stands out from the empty scene lies beside the body by more than its interval"
@@ -72,13 +72,13 @@ def self_check(
     """
     rows = [row for frames in kept if (row := path.row(frames.index)) is not None]
     seen = [frames for frames in kept if path.row(frames.index) is not None]
-    if len(path.poses) < _FEWEST_MOMENTS or len(seen) < _FEWEST_MOMENTS:
+    if not rows:
         return None
     chosen = np.unique(np.linspace(0, len(seen) - 1, _MOST_MOMENTS).round().astype(int))
     rows, moments = [rows[i] for i in chosen], [seen[i] for i in chosen]
     evidence = _gather(RenderModel.of(model), rig, path, rows, moments, kept)
     is_drawn = evidence.edge.any(axis=(1, 2, 3))
-    if np.count_nonzero(is_drawn) < _FEWEST_MOMENTS:
+    if not is_drawn.any():
         return None
     evidence, rows = evidence.select(is_drawn), list(np.array(rows)[is_drawn])
     prior = prior_covariance(rig, calibrated, body_sd, is_person=model.has_joints)
@@ -165,7 +165,7 @@ def _gather(
             columns, shifts = twists(rig, j, posed.t[0], velocity), biases(rig, j)
             evidence.edge[i, j] = outline.edge
             evidence.edge_by_parameter[i, j] = outline.edge @ columns + outline.edge_by_offset @ shifts
-            scene = empty.behind(j, view, silhouette)
+            scene = empty.behind(j, view, silhouette) if silhouette.is_whole else None
             offset = None if scene is None else register(silhouette, foreground(view.rgb, scene, silhouette))
             if offset is not None:
                 evidence.offset[i, j], evidence.by_twist[i, j], evidence.is_seen[i, j] = offset, outline.by_twist, True

@@ -32,6 +32,7 @@ _SIGMA_PX = (4.0, 2.0, 1.2)  # blurs of the fine registration, coarse to fine
 _STEPS = 6  # at each blur
 _CLIP = 0.35  # a residual of the foreground this large has a quarter of the weight
 _LEAST_OVERLAP = 0.55  # correlation of silhouette and foreground below which a view says nothing
+_FARTHEST = np.array([0.5, 0.5, 0.35, 0.3])  # offsets beyond these are mistakes [silhouettes' lengths, same, rad, log]
 _LEAST_GAIN = 0.02  # correlation that a far displacement must gain to be preferred to none
 
 
@@ -45,6 +46,7 @@ class Silhouette:
     middle: Array  # (2,) [px] of the mask's bounding box
     box: tuple[int, int, int, int]  # x0, y0, x1, y1 of the view's image that it covers
     to_view: Array  # (2,) view pixels a pixel, right and down
+    is_whole: bool  # the image's border cuts nothing off
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +59,11 @@ class Outline:
 
 
 def draw_silhouette(render_model: RenderModel, posed: PosedBody, camera: Camera) -> Silhouette | None:
-    """Draw the body in a view with a margin; None where it is too small, or mostly outside the image."""
-    points = _outline_points(render_model, posed, camera)
-    if points is None:
+    """Draw the body in a view with a margin; None where it is too small."""
+    corners = _mask_corners(render_model, posed, camera)
+    if corners is None:
         return None
-    low, high = points
+    low, high = corners
     size = np.array(camera.size)
     aspect = float(camera.K[1, 1] / camera.K[0, 0])
     extent = (high - low) / [1, aspect]
@@ -82,16 +84,17 @@ def draw_silhouette(render_model: RenderModel, posed: PosedBody, camera: Camera)
     surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, pack_view(own), *maps)
     mask = (maps.part >= 0).astype(np.float32)
     middle = ((low + high) / 2 - offset) / to_view
-    return Silhouette(own, mask, maps.inverse_depth, middle, (int(x0), int(y0), int(x1), int(y1)), to_view)
+    is_whole = bool(np.all(low > 0) and np.all(high < size - 1))
+    box = int(x0), int(y0), int(x1), int(y1)
+    return Silhouette(own, mask, maps.inverse_depth, middle, box, to_view, is_whole)
 
 
-def _outline_points(render_model: RenderModel, posed: PosedBody, camera: Camera) -> tuple[Array, Array] | None:
-    """Return the corners of the body's mask in the image; None where it is not there, or cut off by the border."""
+def _mask_corners(render_model: RenderModel, posed: PosedBody, camera: Camera) -> tuple[Array, Array] | None:
+    """Return the corners of the body's mask in the image [px]; None where it is not there."""
     maps = empty_maps(camera.size)
     surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, pack_view(camera), *maps)
     rows, columns = np.flatnonzero((maps.part >= 0).any(axis=1)), np.flatnonzero((maps.part >= 0).any(axis=0))
-    width, height = camera.size
-    if not len(rows) or rows[0] == 0 or columns[0] == 0 or rows[-1] == height - 1 or columns[-1] == width - 1:
+    if not len(rows):
         return None
     return np.array([columns[0], rows[0]], float), np.array([columns[-1], rows[-1]], float)
 
@@ -122,7 +125,8 @@ def register(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array | None
     offset = np.append(_search(silhouette, shown), 0.0)  # the last: how much wider the outline is [px]
     for sigma in _SIGMA_PX:
         offset = _refine(silhouette, shown, offset, sigma)
-    if not np.all(np.isfinite(offset)):
+    length = float(max(np.ptp(np.nonzero(silhouette.mask), axis=1)))
+    if not np.all(np.abs(offset[:N_SIMILARITY]) < _FARTHEST * [length, length, 1, 1]):
         return None
     overlap = _correlation(_warp(silhouette, offset, _blur(silhouette.mask, 1.2)), _blur(shown, 1.2))
     return offset[:N_SIMILARITY] * _to_px(silhouette) if overlap > _LEAST_OVERLAP else None

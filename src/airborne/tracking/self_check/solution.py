@@ -11,6 +11,7 @@ from airborne.types import Array
 
 # sds of a view's offset that the same silhouette has at any one moment, at least: px, px, rad, log scale
 _LEAST_NOISE = np.array([0.15, 0.15, np.radians(0.1), 0.002])
+_STRAY = np.array([np.inf, np.inf, 0.15, 0.1])  # a view's turn and scale farther from its median are mistakes
 _ROUNDS = 4  # of estimating the noise and the weights of views that do not fit
 _CLIP = 3.0  # residuals beyond so many sds lose weight
 _POSE_SD = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])  # hold what no view shows [m, rad]
@@ -75,25 +76,35 @@ def solve(evidence: Evidence, wide: Array) -> tuple[Solution, Array]:
 
     wide (k, k): prior of the parameters while the noise is estimated.
     """
-    weights = evidence.is_seen[..., None] / (3 * _LEAST_NOISE) ** 2
+    is_seen = evidence.is_seen & ~_strays(evidence)
+    weights = is_seen[..., None] / (3 * _LEAST_NOISE) ** 2
     solution = _accumulate(evidence, weights)
-    trust = evidence.is_seen.astype(float)
+    trust = is_seen.astype(float)
     for _ in range(_ROUNDS):
         theta = solution.posterior(wide)[0]
         errors = pose_errors(evidence, weights)
         residual = evidence.offset - np.einsum("ncak,k->nca", evidence.by_parameter, theta)
         residual -= np.einsum("ncai,ni->nca", evidence.by_twist, errors.shown(theta))
-        residual *= evidence.is_seen[..., None]
+        residual *= is_seen[..., None]
         inverse = np.linalg.inv(_pose_information(evidence, weights))
         leverage = np.einsum("ncai,nij,ncaj,nca->nca", evidence.by_twist, inverse, evidence.by_twist, weights)
         freedom = np.sum(trust[..., None] * (1 - leverage), axis=(0, 1))
         noise = np.sqrt(np.sum(trust[..., None] * residual**2, axis=(0, 1)) / np.maximum(freedom, 1.0))
         noise = np.maximum(noise, _LEAST_NOISE)
         away = np.sqrt(np.mean((residual / noise) ** 2, axis=-1))
-        trust = evidence.is_seen * np.minimum(1, _CLIP / np.maximum(away, 1e-9)) ** 2
+        trust = is_seen * np.minimum(1, _CLIP / np.maximum(away, 1e-9)) ** 2
         weights = trust[..., None] / noise**2
         solution = _accumulate(evidence, weights)
     return solution, weights
+
+
+def _strays(evidence: Evidence) -> NDArray[np.bool_]:
+    """Return which offsets are mistakes, far from what their views have at other moments: (n, c)."""
+    median = np.zeros(evidence.offset.shape[1:])
+    for view, is_seen in enumerate(evidence.is_seen.T):
+        if is_seen.any():
+            median[view] = np.median(evidence.offset[is_seen, view], axis=0)
+    return np.any(np.abs(evidence.offset - median) > _STRAY, axis=-1)
 
 
 def pose_errors(evidence: Evidence, weights: Array) -> PoseErrors:
