@@ -12,10 +12,10 @@ from airborne.tracking.self_check.nuisances import Kind, Nuisance, widen
 from airborne.tracking.self_check.solution import Solution
 from airborne.types import Array
 
-ALARM_SDS = 3.0
+_ALARM_SDS = 3.0  # from zero: a false alarm in 370, were errors normal
 _LEAST_EVIDENCE = 4.0  # [nats] by which a cause must explain the pictures better than none
 _SAME = 3.0  # [nats] within which two causes cannot be told apart
-_MOST_CAUSES = 3
+_MOST_CAUSES = 3  # that are named one after the other
 # sds of what the silhouettes and their straight-line equations leave open, however many there are
 _MODEL_SD: Mapping[Kind, float] = {
     "scale": 0.003,
@@ -123,7 +123,7 @@ def _log_likelihood(solution: Solution, prior: Array) -> float:
 
 def _is_clear(solution: Solution, nuisance: Nuisance, prior: Array) -> bool:
     value, sd = _size(solution, nuisance, widen(prior, nuisance))
-    return abs(value) > ALARM_SDS * sd
+    return abs(value) > _ALARM_SDS * sd
 
 
 def _size(solution: Solution, nuisance: Nuisance, prior: Array) -> tuple[float, float]:

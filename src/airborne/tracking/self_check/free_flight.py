@@ -7,7 +7,7 @@ import numpy as np
 from airborne.constants import GRAVITY_M_S2
 from airborne.types import Array
 
-_LEAST_MOMENTS, _LEAST_S = 7, 0.25
+_LEAST_MOMENTS, _LEAST_S = 7, 0.25  # of a flight that is measured
 _MOST_RMS_M = 0.008  # about the parabola: more is no free flight, or not of the centre of mass
 _MOST_TILT = 0.15  # horizontal acceleration, as a share of the vertical one
 _LEAST_M_S2, _MOST_M_S2 = 6.0, 15.0  # a fall that a wrong scale can explain

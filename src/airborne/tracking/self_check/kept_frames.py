@@ -9,7 +9,7 @@ import numpy as np
 from airborne.video import Frames
 
 _MOST_BYTES = 120e6  # of all that are kept
-_MOST_KEPT, _FEWEST_KEPT = 24, 8
+_MOST_KEPT, _FEWEST_KEPT = 24, 8  # frames, whatever their bytes
 
 
 class KeptFrames:

@@ -20,7 +20,7 @@ from airborne.types import Array
 Kind = Literal["scale", "turn_deg", "shift_m", "focal", "time_s"]
 
 _KINDS_OF_CAMERA: tuple[tuple[Kind, int], ...] = (("turn_deg", 3), ("shift_m", 3), ("focal", 1), ("time_s", 1))
-_PER_CAMERA = 8
+_PER_CAMERA = 8  # numbers of the kinds above
 # sds of what is usual: of a body measured or fitted, of one by its stature alone, of a world, of other cameras
 MEASURED_SD, PRESET_SD = 0.01, 0.03  # shares of the size
 _SURVEYED_SD, _WORLD_SD = 0.002, 0.01  # of a world of control points, of any other
