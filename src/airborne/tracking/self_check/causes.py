@@ -79,19 +79,15 @@ def diagnose(solution: Solution, nuisances: Sequence[Nuisance], prior: Array) ->
         same = [n for n, score in clear.items() if n is not best and score > clear[best] - _SAME]
         named.append((best, same))
         prior = widen(prior, best)
-    alarms = []
+    alarms: list[Finding] = []
     for best, same in named:
-        alternatives = []
-        for other in same:
-            value, sd = _size(solution, other, widen(_narrow(prior, best, solution), other))
-            alternatives.append(_describe(other.subject, other.kind, value, sd))
+        without = prior - widen(np.zeros_like(prior), best)
+        others = [Finding(n.subject, n.kind, *_size(solution, n, widen(without, n)), is_alarm=True) for n in same]
+        sentences = tuple(each.sentence for each in others)
         value, sd = _size(solution, best, prior)
-        alarms.append(Finding(best.subject, best.kind, value, sd, True, tuple(alternatives)))
-    for best, same in named:
-        for other in same:
-            value, sd = _size(solution, other, widen(_narrow(prior, best, solution), other))
-            alarms.append(Finding(other.subject, other.kind, value, sd, True))
-            prior = widen(prior, other)
+        alarms += [Finding(best.subject, best.kind, value, sd, is_alarm=True, alternatives=sentences), *others]
+    for nuisance in {each for _, same in named for each in same}:
+        prior = widen(prior, nuisance)
     listed = {(finding.subject, finding.kind) for finding in alarms}
     others = [
         Finding(n.subject, n.kind, *_size(solution, n, prior), is_alarm=False)
@@ -100,12 +96,6 @@ def diagnose(solution: Solution, nuisances: Sequence[Nuisance], prior: Array) ->
     ]
     theta, covariance, _ = solution.posterior(prior)
     return Diagnosis((*alarms, *others), theta, covariance)
-
-
-def _narrow(prior: Array, nuisance: Nuisance, solution: Solution) -> Array:
-    """Undo `widen` for one cause."""
-    change = widen(np.zeros_like(prior), nuisance)
-    return prior - change
 
 
 def _evidence(solution: Solution, nuisances: Sequence[Nuisance], prior: Array) -> dict[Nuisance, float]:

@@ -39,6 +39,22 @@ FAST = "the body moves faster than bodies do"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class RunEquations:
+    """What some moments of a run say of its parameters and of its poses."""
+
+    rows: Sequence[int]  # of the path, the moments
+    evidence: Evidence
+    solution: Solution
+    errors: PoseErrors
+    prior: Array  # (k, k) what is usual
+
+    @property
+    def says_causes(self) -> bool:
+        """Whether enough moments were registered."""
+        return np.count_nonzero(self.evidence.is_seen.any(axis=1)) >= _FEWEST_MOMENTS
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class SelfCheck:
     """What a run says of itself."""
 
@@ -70,29 +86,13 @@ def self_check(
 
     calibrated, body_sd: as `prior_covariance` takes them.
     """
-    rows = [row for frames in kept if (row := path.row(frames.index)) is not None]
-    seen = [frames for frames in kept if path.row(frames.index) is not None]
-    if not rows:
+    run = gather_equations(model, rig, path, kept, calibrated=calibrated, body_sd=body_sd)
+    if run is None:
         return None
-    chosen = np.unique(np.linspace(0, len(seen) - 1, _MOST_MOMENTS).round().astype(int))
-    rows, moments = [rows[i] for i in chosen], [seen[i] for i in chosen]
-    evidence = _gather(RenderModel.of(model), rig, path, rows, moments, kept)
-    is_drawn = evidence.edge.any(axis=(1, 2, 3))
-    if not is_drawn.any():
-        return None
-    evidence, rows = evidence.select(is_drawn), list(np.array(rows)[is_drawn])
-    prior = prior_covariance(rig, calibrated, body_sd, is_person=model.has_joints)
-    nuisances = nuisances_of(rig)
-    wide = prior
-    for nuisance in nuisances:
-        wide = widen(wide, nuisance)
-    solution, weights = solve(evidence, wide)
-    errors = pose_errors(evidence, weights)
-    solution = _with_fall(solution, errors, path, rows)
-    if np.count_nonzero(evidence.is_seen.any(axis=1)) < _FEWEST_MOMENTS:
-        diagnosis = Diagnosis((), np.zeros(len(prior)), prior)
-    else:
-        diagnosis = diagnose(solution, nuisances, prior)
+    rows, evidence, errors = run.rows, run.evidence, run.errors
+    diagnosis = Diagnosis((), np.zeros(len(run.prior)), run.prior)
+    if run.says_causes:
+        diagnosis = diagnose(run.solution, nuisances_of(rig), run.prior)
     K = errors.by_parameter
     constant = K @ diagnosis.covariance @ np.swapaxes(K, 1, 2)
     mean = errors.shown(diagnosis.theta) if diagnosis.has_alarm else K @ diagnosis.theta
@@ -131,6 +131,35 @@ def _positive(matrices: Array) -> Array:
     """Return the nearest matrices (n, 6, 6) without negative eigenvalues."""
     values, vectors = np.linalg.eigh(matrices)
     return (vectors * np.maximum(values, 0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+
+
+def gather_equations(
+    model: BodyModel,
+    rig: Rig,
+    path: TrackedPath,
+    kept: Sequence[Frames],
+    *,
+    calibrated: Mapping[str, Array],
+    body_sd: float,
+) -> RunEquations | None:
+    """Look at some frames of a run again; None where none of them shows the body."""
+    seen = [(row, frames) for frames in kept if (row := path.row(frames.index)) is not None]
+    if not seen:
+        return None
+    chosen = np.unique(np.linspace(0, len(seen) - 1, _MOST_MOMENTS).round().astype(int))
+    rows, moments = [seen[i][0] for i in chosen], [seen[i][1] for i in chosen]
+    evidence = _gather(RenderModel.of(model), rig, path, rows, moments, kept)
+    is_drawn = evidence.edge.any(axis=(1, 2, 3))
+    if not is_drawn.any():
+        return None
+    evidence, rows = evidence.select(is_drawn), list(np.array(rows)[is_drawn])
+    prior = prior_covariance(rig, calibrated, body_sd, is_person=model.has_joints)
+    wide = prior
+    for nuisance in nuisances_of(rig):
+        wide = widen(wide, nuisance)
+    solution, weights = solve(evidence, wide)
+    errors = pose_errors(evidence, weights)
+    return RunEquations(rows, evidence, _with_fall(solution, errors, path, rows), errors, prior)
 
 
 def _gather(
