@@ -1,4 +1,4 @@
-"""What every test may use."""
+"""What every test may use, the order in which test files start, and which tests are quick."""
 
 import os
 import warnings
@@ -9,6 +9,44 @@ import pytest
 from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.control_points import ControlPoints, read_control_points
 from tests.support.places import ROOT
+
+SKIPPED = "airborne/skipped"  # where pytest's cache keeps what the last run skipped
+SLOW_FILES = Path(__file__).with_name("slow_files.txt")  # CPU seconds and file, kernels not yet compiled
+
+
+def pytest_addoption(parser):
+    parser.addoption("--skipped", action="store_true", help="run what the last run skipped; another skip is a failure")
+
+
+def pytest_configure(config):
+    config.option.loadscopereorder = False  # workers take the files in the order below, not those of most tests first
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """Start with the slowest files, so that no worker ends long before another; what is in no slow file is quick."""
+    lines = SLOW_FILES.read_text(encoding="utf-8").splitlines()
+    seconds = {file: float(each) for each, file in map(str.split, lines)}
+    items.sort(key=lambda item: -seconds.get(item.location[0], 0))
+    for item in items:
+        if item.location[0] not in seconds:
+            item.add_marker("quick")
+    if config.getoption("skipped"):
+        skipped = set(config.cache.get(SKIPPED, []))
+        config.hook.pytest_deselected(items=[item for item in items if item.nodeid not in skipped])
+        items[:] = [item for item in items if item.nodeid in skipped]
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item):
+    report = (yield).get_result()
+    if report.skipped and item.config.getoption("skipped"):
+        report.outcome, report.longrepr = "failed", f"skipped again: {report.longrepr[2]}"
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    """Remember what was skipped."""
+    config.cache.set(SKIPPED, [report.nodeid for report in terminalreporter.stats.get("skipped", [])])
 
 
 @pytest.fixture(scope="session")

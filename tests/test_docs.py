@@ -252,7 +252,14 @@ def test_every_file_of_a_run_is_documented(run):
 
 def test_every_file_of_a_smoothed_run_is_documented():
     documented = {name for row in table_of(RESULTS, "Files added to a finished run") for name in named(row[0])}
-    assert {smooth.MOTION, smooth.JOINTS, smooth.ANGLES, smooth.EVENTS, smooth.FIGURE, SMOOTH_RECORD} <= documented
+    assert {
+        smooth.MOTION,
+        smooth.JOINTS,
+        smooth.ANGLES,
+        smooth.EVENTS,
+        smooth.RESIDUALS_FIGURE,
+        SMOOTH_RECORD,
+    } <= documented
     assert f"`{PICTURE}`" in RESULTS.read_text(encoding="utf-8")
 
 

@@ -11,6 +11,7 @@ Array = NDArray[np.floating]
 Ints = NDArray[np.integer]
 Mask = NDArray[np.bool_]
 Image = NDArray[np.uint8]  # (h, w, 3) sRGB, or (h, w) grey
+Size = tuple[int, int]  # (width, height) [px]
 Triple = tuple[float, float, float]
 Progress = Callable[[int, int | None], None]  # steps done, steps expected or None where nobody knows
 StageProgress = Callable[[str, int, int | None], None]  # the stage, then as Progress

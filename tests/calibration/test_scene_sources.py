@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from functools import cache
 
@@ -16,6 +14,7 @@ from airborne.calibration.report import calibration_to_dict, describe_calibratio
 from airborne.cameras import read_rig, write_pose2sim
 from airborne.errors import CalibrationError
 from tests.support import wand_waving as waving
+from tests.support.commands import in_process
 
 CLICKED = (
     *("corner_near_left_outer", "corner_near_right_outer", "corner_far_left_outer", "corner_far_right_outer"),
@@ -28,7 +27,6 @@ COURT = '[court]\nfile = "court.csv"\nnet = "men"\n'
 WAND = '[wand]\nfile = "wand_xypts.csv"\nlengths_m = [0.6, 0.4]\n'
 RATE_HZ = 50
 N = 80  # frames of the wand
-MAIN = "from airborne.cli import main; main()"
 
 
 def xypts(px):
@@ -129,19 +127,14 @@ def test_a_throw_tells_which_way_is_up(hall):
     assert "times as" in half.world
 
 
-def test_the_command_writes_the_rig_and_says_how_good_it_is(hall):
+def test_the_command_writes_the_rig_and_says_how_good_it_is(hall, capsys):
     sources = written(hall, COURT + WAND, "command.toml")
-    done = run(sources, "-o", hall / "calib.toml")
-    assert done.returncode == 0, done.stderr
+    assert in_process("calibrate", sources, "-o", hall / "calib.toml") == 0
     assert off_m(read_rig(hall / "calib.toml")) < 0.012
     report = json.loads((hall / "calib_report" / "report.json").read_text())
     assert report["findings"] == []
-    assert "wand" in done.stdout and "court" in done.stdout
-
-
-def run(*arguments):
-    command = [sys.executable, "-c", MAIN, "calibrate", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300)
+    printed = capsys.readouterr().out
+    assert "wand" in printed and "court" in printed
 
 
 def test_one_table_needs_no_file_of_sources(hall):
@@ -151,8 +144,7 @@ def test_one_table_needs_no_file_of_sources(hall):
             px = waving.tracks(np.random.default_rng(6), RIG, 60, lengths_m=(0.6,)).px
             (hall / table).write_text(xypts(px))
             options = (*options, "--size", named)
-        done = run(hall / table, *options, "-o", hall / "short.toml")
-        assert done.returncode == 0, done.stderr
+        assert in_process("calibrate", hall / table, *options, "-o", hall / "short.toml") == 0
         assert waving.misplaced_m(RIG, read_rig(hall / "short.toml")).max() < 0.15
 
 
@@ -165,12 +157,12 @@ def test_one_table_needs_no_file_of_sources(hall):
         (("--wand", "1000", "--size", "1920x1080"), "metres, not millimetres"),
     ],
 )
-def test_wrong_options_are_answered_in_one_line(hall, options, said):
+def test_wrong_options_are_answered_in_one_line(hall, options, said, capsys):
     table = "court.csv" if "--court" in options else "wand_xypts.csv"
-    done = run(hall / table, *options, "-o", hall / "no.toml")
-    assert done.returncode == 2
-    assert re.search(said, done.stderr)
-    assert len(done.stderr.strip().splitlines()) == 1
+    assert in_process("calibrate", hall / table, *options, "-o", hall / "no.toml") == 2
+    complaint = capsys.readouterr().err
+    assert re.search(said, complaint)
+    assert len(complaint.strip().splitlines()) == 1
 
 
 def test_a_wand_in_millimetres_is_refused(hall):

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from airborne import cli
 from airborne.motion import read_motion
+from tests.support.commands import in_process
 from tests.support.places import THROWN_CROSS
 from tests.support.players_trial import write_run, write_truth
 from tests.support.run_files import files_of
@@ -59,18 +59,6 @@ def edit_trial(path: Path, name: str, *replacements: tuple[str, str]) -> Path:
     return path.with_name(name)
 
 
-def in_process(*arguments) -> int:
-    """Run a command in this process, as its entry point does, and return the exit code."""
-    before, sys.argv = sys.argv, ["airborne", *map(str, arguments)]
-    try:
-        cli.main()
-    except SystemExit as end:
-        return int(end.code or 0)
-    finally:
-        sys.argv = before
-    return 0
-
-
 def start_command(*arguments) -> subprocess.Popen:
     """Start a command of its own process."""
     command = [sys.executable, "-c", "from airborne.cli import main; main()", *map(str, arguments)]
@@ -86,6 +74,7 @@ def wait_for_rows(process: subprocess.Popen, motion: Path, rows: int) -> None:
         time.sleep(0.005)
 
 
+@pytest.mark.quick
 def test_track_prints_what_was_found_and_leaves_every_table(trial, tmp_path, capsys):
     assert in_process("track", trial, "-o", tmp_path / "run", "--no-pictures", "--cameras", "cam1, cam2") == 0
     out, err = capsys.readouterr()
@@ -221,9 +210,7 @@ def test_demo_runs_again_in_its_own_folder_and_spares_any_other(trial, short_run
 
 def test_a_killed_run_is_readable_and_resumes_to_the_same_bytes(trial, tmp_path):
     long = trial.with_name("long.toml")
-    whole = start_command("track", long, "-o", tmp_path / "whole", "--no-pictures")
-    whole.communicate()
-    assert whole.returncode == 0
+    assert in_process("track", long, "-o", tmp_path / "whole", "--no-pictures") == 0
     process = start_command("track", long, "-o", tmp_path / "killed", "--no-pictures")
     wait_for_rows(process, tmp_path / "killed" / "motion.csv", KILLED_AFTER)
     process.kill()
@@ -231,9 +218,7 @@ def test_a_killed_run_is_readable_and_resumes_to_the_same_bytes(trial, tmp_path)
     n_kept = len(read_motion(tmp_path / "killed" / "motion.csv"))
     assert KILLED_AFTER <= n_kept < LONG
     assert not (tmp_path / "killed" / "summary.json").exists()
-    resumed = start_command("track", long, "-o", tmp_path / "killed", "--no-pictures", "--resume")
-    resumed.communicate()
-    assert resumed.returncode == 0
+    assert in_process("track", long, "-o", tmp_path / "killed", "--no-pictures", "--resume") == 0
     for name in ("motion.csv", "tables/angles.csv", "joints.csv"):
         assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 

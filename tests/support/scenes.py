@@ -1,7 +1,7 @@
 """Small clips with truth: a coloured body thrown over a cluttered background, seen by up to four cameras."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 import cv2
@@ -122,8 +122,15 @@ class Scene:
     noise_grey: float = 2.0
     is_dark: Callable[[int, str], bool] = lambda index, name: False  # a camera without an image at a frame
     reach: float = REACH
+    _rendered: dict[int, Frames] = field(default_factory=dict, init=False)
 
     def frames(self, index: int) -> Frames:
+        """Render a frame, once."""
+        if index not in self._rendered:
+            self._rendered[index] = self._render(index)
+        return self._rendered[index]
+
+    def _render(self, index: int) -> Frames:
         time_s = Fraction(index, FPS)
         pose = self.motion(time_s)
         views = [

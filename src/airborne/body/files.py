@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from airborne.body.mesh_files import read_mesh
 from airborne.body.model import (
-    LONGEST_M,
     UNLIMITED,
     WHOLE,
     BodyModel,
@@ -166,28 +165,7 @@ def _shape(table: _PartTable, path: Path) -> Shape:
         raise BodyError(
             f"{path.name}: part '{table.name}': mesh file {value} must lie beside the body file or below it"
         )
-    return _mesh(path.parent / value, table.scale)
-
-
-def _mesh(path: Path, scale: float) -> Mesh:
-    if not path.is_file():
-        raise BodyError(f"mesh file {path.name} not found beside the body file")
-    try:
-        with np.errstate(all="ignore"):
-            mesh = trimesh.load_mesh(path)
-            is_closed, volume = mesh.is_watertight, mesh.volume
-            vertices, faces = np.asarray(mesh.vertices, float) * scale, np.asarray(mesh.faces, np.int64)
-    except Exception as error:  # trimesh raises whatever its parsers raise
-        raise BodyError(f"{path.name}: not a readable OBJ, PLY or STL mesh ({error})") from error
-    if not len(faces) or not np.all(np.isfinite(vertices)):
-        raise BodyError(f"{path.name}: the mesh has no faces, or corners that are not numbers")
-    if not is_closed:
-        raise BodyError(f"{path.name}: the mesh is not closed; fill its holes, so that inside and outside can be told")
-    if np.ptp(vertices, axis=0).max() > LONGEST_M:
-        raise BodyError(
-            f"{path.name}: the mesh is over {LONGEST_M:.0f} m long; give scale = 0.001 if it is in millimetres"
-        )
-    return Mesh(vertices, faces if volume >= 0 else faces[:, ::-1])
+    return read_mesh(path.parent / value, table.scale)
 
 
 def mesh_files(path: Path) -> list[str]:

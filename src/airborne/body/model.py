@@ -40,6 +40,7 @@ class Mesh:
     vertices_m: Array  # (v, 3) [m]
     faces: NDArray[np.integer]  # (f, 3)
     normals: Array | None = None  # (v, 3) unit, outward, for smooth shading; None: each face has its own
+    note: str = ""  # what its file had that was not as it should be
 
 
 Shape = Ellipsoid | Box | Mesh
@@ -192,6 +193,11 @@ class BodyModel:
     def parts(self) -> tuple[Part, ...]:
         """Every part, in the order of the segments."""
         return tuple(part for segment in self.segments for part in segment.parts)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the files of its meshes had that was not as it should be."""
+        return tuple(part.shape.note for part in self.parts if isinstance(part.shape, Mesh) and part.shape.note)
 
     @property
     def needs_colours(self) -> bool:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from airborne.appearance.lighting import fit_light, shade_body
 from airborne.body import PosedBody
 from airborne.rendering.maps import surface_maps
-from airborne.tracking.model_based.blur import RADIUS_PX, blur, gaussian_taps
+from airborne.tracking.model_based.blur import RADIUS_PX, blur_planes, gaussian_taps
 from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers
 from airborne.tracking.model_based.twist_equations import BLOCK_PX
 from airborne.types import Array
@@ -92,7 +92,7 @@ def composite_equations(
         v, u = _box(np.abs(change).max(axis=0, initial=0) > 0, RADIUS_PX)
         if v.stop > v.start:
             blurred = np.empty_like(change[:, v, u])
-            blur(np.ascontiguousarray(change[:, v, u]), *_taps(view), blurred)
+            blur_planes(np.ascontiguousarray(change[:, v, u]), *_taps(view), blurred)
             column[:, v, u] = blurred / np.float32(step)
     weight = np.tile(weights[rows, across].ravel(), 3)
     flat = columns.reshape(len(steps), -1)
@@ -124,7 +124,7 @@ def _compose(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -> 
 
 def _residual(view: ViewBuffers, composite: NDArray[np.float32]) -> NDArray[np.float32]:
     out = np.empty_like(composite)
-    blur(view.observation.observed - composite, *_taps(view), out)
+    blur_planes(view.observation.observed - composite, *_taps(view), out)
     return out
 
 

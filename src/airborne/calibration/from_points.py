@@ -8,21 +8,24 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.diagnosis import check_points, decompose_cameras, warnings_about
-from airborne.calibration.intrinsics.model_selection import Solution, choose_simplest, leave_one_out, models_for
+from airborne.calibration.intrinsics.model_selection import (
+    Solution,
+    candidates_for,
+    choose_simplest,
+    leave_one_out,
+    place_sd,
+)
 from airborne.calibration.intrinsics.physical import (
-    PINHOLE_MODELS,
     SEVEN_PARAMETERS,
     Pinhole,
     anneal_pinhole,
-    fit_pinhole,
     parameter_covariance,
     parameter_names,
 )
 from airborne.calibration.sources.control_points import ControlPoints
-from airborne.cameras.camera import Camera, Rig
+from airborne.cameras.camera import Rig
 from airborne.cameras.dlt import Decomposition, dlt_coefficients, fit_dlt
 from airborne.errors import CalibrationError
 from airborne.geometry.triangulation import px_from_points, triangulate
@@ -101,7 +104,7 @@ def calibrate(
             points, name, size=sizes[name], decomposition=decompositions[name], method=method, seed=seed
         )
         solutions[name] = choose_simplest(candidates)
-        cameras.append(_camera(name, sizes[name], solutions[name]))
+        cameras.append(solutions[name].pinhole.camera(name, sizes[name], solutions[name].shift_sd_px))
         fits.append(_describe_fit(points, name, solutions[name], candidates))
     return Calibration(
         rig=Rig(tuple(cameras)),
@@ -132,29 +135,17 @@ def _solve(
     if method == "annealing":
         pinhole = anneal_pinhole(initial, world, px, seed=seed)
         return [leave_one_out(pinhole, SEVEN_PARAMETERS, world, px)]
-    return [
-        leave_one_out(fit_pinhole(initial, model, world, px), model, world, px)
-        for model in models_for(PINHOLE_MODELS, len(world))
-    ]
-
-
-def _camera(name: str, size: tuple[int, int], solution: Solution) -> Camera:
-    pinhole = solution.pinhole
-    f, (u0, v0) = pinhole.focal_px, pinhole.principal_point
-    return Camera(
-        name=name,
-        K=np.array([[f, 0, u0], [0, f, v0], [0, 0, 1]]),
-        size=size,
-        camera_from_world=RigidTransform.from_components(-pinhole.R @ pinhole.centre, Rotation.from_matrix(pinhole.R)),
-        distortion=np.array([pinhole.k1, 0, 0, 0, 0]),
-        shift_sd_px=solution.shift_sd_px,
-    )
+    return candidates_for(initial, world, px)
 
 
 def _describe_fit(points: ControlPoints, name: str, best: Solution, candidates: list[Solution]) -> CameraFit:
     is_seen = points.is_seen_by(name)
     P_dlt = fit_dlt(best.world, best.px)
     covariance = parameter_covariance(best.pinhole, best.model, best.world, best.px)
+    sd = np.sqrt(np.diag(covariance))
+    places = place_sd(best, candidates)
+    wider = float(np.mean(places / sd[3:6]))  # by the lens model's error: all of them alike
+    sd[3:6] = places
     return CameraFit(
         name=name,
         model=best.model.name,
@@ -163,8 +154,8 @@ def _describe_fit(points: ControlPoints, name: str, best: Solution, candidates: 
         held_out_px=_spread_over_points(is_seen, best.held_out_px),
         m_per_px=_spread_over_points(is_seen, best.pinhole.depth(best.world) / best.pinhole.focal_px),
         held_out_rms_px={solution.model.name: _rms(solution.held_out_px) for solution in candidates},
-        sd=dict(zip(parameter_names(best.model), np.sqrt(np.diag(covariance)).tolist(), strict=True)),
-        covariance=_covariance_in_camera(best.pinhole, covariance),
+        sd=dict(zip(parameter_names(best.model), sd.tolist(), strict=True)),
+        covariance=_covariance_in_camera(best.pinhole, wider**2 * covariance),
         dlt_rms_px=_rms(best.px - px_from_points(P_dlt[None], best.world)[:, 0]),
         dlt=dlt_coefficients(P_dlt),
     )

@@ -43,6 +43,11 @@ class RigCalibration:
         """The cameras."""
         return self.adjustment.rig
 
+    def held_out_px_of(self, camera: str) -> Array:
+        """Return the distances of a camera's held-out observations from their predictions, of all sources [px]."""
+        i = self.rig.names.index(camera)
+        return np.concatenate([self.held_out_px[s.name][s.camera == i] for s in self.adjustment.sources])
+
 
 def calibrate_from(sources: Sources, progress: StageProgress) -> RigCalibration:
     """Read all sources and adjust the cameras to all of them at once; raises an AirborneError in one line.
@@ -56,16 +61,17 @@ def calibrate_from(sources: Sources, progress: StageProgress) -> RigCalibration:
     adjustment, lag_sd_s = without_lags, _lag_sd_s(inputs)
     if lag_sd_s is not None:
         with_lags = _adjust(inputs, without_lags.rig, free, lag_sd_s=lag_sd_s, progress=progress)
-        row = [source.name for source in with_lags.sources].index("board")
-        is_better = with_lags.noise_px[row] < _LOOSE_SYNC_NOISE_SHARE * without_lags.noise_px[row]
         is_requested = sources.board is not None and sources.board.sync == "loose"
-        adjustment, lag_sd_s = (with_lags, lag_sd_s) if is_better or is_requested else (without_lags, None)
+        is_better = is_requested or _is_looser_better(without_lags, with_lags, progress)
+        adjustment, lag_sd_s = (with_lags, lag_sd_s) if is_better else (without_lags, None)
     elif inputs.wand is not None or (inputs.detections is not None and without_lags.prior is None):
         adjustment = _adjust(
             inputs, without_lags.rig, free, lag_sd_s=None, progress=progress
         )  # triangulated anew by better cameras
     frame = choose_world_frame(inputs, adjustment, [m.camera.name for m in mended])
     final = adjustment if frame.is_unchanged else _adjust_in_world(adjustment, frame, progress)
+    if frame.is_unchanged and sources.kinds == ["control_points"]:
+        final = _with_lens_model_error(inputs, final)
     held_out_px = cross_validate(final, lambda done, n: progress("leaving out and predicting", done, n))
     lags = _lags(final) if lag_sd_s is not None else {}
     return RigCalibration(
@@ -140,6 +146,20 @@ def _lag_sd_s(inputs: Inputs) -> float | None:
     return _LAG_SD * gap_s if is_dense else None
 
 
+def _is_looser_better(without_lags: Adjustment, with_lags: Adjustment, progress: StageProgress) -> bool:
+    """Say whether lags come to rest, clearly lower the board's noise, and predict left-out moments as well."""
+    row = [source.name for source in with_lags.sources].index("board")
+    noise_share = with_lags.noise_px[row] / without_lags.noise_px[row]
+    if not with_lags.has_converged or noise_share >= _LOOSE_SYNC_NOISE_SHARE:
+        return False
+    held_out = [
+        cross_validate(adjustment, lambda done, n: progress("comparing the clocks", done, n))["board"]
+        for adjustment in (without_lags, with_lags)
+    ]
+    exact, loose = (float(np.sqrt(np.nanmean(distances**2))) for distances in held_out)
+    return not loose > exact
+
+
 def _adjust_in_world(adjustment: Adjustment, frame: WorldFrame, progress: StageProgress) -> Adjustment:
     """Transform everything to the requested world frame, and estimate the standard deviations there."""
     rig, sources = adjustment.transform(frame.new_from_old, frame.scale)
@@ -153,6 +173,16 @@ def _adjust_in_world(adjustment: Adjustment, frame: WorldFrame, progress: StageP
     if frame.fixed_camera is not None:
         free[frame.fixed_camera] = replace(free[frame.fixed_camera], extrinsics=False)
     return adjust(rig, sources, free, progress=lambda step, _: progress("adjusting", step, None))
+
+
+def _with_lens_model_error(inputs: Inputs, adjustment: Adjustment) -> Adjustment:
+    """Widen the standard deviations of places to those that hold the error of the lens model."""
+    camera_sd = adjustment.camera_sd.copy()
+    for row, name in zip(camera_sd, adjustment.rig.names, strict=True):
+        fit = inputs.lenses.get(name)
+        if fit is not None and fit.place_sd_m is not None:
+            row[3:6] = np.maximum(row[3:6], fit.place_sd_m)
+    return replace(adjustment, camera_sd=camera_sd)
 
 
 def _lags(adjustment: Adjustment) -> dict[str, Array]:

@@ -36,9 +36,7 @@ def calibration_to_dict(calibration: RigCalibration) -> dict[str, Any]:
             "sd": sd,
             "n_observations": int(sum(np.isfinite(r[s.camera == i, 0]).sum() for r, s in _pairs(calibration))),
             "rms_px": _number(adjusted.rms_px(camera=i)),
-            "held_out_rms_px": _number(
-                _rms(np.concatenate([calibration.held_out_px[s.name][s.camera == i] for s in adjusted.sources]))
-            ),
+            "held_out_rms_px": _number(_rms(calibration.held_out_px_of(camera.name))),
             "lens_model": None if fit is None else fit.model,
             "lens_held_out_rms_px": {} if fit is None else fit.held_out_rms_px,
             **_change_from_start(calibration, camera),

@@ -20,7 +20,7 @@ Lens = Literal["brown", "fisheye"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Camera:
-    """A pinhole camera with Brown or fisheye distortion: x right, y down, z forward; pixel centres at whole numbers.
+    """A pinhole camera with distortion: x right, y down, z forward; pixel centres at whole numbers.
 
     World points are in metres. `camera_from_world` is the rigid map from world to camera axes.
     """
@@ -29,7 +29,9 @@ class Camera:
     K: Array  # (3, 3) [px]
     size: tuple[int, int]  # (width, height) [px]
     camera_from_world: RigidTransform
-    distortion: Array = field(default_factory=lambda: np.zeros(5))  # k1, k2, p1, p2, k3; of a fisheye k1, k2, k3, k4
+    distortion: Array = field(
+        default_factory=lambda: np.zeros(5)
+    )  # k1, k2, p1, p2, k3 (, k4, k5, k6); of a fisheye k1 to k4
     lens: Lens = "brown"
     shift_sd_px: float = 0.0  # how far the calibration may displace an image as a whole, right or down [px]
 
@@ -42,6 +44,11 @@ class Camera:
     def is_distorted(self) -> bool:
         """Whether the lens is anything but a pinhole."""
         return self.lens == "fisheye" or bool(np.any(self.distortion))
+
+    @property
+    def is_rational(self) -> bool:
+        """Whether the lens has the eight terms of the rational model."""
+        return len(self.distortion) == 8
 
     @property
     def P(self) -> Array:

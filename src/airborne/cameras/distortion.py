@@ -1,4 +1,7 @@
-"""Lens distortion on normalised image coordinates: Brown (OpenCV's k1, k2, p1, p2, k3) and fisheye (its k1 to k4)."""
+"""Lens distortion on normalised image coordinates: Brown and fisheye.
+
+Brown is OpenCV's k1, k2, p1, p2, k3, and of the rational model k4, k5, k6 behind them; fisheye is its k1 to k4.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +15,10 @@ _TOLERANCE = 1e-9  # a point still this far off lies where the lens model has no
 
 def distort(xy: Array, coefficients: Array) -> Array:
     """Distort normalised points (..., 2): (..., 2)."""
-    k1, k2, p1, p2, k3 = (*coefficients, 0.0, 0.0, 0.0, 0.0)[:5]
     x, y = xy[..., 0], xy[..., 1]
     r2 = x * x + y * y
-    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    radial, _ = radial_factor(r2, coefficients)
+    p1, p2 = (*coefficients, 0.0, 0.0, 0.0)[2:4]
     return np.stack(
         [
             x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
@@ -23,6 +26,19 @@ def distort(xy: Array, coefficients: Array) -> Array:
         ],
         axis=-1,
     )
+
+
+def radial_factor(r2: Array, coefficients: Array) -> tuple[Array, Array]:
+    """Return the radial factor at squared radii r2, and twice its derivative by r2; coefficients are one to eight."""
+    k1, k2, _, _, k3, *more = (*coefficients, 0.0, 0.0, 0.0, 0.0)[: max(len(coefficients), 5)]
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    derivative = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))
+    if not len(more):
+        return radial, derivative
+    k4, k5, k6 = more
+    below = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
+    derivative = (derivative - radial / below * 2 * (k4 + r2 * (2 * k5 + r2 * 3 * k6))) / below
+    return radial / below, derivative
 
 
 def undistort(xy: Array, coefficients: Array) -> Array:
@@ -44,11 +60,10 @@ def undistort(xy: Array, coefficients: Array) -> Array:
 
 def _inverse_jacobian(xy: Array, coefficients: Array) -> Array:
     """Return the inverse of the derivative of `distort` at xy (..., 2): (..., 2, 2)."""
-    k1, k2, p1, p2, k3 = (*coefficients, 0.0, 0.0, 0.0, 0.0)[:5]
     x, y = xy[..., 0], xy[..., 1]
     r2 = x * x + y * y
-    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    radial_derivative = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))  # d radial / d r2, twice: times x or y below
+    radial, radial_derivative = radial_factor(r2, coefficients)
+    p1, p2 = (*coefficients, 0.0, 0.0, 0.0)[2:4]
     xx = radial + x * x * radial_derivative + 2 * p1 * y + 6 * p2 * x
     yy = radial + y * y * radial_derivative + 6 * p1 * y + 2 * p2 * x
     xy_ = x * y * radial_derivative + 2 * p1 * x + 2 * p2 * y  # the derivative is symmetric

@@ -14,7 +14,7 @@ from airborne.cameras.formats.aniposelib import aniposelib_text
 from airborne.cameras.formats.caliscope import caliscope_losses, caliscope_text, rig_from_caliscope
 from airborne.cameras.formats.dlt import dlt_losses, dlt_text, is_dlt, rig_from_dlt
 from airborne.cameras.formats.opencv import easymocap_texts, halves_in, opencv_text, parse_opencv, rig_from_opencv
-from airborne.cameras.formats.options import FileOptions, PixelConvention, Size, Unit
+from airborne.cameras.formats.options import FileOptions, PixelConvention, Unit
 from airborne.cameras.formats.pose2sim import pose2sim_text, rig_from_tables
 from airborne.cameras.formats.qualisys import qualisys_text, rig_from_qualisys
 from airborne.cameras.formats.vicon import rig_from_vicon, vicon_losses, vicon_text
@@ -22,6 +22,7 @@ from airborne.cameras.formats.xml import parse_xml
 from airborne.cameras.units import FARTHEST_M, check_baselines, longest_baseline_m
 from airborne.errors import CalibrationError
 from airborne.io.text import parse_toml
+from airborne.types import Size
 
 _LARGEST_FILE_BYTES = 2_000_000  # a hundred cameras take a tenth of it
 

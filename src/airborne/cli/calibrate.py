@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from airborne.cli.console import Json, sizes_px
+from airborne.cli.console import Json, errors, sizes_px
 from airborne.errors import AirborneError
 from airborne.io.terminal import Stages
 
@@ -78,19 +78,27 @@ def calibrate_command(
 def _from_control_points(
     points: Path, size: str | None, output: Path, *, method: Literal["lm", "annealing"], as_json: bool
 ) -> None:
+    import numpy as np
+
     from airborne.calibration import calibrate as calibrate_cameras
     from airborne.calibration import read_control_points
+    from airborne.calibration.acceptance import write_accepted
     from airborne.calibration.points_report import describe_points_calibration, points_calibration_to_dict
-    from airborne.cameras import write_pose2sim
 
     if size is None:
         raise AirborneError("--size is missing: give the image size in pixels, such as 768x576")
     table = read_control_points(points)
     calibration = calibrate_cameras(table, _sizes(size, table.cameras), method=method)
-    write_pose2sim(output, calibration.rig, errors_px={fit.name: fit.rms_px for fit in calibration.fits})
+    written, reasons = write_accepted(
+        output,
+        calibration.rig,
+        errors_px={fit.name: fit.rms_px for fit in calibration.fits},
+        held_out_px={fit.name: np.linalg.norm(fit.held_out_px, axis=1) for fit in calibration.fits},
+    )
     print(json.dumps(points_calibration_to_dict(calibration)) if as_json else describe_points_calibration(calibration))
     if not as_json:
-        print(f"written: {output}")
+        print(f"written: {written}")
+    _reject(written, reasons)
 
 
 def _read_sources(path: Path) -> Any:
@@ -151,23 +159,36 @@ def _metres(text: str) -> float:
 
 def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> None:
     from airborne.calibration import calibrate_from
+    from airborne.calibration.acceptance import write_accepted
     from airborne.calibration.report import calibration_to_dict, describe_calibration
     from airborne.calibration.residual_figures import write_residual_figures
-    from airborne.cameras import write_pose2sim
 
     with Stages() as stages:
         calibration = calibrate_from(sources, stages)
     report = calibration_to_dict(calibration)
-    write_pose2sim(
+    written, reasons = write_accepted(
         output,
         calibration.rig,
         errors_px={name: report["cameras"][name]["rms_px"] or 0.0 for name in calibration.rig.names},
+        held_out_px={name: calibration.held_out_px_of(name) for name in calibration.rig.names},
     )
     pictures = write_residual_figures(folder, calibration)
     (folder / "report.json").write_text(json.dumps(report, indent=1), encoding="utf-8")
     print(json.dumps(report) if as_json else describe_calibration(calibration))
     if not as_json:
-        print(f"written: {output}\nreport: {folder / 'report.json'} and {len(pictures)} pictures beside it")
+        print(f"written: {written}\nreport: {folder / 'report.json'} and {len(pictures)} pictures beside it")
+    _reject(written, reasons)
+
+
+def _reject(written: Path, reasons: tuple[str, ...]) -> None:
+    """Say why a calibration was rejected, and end with exit code 1; nothing where it was accepted."""
+    for reason in reasons:
+        errors.print(f"airborne: {reason}", style="red", markup=False)
+    if reasons:
+        errors.print(
+            f"airborne: this is no calibration to measure with; to look at it: {written}", style="red", markup=False
+        )
+        raise typer.Exit(1)
 
 
 def _sizes(text: str, names: tuple[str, ...]) -> dict[str, tuple[int, int]]:

@@ -7,7 +7,13 @@ Independent of images and searches.
 
 from airborne.evaluation.agreement import Agreement, Series, analyse_agreement
 from airborne.evaluation.basin import Basin, is_recovered, perturb
-from airborne.evaluation.compare import Comparison, OrientationErrors, PositionErrors, SdCalibration, compare_motion
+from airborne.evaluation.compare import (
+    MotionComparison,
+    OrientationErrors,
+    PositionErrors,
+    SdCalibration,
+    compare_motion,
+)
 from airborne.evaluation.digitised import (
     DigitisedComparison,
     DigitisedPoints,
@@ -29,13 +35,13 @@ from airborne.evaluation.truth import Truth, read_truth
 __all__ = [
     "Agreement",
     "Basin",
-    "Comparison",
     "DigitisedComparison",
     "DigitisedPoints",
     "DigitisedPoses",
     "JointComparison",
     "JointErrors",
     "JointPaths",
+    "MotionComparison",
     "OrientationErrors",
     "PlayerErrors",
     "PlayersComparison",

@@ -56,7 +56,7 @@ class SdCalibration:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Comparison:
+class MotionComparison:
     """A motion against the truth, over the frames whose times match."""
 
     n_frames: int  # of the motion
@@ -118,7 +118,7 @@ class Comparison:
         return "\n".join(lines)
 
 
-def compare_motion(motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> Comparison:
+def compare_motion(motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> MotionComparison:
     """Compare a motion with the truth, or another reference, frame by frame.
 
     Each frame goes with the nearest time of the truth, less than a tenth of the shorter period of the two away.
@@ -142,7 +142,7 @@ def compare_motion(motion: Motion, truth: Truth, symmetries: Sequence[Array]) ->
     best = int(np.argmin(np.mean(angle**2, axis=0)))
     position_error = motion.position[frames] - truth.position[rows]
     rotation_error = Rotation.from_matrix(nearest_R @ np.swapaxes(true_R, -1, -2)).as_rotvec()
-    return Comparison(
+    return MotionComparison(
         n_frames=len(motion),
         n_truth=len(truth.time_s),
         n_matched=len(status),

@@ -13,7 +13,7 @@ from scipy.spatial.transform import RigidTransform
 from airborne.body import BodyModel, Box, Pose
 from airborne.cameras import Rig
 from airborne.errors import ResultError
-from airborne.evaluation.compare import Comparison, compare_motion
+from airborne.evaluation.compare import MotionComparison, compare_motion
 from airborne.evaluation.table import read_table
 from airborne.evaluation.truth import Truth
 from airborne.motion import Motion
@@ -46,7 +46,7 @@ class DigitisedPoses:
 class DigitisedComparison:
     """Tracked minus digitised, and how well the digitised points fit a rigid body."""
 
-    tracked_minus_digitised: Comparison
+    tracked_minus_digitised: MotionComparison
     rigid_fit_residual_rms_mm: float
     n_poses: int  # digitised
 

@@ -20,8 +20,7 @@ from airborne.motion.players import PlayersMotion, read_players
 from airborne.tracking import Status
 from airborne.types import Array
 
-# tolerances of success; upper end of the tolerances in the area under the curve
-_STRICT_M, _STRICTER_M, _AUC_TO_M = 0.10, 0.05, 0.20
+_STRICT_M, _STRICTER_M, _AUC_TO_M = 0.10, 0.05, 0.20  # tolerances of success; the largest of the curve's
 _GROUPS = {"hips": "hip", "knees": "knee", "ankles": "ankle", "feet": "foot"}
 _SEGMENTS = {"thigh": ("hip", "knee"), "shank": ("knee", "ankle")}
 _SIDES = ("left", "right")

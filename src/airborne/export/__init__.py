@@ -5,7 +5,8 @@ summary.json and a self-contained report.
 Knows no search and decides nothing.
 """
 
-from airborne.export.figures import write_digitised, write_errors, write_figures, write_pose, write_score
+from airborne.export.error_figures import write_digitised, write_errors
+from airborne.export.figures import write_figures, write_pose, write_score
 from airborne.export.matching import MatchingPicture
 from airborne.export.models import write_model
 from airborne.export.overlays import OverlayVideos

@@ -25,7 +25,7 @@ _LARGEST_WORD = 0xFFFF  # of the frame counts in the header
 _LARGEST_INTEGER = 32000  # of a coordinate, should the file be converted to integers
 _LABELS_A_PARAMETER = 255  # a dimension is one byte
 _MOST_BLOCKS = 255  # their count is one byte
-Value = str | list[str] | float | list[int]
+ParameterValue = str | list[str] | float | list[int]
 
 
 def write_c3d(path: Path, takes: Sequence[Take]) -> None:
@@ -88,7 +88,7 @@ def _parameters(takes: Sequence[Take], labels: list[str], scale_mm: float, *, da
     """Lay out the parameter section in whole blocks."""
     take, rate = takes[0], float(takes[0].rate)
     start, end = (list(struct.unpack("<HH", struct.pack("<I", frame))) for frame in _frame_range(take))
-    groups: dict[str, tuple[str, dict[str, Value]]] = {
+    groups: dict[str, tuple[str, dict[str, ParameterValue]]] = {
         "POINT": (
             "residual: standard deviation of the point",
             {
@@ -129,7 +129,7 @@ def _parameters(takes: Sequence[Take], labels: list[str], scale_mm: float, *, da
     return (bytes([1, _KEY, min(n_blocks, 255), _INTEL]) + records).ljust(n_blocks * _BLOCK, b"\0")
 
 
-def _split(name: str, texts: list[str]) -> dict[str, Value]:
+def _split(name: str, texts: list[str]) -> dict[str, ParameterValue]:
     """Spread a long list over NAME, NAME2, NAME3 and so on."""
     parts = [texts[k : k + _LABELS_A_PARAMETER] for k in range(0, len(texts), _LABELS_A_PARAMETER)]
     return {name if k == 0 else f"{name}{k + 1}": part for k, part in enumerate(parts)}
@@ -140,7 +140,7 @@ def _record(name: str, number: int, content: bytes) -> bytes:
     return struct.pack("<bb", len(name), number) + name.encode() + struct.pack("<H", 2 + len(content)) + content
 
 
-def _value(value: Value) -> bytes:
+def _value(value: ParameterValue) -> bytes:
     """Return type, dimensions and data: texts of one width, a float, or 16-bit integers."""
     if isinstance(value, float | int):
         return struct.pack("<bBf", 4, 0, value)

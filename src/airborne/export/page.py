@@ -18,7 +18,7 @@ UNKNOWN_TEXT = "not known"
 _UNITS = {"_m": "m", "_mm": "mm", "_s": "s", "_hz": "1/s", "_px": "px", "_deg": "°", "_rev": "turns"}
 
 
-class Table(NamedTuple):
+class HtmlTable(NamedTuple):
     """A table of a page: values that `format_value` formats, the first of each row names it."""
 
     rows: Sequence[Sequence[Any]]
@@ -64,16 +64,16 @@ def format_value(value: Any) -> str:
     return str(value)
 
 
-def _records_table(records: Sequence[Mapping[str, Any]]) -> Table:
+def _records_table(records: Sequence[Mapping[str, Any]]) -> HtmlTable:
     """Return dictionaries as the rows of a table."""
     keys = list(dict.fromkeys(key for record in records for key in record))
-    return Table([[record.get(key, "") for key in keys] for record in records], [label(key) for key in keys])
+    return HtmlTable([[record.get(key, "") for key in keys] for record in records], [label(key) for key in keys])
 
 
-def settings_table(values: Mapping[str, Any]) -> Table:
+def settings_table(values: Mapping[str, Any]) -> HtmlTable:
     """Return the settings of a method; those that are not set are left out."""
     unread = UNREAD_SETTINGS.get(values.get("method", ""), frozenset())
-    return Table([(label(key), value) for key, value in values.items() if value is not None and key not in unread])
+    return HtmlTable([(label(key), value) for key, value in values.items() if value is not None and key not in unread])
 
 
 def _base64(path: Path) -> str:

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from airborne.export.palette import ESTIMATE_RGB, STATUS_RGB, TEXT_RGB, hex_colour
-from airborne.motion import Motion
+from airborne.motion import Motion, root_angles
 from airborne.tracking import Status
 from airborne.types import Array, Mask
 
@@ -136,3 +136,18 @@ def _intervals(time_s: Array, mask: Mask) -> Iterator[tuple[float, float]]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
     for first, stop in edges.reshape(-1, 2):
         yield float(time_s[first]) - half_s, float(time_s[stop - 1]) + half_s
+
+
+def singular_frames(motion: Motion) -> Mask:
+    """Say in which frames the root's angles are singular: (n,)."""
+    return root_angles(motion)["is_singular"].to_numpy() & motion.has_pose
+
+
+def unobservable_frames(motion: Motion) -> tuple[Mask, Mask]:
+    """Say in which frames some direction of the position, and of the rotation, is unobservable: (n,) each."""
+    return is_unobservable(motion.position_sd), is_unobservable(motion.rotation_sd)
+
+
+def is_unobservable(sd: Array) -> Mask:
+    """Say of which rows of standard deviations (n, k) one is infinite: (n,)."""
+    return np.asarray(np.isinf(sd).any(axis=1))

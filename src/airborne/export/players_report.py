@@ -18,7 +18,7 @@ from airborne.motion import PlayersMotion
 from airborne.motion.run_folder import REPORT, figures_of
 from airborne.tracking import Status
 
-FIGURE = "heights.png"
+HEIGHTS_FIGURE = "heights.png"
 _JOINT_COLOURS = {"hip": "#0072b2", "knee": "#cc79a7", "ankle": "#009e73"}
 _UNCERTAIN_STYLE = {"facecolor": hex_colour(STATUS_RGB[Status.UNCERTAIN]), "edgecolor": "none", "alpha": 0.25}
 
@@ -57,7 +57,7 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
 
     `summary` is the content of summary.json.
     """
-    heights_figure(motion).savefig(figures_of(folder) / FIGURE)
+    heights_figure(motion).savefig(figures_of(folder) / HEIGHTS_FIGURE)
     path = folder / REPORT
     summary = json_ready(summary)
     uncertainty = f"{_DEFINITIONS['Uncertainty']} {summary['uncertainty']}"
@@ -73,7 +73,7 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
             (_interval_cm(row, "hips"), f"{row['player']}, jump {row['jump']}: hips") for row in summary["jumps"]
         ],
         jumps_caption=_JUMPS_CAPTION,
-        heights=figures_of(folder) / FIGURE,
+        heights=figures_of(folder) / HEIGHTS_FIGURE,
         heights_caption=_FIGURE_CAPTION,
     )
     path.write_text(html, encoding="utf-8")

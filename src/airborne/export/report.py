@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from airborne.errors import ResultError
-from airborne.export.page import UNKNOWN_TEXT, Table, render_report
+from airborne.export.page import UNKNOWN_TEXT, HtmlTable, render_report
 from airborne.export.summary import body_warnings, headline, json_ready
 from airborne.motion import Motion
 from airborne.motion.flight.momentum_table import GRAVITY_M_S2
@@ -18,7 +18,7 @@ class _Comparison(NamedTuple):
     """A table of errors with notes below it."""
 
     title: str
-    table: Table
+    table: HtmlTable
     notes: list[str]
 
 
@@ -104,7 +104,7 @@ def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
     - `events`: sentences on what happened to the recording
     - `method`, `timings_s` [s], `versions`, `inputs` (SHA-256 by file name): dictionaries of names and values
     - `cameras`: one dictionary for each camera, with `name` first
-    - `truth`: `Comparison.to_dict()`; `digitised`: `DigitisedComparison.to_dict()`; `joints`:
+    - `truth`: `MotionComparison.to_dict()`; `digitised`: `DigitisedComparison.to_dict()`; `joints`:
       `JointComparison.to_dict()`
     - `self_check`: what the pictures say against the files, see `Finding.to_dict`
     - `flight`: `FlightSummary.to_dict()`
@@ -196,7 +196,7 @@ def _pose_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
                 f"Of the {what} errors, {share['within_1sd']:.0%} lie within one standard deviation (normal: 68%) "
                 f"and {share['within_2sd']:.0%} within two (95%)."
             )
-    table = Table([(name, f"{rms:.2f}", f"{most:.2f}") for name, rms, most in rows], ("", "RMS", "largest"))
+    table = HtmlTable([(name, f"{rms:.2f}", f"{most:.2f}") for name, rms, most in rows], ("", "RMS", "largest"))
     return _Comparison(title, table, lines)
 
 
@@ -205,7 +205,7 @@ def _joint_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
     if comparison["tracked"]:
         rows["all, tracked frames"] = comparison["tracked"]
     keys = ("mean_mm", "rms_mm", "largest_mm", "mean_without_offset_mm")
-    table = Table(
+    table = HtmlTable(
         [(name, *(each[key] for key in keys)) for name, each in rows.items()],
         ("", "mean [mm]", "RMS [mm]", "largest [mm]", "mean without offset [mm]"),
     )
@@ -216,13 +216,13 @@ def _joint_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
     return _Comparison(title, table, lines)
 
 
-def _self_check_table(findings: Sequence[Mapping[str, Any]]) -> Table | None:
+def _self_check_table(findings: Sequence[Mapping[str, Any]]) -> HtmlTable | None:
     """Return the sentences of the self-check; those that are alarms in words too."""
     rows = [(each["sentence"], "wrong" if each["is_alarm"] else "as usual") for each in findings]
-    return Table(rows) if rows else None
+    return HtmlTable(rows) if rows else None
 
 
-def _flight_table(flight: Mapping[str, Any]) -> Table:
+def _flight_table(flight: Mapping[str, Any]) -> HtmlTable:
     mean, sd = flight["angular_momentum_kg_m2_s"], flight["angular_momentum_spread_kg_m2_s"]
     rows = [
         (f"angular momentum about {axis} [kg m²/s]: mean, standard deviation over the frames", mean[k], sd[k])
@@ -236,4 +236,4 @@ def _flight_table(flight: Mapping[str, Any]) -> Table:
         )
     )
     rows.append(("distance of the centre of mass from a free fall [mm], RMS", flight["ballistic_rms_mm"], ""))
-    return Table(rows)
+    return HtmlTable(rows)

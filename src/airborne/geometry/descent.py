@@ -118,22 +118,22 @@ class Iterate(Protocol):
         ...
 
 
-T = TypeVar("T", bound=Iterate)
+IterateT = TypeVar("IterateT", bound=Iterate)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Descent(Generic[T]):
+class Descent(Generic[IterateT]):
     """Where a descent ended, and why."""
 
-    best: T
+    best: IterateT
     outcome: Outcome
     n_steps: int  # tried
     n_losses: int  # since the best was reached
 
 
 def descend(
-    first: T,
-    evaluate: Callable[[Any], T],
+    first: IterateT,
+    evaluate: Callable[[Any], IterateT],
     rule: Rule,
     *,
     most_steps: int,
@@ -141,7 +141,7 @@ def descend(
     least_gain: float = 0.0,
     slack: float = 0.0,
     progress: Callable[[int, float], None] | None = None,
-) -> Descent[T]:
+) -> Descent[IterateT]:
     """Step downhill from the first iterate until the predicted decrease, or the last gain, is next to nothing.
 
     least_predicted: decrease of the cost, absolute and as a share of it. least_gain, a share of the cost, ends the

@@ -33,12 +33,11 @@ from airborne.run.track import track_trial
 from airborne.synthetic import block_scene, write_block, write_somersault, write_thrown_cross
 from airborne.trial.file import Trial
 from airborne.trial.file import read_trial as read_trial_file
-from airborne.types import Progress, StageProgress
+from airborne.types import Progress, Size, StageProgress
 
 __all__ = ["calibrate", "evaluate", "export_run", "fit_body", "read_run", "read_trial", "smooth", "synthesise", "track"]
 
 FilePath = str | PathLike[str]
-Size = tuple[int, int]  # (width, height) [px]
 
 
 def read_trial(path: FilePath, *, cameras: Sequence[str] | None = None, **track: Any) -> Trial:

@@ -69,7 +69,7 @@ class BodyRun:
         """Read the body and find its first pose, whose notes become events of the recording."""
         model = trial.model()
         first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
-        opened.recording.events.extend(first.notes)
+        opened.recording.events.extend([*model.notes, *first.notes])
         return cls(trial, opened.recording, opened.calibration, model, first.pose)
 
     def read_done(self, folder: Path) -> list[Estimate]:

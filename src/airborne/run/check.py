@@ -10,12 +10,13 @@ from typing import TypeVar
 from airborne.errors import AirborneError, MistakesError
 from airborne.run.detections import read_trial_detections
 from airborne.run.first_pose import find_first_pose
+from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files
 from airborne.run.opening import Opened, calibrated_cameras, open_trial, past_the_end_error, video_source
 from airborne.run.players_tracker import players_tracker_of
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
 from airborne.video import Recording, VideoFacts, inspect
 
-Value = TypeVar("Value")
+_T = TypeVar("_T")
 
 
 class Checks:
@@ -26,7 +27,7 @@ class Checks:
         self.well: list[str] = []
         self.mistakes: list[str] = []
 
-    def attempt(self, read: Callable[[], Value], describe: Callable[[Value], str]) -> Value | None:
+    def attempt(self, read: Callable[[], _T], describe: Callable[[_T], str]) -> _T | None:
         """Read something and describe it; None where it has a mistake."""
         try:
             value = read()
@@ -48,6 +49,7 @@ def check_trial(path: Path) -> Checks:
         return checks
     checks.mistakes += [f"{path.name}: {mistake}" for mistake in list_wrong_names(trial)]
     facts = _check_videos(checks, trial)
+    checks.attempt(lambda: refuse_same_files(trial), lambda _: "videos: no file twice")
     _check_files(checks, trial, facts)
     if not checks.mistakes:
         _check_start(checks, trial, tuple(facts.values()))
@@ -77,7 +79,9 @@ def _check_files(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> 
             lambda: calibrated_cameras(shown, sizes), lambda cameras: f"calibration: {', '.join(cameras[0].names)}"
         )
     if not trial.has_players and _exists(trial, body.source_file):
-        checks.attempt(trial.model, lambda model: f"body: {model.name}, {len(model.segments)} segments")
+        checks.attempt(
+            trial.model, lambda model: "; ".join([f"body: {model.name}, {len(model.segments)} segments", *model.notes])
+        )
     if detections is not None and facts and _exists(trial, detections):
         checks.attempt(
             lambda: read_trial_detections(shown, tuple(facts.values())), lambda _: f"detections: {detections}"
@@ -100,10 +104,16 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
             lambda _: f"start: frame {trial.start.frame}, {', '.join(player.name for player in trial.players)}",
         )
     else:
-        checks.attempt(
-            lambda: find_first_pose(trial, trial.model(), recording.rig, opened.detections),
+        model = trial.model()
+        first = checks.attempt(
+            lambda: find_first_pose(trial, model, recording.rig, opened.detections),
             lambda first: "; ".join([f"start: frame {trial.start.frame}", *first.notes]),
         )
+        if first is not None:
+            checks.attempt(
+                lambda: refuse_mix_ups(recording, model, first.pose),
+                lambda _: "videos: none fits another camera better",
+            )
     checks.well += [f"note: {event}" for event in recording.events]
 
 

@@ -18,9 +18,9 @@ from airborne.cameras import Rig, read_rig
 from airborne.errors import ResultError
 from airborne.evaluation import (
     Agreement,
-    Comparison,
     DigitisedComparison,
     JointComparison,
+    MotionComparison,
     PlayersComparison,
     Repeatability,
     Series,
@@ -58,7 +58,7 @@ from airborne.motion import Motion, run_folder
 from airborne.motion.run_folder import check_record, holds_players, read_body_run, read_players_run
 from airborne.run.provenance import versions
 
-Comparisons = Mapping[str, Comparison | DigitisedComparison | JointComparison | PlayersComparison]
+Comparisons = Mapping[str, MotionComparison | DigitisedComparison | JointComparison | PlayersComparison]
 
 
 def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Path | None = None) -> Comparisons:
@@ -75,7 +75,7 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
         )
     motion, model = read_body_run(folder)
     symmetry = symmetries(model)
-    comparisons: dict[str, Comparison | DigitisedComparison | JointComparison] = {}
+    comparisons: dict[str, MotionComparison | DigitisedComparison | JointComparison] = {}
     true_poses = clicked = None
     if truth is not None:
         true_poses = read_truth(truth)

@@ -90,15 +90,16 @@ def input_hashes(trial: Trial, *, live: bool = False) -> dict[str, str]:
     names = [*(camera.video for camera in trial.camera if not live), *trial.input_files]
     rest = [trial.start, trial.lights, trial.calibration, trial.body, *trial.camera]
     start = json.dumps([table and table.model_dump() for table in rest])
-    hashes = {name: _sha256(trial.path(name)) for name in names}
+    hashes = {name: file_digest(trial.path(name)) for name in names}
     return {**hashes, "start and lights": hashlib.sha256(start.encode()).hexdigest()}
 
 
-def _sha256(path: Path) -> str:
+def file_digest(path: Path) -> str:
+    """Return the SHA-256 of a file, of a large one of both ends and the size; of a folder that of its JSON files."""
     digest = hashlib.sha256()
     if path.is_dir():
         for file in sorted(path.rglob("*.json")):
-            digest.update(f"{file.relative_to(path).as_posix()} {_sha256(file)}\n".encode())
+            digest.update(f"{file.relative_to(path).as_posix()} {file_digest(file)}\n".encode())
         return digest.hexdigest()
     size = path.stat().st_size
     with path.open("rb") as file:

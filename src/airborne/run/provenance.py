@@ -17,7 +17,7 @@ _EXACT_CALIBRATION = (
 )
 
 
-def provenance(
+def provenance_of(
     trial: Trial, recording: Recording | LiveRecording, calibration: Calibration | None, inputs: dict[str, str]
 ) -> dict[str, Any]:
     """Return the end of every summary: warnings, events, method, cameras, versions, inputs."""

@@ -44,7 +44,7 @@ Events = dict[str, tuple[Event, ...]]  # by player; of one body under ""
 
 MOTION, JOINTS = "tables/smooth_motion.csv", "tables/smooth_joints.csv"
 ANGLES, EVENTS = "tables/smooth_joint_angles.csv", "tables/smooth_events.csv"
-FIGURE = "figures/residuals.png"
+RESIDUALS_FIGURE = "figures/residuals.png"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,8 +127,8 @@ def smooth_run(
     tables, files = run.write(out, smoothing, events, progress)
     if analysis is not None:
         figures_of(out)
-        write_residuals(out / FIGURE, analysis, smoothing.cutoff_hz)
-        files = (*files, FIGURE)
+        write_residuals(out / RESIDUALS_FIGURE, analysis, smoothing.cutoff_hz)
+        files = (*files, RESIDUALS_FIGURE)
     result = SmoothRun(smoothing, events, analysis, tables, (*files, SMOOTH_RECORD))
     write_json(out / SMOOTH_RECORD, result.to_dict())
     return result

@@ -20,10 +20,11 @@ from airborne.motion import Motion, PlayersMotion
 from airborne.motion.run_folder import CALIBRATION, SUMMARY
 from airborne.run.body import BodyRun
 from airborne.run.folder import list_tables, prepare_folder, run_identity
+from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files
 from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
 from airborne.run.players import PlayersRun
 from airborne.run.players_tracker import compile_kernels
-from airborne.run.provenance import provenance
+from airborne.run.provenance import provenance_of
 from airborne.run.self_check import alarms
 from airborne.run.subject import AnyMotion, Subject
 from airborne.tracking.tracker import Found, track_frames
@@ -69,6 +70,8 @@ def track_trial(
         raise ResultError("a run is either resumed or overwritten; give one of --resume and --overwrite")
     if first_frame:
         trial = trial.model_copy(update={"track": trial.track.model_copy(update={"stop": trial.start.frame + 1})})
+    if not live:
+        refuse_same_files(trial)
     started_s = time.monotonic()
     drawn = None if not pictures else "stills" if first_frame else "videos"
     options = _Options(folder, started_s, resume, overwrite, live, drawn, progress)
@@ -76,7 +79,9 @@ def track_trial(
         if trial.has_players:
             opened = _open_live(trial, stack, progress) if live else open_trial(trial)
             return _run(PlayersRun.open(trial, opened), options, stack)
-        return _run(BodyRun.open(trial, open_trial(trial)), options, stack)
+        body = BodyRun.open(trial, open_trial(trial))
+        refuse_mix_ups(body.recording, body.model, body.start)
+        return _run(body, options, stack)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +107,7 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     connection.close()
     tracked_s = time.monotonic()
     motion, summary = subject.finish(folder)
-    summary |= provenance(subject.trial, recording, subject.calibration, identity["inputs"])
+    summary |= provenance_of(subject.trial, recording, subject.calibration, identity["inputs"])
     summary["warnings"] += [*subject.warnings(), *alarms(summary.get("self_check", []))]
     summary["tables"] = list_tables(folder)
     if isinstance(recording, LiveRecording):

@@ -22,7 +22,7 @@ from airborne.video import Frames
 
 Method = Literal["refined", "joint", "hierarchical", "stepping", "simplex"]
 Prediction = Literal["smooth", "ballistic", "none"]
-ColourRule = Literal["raw", "normalised", "blend", "union"]
+ScoreName = Literal["raw", "normalised", "blend", "union"]
 
 # stepping and simplex get what paper B had: full frames whose missing rows are interpolated
 FIELD_MODES: dict[Method, Literal["rows", "interpolated"]] = {
@@ -48,7 +48,7 @@ class Settings:
 
     method: Method = "refined"
     prediction: Prediction = "smooth"
-    colour: ColourRule = "normalised"
+    colour: ScoreName = "normalised"
     v_rule: VRule = "v_sym"
     loops: Sequence[tuple[float, float]] = ()  # stepping: a step in position [m] and in angle [rad] for each loop
     scale: Literal[1, 2, 4] = 1  # stepping, simplex: reduction of the images

@@ -7,37 +7,40 @@ from typing import Protocol, TypeVar
 
 from airborne.video import Frames
 
-State = TypeVar("State")
+StateT = TypeVar("StateT")
 Found = TypeVar("Found")
 
 
-class Tracker(Protocol[State, Found]):
+class Tracker(Protocol[StateT, Found]):
     """A tracker holds its settings; what it learns is in the states it returns. `search` and `learn` are pure.
 
     What it finds at one time is an `Estimate` of a body, or a `PlayersStep`.
     """
 
-    def init(self) -> State:
+    def init(self) -> StateT:
         """Return the state before the first frame."""
         ...
 
-    def search(self, state: State, frames: Frames) -> Found:
+    def search(self, state: StateT, frames: Frames) -> Found:
         """Find the body or the players in the frames, without learning from them."""
         ...
 
-    def learn(self, state: State, frames: Frames, estimate: Found) -> State:
+    def learn(self, state: StateT, frames: Frames, estimate: Found) -> StateT:
         """Return the state after the frames, given their estimate: a run is resumed by learning alone."""
         ...
 
 
-def step(tracker: Tracker[State, Found], state: State, frames: Frames) -> tuple[State, Found]:
+def step(tracker: Tracker[StateT, Found], state: StateT, frames: Frames) -> tuple[StateT, Found]:
     """Track one time: search, then learn."""
     estimate = tracker.search(state, frames)
     return tracker.learn(state, frames, estimate), estimate
 
 
 def track_frames(
-    tracker: Tracker[State, Found], frames: Iterable[Frames], write: Callable[[Found], None], done: Iterable[Found] = ()
+    tracker: Tracker[StateT, Found],
+    frames: Iterable[Frames],
+    write: Callable[[Found], None],
+    done: Iterable[Found] = (),
 ) -> Iterator[tuple[Frames, Found]]:
     """Yield each time's frames with their estimate, written as soon as it is found.
 

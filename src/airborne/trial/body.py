@@ -6,10 +6,10 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from airborne.trial.table import Table
+from airborne.trial.table import SettingsTable
 
 
-class BodyTable(Table):
+class BodyTable(SettingsTable):
     """Which body: a body file, a person of given stature and mass, a measured person, or players' legs."""
 
     file: str | None = None

@@ -6,10 +6,10 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from airborne.trial.table import Table
+from airborne.trial.table import SettingsTable
 
 
-class CalibrationTable(Table):
+class CalibrationTable(SettingsTable):
     """Where the cameras come from: a calibration file, or control points."""
 
     file: str | None = None

@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from airborne.trial.table import Table
+from airborne.trial.table import SettingsTable
 
 
-class CameraTable(Table):
+class CameraTable(SettingsTable):
     """One camera's video, and how its pixels lie in the calibration's image."""
 
     name: str

@@ -28,10 +28,10 @@ from airborne.trial.settings import (
     TrackSettings,
 )
 from airborne.trial.start import StartTable
-from airborne.trial.table import Table
+from airborne.trial.table import SettingsTable
 
 
-class Trial(Table):
+class Trial(SettingsTable):
     """A whole trial file."""
 
     name: str

@@ -6,10 +6,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from airborne.rendering import Lamp, Lights
-from airborne.trial.table import Table, Vector
+from airborne.trial.table import SettingsTable, Vector
 
 
-class LampTable(Table):
+class LampTable(SettingsTable):
     """A lamp: a point light, or with a direction and a half angle a spot light."""
 
     position_m: Vector
@@ -30,7 +30,7 @@ class LampTable(Table):
         return Lamp(np.array(self.position_m), self.intensity, direction, angle)
 
 
-class LightsTable(Table):
+class LightsTable(SettingsTable):
     """Measured lights; without this table the light is unknown."""
 
     ambient: float = Field(ge=0)

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, model_validator
 from airborne.body.legs import LEG_POINTS, Legs
 from airborne.errors import BodyError
 from airborne.tracking.players import PlayerStart
-from airborne.trial.table import Table, Vector
+from airborne.trial.table import SettingsTable, Vector
 
 _FEET = ("foot_left", "foot_right")
 _FARTHEST_M = 100.0  # no court is larger
@@ -25,7 +25,7 @@ def _check_name(name: str) -> str:
     return name
 
 
-class PlayerTable(Table):
+class PlayerTable(SettingsTable):
     """A player's joints at the first frame; a player with a torso only is a bystander."""
 
     name: Annotated[str, AfterValidator(_check_name)]

@@ -9,20 +9,20 @@ from pydantic import Field, model_validator
 
 from airborne.rendering import Lights
 from airborne.tracking.direct_search.stepping import VRule
-from airborne.tracking.methods import ColourRule, Method, Prediction, Settings
+from airborne.tracking.methods import Method, Prediction, ScoreName, Settings
 from airborne.tracking.particle import LegsMethod, LegsSettings
 from airborne.tracking.particle.bootstrap import ResampleWhen
 from airborne.tracking.particle.resampling import Scheme
 from airborne.tracking.particle.settings import EstimateAs, ViewsAs
 from airborne.tracking.particle.swing import Swing
-from airborne.trial.table import Table
+from airborne.trial.table import SettingsTable
 
 StepSizes = list[Annotated[float, Field(gt=0)]]
 CapsuleMethod = Literal["blocker"]
 Overlay = Literal["paper", "broadcast"]
 
 
-class _Settings(Table):
+class _Settings(SettingsTable):
     """What every method reads."""
 
     method: str
@@ -46,7 +46,7 @@ class BodySettings(_Settings):
     method: Method = "refined"
     prediction: Prediction = "smooth"
     fixed_shape: bool = False  # joint angles stay those of the start; stepping and simplex never change them
-    colour: ColourRule = "normalised"  # stepping and simplex: paper B's score
+    colour: ScoreName = "normalised"  # stepping and simplex: paper B's score
     v_rule: VRule = "v_sym"  # stepping
     steps_mm: StepSizes = [50, 30, 20, 10, 10, 5, 5]  # stepping: one loop each
     steps_deg: StepSizes = [5, 3, 2, 1, 1, 0.5, 0.5]

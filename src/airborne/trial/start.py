@@ -12,10 +12,10 @@ from airborne.body import Pose
 from airborne.errors import TrialError
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.trial.players import PlayerTable
-from airborne.trial.table import Table, Vector
+from airborne.trial.table import SettingsTable, Vector
 
 
-class StartTable(Table):
+class StartTable(SettingsTable):
     """The first pose: set by hand, or found from positions of the body's landmarks; or those of several players."""
 
     frame: Annotated[int, Field(ge=0)] = 0

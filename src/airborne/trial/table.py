@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
-class Table(BaseModel):
+class SettingsTable(BaseModel):
     """A table of a trial file: an unknown key, a number that is not finite, or a change afterwards is an error."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

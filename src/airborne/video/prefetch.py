@@ -7,12 +7,12 @@ from collections.abc import Generator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 _N_AHEAD = 4  # items ready: enough to hide the time of one, few enough to stay small
 
 
-def read_ahead(items: Generator[T]) -> Generator[T]:
+def read_ahead(items: Generator[_T]) -> Generator[_T]:
     """Yield the items unchanged and in order, while a thread prepares the next few.
 
     An error is raised where its item would have come. Closing this generator ends the thread and closes `items`.

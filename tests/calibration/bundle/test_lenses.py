@@ -14,9 +14,9 @@ def numbers(lens, n=6):
     rig = ring(n, distortion=BROWN if lens == "brown" else FISHEYE, lens=lens)
     R = np.stack([c.camera_from_world.rotation.as_matrix() for c in rig])
     centre = np.stack([c.centre for c in rig])
-    inner = np.stack([[c.K[0, 0], 1.01 * c.K[1, 1], *c.K[:2, 2], *np.resize([*c.distortion, 0.01], 5)] for c in rig])
+    inner = np.stack([[c.K[0, 0], 1.01 * c.K[1, 1], *c.K[:2, 2], *np.resize([*c.distortion, 0.01], 8)] for c in rig])
     if lens == "fisheye":
-        inner[:, 8] = 0
+        inner[:, 8:] = 0
     return rig, R, centre, inner, np.full(n, lens == "fisheye"), rng.uniform(-0.5, 0.5, (n, 3)) + MIDDLE
 
 
@@ -24,7 +24,7 @@ def numbers(lens, n=6):
 def test_pixels_are_those_of_the_camera(lens):
     rig, R, centre, inner, is_fisheye, world = numbers(lens)
     inner[:, 1] = inner[:, 0]
-    inner[:, 4:] = np.stack([np.pad(c.distortion, (0, 5 - len(c.distortion))) for c in rig])
+    inner[:, 4:] = np.stack([np.pad(c.distortion, (0, 8 - len(c.distortion))) for c in rig])
     expected = np.stack([camera.px_from_world(point) for camera, point in zip(rig, world, strict=True)])
     np.testing.assert_allclose(project(R, centre, inner, is_fisheye=is_fisheye, world=world), expected, rtol=1e-12)
 
@@ -34,11 +34,11 @@ def test_slopes_are_those_of_differences(lens):
     _, R, centre, inner, is_fisheye, world = numbers(lens)
     px, by_camera, by_world = project_with_jacobian(R, centre, inner, is_fisheye=is_fisheye, world=world)
     np.testing.assert_allclose(px, project(R, centre, inner, is_fisheye=is_fisheye, world=world), rtol=EXACT)
-    for number in range(15):
+    for number in range(18):
         width = 1e-3 if 6 <= number < 10 else 1e-6
 
         def moved(step, number=number):
-            change = np.zeros(15)
+            change = np.zeros(18)
             change[number] = step
             turned = Rotation.from_rotvec(change[:3]).as_matrix() @ R
             return project(turned, centre + change[3:6], inner + change[6:], is_fisheye=is_fisheye, world=world)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.sources.boards import Board, board_detector, board_from_table, match_print, read_board
+from airborne.calibration.sources.board_print import match_print
+from airborne.calibration.sources.boards import Board, board_detector, board_from_table, read_board
 from airborne.cameras import camera_looking_at
 from airborne.errors import CalibrationError
 from tests.support.board_prints import photographed

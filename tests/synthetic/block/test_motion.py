@@ -8,7 +8,7 @@ import pytest
 from airborne.body import human18
 from airborne.synthetic.block.jump import build_jump
 from airborne.synthetic.block.legs import LegSizes, axis_rotation, leg_angles, roll_foot
-from airborne.synthetic.block.margins import NET_TOP_M, Capsules, gap_m, margins_of
+from airborne.synthetic.block.margins import NET_TOP_M, BodyVolume, gap_m, margins_of
 from airborne.synthetic.block.motion import evaluate_clamped, translate
 from airborne.synthetic.block.plan import JumpPlan
 from airborne.synthetic.block.steps import STEP_S, approach_steps, foot_placements
@@ -197,7 +197,7 @@ def test_waiting_player_stands_and_steps():
 
 def test_gap_between_capsules_is_that_of_their_nearest_points():
     def capsule(a, b, radius):
-        return Capsules(np.array(a, float)[None, None], np.array(b, float)[None, None], np.array([radius]))
+        return BodyVolume(np.array(a, float)[None, None], np.array(b, float)[None, None], np.array([radius]))
 
     crossed = gap_m(capsule([-1, 0, 0], [1, 0, 0], 0.1), capsule([0, -1, 1], [0, 1, 1], 0.2))
     beside = gap_m(capsule([0, 0, 0], [1, 0, 0], 0.1), capsule([3, 0, 4], [3, 5, 4], 0.2))

@@ -10,7 +10,7 @@ from airborne.appearance.lighting import LIGHT_FROM_SRGB, LIGHT_TERMS, light_pla
 from airborne.body.chain import move_pose
 from airborne.rendering.maps import empty_maps
 from airborne.tracking.image_regions import crop_regions
-from airborne.tracking.model_based.blur import RADIUS_PX, blur, gaussian_taps
+from airborne.tracking.model_based.blur import RADIUS_PX, blur_planes, gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, root_only
 from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, Paint, Projection, Window
 from airborne.tracking.model_based.normal_equations import photometric_equations, silhouette_equations
@@ -38,7 +38,7 @@ def test_taps_sum_to_one_and_fall_off_as_a_gaussian(sigma):
 def test_blur_is_scipys_along_each_axis_with_its_own_taps():
     observation, out = planes(), np.empty((3, 30, 41), np.float32)
     taps_u, taps_v = gaussian_taps(1.2), gaussian_taps(0.6)
-    blur(observation, taps_u, taps_v, out)
+    blur_planes(observation, taps_u, taps_v, out)
     both = [np.concatenate([taps[:0:-1], taps]) for taps in (taps_u, taps_v)]
     expected = correlate1d(correlate1d(observation, both[0], axis=2, mode="nearest"), both[1], axis=1, mode="nearest")
     np.testing.assert_allclose(out, expected, atol=SINGLE)
@@ -46,7 +46,7 @@ def test_blur_is_scipys_along_each_axis_with_its_own_taps():
 
 def test_blur_is_scipys_gaussian():
     observation, out = planes(shape=(1, 20, 25)), np.empty((1, 20, 25), np.float32)
-    blur(observation, gaussian_taps(1.2), gaussian_taps(1.2), out)
+    blur_planes(observation, gaussian_taps(1.2), gaussian_taps(1.2), out)
     np.testing.assert_allclose(
         out[0], gaussian_filter(observation[0], 1.2, mode="nearest", radius=RADIUS_PX), atol=SINGLE
     )
@@ -54,7 +54,7 @@ def test_blur_is_scipys_gaussian():
 
 def test_blur_leaves_an_even_plane_alone():
     out = np.empty((2, 9, 5), np.float32)
-    blur(np.full((2, 9, 5), 0.7, np.float32), gaussian_taps(1.2), gaussian_taps(0.5), out)
+    blur_planes(np.full((2, 9, 5), 0.7, np.float32), gaussian_taps(1.2), gaussian_taps(0.5), out)
     np.testing.assert_allclose(out, 0.7, atol=SINGLE)
 
 

@@ -35,10 +35,10 @@ class Adjustment:
     residual_px: tuple[Array, ...]  # by source (n, 2), measured minus projected [px]; NaN: the point was left out
     weight: tuple[Array, ...]  # by source (n,), 1 for what fits, near 0 for what does not
     noise_px: tuple[float, ...]  # by source: the estimated standard deviation of a coordinate with sd_px 1 [px]
-    camera_sd: Array  # (cameras, 15), in the units of `lenses.CAMERA_PARAMETERS`; 0 where fixed
+    camera_sd: Array  # (cameras, 18), in the units of `lenses.CAMERA_PARAMETERS`; 0 where fixed
     covariance: Array  # of the cameras' free parameters
     lag_s: tuple[Array, ...]  # by source: each observation's lag (n,) [s]
-    columns: Ints  # (cameras, 15): each parameter's row in the covariance; -1 where fixed
+    columns: Ints  # (cameras, 18): each parameter's row in the covariance; -1 where fixed
     is_gauge_free: bool  # nothing fixes the world: standard deviations are relative to the rig
     has_converged: bool  # False: stopped at the limit of steps
 

@@ -5,22 +5,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.cameras.distortion import distort, distort_fisheye
+from airborne.cameras.distortion import distort, distort_fisheye, radial_factor
 from airborne.types import Array
 
-N_PARAMETERS = 15  # of a camera: rotation (3) [rad], centre (3) [m], fx, fy, cx, cy [px], five lens terms
+N_PARAMETERS = 18  # of a camera: rotation (3) [rad], centre (3) [m], fx, fy, cx, cy [px], eight lens terms
 CAMERA_PARAMETERS = (
     *("turn_x_rad", "turn_y_rad", "turn_z_rad", "x_m", "y_m", "z_m"),
-    *("fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"),
+    *("fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
 )
-FISHEYE_PARAMETERS = (*CAMERA_PARAMETERS[:10], "k1", "k2", "k3", "k4", "")
+FISHEYE_PARAMETERS = (*CAMERA_PARAMETERS[:10], "k1", "k2", "k3", "k4", "", "", "", "")
 _NEAREST_DEPTH_M = 1e-9  # a point at a smaller depth counts as behind the camera
 
 
 def project(R: Array, centre: Array, intrinsics: Array, *, is_fisheye: NDArray[np.bool_], world: Array) -> Array:
     """Project one world point a row: (n, 2) [px]; NaN behind the camera.
 
-    R (n, 3, 3) camera from world, centre (n, 3) [m], intrinsics (n, 9) fx, fy, cx, cy and lens terms, world (n, 3) [m].
+    R (n, 3, 3) camera from world, centre (n, 3) [m], intrinsics (n, 12) fx, fy, cx, cy and lens terms,
+    world (n, 3) [m].
     """
     xyz = np.einsum("nij,nj->ni", R, world - centre)
     z = np.where(xyz[:, 2:] > _NEAREST_DEPTH_M, xyz[:, 2:], np.nan)
@@ -30,7 +31,7 @@ def project(R: Array, centre: Array, intrinsics: Array, *, is_fisheye: NDArray[n
 def project_with_jacobian(
     R: Array, centre: Array, intrinsics: Array, *, is_fisheye: NDArray[np.bool_], world: Array
 ) -> tuple[Array, Array, Array]:
-    """Return pixels (n, 2) and their derivatives by the camera's parameters (n, 2, 15) and the point (n, 2, 3).
+    """Return pixels (n, 2) and their derivatives by the camera's parameters (n, 2, 18) and the point (n, 2, 3).
 
     Arguments as in `project`. The parameters are `CAMERA_PARAMETERS`: a rotation about the camera's own axes,
     `R <- exp(rotation) R`, and steps of the others. Behind the camera the pixels are NaN and the derivatives 0.
@@ -71,7 +72,7 @@ def _distort(xy: Array, terms: Array, is_fisheye: NDArray[np.bool_]) -> Array:
 
 
 def _lens_jacobian(xy: Array, terms: Array, is_fisheye: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return the derivatives of the distorted points by the undistorted ones (n, 2, 2) and by the terms (n, 2, 5)."""
+    """Return the derivatives of the distorted points by the undistorted ones (n, 2, 2) and by the terms (n, 2, 8)."""
     by_xy, by_terms = _brown_jacobian(xy, terms)
     if is_fisheye.any():
         by_xy[is_fisheye], by_terms[is_fisheye] = _fisheye_jacobian(xy[is_fisheye], terms[is_fisheye])
@@ -79,18 +80,21 @@ def _lens_jacobian(xy: Array, terms: Array, is_fisheye: NDArray[np.bool_]) -> tu
 
 
 def _brown_jacobian(xy: Array, terms: Array) -> tuple[Array, Array]:
-    k1, k2, p1, p2, k3 = terms.T
+    _, _, p1, p2, _, k4, k5, k6 = terms.T
     x, y = xy.T
     r2 = x * x + y * y
-    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    radial_derivative = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))
+    radial, radial_derivative = radial_factor(r2, terms.T)
     by_xy = np.empty((len(xy), 2, 2))
     by_xy[:, 0, 0] = radial + x * x * radial_derivative + 2 * p1 * y + 6 * p2 * x
     by_xy[:, 1, 1] = radial + y * y * radial_derivative + 6 * p1 * y + 2 * p2 * x
     by_xy[:, 0, 1] = by_xy[:, 1, 0] = x * y * radial_derivative + 2 * p1 * x + 2 * p2 * y
-    by_x = np.stack([x * r2, x * r2**2, 2 * x * y, r2 + 2 * x * x, x * r2**3], axis=-1)
-    by_y = np.stack([y * r2, y * r2**2, r2 + 2 * y * y, 2 * x * y, y * r2**3], axis=-1)
-    return by_xy, np.stack([by_x, by_y], axis=1)
+    by_above = np.stack([r2, r2**2, r2**3], axis=-1) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))[:, None]
+    by_terms = np.empty((len(xy), 2, 8))
+    by_terms[:, :, [0, 1, 4]] = xy[:, :, None] * by_above[:, None]
+    by_terms[:, :, 5:] = -radial[:, None, None] * by_terms[:, :, [0, 1, 4]]
+    by_terms[:, 0, 2], by_terms[:, 0, 3] = 2 * x * y, r2 + 2 * x * x
+    by_terms[:, 1, 2], by_terms[:, 1, 3] = r2 + 2 * y * y, 2 * x * y
+    return by_xy, by_terms
 
 
 def _fisheye_jacobian(xy: Array, terms: Array) -> tuple[Array, Array]:
@@ -105,6 +109,6 @@ def _fisheye_jacobian(xy: Array, terms: Array) -> tuple[Array, Array]:
     by_xy = (
         scale[:, None, None] * np.eye(2) + (scale_derivative * r)[:, None, None] * unit[:, :, None] * unit[:, None, :]
     )
-    by_terms = np.zeros((len(xy), 2, 5))
+    by_terms = np.zeros((len(xy), 2, 8))
     by_terms[:, :, :4] = unit[:, :, None] * powers[:, None, :]
     return by_xy, by_terms

@@ -21,7 +21,7 @@ class State:
 
     R: Array  # (cameras, 3, 3) camera from world
     centre: Array  # (cameras, 3) [m]
-    intrinsics: Array  # (cameras, 9) fx, fy, cx, cy [px], lens terms
+    intrinsics: Array  # (cameras, 12) fx, fy, cx, cy [px], lens terms
     target_R: Array  # (m, 3, 3) world from target
     target_t: Array  # (m, 3) [m]
     points: Array  # (p, 3) [m], in the world or in a target's axes
@@ -45,7 +45,7 @@ class Problem:
     source: Ints  # (n,)
     cluster: Ints  # (n,), numbered over all sources; -1: none
     is_used: NDArray[np.bool_]  # (n,) whether the observation constrains the unknowns
-    camera_columns: Ints  # (cameras, 15)
+    camera_columns: Ints  # (cameras, 18)
     target_columns: Ints  # (m, 6): rotation about the world's axes [rad], shift [m]
     point_columns: Ints  # (p, 3)
     source_of_column: Ints  # of targets' and points' columns
@@ -126,7 +126,7 @@ def initial_state(rig: Rig, sources: Sequence[Source], problem: Problem) -> Stat
         centre=np.stack([c.centre for c in rig]),
         intrinsics=np.stack(
             [
-                [c.K[0, 0], c.K[1, 1], c.K[0, 2], c.K[1, 2], *np.pad(c.distortion, (0, 5 - len(c.distortion)))]
+                [c.K[0, 0], c.K[1, 1], c.K[0, 2], c.K[1, 2], *np.pad(c.distortion, (0, 8 - len(c.distortion)))]
                 for c in rig
             ]
         ),
@@ -203,7 +203,7 @@ def _camera(camera: Camera, state: State, i: int) -> Camera:
         camera,
         K=np.array([[fx, camera.K[0, 1], cx], [0, fy, cy], [0, 0, 1]]),
         camera_from_world=RigidTransform.from_components(-R @ state.centre[i], Rotation.from_matrix(R)),
-        distortion=np.array(terms[: 4 if camera.lens == "fisheye" else 5]),
+        distortion=np.array(terms[: len(camera.distortion)]),
     )
 
 
@@ -217,7 +217,7 @@ def _step_of(step: Array, columns: Ints) -> Array:
 
 
 def _keep_focal_ratio(state: State, change: Array, columns: Ints) -> Array:
-    """Preserve the ratio of the focal lengths where they share a column; change (cameras, 9)."""
+    """Preserve the ratio of the focal lengths where they share a column; change (cameras, 12)."""
     is_square = (columns[:, 6] >= 0) & (columns[:, 6] == columns[:, 7])
     ratio = state.intrinsics[:, 1] / state.intrinsics[:, 0]
     change = change.copy()

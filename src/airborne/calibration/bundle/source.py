@@ -12,7 +12,15 @@ from scipy.spatial.transform import RigidTransform
 from airborne.errors import CalibrationError
 from airborne.types import Array, Ints
 
-_TERMS = {0: (), 1: (0,), 2: (0, 1), 3: (0, 1, 4), 4: (0, 1, 2, 3), 5: (0, 1, 2, 3, 4)}  # how many -> which
+_TERMS = {
+    0: (),
+    1: (0,),
+    2: (0, 1),
+    3: (0, 1, 4),
+    4: (0, 1, 2, 3),
+    5: (0, 1, 2, 3, 4),
+    8: tuple(range(8)),
+}  # how many -> which
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,7 +32,9 @@ class FreeParameters:
     shares_focal: str = ""  # cameras with the same word here share one focal length
     square_pixels: bool = True  # the ratio of both focal lengths is fixed
     principal_point: bool = False
-    n_terms: int = 0  # lens terms: k1 | k1 k2 | k1 k2 k3 | k1 k2 p1 p2 | all five; of a fisheye the first n of four
+    n_terms: int = (
+        0  # k1 | k1 k2 | k1 k2 k3 | k1 k2 p1 p2 | all five | 8: the rational ones too; of a fisheye the first n
+    )
 
     def parameters(self, lens: Literal["brown", "fisheye"] = "brown") -> tuple[int, ...]:
         """Return which of `lenses.CAMERA_PARAMETERS` are free, by index; of square pixels fx, without fy."""
@@ -138,4 +148,4 @@ class Source:
 class CameraPrior:
     """A normal prior of the cameras about their initial parameters."""
 
-    sd: Array  # (cameras, 15), in the units of `lenses.CAMERA_PARAMETERS`; inf: no prior
+    sd: Array  # (cameras, 18), in the units of `lenses.CAMERA_PARAMETERS`; inf: no prior

@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.calibration.sources.boards import DICTIONARIES, Board, board_detector
+from airborne.calibration.sources.board_print import turn_to_front
+from airborne.calibration.sources.boards import DICTIONARIES, Board, board_detector, mirror_image
 from airborne.cameras.finding import Finding, join_names
 from airborne.types import Array, Image
 
@@ -42,16 +43,14 @@ def check_board_print(board: Board, pictures: Sequence[Image], camera: str = "")
     if not len(pictures):
         return []
     sample = [pictures[i] for i in np.unique(np.linspace(0, len(pictures) - 1, _MOST_PICTURES).astype(int))]
+    board, sample = turn_to_front(board, sample)
     where = f"{camera}: " if camera else ""
     counts = _corner_counts(board, sample)
     n_corners = board.inner_size[0] * board.inner_size[1]
     detected = [count for count in counts if count]
     if board.kind == "chessboard":
-        return (
-            []
-            if len(detected) >= max(_DETECTED_SHARE * len(sample), 1)
-            else _wrong_chessboard(board, sample, where, camera)
-        )
+        is_found = len(detected) >= max(_DETECTED_SHARE * len(sample), 1)
+        return [] if is_found else _wrong_chessboard(board, sample, where, camera)
     is_found = len(detected) >= _DETECTED_SHARE * len(sample) and bool(
         np.median(detected) >= _DETECTED_SHARE * n_corners
     )
@@ -88,7 +87,7 @@ def _wrong_charuco(
     if not is_found:
         sample = pictures[:: max(len(pictures) // _MOST_SEARCHED, 1)]
         n_here = _n_markers(_all_markers(sample, board.dictionary, board.is_inverted))
-        mirrored = [np.ascontiguousarray(picture[:, ::-1]) for picture in sample]
+        mirrored = [mirror_image(picture) for picture in sample]
         n_mirrored = _n_markers(_all_markers(mirrored, board.dictionary, board.is_inverted))
         if n_mirrored >= _CLEAR_RATIO * max(n_here, _FEWEST_MARKERS):
             yield Finding(

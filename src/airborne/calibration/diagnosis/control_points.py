@@ -12,12 +12,14 @@ from airborne.calibration.intrinsics.physical import fit_pinhole
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras.dlt import FEWEST_DLT_POINTS, Decomposition, decompose, fit_dlt
 from airborne.errors import CalibrationError
+from airborne.geometry.triangulation import px_from_points
 from airborne.types import Array
 
 _FLAT_ERROR, _FLAT_WARNING = 0.01, 0.1  # thickness over extent of the points that one camera sees
 # of the control points: beyond it an error, a warning: the unit is wrong
 _LARGEST_EXTENT_M, _LARGE_EXTENT_M = 500.0, 100.0
 _ROUGH_FIT_PX = 3.0  # careful clicks give about one pixel
+_BENT = 3.0  # times a model's residuals: what the direct linear transformation may leave of a straight lens
 _OFF_CENTRE = 0.15  # of the image's diagonal
 _NOT_SQUARE = 0.03  # relative difference of the focal lengths that is reported
 _MOST_ROLL = np.radians(60)  # about the optical axis: cameras stand roughly upright
@@ -109,7 +111,8 @@ def warnings_about(
     outliers = {camera: find_outliers(solutions[camera]) for camera in points.cameras}
     warnings += _outlier_warnings(points, outliers)
     for camera in points.cameras:
-        warnings += _image_warnings(camera, sizes[camera], decompositions[camera])
+        if _is_straight(solutions[camera]):  # else the decomposition says little
+            warnings += _image_warnings(camera, sizes[camera], decompositions[camera])
         ratio = flatness(solutions[camera].world)
         if ratio < _FLAT_WARNING:
             warnings.append(
@@ -123,6 +126,13 @@ def warnings_about(
                 "check its points, their coordinates and the picture size"
             )
     return tuple(warnings)
+
+
+def _is_straight(solution: Solution) -> bool:
+    """Say whether the direct linear transformation, which knows no lens, fits about as well as the chosen model."""
+    P = fit_dlt(solution.world, solution.px)
+    rms_px = np.sqrt(np.mean(np.sum((px_from_points(P[None], solution.world)[:, 0] - solution.px) ** 2, axis=1)))
+    return bool(rms_px < _BENT * np.sqrt(np.mean(np.sum(solution.residual_px**2, axis=1))))
 
 
 def _image_warnings(camera: str, size: tuple[int, int], decomposition: Decomposition) -> list[str]:

@@ -154,12 +154,12 @@ def _track(rig: Rig, others: Sequence[str], name: str, px: Array) -> _Track:
 def _project(camera: Camera, points: Array) -> tuple[Array, Array]:
     n = len(points)
     R = camera.camera_from_world.rotation.as_matrix()
-    terms = np.pad(camera.distortion, (0, 5 - len(camera.distortion)))
+    terms = np.pad(camera.distortion, (0, 8 - len(camera.distortion)))
     intrinsics = np.array([camera.K[0, 0], camera.K[1, 1], camera.K[0, 2], camera.K[1, 2], *terms])
     px, jacobian, _ = project_with_jacobian(
         np.broadcast_to(R, (n, 3, 3)),
         np.broadcast_to(camera.centre, (n, 3)),
-        np.broadcast_to(intrinsics, (n, 9)),
+        np.broadcast_to(intrinsics, (n, 12)),
         is_fisheye=np.full(n, camera.lens == "fisheye"),
         world=points,
     )

@@ -52,7 +52,7 @@ class Views:
 
     def groups(self) -> list[list[int]]:
         """Return the cameras that are linked by shared moments, group by group, the largest first."""
-        n, label = connected_components(_n_shared_moments(self), directed=False)
+        n, label = connected_components(n_shared_moments(self), directed=False)
         return sorted((np.flatnonzero(label == i).tolist() for i in range(n)), key=len, reverse=True)
 
     def of_camera(self, camera: int) -> Views:
@@ -102,14 +102,14 @@ def initial_lens(views: Views, size: tuple[int, int], *, lens: Lens) -> tuple[Ca
     best, best_error = None, np.inf
     for ratio in _FOCALS:
         camera = _pinhole(name, size, ratio * max(size), lens)
-        errors = [_board_pose(camera, views.board, row[i])[1] for i in sample]
+        errors = [board_pose(camera, views.board, row[i])[1] for i in sample]
         if np.median(errors) < best_error:
             best, best_error = camera, float(np.median(errors))
     if best is None:
         raise CalibrationError(
             f"camera '{name}': no focal length fits its views of the board; is the board's file right?"
         )
-    return best, stack_transforms([_board_pose(best, views.board, sighting)[0] for sighting in row])
+    return best, stack_transforms([board_pose(best, views.board, sighting)[0] for sighting in row])
 
 
 def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTransform]:
@@ -120,10 +120,10 @@ def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTr
     """
     n = len(cameras)
     camera_from_board = [
-        [_board_pose(camera, views.board, s)[0] if len(s.corner) else None for s in row]
+        [board_pose(camera, views.board, s)[0] if len(s.corner) else None for s in row]
         for camera, row in zip(cameras, views.detections, strict=True)
     ]
-    n_shared = _n_shared_moments(views)
+    n_shared = n_shared_moments(views)
     root = int(np.argmax(n_shared.sum(axis=1)))
     tree = minimum_spanning_tree(np.where(n_shared > 0, 1 / np.maximum(n_shared, 1), 0.0))
     order, parent = breadth_first_order(tree, root, directed=False)
@@ -133,14 +133,14 @@ def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTr
     for i in order[1:]:
         j = int(parent[i])
         from_world[int(i)] = (
-            _relative_pose(
+            linked_pose(
                 cameras[i],
                 cameras[j],
                 views,
                 poses=camera_from_board[i],
                 other_poses=camera_from_board[j],
                 pair=(int(i), j),
-            )
+            )[0]
             * from_world[j]
         )
     rig = Rig(tuple(replace(camera, camera_from_world=from_world[i]) for i, camera in enumerate(cameras)))
@@ -152,7 +152,7 @@ def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTr
 def board_poses(rig: Rig, views: Views) -> RigidTransform:
     """Return the board's pose at every moment from a known rig: (moments,); the identity where no camera sees it."""
     camera_from_board = [
-        [_board_pose(camera, views.board, s)[0] if len(s.corner) else None for s in row]
+        [board_pose(camera, views.board, s)[0] if len(s.corner) else None for s in row]
         for camera, row in zip(rig, views.detections, strict=True)
     ]
     return stack_transforms([_consensus_board_pose(rig, views, camera_from_board, m) for m in range(views.n_moments)])
@@ -170,7 +170,7 @@ def _pinhole(name: str, size: tuple[int, int], focal_px: float, lens: Lens) -> C
     )
 
 
-def _board_pose(camera: Camera, board: Board, sighting: DetectedCorners) -> tuple[RigidTransform, float]:
+def board_pose(camera: Camera, board: Board, sighting: DetectedCorners) -> tuple[RigidTransform, float]:
     """Return camera_from_board of one view and its RMS [px], by perspective-n-point; the camera's pose is ignored."""
     corners = board.corners[sighting.corner]
     ideal = camera.undistort_px(sighting.px)
@@ -193,7 +193,7 @@ def _board_pose(camera: Camera, board: Board, sighting: DetectedCorners) -> tupl
     return (camera_from_board, float(error)) if np.isfinite(error) else (_IDENTITY, np.inf)
 
 
-def _n_shared_moments(views: Views) -> Array:
+def n_shared_moments(views: Views) -> Array:
     """Return how many moments every two cameras share: (cameras, cameras), 0 on the diagonal."""
     is_seen = (views.n_corners > 0).astype(float)
     shared = is_seen @ is_seen.T
@@ -201,7 +201,7 @@ def _n_shared_moments(views: Views) -> Array:
     return shared
 
 
-def _relative_pose(
+def linked_pose(
     one: Camera,
     other: Camera,
     views: Views,
@@ -209,8 +209,8 @@ def _relative_pose(
     poses: Sequence[RigidTransform | None],
     other_poses: Sequence[RigidTransform | None],
     pair: tuple[int, int],
-) -> RigidTransform:
-    """Return one_from_other: of the shared moments' candidates the one that fits most of them."""
+) -> tuple[RigidTransform, float]:
+    """Return one_from_other, of the shared moments' candidates the one that fits most of them, and its misfit [px]."""
     shared = [
         (a, b, m) for m, (a, b) in enumerate(zip(poses, other_poses, strict=True)) if a is not None and b is not None
     ]
@@ -225,7 +225,8 @@ def _relative_pose(
             distances.append(np.median(np.nan_to_num(np.linalg.norm(projected - sighting.px, axis=1), nan=1e6)))
         return float(np.median(distances))
 
-    return min(candidates, key=misfit)
+    best = min(candidates, key=misfit)
+    return best, misfit(best)
 
 
 def _consensus_board_pose(

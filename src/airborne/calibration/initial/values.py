@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 from airborne.calibration.bundle import FreeParameters
 from airborne.calibration.diagnosis.images import check_image_size
 from airborne.calibration.initial.chaining import Views, chain_cameras
+from airborne.calibration.initial.mirrored import find_mirrored_cameras
 from airborne.calibration.initial.wand import initial_rig_from_wand
-from airborne.calibration.intrinsics.lens_selection import LENS_MODELS, LensFit, choose_lens
+from airborne.calibration.initial.wand_fisheyes import initial_rig_from_wand_and_fisheyes
+from airborne.calibration.intrinsics.lens_selection import LENS_MODELS, LensFit, choose_lens, lenses_from_points
 from airborne.calibration.sources.board_detection import BoardDetections, detect_boards, detect_lens_board, image_size
 from airborne.calibration.sources.boards import Board, board_from_table, read_board
 from airborne.calibration.sources.control_points import ControlPoints, read_control_points
@@ -65,19 +67,36 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
     if sources.court is not None:
         points["court"] = read_control_points(sources.path(sources.court.file), court_points(sources.court.net))
     wand = _wand(sources, sizes)
+    fisheyes = [camera.name for camera in sources.camera if camera.lens == "fisheye"]
     detections = None
     if sources.detections is not None:
         detections = read_detections(sources.path(sources.detections.file), sources.names, sources.detections.cameras)
+    if "control points" in points and start_rig is None:
+        table = points["control points"]
+        unknown = [name for name in _common(table.cameras, sizes) if name not in lenses]
+        lenses |= lenses_from_points(
+            initial_rig_from_points(table.select(unknown), sizes, fisheyes=fisheyes),
+            table,
+            lambda done, n: progress("fitting the lenses", done, n),
+        )
     known_lenses = {name: fit.camera for name, fit in lenses.items()}
     if start_rig is not None:
         known_lenses |= {camera.name: camera for camera in start_rig if camera.name not in known_lenses}
     start_of = {
-        name: initial_rig_from_points(table.select(_common(table.cameras, sizes)), sizes, known_lenses)
+        name: initial_rig_from_points(
+            table.select(_common(table.cameras, sizes)), sizes, known_lenses, fisheyes=fisheyes
+        )
         for name, table in points.items()
     }
     start_of |= {"calibration at the start": start_rig} if start_rig is not None else {}
     if wand is not None:
-        start_of["wand"] = initial_rig_from_wand(wand, {name: sizes[name] for name in wand.cameras}, known_lenses)
+        unknown = [name for name in wand.cameras if name in fisheyes and name not in known_lenses]
+        wand_sizes = {name: sizes[name] for name in wand.cameras}
+        start_of["wand"] = (
+            initial_rig_from_wand_and_fisheyes(wand, wand_sizes, known_lenses, unknown)
+            if unknown
+            else initial_rig_from_wand(wand, wand_sizes, known_lenses)
+        )
     starts = list(start_of.values())
     if board_detections is not None:
         starts += _board_starts(
@@ -143,7 +162,18 @@ def _board(sources: Sources) -> Board | None:
         return None
     if table.file is not None:
         return read_board(sources.path(table.file))
-    keys = ("kind", "columns", "rows", "square_m", "marker_m", "dictionary", "inverted", "legacy")
+    keys = (
+        "kind",
+        "columns",
+        "rows",
+        "square_m",
+        "marker_m",
+        "dictionary",
+        "inverted",
+        "legacy",
+        "two_sided",
+        "thickness_m",
+    )
     return board_from_table({key: v for key in keys if (v := getattr(table, key)) is not None}, "[board]")
 
 
@@ -210,6 +240,13 @@ def _board_starts(views: Views, known_lenses: dict[str, Camera], *, alone_is_eno
             "this chessboard looks the same after half a revolution, so cameras cannot be linked by it: use a board "
             "with an even and an odd number of inner corners, or a ChArUco board"
         )
+    if views.board.is_two_sided:
+        mirrored = find_mirrored_cameras([known_lenses[name] for name in views.cameras], views)
+        if mirrored:
+            raise CalibrationError(
+                f"{', '.join(mirrored)}: the board is seen mirrored, but no place behind it fits all moments: its "
+                "pictures are mirrored; switch off the camera's mirror image and record or convert anew"
+            )
     groups = [list(range(len(views.cameras)))] if alone_is_enough else views.groups()
     return [
         chain_cameras([known_lenses[views.cameras[c]] for c in group], views.select_cameras(group))[0]

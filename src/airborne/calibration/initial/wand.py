@@ -10,13 +10,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.diagnosis.images import check_mirroring
+from airborne.calibration.initial.pinhole_pose import resect_pinhole
 from airborne.calibration.initial.two_views import EpipolarGeometry, RelativePose, fit_epipolar_geometry, relative_pose
 from airborne.calibration.sources.wand import WandTracks
 from airborne.cameras.camera import Camera, Rig
@@ -30,8 +29,6 @@ _FOCAL_RATIOS = np.geomspace(
     0.45, 3.6, 10
 )  # focal length over the image's longer side: fields of view of 96 to 16 degrees
 _N_SAMPLE_FRAMES = 120  # frames that test a focal length
-_RESECTION_LIMIT_SHARE = 0.02  # of the longer side: how far a marker may lie off in a resection
-_INLIER_SHARE = 0.8  # least share of the markers within it
 _LEAST_FRONT = 0.75  # share of the markers in front of both cameras
 _MOST_LENGTH_VARIATION = 0.2  # relative standard deviation of the wand's length: beyond it a pair is useless
 
@@ -182,7 +179,7 @@ def _length_variation(
         return 0.0
     K_a, K_b = (_with_focal(cameras[i], focals[i]).K for i in (pair.a, pair.b))
     pose, points = _relative_pose(pair, rows, tracks, K_a=K_a, K_b=K_b)
-    _, variation = _scale(points, pair.is_inlier[rows], tracks)
+    _, variation = wand_scale(points, pair.is_inlier[rows], tracks)
     return min(variation + 1 - pose.front_share, _MOST_LENGTH_VARIATION)
 
 
@@ -198,7 +195,7 @@ def _relative_pose(
     return pose, points
 
 
-def _scale(points: Array, is_seen: NDArray[np.bool_], tracks: WandTracks) -> tuple[float, float]:
+def wand_scale(points: Array, is_seen: NDArray[np.bool_], tracks: WandTracks) -> tuple[float, float]:
     """Return the factor that gives the wand its lengths, and their relative standard deviation (robust)."""
     factors = [
         length / np.linalg.norm(points[:, a] - points[:, b], axis=1)[is_seen[:, a] & is_seen[:, b]]
@@ -244,7 +241,7 @@ def _chain_cameras(cameras: Sequence[Camera], pairs: Sequence[_Pair], tracks: Wa
         if counts[i] < _LEAST_SHARED:
             i, new = _place_by_link(cameras, posed, links)
         else:
-            new = _resect(cameras[i], points[is_triangulated], tracks.px[:, :, i][is_triangulated])
+            new = resect_pinhole(cameras[i], points[is_triangulated], tracks.px[:, :, i][is_triangulated])
         if new is None:
             raise CalibrationError(
                 f"the wand does not determine where camera '{cameras[i].name}' stands relative to "
@@ -271,7 +268,7 @@ def _links(cameras: Sequence[Camera], pairs: Sequence[_Pair], tracks: WandTracks
     for pair in pairs:
         rows = np.flatnonzero(pair.is_inlier.any(axis=1))
         pose, points = _relative_pose(pair, rows, tracks, K_a=cameras[pair.a].K, K_b=cameras[pair.b].K)
-        factor, variation = _scale(points, pair.is_inlier[rows], tracks)
+        factor, variation = wand_scale(points, pair.is_inlier[rows], tracks)
         least_variation = min(least_variation, variation)
         if pose.front_share < _LEAST_FRONT or variation > _MOST_LENGTH_VARIATION:
             continue
@@ -296,33 +293,3 @@ def _place_by_link(
                 pose = new_from_old * posed[old].camera_from_world
                 return new, replace(cameras[new], camera_from_world=pose)
     return next(i for i in range(len(cameras)) if i not in posed), None
-
-
-def _resect(camera: Camera, points: Array, px: Array) -> Camera | None:
-    """Return the camera that sees points (n, 3) [m] at px (n, 2), without distortion; None where no pose fits.
-
-    Raises CalibrationError where only a mirrored image fits.
-    """
-    is_seen = np.isfinite(px).all(axis=-1)
-    for finding in check_mirroring(camera.name, camera.size, points, px):
-        raise CalibrationError(finding.sentence)
-    cv2.setRNGSeed(0)
-    limit = _RESECTION_LIMIT_SHARE * max(camera.size)
-    is_solved, rotation_vector, t, inliers = cv2.solvePnPRansac(
-        points[is_seen],
-        px[is_seen],
-        camera.K,
-        None,
-        reprojectionError=limit,
-        iterationsCount=300,
-        flags=cv2.SOLVEPNP_SQPNP,
-    )
-    if (
-        not is_solved
-        or inliers is None
-        or len(inliers) < _INLIER_SHARE * is_seen.sum()
-        or not np.all(np.isfinite([rotation_vector, t]))
-    ):
-        return None
-    pose = RigidTransform.from_components(t.ravel(), Rotation.from_rotvec(rotation_vector.ravel()))
-    return replace(camera, camera_from_world=pose)

@@ -9,9 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.calibration.bundle import ALL_FIXED, Adjustment, FreeParameters, adjust
+from airborne.calibration.diagnosis.control_points import flatness
 from airborne.calibration.initial.chaining import Views, board_source, initial_lens
+from airborne.calibration.intrinsics.model_selection import candidates_for, choose_simplest, place_sd
+from airborne.calibration.intrinsics.physical import Pinhole
+from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras.camera import Camera, Lens, Rig
-from airborne.types import Array
+from airborne.types import Array, Progress
 
 LENS_MODELS: dict[Lens, tuple[tuple[str, FreeParameters], ...]] = {
     "brown": (
@@ -30,19 +34,23 @@ LENS_MODELS: dict[Lens, tuple[tuple[str, FreeParameters], ...]] = {
 }
 _N_FOLDS = 3  # parts of the views, each left out once
 _MOST_VIEWS = 30  # views that decide; more take longer and change nothing
+_FEWEST_POINTS, _LEAST_FLATNESS = 20, 0.05  # control points of a lens, and their thickness over extent
 _FEWEST_TO_CHOOSE = 9  # views; with fewer only the focal length and k1 are estimated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LensFit:
-    """One camera's lens fitted to its views of a board; the camera is at the world's origin."""
+    """One camera's lens fitted to its views of a board, the camera at the world's origin; or to control points."""
 
     camera: Camera
     model: str  # what is free, in words
     free: FreeParameters
-    n_views: int
+    n_views: int  # of a board; or points
     rms_px: float
-    held_out_rms_px: dict[str, float]  # by model, over the views left out: RMS of a view's corners, mean over views
+    held_out_rms_px: dict[
+        str, float
+    ]  # by model, over what was left out: RMS of a view's corners, mean over views; or of points
+    place_sd_m: Array | None = None  # (3,) of control points: with the lens model's error
 
 
 def choose_lens(
@@ -77,6 +85,37 @@ def choose_lens(
         n_views=len(row),
         rms_px=fit.rms_px(),
         held_out_rms_px={name: float(np.mean(score)) for name, score in scores.items()},
+    )
+
+
+def lenses_from_points(rig: Rig, points: ControlPoints, progress: Progress) -> dict[str, LensFit]:
+    """Fit the lenses of cameras that see many control points, from initial values; those with few are left out."""
+    fits = {}
+    for done, camera in enumerate(rig):
+        is_seen = points.is_seen_by(camera.name)
+        if is_seen.sum() >= _FEWEST_POINTS and flatness(points.world[is_seen]) >= _LEAST_FLATNESS:
+            px = points.px[is_seen, points.cameras.index(camera.name)]
+            fits[camera.name] = _lens_from_points(camera, points.world[is_seen], px)
+        progress(done + 1, len(rig))
+    return fits
+
+
+def _lens_from_points(camera: Camera, world: Array, px: Array) -> LensFit:
+    R = camera.camera_from_world.rotation.as_matrix()
+    terms = np.zeros(4 if camera.lens == "fisheye" else 5)
+    initial = Pinhole(R, camera.centre, camera.K[0, 0], camera.K[:2, 2], terms, camera.lens)
+    candidates = candidates_for(initial, world, px)
+    chosen = choose_simplest(candidates)
+    pinhole, model = chosen.pinhole, chosen.model
+    rms_px = {s.model.name: float(np.sqrt(np.mean(np.sum(s.held_out_px**2, axis=1)))) for s in candidates}
+    return LensFit(
+        camera=pinhole.camera(camera.name, camera.size),
+        model=model.name,
+        free=FreeParameters(principal_point=model.frees_principal_point, n_terms=len(model.terms)),
+        n_views=len(world),
+        rms_px=float(np.sqrt(np.mean(np.sum(chosen.residual_px**2, axis=1)))),
+        held_out_rms_px=rms_px,
+        place_sd_m=place_sd(chosen, candidates),
     )
 
 

@@ -6,9 +6,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from airborne.calibration.intrinsics.physical import Pinhole, PinholeModel, fit_pinhole
+from airborne.calibration.intrinsics.physical import (
+    FISHEYE_MODELS,
+    PINHOLE_MODELS,
+    WIDE_MODELS,
+    Pinhole,
+    PinholeModel,
+    fit_pinhole,
+    parameter_covariance,
+)
 from airborne.types import Array
+
+_MOST_ALONE, _N_FOLDS = 30, 10  # points left out one by one; of more points every tenth at once
+_N_PARTS = 25  # of an image, for the jackknife
+_COORDINATES_PER_PARAMETER = 3  # of a wide lens, at least: fewer points would bend it to their noise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,26 +52,85 @@ class Solution:
 
 
 def leave_one_out(pinhole: Pinhole, model: PinholeModel, world: Array, px: Array) -> Solution:
-    """Refit a pinhole by least squares without each point, starting from the fit to all."""
-    keep = ~np.eye(len(world), dtype=bool)
-    refits = tuple(fit_pinhole(pinhole, model, world[k], px[k]) for k in keep)
-    return Solution(model, pinhole, refits, world, px)
+    """Refit a pinhole by least squares without each point, of many points without every tenth, from the fit to all."""
+    n = len(world)
+    fold = np.arange(n) if n <= _MOST_ALONE else np.arange(n) % _N_FOLDS
+    refits = [fit_pinhole(pinhole, model, world[fold != k], px[fold != k]) for k in range(fold.max() + 1)]
+    return Solution(model, pinhole, tuple(refits[k] for k in fold), world, px)
 
 
-def models_for(models: Sequence[PinholeModel], n_points: int) -> list[PinholeModel]:
-    """Return the models with fewer free parameters than the coordinates that remain without one point."""
-    return [model for model in models if model.n_parameters < 2 * (n_points - 1)]
+def candidates_for(initial: Pinhole, world: Array, px: Array) -> list[Solution]:
+    """Return one camera fitted with every model that its points support, the simplest first.
+
+    A fisheye is offered the models of Kannala and Brandt alone, any other camera all models.
+    """
+    solutions, start = list[Solution](), initial
+    if initial.lens == "brown":
+        few = [model for model in PINHOLE_MODELS if model.n_parameters < 2 * (len(world) - 1)]
+        solutions = [leave_one_out(fit_pinhole(initial, model, world, px), model, world, px) for model in few]
+        start = next((s.pinhole for s in solutions if s.model.terms), initial)
+    for model in FISHEYE_MODELS if initial.lens == "fisheye" else WIDE_MODELS:
+        is_supported = _COORDINATES_PER_PARAMETER * model.n_parameters <= 2 * len(world)
+        if is_supported or not (solutions or model is not FISHEYE_MODELS[0]):
+            within = [
+                s.pinhole for s in solutions if s.model.lens == model.lens and set(s.model.terms) <= {*model.terms}
+            ]
+            pinhole = fit_pinhole(within[-1] if within else start, model, world, px)
+            solutions.append(leave_one_out(pinhole, model, world, px))
+    return sorted(solutions, key=lambda solution: solution.model.n_parameters)
 
 
 def choose_simplest(solutions: Sequence[Solution]) -> Solution:
-    """Return the first (simplest) solution that is not clearly worse than the best on held-out points.
+    """Return the first (simplest) solution that is not clearly worse than the best on held-out points."""
+    return as_good_as_best(solutions)[0]
+
+
+def as_good_as_best(solutions: Sequence[Solution]) -> list[Solution]:
+    """Return the solutions that are not clearly worse than the best on held-out points.
 
     Clearly: the mean difference of squared held-out errors, point by point, exceeds its standard error.
     """
     squares = [np.sum(solution.held_out_px**2, axis=1) for solution in solutions]
     best = min(squares, key=np.mean)
-    for solution, square in zip(solutions, squares, strict=True):
-        excess = square - best
-        if np.mean(excess) <= np.std(excess, ddof=1) / np.sqrt(len(excess)):
-            return solution
-    raise AssertionError("the best solution is never worse than itself")
+    excess = [square - best for square in squares]
+    return [
+        solution
+        for solution, own in zip(solutions, excess, strict=True)
+        if np.mean(own) <= np.std(own, ddof=1) / np.sqrt(len(own))
+    ]
+
+
+def place_sd(chosen: Solution, candidates: Sequence[Solution]) -> Array:
+    """Return the standard deviation of a camera's position (3,) [m], with the error of its lens model.
+
+    The larger of that of independent errors and that of a jackknife over parts of the image, where a lens that fits
+    badly errs alike; and the differences to the models that predict held-out points as well.
+    """
+    sd = np.sqrt(np.diag(parameter_covariance(chosen.pinhole, chosen.model, chosen.world, chosen.px)))[3:6]
+    others = [s.pinhole.centre - chosen.pinhole.centre for s in as_good_as_best(candidates)]
+    return np.hypot(np.maximum(sd, _jackknife_sd(chosen)), np.sqrt(np.mean(np.square(others), axis=0)))
+
+
+def _jackknife_sd(solution: Solution) -> Array:
+    """Return the standard deviation (3,) [m] of the position by leaving out parts of the image, one after another."""
+    centres = np.array([p.centre for p in dict.fromkeys(solution.refits)])
+    if len(solution.world) > _MOST_ALONE:
+        part = _parts_of_image(solution.px)
+        centres = np.array(
+            [
+                fit_pinhole(solution.pinhole, solution.model, solution.world[part != k], solution.px[part != k]).centre
+                for k in range(part.max() + 1)
+            ]
+        )
+    return np.sqrt((len(centres) - 1) * np.var(centres, axis=0))
+
+
+def _parts_of_image(px: Array) -> NDArray[np.integer]:
+    """Return each point's part (n,) of `_N_PARTS` parts with equally many points: columns, each cut into rows."""
+    n_side = round(_N_PARTS**0.5)
+    column = np.argsort(np.argsort(px[:, 0])) * n_side // len(px)
+    part = np.zeros(len(px), int)
+    for k in range(n_side):
+        own = column == k
+        part[own] = k * n_side + np.argsort(np.argsort(px[own, 1])) * n_side // own.sum()
+    return part

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import dual_annealing, least_squares
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.cameras.distortion import distort, undistort
+from airborne.calibration.bundle.lenses import cross_matrices, project_with_jacobian
+from airborne.cameras.camera import Camera, Lens
+from airborne.cameras.distortion import distort, distort_fisheye, undistort, undistort_fisheye
 from airborne.types import Array
 
 _ANNEALING_BOUNDS = np.array(
@@ -24,33 +26,50 @@ class PinholeModel:
 
     name: str
     frees_principal_point: bool = False
-    frees_k1: bool = False
+    terms: tuple[int, ...] = ()  # of the lens, by index: of `brown` k1 k2 p1 p2 k3 k4 k5 k6, of `fisheye` k1 to k4
+    lens: Lens = "brown"
 
     @property
     def n_parameters(self) -> int:
         """How many parameters are free."""
-        return 7 + 2 * self.frees_principal_point + self.frees_k1
+        return 7 + 2 * self.frees_principal_point + len(self.terms)
 
 
 SEVEN_PARAMETERS = PinholeModel("7 parameters")
 PINHOLE_MODELS = (
     SEVEN_PARAMETERS,
-    PinholeModel("7 + k1", frees_k1=True),
+    PinholeModel("7 + k1", terms=(0,)),
     PinholeModel("7 + principal point", frees_principal_point=True),
-    PinholeModel("7 + principal point + k1", frees_principal_point=True, frees_k1=True),
+    PinholeModel("7 + principal point + k1", frees_principal_point=True, terms=(0,)),
 )
-_PARAMETERS = ("turn_x_rad", "turn_y_rad", "turn_z_rad", "x_m", "y_m", "z_m", "focal_px", "u0_px", "v0_px", "k1")
+FISHEYE_MODELS = (  # Kannala and Brandt 2006
+    PinholeModel("7 + Kannala-Brandt k1 k2", terms=(0, 1), lens="fisheye"),
+    PinholeModel("7 + principal point + Kannala-Brandt k1 k2", True, (0, 1), "fisheye"),
+    PinholeModel("7 + principal point + Kannala-Brandt k1 to k4", True, (0, 1, 2, 3), "fisheye"),
+)
+WIDE_MODELS = (
+    FISHEYE_MODELS[0],
+    PinholeModel("7 + principal point + k1 k2", True, (0, 1)),
+    *FISHEYE_MODELS[1:],
+    PinholeModel("7 + principal point + k1 k2 p1 p2 k3", True, (0, 1, 2, 3, 4)),
+    PinholeModel("7 + principal point + rational k1 to k6 p1 p2", True, (0, 1, 2, 3, 4, 5, 6, 7)),
+)
+_MOST_ITERATIONS = 40  # of a fit; the rational model's terms nearly cancel, and would wander for thousands
+_PARAMETERS = ("turn_x_rad", "turn_y_rad", "turn_z_rad", "x_m", "y_m", "z_m", "focal_px", "u0_px", "v0_px")
+_FEWEST_TERMS = {"brown": 5, "fisheye": 4}  # that a camera keeps
+_TERM_NAMES = {"brown": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"), "fisheye": ("k1", "k2", "k3", "k4")}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pinhole:
-    """A camera with square pixels, no skew and one radial distortion term."""
+    """A camera with square pixels, no skew and a distorting lens."""
 
     R: Array  # (3, 3), camera from world
     centre: Array  # (3,) [m]
     focal_px: float
     principal_point: Array  # (2,) [px]
-    k1: float = 0.0
+    terms: Array = field(default_factory=lambda: np.zeros(5))  # of the lens, indexed by `PinholeModel.terms`
+    lens: Lens = "brown"
 
     @property
     def P(self) -> Array:
@@ -58,6 +77,19 @@ class Pinhole:
         f, (u0, v0) = self.focal_px, self.principal_point
         K = np.array([[f, 0, u0], [0, f, v0], [0, 0, 1]])
         return K @ np.column_stack([self.R, -self.R @ self.centre])
+
+    def camera(self, name: str, size: tuple[int, int], shift_sd_px: float = 0.0) -> Camera:
+        """Return the camera of a name and size (width, height) [px]."""
+        f, (u0, v0) = self.focal_px, self.principal_point
+        return Camera(
+            name=name,
+            K=np.array([[f, 0, u0], [0, f, v0], [0, 0, 1]]),
+            size=size,
+            camera_from_world=RigidTransform.from_components(-self.R @ self.centre, Rotation.from_matrix(self.R)),
+            distortion=self.terms,
+            lens=self.lens,
+            shift_sd_px=shift_sd_px,
+        )
 
     def depth(self, world: Array) -> Array:
         """Return how far in front of the camera points (..., 3) lie: (...) [m]."""
@@ -67,37 +99,59 @@ class Pinhole:
         """Project points (..., 3) [m]: (..., 2) [px]; points behind the camera come out mirrored."""
         xyz = (world - self.centre) @ self.R.T
         xy = xyz[..., :2] / xyz[..., 2:]
-        return self.focal_px * distort(xy, np.array([self.k1])) + self.principal_point
+        lens = distort_fisheye if self.lens == "fisheye" else distort
+        return self.focal_px * lens(xy, self.terms) + self.principal_point
 
     def undistort_px(self, px: Array) -> Array:
         """Undistort pixels (..., 2) [px]."""
         xy = (px - self.principal_point) / self.focal_px
-        return self.focal_px * undistort(xy, np.array([self.k1])) + self.principal_point
+        inverse = undistort_fisheye if self.lens == "fisheye" else undistort
+        return self.focal_px * inverse(xy, self.terms) + self.principal_point
+
+    def with_lens(self, model: PinholeModel) -> Pinhole:
+        """Return the camera with room for the model's lens terms; one of the other kind starts without distortion."""
+        n = 1 + max(model.terms, default=0)
+        terms = np.zeros(n) if model.lens != self.lens else np.pad(self.terms, (0, max(n - len(self.terms), 0)))
+        return replace(self, terms=np.pad(terms, (0, max(_FEWEST_TERMS[model.lens] - len(terms), 0))), lens=model.lens)
 
     def apply_step(self, model: PinholeModel, step: Array) -> Pinhole:
         """Return the camera with the model's free parameters changed by step (n_parameters,).
 
-        The order is that of `_PARAMETERS`, without those the model fixes; the rotation vector is about the camera's own
-        axes.
+        The order is that of `parameter_names`; the rotation vector is about the camera's own axes.
         """
+        terms = self.terms.copy()
+        terms[list(model.terms)] += step[-len(model.terms) :] if model.terms else 0.0
         return Pinhole(
             Rotation.from_rotvec(step[:3]).as_matrix() @ self.R,
             self.centre + step[3:6],
             self.focal_px + step[6],
             self.principal_point + (step[7:9] if model.frees_principal_point else 0.0),
-            self.k1 + (step[-1] if model.frees_k1 else 0.0),
+            terms,
+            self.lens,
         )
 
 
 def parameter_names(model: PinholeModel) -> tuple[str, ...]:
     """Return the names, with units, of the model's free parameters, in the order of `Pinhole.apply_step`."""
-    return _PARAMETERS[:7] + _PARAMETERS[7:9] * model.frees_principal_point + _PARAMETERS[9:] * model.frees_k1
+    lens_terms = tuple(_TERM_NAMES[model.lens][term] for term in model.terms)
+    return _PARAMETERS[:7] + _PARAMETERS[7:] * model.frees_principal_point + lens_terms
 
 
 def fit_pinhole(start: Pinhole, model: PinholeModel, world: Array, px: Array) -> Pinhole:
     """Return the camera near start that projects world (n, 3) [m] closest to px (n, 2) [px], by Levenberg-Marquardt."""
+    start, n = start.with_lens(model), model.n_parameters
     residual = _residual_of_step(start, model, world, px)
-    solution = least_squares(residual, np.zeros(model.n_parameters), method="lm", x_scale="jac", xtol=1e-10, ftol=1e-10)
+    slopes = _slopes_of_step(start, model, world) if model in WIDE_MODELS else "2-point"
+    solution = least_squares(
+        residual,
+        np.zeros(n),
+        jac=slopes,
+        method="lm",
+        x_scale="jac",
+        xtol=1e-10,
+        ftol=1e-10,
+        max_nfev=_MOST_ITERATIONS * (n + 1 if slopes == "2-point" else 1),
+    )
     return start.apply_step(model, solution.x)
 
 
@@ -138,3 +192,33 @@ def parameter_covariance(pinhole: Pinhole, model: PinholeModel, world: Array, px
 
 def _residual_of_step(start: Pinhole, model: PinholeModel, world: Array, px: Array) -> Callable[[Array], Array]:
     return lambda step: (start.apply_step(model, step).px_from_world(world) - px).ravel()
+
+
+def _slopes_of_step(start: Pinhole, model: PinholeModel, world: Array) -> Callable[[Array], Array]:
+    """Return the derivatives (2 n, n_parameters) of the projections at a step."""
+    own = [*range(7), *(8, 9) * model.frees_principal_point, *(10 + term for term in model.terms)]
+
+    def slopes(step: Array) -> Array:
+        pinhole, n = start.apply_step(model, step), len(world)
+        f, terms = pinhole.focal_px, np.pad(pinhole.terms, (0, 8 - len(pinhole.terms)))
+        intrinsics = np.array([f, f, *pinhole.principal_point, *terms])
+        _, by_camera, _ = project_with_jacobian(
+            np.broadcast_to(pinhole.R, (n, 3, 3)),
+            pinhole.centre,
+            np.broadcast_to(intrinsics, (n, 12)),
+            is_fisheye=np.full(n, pinhole.lens == "fisheye"),
+            world=world,
+        )
+        by_camera[:, :, 6] += by_camera[:, :, 7]  # square pixels
+        by_camera[:, :, :3] = by_camera[:, :, :3] @ _left_jacobian(step[:3])
+        return by_camera.reshape(2 * n, -1)[:, own]
+
+    return slopes
+
+
+def _left_jacobian(rotation: Array) -> Array:
+    """Return the derivative (3, 3) of `exp(rotation)`'s own small rotation by the rotation vector (3,)."""
+    angle, K = np.linalg.norm(rotation), cross_matrices(rotation[None])[0]
+    if angle < 1e-6:
+        return np.eye(3) + K / 2
+    return np.eye(3) + (1 - np.cos(angle)) / angle**2 * K + (angle - np.sin(angle)) / angle**3 * K @ K

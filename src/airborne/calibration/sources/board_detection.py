@@ -15,7 +15,8 @@ import numpy as np
 from airborne.calibration.diagnosis.clocks import check_image_counts
 from airborne.calibration.diagnosis.inputs import check_board, check_time_stamps
 from airborne.calibration.initial.chaining import Views
-from airborne.calibration.sources.boards import NO_CORNERS, Board, DetectedCorners, board_detector, match_print
+from airborne.calibration.sources.board_print import match_print, match_sides
+from airborne.calibration.sources.boards import NO_CORNERS, Board, DetectedCorners, board_detector
 from airborne.calibration.sources.files import CameraSource, Sources
 from airborne.cameras.finding import Finding
 from airborne.errors import CalibrationError
@@ -62,6 +63,7 @@ def detect_boards(sources: Sources, board: Board, progress: Progress) -> BoardDe
         raise CalibrationError("some cameras have a video and some pictures; give the same kind for all")
     samples = {camera.name: _sample_images(sources, camera) for camera in cameras}
     board, notes = match_print(board, [grey for own in samples.values() for grey in own])
+    board, side_notes = match_sides(board, samples)
     total = sum(len(own) for own in moments)
     n_moments = max(max(own.values(), default=-1) for own in moments) + 1
     rows, sizes, examples, done = [], {}, {}, 0
@@ -77,7 +79,9 @@ def detect_boards(sources: Sources, board: Board, progress: Progress) -> BoardDe
             progress(done, total)
         rows.append(tuple(row))
     views = Views(board, tuple(camera.name for camera in cameras), tuple(rows))
-    return BoardDetections(views, time_s, sizes, examples, notes, (*findings, *check_board(views, samples)))
+    return BoardDetections(
+        views, time_s, sizes, examples, (*notes, *side_notes), (*findings, *check_board(views, samples))
+    )
 
 
 def detect_lens_board(sources: Sources, camera: CameraSource, board: Board, progress: Progress) -> Views | None:

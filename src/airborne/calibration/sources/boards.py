@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -18,15 +18,17 @@ from airborne.errors import CalibrationError, one_line
 from airborne.io.text import read_toml
 from airborne.types import Array, Ints
 
-_FEWEST_CORNERS = 6  # of a view that determines the board's pose
+FEWEST_CORNERS = 6  # of a view that determines the board's pose
 _THINNEST = 0.05  # width over length of the detected corners: corners on one line leave a rotation free
-_ENOUGH_CORNERS = 2  # corners an image, on average, from which on the board is as described
 DICTIONARIES = tuple(sorted(name for name in dir(cv2.aruco) if re.match(r"DICT_[0-9A]", name)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Board:
-    """A flat printed board; its corners lie in the plane z = 0, x along a row, y down the rows, z into the paper."""
+    """A flat printed board; its corners lie in the plane z = 0, x along a row, y down the rows, z into the paper.
+
+    On a two-sided board the back is the mirror image of the front, each corner behind its own, `thickness_m` deeper.
+    """
 
     kind: Literal["charuco", "chessboard"]
     columns: int  # squares in a row; of a chessboard inner corners in a row
@@ -36,13 +38,16 @@ class Board:
     dictionary: str = "DICT_4X4_50"  # charuco
     is_inverted: bool = False  # printed white on black
     is_legacy: bool = False  # even rows begin with a marker, as OpenCV printed them before 4.6
+    is_two_sided: bool = False  # charuco
+    thickness_m: float = 0.0  # from the front to the back of a two-sided board [m]
 
     @property
     def corners(self) -> Array:
-        """The inner corners (n, 3) [m], row by row."""
+        """The inner corners (n, 3) [m], row by row; of a thick two-sided board then those of its back (2 n, 3)."""
         nx, ny = self.inner_size
         grid = np.stack(np.meshgrid(np.arange(nx), np.arange(ny)), axis=-1).reshape(-1, 2) * self.square_m
-        return np.column_stack([grid, np.zeros(len(grid))])
+        front = np.column_stack([grid, np.zeros(len(grid))])
+        return np.concatenate([front, front + np.array([0, 0, self.thickness_m])]) if self.thickness_m else front
 
     @property
     def inner_size(self) -> tuple[int, int]:
@@ -78,6 +83,8 @@ class _BoardTable(BaseModel):
     dictionary: str = "DICT_4X4_50"
     inverted: bool = False
     legacy: bool = False
+    two_sided: bool = False
+    thickness_m: float = Field(0.0, ge=0, le=0.2)
 
 
 def read_board(path: str | Path) -> Board:
@@ -114,6 +121,10 @@ def board_from_table(table: dict, where: str) -> Board:
     marker_m = checked.marker_m or checked.aruco_scale * square_m
     if marker_m >= square_m:
         raise CalibrationError(f"{where}: marker_m {marker_m} is not below square_m {square_m}; exchange them?")
+    if checked.kind == "chessboard" and (checked.two_sided or checked.thickness_m):
+        raise CalibrationError(
+            f"{where}: a chessboard looks the same from behind; leave two_sided and thickness_m out, or print a charuco"
+        )
     if min(checked.columns, checked.rows) < 3:
         raise CalibrationError(
             f"{where}: {checked.columns}×{checked.rows} is too small; a board has 3 columns and rows at least"
@@ -127,6 +138,8 @@ def board_from_table(table: dict, where: str) -> Board:
         dictionary=checked.dictionary,
         is_inverted=checked.inverted,
         is_legacy=checked.legacy,
+        is_two_sided=checked.two_sided or checked.thickness_m > 0,
+        thickness_m=checked.thickness_m,
     )
 
 
@@ -136,6 +149,7 @@ class DetectedCorners:
 
     corner: Ints  # (n,) rows of the board's corners
     px: Array  # (n, 2) [px]
+    is_back: bool = False  # of a two-sided board, seen from behind
 
 
 NO_CORNERS = DetectedCorners(np.zeros(0, int), np.zeros((0, 2)))
@@ -143,13 +157,17 @@ Detector = Callable[[NDArray[np.uint8]], DetectedCorners]
 
 
 def board_detector(board: Board) -> Detector:
-    """Return a detector of the board in grey images (h, w); too few corners, or all on a line, count as none."""
+    """Return a detector of the board in grey images (h, w); too few corners, or all on a line, count as none.
+
+    Of a two-sided board it sees the side with more corners.
+    """
     find = _charuco_finder(board) if board.kind == "charuco" else _chessboard_finder(board)
+    find = _two_sided_finder(board, find) if board.is_two_sided else find
     corners = board.corners[:, :2]
 
     def detect(grey: NDArray[np.uint8]) -> DetectedCorners:
         detected = find(255 - grey if board.is_inverted else grey)
-        if len(detected.corner) < _FEWEST_CORNERS:
+        if len(detected.corner) < FEWEST_CORNERS:
             return NO_CORNERS
         extent = np.linalg.svd(corners[detected.corner] - corners[detected.corner].mean(axis=0), compute_uv=False)
         return detected if extent[1] > _THINNEST * extent[0] else NO_CORNERS
@@ -157,33 +175,31 @@ def board_detector(board: Board) -> Detector:
     return detect
 
 
-def match_print(board: Board, pictures: Sequence[NDArray[np.uint8]]) -> tuple[Board, tuple[str, ...]]:
-    """Return the board with the pattern (legacy or not, inverted or not) of which most corners are detected.
-
-    The notes say what differs from the description; without any detection the board stays as it is.
-    """
-    if board.kind != "charuco" or not pictures:
-        return board, ()
-    described = (board.is_inverted, board.is_legacy)
-    counts = {described: _n_corners(board, pictures)}
-    kinds = [(inverted, legacy) for inverted in (False, True) for legacy in {False, board.rows % 2 == 0}]
-    for inverted, legacy in kinds if counts[described] < _ENOUGH_CORNERS * len(pictures) else ():
-        if (inverted, legacy) not in counts:
-            counts[inverted, legacy] = _n_corners(replace(board, is_inverted=inverted, is_legacy=legacy), pictures)
-    best = max(counts, key=counts.__getitem__)
-    if counts[best] <= 1.5 * counts[described]:
-        return board, ()
-    names = zip(("inverted", "legacy"), best, described, strict=True)
-    settings = " and ".join(f"{name} = {str(new).lower()}" for name, new, old in names if new != old)
-    return replace(board, is_inverted=best[0], is_legacy=best[1]), (
-        f"the board shows {counts[best]} corners with {settings}, {counts[described]} as described; "
-        f"went on with {settings}",
-    )
+def mirror_image(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return an image (h, w) with left and right exchanged."""
+    return np.ascontiguousarray(picture[:, ::-1])
 
 
-def _n_corners(board: Board, pictures: Sequence[NDArray[np.uint8]]) -> int:
-    detect = board_detector(board)
-    return sum(len(detect(picture).corner) for picture in pictures)
+def mirror_corners(detected: DetectedCorners, width: int) -> DetectedCorners:
+    """Return corners detected in an image of this width as they lie in its mirror image, of the board's other side."""
+    px = np.column_stack([width - 1 - detected.px[:, 0], detected.px[:, 1]])
+    return replace(detected, px=px, is_back=not detected.is_back)
+
+
+def _two_sided_finder(board: Board, find: Detector) -> Detector:
+    """Return a detector of either side: the back is searched in the mirrored image."""
+    n = board.inner_size[0] * board.inner_size[1]
+
+    def find_side(grey: NDArray[np.uint8]) -> DetectedCorners:
+        front = find(grey)
+        if len(front.corner) > n / 2:
+            return front
+        back = find(mirror_image(grey))
+        if len(back.corner) <= len(front.corner):
+            return front
+        return replace(mirror_corners(back, grey.shape[1]), corner=back.corner + (n if board.thickness_m else 0))
+
+    return find_side
 
 
 def _charuco_finder(board: Board) -> Detector:

@@ -54,6 +54,8 @@ class BoardSource(_Strict):
     dictionary: str | None = None
     inverted: bool | None = None
     legacy: bool | None = None
+    two_sided: bool | None = None  # the back is printed with the mirror image
+    thickness_m: Annotated[float, Field(ge=0, le=0.2)] | None = None  # of a two-sided board
     timestamps: str | None = None  # which frames belong together: sync_index,cam_id,frame_time
     sync: Literal["auto", "exact", "loose"] = "auto"  # loose: every image may lag behind the others
 

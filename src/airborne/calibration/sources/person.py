@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.bundle import CameraPrior, Source
+from airborne.calibration.bundle.lenses import N_PARAMETERS
 from airborne.calibration.initial.resection import (
     LEAST_RESECTION_VISIBILITY,
     MISPLACED_PX,
@@ -31,7 +32,7 @@ def calibration_prior(rig: Rig, trusted: Sequence[str], points: Array) -> Camera
 
     Half of the variance by each camera's position and half by its rotation; no prior on other cameras, nor on lenses.
     """
-    sd = np.full((len(rig), 15), np.inf)
+    sd = np.full((len(rig), N_PARAMETERS), np.inf)
     middle = np.median(points, axis=0)
     for row, camera in zip(sd, rig, strict=True):
         if camera.name in trusted:

@@ -6,7 +6,7 @@ focal lengths is taken.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import cv2
@@ -28,19 +28,23 @@ _LARGEST_LOG_CHANGE = 5.0  # bound of a step of the focal length's logarithm
 
 
 def initial_rig_from_points(
-    points: ControlPoints, sizes: Mapping[str, tuple[int, int]], lenses: Mapping[str, Camera] | None = None
+    points: ControlPoints,
+    sizes: Mapping[str, tuple[int, int]],
+    lenses: Mapping[str, Camera] | None = None,
+    *,
+    fisheyes: Collection[str] = (),
 ) -> Rig:
     """Return initial values of every camera that sees four known points or more.
 
-    lenses: cameras whose K and distortion are known; the others are pinholes with the principal point in the image's
-    middle. Robust against a few wrong clicks. Cameras with too few points are left out.
+    lenses: cameras whose K and distortion are known; the others are pinholes, or `fisheyes` without terms, with the
+    principal point in the image's middle. Robust against a few wrong clicks. Cameras with too few points are left out.
     """
     cameras = []
     for i, name in enumerate(points.cameras):
         is_seen = points.is_seen_by(name)
         if is_seen.sum() >= _N_POINTS:
             lens = (lenses or {}).get(name)
-            guesses = [lens] if lens is not None else _focal_guesses(name, sizes[name])
+            guesses = [lens] if lens is not None else _focal_guesses(name, sizes[name], is_fisheye=name in fisheyes)
             cameras.append(
                 _best_camera(guesses, points.world[is_seen], points.px[is_seen, i], is_lens_known=lens is not None)
             )
@@ -77,7 +81,7 @@ def scene_source(rig_names: Sequence[str], points: ControlPoints, *, name: str) 
     )
 
 
-def _focal_guesses(name: str, size: tuple[int, int]) -> list[Camera]:
+def _focal_guesses(name: str, size: tuple[int, int], *, is_fisheye: bool) -> list[Camera]:
     middle = (np.array(size) - 1) / 2
     focals = _FOCAL_RATIOS * max(size)
     return [
@@ -86,6 +90,8 @@ def _focal_guesses(name: str, size: tuple[int, int]) -> list[Camera]:
             K=np.array([[f, 0, middle[0]], [0, f, middle[1]], [0, 0, 1]]),
             size=size,
             camera_from_world=RigidTransform.identity(),
+            distortion=np.zeros(4 if is_fisheye else 5),
+            lens="fisheye" if is_fisheye else "brown",
         )
         for f in focals
     ]

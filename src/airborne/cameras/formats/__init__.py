@@ -4,6 +4,6 @@ A reader takes a file's text and what it does not say about itself (`FileOptions
 `Rig` and returns a text, with phrases on what the format cannot hold. `cameras/files.py` recognises the format.
 """
 
-from airborne.cameras.formats.options import FileOptions, PixelConvention, Size, Unit
+from airborne.cameras.formats.options import FileOptions, PixelConvention, Unit
 
-__all__ = ["FileOptions", "PixelConvention", "Size", "Unit"]
+__all__ = ["FileOptions", "PixelConvention", "Unit"]

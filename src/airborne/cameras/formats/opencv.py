@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from airborne.cameras.camera import Camera, Rig
-from airborne.cameras.formats.options import METRES, FileOptions, Size, Unit
-from airborne.cameras.formats.parsing import build_camera, distortion_terms, parse_array, refuse_fisheye
+from airborne.cameras.formats.options import METRES, FileOptions, Unit
+from airborne.cameras.formats.parsing import build_camera, distortion_terms, parse_array, refuse_lens
 from airborne.errors import CalibrationError
-from airborne.types import Array
+from airborne.types import Array, Size
 
 _EXPECTED = "expected OpenCV's YAML with K_<camera>, dist_<camera>, R_<camera>, T_<camera>"
 _HEADER = "%YAML:1.0\n---\n"
@@ -96,7 +96,7 @@ def _camera(document: dict[str, Any], where: str, name: str, *, key: str, option
         size=_size(document, where, name, key=key, options=options),
         rotation=_rotation(document, where, key),
         translation=options.metres("m") * _matrix(document, where, f"T_{key}", (3, 1), (1, 3)).ravel(),
-        distortion=_matrix(document, where, f"dist_{key}", (1, 4), (4, 1), (1, 5), (5, 1)).ravel(),
+        distortion=_matrix(document, where, f"dist_{key}", (1, 4), (4, 1), (1, 5), (5, 1), (1, 8), (8, 1)).ravel(),
     )
 
 
@@ -129,7 +129,7 @@ def _matrix(document: dict[str, Any], where: str, key: str, *shapes: tuple[int, 
 
 def _names(rig: Rig) -> str:
     for camera in rig:
-        refuse_fisheye(camera, "OpenCV's YAML")
+        refuse_lens(camera, "OpenCV's YAML", is_rational_held=True)
         if not _KEY.fullmatch(camera.name):
             raise CalibrationError(
                 f"camera '{camera.name}' cannot be a key of OpenCV's YAML; rename it with letters, digits, _ and -"

@@ -9,9 +9,8 @@ from typing import Literal
 import numpy as np
 
 from airborne.errors import CalibrationError
-from airborne.types import Array
+from airborne.types import Array, Size
 
-Size = tuple[int, int]  # (width, height) [px]
 Unit = Literal["m", "mm"]
 Corner = Literal["upper-left", "lower-left"]
 

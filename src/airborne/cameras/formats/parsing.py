@@ -7,14 +7,13 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras.camera import Camera
-from airborne.cameras.formats.options import Size
 from airborne.errors import CalibrationError
-from airborne.types import Array
+from airborne.types import Array, Size
 
 LARGEST_NUMBER = 1e9  # of any number in a calibration: metres, millimetres or pixels
 _LARGEST_SIZE_PX = 65_535  # what 16 bits hold
 _ROTATION_TOLERANCE = 1e-3  # how far nine numbers may be from a rotation
-_N_TERMS = {"brown": 5, "fisheye": 4}
+_N_TERMS = {"brown": (5, 8), "fisheye": (4,)}  # the numbers that a lens may have; 8: the rational model
 
 
 def parse_array(where: str, name: str, value: object, *shapes: tuple[int, ...]) -> Array:
@@ -45,19 +44,20 @@ def build_camera(
     """Build a camera from checked numbers; raises CalibrationError where they describe no camera.
 
     size (width, height) [px]; rotation (3,) Rodrigues or (3, 3), camera from world; translation (3,) [m]; distortion up
-    to five Brown terms k1, k2, p1, p2, k3, or the four of a fisheye.
+    to five Brown terms k1, k2, p1, p2, k3, the eight of the rational model, or the four of a fisheye.
     """
     if not (K[0, 0] > 0 and K[1, 1] > 0 and K[1, 0] == 0 and np.array_equal(K[2], [0, 0, 1])):
         raise CalibrationError(f"{where}: matrix is not [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with positive fx and fy")
     lens = "fisheye" if is_fisheye else "brown"
-    if len(distortion) > _N_TERMS[lens]:
-        raise CalibrationError(f"{where}: {len(distortion)} distortion terms; a {lens} lens has {_N_TERMS[lens]}")
+    n_terms = next((n for n in _N_TERMS[lens] if n >= len(distortion)), None)
+    if n_terms is None:
+        raise CalibrationError(f"{where}: {len(distortion)} distortion terms; a {lens} lens has {_N_TERMS[lens][-1]}")
     return Camera(
         name=name,
         K=K,
         size=parse_size(where, size),
         camera_from_world=RigidTransform.from_components(translation, _rotation(where, rotation)),
-        distortion=np.pad(distortion, (0, _N_TERMS[lens] - len(distortion))),
+        distortion=np.pad(distortion, (0, n_terms - len(distortion))),
         lens=lens,
     )
 
@@ -71,15 +71,18 @@ def parse_size(where: str, size: ArrayLike) -> Size:
 
 
 def distortion_terms(camera: Camera, n: int) -> list[float]:
-    """Return the camera's distortion in n terms, zeros where it has fewer."""
+    """Return the camera's distortion in n terms, zeros where it has fewer; all eight of the rational model."""
+    if camera.is_rational:
+        return camera.distortion.tolist()
     return np.pad(camera.distortion, (0, max(n - len(camera.distortion), 0)))[:n].tolist()
 
 
-def refuse_fisheye(camera: Camera, name_of_format: str) -> None:
-    """Raise CalibrationError for a fisheye lens in a format that cannot hold one."""
-    if camera.lens == "fisheye":
+def refuse_lens(camera: Camera, name_of_format: str, *, is_rational_held: bool = False) -> None:
+    """Raise CalibrationError for a fisheye lens, or the rational model, in a format that cannot hold it."""
+    if camera.lens == "fisheye" or (camera.is_rational and not is_rational_held):
+        lens = "fisheye lens" if camera.lens == "fisheye" else "rational lens model"
         raise CalibrationError(
-            f"camera '{camera.name}' has a fisheye lens, which {name_of_format} cannot hold; "
+            f"camera '{camera.name}' has a {lens}, which {name_of_format} cannot hold; "
             "write pose2sim, aniposelib or caliscope"
         )
 

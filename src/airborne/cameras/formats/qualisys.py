@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from airborne.cameras.camera import Camera, Rig
 from airborne.cameras.formats.options import FileOptions
-from airborne.cameras.formats.parsing import build_camera, parse_size, refuse_fisheye
+from airborne.cameras.formats.parsing import build_camera, parse_size, refuse_lens
 from airborne.cameras.formats.xml import attribute_numbers, xml_text
 from airborne.errors import CalibrationError
 
@@ -38,7 +38,7 @@ def qualisys_text(rig: Rig) -> str:
     root = ElementTree.Element("calibration", {"source": "airborne", "type": "regular"})
     cameras = ElementTree.SubElement(root, "cameras")
     for camera in rig:
-        refuse_fisheye(camera, "a Qualisys file")
+        refuse_lens(camera, "a Qualisys file")
         attributes = {"active": "1", "avg-residual": "nan", "model": "none", "serial": camera.name, "viewrotation": "0"}
         element = ElementTree.SubElement(cameras, "camera", attributes)
         right, bottom = camera.size[0] - 1, camera.size[1] - 1

@@ -11,7 +11,7 @@ from airborne.cameras.camera import Camera
 from airborne.cameras.formats.parsing import build_camera, distortion_terms, parse_array, parse_size
 
 _ROTATION_SHAPES = ((3,), (3, 3))  # a rotation vector or a matrix
-_TERM_SHAPES = {False: ((4,), (5,)), True: ((4,),)}  # by whether the lens is a fisheye
+_TERM_SHAPES = {False: ((4,), (5,), (8,)), True: ((4,),)}  # by whether the lens is a fisheye
 
 
 def camera_from_table(where: str, name: str, table: dict, metres: float) -> Camera:

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from airborne.cameras.camera import Camera, Rig
 from airborne.cameras.formats.options import FileOptions
-from airborne.cameras.formats.parsing import build_camera, parse_array, parse_size, refuse_fisheye
+from airborne.cameras.formats.parsing import build_camera, parse_array, parse_size, refuse_lens
 from airborne.cameras.formats.xml import attribute_numbers, xml_text
 from airborne.errors import CalibrationError
 
@@ -33,7 +33,7 @@ def vicon_text(rig: Rig) -> str:
     """Return a Vicon file; errors are not known and therefore NaN. Raises CalibrationError for a fisheye lens."""
     root = ElementTree.Element("Cameras", {"SOURCE": "airborne", "VERSION": "1"})
     for number, camera in enumerate(rig, 1):
-        refuse_fisheye(camera, "a Vicon file")
+        refuse_lens(camera, "a Vicon file")
         element = ElementTree.SubElement(root, "Camera", _attributes(camera, number))
         keys = ElementTree.SubElement(element, "KeyFrames")
         ElementTree.SubElement(keys, "KeyFrame", _key_frame(camera))

@@ -43,7 +43,7 @@ class Margins(NamedTuple):
     limits_rad: float  # to the nearest limit of a joint
 
 
-class Capsules(NamedTuple):
+class BodyVolume(NamedTuple):
     """The volume of a body at n times: c capsules."""
 
     start: Array  # (n, c, 3) world [m]
@@ -66,14 +66,14 @@ def margins_of(person: Person, poses: Poses, *, side: float) -> Margins:
     return Margins(float(lowest.min()), float(from_net.min()), float(slack.min()))
 
 
-def capsules_of(person: Person, poses: Poses, stature_m: float) -> Capsules:
+def capsules_of(person: Person, poses: Poses, stature_m: float) -> BodyVolume:
     """Return the volume of a person in n poses."""
     marks = person.landmarks(poses)
     starts, stops = (np.stack([marks[name] for name in names], axis=1) for names in list(zip(*_BONES, strict=True))[:2])
-    return Capsules(starts, stops, np.array([radius for *_, radius in _BONES]) * stature_m / 1.80)
+    return BodyVolume(starts, stops, np.array([radius for *_, radius in _BONES]) * stature_m / 1.80)
 
 
-def gap_m(one: Capsules, other: Capsules) -> float:
+def gap_m(one: BodyVolume, other: BodyVolume) -> float:
     """Return the least distance [m] between two players' capsules over n times; negative where they overlap."""
     (a, b, r), (c, d, s) = one, other
     distance = _segment_distances(a[:, :, None], b[:, :, None], c[:, None], d[:, None])

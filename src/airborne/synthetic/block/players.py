@@ -11,7 +11,7 @@ import numpy as np
 from airborne.body import BodyModel, Outfit, human18
 from airborne.errors import TrialError
 from airborne.synthetic.block.jump import build_jump
-from airborne.synthetic.block.margins import Capsules, capsules_of, margins_of
+from airborne.synthetic.block.margins import BodyVolume, capsules_of, margins_of
 from airborne.synthetic.block.motion import Movement, translate
 from airborne.synthetic.block.plan import JumpPlan, KeyPosture
 from airborne.synthetic.block.posture import Poses
@@ -192,7 +192,7 @@ def _move_clear_of_net(player: Player, duration_s: float) -> Player:
     return player.translate(np.array([0.0, player.side * max(CLEARANCE_M - margins.net_m, 0.0)]))
 
 
-def volume_over(player: Player, duration_s: float) -> Capsules:
+def volume_over(player: Player, duration_s: float) -> BodyVolume:
     """Return the volume of a player over a recording."""
     return capsules_of(player.movement.person, player.poses(sample_times(duration_s)), player.stature_m)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from airborne.cameras import Rig
 from airborne.errors import TrialError
-from airborne.synthetic.block.margins import Capsules, gap_m
+from airborne.synthetic.block.margins import BodyVolume, gap_m
 from airborne.synthetic.block.players import (
     CLEARANCE_M,
     Player,
@@ -210,7 +210,7 @@ def _draw_until(draw: Callable[[], Player], is_good: Callable[[Player], bool] = 
     raise TrialError("no room was found for all players; use another seed")
 
 
-def _is_clear(volume: Capsules, others: Sequence[Capsules]) -> bool:
+def _is_clear(volume: BodyVolume, others: Sequence[BodyVolume]) -> bool:
     """Say whether a player's volume is clear of all others; distant ones are not checked closely."""
     middle = volume[0][0].mean(axis=0)[:2]
     near = [other for other in others if np.linalg.norm(other[0][0].mean(axis=0)[:2] - middle) < _NEAR_M]

@@ -15,7 +15,7 @@ from airborne.kernels import kernel
 from airborne.tracking.capsules.outlines import BEHIND_M, border_in_row, outline, part_at
 from airborne.tracking.capsules.spans import (
     MOST_SPANS,
-    Border,
+    MapBorder,
     add_span,
     border_sum_at,
     border_value_at,
@@ -88,7 +88,7 @@ def capsule_evidence(discs, depth, classes, share, sums, contrast, origin, work,
             if b <= a:
                 continue
             cut, weight, split = border_in_row(discs[i], share[i], y, 0.5 * (a + b) + ox)
-            border = Border(cut - ox, weight, split)
+            border = MapBorder(cut - ox, weight, split)
             map_0, map_1 = sums[classes[i, 0], row], sums[classes[i, 1], row]
             at, from_k = a, -1  # the gaps that nearer capsules have left
             for k in range(taken + 1):

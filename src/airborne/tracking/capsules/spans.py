@@ -1,6 +1,6 @@
 """Spans of rows over maps stored as cumulative sums: the sum over a span costs two reads, however long it is.
 
-Where a row crosses from one map to another, a `Border` says how.
+Where a row crosses from one map to another, a `MapBorder` says how.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from airborne.kernels import kernel
 MOST_SPANS = 64  # disjoint ones in one row
 
 
-class Border(NamedTuple):
+class MapBorder(NamedTuple):
     """Where a row meets the border between the first and the second map of a capsule."""
 
     cut: Any  # x [px]

@@ -16,7 +16,7 @@ def gaussian_taps(sigma_px: float) -> np.ndarray:
 
 
 @kernel(fastmath=True)
-def blur(planes, taps_u, taps_v, out):
+def blur_planes(planes, taps_u, taps_v, out):
     """Blur planes (c, h, w) with separable symmetric taps (5,) into out; outside the planes the border is repeated."""
     c, h, w = planes.shape
     u0, u1, u2, u3, u4 = taps_u[0], taps_u[1], taps_u[2], taps_u[3], taps_u[4]

@@ -12,7 +12,7 @@ from airborne.appearance.lighting import fit_light, flatten_shading, shade_body
 from airborne.kernels import kernel
 from airborne.rendering.drawing import draw_maps
 from airborne.rendering.maps import surface_maps
-from airborne.tracking.model_based.blur import blur
+from airborne.tracking.model_based.blur import blur_planes
 from airborne.tracking.model_based.owners import find_owners
 from airborne.tracking.model_based.twist_equations import accumulate
 
@@ -26,7 +26,7 @@ def silhouette_equations(body, projection, observation, comparison, maps, sums, 
     x0, y0, x1, y1 = comparison.window
     owner, nearness = _draw(body, projection, maps, comparison.window)
     residual = np.empty((1, y1 - y0, x1 - x0), np.float32)
-    blur(observation.observed[:, y0:y1, x0:x1], comparison.taps_u, comparison.taps_v, residual)
+    blur_planes(observation.observed[:, y0:y1, x0:x1], comparison.taps_u, comparison.taps_v, residual)
     coverage = _mask_coverage(maps.part, comparison)
     shape = np.empty_like(residual)
     for y in range(y1 - y0):
@@ -90,7 +90,7 @@ def _mask_coverage(part, comparison):
     for y in range(y1 - y0):
         for x in range(x1 - x0):
             mask[0, y, x] = 1.0 if part[y + y0, x + x0] >= 0 else 0.0
-    blur(mask, comparison.taps_u, comparison.taps_v, coverage)
+    blur_planes(mask, comparison.taps_u, comparison.taps_v, coverage)
     return coverage
 
 
@@ -106,9 +106,9 @@ def _composite_equations(lit, is_faceted, part, owner, nearness, projection, obs
             for x in range(lit.shape[2]):
                 rendered = lit[k, y, x] if part[y + y0, x + x0] >= 0 else background[k, y + y0, x + x0]
                 sharp[k, y, x] = observed[k, y + y0, x + x0] - rendered
-    blur(sharp, taps_u, taps_v, residual)
+    blur_planes(sharp, taps_u, taps_v, residual)
     coverage = _mask_coverage(part, comparison)
     flatten_shading(part, is_faceted, x0, y0, lit)
     shape = sharp
-    blur(lit, taps_u, taps_v, shape)
+    blur_planes(lit, taps_u, taps_v, shape)
     return accumulate(residual, shape, coverage[0], owner, nearness, projection, observation, comparison, sums, blocks)

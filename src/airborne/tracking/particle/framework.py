@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airborne.tracking.particle.bootstrap import Particles, resample, reweight, uniform_particles
-from airborne.tracking.particle.observations import Observation
+from airborne.tracking.particle.observations import LegsObservation
 from airborne.tracking.particle.parts import N_PARTS, ends_of
 from airborne.tracking.particle.resampling import SCHEMES
 from airborne.tracking.particle.settings import LegsSettings
@@ -36,7 +36,9 @@ class Framework:
         """Return all points (n, 3)."""
         return particles.values.reshape(-1, 3)
 
-    def update(self, particles: Particles, observation: Observation, now: Situation) -> tuple[Particles, LegsEstimate]:
+    def update(
+        self, particles: Particles, observation: LegsObservation, now: Situation
+    ) -> tuple[Particles, LegsEstimate]:
         """Reweight by the colours of all parts."""
         log_likelihood = observation.log_likelihood(ends_of(particles.values), range(N_PARTS)).sum(axis=-1)
         particles = reweight(particles, log_likelihood)

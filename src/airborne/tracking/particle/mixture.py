@@ -14,7 +14,7 @@ import numpy as np
 
 from airborne.tracking.particle.bootstrap import Particles, resample, reweight, uniform_particles
 from airborne.tracking.particle.distances import TORSO_LENGTH_SD_M, length_term
-from airborne.tracking.particle.observations import Observation
+from airborne.tracking.particle.observations import LegsObservation
 from airborne.tracking.particle.parts import PELVIS, hip_ends, leg_ends, leg_parts
 from airborne.tracking.particle.resampling import SCHEMES
 from airborne.tracking.particle.settings import EstimateAs, LegsSettings
@@ -119,7 +119,7 @@ class Mixture:
         return np.concatenate([each.values.reshape(-1, 3) for each in (particles.hips, *particles.legs)])
 
     def update(
-        self, particles: MixtureParticles, observation: Observation, now: Situation
+        self, particles: MixtureParticles, observation: LegsObservation, now: Situation
     ) -> tuple[MixtureParticles, LegsEstimate]:
         """Reweight the hips, then each leg given the best hip, then every combination of the best of them."""
         hips_log_likelihood = observation.log_likelihood(hip_ends(particles.hips.values), PELVIS).sum(axis=-1)
@@ -132,7 +132,7 @@ class Mixture:
         return MixtureParticles(hips, (left, right)), self._combine(hips, left, right, best=best, now=now)
 
     def _update_leg(
-        self, leg: Particles, side: int, *, hip: Array, observation: Observation, now: Situation
+        self, leg: Particles, side: int, *, hip: Array, observation: LegsObservation, now: Situation
     ) -> Particles:
         values = leg.values
         leg_log_likelihood = observation.log_likelihood(leg_ends(values), leg_parts(side)).sum(axis=-1)

@@ -23,7 +23,7 @@ from airborne.types import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Observation:
+class LegsObservation:
     """One player's image regions at one time, as codes, with the references to compare them to."""
 
     references: References
@@ -78,7 +78,7 @@ def observe(
     *,
     tempered: bool = False,
     is_robust: bool = False,
-) -> Observation:
+) -> LegsObservation:
     """Encode the regions that any part uses; `used` (parts, views) is cleared where there is no region."""
     codes = tuple(
         look_up(region.rgb, references.tables[v]) if region is not None and used[:, v].any() else None
@@ -86,4 +86,4 @@ def observe(
     )
     used = used & np.array([code is not None for code in codes])
     stiffness = STIFFNESS / np.sqrt(max(used.any(axis=0).sum(), 1)) if tempered else STIFFNESS
-    return Observation(references, tuple(regions), codes, used, float(stiffness), is_robust)
+    return LegsObservation(references, tuple(regions), codes, used, float(stiffness), is_robust)

@@ -9,7 +9,7 @@ import numpy as np
 
 from airborne.body.legs import Legs
 from airborne.tracking.particle.bootstrap import Particles
-from airborne.tracking.particle.observations import Observation
+from airborne.tracking.particle.observations import LegsObservation
 from airborne.tracking.particle.settings import EstimateAs
 from airborne.types import Array
 
@@ -59,7 +59,7 @@ class Filter(Protocol):
         """Return all points of all particles (n, 3): the region of interest."""
         ...
 
-    def update(self, particles: Any, observation: Observation, now: Situation) -> tuple[Any, LegsEstimate]:
+    def update(self, particles: Any, observation: LegsObservation, now: Situation) -> tuple[Any, LegsEstimate]:
         """Reweight the particles by the observation, and estimate the points."""
         ...
 

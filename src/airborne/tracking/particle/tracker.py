@@ -13,7 +13,7 @@ from airborne.cameras import Rig
 from airborne.tracking.estimate import Status
 from airborne.tracking.particle.image_regions import LEARNING_MARGIN_M, centre_of, is_in_image, regions_of
 from airborne.tracking.particle.jump_state import SPEED_FRAMES, share_above, vertical_speed
-from airborne.tracking.particle.observations import Observation, observe
+from airborne.tracking.particle.observations import LegsObservation, observe
 from airborne.tracking.particle.occlusion import occlusion_share
 from airborne.tracking.particle.parts import N_PARTS, PARTS, ends_of
 from airborne.tracking.particle.references import References, learn_references
@@ -161,7 +161,7 @@ class LegsTracker:
         return state._replace(references=references), _estimate(player.name, frames, legs, observation)
 
 
-def _estimate(name: str, frames: Frames, legs: LegsEstimate, observation: Observation) -> PlayerEstimate:
+def _estimate(name: str, frames: Frames, legs: LegsEstimate, observation: LegsObservation) -> PlayerEstimate:
     parts = observation.log_likelihood(ends_of(legs.points[None]), range(N_PARTS))[0]
     score = float(parts.mean())
     sd_m = np.sqrt(np.trace(legs.covariance, axis1=-2, axis2=-1))

@@ -51,7 +51,7 @@ class RunEquations:
     @property
     def says_causes(self) -> bool:
         """Whether enough moments were registered."""
-        return np.count_nonzero(self.evidence.is_seen.any(axis=1)) >= _FEWEST_MOMENTS
+        return int(np.count_nonzero(self.evidence.is_seen.any(axis=1))) >= _FEWEST_MOMENTS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,7 +149,7 @@ def gather_equations(
     chosen = np.unique(np.linspace(0, len(seen) - 1, _MOST_MOMENTS).round().astype(int))
     rows, moments = [seen[i][0] for i in chosen], [seen[i][1] for i in chosen]
     evidence = _gather(RenderModel.of(model), rig, path, rows, moments, kept)
-    is_drawn = evidence.edge.any(axis=(1, 2, 3))
+    is_drawn = np.asarray(evidence.edge.any(axis=(1, 2, 3)))
     if not is_drawn.any():
         return None
     evidence, rows = evidence.select(is_drawn), list(np.array(rows)[is_drawn])

@@ -1,0 +1,143 @@
+"""Mix-ups of a trial's videos, before anything is tracked: the same file twice, files exchanged, mirrored images.
+
+At the start, each video's foreground, what is not in its median image, is compared with the body's silhouette in every
+camera: exchanged files agree with each other's cameras, a mirrored image with its own camera's silhouette mirrored.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import cv2
+import numpy as np
+
+from airborne.body import BodyModel, Pose
+from airborne.body.surface import surface_arrays
+from airborne.cameras import Camera
+from airborne.cameras.finding import Finding, join_names
+from airborne.errors import MistakesError
+from airborne.rendering import FLAT, render
+from airborne.run.folder import file_digest
+from airborne.trial.file import Trial
+from airborne.types import Array
+from airborne.video import Recording, VideoFacts, VideoSource
+from airborne.video.decoding import decode, rgb_from_decoded
+
+_SHORT_SIDE_PX = 180  # of the images compared
+_N_IMAGES, _N_BACKGROUND = 90, 24  # images on each side of the start that are read, and of which the median is made
+_LEAST_GREY = 15.0  # by which the foreground differs from the median image
+_RING_SHARE = 0.5  # of the silhouette's size: how far around it no foreground is expected
+_LEAST_AGREEMENT = 0.4  # of a silhouette in the right camera, from which on something can be said
+_MOST_OF_IT = 0.5  # share of that agreement which a camera given the wrong images has left, at most
+
+
+def refuse_same_files(trial: Trial) -> None:
+    """Raise MistakesError where cameras' videos have the same content; only files of the same length are read."""
+    files = {camera.name: trial.path(camera.video) for camera in trial.camera if trial.path(camera.video).is_file()}
+    lengths = {name: path.stat().st_size for name, path in files.items()}
+    cameras_of: dict[str, list[str]] = {}
+    for name, path in files.items():
+        if list(lengths.values()).count(lengths[name]) > 1:
+            cameras_of.setdefault(file_digest(path), []).append(name)
+    mistakes = [
+        f"cameras {join_names(names)} have the same video ({join_names([files[name].name for name in names])}); give "
+        "each camera its own"
+        for names in cameras_of.values()
+        if len(names) > 1
+    ]
+    if mistakes:
+        raise MistakesError(trial.name, mistakes)
+
+
+def refuse_mix_ups(recording: Recording, model: BodyModel, start: Pose) -> None:
+    """Raise MistakesError, naming the cameras, where the start's silhouettes fit the videos of other cameras."""
+    images = [
+        _foreground(recording, source, facts, camera)
+        for source, facts, camera in zip(recording.sources, recording.facts, recording.rig, strict=True)
+    ]
+    silhouettes = [_silhouette(model, start, camera) for camera in recording.rig]
+    findings = mix_ups_in(recording.rig.names, images, silhouettes)
+    if findings:
+        raise MistakesError("the videos", [finding.sentence for finding in findings])
+
+
+def mix_ups_in(names: tuple[str, ...], images: list[Array | None], silhouettes: list[Array]) -> list[Finding]:
+    """Return the mix-ups that foregrounds (h, w), None where there is none, and silhouettes (h, w) by camera show."""
+    own = [_agreement(image, silhouette) for image, silhouette in zip(images, silhouettes, strict=True)]
+    clear = [max(_LEAST_AGREEMENT, each / _MOST_OF_IT) for each in own]
+    findings = []
+    for a, b in combinations(range(len(names)), 2):
+        crossed = _agreement(images[a], silhouettes[b]), _agreement(images[b], silhouettes[a])
+        if crossed[0] >= clear[a] and crossed[1] >= clear[b]:
+            findings.append(
+                Finding(
+                    kind="swapped",
+                    what=_compare(names[a], own[a], crossed[0], f"in that of {names[b]}, whose video fits in turn"),
+                    advice=f"the videos of {names[a]} and {names[b]} are exchanged; exchange them back",
+                    cameras=(names[a], names[b]),
+                )
+            )
+    exchanged = {name for finding in findings for name in finding.cameras}
+    for i, name in enumerate(names):
+        mirrored = _agreement(images[i], silhouettes[i][:, ::-1])
+        if name not in exchanged and mirrored >= clear[i]:
+            findings.append(
+                Finding(
+                    kind="mirrored",
+                    what=_compare(name, own[i], mirrored, "once it is mirrored"),
+                    advice="its pictures are mirrored; switch that off in the camera, and record or convert anew",
+                    cameras=(name,),
+                )
+            )
+    return findings
+
+
+def _compare(name: str, own: float, other: float, how: str) -> str:
+    return f"the body at the start agrees with what moves in {name} to {max(own, 0):.0%}, to {other:.0%} {how}"
+
+
+def _agreement(image: Array | None, silhouette: Array) -> float:
+    """Return the share of foreground in a silhouette minus that in the ring around it; 0 where there is nothing."""
+    if image is None or image.shape != silhouette.shape or not silhouette.any():
+        return 0.0
+    reach = max(int(_RING_SHARE * np.sqrt(np.count_nonzero(silhouette))), 2)
+    around = cv2.dilate(silhouette.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) > 0
+    ring = around & ~silhouette
+    return float(image[silhouette].mean() - image[ring].mean()) if ring.any() else 0.0
+
+
+def _silhouette(model: BodyModel, start: Pose, camera: Camera) -> Array:
+    small = _small(camera)
+    return np.asarray(render(surface_arrays(model), model.with_pose(start), small.without_distortion(), FLAT).mask > 0)
+
+
+def _small(camera: Camera) -> Camera:
+    scale = max(min(camera.size) / _SHORT_SIDE_PX, 1.0)
+    size = round(camera.size[0] / scale), round(camera.size[1] / scale)
+    offset = ((scale - 1) / 2, (scale - 1) / 2)
+    return camera.resample(scale=(scale, scale), offset=offset, size=size)
+
+
+def _foreground(recording: Recording, source: VideoSource, facts: VideoFacts, camera: Camera) -> Array | None:
+    """Return what differs from the median image at the start, without distortion: (h, w); None past the video's end."""
+    small = _small(camera)
+    clock, rate = recording.sources[0], recording.facts[0].image_rate
+    start_s = clock.trial_time(recording.start / rate)
+    within_s = _N_IMAGES / facts.image_rate
+    every = max(1, 2 * _N_IMAGES // _N_BACKGROUND)
+    images, best, nearest_s = [], None, 1 / rate
+    for n, picture in enumerate(decode(source, facts)):
+        late_s = source.trial_time(picture.time_s) - start_s
+        if late_s > within_s:
+            break
+        if abs(late_s) < nearest_s or (n % every == 0 and late_s > -within_s):
+            grey = cv2.cvtColor(rgb_from_decoded(picture, facts), cv2.COLOR_RGB2GRAY)
+            images.append(cv2.resize(grey, small.size, interpolation=cv2.INTER_AREA))
+            if abs(late_s) < nearest_s:
+                best, nearest_s = images[-1], abs(late_s)
+    if best is None:
+        return None
+    differs = np.abs(best.astype(np.float32) - np.median(images, axis=0)) > _LEAST_GREY
+    px = np.stack(np.meshgrid(np.arange(small.size[0]), np.arange(small.size[1])), axis=-1).astype(float)
+    u, v = np.moveaxis(small.distort_px(px), -1, 0).astype(np.float32)
+    return cv2.remap(differs.astype(np.uint8), u, v, cv2.INTER_NEAREST) > 0
