@@ -32,7 +32,7 @@ from airborne.video import Frames, Recording
 
 _LEAST_FRAMES = 8  # moments at which the body must be tracked to estimate lags
 _MOST_PASSES = 4  # over the recording, with silhouettes
-_CONVERGED_S = 1e-4  # a step of theirs below it ends the iteration
+_CONVERGED_SDS = 0.3  # a step of theirs below this share of its sd ends the iteration
 _MOMENTS_PER_PERIOD = np.arange(-3, 4) / 2  # that an image may show [its period]
 
 
@@ -79,7 +79,7 @@ def _lags_by_silhouettes(measure: _Measure, lag_s: Array) -> CameraLags | None:
             return None
         step, sd_s = found
         lag_s = lag_s + step
-        if np.all(np.abs(step) < _CONVERGED_S):
+        if np.all(np.abs(step) <= _CONVERGED_SDS * sd_s):
             break
     return CameraLags(lag_s, sd_s, zeros, zeros)
 
