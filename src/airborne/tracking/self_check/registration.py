@@ -32,6 +32,7 @@ _SIGMA_PX = (4.0, 2.0, 1.2)  # blurs of the fine registration, coarse to fine
 _STEPS = 6  # at each blur
 _CLIP = 0.35  # a residual of the foreground this large has a quarter of the weight
 _LEAST_OVERLAP = 0.55  # correlation of silhouette and foreground below which a view says nothing
+_LEAST_CONTRAST = 0.1  # of the foreground, below which nothing stands out
 _FARTHEST = np.array([0.5, 0.5, 0.35, 0.3])  # offsets beyond these are mistakes [silhouettes' lengths, same, rad, log]
 _LEAST_GAIN = 0.02  # correlation that a far displacement must gain to be preferred to none
 
@@ -122,6 +123,8 @@ def register(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array | None
 
     Positive: the foreground lies right, down [px of the view's columns], turned clockwise [rad], is larger [log].
     """
+    if np.ptp(shown) < _LEAST_CONTRAST:
+        return None
     offset = np.append(_search(silhouette, shown), 0.0)  # the last: how much wider the outline is [px]
     for sigma in _SIGMA_PX:
         offset = _refine(silhouette, shown, offset, sigma)
