@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from airborne.body import files as bodies
 from airborne.body.files import read_body
-from airborne.body.human import LIMITS_DEG, PARENTS
+from airborne.body.human import BALL_LIMITS_DEG, HINGE_LIMITS_DEG, PARENTS
 from airborne.body_fitting.from_trial import PICTURE
 from airborne.cli import app
 from airborne.evaluation import PlayerErrors, PlayersComparison
@@ -183,6 +183,7 @@ MODELS = {
     "Body": bodies._BodyTable,
     "`[[segment]]`": bodies._SegmentTable,
     "`[[segment.part]]`": bodies._PartTable,
+    "`[segment.limits]`": bodies._LimitsTable,
     "`[segment.inertia]`": bodies._InertiaTable,
     "`[[landmark]]`": bodies._LandmarkTable,
 }
@@ -317,8 +318,10 @@ def test_the_segments_of_a_person_and_their_limits_are_documented():
     middle_and_left = {name: parent for name, parent in PARENTS.items() if not name.endswith("_right")}
     assert list(rows) == list(middle_and_left)
     assert {name: row[0].strip("`") for name, row in rows.items()} == middle_and_left | {"pelvis": "the root"}
-    limits = {name: tuple(tuple(map(float, cell.split(" to "))) for cell in rows[name][1:]) for name in LIMITS_DEG}
-    assert limits == LIMITS_DEG
+    limits = BALL_LIMITS_DEG | HINGE_LIMITS_DEG
+    documented = {name: tuple(tuple(map(float, cell.split())) for cell in rows[name][1:3]) for name in limits}
+    assert documented == limits
+    assert {name for name, row in rows.items() if row[3] == "an ellipse"} == set(BALL_LIMITS_DEG)
 
 
 def test_the_landmarks_of_a_person_are_documented():

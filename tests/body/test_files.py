@@ -1,5 +1,7 @@
 """Body files: what is read, and what is refused in one line."""
 
+import re
+
 import numpy as np
 import pytest
 import trimesh
@@ -19,6 +21,7 @@ from airborne.body import (
     surface_arrays,
 )
 from airborne.body.files import body_toml, mesh_files, read_body, write_body
+from airborne.body.limits import JointLimits
 from airborne.errors import BodyError
 from tests.support.tolerances import EXACT
 
@@ -111,21 +114,25 @@ def test_file_holds_segments_parts_positions_and_colours(tmp_path):
     ("old", "new", "expected"),
     [
         ('name = "leg"', 'name = "leg"\nheight = 3', "height: unknown key"),
-        ('name = "leg"', "", "name: is missing"),
-        ("centre_m", "center_m", "segment.0.part.0.center_m: unknown key"),
+        ('name = "leg"', "", "name is missing"),
+        ("centre_m", "center_m", "part 'upper': center_m: unknown key; did you mean centre_m?"),
         ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, -0.2, 0.4]", "part 'upper': size_m is [0.1, -0.2, 0.4]"),
-        ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2, nan]", "segment.0.part.0.size_m.2: expected a finite"),
-        ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2]", "segment.0.part.0.size_m"),
+        (
+            "size_m = [0.1, 0.2, 0.4]",
+            "size_m = [0.1, 0.2, nan]",
+            "part 'upper': size_m.2: expected a finite",
+        ),
+        ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2]", "segment 'thigh': part 'upper': size_m"),
         ("size_m = [0.1, 0.2, 0.4]", "", "part 'upper' is a box and needs size_m"),
         ("size_m = [0.1, 0.2, 0.4]", "semi_axes_m = [1, 1, 1]", "part 'upper' is a box and needs size_m"),
         ("semi_axes_m = [0.05, 0.06, 0.2]", 'semi_axes_m = [1, 1, 1]\nfile = "a.obj"', "file does not belong to it"),
         ("semi_axes_m = [0.05, 0.06, 0.2]", "semi_axes_m = [1, 0, 1]", "part 'lower': semi_axes_m is [1.0, 0.0, 1.0]"),
-        ('shape = "box"', 'shape = "cone"', "segment.0.part.0.shape"),
+        ('shape = "box"', 'shape = "cone"', "part 'upper': shape"),
         ("colour_srgb = [10, 20, 30]", "", "part 'upper' needs colour_srgb"),
         ('colour = "sample"', 'colour = "sample"\ncolour_srgb = [1, 2, 3]', "part 'lower' needs colour_srgb"),
         ("colour_srgb = [10, 20, 30]", "colour_srgb = [10, 20, 256]", "colour_srgb.2"),
-        ("colour_srgb = [10, 20, 30]", "colour_srgb = [10, 20]", "segment.0.part.0.colour_srgb"),
-        ('colour = "sample"', 'colour = "guess"', "segment.1.part.0.colour"),
+        ("colour_srgb = [10, 20, 30]", "colour_srgb = [10, 20]", "part 'upper': colour_srgb"),
+        ('colour = "sample"', 'colour = "guess"', "part 'lower': colour"),
         ('parent = "thigh"', 'parent = "hip"', "parent 'hip' must stand before it; so far: thigh"),
         ('parent = "thigh"', "", "exactly the first segment has no parent"),
         ('name = "shank"', 'name = "thigh"', "two segments are named 'thigh'"),
@@ -225,6 +232,19 @@ def test_open_mesh_is_refused(tmp_path):
     assert "lump.obj: the mesh is not closed" in complaint(tmp_path, MESH.replace("FILE", "lump.obj"))
 
 
+def test_a_mesh_with_a_few_bad_edges_is_taken_with_a_note_that_counts_and_places_them(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+    hole = ball.triangles_center[0]
+    ball.update_faces(np.arange(len(ball.faces)) > 0)
+    ball.export(tmp_path / "lump.obj")
+    (note,) = read(tmp_path, MESH.replace("FILE", "lump.obj")).notes
+    assert note.startswith("lump.obj: 3 of 1920 edges do not have two faces, at (")
+    places = np.array([[float(x) for x in each.split(",")] for each in re.findall(r"\(([^)]*)\)", note)])
+    assert np.linalg.norm(places - hole, axis=1).max() < 0.02
+    trimesh.creation.icosphere(subdivisions=3, radius=0.1).export(tmp_path / "lump.obj")
+    assert read(tmp_path, MESH.replace("FILE", "lump.obj")).notes == ()
+
+
 def test_measures_in_millimetres_are_noticed(tmp_path):
     trimesh.creation.box(extents=[100, 200, 300]).export(tmp_path / "lump.stl")
     assert "is in millimetres" in complaint(tmp_path, MESH.replace("FILE", "lump.stl"))
@@ -234,8 +254,10 @@ def test_measures_in_millimetres_are_noticed(tmp_path):
 
 def test_file_says_limits_slabs_inertia_and_landmarks(tmp_path):
     thigh, shank = (model := read(tmp_path, FULL)).segments
-    np.testing.assert_array_equal(thigh.limits_rad, np.tile([-np.inf, np.inf], (3, 1)))
-    np.testing.assert_allclose(shank.limits_rad, np.radians([[-5, 140], [0, 0], [-np.inf, 10]]), atol=EXACT)
+    assert not thigh.limits.is_limited
+    np.testing.assert_allclose(shank.limits.half_rad, np.radians([72.5, 0, 95]), atol=EXACT)
+    np.testing.assert_allclose(shank.limits.centre_angles_rad, np.radians([67.5, 0, -85]), atol=EXACT)
+    assert model.notes == ("body: limits_deg of shank are read as a swing and a twist",)
     assert shank.parts[0].slab_m == (-np.inf, 0.05)
     assert thigh.inertia is None
     assert shank.inertia.mass_kg == 3.5
@@ -250,25 +272,25 @@ def test_file_says_limits_slabs_inertia_and_landmarks(tmp_path):
     [
         ("[[-5, 140], ", "[[140, -5], ", "segment 'shank': each joint limit needs a least and a greatest angle"),
         ("[[-5, 140], ", "[[nan, 140], ", "segment 'shank': each joint limit needs a least and a greatest angle"),
-        ("[[-5, 140], ", "[", "segment.1.limits_deg"),
-        ("[[-5, 140], ", "[[-5], ", "segment.1.limits_deg.0"),
+        ("[[-5, 140], ", "[", "segment 'shank': limits_deg"),
+        ("[[-5, 140], ", "[[-5], ", "segment 'shank': limits_deg.0"),
         ("slab_m = [-inf, 0.05]", "slab_m = [0.05, -0.05]", "part 'lower': slab_m is [0.05, -0.05]"),
         ("slab_m = [-inf, 0.05]", "slab_m = [nan, 0.05]", "part 'lower': slab_m"),
-        ("slab_m = [-inf, 0.05]", "slab_m = [0.05]", "segment.1.part.0.slab_m"),
+        ("slab_m = [-inf, 0.05]", "slab_m = [0.05]", "slab_m"),
         ("rotation_deg = [10", "slab_m = [0, 0.1]\nrotation_deg = [10", "part 'upper': only an ellipsoid can be cut"),
-        ("mass_kg = 3.5", "mass_kg = 0", "segment.1.inertia.mass_kg"),
-        ("mass_kg = 3.5", "", "segment.1.inertia.mass_kg: is missing"),
+        ("mass_kg = 3.5", "mass_kg = 0", "segment 'shank': inertia.mass_kg"),
+        ("mass_kg = 3.5", "", "inertia.mass_kg is missing"),
         ("[[0.05, 0.0, 0.0], ", "[[0.05, 0.01, 0.0], ", "segment 'shank': tensor_kg_m2 belongs to no solid"),
         ("[[0.05, 0.0, 0.0], ", "[[0.5, 0.0, 0.0], ", "segment 'shank': tensor_kg_m2 belongs to no solid"),
         ("[[0.05, 0.0, 0.0], ", "[[-0.05, 0.0, 0.0], ", "segment 'shank': tensor_kg_m2 belongs to no solid"),
-        ("[[0.05, 0.0, 0.0], ", "[", "segment.1.inertia.tensor_kg_m2"),
+        ("[[0.05, 0.0, 0.0], ", "[", "segment 'shank': inertia.tensor_kg_m2"),
         (
             'name = "ankle"\nsegment = "shank"',
             'name = "ankle"\nsegment = "foot"',
             "landmark 'ankle': no segment 'foot'",
         ),
         ('name = "ankle"', 'name = "knee"', "two landmarks of body 'leg' share a name"),
-        ("position_m = [0.0, 0.0, -0.4]", "position_m = [0.0, inf, -0.4]", "landmark.1.position_m"),
+        ("position_m = [0.0, 0.0, -0.4]", "position_m = [0.0, inf, -0.4]", "position_m"),
     ],
 )
 def test_faulty_limit_slab_inertia_or_landmark_is_refused_in_one_line(tmp_path, old, new, expected):
@@ -286,7 +308,7 @@ def same(a, b):
     pairs = [(m.position_m, n.position_m) for m, n in zip(a.landmarks, b.landmarks, strict=True)]
     for s, u in zip(a.segments, b.segments, strict=True):
         assert (s.name, s.inertia is None) == (u.name, u.inertia is None)
-        pairs += [(s.joint_m, u.joint_m), (s.limits_rad, u.limits_rad)]
+        pairs += [(s.joint_m, u.joint_m), (s.limits.half_rad, u.limits.half_rad), (s.limits.centre, u.limits.centre)]
         if s.inertia is not None:
             pairs += [(getattr(s.inertia, k), getattr(u.inertia, k)) for k in ("mass_kg", "centre_m", "tensor_kg_m2")]
         for p, q in zip(s.parts, u.parts, strict=True):
@@ -331,7 +353,7 @@ def random_body(seed):
     inertia = Inertia(float(rng.uniform(1, 9)), rng.normal(size=3), np.diag(rng.uniform(0.6, 1, 3)))
     segments = (
         Segment("root", None, np.zeros(3), parts[:2], inertia=inertia),
-        Segment("limb", "root", rng.normal(size=3), (), limits),
+        Segment("limb", "root", rng.normal(size=3), (), JointLimits.from_angles(limits)),
         Segment("tip", "limb", rng.normal(size=3), parts[2:]),
     )
     landmarks = (Landmark("end", "tip", rng.normal(size=3)), Landmark("root", "limb", np.zeros(3)))

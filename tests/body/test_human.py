@@ -8,6 +8,7 @@ from airborne.body import SAMPLED, Ellipsoid, Pose, human18, human18_from_measur
 from airborne.body.anthropometry import measurements_of, segment_properties
 from airborne.body.human import PARENTS
 from airborne.errors import BodyError
+from airborne.geometry.rotations import matrix_from_angles
 from tests.support.bodies import total_inertia
 from tests.support.tolerances import EXACT, ROUNDTRIP
 from tests.support.yeadon_oracle import ANGLES, SEGMENTS, random_configuration, same_pose, yeadon_person
@@ -37,7 +38,7 @@ def test_it_is_the_papers_tree_of_18_segments_with_57_degrees_of_freedom():
     assert {segment.name: segment.parent for segment in model.segments} == PARENTS
     assert [segment.name for segment in model.segments] == list(PARENTS)
     assert 6 + 3 * (len(model.segments) - 1) == 57
-    assert model.limits_rad.shape == (17, 3, 2)
+    assert model.limits.half_rad.shape == (17, 3)
 
 
 def test_landmarks_are_joint_centres_balls_of_the_feet_hands_and_head():
@@ -145,8 +146,9 @@ def test_right_is_left_in_a_mirror():
         np.testing.assert_allclose(twin.inertia.centre_m, flip * segment.inertia.centre_m, atol=EXACT)
         tensor = segment.inertia.tensor_kg_m2 * np.outer(flip, flip)
         np.testing.assert_allclose(twin.inertia.tensor_kg_m2, tensor, atol=EXACT)
-        (x, y, z), (tx, ty, tz) = segment.limits_rad, twin.limits_rad
-        np.testing.assert_array_equal([tx, -ty[::-1], -tz[::-1]], [x, y, z])
+        np.testing.assert_array_equal(twin.limits.half_rad, segment.limits.half_rad)
+        mirrored_centre = segment.limits.centre * np.outer(flip, flip)
+        np.testing.assert_allclose(twin.limits.centre, mirrored_centre, atol=EXACT)
         for p, q in zip(segment.parts, twin.parts, strict=True):
             np.testing.assert_allclose(q.shape.semi_axes_m, p.shape.semi_axes_m, atol=EXACT)
             centre = flip * p.segment_from_part.translation
@@ -244,20 +246,55 @@ def test_joints_turn_the_way_their_limits_say(movement, segment, axis, sign, lan
     moved = positions(posed(**{segment: angles}))[landmark] - positions(posed())[landmark]
     assert moved @ direction > 0.5 * np.linalg.norm(moved) > 0.005
     model = human18()
-    limit = model.segments[model.index_of(segment)].limits_rad[axis]
-    assert (limit[1] if sign > 0 else -limit[0]) >= np.radians(10), "the joint can do it"
+    limits = model.segments[model.index_of(segment)].limits
+    turned = matrix_from_angles(np.radians(10) * angles / 15)
+    assert limits.slack(turned) > -np.radians(0.5), "the joint can do it"
 
 
-def test_angles_of_the_clinic_are_the_limits():
-    degrees = {s.name: np.degrees(s.limits_rad).round(9).tolist() for s in human18().segments[1:]}
-    assert degrees["thigh_left"] == [[-125, 30], [-45, 25], [-40, 60]]
-    assert degrees["thigh_right"] == [[-125, 30], [-25, 45], [-60, 40]]
-    assert degrees["shank_right"][0] == [-5, 140]
-    assert degrees["upper_arm_right"][:2] == [[-180, 60], [-45, 180]]
-    assert degrees["forearm_left"] == [[-145, 5], [-5, 5], [-90, 90]]
-    assert degrees["foot_left"][0] == [-30, 50]
-    limits = human18().limits_rad
-    assert np.all(limits[..., 0] < 0) and np.all(limits[..., 1] > 0), "the zero pose is well within"
+CLINIC = [  # AAOS, Joint Motion (1965): x-y-z angles [deg] that healthy adults reach
+    ("thigh_left", (-120, 0, 0)),
+    ("thigh_left", (30, 0, 0)),
+    ("thigh_left", (0, -40, 0)),
+    ("thigh_left", (-90, 0, 45)),
+    ("thigh_right", (-90, 0, -45)),
+    ("shank_right", (0, 0, 0)),
+    ("shank_right", (140, 0, 0)),
+    ("forearm_left", (-150, 0, 0)),
+    ("forearm_left", (-90, 0, 80)),
+    ("foot_left", (-30, 0, 0)),
+    ("foot_left", (50, 0, 0)),
+    ("upper_arm_left", (-180, 0, 0)),
+    ("upper_arm_left", (0, -180, 0)),
+    ("upper_arm_right", (0, 180, 0)),
+    ("upper_arm_left", (60, 0, 0)),
+    ("upper_arm_left", (0, -90, 90)),
+    ("upper_arm_left", (0, -90, -70)),
+    ("upper_arm_right", (-90, 0, 0)),
+]
+
+
+@pytest.mark.parametrize(("segment", "angles_deg"), CLINIC)
+def test_what_healthy_adults_reach_is_within_the_limits(segment, angles_deg):
+    limits = (model := human18()).segments[model.index_of(segment)].limits
+    assert limits.slack(matrix_from_angles(np.radians(angles_deg))) > -np.radians(1)
+
+
+@pytest.mark.parametrize(
+    ("segment", "angles_deg"),
+    [
+        ("shank_left", (-20, 0, 0)),
+        ("forearm_right", (30, 0, 0)),
+        ("upper_arm_left", (0, 90, 0)),
+        ("foot_left", (90, 0, 0)),
+    ],
+)
+def test_what_nobody_reaches_is_beyond_the_limits(segment, angles_deg):
+    limits = (model := human18()).segments[model.index_of(segment)].limits
+    assert limits.slack(matrix_from_angles(np.radians(angles_deg))) < -np.radians(10)
+
+
+def test_the_zero_pose_is_well_within_the_limits():
+    assert np.all(human18().limits.slack(np.eye(3)) > np.radians(3))
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import BodyModel, Ellipsoid, Landmark, Part, Pose, Segment, human18, with_segment_lengths
 from airborne.body.inverse_kinematics import CORE, fit_lengths, fit_pose
 from airborne.errors import BodyError
-from airborne.geometry.rotations import geodesic
+from airborne.geometry.rotations import angles_from_matrix, geodesic
 
 MODEL = human18(1.75, 70.0)
 NAMES = [landmark.name for landmark in MODEL.landmarks]
@@ -19,13 +19,14 @@ PRONE = Rotation.from_euler("x", 90, degrees=True).as_matrix()
 
 def pose_within_limits(rng, share, R=None):
     """Joint angles anywhere up to a share of the way from straight to each limit."""
-    low, high = MODEL.limits_rad[..., 0], MODEL.limits_rad[..., 1]
-    straight = np.clip(0.0, low, high)
-    far = np.where(rng.random(low.shape) < 0.5, low, high)
+    limits = MODEL.limits
+    straight = limits.nearest(limits.coordinates(np.eye(3)))
+    far = np.where(rng.random(straight.shape) < 0.5, -1, 1) * limits.half_rad
+    turned = limits.rotation(limits.nearest(straight + share * rng.random(straight.shape) * (far - straight)))
     rotation = Rotation.random(rng=rng) if R is None else Rotation.from_matrix(R)
     return Pose(
         world_from_root=RigidTransform.from_components(rng.normal(size=3), rotation),
-        joint_angles=straight + share * rng.random(low.shape) * (far - straight),
+        joint_angles=angles_from_matrix(turned),
     )
 
 
@@ -37,18 +38,12 @@ def landmarks(pose, names=NAMES, model=MODEL):
     )
 
 
-def is_within_limits(pose):
-    return np.all(pose.joint_angles >= MODEL.limits_rad[..., 0]) and np.all(
-        pose.joint_angles <= MODEL.limits_rad[..., 1]
-    )
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_landmarks_of_any_pose_within_the_limits_are_met_to_a_millimetre(seed):
     pose = pose_within_limits(np.random.default_rng(seed), 0.5)
     fit = fit_pose(MODEL, landmarks(pose))
     assert max(fit.residual_m.values()) < 1e-3
-    assert is_within_limits(fit.pose)
+    assert MODEL.is_within_limits(fit.pose)
     assert fit.note is None
 
 
@@ -75,7 +70,7 @@ def test_landmarks_wrong_by_20_mm_give_a_pose_within_limits_that_is_little_worse
     pose = pose_within_limits(rng, 0.3)
     targets = {name: place + rng.normal(0, 0.02, 3) for name, place in landmarks(pose, LIMBS).items()}
     fit = fit_pose(MODEL, targets)
-    assert is_within_limits(fit.pose)
+    assert MODEL.is_within_limits(fit.pose)
     assert fit.rms_m < 0.02 * np.sqrt(3), "no further off than the truth is"
     true, found = landmarks(pose), landmarks(fit.pose)
     assert np.sqrt(np.mean([np.sum((found[name] - true[name]) ** 2) for name in LIMBS])) < 0.035
@@ -93,7 +88,7 @@ def test_limits_hold_however_far_the_targets_lie_beyond_them():
     knee, ankle = targets["knee_left"], targets["ankle_left"]
     targets["ankle_left"] = knee + Rotation.from_euler("x", -60, degrees=True).apply(ankle - knee)  # bent forward
     fit = fit_pose(MODEL, targets)
-    assert is_within_limits(fit.pose)
+    assert MODEL.is_within_limits(fit.pose)
     assert fit.residual_m["ankle_left"] > 0.05
 
 
@@ -133,7 +128,7 @@ def test_search_from_a_start_stays_with_it():
     pose = pose_within_limits(rng, 0.4)
     nearby = Pose(
         world_from_root=pose.move(rng.normal(0, 0.02, 3), rng.normal(0, 0.05, 3)).world_from_root,
-        joint_angles=np.clip(pose.joint_angles + 0.05, MODEL.limits_rad[..., 0], MODEL.limits_rad[..., 1]),
+        joint_angles=pose.joint_angles + 0.05,
     )
     fit = fit_pose(MODEL, landmarks(pose), start=nearby)
     assert fit.rms_m < 1e-3

@@ -67,7 +67,7 @@ def test_skeleton_masses_landmarks_and_colours_are_the_model_s_own():
     for ours, theirs in zip(skin.segments, PERSON.segments, strict=True):
         assert (ours.name, ours.parent, ours.inertia) == (theirs.name, theirs.parent, theirs.inertia)
         np.testing.assert_array_equal(ours.joint_m, theirs.joint_m)
-        np.testing.assert_array_equal(ours.limits_rad, theirs.limits_rad)
+        np.testing.assert_array_equal(ours.limits.half_rad, theirs.limits.half_rad)
         assert [part.name for part in ours.parts] == [part.name for part in theirs.parts]
         for a, b in zip(ours.parts, theirs.parts, strict=True):
             np.testing.assert_array_equal(a.colour, b.colour)

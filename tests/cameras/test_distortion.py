@@ -17,6 +17,15 @@ def test_distortion_is_that_of_opencv():
     assert np.allclose(distort(XY, LENS), oracle[:, 0], atol=ROUNDTRIP)
 
 
+@pytest.mark.parametrize("n_terms", [1, 4, 5, 8])
+def test_the_rational_model_is_that_of_opencv_and_turns_back(n_terms):
+    lens = np.array([0.31, -0.04, 0.001, -0.0007, 0.012, 0.62, 0.03, 0.004])[:n_terms]
+    points = np.column_stack([XY, np.ones(len(XY))])
+    oracle, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), np.eye(3), np.pad(lens, (0, 8 - n_terms)))
+    assert np.allclose(distort(XY, lens), oracle[:, 0], atol=ROUNDTRIP)
+    assert np.allclose(undistort(distort(XY, lens), lens), XY, atol=ROUNDTRIP)
+
+
 @given(
     st.tuples(
         *(st.floats(-size, size) for size in (0.3, 0.1, 0.01, 0.01, 0.05)),

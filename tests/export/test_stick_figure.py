@@ -35,7 +35,7 @@ def test_what_joint_centres_do_not_show_is_zero_and_locked():
     np.testing.assert_allclose(np.sum(np.cross(x, [0, 0, 1]) * z, axis=1), 0, atol=ROUNDTRIP)  # as vertical as it can
     assert (z[:, 2] > 0).all()
     for segment, angles in zip(figure.model.segments[1:], np.moveaxis(figure.joint_angles, 1, 0), strict=True):
-        locked = np.flatnonzero(np.ptp(segment.limits_rad, axis=1) == 0)
+        locked = np.flatnonzero(np.ptp(segment.limits.angle_ranges_rad, axis=1) == 0)
         assert list(locked) == [1 if segment.name.startswith("foot") else 2]
         np.testing.assert_array_equal(angles[:, locked], 0)
 

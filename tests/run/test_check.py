@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from airborne.cli import main
-from airborne.errors import ResultError
+from airborne.errors import MistakesError, ResultError
 from airborne.run.check import check_trial
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
@@ -39,13 +39,13 @@ def edit(folder, *changes):
 def test_a_good_trial_has_a_line_for_each_thing(folder):
     checks = check_trial(folder / "trial.toml")
     assert checks.mistakes == []
-    heads = ["trial.toml", "cam1", "cam2", "cam3", "calibration", "body", "frames", "start"]
+    heads = ["trial.toml", "cam1", "cam2", "cam3", "videos", "calibration", "body", "frames", "start", "videos"]
     assert [line.split(": ")[0] for line in checks.well] == heads
 
 
 def test_every_mistake_of_the_tables_is_listed(folder, capsys, monkeypatch):
     path = edit(folder, ('"top-first"', '"odd"'), ("[track]", "[track]\nevery = 0"))
-    assert [line.split(": ")[1] for line in check_trial(path).mistakes] == ["camera.0.fields", "track.every"]
+    assert [line.split(": ")[1] for line in check_trial(path).mistakes] == ["camera 'cam1'", "track.every"]
     monkeypatch.setattr("sys.argv", ["airborne", "check", str(path)])
     with pytest.raises(SystemExit) as stopped:
         main()
@@ -63,9 +63,64 @@ def test_every_unusable_file_is_listed(folder):
         assert sum(said in line for line in mistakes) == 1, said
 
 
+def test_cameras_with_the_same_video_are_named_whatever_the_file_is_called(folder):
+    shutil.copyfile(folder / "cam1.mp4", folder / "cam3.mp4")
+    said = "the videos: cameras cam1 and cam3 have the same video (cam1.mp4 and cam3.mp4); give each camera its own"
+    assert said.removeprefix("the videos: ") in check_trial(folder / "trial.toml").mistakes[0]
+    with pytest.raises(MistakesError, match="cam1 and cam3 have the same video"):
+        track_trial(read_trial(folder / "trial.toml"), folder / "out")
+    assert not (folder / "out").exists()
+
+
+def test_exchanged_videos_and_a_mirrored_one_are_named_before_anything_is_tracked(folder):
+    (folder / "cam2.mp4").rename(folder / "other.mp4")
+    (folder / "cam3.mp4").rename(folder / "cam2.mp4")
+    (folder / "other.mp4").rename(folder / "cam3.mp4")
+    (mistake,) = check_trial(folder / "trial.toml").mistakes
+    assert "the videos of cam2 and cam3 are exchanged" in mistake
+    with pytest.raises(MistakesError, match="the videos of cam2 and cam3 are exchanged"):
+        track_trial(read_trial(folder / "trial.toml"), folder / "out")
+    assert not (folder / "out").exists()
+
+
 def test_a_start_past_the_end_is_a_mistake(folder):
     path = edit(folder, ("frame = 0", "frame = 900"))
-    assert "start.frame lies past the end" in " ".join(check_trial(path).mistakes)
+    said = "there is no frame 900, the last is 33; start.frame lies past the end"
+    assert said in " ".join(check_trial(path).mistakes)
+
+
+def test_what_is_left_of_tables_with_mistakes_is_read_too(folder, capsys):
+    changes = ('[track]\nmethod = "refined"', '[track]\nmethod = "refind"'), ("cam2.mp4", "cam9.mp4")
+    path = edit(folder, *changes, ("cross.toml", "corss.toml"))
+    mistakes = check_trial(path).mistakes
+    assert len(mistakes) == 3
+    for said in ("track.method: expected", "cam9.mp4 not found", "corss.toml not found"):
+        assert sum(said in line for line in mistakes) == 1, said
+
+
+def test_cameras_with_mistakes_are_left_out_and_the_others_read(folder):
+    path = edit(folder, ("frame = 0", "fram = 0"), ('video = "cam2.mp4"\n', ""), ("cam3.mp4", "cam9.mp4"))
+    checks = check_trial(path)
+    wrong = ["camera 'cam2': video is missing", "start.fram: unknown key; did you mean frame?"]
+    assert checks.mistakes[:2] == [f"trial.toml: {each}" for each in wrong]
+    assert len(checks.mistakes) == 3 and "cam9.mp4 not found" in checks.mistakes[2]
+    assert checks.well[0].startswith("cam1: 768×576 px, 50 images/s")
+
+
+def test_nothing_is_left_of_a_file_whose_tables_contradict_each_other(folder):
+    path = edit(folder, ('file = "calib_true.toml"', 'file = "calib_true.toml"\nmend = ["cam8"]'))
+    assert len(check_trial(path).mistakes) == 1
+
+
+def test_a_start_in_millimetres_is_a_mistake(folder):
+    path = edit(folder, ("position_m = [-0.42419, -0.01495, 1.26533]", "position_m = [-424.19, -14.95, 1265.33]"))
+    (mistake,) = check_trial(path).mistakes
+    assert "the start pose lies in no camera's image; check start.position_m, in metres" in mistake
+
+
+def test_lines_are_reported_as_they_are_found(folder):
+    reported = []
+    assert reported == [] and check_trial(folder / "trial.toml", reported.append).well == reported
 
 
 def test_players_are_checked_against_the_cameras(tmp_path):

@@ -8,10 +8,9 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Pose, human18
-from airborne.body.chain import move_pose
+from airborne.body.chain import clamp_to_limits, move_pose
 from airborne.tracking import Estimate
 from airborne.tracking.methods import Settings, tracker_of
-from airborne.tracking.model_based.degrees_of_freedom import clamp_to_limits
 from airborne.tracking.tracker import Tracker
 from tests.support.scenes import TURNS, Scene, camera
 

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Ellipsoid, Part, Pose, Segment, surface_arrays
+from airborne.body.limits import JointLimits
 from airborne.cameras import Camera
 from airborne.rendering import Lamp, Lights, render
 from airborne.rendering.srgb import light_from_srgb
@@ -47,7 +48,7 @@ SPINDLE = rigid_body(part("spindle", Ellipsoid(np.array([0.12, 0.12, 0.35])), (0
 
 
 def _limb(name: str, parent: str | None, joint, semi_axes, centre, colour) -> Segment:
-    limits = np.radians([[-120.0, 120.0]] * 3)
+    limits = JointLimits.from_angles(np.radians([[-120.0, 120.0]] * 3))
     return Segment(
         name, parent, np.array(joint, float), (part(name, Ellipsoid(np.array(semi_axes)), centre, colour),), limits
     )

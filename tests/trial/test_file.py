@@ -120,10 +120,10 @@ def test_entries_of_the_track_table_can_be_replaced(folder):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"every": 0}, "--every 0: track.every: expected greater than or equal to 1"),
-        ({"method": "magic"}, "--method magic: track.method: expected 'refined', 'joint'"),
-        ({"method": "blocker"}, "--method blocker: track: method 'blocker' does not go with this body"),
-        ({"overlay": "paper"}, "--overlay paper: track: overlay: not read by method 'stepping'; remove it"),
+        ({"every": 0}, "every = 0: track.every: expected greater than or equal to 1"),
+        ({"method": "magic"}, "method = 'magic': track.method: expected 'refined', 'joint'"),
+        ({"method": "blocker"}, "method = 'blocker': track: method 'blocker' does not go with this body"),
+        ({"overlay": "paper"}, "overlay = 'paper': track: overlay: not read by method 'stepping'; remove it"),
     ],
 )
 def test_a_change_that_cannot_be_is_named_instead_of_the_file(folder, changes, said):
@@ -142,7 +142,7 @@ def test_every_mistake_of_a_file_is_listed(folder):
     text = GOOD.replace("every = 2", "every = 0").replace("frame = 3", "frame = -1").replace('"top-first"', '"odd"')
     with pytest.raises(MistakesError) as caught:
         read(folder, text)
-    places = ["camera.0.fields", "start.frame", "track.every"]
+    places = ["camera 'left'", "start.frame", "track.every"]
     assert [line.split(": ")[1] for line in caught.value.mistakes] == places
     assert str(caught.value) == f"{caught.value.mistakes[0]}; and 2 more mistakes"
 
@@ -156,21 +156,21 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('name = "a throw"', "", "name: is missing"),
+        ('name = "a throw"', "", "name is missing"),
         ('name = "a throw"', 'name = "a throw"\nplace = "hall"', "place: unknown key"),
-        ('video = "left.mp4"', "", "camera.0.video: is missing"),
+        ('video = "left.mp4"', "", "camera 'left': video is missing"),
         ('video = "left.mp4"', 'vidoe = "left.mp4"', "and 1 more"),
         ('name = "right"', 'name = "left"', "two cameras share a name: left, left; give each its own"),
-        ('"top-first"', '"odd-first"', "camera.0.fields"),
-        ("offset_s = 0.004", "offset_s = nan", "camera.0.offset_s: expected a finite number"),
-        ("offset_s = 0.004", "saved_scale = 0", "camera.0.saved_scale"),
-        ("offset_s = 0.004", "saved_offset_px = [1]", "camera.0.saved_offset_px"),
+        ('"top-first"', '"odd-first"', "camera 'left': fields"),
+        ("offset_s = 0.004", "offset_s = nan", "camera 'left': offset_s: expected a finite number"),
+        ("offset_s = 0.004", "saved_scale = 0", "camera 'left': saved_scale"),
+        ("offset_s = 0.004", "saved_offset_px = [1]", "camera 'left': saved_offset_px"),
         ('file = "calib.toml"', "", 'calibration: give file = "..." or control_points = "..."'),
         ('file = "calib.toml"', 'file = "calib.toml"\ncontrol_points = "a.csv"', "one of them"),
         ('file = "calib.toml"', 'file = "none.toml"', "none.toml not found beside it"),
         ('file = "calib.toml"', 'control_points = "none.csv"', "none.csv not found beside it"),
         ('file = "body.toml"', 'file = "none.toml"', "none.toml not found beside it"),
-        ('[body]\nfile = "body.toml"', "", "body: is missing"),
+        ('[body]\nfile = "body.toml"', "", "body is missing"),
         ('file = "body.toml"', 'file = "body.toml"\npreset = "human18"', "body: give file"),
         ('file = "body.toml"', "", 'body: give file = "...", preset = "human18" or measurements = "...", one of them'),
         ('file = "body.toml"', 'preset = "human19"', "body.preset"),
@@ -188,7 +188,7 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
             'file = "calib.toml"\nmend = ["top"]',
             "calibration.mend: no camera top; there are: left",
         ),
-        ("frame = 3", 'joints_m = "joints.csv"', "or joints_m, points_px or detections, one of them"),
+        ("frame = 3", 'joints_m = "joints.csv"', "or joints_m, points_px, detections or find = true, one of them"),
         ("frame = 3", 'detections_cameras = {left = "c1"}', "detections_cameras goes with detections"),
         ("position_m = [0.1, 0.2, 1.3]", "", "position_m is missing: give where the root's origin is"),
         ("frame = 3", "joint_angles_deg = {knee = [1, 2]}", "start.joint_angles_deg.knee"),
@@ -202,13 +202,13 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
         (QUATERNION, "quaternion_xyzw = [0, 0, 0, 0]", "quaternion_xyzw is all zeros"),
         (QUATERNION, "quaternion_xyzw = [0, 0, 1]", "start.quaternion_xyzw"),
         (QUATERNION, "somersault_tilt_twist_deg = [1, 2, nan]", "start.somersault_tilt_twist_deg.2"),
-        (QUATERNION, "rotation_matrix = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]", "rotation_matrix is no rotation"),
-        (QUATERNION, "rotation_matrix = [[2, 0, 0], [0, 1, 0], [0, 0, 1]]", "rotation_matrix is no rotation"),
+        (QUATERNION, "rotation_matrix = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]", "rotation_matrix is not a rotation"),
+        (QUATERNION, "rotation_matrix = [[2, 0, 0], [0, 1, 0], [0, 0, 1]]", "rotation_matrix is not a rotation"),
         (QUATERNION, "rotation_matrix = [[1, 0, 0], [0, 1, 0]]", "start.rotation_matrix"),
         ('"stepping"', '"magic"', "track.method"),
         ("every = 2", "every = 0", "track.every"),
         ("every = 2", "every = 2\nstop = 0", "track.stop"),
-        ("every = 2", "evrey = 2", "track.evrey: unknown key"),
+        ("every = 2", "evrey = 2", "track.evrey: unknown key; did you mean every?"),
         ("every = 2", "scale = 3", "track.scale"),
         ("every = 2", 'colour = "blue"', "track.colour"),
         ("every = 2", 'v_rule = "v"', "track.v_rule"),
@@ -257,7 +257,10 @@ def test_start_can_be_given_by_positions_clicks_or_detections(folder):
 @pytest.mark.parametrize(
     ("start", "said"),
     [
-        ("frame = 3", "give a position_m and a rotation, or joints_m, points_px or detections, one of them"),
+        (
+            "frame = 3",
+            "give a position_m and a rotation, or joints_m, points_px, detections or find = true, one of them",
+        ),
         (f'{PLACES}\npoints_px = "clicks.csv"', "one of them"),
         (f"{PLACES}\nposition_m = [1, 2, 3]", "one of them"),
         (f"{PLACES}\njoint_angles_deg = {{a = [1, 2, 3]}}", "one of them"),
@@ -303,12 +306,12 @@ def test_resection_is_for_selected_cameras(folder):
 @pytest.mark.parametrize(
     ("lamp", "said"),
     [
-        ("intensity = 1", "lights.lamp.0.position_m: is missing"),
+        ("intensity = 1", "lights.lamp 1: position_m is missing"),
         ("position_m = [1, 2, 3]\nintensity = 1\ndirection = [0, 0, 1]", "a spot light needs a direction"),
         ("position_m = [1, 2, 3]\nintensity = 1\nhalf_angle_deg = 20", "a spot light needs a direction"),
         ("position_m = [1, 2, 3]\nintensity = 1\ndirection = [0, 0, 0]\nhalf_angle_deg = 20", "with a length"),
         ("position_m = [1, 2, 3]\nintensity = 1\ndirection = [0, 0, 1]\nhalf_angle_deg = 90", "half_angle_deg"),
-        ("position_m = [1, 2, 3]\nintensity = -1", "lights.lamp.0.intensity"),
+        ("position_m = [1, 2, 3]\nintensity = -1", "lights.lamp 1: intensity"),
     ],
 )
 def test_impossible_lamp_is_refused(folder, lamp, said):
@@ -326,7 +329,7 @@ def test_value_where_a_table_belongs_is_refused(folder, wrong):
 
 
 def test_empty_missing_or_binary_file_is_refused(folder):
-    assert "no trial file, as [[camera]], [calibration], [body], [start] are missing" in complaint(folder, "")
+    assert "no trial file, as [[camera]], [calibration], [body] are missing" in complaint(folder, "")
     assert "(found segment)" in complaint(folder, "[[segment]]")
     with pytest.raises(TrialError, match=r"none\.toml: cannot be read \(No such file or directory\)"):
         read_trial(folder / "none.toml")

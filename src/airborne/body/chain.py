@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from airborne.body.model import BodyModel, Pose, PosedBody
 from airborne.geometry.joint_rotations import compose_rotation_vectors, rotation_vectors_between
-from airborne.geometry.rotations import angles_from_matrix
+from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.types import Array
 
 _LOCKED = 1e-8  # cosine of the middle angle below which the other two are one angle
@@ -31,7 +31,7 @@ def move_pose(pose: Pose, delta: Array) -> Pose:
     if not n_joints:
         return root
     return replace(
-        root, joint_angles=compose_rotation_vectors(_angles_of(pose, n_joints), np.reshape(delta[6:], (n_joints, 3)))
+        root, joint_angles=compose_rotation_vectors(angles_of(pose, n_joints), np.reshape(delta[6:], (n_joints, 3)))
     )
 
 
@@ -42,8 +42,19 @@ def delta_between(earlier: Pose, later: Pose) -> Array:
     n_joints = max(len(earlier.joint_angles), len(later.joint_angles))
     if not n_joints:
         return root
-    rotations = rotation_vectors_between(_angles_of(earlier, n_joints), _angles_of(later, n_joints))
+    rotations = rotation_vectors_between(angles_of(earlier, n_joints), angles_of(later, n_joints))
     return np.concatenate([root, rotations.ravel()])
+
+
+def clamp_to_limits(model: BodyModel, pose: Pose) -> Pose:
+    """Return the pose with every joint clamped to its limits; joints within are left as they are, bit for bit."""
+    if not pose.joint_angles.size:
+        return pose
+    R = matrix_from_angles(pose.joint_angles)
+    clamped = model.limits.clamp(R)
+    is_out = np.any(clamped != R, axis=(1, 2))
+    angles = np.where(is_out[:, None], angles_near(clamped, pose.joint_angles), pose.joint_angles)
+    return replace(pose, joint_angles=angles)
 
 
 def joint_angles_of(model: BodyModel, R: Array, near: Array | None = None) -> Array:
@@ -52,7 +63,7 @@ def joint_angles_of(model: BodyModel, R: Array, near: Array | None = None) -> Ar
     `near` (..., joints, 3) are angles that fix the branch; without it y lies in [-pi/2, pi/2].
     """
     parent_from_segment = np.swapaxes(R[..., model.parents[1:], :, :], -1, -2) @ R[..., 1:, :, :]
-    return angles_from_matrix(parent_from_segment) if near is None else _angles_near(parent_from_segment, near)
+    return angles_from_matrix(parent_from_segment) if near is None else angles_near(parent_from_segment, near)
 
 
 def nearest_angles(angles: Array, near: Array) -> Array:
@@ -99,7 +110,7 @@ def point_jacobian(posed: PosedBody, segment: int | NDArray[np.integer], points:
     return np.concatenate([np.broadcast_to(np.eye(3), (*shape, 3, 3)), columns], axis=-1)
 
 
-def _angles_of(pose: Pose, n_joints: int) -> Array:
+def angles_of(pose: Pose, n_joints: int) -> Array:
     """Return the joint angles (joints, 3) of a pose, where an empty array stands for straight joints."""
     return np.asarray(pose.joint_angles, float) if pose.joint_angles.size else np.zeros((n_joints, 3))
 
@@ -113,7 +124,7 @@ def _is_carried(model: BodyModel) -> NDArray[np.bool_]:
     return carried[:, 1:]
 
 
-def _angles_near(matrix: Array, near: Array) -> Array:
+def angles_near(matrix: Array, near: Array) -> Array:
     """Read x-y-z angles off matrices on the branch nearest to `near`; where y is +-90 degrees, x stays as it was."""
     angles = angles_from_matrix(matrix)
     x = np.where(np.hypot(matrix[..., 1, 2], matrix[..., 2, 2]) < _LOCKED, near[..., 0], angles[..., 0])

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from airborne.body.limits import FREE, JointLimits
 from airborne.body.mesh_files import read_mesh
 from airborne.body.model import (
-    UNLIMITED,
     WHOLE,
     BodyModel,
     Box,
@@ -36,6 +36,7 @@ _Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 _Matrix = Annotated[list[_Vector], Field(min_length=3, max_length=3)]
 _Bound = Annotated[float, Field(allow_inf_nan=True)]  # inf: no bound
 _Range = Annotated[list[_Bound], Field(min_length=2, max_length=2)]
+_HalfRange = Annotated[float, Field(ge=0, allow_inf_nan=True)]  # inf: no bound
 _Channel = Annotated[float, Field(ge=0, le=255)]
 
 
@@ -73,11 +74,18 @@ class _LandmarkTable(_Strict):
     position_m: _Vector = [0.0, 0.0, 0.0]
 
 
+class _LimitsTable(_Strict):
+    swing: Literal["ellipse", "rectangle"]
+    centre_deg: _Vector = [0.0, 0.0, 0.0]  # about x, then the new y, then the new z
+    half_deg: Annotated[list[_HalfRange], Field(min_length=3, max_length=3)]  # swing about x and y, twist
+
+
 class _SegmentTable(_Strict):
     name: str
     parent: str | None = None
     joint_m: _Vector = [0.0, 0.0, 0.0]
-    limits_deg: Annotated[list[_Range], Field(min_length=3, max_length=3)] | None = None  # about x, y, z
+    limits: _LimitsTable | None = None
+    limits_deg: Annotated[list[_Range], Field(min_length=3, max_length=3)] | None = None  # x-y-z angles; older files
     part: list[_PartTable] = []
     inertia: _InertiaTable | None = None
 
@@ -100,7 +108,7 @@ def read_body(path: Path) -> BodyModel:
     except tomllib.TOMLDecodeError as error:
         raise BodyError(f"{path.name}: not a TOML file: {error}; expected a body's [[segment]] tables") from error
     except ValidationError as error:
-        raise BodyError(f"{path.name}: {one_line(error)}") from error
+        raise BodyError(f"{path.name}: {one_line(error, document, _BodyTable)}") from error
     segments = tuple(_segment(segment, path) for segment in table.segment)
     landmarks = tuple(Landmark(mark.name, mark.segment, np.array(mark.position_m)) for mark in table.landmark)
     try:
@@ -111,7 +119,7 @@ def read_body(path: Path) -> BodyModel:
 
 def _segment(table: _SegmentTable, path: Path) -> Segment:
     parts = tuple(_part(part, path) for part in table.part)
-    limits = UNLIMITED if table.limits_deg is None else np.radians(np.array(table.limits_deg))
+    limits = _limits(table, f"{path.name}: segment '{table.name}'")
     inertia = None if table.inertia is None else _inertia(table.inertia, f"{path.name}: segment '{table.name}'")
     return Segment(table.name, table.parent, np.array(table.joint_m), parts, limits, inertia)
 
@@ -128,6 +136,20 @@ def _inertia(table: _InertiaTable, owner: str) -> Inertia:
             "principal moment may exceed the sum of the other two"
         )
     return Inertia(table.mass_kg, np.array(table.centre_m), tensor)
+
+
+def _limits(table: _SegmentTable, owner: str) -> JointLimits:
+    if table.limits is not None and table.limits_deg is not None:
+        raise BodyError(f"{owner}: limits and limits_deg say the same; leave limits_deg, the older one, out")
+    if table.limits is not None:
+        centre, half = np.radians(table.limits.centre_deg), np.radians(table.limits.half_deg)
+        return JointLimits(matrix_from_angles(centre), half, np.asarray(table.limits.swing == "ellipse"))
+    if table.limits_deg is None:
+        return FREE
+    ranges = np.radians(np.array(table.limits_deg))
+    if not np.all(ranges[:, 0] <= ranges[:, 1]):
+        raise BodyError(f"{owner}: each joint limit needs a least and a greatest angle")
+    return JointLimits.from_angles(ranges)
 
 
 def _part(table: _PartTable, path: Path) -> Part:
@@ -192,8 +214,8 @@ def body_toml(model: BodyModel) -> str:
         lines += ["", "[[segment]]", f"name = {_text(segment.name)}"]
         if segment.parent is not None:
             lines += [f"parent = {_text(segment.parent)}", f"joint_m = {_numbers(segment.joint_m)}"]
-        if np.any(np.isfinite(segment.limits_rad)):
-            lines.append(f"limits_deg = {_rows(np.degrees(segment.limits_rad))}")
+        if segment.limits.is_limited:
+            lines += ["", "[segment.limits]", *_limits_lines(segment.limits)]
         for part in segment.parts:
             lines += ["", "[[segment.part]]", f"name = {_text(part.name)}", *_part_lines(part, next(meshes))]
         if segment.inertia is not None:
@@ -226,13 +248,26 @@ def _part_lines(part: Part, mesh_name: str) -> list[str]:
     return lines + ([] if part.slab_m == WHOLE else [f"slab_m = {_numbers(part.slab_m)}"])
 
 
+def _limits_lines(limits: JointLimits) -> list[str]:
+    centre, half = (np.degrees(angles) for angles in (limits.centre_angles_rad, limits.half_rad))
+    return [
+        f'swing = "{"ellipse" if limits.is_ball else "rectangle"}"',
+        f"centre_deg = {_numbers(_shortest(centre))}",
+        f"half_deg = {_numbers(half.round(9))}",
+    ]
+
+
 def _rotation_lines(R: np.ndarray) -> list[str]:
     if np.array_equal(R, np.eye(3)):
         return []
-    exact = np.degrees(angles_from_matrix(R))
+    return [f"rotation_deg = {_numbers(_shortest(np.degrees(angles_from_matrix(R))))}"]
+
+
+def _shortest(exact: np.ndarray) -> np.ndarray:
+    """Return angles [deg] with nine decimals, where these give the same rotation."""
     short = exact.round(9) + 0.0  # no -0
-    is_same = np.abs(matrix_from_angles(np.radians(short)) - R).max() < _SAME_ROTATION
-    return [f"rotation_deg = {_numbers(short if is_same else exact)}"]
+    matrices = matrix_from_angles(np.radians([short, exact]))
+    return short if np.abs(matrices[0] - matrices[1]).max() < _SAME_ROTATION else exact
 
 
 def _mesh_names(model: BodyModel) -> list[str]:

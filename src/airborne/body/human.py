@@ -20,10 +20,12 @@ from pathlib import Path
 import numpy as np
 
 from airborne.body.anthropometry import FOOT_SLOPE_RAD, measurements_of, segment_properties, sternoclavicular_m
+from airborne.body.limits import FREE, JointLimits
 from airborne.body.measurements import Measurements, check_measurements, read_measurements
-from airborne.body.model import UNLIMITED, BodyModel, Ellipsoid, Landmark, Segment
+from airborne.body.model import BodyModel, Ellipsoid, Landmark, Segment
 from airborne.body.outfits import ATHLETE, Outfit
 from airborne.body.stadia import SolidProperties
+from airborne.geometry.rotations import matrix_from_angles
 from airborne.types import Array
 
 PARENTS = {
@@ -46,20 +48,27 @@ PARENTS = {
     "shank_right": "thigh_right",
     "foot_right": "shank_right",
 }
-# Least and greatest x, y, z angle [deg], of the middle and the left; the right mirrors y and z. Hip, knee, ankle,
-# shoulder and elbow as measured in healthy adults; knee and elbow are hinges with 5 deg to spare, and the forearm's z
-# is pronation. Trunk, neck, shoulder girdle and wrist: plausible ranges of ours.
-LIMITS_DEG = {
-    "torso": ((-25, 60), (-25, 25), (-20, 20)),
-    "chest": ((-20, 35), (-15, 15), (-35, 35)),
-    "head": ((-60, 50), (-40, 40), (-75, 75)),
-    "shoulder_left": ((-10, 10), (-35, 10), (-25, 20)),  # raised, forward
-    "upper_arm_left": ((-180, 60), (-180, 45), (-90, 90)),
-    "forearm_left": ((-145, 5), (-5, 5), (-90, 90)),
-    "hand_left": ((-20, 35), (-70, 80), (-5, 5)),
-    "thigh_left": ((-125, 30), (-45, 25), (-40, 60)),
-    "shank_left": ((-5, 140), (-5, 5), (-10, 10)),
-    "foot_left": ((-30, 50), (-15, 25), (-20, 20)),
+# Limits of the middle and the left [deg], see `JointLimits`: the centre as x-y-z angles, then how far the segment
+# swings about the centre's x and y and twists about its z, to either side; the right mirrors y and z. Hip, knee, ankle,
+# shoulder and elbow hold the ranges of healthy adults (AAOS, Joint Motion, 1965; Norkin & White, Measurement of Joint
+# Motion): hip flexion 120 and extension 30, abduction 45, rotation 45 each; shoulder flexion and abduction 180,
+# extension 60, horizontal flexion 135 and extension 45, rotation 70 and 90; elbow 0 to 150; knee 0 to 140; ankle 30 and
+# 50. The shoulder's cone is about the directions in which these end, its centre forward, outward and a little down.
+# Knee and elbow are hinges with 5 deg to spare, and the forearm's twist is pronation. Trunk, neck, shoulder girdle and
+# wrist: plausible ranges of ours.
+BALL_LIMITS_DEG = {
+    "torso": ((17.5, 0, 0), (42.5, 25, 20)),
+    "chest": ((7.5, 0, 0), (27.5, 15, 35)),
+    "head": ((-5, 0, 0), (55, 40, 75)),
+    "shoulder_left": ((0, -12.5, -2.5), (10, 22.5, 22.5)),  # raised, forward
+    "upper_arm_left": ((-62, -39, -24), (118, 118, 110)),
+    "thigh_left": ((-50, -10, 5), (85, 45, 55)),
+}
+HINGE_LIMITS_DEG = {  # and saddles
+    "forearm_left": ((-72.5, 0, 0), (77.5, 6, 90)),
+    "hand_left": ((7.5, 5, 0), (27.5, 75, 5)),
+    "shank_left": ((67.5, 0, 0), (72.5, 5, 12)),
+    "foot_left": ((10, 5, 0), (40, 20, 20)),
 }
 _JOINT_LANDMARKS = {  # named for the joint at a segment's origin
     "hip": "thigh",
@@ -99,7 +108,7 @@ def human18_from_measurements(
     for name, parent in PARENTS.items():
         ellipsoid, centre, span = _ellipsoid(name, properties[name], values, joints)
         parts = tuple(outfit.parts(name, ellipsoid, centre, span))
-        segments.append(Segment(name, parent, joints[name], parts, _limits(name), properties[name].inertia))
+        segments.append(Segment(name, parent, joints[name], parts, limits_of(name), properties[name].inertia))
     return BodyModel("human18", tuple(segments), _landmarks(values))
 
 
@@ -208,10 +217,12 @@ def _landmarks(v: Mapping[str, float]) -> tuple[Landmark, ...]:
     )
 
 
-def _limits(name: str) -> Array:
-    if name in LIMITS_DEG:
-        return np.radians(np.array(LIMITS_DEG[name], float))
-    if name.endswith("_right"):
-        x, y, z = LIMITS_DEG[name.replace("_right", "_left")]
-        return np.radians(np.array([x, (-y[1], -y[0]), (-z[1], -z[0])], float))
-    return UNLIMITED
+def limits_of(name: str) -> JointLimits:
+    """Return the limits of a segment's joint; those of the root are free."""
+    left = name.replace("_right", "_left")
+    limits = BALL_LIMITS_DEG | HINGE_LIMITS_DEG
+    if left not in limits:
+        return FREE
+    centre, half = np.radians(limits[left])
+    mirror = np.array([1, 1, 1]) if left == name else np.array([1, -1, -1])
+    return JointLimits(matrix_from_angles(mirror * centre), half, np.asarray(left in BALL_LIMITS_DEG))

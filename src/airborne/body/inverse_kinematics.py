@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from airborne.body.chain import clamp_to_limits
 from airborne.body.landmark_fit import (
     COARSE_GAIN,
     LandmarkProblem,
@@ -24,13 +25,14 @@ from airborne.body.landmark_fit import (
 )
 from airborne.body.model import BodyModel, Pose
 from airborne.errors import BodyError
+from airborne.geometry.rotations import angles_from_matrix
 from airborne.types import Array
 
 CORE = ("hip_left", "hip_right", "shoulder_left", "shoulder_right")  # they give a person's position and heading
 _LEAST_SD_M, _MOST_SD_M = 0.003, 0.05  # of a landmark; between them, the RMS of the fit
 _SUSPECT_M, _SWAPPED_SHARE = 0.02, 0.5  # an RMS over this, halved by swapping left and right: they look swapped
 _LEAST_WIDTH_M = 0.02  # second principal sd: landmarks on a line leave the rotation about it open
-_SHARES = np.linspace(0.02, 0.98, 7)  # of a joint's range: where a limb's search starts
+_SHARES = np.linspace(-0.96, 0.96, 7)  # of a joint's half range: where a limb's search starts
 _N_RESTARTS, _WORTHWHILE_SHARE = 3, 0.95  # restarts of the limbs, while each brings the cost below this share
 
 
@@ -143,8 +145,9 @@ def _fit(problem: LandmarkProblem, start: Pose | None) -> tuple[Pose, Array, flo
     sd_m = float(np.clip(_rms(landmark_distances(problem, state)), _LEAST_SD_M, _MOST_SD_M))
     state, _ = minimise(replace(problem, sd_m=sd_m), state, everything)
     root = RigidTransform.from_components(state.t, Rotation.from_matrix(state.R))
-    off_m = landmark_distances(problem, state)
-    return Pose(world_from_root=root, joint_angles=state.angles), off_m, _rms(off_m)
+    pose = clamp_to_limits(problem.model, Pose(world_from_root=root, joint_angles=state.angles))
+    off_m = landmark_distances(problem, replace(state, angles=pose.joint_angles))
+    return pose, off_m, _rms(off_m)
 
 
 def _initial_state(problem: LandmarkProblem) -> PoseState:
@@ -183,14 +186,16 @@ def _fit_limb(problem: LandmarkProblem, state: PoseState, top: int) -> PoseState
     alone = replace(problem, targets=np.where(is_own[:, None], problem.targets, np.nan))
     girdle = [index for index in _chain(model, top)[:-1] if sum(index in chain for chain in _core_chains(model)) == 1]
     joints = np.array(limb[:2]) - 1
-    low, high = np.moveaxis(problem.limits[joints].clip(-np.pi, np.pi), -1, 0)
-    bend = int(np.argmax((high - low)[-1]))  # the axis about which a knee or an elbow flexes
-    ranges = np.concatenate([np.stack([low, high], axis=-1)[0], [(low[-1, bend], high[-1, bend])]])
-    x, y, z, b = np.meshgrid(*(start + _SHARES * (end - start) for start, end in ranges), indexing="ij")
+    first, last = (model.segments[limb[k]].limits for k in (0, len(joints) - 1))
+    half = np.minimum(np.stack([first.half_rad, last.half_rad]), np.pi)
+    bend = int(np.argmax(half[-1, :2]))  # the axis about which a knee or an elbow flexes
+    x, y, twist, b = np.meshgrid(*(_SHARES * each for each in (*half[0], half[-1, bend])), indexing="ij")
     angles = np.broadcast_to(state.angles, (*x.shape, *state.angles.shape)).copy()
     angles[..., [index - 1 for index in girdle], :] = problem.prior[[index - 1 for index in girdle]]
-    angles[..., joints[-1], bend] = b
-    angles[..., joints[0], :] = np.stack([x, y, z], axis=-1)
+    bent = last.rotation(b[..., None] * np.eye(3)[bend])
+    angles[..., joints[-1], :] = angles_from_matrix(bent)
+    turned = first.rotation(first.nearest(np.stack([x, y, twist], axis=-1)))
+    angles[..., joints[0], :] = angles_from_matrix(turned)
     costs = np.nansum(landmark_distances(alone, replace(state, angles=angles)) ** 2, axis=-1)
     starts = [state]
     for spin in range(len(_SHARES)):

@@ -1,4 +1,4 @@
-"""Landmarks to targets by damped Gauss-Newton steps over the root and the joint angles, within the joints' limits."""
+"""Landmarks to targets by damped Gauss-Newton steps over the root and the joints' rotations, within their limits."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from airborne.body.chain import point_jacobian
+from airborne.body.chain import angles_near, point_jacobian
 from airborne.body.model import BodyModel, PosedBody
 from airborne.geometry.descent import MarquardtRule, descend
+from airborne.geometry.joint_rotations import compose_rotation_vectors, rotation_vectors_between
 from airborne.geometry.rotations import matrix_from_angles
+from airborne.geometry.swing_twist import swing_twist_jacobian
 from airborne.types import Array
 
-_ANGLE_SD_RAD = 1.0  # prior sd of an angle about neutral
+_JOINT_SD_RAD = 1.0  # prior sd of a joint's rotation about neutral
+_LIMIT_SD_RAD = np.radians(0.3)  # of how far a joint may go beyond its limits: points set by hand are often off
 _FINE_GAIN, COARSE_GAIN = 1e-6, 1e-4  # shares of the cost; a smaller gain ends the iteration
 _MOST_STEPS = 100  # at most
 _DAMPING = MarquardtRule(first=1e-4, down=5, up=4, least=1e-9, most=4e8)
@@ -29,7 +32,7 @@ class LandmarkProblem:
     targets: Array  # (landmarks, 3) world [m]; NaN where unknown
     root_weights: Array  # (landmarks,) square roots
     sd_m: float  # of a landmark of weight 1 [m]
-    neutral: Array | None = None  # (joints, 3) [rad]; None: straight, as far as the limits allow
+    neutral: Array | None = None  # (joints, 3) angles [rad]; None: straight, as far as the limits allow
 
     @cached_property
     def segments(self) -> NDArray[np.int64]:
@@ -47,15 +50,10 @@ class LandmarkProblem:
         return np.asarray(np.isfinite(self.targets).all(axis=1))
 
     @cached_property
-    def limits(self) -> Array:
-        """The joints' least and greatest angles: (joints, 3, 2) [rad]."""
-        return self.model.limits_rad
-
-    @cached_property
     def prior(self) -> Array:
-        """The prior mean of the angles: (joints, 3) [rad]."""
-        neutral = np.zeros(self.limits.shape[:2]) if self.neutral is None else self.neutral
-        return np.clip(neutral, self.limits[..., 0], self.limits[..., 1])
+        """The pose that the joints' prior is about, as angles: (joints, 3) [rad]."""
+        neutral = np.zeros((self.model.n_joints, 3)) if self.neutral is None else self.neutral
+        return angles_near(self.model.limits.clamp(matrix_from_angles(neutral)), neutral)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,33 +95,14 @@ class _Iterate:
         return self.equations[0]
 
     def step(self, damping: float) -> tuple[PoseState, float]:
-        """Return the state after a damped step; no decrease is predicted, as it may stop at the limits."""
+        """Return the state after a damped step; no decrease is predicted, as it may reach limits."""
         _, gradient, hessian = self.equations
-        low, high = np.concatenate([np.full((6, 2), [-np.inf, np.inf]), self.problem.limits.reshape(-1, 2)]).T
-        now = np.concatenate([np.zeros(6), self.state.angles.ravel()])
-        down, up = np.where(self.free, low - now, 0.0), np.where(self.free, high - now, 0.0)
-        step = _step(gradient, hessian, damping, low=down, high=up)
+        damped = (hessian + np.diag(damping * np.diag(hessian) + 1e-9))[np.ix_(self.free, self.free)]
+        step = np.zeros(len(gradient))
+        step[self.free] = np.linalg.solve(damped, -gradient[self.free])
         R = Rotation.from_rotvec(step[3:6]).as_matrix() @ self.state.R
-        angles = np.clip(now + step, low, high)[6:].reshape(-1, 3)
+        angles = compose_rotation_vectors(self.state.angles, step[6:].reshape(-1, 3))
         return PoseState(R, self.state.t + step[:3], angles), np.inf
-
-
-def _step(gradient: Array, hessian: Array, damping: float, *, low: Array, high: Array) -> Array:
-    """Return the damped Gauss-Newton step (variables,) within bounds; what reaches a bound stays there (active set)."""
-    step, moving = np.zeros(len(gradient)), (low < 0) & (high > 0)
-    moving |= (low < 0) & (high >= 0) & (gradient > 0) | (low <= 0) & (high > 0) & (gradient < 0)
-    damped = hessian + np.diag(damping * np.diag(hessian) + 1e-9)
-    while moving.any():
-        at_bound = ~moving
-        slope = gradient[moving] + damped[np.ix_(moving, at_bound)] @ step[at_bound]
-        unbounded = np.zeros(len(step))
-        unbounded[moving] = np.linalg.solve(damped[np.ix_(moving, moving)], -slope)
-        is_out = moving & ((unbounded < low) | (unbounded > high))
-        step[moving] = np.clip(unbounded, low, high)[moving]
-        if not is_out.any():
-            break
-        moving &= ~is_out
-    return step
 
 
 def _equations(problem: LandmarkProblem, state: PoseState) -> tuple[float, Array, Array]:
@@ -133,25 +112,23 @@ def _equations(problem: LandmarkProblem, state: PoseState) -> tuple[float, Array
     points = posed.landmarks[has_target]
     jacobian = point_jacobian(posed, problem.segments[has_target], points)
     n_joints = len(state.angles)
-    by_joint = jacobian[..., 6:].reshape(*jacobian.shape[:2], n_joints, 3)
-    by_angle = np.einsum("...ki,kij->...kj", by_joint, _rotation_jacobian(state.angles))
-    jacobian = np.concatenate([jacobian[..., :6], by_angle.reshape(*jacobian.shape[:2], -1)], axis=-1)
     J = (scale[:, None, None] * jacobian).reshape(-1, 6 + 3 * n_joints)
     r = (scale[:, None] * (points - problem.targets[has_target])).ravel()
-    deviation = (state.angles - problem.prior).ravel() / _ANGLE_SD_RAD
+    deviation = rotation_vectors_between(problem.prior, state.angles).ravel() / _JOINT_SD_RAD
     gradient, hessian = J.T @ r, J.T @ J
-    gradient[6:] += deviation / _ANGLE_SD_RAD
-    hessian[range(6, len(hessian)), range(6, len(hessian))] += _ANGLE_SD_RAD**-2
-    return float(r @ r + deviation @ deviation) / 2, gradient, hessian
-
-
-def _rotation_jacobian(angles: Array) -> Array:
-    """Differentiate a joint's rotation vector, segment's own axes, by its x, y, z angles (..., 3): (..., 3, 3)."""
-    cos, sin = np.cos(angles), np.sin(angles)
-    zero, one = np.zeros(angles.shape[:-1]), np.ones(angles.shape[:-1])
-    (_, cy, cz), (_, sy, sz) = np.moveaxis(cos, -1, 0), np.moveaxis(sin, -1, 0)
-    rows = [[cz * cy, sz, zero], [-sz * cy, cz, zero], [sy, zero, one]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    gradient[6:] += deviation / _JOINT_SD_RAD
+    hessian[range(6, len(hessian)), range(6, len(hessian))] += _JOINT_SD_RAD**-2
+    cost = float(r @ r + deviation @ deviation) / 2
+    limits, rotations = problem.model.limits, matrix_from_angles(state.angles)
+    excess = limits.excess(rotations) / _LIMIT_SD_RAD
+    for joint in np.flatnonzero(np.any(excess != 0, axis=-1)):
+        own, size = slice(6 + 3 * joint, 9 + 3 * joint), np.linalg.norm(excess[joint])
+        jacobian = swing_twist_jacobian(limits.relative(rotations)[joint]) / _LIMIT_SD_RAD
+        row = (excess[joint] / size) @ jacobian
+        gradient[own] += size * row
+        hessian[own, own] += np.outer(row, row)
+        cost += float(size**2) / 2
+    return cost, gradient, hessian
 
 
 def _forward_kinematics(model: BodyModel, state: PoseState) -> tuple[Array, Array]:

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from airborne.body.limits import FREE, JointLimits
 from airborne.errors import BodyError
+from airborne.geometry.rotations import matrix_from_angles
 from airborne.types import Array
 
 
@@ -47,7 +49,6 @@ Shape = Ellipsoid | Box | Mesh
 
 LONGEST_M = 20.0  # no part of a body is longer
 WHOLE = (-np.inf, np.inf)  # a part that is not clipped to a slab
-UNLIMITED = np.tile([-np.inf, np.inf], (3, 1))  # a free joint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +101,7 @@ class Segment:
     parent: str | None
     joint_m: Array  # (3,) the joint in the parent's frame [m]; the segment's own origin
     parts: tuple[Part, ...]
-    limits_rad: Array = field(default_factory=lambda: UNLIMITED)  # (3, 2) least and greatest x, y, z joint angle [rad]
+    limits: JointLimits = FREE
     inertia: Inertia | None = None  # None: unknown
 
 
@@ -140,8 +141,6 @@ class BodyModel:
                 raise BodyError(
                     f"segment '{segment.name}': parent '{segment.parent}' must stand before it; so far: {listed}"
                 )
-            if segment.limits_rad.shape != (3, 2) or not np.all(segment.limits_rad[:, 0] <= segment.limits_rad[:, 1]):
-                raise BodyError(f"segment '{segment.name}': each joint limit needs a least and a greatest angle")
             names.append(segment.name)
         for landmark in self.landmarks:
             if landmark.segment not in names:
@@ -178,9 +177,14 @@ class BodyModel:
         return 6 + 3 * self.n_joints
 
     @cached_property
-    def limits_rad(self) -> Array:
-        """The least and greatest angles of every joint: (segments - 1, 3, 2) [rad]; infinite where a joint is free."""
-        return np.array([segment.limits_rad for segment in self.segments[1:]]).reshape(-1, 3, 2)
+    def limits(self) -> JointLimits:
+        """The limits of every joint, stacked: (segments - 1)."""
+        return JointLimits.stack(segment.limits for segment in self.segments[1:])
+
+    def is_within_limits(self, pose: Pose, slack_rad: float = 1e-9) -> bool:
+        """Whether no joint of a pose lies beyond its limits by more than a slack."""
+        excess = self.limits.excess(matrix_from_angles(pose.joint_angles)) if pose.joint_angles.size else np.zeros(1)
+        return bool(np.all(np.abs(excess) <= slack_rad))
 
     def index_of(self, segment: str) -> int:
         """Return a segment's index; raises BodyError for a name that is not there."""
@@ -196,8 +200,10 @@ class BodyModel:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the files of its meshes had that was not as it should be."""
-        return tuple(part.shape.note for part in self.parts if isinstance(part.shape, Mesh) and part.shape.note)
+        """What its file had in an older form, and those of its meshes that was not as it should be."""
+        of_meshes = tuple(part.shape.note for part in self.parts if isinstance(part.shape, Mesh) and part.shape.note)
+        older = ", ".join(segment.name for segment in self.segments if segment.limits.is_from_angles)
+        return (*of_meshes, f"body: limits_deg of {older} are read as a swing and a twist") if older else of_meshes
 
     @property
     def needs_colours(self) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.calibration.diagnosis import check_points, decompose_cameras, warnings_about
+from airborne.calibration.intrinsics.common_lens import common_lens_sd
 from airborne.calibration.intrinsics.model_selection import (
     Solution,
     candidates_for,
@@ -98,14 +99,14 @@ def calibrate(
         raise CalibrationError(f"unknown calibration method '{method}'; expected 'lm' or 'annealing'")
     check_points(points, sizes)
     decompositions = decompose_cameras(points)
-    cameras, fits, solutions = [], [], {}
-    for name in points.cameras:
-        candidates = _solve(
-            points, name, size=sizes[name], decomposition=decompositions[name], method=method, seed=seed
-        )
-        solutions[name] = choose_simplest(candidates)
-        cameras.append(solutions[name].pinhole.camera(name, sizes[name], solutions[name].shift_sd_px))
-        fits.append(_describe_fit(points, name, solutions[name], candidates))
+    candidates = {
+        name: _solve(points, name, size=sizes[name], decomposition=decompositions[name], method=method, seed=seed)
+        for name in points.cameras
+    }
+    solutions = {name: choose_simplest(each) for name, each in candidates.items()}
+    common_sd_m = common_lens_sd(candidates, sizes)
+    cameras = [each.pinhole.camera(name, sizes[name], each.shift_sd_px) for name, each in solutions.items()]
+    fits = [_describe_fit(points, name, solutions[name], candidates[name], common_sd_m.get(name)) for name in solutions]
     return Calibration(
         rig=Rig(tuple(cameras)),
         method=method,
@@ -138,12 +139,14 @@ def _solve(
     return candidates_for(initial, world, px)
 
 
-def _describe_fit(points: ControlPoints, name: str, best: Solution, candidates: list[Solution]) -> CameraFit:
+def _describe_fit(
+    points: ControlPoints, name: str, best: Solution, candidates: list[Solution], common_lens_sd_m: Array | None
+) -> CameraFit:
     is_seen = points.is_seen_by(name)
     P_dlt = fit_dlt(best.world, best.px)
     covariance = parameter_covariance(best.pinhole, best.model, best.world, best.px)
     sd = np.sqrt(np.diag(covariance))
-    places = place_sd(best, candidates)
+    places = place_sd(best, candidates, common_lens_sd_m)
     wider = float(np.mean(places / sd[3:6]))  # by the lens model's error: all of them alike
     sd[3:6] = places
     return CameraFit(

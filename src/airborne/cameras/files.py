@@ -160,7 +160,7 @@ def format_of_name(path: Path) -> str:
     for suffix, kind in _SUFFIXES.items():
         if path.name.lower().endswith(suffix):
             return kind
-    raise CalibrationError(f"{path}: the name asks for no format; end it in {', '.join(_SUFFIXES)}, or give --to")
+    raise CalibrationError(f"{path}: the name names no format; end it in {', '.join(_SUFFIXES)}, or give --to")
 
 
 def _texts(

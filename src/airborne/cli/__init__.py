@@ -12,17 +12,20 @@ from airborne import __version__
 from airborne.cli import reproduce, results, synth, track
 from airborne.cli.calibrate import calibrate_command
 from airborne.cli.check import check_command
-from airborne.cli.console import STOPPED, refuse, stop
+from airborne.cli.console import STOPPED, UNDECIDED, refuse, stop
 from airborne.cli.convert import convert_command
 from airborne.cli.export import export_command
+from airborne.cli.find import find_command, frame_command
 from airborne.cli.smooth import smooth_command
 from airborne.cli.sync import sync_command
-from airborne.errors import AirborneError
+from airborne.errors import AirborneError, UndecidedError
 
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
 _COMMANDS = {
     "demo": track.demo_command,
     "check": check_command,
+    "find": find_command,
+    "frame": frame_command,
     "track": track.track_command,
     "calibrate": calibrate_command,
     "sync": sync_command,
@@ -44,7 +47,7 @@ _REPRODUCE = {"rigid": reproduce.reproduce_rigid_command, "blockjump": reproduce
 def _group(commands: dict, text: str, **options: Any) -> typer.Typer:
     group = typer.Typer(no_args_is_help=True, help=text, rich_markup_mode=None, **options)  # [start] is no markup
     for name, command in commands.items():
-        group.command(name)(command)
+        group.command(name, short_help=(command.__doc__ or "").partition("\n")[0])(command)  # whole, however long
     return group
 
 
@@ -74,6 +77,8 @@ def main() -> None:
         refuse(f"{' '.join(message.split()).rstrip('.')}; see {context.command_path if context else 'airborne'} --help")
     except (KeyboardInterrupt, typer.Abort):
         stop()
+    except UndecidedError as error:
+        refuse(str(error), code=UNDECIDED)
     except AirborneError as error:
         refuse(str(error))
     except OSError as error:
@@ -91,6 +96,8 @@ def _describe_path_error(error: OSError) -> str:
             return f"{path} is a folder; give a file's name"
         case FileNotFoundError() if not path.parent.exists():
             return f"{path}: there is no folder {path.parent}; make it, or give another path"
+        case PermissionError() if path.suffix == ".part" or not path.exists():  # .part: a file that is being written
+            return f"{path.parent} cannot be written ({error.strerror}); give another folder with -o"
     return f"{path}: {error.strerror or error}; give a path that can be read or written"
 
 

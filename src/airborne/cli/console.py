@@ -13,16 +13,17 @@ from airborne.io.terminal import errors
 from airborne.io.terminal import progress as progress
 
 STOPPED = 130  # the exit code
+UNDECIDED = 3  # the exit code where the body's start is undecided
 _SIDES_PX = range(16, 20_001)  # of an image
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Out = Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.")]
 
 
-def refuse(reason: str) -> NoReturn:
-    """Print the reason in one line and exit with code 2."""
+def refuse(reason: str, code: int = 2) -> NoReturn:
+    """Print the reason in one line and exit."""
     errors.print(f"airborne: {reason}", style="red", markup=False)
-    sys.exit(2)
+    sys.exit(code)
 
 
 def stop(left: str = "") -> NoReturn:

@@ -9,14 +9,25 @@ import numpy as np
 
 from airborne.body import BodyModel
 from airborne.errors import ResultError
-from airborne.evaluation.compare import SdCalibration, match_times, nan_to_none, sd_calibration, span
+from airborne.evaluation.columns import align_columns
+from airborne.evaluation.compare import (
+    SdCalibration,
+    match_times,
+    nan_to_none,
+    or_dash,
+    question_units,
+    sd_calibration,
+    span,
+)
 from airborne.evaluation.joint_files import JointPaths, landmark_of
-from airborne.motion import Motion, landmarks
+from airborne.evaluation.reliability import Reliability, reliability
+from airborne.motion import JointStatus, Motion, joint_statuses, landmarks
 from airborne.tracking import Status
 from airborne.types import Array, Triple
 
 _FARTHEST_SHIFT = 3  # periods by which the clocks are shifted relative to each other
 _CLEARLY_BETTER = 0.98  # of the unshifted distance
+_FAR_M = 0.1  # a joint that far off is misplaced
 _MOST_FRAMES = 0.9  # shifts that leave fewer of the frames are ignored
 
 
@@ -47,9 +58,12 @@ class JointComparison:
     largest_time_offset_s: float
     joints: dict[str, JointErrors]  # by landmark
     whole: JointErrors  # its mean is the mean per-joint position error (MPJPE)
-    tracked: JointErrors | None  # the same over the tracked frames alone; None where there are none
+    tracked: JointErrors | None  # the same over the joints whose own status is tracked; None where there are none
+    share_tracked: float  # of the joints in the frames compared
+    n_far: int  # joints whose own status is tracked and that are more than 100 mm off
     not_compared: tuple[str, ...]  # markers without a landmark, and landmarks without a marker
     calibration: SdCalibration  # errors against the landmarks' reported deviations
+    reliability: Reliability  # the same without each landmark's constant offset in its segment
     better_shift_s: float  # added to the reference's times, this would clearly agree better; whole periods, or 0
     better_mean_without_offset_mm: float  # the error with that shift
 
@@ -63,24 +77,29 @@ class JointComparison:
             f"{self.n_matched} of {self.n_reference} reference times matched, at most "
             f"{1e3 * self.largest_time_offset_s:.1f} ms off: "
             f"{self.n_tracked} tracked, {self.n_uncertain} uncertain, {self.n_lost} lost",
-            f"{'joint [mm]':<18}{'mean':>9}{'RMS':>9}{'max':>9}{'no offset':>11}",
         ]
         rows = {**self.joints, "all": self.whole} | ({"all, tracked": self.tracked} if self.tracked else {})
+        table = [("joint [mm]", "mean", "RMS", "max", "no offset")]
         for name, e in rows.items():
-            cells = f"{e.mean_mm:9.1f}{e.rms_mm:9.1f}{e.largest_mm:9.1f}{e.mean_without_offset_mm:11.1f}"
-            lines.append(f"  {name:<16}{cells}")
+            numbers = (e.mean_mm, e.rms_mm, e.largest_mm, e.mean_without_offset_mm)
+            table.append((f"  {name}", *(or_dash(number, ".1f") for number in numbers)))
+        lines += align_columns(table, (18, 9, 9, 9, 11))
         lines.append("no offset: the mean without a constant offset in the segment, as between two definitions")
         if self.better_shift_s:
             lines.append(
                 f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, {'no offset'!r} would be "
                 f"{self.better_mean_without_offset_mm:.1f} mm: do both clocks start at the same frame?"
             )
+        lines += question_units(self.whole.rms_mm)
         share = self.calibration
         if share.n:
             lines.append(
                 f"errors within 1 sd {share.within_1sd:.0%} (normal: 68%), "
                 f"within 2 sd {share.within_2sd:.0%} (95%), n = {share.n}"
             )
+        if self.reliability.n:
+            lines.append(self.reliability.describe())
+        lines.append(f"joints tracked: {self.share_tracked:.0%}; of these more than 100 mm off: {self.n_far}")
         if self.not_compared:
             lines.append(f"not compared: {', '.join(self.not_compared)}")
         return "\n".join(lines)
@@ -117,7 +136,9 @@ def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> J
             f"no pose to compare: motion {span(motion.time_s)} with {int(motion.has_pose.sum())} poses, "
             f"reference {span(reference.time_s)}; give the joints of this recording"
         )
-    measured, sd = (values[:, columns] for values in landmarks(motion, model))
+    points, all_sd = landmarks(motion, model)
+    joint_status = joint_statuses(motion, model, all_sd)[:, columns]
+    measured, sd = points[:, columns], all_sd[:, columns]
     R = _rotations(motion, model, columns)
     frames, rows = frames[has_pose], rows[has_pose]
     pairs = _Pairs(measured[frames], reference.points[rows], R[frames])
@@ -125,8 +146,8 @@ def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> J
     if not is_known.any():
         raise ResultError("the reference has no number where the motion has a pose; give the joints of this recording")
     joints = {name: _errors(pairs, [k]) for k, name in enumerate(names) if is_known[:, k].any()}
-    is_tracked = np.asarray(status[has_pose] == Status.TRACKED.value)
-    tracked = _Pairs(pairs.measured[is_tracked], pairs.reference[is_tracked], pairs.R[is_tracked])
+    is_tracked = (joint_status[frames] == JointStatus.TRACKED.value) & is_known
+    tracked = replace(pairs, measured=np.where(is_tracked[..., None], pairs.measured, np.nan))
     everything = list(range(len(names)))
     whole = _errors(pairs, everything)
     shift_s, shifted_mm = _best_time_shift(
@@ -142,9 +163,12 @@ def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> J
         largest_time_offset_s=float(offset[has_pose].max()),
         joints=joints,
         whole=whole,
-        tracked=_errors(tracked, everything) if np.isfinite(tracked.error).all(axis=-1).any() else None,
+        tracked=_errors(tracked, everything) if is_tracked.any() else None,
+        share_tracked=float(is_tracked.sum() / is_known.sum()),
+        n_far=int(np.sum(np.linalg.norm(tracked.error, axis=-1) > _FAR_M)),
         not_compared=(*not_compared, *(name for name in names if name not in joints)),
         calibration=sd_calibration(pairs.error[is_known], np.repeat(sd[frames][is_known][:, None], 3, axis=1)),
+        reliability=reliability(_without_offset(pairs), np.repeat(sd[frames][..., None], 3, axis=2)),
         better_shift_s=shift_s,
         better_mean_without_offset_mm=shifted_mm,
     )
@@ -194,6 +218,13 @@ def _errors(pairs: _Pairs, columns: list[int]) -> JointErrors:
         bias_mm=_triple(1e3 * error[is_known].mean(axis=0)),
         offset_mm=_triple(1e3 * local[is_known].mean(axis=0)) if len(columns) == 1 else None,
     )
+
+
+def _without_offset(pairs: _Pairs) -> Array:
+    """Return the errors (n, l, 3) [m] in the segments' axes, less each landmark's mean."""
+    local = np.einsum("nlji,nlj->nli", pairs.R, pairs.error)
+    n = np.isfinite(local).all(axis=-1, keepdims=True).sum(axis=0)
+    return local - np.nansum(local, axis=0) / np.maximum(n, 1)
 
 
 def _mean_about(error: Array) -> float:

@@ -25,6 +25,7 @@ _FLEXION = {  # of a person: the segment that a joint turns, the joint, and the 
     "thigh": ("hip", -1.0),
     "shank": ("knee", 1.0),
 }
+_TWO_SD = "± 2 standard deviations; unseen where thinner than the line"
 _MOST_JOINTS = 8  # of a body that is not a person
 
 
@@ -84,7 +85,7 @@ def pose_figure(motion: Motion) -> Figure:
         if angle != "tilt":
             panels.shade_spans(right, motion.time_s, singular, panels.SINGULAR_STYLE)
     handles = [*panels.unobservable_handles(unobservable[0] | unobservable[1]), *panels.singular_handles(singular)]
-    return panels.add_legend(figure, motion, [panels.band_handle("± 2 standard deviations"), *handles])
+    return panels.add_legend(figure, motion, [panels.band_handle(_TWO_SD), *handles])
 
 
 def write_score(path: Path, motion: Motion) -> None:
@@ -119,8 +120,10 @@ def write_joints_figure(path: Path, motion: Motion, model: BodyModel) -> None:
 def joints_figure(motion: Motion, model: BodyModel) -> Figure:
     """Draw the angles of the main joints over time [deg], left beside right, with bands of two standard deviations.
 
-    Of a person shoulders, elbows, hips and knees: the x angle, with its sign such that flexion is positive. Of another
-    body the x angles of its first joints. Raises ResultError where the motion is another body's.
+    Where the images do not show an angle, it is left out. Of a person shoulders, elbows, hips and knees: the x angle,
+    flexion positive. Of another body the x angles of its first joints.
+
+    Raises ResultError where the motion is another body's.
     """
     table, joint_panels = joint_angles(motion, model), _joint_panels(motion.joints)
     unobservable, singular = np.zeros((2, len(motion)), bool)
@@ -130,6 +133,7 @@ def joints_figure(motion: Motion, model: BodyModel) -> Figure:
         of_joint = table.sel(joint=segment)
         values, sd = (of_joint[name].sel(axis="x").to_numpy() for name in ("angle", "angle_sd"))
         is_unobservable, is_singular = np.isinf(sd), of_joint["is_singular"].to_numpy() & motion.has_pose
+        values = np.where(is_unobservable, np.nan, values)
         panels.draw_band(axes, motion.time_s, sign * values, sd)
         panels.draw_estimate(axes, motion, sign * values)
         panels.shade_spans(axes, motion.time_s, is_unobservable, panels.UNOBSERVABLE_STYLE)
@@ -142,7 +146,7 @@ def joints_figure(motion: Motion, model: BodyModel) -> Figure:
         *panels.unobservable_handles(unobservable),
         *panels.singular_handles(singular, "y near ±90°: x and z mix"),
     ]
-    return panels.add_legend(figure, motion, [panels.band_handle("± 2 standard deviations"), *handles])
+    return panels.add_legend(figure, motion, [panels.band_handle(_TWO_SD), *handles])
 
 
 def _joint_panels(joints: Sequence[str]) -> list[tuple[str, str, float]]:
@@ -184,4 +188,4 @@ def flight_figure(motion: Motion, model: BodyModel) -> Figure:
     low, high = zip(*(axes.get_ylim() for axes in momenta), strict=True)
     for axes in momenta:  # one scale, so that the components can be compared
         axes.set_ylim(min(low), max(high))
-    return panels.add_legend(figure, motion, [panels.band_handle("± 2 standard deviations")])
+    return panels.add_legend(figure, motion, [panels.band_handle(_TWO_SD)])

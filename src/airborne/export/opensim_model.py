@@ -164,7 +164,7 @@ def _joint(segment: Segment, name: str, parent: str) -> ET.Element:
     """Return a segment's joint: R = Rx Ry Rz about the parent's axes."""
     rotations = [
         _Coordinate(f"{name}_{letter}", axis, low, high)
-        for letter, axis, (low, high) in zip("xyz", _BODY_FROM_SEGMENT.T, segment.limits_rad, strict=True)
+        for letter, axis, (low, high) in zip("xyz", _BODY_FROM_SEGMENT.T, segment.limits.angle_ranges_rad, strict=True)
     ]
     joint, frames = _custom_joint(f"{name}_joint", rotations)
     _fix_frame(frames[0], f"/bodyset/{parent}", _BODY_FROM_SEGMENT @ segment.joint_m, np.eye(3))

@@ -12,6 +12,7 @@ from typing import Literal, Self
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.body import PosedBody
 from airborne.cameras import Camera, Rig
@@ -89,15 +90,22 @@ class OverlayVideos:
         """
         self._videos = CameraVideos(folder, rig, rate, drawn)
 
-    def write(self, frames: Frames, posed: PosedBody | None, status: Status) -> None:
-        """Append what every camera saw at one time; no outline is drawn where `posed` is None."""
+    def write(
+        self, frames: Frames, posed: PosedBody | None, status: Status, unknown: NDArray[np.bool_] | None = None
+    ) -> None:
+        """Append what every camera saw at one time; no outline is drawn where `posed` is None.
+
+        unknown (segments,): those that the images do not show are drawn in the colour of an uncertain frame.
+        """
         images = []
         for view, camera in zip(frames.views, self._videos.cameras, strict=True):
             image = view_image(view, camera)
             if view is not None and posed is not None:
-                _draw_outline(
-                    image, render(cached_surface_arrays(posed.model), posed, camera, FLAT).mask, STATUS_RGB[status]
-                )
+                drawn = render(cached_surface_arrays(posed.model), posed, camera, FLAT)
+                _draw_outline(image, drawn.mask, STATUS_RGB[status])
+                if unknown is not None and unknown.any():
+                    hidden = drawn.mask & unknown[np.maximum(drawn.segment, 0)]
+                    _draw_outline(image, hidden, STATUS_RGB[Status.UNCERTAIN])
             if status is Status.LOST:
                 _draw_border(image, STATUS_RGB[status])
             draw_label(image, time_label(frames, status), STATUS_RGB[status])

@@ -23,6 +23,11 @@ class _Comparison(NamedTuple):
 
 
 _FIGURES = {  # titles and captions, in the order of the page
+    "empty_scene.png": (
+        "How the start was found",
+        "For each camera the empty scene, the median of pictures spread over the recording; what stands out from it at "
+        "the moment in which the body is seen well; and the outline of the body found there.",
+    ),
     "pose.png": (
         "The motion",
         "Position of the body's root in the world, and its somersault, tilt and twist, over time.",
@@ -49,7 +54,7 @@ _FIGURES = {  # titles and captions, in the order of the page
     ),
     "score.png": ("Score and spread", "Score, and standard deviations of position and rotation, over time."),
     "digitised.png": (
-        "Beside digitising by hand",
+        "Beside points digitised by hand",
         "Tracked poses and those from points clicked by hand, each with their difference below.",
     ),
     "errors.png": (
@@ -167,11 +172,11 @@ def _with_unit(value: float | None, form: str) -> str:
 
 
 def _comparisons(summary: Mapping[str, Any]) -> Iterator[_Comparison]:
-    for key, title in (("truth", "Against the truth"), ("digitised", "Against digitising by hand")):
+    for key, title in (("truth", "Compared with the truth"), ("digitised", "Compared with points digitised by hand")):
         if summary.get(key):
             yield _pose_comparison(title, summary[key])
     if summary.get("joints"):
-        yield _joint_comparison("Against the paths of the joints", summary["joints"])
+        yield _joint_comparison("Compared with the paths of the joints", summary["joints"])
 
 
 def _pose_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from airborne.types import Array
 
@@ -87,3 +88,12 @@ def geodesic(A: Array, B: Array) -> Array:
 def wrap(angle: Array) -> Array:
     """Wrap angles to [-pi, pi) [rad]."""
     return np.remainder(np.asarray(angle, float) + np.pi, 2 * np.pi) - np.pi
+
+
+def super_fibonacci(n: int) -> Array:
+    """Return n orientations (n, 3, 3) spread evenly over all (Alexa, Super-Fibonacci Spirals, CVPR 2022)."""
+    s = np.arange(n) + 0.5
+    first, second = 2 * np.pi * s / np.sqrt(2), 2 * np.pi * s / 1.533751168755204288118041
+    r, R = np.sqrt(s / n), np.sqrt(1 - s / n)
+    quaternions = np.stack([r * np.sin(first), r * np.cos(first), R * np.sin(second), R * np.cos(second)], axis=1)
+    return Rotation.from_quat(quaternions).as_matrix()

@@ -9,7 +9,7 @@ Independent of cameras, images and truth.
 from airborne.motion.angles import root_angles
 from airborne.motion.files import MotionWriter, read_estimates, read_motion, revise_motion
 from airborne.motion.flight.momentum_table import FlightSummary, flight_summary, has_inertias, measure_flight
-from airborne.motion.joints import joint_angles, landmarks
+from airborne.motion.joints import JointStatus, joint_angles, joint_statuses, landmarks
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.jump import Jump
 from airborne.motion.jumps.table import write_jumps
@@ -19,6 +19,7 @@ from airborne.motion.tables import write_angles, write_flight, write_joint_angle
 
 __all__ = [
     "FlightSummary",
+    "JointStatus",
     "Jump",
     "Motion",
     "MotionWriter",
@@ -28,6 +29,7 @@ __all__ = [
     "flight_summary",
     "has_inertias",
     "joint_angles",
+    "joint_statuses",
     "landmarks",
     "measure_flight",
     "measure_jumps",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from itertools import pairwise
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.body.chain import nearest_angles, point_jacobian
@@ -19,6 +21,19 @@ from airborne.geometry.rotations import (
 from airborne.motion.motion import Motion
 from airborne.motion.uncertainty import propagate_variances, standard_deviation
 from airborne.types import Array
+
+_OPEN_SD_RAD = 0.5  # of an angle that counts as unobserved
+_UNCERTAIN_SD_M = 0.05  # of a landmark; the same as of a whole body
+_STRAINED_RAD, _STRAINED_FRAMES = np.radians(3.0), 3  # beyond a limit by more than its sd, in so many frames on end
+
+
+class JointStatus(StrEnum):
+    """How far the position of one joint in one frame can be trusted."""
+
+    TRACKED = "tracked"
+    UNCERTAIN = "uncertain"
+    UNKNOWN = "unknown"  # the images do not show where it is: what stands there is a guess
+    LOST = "lost"
 
 
 def landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
@@ -37,6 +52,37 @@ def landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
         points[row] = posed.landmarks
         variance[row] = propagate_variances(point_jacobian(posed, owners, points[row]), covariance[row])
     return points, standard_deviation(variance.mean(axis=-1))
+
+
+def joint_statuses(motion: Motion, model: BodyModel, sd: Array) -> NDArray[np.str_]:
+    """Return how far each landmark can be trusted in each frame: (n, landmarks), values of `JointStatus`.
+
+    sd (n, landmarks) [m] as `landmarks` gives it. A joint that lies beyond its limits for several frames on end makes
+    the landmarks that hang on it uncertain.
+    """
+    status = np.repeat(motion.status.astype("<U9")[:, None], sd.shape[1], axis=1)
+    is_doubtful = (sd > _UNCERTAIN_SD_M) | _is_strained(motion, model)[:, _carriers(model)]
+    status[(status == JointStatus.TRACKED.value) & is_doubtful] = JointStatus.UNCERTAIN.value
+    status[motion.has_pose[:, None] & np.isinf(sd)] = JointStatus.UNKNOWN.value
+    return status
+
+
+def _carriers(model: BodyModel) -> NDArray[np.int64]:
+    """Return the segment whose joint moves each landmark, the parent of a segment for its origin: (landmarks,)."""
+    owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])
+    at_origin = np.array([not np.any(landmark.position_m) for landmark in model.landmarks])
+    return np.where(at_origin & (owners > 0), model.parents[owners], owners)
+
+
+def _is_strained(motion: Motion, model: BodyModel) -> NDArray[np.bool_]:
+    """Say which segments' joints are beyond their limits in this frame and for several on end: (n, segments)."""
+    excess = np.linalg.norm(model.limits.excess(matrix_from_angles(motion.joint_angles)), axis=-1)
+    beyond = np.concatenate([np.zeros((len(motion), 1), bool), excess > _STRAINED_RAD], axis=1)
+    strained = np.zeros_like(beyond)
+    for first in range(len(motion) - _STRAINED_FRAMES + 1):
+        window = slice(first, first + _STRAINED_FRAMES)
+        strained[window] |= beyond[window].all(axis=0)
+    return strained
 
 
 def continuous_angles(motion: Motion) -> Array:
@@ -68,6 +114,7 @@ def joint_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
             variance[row, joint] = propagate_variances(
                 by_rotation_vector[row, joint], motion.covariance[row, block, block]
             )
+    variance[variance > _OPEN_SD_RAD**2] = np.inf
     dimensions = ("time", "joint", "axis")
     variables = {
         "angle": (dimensions, np.rad2deg(radians), {"units": "deg", "order": "x, y, z, body-fixed"}),

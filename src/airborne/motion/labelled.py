@@ -9,7 +9,7 @@ import xarray as xr
 
 from airborne.body import BodyModel
 from airborne.motion.angles import root_angles
-from airborne.motion.joints import joint_angles, landmarks
+from airborne.motion.joints import joint_angles, joint_statuses, landmarks
 from airborne.motion.jumps.jump import Jump
 from airborne.motion.jumps.table import JUMP_COLUMNS, jump_row
 from airborne.motion.motion import Motion
@@ -24,13 +24,15 @@ _TEXTS = ("status", "standing_source")
 def label_joints(motion: Motion, model: BodyModel) -> xr.Dataset:
     """Label a body's landmarks: `position` (time, joint, space) [m], `position_sd` (time, joint) [m], `status` (time).
 
-    NaN where lost; see `landmarks` for the standard deviations. Raises ResultError for another body's motion.
+    `joint_status` (time, joint) is each landmark's own, see `joint_statuses`. NaN where lost; see `landmarks` for the
+    standard deviations. Raises ResultError for another body's motion.
     """
     points, sd = landmarks(motion, model)
     variables = {
         "position": (("time", "joint", "space"), points, _METRES),
         "position_sd": (("time", "joint"), sd, _SD),
         "status": (("time",), motion.status),
+        "joint_status": (("time", "joint"), joint_statuses(motion, model, sd)),
     }
     coordinates = {
         "time": ("time", motion.time_s, {"units": "s"}),

@@ -90,6 +90,16 @@ class Motion:
         return quaternion
 
     @property
+    def joint_quaternion(self) -> Array:
+        """Parent from segment of each joint as x, y, z, w with w >= 0: (n, joints, 4)."""
+        quaternion = np.full((*self.joint_angles.shape[:2], 4), np.nan)
+        if self.joints and self.has_pose.any():
+            angles = self.joint_angles[self.has_pose].reshape(-1, 3)
+            of_poses = Rotation.from_euler("XYZ", angles).as_quat(canonical=True)
+            quaternion[self.has_pose] = of_poses.reshape(-1, len(self.joints), 4)
+        return quaternion
+
+    @property
     def position_sd(self) -> Array:
         """Standard deviations of the position, of errors of the moment and of lasting ones: (n, 3) [m]."""
         return self._sd[:, :3]

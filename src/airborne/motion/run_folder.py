@@ -18,6 +18,7 @@ MOTION, JOINTS, JUMPS = "motion.csv", "joints.csv", "jumps.csv"
 SUMMARY, REPORT, RUN_RECORD = "summary.json", "report.html", "run.json"
 CALIBRATION, BODY = "calib.toml", "body.toml"
 SMOOTH_RECORD = "smooth.json"
+CANDIDATES, CANDIDATES_PICTURE = "candidates.json", "candidates.png"  # of a start that is undecided
 FOLDERS = ("tables", "figures", "videos")
 
 
@@ -44,6 +45,13 @@ def _made(folder: Path) -> Path:
 def holds_players(folder: Path) -> bool:
     """Tell whether a folder holds a run of several players, finished or not."""
     return (folder / JOINTS).is_file() and not (folder / MOTION).is_file()
+
+
+def unfinished_note(folder: Path) -> str | None:
+    """Say that the run in a folder is not finished; None where it is."""
+    if (folder / SUMMARY).is_file():
+        return None
+    return "the run is not finished: these are the frames so far; `airborne track --resume` goes on"
 
 
 def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:

@@ -11,7 +11,7 @@ from airborne.body import BodyModel
 from airborne.io.parquet import CAN_WRITE_PARQUET, write_parquet
 from airborne.motion.angles import ROOT_ANGLES, root_angles
 from airborne.motion.flight.momentum_table import measure_flight
-from airborne.motion.joints import joint_angles, landmarks
+from airborne.motion.joints import joint_angles, joint_statuses, landmarks
 from airborne.motion.motion import Motion
 from airborne.types import Array
 
@@ -34,7 +34,7 @@ def motion_columns(motion: Motion) -> dict[str, NDArray]:
 
 
 def write_motion_parquet(path: Path, motion: Motion) -> None:
-    """Write the columns of motion.csv, and joint angles in degrees, with their units in the metadata.
+    """Write the columns of motion.csv, and joints as angles in degrees and as quaternions, units in the metadata.
 
     Without *pyarrow* nothing is written.
     """
@@ -43,7 +43,13 @@ def write_motion_parquet(path: Path, motion: Motion) -> None:
     columns = motion_columns(motion)
     for k, joint in enumerate(motion.joints):
         columns |= {f"{joint}_{axis}_deg": np.rad2deg(motion.joint_angles[:, k, i]) for i, axis in enumerate("xyz")}
-    conventions = {"world": "metres, z up", "quaternion": "x, y, z, w; world from root", "rotation_sd": "world axes"}
+        quaternion = motion.joint_quaternion[:, k]
+        columns |= {f"{joint}_q{axis}": quaternion[:, i] for i, axis in enumerate("xyzw")}
+    conventions = {
+        "world": "metres, z up",
+        "quaternion": "x, y, z, w; world from root, and parent from segment",
+        "rotation_sd": "world axes",
+    }
     write_parquet(path, columns, {name: _unit(name) for name in columns}, conventions)
 
 
@@ -76,12 +82,13 @@ def write_joints(path: Path, motion: Motion, model: BodyModel) -> None:
     """Write joints.csv, long: one row per frame and landmark; empty cells where lost.
 
     `sd_m` is the root mean square, over the three axes, of the point's standard deviations, propagated from the
-    covariance through every joint that moves it; infinite where a direction that moves it is unobserved.
+    covariance through every joint that moves it; infinite where a direction that moves it is unobserved. `status` is
+    the joint's own: see `joint_statuses`.
     """
     points, sd = landmarks(motion, model)
     names = np.array([landmark.name for landmark in model.landmarks])
     columns = _long(motion, names) | {f"{axis}_m": points[..., k].ravel() for k, axis in enumerate("xyz")}
-    _write_csv(path, columns | {"sd_m": sd.ravel()})
+    _write_csv(path, columns | {"sd_m": sd.ravel(), "status": joint_statuses(motion, model, sd).ravel()})
 
 
 def write_joint_angles(path: Path, motion: Motion, model: BodyModel) -> None:

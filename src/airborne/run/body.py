@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
 from airborne.body.files import body_toml, mesh_files
 from airborne.calibration.from_points import Calibration
+from airborne.cameras import Camera
 from airborne.export import ContactSheet, MatchingPicture, OverlayVideos, headline, write_figures, write_report
 from airborne.export.overlays import OverlaysAs
 from airborne.motion import (
@@ -33,22 +32,25 @@ from airborne.motion import (
 from airborne.motion.run_folder import BODY, JOINTS, MOTION, figures_of, tables_of, videos_of
 from airborne.motion.tables import write_uncertainty
 from airborne.rendering import FLAT, render
+from airborne.run.find import FoundStart
 from airborne.run.first_pose import find_first_pose
 from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
 from airborne.tracking import Estimate
+from airborne.tracking.estimate import unknown_segments
 from airborne.tracking.methods import sample_body_colours, tracker_of
 from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.tracker import Tracker
 from airborne.trial.file import Trial
-from airborne.video import Frames, Recording, View
+from airborne.video import Frames, Recording
 
 _UNCERTAINTY = (
-    "Standard deviations of position and orientation hold what the pictures leave open: noise, light, and edges that "
-    "are not where the drawn body has them; and what the self-check leaves open: the sizes of body and world, and the "
-    "cameras' places and times. They do not hold the lengths and girths of single segments."
+    "Standard deviations of position and orientation include image noise, light, and edges that are not where the drawn "
+    "body has them; and what the self-check leaves open: the sizes of body and world, and the cameras' places and "
+    "times. They do not include wrong lengths and girths of single segments."
 )
-_CALIBRATION_UNCERTAINTY = " They hold how far the control points leave each camera's picture open."
+_CALIBRATION_UNCERTAINTY = " They include a shift of each camera's whole image due to calibration."
+OUT_OF_SIGHT = "the start pose lies in no camera's image; check start.position_m, in metres"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,16 +63,18 @@ class BodyRun:
     model: BodyModel
     start: Pose
     kept: KeptFrames = field(default_factory=KeptFrames)  # grows while the run is tracked
+    found: FoundStart | None = None  # where the start was looked for
 
     table = MOTION
 
     @classmethod
-    def open(cls, trial: Trial, opened: Opened[Recording]) -> BodyRun:
+    def open(cls, trial: Trial, opened: Opened[Recording], found: FoundStart | None = None) -> BodyRun:
         """Read the body and find its first pose, whose notes become events of the recording."""
         model = trial.model()
         first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
-        opened.recording.events.extend([*model.notes, *first.notes])
-        return cls(trial, opened.recording, opened.calibration, model, first.pose)
+        found_notes = () if found is None else (found.note,)
+        opened.recording.events.extend([*model.notes, *found_notes, *first.notes])
+        return cls(trial, opened.recording, opened.calibration, model, first.pose, found)
 
     def read_done(self, folder: Path) -> list[Estimate]:
         """Return the estimates that a killed run left: from their frames the tracker only learns."""
@@ -95,10 +99,8 @@ class BodyRun:
             tracker = tracker_of(self.trial.settings, model, self.start)
             found = tracker.search(tracker.init(), first)
             model = model if found.pose is None else sample_body_colours(self.model, found.pose, first)
-        if not np.any([_is_visible(view, model.with_pose(self.start)) for view in first.views]):
-            self.recording.events.append(
-                "the start pose lies in no camera's picture; check start.position_m, in metres"
-            )
+        if not is_seen(model.with_pose(self.start), [view.camera for view in first.views if view is not None]):
+            self.recording.events.append(OUT_OF_SIGHT)
         return replace(self, model=model)
 
     def tracker(self) -> Tracker[Any, Estimate]:
@@ -127,7 +129,10 @@ class BodyRun:
         pose = self.start if is_first and estimate.pose is None else estimate.pose
         posed = None if pose is None else self.model.with_pose(pose)
         for artist in artists:
-            artist.write(frames, posed, estimate.status)
+            if isinstance(artist, OverlayVideos):
+                artist.write(frames, posed, estimate.status, unknown_segments(estimate, self.model))
+            else:
+                artist.write(frames, posed, estimate.status)
 
     def keep(self, frames: Frames) -> None:
         """Keep some frames, spread over the run, for the self-check."""
@@ -163,6 +168,8 @@ class BodyRun:
     def write_report(self, folder: Path, summary: dict[str, Any], motion: Motion) -> None:
         """Draw the figures and write the report."""
         write_figures(figures_of(folder), motion, self.model)
+        if self.found is not None:
+            self.found.draw(folder)
         write_report(folder, summary)
 
     def warnings(self) -> list[str]:
@@ -186,6 +193,7 @@ def _has_flight(motion: Motion, model: BodyModel) -> bool:
     return bool(motion.joints) and has_inertias(model)
 
 
-def _is_visible(view: View | None, posed: PosedBody) -> bool:
-    """Say whether a view shows any part of the body."""
-    return view is not None and bool(render(surface_arrays(posed.model), posed, view.camera, FLAT).mask.any())
+def is_seen(posed: PosedBody, cameras: Iterable[Camera]) -> bool:
+    """Say whether any part of a body lies in a camera's image; lens distortion is left out."""
+    surface = surface_arrays(posed.model)
+    return any(render(surface, posed, camera.without_distortion(), FLAT).mask.any() for camera in cameras)

@@ -7,6 +7,7 @@ import numpy as np
 from airborne.body import BodyModel
 from airborne.cameras import Rig
 from airborne.cameras.clicks import read_clicks, read_positions
+from airborne.errors import TrialError
 from airborne.run.detections import TrialDetections
 from airborne.tracking.first_pose import FirstPose, fit_to_detections, fit_to_pixels, fit_to_points, pose_by_hand
 from airborne.trial.file import Trial
@@ -18,6 +19,8 @@ def find_first_pose(trial: Trial, model: BodyModel, rig: Rig, detections: TrialD
     Raises TrialError where the points do not determine a pose of this body, CalibrationError for unusable tables.
     """
     start = trial.start
+    if start.find:
+        raise TrialError(f"{trial.name}: [start] is missing; `airborne find` looks for the body and prints one")
     if detections is not None:
         where = f"{start.detections}, frame {start.frame}"
         return fit_to_detections(model, rig, where, detections.at_image(start.frame))

@@ -15,6 +15,8 @@ from airborne.motion.covariance_file import COVARIANCE_FILE, LASTING_FILE
 from airborne.motion.run_folder import (
     BODY,
     CALIBRATION,
+    CANDIDATES,
+    CANDIDATES_PICTURE,
     FOLDERS,
     JOINTS,
     JUMPS,
@@ -27,6 +29,7 @@ from airborne.motion.run_folder import (
 )
 from airborne.trial.file import Trial
 
+_BEFORE_A_RUN = {CANDIDATES, CANDIDATES_PICTURE}  # what a start that is undecided leaves
 _HASHED_BYTES = 8 << 20  # larger files are identified by their first and last so many bytes and their length
 
 
@@ -43,7 +46,7 @@ def prepare_folder(
     if overwrite and record.exists():
         read_record(record)
         _remove_run(folder)
-    elif not record.exists() and not rows.exists() and any(folder.iterdir()):
+    elif not record.exists() and not rows.exists() and {path.name for path in folder.iterdir()} - _BEFORE_A_RUN:
         raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
     if rows.exists() and not resume:
         raise ResultError(
@@ -61,8 +64,19 @@ def prepare_folder(
 
 def _remove_run(folder: Path) -> None:
     """Remove what commands leave in a run's folder; exports and what others put there stay."""
-    binary = COVARIANCE_FILE, LASTING_FILE
-    for name in (MOTION, JOINTS, JUMPS, SUMMARY, REPORT, CALIBRATION, BODY, *binary, SMOOTH_RECORD):
+    for name in (
+        MOTION,
+        JOINTS,
+        JUMPS,
+        SUMMARY,
+        REPORT,
+        CALIBRATION,
+        BODY,
+        COVARIANCE_FILE,
+        LASTING_FILE,
+        SMOOTH_RECORD,
+        *_BEFORE_A_RUN,
+    ):
         (folder / name).unlink(missing_ok=True)
     for name in FOLDERS:
         shutil.rmtree(folder / name, ignore_errors=True)

@@ -19,6 +19,7 @@ from airborne.export.overlays import OverlaysAs
 from airborne.motion import Motion, PlayersMotion
 from airborne.motion.run_folder import CALIBRATION, SUMMARY
 from airborne.run.body import BodyRun
+from airborne.run.find import find_start
 from airborne.run.folder import list_tables, prepare_folder, run_identity
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files
 from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
@@ -50,6 +51,7 @@ def track_trial(
     live: bool = False,
     pictures: bool = True,
     first_frame: bool = False,
+    take: int | None = None,
     progress: Progress | None = None,
 ) -> TrackResult:
     """Track a trial, a body or players, and write the results into a folder.
@@ -58,6 +60,7 @@ def track_trial(
     rows stay. `live`, for players, reads pipes, capture devices, or files at their own speed, drops frames rather than
     fall behind, and ends with them or with KeyboardInterrupt. `pictures=False` leaves out videos, figures and report.
     `overwrite` replaces the run that the folder holds. `first_frame` tracks one frame and draws it, without a report.
+    `take` chooses one of the poses that were found, from 1, where the trial leaves its start to be found.
     Raises an AirborneError for input that cannot be used, and for a folder that holds another run.
     """
     if live and resume:
@@ -68,18 +71,25 @@ def track_trial(
         raise ResultError("a live run has no first frame to come back to; leave --live or --first-frame out")
     if overwrite and resume:
         raise ResultError("a run is either resumed or overwritten; give one of --resume and --overwrite")
-    if first_frame:
-        trial = trial.model_copy(update={"track": trial.track.model_copy(update={"stop": trial.start.frame + 1})})
     if not live:
         refuse_same_files(trial)
     started_s = time.monotonic()
+    found = None
+    if trial.start.find:
+        found = find_start(trial, folder, take=take, progress=progress)
+        trial = found.trial
+    elif take is not None:
+        raise ResultError("--take chooses between poses that were found; this trial's [start] says where the body is")
+    if first_frame:
+        trial = trial.model_copy(update={"track": trial.track.model_copy(update={"stop": trial.start.frame + 1})})
     drawn = None if not pictures else "stills" if first_frame else "videos"
     options = _Options(folder, started_s, resume, overwrite, live, drawn, progress)
     with ExitStack() as stack:
         if trial.has_players:
             opened = _open_live(trial, stack, progress) if live else open_trial(trial)
             return _run(PlayersRun.open(trial, opened), options, stack)
-        body = BodyRun.open(trial, open_trial(trial))
+        opened = open_trial(trial, None if found is None else found.facts)
+        body = BodyRun.open(trial, opened, found)
         refuse_mix_ups(body.recording, body.model, body.start)
         return _run(body, options, stack)
 
@@ -145,7 +155,7 @@ def _track(
         frames = stack.enter_context(closing(iter(recording)))
         first = next(frames, None)
         if first is None:
-            raise past_the_end_error(subject.trial)
+            raise past_the_end_error(subject.trial, recording)
         subject = subject.see(first)
         done = subject.read_done(folder) if resume else ()
         writer = stack.enter_context(subject.writer(folder, resume=resume))

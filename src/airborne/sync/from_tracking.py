@@ -208,7 +208,7 @@ class _Measure:
                 tracked.equations.append(root_equations(refined, state.inner, compensated, estimate.pose))
             self._on_image()
         if tracked is None:
-            raise past_the_end_error(trial)
+            raise past_the_end_error(trial, self._recording)
         if len(tracked.poses) < _LEAST_FRAMES:
             raise TrialError(
                 f"{trial.name}: the body was tracked at {len(tracked.poses)} moments; the lags need at least "

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from airborne.appearance.empty_scene import difference
 from airborne.cameras import Camera, Rig
 from airborne.errors import VideoError
 from airborne.geometry.robust import SD_OF_MEDIAN_DEVIATION, covariance_of_sum
@@ -31,7 +32,6 @@ _MOST_IMAGES = 1500  # images read
 _N_BACKGROUND = 60  # images that the median is made of
 _LEAST_SDS = 5.0  # robust sds of the static scene
 _LEAST_GREY = 8.0  # grey levels by which something must differ in any case
-_DARKEST_SHADOW = 0.35  # of the background's light
 _LEAST_SHARE = 2e-4  # of the image that must differ
 _LEAST_OF_LARGEST = 0.25  # regions smaller than this share of the largest are ignored
 _HALF_WINDOW = 3  # images on either side of a smoothed one
@@ -233,7 +233,7 @@ def _hulls(stack: NDArray[np.uint8]) -> list[Array]:
     height, width = background.shape[:2]
     hulls = []
     for image in stack:
-        distance = cv2.GaussianBlur(_difference(image.astype(np.float32), background), (0, 0), 0.8)
+        distance = cv2.GaussianBlur(difference(image, background), (0, 0), 0.8)
         is_new = distance > max(_LEAST_SDS * SD_OF_MEDIAN_DEVIATION * float(np.median(distance)), _LEAST_GREY)
         _, labels, boxes, _ = cv2.connectedComponentsWithStats(is_new.astype(np.uint8))
         areas = boxes[1:, cv2.CC_STAT_AREA]
@@ -244,14 +244,6 @@ def _hulls(stack: NDArray[np.uint8]) -> list[Array]:
             if points.min() > 0 and points[:, 0].max() < width - 1 and points[:, 1].max() < height - 1:
                 hulls[-1] = cv2.convexHull(points)[:, 0].astype(float)
     return hulls
-
-
-def _difference(image: Array, background: Array) -> Array:
-    """Return how far pixels differ from the background (h, w) [grey levels]; where it is only darker, by hue alone."""
-    share = (image * background).sum(axis=2) / np.maximum((background**2).sum(axis=2), 1.0)
-    is_shadow = (share > _DARKEST_SHADOW) & (share < 1)
-    expected = np.where(is_shadow[..., None], share[..., None] * background, background)
-    return np.abs(image - expected).max(axis=2)
 
 
 def _shrunk_camera(small: tuple[int, ...], camera: Camera, parity: int | None) -> Camera:

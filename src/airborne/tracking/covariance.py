@@ -9,6 +9,7 @@ from airborne.types import Array
 
 SHIFT_SD_PX = 0.12  # of a full frame: light and edges that are not quite as modelled may displace an image by this
 _LEVER_M = 0.3  # the length that makes metres and radians comparable
+_JOINT_RANGE_RAD = 1.0  # sd of a joint's rotation that images do not show: that of a range of +-100 degrees
 _MOST_SWEEPS = 30  # of the iteration
 _UNOBSERVED_SD_M = 0.15  # a direction with a larger sd than this, at the lever's length, counts as unobserved
 
@@ -20,7 +21,9 @@ def covariance_of(curvature: Array, *, noise: float, score_covariance: Array | N
     pixels share it. `score_covariance` (d, d) is the sum of g g' over image patches, g the gradient: along each
     principal direction the larger of two variances holds, that of independent noise and that of the patches (the
     sandwich estimate), which also counts wrong light and wrong shape. A direction with an sd above 0.15 m, or above
-    0.5 rad, counts as unobserved: what it touches has an infinite variance.
+    0.5 rad, counts as unobserved: what it touches has an infinite variance, if it moves the root. One of joints alone
+    has the variance of a joint's range, so that what hardly depends on it, as an ankle on a straight leg's spin, keeps
+    its own.
     """
     scale = np.where(np.arange(len(curvature)) < 3, 1, 1 / _LEVER_M)
     steepness, directions = eigen_decomposition(curvature * np.outer(scale, scale))
@@ -30,6 +33,9 @@ def covariance_of(curvature: Array, *, noise: float, score_covariance: Array | N
         forms = _quadratic_forms(directions, score_covariance * np.outer(scale, scale))
         variance = np.maximum(variance, forms / steepness**2)
     observed = variance < _UNOBSERVED_SD_M**2
+    is_of_joints = ~observed & ~np.any(np.abs(directions[:6]) > 0.1, axis=0)
+    variance = np.where(is_of_joints, (_JOINT_RANGE_RAD * _LEVER_M) ** 2, variance)
+    observed |= is_of_joints
     covariance = _compose(directions, np.where(observed, variance, 0.0)) * np.outer(scale, scale)
     unobserved = np.any(np.abs(directions[:, ~observed]) > 0.1, axis=1)
     covariance[unobserved] = covariance[:, unobserved] = 0

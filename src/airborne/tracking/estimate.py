@@ -7,8 +7,9 @@ from enum import StrEnum
 from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
 
-from airborne.body import Pose
+from airborne.body import BodyModel, Pose
 from airborne.types import Array
 
 
@@ -42,3 +43,14 @@ class Estimate:
 def lost_estimate(index: int, time_s: Fraction) -> Estimate:
     """Return the estimate of a frame in which the body was not found."""
     return Estimate(index=index, time_s=time_s, status=Status.LOST, score=np.nan, pose=None, covariance=None, n_views=0)
+
+
+def unknown_segments(estimate: Estimate, model: BodyModel) -> NDArray[np.bool_]:
+    """Return which segments the images do not show: an unobserved joint, or one nearer to the trunk: (segments,)."""
+    unknown = np.zeros(len(model.segments), bool)
+    if estimate.covariance is None or len(estimate.covariance) != model.n_dofs:
+        return unknown
+    unknown[1:] = np.isinf(np.diagonal(estimate.covariance)[6:]).reshape(-1, 3).any(axis=1)
+    for segment, parent in enumerate(model.parents[1:], start=1):
+        unknown[segment] |= unknown[parent]
+    return unknown

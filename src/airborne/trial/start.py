@@ -18,6 +18,7 @@ from airborne.trial.table import SettingsTable, Vector
 class StartTable(SettingsTable):
     """The first pose: set by hand, or found from positions of the body's landmarks; or those of several players."""
 
+    find: bool = False  # the body is looked for, from `frame` on
     frame: Annotated[int, Field(ge=0)] = 0
     position_m: Vector | None = None
     rotation_matrix: Annotated[list[Vector], Field(min_length=3, max_length=3)] | None = None
@@ -34,10 +35,15 @@ class StartTable(SettingsTable):
     def _check_start(self) -> StartTable:
         by_hand = {"position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg"}
         ways = [self.joints_m, self.points_px, self.detections]
-        given = sum(value is not None for value in ways) + bool(by_hand & self.model_fields_set) + bool(self.player)
+        given = (
+            sum(value is not None for value in ways)
+            + bool(by_hand & self.model_fields_set)
+            + bool(self.player)
+            + self.find
+        )
         if given != 1:
             raise ValueError(
-                "give a position_m and a rotation, or joints_m, points_px or detections, one of them; "
+                "give a position_m and a rotation, or joints_m, points_px, detections or find = true, one of them; "
                 "of several players [[start.player]] tables"
             )
         names = [player.name for player in self.player]
@@ -62,7 +68,7 @@ class StartTable(SettingsTable):
         if self.rotation_matrix is not None:
             R = np.array(self.rotation_matrix)
             if not np.allclose(R @ R.T, np.eye(3), atol=1e-3) or np.linalg.det(R) < 0:
-                raise ValueError("rotation_matrix is no rotation: rows must be unit, at right angles, right-handed")
+                raise ValueError("rotation_matrix is not a rotation: rows must be unit, at right angles, right-handed")
 
     @property
     def pose(self) -> Pose:

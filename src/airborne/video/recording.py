@@ -47,12 +47,19 @@ class Recording:
         return self.facts[0].image_rate / self.every
 
     @property
-    def n_frames(self) -> int | None:
-        """How many `Frames` to expect by the files' stated durations; None where the clock's file states none."""
+    def n_images(self) -> int | None:
+        """How many images the clock counts by the files' stated durations; None where the clock's file states none."""
         ends = [s.trial_time(f.duration_s) for s, f in zip(self.sources, self.facts, strict=True) if f.duration_s]
         if self.facts[0].duration_s is None:
             return None
-        n = round((max(ends) - self.sources[0].trial_time(Fraction(0))) * self.facts[0].image_rate)
+        return round((max(ends) - self.sources[0].trial_time(Fraction(0))) * self.facts[0].image_rate)
+
+    @property
+    def n_frames(self) -> int | None:
+        """How many `Frames` to expect by the files' stated durations; None where the clock's file states none."""
+        n = self.n_images
+        if n is None:
+            return None
         return len(range(self.start, n if self.stop is None else min(n, self.stop), self.every))
 
     def __iter__(self) -> Generator[Frames]:

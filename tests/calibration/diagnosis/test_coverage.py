@@ -12,7 +12,7 @@ SIZE = (1920, 1080)
 def test_few_views_are_counted():
     assert check_view_count("cam1", 8) == []
     assert check_view_count("cam1", 1)[0].sentence.startswith(
-        "cam1 shows the board in 1 picture, expected 8: film it longer"
+        "cam1 shows the board in 1 image, expected 8: film it longer"
     )
 
 

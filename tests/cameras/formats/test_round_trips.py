@@ -94,6 +94,18 @@ def test_a_fisheye_is_refused_where_there_is_no_place_for_it(tmp_path, kind):
     assert not list(tmp_path.glob("**/*.*"))
 
 
+@pytest.mark.parametrize("kind", ["pose2sim", "aniposelib", "caliscope", "opencv", "qualisys", "vicon"])
+def test_the_rational_model_comes_back_or_is_refused(tmp_path, kind):
+    lens = np.array([0.31, -0.04, 0.001, -0.0007, 0.012, 0.62, 0.03, 0.004])
+    rig = Rig(tuple(replace(camera, distortion=lens) for camera in three_cameras()))
+    if kind in ("qualisys", "vicon"):
+        with pytest.raises(CalibrationError, match=r"camera 'left' has a rational lens model, which .* cannot hold"):
+            write_rig(tmp_path / "out", rig, format=kind)
+    else:
+        write_rig(tmp_path / "out", rig, format=kind)
+        assert_same(read_rig(tmp_path / "out"), rig, with_names=kind != "caliscope")
+
+
 def test_what_a_format_loses_is_said(tmp_path):
     rig = three_cameras(LENS)
     skewed = Rig(
@@ -120,7 +132,7 @@ def test_a_name_that_no_file_can_hold_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("rig.txt", {}, "the name asks for no format; end it in .toml, .qca.txt, .xcp"),
+        ("rig.txt", {}, "the name names no format; end it in .toml, .qca.txt, .xcp"),
         ("rig.toml", {"format": "anipose"}, "no calibration format 'anipose'; choose from pose2sim, aniposelib"),
         ("rig.toml", {"unit": "mm"}, "pose2sim files are always in m"),
         ("rig.xcp", {"unit": "m"}, "vicon files are always in mm"),

@@ -114,7 +114,7 @@ def test_momentum_recomputed_from_the_poses_stays_the_same(middle):
 def test_momentum_of_a_gymnast_stays_the_same_too():
     model, half = human18(1.66, 58.0), 0.02
     rng = np.random.default_rng(5)
-    lowest, highest = np.clip(np.moveaxis(model.limits_rad, -1, 0), -1, 1)
+    lowest, highest = np.clip(np.moveaxis(model.limits.angle_ranges_rad, -1, 0), -1, 1)
     joints = joint_motion(np.array([0.0, 0.3]), rng.uniform(lowest, highest, (2, 17, 3)))
     given = takeoff(angular_momentum=np.array([70.0, 5.0, -3.0]))
     flight = fly_articulated(model, given, joints, 0.15 + half * NODES)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from airborne.cameras.finding import Finding, join_names
+from airborne.errors import count
 from airborne.types import Array
 
 _FEWEST_VIEWS = 8  # of a board, for a lens
@@ -27,7 +28,7 @@ def check_view_count(camera: str, n_views: int) -> list[Finding]:
     return [
         Finding(
             kind="coverage",
-            what=f"{camera} shows the board in {n_views} picture{'s' * (n_views != 1)}, expected {_FEWEST_VIEWS}",
+            what=f"{camera} shows the board in {count(n_views, 'image')}, expected {_FEWEST_VIEWS}",
             advice="film it longer, in all parts of the picture, near and far",
             cameras=(camera,),
         )

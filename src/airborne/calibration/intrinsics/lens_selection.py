@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from airborne.calibration.bundle import ALL_FIXED, Adjustment, FreeParameters, adjust
 from airborne.calibration.diagnosis.control_points import flatness
 from airborne.calibration.initial.chaining import Views, board_source, initial_lens
-from airborne.calibration.intrinsics.model_selection import candidates_for, choose_simplest, place_sd
-from airborne.calibration.intrinsics.physical import Pinhole
+from airborne.calibration.intrinsics.common_lens import common_lens_sd
+from airborne.calibration.intrinsics.model_selection import Solution, candidates_for, choose_simplest, place_sd
+from airborne.calibration.intrinsics.physical import pinhole_of
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras.camera import Camera, Lens, Rig
 from airborne.types import Array, Progress
@@ -90,32 +91,28 @@ def choose_lens(
 
 def lenses_from_points(rig: Rig, points: ControlPoints, progress: Progress) -> dict[str, LensFit]:
     """Fit the lenses of cameras that see many control points, from initial values; those with few are left out."""
-    fits = {}
+    candidates: dict[str, list[Solution]] = {}
     for done, camera in enumerate(rig):
         is_seen = points.is_seen_by(camera.name)
         if is_seen.sum() >= _FEWEST_POINTS and flatness(points.world[is_seen]) >= _LEAST_FLATNESS:
             px = points.px[is_seen, points.cameras.index(camera.name)]
-            fits[camera.name] = _lens_from_points(camera, points.world[is_seen], px)
+            candidates[camera.name] = candidates_for(pinhole_of(camera), points.world[is_seen], px)
         progress(done + 1, len(rig))
-    return fits
+    common_sd_m = common_lens_sd(candidates, {camera.name: camera.size for camera in rig})
+    return {name: _lens_from_points(rig[name], each, common_sd_m.get(name)) for name, each in candidates.items()}
 
 
-def _lens_from_points(camera: Camera, world: Array, px: Array) -> LensFit:
-    R = camera.camera_from_world.rotation.as_matrix()
-    terms = np.zeros(4 if camera.lens == "fisheye" else 5)
-    initial = Pinhole(R, camera.centre, camera.K[0, 0], camera.K[:2, 2], terms, camera.lens)
-    candidates = candidates_for(initial, world, px)
+def _lens_from_points(camera: Camera, candidates: list[Solution], common_lens_sd_m: Array | None) -> LensFit:
     chosen = choose_simplest(candidates)
-    pinhole, model = chosen.pinhole, chosen.model
-    rms_px = {s.model.name: float(np.sqrt(np.mean(np.sum(s.held_out_px**2, axis=1)))) for s in candidates}
+    model = chosen.model
     return LensFit(
-        camera=pinhole.camera(camera.name, camera.size),
+        camera=chosen.pinhole.camera(camera.name, camera.size),
         model=model.name,
         free=FreeParameters(principal_point=model.frees_principal_point, n_terms=len(model.terms)),
-        n_views=len(world),
+        n_views=len(chosen.world),
         rms_px=float(np.sqrt(np.mean(np.sum(chosen.residual_px**2, axis=1)))),
-        held_out_rms_px=rms_px,
-        place_sd_m=place_sd(chosen, candidates),
+        held_out_rms_px={s.model.name: float(np.sqrt(np.mean(np.sum(s.held_out_px**2, axis=1)))) for s in candidates},
+        place_sd_m=place_sd(chosen, candidates, common_lens_sd_m),
     )
 
 

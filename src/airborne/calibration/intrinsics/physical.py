@@ -131,6 +131,13 @@ class Pinhole:
         )
 
 
+def pinhole_of(camera: Camera) -> Pinhole:
+    """Return a camera's pose and focal length with square pixels, its lens without distortion."""
+    R = camera.camera_from_world.rotation.as_matrix()
+    terms = np.zeros(_FEWEST_TERMS[camera.lens])
+    return Pinhole(R, camera.centre, camera.K[0, 0], camera.K[:2, 2], terms, camera.lens)
+
+
 def parameter_names(model: PinholeModel) -> tuple[str, ...]:
     """Return the names, with units, of the model's free parameters, in the order of `Pinhole.apply_step`."""
     lens_terms = tuple(_TERM_NAMES[model.lens][term] for term in model.terms)
@@ -153,6 +160,13 @@ def fit_pinhole(start: Pinhole, model: PinholeModel, world: Array, px: Array) ->
         max_nfev=_MOST_ITERATIONS * (n + 1 if slopes == "2-point" else 1),
     )
     return start.apply_step(model, solution.x)
+
+
+def fit_pose(start: Pinhole, world: Array, px: Array) -> Pinhole:
+    """Return the camera near start with its lens kept that projects world (n, 3) [m] closest to px (n, 2) [px]."""
+    residual = _residual_of_step(start, SEVEN_PARAMETERS, world, px)
+    solution = least_squares(lambda step: residual(np.append(step, 0.0)), np.zeros(6), method="lm", x_scale="jac")
+    return start.apply_step(SEVEN_PARAMETERS, np.append(solution.x, 0.0))
 
 
 def anneal_pinhole(start: Pinhole, world: Array, px: Array, *, seed: int) -> Pinhole:

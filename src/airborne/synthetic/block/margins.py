@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airborne.body import surface_arrays
+from airborne.geometry.rotations import matrix_from_angles
 from airborne.synthetic.block.posture import Person, Poses
 from airborne.types import Array
 
@@ -61,8 +62,7 @@ def margins_of(person: Person, poses: Poses, *, side: float) -> Margins:
     lowest = centre[..., 2] - np.linalg.norm(axes[:, :, 2], axis=-1)
     surface = centre[:, :, None] + np.einsum("neij,kj->neki", axes, _SPHERE)
     from_net = np.where(surface[..., 2] < NET_TOP_M + _NET_CLEAR_M, side * surface[..., 1], np.inf)
-    limits = person.model.limits_rad
-    slack = np.minimum(poses.joint_angles - limits[..., 0], limits[..., 1] - poses.joint_angles)
+    slack = person.model.limits.slack(matrix_from_angles(poses.joint_angles))
     return Margins(float(lowest.min()), float(from_net.min()), float(slack.min()))
 
 

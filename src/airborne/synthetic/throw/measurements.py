@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from airborne.body import Box, Pose
-from airborne.body.chain import move_pose
+from airborne.body.chain import clamp_to_limits, move_pose
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras import Rig
 from airborne.synthetic.flight.rigid import SampledFlight
@@ -66,9 +65,7 @@ def start_pose(scene: Scene) -> Pose:
     rotations = rng.normal(size=true.joint_angles.shape)
     rotations = scene.start_joint_error_rad * rotations / np.linalg.norm(rotations, axis=1, keepdims=True)
     delta = np.concatenate([scene.start_error_m * offset, scene.start_error_rad * axis, rotations.ravel()])
-    pose = move_pose(true, delta)
-    lowest, highest = np.moveaxis(scene.model.limits_rad, -1, 0)
-    return replace(pose, joint_angles=np.clip(pose.joint_angles, lowest, highest))
+    return clamp_to_limits(scene.model, move_pose(true, delta))
 
 
 def lights_table(scene: Scene) -> dict:

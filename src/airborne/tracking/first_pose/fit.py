@@ -15,8 +15,10 @@ from airborne.cameras import Rig
 from airborne.cameras.consensus import triangulate_consensus
 from airborne.cameras.detections import LANDMARK_RECIPES, NETWORKS, Detections, landmarks_from_points
 from airborne.errors import BodyError, TrialError
+from airborne.geometry.rotations import matrix_from_angles
 from airborne.types import Array
 
+_ROUNDING_RAD = 1e-9  # an angle beyond its limit by less is at it
 LEAST_VISIBILITY = 0.3  # detections with a lower confidence are ignored
 LANDMARK_WEIGHTS = {  # of points that only lie near the landmark they stand for
     "head": 0.1,
@@ -45,7 +47,7 @@ def pose_by_hand(
                 f"it has: {', '.join(joints) or 'none'}"
             )
         angles[joints.index(name)] = np.radians(xyz)
-    is_out = np.any((angles < model.limits_rad[..., 0]) | (angles > model.limits_rad[..., 1]), axis=1)
+    is_out = np.any(np.abs(model.limits.excess(matrix_from_angles(angles))) > _ROUNDING_RAD, axis=1)
     beyond = [name for name, out in zip(joints, is_out, strict=True) if out and name in joint_angles_deg]
     notes = (f"start.joint_angles_deg: {', '.join(beyond)} beyond the body's joint limits",) if beyond else ()
     return FirstPose(Pose(world_from_root=world_from_root, joint_angles=angles), notes)
@@ -91,8 +93,8 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
     worst = max(off_m, key=off_m.__getitem__)
     missing = ", ".join(name for name, point in targets.items() if np.isnan(point).any())
     notes = [
-        f"{where}: first pose found, landmarks {fit.rms_m * 1e3:.0f} mm off (RMS), "
-        f"most {worst}, {off_m[worst] * 1e3:.0f} mm",
+        f"{where}: first pose found; landmarks are {fit.rms_m * 1e3:.0f} mm off (RMS), "
+        f"the largest is {worst} with {off_m[worst] * 1e3:.0f} mm",
         f"{where}: no place of {missing}; there the first pose is as near to straight as it can be" if missing else "",
         f"{where}: {fit.note}" if fit.note else "",
     ]

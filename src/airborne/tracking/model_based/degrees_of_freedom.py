@@ -12,12 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose, PosedBody
-from airborne.body.chain import delta_between, move_pose, segment_jacobians
-from airborne.geometry.joint_rotations import compose_rotation_vectors
-from airborne.geometry.rotations import angles_from_world_rotation, matrix_from_angles
+from airborne.body.chain import angles_of, delta_between, move_pose, point_jacobian, segment_jacobians
+from airborne.body.contact import contact_model, overlaps
+from airborne.geometry.rotations import matrix_from_angles
+from airborne.geometry.swing_twist import swing_twist, swing_twist_jacobian
+from airborne.rendering import pose_segments
 from airborne.types import Array
 
-_LIMIT_SD_RAD = np.radians(0.5)  # sd with which a joint that has reached its limit is held there
+_LIMIT_SD_RAD = np.radians(3.0)  # sd of how far a joint may go beyond its limits
+_OVERLAP_SD_M = 0.01  # sd of how far segments may pass through each other, beyond what flesh gives way
+_LIMIT_ROUNDS = 3  # of finding which limits a step reaches
+_BEYOND_RAD = 1e-6  # rounding
 _WIDE_SD = 1.5  # [m, rad]
 _DAMPING_SD_M, _DAMPING_SD_RAD = 0.5, 1.0  # hold what the images do not show
 
@@ -64,16 +69,16 @@ class DegreesOfFreedom:
         return full
 
     def update(self, pose: Pose, delta: Array) -> Pose:
-        """Move a pose by a delta (d,) [m, rad], no joint beyond its limits."""
-        moved = move_pose(pose, self.embed(delta))
-        return clamp_to_limits(self.model, moved)
+        """Move a pose by a delta (d,) [m, rad]."""
+        return move_pose(pose, self.embed(delta))
 
     def solve_step(self, pose: Pose, H: Array, g: Array, prior: PosePrior | None = None) -> Array:
-        """Return the delta (d,) that solves H delta = g with the prior, joints held at their limits.
+        """Return the delta (d,) that solves H delta = g with the prior and the joints' limits, which are soft.
 
         H (d, d), g (d,) in units of the noise's variance.
         """
-        H, g = H + np.diag(self._damping), g.copy()
+        rows, depth = self._overlap_residuals(pose)
+        H, g = H + np.diag(self._damping) + rows.T @ rows, g - rows.T @ depth
         if prior is not None:
             precision = 1 / prior.sd[self.columns] ** 2
             H[np.diag_indices(len(g))] += precision
@@ -81,63 +86,76 @@ class DegreesOfFreedom:
             rows, away = self.rest_residuals(pose)
             H, g = H + rows.T @ rows, g - rows.T @ away
         delta = np.linalg.solve(H, g)
-        for _ in range(3):
-            rows, targets = self._active_limits(pose, delta)
+        for _ in range(_LIMIT_ROUNDS):
+            rows, targets = self._walls(pose, delta)
             if not len(rows):
                 return delta
-            weight = 1 / _LIMIT_SD_RAD**2
-            H, g = H + weight * rows.T @ rows, g + weight * rows.T @ targets
-            delta = np.linalg.solve(H, g)
+            delta = np.linalg.solve(H + rows.T @ rows, g + rows.T @ targets)
         return delta
 
     def prior_cost(self, pose: Pose, prior: PosePrior | None) -> float:
-        """Return minus the log prior: half the squared distance to the expected pose, in sds."""
+        """Return minus the log prior: half the squared distances, in sds, beyond the possible and to the expected."""
+        if not self.moves_joints:
+            possible = np.zeros(0)
+        else:
+            excess = self.model.limits.excess(_rotations(self.model, pose))
+            depth = overlaps(contact_model(self.model), *self._segments(pose)).depth_m
+            possible = np.concatenate([excess.ravel() / _LIMIT_SD_RAD, depth / _OVERLAP_SD_M])
         if prior is None:
-            return 0.0
+            return 0.5 * float(possible @ possible)
         away = delta_between(prior.expected, pose)[self.columns] / prior.sd[self.columns]
         rest = self.rest_residuals(pose)[1]
-        return 0.5 * float(away @ away + rest @ rest)
+        return 0.5 * float(away @ away + rest @ rest + possible @ possible)
 
     def rest_residuals(self, pose: Pose) -> tuple[Array, Array]:
-        """Return how far limited joint angles are from the zero pose, in sds: rows (k, d), values (k,)."""
-        limits = self.model.limits_rad
-        half = (limits[..., 1] - limits[..., 0]) / 2
-        by_own_rotation = _angles_by_own_rotation(pose.joint_angles)
-        is_regular = np.all(np.isfinite(by_own_rotation), axis=(1, 2))
-        used = np.isfinite(half) & (half > 0) & is_regular[:, None]
+        """Return how far limited joints are from the zero pose, in half ranges: rows (k, d), values (k,)."""
+        limits, R = self.model.limits, _rotations(self.model, pose)
+        away = limits.coordinates(R) - limits.nearest(limits.coordinates(np.eye(3)))
+        used = np.isfinite(limits.half_rad) & (limits.half_rad > 0)
         joints, axes = np.nonzero(used)
-        rows = np.zeros((len(joints), 6 + 3 * len(limits)))
+        jacobian = swing_twist_jacobian(limits.relative(R))
+        rows = np.zeros((len(joints), 6 + 3 * len(R)))
         columns = 6 + 3 * joints[:, None] + np.arange(3)
-        sd = half[joints, axes]
-        rows[np.arange(len(joints))[:, None], columns] = by_own_rotation[joints, axes] / sd[:, None]
-        away = pose.joint_angles - np.clip(0.0, limits[..., 0], limits[..., 1])
+        sd = limits.half_rad[joints, axes]
+        rows[np.arange(len(joints))[:, None], columns] = jacobian[joints, axes] / sd[:, None]
         return rows[:, self.columns], away[joints, axes] / sd
 
-    def _active_limits(self, pose: Pose, delta: Array) -> tuple[Array, Array]:
-        """Return rows (k, d) and targets (k,) [rad] of the joint angles that the delta would take past a limit."""
-        limits = self.model.limits_rad
-        nothing = np.zeros((0, len(self.columns))), np.zeros(0)
-        if not np.isfinite(limits).any():
-            return nothing
-        after = compose_rotation_vectors(pose.joint_angles, self.embed(delta)[6:].reshape(-1, 3))
-        bound = np.clip(after, limits[..., 0], limits[..., 1])
-        joints, axes = np.nonzero(np.abs(after - bound) > 1e-6)
-        if not len(joints):
-            return nothing
-        by_own_rotation = _angles_by_own_rotation(pose.joint_angles[joints])
-        rows = np.zeros((len(joints), 6 + 3 * len(limits)))
-        for row, (joint, axis) in enumerate(zip(joints, axes, strict=True)):
-            rows[row, 6 + 3 * joint : 9 + 3 * joint] = by_own_rotation[row, axis]
-        targets = bound[joints, axes] - pose.joint_angles[joints, axes]
-        is_regular = np.isfinite(rows).all(axis=1)
-        return rows[is_regular][:, self.columns], targets[is_regular]
+    def _segments(self, pose: Pose) -> tuple[Array, Array]:
+        """Return the segments in the world, R (segments, 3, 3) and t (segments, 3) [m]."""
+        root, joints = pose.world_from_root, angles_of(pose, self.model.n_joints)
+        R, t = pose_segments(self.model, root.rotation.as_matrix()[None], root.translation[None], joints[None])
+        return R[0], t[0]
 
+    def _overlap_residuals(self, pose: Pose) -> tuple[Array, Array]:
+        """Return how deep segments pass through each other, in sds: rows (k, d), values (k,)."""
+        if not self.moves_joints:
+            return np.zeros((0, len(self.columns))), np.zeros(0)
+        R, t = self._segments(pose)
+        found = overlaps(contact_model(self.model), R, t)
+        if not len(found.depth_m):
+            return np.zeros((0, len(self.columns))), np.zeros(0)
+        posed = PosedBody(self.model, R, t)
+        sphere, other = (point_jacobian(posed, found.segments[:, k], found.point) for k in (0, 1))
+        rows = -np.einsum("ki,kij->kj", found.normal, sphere - other)
+        return rows[:, self.columns] / _OVERLAP_SD_M, found.depth_m / _OVERLAP_SD_M
 
-def clamp_to_limits(model: BodyModel, pose: Pose) -> Pose:
-    """Return the pose with every joint angle clamped to its limits."""
-    if not pose.joint_angles.size:
-        return pose
-    return replace(pose, joint_angles=np.clip(pose.joint_angles, *np.moveaxis(model.limits_rad, -1, 0)))
+    def _walls(self, pose: Pose, delta: Array) -> tuple[Array, Array]:
+        """Return rows (k, d) and targets (k,), in sds, of the joints that the delta would take past a limit."""
+        limits = self.model.limits
+        if not self.moves_joints or not limits.is_limited.any():
+            return np.zeros((0, len(self.columns))), np.zeros(0)
+        after = limits.coordinates(_rotations(self.model, self.update(pose, delta)))
+        bound = limits.nearest(after)
+        beyond = np.linalg.norm(after - bound, axis=1)
+        joints = np.flatnonzero(beyond > _BEYOND_RAD)
+        normal = (after - bound)[joints] / beyond[joints, None]
+        relative = limits.relative(_rotations(self.model, pose))
+        rows = np.zeros((len(joints), 6 + 3 * len(after)))
+        columns = 6 + 3 * joints[:, None] + np.arange(3)
+        jacobian = swing_twist_jacobian(relative[joints])
+        rows[np.arange(len(joints))[:, None], columns] = np.einsum("ki,kij->kj", normal, jacobian)
+        targets = np.einsum("ki,ki->k", normal, bound[joints] - swing_twist(relative[joints]))
+        return rows[:, self.columns] / _LIMIT_SD_RAD, targets / _LIMIT_SD_RAD
 
 
 def root_only(model: BodyModel) -> DegreesOfFreedom:
@@ -166,6 +184,13 @@ def limb_of_segment(model: BodyModel) -> NDArray[np.int64]:
     return limb
 
 
+def limbs_of(model: BodyModel) -> list[NDArray[np.int64]]:
+    """Return the segments of each limb of more than one segment."""
+    limb = limb_of_segment(model)
+    limbs = [np.flatnonzero(limb == each) for each in np.unique(limb[limb >= 0])]
+    return [each for each in limbs if len(each) > 1]
+
+
 def joints_of(model: BodyModel, segments: NDArray[np.integer]) -> DegreesOfFreedom:
     """Free the joints of some segments."""
     return DegreesOfFreedom(model, (3 + 3 * np.asarray(segments)[:, None] + np.arange(3)).ravel())
@@ -185,6 +210,6 @@ def _distance_from_trunk(model: BodyModel) -> NDArray[np.int64]:
     return distance
 
 
-def _angles_by_own_rotation(angles: Array) -> Array:
-    """Differentiate joint angles (n, 3) by a rotation vector in the segment's own axes: (n, 3, 3); NaN near +-90°."""
-    return angles_from_world_rotation(angles) @ matrix_from_angles(angles)
+def _rotations(model: BodyModel, pose: Pose) -> Array:
+    """Return the joints' rotations, parent from segment: (joints, 3, 3)."""
+    return matrix_from_angles(angles_of(pose, model.n_joints))

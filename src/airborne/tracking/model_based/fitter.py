@@ -15,6 +15,7 @@ from airborne.tracking.model_based.degrees_of_freedom import (
     DegreesOfFreedom,
     PosePrior,
     joints_of,
+    limbs_of,
     proximal_to_distal,
     root_only,
 )
@@ -25,10 +26,14 @@ from airborne.tracking.model_based.left_right_swap import swap_limbs
 from airborne.tracking.model_based.misplaced_limbs import find_misplaced_limbs, search_limb
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
+from airborne.tracking.model_based.support import count_views
+from airborne.tracking.model_based.uncovered import uncovered_pixels
 from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
 
+_MOVED_NATS = 7.0  # by which a limb's new place must be likelier: one limb in a thousand is lost in a frame
+_FEWEST_VIEWS = 2  # in which something uncovered asks for a limb
 _TRUNK_AT = 4  # images at this reduction show the limbs of a body with joints; more reduced ones, its trunk alone
 
 
@@ -100,8 +105,7 @@ class Fitter:
 
     def fit_images(self, poses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> Fit:
         """Fit the images from several poses; return the best fit."""
-        posed = self.render_model.with_pose(poses[0])
-        appearance = learn_missing_backgrounds(self.render_model, posed, learned.regions, learned.appearance)
+        appearance = self._complete(poses[0], learned)
         *before, last = self.stages if self.order == "hierarchical" else self.stages[-1:]
         for dofs in before:
             fit = fit_images(self.render_model, poses, learned.regions, appearance, dofs=dofs, prior=prior)
@@ -112,19 +116,51 @@ class Fitter:
         """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it."""
         if not self.moves_joints:
             return JudgedFit(fit, self.agreement(fit.pose, learned))
-        maps, seen = None, (learned.regions, learned.posteriors)
-        for limb in find_misplaced_limbs(self.render_model, fit.pose, *seen):
-            maps = maps or region_evidence(*seen)
-            expected = [replace(fit.pose, joint_angles=_with_limb(fit.pose, guess, limb)) for guess in guesses]
-            dofs = joints_of(self.model, limb)
-            poses = [
-                fit_silhouettes(self.render_model, pose, *seen, levels=NEAR, dofs=dofs)
-                for pose in search_limb(self.render_model, [fit.pose, *expected], limb, maps)
-            ]
-            fit = self.fit_images([fit.pose, *poses], learned, None if prior is None else prior.widen(dofs.columns))
+        seen = learned.regions, learned.posteriors
+        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *seen)
+        for limb in misplaced:
+            fit = self._refit_limb(fit, limb, guesses, learned, prior)
+        for limb in limbs_of(self.model):
+            if self._n_views_uncovered(fit.pose, learned) < _FEWEST_VIEWS:
+                break
+            fit = self._refit_limb(fit, limb, guesses, learned, prior)
         misplaced = find_misplaced_limbs(self.render_model, fit.pose, *seen)
         segments = tuple(int(segment) for limb in misplaced for segment in limb)
-        return JudgedFit(fit, replace(self.agreement(fit.pose, learned), misplaced=segments))
+        n_views_of = count_views(self.render_model, fit.pose, learned.regions, self._complete(fit.pose, learned))
+        agreement = replace(self.agreement(fit.pose, learned), misplaced=segments, n_views_of=n_views_of)
+        return JudgedFit(fit, agreement)
+
+    def _complete(self, pose: Pose, learned: LearnedRegions) -> Appearance:
+        """Return the appearance with a background in every region."""
+        posed = self.render_model.with_pose(pose)
+        return learn_missing_backgrounds(self.render_model, posed, learned.regions, learned.appearance)
+
+    def _refit_limb(
+        self,
+        fit: Fit,
+        limb: NDArray[np.int64],
+        guesses: Sequence[Pose],
+        learned: LearnedRegions,
+        prior: PosePrior | None,
+    ) -> Fit:
+        """Search for a limb, from where the fit and the guesses have it and from anywhere; return the better fit."""
+        seen = learned.regions, learned.posteriors
+        expected = [replace(fit.pose, joint_angles=_with_limb(fit.pose, guess, limb)) for guess in guesses]
+        dofs = joints_of(self.model, limb)
+        poses = [
+            fit_silhouettes(self.render_model, pose, *seen, levels=NEAR, dofs=dofs)
+            for pose in search_limb(self.render_model, [fit.pose, *expected], limb, region_evidence(*seen))
+        ]
+        widened = None if prior is None else prior.widen(dofs.columns)
+        moved = self.fit_images(poses, learned, widened)
+        noise = min(fit.equations.noise, moved.equations.noise)
+        return moved if moved.objective(noise, widened) + _MOVED_NATS < fit.objective(noise, widened) else fit
+
+    def _n_views_uncovered(self, pose: Pose, learned: LearnedRegions) -> int:
+        """Count the views in which something like a limb stands out that the body does not cover."""
+        posed = self.render_model.with_pose(pose)
+        uncovered = uncovered_pixels(self.render_model, posed, learned.regions, learned.posteriors)
+        return sum(bool(each.any()) for each in uncovered)
 
     def _stages_at(self, reduction: int) -> list[DegreesOfFreedom]:
         trunk, everything = self.stages[0], self.stages[-1]

@@ -58,6 +58,10 @@ class Fit:
     equations: PoseEquations  # before the last step
     rms_light: float  # blurred residual, linear light 0..1
 
+    def objective(self, noise: float, prior: PosePrior | None) -> float:
+        """Return minus the log-posterior before the last step, for a given variance of the noise."""
+        return self.equations.objective(noise, self.dofs.prior_cost(self.equations.pose, prior))
+
     @property
     def covariance(self) -> Array:
         """Of position [m] and rotation vectors [rad], (6 + 3 joints,) squared; infinite where unobserved."""
@@ -142,6 +146,32 @@ def linearise_images(
     """Return the normal equations of the images at one pose, without moving it."""
     evaluate, _ = _image_evaluator(render_model, [pose], regions, appearance, dofs=dofs)
     return evaluate(pose, True)
+
+
+def image_cost(render_model: RenderModel, bodies: Sequence[PosedBody], region: Region, appearance: Appearance) -> Array:
+    """Return minus the log-likelihood of one image for each of several bodies, the light and noise of the first."""
+    view, n = image_buffers(render_model, bodies[:1], region, appearance), len(render_model.model.segments)
+    if not view.is_visible:
+        return np.zeros(len(bodies))
+    rows_sigma_px = max(_FINE_SIGMA_PX * region.aspect, 0.5)
+    taps = gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(rows_sigma_px)
+    totals = np.array(
+        [
+            _add_image_equations(
+                render_model,
+                posed,
+                view,
+                taps=taps,
+                iterations=0 if k else 3,
+                sums=Sums.zero(n),
+                blocks=_blocks(view, n),
+            )
+            for k, posed in enumerate(bodies)
+        ]
+    )
+    cost, total, weight = totals.T
+    noise = 4 * np.pi * _FINE_SIGMA_PX * rows_sigma_px * total[0] / weight[0] if weight[0] > 0 else 1.0
+    return 0.5 * cost / max(noise, 1e-9)
 
 
 def _image_evaluator(

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from airborne.body import BodyModel, Pose
-from airborne.body.chain import joint_angles_of
-from airborne.tracking.model_based.degrees_of_freedom import clamp_to_limits
+from airborne.body.chain import clamp_to_limits, joint_angles_of
 from airborne.types import Array
 
 _LEFT, _RIGHT = "_left", "_right"

@@ -7,12 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
 from scipy.special import ndtri
 from scipy.stats import qmc
 
 from airborne.appearance.model import Region
 from airborne.body import Pose
+from airborne.body.chain import angles_near
+from airborne.body.limits import JointLimits
 from airborne.geometry.joint_rotations import compose_rotation_vectors
+from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.rendering import EvidenceMaps, mask_evidence, pose_segments
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
 from airborne.tracking.model_based.render_model import RenderModel
@@ -20,6 +24,7 @@ from airborne.types import Array
 
 _ROUNDS = ((512, 16), (256, 3))  # proposals, survivors; the sds are halved in each round
 _REACH_RAD = 0.7  # sd of the first proposals, for each joint and axis
+_N_WIDE, _LARGE_RAD = 1024, np.radians(50)  # starts all over the ranges, of those axes whose half is larger
 _FEWEST_PX = 25  # a segment with fewer visible pixels in a view is occluded there, not misplaced
 _MISPLACED = 0.5  # share of the body's precision, below which a segment is misplaced
 
@@ -47,23 +52,38 @@ def search_limb(
 ) -> list[Pose]:
     """Return the poses with the most evidence when one limb moves from where the given poses have it.
 
-    The poses differ in that limb only.
+    The poses differ in that limb only. The search starts from all over the joints' ranges too.
     """
-    model, joints = render_model.model, limb - 1
-    root = poses[0].world_from_root
+    joints, root = limb - 1, poses[0].world_from_root
     angles = np.stack([pose.joint_angles for pose in poses])  # (candidates, joints, 3)
-    half = np.diff(model.limits_rad[joints], axis=-1).ravel() / 2  # a hinge is searched about its one axis
-    reach = np.minimum(half / 2, _REACH_RAD)
+    limits = JointLimits.stack(render_model.model.segments[segment].limits for segment in limb)
+    reach = np.minimum(limits.half_rad.ravel() / 2, _REACH_RAD)  # a hinge is searched about its one axis
+    anywhere = np.concatenate([angles, _all_over(limits, joints, angles[0])])
+    angles = _best(render_model, root, anywhere, maps, _ROUNDS[0][1])
     for number, (n_proposals, n_survivors) in enumerate(_ROUNDS):
         steps = ndtri(qmc.Sobol(3 * len(limb), rng=number).random(n_proposals)) * reach / 2**number
         proposed = angles[np.arange(n_proposals) % len(angles)]
         angles_of_limb = np.ascontiguousarray(proposed[:, joints]).reshape(-1, 3)
-        proposed[:, joints] = compose_rotation_vectors(angles_of_limb, steps.reshape(-1, 3)).reshape(
-            n_proposals, len(limb), 3
-        )
-        angles = np.concatenate([angles, np.clip(proposed, *np.moveaxis(model.limits_rad, -1, 0))])
-        R = np.broadcast_to(root.rotation.as_matrix(), (len(angles), 3, 3))
-        t = np.broadcast_to(root.translation, (len(angles), 3))
-        scores = mask_evidence(render_model.geometry, maps, *pose_segments(model, R, t, angles)).sum(axis=1)
-        angles = angles[np.argsort(-scores, kind="stable")[:n_survivors]]
+        turned = compose_rotation_vectors(angles_of_limb, steps.reshape(-1, 3)).reshape(n_proposals, len(limb), 3)
+        proposed[:, joints] = angles_near(limits.clamp(matrix_from_angles(turned)), turned)
+        angles = _best(render_model, root, np.concatenate([angles, proposed]), maps, n_survivors)
     return [replace(poses[0], joint_angles=each) for each in angles]
+
+
+def _best(render_model: RenderModel, root: RigidTransform, angles: Array, maps: EvidenceMaps, n: int) -> Array:
+    """Return the n joint angles (n, joints, 3) of most evidence, best first."""
+    R = np.broadcast_to(root.rotation.as_matrix(), (len(angles), 3, 3))
+    t = np.broadcast_to(root.translation, (len(angles), 3))
+    segments = pose_segments(render_model.model, R, t, angles)
+    scores = mask_evidence(render_model.geometry, maps, *segments).sum(axis=1)
+    return angles[np.argsort(-scores, kind="stable")[:n]]
+
+
+def _all_over(limits: JointLimits, joints: NDArray[np.int64], angles: Array) -> Array:
+    """Return joint angles (n, joints, 3) with one limb's joints anywhere in their ranges, as far as these are large."""
+    turned = limits.coordinates(matrix_from_angles(angles[joints]))
+    anywhere = (2 * qmc.Sobol(turned.size, rng=0).random(_N_WIDE).reshape(-1, *turned.shape) - 1) * limits.half_rad
+    turned = limits.nearest(np.where((limits.half_rad > _LARGE_RAD) & np.isfinite(anywhere), anywhere, turned))
+    proposed = np.broadcast_to(angles, (_N_WIDE, *angles.shape)).copy()
+    proposed[:, joints] = angles_from_matrix(limits.rotation(turned))
+    return proposed

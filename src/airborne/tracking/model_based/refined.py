@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.appearance.model import Appearance
 from airborne.body import BodyModel, Pose
@@ -28,6 +27,7 @@ from airborne.tracking.model_based.learning import learn_appearance
 from airborne.tracking.model_based.recovery import recover
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import Reference, status_of
+from airborne.tracking.model_based.support import mark_unobserved, widen_unseen
 from airborne.types import Array
 from airborne.video import Frames
 
@@ -133,8 +133,10 @@ class RefinedTracker:
             return lost_estimate(frames.index, frames.time_s)
         if agreement.misplaced:
             limbs = joints_of(self._fitter.model, np.array(agreement.misplaced))
-            covariance = _mark_unobserved(covariance, limbs.columns)
+            covariance = mark_unobserved(covariance, limbs.columns)
             status = status if reference.is_learned else Status.UNCERTAIN
+        if agreement.n_views_of is not None:
+            covariance = widen_unseen(covariance, self._fitter.model, agreement.n_views_of)
         posed = self.render_model.with_pose(fit.pose)
         if share_in_view(posed, self.render_model.geometry, frames) < _LEAST_IN_VIEW:
             status = Status.UNCERTAIN
@@ -167,11 +169,3 @@ def _shrink_unobserved(last: Pose, predicted: Pose, covariance: Array) -> Pose:
     S = _OBSERVED_SD_RAD**2 * np.eye(3)
     delta[3:] = (S @ np.linalg.solve(S + C, rotations[..., None]))[..., 0].ravel()
     return move_pose(last, delta)
-
-
-def _mark_unobserved(covariance: Array, columns: NDArray[np.integer]) -> Array:
-    """Return a covariance in which some degrees of freedom are unobserved: infinite."""
-    covariance = covariance.copy()
-    covariance[columns] = covariance[:, columns] = 0
-    covariance[columns, columns] = np.inf
-    return covariance

@@ -49,6 +49,7 @@ class MaskAgreement:
     evidence: float  # sum over the mask [nats]
     n_views: int  # views in which the body is visible
     misplaced: tuple[int, ...] = ()  # segments of misplaced limbs
+    n_views_of: NDArray[np.int64] | None = None  # (segments,) views that show each; None where no joint moves
 
     def is_suspect(self, reference: Reference) -> bool:
         """Whether a global search is worth while."""

@@ -1,0 +1,115 @@
+"""Which segments of a body pass through each other: spheres along the limbs against the other segments' ellipsoids.
+
+Flesh gives way, so that a little overlap is none. What overlaps in the zero pose, and a segment with its parent, may
+always overlap. Boxes and meshes are left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from airborne.body.model import BodyModel, Ellipsoid, Pose
+from airborne.types import Array
+
+FLESH_M = 0.015  # two segments may overlap by this
+_ALONG = np.array([-0.7, -0.25, 0.25, 0.7])  # places of an ellipsoid's spheres on its longest axis, in semi-axes
+_LEAST_RATIO = 1.5  # of the longest semi-axis to the next, of an ellipsoid that spheres stand for
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactModel:
+    """Spheres and ellipsoids of a body, and which of them must not overlap."""
+
+    sphere_segment: NDArray[np.int64]  # (m,)
+    sphere_centre: Array  # (m, 3) segment's frame [m]
+    sphere_radius: Array  # (m,) [m]
+    ellipsoid_segment: NDArray[np.int64]  # (e,)
+    ellipsoid_centre: Array  # (e, 3) segment's frame [m]
+    ellipsoid_axes: Array  # (e, 3, 3) columns in the segment's frame
+    ellipsoid_semi_axes: Array  # (e, 3) [m]
+    pairs: tuple[NDArray[np.int64], NDArray[np.int64]]  # sphere and ellipsoid of each pair
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Overlaps:
+    """Where a posed body passes through itself, deeper than flesh gives way."""
+
+    depth_m: Array  # (k,)
+    normal: Array  # (k, 3) out of the ellipsoid, world
+    point: Array  # (k, 3) world [m]
+    segments: NDArray[np.int64]  # (k, 2) of the sphere and of the ellipsoid
+
+
+@lru_cache(maxsize=16)
+def contact_model(model: BodyModel) -> ContactModel:
+    """Prepare a body."""
+    owners, parts = [], []
+    for index, segment in enumerate(model.segments):
+        solids = [part for part in segment.parts if isinstance(part.shape, Ellipsoid)]
+        if solids:  # pieces of one ellipsoid in several colours are the same solid
+            owners.append(index)
+            parts.append(max(solids, key=lambda part: float(part.shape.semi_axes_m.prod())))
+    centre = np.array([part.segment_from_part.translation for part in parts]).reshape(-1, 3)
+    axes = np.array([part.segment_from_part.rotation.as_matrix() for part in parts]).reshape(-1, 3, 3)
+    semi_axes = np.array([part.shape.semi_axes_m for part in parts]).reshape(-1, 3)
+    order = np.argsort(semi_axes, axis=1)
+    ordered = np.take_along_axis(semi_axes, order, axis=1)
+    is_long = (ordered[:, 2] > _LEAST_RATIO * ordered[:, 1]) if len(parts) else np.zeros(0, bool)
+    longest = np.take_along_axis(axes, order[:, None, 2:], axis=2)[..., 0] * ordered[:, 2:]
+    along = (centre[:, None] + _ALONG[:, None] * longest[:, None])[is_long]
+    radius = (np.sqrt(1 - _ALONG**2) * ordered[:, :2].mean(axis=1, keepdims=True))[is_long]
+    segments = np.array(owners, np.int64)
+    whole = ContactModel(
+        np.repeat(segments[is_long], len(_ALONG)),
+        along.reshape(-1, 3),
+        radius.ravel(),
+        segments,
+        centre,
+        axes,
+        semi_axes,
+        (np.zeros(0, np.int64), np.zeros(0, np.int64)),
+    )
+    sphere, ellipsoid = np.meshgrid(np.arange(len(whole.sphere_segment)), np.arange(len(segments)), indexing="ij")
+    every = sphere.ravel(), ellipsoid.ravel()
+    a, b = whole.sphere_segment[every[0]], segments[every[1]]
+    parents = model.parents
+    is_apart = (a != b) & (parents[a] != b) & (parents[b] != a)
+    at_rest = model.with_pose(Pose(world_from_root=RigidTransform.identity()))
+    is_apart &= _depths(whole, every, at_rest.R, at_rest.t)[0] < FLESH_M
+    return replace(whole, pairs=(every[0][is_apart], every[1][is_apart]))
+
+
+def overlaps(contact: ContactModel, R: Array, t: Array) -> Overlaps:
+    """Find where segments pass through each other: R (segments, 3, 3), t (segments, 3) [m] world from segment."""
+    depth, normal, point = _depths(contact, contact.pairs, R, t)
+    rows = np.flatnonzero(depth > FLESH_M)
+    segments = np.stack(
+        [contact.sphere_segment[contact.pairs[0][rows]], contact.ellipsoid_segment[contact.pairs[1][rows]]], axis=1
+    )
+    return Overlaps(depth[rows] - FLESH_M, normal[rows], point[rows], segments)
+
+
+def _depths(
+    contact: ContactModel, pairs: tuple[NDArray[np.int64], NDArray[np.int64]], R: Array, t: Array
+) -> tuple[Array, Array, Array]:
+    """Return each pair's overlap (k,) [m], its normal (k, 3) and the sphere's centre (k, 3), in the world.
+
+    To first order: an ellipsoid wider by the sphere's radius against the sphere's centre.
+    """
+    own = contact.sphere_segment
+    centre = (np.einsum("mij,mj->mi", R[own], contact.sphere_centre) + t[own])[pairs[0]]
+    other = contact.ellipsoid_segment
+    axes = (R[other] @ contact.ellipsoid_axes)[pairs[1]]
+    middle = (np.einsum("eij,ej->ei", R[other], contact.ellipsoid_centre) + t[other])[pairs[1]]
+    local = np.einsum("kji,kj->ki", axes, centre - middle)
+    reach = contact.ellipsoid_semi_axes[pairs[1]] + contact.sphere_radius[pairs[0], None]
+    level = np.maximum(np.linalg.norm(local / reach, axis=1), 1e-6)
+    slope = local / reach**2 / level[:, None]
+    steepness = np.maximum(np.linalg.norm(slope, axis=1), 1e-9)
+    depth = np.minimum((1 - level) / steepness, reach.min(axis=1))
+    return depth, np.einsum("kij,kj->ki", axes, slope / steepness[:, None]), centre

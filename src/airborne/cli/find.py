@@ -1,0 +1,51 @@
+"""Commands before the first pose is known: one looks for the body, the other writes the picture to click in."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from airborne.cli.console import Json, Out, progress
+
+
+def find_command(
+    trial: Annotated[Path, typer.Argument(help="The trial's TOML file; it needs no [start].")],
+    output: Out = Path("airborne-find"),
+    take: Annotated[int | None, typer.Option(min=1, help="Which of the poses in candidates.json.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Look for the body in the videos, and print the [start] that was found. Exit code 3: undecided.
+
+    Example: airborne find trial.toml
+    """
+    from airborne.run.find import find_start
+    from airborne.trial.file import read_trial
+
+    with progress("looking for the body") as report:
+        found = find_start(read_trial(trial), output, take=take, progress=report)
+    start = found.trial.start.model_dump(include={"frame", "position_m", "quaternion_xyzw"})
+    if as_json:
+        print(json.dumps({**start, "probability": found.finding.candidates[0].probability, "note": found.note}))
+    else:
+        print("\n".join(["[start]", *(f"{key} = {value}" for key, value in start.items())]))
+        print(f"# {found.note}")
+
+
+def frame_command(
+    trial: Annotated[Path, typer.Argument(help="The trial's TOML file.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The picture to write: .png, .tif, .bmp.")],
+    camera: Annotated[str, typer.Option(help="The camera's name.")],
+    frame: Annotated[int, typer.Option(min=0, help="Number of the frame or field, as in start.frame.")] = 0,
+) -> None:
+    """Write the picture of one camera at one frame or field, in whose pixels points are clicked.
+
+    Example: airborne frame trial.toml --camera cam1 --frame 12 -o cam1_12.png
+    """
+    from airborne.run.frame import write_frame
+    from airborne.trial.file import read_trial
+
+    size = write_frame(read_trial(trial), camera, frame, output)
+    print(f"{output}: {size[0]}×{size[1]} px; (0, 0) is the middle of the top-left pixel")

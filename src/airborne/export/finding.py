@@ -1,0 +1,86 @@
+"""empty_scene.png and candidates.png: what stands out from the empty scene, and where the body was found in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+from matplotlib.figure import Figure
+
+from airborne.appearance.empty_scene import EmptyScene
+from airborne.body import PosedBody
+from airborne.cameras import Camera
+from airborne.export.palette import ESTIMATE_RGB, TEXT_RGB, hex_colour
+from airborne.export.panels import FONT_PT, WIDTH_IN
+from airborne.export.sheet import SHEET_DPI, draw_cell
+from airborne.export.views import cached_surface_arrays
+from airborne.rendering import FLAT, render
+from airborne.tracking.first_pose.moments import Moment, Source, source_of
+from airborne.types import Image
+from airborne.video import View
+
+_TITLES = ("empty scene", "what stands out", "where the body was found")
+_MARGIN = 0.6  # around a candidate, as a share of its size
+
+
+def draw_empty_scene(path: Path, moment: Moment, scenes: Mapping[Source, EmptyScene], posed: PosedBody) -> None:
+    """Draw for every camera the empty scene, what stands out from it at one moment, and the body's outline."""
+    rows, names = [], []
+    for view, shown in zip(moment.frames.views, moment.probability, strict=True):
+        if view is None or shown is None:
+            continue
+        names.append(view.camera.name)
+        empty = scenes[source_of(view)].rgb.astype(np.uint8)
+        grey = np.repeat((255 * shown).astype(np.uint8)[..., None], 3, axis=2)
+        square = [_square_pixels(image, view.camera) for image in (empty, grey, _with_outline(view, posed))]
+        rows.append(square)
+    _figure(rows, names, _TITLES).savefig(path)
+
+
+def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, PosedBody]]) -> None:
+    """Draw the outlines of candidates, each with its label, one row a candidate, in every view."""
+    views = [view for view in moment.frames.views if view is not None]
+    rows = [[_near(_with_outline(view, posed), view.camera, posed) for view in views] for _, posed in candidates]
+    names = [f"{number}: {label}" for number, (label, _) in enumerate(candidates, start=1)]
+    _figure(rows, names, [view.camera.name for view in views]).savefig(path)
+
+
+def _with_outline(view: View, posed: PosedBody) -> Image:
+    mask = render(cached_surface_arrays(posed.model), posed, view.camera, FLAT).mask.astype(np.uint8)
+    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return np.asarray(cv2.drawContours(view.rgb.copy(), contours, -1, ESTIMATE_RGB, 1), np.uint8)
+
+
+def _near(image: Image, camera: Camera, posed: PosedBody) -> Image | None:
+    """Cut out what lies around the body; None where the view does not show it."""
+    mask = render(cached_surface_arrays(posed.model), posed, camera, FLAT).mask
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not len(rows):
+        return None
+    spans = []
+    for ends, length in ((rows, mask.shape[0]), (columns, mask.shape[1])):
+        room = int(_MARGIN * (ends[-1] - ends[0] + 1))
+        spans.append(slice(max(ends[0] - room, 0), min(ends[-1] + room + 1, length)))
+    return _square_pixels(image[spans[0], spans[1]], camera)
+
+
+def _square_pixels(image: Image, camera: Camera) -> Image:
+    """Stretch the rows of a field to square pixels."""
+    height = round(image.shape[0] * camera.K[0, 0] / camera.K[1, 1])
+    return np.asarray(cv2.resize(image, (image.shape[1], height), interpolation=cv2.INTER_LINEAR), np.uint8)
+
+
+def _figure(rows: Sequence[Sequence[Image | None]], names: Sequence[str], titles: Sequence[str]) -> Figure:
+    cell_in = (WIDTH_IN - 0.5) / len(titles)
+    figure = Figure((WIDTH_IN, 0.4 + 0.8 * cell_in * len(rows)), dpi=SHEET_DPI)
+    figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.02, wspace=0, hspace=0)
+    grid = figure.subplots(len(rows), len(titles), squeeze=False)
+    for axes, title in zip(grid[0], titles, strict=True):
+        axes.set_title(title, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
+    for i, (row, name) in enumerate(zip(rows, names, strict=True)):
+        for axes, cell in zip(grid[i], row, strict=True):
+            draw_cell(axes, cell)
+        grid[i, 0].set_ylabel(name, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
+    return figure

@@ -1,0 +1,193 @@
+"""The start of a trial found in its videos: the empty scene, what stands out from it, the body's pose and frame."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene
+from airborne.body import BodyModel, Pose
+from airborne.errors import TrialError, UndecidedError
+from airborne.export import write_json
+from airborne.export.finding import draw_candidates, draw_empty_scene
+from airborne.geometry.rotations import angles_from_matrix
+from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE, figures_of
+from airborne.run.opening import open_cameras, past_the_end_error, video_source
+from airborne.tracking import Status
+from airborne.tracking.first_pose.candidates import Finding, find_thing
+from airborne.tracking.first_pose.moments import Source, empty_scenes, look, spread_sample
+from airborne.tracking.methods import sample_body_colours
+from airborne.tracking.model_based.refined import RefinedTracker
+from airborne.tracking.tracker import track_frames
+from airborne.trial.file import Trial
+from airborne.trial.start import StartTable
+from airborne.types import Progress
+from airborne.video import Frames, Recording, VideoFacts, open_recording
+
+_MOST_IMAGES = 1500  # of each camera that are looked at
+_MOST_BYTES = 4e8  # of decoded pictures that are kept to track back through
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundStart:
+    """Where a trial's body is, and what it was found by."""
+
+    trial: Trial  # with the start that was found
+    model: BodyModel
+    finding: Finding
+    scenes: Mapping[Source, EmptyScene]
+    facts: tuple[VideoFacts, ...]
+    note: str  # what the user should know, in one line
+
+    def draw(self, folder: Path) -> None:
+        """Draw the empty scene, what stands out from it and the body there."""
+        posed = self.model.with_pose(self.finding.candidates[0].pose)
+        draw_empty_scene(figures_of(folder) / "empty_scene.png", self.finding.moment, self.scenes, posed)
+
+
+def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress: Progress | None = None) -> FoundStart:
+    """Find the start of a trial that says nothing of it: the earliest frame from which the body can be followed.
+
+    Where the pictures do not decide between poses, candidates.json and a picture of them are written into `folder` and
+    UndecidedError is raised; `take` chooses one of them, from 1. Raises TrialError where nothing can be found.
+    """
+    model = trial.model()
+    if model.has_joints:
+        raise TrialError(
+            f"{trial.name}: [start] is missing; a body with joints is not found by itself yet: give joints_m, "
+            "points_px or detections under [start]"
+        )
+    if len(trial.camera) < 2:
+        raise TrialError(f"{trial.name}: [start] is missing; finding the body needs two cameras: give its pose")
+    recording, facts = _open(trial)
+    sample = spread_sample(_counted(recording, progress), recording.n_frames)
+    if not sample:
+        raise past_the_end_error(trial)
+    scenes = empty_scenes(sample)
+    if not scenes:
+        raise TrialError(
+            f"{trial.name}: {len(sample)} frames are too few to tell the empty scene, {FEWEST_PICTURES} at least; "
+            "give the pose under [start]"
+        )
+    finding = find_thing(model, look(sample, scenes))
+    if take is not None:
+        finding = _take(trial, finding, take)
+    elif not finding.is_decided:
+        raise _undecided(trial, model, finding, folder)
+    first = finding.candidates[0]
+    frame, pose = _track_back(trial, model, recording, finding)
+    note = (
+        f"[start] was found: the body stands out best in frame {finding.moment.frames.index} "
+        f"(probability {first.probability:.3g}) and can be followed back to frame {frame}"
+    )
+    return FoundStart(_with_start(trial, frame, pose), model, finding, scenes, facts, note)
+
+
+def _open(trial: Trial) -> tuple[Recording, tuple[VideoFacts, ...]]:
+    """Open the videos for a look: images are converted only where they are used."""
+    cameras = open_cameras(trial)
+    start = trial.start.frame
+    stop = start + _MOST_IMAGES
+    recording = open_recording(
+        [video_source(trial, camera) for camera in trial.camera],
+        cameras.rig,
+        facts=cameras.facts,
+        every=trial.track.every,
+        start=start,
+        stop=stop if trial.track.stop is None else max(min(stop, trial.track.stop), start + 1),
+        lazy=True,
+    )
+    return recording, cameras.facts
+
+
+def _counted(recording: Recording, progress: Progress | None) -> Iterator[Frames]:
+    for number, frames in enumerate(recording, start=1):
+        if progress is not None:
+            progress(number, recording.n_frames)
+        yield frames
+
+
+def _take(trial: Trial, finding: Finding, number: int) -> Finding:
+    """Put a candidate first."""
+    n = len(finding.candidates)
+    if not 1 <= number <= n:
+        raise TrialError(f"{trial.name}: there is no candidate {number}; there are {n}, in the order of {CANDIDATES}")
+    chosen = finding.candidates[number - 1]
+    return replace(finding, candidates=(chosen, *(each for each in finding.candidates if each is not chosen)))
+
+
+def _undecided(trial: Trial, model: BodyModel, finding: Finding, folder: Path) -> UndecidedError:
+    """Write the candidates and return the error that names them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    frame, best = finding.moment.frames.index, finding.candidates[0]
+    write_json(folder / CANDIDATES, _describe(finding))
+    draw_candidates(
+        folder / CANDIDATES_PICTURE,
+        finding.moment,
+        [(f"{each.probability:.0%}", model.with_pose(each.pose)) for each in finding.candidates],
+    )
+    if not best.is_plausible:
+        reason = (
+            f"what moves in frame {frame} does not look like the body ({best.precision:.0%} of its outline stands out, "
+            f"and covers {best.recall:.0%} of what does); check [body] and [calibration]"
+        )
+    else:
+        reason = f"{len(finding.candidates)} poses in frame {frame} look alike, the likeliest {best.probability:.0%}"
+    return UndecidedError(
+        f"{trial.name}: the start is undecided: {reason}; look at {folder / CANDIDATES_PICTURE}, then give "
+        "--take 1 (or another number), or the pose under [start]"
+    )
+
+
+def _describe(finding: Finding) -> dict[str, Any]:
+    return {
+        "frame": finding.moment.frames.index,
+        "time_s": float(finding.moment.frames.time_s),
+        "n_moving": finding.n_moving,
+        "candidates": [
+            {
+                "number": number,
+                "probability": round(each.probability, 4),
+                "precision": round(each.precision, 3),
+                "recall": round(each.recall, 3),
+                "position_m": each.pose.world_from_root.translation.tolist(),
+                "quaternion_xyzw": each.pose.world_from_root.rotation.as_quat().tolist(),
+                "somersault_tilt_twist_deg": np.degrees(
+                    angles_from_matrix(each.pose.world_from_root.rotation.as_matrix())
+                ).tolist(),
+            }
+            for number, each in enumerate(finding.candidates, start=1)
+        ],
+    }
+
+
+def _track_back(trial: Trial, model: BodyModel, recording: Recording, finding: Finding) -> tuple[int, Pose]:
+    """Track from the moment of the finding back in time; return the earliest frame that is tracked, and the pose."""
+    found, pose = finding.moment.frames.index, finding.candidates[0].pose
+    picture_bytes = sum(1.5 * facts.size[0] * facts.size[1] for facts in recording.facts)
+    most = max(2, int(_MOST_BYTES / picture_bytes))
+    earlier = replace(recording, start=trial.start.frame, stop=found + 1)
+    kept = deque(earlier, maxlen=most)
+    if not kept:
+        return found, pose
+    backward = [replace(frames, time_s=-frames.time_s) for frames in reversed(kept)]
+    tracker = RefinedTracker(sample_body_colours(model, pose, backward[0]), pose)
+    earliest = found, pose
+    for frames, estimate in track_frames(tracker, backward, lambda estimate: None):
+        if estimate.status is not Status.TRACKED or estimate.pose is None:
+            break
+        earliest = frames.index, estimate.pose
+    return earliest
+
+
+def _with_start(trial: Trial, frame: int, pose: Pose) -> Trial:
+    root = pose.world_from_root
+    start = StartTable(
+        frame=frame, position_m=root.translation.tolist(), quaternion_xyzw=root.rotation.as_quat().tolist()
+    )
+    return trial.model_copy(update={"start": start})

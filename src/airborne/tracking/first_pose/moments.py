@@ -1,0 +1,86 @@
+"""Moments of a recording as finding looks at them: small pictures, and what stands out from the empty scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import expit
+
+from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene, empty_scene
+from airborne.types import Array
+from airborne.video import Frames, View
+
+_MOST_MOMENTS = 24  # enough for a median, and to meet a body that is seen for a tenth of the time
+_WIDTH_PX = 640  # about the width of the small pictures
+
+Source = tuple[str, bytes]  # camera name and intrinsics: pictures that share them show the scene by the same pixels
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moment:
+    """What stands out in every view at one time."""
+
+    frames: Frames  # small pictures
+    evidence: tuple[NDArray[np.float32] | None, ...]  # (h, w) by view [nats]; None: no picture, or no empty scene
+
+    @property
+    def probability(self) -> tuple[NDArray[np.float32] | None, ...]:
+        """Each pixel's probability (h, w) to show what is not in the empty scene, at even odds."""
+        return tuple(None if nats is None else np.asarray(expit(nats), np.float32) for nats in self.evidence)
+
+
+def spread_sample(recording: Iterable[Frames], n_expected: int | None) -> list[Frames]:
+    """Keep 12 to 24 times, spread evenly over a recording of about so many, or any number, as small pictures."""
+    stride, kept = max(1, -(-(n_expected or 0) // _MOST_MOMENTS)), []
+    for number, frames in enumerate(recording):
+        if number % stride:
+            continue
+        views = tuple(None if view is None else _shrink(view) for view in frames.views)
+        kept.append(Frames(frames.index, frames.time_s, views))
+        if len(kept) > _MOST_MOMENTS:
+            stride, kept = 2 * stride, kept[::2]
+    return kept
+
+
+def empty_scenes(sample: Sequence[Frames]) -> dict[Source, EmptyScene]:
+    """Find the empty scene of every camera, and kind of field, that has enough pictures."""
+    pictures: dict[Source, list] = {}
+    for frames in sample:
+        for view in frames.views:
+            if view is not None:
+                pictures.setdefault(source_of(view), []).append(view.rgb)
+    return {source: empty_scene(each) for source, each in pictures.items() if len(each) >= FEWEST_PICTURES}
+
+
+def look(sample: Sequence[Frames], scenes: Mapping[Source, EmptyScene]) -> list[Moment]:
+    """Compare every picture with the empty scene."""
+    return [Moment(frames, tuple(_evidence(view, scenes) for view in frames.views)) for frames in sample]
+
+
+def _evidence(view: View | None, scenes: Mapping[Source, EmptyScene]) -> Array | None:
+    scene = None if view is None else scenes.get(source_of(view))
+    return None if view is None or scene is None else scene.evidence(view.rgb)
+
+
+def source_of(view: View) -> Source:
+    """Return what a view shows the static scene by."""
+    return view.camera.name, view.camera.K.tobytes()
+
+
+def _shrink(view: View) -> View:
+    """Average areas of about square pixels: fields keep their rows until their columns are as wide."""
+    camera, rgb = view.camera, view.rgb
+    columns = max(1, round(camera.size[0] / _WIDTH_PX))
+    rows = max(1, round(columns * camera.K[1, 1] / camera.K[0, 0]))
+    if columns == rows == 1:
+        return View(camera, rgb, view.delay_s)
+    size = camera.size[0] // columns, camera.size[1] // rows
+    small = cv2.resize(rgb[: size[1] * rows, : size[0] * columns], size, interpolation=cv2.INTER_AREA)
+    middle = ((columns - 1) / 2, (rows - 1) / 2)
+    return View(
+        camera.resample(scale=(columns, rows), offset=middle, size=size), np.asarray(small, np.uint8), view.delay_s
+    )

@@ -1,0 +1,196 @@
+"""Finding a thing: all orientations at the places where something moves, scored by silhouettes, the best fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from airborne.appearance.model import Region
+from airborne.body import BodyModel, Pose, SurfaceArrays
+from airborne.body.symmetry import continuous_axes, symmetries
+from airborne.geometry.rotations import super_fibonacci
+from airborne.rendering import EvidenceMaps, evidence_maps, mask_evidence
+from airborne.tracking.first_pose.moments import Moment
+from airborne.tracking.first_pose.places import Place
+from airborne.tracking.image_regions import bounding_points, crop_regions
+from airborne.tracking.model_based.degrees_of_freedom import root_only
+from airborne.tracking.model_based.gauss_newton import PyramidLevels, fit_silhouettes
+from airborne.tracking.model_based.render_model import RenderModel
+from airborne.types import Array
+
+_N_ORIENTATIONS = 3000  # about 9 degrees from any orientation to the nearest
+_BLURS = (0.12, 0.06, 0.03)  # of the evidence, in body radii, coarse to fine
+_N_KEPT = 64  # orientations that are searched around
+_N_AROUND = 32  # proposals around each, at every blur after the first
+_WIDTH_M, _WIDTH_RAD = 0.12, 0.16  # sds of the first of these, in body radii and radians; halved each time
+_APART_RAD = 0.35  # orientations that are closer count as one
+_N_FITTED = 20  # of the best, to the silhouettes
+_LEVELS: PyramidLevels = ((4, 4), (2, 3), (1, 4))  # reduction of the small pictures, steps
+_MARGIN_PX = 24  # around the poses, of the small pictures
+
+
+@dataclass(frozen=True, slots=True)
+class Posed:
+    """A pose that was found, with what its silhouette covers."""
+
+    pose: Pose
+    evidence: float  # sum over its masks in all views [nats]
+
+
+@dataclass(frozen=True, eq=False)
+class Thing:
+    """A rigid body as the search sees it."""
+
+    render_model: RenderModel
+
+    @property
+    def model(self) -> BodyModel:
+        """The body."""
+        return self.render_model.model
+
+    @cached_property
+    def centre(self) -> Array:
+        """The middle of its surface, in the root's frame: (3,) [m]."""
+        return _surface_centre(self.render_model.geometry)
+
+    @cached_property
+    def radius_m(self) -> float:
+        """The largest distance of its surface from its centre."""
+        body = self.render_model.with_pose(Pose(world_from_root=RigidTransform.identity()))
+        points = bounding_points(body, self.render_model.geometry)
+        return float(np.linalg.norm(points - self.centre, axis=1).max())
+
+    @cached_property
+    def symmetries(self) -> Array:
+        """Rotations of the root that no picture shows: (s, 3, 3)."""
+        return np.stack(symmetries(self.model))
+
+    @cached_property
+    def axes(self) -> Array:
+        """Axes about which no rotation is visible: (k, 3)."""
+        return continuous_axes(self.model)
+
+    def angles(self, R: Array, other: Array) -> Array:
+        """Return the angles between orientations R (n, 3, 3) and another (3, 3), up to symmetry: (n,) [rad]."""
+        if len(self.axes) == 3:
+            return np.zeros(len(R))
+        if len(self.axes) == 1:
+            directions = R @ self.axes[0], other @ self.symmetries @ self.axes[0]
+            return np.arccos(np.clip(directions[0] @ directions[1].T, -1, 1)).min(axis=1)
+        traces = np.einsum("nij,sij->ns", R, other @ self.symmetries)
+        return np.arccos(np.clip((traces.max(axis=1) - 1) / 2, -1, 1))
+
+
+def search_orientations(thing: Thing, moment: Moment, place: Place) -> list[Posed]:
+    """Search all orientations at one place of one moment; return what was found, the best first, all different."""
+    R = super_fibonacci(_N_ORIENTATIONS)
+    t = place.position - R @ thing.centre
+    for number, blur in enumerate(_BLURS):
+        maps = _blurred_maps(moment, place, blur * thing.radius_m)
+        if number == 0:
+            scores = _scores(thing, maps, R, t)
+            best = _apart(thing, R, t, scores, _N_KEPT)
+            R, t = R[best], t[best]
+            continue
+        steps = ndtri(qmc.Sobol(6, rng=number).random(_N_AROUND * _N_KEPT)[: _N_AROUND * len(R)]) / 2 ** (number - 1)
+        steps[: len(R)] = 0
+        parent = np.arange(len(steps)) % len(R)
+        turned = Rotation.from_rotvec(_WIDTH_RAD * steps[:, 3:]).as_matrix() @ R[parent]
+        middle = (t + R @ thing.centre)[parent] + _WIDTH_M * thing.radius_m * steps[:, :3]
+        moved = middle - turned @ thing.centre
+        scores = _scores(thing, maps, turned, moved).reshape(_N_AROUND, len(R))
+        rows = scores.argmax(axis=0) * len(R) + np.arange(len(R))
+        R, t = turned[rows], moved[rows]
+    best = _apart(thing, R, t, scores.max(axis=0), _N_FITTED)
+    return _fit(thing, moment, R[best], t[best])
+
+
+def _fit(thing: Thing, moment: Moment, R: Array, t: Array) -> list[Posed]:
+    """Fit poses to the silhouettes; return those that end apart, the best first."""
+    poses = [
+        Pose(world_from_root=RigidTransform.from_components(position, Rotation.from_matrix(rotation)))
+        for rotation, position in zip(R, t, strict=True)
+    ]
+    regions, probabilities = regions_of(thing, moment, poses)
+    dofs = root_only(thing.model)
+    poses = [
+        fit_silhouettes(thing.render_model, pose, regions, probabilities, levels=_LEVELS, dofs=dofs) for pose in poses
+    ]
+    R = np.stack([pose.world_from_root.rotation.as_matrix() for pose in poses])
+    t = np.stack([pose.world_from_root.translation for pose in poses])
+    scores = _scores(thing, full_maps(moment, moment.evidence), R, t)
+    return [Posed(poses[i], float(scores[i])) for i in _apart(thing, R, t, scores, _N_FITTED)]
+
+
+def regions_of(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> tuple[list[Region], list[Array]]:
+    """Cut out what holds the poses in every view; return the regions and the probabilities in them."""
+    bodies = [thing.render_model.with_pose(pose) for pose in poses]
+    seen = {
+        (view.camera.name, view.camera.K.tobytes()): plane
+        for view, plane in zip(moment.frames.views, moment.probability, strict=True)
+        if view is not None and plane is not None
+    }
+    regions = crop_regions(bodies, thing.render_model.geometry, moment.frames, _MARGIN_PX)
+    regions = [region for region in regions if region.source in seen]
+    return regions, [np.ascontiguousarray(region.crop(seen[region.source])) for region in regions]
+
+
+def full_maps(moment: Moment, planes: Sequence[Array | None]) -> EvidenceMaps:
+    """Sum planes (h, w), one a view, for `mask_evidence`; None where a view has none."""
+    kept = [
+        (view.camera, plane)
+        for view, plane in zip(moment.frames.views, planes, strict=True)
+        if view is not None and plane is not None
+    ]
+    return evidence_maps([camera for camera, _ in kept], [plane for _, plane in kept])
+
+
+def _blurred_maps(moment: Moment, place: Place, blur_m: float) -> EvidenceMaps:
+    cameras, planes = [], []
+    for view, nats in zip(moment.frames.views, moment.evidence, strict=True):
+        if view is None or nats is None:
+            continue
+        depth_m = max(float(view.camera.camera_from_world.apply(place.position)[2]), 0.1)
+        sigma = blur_m / depth_m * np.array([view.camera.K[0, 0], view.camera.K[1, 1]])
+        cameras.append(view.camera)
+        planes.append(cv2.GaussianBlur(nats, (0, 0), max(sigma[0], 0.3), sigmaY=max(sigma[1], 0.3)))
+    return evidence_maps(cameras, planes)
+
+
+def _scores(thing: Thing, maps: EvidenceMaps, R: Array, t: Array) -> Array:
+    return mask_evidence(thing.render_model.geometry, maps, R[:, None], t[:, None]).sum(axis=1)
+
+
+def _apart(thing: Thing, R: Array, t: Array, scores: Array, n: int) -> list[int]:
+    """Return the indices of the n best poses that are apart from each other, the best first."""
+    chosen: list[int] = []
+    left = np.ones(len(R), bool)
+    middles = t + R @ thing.centre
+    for i in np.argsort(-scores, kind="stable"):
+        if left[i]:
+            chosen.append(int(i))
+            is_near = np.linalg.norm(middles - middles[i], axis=1) < 0.3 * thing.radius_m
+            left &= ~(is_near & (thing.angles(R, R[i]) < _APART_RAD))
+            if len(chosen) == n:
+                break
+    return chosen
+
+
+def _surface_centre(geometry: SurfaceArrays) -> Array:
+    """Return the middle of a body's surface, by area, in its only segment's frame: (3,) [m]."""
+    centres, areas = [*geometry.ellipsoid_centre], [float(a @ np.roll(a, 1)) for a in geometry.ellipsoid_semi_axes]
+    areas = [4 * np.pi / 3 * area for area in areas]
+    for first, last in pairwise(geometry.start):
+        corners = geometry.corners[first:last]
+        fan = np.cross(corners[1:-1] - corners[0], corners[2:] - corners[0])
+        centres.append(corners.mean(axis=0))
+        areas.append(float(np.linalg.norm(fan, axis=1).sum()) / 2)
+    return np.average(centres, axis=0, weights=areas)

@@ -1,0 +1,82 @@
+"""How many views show each segment of a limb: what the images would cost without it, and what follows for its joint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.appearance.model import Appearance, Region
+from airborne.body import BodyModel, Pose, PosedBody
+from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
+from airborne.tracking.model_based.gauss_newton import image_cost
+from airborne.tracking.model_based.render_model import RenderModel
+from airborne.types import Array
+
+_BEHIND_M = 100.0  # a segment that is taken away goes this far behind the camera
+_STRONG_NATS = 3.0  # a view shows a segment where it is 20 times likelier with it: "strong" (Kass & Raftery 1995)
+_ONE_VIEW_SD_M = 0.1  # of the far end of a segment that one view alone shows
+
+
+def count_views(
+    render_model: RenderModel, pose: Pose, regions: Sequence[Region], appearance: Appearance
+) -> NDArray[np.int64]:
+    """Count the views that show each segment: (segments,); those of the trunk are shown by all.
+
+    A view shows a segment if the image is clearly less likely without it: there the background is seen, or another
+    segment behind, of perhaps the same colour.
+    """
+    posed, segments = render_model.with_pose(pose), np.flatnonzero(limb_of_segment(render_model.model) >= 0)
+    counts = np.full(len(posed.R), len(regions))
+    counts[segments] = 0
+    for region in regions:
+        R, t = region.packed_view[:9].reshape(3, 3), region.packed_view[9:12]
+        behind = -R.T @ t - _BEHIND_M * R[2]
+        bodies = [posed, *(_without(posed, segment, behind) for segment in segments)]
+        cost = image_cost(render_model, bodies, region, appearance)
+        counts[segments] += cost[1:] - cost[0] > _STRONG_NATS
+    return counts
+
+
+def widen_unseen(covariance: Array, model: BodyModel, n_views: NDArray[np.integer]) -> Array:
+    """Widen a pose's covariance for the joints of segments that fewer than two views show (segments,).
+
+    One view alone leaves open how near the segment's end is; the joint of a segment that none shows is unobserved. A
+    view that shows the next segment shows where this one ends. A segment without a landmark or a joint is left out.
+    """
+    covariance, of_end = covariance.copy(), n_views.copy()
+    np.maximum.at(of_end, model.parents[1:], n_views[1:])
+    for segment in np.flatnonzero((of_end < 2) & (limb_of_segment(model) >= 0)):
+        own = slice(3 + 3 * segment, 6 + 3 * segment)
+        length_m = _length_m(model, int(segment))
+        if length_m == 0:
+            continue
+        if of_end[segment] == 1:
+            covariance[own, own] += (_ONE_VIEW_SD_M / length_m) ** 2 * np.eye(3)
+        else:
+            covariance = mark_unobserved(covariance, np.arange(own.start, own.stop))
+    return covariance
+
+
+def mark_unobserved(covariance: Array, columns: NDArray[np.integer]) -> Array:
+    """Return a covariance in which some degrees of freedom are unobserved: infinite."""
+    covariance = covariance.copy()
+    covariance[columns] = covariance[:, columns] = 0
+    covariance[columns, columns] = np.inf
+    return covariance
+
+
+def _length_m(model: BodyModel, segment: int) -> float:
+    """Return the distance from a segment's joint to the farthest landmark or joint fixed in it [m]."""
+    name = model.segments[segment].name
+    points = [child.joint_m for child in model.segments if child.parent == name]
+    points += [landmark.position_m for landmark in model.landmarks if landmark.segment == name]
+    return max((float(np.linalg.norm(point)) for point in points), default=0.0)
+
+
+def _without(posed: PosedBody, segment: int, place: Array) -> PosedBody:
+    t = posed.t.copy()
+    t[segment] = place
+    return replace(posed, t=t)

@@ -1,0 +1,69 @@
+"""A calibration that predicts absurdly, or that cannot be read back, gets another name."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airborne import cli
+from airborne.calibration.acceptance import write_accepted
+from airborne.cameras import Rig, read_rig
+from tests.support.cameras import three_cameras
+
+RIG = three_cameras()
+ERRORS = dict.fromkeys(RIG.names, 0.5)
+GOOD = {name: np.full(20, 0.7) for name in RIG.names}
+
+
+def test_a_good_calibration_is_written_under_its_name(tmp_path):
+    written, reasons = write_accepted(tmp_path / "calib.toml", RIG, errors_px=ERRORS, held_out_px=GOOD)
+    assert (written, reasons) == (tmp_path / "calib.toml", ())
+    assert [path.name for path in tmp_path.iterdir()] == ["calib.toml"]
+    assert read_rig(written).names == RIG.names
+
+
+def test_an_absurd_left_out_error_is_named_and_the_old_file_stays(tmp_path):
+    (tmp_path / "calib.toml").write_text("an older one")
+    absurd = GOOD | {RIG.names[1]: np.r_[np.full(14, 0.5), np.full(6, 300.0)]}
+    written, reasons = write_accepted(tmp_path / "calib.toml", RIG, errors_px=ERRORS, held_out_px=absurd)
+    assert written == tmp_path / "calib.rejected.toml" and written.exists()
+    assert (tmp_path / "calib.toml").read_text() == "an older one"
+    assert len(reasons) == 1 and reasons[0].startswith(f"{RIG.names[1]}: what is left out of the fit lies 164 px")
+
+
+def test_a_few_wrong_clicks_and_errors_that_are_unknown_are_no_reason(tmp_path):
+    some = np.r_[np.full(17, 0.5), np.full(3, 300.0)]
+    unknown = np.full(20, np.nan)
+    held_out_px = dict(zip(RIG.names, (some, unknown, some), strict=True))
+    assert write_accepted(tmp_path / "calib.toml", RIG, errors_px=ERRORS, held_out_px=held_out_px)[1] == ()
+
+
+def test_what_our_reader_refuses_is_rejected(tmp_path):
+    far = Rig(tuple(replace(c, camera_from_world=c.camera_from_world) for c in RIG))
+    scaled = Rig(tuple(_far(camera, 1000.0) for camera in far))
+    written, reasons = write_accepted(tmp_path / "calib.toml", scaled, errors_px=ERRORS, held_out_px=GOOD)
+    assert written.name == "calib.rejected.toml"
+    assert "cannot be read back" in reasons[0]
+
+
+def _far(camera, scale):
+    from scipy.spatial.transform import RigidTransform
+
+    old = camera.camera_from_world
+    return replace(camera, camera_from_world=RigidTransform.from_components(scale * old.translation, old.rotation))
+
+
+def test_points_of_other_cameras_end_with_exit_code_1_and_another_file(tmp_path, monkeypatch, capsys):
+    rng = np.random.default_rng(0)
+    world, px = rng.uniform(-1, 1, (30, 3)), rng.uniform(5, 630, (30, 2))
+    rows = [
+        f"P{i},{x:.4f},{y:.4f},{z:.4f},{u:.2f},{v * 0.7:.2f}"
+        for i, ((x, y, z), (u, v)) in enumerate(zip(world, px, strict=True))
+    ]
+    (tmp_path / "points.csv").write_text("\n".join(["point,x_m,y_m,z_m,cam_u,cam_v", *rows]))
+    argv = ["airborne", "calibrate", str(tmp_path / "points.csv"), "--size", "640x480", "-o", str(tmp_path / "c.toml")]
+    monkeypatch.setattr("sys.argv", argv)
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    assert not (tmp_path / "c.toml").exists()
+    assert stopped.value.code == 1 and (tmp_path / "c.rejected.toml").exists(), capsys.readouterr().err

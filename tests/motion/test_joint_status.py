@@ -1,0 +1,74 @@
+"""A frame is tracked; a joint of it need not be."""
+
+from fractions import Fraction
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from airborne.body import Pose, human18
+from airborne.motion import JointStatus, Motion, joint_statuses, landmarks
+from airborne.tracking import Estimate, Status
+
+HUMAN = human18()
+NAMES = [landmark.name for landmark in HUMAN.landmarks]
+JOINTS = tuple(segment.name for segment in HUMAN.segments[1:])
+
+
+def columns(segment):
+    index = HUMAN.index_of(segment)
+    return np.arange(3 + 3 * index, 6 + 3 * index)
+
+
+def motion(n=5, *, sd_rad=0.01, status=Status.TRACKED, wide=None, knee_deg=None):
+    """Frames of the zero pose: `wide` segment -> sd of its joint [rad], `knee_deg` of the left knee by frame."""
+    variances = np.full(HUMAN.n_dofs, sd_rad**2)
+    for segment, sd in (wide or {}).items():
+        variances[columns(segment)] = sd**2
+    estimates = []
+    for index in range(n):
+        angles = np.zeros((HUMAN.n_joints, 3))
+        angles[HUMAN.index_of("shank_left") - 1, 0] = np.radians((knee_deg or {}).get(index, 10.0))
+        estimates.append(
+            Estimate(
+                index=index,
+                time_s=Fraction(index, 50),
+                status=status,
+                score=5.0,
+                pose=Pose(world_from_root=RigidTransform.identity(), joint_angles=angles),
+                covariance=np.diag(variances),
+                n_views=3,
+            )
+        )
+    return Motion.collect(estimates, JOINTS)
+
+
+def statuses(of_motion, name):
+    return joint_statuses(of_motion, HUMAN, landmarks(of_motion, HUMAN)[1])[:, NAMES.index(name)].tolist()
+
+
+def test_joints_with_small_deviations_are_tracked():
+    for name in NAMES:
+        assert statuses(motion(), name) == [JointStatus.TRACKED] * 5
+
+
+def test_points_beyond_an_unobserved_joint_are_unknown_and_the_others_tracked():
+    unseen = motion(wide={"forearm_left": np.inf})
+    assert statuses(unseen, "wrist_left") == statuses(unseen, "hand_left") == [JointStatus.UNKNOWN] * 5
+    assert statuses(unseen, "elbow_left") == statuses(unseen, "wrist_right") == [JointStatus.TRACKED] * 5
+
+
+def test_points_with_a_large_deviation_are_uncertain():
+    doubtful = motion(wide={"shank_right": 0.3})
+    assert statuses(doubtful, "ankle_right") == [JointStatus.UNCERTAIN] * 5
+    assert statuses(doubtful, "knee_right") == [JointStatus.TRACKED] * 5
+
+
+def test_joint_beyond_its_limits_is_uncertain_if_it_stays_there():
+    bent = {1: -20.0, 2: -20.0, 3: -20.0}
+    status = statuses(motion(knee_deg=bent), "ankle_left")
+    assert status == [JointStatus.TRACKED, *[JointStatus.UNCERTAIN] * 3, JointStatus.TRACKED]
+    assert statuses(motion(knee_deg={1: -20.0, 2: -20.0}), "ankle_left") == [JointStatus.TRACKED] * 5
+
+
+def test_uncertain_frame_has_no_tracked_joint():
+    assert set(statuses(motion(status=Status.UNCERTAIN), "knee_left")) == {JointStatus.UNCERTAIN}

@@ -1,0 +1,49 @@
+"""Which mix-ups foregrounds and silhouettes show, and which they must not show."""
+
+import numpy as np
+import pytest
+
+from airborne.run.mix_ups import mix_ups_in
+
+NAMES = ("left", "middle", "right")
+
+
+def disc(u, v, radius=12, size=(120, 160)):
+    rows, columns = np.indices(size)
+    return (rows - v) ** 2 + (columns - u) ** 2 < radius**2
+
+
+SILHOUETTES = [disc(30, 40), disc(110, 60), disc(60, 95)]
+RNG = np.random.default_rng(0)
+IMAGES = [each & (RNG.random(each.shape) < 0.8) | (RNG.random(each.shape) < 0.02) for each in SILHOUETTES]
+
+
+def kinds(images, silhouettes=SILHOUETTES):
+    return [(finding.kind, finding.cameras) for finding in mix_ups_in(NAMES, images, silhouettes)]
+
+
+def test_videos_of_their_own_cameras_show_nothing():
+    assert kinds(IMAGES) == []
+
+
+@pytest.mark.parametrize(("a", "b"), [(0, 1), (0, 2), (1, 2)])
+def test_two_exchanged_videos_are_named(a, b):
+    images = list(IMAGES)
+    images[a], images[b] = images[b], images[a]
+    assert kinds(images) == [("swapped", (NAMES[a], NAMES[b]))]
+
+
+@pytest.mark.parametrize("i", [0, 1, 2])
+def test_a_mirrored_video_is_named(i):
+    images = list(IMAGES)
+    images[i] = images[i][:, ::-1]
+    assert kinds(images) == [("mirrored", (NAMES[i],))]
+
+
+def test_where_little_can_be_seen_nothing_is_said():
+    still = np.zeros_like(IMAGES[0])
+    assert kinds([still, still, still]) == []
+    assert kinds([None, IMAGES[0], IMAGES[2]]) == []
+    everywhere = RNG.random(still.shape) < 0.9
+    assert kinds([everywhere, everywhere, everywhere]) == []
+    assert kinds([disc(80, 60), disc(80, 60), disc(80, 60)], [disc(79.5, 60), disc(84, 60), disc(74, 60)]) == []
