@@ -45,7 +45,7 @@ from airborne.trial.file import Trial
 from airborne.video import Frames, Recording
 
 _UNCERTAINTY = (
-    "Standard deviations of position and orientation include image noise, light, and edges that are not where the drawn "
+    "Standard deviations of position and orientation include image noise, light, and edges not where the drawn "
     "body has them; and what the self-check leaves open: the sizes of body and world, and the cameras' places and "
     "times. They do not include wrong lengths and girths of single segments."
 )
@@ -62,8 +62,8 @@ class BodyRun:
     calibration: Calibration | None
     model: BodyModel
     start: Pose
-    kept: KeptFrames = field(default_factory=KeptFrames)  # grows while the run is tracked
     found: FoundStart | None = None  # where the start was looked for
+    kept: KeptFrames = field(default_factory=KeptFrames)  # grows while the run is tracked
 
     table = MOTION
 
