@@ -8,7 +8,7 @@ import pytest
 
 from airborne.errors import AirborneError, ResultError
 from airborne.io.figures import names_not_drawn
-from airborne.io.writing import write_text, explain_full_disk
+from airborne.io.writing import explain_full_disk, write_text
 from airborne.video import VideoWriter
 from tests.support.run_files import contents_of
 
@@ -25,7 +25,7 @@ def test_a_full_disk_is_told_with_the_file_and_the_free_space():
 
 
 def test_other_errors_are_left_to_who_knows_them(tmp_path):
-    with pytest.raises(PermissionError), writing(tmp_path / "a"):
+    with pytest.raises(PermissionError), explain_full_disk(tmp_path / "a"):
         raise PermissionError
 
 

@@ -14,7 +14,7 @@ _FULL = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC))
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
+def explain_full_disk(path: Path) -> Iterator[None]:
     """Raise ResultError, in one line, where what is done here finds no room for a file; other errors pass."""
     try:
         yield
@@ -30,5 +30,5 @@ def writing(path: Path) -> Iterator[None]:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file."""
-    with writing(path):
+    with explain_full_disk(path):
         path.write_text(text, encoding="utf-8", newline="\n")

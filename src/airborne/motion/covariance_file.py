@@ -17,6 +17,7 @@ from airborne.io.writing import explain_full_disk
 from airborne.types import Array
 
 COVARIANCE_FILE = "covariance.bin"
+LASTING_FILE = "lasting.bin"  # the same of the root's errors that last all run long (6, 6), of any body
 _FLOAT = np.dtype("<f8")
 
 
@@ -43,6 +44,12 @@ class CovarianceWriter:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+
+def write_covariances(path: Path, covariances: Array) -> None:
+    """Write covariances (n, size, size) at once."""
+    rows, columns = np.triu_indices(covariances.shape[-1])
+    path.write_bytes(covariances[:, rows, columns].astype(_FLOAT).tobytes())
 
 
 def read_covariances(path: Path, n: int, *, size: int) -> Array:

@@ -16,7 +16,7 @@ from airborne.cameras.files import files_beside
 from airborne.errors import ResultError
 from airborne.export import write_json
 from airborne.io.folder_lock import LOCK, refuse_links, sole_writer
-from airborne.motion.covariance_file import COVARIANCE_FILE
+from airborne.motion.covariance_file import COVARIANCE_FILE, LASTING_FILE
 from airborne.motion.run_folder import (
     BODY,
     CALIBRATION,
@@ -87,6 +87,7 @@ def _remove_run(folder: Path) -> None:
         CALIBRATION,
         BODY,
         COVARIANCE_FILE,
+        LASTING_FILE,
         SMOOTH_RECORD,
         *_BEFORE_A_RUN,
     ):

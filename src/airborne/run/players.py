@@ -129,6 +129,9 @@ class PlayersRun:
             "uncertainty": _UNCERTAINTY,
         }
 
+    def keep(self, frames: Frames) -> None:
+        """Keep nothing: players are not checked at the end."""
+
     def warnings(self) -> list[str]:
         """Return what a reader of the numbers must know."""
         method = self.trial.track.method

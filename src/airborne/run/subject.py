@@ -77,6 +77,10 @@ class Subject(Protocol[Found, AnyMotion]):
         """Let the artists draw one time."""
         ...
 
+    def keep(self, frames: Frames) -> None:
+        """Keep what the end of the run needs of a time's frames."""
+        ...
+
     def finish(self, folder: Path) -> tuple[AnyMotion, dict[str, Any]]:
         """Write the other tables; return the motion and the beginning of the summary."""
         ...

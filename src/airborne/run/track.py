@@ -28,6 +28,7 @@ from airborne.run.opening import Opened, open_live, open_trial, past_the_end_err
 from airborne.run.players import PlayersRun
 from airborne.run.players_tracker import compile_kernels
 from airborne.run.provenance import provenance_of
+from airborne.run.self_check import alarms
 from airborne.run.subject import AnyMotion, Subject
 from airborne.tracking.tracker import Found, track_frames
 from airborne.trial.file import Trial
@@ -124,7 +125,7 @@ def _run_alone(subject: Subject[Found, AnyMotion], options: _Options, connection
     tracked_s = time.monotonic()
     motion, summary = subject.finish(folder)
     summary |= provenance_of(subject.trial, recording, subject.calibration, identity["inputs"])
-    summary["warnings"] += subject.warnings()
+    summary["warnings"] += [*subject.warnings(), *alarms(summary.get("self_check", []))]
     if options.drawn is not None:
         summary["warnings"] += names_not_drawn([subject.trial.name, *recording.rig.names, *subject.names])
     summary["tables"] = list_tables(folder)
@@ -174,6 +175,7 @@ def _track(
                 if isinstance(recording, LiveRecording):
                     delays_s.append(time.monotonic() - recording.arrival_s)
                 outages.add(observed)
+                subject.keep(observed)
                 subject.draw(artists, observed, estimate)
                 if options.progress is not None:
                     options.progress(number, recording.n_frames)
