@@ -12,6 +12,7 @@ from airborne.geometry.rotations import (
     geodesic,
     is_near_singular,
     matrix_from_angles,
+    super_fibonacci,
     unwrap,
     wrap,
 )
@@ -150,3 +151,11 @@ def test_wrapping_takes_away_whole_turns(angle):
     assert -np.pi <= result < np.pi
     turns = (angle - result) / (2 * np.pi)
     assert turns == pytest.approx(round(turns), abs=ROUNDTRIP)
+
+
+def test_a_spiral_of_3000_orientations_leaves_none_far_from_all():
+    spiral = super_fibonacci(3000)
+    assert np.abs(spiral @ np.swapaxes(spiral, 1, 2) - np.eye(3)).max() < EXACT
+    nearest = [geodesic(spiral, R).min() for R in Rotation.random(200, random_state=1).as_matrix()]
+    assert np.mean(nearest) < np.radians(9)
+    assert np.max(nearest) < np.radians(16)
