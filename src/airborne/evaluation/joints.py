@@ -19,8 +19,8 @@ from airborne.evaluation.compare import (
     sd_calibration,
     span,
 )
+from airborne.evaluation.interval_coverage import Reliability, reliability
 from airborne.evaluation.joint_files import JointPaths, landmark_of
-from airborne.evaluation.reliability import Reliability, reliability
 from airborne.motion import JointStatus, Motion, joint_statuses, landmarks
 from airborne.tracking import Status
 from airborne.types import Array, Triple

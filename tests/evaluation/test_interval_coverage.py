@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.evaluation.reliability import reliability
+from airborne.evaluation.interval_coverage import reliability
 from tests.support.tolerances import sampled
 
 RNG = np.random.default_rng(3)
