@@ -79,7 +79,7 @@ class JointComparison:
             f"{self.n_tracked} tracked, {self.n_uncertain} uncertain, {self.n_lost} lost",
         ]
         rows = {**self.joints, "all": self.whole} | ({"all, tracked": self.tracked} if self.tracked else {})
-        table = [("joint [mm]", "mean", "RMS", "max", "no offset")]
+        table: list[tuple[str, ...]] = [("joint [mm]", "mean", "RMS", "max", "no offset")]
         for name, e in rows.items():
             numbers = (e.mean_mm, e.rms_mm, e.largest_mm, e.mean_without_offset_mm)
             table.append((f"  {name}", *(or_dash(number, ".1f") for number in numbers)))
