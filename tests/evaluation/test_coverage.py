@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-<<<<<<<< HEAD:tests/evaluation/test_coverage.py
 from airborne.evaluation.coverage import coverage_of
-========
-from airborne.evaluation.interval_coverage import reliability
->>>>>>>> 9d4ee810e9b9f4d754daa34da17d277e123a52d3:tests/evaluation/test_interval_coverage.py
 from tests.support.tolerances import sampled
 
 RNG = np.random.default_rng(3)
