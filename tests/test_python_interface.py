@@ -99,7 +99,7 @@ def test_examples_of_docstrings_run(done, tmp_path, monkeypatch):
     shutil.copytree(THROWN_CROSS, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     trial = tmp_path / "trial.toml"
-    trial.write_text(trial.read_text(encoding="utf-8") + "stop = 3\n", encoding="utf-8")
+    trial.write_text(trial.read_text(encoding="utf-8") + "stop = 5\n", encoding="utf-8")
     shutil.copytree(folder / "in-code", "results")
     functions = {name: getattr(interface, name) for name in interface.__all__}
     finder, runner = doctest.DocTestFinder(recurse=False), doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
@@ -122,3 +122,27 @@ def test_the_study_holds_no_outputs():
     notebook = json.loads(STUDY.read_text(encoding="utf-8"))
     code = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
     assert [cell for cell in code if cell["outputs"] or cell["execution_count"] is not None] == []
+
+
+@pytest.mark.parametrize(
+    ("mistake", "said"),
+    [
+        (lambda: ab.synthesise("banana", "p"), "scene 'banana' is not known; choose cross or somersault or block"),
+        (lambda: ab.smooth("results", "butterwort"), "choose butterworth or spline or kalman"),
+        (lambda: ab.read_run("results").plot("banana"), "choose pose or joints or flight"),
+        (lambda: ab.Trial(name="x", camera=[]), "Trial: camera: holds 0 values, expected 1"),
+        (lambda: ab.read_rig("calib.toml")["cam1"].px_from_world([0, 1]), "expected (..., 3)"),
+        (lambda: ab.read_trial("trial.toml", stopp=3), "stopp = 3: track.stopp: unknown key; did you mean stop?"),
+        (lambda: ab.evaluate("results"), "give truth, digitised or joints"),
+    ],
+)
+def test_what_a_user_can_correct_is_said_in_one_line_of_python(mistake, said, done, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("results", "calib.toml"):
+        (tmp_path / name).symlink_to(done[0] / name)
+    shutil.copyfile(THROWN_CROSS / "trial.toml", "trial.toml")
+    with pytest.raises(ab.AirborneError) as caught:
+        mistake()
+    assert said in str(caught.value)
+    assert not any(word in str(caught.value) for word in ("--", "http"))
+    assert not (tmp_path / "p").exists()

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any, get_args
 
 if TYPE_CHECKING:
-    from pydantic import ValidationError
+    from pydantic import BaseModel, ValidationError
     from pydantic_core import ErrorDetails
 
 
@@ -46,8 +47,9 @@ class UndecidedError(TrialError):
 class MistakesError(TrialError):
     """A trial file with mistakes: the message says the first and counts the others, `mistakes` has a line for each."""
 
-    def __init__(self, where: str, mistakes: Sequence[str]) -> None:
-        """Take where they are, a file or options of the command line, and what each is."""
+    def __init__(self, where: str, mistakes: Sequence[str], places: Sequence[tuple[int | str, ...]] = ()) -> None:
+        """Take where they are, a file or options of the command line, and what each is; their places in its tables."""
+        self.plain, self.places = tuple(mistakes), tuple(places)
         self.mistakes = tuple(f"{where}: {mistake}" for mistake in mistakes)
         super().__init__(f"{where}: {_count_others(mistakes)}")
 
@@ -56,8 +58,18 @@ class ResultError(AirborneError):
     """A run folder or truth file is unusable."""
 
 
+def count(n: int, noun: str) -> str:
+    """Return a number with its noun, as 1 camera or 2 cameras."""
+    return f"{n} {noun if n == 1 else f'{noun}s'}"
+
+
+def require_choice(value: str, choices: Collection[str], what: str) -> None:
+    """Raise AirborneError, listing the choices, where a value is none of them; `what` says what it is."""
+    if value not in choices:
+        raise AirborneError(f"{what} '{str(value)[:60]}' is not known; choose {' or '.join(choices)}")
+
+
 _PLAIN = {
-    "missing": "is missing",
     "extra_forbidden": "unknown key",
     "float_parsing": "expected a number",
     "int_parsing": "expected a whole number",
@@ -67,34 +79,82 @@ _PLAIN = {
 _KIND = re.compile(r"(literal|dict|list|constrained|function)\W.*|str|int|float|bool")  # a step to one of several kinds
 
 
-def one_line(error: ValidationError) -> str:
-    """Say a pydantic error's first complaint in one line: where, what, what was given."""
-    return _count_others(list_mistakes(error))
+def one_line(error: ValidationError, document: Any, model: type[BaseModel]) -> str:
+    """Say a pydantic error's first complaint in one line: where, what, what was given; see `list_mistakes`."""
+    return _count_others(list_mistakes(error, (), document, model))
 
 
-def list_mistakes(error: ValidationError, tags: Collection[str] = ()) -> list[str]:
-    """List a pydantic error's complaints, a line for each place; `tags` tell kinds of one table apart."""
-    by_place: dict[str, list[ErrorDetails]] = {}
+def list_mistakes(error: ValidationError, tags: Collection[str], document: Any, model: type[BaseModel]) -> list[str]:
+    """List a pydantic error's complaints, a line for each place; `tags` tell kinds of one table apart.
+
+    Tables of a list are named as the `document` names them, and the keys of `model` are suggested for unknown ones.
+    """
+    by_place: dict[tuple[str, ...], list[ErrorDetails]] = {}
     for one in error.errors(include_url=False):
-        steps = [str(step)[:60] for step in one["loc"]]
-        steps = [step for step in steps if not _KIND.fullmatch(step) and step not in tags]
-        if one["type"] == "union_tag_invalid":
-            steps.append(one.get("ctx", {})["discriminator"].strip("'"))
-        by_place.setdefault(".".join(steps), []).append(one)
-    places = [place for place in by_place if not any(other.startswith(f"{place}.") for other in by_place)]
-    return [_describe_place(place, by_place[place]) for place in places]
+        by_place.setdefault(_name_steps(one, tags, document), []).append(one)
+    places = [
+        place for place in by_place if not any(other[: len(place)] == place for other in by_place if other != place)
+    ]
+    return [_describe_place(place, by_place[place], model) for place in places]
 
 
-def _describe_place(place: str, errors: Sequence[ErrorDetails]) -> str:
+def _name_steps(one: ErrorDetails, tags: Collection[str], document: Any) -> tuple[str, ...]:
+    """Return the way to an error's place, tables of a list by their names: start, frame; camera 'cam2', video."""
+    steps: list[str] = []
+    for step in one["loc"]:
+        text = str(step)[:60]
+        if _KIND.fullmatch(text) or text in tags:
+            continue
+        document = _item(document, step)
+        if isinstance(step, int) and isinstance(document, dict) and steps:
+            name = document.get("name")
+            steps[-1] += f" '{name[:60]}':" if name and isinstance(name, str) else f" {step + 1}:"
+        else:
+            steps.append(text)
+    if one["type"] == "union_tag_invalid":
+        steps.append(one.get("ctx", {})["discriminator"].strip("'"))
+    return tuple(steps)
+
+
+def _item(document: Any, step: int | str) -> Any:
+    """Return an item of a table or a list of them, None where there is none."""
+    if isinstance(document, list):
+        return document[step] if isinstance(step, int) and step < len(document) else None
+    return document.get(step) if isinstance(document, dict) else None
+
+
+def _describe_place(place: tuple[str, ...], errors: Sequence[ErrorDetails], model: type[BaseModel]) -> str:
+    where = ".".join(place).replace(":.", ": ").removesuffix(":")
+    first = errors[0]
+    if first["type"] == "missing":
+        return f"{where} is missing"
+    if first["type"] == "extra_forbidden":
+        alike = get_close_matches(place[-1], _list_keys(model, first["loc"]), 1)
+        if alike:
+            return f"{where}: unknown key; did you mean {alike[0]}?"
     said = ", or ".join(dict.fromkeys(map(_phrase, errors)))
-    is_whole_table = isinstance(errors[0]["input"], dict) or errors[0]["type"] == "missing"
-    given = "" if is_whole_table else f" (found {str(errors[0]['input'])[:60]!r})"
-    return f"{place}{': ' if place else ''}{said}{given}"
+    given = "" if isinstance(first["input"], dict) else f" (found {str(first['input'])[:60]!r})"
+    return f"{where}{': ' if where else ''}{said}{given}"
+
+
+def _list_keys(model: type[BaseModel], loc: Sequence[int | str]) -> list[str]:
+    """Return the keys of the tables in which an error's place lies."""
+    models = [model]
+    for step in loc[:-1]:
+        fields = [each.model_fields[step] for each in models if step in each.model_fields]
+        models = [each for field in fields for each in _models_in(field.annotation)] or models
+    return [key for each in models for key in each.model_fields]
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    if hasattr(annotation, "model_fields"):
+        return [annotation]
+    return [model for each in get_args(annotation) for model in _models_in(each)]
 
 
 def _count_others(mistakes: Sequence[str]) -> str:
     more = len(mistakes) - 1
-    return mistakes[0] + (f"; and {more} more mistake{'s' * (more > 1)}" if more else "")
+    return mistakes[0] + (f"; and {count(more, 'more mistake')}" if more else "")
 
 
 def _phrase(one: ErrorDetails) -> str:

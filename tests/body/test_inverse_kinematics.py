@@ -152,7 +152,7 @@ def test_mirrored_space_is_noted():
     pose = pose_within_limits(np.random.default_rng(4), 0.4)
     fit = fit_pose(MODEL, {name: place * [-1, 1, 1] for name, place in landmarks(pose, LIMBS).items()})
     assert fit.rms_m > 0.02
-    assert fit.note is not None and "no picture is mirrored" in fit.note
+    assert fit.note is not None and "no image is mirrored" in fit.note
 
 
 @pytest.mark.parametrize("missing", CORE)

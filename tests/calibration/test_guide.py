@@ -75,4 +75,4 @@ def test_the_example_of_a_finding_runs():
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
         exec(fences("python")[0], {})
-    assert said.getvalue().startswith("left: its picture numbers fall from 65535 to 0 after picture 35")
+    assert said.getvalue().startswith("left: its image numbers fall from 65535 to 0 after image 35")

@@ -103,7 +103,7 @@ def test_of_several_people_the_surest_is_taken_and_it_is_said(tmp_path):
     save_json(tmp_path, "a", np.stack([unsure, sure], axis=1))
     found = read_detections(tmp_path, ["a"])
     np.testing.assert_array_equal(found.px[:, :, 0], sure[..., :2])
-    assert found.notes == ("a: up to 2 people in a picture; took the one detected most surely",)
+    assert found.notes == ("a: up to 2 people in an image; took the one detected most surely",)
 
 
 def test_frame_with_nobody_is_not_seen(tmp_path):
@@ -115,7 +115,7 @@ def test_frame_with_nobody_is_not_seen(tmp_path):
     ("values", "said"),
     [
         (table()[..., :2], r"detections of 'a' are float64 \(3, 17, 2\)"),
-        (table(points=19), "points per picture: a 19; expected the same for all, one of 17, 18, 25"),
+        (table(points=19), "points per image: a 19; expected the same for all, one of 17, 18, 25"),
         (np.array([["x"]]), "the detections of 'a' are"),
         (table(frames=0), r"\(0, 17, 3\)"),
     ],
@@ -144,7 +144,7 @@ def test_file_that_holds_no_detections_is_refused(tmp_path):
         ("{", "a_1.json", "is not OpenPose JSON"),
         ('{"people": 3}', "a_1.json", "is not OpenPose JSON"),
         ('{"people": [{"pose_keypoints_2d": [1, 2]}]}', "a_1.json", "is not OpenPose JSON"),
-        ('{"people": []}', "a_1.json", "there is nobody in any picture"),
+        ('{"people": []}', "a_1.json", "there is nobody in any image"),
         ('{"people": []}', "first.json", "whose names end in the frame's number"),
         ("", "a.txt", "holds no detections; expected JSON files"),
     ],

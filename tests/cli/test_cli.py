@@ -183,7 +183,7 @@ def test_evaluate_compares_players_with_their_truth(tmp_path, capsys):
     assert in_process("evaluate", run, truth, "--json") == 0
     result = json.loads(capsys.readouterr().out)
     assert result["truth"]["players"]["Anna"]["parts"]["knees"]["mean_mm"] == pytest.approx(20)
-    assert "leave --digitised" in refusal(capsys, "evaluate", run, truth, "--digitised", truth)
+    assert "leave clicked points" in refusal(capsys, "evaluate", run, truth, "--digitised", truth)
     assert "give a truth.csv" in refusal(capsys, "evaluate", run)
     assert "cannot be read" in refusal(capsys, "evaluate", run, tmp_path / "none.csv")
 
@@ -368,5 +368,32 @@ def test_a_body_found_nowhere_is_reported(trial, tmp_path, capsys):
     assert in_process("track", far, "-o", tmp_path / "run", "--no-pictures") == 1
     out, _ = capsys.readouterr()
     assert "found in no frame" in out
-    assert "the start pose lies in no camera's picture" in out
+    assert "the start pose lies in no camera's image" in out
     assert "nan" not in out
+
+
+def test_the_first_frame_says_what_to_open_also_where_it_failed(trial, tmp_path, capsys):
+    far = edit_trial(trial, "far.toml", ("position_m = [-0.42419,", "position_m = [40.0,"))
+    assert in_process("track", far, "-o", tmp_path / "run", "--first-frame") == 1
+    out, _ = capsys.readouterr()
+    drawn = [f"figures/overlay_cam{k}.png" for k in (1, 2, 3)]
+    assert f"look at the first frame in {', '.join(drawn)}, correct [start]" in out
+    assert f"results: {tmp_path / 'run'}; open {tmp_path / 'run' / drawn[0]}, " in out
+
+
+def test_a_stop_before_the_first_frame_leaves_nothing(trial, tmp_path, capsys, monkeypatch):
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("airborne.run.track.track_trial", interrupted)
+    assert in_process("track", trial, "-o", tmp_path / "run") == 130
+    assert capsys.readouterr() == ("", "airborne: stopped; no frame was tracked yet, and nothing is written\n")
+
+
+def test_a_folder_that_may_not_be_written_is_named_and_another_suggested(tmp_path, capsys, monkeypatch):
+    def forbidden():
+        raise PermissionError(13, "Permission denied", str(tmp_path / "summary.json.part"))
+
+    monkeypatch.setattr("airborne.run.bench.measure_speed", forbidden)
+    said = f"airborne: {tmp_path} cannot be written (Permission denied); give another folder with -o\n"
+    assert refusal(capsys, "bench") == said

@@ -159,3 +159,12 @@ def test_description_names_every_axis_and_symmetry_only_where_there_is_one():
     assert all(name in plain for name in ("x ", "y ", "z ", "somersault", "tilt", "twist", "RMS", "mm", "deg", "1 sd"))
     assert "symmetry" not in plain
     assert "symmetry" in compare_motion(motion, flight(), HALF_TURN).describe()
+
+
+def test_a_reference_in_millimetres_is_asked_about_in_columns_that_stay_apart():
+    true = flight()
+    text = compare_motion(motion_of(true), replace(true, position=1e3 * true.position), IDENTITY).describe()
+    assert "is it in millimetres?" in text
+    row = next(line for line in text.splitlines() if line.startswith("  in space"))
+    assert len(row.split()) == 4
+    assert "millimetres" not in compare_motion(motion_of(true), true, IDENTITY).describe()

@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from airborne.errors import ResultError
+from airborne.evaluation import analyse_agreement
 from airborne.evaluation.variables import (
     align_symmetry,
     common_series,
@@ -32,6 +33,25 @@ def test_angles_differ_on_the_circle_and_not_by_a_revolution():
     result = by_name(common_series([root(179.0), root(-179.0)], "both"))["somersault"]
     assert result.unit == "deg"
     assert result.values[:, 0] - result.values[:, 1] == pytest.approx(np.full(40, -2.0), abs=1e-9)
+
+
+def test_a_reference_of_several_revolutions_has_their_whole_range():
+    steady = np.linspace(10.0, 610.0, 40)[:, None] * np.array([1.0, 0.0, 0.0])
+    R = Rotation.from_rotvec(np.deg2rad(steady)).as_matrix()
+    turning = root_variables(T, np.zeros((40, 3)), R)
+    result = by_name(common_series([turning, turning], "both"))["somersault"]
+    assert np.ptp(result.values[:, 1]) == pytest.approx(600.0)
+    assert analyse_agreement(result).range == pytest.approx(600.0)
+    few = root_variables(T[::10], np.zeros((4, 3)), R[::10])  # steps of 154 degrees: revolutions are those of the run
+    result = by_name(common_series([turning, few], "both"))["somersault"]
+    assert np.ptp(result.values[:, 1]) == pytest.approx(30 * 600 / 39)
+
+
+def test_joint_angles_go_on_over_half_a_turn():
+    angles = np.zeros((40, 1, 3))
+    angles[:, 0, 0] = np.linspace(2.0, 5.0, 40)
+    result = joint_angle_variables(T, angles, ["shoulder"]).columns["shoulder turn x", "body"]
+    assert np.ptp(result) == pytest.approx(np.rad2deg(3.0))
 
 
 def test_somersault_and_twist_are_left_out_where_they_are_ambiguous():

@@ -1,11 +1,14 @@
 """Figures of an analysis are written for whatever there is to draw."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PIL import Image
 
 from airborne.evaluation import Series, analyse_agreement
-from airborne.export.analysis_figures import write_bland_altman, write_identity, write_residuals
+from airborne.export.analysis_figures import format_limits, write_bland_altman, write_identity, write_residuals
+from airborne.motion.jumps.jump import Measurement
 from airborne.motion.smoothing import residual_analysis
 
 BIAS_GREY = (51, 51, 51)
@@ -49,3 +52,17 @@ def test_residuals_are_drawn_with_and_without_a_cutoff_used(tmp_path):
     write_residuals(tmp_path / "a.png", result)
     write_residuals(tmp_path / "b.png", result, 3.0)
     assert (tmp_path / "a.png").read_bytes() != (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("numbers", "text"),
+    [
+        ((-0.00328, -0.217, 0.21), "0.00 [−0.22, 0.21] mm"),
+        ((1.5, -30.0, 33.0), "2 [−30, 33] mm"),
+        ((0.0, 0.0, 0.0), "0.00 [0.00, 0.00] mm"),
+    ],
+)
+def test_limits_have_equally_many_decimals_and_a_true_minus(numbers, text):
+    _, row = make_variables(1)[0]
+    bias, low, high = (Measurement(value, value, value) for value in numbers)
+    assert format_limits(replace(row, bias=bias, lower_limit=low, upper_limit=high)) == text

@@ -152,16 +152,16 @@ def test_detections_go_to_openpose_and_back(tmp_path, shared_data, airborne):
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (("calib.toml", "x.txt"), "the name asks for no format"),
+        (("calib.toml", "x.txt"), "the name names no format"),
         (("calib.toml", "x.toml", "--origin", "lower-left"), "--origin does not apply to a pose2sim file to read"),
         (("calib.toml", "x.toml", "--to-unit", "mm"), "--to-unit does not apply to a pose2sim file to write"),
         (("calib.toml", "x.npz", "--to", "npz"), "holds cameras, which cannot be written as npz"),
         (("calib.toml", "x.toml", "--to", "bvh"), "--to bvh: no such format"),
         (("clicks.csv", "x_xypts.csv"), "say which cameras its columns are of: --cameras"),
         (("clicks.csv", "x.toml", "--cameras", "a"), "give a name ending in xypts.csv, .csv or .npz"),
-        (("clicks.csv", "x.toml", "--cameras", "a", "--to", "vicon"), "holds points in pictures, not cameras"),
+        (("clicks.csv", "x.toml", "--cameras", "a", "--to", "vicon"), "holds points in images, not cameras"),
         (("none.toml", "x.toml"), "none.toml cannot be read"),
-        (("coefficients.csv", "x.toml"), "does not say how large the pictures of 'cam1' are; give --size"),
+        (("coefficients.csv", "x.toml"), "does not say how large the images of 'cam1' are; give --size"),
         (("coefficients.csv", "x.toml", "--size", "768"), "--size 768: expected WIDTHxHEIGHT"),
     ],
 )

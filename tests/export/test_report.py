@@ -74,7 +74,7 @@ def test_a_comparison_with_the_truth_becomes_a_table(tmp_path):
         index=motion.index, time_s=motion.time_s, position=motion.position + np.array([0.003, 0, 0]), R=motion.R
     )
     html = html_of(tmp_path, motion, truth=compare_motion(motion, truth, [np.eye(3), HALF_TURN]).to_dict())
-    assert "Against the truth" in html
+    assert "Compared with the truth" in html
     assert "<th>x [mm]</th><td>3.00</td><td>3.00</td>" in html
     assert "20 of 20 reference times matched" in html
 
@@ -109,7 +109,7 @@ def test_a_comparison_with_paths_of_joints_becomes_a_table(tmp_path):
     names = tuple(mark.name for mark in PERSON.landmarks)
     paths = JointPaths(time_s=motion.time_s, names=names, points=points - [0.004, 0, 0])
     html = html_of(tmp_path, motion, joints=compare_joints(motion, PERSON, paths).to_dict())
-    assert "Against the paths of the joints" in html
+    assert "Compared with the paths of the joints" in html
     assert html.count("<td>4</td><td>4</td><td>4</td>") == len(names) + 2  # all, and all tracked
 
 

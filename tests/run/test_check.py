@@ -45,7 +45,7 @@ def test_a_good_trial_has_a_line_for_each_thing(folder):
 
 def test_every_mistake_of_the_tables_is_listed(folder, capsys, monkeypatch):
     path = edit(folder, ('"top-first"', '"odd"'), ("[track]", "[track]\nevery = 0"))
-    assert [line.split(": ")[1] for line in check_trial(path).mistakes] == ["camera.0.fields", "track.every"]
+    assert [line.split(": ")[1] for line in check_trial(path).mistakes] == ["camera 'cam1'", "track.every"]
     monkeypatch.setattr("sys.argv", ["airborne", "check", str(path)])
     with pytest.raises(SystemExit) as stopped:
         main()
@@ -85,7 +85,42 @@ def test_exchanged_videos_and_a_mirrored_one_are_named_before_anything_is_tracke
 
 def test_a_start_past_the_end_is_a_mistake(folder):
     path = edit(folder, ("frame = 0", "frame = 900"))
-    assert "start.frame lies past the end" in " ".join(check_trial(path).mistakes)
+    said = "there is no frame 900, the last is 33; start.frame lies past the end"
+    assert said in " ".join(check_trial(path).mistakes)
+
+
+def test_what_is_left_of_tables_with_mistakes_is_read_too(folder, capsys):
+    changes = ('[track]\nmethod = "refined"', '[track]\nmethod = "refind"'), ("cam2.mp4", "cam9.mp4")
+    path = edit(folder, *changes, ("cross.toml", "corss.toml"))
+    mistakes = check_trial(path).mistakes
+    assert len(mistakes) == 3
+    for said in ("track.method: expected", "cam9.mp4 not found", "corss.toml not found"):
+        assert sum(said in line for line in mistakes) == 1, said
+
+
+def test_cameras_with_mistakes_are_left_out_and_the_others_read(folder):
+    path = edit(folder, ("frame = 0", "fram = 0"), ('video = "cam2.mp4"\n', ""), ("cam3.mp4", "cam9.mp4"))
+    checks = check_trial(path)
+    wrong = ["camera 'cam2': video is missing", "start.fram: unknown key; did you mean frame?"]
+    assert checks.mistakes[:2] == [f"trial.toml: {each}" for each in wrong]
+    assert len(checks.mistakes) == 3 and "cam9.mp4 not found" in checks.mistakes[2]
+    assert checks.well[0].startswith("cam1: 768×576 px, 50 images/s")
+
+
+def test_nothing_is_left_of_a_file_whose_tables_contradict_each_other(folder):
+    path = edit(folder, ('file = "calib_true.toml"', 'file = "calib_true.toml"\nmend = ["cam8"]'))
+    assert len(check_trial(path).mistakes) == 1
+
+
+def test_a_start_in_millimetres_is_a_mistake(folder):
+    path = edit(folder, ("position_m = [-0.42419, -0.01495, 1.26533]", "position_m = [-424.19, -14.95, 1265.33]"))
+    (mistake,) = check_trial(path).mistakes
+    assert "the start pose lies in no camera's image; check start.position_m, in metres" in mistake
+
+
+def test_lines_are_reported_as_they_are_found(folder):
+    reported = []
+    assert reported == [] and check_trial(folder / "trial.toml", reported.append).well == reported
 
 
 def test_players_are_checked_against_the_cameras(tmp_path):

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import shutil
 from dataclasses import replace
 
@@ -13,6 +14,7 @@ from airborne.cameras import read_rig, write_pose2sim
 from airborne.errors import ResultError
 from airborne.motion import Motion, MotionWriter, write_joints
 from airborne.run.evaluate import assess, evaluate_agreement
+from tests.support.commands import in_process
 from tests.support.motions import estimate
 from tests.support.players_trial import PLAYERS, write_run, write_truth
 from tests.support.run_files import contents_of, files_of
@@ -195,3 +197,25 @@ def test_every_number_is_documented(run, tmp_path):
         header = (tmp_path / "tables" / name).read_text().splitlines()[0].split(",")
         stems = {column.removesuffix("_low").removesuffix("_high") for column in header}
         assert {stem for stem in stems if f"`{stem}`" not in text} <= {"against", "between", "variable", "unit"}
+
+
+def test_one_frame_of_joints_has_a_dash_for_what_it_cannot_say(run, tmp_path):
+    lines = (run.parent / "higher.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "one.csv").write_text("".join(lines[:2]))
+    text = assess(run, None, None, tmp_path / "one.csv")["joints"].describe()
+    assert "nan" not in text
+    assert text.splitlines()[2].split()[-1] == "-"
+
+
+def test_a_run_that_may_not_be_written_is_compared_into_another_folder(run, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("airborne.run.evaluate.os.access", lambda path, mode: mode != os.W_OK)
+    before = contents_of(run)
+    assert in_process("evaluate", run, "--joints", run.parent / "higher.csv", "-o", tmp_path / "out") == 0
+    assert contents_of(run) == before
+    assert f"wrote into {tmp_path / 'out'}: tables/agreement.csv" in capsys.readouterr().out
+
+
+def test_an_unfinished_run_is_said_to_be_one(run, capsys):
+    (run / "summary.json").unlink()
+    assert in_process("evaluate", run, "--joints", run.parent / "higher.csv") == 0
+    assert "note: the run is not finished" in capsys.readouterr().out

@@ -19,6 +19,7 @@ from tests.support.export_scenes import BOX, PERSON
 from tests.support.players_trial import write_run
 from tests.support.takes import tumbling
 
+UNFINISHED = "the run is not finished: these are the frames so far; `airborne track --resume` goes on"
 SUFFIXES = ["c3d", "trc", "mot", "osim", "glb", "bvh", "csv", "parquet"]
 
 
@@ -62,7 +63,7 @@ def names(exported):
 def test_a_killed_run_of_a_person_is_exported_in_every_format(person_run, tmp_path):
     exported = export_run(person_run, tmp_path / "out")
     assert names(exported) == [f"my_run.{suffix}" for suffix in SUFFIXES]
-    assert exported.notes == ()
+    assert exported.notes == (UNFINISHED,)
     assert all(path.stat().st_size > 0 for path in exported.files)
     paths = read_joint_paths(tmp_path / "out" / "my_run.trc")
     points, _ = landmarks(tumbling(5), PERSON)
@@ -84,7 +85,8 @@ def test_a_body_in_one_piece_is_exported_in_every_format(tmp_path):
         "throw.csv",
         "throw.parquet",
     ]
-    (note,) = exported.notes
+    note, unfinished = exported.notes
+    assert unfinished == UNFINISHED
     assert note == "2 of 5 frames have no pose and stay gaps; .mot and .bvh are in 2 parts, one a stretch without a gap"
 
 
@@ -112,9 +114,10 @@ def test_uneven_times_are_kept_out_of_files_without_times(tmp_path):
     exported = export_run(folder)
     assert not {path.suffix for path in exported.files} & {".c3d", ".bvh"}
     assert exported.notes == (
-        "frames stray from an even beat by up to 0.15 frames: left out c3d, bvh, which hold no times",
+        "frames are off an even rate by up to 0.15 frames: left out c3d, bvh, which hold no times",
+        UNFINISHED,
     )
-    with pytest.raises(ResultError, match=r"0\.15 frames, and c3d hold no times; give --trc"):
+    with pytest.raises(ResultError, match=r"0\.15 frames, and c3d hold no times; write trc"):
         export_run(folder, formats=["c3d", "trc"])
 
 
@@ -122,9 +125,9 @@ def test_without_pyarrow_parquet_is_left_out_and_refused_where_asked_for(players
     monkeypatch.setattr("airborne.run.export.CAN_WRITE_PARQUET", False)
     exported = export_run(players_run, tmp_path)
     assert "block.parquet" not in names(exported) and "block.csv" in names(exported)
-    mend = "Parquet needs pyarrow, which is not installed: pip install 'airborne[parquet]'"
-    assert exported.notes == (f"left out parquet. {mend}",)
-    with pytest.raises(ResultError, match=re.escape(mend)):
+    advice = "Parquet needs pyarrow, which is not installed: pip install pyarrow"
+    assert exported.notes == (f"left out parquet. {advice}",)
+    with pytest.raises(ResultError, match=re.escape(advice)):
         export_run(players_run, tmp_path, ["csv", "parquet"])
 
 

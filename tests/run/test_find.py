@@ -129,7 +129,7 @@ def test_frame_writes_the_pixels_to_click_in(path, tmp_path, monkeypatch):
     trial = read_trial(path)
     with pytest.raises(TrialError, match="no camera 'cam9'; it has: cam1, cam2, cam3"):
         write_frame(trial, "cam9", 0, picture)
-    with pytest.raises(TrialError, match="cam1 has no picture at frame 999"):
+    with pytest.raises(TrialError, match="cam1 has no image at frame 999"):
         write_frame(trial, "cam1", 999, picture)
     with pytest.raises(TrialError, match=r"cannot be written; give a file .* that ends in \.png"):
         write_frame(trial, "cam1", 0, tmp_path / "none" / "f.png")

@@ -158,7 +158,7 @@ def test_positions_of_landmarks_in_the_file_or_in_a_table(trial, tmp_path):
     (tmp_path / "joints.csv").write_text("\n".join(["joint,x_m,y_m,z_m", *rows]))
     again = find_first_pose(trial('[start]\njoints_m = "joints.csv"\n'), MODEL, RIG)
     assert off_m(again.pose) < 1e-3
-    assert "first pose found, landmarks 0 mm off (RMS)" in again.notes[0]
+    assert "first pose found; landmarks are 0 mm off (RMS)" in again.notes[0]
 
 
 def test_points_clicked_in_the_images(trial, tmp_path):

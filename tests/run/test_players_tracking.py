@@ -165,7 +165,7 @@ def test_cameras_that_end_or_go_dark_are_reported_with_their_frames(tmp_path):
     write_clip(folder / "right.mkv", dark, codec="libx264", pix_fmt="yuv420p")
     run = track_trial(read_trial(trial), tmp_path / "run")
     assert len(run.motion) == 12
-    assert "left: no picture at 7 of 12 frames: frames 5 to 11" in run.summary["events"]
+    assert "left: no image at 7 of 12 frames: frames 5 to 11" in run.summary["events"]
     assert "right: dark at 2 of 12 frames: frames 3 to 4" in run.summary["events"]
     assert run.summary["players"]["Anna"]["n_below_two_cameras"] == 7
     report = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")

@@ -48,7 +48,7 @@ def test_new_tables_lie_beside_the_raw_ones_which_stay(run, capsys):
     before = contents_of(run)
     assert in_process("smooth", run, "--butterworth", "10") == 0
     output = capsys.readouterr().out
-    assert "-3 dB of both at 10 Hz" in output and "no gap filled" in output and "Winter" in output
+    assert "-3 dB of both at 10 Hz" in output and "gaps are not filled" in output and "Winter" in output
     assert before.items() <= contents_of(run).items()
     assert set(files_of(run)) - set(before) == NEW
     rows = table(run / "tables/smooth_motion.csv")
@@ -58,10 +58,11 @@ def test_new_tables_lie_beside_the_raw_ones_which_stay(run, capsys):
     assert float(rows[10]["x_m_sd"]) < 1e-3
 
 
-def test_gaps_are_filled_on_request_into_another_folder(run, tmp_path):
+def test_gaps_are_filled_on_request_into_another_folder(run, tmp_path, capsys):
     out = tmp_path / "new" / "out"
     assert in_process("smooth", run, "--spline", "--fill", "0.1", "-o", out) == 0
     assert set(files_of(out)) == NEW
+    assert f"wrote into {out}: tables/smooth_motion.csv" in capsys.readouterr().out
     rows = table(out / "tables/smooth_motion.csv")
     assert rows[20]["is_filled"] == "1" and float(rows[20]["x_m"]) == pytest.approx(2.0, abs=0.05)
 
@@ -128,3 +129,11 @@ def test_every_column_is_documented(run, tmp_path):
     assert all(
         f"`{name}`" in text for name in (run / "tables/smooth_events.csv").read_text().splitlines()[0].split(",")
     )
+
+
+def test_two_frames_are_too_few_and_nothing_is_written(run, capsys):
+    table = run / "motion.csv"
+    table.write_text("".join(table.read_text().splitlines(keepends=True)[:3]))
+    before = files_of(run)
+    assert "no stretch has 5 frames with a pose (the run has 2 frames)" in refusal(capsys, "smooth", run, "--kalman")
+    assert files_of(run) == before

@@ -145,7 +145,7 @@ def test_whole_images_are_rounded_to_and_doubts_noted():
     found = round_to_images(offsets((0, 0.041, -0.0085), sd_s=(0, 0.001, 0.001)), sources)
     assert np.allclose(found.offset_s, (0, 2 * FIELD_S, 0), atol=EXACT)
     assert len(found.notes) == 1
-    assert "cam3 lies 8.5 ms beside a whole picture" in found.notes[0]
+    assert "cam3 lies 8.5 ms beside a whole image" in found.notes[0]
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,7 @@ def test_search_for_a_limb_brings_it_near_and_moves_nothing_else(frame, name):
     wrong, limb = fold(frame.truth, name, FOLDS[name]), limb_with(name)
     poses = search_limb(frame.render_model, [wrong], limb, region_evidence(*frame.views(wrong)))
     assert frame.off_mm(wrong, limb) > 450
-    assert frame.off_mm(poses[0], limb) < 130
+    assert frame.off_mm(poses[0], limb) < 150
     others = np.setdiff1d(np.arange(len(HUMAN.segments)), limb)
     for pose in poses:
         np.testing.assert_array_equal(HUMAN.with_pose(pose).t[others], HUMAN.with_pose(wrong).t[others])

@@ -120,10 +120,10 @@ def test_entries_of_the_track_table_can_be_replaced(folder):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"every": 0}, "--every 0: track.every: expected greater than or equal to 1"),
-        ({"method": "magic"}, "--method magic: track.method: expected 'refined', 'joint'"),
-        ({"method": "blocker"}, "--method blocker: track: method 'blocker' does not go with this body"),
-        ({"overlay": "paper"}, "--overlay paper: track: overlay: not read by method 'stepping'; remove it"),
+        ({"every": 0}, "every = 0: track.every: expected greater than or equal to 1"),
+        ({"method": "magic"}, "method = 'magic': track.method: expected 'refined', 'joint'"),
+        ({"method": "blocker"}, "method = 'blocker': track: method 'blocker' does not go with this body"),
+        ({"overlay": "paper"}, "overlay = 'paper': track: overlay: not read by method 'stepping'; remove it"),
     ],
 )
 def test_a_change_that_cannot_be_is_named_instead_of_the_file(folder, changes, said):
@@ -142,7 +142,7 @@ def test_every_mistake_of_a_file_is_listed(folder):
     text = GOOD.replace("every = 2", "every = 0").replace("frame = 3", "frame = -1").replace('"top-first"', '"odd"')
     with pytest.raises(MistakesError) as caught:
         read(folder, text)
-    places = ["camera.0.fields", "start.frame", "track.every"]
+    places = ["camera 'left'", "start.frame", "track.every"]
     assert [line.split(": ")[1] for line in caught.value.mistakes] == places
     assert str(caught.value) == f"{caught.value.mistakes[0]}; and 2 more mistakes"
 
@@ -156,21 +156,21 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('name = "a throw"', "", "name: is missing"),
+        ('name = "a throw"', "", "name is missing"),
         ('name = "a throw"', 'name = "a throw"\nplace = "hall"', "place: unknown key"),
-        ('video = "left.mp4"', "", "camera.0.video: is missing"),
+        ('video = "left.mp4"', "", "camera 'left': video is missing"),
         ('video = "left.mp4"', 'vidoe = "left.mp4"', "and 1 more"),
         ('name = "right"', 'name = "left"', "two cameras share a name: left, left; give each its own"),
-        ('"top-first"', '"odd-first"', "camera.0.fields"),
-        ("offset_s = 0.004", "offset_s = nan", "camera.0.offset_s: expected a finite number"),
-        ("offset_s = 0.004", "saved_scale = 0", "camera.0.saved_scale"),
-        ("offset_s = 0.004", "saved_offset_px = [1]", "camera.0.saved_offset_px"),
+        ('"top-first"', '"odd-first"', "camera 'left': fields"),
+        ("offset_s = 0.004", "offset_s = nan", "camera 'left': offset_s: expected a finite number"),
+        ("offset_s = 0.004", "saved_scale = 0", "camera 'left': saved_scale"),
+        ("offset_s = 0.004", "saved_offset_px = [1]", "camera 'left': saved_offset_px"),
         ('file = "calib.toml"', "", 'calibration: give file = "..." or control_points = "..."'),
         ('file = "calib.toml"', 'file = "calib.toml"\ncontrol_points = "a.csv"', "one of them"),
         ('file = "calib.toml"', 'file = "none.toml"', "none.toml not found beside it"),
         ('file = "calib.toml"', 'control_points = "none.csv"', "none.csv not found beside it"),
         ('file = "body.toml"', 'file = "none.toml"', "none.toml not found beside it"),
-        ('[body]\nfile = "body.toml"', "", "body: is missing"),
+        ('[body]\nfile = "body.toml"', "", "body is missing"),
         ('file = "body.toml"', 'file = "body.toml"\npreset = "human18"', "body: give file"),
         ('file = "body.toml"', "", 'body: give file = "...", preset = "human18" or measurements = "...", one of them'),
         ('file = "body.toml"', 'preset = "human19"', "body.preset"),
@@ -202,13 +202,13 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
         (QUATERNION, "quaternion_xyzw = [0, 0, 0, 0]", "quaternion_xyzw is all zeros"),
         (QUATERNION, "quaternion_xyzw = [0, 0, 1]", "start.quaternion_xyzw"),
         (QUATERNION, "somersault_tilt_twist_deg = [1, 2, nan]", "start.somersault_tilt_twist_deg.2"),
-        (QUATERNION, "rotation_matrix = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]", "rotation_matrix is no rotation"),
-        (QUATERNION, "rotation_matrix = [[2, 0, 0], [0, 1, 0], [0, 0, 1]]", "rotation_matrix is no rotation"),
+        (QUATERNION, "rotation_matrix = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]", "rotation_matrix is not a rotation"),
+        (QUATERNION, "rotation_matrix = [[2, 0, 0], [0, 1, 0], [0, 0, 1]]", "rotation_matrix is not a rotation"),
         (QUATERNION, "rotation_matrix = [[1, 0, 0], [0, 1, 0]]", "start.rotation_matrix"),
         ('"stepping"', '"magic"', "track.method"),
         ("every = 2", "every = 0", "track.every"),
         ("every = 2", "every = 2\nstop = 0", "track.stop"),
-        ("every = 2", "evrey = 2", "track.evrey: unknown key"),
+        ("every = 2", "evrey = 2", "track.evrey: unknown key; did you mean every?"),
         ("every = 2", "scale = 3", "track.scale"),
         ("every = 2", 'colour = "blue"', "track.colour"),
         ("every = 2", 'v_rule = "v"', "track.v_rule"),
@@ -306,12 +306,12 @@ def test_resection_is_for_selected_cameras(folder):
 @pytest.mark.parametrize(
     ("lamp", "said"),
     [
-        ("intensity = 1", "lights.lamp.0.position_m: is missing"),
+        ("intensity = 1", "lights.lamp 1: position_m is missing"),
         ("position_m = [1, 2, 3]\nintensity = 1\ndirection = [0, 0, 1]", "a spot light needs a direction"),
         ("position_m = [1, 2, 3]\nintensity = 1\nhalf_angle_deg = 20", "a spot light needs a direction"),
         ("position_m = [1, 2, 3]\nintensity = 1\ndirection = [0, 0, 0]\nhalf_angle_deg = 20", "with a length"),
         ("position_m = [1, 2, 3]\nintensity = 1\ndirection = [0, 0, 1]\nhalf_angle_deg = 90", "half_angle_deg"),
-        ("position_m = [1, 2, 3]\nintensity = -1", "lights.lamp.0.intensity"),
+        ("position_m = [1, 2, 3]\nintensity = -1", "lights.lamp 1: intensity"),
     ],
 )
 def test_impossible_lamp_is_refused(folder, lamp, said):

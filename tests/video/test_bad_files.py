@@ -51,7 +51,7 @@ def test_a_file_without_its_index_cannot_be_opened(clip, tmp_path):
 def test_a_file_cut_off_before_its_first_image_is_refused(clip, tmp_path):
     data = clip.read_bytes()
     (tmp_path / "a.mp4").write_bytes(data[: data.index(b"mdat") + 40])
-    assert "no picture" in refusal(tmp_path / "a.mp4")
+    assert "no image" in refusal(tmp_path / "a.mp4")
 
 
 def test_a_sound_file_has_no_video_stream(tmp_path):

@@ -30,19 +30,19 @@ def test_nothing_is_reported_of_cameras_that_show_something():
 
 def test_missing_and_dark_images_are_reported_by_camera_and_frames():
     assert outages_of([90, None, None, 90, 3, 90, None]) == [
-        "left: no picture at 3 of 7 frames: frames 1 to 2, 6",
+        "left: no image at 3 of 7 frames: frames 1 to 2, 6",
         "left: dark at 1 of 7 frames: frame 4",
     ]
 
 
 def test_frames_that_are_left_out_on_purpose_make_no_new_stretch():
-    assert outages_of([90, None, None, None], step=3) == ["left: no picture at 3 of 4 frames: frames 3 to 9"]
+    assert outages_of([90, None, None, None], step=3) == ["left: no image at 3 of 4 frames: frames 3 to 9"]
 
 
 @pytest.mark.parametrize("n", [40, 4000])
 def test_the_report_does_not_grow_with_the_run(n):
     (line,) = outages_of([None if k % 2 else 90 for k in range(n)])
-    assert line.startswith(f"left: no picture at {n // 2} of {n} frames: frames 1, 3, 5, 7, 9 and")
+    assert line.startswith(f"left: no image at {n // 2} of {n} frames: frames 1, 3, 5, 7, 9 and")
     assert line.endswith(f"{n // 2 - N_LISTED} more times")
 
 

@@ -120,7 +120,7 @@ def test_a_broken_image_is_an_empty_view_and_an_event(noisy, tmp_path, damaged_f
     assert [f.time_s for f in frames] == [Fraction(k, 50) for k in range(30)]
     name = "cam1" if damaged_first else "cam2"
     assert len(trial.events) == 1
-    assert trial.events[0].startswith(f"{name}: no picture from 0.240 s to 0.260 s")
+    assert trial.events[0].startswith(f"{name}: no image from 0.240 s to 0.260 s")
 
 
 @pytest.mark.parametrize("damaged_first", [True, False])
@@ -141,7 +141,7 @@ def test_a_file_cut_off_in_the_middle_gives_what_it_holds_and_an_event(noisy, tm
     trial = recording(noisy, cut)
     frames = list(trial)
     assert [k for k, f in enumerate(frames) if f.views[1] is None] == list(range(20, 30))
-    assert trial.events == ["cam2: the pictures end at 0.400 s; the file promises 0.600 s"]
+    assert trial.events == ["cam2: the images end at 0.400 s; the file promises 0.600 s"]
 
 
 def test_other_field_orders_than_the_files_flags_are_an_event_not_an_error(tmp_path):

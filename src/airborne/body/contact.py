@@ -48,15 +48,17 @@ class Overlaps:
 @lru_cache(maxsize=16)
 def contact_model(model: BodyModel) -> ContactModel:
     """Prepare a body."""
-    owners, parts = [], []
+    owners, parts, shapes = [], [], []
     for index, segment in enumerate(model.segments):
-        solids = [part for part in segment.parts if isinstance(part.shape, Ellipsoid)]
+        solids = [(part, part.shape) for part in segment.parts if isinstance(part.shape, Ellipsoid)]
         if solids:  # pieces of one ellipsoid in several colours are the same solid
+            part, shape = max(solids, key=lambda each: float(each[1].semi_axes_m.prod()))
             owners.append(index)
-            parts.append(max(solids, key=lambda part: float(part.shape.semi_axes_m.prod())))
+            parts.append(part)
+            shapes.append(shape)
     centre = np.array([part.segment_from_part.translation for part in parts]).reshape(-1, 3)
     axes = np.array([part.segment_from_part.rotation.as_matrix() for part in parts]).reshape(-1, 3, 3)
-    semi_axes = np.array([part.shape.semi_axes_m for part in parts]).reshape(-1, 3)
+    semi_axes = np.array([shape.semi_axes_m for shape in shapes]).reshape(-1, 3)
     order = np.argsort(semi_axes, axis=1)
     ordered = np.take_along_axis(semi_axes, order, axis=1)
     is_long = (ordered[:, 2] > _LEAST_RATIO * ordered[:, 1]) if len(parts) else np.zeros(0, bool)

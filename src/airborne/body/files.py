@@ -108,7 +108,7 @@ def read_body(path: Path) -> BodyModel:
     except tomllib.TOMLDecodeError as error:
         raise BodyError(f"{path.name}: not a TOML file: {error}; expected a body's [[segment]] tables") from error
     except ValidationError as error:
-        raise BodyError(f"{path.name}: {one_line(error)}") from error
+        raise BodyError(f"{path.name}: {one_line(error, document, _BodyTable)}") from error
     segments = tuple(_segment(segment, path) for segment in table.segment)
     landmarks = tuple(Landmark(mark.name, mark.segment, np.array(mark.position_m)) for mark in table.landmark)
     try:

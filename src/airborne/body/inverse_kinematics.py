@@ -77,7 +77,7 @@ def fit_pose(
         if swapped_m < _SWAPPED_SHARE * rms_m:
             note = (
                 f"left and right look exchanged: landmarks {rms_m * 1e3:.0f} mm off as named, "
-                f"{swapped_m * 1e3:.0f} mm the other way; check the points' names, and that no picture is mirrored"
+                f"{swapped_m * 1e3:.0f} mm the other way; check the points' names, and that no image is mirrored"
             )
     return PoseFit(pose, dict(zip(names, residual_m.tolist(), strict=True)), rms_m, note)
 

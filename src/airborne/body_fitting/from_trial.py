@@ -154,7 +154,7 @@ def _contact_sheet(fit: BodyFit, frames: Sequence[Frames]) -> bytes:
     for each, pose in zip(frames, fit.poses, strict=True):
         rows.append(np.concatenate([_cell(each, i, fit.model, pose) for i in range(len(each.views))], axis=1))
     is_written, png = cv2.imencode(".png", np.concatenate(rows)[..., ::-1])
-    assert is_written, "a picture in memory can be written as PNG"
+    assert is_written, "an image in memory can be written as PNG"
     return png.tobytes()
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.calibration.diagnosis import check_points, decompose_cameras, warnings_about
-from airborne.calibration.intrinsics.common_lens import common_lens_shifts
+from airborne.calibration.intrinsics.common_lens import common_lens_sd
 from airborne.calibration.intrinsics.model_selection import (
     Solution,
     candidates_for,
@@ -103,9 +103,9 @@ def calibrate(
         for name in points.cameras
     }
     solutions = {name: choose_simplest(each) for name, each in candidates.items()}
-    shifts = common_lens_shifts(candidates, sizes)
+    common_sd_m = common_lens_sd(candidates, sizes)
     cameras = [each.pinhole.camera(name, sizes[name], each.shift_sd_px) for name, each in solutions.items()]
-    fits = [_describe_fit(points, name, solutions[name], candidates[name], shifts.get(name)) for name in solutions]
+    fits = [_describe_fit(points, name, solutions[name], candidates[name], common_sd_m.get(name)) for name in solutions]
     return Calibration(
         rig=Rig(tuple(cameras)),
         method=method,
@@ -139,12 +139,12 @@ def _solve(
 
 
 def _describe_fit(
-    points: ControlPoints, name: str, best: Solution, candidates: list[Solution], common_lens_shift: Array | None
+    points: ControlPoints, name: str, best: Solution, candidates: list[Solution], common_lens_sd_m: Array | None
 ) -> CameraFit:
     is_seen = points.is_seen_by(name)
     P_dlt = fit_dlt(best.world, best.px)
     sd = parameter_sd(best.pinhole, best.model, best.world, best.px)
-    sd[3:6] = place_sd(best, candidates, common_lens_shift)
+    sd[3:6] = place_sd(best, candidates, common_lens_sd_m)
     return CameraFit(
         name=name,
         model=best.model.name,

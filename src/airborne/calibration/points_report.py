@@ -21,7 +21,11 @@ def describe_points_calibration(calibration: Calibration) -> str:
     ]
     if not math.isnan(calibration.held_out_3d_m):
         lines.append(f"held-out control points in 3D: {calibration.held_out_3d_m * 1e3:.1f} mm RMS")
-    lines += [_reason(fit) for fit in calibration.fits if len(fit.held_out_rms_px) > 1]
+    n_models = max(len(fit.held_out_rms_px) for fit in calibration.fits)
+    if n_models > 1:
+        lines.append(
+            f"model: the simplest of {n_models} that is not clearly worse on held-out points; --json lists their errors"
+        )
     lines += [f"warning: {warning}" for warning in calibration.warnings]
     return "\n".join(lines)
 
@@ -61,8 +65,3 @@ def _row(fit: CameraFit) -> tuple[str, ...]:
     held_out_px = fit.held_out_rms_px[fit.model]
     numbers = (fit.rms_px, fit.rms_m * 1e3, held_out_px, fit.held_out_m * 1e3, fit.dlt_rms_px)
     return (fit.name, str(fit.n_points), *(f"{number:.2f}" for number in numbers), fit.model)
-
-
-def _reason(fit: CameraFit) -> str:
-    scores = ", ".join(f"{name} {rms:.2f}" for name, rms in fit.held_out_rms_px.items())
-    return f"{fit.name}: '{fit.model}' is the simplest model not clearly worse on held-out points (px: {scores})"

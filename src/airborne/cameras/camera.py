@@ -58,6 +58,8 @@ class Camera:
     def px_from_world(self, points: Array) -> Array:
         """Project points (..., 3) [m] to the image: (..., 2) [px]; NaN behind the camera."""
         points = np.asarray(points, float)
+        if points.shape[-1:] != (3,):
+            raise CalibrationError(f"points have the shape {points.shape}; expected (..., 3): x, y, z in metres")
         xyz = points @ self.camera_from_world.rotation.as_matrix().T + self.camera_from_world.translation
         z = np.where(xyz[..., 2:] > 0, xyz[..., 2:], np.nan)
         return self._distort(xyz[..., :2] / z) @ self.K[:2, :2].T + self.K[:2, 2]
@@ -172,5 +174,7 @@ class Rig:
         Lens distortion is taken out first; NaN where fewer than two cameras see the point (see `triangulate`).
         """
         px = np.asarray(px, float)
+        if px.shape[-2:] != (len(self), 2):
+            raise CalibrationError(f"pixels have the shape {px.shape}; expected (..., {len(self)}, 2), a row a camera")
         undistorted = [camera.undistort_px(px[..., i, :]) for i, camera in enumerate(self.cameras)]
         return triangulate(self.P, np.stack(undistorted, axis=-2), weights)

@@ -80,7 +80,7 @@ def read_detections(
             tables[camera], n_people = read_folder(folders[name], person)
             if n_people > 1:
                 which = "the one detected most surely" if person is None else f"number {person} of each"
-                notes.append(f"{camera}: up to {n_people} people in a picture; took {which}")
+                notes.append(f"{camera}: up to {n_people} people in an image; took {which}")
         return _detections(str(path), tables, tuple(notes))
     try:
         arrays = read_arrays(path)
@@ -162,7 +162,7 @@ def _detections(where: str, tables: Mapping[str, Array], notes: tuple[str, ...] 
     if len(set(n_points.values())) > 1 or count not in NETWORKS:
         counts = ", ".join(f"{camera} {n}" for camera, n in n_points.items())
         expected = ", ".join(map(str, NETWORKS))
-        raise CalibrationError(f"{where}: points per picture: {counts}; expected the same for all, one of {expected}")
+        raise CalibrationError(f"{where}: points per image: {counts}; expected the same for all, one of {expected}")
     names = NETWORKS[count]
     values = np.full((max(map(len, tables.values())), len(names), len(tables), 3), np.nan)
     for column, table in enumerate(tables.values()):

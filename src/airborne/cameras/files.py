@@ -74,7 +74,7 @@ def build_rig(file: CalibrationFile, options: FileOptions) -> Rig:
         if size not in (None, camera.size):
             size_text = f"{camera.size[0]}x{camera.size[1]}"
             raise CalibrationError(
-                f"{file.where} says that '{camera.name}' has pictures of {size_text}; leave --size out"
+                f"{file.where} says that '{camera.name}' has images of {size_text}; leave --size out"
             )
     if options.unit is None and check_baselines(rig):
         question = (
@@ -160,7 +160,7 @@ def format_of_name(path: Path) -> str:
     for suffix, kind in _SUFFIXES.items():
         if path.name.lower().endswith(suffix):
             return kind
-    raise CalibrationError(f"{path}: the name asks for no format; end it in {', '.join(_SUFFIXES)}, or give --to")
+    raise CalibrationError(f"{path}: the name names no format; end it in {', '.join(_SUFFIXES)}, or give --to")
 
 
 def _texts(

@@ -47,7 +47,7 @@ _REPRODUCE = {"rigid": reproduce.reproduce_rigid_command, "blockjump": reproduce
 def _group(commands: dict, text: str, **options: Any) -> typer.Typer:
     group = typer.Typer(no_args_is_help=True, help=text, rich_markup_mode=None, **options)  # [start] is no markup
     for name, command in commands.items():
-        group.command(name)(command)
+        group.command(name, short_help=(command.__doc__ or "").partition("\n")[0])(command)  # whole, however long
     return group
 
 
@@ -96,6 +96,8 @@ def _describe_path_error(error: OSError) -> str:
             return f"{path} is a folder; give a file's name"
         case FileNotFoundError() if not path.parent.exists():
             return f"{path}: there is no folder {path.parent}; make it, or give another path"
+        case PermissionError() if path.suffix == ".part" or not path.exists():  # .part: a file that is being written
+            return f"{path.parent} cannot be written ({error.strerror}); give another folder with -o"
     return f"{path}: {error.strerror or error}; give a path that can be read or written"
 
 

@@ -176,7 +176,7 @@ def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> No
     (folder / "report.json").write_text(json.dumps(report, indent=1), encoding="utf-8")
     print(json.dumps(report) if as_json else describe_calibration(calibration))
     if not as_json:
-        print(f"written: {written}\nreport: {folder / 'report.json'} and {len(pictures)} pictures beside it")
+        print(f"written: {written}\nreport: {folder / 'report.json'} and {len(pictures)} images beside it")
     _reject(written, reasons)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -20,14 +21,14 @@ def check_command(
 
     Example: airborne check trial.toml
     """
+    if errors.is_terminal:
+        errors.print("opening videos; what is well is listed first, then the mistakes", style="dim")
     from airborne.run.check import check_trial
 
-    checks = check_trial(trial)
+    checks = check_trial(trial, (lambda line: None) if as_json else partial(print, flush=True))
     if as_json:
         print(json.dumps({"mistakes": checks.mistakes, "well": checks.well}, ensure_ascii=False))
     else:
-        for line in checks.well:
-            print(line)
         for line in checks.mistakes:
             errors.print(f"airborne: {line}", style="red", markup=False)
     if checks.mistakes:

@@ -1,4 +1,4 @@
-"""Commands before the first pose is known: one looks for the body, the other writes the picture to click in."""
+"""Commands before the first pose is known: one looks for the body, the other writes the image to click in."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ def find_command(
 
 def frame_command(
     trial: Annotated[Path, typer.Argument(help="The trial's TOML file.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="The picture to write: .png, .tif, .bmp.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The image to write: .png, .tif, .bmp.")],
     camera: Annotated[str, typer.Option(help="The camera's name.")],
     frame: Annotated[int, typer.Option(min=0, help="Number of the frame or field, as in start.frame.")] = 0,
 ) -> None:
-    """Write the picture of one camera at one frame or field, in whose pixels points are clicked.
+    """Write the image of one camera at one frame or field, in whose pixels points are clicked.
 
     Example: airborne frame trial.toml --camera cam1 --frame 12 -o cam1_12.png
     """

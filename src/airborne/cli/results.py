@@ -12,7 +12,7 @@ from airborne.cli.console import Json
 
 _AGAINST = {
     "truth": "against the truth",
-    "digitised": "against digitising by hand",
+    "digitised": "against points clicked by hand",
     "joints": "against the paths of the joints",
 }
 
@@ -51,6 +51,7 @@ def evaluate_command(
 
     Example: airborne evaluate results truth.csv --digitised digitised.csv --repeat results2
     """
+    from airborne.motion.run_folder import unfinished_note
     from airborne.run.evaluate import assess, evaluate_agreement
 
     others = repeat or joint_angles
@@ -74,3 +75,5 @@ def evaluate_command(
         print(_AGAINST[name])
         print(comparison.describe())
     print(agreement.describe())
+    if (note := unfinished_note(results)) is not None:
+        print(f"note: {note}")

@@ -34,7 +34,7 @@ def sync_command(
     from airborne.sync.from_trial import synchronise, write_offsets
     from airborne.trial.file import read_trial
 
-    with progress("synchronising: pictures read") as report:
+    with progress("synchronising: images read") as report:
         offsets = synchronise(
             read_trial(trial),
             by=by,

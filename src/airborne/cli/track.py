@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,17 +12,20 @@ import typer
 
 from airborne.cli.console import Json, Out, progress, stop
 from airborne.cli.results import evaluate_command
-from airborne.errors import AirborneError
+from airborne.errors import AirborneError, count
+from airborne.io.terminal import Stages
 
 if TYPE_CHECKING:
     from airborne.run.track import TrackResult
+
+_FIRST_WRITTEN = ("motion.csv", "joints.csv")  # of a body, of players
 
 
 def demo_command(
     output: Out = Path("airborne-demo"),
     as_json: Json = False,
 ) -> None:
-    """Track the bundled example, a thrown cross, and compare it with its truth.
+    """Track the bundled example, a thrown cross, and compare it with its truth; an earlier demo's run is replaced.
 
     Example: airborne demo
     """
@@ -33,7 +37,7 @@ def demo_command(
     overwrite = holds_run_of(read_trial(trial), output)  # a folder with any other run is left alone
     run = _track(trial, output, resume=False, overwrite=overwrite, pictures=True)
     if not as_json:
-        print(_describe(run.summary))
+        print(_describe(run.summary, output))
     evaluate_command(output, trial.parent / "truth.csv", trial.parent / "digitised.csv", as_json=as_json)
     if not as_json:
         print(f"report: {output / 'report.html'}")
@@ -89,7 +93,7 @@ def track_command(
     if as_json:
         print((output / "summary.json").read_text(encoding="utf-8"), end="")
     else:
-        print(f"{_describe(run.summary)}\nresults: {output}")
+        print(f"{_describe(run.summary, output)}\nresults: {_describe_results(output)}")
     if run.summary["n_frames"] == run.summary["n_lost"]:
         raise typer.Exit(1)
 
@@ -107,15 +111,16 @@ def _track(
     cameras: str | None = None,
     live: bool = False,
 ) -> TrackResult:
-    from airborne.run.track import track_trial
-    from airborne.trial.file import read_trial
-
     names = None if cameras is None else [name.strip() for name in cameras.split(",") if name.strip()]
     if names == []:
         raise AirborneError("--cameras names no camera; give their names, separated by commas")
-    trial = read_trial(path, changes or {}, names)
     try:
-        with progress(f"tracking {trial.name}") as report:
+        with Stages() as report:
+            report("opening videos", 0, None)  # at once, as even loading the modules takes seconds
+            from airborne.run.track import track_trial
+            from airborne.trial.file import read_trial
+
+            trial = read_trial(path, changes or {}, names, given_as="--{} {}")
             return track_trial(
                 trial,
                 output,
@@ -125,38 +130,53 @@ def _track(
                 pictures=pictures,
                 first_frame=first_frame,
                 take=take,
-                progress=report,
+                progress=partial(report, f"tracking {trial.name}"),
             )
     except KeyboardInterrupt:
-        if live and not output.exists():
-            stop("not every camera had delivered a frame yet, so nothing is written")
+        if not any((output / table).is_file() for table in _FIRST_WRITTEN):
+            stop("no frame was tracked yet, and nothing is written")
         stop(f"the frames found so far are in {output}{'' if live else '; --resume goes on'}")
 
 
-def _describe(summary: dict) -> str:
+def _overlays(output: Path) -> list[Path]:
+    """Return the overlays that a run left: its videos, or after --first-frame images."""
+    return sorted([*output.glob("videos/overlay_*"), *output.glob("figures/overlay_*")])
+
+
+def _describe_results(output: Path) -> str:
+    """Say where the results are, and what to open first."""
+    from airborne.motion.run_folder import REPORT
+
+    first = [output / REPORT] if (output / REPORT).is_file() else _overlays(output)
+    return f"{output}; open {', '.join(map(str, first))}" if first else str(output)
+
+
+def _describe(summary: dict, output: Path) -> str:
     from airborne.export.players_report import players_summary
 
     counts = ", ".join(f"{summary[f'n_{status}']} {status}" for status in ("tracked", "uncertain", "lost"))
     n, rate_hz = summary["n_frames"], summary["rate_hz"]
-    lines = [f"{n} frames at {rate_hz:.5g} Hz: {counts}" if n > 1 else f"{n} frame: {counts}"]
+    lines = [f"{count(n, 'frame')}{f' at {rate_hz:.5g} Hz' if n > 1 else ''}: {counts}"]
+    drawn = [path.relative_to(output).as_posix() for path in _overlays(output)]
+    look = f"look at the first frame in {', '.join(drawn)}, " if drawn else ""
     if "players" in summary:
         lines += players_summary(summary)
         if n == summary["n_lost"]:
-            lines.append("no player was found in any frame: look at the overlay videos, correct [[start.player]]")
+            lines.append(f"no player was found in any frame: {look}correct [[start.player]]")
     elif summary["n_frames"] == summary["n_lost"]:
-        lines.append("the body was found in no frame: look at the first frame of the overlay videos, correct [start]")
+        lines.append(f"the body was found in no frame: {look}correct [start]")
     else:
         position, rotation = summary["median_position_sd_mm"], summary["median_rotation_sd_deg"]
         lines.append(
             f"median sd: position {_describe_sd(position, 'mm')}, rotation {_describe_sd(rotation, 'degrees')}; "
-            "summary.json says which errors it holds"
+            "summary.json says which errors these include"
         )
     lines += [f"note: {text}" for text in [*summary["warnings"], *summary["events"]]]
     return "\n".join(lines)
 
 
 def _describe_sd(sd: float, unit: str) -> str:
-    return f"{sd:.2g} {unit}" if math.isfinite(sd) else "not seen in the pictures"
+    return f"{sd:.2g} {unit}" if math.isfinite(sd) else "not visible in the images"
 
 
 def fit_body_command(

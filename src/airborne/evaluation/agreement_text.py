@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from airborne.evaluation.agreement import Agreement
+from airborne.evaluation.columns import align_columns
 from airborne.evaluation.compare import or_dash
 from airborne.evaluation.repeatability import Repeatability
 from airborne.motion.jumps.jump import Measurement
@@ -23,30 +24,24 @@ _REFERENCES = (
 
 def agreement_table(rows: Sequence[Agreement]) -> str:
     """Return agreement as a short plain table."""
-    width = max(16, *(len(f"{row.name} [{row.unit}]") + 2 for row in rows))
-    lines = [f"{'agreement':<{width}}{'bias':>9}{'95 % limits':>19}{'RMSE':>9}{'nRMSE':>8}{'ICC(A,1)':>10}{'SEM':>9}"]
+    table = [("agreement", "bias", "95 % limits", "RMSE", "nRMSE", "ICC(A,1)", "SEM")]
     for row in rows:
         limits = f"{_number(row.lower_limit.value)} to {_number(row.upper_limit.value)}"
         share = or_dash(row.nrmse_percent.value / 100, ".2%")
         icc = or_dash(row.icc.agreement.value, ".4f")
-        lines.append(
-            f"{f'  {row.name} [{row.unit}]':<{width}}{_number(row.bias.value):>9}{limits:>19}"
-            f"{_number(row.rmse.value):>9}{share:>8}{icc:>10}{_number(row.sem.value):>9}"
-        )
-    return "\n".join(lines)
+        name, errors = f"  {row.name} [{row.unit}]", (_number(row.bias.value), limits, _number(row.rmse.value))
+        table.append((name, *errors, share, icc, _number(row.sem.value)))
+    return "\n".join(align_columns(table, (16, 9, 19, 9, 8, 10, 9)))
 
 
 def repeatability_table(rows: Sequence[Repeatability]) -> str:
     """Return repeatability as a short plain table."""
-    width = max(16, *(len(f"{row.name} [{row.unit}]") + 2 for row in rows))
-    lines = [f"{'repeatability':<{width}}{'within sd':>10}{'coefficient':>12}{'ICC(A,1)':>10}{'SEM':>9}{'MDC':>9}"]
+    table = [("repeatability", "within sd", "coefficient", "ICC(A,1)", "SEM", "MDC")]
     for row in rows:
         icc = or_dash(row.icc.agreement.value, ".4f")
-        numbers = f"{_number(row.within_sd.value):>10}{_number(row.coefficient.value):>12}{icc:>10}"
-        lines.append(
-            f"{f'  {row.name} [{row.unit}]':<{width}}{numbers}{_number(row.sem.value):>9}{_number(row.mdc.value):>9}"
-        )
-    return "\n".join(lines)
+        name, spread = f"  {row.name} [{row.unit}]", (_number(row.within_sd.value), _number(row.coefficient.value))
+        table.append((name, *spread, icc, _number(row.sem.value), _number(row.mdc.value)))
+    return "\n".join(align_columns(table, (16, 10, 12, 10, 9, 9)))
 
 
 def methods_text(
@@ -69,7 +64,7 @@ def methods_text(
     ]
     if agreements:
         text.append(
-            "Bias is the mean of measured minus reference. The 95 % limits of agreement are bias +- 1.96 standard "
+            "Bias is the mean of measured minus reference. The 95 % limits of agreement are bias ± 1.96 standard "
             "deviations of a single difference, the variance being the sum of that between and that within individuals "
             "for a true value that varies (Bland and Altman 2007), with intervals by variance estimates recovery (Zou "
             "2013). nRMSE is the root mean square error over the range of the reference. ICC(A,1) and ICC(C,1) are "

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from airborne.errors import ResultError
+from airborne.evaluation.columns import align_columns
 from airborne.evaluation.truth import Truth
 from airborne.geometry.rotations import angles_from_matrix, geodesic, is_near_singular, wrap
 from airborne.motion import Motion
@@ -20,6 +21,7 @@ from airborne.types import Array, Triple
 
 _SAME_TIME_S = 1e-6  # where neither table has two times, so that no period is known
 _HARDLY_ANY = 0.2  # share within two sds; 0.95 is expected
+_FAR_MM = 20_000.0  # beyond any error of a body in a hall
 _SAME_SHARE = 0.1  # of the shorter period: times further apart do not match
 
 
@@ -86,23 +88,21 @@ class MotionComparison:
             f"{self.n_matched} of {self.n_truth} reference times matched, at most "
             f"{1e3 * self.largest_time_offset_s:.1f} ms off: "
             f"{self.n_tracked} tracked, {self.n_uncertain} uncertain, {self.n_lost} lost",
-            f"{'position [mm]':<18}{'RMS':>9}{'max':>9}",
         ]
         position = self.position
         rms, largest = (*position.rms_mm, position.rms_3d_mm), (*position.largest_mm, position.largest_3d_mm)
-        for name, a, b in zip(("x", "y", "z", "in space"), rms, largest, strict=True):
-            lines.append(f"  {name:<16}{a:9.2f}{b:9.2f}")
+        rows = [("position [mm]", "RMS", "max"), *_rows(("x", "y", "z", "in space"), rms, largest)]
         kinds = {"": self.raw}
         if self.n_symmetries > 1:
             kinds |= {" modulo symmetry, whole run": self.modulo_run, " modulo symmetry, by frame": self.modulo_frame}
         if all(errors == self.raw for errors in kinds.values()):
             kinds = {", raw and modulo symmetry" if len(kinds) > 1 else "": self.raw}
         for title, errors in kinds.items():
-            lines.append(f"orientation [deg]{title}")
+            rows.append((f"orientation [deg]{title}",))
             rms = (*errors.rms_deg, errors.geodesic_rms_deg)
             largest = (*errors.largest_deg, errors.geodesic_largest_deg)
-            for name, a, b in zip(("somersault", "tilt", "twist", "whole"), rms, largest, strict=True):
-                lines.append(f"  {name:<16}{a:9.2f}{b:9.2f}")
+            rows += _rows(("somersault", "tilt", "twist", "whole"), rms, largest)
+        lines += align_columns(rows, (18, 9, 9))
         if self.n_singular:
             lines.append(f"{self.n_singular} frames near 90 degrees of tilt: their somersault and twist mean little")
         if self.n_flips:
@@ -115,7 +115,18 @@ class MotionComparison:
                 )
         if self.position_calibration.n and self.position_calibration.within_2sd < _HARDLY_ANY:
             lines.append("hardly any position lies within 2 sd: is this the reference of this recording, in its world?")
+        lines += question_units(position.rms_3d_mm)
         return "\n".join(lines)
+
+
+def question_units(rms_mm: float) -> list[str]:
+    """Ask in one line whether a reference so far away is in millimetres; nothing where it is near."""
+    far = f"the reference lies {rms_mm / 1e3:.0f} m from the run; is it in millimetres? Tables hold metres"
+    return [far] if rms_mm > _FAR_MM else []
+
+
+def _rows(names: Sequence[str], rms: Sequence[float], largest: Sequence[float]) -> list[tuple[str, str, str]]:
+    return [(f"  {name}", f"{a:.2f}", f"{b:.2f}") for name, a, b in zip(names, rms, largest, strict=True)]
 
 
 def compare_motion(motion: Motion, truth: Truth, symmetries: Sequence[Array]) -> MotionComparison:

@@ -9,7 +9,16 @@ import numpy as np
 
 from airborne.body import BodyModel
 from airborne.errors import ResultError
-from airborne.evaluation.compare import SdCalibration, match_times, nan_to_none, sd_calibration, span
+from airborne.evaluation.columns import align_columns
+from airborne.evaluation.compare import (
+    SdCalibration,
+    match_times,
+    nan_to_none,
+    or_dash,
+    question_units,
+    sd_calibration,
+    span,
+)
 from airborne.evaluation.joint_files import JointPaths, landmark_of
 from airborne.evaluation.reliability import Reliability, reliability
 from airborne.motion import JointStatus, Motion, joint_statuses, landmarks
@@ -68,18 +77,20 @@ class JointComparison:
             f"{self.n_matched} of {self.n_reference} reference times matched, at most "
             f"{1e3 * self.largest_time_offset_s:.1f} ms off: "
             f"{self.n_tracked} tracked, {self.n_uncertain} uncertain, {self.n_lost} lost",
-            f"{'joint [mm]':<18}{'mean':>9}{'RMS':>9}{'max':>9}{'no offset':>11}",
         ]
         rows = {**self.joints, "all": self.whole} | ({"all, tracked": self.tracked} if self.tracked else {})
+        table = [("joint [mm]", "mean", "RMS", "max", "no offset")]
         for name, e in rows.items():
-            cells = f"{e.mean_mm:9.1f}{e.rms_mm:9.1f}{e.largest_mm:9.1f}{e.mean_without_offset_mm:11.1f}"
-            lines.append(f"  {name:<16}{cells}")
+            numbers = (e.mean_mm, e.rms_mm, e.largest_mm, e.mean_without_offset_mm)
+            table.append((f"  {name}", *(or_dash(number, ".1f") for number in numbers)))
+        lines += align_columns(table, (18, 9, 9, 9, 11))
         lines.append("no offset: the mean without a constant offset in the segment, as between two definitions")
         if self.better_shift_s:
             lines.append(
                 f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, {'no offset'!r} would be "
                 f"{self.better_mean_without_offset_mm:.1f} mm: do both clocks start at the same frame?"
             )
+        lines += question_units(self.whole.rms_mm)
         share = self.calibration
         if share.n:
             lines.append(

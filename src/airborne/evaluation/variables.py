@@ -16,7 +16,14 @@ from airborne.evaluation.compare import match_times, span
 from airborne.evaluation.joint_files import JointPaths, landmark_of
 from airborne.evaluation.jump_errors import HEIGHTS
 from airborne.evaluation.table import read_table
-from airborne.geometry.rotations import angles_from_matrix, geodesic, is_near_singular, matrix_from_angles, wrap
+from airborne.geometry.rotations import (
+    angles_from_matrix,
+    geodesic,
+    is_near_singular,
+    matrix_from_angles,
+    unwrap,
+    wrap,
+)
 from airborne.motion import Motion, PlayersMotion, landmarks
 from airborne.motion.angles import ROOT_ANGLES
 from airborne.motion.jumps.jump import Jump
@@ -43,8 +50,11 @@ class Variables:
 
 
 def root_variables(time_s: Array, position: Array, R: Array) -> Variables:
-    """Return a root's position (n, 3) [m] and orientation (n, 3, 3) as variables; ambiguous angles are unknown."""
-    radians = angles_from_matrix(R)
+    """Return a root's position (n, 3) [m] and orientation (n, 3, 3) as variables, its angles unwrapped over time.
+
+    Ambiguous angles are unknown.
+    """
+    radians = unwrap(angles_from_matrix(R), time_s)
     singular = is_near_singular(radians)
     columns = {(axis, BODY): 1e3 * position[:, k] for k, axis in enumerate("xyz")}
     for k, name in enumerate(ROOT_ANGLES):
@@ -65,15 +75,16 @@ def point_variables(time_s: Array, points: Array, names: Sequence[str], individu
 def joint_angle_variables(time_s: Array, radians: Array, names: Sequence[str]) -> Variables:
     """Return joint angles (n, joints, 3) [rad] as variables, y within +-90 degrees; see `joint_angles`.
 
-    x and z are unknown where they are ambiguous.
+    x and z are unwrapped over time, and unknown where they are ambiguous.
     """
     principal = angles_from_matrix(matrix_from_angles(radians))
     singular = is_near_singular(principal)
     columns = {}
     for k, name in enumerate(names):
+        continuous = unwrap(principal[:, k], time_s)
         for i, axis in enumerate("xyz"):
             is_ambiguous = singular[:, k] & (axis != "y")
-            columns[f"{name} turn {axis}", BODY] = np.rad2deg(np.where(is_ambiguous, np.nan, principal[:, k, i]))
+            columns[f"{name} turn {axis}", BODY] = np.rad2deg(np.where(is_ambiguous, np.nan, continuous[:, i]))
     return Variables(time_s, columns, frozenset(name for name, _ in columns))
 
 
@@ -130,7 +141,8 @@ def align_symmetry(motion: Motion, R: Array, time_s: Array, symmetries: Sequence
 def common_series(sources: Sequence[Variables], names_text: str) -> list[Series]:
     """Return the variables that all sources share as series, at the times of the first that all share.
 
-    Angles are unwrapped to within 180 degrees of the last source's. A variable of several players becomes one series.
+    Angles of the others are brought by whole revolutions to within 180 degrees of the first's. A variable of several
+    players becomes one series.
     The coordinates of all joints, and their angles, are also pooled: three more series each, with joints as
     individuals. Raises ResultError without a common time or variable; `names_text` names the sources in it.
     """
@@ -147,8 +159,8 @@ def common_series(sources: Sequence[Variables], names_text: str) -> list[Series]
     for name, individual in keys:
         columns = [source.columns[name, individual][at] for source, at in zip(sources, rows, strict=True)]
         if name in first.angles:
-            last = columns[-1]
-            columns = [last + np.rad2deg(wrap(np.deg2rad(column - last))) for column in columns]
+            own, *others = columns
+            columns = [own, *(own + np.rad2deg(wrap(np.deg2rad(column - own))) for column in others)]
         unit = "deg" if name in first.angles else "mm"
         values = np.stack(columns, axis=1)
         series.setdefault(name, []).append(Series(name, unit, values, np.full(len(values), individual)))

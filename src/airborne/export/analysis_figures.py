@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
-from math import ceil
+from math import ceil, floor, isfinite, log10
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from airborne.evaluation import Agreement, Series
 from airborne.export import panels
@@ -32,7 +35,7 @@ def write_residuals(path: Path, analysis: ResidualAnalysis, used_hz: float | Non
     axes.plot(f, residual, color=panels.LINE, label="residual, all joints and axes")
     if np.isfinite(start):
         axes.plot(f, np.maximum(start + slope * f, 0), "--", color=_OTHER, linewidth=1, label="line of noise alone")
-        axes.axhline(start, color=_OTHER, linewidth=0.6)
+        axes.axhline(start, color=_OTHER, linewidth=0.6, label=f"RMS of the noise: {start:.2g} mm")
         axes.set_ylim(0, max(4 * start, 1.2 * float(np.interp(f[-1] / 6, f, residual))))
     for hz, colour, style, label in (
         (analysis.chosen_hz, _CHOSEN, "-", "Winter"),
@@ -54,6 +57,15 @@ def write_bland_altman(path: Path, variables: Sequence[tuple[Series, Agreement]]
     Individuals differ in colour. Source: Bland and Altman 1986, 1999.
     """
     figure, grid = _panels(variables)
+    figure.legend(
+        handles=[
+            Line2D([], [], color=_OTHER, linewidth=1.0, label="bias"),
+            Line2D([], [], color=_OTHER, linewidth=1.0, linestyle="--", label="95 % limits of agreement"),
+            Patch(facecolor=_OTHER, alpha=0.12, linewidth=0, label="95 % intervals of all three"),
+        ],
+        loc="outside upper center", ncols=min(3, len(variables)), fontsize=panels.FONT_PT - 1, frameon=False,
+        labelcolor=panels.TEXT,
+    )  # fmt: skip
     for axes, (series, row) in zip(grid, variables, strict=False):
         measured, reference = series.drop_missing().values.T
         _points(axes, series.drop_missing(), (measured + reference) / 2, measured - reference)
@@ -66,11 +78,20 @@ def write_bland_altman(path: Path, variables: Sequence[tuple[Series, Agreement]]
         span = np.nanmax([*reach, float(np.max(measured - reference))]) - np.nanmin(reach)
         middle = row.bias.value
         axes.set_ylim(middle - 0.75 * span, middle + 0.75 * span) if span > 0 else None
-        title = f"{row.bias.value:.3g} [{row.lower_limit.value:.3g}, {row.upper_limit.value:.3g}] {row.unit}"
+        title = format_limits(row)
         axes.set_title(f"{row.name}\n{title}", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
         axes.set_xlabel(f"mean [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
         axes.set_ylabel(f"difference [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
     figure.savefig(path)
+
+
+def format_limits(row: Agreement) -> str:
+    """Return bias and limits of agreement, all with as many decimals as show two digits of the limits' distance."""
+    bias, low, high = (each.value for each in (row.bias, row.lower_limit, row.upper_limit))
+    distance = high - low
+    decimals = max(0, 1 - floor(log10(distance))) if isfinite(distance) and distance > 0 else 2
+    text = f"{bias:.{decimals}f} [{low:.{decimals}f}, {high:.{decimals}f}] {row.unit}"
+    return re.sub(r"-(0\.?0*)(?![\d.])", r"\1", text).replace("-", "−")  # no minus before zero
 
 
 def write_identity(path: Path, variables: Sequence[tuple[Series, Agreement]]) -> None:

@@ -21,7 +21,7 @@ from airborne.cameras.formats.dltdv import (
 )
 from airborne.cameras.formats.options import FileOptions
 from airborne.cameras.units import check_baselines
-from airborne.errors import AirborneError, CalibrationError
+from airborne.errors import AirborneError, CalibrationError, count
 from airborne.evaluation import DigitisedPoints, read_clicked_frames, write_clicked_frames
 from airborne.io.text import read_toml
 
@@ -31,7 +31,7 @@ _LARGE_RESIDUAL = 0.01  # of an image's longer side: a larger median residual ha
 _MOST_NUMBERS = 20_000_000  # of a table of clicked points
 _PIXELS = frozenset({"--origin", "--pixel-base"})
 _NAMES = frozenset({"--cameras", "--calibration"})
-_EXPECTED_POINTS = "points in pictures: tables frame,<point>_<camera>_u,..., DLTdv's xypts, .npz, OpenPose's folders"
+_EXPECTED_POINTS = "points in images: tables frame,<point>_<camera>_u,..., DLTdv's xypts, .npz, OpenPose's folders"
 _EXPECTED = f"calibrations, or {_EXPECTED_POINTS}"
 _OTHERS = (
     ({"run.json"}, "a run's folder, which `airborne export` hands on"),
@@ -131,7 +131,7 @@ def _convert_rig(file: CalibrationFile, target: Path, options: ConversionOptions
     rig = build_rig(file, options.source)
     lost = write_rig(target, rig, format=to, unit=options.target.unit, pixels=options.target.pixels)
     return Conversion(
-        read=f"{file.where}, {file.format}, {len(rig)} cameras: {', '.join(rig.names)}",
+        read=f"{file.where}, {file.format}, {count(len(rig), 'camera')}: {', '.join(rig.names)}",
         written=f"{target}, {to}{_convention(to, options.target)}",
         lost=lost,
         notes=tuple(f"{finding.what}; is --unit {options.source.unit} right?" for finding in check_baselines(rig)),
@@ -141,7 +141,7 @@ def _convert_rig(file: CalibrationFile, target: Path, options: ConversionOptions
 def _convert_points(source: Path, kind: str, target: Path, options: ConversionOptions) -> Conversion:
     to = options.to or _points_format_of_name(target, source)
     if to not in _POINT_FORMATS:
-        raise AirborneError(f"{source} holds points in pictures, not cameras; write one of {', '.join(_POINT_FORMATS)}")
+        raise AirborneError(f"{source} holds points in images, not cameras; write one of {', '.join(_POINT_FORMATS)}")
     _check_options(options, kind, to)
     rig = read_rig(options.calibration) if options.calibration else None
     read = _read_points(source, kind, options, rig)
@@ -158,7 +158,8 @@ def _convert_points(source: Path, kind: str, target: Path, options: ConversionOp
     if to != "dltdv" and read.world is not None:
         lost = (*lost, "places in the world and their residuals")
     n_frames, n_points, n_cameras = read.points.visibility.shape
-    counts = f"{n_frames} frames, {n_points} points, {n_cameras} cameras: {', '.join(read.points.cameras)}"
+    sizes = ", ".join([count(n_frames, "frame"), count(n_points, "point"), count(n_cameras, "camera")])
+    counts = f"{sizes}: {', '.join(read.points.cameras)}"
     notes = "".join(f"; {note}" for note in read.points.notes)
     return Conversion(
         read=f"{source}, {kind}, {counts}{notes}",
@@ -207,7 +208,7 @@ def _points_format_of_name(target: Path, source: Path) -> str:
     if not target.suffix:
         return "openpose"
     raise AirborneError(
-        f"{source} holds points in pictures, not cameras; for {target} give a name ending in xypts.csv, .csv or .npz, "
+        f"{source} holds points in images, not cameras; for {target} give a name ending in xypts.csv, .csv or .npz, "
         "or a folder"
     )
 

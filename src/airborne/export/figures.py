@@ -25,6 +25,7 @@ _FLEXION = {  # of a person: the segment that a joint turns, the joint, and the 
     "thigh": ("hip", -1.0),
     "shank": ("knee", 1.0),
 }
+_TWO_SD = "± 2 standard deviations; unseen where thinner than the line"
 _MOST_JOINTS = 8  # of a body that is not a person
 
 
@@ -84,7 +85,7 @@ def pose_figure(motion: Motion) -> Figure:
         if angle != "tilt":
             panels.shade_spans(right, motion.time_s, singular, panels.SINGULAR_STYLE)
     handles = [*panels.unobservable_handles(unobservable[0] | unobservable[1]), *panels.singular_handles(singular)]
-    return panels.add_legend(figure, motion, [panels.band_handle("± 2 standard deviations"), *handles])
+    return panels.add_legend(figure, motion, [panels.band_handle(_TWO_SD), *handles])
 
 
 def write_score(path: Path, motion: Motion) -> None:
@@ -145,7 +146,7 @@ def joints_figure(motion: Motion, model: BodyModel) -> Figure:
         *panels.unobservable_handles(unobservable),
         *panels.singular_handles(singular, "y near ±90°: x and z mix"),
     ]
-    return panels.add_legend(figure, motion, [panels.band_handle("± 2 standard deviations"), *handles])
+    return panels.add_legend(figure, motion, [panels.band_handle(_TWO_SD), *handles])
 
 
 def _joint_panels(joints: Sequence[str]) -> list[tuple[str, str, float]]:
@@ -187,4 +188,4 @@ def flight_figure(motion: Motion, model: BodyModel) -> Figure:
     low, high = zip(*(axes.get_ylim() for axes in momenta), strict=True)
     for axes in momenta:  # one scale, so that the components can be compared
         axes.set_ylim(min(low), max(high))
-    return panels.add_legend(figure, motion, [panels.band_handle("± 2 standard deviations")])
+    return panels.add_legend(figure, motion, [panels.band_handle(_TWO_SD)])

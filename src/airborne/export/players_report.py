@@ -47,7 +47,7 @@ _DEFINITIONS = {
     "Score": "Mean log-likelihood of the estimate, in nats; larger is better; for frames of a run, not methods.",
     "Uncertainty": (
         "One standard deviation, the root mean square of the three axes', of each joint for itself; bands in figures "
-        "are two. An infinite one means that the pictures do not show that direction."
+        "are two. An infinite one means that the images do not show that direction."
     ),
 }
 

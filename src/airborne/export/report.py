@@ -25,7 +25,7 @@ class _Comparison(NamedTuple):
 _FIGURES = {  # titles and captions, in the order of the page
     "empty_scene.png": (
         "How the start was found",
-        "For each camera the empty scene, the median of pictures spread over the recording; what stands out from it at "
+        "For each camera the empty scene, the median of images spread over the recording; what stands out from it at "
         "the moment in which the body is seen well; and the outline of the body found there.",
     ),
     "pose.png": (
@@ -48,13 +48,13 @@ _FIGURES = {  # titles and captions, in the order of the page
         "body is cut off, the pose is off. Times in amber are uncertain.",
     ),
     "matching.png": (
-        "How picture and body are compared",
-        "The first tracked frame: what a camera saw, the body as drawn in flat colours, its mask, the picture through "
+        "How image and body are compared",
+        "The first tracked frame: what a camera saw, the body as drawn in flat colours, its mask, the image through "
         "the mask, and their agreement, the brighter the better.",
     ),
     "score.png": ("Score and spread", "Score, and standard deviations of position and rotation, over time."),
     "digitised.png": (
-        "Beside digitising by hand",
+        "Beside points digitised by hand",
         "Tracked poses and those from points clicked by hand, each with their difference below.",
     ),
     "errors.png": (
@@ -78,24 +78,24 @@ DEFINITIONS = {
         "of tilt they cannot be told apart, and small errors of the orientation make large ones in both."
     ),
     "Score": (
-        "Root mean square colour difference between the pictures and the drawn body inside its outline, in grey levels "
+        "Root mean square colour difference between the images and the drawn body inside its outline, in grey levels "
         "(0 to 255)."
     ),
     "Status": (
-        "Tracked: the pictures support the pose. Uncertain: the pose is a candidate that needs to be looked at. "
+        "Tracked: the images support the pose. Uncertain: the pose is a candidate that needs to be looked at. "
         "Lost: nothing is claimed, and the frame holds no numbers."
     ),
 }
 
 _JOINT_ANGLES = (
     "Successive turns about the moving x, y and z axes, parent from segment; a joint bears the name of the segment it "
-    "turns. All are zero in a person standing upright, arms hanging, feet forward. What no picture shows, such as a "
+    "turns. All are zero in a person standing upright, arms hanging, feet forward. What no image shows, such as a "
     "round limb's turn about its own axis, stays as it was and has an infinite standard deviation."
 )
 
 _UNCERTAINTY = (
     "Given as one standard deviation for each axis; bands in the figures are two. If errors are normal, 68% of them "
-    "lie within one and 95% within two. Infinite means that the pictures do not show that direction."
+    "lie within one and 95% within two. Infinite means that the images do not show that direction."
 )
 
 
@@ -170,11 +170,11 @@ def _with_unit(value: float | None, form: str) -> str:
 
 
 def _comparisons(summary: Mapping[str, Any]) -> Iterator[_Comparison]:
-    for key, title in (("truth", "Against the truth"), ("digitised", "Against digitising by hand")):
+    for key, title in (("truth", "Compared with the truth"), ("digitised", "Compared with points digitised by hand")):
         if summary.get(key):
             yield _pose_comparison(title, summary[key])
     if summary.get("joints"):
-        yield _joint_comparison("Against the paths of the joints", summary["joints"])
+        yield _joint_comparison("Compared with the paths of the joints", summary["joints"])
 
 
 def _pose_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:

@@ -10,6 +10,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Ellipsoid, Landmark, Part, Segment
 from airborne.body.legs import LEG_POINTS
+from airborne.body.limits import JointLimits
 from airborne.errors import ResultError
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.types import Array
@@ -126,7 +127,7 @@ def _segment(name: str, stick: _Stick, joint_m: Array, end_m: Array) -> Segment:
     """Return a stick's segment: an ellipsoid from joint to joint, its axial rotation locked."""
     radii = np.where(end_m != 0, np.abs(end_m) / 2 + stick.radius_m / 2, stick.radius_m)
     segment_from_part = RigidTransform.from_components(end_m / 2, Rotation.identity())
-    limits = np.tile([-np.pi, np.pi], (3, 1))
-    limits[1 if stick.rest == _AHEAD else 2] = 0
+    half_rad = np.full(3, np.pi)
+    half_rad[1 if stick.rest == _AHEAD else 2] = 0
     part = Part(name, Ellipsoid(radii), segment_from_part, np.array(stick.colour_srgb, float))
-    return Segment(name, stick.parent, joint_m, (part,), limits)
+    return Segment(name, stick.parent, joint_m, (part,), JointLimits(np.eye(3), half_rad, np.asarray(False)))

@@ -70,7 +70,7 @@ def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
         if head[f"n_{what}_unobservable"]:
             yield (
                 f"In {head[f'n_{what}_unobservable']} of {n_posed} frames with a pose, some direction of the {what} "
-                "cannot be seen in the pictures: its standard deviation is infinite, and its number is only a guess."
+                "cannot be seen in the images: its standard deviation is infinite, and its number is only a guess."
             )
         elif n_posed and head[f"median_{what}_sd_{'mm' if what == 'position' else 'deg'}"] is None:
             yield f"The uncertainty of the {what} is not known."

@@ -20,7 +20,7 @@ from airborne.calibration import (
     read_sources,
 )
 from airborne.calibration import calibrate as calibrate_points
-from airborne.errors import AirborneError
+from airborne.errors import AirborneError, require_choice
 from airborne.io.terminal import Stages
 from airborne.io.terminal import progress as progress_bar
 from airborne.motion.smoothing.smoother import Smoothing
@@ -38,6 +38,9 @@ from airborne.types import Progress, Size, StageProgress
 __all__ = ["calibrate", "evaluate", "export_run", "fit_body", "read_run", "read_trial", "smooth", "synthesise", "track"]
 
 FilePath = str | PathLike[str]
+
+_SCENES = ("cross", "somersault", "block")
+_SMOOTHINGS = ("butterworth", "spline", "kalman")
 
 
 def read_trial(path: FilePath, *, cameras: Sequence[str] | None = None, **track: Any) -> Trial:
@@ -67,7 +70,7 @@ def track(
 
     >>> run = track("trial.toml", "again", pictures=False, progress=True)
     >>> run
-    Run('again'): thrown cross, half-twisting somersault, 3 frames: 3 tracked, 0 uncertain, 0 lost
+    Run('again'): thrown cross, half-twisting somersault, 5 frames: 5 tracked, 0 uncertain, 0 lost
     """
     trial = trial if isinstance(trial, Trial) else read_trial(trial)
     with _reporting(progress, f"tracking {trial.name}") as report:
@@ -79,7 +82,7 @@ def read_run(folder: FilePath) -> Run:
     """Return the run in a folder, finished or not; raises ResultError where there is none.
 
     >>> read_run("results").summary["n_frames"]
-    3
+    5
     """
     return Run(Path(folder))
 
@@ -144,8 +147,10 @@ def evaluate(
     ResultError where a file cannot be read, or is of another recording.
 
     >>> evaluate("results", "truth.csv")["truth"].n_matched
-    3
+    5
     """
+    if truth is None and digitised is None and joints is None:
+        raise AirborneError("nothing to compare with; give truth, digitised or joints, the path of a table")
     paths = (None if path is None else Path(path) for path in (truth, digitised, joints))
     return assess(_folder(run), *paths)
 
@@ -170,6 +175,7 @@ def smooth(
     >>> smooth("results", cutoff_hz=10, events_s=[]).tables["joints"]["velocity"].attrs["units"]
     'm/s'
     """
+    require_choice(method, _SMOOTHINGS, "method")
     settings = Smoothing(method=method, cutoff_hz=cutoff_hz, resample_hz=resample_hz, fill_s=fill_s)
     out = None if output is None else Path(output)
     with _reporting(progress, "smoothing") as report:
@@ -204,11 +210,12 @@ def synthesise(
     """Write a synthetic trial with its truth into a new folder, and return the trial file; as `airborne synth` does.
 
     Options are those of `write_thrown_cross`, `write_somersault` and `block_scene` in `airborne.synthetic`. Raises
-    TrialError for a folder that holds anything.
+    an AirborneError for an unknown scene, and for a folder that holds anything.
 
     >>> read_trial(synthesise("somersault", "practice", preset="paper")).has_players
     False
     """
+    require_choice(scene, _SCENES, "scene")
     folder = Path(folder)
     with _reporting(progress, "rendering") as report:
         if scene == "block":

@@ -1,4 +1,4 @@
-"""Tables as Parquet files; *pyarrow*, which writes them, is large and optional (`pip install 'airborne[parquet]'`)."""
+"""Tables as Parquet files; *pyarrow*, which writes them, is large and optional (`pip install pyarrow`)."""
 
 from __future__ import annotations
 

@@ -47,6 +47,13 @@ def holds_players(folder: Path) -> bool:
     return (folder / JOINTS).is_file() and not (folder / MOTION).is_file()
 
 
+def unfinished_note(folder: Path) -> str | None:
+    """Say that the run in a folder is not finished; None where it is."""
+    if (folder / SUMMARY).is_file():
+        return None
+    return "the run is not finished: these are the frames so far; `airborne track --resume` goes on"
+
+
 def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:
     """Return the motion and the body of the run in a folder, finished or not.
 

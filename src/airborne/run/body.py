@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
 from airborne.body.files import body_toml, mesh_files
 from airborne.calibration.from_points import Calibration
+from airborne.cameras import Camera
 from airborne.export import ContactSheet, MatchingPicture, OverlayVideos, headline, write_figures, write_report
 from airborne.export.overlays import OverlaysAs
 from airborne.motion import (
@@ -39,13 +38,14 @@ from airborne.tracking.estimate import unknown_segments
 from airborne.tracking.methods import sample_body_colours, tracker_of
 from airborne.tracking.tracker import Tracker
 from airborne.trial.file import Trial
-from airborne.video import Frames, Recording, View
+from airborne.video import Frames, Recording
 
 _UNCERTAINTY = (
-    "Standard deviations hold what the pictures leave open: noise, light, and edges that are not where the drawn body "
-    "has them. They do not hold a body measured wrongly all over, or wrong times of the cameras."
+    "Standard deviations include image noise, light, and edges that are not where the drawn body has them. They do not "
+    "include wrong dimensions of the whole body, or wrong times of the cameras."
 )
-_CALIBRATION_UNCERTAINTY = " They hold how far the control points leave each camera's picture open."
+_CALIBRATION_UNCERTAINTY = " They include a shift of each camera's whole image due to calibration."
+OUT_OF_SIGHT = "the start pose lies in no camera's image; check start.position_m, in metres"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,10 +89,8 @@ class BodyRun:
     def see(self, first: Frames) -> BodyRun:
         """Return the body with the colours that the first frames show; an event says where they do not show it."""
         model = sample_body_colours(self.model, self.start, first)
-        if not np.any([_is_visible(view, model.with_pose(self.start)) for view in first.views]):
-            self.recording.events.append(
-                "the start pose lies in no camera's picture; check start.position_m, in metres"
-            )
+        if not is_seen(model.with_pose(self.start), [view.camera for view in first.views if view is not None]):
+            self.recording.events.append(OUT_OF_SIGHT)
         return replace(self, model=model)
 
     def tracker(self) -> Tracker[Any, Estimate]:
@@ -166,6 +164,7 @@ def _has_flight(motion: Motion, model: BodyModel) -> bool:
     return bool(motion.joints) and has_inertias(model)
 
 
-def _is_visible(view: View | None, posed: PosedBody) -> bool:
-    """Say whether a view shows any part of the body."""
-    return view is not None and bool(render(surface_arrays(posed.model), posed, view.camera, FLAT).mask.any())
+def is_seen(posed: PosedBody, cameras: Iterable[Camera]) -> bool:
+    """Say whether any part of a body lies in a camera's image; lens distortion is left out."""
+    surface = surface_arrays(posed.model)
+    return any(render(surface, posed, camera.without_distortion(), FLAT).mask.any() for camera in cameras)

@@ -7,13 +7,15 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from airborne.errors import AirborneError, MistakesError
+from airborne.errors import AirborneError, MistakesError, TrialError, count
+from airborne.run.body import OUT_OF_SIGHT, is_seen
 from airborne.run.detections import read_trial_detections
 from airborne.run.first_pose import find_first_pose
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files
 from airborne.run.opening import Opened, calibrated_cameras, open_trial, past_the_end_error, video_source
 from airborne.run.players_tracker import players_tracker_of
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
+from airborne.trial.remainder import parse_remainder
 from airborne.video import Recording, VideoFacts, inspect
 
 _T = TypeVar("_T")
@@ -22,10 +24,16 @@ _T = TypeVar("_T")
 class Checks:
     """What was found: a line for each thing that is well, and a line for each mistake."""
 
-    def __init__(self) -> None:
-        """Start with nothing found."""
+    def __init__(self, report: Callable[[str], None]) -> None:
+        """Start with nothing found; `report` is called with each line for what is well."""
         self.well: list[str] = []
         self.mistakes: list[str] = []
+        self._report = report
+
+    def add(self, line: str) -> None:
+        """Note something that is well."""
+        self.well.append(line)
+        self._report(line)
 
     def attempt(self, read: Callable[[], _T], describe: Callable[[_T], str]) -> _T | None:
         """Read something and describe it; None where it has a mistake."""
@@ -36,15 +44,19 @@ class Checks:
         except AirborneError as error:
             self.mistakes.append(str(error))
         else:
-            self.well.append(describe(value))
+            self.add(describe(value))
             return value
         return None
 
 
-def check_trial(path: Path) -> Checks:
-    """Read everything that a trial names, and track nothing."""
-    checks = Checks()
+def check_trial(path: Path, report: Callable[[str], None] = lambda line: None) -> Checks:
+    """Read everything that a trial names, and track nothing; `report` is called with each line for what is well.
+
+    Of tables with mistakes, what is left without them is read.
+    """
+    checks = Checks(report)
     trial = checks.attempt(lambda: parse_trial(path), lambda trial: f"{path.name}: {_describe(trial)}")
+    trial = trial or _read_remainder(path)
     if trial is None:
         return checks
     checks.mistakes += [f"{path.name}: {mistake}" for mistake in list_wrong_names(trial)]
@@ -54,6 +66,13 @@ def check_trial(path: Path) -> Checks:
     if not checks.mistakes:
         _check_start(checks, trial, tuple(facts.values()))
     return checks
+
+
+def _read_remainder(path: Path) -> Trial | None:
+    try:
+        return parse_remainder(path)
+    except TrialError:
+        return None
 
 
 def _check_videos(checks: Checks, trial: Trial) -> dict[str, VideoFacts]:
@@ -80,14 +99,15 @@ def _check_files(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> 
         )
     if not trial.has_players and _exists(trial, body.source_file):
         checks.attempt(
-            trial.model, lambda model: "; ".join([f"body: {model.name}, {len(model.segments)} segments", *model.notes])
+            trial.model,
+            lambda model: "; ".join([f"body: {model.name}, {count(len(model.segments), 'segment')}", *model.notes]),
         )
     if detections is not None and facts and _exists(trial, detections):
         checks.attempt(
             lambda: read_trial_detections(shown, tuple(facts.values())), lambda _: f"detections: {detections}"
         )
     if trial.lights is not None:
-        checks.well.append(f"lights: {len(trial.lights.lamp)} lamps, ambient {trial.lights.ambient:g}")
+        checks.add(f"lights: {count(len(trial.lights.lamp), 'lamp')}, ambient {trial.lights.ambient:g}")
 
 
 def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> None:
@@ -97,26 +117,29 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
         return
     recording = opened.recording
     if recording.n_frames == 0:
-        checks.mistakes.append(str(past_the_end_error(trial)))
+        checks.mistakes.append(str(past_the_end_error(trial, recording)))
     elif trial.has_players:
         checks.attempt(
             lambda: players_tracker_of(trial, recording.rig),
             lambda _: f"start: frame {trial.start.frame}, {', '.join(player.name for player in trial.players)}",
         )
     elif trial.start.find:
-        checks.well.append("start: not given; the body is looked for when the trial is tracked")
+        checks.add("start: not given; the body is looked for when the trial is tracked")
     else:
         model = trial.model()
         first = checks.attempt(
             lambda: find_first_pose(trial, model, recording.rig, opened.detections),
             lambda first: "; ".join([f"start: frame {trial.start.frame}", *first.notes]),
         )
-        if first is not None:
+        if first is not None and not is_seen(model.with_pose(first.pose), recording.rig):
+            checks.mistakes.append(f"{trial.name}: {OUT_OF_SIGHT}")
+        elif first is not None:
             checks.attempt(
                 lambda: refuse_mix_ups(recording, model, first.pose),
                 lambda _: "videos: none fits another camera better",
             )
-    checks.well += [f"note: {event}" for event in recording.events]
+    for event in recording.events:
+        checks.add(f"note: {event}")
 
 
 def _exists(trial: Trial, name: str | None) -> bool:
@@ -129,9 +152,9 @@ def _describe_frames(opened: Opened[Recording]) -> str:
 
 
 def _describe(trial: Trial) -> str:
-    return f"{trial.name}, {len(trial.camera)} cameras, method {trial.track.method}"
+    return f"{trial.name}, {count(len(trial.camera), 'camera')}, method {trial.track.method}"
 
 
 def _describe_video(facts: VideoFacts) -> str:
     width, height = facts.size
-    return f"{width}×{height} px, {float(facts.image_rate):.5g} pictures a second, {facts.fields}"
+    return f"{width}×{height} px, {float(facts.image_rate):.5g} images/s, {facts.fields}"

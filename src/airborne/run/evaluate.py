@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -99,7 +100,7 @@ def _assess_players(folder: Path, truth: Path | None, *, is_alone: bool) -> Comp
     if truth is None or not is_alone:
         raise ResultError(
             f"{folder} holds a run of players, which is compared with a truth of players only; "
-            "leave --digitised and --joints out and give a truth.csv"
+            "leave clicked points and joints out and give a truth.csv"
         )
     check_record(folder)
     comparisons = {"truth": assess_players(folder, truth)}
@@ -108,9 +109,9 @@ def _assess_players(folder: Path, truth: Path | None, *, is_alone: bool) -> Comp
 
 
 def _add_to_summary(folder: Path, comparisons: Comparisons) -> dict:
-    """Put comparisons into the run's summary and return it; {} where the run has none."""
+    """Put comparisons into the run's summary and return it; {} where the run has none, or is not ours to write."""
     path = folder / run_folder.SUMMARY
-    if not path.is_file():
+    if not path.is_file() or not os.access(folder, os.W_OK):
         return {}
     try:
         summary = read_json(path)
@@ -130,7 +131,8 @@ class AgreementReport:
     agreements: dict[str, list[Agreement]]
     repeats: dict[str, list[Repeatability]]
     headlines: frozenset[str]  # names of the headline variables
-    files: tuple[str, ...]
+    folder: Path
+    files: tuple[str, ...]  # in it
 
     def to_dict(self) -> dict[str, Any]:
         """Return the numbers for a JSON file."""
@@ -146,7 +148,7 @@ class AgreementReport:
             lines += [f"agreement with {name}", agreement_table([row for row in rows if row.name in self.headlines])]
         for name, rows in self.repeats.items():
             lines += [f"between {name}", repeatability_table([row for row in rows if row.name in self.headlines])]
-        return "\n".join([*lines, f"wrote {', '.join(self.files)}"])
+        return "\n".join([*lines, f"wrote into {self.folder}: {', '.join(self.files)}"])
 
 
 def evaluate_agreement(
@@ -213,7 +215,7 @@ def evaluate_agreement(
         versions(),
     )
     (out / "agreement_methods.txt").write_text(text, encoding="utf-8", newline="\n")
-    return AgreementReport(agreements, repeatable, first, (*files, "agreement_methods.txt"))
+    return AgreementReport(agreements, repeatable, first, out, (*files, "agreement_methods.txt"))
 
 
 def _check_different(option: str, paths: Sequence[Path], wanted: str) -> None:

@@ -20,7 +20,7 @@ from airborne.export.takes import Take, body_take, player_takes, portable_names,
 from airborne.export.trc import write_trc
 from airborne.io.parquet import CAN_WRITE_PARQUET
 from airborne.motion import Motion, has_inertias, landmarks, measure_flight
-from airborne.motion.run_folder import holds_players, read_body_run, read_players_run
+from airborne.motion.run_folder import holds_players, read_body_run, read_players_run, unfinished_note
 from airborne.types import Array, Progress
 
 EXPORT_FORMATS = ("c3d", "trc", "mot", "osim", "gltf", "bvh", "csv", "parquet")
@@ -28,7 +28,7 @@ _TABLE_FORMATS = ("csv", "parquet")
 _UNIFORM_FORMATS = ("c3d", "bvh")  # uniform sampling: hold a rate and no times
 _LARGEST_JITTER = 0.05  # of a frame: how far such a file may shift one in time
 _ROWS_AT_A_TIME = 10  # poses in memory at once
-_NO_PARQUET = "Parquet needs pyarrow, which is not installed: pip install 'airborne[parquet]'"
+_NO_PARQUET = "Parquet needs pyarrow, which is not installed: pip install pyarrow"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +58,7 @@ def export_run(
     format cannot hold it.
     """
     if "parquet" in formats and not CAN_WRITE_PARQUET:
-        raise ResultError(f"{_NO_PARQUET}, or give --csv")
+        raise ResultError(f"{_NO_PARQUET}, or write csv")
     wanted = [format for format in EXPORT_FORMATS if format in formats] or list(EXPORT_FORMATS)
     read = _read(folder, any(format in _TABLE_FORMATS for format in wanted), progress or (lambda done, total: None))
     jitter, notes = max(take.jitter_s * float(take.rate) for take in read.takes), list(read.notes)
@@ -67,16 +67,18 @@ def export_run(
         notes.append(f"left out parquet. {_NO_PARQUET}")
     if jitter > _LARGEST_JITTER:
         unfit = [format for format in wanted if format in _UNIFORM_FORMATS]
-        reason = f"frames stray from an even beat by up to {jitter:.2f} frames"
+        reason = f"frames are off an even rate by up to {jitter:.2f} frames"
         if formats and unfit:
-            raise ResultError(f"{reason}, and {' and '.join(unfit)} hold no times; give --trc, --mot, --gltf or --csv")
+            raise ResultError(f"{reason}, and {' and '.join(unfit)} hold no times; write trc, mot, gltf or csv")
         notes += [f"{reason}: left out {', '.join(unfit)}, which hold no times"] if unfit else []
         wanted = [format for format in wanted if format not in unfit]
     target = folder / "export" if output is None else output
     target.mkdir(parents=True, exist_ok=True)
     stem = portable_names([folder.resolve().name])[0]
     files = [path for format in wanted for path in _write(format, target, stem, read)]
-    return ExportResult(tuple(files), (*notes, *_gap_notes(read.takes, bool({"mot", "bvh"} & set(wanted)))))
+    unfinished = [note for note in [unfinished_note(folder)] if note is not None]
+    gaps = _gap_notes(read.takes, bool({"mot", "bvh"} & set(wanted)))
+    return ExportResult(tuple(files), (*notes, *gaps, *unfinished))
 
 
 def _gap_notes(takes: Sequence[Take], has_parts: bool) -> Iterator[str]:

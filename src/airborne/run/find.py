@@ -67,7 +67,7 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     recording, facts = _open(trial)
     sample = spread_sample(_counted(recording, progress), recording.n_frames)
     if not sample:
-        raise past_the_end_error(trial)
+        raise past_the_end_error(trial, recording)
     scenes = empty_scenes(sample)
     if not scenes:
         raise TrialError(

@@ -36,7 +36,7 @@ def write_frame(trial: Trial, camera: str, frame: int, path: Path) -> Size:
     frames = next(iter(recording), None)
     view = None if frames is None else frames.views[names.index(camera)]
     if view is None:
-        raise TrialError(f"{trial.name}: {camera} has no picture at frame {frame}; give an earlier frame")
+        raise TrialError(f"{trial.name}: {camera} has no image at frame {frame}; give an earlier frame")
     try:
         is_written = cv2.imwrite(str(path), np.ascontiguousarray(view.rgb[..., ::-1]))
     except cv2.error:

@@ -10,6 +10,7 @@ from itertools import combinations
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
 from airborne.body.surface import surface_arrays
@@ -19,9 +20,10 @@ from airborne.errors import MistakesError
 from airborne.rendering import FLAT, render
 from airborne.run.folder import file_digest
 from airborne.trial.file import Trial
-from airborne.types import Array
 from airborne.video import Recording, VideoFacts, VideoSource
 from airborne.video.decoding import decode, rgb_from_decoded
+
+Mask = NDArray[np.bool_]
 
 _SHORT_SIDE_PX = 180  # of the images compared
 _N_IMAGES, _N_BACKGROUND = 90, 24  # images on each side of the start that are read, and of which the median is made
@@ -61,7 +63,7 @@ def refuse_mix_ups(recording: Recording, model: BodyModel, start: Pose) -> None:
         raise MistakesError("the videos", [finding.sentence for finding in findings])
 
 
-def mix_ups_in(names: tuple[str, ...], images: list[Array | None], silhouettes: list[Array]) -> list[Finding]:
+def mix_ups_in(names: tuple[str, ...], images: list[Mask | None], silhouettes: list[Mask]) -> list[Finding]:
     """Return the mix-ups that foregrounds (h, w), None where there is none, and silhouettes (h, w) by camera show."""
     own = [_agreement(image, silhouette) for image, silhouette in zip(images, silhouettes, strict=True)]
     clear = [max(_LEAST_AGREEMENT, each / _MOST_OF_IT) for each in own]
@@ -85,7 +87,7 @@ def mix_ups_in(names: tuple[str, ...], images: list[Array | None], silhouettes: 
                 Finding(
                     kind="mirrored",
                     what=_compare(name, own[i], mirrored, "once it is mirrored"),
-                    advice="its pictures are mirrored; switch that off in the camera, and record or convert anew",
+                    advice="its images are mirrored; switch that off in the camera, and record or convert anew",
                     cameras=(name,),
                 )
             )
@@ -96,7 +98,7 @@ def _compare(name: str, own: float, other: float, how: str) -> str:
     return f"the body at the start agrees with what moves in {name} to {max(own, 0):.0%}, to {other:.0%} {how}"
 
 
-def _agreement(image: Array | None, silhouette: Array) -> float:
+def _agreement(image: Mask | None, silhouette: Mask) -> float:
     """Return the share of foreground in a silhouette minus that in the ring around it; 0 where there is nothing."""
     if image is None or image.shape != silhouette.shape or not silhouette.any():
         return 0.0
@@ -106,7 +108,7 @@ def _agreement(image: Array | None, silhouette: Array) -> float:
     return float(image[silhouette].mean() - image[ring].mean()) if ring.any() else 0.0
 
 
-def _silhouette(model: BodyModel, start: Pose, camera: Camera) -> Array:
+def _silhouette(model: BodyModel, start: Pose, camera: Camera) -> Mask:
     small = _small(camera)
     return np.asarray(render(surface_arrays(model), model.with_pose(start), small.without_distortion(), FLAT).mask > 0)
 
@@ -118,7 +120,7 @@ def _small(camera: Camera) -> Camera:
     return camera.resample(scale=(scale, scale), offset=offset, size=size)
 
 
-def _foreground(recording: Recording, source: VideoSource, facts: VideoFacts, camera: Camera) -> Array | None:
+def _foreground(recording: Recording, source: VideoSource, facts: VideoFacts, camera: Camera) -> Mask | None:
     """Return what differs from the median image at the start, without distortion: (h, w); None past the video's end."""
     small = _small(camera)
     clock, rate = recording.sources[0], recording.facts[0].image_rate

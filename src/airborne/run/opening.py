@@ -131,6 +131,8 @@ def video_source(trial: Trial, camera: CameraTable) -> VideoSource:
     return VideoSource(camera.name, trial.path(camera.video), camera.fields, camera.offset_s, camera.drift_ppm)
 
 
-def past_the_end_error(trial: Trial) -> TrialError:
+def past_the_end_error(trial: Trial, recording: Recording | LiveRecording) -> TrialError:
     """Return the error of a recording that ends before its first frame to track."""
-    return TrialError(f"{trial.name}: there is no frame {trial.start.frame}; start.frame lies past the end")
+    n = recording.n_images if isinstance(recording, Recording) else None
+    last = f", the last is {n - 1}" if n else ""
+    return TrialError(f"{trial.name}: there is no frame {trial.start.frame}{last}; start.frame lies past the end")

@@ -27,8 +27,8 @@ from airborne.trial.settings import BodySettings
 from airborne.video import Frames, LiveRecording, Recording
 
 _UNCERTAINTY = (
-    "Standard deviations hold what the method itself leaves open, joint by joint. They do not hold joints that were "
-    "set wrongly at the start, nor errors of the cameras' calibration or times."
+    "Standard deviations include what the method itself leaves uncertain, joint by joint. They do not include joints "
+    "that were set wrongly at the start, or errors of the cameras' calibration or times."
 )
 _OVERCONFIDENT = (
     "the standard deviations are only the spread of the particles of {method} and far too small: in trials with a "

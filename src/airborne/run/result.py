@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from airborne.body import BodyModel
 from airborne.cameras import Rig, read_rig
-from airborne.errors import AirborneError, ResultError
+from airborne.errors import AirborneError, ResultError, require_choice
 from airborne.export.figures import flight_figure, joints_figure, pose_figure
 from airborne.export.players_report import heights_figure
 from airborne.io.text import read_json
@@ -129,6 +129,7 @@ class Run:
         Of a body its pose, or the angles of its joints, or its flight; of players the heights of hips, knees and
         ankles.
         """
+        require_choice(what, ("pose", *_FIGURES), "figure")
         if self.has_players:
             return heights_figure(self.players)
         return pose_figure(self.motion) if what == "pose" else _FIGURES[what](self.motion, self.body)

@@ -25,6 +25,7 @@ from airborne.motion.run_folder import (
     tables_of,
 )
 from airborne.motion.smoothing import ResidualAnalysis, is_evenly_sampled, residual_analysis
+from airborne.motion.smoothing.segments import MIN_FRAMES, finite_rows, segment_numbers, stretches
 from airborne.motion.smoothing.smoother import (
     Smoothing,
     smooth_joint_angles,
@@ -55,7 +56,8 @@ class SmoothRun:
     events: Events
     analysis: ResidualAnalysis | None  # None where times are not even, or no stretch is long enough
     tables: dict[str, xr.Dataset]  # "joints"; of a body also "root" and, if it has joints, "angles"
-    files: tuple[str, ...]
+    folder: Path
+    files: tuple[str, ...]  # in it
 
     @property
     def history(self) -> list[str]:
@@ -94,7 +96,7 @@ class SmoothRun:
                 f"residual analysis: cut-off {a.chosen_hz:.1f} Hz (Winter), {a.whitest_hz:.1f} Hz (whitest residuals, "
                 f"Challis); white noise {1e3 * a.noise:.1f} mm an axis"
             )
-        return "\n".join([*lines, f"wrote {', '.join(self.files)}"])
+        return "\n".join([*lines, f"wrote into {self.folder}: {', '.join(self.files)}"])
 
 
 def smooth_run(
@@ -121,6 +123,11 @@ def smooth_run(
         analysis = analysis if analysis.n_values else None
     if smoothing.method == "butterworth" and smoothing.cutoff_hz is None:
         smoothing = replace(smoothing, cutoff_hz=_choose_cutoff(analysis))
+    if not _has_stretch(run, boundaries, smoothing.fill_s):
+        raise ResultError(
+            f"{folder}: nothing can be smoothed, as no stretch has {MIN_FRAMES} frames with a pose (the run has "
+            f"{len(run.time_s)} frames); track more, fill gaps, or set fewer events"
+        )
     out = folder if out is None else out
     out.mkdir(parents=True, exist_ok=True)
     tables_of(out)
@@ -129,7 +136,7 @@ def smooth_run(
         figures_of(out)
         write_residuals(out / RESIDUALS_FIGURE, analysis, smoothing.cutoff_hz)
         files = (*files, RESIDUALS_FIGURE)
-    result = SmoothRun(smoothing, events, analysis, tables, (*files, SMOOTH_RECORD))
+    result = SmoothRun(smoothing, events, analysis, tables, out, (*files, SMOOTH_RECORD))
     write_json(out / SMOOTH_RECORD, result.to_dict())
     return result
 
@@ -182,6 +189,14 @@ def _body_run(folder: Path) -> _Run:
 
     points, _ = landmarks(motion, model)
     return _Run(motion.time_s, points, ("",) * points.shape[1], lambda: {"": body_events(motion, model)}, write)
+
+
+def _has_stretch(run: _Run, boundaries_s: dict[str, list[float]], fill_s: float) -> bool:
+    """Say whether any path has a stretch that is long enough to be smoothed."""
+    return any(
+        any(stretches(run.time_s, finite_rows(path), segment_numbers(run.time_s, boundaries_s[owner]), fill_s))
+        for owner, path in zip(run.owners, run.paths.transpose(1, 0, 2), strict=True)
+    )
 
 
 def _events(run: _Run, times_s: Sequence[float] | None) -> Events:

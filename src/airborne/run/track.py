@@ -154,7 +154,7 @@ def _track(
         frames = stack.enter_context(closing(iter(recording)))
         first = next(frames, None)
         if first is None:
-            raise past_the_end_error(subject.trial)
+            raise past_the_end_error(subject.trial, recording)
         subject = subject.see(first)
         done = subject.read_done(folder) if resume else ()
         writer = stack.enter_context(subject.writer(folder, resume=resume))

@@ -44,7 +44,7 @@ def offsets_by_flash(
     missing = [source.name for source, (times, _) in zip(sources, flashes, strict=True) if not len(times)]
     if missing:
         raise VideoError(
-            f"no flash seen by {', '.join(missing)}: the whole picture never brightens at once; "
+            f"no flash seen by {', '.join(missing)}: the whole image never brightens at once; "
             "synchronise by sound, motion or tracking instead"
         )
     (reference, reference_sd), rows = flashes[0], [(0.0, 0.0, 0.0, 0.0)]

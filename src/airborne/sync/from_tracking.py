@@ -49,14 +49,14 @@ def offsets_by_tracking(
     if mixed := [i for i, blend in enumerate(measure.blends(about, range(len(names)))) if blend.is_mixed]:
         listed = ", ".join(names[i] for i in mixed)
         if len(mixed) == len(names):
-            notes = [f"{listed}: the pictures are mixed from two moments, so the offsets may be off by half a picture"]
+            notes = [f"{listed}: the images are mixed from two moments, so the offsets may be off by half an image"]
         else:
             lags = _lags_beside_mixed(measure, lags, mixed, start=start, with_drift=with_drift)
-            notes = [f"{listed}: the pictures are mixed from two moments; the offset is that of their mean"]
+            notes = [f"{listed}: the images are mixed from two moments; the offset is that of their mean"]
     unknown = [name for name, lag_s in zip(names, lags.lag_s, strict=True) if not np.isfinite(lag_s)]
     if unknown:
         raise TrialError(f"{', '.join(unknown)}: never sees the tracked body move; synchronise by flash or sound")
-    how = "by tracking: every camera's pictures against the body as all of them see it"
+    how = "by tracking: every camera's images against the body as all of them see it"
     return Offsets(names, start_s[0] + lags.lag_s, lags.sd_s, lags.drift, lags.drift_sd, how=how, notes=tuple(notes))
 
 
@@ -166,7 +166,7 @@ class _Measure:
                 tracked.equations.append(root_equations(refined, state.inner, compensated, estimate.pose))
             self._on_image()
         if tracked is None:
-            raise past_the_end_error(trial)
+            raise past_the_end_error(trial, self._recording)
         if len(tracked.poses) < _LEAST_FRAMES:
             raise TrialError(
                 f"{trial.name}: the body was tracked at {len(tracked.poses)} moments; the lags need at least "

@@ -66,7 +66,7 @@ def round_to_images(offsets: Offsets, sources: Sequence[VideoSource]) -> Offsets
     rounded = np.round((offsets.offset_s - offsets.offset_s[0]) / period_s) * period_s + offsets.offset_s[0]
     apart_s = np.abs(offsets.offset_s - rounded)
     doubts = [
-        f"{name} lies {1000 * apart:.1f} ms beside a whole picture: is it genlocked?"
+        f"{name} lies {1000 * apart:.1f} ms beside a whole image: is it genlocked?"
         for name, apart, sd, period in zip(offsets.names, apart_s, offsets.offset_sd_s, period_s, strict=True)
         if apart > max(period / 4, 3 * sd)
     ]
@@ -75,7 +75,7 @@ def round_to_images(offsets: Offsets, sources: Sequence[VideoSource]) -> Offsets
         offset_s=rounded,
         offset_sd_s=np.zeros_like(rounded),
         notes=(*offsets.notes, *doubts),
-        how=offsets.how + ", in whole pictures",
+        how=offsets.how + ", in whole images",
     )
 
 

@@ -91,6 +91,14 @@ class Trial(SettingsTable):
             raise ValueError("calibration.mend needs [start] with detections: they say where the points are")
         return self
 
+    def __init__(self, /, **tables: Any) -> None:
+        """Make a trial of tables as a trial file has them; raises MistakesError for what is wrong in them."""
+        try:
+            super().__init__(**tables)
+        except ValidationError as error:
+            places = [one["loc"] for one in error.errors(include_url=False)]
+            raise MistakesError("Trial", list_mistakes(error, METHODS, tables, Trial), places) from None
+
     _folder: Path = PrivateAttr(default=Path())
 
     @property
@@ -142,32 +150,42 @@ class Trial(SettingsTable):
         return self._folder / name
 
 
-def parse_trial(path: Path, track: dict[str, Any] | None = None) -> Trial:
+def parse_trial(path: Path, track: dict[str, Any] | None = None, given_as: str = "{} = {!r}") -> Trial:
     """Read a trial's tables, but look for none of the files that they name; raises TrialError."""
-    try:
-        trial = _validate(read_toml(path), track or {}, path.name)
-    except OSError as error:
-        raise TrialError(f"{path}: cannot be read ({error.strerror}); give the path of a trial's TOML file") from error
-    except tomllib.TOMLDecodeError as error:
-        raise TrialError(f"{path.name}: not a TOML file: {error}; expected a trial's TOML") from error
+    trial = _validate(read_tables(path), track or {}, path.name, given_as)
     trial._folder = path.parent
     return trial
 
 
-def read_trial(path: Path, track: dict[str, Any] | None = None, cameras: Sequence[str] | None = None) -> Trial:
+def read_tables(path: Path) -> dict[str, Any]:
+    """Read a trial's TOML as it stands there; raises TrialError."""
+    try:
+        return read_toml(path)
+    except OSError as error:
+        raise TrialError(f"{path}: cannot be read ({error.strerror}); give the path of a trial's TOML file") from error
+    except tomllib.TOMLDecodeError as error:
+        raise TrialError(f"{path.name}: not a TOML file: {error}; expected a trial's TOML") from error
+
+
+def read_trial(
+    path: Path,
+    track: dict[str, Any] | None = None,
+    cameras: Sequence[str] | None = None,
+    given_as: str = "{} = {!r}",
+) -> Trial:
     """Read a trial file; raises TrialError, naming the file and what is wrong, for anything unusable.
 
     `track` replaces entries of its [track] table, as options of `airborne track` do; `cameras` selects cameras by
-    name.
+    name. `given_as` is how errors write a replaced entry's name and value.
     """
-    trial = parse_trial(path, track)
+    trial = parse_trial(path, track, given_as)
     mistakes = list_wrong_names(trial)
     if mistakes:
         raise MistakesError(path.name, mistakes)
     return trial if cameras is None else _select_cameras(path, trial, cameras)
 
 
-def _validate(table: dict[str, Any], changes: dict[str, Any], where: str) -> Trial:
+def _validate(table: dict[str, Any], changes: dict[str, Any], where: str, given_as: str) -> Trial:
     """Return the trial of a table with changes to its settings; an error names the changes where they cause it."""
     heads = ("[[camera]]", "[calibration]", "[body]")
     missing = [head for head in heads if head.strip("[]") not in table]
@@ -176,16 +194,16 @@ def _validate(table: dict[str, Any], changes: dict[str, Any], where: str) -> Tri
     settings = table.get("track", {})
     changed = {**table, "track": {**settings, **changes} if isinstance(settings, dict) else settings}
     try:
-        return Trial.model_validate(changed)
-    except ValidationError as error:
-        mistakes = list_mistakes(error, tags=METHODS)
+        return Trial(**changed)
+    except MistakesError as error:
+        found = error
     if changes:
         try:
-            Trial.model_validate(table)
-            where = " ".join(f"--{name} {value}" for name, value in changes.items())
-        except ValidationError:
+            Trial(**table)
+            where = " ".join(given_as.format(name, value) for name, value in changes.items())
+        except MistakesError:
             pass
-    raise MistakesError(where, mistakes)
+    raise MistakesError(where, found.plain, found.places)
 
 
 def list_wrong_names(trial: Trial) -> list[str]:

@@ -68,7 +68,7 @@ class StartTable(SettingsTable):
         if self.rotation_matrix is not None:
             R = np.array(self.rotation_matrix)
             if not np.allclose(R @ R.T, np.eye(3), atol=1e-3) or np.linalg.det(R) < 0:
-                raise ValueError("rotation_matrix is no rotation: rows must be unit, at right angles, right-handed")
+                raise ValueError("rotation_matrix is not a rotation: rows must be unit, at right angles, right-handed")
 
     @property
     def pose(self) -> Pose:

@@ -91,7 +91,7 @@ def inspect(source: VideoSource) -> VideoFacts:
     with _open(source) as (container, stream):
         frame = next((image for _, image in intact_frames(container, stream, size=None)), None)
         if frame is None:
-            raise VideoError(f"{source.name}: no picture of {source.path} can be decoded; copy or convert it again")
+            raise VideoError(f"{source.name}: no image of {source.path} can be decoded; copy or convert it again")
         return facts_of(source, container, stream, frame)
 
 

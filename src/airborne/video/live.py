@@ -79,7 +79,7 @@ class LiveCamera:
                     stamp_s = Fraction(round((now_s - start_s) * _MICRO), _MICRO) + 1 / facts.frame_rate
                 self._keep(DecodedImage(self.source.trial_time(stamp_s), frame, None), facts, now_s)
         if self.facts is None and not self.stop.is_set():
-            raise VideoError(f"{self.source.name}: no picture came from {self.source.path}; check what sends them")
+            raise VideoError(f"{self.source.name}: no image came from {self.source.path}; check what sends them")
 
     def _keep(self, image: DecodedImage, facts: VideoFacts, now_s: float) -> None:
         with self.changed:
@@ -211,7 +211,7 @@ class LiveRecording:
     def _note_ends(self) -> None:
         for camera in self.cameras:
             if camera.error is not None:
-                self.events.append(f"{camera.source.name}: the pictures broke off: {camera.error}")
+                self.events.append(f"{camera.source.name}: the images broke off: {camera.error}")
 
 
 @contextmanager
@@ -225,7 +225,7 @@ def connect(
     """
     interlaced = [source.name for source in sources if source.fields not in ("progressive", "auto")]
     if interlaced:
-        raise VideoError(f"{interlaced[0]}: live pictures are read as whole frames; remove fields from its [[camera]]")
+        raise VideoError(f"{interlaced[0]}: live images are read as whole frames; remove fields from its [[camera]]")
     paths = [str(source.path) for source in sources]
     twice = [path for path in paths if paths.count(path) > 1 and kind_of(sources[paths.index(path)]) != "file"]
     if twice:

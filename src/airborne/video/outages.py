@@ -60,7 +60,7 @@ class Outages:
 
     def describe(self) -> Iterator[str]:
         """State in a sentence when each camera had each kind of outage."""
-        for kind, runs_by_camera in (("no picture", self._missing), ("dark", self._dark)):
+        for kind, runs_by_camera in (("no image", self._missing), ("dark", self._dark)):
             for name, runs in runs_by_camera.items():
                 yield f"{name}: {kind} at {runs.n_frames} of {self._n_times} frames: {runs.describe()}"
 

@@ -47,12 +47,19 @@ class Recording:
         return self.facts[0].image_rate / self.every
 
     @property
-    def n_frames(self) -> int | None:
-        """How many `Frames` to expect by the files' stated durations; None where the clock's file states none."""
+    def n_images(self) -> int | None:
+        """How many images the clock counts by the files' stated durations; None where the clock's file states none."""
         ends = [s.trial_time(f.duration_s) for s, f in zip(self.sources, self.facts, strict=True) if f.duration_s]
         if self.facts[0].duration_s is None:
             return None
-        n = round((max(ends) - self.sources[0].trial_time(Fraction(0))) * self.facts[0].image_rate)
+        return round((max(ends) - self.sources[0].trial_time(Fraction(0))) * self.facts[0].image_rate)
+
+    @property
+    def n_frames(self) -> int | None:
+        """How many `Frames` to expect by the files' stated durations; None where the clock's file states none."""
+        n = self.n_images
+        if n is None:
+            return None
         return len(range(self.start, n if self.stop is None else min(n, self.stop), self.every))
 
     def __iter__(self) -> Generator[Frames]:
@@ -108,15 +115,15 @@ class Recording:
                 time_s = source.trial_time(image.time_s)
                 if time_s > expected_s + period_s / 2:
                     self._note(
-                        f"{source.name}: no picture from {float(expected_s):.3f} s to {float(time_s):.3f} s (damaged "
-                        "or missing); pictures after it may carry damage up to the next key frame"
+                        f"{source.name}: no image from {float(expected_s):.3f} s to {float(time_s):.3f} s (damaged "
+                        "or missing); images after it may carry damage up to the next key frame"
                     )
                 yield image._replace(time_s=time_s)
                 expected_s = time_s + period_s
         end_s = source.trial_time(facts.duration_s or Fraction(0))
         if facts.duration_s and expected_s < end_s - period_s / 2:
             self._note(
-                f"{source.name}: the pictures end at {float(expected_s):.3f} s; the file promises {float(end_s):.3f} s"
+                f"{source.name}: the images end at {float(expected_s):.3f} s; the file promises {float(end_s):.3f} s"
             )
 
     def _note(self, event: str) -> None:

@@ -59,7 +59,7 @@ def open_source(source: VideoSource, stop: Event) -> Iterator[tuple[InputContain
             pipe.close()
         reason = getattr(error, "strerror", None) or error
         raise VideoError(
-            f"{source.name}: no pictures come from {source.path} ({reason}); check what sends them"
+            f"{source.name}: no images come from {source.path} ({reason}); check what sends them"
         ) from error
     try:
         with container:

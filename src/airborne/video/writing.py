@@ -42,9 +42,7 @@ class VideoWriter:
         """
         width, height = size
         if fields != "progressive" and height % 4:
-            raise VideoError(
-                f"{path}: an interlaced video's height is a multiple of 4, found {height}; pad the picture"
-            )
+            raise VideoError(f"{path}: an interlaced video's height is a multiple of 4, found {height}; pad the image")
         self.path, self.size = path, size
         self._time_base = 1 / Fraction(rate)
         self._container = av.open(path, "w", format="mp4", options=_FRAGMENTED)
@@ -71,7 +69,7 @@ class VideoWriter:
         width, height = self.size
         if rgb.shape != (height, width, 3):
             actual = "×".join(map(str, rgb.shape))
-            raise VideoError(f"{self.path}: a picture of {actual} was given, expected {height}×{width}×3")
+            raise VideoError(f"{self.path}: an image of {actual} was given, expected {height}×{width}×3")
         even = np.pad(rgb, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
         side = min(self.size)
         if self._field_filter is None:

@@ -66,13 +66,13 @@ def test_another_number_of_squares_is_named():
 
 def test_another_size_of_markers_is_named():
     said = sentence(replace(CHARUCO, marker_m=0.05), pictures(CHARUCO))
-    assert "of a square in the pictures, 0.50 as described" in said
+    assert "of a square in the images, 0.50 as described" in said
     assert 0.064 < float(said.rsplit("= ", 1)[1]) < 0.074
 
 
 def test_mirrored_images_are_named():
     mirrored = [np.ascontiguousarray(picture[:, ::-1]) for picture in pictures(CHARUCO)]
-    assert "the pictures are mirrored" in sentence(CHARUCO, mirrored)
+    assert "the images are mirrored" in sentence(CHARUCO, mirrored)
 
 
 def test_squares_counted_for_inner_corners_are_reported():
@@ -82,7 +82,7 @@ def test_squares_counted_for_inner_corners_are_reported():
 
 def test_nothing_in_the_images_is_reported_as_that():
     empty = [np.full((400, 560), 90, np.uint8)] * 3
-    assert "found in 0 of 3 pictures, with 0 of its 12 corners at most" in sentence(CHARUCO, empty)
+    assert "found in 0 of 3 images, with 0 of its 12 corners at most" in sentence(CHARUCO, empty)
     assert "no other board is either" in sentence(CHESS, empty)
     assert check_board_print(CHARUCO, [], "cam1") == []
 
@@ -105,7 +105,7 @@ def test_a_real_board_is_not_flagged(real):
     ("change", "said"),
     [
         ({"dictionary": "DICT_6X6_250"}, 'set dictionary = "DICT_4X4_50"'),
-        ({"marker_m": 0.02}, "of a square in the pictures, 0.37 as described"),
+        ({"marker_m": 0.02}, "of a square in the images, 0.37 as described"),
     ],
 )
 def test_a_wrong_description_of_a_real_board_is_named(real, change, said):

@@ -18,7 +18,7 @@ def test_a_clock_that_runs_on_is_not_flagged():
 def test_a_counter_that_rolls_over_is_reported(modulus):
     counts = np.arange(modulus - 60, modulus + 40) % modulus
     [found] = check_counter("cam1", counts)
-    assert f"picture numbers fall from {modulus - 1:g} to 0 after picture 59" in found.sentence
+    assert f"image numbers fall from {modulus - 1:g} to 0 after image 59" in found.sentence
 
 
 def test_a_clock_that_starts_anew_is_reported():
@@ -26,20 +26,20 @@ def test_a_clock_that_starts_anew_is_reported():
     times_s[120:] -= times_s[120]
     [found] = check_times("cam1", times_s)
     assert "time stamps fall from 2.38" in found.sentence
-    assert "to 0 after picture 119" in found.sentence
+    assert "to 0 after image 119" in found.sentence
 
 
 def test_images_stored_twice_are_reported():
     times_s = np.insert(TIMES_S, [50, 90], TIMES_S[[50, 90]])
     [found] = check_times("cam1", times_s)
-    assert "time stamps stand still after pictures 50, 91" in found.sentence
+    assert "time stamps stand still after images 50, 91" in found.sentence
 
 
 def test_lost_images_are_counted():
     [found] = check_times("cam1", np.delete(TIMES_S, [30, 31, 32, 100]))
-    assert found.sentence.startswith("cam1: 4 pictures are missing by its time stamps, after pictures 29, 96")
+    assert found.sentence.startswith("cam1: 4 images are missing by its time stamps, after images 29, 96")
     [found] = check_counter("cam1", np.delete(np.arange(100), [40]))
-    assert "1 picture is missing by its picture numbers, after picture 39" in found.sentence
+    assert "1 image is missing by its image numbers, after image 39" in found.sentence
 
 
 def test_many_places_are_not_all_listed():
@@ -55,7 +55,7 @@ def test_the_camera_with_another_number_of_images_is_named():
     assert check_image_counts({"cam1": 100, "cam2": 100}) == []
     assert check_image_counts({"cam1": 100, "cam2": 99}, 2) == []
     [found] = check_image_counts({"cam1": 100, "cam2": 100, "cam3": 95})
-    assert found.sentence.startswith("cam3 has 95 pictures, cam1 and cam2 100: ")
+    assert found.sentence.startswith("cam3 has 95 images, cam1 and cam2 100: ")
 
 
 def rows_read_late(readout_s, *, offset_s=0.0, n=400):

@@ -12,7 +12,7 @@ SIZE = (1920, 1080)
 def test_few_views_are_counted():
     assert check_view_count("cam1", 8) == []
     assert check_view_count("cam1", 1)[0].sentence.startswith(
-        "cam1 shows the board in 1 picture, expected 8: film it longer"
+        "cam1 shows the board in 1 image, expected 8: film it longer"
     )
 
 
@@ -33,7 +33,7 @@ def test_where_points_are_missing_is_named(low, high, where):
     px = np.random.default_rng(0).uniform(low, high, (200, 2))
     [found] = check_coverage("cam1", px, SIZE)
     assert where in found.sentence
-    assert "% of its picture" in found.sentence
+    assert "% of its image" in found.sentence
 
 
 def test_a_few_clicks_are_not_blamed_for_leaving_the_image_empty():

@@ -64,7 +64,7 @@ def test_boards_are_placed_by_a_known_rig():
 
 def test_a_camera_that_never_sees_the_board_is_named():
     views = Views(BOARD, ("left",), ((NO_CORNERS,) * 5,))
-    with pytest.raises(CalibrationError, match="camera 'left' shows the board in 0 pictures"):
+    with pytest.raises(CalibrationError, match="camera 'left' shows the board in 0 images"):
         choose_lens(views.of_camera(0), SIZE)
 
 

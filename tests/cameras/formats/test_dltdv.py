@@ -124,7 +124,7 @@ def test_what_does_not_fit_together_is_reported(tmp_path):
     write_digitisation(tmp_path / "t_xypts.csv", triangulate_digitisation(clicked(RIG.names), RIG), FileOptions())
     with pytest.raises(CalibrationError, match="has 3 cameras; name as many"):
         read_digitisation(tmp_path / "t_xypts.csv", FileOptions(), ("left", "right"))
-    with pytest.raises(CalibrationError, match="does not say how large the pictures of 'cam1' are; give --size"):
+    with pytest.raises(CalibrationError, match="does not say how large the images of 'cam1' are; give --size"):
         read_digitisation(tmp_path / "t_xypts.csv", FileOptions(pixels=PixelConvention("lower-left")))
     (tmp_path / "t_xyzres.csv").write_text("pt1_dltres\n1\n")
     with pytest.raises(CalibrationError, match="has 1 rows of 1; expected 4 of 2"):

@@ -46,7 +46,7 @@ def test_the_surest_of_several_people_is_taken_where_it_is_clear(tmp_path):
     crowd(tmp_path, 0.4, 0.9)
     found = read_detections(tmp_path, ["a"])
     assert found.px[0, 0, 0].tolist() == [20, 20]
-    assert found.notes == ("a: up to 2 people in a picture; took the one detected most surely",)
+    assert found.notes == ("a: up to 2 people in an image; took the one detected most surely",)
 
 
 def test_people_detected_alike_are_refused_until_one_is_chosen(tmp_path):
@@ -55,7 +55,7 @@ def test_people_detected_alike_are_refused_until_one_is_chosen(tmp_path):
         read_detections(tmp_path, ["a"])
     for person in (0, 1):
         assert read_detections(tmp_path, ["a"], person=person).px[0, 0, 0].tolist() == [10 * (person + 1)] * 2
-    with pytest.raises(CalibrationError, match="there is nobody in any picture"):
+    with pytest.raises(CalibrationError, match="there is nobody in any image"):
         read_detections(tmp_path, ["a"], person=2)
 
 

@@ -84,7 +84,7 @@ def test_dlt_coefficients_give_all_but_names_and_sizes_back(tmp_path, rig, pixel
     sizes = {f"cam{number}": camera.size for number, camera in enumerate(rig, 1)}
     found = read_rig(tmp_path / "dltCoefs.csv", size=sizes, pixels=pixels, unit=unit)
     assert_same(found, rig, with_names=False)
-    assert notes == (f"names: cam1, cam2, ... for {', '.join(rig.names)}", "picture sizes")
+    assert notes == (f"names: cam1, cam2, ... for {', '.join(rig.names)}", "image sizes")
 
 
 @pytest.mark.parametrize("kind", ["qualisys", "vicon", "opencv", "easymocap", "dlt"])
@@ -132,7 +132,7 @@ def test_a_name_that_no_file_can_hold_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("rig.txt", {}, "the name asks for no format; end it in .toml, .qca.txt, .xcp"),
+        ("rig.txt", {}, "the name names no format; end it in .toml, .qca.txt, .xcp"),
         ("rig.toml", {"format": "anipose"}, "no calibration format 'anipose'; choose from pose2sim, aniposelib"),
         ("rig.toml", {"unit": "mm"}, "pose2sim files are always in m"),
         ("rig.xcp", {"unit": "m"}, "vicon files are always in mm"),
@@ -159,5 +159,5 @@ def test_a_unit_is_asked_for_where_cameras_lie_too_far_apart(tmp_path, written, 
 def test_a_size_that_contradicts_the_file_is_refused(tmp_path):
     write_rig(tmp_path / "calib.toml", three_cameras())
     assert len(read_rig(tmp_path / "calib.toml", size={"left": (768, 576)})) == 3
-    with pytest.raises(CalibrationError, match="'left' has pictures of 768x576; leave --size out"):
+    with pytest.raises(CalibrationError, match="'left' has images of 768x576; leave --size out"):
         read_rig(tmp_path / "calib.toml", size=(640, 480))

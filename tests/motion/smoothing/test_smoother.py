@@ -59,7 +59,7 @@ def test_everything_has_its_unit_and_the_history_says_what_was_done():
     assert None not in units.values()
     history = " ".join(result.attrs["history"])
     assert "Butterworth" in history and "6 Hz" in history and "up to 0.1 s" in history and "0.4000 s" in history
-    assert "no gap filled" in smooth_root(noisy, BUTTERWORTH, []).attrs["history"]
+    assert "gaps are not filled" in smooth_root(noisy, BUTTERWORTH, []).attrs["history"]
 
 
 def test_landmarks_and_the_centre_of_mass_are_smoothed():

@@ -72,7 +72,7 @@ def _not_detected(
     return Finding(
         kind="board",
         what=(
-            f"{where}the board is found in {n_detected} of {len(pictures)} pictures, with {max(counts)} of its "
+            f"{where}the board is found in {n_detected} of {len(pictures)} images, with {max(counts)} of its "
             f"{n_corners} corners at most, and no other board is either"
         ),
         advice="show it larger, flat, sharp and without glare, with its white border free",
@@ -92,8 +92,8 @@ def _wrong_charuco(
         if n_mirrored >= _CLEAR_RATIO * max(n_here, _FEWEST_MARKERS):
             yield Finding(
                 kind="mirrored",
-                what=f"{where}{n_here} of the board's markers are seen, {n_mirrored} once the pictures are mirrored",
-                advice="the pictures are mirrored; switch off the camera's mirror image and record or convert anew",
+                what=f"{where}{n_here} of the board's markers are seen, {n_mirrored} once the images are mirrored",
+                advice="the images are mirrored; switch off the camera's mirror image and record or convert anew",
                 cameras=about,
             )
             return
@@ -151,7 +151,7 @@ def _wrong_layout(
     if np.isfinite(ratio) and abs(ratio / stated - 1) > _RATIO_OFF:
         yield Finding(
             kind="board",
-            what=f"{where}markers are {ratio:.2f} of a square in the pictures, {stated:.2f} as described",
+            what=f"{where}markers are {ratio:.2f} of a square in the images, {stated:.2f} as described",
             advice=f"measure the print; with these squares marker_m = {ratio * board.square_m:.4f}",
             cameras=about,
         )
@@ -289,7 +289,7 @@ def _wrong_chessboard(board: Board, pictures: Sequence[Image], where: str, camer
             kind="board",
             what=(
                 f"{where}no chessboard of {board.columns} by {board.rows} inner corners is seen, but one of {columns} "
-                f"by {rows} in {n_detected} of {len(pictures)} pictures"
+                f"by {rows} in {n_detected} of {len(pictures)} images"
             ),
             advice=(
                 f"{'squares were counted, not the inner corners; ' if squares else ''}set columns = {columns} and "

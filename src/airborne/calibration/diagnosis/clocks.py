@@ -35,7 +35,7 @@ def check_counter(camera: str, counts: NDArray[np.integer]) -> list[Finding]:
     """Report where a camera's own frame counter (n,), in the order of its frames, rolls over, repeats or jumps."""
     if len(counts) < _FEWEST_TIMES:
         return []
-    return list(_check_steps(camera, counts.astype(float), "picture numbers", period=1.0))
+    return list(_check_steps(camera, counts.astype(float), "image numbers", period=1.0))
 
 
 def check_image_counts(n_pictures: Mapping[str, int], n_least: int = 1) -> list[Finding]:
@@ -52,7 +52,7 @@ def check_image_counts(n_pictures: Mapping[str, int], n_least: int = 1) -> list[
     return [
         Finding(
             kind="clock",
-            what=f"{description} pictures, {others} {most_common}",
+            what=f"{description} images, {others} {most_common}",
             advice=(
                 "started late, ended early or lost some; without time stamps that is not known, so compare an event "
                 "that all cameras see near the end (airborne sync)"
@@ -83,14 +83,14 @@ def _check_steps(camera: str, values: Array, what: str, *, period: float | None)
         yield _finding(
             camera,
             f"its {what} stand still {_at(repeated)}",
-            "pictures were stored twice; leave the repeats out",
+            "images were stored twice; leave the repeats out",
         )
     if len(gaps):
         lost = int(np.sum(np.round(steps[gaps] / period) - 1))
         yield _finding(
             camera,
-            f"{lost} picture{'s are' if lost != 1 else ' is'} missing by its {what}, {_at(gaps)}",
-            "the camera lost them; go by the time stamps, do not count pictures",
+            f"{lost} image{'s are' if lost != 1 else ' is'} missing by its {what}, {_at(gaps)}",
+            "the camera lost them; go by the time stamps, do not count images",
         )
 
 
@@ -98,7 +98,7 @@ def _at(rows: NDArray[np.integer]) -> str:
     """Return a phrase: after which frames, counted from 0."""
     listed = ", ".join(str(row) for row in rows[:_NAMED])
     more = f" and {len(rows) - _NAMED} more" if len(rows) > _NAMED else ""
-    return f"after picture{'s' * (len(rows) > 1)} {listed}{more}"
+    return f"after image{'s' * (len(rows) > 1)} {listed}{more}"
 
 
 def _finding(camera: str, what: str, advice: str) -> Finding:
@@ -138,9 +138,9 @@ def check_rolling_shutter(
             kind="rolling shutter",
             what=(
                 f"{camera} reads its rows over {x[1] * 1e3:.0f} ms (sd {sd * 1e3:.0f}): moving points are displaced by "
-                f"{shift_px:.1f} px at the picture's upper and lower edge"
+                f"{shift_px:.1f} px at the image's upper and lower edge"
             ),
-            advice="calibrate with slow movements; fast ones are measured late in the lower half of the picture",
+            advice="calibrate with slow movements; fast ones are measured late in the lower half of the image",
             cameras=(camera,),
         )
     ]

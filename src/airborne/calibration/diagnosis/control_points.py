@@ -31,7 +31,7 @@ def check_points(points: ControlPoints, sizes: Mapping[str, tuple[int, int]]) ->
     """Raise CalibrationError where a camera cannot be estimated: size, number, unit, image borders, flatness."""
     missing = [camera for camera in points.cameras if camera not in sizes]
     if missing:
-        raise CalibrationError(f"no picture size for camera '{missing[0]}'; sizes are given for: {', '.join(sizes)}")
+        raise CalibrationError(f"no image size for camera '{missing[0]}'; sizes are given for: {', '.join(sizes)}")
     extent = np.linalg.norm(np.ptp(points.world, axis=0))
     if extent > _LARGEST_EXTENT_M:
         raise CalibrationError(
@@ -61,14 +61,14 @@ def _check_inside(points: ControlPoints, camera: str, size: tuple[int, int]) -> 
         return
     first = int(np.flatnonzero(outside.any(axis=1))[0])
     what = (
-        f"camera '{camera}': {outside.any(axis=1).sum()} control points lie outside its {size[0]}×{size[1]} picture "
+        f"camera '{camera}': {outside.any(axis=1).sum()} control points lie outside its {size[0]}×{size[1]} image "
         f"(first '{points.names[first]}' at u={px[first, 0]:g}, v={px[first, 1]:g})"
     )
     if not ((px < -0.5) | (px > upper[::-1])).any():
         raise CalibrationError(
             f"{what}; with width and height exchanged they would fit: exchange those, or the columns u and v"
         )
-    raise CalibrationError(f"{what}: correct them, or the picture size")
+    raise CalibrationError(f"{what}: correct them, or the image size")
 
 
 def flatness(world: Array) -> float:
@@ -123,7 +123,7 @@ def warnings_about(
         if rms > _ROUGH_FIT_PX and len(outliers[camera]) in (0, _MOST_OUTLIERS):  # else the named points explain it
             warnings.append(
                 f"camera '{camera}' fits its control points only to {rms:.1f} px (careful clicks give about 1): "
-                "check its points, their coordinates and the picture size"
+                "check its points, their coordinates and the image size"
             )
     return tuple(warnings)
 
@@ -142,12 +142,12 @@ def _image_warnings(camera: str, size: tuple[int, int], decomposition: Decomposi
     if np.linalg.norm(K[:2, 2] - middle) > _OFF_CENTRE * np.hypot(*size):
         warnings.append(
             f"camera '{camera}' looks through pixel ({K[0, 2]:.0f}, {K[1, 2]:.0f}), expected near the middle "
-            f"({middle[0]:.0f}, {middle[1]:.0f}): is {size[0]}×{size[1]} its size, or is the picture cropped?"
+            f"({middle[0]:.0f}, {middle[1]:.0f}): is {size[0]}×{size[1]} its size, or is the image cropped?"
         )
     if abs(K[0, 0] / K[1, 1] - 1) > _NOT_SQUARE:
         warnings.append(
             f"camera '{camera}' seems to have pixels that are not square (focal lengths {K[0, 0]:.0f} and "
-            f"{K[1, 1]:.0f} px): resample its picture to square pixels"
+            f"{K[1, 1]:.0f} px): resample its image to square pixels"
         )
     level = np.hypot(R[2, 0], R[2, 1])
     if level > 0.5 and -R[1, 2] / level < np.cos(_MOST_ROLL):

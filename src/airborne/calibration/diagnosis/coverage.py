@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from airborne.cameras.finding import Finding, join_names
+from airborne.errors import count
 from airborne.types import Array
 
 _FEWEST_VIEWS = 8  # of a board, for a lens
@@ -27,8 +28,8 @@ def check_view_count(camera: str, n_views: int) -> list[Finding]:
     return [
         Finding(
             kind="coverage",
-            what=f"{camera} shows the board in {n_views} picture{'s' * (n_views != 1)}, expected {_FEWEST_VIEWS}",
-            advice="film it longer, in all parts of the picture, near and far",
+            what=f"{camera} shows the board in {count(n_views, 'image')}, expected {_FEWEST_VIEWS}",
+            advice="film it longer, in all parts of the image, near and far",
             cameras=(camera,),
         )
     ]
@@ -53,8 +54,8 @@ def check_coverage(camera: str, px: Array, size: tuple[int, int]) -> list[Findin
     return [
         Finding(
             kind="coverage",
-            what=f"{camera} has points in {filled.mean():.0%} of its picture{where}",
-            advice="the lens and the place are guessed where there is nothing; cover the whole picture",
+            what=f"{camera} has points in {filled.mean():.0%} of its image{where}",
+            advice="the lens and the place are guessed where there is nothing; cover the whole image",
             cameras=(camera,),
         )
     ]

@@ -47,7 +47,7 @@ def check_mirroring(camera: str, size: tuple[int, int], points: Array, px: Array
         Finding(
             kind="mirrored",
             what=f"{camera} fits what the other cameras see, to {fit_px:.1f} px, but only as in a mirror",
-            advice="its pictures are mirrored; switch that off in the camera, and record or convert anew",
+            advice="its images are mirrored; switch that off in the camera, and record or convert anew",
             cameras=(camera,),
         )
     ]
@@ -100,8 +100,7 @@ def check_image_size(camera: str, calibrated: tuple[int, int], picture: tuple[in
             "it was cropped (give saved_offset_px), or the camera has another mode",
         )
     what = (
-        f"{camera} was calibrated with pictures of {calibrated[0]}×{calibrated[1]}, "
-        f"these have {picture[0]}×{picture[1]}"
+        f"{camera} was calibrated with images of {calibrated[0]}×{calibrated[1]}, these have {picture[0]}×{picture[1]}"
     )
     return [Finding(kind=kind, what=what, advice=advice, cameras=(camera,))]
 
@@ -162,7 +161,7 @@ def check_floor(rig: Rig) -> list[Finding]:
         Finding(
             kind="mirrored",
             what=f"{join_names(names)} {come} out below the floor, at z = {deepest:.1f} m",
-            advice="left and right, or near and far, are exchanged in the points' names, or the pictures are mirrored",
+            advice="left and right, or near and far, are exchanged in the points' names, or the images are mirrored",
             cameras=tuple(names),
         )
     ]

@@ -67,7 +67,7 @@ def _displacement_finding(name: str, displacement: _Displacement, times: Sequenc
     return Finding(
         kind="moved",
         what=(
-            f"{name} moved between {times[displacement.moment - 1]} and {times[displacement.moment]}: its picture "
+            f"{name} moved between {times[displacement.moment - 1]} and {times[displacement.moment]}: its image "
             f"jumps by {displacement.shift_px:.1f} px (turned by {np.degrees(displacement.turn_rad):.2f} degrees, "
             f"shifted by {displacement.shift_m * 1e3:.0f} mm)"
         ),

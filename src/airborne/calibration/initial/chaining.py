@@ -95,7 +95,7 @@ def initial_lens(views: Views, size: tuple[int, int], *, lens: Lens) -> tuple[Ca
     row = views.detections[0]
     if len(row) < FEWEST_LENS_VIEWS:
         raise CalibrationError(
-            f"camera '{name}' shows the board in {len(row)} pictures, at least {FEWEST_LENS_VIEWS} are needed: show it "
+            f"camera '{name}' shows the board in {len(row)} images, at least {FEWEST_LENS_VIEWS} are needed: show it "
             "more often, nearer, and check the board's columns, rows and dictionary"
         )
     sample = np.unique(np.linspace(0, len(row) - 1, min(len(row), 12)).astype(int))

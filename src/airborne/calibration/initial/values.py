@@ -112,7 +112,7 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
     if missing:
         raise CalibrationError(
             f"no source determines where {', '.join(missing)} stands; show it the board or the wand together with "
-            "another camera, or click four known points in its picture"
+            "another camera, or click four known points in its image"
         )
     rig = Rig(tuple(_with_lens(rig[name], lenses.get(name)) for name in sources.names))
     counts = {name: _n_observations(name, points, wand) for name in sources.names}
@@ -245,7 +245,7 @@ def _board_starts(views: Views, known_lenses: dict[str, Camera], *, alone_is_eno
         if mirrored:
             raise CalibrationError(
                 f"{', '.join(mirrored)}: the board is seen mirrored, but no place behind it fits all moments: its "
-                "pictures are mirrored; switch off the camera's mirror image and record or convert anew"
+                "images are mirrored; switch off the camera's mirror image and record or convert anew"
             )
     groups = [list(range(len(views.cameras)))] if alone_is_enough else views.groups()
     return [

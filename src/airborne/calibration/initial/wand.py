@@ -277,7 +277,7 @@ def _links(cameras: Sequence[Camera], pairs: Sequence[_Pair], tracks: WandTracks
         links.append(_Link(pair.a, pair.b, b_from_a, quality))
     if not links:
         raise CalibrationError(
-            f"however the cameras stand, the wand's length varies by {least_variation:.0%}: a picture is mirrored, the "
+            f"however the cameras stand, the wand's length varies by {least_variation:.0%}: an image is mirrored, the "
             "pixels count from another corner, the cameras are not in step, or the columns are in another order"
         )
     return sorted(links, key=lambda link: -link.quality)

@@ -16,15 +16,15 @@ _FEWEST = 3  # cameras of one size that have a common lens
 _PLAUSIBLE = 2.0  # times a camera's own left-out error: what the common lens may leave
 
 
-def common_lens_shifts(
+def common_lens_sd(
     candidates: Mapping[str, Sequence[Solution]], sizes: Mapping[str, tuple[int, int]]
 ) -> dict[str, Array]:
     """Return by camera how far its centre moves (3,) [m] with the median lens of the wide cameras of its size.
 
-    Empty for cameras that this lens does not suit. What a lens and a place exchange without a trace in the pixels shows
-    here, if cameras are alike; it is a part of the place's uncertainty.
+    RMS over the cameras that this lens suits, in each one's own axes, turned to the world's; the others have none. What
+    a lens and a place exchange without a trace in the pixels shows here; it is a part of the place's uncertainty.
     """
-    shifts = {}
+    sd = {}
     for size in set(sizes.values()):
         own = {
             name: next((s for s in each if s.model is _MODEL), None)
@@ -37,11 +37,14 @@ def common_lens_shifts(
         focal = float(np.median([fit.focal_px for fit in fits.values()]))
         middle = np.median([fit.principal_point for fit in fits.values()], axis=0)
         terms = np.median([fit.terms for fit in fits.values()], axis=0)
+        shifts = {}
         for name, fit in fits.items():
             chosen = choose_simplest(candidates[name])
             start = replace(fit, focal_px=focal, principal_point=middle, terms=terms)
             common = fit_pose(start, chosen.world, chosen.px)
             rms = np.sqrt(np.mean((common.px_from_world(chosen.world) - chosen.px) ** 2))
             if rms < _PLAUSIBLE * np.sqrt(np.mean(chosen.held_out_px**2)):
-                shifts[name] = common.centre - chosen.pinhole.centre
-    return shifts
+                shifts[name] = chosen.pinhole.R @ (common.centre - chosen.pinhole.centre)
+        variance = np.mean(np.square(list(shifts.values())), axis=0) if shifts else np.zeros(3)
+        sd |= {name: np.sqrt(fits[name].R.T ** 2 @ variance) for name in shifts}
+    return sd

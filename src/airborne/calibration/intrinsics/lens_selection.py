@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from airborne.calibration.bundle import ALL_FIXED, Adjustment, FreeParameters, adjust
 from airborne.calibration.diagnosis.control_points import flatness
 from airborne.calibration.initial.chaining import Views, board_source, initial_lens
-from airborne.calibration.intrinsics.common_lens import common_lens_shifts
+from airborne.calibration.intrinsics.common_lens import common_lens_sd
 from airborne.calibration.intrinsics.model_selection import Solution, candidates_for, choose_simplest, place_sd
 from airborne.calibration.intrinsics.physical import pinhole_of
 from airborne.calibration.sources.control_points import ControlPoints
@@ -98,11 +98,11 @@ def lenses_from_points(rig: Rig, points: ControlPoints, progress: Progress) -> d
             px = points.px[is_seen, points.cameras.index(camera.name)]
             candidates[camera.name] = candidates_for(pinhole_of(camera), points.world[is_seen], px)
         progress(done + 1, len(rig))
-    shifts = common_lens_shifts(candidates, {camera.name: camera.size for camera in rig})
-    return {name: _lens_from_points(rig[name], each, shifts.get(name)) for name, each in candidates.items()}
+    common_sd_m = common_lens_sd(candidates, {camera.name: camera.size for camera in rig})
+    return {name: _lens_from_points(rig[name], each, common_sd_m.get(name)) for name, each in candidates.items()}
 
 
-def _lens_from_points(camera: Camera, candidates: list[Solution], common_lens_shift: Array | None) -> LensFit:
+def _lens_from_points(camera: Camera, candidates: list[Solution], common_lens_sd_m: Array | None) -> LensFit:
     chosen = choose_simplest(candidates)
     model = chosen.model
     return LensFit(
@@ -112,7 +112,7 @@ def _lens_from_points(camera: Camera, candidates: list[Solution], common_lens_sh
         n_views=len(chosen.world),
         rms_px=float(np.sqrt(np.mean(np.sum(chosen.residual_px**2, axis=1)))),
         held_out_rms_px={s.model.name: float(np.sqrt(np.mean(np.sum(s.held_out_px**2, axis=1)))) for s in candidates},
-        place_sd_m=place_sd(chosen, candidates, common_lens_shift),
+        place_sd_m=place_sd(chosen, candidates, common_lens_sd_m),
     )
 
 

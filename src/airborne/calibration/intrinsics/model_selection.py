@@ -100,17 +100,17 @@ def as_good_as_best(solutions: Sequence[Solution]) -> list[Solution]:
     ]
 
 
-def place_sd(chosen: Solution, candidates: Sequence[Solution], common_lens_shift: Array | None = None) -> Array:
+def place_sd(chosen: Solution, candidates: Sequence[Solution], common_lens_sd_m: Array | None = None) -> Array:
     """Return the standard deviation of a camera's position (3,) [m], with the error of its lens model.
 
     The larger of that of independent errors and that of a jackknife over parts of the image, where a lens that fits
-    badly errs alike; the differences to the models that predict held-out points as well; and the shift (3,) [m] with
+    badly errs alike; the differences to the models that predict held-out points as well; and the shifts (3,) [m] with
     the lens that is common to cameras alike, if there is one.
     """
     sd = parameter_sd(chosen.pinhole, chosen.model, chosen.world, chosen.px)[3:6]
     others = [s.pinhole.centre - chosen.pinhole.centre for s in as_good_as_best(candidates)]
     model_sd = np.hypot(
-        np.sqrt(np.mean(np.square(others), axis=0)), 0.0 if common_lens_shift is None else common_lens_shift
+        np.sqrt(np.mean(np.square(others), axis=0)), 0.0 if common_lens_sd_m is None else common_lens_sd_m
     )
     return np.hypot(np.maximum(sd, _jackknife_sd(chosen)), model_sd)
 

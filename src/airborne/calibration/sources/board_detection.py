@@ -47,7 +47,7 @@ def detect_boards(sources: Sources, board: Board, progress: Progress) -> BoardDe
     """Detect the board in all cameras' recordings; raises VideoError or CalibrationError for what cannot be read."""
     cameras = [camera for camera in sources.camera if camera.video or camera.pictures]
     if not cameras:
-        raise CalibrationError("[board] needs a video or pictures of the cameras; add video = ... to each [[camera]]")
+        raise CalibrationError("[board] needs a video or images of the cameras; add video = ... to each [[camera]]")
     if all(camera.video for camera in cameras):
         moments, time_s, findings = _moments(sources, cameras)
     elif all(camera.pictures for camera in cameras):
@@ -55,12 +55,12 @@ def detect_boards(sources: Sources, board: Board, progress: Progress) -> BoardDe
         if len(cameras) > 1 and len(set(counts)) > 1:
             counts_text = ", ".join(f"{camera.name} {n}" for camera, n in zip(cameras, counts, strict=True))
             raise CalibrationError(
-                f"pictures that belong together stand at the same place of every folder, but there are: {counts_text}; "
+                f"images that belong together stand at the same place of every folder, but there are: {counts_text}; "
                 "use lens_pictures for pictures of one camera alone"
             )
         moments, time_s, findings = [{i: i for i in range(n)} for n in counts], None, ()
     else:
-        raise CalibrationError("some cameras have a video and some pictures; give the same kind for all")
+        raise CalibrationError("some cameras have a video and some images; give the same kind for all")
     samples = {camera.name: _sample_images(sources, camera) for camera in cameras}
     board, notes = match_print(board, [grey for own in samples.values() for grey in own])
     board, side_notes = match_sides(board, samples)
@@ -221,17 +221,17 @@ def _image_paths(sources: Sources, pattern: str) -> list[Path]:
     else:
         paths = sorted(path for path in location.parent.glob(location.name) if path.suffix.lower() in _IMAGE_SUFFIXES)
     if not paths:
-        raise CalibrationError(f"no pictures at {location}; give a folder or a pattern such as left/*.png")
+        raise CalibrationError(f"no images at {location}; give a folder or a pattern such as left/*.png")
     return paths
 
 
 def _read_grey_image(path: Path) -> Image:
     if path.stat().st_size > _LARGEST_PICTURE_BYTES:
-        raise CalibrationError(f"{path} is larger than {_LARGEST_PICTURE_BYTES // 10**6} MB; is it a picture?")
+        raise CalibrationError(f"{path} is larger than {_LARGEST_PICTURE_BYTES // 10**6} MB; is it an image?")
     try:
         grey = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_GRAYSCALE)
     except cv2.error:
         grey = None
     if grey is None:
-        raise CalibrationError(f"{path} cannot be read as a picture; convert it to PNG or JPEG")
+        raise CalibrationError(f"{path} cannot be read as an image; convert it to PNG or JPEG")
     return np.asarray(grey, np.uint8)

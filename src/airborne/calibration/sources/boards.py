@@ -107,7 +107,7 @@ def board_from_table(table: dict, where: str) -> Board:
     try:
         checked = _BoardTable.model_validate(table)
     except ValidationError as error:
-        raise CalibrationError(f"{where}: {one_line(error)}") from None
+        raise CalibrationError(f"{where}: {one_line(error, table, _BoardTable)}") from None
     square_m = checked.square_m or (checked.square_size_override_cm or 0.0) / 100
     if not square_m:
         raise CalibrationError(f"{where}: the size of a square is missing; measure the print and give square_m")

@@ -191,6 +191,6 @@ def sources_from(document: dict, folder: Path, where: str) -> Sources:
     try:
         sources = Sources.model_validate(document)
     except ValidationError as error:
-        raise CalibrationError(f"{where}: {one_line(error)}") from None
+        raise CalibrationError(f"{where}: {one_line(error, document, Sources)}") from None
     sources._folder = folder
     return sources

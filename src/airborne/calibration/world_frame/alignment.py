@@ -14,7 +14,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras.camera import Rig
 from airborne.constants import STANDARD_GRAVITY_M_S2
-from airborne.errors import CalibrationError
+from airborne.errors import CalibrationError, count
 from airborne.geometry.robust import SD_OF_MEDIAN_DEVIATION
 from airborne.types import Array
 
@@ -60,7 +60,7 @@ class Gravity:
         ratio = self.magnitude / STANDARD_GRAVITY_M_S2
         error = abs(self.magnitude - STANDARD_GRAVITY_M_S2)
         sentence = (
-            f"up from {self.n_throws} throw{'s' * (self.n_throws > 1)}: known to {np.degrees(self.tilt_sd_rad):.2f} "
+            f"up from {count(self.n_throws, 'throw')}: known to {np.degrees(self.tilt_sd_rad):.2f} "
             f"degrees; the fall is {self.magnitude:.2f} m/s2 (sd {self.magnitude_sd:.2f}), expected 9.81"
         )
         if error <= max(3 * self.magnitude_sd, 0.01 * STANDARD_GRAVITY_M_S2):

@@ -62,7 +62,7 @@ def dlt_text(rig: Rig, pixels: PixelConvention, unit: Unit = "m") -> str:
 
 def dlt_losses(rig: Rig) -> tuple[str, ...]:
     """Return what DLT coefficients cannot hold: names, image sizes, and distortion with its largest displacement."""
-    notes = [f"names: cam1, cam2, ... for {', '.join(rig.names)}", "picture sizes"]
+    notes = [f"names: cam1, cam2, ... for {', '.join(rig.names)}", "image sizes"]
     distorted = [f"{camera.name} (up to {_corner_shift_px(camera):.1f} px)" for camera in rig if camera.is_distorted]
     return (
         (*notes, f"lens distortion of {', '.join(distorted)}: straighten pixels first") if distorted else tuple(notes)

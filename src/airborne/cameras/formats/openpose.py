@@ -43,7 +43,7 @@ def read_folder(folder: Path, person: int | None = None) -> tuple[Array, int]:
         if one_person is not None and frame is not None:
             keypoints[frame] = one_person
     if not keypoints:
-        raise CalibrationError(f"{folder}: there is nobody in any picture; give the detections of a person")
+        raise CalibrationError(f"{folder}: there is nobody in any image; give the detections of a person")
     counts = {len(one) for one in keypoints.values()}
     if len(counts) > 1:
         raise CalibrationError(f"{folder}: people of {sorted(counts)} points; expected one list of points throughout")
@@ -93,7 +93,7 @@ def _people(path: Path) -> list[Array]:
     """Read the people (points, 3) of one OpenPose file."""
     try:
         if path.stat().st_size > _LARGEST_FILE_BYTES:
-            raise CalibrationError(f"{path} is larger than any picture's detections ({path.stat().st_size} bytes)")
+            raise CalibrationError(f"{path} is larger than any image's detections ({path.stat().st_size} bytes)")
         document = read_json(path)
         people = [np.array(person["pose_keypoints_2d"], float).reshape(-1, 3) for person in document["people"]]
     except OSError as error:

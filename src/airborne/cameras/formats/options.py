@@ -61,6 +61,6 @@ class FileOptions:
         size = self.size.get(camera) if isinstance(self.size, Mapping) else self.size
         if size is None:
             raise CalibrationError(
-                f"{where} does not say how large the pictures of '{camera}' are; give --size WIDTHxHEIGHT"
+                f"{where} does not say how large the images of '{camera}' are; give --size WIDTHxHEIGHT"
             )
         return size

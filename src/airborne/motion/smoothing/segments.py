@@ -71,7 +71,7 @@ def smooth_stretches(
     shorter gaps are filled by the smoother. Frames before the first and after the last known one of a segment are
     never filled. Stretches of fewer than five known frames stay NaN.
     """
-    segment = np.searchsorted(np.sort(np.asarray(boundaries_s, float)), time_s, side="right")
+    segment = segment_numbers(time_s, boundaries_s)
     is_known = finite_rows(values)
     pieces = SmoothedSegments(SmoothedPaths.unknown(values.shape), segment, np.zeros(len(time_s), bool))
     for rows in stretches(time_s, is_known, segment, fill_s):
@@ -80,6 +80,11 @@ def smooth_stretches(
             getattr(pieces.paths, field.name)[rows] = getattr(stretch, field.name)
         pieces.is_filled[rows] = ~is_known[rows]
     return pieces
+
+
+def segment_numbers(time_s: Array, boundaries_s: Sequence[float]) -> NDArray[np.int64]:
+    """Return the number of each time's segment, from 0: (n,); at the very time of a boundary that of the next."""
+    return np.searchsorted(np.sort(np.asarray(boundaries_s, float)), time_s, side="right")
 
 
 def finite_rows(values: Array) -> NDArray[np.bool_]:

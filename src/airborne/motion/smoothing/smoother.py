@@ -40,7 +40,7 @@ CENTRE_OF_MASS = "centre_of_mass"
 _DESCRIPTIONS = {
     "butterworth": "zero-lag Butterworth low-pass, second order forward and back, -3 dB of both at {cutoff:g} Hz",
     "spline": "cubic smoothing spline by generalised cross-validation, weighted by 1 / variance",
-    "kalman": "Kalman smoother, white jerk of likeliest strength, the tracker's covariances",
+    "kalman": "Kalman smoother with white-noise jerk, its density by maximum likelihood, and the tracker's covariances",
 }
 _FILLED_BY = {
     "butterworth": "a cubic spline through the known frames",
@@ -83,10 +83,15 @@ class Smoothing:
         text = _DESCRIPTIONS[self.method].format(cutoff=self.cutoff_hz)
         if self.resample_hz is not None:
             text += f", on a cubic spline through the values sampled at {self.resample_hz:g} Hz"
-        fill = f"gaps up to {self.fill_s:g} s filled by {_FILLED_BY[self.method]}" if self.fill_s else "no gap filled"
+        fill = (
+            f"gaps up to {self.fill_s:g} s filled by {_FILLED_BY[self.method]}"
+            if self.fill_s
+            else "gaps are not filled"
+        )
         spans = boundaries_s if isinstance(boundaries_s, Mapping) else {"": boundaries_s}
-        cuts = [f"{name} {_list_times(times)}".strip() for name, times in spans.items()]
-        return [f"smoothing: {text}", fill, f"segments end at {'; '.join(cuts)}"]
+        cuts = [f"{name} {', '.join(f'{t:.4f} s' for t in times)}".strip() for name, times in spans.items() if times]
+        ends = f"segments end at {'; '.join(cuts)}" if cuts else "no event splits the motion"
+        return [f"smoothing: {text}", fill, ends]
 
 
 def smooth_root(motion: Motion, smoothing: Smoothing, boundaries_s: Sequence[float]) -> xr.Dataset:
@@ -291,7 +296,3 @@ def _continuous(radians: Array) -> Array:
     for before, row in pairwise(np.flatnonzero(np.isfinite(angles).all(axis=1))):
         angles[row] = nearest_angles(angles[row], angles[before])
     return angles
-
-
-def _list_times(times_s: Sequence[float]) -> str:
-    return ", ".join(f"{time:.4f} s" for time in times_s) or "no event"

@@ -85,7 +85,7 @@ def require_empty(folder: Path, overwrite: bool) -> None:
     if folder.exists() and not folder.is_dir():
         raise TrialError(f"{folder} is a file; give a folder for the trial")
     if not overwrite and folder.is_dir() and any(folder.iterdir()):
-        raise TrialError(f"{folder} is not empty; give another folder, or overwrite it")
+        raise TrialError(f"{folder} is not empty; give a new folder, or empty this one")
 
 
 def trial_toml(scene: Scene) -> str:

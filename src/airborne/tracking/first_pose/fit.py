@@ -93,8 +93,8 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
     worst = max(off_m, key=off_m.__getitem__)
     missing = ", ".join(name for name, point in targets.items() if np.isnan(point).any())
     notes = [
-        f"{where}: first pose found, landmarks {fit.rms_m * 1e3:.0f} mm off (RMS), "
-        f"most {worst}, {off_m[worst] * 1e3:.0f} mm",
+        f"{where}: first pose found; landmarks are {fit.rms_m * 1e3:.0f} mm off (RMS), "
+        f"the largest is {worst} with {off_m[worst] * 1e3:.0f} mm",
         f"{where}: no place of {missing}; there the first pose is as near to straight as it can be" if missing else "",
         f"{where}: {fit.note}" if fit.note else "",
     ]

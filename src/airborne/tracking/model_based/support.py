@@ -34,7 +34,7 @@ def count_views(
     for region in regions:
         R, t = region.packed_view[:9].reshape(3, 3), region.packed_view[9:12]
         behind = -R.T @ t - _BEHIND_M * R[2]
-        bodies = [posed, *(_without(posed, segment, behind) for segment in segments)]
+        bodies = [posed, *(_without(posed, int(segment), behind) for segment in segments)]
         cost = image_cost(render_model, bodies, region, appearance)
         counts[segments] += cost[1:] - cost[0] > _STRONG_NATS
     return counts

@@ -1,0 +1,45 @@
+"""What is left of a trial file without its mistakes, so that all else in it can be checked too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+from airborne.errors import MistakesError
+from airborne.trial.file import Trial, read_tables
+
+_MOST_MISTAKES = 100  # after which nothing is left
+
+
+def parse_remainder(path: Path) -> Trial | None:
+    """Read a trial whose tables hold mistakes, without these: keys at their defaults, cameras left out.
+
+    None where it cannot be read without them. Raises TrialError for a file without tables.
+    """
+    tables = deepcopy(read_tables(path))
+    for _ in range(_MOST_MISTAKES):
+        try:
+            trial = Trial(**tables)
+        except MistakesError as error:
+            if not any(_remove(tables, place) for place in error.places[:1]):
+                return None
+        else:
+            trial._folder = path.parent
+            return trial
+    return None
+
+
+def _remove(tables: dict[str, Any], place: Sequence[int | str]) -> bool:
+    """Remove the innermost item on the way to a place; False where the way leads nowhere."""
+    here: Any = tables
+    holder, key = None, None
+    for step in place:
+        is_index = isinstance(here, list) and isinstance(step, int) and step < len(here)
+        if is_index or (isinstance(here, dict) and step in here):
+            holder, key, here = here, step, here[step]
+    if holder is None:
+        return False
+    del holder[key]
+    return True
