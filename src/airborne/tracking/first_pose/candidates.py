@@ -10,20 +10,26 @@ import numpy as np
 
 from airborne.body import BodyModel, Pose
 from airborne.errors import TrialError
-from airborne.rendering import FLAT, ScoreRule, mask_evidence, pack_targets, score
+from airborne.rendering import mask_evidence
 from airborne.tracking.first_pose.moments import Moment
 from airborne.tracking.first_pose.places import Place, find_places
-from airborne.tracking.first_pose.rigid_search import Posed, Thing, full_maps, search_orientations
+from airborne.tracking.first_pose.rigid_search import (
+    N_FITTED,
+    Thing,
+    different_poses,
+    fit_image,
+    full_maps,
+    log_likelihoods,
+    roots_of,
+    search_orientations,
+)
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
 LEAST_PROBABILITY = 0.95  # of the best candidate, with which it is taken
-# the next five: `benchmarks/accuracy/find_start.py --seeds 1000-1029`, none of which its rows are measured on
-_SHARE_PER_NAT = 0.02  # share of the evidence that makes a silhouette e times likelier
-_CHROMA_SD, _GREY_SD = 4.0, 12.0  # of colours, less their brightness, and with it [grey levels]
-_LEAST_PRECISION, _LEAST_RECALL = 0.75, 0.6  # of a mask over what stands out
+# right bodies had 0.86 and more, other bodies 0.77 at most (`benchmarks/accuracy/find_start.py`, throws 1000-1029)
+_LEAST_AGREEMENT = 0.8  # mean of a mask's precision and recall over what stands out
 _MOST_MOMENTS, _MOST_PLACES = 3, 3  # that are searched: about a second each
-_MOST_CANDIDATES = 6  # whose colours are compared: the rest covers far less
 _AS_WELL = 0.7  # share of the largest picture of the body that counts as large as any
 _LEAST_SHOWN = 0.01  # probability of a candidate that is listed
 
@@ -40,7 +46,7 @@ class Candidate:
     @property
     def is_plausible(self) -> bool:
         """Whether its silhouettes agree with what stands out."""
-        return self.precision >= _LEAST_PRECISION and self.recall >= _LEAST_RECALL
+        return (self.precision + self.recall) / 2 >= _LEAST_AGREEMENT
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,41 +94,37 @@ def _best_first(seen: Sequence[tuple[Moment, list[Place]]]) -> list[tuple[Moment
 
 
 def _find_at(thing: Thing, moment: Moment, places: Sequence[Place]) -> StartSearch:
-    found = [(place, posed) for place in places[:_MOST_PLACES] for posed in search_orientations(thing, moment, place)]
-    found.sort(key=lambda each: -each[1].evidence)
-    found = found[:_MOST_CANDIDATES]
-    R = np.stack([posed.pose.world_from_root.rotation.as_matrix() for _, posed in found])[:, None]
-    t = np.stack([posed.pose.world_from_root.translation for _, posed in found])[:, None]
-    probability = _probabilities(thing, moment, [posed for _, posed in found], R, t)
-    precision, recall = _agreement(thing, moment, [place for place, _ in found], R, t)
+    poses = [pose for place in places[:_MOST_PLACES] for pose in search_orientations(thing, moment, place)]
+    poses = different_poses(thing, moment, poses, N_FITTED)
+    if not thing.model.needs_colours:
+        likely = _probabilities(thing, moment, poses) >= _LEAST_SHOWN
+        fitted = [fit_image(thing, moment, pose) for pose, is_likely in zip(poses, likely, strict=True) if is_likely]
+        poses = different_poses(thing, moment, [*fitted, *poses[len(fitted) :]], N_FITTED)
+    probability = _probabilities(thing, moment, poses)
+    precision, recall = _agreement(thing, moment, places, poses)
     candidates = [
-        Candidate(posed.pose, float(probability[i]), float(precision[i]), float(recall[i]))
-        for i, (_, posed) in enumerate(found)
+        Candidate(pose, float(probability[i]), float(precision[i]), float(recall[i]))
+        for i, pose in enumerate(poses)
         if probability[i] >= _LEAST_SHOWN
     ]
     candidates.sort(key=lambda candidate: -candidate.probability)
     return StartSearch(moment, tuple(candidates), len(places))
 
 
-def _probabilities(thing: Thing, moment: Moment, found: Sequence[Posed], R: Array, t: Array) -> Array:
-    """Return the candidates' probabilities (n,) by silhouettes and colours; R (n, 1, 3, 3), t (n, 1, 3) [m]."""
-    evidence = np.array([posed.evidence for posed in found])
-    nats = (evidence / max(evidence.max(), 1e-9) - 1) / _SHARE_PER_NAT
-    if not thing.model.needs_colours:
-        targets = pack_targets(moment.frames.views, FLAT)
-        for rule, sd in ((ScoreRule(normalised=1.0), _CHROMA_SD), (ScoreRule(fits_gain=True), _GREY_SD)):
-            off = score(thing.render_model.geometry, targets, R, t, rule=rule)
-            nats = nats - np.minimum(off, 128.0) ** 2 / (2 * sd**2)
+def _probabilities(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> Array:
+    nats = log_likelihoods(thing, moment, poses)
     likelihood = np.exp(nats - nats.max())
     return likelihood / likelihood.sum()
 
 
-def _agreement(thing: Thing, moment: Moment, places: Sequence[Place], R: Array, t: Array) -> tuple[Array, Array]:
-    """Return precision and recall (n,) of the candidates' masks, over all views."""
-    geometry = thing.render_model.geometry
+def _agreement(thing: Thing, moment: Moment, places: Sequence[Place], poses: Sequence[Pose]) -> tuple[Array, Array]:
+    """Return precision and recall (n,) of the poses' masks, over all views; recall of the nearest place."""
+    geometry, (R, t) = thing.render_model.geometry, roots_of(poses)
     probable = full_maps(moment, moment.probability)
     ones = full_maps(moment, [None if p is None else np.ones_like(p) for p in moment.probability])
-    inside = mask_evidence(geometry, probable, R, t).sum(axis=1)
-    area = mask_evidence(geometry, ones, R, t).sum(axis=1)
-    total = np.array([sum(region.area_px for region in place.regions if region is not None) for place in places])
+    inside = mask_evidence(geometry, probable, R[:, None], t[:, None]).sum(axis=1)
+    area = mask_evidence(geometry, ones, R[:, None], t[:, None]).sum(axis=1)
+    middles = t + R @ thing.centre
+    away = np.linalg.norm(middles[:, None] - np.stack([place.position for place in places]), axis=2)
+    total = np.array([places[i].rank[1] for i in away.argmin(axis=1)])
     return inside / np.maximum(area, 1), np.minimum(inside / np.maximum(total, 1), 1.0)

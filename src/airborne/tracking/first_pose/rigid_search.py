@@ -1,4 +1,4 @@
-"""Finding a thing: all orientations at the places where something moves, scored by silhouettes, the best fitted."""
+"""StartSearch a thing: all orientations at the places where something moves, scored by silhouettes, the best fitted."""
 
 from __future__ import annotations
 
@@ -17,11 +17,13 @@ from airborne.appearance.model import Region
 from airborne.body import BodyModel, Pose, SurfaceArrays
 from airborne.body.symmetry import continuous_axes, symmetries
 from airborne.geometry.rotations import super_fibonacci
-from airborne.rendering import EvidenceMaps, evidence_maps, mask_evidence
+from airborne.rendering import FLAT, EvidenceMaps, ScoreRule, evidence_maps, mask_evidence, pack_targets, score
 from airborne.tracking.first_pose.moments import Moment
 from airborne.tracking.first_pose.places import Place
 from airborne.tracking.image_regions import bounding_points, crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import root_only
+from airborne.tracking.model_based.first_frame import fit_first
+from airborne.tracking.model_based.fitter import Fitter
 from airborne.tracking.model_based.gauss_newton import PyramidLevels, fit_silhouettes
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
@@ -32,17 +34,13 @@ _N_KEPT = 64  # orientations that are searched around
 _N_AROUND = 32  # proposals around each, at every blur after the first
 _WIDTH_M, _WIDTH_RAD = 0.12, 0.16  # sds of the first of these, in body radii and radians; halved each time
 _APART_RAD = 0.35  # orientations that are closer count as one
-_N_FITTED = 20  # of the best, to the silhouettes
+N_FITTED = 20  # of the best, to the silhouettes
 _LEVELS: PyramidLevels = ((4, 4), (2, 3), (1, 4))  # reduction of the small pictures, steps
+# the next three: `benchmarks/accuracy/find_start.py`, seeds from 1000 on, none of which its rows are measured on
+_SHARE_PER_NAT = 0.01  # share of the evidence that makes a silhouette e times likelier
+_CHROMA_SD, _GREY_SD = 4.0, 12.0  # of colours, less their brightness, and with it [grey levels]
+_MOST_GREY = 128.0  # [grey levels] a larger difference counts as this
 _MARGIN_PX = 24  # around the poses, of the small pictures
-
-
-@dataclass(frozen=True, slots=True)
-class Posed:
-    """A pose that was found, with what its silhouette covers."""
-
-    pose: Pose
-    evidence: float  # sum over its masks in all views [nats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +87,7 @@ class Thing:
         return np.arccos(np.clip((traces.max(axis=1) - 1) / 2, -1, 1))
 
 
-def search_orientations(thing: Thing, moment: Moment, place: Place) -> list[Posed]:
+def search_orientations(thing: Thing, moment: Moment, place: Place) -> list[Pose]:
     """Search all orientations at one place of one moment; return what was found, the best first, all different."""
     R = super_fibonacci(_N_ORIENTATIONS)
     t = place.position - R @ thing.centre
@@ -109,25 +107,53 @@ def search_orientations(thing: Thing, moment: Moment, place: Place) -> list[Pose
         scores = _scores(thing, maps, turned, moved).reshape(_N_AROUND, len(R))
         rows = scores.argmax(axis=0) * len(R) + np.arange(len(R))
         R, t = turned[rows], moved[rows]
-    best = _apart(thing, R, t, scores.max(axis=0), _N_FITTED)
-    return _fit(thing, moment, R[best], t[best])
-
-
-def _fit(thing: Thing, moment: Moment, R: Array, t: Array) -> list[Posed]:
-    """Fit poses to the silhouettes; return those that end apart, the best first."""
     poses = [
         Pose(world_from_root=RigidTransform.from_components(position, Rotation.from_matrix(rotation)))
         for rotation, position in zip(R, t, strict=True)
     ]
+    return _fit(thing, moment, different_poses(thing, moment, poses, N_FITTED))
+
+
+def log_likelihoods(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> Array:
+    """Compare poses with each other by silhouettes and known colours: (n,) [nats]."""
+    R, t = roots_of(poses)
+    evidence = _scores(thing, full_maps(moment, moment.evidence), R, t)
+    nats = (evidence / max(evidence.max(), 1e-9) - 1) / _SHARE_PER_NAT
+    if thing.model.needs_colours:
+        return nats
+    targets, geometry = pack_targets(moment.frames.views, FLAT), thing.render_model.geometry
+    for rule, sd in ((ScoreRule(normalised=1.0), _CHROMA_SD), (ScoreRule(fits_gain=True), _GREY_SD)):
+        off = score(geometry, targets, R[:, None], t[:, None], rule=rule)
+        nats = nats - np.minimum(off, _MOST_GREY) ** 2 / (2 * sd**2)
+    return nats
+
+
+def _fit(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> list[Pose]:
+    """Fit poses to the silhouettes."""
     regions, probabilities = candidate_regions(thing, moment, poses)
     dofs = root_only(thing.model)
-    poses = [
+    return [
         fit_silhouettes(thing.render_model, pose, regions, probabilities, levels=_LEVELS, dofs=dofs) for pose in poses
     ]
-    R = np.stack([pose.world_from_root.rotation.as_matrix() for pose in poses])
-    t = np.stack([pose.world_from_root.translation for pose in poses])
-    scores = _scores(thing, full_maps(moment, moment.evidence), R, t)
-    return [Posed(poses[i], float(scores[i])) for i in _apart(thing, R, t, scores, _N_FITTED)]
+
+
+def fit_image(thing: Thing, moment: Moment, pose: Pose) -> Pose:
+    """Fit a pose to the small pictures themselves, as the first frame of a run is; itself where that is no better."""
+    fit = fit_first(Fitter.of(thing.render_model, "refined", fixed_shape=True), pose, moment.frames, None)
+    both = [pose] if fit is None else [pose, fit.fit.pose]
+    return both[int(np.argmax(log_likelihoods(thing, moment, both)))]
+
+
+def different_poses(thing: Thing, moment: Moment, poses: Sequence[Pose], n: int) -> list[Pose]:
+    """Return the n likeliest of the poses that are apart from each other, the likeliest first."""
+    R, t = roots_of(poses)
+    return [poses[i] for i in _apart(thing, R, t, log_likelihoods(thing, moment, poses), n)]
+
+
+def roots_of(poses: Sequence[Pose]) -> tuple[Array, Array]:
+    """Return the poses' rotations (n, 3, 3) and positions (n, 3) [m]."""
+    roots = [pose.world_from_root for pose in poses]
+    return np.stack([root.rotation.as_matrix() for root in roots]), np.stack([root.translation for root in roots])
 
 
 def candidate_regions(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> tuple[list[Region], list[Array]]:
