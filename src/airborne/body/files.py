@@ -30,7 +30,7 @@ from airborne.body.model import (
 )
 from airborne.errors import BodyError, one_line
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
-from airborne.io.names import FilePath
+from airborne.io.names import CheckedPath
 from airborne.io.text import list_keys, read_toml
 from airborne.io.writing import write_text
 
@@ -55,7 +55,7 @@ class _PartTable(_Strict):
     shape: Literal["box", "ellipsoid", "mesh"]
     size_m: _Vector | None = None
     semi_axes_m: _Vector | None = None
-    file: FilePath | None = None
+    file: CheckedPath | None = None
     scale: float = Field(1.0, gt=0)  # metres per unit of the mesh file
     centre_m: _Vector = [0.0, 0.0, 0.0]
     rotation_deg: _Vector = [0.0, 0.0, 0.0]  # about the segment's x, then the new y, then the new z

@@ -59,4 +59,4 @@ def _quote(text: str) -> str:
 
 Name = Annotated[str, AfterValidator(check_name)]
 ColumnName = Annotated[str, AfterValidator(check_column)]
-FilePath = Annotated[str, AfterValidator(check_path)]
+CheckedPath = Annotated[str, AfterValidator(check_path)]

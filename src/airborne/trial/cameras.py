@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from airborne.io.names import FilePath, Name
+from airborne.io.names import CheckedPath, Name
 from airborne.trial.table import SettingsTable
 
 
@@ -14,7 +14,7 @@ class CameraTable(SettingsTable):
     """One camera's video, and how its pixels lie in the calibration's image."""
 
     name: Name
-    video: FilePath  # live also rtsp://...
+    video: CheckedPath  # live also rtsp://...
     fields: Literal["progressive", "top-first", "bottom-first", "auto"] = "progressive"
     offset_s: float = 0.0  # added to this camera's times
     offset_sd_s: float = Field(0.0, ge=0)  # its standard deviation

@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import Pose
 from airborne.errors import TrialError
 from airborne.geometry.rotations import matrix_from_angles
-from airborne.io.names import FilePath
+from airborne.io.names import CheckedPath
 from airborne.trial.players import PlayerTable
 from airborne.trial.table import SettingsTable, Vector
 
@@ -26,9 +26,9 @@ class StartTable(SettingsTable):
     quaternion_xyzw: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
     somersault_tilt_twist_deg: Vector | None = None
     joint_angles_deg: dict[str, Vector] = {}  # segment -> x, y, z
-    joints_m: dict[str, Vector] | FilePath | None = None  # landmark -> position, or a table of them
-    points_px: FilePath | None = None  # a table of clicked points
-    detections: FilePath | None = None  # .npz, or a folder of folders of OpenPose JSON
+    joints_m: dict[str, Vector] | CheckedPath | None = None  # landmark -> position, or a table of them
+    points_px: CheckedPath | None = None  # a table of clicked points
+    detections: CheckedPath | None = None  # .npz, or a folder of folders of OpenPose JSON
     detections_cameras: dict[str, str] = {}  # camera -> its array or folder
     player: list[PlayerTable] = []
 

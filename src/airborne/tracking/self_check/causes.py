@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from airborne.tracking.self_check.nuisances import Kind, Nuisance, widen
-from airborne.tracking.self_check.solution import Solution
+from airborne.tracking.self_check.solution import NuisanceSolution
 from airborne.types import Array
 
 _ALARM_SDS = 3.0  # from zero: a false alarm in 370, were errors normal
@@ -28,7 +28,7 @@ _MODEL_SHARE = 0.02  # the same, as a share of the value
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class LikelyCause:
     """One cause's size, positive where the truth is larger or later than the files say; of three numbers, the norm."""
 
     subject: str
@@ -56,7 +56,7 @@ class Finding:
 class Diagnosis:
     """The findings, alarms first, and the parameters with what is known of them."""
 
-    findings: tuple[Finding, ...]
+    findings: tuple[LikelyCause, ...]
     theta: Array  # (k,)
     covariance: Array  # (k, k)
 
@@ -66,7 +66,7 @@ class Diagnosis:
         return any(finding.is_alarm for finding in self.findings)
 
 
-def diagnose(solution: Solution, nuisances: Sequence[Nuisance], prior: Array) -> Diagnosis:
+def name_causes(solution: NuisanceSolution, nuisances: Sequence[Nuisance], prior: Array) -> Diagnosis:
     """Name the likeliest causes, one after the other while each explains more than chance; list all the others."""
     named: list[tuple[Nuisance, list[Nuisance]]] = []
     for _ in range(_MOST_CAUSES):
@@ -79,18 +79,18 @@ def diagnose(solution: Solution, nuisances: Sequence[Nuisance], prior: Array) ->
         same = [n for n, score in clear.items() if n is not best and score > clear[best] - _SAME]
         named.append((best, same))
         prior = widen(prior, best)
-    alarms: list[Finding] = []
+    alarms: list[LikelyCause] = []
     for best, same in named:
         without = prior - widen(np.zeros_like(prior), best)
-        others = [Finding(n.subject, n.kind, *_size(solution, n, widen(without, n)), is_alarm=True) for n in same]
+        others = [LikelyCause(n.subject, n.kind, *_size(solution, n, widen(without, n)), is_alarm=True) for n in same]
         sentences = tuple(each.sentence for each in others)
         value, sd = _size(solution, best, prior)
-        alarms += [Finding(best.subject, best.kind, value, sd, is_alarm=True, alternatives=sentences), *others]
+        alarms += [LikelyCause(best.subject, best.kind, value, sd, is_alarm=True, alternatives=sentences), *others]
     for nuisance in {each for _, same in named for each in same}:
         prior = widen(prior, nuisance)
     listed = {(finding.subject, finding.kind) for finding in alarms}
     others = [
-        Finding(n.subject, n.kind, *_size(solution, n, prior), is_alarm=False)
+        LikelyCause(n.subject, n.kind, *_size(solution, n, prior), is_alarm=False)
         for n in nuisances
         if (n.subject, n.kind) not in listed
     ]
@@ -98,25 +98,25 @@ def diagnose(solution: Solution, nuisances: Sequence[Nuisance], prior: Array) ->
     return Diagnosis((*alarms, *others), theta, covariance)
 
 
-def _evidence(solution: Solution, nuisances: Sequence[Nuisance], prior: Array) -> dict[Nuisance, float]:
+def _evidence(solution: NuisanceSolution, nuisances: Sequence[Nuisance], prior: Array) -> dict[Nuisance, float]:
     """Return by how much each cause alone makes the pictures likelier [nats], its freedom penalised."""
     base = _log_likelihood(solution, prior)
     return {n: _log_likelihood(solution, widen(prior, n)) - base for n in nuisances}
 
 
-def _log_likelihood(solution: Solution, prior: Array) -> float:
+def _log_likelihood(solution: NuisanceSolution, prior: Array) -> float:
     """Return the logarithm of the marginal likelihood, less what does not depend on the prior."""
     misfit = solution.posterior(prior)[2]
     occam = np.linalg.slogdet(np.eye(len(prior)) + prior @ solution.H)[1]
     return -0.5 * (misfit + float(occam))
 
 
-def _is_clear(solution: Solution, nuisance: Nuisance, prior: Array) -> bool:
+def _is_clear(solution: NuisanceSolution, nuisance: Nuisance, prior: Array) -> bool:
     value, sd = _size(solution, nuisance, widen(prior, nuisance))
     return abs(value) > _ALARM_SDS * sd
 
 
-def _size(solution: Solution, nuisance: Nuisance, prior: Array) -> tuple[float, float]:
+def _size(solution: NuisanceSolution, nuisance: Nuisance, prior: Array) -> tuple[float, float]:
     """Return a cause's value and sd, in degrees for a turn; of three numbers the norm."""
     theta, covariance, _ = solution.posterior(prior)
     mean, block = theta[nuisance.columns], covariance[nuisance.columns, nuisance.columns]

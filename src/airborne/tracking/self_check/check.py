@@ -12,7 +12,7 @@ from airborne.body import BodyModel, Pose
 from airborne.cameras import Rig
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.self_check.absolute import has_stayed, lies_elsewhere, spread, too_fast
-from airborne.tracking.self_check.causes import Diagnosis, diagnose
+from airborne.tracking.self_check.causes import Diagnosis, name_causes
 from airborne.tracking.self_check.empty_scenes import EmptyScenes
 from airborne.tracking.self_check.free_flight import excess, fall
 from airborne.tracking.self_check.nuisances import (
@@ -26,7 +26,7 @@ from airborne.tracking.self_check.nuisances import (
 )
 from airborne.tracking.self_check.path import TrackedPath
 from airborne.tracking.self_check.registration import draw_silhouette, foreground, outline_of, register
-from airborne.tracking.self_check.solution import Evidence, PoseErrors, Solution, pose_errors, solve
+from airborne.tracking.self_check.solution import Evidence, NuisanceSolution, PoseErrors, pose_errors, solve
 from airborne.types import Array
 from airborne.video import Frames
 
@@ -44,7 +44,7 @@ class RunEquations:
 
     rows: Sequence[int]  # of the path, the moments
     evidence: Evidence
-    solution: Solution
+    solution: NuisanceSolution
     errors: PoseErrors
     prior: Array  # (k, k) what is usual
 
@@ -92,7 +92,7 @@ def self_check(
     rows, evidence, errors = run.rows, run.evidence, run.errors
     diagnosis = Diagnosis((), np.zeros(len(run.prior)), run.prior)
     if run.says_causes:
-        diagnosis = diagnose(run.solution, nuisances_of(rig), run.prior)
+        diagnosis = name_causes(run.solution, nuisances_of(rig), run.prior)
     K = errors.by_parameter
     constant = K @ diagnosis.covariance @ np.swapaxes(K, 1, 2)
     mean = errors.shown(diagnosis.theta) if diagnosis.has_alarm else K @ diagnosis.theta
@@ -202,7 +202,9 @@ def _gather(
     return evidence
 
 
-def _with_fall(solution: Solution, errors: PoseErrors, path: TrackedPath, rows: Sequence[int]) -> Solution:
+def _with_fall(
+    solution: NuisanceSolution, errors: PoseErrors, path: TrackedPath, rows: Sequence[int]
+) -> NuisanceSolution:
     """Add what the fall says of the sizes, where the body falls freely."""
     poses = [path.poses[row].world_from_root for row in rows]
     position = np.array([pose.translation for pose in poses])

@@ -51,7 +51,7 @@ class Silhouette:
 
 
 @dataclass(frozen=True, slots=True)
-class Outline:
+class SilhouetteOutline:
     """How a silhouette's outline changes by a twist of the body about its root [per m, per rad]."""
 
     by_twist: Array  # (4, 6) its offset
@@ -135,12 +135,12 @@ def register(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array | None
     return offset[:N_SIMILARITY] * _to_px(silhouette) if overlap > _LEAST_OVERLAP else None
 
 
-def outline_of(silhouette: Silhouette, posed: PosedBody) -> Outline:
+def outline_of(silhouette: Silhouette, posed: PosedBody) -> SilhouetteOutline:
     """Differentiate a silhouette's outline."""
     C, B = _outline_derivatives(silhouette, posed)
     to_px = _to_px(silhouette)
     by_twist = np.linalg.lstsq(B.T, C.T, rcond=1e-6)[0][:N_SIMILARITY]
-    return Outline(by_twist * to_px[:, None], C @ C.T, C @ B[:N_SIMILARITY].T / to_px)
+    return SilhouetteOutline(by_twist * to_px[:, None], C @ C.T, C @ B[:N_SIMILARITY].T / to_px)
 
 
 def _to_px(silhouette: Silhouette) -> Array:

@@ -34,7 +34,7 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solution:
+class NuisanceSolution:
     """Normal equations of the parameters, H theta = g, poses eliminated: theta by H; `total` is the misfit of zero."""
 
     H: Array  # (k, k)
@@ -51,10 +51,10 @@ class Solution:
         mean = covariance @ self.g
         return mean, covariance, float(self.total - self.g @ mean)
 
-    def with_row(self, row: Array, value: float, sd: float) -> Solution:
+    def with_row(self, row: Array, value: float, sd: float) -> NuisanceSolution:
         """Add a linear measurement, row (k,) theta = value."""
         row, value = row / sd, value / sd
-        return Solution(self.H + np.outer(row, row), self.g + value * row, self.total + value**2)
+        return NuisanceSolution(self.H + np.outer(row, row), self.g + value * row, self.total + value**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +71,7 @@ class PoseErrors:
         return self.seen + self.seen_by_parameter @ theta
 
 
-def solve(evidence: Evidence, wide: Array) -> tuple[Solution, Array]:
+def solve(evidence: Evidence, wide: Array) -> tuple[NuisanceSolution, Array]:
     """Accumulate the equations with the noise that the residuals show; return the weights (n, c, 4) too.
 
     wide (k, k): prior of the parameters while the noise is estimated.
@@ -124,7 +124,7 @@ def _pose_information(evidence: Evidence, weights: Array) -> Array:
     return np.einsum("ncai,nca,ncaj->nij", S, weights, S) + np.diag(1 / _POSE_SD**2)
 
 
-def _accumulate(evidence: Evidence, W: Array) -> Solution:
+def _accumulate(evidence: Evidence, W: Array) -> NuisanceSolution:
     """Eliminate each moment's pose (a twist) from the least squares of the offsets."""
     S, D = evidence.by_twist, evidence.by_parameter
     A = _pose_information(evidence, W)
@@ -134,4 +134,4 @@ def _accumulate(evidence: Evidence, W: Array) -> Solution:
     H = np.einsum("ncak,nca,ncal->kl", D, W, D) - np.einsum("nik,nil->kl", C, AC)
     g = np.einsum("ncak,nca,nca->k", D, W, evidence.offset) - np.einsum("nik,ni->k", C, Ab)
     total = float(np.sum(W * evidence.offset**2) - np.sum(b * Ab))
-    return Solution((H + H.T) / 2, g, total)
+    return NuisanceSolution((H + H.T) / 2, g, total)
