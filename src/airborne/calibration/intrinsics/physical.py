@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import dual_annealing, least_squares
@@ -148,7 +149,7 @@ def fit_pinhole(start: Pinhole, model: PinholeModel, world: Array, px: Array) ->
     """Return the camera near start that projects world (n, 3) [m] closest to px (n, 2) [px], by Levenberg-Marquardt."""
     start, n = start.with_lens(model), model.n_parameters
     residual = _residual_of_step(start, model, world, px)
-    slopes = _slopes_of_step(start, model, world) if model in WIDE_MODELS else "2-point"
+    slopes: Any = _slopes_of_step(start, model, world) if model in WIDE_MODELS else "2-point"
     solution = least_squares(
         residual,
         np.zeros(n),

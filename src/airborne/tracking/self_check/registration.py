@@ -115,7 +115,8 @@ def foreground(rgb: NDArray[np.uint8], empty: NDArray[np.uint8], silhouette: Sil
     # pixel (i, j) of the silhouette lies at sx i + (sx - 1) / 2 of the box
     M = np.array([[sx, 0, (sx - 1) / 2], [0, sy, (sy - 1) / 2]])
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    return np.asarray(cv2.warpAffine(share, M, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE))
+    warped = cv2.warpAffine(share, M, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(warped, np.float32)
 
 
 def register(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array | None:
@@ -202,7 +203,7 @@ def _warp(silhouette: Silhouette, offset: Array, plane: NDArray[np.float32]) -> 
     A = np.array([[c, -s], [s, c]])
     shift = silhouette.middle + offset[:2] - A @ silhouette.middle
     size: Any = plane.shape[::-1]
-    return np.asarray(cv2.warpAffine(plane, np.column_stack([A, shift]), size, flags=cv2.INTER_LINEAR))
+    return np.asarray(cv2.warpAffine(plane, np.column_stack([A, shift]), size, flags=cv2.INTER_LINEAR), np.float32)
 
 
 def _outline_derivatives(silhouette: Silhouette, posed: PosedBody) -> tuple[Array, Array]:
@@ -224,11 +225,11 @@ def _outline_derivatives(silhouette: Silhouette, posed: PosedBody) -> tuple[Arra
     turning = np.cross(arms.T, normal.T).T
     C = np.concatenate([R.T @ normal, R.T @ turning])  # (6, n)
     dx, dy = x - silhouette.middle[0], y - silhouette.middle[1]
-    return C, np.stack([gx, gy, gy * dx - gx * dy, gx * dx + gy * dy, -np.hypot(gx, gy)])
+    return C, np.asarray(np.stack([gx, gy, gy * dx - gx * dy, gx * dx + gy * dy, -np.hypot(gx, gy)]), float)
 
 
 def _blur(plane: NDArray[np.float32], sigma: float) -> NDArray[np.float32]:
-    return np.asarray(cv2.GaussianBlur(plane, (0, 0), sigma))
+    return np.asarray(cv2.GaussianBlur(plane, (0, 0), sigma), np.float32)
 
 
 def _correlation(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:

@@ -8,7 +8,7 @@ from airborne.cameras import Rig
 from airborne.tracking.self_check.check import RunEquations
 from airborne.tracking.self_check.nuisances import nuisances_of, widen
 from airborne.tracking.self_check.solution import NuisanceSolution, solve
-from airborne.types import Array
+from airborne.types import Array, Ints
 
 _MODEL_SD_S = 0.0003  # what straight-line motion and constant biases leave open
 _PARTS = 4  # of the run, each left out once: offsets that are wrong alike at neighbouring moments
@@ -39,7 +39,7 @@ def camera_times(run: RunEquations, rig: Rig) -> tuple[Array, Array] | None:
     return later_s, sd
 
 
-def _beyond_first(solution: NuisanceSolution, prior: Array, columns: Array) -> tuple[Array, Array]:
+def _beyond_first(solution: NuisanceSolution, prior: Array, columns: Ints) -> tuple[Array, Array]:
     """Return some parameters less the first of them, and the variances: (c,) twice."""
     theta, covariance, _ = solution.posterior(prior)
     difference = np.eye(len(columns)) - np.eye(len(columns))[0]
