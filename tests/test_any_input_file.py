@@ -10,8 +10,9 @@ import pytest
 from tests.support.any_input import CPU_LIMIT_S, MEMORY_LIMIT_BYTES
 from tests.support.places import ROOT
 
-N_FILES = 2000
-CPU_LIMIT_ALL_S = 120.0  # it takes 20 s on two cores of 2020
+N_FILES = 2000  # a seed
+SEED, SECONDS = (os.environ.get(f"AIRBORNE_FUZZ_{word}", "0") for word in ("SEED", "SECONDS"))
+CPU_LIMIT_ALL_S = 120.0 + 2 * float(SECONDS)  # it takes 20 s on two cores of 2020
 
 
 @pytest.fixture(scope="module")
@@ -19,8 +20,24 @@ def found():
     """What came of feeding the files, in a process of its own, whose memory is limited."""
     threads = {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(
-        [sys.executable, "-m", "tests.support.any_input", str(N_FILES)],
-        **{"cwd": ROOT, "env": os.environ | threads, "capture_output": True, "text": True, "timeout": 1800},
+        [
+            sys.executable,
+            "-m",
+            "tests.support.any_input",
+            "--files",
+            str(N_FILES),
+            "--seed",
+            SEED,
+            "--seconds",
+            SECONDS,
+        ],
+        **{
+            "cwd": ROOT,
+            "env": os.environ | threads,
+            "capture_output": True,
+            "text": True,
+            "timeout": 1800 + 2 * float(SECONDS),
+        },
     )
     assert done.returncode == 0, done.stderr[-2000:]
     return json.loads(done.stdout)

@@ -132,6 +132,7 @@ def test_the_study_holds_no_outputs():
         (lambda: ab.read_run("results").plot("banana"), "choose pose or joints or flight"),
         (lambda: ab.Trial(name="x", camera=[]), "Trial: camera: holds 0 values, expected 1"),
         (lambda: ab.read_rig("calib.toml")["cam1"].px_from_world([0, 1]), "expected (..., 3)"),
+        (lambda: ab.read_rig("calib.toml").points_from_px([0, 1]), "expected (..., 3, 2), a row a camera"),
         (lambda: ab.read_trial("trial.toml", stopp=3), "stopp = 3: track.stopp: unknown key; did you mean stop?"),
         (lambda: ab.evaluate("results"), "give truth, digitised or joints"),
     ],

@@ -19,8 +19,9 @@ class AirborneError(Exception):
     """Base of every error that Airborne raises on purpose; the command line prints it and exits with 2."""
 
     def __str__(self) -> str:
-        """Return the message in one line, however much of a file it quotes."""
+        """Return the message in one line, however much of a file it quotes, and whatever would steer a terminal."""
         text = " ".join(super().__str__().splitlines())
+        text = "".join(letter if letter.isprintable() else "?" for letter in text)
         return text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} ... {text[-_LONGEST // 4 :]}"
 
 

@@ -341,7 +341,7 @@ def random_body(seed):
     turns.append(Rotation.from_euler("XYZ", [rng.uniform(-180, 180), rng.choice([-90, 90]), 20], degrees=True))
     parts = tuple(
         Part(
-            f'a "{i}" \\ é',
+            f'a "{i}" é',
             shape,
             RigidTransform.from_components(rng.normal(size=3), turn),
             None if i == 1 else rng.uniform(0, 255, 3).round(),

@@ -82,7 +82,14 @@ def test_track_prints_what_was_found_and_leaves_every_table(trial, tmp_path, cap
     assert all(line.startswith("tracking ") for line in err.splitlines())
     names = set(files_of(tmp_path / "run"))
     assert names == {
-        *("motion.csv", "tables/motion.parquet", "tables/angles.csv", "joints.csv"),
+        *(
+            "motion.csv",
+            "lasting.bin",
+            "tables/motion.parquet",
+            "tables/angles.csv",
+            "tables/uncertainty.csv",
+            "joints.csv",
+        ),
         *("summary.json", "run.json", "calib.toml", "body.toml"),
     }
     assert list(tomllib.loads((tmp_path / "run" / "calib.toml").read_text())) == ["cam1", "cam2", "metadata"]

@@ -253,7 +253,7 @@ def test_missing_file_is_refused_in_one_line(tmp_path, name):
 
 def test_file_that_is_no_text_is_refused(tmp_path):
     (tmp_path / "a.trc").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ResultError, match="not text"):
+    with pytest.raises(ResultError, match="is not a text file"):
         read_joint_paths(tmp_path / "a.trc")
 
 

@@ -1,11 +1,13 @@
-"""TOML and JSON of any content are read, or refused as broken files are, in little time."""
+"""TOML, JSON and YAML of any content are read, or refused as broken files are, in little time."""
 
+import os
 import time
 import tomllib
+from pathlib import Path
 
 import pytest
 
-from airborne.io.text import parse_toml, read_json, read_toml
+from airborne.io.text import parse_toml, read_bytes, read_flat_yaml, read_json, read_toml
 
 
 def test_plain_files_are_read(tmp_path):
@@ -33,3 +35,55 @@ def test_odd_json_is_a_value_error(tmp_path, text):
 def test_many_numbers_with_points_are_no_deep_key():
     row = ", ".join(["1.5"] * 10_000)
     assert len(parse_toml(f"a = [{row}]")["a"]) == 10_000
+
+
+def flat_yaml(folder, text):
+    (folder / "a.yml").write_text(text)
+    return read_flat_yaml(folder / "a.yml")
+
+
+def test_flat_yaml_is_keys_and_values_as_text(tmp_path):
+    assert flat_yaml(tmp_path, "# measured\na: 1.5\nb: 1e-2\n'c d': 2001-13-45\n") == [
+        ("a", "1.5"),
+        ("b", "1e-2"),
+        ("c d", "2001-13-45"),
+    ]
+    assert flat_yaml(tmp_path, '{"a": 1, "b": "x"}') == [("a", "1"), ("b", "x")]
+    assert flat_yaml(tmp_path, "") == flat_yaml(tmp_path, "- 1\n") == []
+
+
+ALIASES = "a0: &a0 {k: 1}\n" + "".join(f"a{i}: &a{i} {{<<: [{', '.join([f'*a{i - 1}'] * 9)}]}}\n" for i in range(1, 12))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (ALIASES, "line 1: no anchor is read"),
+        ("a: *b\n", "line 1: no alias is read"),
+        *(
+            (f"a: 1\nb: !!{tag} x\n", "line 2: no tag is read")
+            for tag in ("int", "float", "timestamp", "binary", "set")
+        ),
+        ("a: !!python/object/apply:os.system [x]\n", "line 1: no tag is read"),
+        ("a: [1, 2]\n", "line 1: expected one value"),
+        ("a:\n  b: 1\n", "line 2: expected one value"),
+        ("[" * 90_000, "it holds lists and tables"),
+        ("a: " * 30_000, "mapping values are not allowed here"),
+        ("a: 1\n" * 30_000, "larger than 0.1 MB"),
+    ],
+)
+def test_yaml_that_is_not_flat_is_refused_in_one_line_and_soon(tmp_path, text, expected):
+    before = time.process_time()
+    with pytest.raises(ValueError, match=expected) as caught:
+        flat_yaml(tmp_path, text)
+    assert "\n" not in str(caught.value)
+    assert time.process_time() - before < 4
+
+
+def test_what_is_no_file_is_not_read(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", tmp_path, "/dev/zero", "/dev/null"):
+        with pytest.raises(OSError, match="it is no file"):
+            read_bytes(Path(path), 1000)
+    if os.path.exists("/proc/kmsg"):
+        assert read_bytes(Path("/proc/kmsg"), 1000) == b""  # of 0 bytes, says the system; reading would wait for ever

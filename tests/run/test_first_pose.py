@@ -177,7 +177,7 @@ def test_detections_at_the_first_frame_tracked(trial):
     given = trial(DETECTIONS + "frame = 7\n", tables=detections())
     result = find_first_pose(given, MODEL, RIG)
     assert off_m(result.pose, 7, ON_COCO) < 2e-3
-    assert result.notes[0].startswith("found.npz, frame 7: first pose found, landmarks ")
+    assert result.notes[0].startswith("found.npz, frame 7: first pose found; landmarks are ")
 
 
 def test_cameras_with_other_times_are_matched_by_time(trial):

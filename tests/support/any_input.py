@@ -1,9 +1,11 @@
-"""Feeds random and mutated files to every reader of the package: `python -m tests.support.any_input [files] [reader]`.
+"""Feeds random and mutated files to every reader of the package, and those of `tests/corpus`, which broke one once.
 
-Run by test_any_input_file.py in a process of its own. Prints one JSON object: how many files each reader saw, what came
-out that was no AirborneError, the slowest file, the memory taken.
+`python -m tests.support.any_input [--files N] [--seconds S] [--seed K] [--reader NAME]`; test_any_input_file.py runs it
+in a process of its own. With `--seconds` it goes on, seed after seed, until they are over. Prints one JSON object: how
+many files each reader saw, what came out that was no AirborneError, the slowest file, the memory taken.
 """
 
+import argparse
 import contextlib
 import io
 import json
@@ -17,18 +19,19 @@ import traceback
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 import numpy as np
-from hypothesis import Phase, given, settings
-from hypothesis import strategies as st
 
 from airborne import cli
 from airborne.body import human18
 from airborne.body.files import read_body, write_body
 from airborne.body.measurements import read_measurements, write_measurements
+from airborne.body.mesh_files import read_mesh
 from airborne.calibration.sources.boards import read_board
 from airborne.calibration.sources.control_points import read_control_points
+from airborne.calibration.sources.files import read_sources
 from airborne.calibration.sources.wand import read_wand
 from airborne.cameras import PixelConvention, read_detections, read_rig, write_rig
 from airborne.cameras.clicks import read_clicks, read_positions
@@ -55,6 +58,7 @@ from tests.support.mutations import MUTATORS
 from tests.support.places import THROWN_CROSS
 
 EXAMPLE = THROWN_CROSS
+CORPUS = Path(__file__).resolve().parents[1] / "corpus"  # a folder a reader
 CPU_LIMIT_S = 4.0
 MEMORY_LIMIT_BYTES = 1_000_000_000  # above what the process takes with everything loaded
 CAMERAS = ("left", "right", "side")
@@ -112,6 +116,12 @@ def points_in_pictures(folder):
     yield case("DLTdv xypts", xypts, lambda: read_digitisation(xypts, FileOptions()))
     xyz = folder / "t_xyzpts.csv"
     yield case("DLTdv xyzpts", xyz, lambda: read_digitisation(xypts, FileOptions()))
+    sources = folder / "sources.toml"
+    sources.write_text(
+        '[[camera]]\nname = "left"\nsize = [768, 576]\n[[camera]]\nname = "right"\nsize = [768, 576]\n'
+        '[wand]\nfile = "wand.csv"\nlength_m = 0.5\n[world]\nframe = "camera"\n'
+    )
+    yield case("sources", sources, lambda: read_sources(sources))
     wand = folder / "wand.csv"
     wand.write_text("frame,marker,camera,u_px,v_px\n0,1,left,5,6\n0,2,left,7,8\n1,1,right,,\n")
     yield case("wand", wand, lambda: read_wand(wand, CAMERAS, FileOptions(), [0.5]))
@@ -148,6 +158,9 @@ def bodies(folder):
     measured = folder / "athlete.txt"
     write_measurements(measured, PERSON)
     yield case("measurements", measured, lambda: read_measurements(measured))
+    ascii_stl = folder / "cube_ascii.stl"
+    trimesh.creation.box((0.5, 0.5, 0.5)).export(ascii_stl, file_type="stl_ascii")
+    yield case("mesh.ascii.stl", ascii_stl, lambda: read_mesh(ascii_stl, 1.0))
 
 
 def trials(folder):
@@ -286,22 +299,28 @@ def complaint(read):
     return None
 
 
-def fuzz(case, n):
+def fuzz(case, n, seed):
     """Feed n files to one reader."""
-    seen, failures, slowest = 0, [], (0.0, "")
-
-    @settings(max_examples=n, derandomize=True, deadline=None, database=None, phases=[Phase.generate])
-    @given(how=st.sampled_from(MUTATORS), seed=st.integers(0, 2**32 - 1))
-    def feed(how, seed):
-        nonlocal seen, slowest
-        seen += 1
-        cpu_s, wrong = fed(case, how, seed)
-        slowest = max(slowest, (cpu_s, f"{how.__name__} {seed}"))
+    choice, failures, slowest = random.Random(f"{case.name} {seed}"), [], (0.0, "")
+    for _ in range(n):
+        how, number = choice.choice(MUTATORS), choice.getrandbits(32)
+        cpu_s, wrong = fed(case, how, number)
+        slowest = max(slowest, (cpu_s, f"{how.__name__} {number}"))
         if wrong:
-            failures.append(f"{how.__name__} {seed}: {wrong}")
+            failures.append(f"{how.__name__} {number}: {wrong}")
+    return failures, slowest
 
-    feed()
-    return seen, failures, slowest
+
+def fed_corpus(case):
+    """Feed a reader the files that broke it once; return what came out that should not."""
+    failures = []
+    for path in sorted((CORPUS / case.name).glob("*")):
+        case.path.write_bytes(path.read_bytes())
+        wrong = complaint(case.read)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        failures += [f"{path.name}: {wrong}"] if wrong else []
+    case.path.write_bytes(case.whole)
+    return failures
 
 
 def cases(folder):
@@ -311,30 +330,43 @@ def cases(folder):
         yield from make(inner)
 
 
-def main(n=2000, only=""):
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--files", type=int, default=2000)
+    parser.add_argument("--seconds", type=float, default=0.0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--reader", default="")
+    options = parser.parse_args()
     warnings.simplefilter("error")
     signal.signal(signal.SIGPROF, too_slow)
-    found = {"files": {}, "failures": {}, "slowest": {}}
+    found = {"files": {}, "failures": {}, "slowest": {}, "seed": options.seed}
     with tempfile.TemporaryDirectory() as name:
-        chosen = [each for each in cases(Path(name)) if only in each.name]
+        chosen = [each for each in cases(Path(name)) if options.reader in each.name]
         for each in chosen:
             each.read()  # all that is loaded once is loaded now; and the file as it is is read without complaint
         taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
         before_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
         resource.setrlimit(resource.RLIMIT_AS, (taken + MEMORY_LIMIT_BYTES,) * 2)
         total = sum(WEIGHTS.get(each.name, 1.0) for each in chosen)
-        start = time.process_time()
+        start, end_s = time.process_time(), time.monotonic() + options.seconds
         for each in chosen:
-            count = -int(-n * WEIGHTS.get(each.name, 1.0) // total)
-            seen, failures, slowest = fuzz(each, count)
-            found["files"][each.name] = seen
-            found["slowest"][each.name] = (round(slowest[0], 3), slowest[1])
+            failures = fed_corpus(each)
             if failures:
                 found["failures"][each.name] = failures
+        for seed in count(options.seed):
+            for each in chosen:
+                n = -int(-options.files * WEIGHTS.get(each.name, 1.0) // total)
+                failures, slowest = fuzz(each, n, seed)
+                found["files"][each.name] = found["files"].get(each.name, 0) + n
+                found["slowest"][each.name] = max(found["slowest"].get(each.name, (0.0, "")), slowest)
+                if failures:
+                    found["failures"].setdefault(each.name, []).extend(f"seed {seed}: {text}" for text in failures)
+            if time.monotonic() >= end_s:
+                break
         found["cpu_s"] = round(time.process_time() - start, 1)
     found["grown_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024 - before_mb
     print(json.dumps(found))
 
 
 if __name__ == "__main__":
-    main(*(int(word) if word.isdigit() else word for word in sys.argv[1:]))
+    main()

@@ -21,6 +21,7 @@ NASTY_TEXT = [
         b"__class__",
         b"\x1b[31m",
         b"!!python/object:os.system x",
+        *(b"!!%s x" % tag for tag in (b"int", b"float", b"timestamp", b"binary", b"set", b"omap", b"pairs", b"null")),
     ),
 ]
 NESTS = [b"[", b"{", b"[[", b'{"a":', b"<a>", b"a: {", b"a.", b"- ", b"(", b'"a"=[', b"((("]
@@ -31,6 +32,9 @@ XML_BOMB = (
 )
 YAML_BOMB = b"%YAML:1.0\n---\na0: &a0 [x, x, x]\n" + b"".join(
     b"a%d: &a%d [*a%d, *a%d, *a%d, *a%d]\n" % (i, i, *[i - 1] * 4) for i in range(1, 40)
+)
+YAML_MERGES = b"a0: &a0 {k: 1}\n" + b"".join(
+    b"a%d: &a%d {<<: [%s]}\n" % (i, i, b", ".join([b"*a%d" % (i - 1)] * 9)) for i in range(1, 30)
 )
 
 
@@ -103,7 +107,7 @@ def rubbish(data, rng):
 def bomb(data, rng):
     head = rng.choice([b"", data[:100]])
     return rng.choice(
-        [XML_BOMB, YAML_BOMB, *npz_bombs(), head + b"a = " + b"[" * 50_000, b"a" + b".a" * 20_000 + b"=1"]
+        [XML_BOMB, YAML_BOMB, YAML_MERGES, *npz_bombs(), head + b"a = " + b"[" * 50_000, b"a" + b".a" * 20_000 + b"=1"]
     )
 
 

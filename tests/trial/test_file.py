@@ -1,5 +1,6 @@
 """Trial files: what is read, and what is refused in one line."""
 
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -346,3 +347,28 @@ def test_saved_pixels_go_with_a_calibration_file_only(folder):
     (folder / "points.csv").write_text("")
     clicked = saved.replace('file = "calib.toml"', 'control_points = "points.csv"')
     assert "camera 'left': calibrated_as, saved_scale" in complaint(folder, clicked)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('video = "cam1.mp4"', 'video = ""', "camera 'cam1': video: a file's name is empty; give the file's path"),
+        ('video = "cam1.mp4"', f'video = "{"a" * 300}"', "camera 'cam1': video: a file's name has at most 255 bytes"),
+        ('video = "cam1.mp4"', 'video = "a\\u0000b"', "camera 'cam1': video: a path holds no control character"),
+        ('name = "cam1"', 'name = "../cam1"', "name: a name holds no slash"),
+        ('name = "cam1"', f'name = "{"a" * 81}"', "name: a name has 1 to 80 characters"),
+        ("frame = 0", "frame = 9", "track.stop = 3 leaves no frame, as start.frame = 9"),
+    ],
+)
+def test_names_paths_and_ranges_that_cannot_be_are_refused_where_declared(thrown_cross, tmp_path, old, new, expected):
+    text = (thrown_cross / "trial.toml").read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "trial.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(TrialError, match=re.escape(expected)) as caught:
+        read_trial(tmp_path / "trial.toml", {"stop": 3})
+    assert "\n" not in str(caught.value)
+
+
+def test_a_camera_is_named_once(thrown_cross):
+    with pytest.raises(TrialError, match="--cameras names cam1 twice; name each camera once"):
+        read_trial(thrown_cross / "trial.toml", cameras=["cam1", "cam2", "cam1"])

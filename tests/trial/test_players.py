@@ -93,9 +93,9 @@ def test_the_shared_clip_is_read_as_it_is(shared_data):
         (
             '"number 7"',
             '"a, b"',
-            "start.player 'a, b': name: must not contain a comma, a quote or a line break (found 'a, b')",
+            "start.player 'a, b': name: must not contain a comma or a quote; rename 'a, b'",
         ),
-        ('"number 7"', '""', "start.player 2: name: must not be empty"),
+        ('"number 7"', '""', "start.player 2: name: a name has 1 to 80 characters"),
         ("knee_left =", "knie_left =", "player 'Anna': no point knie_left; there are: torso, hip_left"),
         ("knee_left = [-0.72, 0.0, 0.5]\n", "", "player 'Anna': joints_m has no knee_left; give all of torso"),
         ("torso = [-0.6, 0.0, 1.2]\n", "", "player 'Anna': joints_m has no torso"),

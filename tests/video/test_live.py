@@ -210,7 +210,7 @@ def test_waiting_for_images_is_reported_and_can_be_interrupted(tmp_path):
         ([("cam1", "nowhere", "progressive")], "is no file, pipe or capture device"),
         ([("cam1", "clip.mkv", "top-first")], "live images are read as whole frames"),
         ([("cam1", "pipe", "progressive"), ("cam2", "pipe", "progressive")], "two cameras read from"),
-        ([("cam1", "text", "progressive")], "no images come from"),
+        ([("cam1", "text", "progressive")], "cannot be opened as a video"),
     ],
 )
 def test_what_gives_no_images_is_refused_in_one_line(tmp_path, sources, expected):

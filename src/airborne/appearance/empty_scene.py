@@ -18,7 +18,7 @@ from airborne.types import Image
 
 FEWEST_PICTURES = 5  # with fewer, a median is no empty scene
 _DARKEST = np.float32(0.35)  # shadow, of the background's light
-EVIDENCE_LIMIT = 3.0  # [nats] bound of one pixel's evidence: neighbours err alike
+PIXEL_EVIDENCE_LIMIT = 3.0  # [nats] bound of one pixel's evidence: neighbours err alike
 _LEAST_SD = 2.5  # [grey levels] of what compression and light change from picture to picture
 _RANGE = 128.0  # [grey levels] over which a body's differences from the background are taken to be uniform
 _BLUR_PX = 0.8  # sd of the blur of differences
@@ -38,10 +38,10 @@ class EmptyScene:
         """
         distance = cv2.GaussianBlur(difference(rgb, self.rgb), (0, 0), _BLUR_PX)
         nats = (distance / self.sd) ** 2 / 2 + np.log(self.sd * np.sqrt(np.pi / 2) / _RANGE)
-        return np.asarray(np.clip(nats, -EVIDENCE_LIMIT, EVIDENCE_LIMIT), np.float32)
+        return np.asarray(np.clip(nats, -PIXEL_EVIDENCE_LIMIT, PIXEL_EVIDENCE_LIMIT), np.float32)
 
 
-def empty_scene(pictures: Sequence[Image]) -> EmptyScene:
+def estimate_empty_scene(pictures: Sequence[Image]) -> EmptyScene:
     """Take the median of pictures (h, w, 3) of one static camera, at least FEWEST_PICTURES, and their spread."""
     stack = np.stack(pictures)
     middle = len(stack) // 2

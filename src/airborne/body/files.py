@@ -30,7 +30,9 @@ from airborne.body.model import (
 )
 from airborne.errors import BodyError, one_line
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
+from airborne.io.names import CheckedPath
 from airborne.io.text import list_keys, read_toml
+from airborne.io.writing import write_text
 
 _Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 _Matrix = Annotated[list[_Vector], Field(min_length=3, max_length=3)]
@@ -53,7 +55,7 @@ class _PartTable(_Strict):
     shape: Literal["box", "ellipsoid", "mesh"]
     size_m: _Vector | None = None
     semi_axes_m: _Vector | None = None
-    file: str | None = None
+    file: CheckedPath | None = None
     scale: float = Field(1.0, gt=0)  # metres per unit of the mesh file
     centre_m: _Vector = [0.0, 0.0, 0.0]
     rotation_deg: _Vector = [0.0, 0.0, 0.0]  # about the segment's x, then the new y, then the new z
@@ -198,12 +200,12 @@ def mesh_files(path: Path) -> list[str]:
 
 def write_body(path: Path, model: BodyModel) -> None:
     """Write a body file, and its meshes as OBJ beside it; `read_body` gives the same body back."""
-    path.write_text(body_toml(model), encoding="utf-8")
+    write_text(path, body_toml(model))
     for name, part in zip(_mesh_names(model), model.parts, strict=True):
         if isinstance(part.shape, Mesh):
             corners = [f"v {_join_numbers(corner)}" for corner in part.shape.vertices_m]
             faces = [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in part.shape.faces.tolist()]
-            (path.parent / name).write_text("\n".join([*corners, *faces]) + "\n", encoding="utf-8")
+            write_text(path.parent / name, "\n".join([*corners, *faces]) + "\n")
 
 
 def body_toml(model: BodyModel) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
-from airborne.geometry.swing_twist import rotation_of, swing_twist
+from airborne.geometry.swing_twist import rotation_of, swing_twist_from_matrix
 from airborne.types import Array
 
 _BALL_RAD = np.radians(20)  # a range of angles wider than this, to both sides of its middle, about x and y: a ball
@@ -70,7 +70,7 @@ class JointLimits:
 
     def coordinates(self, R: Array) -> Array:
         """Return the swing's x and y, and the twist, of rotations parent from segment: (..., 3) [rad]."""
-        return swing_twist(self.relative(R))
+        return swing_twist_from_matrix(self.relative(R))
 
     def rotation(self, coordinates: Array) -> Array:
         """Return the rotations (..., 3, 3), parent from segment, of swings and twists (..., 3) [rad]."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
-import yaml
-
 from airborne.errors import BodyError
+from airborne.io.text import read_flat_yaml
+from airborne.io.writing import write_text
 
 # Shares of stature. Levels of the trunk are measured from the hip joint centres, of the head from the acromion, of the
 # arm from the shoulder, of the hand from the wrist, of the leg from the hip, of the foot from the ankle: L length,
@@ -124,17 +124,15 @@ def read_measurements(path: Path) -> Measurements:
     negative, in a unit that the conversion factor does not give, out of order along its limb, or no possible section.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
-        table, node = yaml.safe_load(text), yaml.compose(text, yaml.SafeLoader)
+        lines = read_flat_yaml(path)
     except OSError as error:
         raise BodyError(f"{path.name}: cannot be read ({error.strerror})") from error
-    except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
-        reason = " ".join(str(error).split())[:160]
-        raise BodyError(f"{path.name}: not a YAML file of measurements: {reason}") from error
-    if not isinstance(table, dict) or not isinstance(node, yaml.MappingNode):
+    except ValueError as error:
+        raise BodyError(f"{path.name}: not a YAML file of measurements: {error}") from error
+    if not lines:
         raise BodyError(f"{path.name}: holds no measurements; expected lines such as 'Ls1L: 0.135'")
     allowed = {"measurementconversionfactor", "totalmass", *STATURE_SHARES}
-    keys = [str(key.value) for key, _ in node.value]
+    keys, table = [key for key, _ in lines], dict(lines)
     for key in keys:
         if key not in allowed:
             raise BodyError(f"{path.name}: {key:.40} is no measurement; expected Yeadon's 95 names, such as Ls1L")
@@ -160,7 +158,7 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
     lines = ["measurementconversionfactor: 1"]
     lines += [] if measurements.mass_kg is None else [f"totalmass: {float(measurements.mass_kg)!r}"]
     lines += [f"{key}: {float(measurements.values_m[key])!r}" for key in STATURE_SHARES]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def check_measurements(measurements: Measurements) -> Measurements:
@@ -197,13 +195,13 @@ def check_measurements(measurements: Measurements) -> Measurements:
     return measurements
 
 
-def _number(table: dict, key: str, path: Path, hint: str) -> float:
+def _number(table: Mapping[str, str], key: str, path: Path, hint: str) -> float:
     value = table.get(key)
-    if key not in table or value is None:
+    if not value:
         raise BodyError(f"{path.name}: {key} is missing; {hint}")
     try:
-        number = math.nan if isinstance(value, bool) else float(value)  # YAML reads 1e-2 as text
-    except (TypeError, ValueError):
+        number = float(value)
+    except ValueError:
         number = math.nan
     if not math.isfinite(number):
         raise BodyError(f"{path.name}: {key} is {value!r:.40}; {hint}, a number")

@@ -12,6 +12,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body.limits import FREE, JointLimits
 from airborne.errors import BodyError
 from airborne.geometry.rotations import matrix_from_angles
+from airborne.io.names import check_column, check_name
 from airborne.types import Array
 
 
@@ -130,6 +131,7 @@ class BodyModel:
     landmarks: tuple[Landmark, ...] = ()  # empty: the origin of every segment, under the segment's name
 
     def __post_init__(self) -> None:
+        self._check_names()
         names: list[str] = []
         for segment in self.segments:
             if segment.name in names:
@@ -154,6 +156,13 @@ class BodyModel:
             object.__setattr__(self, "landmarks", origins)
         if not any(segment.parts for segment in self.segments):
             raise BodyError(f"body '{self.name}' has no part to see; add a [[segment.part]]")
+
+    def _check_names(self) -> None:
+        try:
+            list(map(check_name, [self.name, *(part.name for part in self.parts)]))
+            list(map(check_column, [*(each.name for each in self.segments), *(each.name for each in self.landmarks)]))
+        except ValueError as error:
+            raise BodyError(str(error)) from None
 
     @cached_property
     def parents(self) -> NDArray[np.int64]:

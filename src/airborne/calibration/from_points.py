@@ -22,8 +22,8 @@ from airborne.calibration.intrinsics.physical import (
     SEVEN_PARAMETERS,
     Pinhole,
     anneal_pinhole,
+    parameter_covariance,
     parameter_names,
-    parameter_sd,
 )
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras.camera import Rig
@@ -47,6 +47,7 @@ class CameraFit:
     m_per_px: Array  # (n,) [m/px], at the point's depth
     held_out_rms_px: dict[str, float]  # [px] for every model tried
     sd: dict[str, float]  # standard deviations of the fitted numbers, units in the names
+    covariance: Array  # (7, 7) of turn [rad] and place [m], both in the camera's axes, and focal length [share]
     dlt_rms_px: float  # the 11-parameter DLT's own residual [px]
     dlt: Array  # (11,), L1..L11
 
@@ -143,8 +144,11 @@ def _describe_fit(
 ) -> CameraFit:
     is_seen = points.is_seen_by(name)
     P_dlt = fit_dlt(best.world, best.px)
-    sd = parameter_sd(best.pinhole, best.model, best.world, best.px)
-    sd[3:6] = place_sd(best, candidates, common_lens_sd_m)
+    covariance = parameter_covariance(best.pinhole, best.model, best.world, best.px)
+    sd = np.sqrt(np.diag(covariance))
+    places = place_sd(best, candidates, common_lens_sd_m)
+    wider = float(np.mean(places / sd[3:6]))  # by the lens model's error: all of them alike
+    sd[3:6] = places
     return CameraFit(
         name=name,
         model=best.model.name,
@@ -154,9 +158,17 @@ def _describe_fit(
         m_per_px=_spread_over_points(is_seen, best.pinhole.depth(best.world) / best.pinhole.focal_px),
         held_out_rms_px={solution.model.name: _rms(solution.held_out_px) for solution in candidates},
         sd=dict(zip(parameter_names(best.model), sd.tolist(), strict=True)),
+        covariance=_covariance_in_camera(best.pinhole, wider**2 * covariance),
         dlt_rms_px=_rms(best.px - px_from_points(P_dlt[None], best.world)[:, 0]),
         dlt=dlt_coefficients(P_dlt),
     )
+
+
+def _covariance_in_camera(pinhole: Pinhole, covariance: Array) -> Array:
+    """Take the covariance (n, n) of `Pinhole.apply_step` to turn and place in the camera's axes, and focal share."""
+    J = np.zeros((7, 7))
+    J[:3, :3], J[3:6, 3:6], J[6, 6] = np.eye(3), pinhole.R, 1 / pinhole.focal_px
+    return J @ covariance[:7, :7] @ J.T
 
 
 def _point_errors_left_out(points: ControlPoints, solutions: Mapping[str, Solution]) -> Array:

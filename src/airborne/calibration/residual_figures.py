@@ -8,6 +8,8 @@ import numpy as np
 
 from airborne.calibration.from_sources import RigCalibration
 from airborne.calibration.sources.board_detection import first_image
+from airborne.io.figures import save_png
+from airborne.io.names import file_stem
 
 _INCHES, _LEAST_INCHES = 9.0, 6.0  # of a figure's longer side; least width, for the title
 _ARROW_SHARE = 0.06  # of an image's longer side: the length of an arrow of the median residual
@@ -19,7 +21,7 @@ def write_residual_figures(folder: Path, calibration: RigCalibration) -> list[Pa
     """Write `residuals_<camera>.png` for every camera and return the paths."""
     folder.mkdir(parents=True, exist_ok=True)
     return [
-        _write_figure(folder / f"residuals_{_file_name(name)}.png", calibration, i)
+        _write_figure(folder / f"residuals_{file_stem(name)}.png", calibration, i)
         for i, name in enumerate(calibration.rig.names)
     ]
 
@@ -66,7 +68,7 @@ def _write_figure(path: Path, calibration: RigCalibration, i: int) -> Path:
     axes.set_title(f"{camera.name}: from where seen to where expected, {magnified:.0f} times", fontsize="medium")
     if axes.get_legend_handles_labels()[0]:
         figure.legend(loc="outside lower left", fontsize="small", ncols=3, markerscale=5)
-    figure.savefig(path, dpi=110)
+    save_png(figure, path, dpi=110)
     return path
 
 
@@ -79,7 +81,3 @@ def _typical_px(calibration: RigCalibration, i: int) -> float:
     )
     distances = distances[np.isfinite(distances)]
     return max(float(np.median(distances)) if len(distances) else 1.0, 1e-3)
-
-
-def _file_name(name: str) -> str:
-    return "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name)

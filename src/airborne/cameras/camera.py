@@ -13,6 +13,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.cameras.distortion import distort, distort_fisheye, undistort, undistort_fisheye
 from airborne.errors import CalibrationError
 from airborne.geometry.triangulation import triangulate
+from airborne.io.names import check_name
 from airborne.types import Array
 
 Lens = Literal["brown", "fisheye"]
@@ -141,6 +142,10 @@ class Rig:
         names = [camera.name for camera in self.cameras]
         if len(set(names)) != len(names):
             raise CalibrationError(f"two cameras share a name: {', '.join(names)}; give each its own")
+        try:
+            list(map(check_name, names))
+        except ValueError as error:
+            raise CalibrationError(f"cameras: {error}") from None
 
     def __len__(self) -> int:
         return len(self.cameras)

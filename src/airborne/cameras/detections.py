@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from airborne.cameras.formats.openpose import camera_folders, number_at_end, read_folder, write_folders
 from airborne.errors import CalibrationError
+from airborne.io.names import check_name
 from airborne.io.npz import read_arrays, write_arrays
 from airborne.types import Array
 
@@ -29,6 +30,12 @@ class Detections:
     px: Array  # (frames, points, cameras, 2) [px] of the videos themselves; NaN where not seen
     visibility: Array  # (frames, points, cameras) 0..1: the network's confidence; 0 where not seen
     notes: tuple[str, ...] = ()  # what the reader should know, one line each
+
+    def __post_init__(self) -> None:
+        try:
+            list(map(check_name, self.cameras))
+        except ValueError as error:
+            raise CalibrationError(f"detections: {error}") from None
 
     @classmethod
     def from_clicks(cls, cameras: Sequence[str], points: Sequence[str], px: Array) -> Detections:

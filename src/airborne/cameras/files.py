@@ -21,7 +21,8 @@ from airborne.cameras.formats.vicon import rig_from_vicon, vicon_losses, vicon_t
 from airborne.cameras.formats.xml import parse_xml
 from airborne.cameras.units import FARTHEST_M, check_baselines, longest_baseline_m
 from airborne.errors import CalibrationError
-from airborne.io.text import parse_toml
+from airborne.io.text import parse_toml, read_bytes, read_text
+from airborne.io.writing import write_text
 from airborne.types import Size
 
 _LARGEST_FILE_BYTES = 2_000_000  # a hundred cameras take a tenth of it
@@ -135,14 +136,11 @@ def write_rig(
     path = Path(path)
     kind = format or format_of_name(path)
     file_unit = _unit(kind, unit)
-    for name in rig.names:
-        if not name.isprintable() or not name.strip():
-            raise CalibrationError(f"camera {name!r} has a name that files cannot hold; rename it")
     texts, notes = _texts(kind, rig, file_unit, pixels=pixels or PixelConvention(), errors_px=errors_px)
     if kind == "easymocap":
         path.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
-        (path / name).write_text(text, encoding="utf-8")  # path / "" is path itself
+        write_text(path / name, text)  # path / "" is path itself
     return notes
 
 
@@ -192,19 +190,17 @@ def _unit(kind: str, unit: Unit | None) -> Unit:
 
 def _read_text(path: Path) -> str:
     try:
-        if path.stat().st_size > _LARGEST_FILE_BYTES:
-            raise CalibrationError(f"{path} is larger than any calibration ({path.stat().st_size} bytes); {_EXPECTED}")
-        return path.read_text(encoding="utf-8-sig")
+        return read_text(path, _LARGEST_FILE_BYTES)
     except OSError as error:
         raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a calibration file") from None
-    except UnicodeDecodeError:
-        raise CalibrationError(f"{path} is not a text file; {_EXPECTED}") from None
+    except ValueError as error:
+        raise CalibrationError(f"{path}: {error}; {_EXPECTED}") from None
 
 
 def _opencv_calibration(path: Path, where: str, document: dict[str, Any]) -> CalibrationFile:
     """Return an OpenCV calibration; if the file holds intrinsics or extrinsics only, look for the others beside it."""
     if path.is_file() and len(halves_in(document)) == 1:
-        beside = [_opencv_file(other) for other in _yaml_files(path.parent) if other != path]
+        beside = [_opencv_file(other) for other in files_beside(path)]
         others = [other for other in beside if len(halves_in(other) | halves_in(document)) == 2]
         if len(others) == 1:
             document = others[0] | document
@@ -222,9 +218,23 @@ def _opencv_file(path: Path) -> dict[str, Any]:
     return parse_opencv(_read_text(path), str(path))
 
 
+def files_beside(path: Path) -> list[Path]:
+    """Return the files beside an OpenCV calibration among which its other half is looked for."""
+    if _begin(path) != b"%YAML":
+        return []
+    return [other for other in _yaml_files(path.parent) if other != path]
+
+
 def _yaml_files(folder: Path) -> list[Path]:
     paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in (".yml", ".yaml") and path.is_file())
-    return [path for path in paths if path.read_bytes()[:5] == b"%YAML"]
+    return [path for path in paths if _begin(path) == b"%YAML"]
+
+
+def _begin(path: Path) -> bytes:
+    try:
+        return read_bytes(path, _LARGEST_FILE_BYTES)[:5]
+    except ValueError:
+        return b""
 
 
 def _short(error: Exception) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -88,6 +89,8 @@ def main() -> None:
 def _describe_path_error(error: OSError) -> str:
     """Describe what is wrong with the path of a file error."""
     path = Path(str(error.filename or "a file"))
+    if error.errno == errno.ENAMETOOLONG:
+        return f"{str(path)[:60]}...: the name is too long; give a shorter one"
     file = next((each for each in (path, *path.parents) if each.is_file()), path)
     match error:
         case FileExistsError() | NotADirectoryError():

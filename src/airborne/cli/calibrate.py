@@ -11,6 +11,7 @@ import typer
 from airborne.cli.console import Json, errors, sizes_px
 from airborne.errors import AirborneError
 from airborne.io.terminal import Stages
+from airborne.io.writing import write_text
 
 
 def calibrate_command(
@@ -173,7 +174,7 @@ def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> No
         held_out_px={name: calibration.held_out_px_of(name) for name in calibration.rig.names},
     )
     pictures = write_residual_figures(folder, calibration)
-    (folder / "report.json").write_text(json.dumps(report, indent=1), encoding="utf-8")
+    write_text(folder / "report.json", json.dumps(report, indent=1))
     print(json.dumps(report) if as_json else describe_calibration(calibration))
     if not as_json:
         print(f"written: {written}\nreport: {folder / 'report.json'} and {len(pictures)} images beside it")

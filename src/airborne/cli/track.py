@@ -138,6 +138,18 @@ def _track(
         stop(f"the frames found so far are in {output}{'' if live else '; --resume goes on'}")
 
 
+def _describe_self_check(summary: dict) -> str | None:
+    """Say what the self-check found; alarms are among the notes."""
+    findings = summary.get("self_check")
+    if findings is None or summary["n_frames"] == summary["n_lost"]:
+        return None
+    if not findings:
+        return "self-check: the scene is not seen without the body, so that nothing can be said of body and cameras"
+    if any(each["is_alarm"] for each in findings):
+        return "self-check: something is wrong, see the notes"
+    return "self-check: nothing seems wrong; " + "; ".join(each["sentence"] for each in findings[:2])
+
+
 def _overlays(output: Path) -> list[Path]:
     """Return the overlays that a run left: its videos, or after --first-frame images."""
     return sorted([*output.glob("videos/overlay_*"), *output.glob("figures/overlay_*")])
@@ -171,6 +183,8 @@ def _describe(summary: dict, output: Path) -> str:
             f"median sd: position {_describe_sd(position, 'mm')}, rotation {_describe_sd(rotation, 'degrees')}; "
             "summary.json says which errors these include"
         )
+    if (line := _describe_self_check(summary)) is not None:
+        lines.append(line)
     lines += [f"note: {text}" for text in [*summary["warnings"], *summary["events"]]]
     return "\n".join(lines)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from airborne.evaluation.agreement import Agreement
 from airborne.evaluation.icc import Reliability
 from airborne.evaluation.repeatability import Repeatability
+from airborne.io.writing import write_text
 from airborne.motion.jumps.jump import Measurement
 from airborne.motion.tables import cell
 
@@ -65,7 +66,7 @@ def _with_interval(name: str, measured: Measurement) -> Row:
 
 def _write(path: Path, rows: Sequence[Row]) -> None:
     lines = [",".join(rows[0]), *(",".join(_text(value) for value in row.values()) for row in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def _text(value: object) -> str:

@@ -91,7 +91,10 @@ class MotionComparison:
         ]
         position = self.position
         rms, largest = (*position.rms_mm, position.rms_3d_mm), (*position.largest_mm, position.largest_3d_mm)
-        rows = [("position [mm]", "RMS", "max"), *_rows(("x", "y", "z", "in space"), rms, largest)]
+        rows: list[tuple[str, ...]] = [
+            ("position [mm]", "RMS", "max"),
+            *_rows(("x", "y", "z", "in space"), rms, largest),
+        ]
         kinds = {"": self.raw}
         if self.n_symmetries > 1:
             kinds |= {" modulo symmetry, whole run": self.modulo_run, " modulo symmetry, by frame": self.modulo_frame}

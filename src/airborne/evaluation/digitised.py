@@ -16,6 +16,7 @@ from airborne.errors import ResultError
 from airborne.evaluation.compare import MotionComparison, compare_motion
 from airborne.evaluation.table import read_table
 from airborne.evaluation.truth import Truth
+from airborne.io.writing import write_text
 from airborne.motion import Motion
 from airborne.types import Array
 
@@ -95,9 +96,9 @@ def write_clicked_frames(path: Path, digitised: DigitisedPoints, cameras: Sequen
         *(f"{point}_{camera}_{axis}" for point in digitised.points for camera in cameras for axis in "uv"),
     ]
     rows = [header]
-    for frame, values in zip(digitised.index, digitised.px.reshape(len(digitised.px), -1), strict=True):
-        rows.append([str(frame), *("" if np.isnan(value) else repr(float(value)) for value in values)])
-    path.write_text("".join(",".join(row) + "\n" for row in rows), encoding="utf-8")
+    for frame, px in zip(digitised.index, digitised.px, strict=True):
+        rows.append([str(frame), *("" if np.isnan(value) else repr(float(value)) for value in px.ravel())])
+    write_text(path, "".join(",".join(row) + "\n" for row in rows))
 
 
 def body_points(model: BodyModel, points: Sequence[str]) -> Array:

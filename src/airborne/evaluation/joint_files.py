@@ -10,10 +10,12 @@ import numpy as np
 
 from airborne.errors import ResultError
 from airborne.evaluation.table import read_table
+from airborne.io.text import read_text
 from airborne.types import Array
 
 _LONG = "a table with the columns time_s, joint, x_m, y_m, z_m, one line for each time and joint"
 _TRC = "a TRC file of markers: PathFileType, rates and units, marker names, then tab-separated lines"
+_LARGEST_TRC_BYTES = 50_000_000  # larger files are refused
 _METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
 _PAIRED = {name: name for name in ("hip", "knee", "ankle", "foot", "shoulder", "elbow", "wrist", "hand")}
@@ -75,11 +77,11 @@ def _read_long(path: Path) -> JointPaths:
 def _read_trc(path: Path) -> JointPaths:
     """Read a TRC file, whose y points up: world x, y, z are its z, x, y."""
     try:
-        lines = [line.rstrip("\r").split("\t") for line in path.read_text(encoding="utf-8-sig").split("\n")]
+        lines = [line.rstrip("\r").split("\t") for line in read_text(path, _LARGEST_TRC_BYTES).split("\n")]
     except OSError as error:
         raise ResultError(f"{path} cannot be read ({error.strerror}); expected {_TRC}") from None
-    except UnicodeDecodeError:
-        raise ResultError(f"{path} is not text; expected {_TRC}") from None
+    except ValueError as error:
+        raise ResultError(f"{path}: {error}; expected {_TRC}") from None
     if len(lines) < 6 or lines[0][0] != "PathFileType" or lines[3][:1] != ["Frame#"]:
         raise ResultError(f"{path} does not begin like a TRC file; expected {_TRC}")
     header = dict(zip(lines[1], lines[2], strict=False))

@@ -19,8 +19,8 @@ from airborne.evaluation.compare import (
     sd_calibration,
     span,
 )
+from airborne.evaluation.coverage import Coverage, coverage_of
 from airborne.evaluation.joint_files import JointPaths, landmark_of
-from airborne.evaluation.reliability import Reliability, reliability
 from airborne.motion import JointStatus, Motion, joint_statuses, landmarks
 from airborne.tracking import Status
 from airborne.types import Array, Triple
@@ -63,7 +63,7 @@ class JointComparison:
     n_far: int  # joints whose own status is tracked and that are more than 100 mm off
     not_compared: tuple[str, ...]  # markers without a landmark, and landmarks without a marker
     calibration: SdCalibration  # errors against the landmarks' reported deviations
-    reliability: Reliability  # the same without each landmark's constant offset in its segment
+    coverage: Coverage  # the same without each landmark's constant offset in its segment
     better_shift_s: float  # added to the reference's times, this would clearly agree better; whole periods, or 0
     better_mean_without_offset_mm: float  # the error with that shift
 
@@ -79,7 +79,7 @@ class JointComparison:
             f"{self.n_tracked} tracked, {self.n_uncertain} uncertain, {self.n_lost} lost",
         ]
         rows = {**self.joints, "all": self.whole} | ({"all, tracked": self.tracked} if self.tracked else {})
-        table = [("joint [mm]", "mean", "RMS", "max", "no offset")]
+        table: list[tuple[str, ...]] = [("joint [mm]", "mean", "RMS", "max", "no offset")]
         for name, e in rows.items():
             numbers = (e.mean_mm, e.rms_mm, e.largest_mm, e.mean_without_offset_mm)
             table.append((f"  {name}", *(or_dash(number, ".1f") for number in numbers)))
@@ -97,8 +97,8 @@ class JointComparison:
                 f"errors within 1 sd {share.within_1sd:.0%} (normal: 68%), "
                 f"within 2 sd {share.within_2sd:.0%} (95%), n = {share.n}"
             )
-        if self.reliability.n:
-            lines.append(self.reliability.describe())
+        if self.coverage.n:
+            lines.append(self.coverage.describe())
         lines.append(f"joints tracked: {self.share_tracked:.0%}; of these more than 100 mm off: {self.n_far}")
         if self.not_compared:
             lines.append(f"not compared: {', '.join(self.not_compared)}")
@@ -168,7 +168,7 @@ def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> J
         n_far=int(np.sum(np.linalg.norm(tracked.error, axis=-1) > _FAR_M)),
         not_compared=(*not_compared, *(name for name in names if name not in joints)),
         calibration=sd_calibration(pairs.error[is_known], np.repeat(sd[frames][is_known][:, None], 3, axis=1)),
-        reliability=reliability(_without_offset(pairs), np.repeat(sd[frames][..., None], 3, axis=2)),
+        coverage=coverage_of(_without_offset(pairs), np.repeat(sd[frames][..., None], 3, axis=2)),
         better_shift_s=shift_s,
         better_mean_without_offset_mm=shifted_mm,
     )

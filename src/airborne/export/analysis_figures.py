@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 
 from airborne.evaluation import Agreement, Series
 from airborne.export import panels
+from airborne.io.figures import save_png
 from airborne.motion.smoothing import ResidualAnalysis
 from airborne.types import Array
 
@@ -48,7 +49,7 @@ def write_residuals(path: Path, analysis: ResidualAnalysis, used_hz: float | Non
     axes.set_xlabel("cut-off [Hz]", fontsize=panels.FONT_PT, color=panels.TEXT)
     panels.label_panel(axes, "RMS residual [mm]")
     axes.legend(fontsize=panels.FONT_PT - 1, frameon=False, labelcolor=panels.TEXT)
-    figure.savefig(path)
+    save_png(figure, path)
 
 
 def write_bland_altman(path: Path, variables: Sequence[tuple[Series, Agreement]]) -> None:
@@ -82,7 +83,7 @@ def write_bland_altman(path: Path, variables: Sequence[tuple[Series, Agreement]]
         axes.set_title(f"{row.name}\n{title}", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
         axes.set_xlabel(f"mean [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
         axes.set_ylabel(f"difference [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
-    figure.savefig(path)
+    save_png(figure, path)
 
 
 def format_limits(row: Agreement) -> str:
@@ -106,7 +107,7 @@ def write_identity(path: Path, variables: Sequence[tuple[Series, Agreement]]) ->
         axes.set_title(title, fontsize=panels.FONT_PT - 1, color=panels.TEXT)
         axes.set_xlabel(f"reference [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
         axes.set_ylabel(f"measured [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
-    figure.savefig(path)
+    save_png(figure, path)
 
 
 def _panels(variables: Sequence[tuple[Series, Agreement]]) -> tuple[Figure, list[Axes]]:

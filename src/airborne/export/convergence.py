@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from airborne.export import panels
 from airborne.export.palette import ESTIMATE_RGB, hex_colour
+from airborne.io.figures import save_png
 from airborne.types import Array, Image
 
 _LINE_STYLES = (("-", hex_colour(ESTIMATE_RGB)), ("--", "#d55e00"))
@@ -57,7 +58,7 @@ def write_convergence(
         handles, labels, loc="outside upper center", ncols=2, fontsize=panels.FONT_PT, frameon=False,
         labelcolor=panels.TEXT,
     )  # fmt: skip
-    figure.savefig(path)
+    save_png(figure, path)
 
 
 def write_sequences(path: Path, rows: Sequence[tuple[str, Sequence[Image]]]) -> None:

@@ -15,6 +15,7 @@ from airborne.body import BodyModel
 from airborne.evaluation import DigitisedPoses, Truth
 from airborne.export import panels
 from airborne.export.error_figures import write_digitised, write_errors
+from airborne.io.figures import save_png
 from airborne.motion import Motion, has_inertias, joint_angles, measure_flight, root_angles
 from airborne.types import Array
 
@@ -58,7 +59,7 @@ def write_figures(
 
 def write_pose(path: Path, motion: Motion) -> None:
     """Write `pose_figure` as a PNG."""
-    pose_figure(motion).savefig(path)
+    save_png(pose_figure(motion), path)
 
 
 def pose_figure(motion: Motion) -> Figure:
@@ -114,7 +115,7 @@ def write_score(path: Path, motion: Motion) -> None:
 
 def write_joints_figure(path: Path, motion: Motion, model: BodyModel) -> None:
     """Write `joints_figure` as a PNG."""
-    joints_figure(motion, model).savefig(path)
+    save_png(joints_figure(motion, model), path)
 
 
 def joints_figure(motion: Motion, model: BodyModel) -> Figure:
@@ -162,7 +163,7 @@ def _joint_panels(joints: Sequence[str]) -> list[tuple[str, str, float]]:
 
 def write_flight_figure(path: Path, motion: Motion, model: BodyModel) -> None:
     """Write `flight_figure` as a PNG."""
-    flight_figure(motion, model).savefig(path)
+    save_png(flight_figure(motion, model), path)
 
 
 def flight_figure(motion: Motion, model: BodyModel) -> Figure:

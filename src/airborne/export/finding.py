@@ -16,8 +16,9 @@ from airborne.export.palette import ESTIMATE_RGB, TEXT_RGB, hex_colour
 from airborne.export.panels import FONT_PT, WIDTH_IN
 from airborne.export.sheet import SHEET_DPI, draw_cell
 from airborne.export.views import cached_surface_arrays
+from airborne.io.figures import save_png
 from airborne.rendering import FLAT, render
-from airborne.tracking.first_pose.moments import Moment, Source, source_of
+from airborne.tracking.first_pose.moments import Moment, SourceKey, source_of
 from airborne.types import Image
 from airborne.video import View
 
@@ -25,7 +26,7 @@ _TITLES = ("empty scene", "what stands out", "where the body was found")
 _MARGIN = 0.6  # around a candidate, as a share of its size
 
 
-def draw_empty_scene(path: Path, moment: Moment, scenes: Mapping[Source, EmptyScene], posed: PosedBody) -> None:
+def draw_empty_scene(path: Path, moment: Moment, scenes: Mapping[SourceKey, EmptyScene], posed: PosedBody) -> None:
     """Draw for every camera the empty scene, what stands out from it at one moment, and the body's outline."""
     rows, names = [], []
     for view, shown in zip(moment.frames.views, moment.probability, strict=True):
@@ -36,7 +37,7 @@ def draw_empty_scene(path: Path, moment: Moment, scenes: Mapping[Source, EmptySc
         grey = np.repeat((255 * shown).astype(np.uint8)[..., None], 3, axis=2)
         square = [_square_pixels(image, view.camera) for image in (empty, grey, _with_outline(view, posed))]
         rows.append(square)
-    _figure(rows, names, _TITLES).savefig(path)
+    save_png(_figure(rows, names, _TITLES), path)
 
 
 def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, PosedBody]]) -> None:
@@ -44,7 +45,7 @@ def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, 
     views = [view for view in moment.frames.views if view is not None]
     rows = [[_near(_with_outline(view, posed), view.camera, posed) for view in views] for _, posed in candidates]
     names = [f"{number}: {label}" for number, (label, _) in enumerate(candidates, start=1)]
-    _figure(rows, names, [view.camera.name for view in views]).savefig(path)
+    save_png(_figure(rows, names, [view.camera.name for view in views]), path)
 
 
 def _with_outline(view: View, posed: PosedBody) -> Image:

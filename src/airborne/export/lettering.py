@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from airborne.io.figures import any_letters
 from airborne.types import Image
 
 Outline = NDArray[np.floating]
@@ -45,7 +46,7 @@ def _outlines(text: str, bold: bool) -> tuple[Outline, ...]:
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import TextPath
 
-    path = TextPath(
-        (0, 0), text, size=_EM, prop=FontProperties(family="DejaVu Sans", weight="bold" if bold else "normal")
-    )
+    font = FontProperties(family="DejaVu Sans", weight="bold" if bold else "normal")
+    with any_letters():
+        path = TextPath((0, 0), text, size=_EM, prop=font)
     return tuple(np.asarray(polygon, float) for polygon in path.to_polygons())

@@ -14,6 +14,7 @@ from airborne.export.palette import TEXT_RGB, hex_colour
 from airborne.export.panels import FONT_PT, WIDTH_IN
 from airborne.export.sheet import SHEET_DPI, draw_cell
 from airborne.export.views import cached_surface_arrays, crop_camera, resample_view
+from airborne.io.figures import save_png
 from airborne.rendering import FLAT, mask_picture, match_picture, model_picture, render, through_mask
 from airborne.tracking import Status
 from airborne.types import Image
@@ -37,7 +38,7 @@ class MatchingPicture:
         if self._is_drawn or posed is None or status is not Status.TRACKED:
             return
         rows = [_row(view, camera, posed) for view, camera in zip(frames.views, self._cameras, strict=True)]
-        _figure(rows, [camera.name for camera in self._cameras]).savefig(self._path)
+        save_png(_figure(rows, [camera.name for camera in self._cameras]), self._path)
         self._is_drawn = True
 
     def __enter__(self) -> Self:

@@ -18,6 +18,8 @@ from airborne.body import PosedBody
 from airborne.cameras import Camera, Rig
 from airborne.export.palette import STATUS_RGB
 from airborne.export.views import cached_surface_arrays, resample_view
+from airborne.io.names import file_stem
+from airborne.io.writing import explain_full_disk
 from airborne.rendering import FLAT, render
 from airborne.tracking import Status
 from airborne.types import Image
@@ -39,7 +41,8 @@ class _Still:
     path: Path
 
     def write(self, image: Image) -> None:
-        self.path.write_bytes(cv2.imencode(".png", image[..., ::-1])[1].tobytes())
+        with explain_full_disk(self.path):
+            self.path.write_bytes(cv2.imencode(".png", image[..., ::-1])[1].tobytes())
 
 
 class CameraVideos:
@@ -54,9 +57,9 @@ class CameraVideos:
         with ExitStack() as stack:
             self._writers = [
                 stack.enter_context(
-                    VideoWriter(folder / f"overlay_{camera.name}.mp4", size=camera.size, rate=rate)
+                    VideoWriter(folder / f"overlay_{file_stem(camera.name)}.mp4", size=camera.size, rate=rate)
                     if drawn == "videos"
-                    else nullcontext(_Still(folder / f"overlay_{camera.name}.png"))
+                    else nullcontext(_Still(folder / f"overlay_{file_stem(camera.name)}.png"))
                 )
                 for camera in self.cameras
             ]
@@ -74,7 +77,7 @@ class CameraVideos:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Finish the files; after an error too, so that they hold what was written."""
-        self._stack.close()
+        self._stack.__exit__(kind, error, trace)
 
 
 class OverlayVideos:

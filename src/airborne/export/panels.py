@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from airborne.export.palette import ESTIMATE_RGB, STATUS_RGB, TEXT_RGB, hex_colour
+from airborne.io.figures import save_png
 from airborne.motion import Motion, root_angles
 from airborne.tracking import Status
 from airborne.types import Array, Mask
@@ -82,7 +83,7 @@ def begin_at_zero(axes: Axes) -> None:
 
 def save_figure(figure: Figure, path: Path, motion: Motion, extra: Sequence[Artist] = ()) -> None:
     """Add the legend on top and write the PNG."""
-    add_legend(figure, motion, extra).savefig(path)
+    save_png(add_legend(figure, motion, extra), path)
 
 
 def add_legend(figure: Figure, motion: Motion, extra: Sequence[Artist] = ()) -> Figure:

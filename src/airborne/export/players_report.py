@@ -14,6 +14,8 @@ from airborne.export.page import UNKNOWN_TEXT, render_report
 from airborne.export.palette import STATUS_RGB, hex_colour
 from airborne.export.report import DEFINITIONS
 from airborne.export.summary import json_ready
+from airborne.io.figures import save_png
+from airborne.io.writing import write_text
 from airborne.motion import PlayersMotion
 from airborne.motion.run_folder import REPORT, figures_of
 from airborne.tracking import Status
@@ -57,7 +59,7 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
 
     `summary` is the content of summary.json.
     """
-    heights_figure(motion).savefig(figures_of(folder) / HEIGHTS_FIGURE)
+    save_png(heights_figure(motion), figures_of(folder) / HEIGHTS_FIGURE)
     path = folder / REPORT
     summary = json_ready(summary)
     uncertainty = f"{_DEFINITIONS['Uncertainty']} {summary['uncertainty']}"
@@ -76,7 +78,7 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
         heights=figures_of(folder) / HEIGHTS_FIGURE,
         heights_caption=_FIGURE_CAPTION,
     )
-    path.write_text(html, encoding="utf-8")
+    write_text(path, html)
     return path
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from airborne.errors import ResultError
 from airborne.export.page import UNKNOWN_TEXT, HtmlTable, render_report
 from airborne.export.summary import body_warnings, headline, json_ready
+from airborne.io.writing import write_text
 from airborne.motion import Motion
 from airborne.motion.flight.momentum_table import GRAVITY_M_S2
 from airborne.motion.run_folder import REPORT, figures_of
@@ -111,6 +112,7 @@ def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
     - `cameras`: one dictionary for each camera, with `name` first
     - `truth`: `MotionComparison.to_dict()`; `digitised`: `DigitisedComparison.to_dict()`; `joints`:
       `JointComparison.to_dict()`
+    - `self_check`: what the pictures say against the files, see `Finding.to_dict`
     - `flight`: `FlightSummary.to_dict()`
 
     Units stand at the ends of keys (`_s`, `_px`, ...) and are shown as such. All text is escaped. Of the figures and
@@ -133,9 +135,10 @@ def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
         comparisons=list(_comparisons(summary)),
         figures=[(name, *texts) for name, texts in _FIGURES.items()],
         folder=figures_of(folder),
+        self_check=_self_check_table(summary.get("self_check", [])),
         flight_table=_flight_table(summary["flight"]) if summary.get("flight") else None,
     )
-    path.write_text(html, encoding="utf-8")
+    write_text(path, html)
     return path
 
 
@@ -217,6 +220,12 @@ def _joint_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
         "Without offset: less a constant offset in the segment, as two definitions of a joint have.",
     ]
     return _Comparison(title, table, lines)
+
+
+def _self_check_table(findings: Sequence[Mapping[str, Any]]) -> HtmlTable | None:
+    """Return the sentences of the self-check; those that are alarms in words too."""
+    rows = [(each["sentence"], "wrong" if each["is_alarm"] else "as usual") for each in findings]
+    return HtmlTable(rows) if rows else None
 
 
 def _flight_table(flight: Mapping[str, Any]) -> HtmlTable:

@@ -16,6 +16,7 @@ from airborne.cameras import Camera, Rig
 from airborne.export.palette import STATUS_RGB, TEXT_RGB, hex_colour
 from airborne.export.panels import FONT_PT, WIDTH_IN
 from airborne.export.views import cached_surface_arrays, crop_camera, resample_view
+from airborne.io.figures import save_png
 from airborne.rendering import FLAT, render, through_mask
 from airborne.tracking import Status
 from airborne.types import Image
@@ -72,7 +73,7 @@ class ContactSheet:
         if n:
             selected = np.linspace(0, n - 1, min(n, _N_COLUMNS)).round().astype(int)
             names = [camera.name for camera in self._cameras]
-            _sheet_figure([self._columns[i] for i in selected], names).savefig(self._path)
+            save_png(_sheet_figure([self._columns[i] for i in selected], names), self._path)
 
 
 def _sheet_figure(columns: Sequence[_Column], names: Sequence[str]) -> Figure:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from airborne.io.writing import write_text
 from airborne.motion import Motion, root_angles
 from airborne.tracking import Status
 from airborne.types import Array
@@ -90,7 +91,7 @@ def write_json(path: Path, values: Mapping[str, Any]) -> None:
     """Write a dictionary as JSON; NaN and infinite numbers become null. The file appears whole or not at all."""
     text = json.dumps(json_ready(values), indent=2, ensure_ascii=False, allow_nan=False)
     unfinished = path.with_name(path.name + ".part")
-    unfinished.write_text(text + "\n", encoding="utf-8")
+    write_text(unfinished, text + "\n")
     unfinished.replace(path)
 
 

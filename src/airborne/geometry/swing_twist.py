@@ -13,7 +13,7 @@ from airborne.types import Array
 _SMALL = 1e-6  # sine of the swing below which its rotation vector is taken as its sine
 
 
-def swing_twist(R: Array) -> Array:
+def swing_twist_from_matrix(R: Array) -> Array:
     """Read the coordinates (..., 3) [rad] off rotations (..., 3, 3)."""
     x, y, z = np.moveaxis(R[..., :, 2], -1, 0)
     sine = np.hypot(x, y)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import struct
 import tokenize
@@ -13,6 +14,8 @@ from pathlib import Path
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from airborne.io.text import read_bytes
+
 _MOST_BYTES = 256_000_000  # of an unpacked archive
 
 _BROKEN = (zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, EOFError, KeyError, TypeError)
@@ -22,7 +25,7 @@ _BROKEN += (NotImplementedError, RuntimeError, SyntaxError, MemoryError, Overflo
 def read_arrays(path: Path) -> dict[str, NDArray]:
     """Return a file's arrays by name. Raises ValueError for anything but a `.npz` of numbers, OSError if unreadable."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(io.BytesIO(read_bytes(path, _MOST_BYTES))) as archive:
             members = [member for member in archive.infolist() if member.filename.endswith(".npy")]
             if sum(member.file_size for member in members) > _MOST_BYTES:
                 raise ValueError(f"its arrays take more than {_MOST_BYTES // 1_000_000} MB")

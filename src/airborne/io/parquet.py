@@ -7,6 +7,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from airborne.io.writing import explain_full_disk
+
 CAN_WRITE_PARQUET = find_spec("pyarrow") is not None
 
 
@@ -25,4 +27,5 @@ def write_parquet(
         pa.field(name, array.type, metadata={"units": units.get(name, "1")})
         for name, array in zip(columns, arrays, strict=True)
     ]
-    pq.write_table(pa.table(arrays, schema=pa.schema(fields, metadata=conventions)), path)
+    with explain_full_disk(path):
+        pq.write_table(pa.table(arrays, schema=pa.schema(fields, metadata=conventions)), path)

@@ -1,29 +1,89 @@
-"""Text files, read with limits on size and nesting; knows no noun of the field."""
+"""Text files, TOML, JSON, YAML and CSV, read with limits on size and nesting; knows no noun of the field."""
 
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import re
+import stat
 import tomllib
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 _LARGEST_TOML_BYTES = 5_000_000  # larger files are refused
 _LARGEST_JSON_BYTES = 50_000_000  # likewise
 _LARGEST_CSV_BYTES = 50_000_000  # likewise
+_MOST_BRACKETS = 200  # in a flat YAML file
+_LARGEST_YAML_BYTES = 100_000  # likewise: it is parsed slowly
 
 _DEEP_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){64}""")  # a.a.a...: takes quadratic time
 
 
+def read_bytes(path: Path, most_bytes: int) -> bytes:
+    """Read a file. Raises OSError, also for a pipe or a device, or ValueError where it is too large."""
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
+        raise OSError(errno.EINVAL, "it is no file", str(path))
+    if status.st_size > most_bytes:
+        raise ValueError(f"larger than {most_bytes / 1e6:g} MB")
+    if status.st_size == 0:  # as the system's own files say, some of which never end
+        return b""
+    with path.open("rb") as file:
+        return file.read(status.st_size)
+
+
+def read_text(path: Path, most_bytes: int) -> str:
+    """Read a text file. Raises OSError, or ValueError where it is too large or no text."""
+    data = read_bytes(path, most_bytes)
+    try:
+        return data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError:
+        raise ValueError("it is not a text file") from None
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file. Raises OSError, or TOMLDecodeError for anything else, also if too large or nested too deep."""
-    if path.stat().st_size > _LARGEST_TOML_BYTES:
-        raise tomllib.TOMLDecodeError(f"larger than {_LARGEST_TOML_BYTES // 1_000_000} MB")
     try:
-        return parse_toml(path.read_text(encoding="utf-8-sig"))
-    except UnicodeDecodeError:
-        raise tomllib.TOMLDecodeError("it is not a text file") from None
+        return parse_toml(read_text(path, _LARGEST_TOML_BYTES))
+    except tomllib.TOMLDecodeError:
+        raise
+    except ValueError as error:
+        raise tomllib.TOMLDecodeError(str(error)) from None
+
+
+def read_flat_yaml(path: Path) -> list[tuple[str, str]]:
+    """Read a YAML file of lines `key: value`: keys and values as text, in order; none where it has another form.
+
+    Raises OSError, or ValueError for anything else: lists and tables in it, tags, anchors.
+    """
+    try:
+        document = yaml.compose(_plain_yaml(read_text(path, _LARGEST_YAML_BYTES)), yaml.BaseLoader)
+    except yaml.YAMLError as error:
+        raise ValueError(" ".join(str(error).split())[:160]) from None
+    except RecursionError:
+        raise ValueError("nested too deep") from None
+    if not isinstance(document, yaml.MappingNode):
+        return []
+    for node in (node for pair in document.value for node in pair):
+        if not isinstance(node, yaml.ScalarNode):
+            raise ValueError(f"line {node.start_mark.line + 1}: expected one value")
+    return [(key.value, value.value) for key, value in document.value]
+
+
+def _plain_yaml(text: str) -> str:
+    """Return a text without anchors, aliases and tags, which could make a short text a large or a strange one."""
+    n_open = 0
+    for token in yaml.scan(text, yaml.BaseLoader):
+        n_open += isinstance(token, yaml.FlowSequenceStartToken | yaml.FlowMappingStartToken)
+        if n_open > _MOST_BRACKETS:
+            raise ValueError("it holds lists and tables, expected lines such as 'key: 0.1'")
+        if isinstance(token, yaml.AnchorToken | yaml.AliasToken | yaml.TagToken):
+            kind = type(token).__name__.removesuffix("Token").lower()
+            raise ValueError(f"line {token.start_mark.line + 1}: no {kind} is read; write the value itself")
+    return text
 
 
 def list_keys(document: dict[str, Any]) -> str:
@@ -33,10 +93,9 @@ def list_keys(document: dict[str, Any]) -> str:
 
 def read_json(path: Path) -> Any:
     """Read a JSON file. Raises OSError, or ValueError for anything else, also if too large or nested too deep."""
-    if path.stat().st_size > _LARGEST_JSON_BYTES:
-        raise ValueError(f"larger than {_LARGEST_JSON_BYTES // 1_000_000} MB")
+    text = read_text(path, _LARGEST_JSON_BYTES)
     try:
-        return json.loads(path.read_text(encoding="utf-8-sig"))
+        return json.loads(text)
     except RecursionError:
         raise ValueError("nested too deep") from None
 
@@ -47,15 +106,13 @@ def read_csv(path: Path, expected: str, error: type[Exception]) -> list[tuple[in
     Raises `error`, saying in one line what was found and what is `expected`.
     """
     try:
-        if path.stat().st_size > _LARGEST_CSV_BYTES:
-            raise error(f"{path} is larger than {_LARGEST_CSV_BYTES // 1_000_000} MB; {expected}")
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path, _LARGEST_CSV_BYTES)
     except OSError as failure:
         raise error(f"{path} cannot be read ({failure.strerror}); {expected}") from None
-    except UnicodeDecodeError:
-        raise error(f"{path} is not a text file; {expected}") from None
+    except ValueError as failure:
+        raise error(f"{path}: {failure}; {expected}") from None
     if "\0" in text:
-        raise error(f"{path} is not a text file; {expected}")
+        raise error(f"{path}: it is not a text file; {expected}")
     reader = csv.reader(text.splitlines())
     try:
         rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]

@@ -7,7 +7,7 @@ Independent of cameras, images and truth.
 """
 
 from airborne.motion.angles import root_angles
-from airborne.motion.files import MotionWriter, read_estimates, read_motion
+from airborne.motion.files import MotionWriter, read_estimates, read_motion, revise_motion
 from airborne.motion.flight.momentum_table import FlightSummary, flight_summary, has_inertias, measure_flight
 from airborne.motion.joints import JointStatus, joint_angles, joint_statuses, landmarks
 from airborne.motion.jumps.heights import measure_jumps
@@ -36,6 +36,7 @@ __all__ = [
     "read_estimates",
     "read_motion",
     "read_players",
+    "revise_motion",
     "root_angles",
     "write_angles",
     "write_flight",

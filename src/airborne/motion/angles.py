@@ -20,7 +20,7 @@ def root_angles(motion: Motion) -> xr.Dataset:
     """
     radians = unwrap(angles_from_matrix(motion.R), motion.time_s)
     jacobian = angles_from_world_rotation(radians)
-    covariance = motion.covariance[:, 3:6, 3:6]
+    covariance = motion.total_covariance[:, 3:6, 3:6]
     is_known = np.isfinite(covariance).all(axis=(-2, -1), keepdims=True)
     sd = standard_deviation(np.einsum("nij,njk,nik->ni", jacobian, np.where(is_known, covariance, np.nan), jacobian))
     variables: dict = {

@@ -13,9 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from airborne.errors import ResultError
+from airborne.io.writing import explain_full_disk
 from airborne.types import Array
 
 COVARIANCE_FILE = "covariance.bin"
+LASTING_FILE = "lasting.bin"  # the same of the root's errors that last all run long (6, 6), of any body
 _FLOAT = np.dtype("<f8")
 
 
@@ -25,7 +27,7 @@ class CovarianceWriter:
     def __init__(self, path: Path, covariances: Sequence[Array], *, size: int) -> None:
         """Open a file for the given covariances (size, size); rows that it already has stay as they are."""
         n_finished = min(len(covariances), path.stat().st_size // _row_bytes(size)) if path.is_file() else 0
-        self._upper = np.triu_indices(size)
+        self._path, self._upper = path, np.triu_indices(size)
         self._file = path.open("r+b" if n_finished else "wb")
         self._file.truncate(n_finished * _row_bytes(size))
         self._file.seek(0, os.SEEK_END)
@@ -34,13 +36,20 @@ class CovarianceWriter:
 
     def append(self, covariance: Array) -> None:
         """Write one covariance (size, size) and wait until it is on disk."""
-        self._file.write(covariance[self._upper].astype(_FLOAT).tobytes())
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        with explain_full_disk(self._path):
+            self._file.write(covariance[self._upper].astype(_FLOAT).tobytes())
+            self._file.flush()
+            os.fsync(self._file.fileno())
 
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+
+def write_covariances(path: Path, covariances: Array) -> None:
+    """Write covariances (n, size, size) at once."""
+    rows, columns = np.triu_indices(covariances.shape[-1])
+    path.write_bytes(covariances[:, rows, columns].astype(_FLOAT).tobytes())
 
 
 def read_covariances(path: Path, n: int, *, size: int) -> Array:

@@ -9,6 +9,7 @@ import csv
 import math
 import os
 import re
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -17,7 +18,14 @@ from numpy.typing import NDArray
 
 from airborne.body import Pose
 from airborne.errors import ResultError
-from airborne.motion.covariance_file import COVARIANCE_FILE, CovarianceWriter, read_covariances
+from airborne.io.writing import explain_full_disk
+from airborne.motion.covariance_file import (
+    COVARIANCE_FILE,
+    LASTING_FILE,
+    CovarianceWriter,
+    read_covariances,
+    write_covariances,
+)
 from airborne.motion.motion import Motion, rigid_transform
 from airborne.motion.tables import cell, motion_columns
 from airborne.tracking import Estimate, Status
@@ -45,7 +53,7 @@ class MotionWriter:
         if file_joints != joints:
             listed = ", ".join(joints) or "none"
             raise ResultError(f"{path} was written for another body; joints here: {listed}; start in a new folder")
-        self._joints = joints
+        self._path, self._joints = path, joints
         self._covariances = None
         if joints:
             past = Motion.collect(estimates, joints).covariance
@@ -75,9 +83,10 @@ class MotionWriter:
         self._write_line([*public, *covariance, str(estimate.time_s), *pose])
 
     def _write_line(self, cells: list[str]) -> None:
-        self._file.write((",".join(cells) + "\n").encode())
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        with explain_full_disk(self._path):
+            self._file.write((",".join(cells) + "\n").encode())
+            self._file.flush()
+            os.fsync(self._file.fileno())
 
 
 def read_estimates(path: Path) -> list[Estimate]:
@@ -91,9 +100,28 @@ def read_estimates(path: Path) -> list[Estimate]:
 
 
 def read_motion(path: Path) -> Motion:
-    """Read motion.csv as a `Motion`; the rules are those of `read_estimates`."""
+    """Read motion.csv as a `Motion`, with the lasting errors beside it; the rules are those of `read_estimates`."""
     joints, estimates = _parse(path)
-    return Motion.collect(estimates, joints)
+    motion = Motion.collect(estimates, joints)
+    lasting = read_covariances(path.with_name(LASTING_FILE), len(motion), size=6)
+    return motion if np.isnan(lasting).any() else replace(motion, lasting=lasting)
+
+
+def revise_motion(path: Path, motion: Motion) -> None:
+    """Write what the end of a run says of all of it: lasting errors beside motion.csv, and its sds and statuses anew.
+
+    The covariances of the moments' own errors stay as they are.
+    """
+    header, *rows = path.read_text(encoding="utf-8").splitlines()
+    columns, lines = motion_columns(motion).values(), [header]
+    for row, line in enumerate(rows):
+        public = [cell(column[row]) for column in columns]
+        lines.append(",".join([*public, *line.split(",")[len(public) :]]))
+    if motion.lasting is not None:
+        write_covariances(path.with_name(LASTING_FILE), motion.lasting)
+    unfinished = path.with_name(path.name + ".part")
+    unfinished.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    unfinished.replace(path)
 
 
 def _header(joints: tuple[str, ...]) -> list[str]:

@@ -46,10 +46,11 @@ def landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
     owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])
     points = np.full((len(motion), len(owners), 3), np.nan)
     variance = np.full(points.shape, np.nan)
+    covariance = motion.total_covariance
     for row in np.flatnonzero(motion.has_pose):
         posed = model.with_pose(motion.pose(row))
         points[row] = posed.landmarks
-        variance[row] = propagate_variances(point_jacobian(posed, owners, points[row]), motion.covariance[row])
+        variance[row] = propagate_variances(point_jacobian(posed, owners, points[row]), covariance[row])
     return points, standard_deviation(variance.mean(axis=-1))
 
 

@@ -35,6 +35,7 @@ class Motion:
     covariance: Array  # (n, 6 + 3 joints, 6 + 3 joints)
     joints: tuple[str, ...]  # names of the segments after the root; () for a body in one piece
     joint_angles: Array  # (n, joints, 3) x-y-z [rad]
+    lasting: Array | None = None  # (n, 6, 6) of the root's errors that last all run long, beside `covariance`
 
     @classmethod
     def collect(cls, estimates: Sequence[Estimate], joints: tuple[str, ...] = ()) -> Motion:
@@ -100,7 +101,7 @@ class Motion:
 
     @property
     def position_sd(self) -> Array:
-        """Standard deviations of the position: (n, 3) [m]."""
+        """Standard deviations of the position, of errors of the moment and of lasting ones: (n, 3) [m]."""
         return self._sd[:, :3]
 
     @property
@@ -114,8 +115,17 @@ class Motion:
         return self._sd[:, 6:].reshape(len(self), len(self.joints), 3)
 
     @property
+    def total_covariance(self) -> Array:
+        """Covariance of the errors of the moment and of lasting ones: (n, 6 + 3 joints, 6 + 3 joints)."""
+        if self.lasting is None:
+            return self.covariance
+        total = self.covariance.copy()
+        total[:, :6, :6] += self.lasting
+        return total
+
+    @property
     def _sd(self) -> Array:
-        return standard_deviation(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+        return standard_deviation(np.diagonal(self.total_covariance, axis1=-2, axis2=-1))
 
     def count(self, status: Status) -> int:
         """Count the frames of one status."""

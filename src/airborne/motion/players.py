@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from airborne.errors import ResultError
 from airborne.io.parquet import CAN_WRITE_PARQUET, write_parquet
+from airborne.io.writing import explain_full_disk
 from airborne.motion.tables import cell
 from airborne.motion.uncertainty import standard_deviation
 from airborne.tracking import Status
@@ -125,8 +126,9 @@ class PlayersWriter:
                 )
         if data:
             self._file.seek(offset + len(text.encode()) - len(data))
-            self._file.write(data)
-            self._file.flush()
+            with explain_full_disk(self.path):
+                self._file.write(data)
+                self._file.flush()
 
 
 def read_players(path: Path) -> PlayersMotion:
@@ -226,13 +228,10 @@ def _table(path: Path, n_bytes: int) -> pd.DataFrame:
         )
     unknown = {name: [""] for name in PLAYERS_COLUMNS if name not in _TEXTS}
     try:
-        return pd.read_csv(
-            io.BytesIO(data),
-            dtype=types,
-            na_values=unknown,
-            keep_default_na=False,
-            low_memory=False,
-        )
+        with np.errstate(invalid="ignore"):
+            return pd.read_csv(
+                io.BytesIO(data), dtype=types, na_values=unknown, keep_default_na=False, low_memory=False
+            )
     except ValueError as error:
         raise ResultError(f"{path}: {str(error).splitlines()[0][:200]}; correct the line or track again") from None
 

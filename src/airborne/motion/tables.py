@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.io.parquet import CAN_WRITE_PARQUET, write_parquet
+from airborne.io.writing import write_text
 from airborne.motion.angles import ROOT_ANGLES, root_angles
 from airborne.motion.flight.momentum_table import measure_flight
 from airborne.motion.joints import joint_angles, joint_statuses, landmarks
 from airborne.motion.motion import Motion
+from airborne.types import Array
 
 _UNITS = {"_m": "m", "_s": "s", "_deg": "deg", "_m_sd": "m", "_deg_sd": "deg"}
 
@@ -50,6 +52,22 @@ def write_motion_parquet(path: Path, motion: Motion) -> None:
         "rotation_sd": "world axes",
     }
     write_parquet(path, columns, {name: _unit(name) for name in columns}, conventions)
+
+
+def write_uncertainty(path: Path, motion: Motion, constant: Array) -> None:
+    """Write uncertainty.csv: the root's sds, split into errors that last all run long and those of each frame.
+
+    constant (n, 6, 6): covariance of the lasting ones [m, rad].
+    """
+    lasting = np.sqrt(np.diagonal(constant, axis1=1, axis2=2))
+    total = np.hstack([motion.position_sd, motion.rotation_sd])
+    own = np.sqrt(np.diagonal(motion.covariance, axis1=1, axis2=2))[:, :6]
+    by_frame = np.sqrt(np.maximum(total**2 - lasting**2, own**2 / 4))  # own sds hold some that lasts
+    columns: dict[str, NDArray] = {"frame": motion.index, "time_s": motion.time_s}
+    for name, sd in (("sd_constant", np.where(np.isnan(total), np.nan, lasting)), ("sd_frame", by_frame)):
+        columns |= {f"{axis}_m_{name}": sd[:, k] for k, axis in enumerate("xyz")}
+        columns |= {f"r{axis}_deg_{name}": np.rad2deg(sd[:, 3 + k]) for k, axis in enumerate("xyz")}
+    _write_csv(path, columns)
 
 
 def write_angles(path: Path, motion: Motion) -> None:
@@ -124,4 +142,4 @@ def _unit(name: str) -> str:
 def _write_csv(path: Path, columns: dict[str, NDArray]) -> None:
     rows = zip(*columns.values(), strict=True)
     lines = [",".join(columns), *(",".join(map(cell, row)) for row in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_text(path, "\n".join(lines) + "\n")

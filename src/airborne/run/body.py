@@ -5,12 +5,12 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
-from airborne.body.files import body_toml, mesh_files
+from airborne.body.files import mesh_files, write_body
 from airborne.calibration.from_points import Calibration
 from airborne.cameras import Camera
 from airborne.export import ContactSheet, MatchingPicture, OverlayVideos, headline, write_figures, write_report
@@ -22,6 +22,7 @@ from airborne.motion import (
     has_inertias,
     read_estimates,
     read_motion,
+    revise_motion,
     write_angles,
     write_flight,
     write_joint_angles,
@@ -29,20 +30,24 @@ from airborne.motion import (
     write_motion_parquet,
 )
 from airborne.motion.run_folder import BODY, JOINTS, MOTION, figures_of, tables_of, videos_of
+from airborne.motion.tables import write_uncertainty
 from airborne.rendering import FLAT, render
 from airborne.run.find import FoundStart
 from airborne.run.first_pose import find_first_pose
 from airborne.run.opening import Opened
+from airborne.run.self_check import check_run
 from airborne.tracking import Estimate
 from airborne.tracking.estimate import unknown_segments
 from airborne.tracking.methods import sample_body_colours, tracker_of
+from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.tracker import Tracker
 from airborne.trial.file import Trial
 from airborne.video import Frames, Recording
 
 _UNCERTAINTY = (
-    "Standard deviations include image noise, light, and edges that are not where the drawn body has them. They do not "
-    "include wrong dimensions of the whole body, or wrong times of the cameras."
+    "Standard deviations of position and orientation include image noise, light, and edges not where the drawn "
+    "body has them; and what the self-check leaves open: the sizes of body and world, and the cameras' places and "
+    "times. They do not include wrong lengths and girths of single segments."
 )
 _CALIBRATION_UNCERTAINTY = " They include a shift of each camera's whole image due to calibration."
 OUT_OF_SIGHT = "the start pose lies in no camera's image; check start.position_m, in metres"
@@ -58,6 +63,7 @@ class BodyRun:
     model: BodyModel
     start: Pose
     found: FoundStart | None = None  # where the start was looked for
+    kept: KeptFrames = field(default_factory=KeptFrames)  # grows while the run is tracked
 
     table = MOTION
 
@@ -70,25 +76,30 @@ class BodyRun:
         opened.recording.events.extend([*model.notes, *found_notes, *first.notes])
         return cls(trial, opened.recording, opened.calibration, model, first.pose, found)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names that figures show."""
+        return tuple(segment.name for segment in self.model.segments)
+
     def read_done(self, folder: Path) -> list[Estimate]:
         """Return the estimates that a killed run left: from their frames the tracker only learns."""
         return read_estimates(folder / self.table)
 
     def copy_inputs(self, folder: Path) -> None:
         """Write the body beside the results, for `airborne evaluate` and for other tools."""
-        if self.trial.body.file is None:
-            (folder / BODY).write_text(body_toml(self.model), encoding="utf-8")
-            return
-        body = self.trial.path(self.trial.body.file)
-        shutil.copyfile(body, folder / BODY)
-        for name in mesh_files(body):
-            target = folder / name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(body.parent / name, target)
+        file = self.trial.body.file
+        if file is None or mesh_files(self.trial.path(file)):  # meshes get names of our own, beside the body's
+            write_body(folder / BODY, self.model)
+        else:
+            shutil.copyfile(self.trial.path(file), folder / BODY)
 
     def see(self, first: Frames) -> BodyRun:
         """Return the body with the colours that the first frames show; an event says where they do not show it."""
         model = sample_body_colours(self.model, self.start, first)
+        if self.model.needs_colours:  # once more where the first frames show the body to be
+            tracker = tracker_of(self.trial.settings, model, self.start)
+            found = tracker.search(tracker.init(), first)
+            model = model if found.pose is None else sample_body_colours(self.model, found.pose, first)
         if not is_seen(model.with_pose(self.start), [view.camera for view in first.views if view is not None]):
             self.recording.events.append(OUT_OF_SIGHT)
         return replace(self, model=model)
@@ -124,15 +135,34 @@ class BodyRun:
             else:
                 artist.write(frames, posed, estimate.status)
 
+    def keep(self, frames: Frames) -> None:
+        """Keep some frames, spread over the run, for the self-check."""
+        self.kept.add(frames)
+
     def finish(self, folder: Path) -> tuple[Motion, dict[str, Any]]:
-        """Write the tables; return the motion and the beginning of the summary."""
+        """Check the run and write the tables; return the motion and the beginning of the summary."""
         motion, model = read_motion(folder / self.table), self.model
+        checked = check_run(
+            motion,
+            model,
+            self.recording.rig,
+            self.start,
+            self.kept,
+            self.calibration,
+            is_preset=self.trial.body.file is None,
+        )
+        motion = checked.motion
+        revise_motion(folder / self.table, motion)
+        if checked.found is not None:
+            write_uncertainty(tables_of(folder) / "uncertainty.csv", motion, checked.found.constant_at(motion.index))
         write_tables(folder, motion, model)
+        self.recording.events.extend(checked.doubts)
         is_exact = self.calibration is None
         return motion, {
             "name": self.trial.name,
             **headline(motion),
             **({"flight": flight_summary(motion, model).to_dict()} if _has_flight(motion, model) else {}),
+            "self_check": checked.findings,
             "uncertainty": _UNCERTAINTY if is_exact else _UNCERTAINTY + _CALIBRATION_UNCERTAINTY,
         }
 

@@ -132,7 +132,8 @@ def _measure_in_chunks(
     parts, (done, rounds), n = [], of_rounds, len(motion)
     for first in range(0, n, _ROWS_AT_A_TIME):
         rows = slice(first, first + _ROWS_AT_A_TIME)
-        chunk = {each.name: getattr(motion, each.name)[rows] for each in fields(motion) if each.name != "joints"}
+        arrays = {each.name: getattr(motion, each.name) for each in fields(motion)}
+        chunk = {name: array[rows] for name, array in arrays.items() if isinstance(array, np.ndarray)}
         parts.append(measure(replace(motion, **chunk)))
         progress(done * n + min(rows.stop, n), rounds * n)
     values, sd = (np.concatenate(each) for each in zip(*parts, strict=True))

@@ -17,10 +17,11 @@ from airborne.export import write_json
 from airborne.export.finding import draw_candidates, draw_empty_scene
 from airborne.geometry.rotations import angles_from_matrix
 from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE, figures_of
+from airborne.run.folder import open_results
 from airborne.run.opening import open_cameras, past_the_end_error, video_source
 from airborne.tracking import Status
-from airborne.tracking.first_pose.candidates import Finding, find_thing
-from airborne.tracking.first_pose.moments import Source, empty_scenes, look, spread_sample
+from airborne.tracking.first_pose.candidates import StartSearch, find_thing
+from airborne.tracking.first_pose.moments import SourceKey, empty_scenes, look, spread_sample
 from airborne.tracking.methods import sample_body_colours
 from airborne.tracking.model_based.refined import RefinedTracker
 from airborne.tracking.tracker import track_frames
@@ -39,8 +40,8 @@ class FoundStart:
 
     trial: Trial  # with the start that was found
     model: BodyModel
-    finding: Finding
-    scenes: Mapping[Source, EmptyScene]
+    finding: StartSearch
+    scenes: Mapping[SourceKey, EmptyScene]
     facts: tuple[VideoFacts, ...]
     note: str  # what the user should know, in one line
 
@@ -112,7 +113,7 @@ def _counted(recording: Recording, progress: Progress | None) -> Iterator[Frames
         yield frames
 
 
-def _take(trial: Trial, finding: Finding, number: int) -> Finding:
+def _take(trial: Trial, finding: StartSearch, number: int) -> StartSearch:
     """Put a candidate first."""
     n = len(finding.candidates)
     if not 1 <= number <= n:
@@ -121,16 +122,16 @@ def _take(trial: Trial, finding: Finding, number: int) -> Finding:
     return replace(finding, candidates=(chosen, *(each for each in finding.candidates if each is not chosen)))
 
 
-def _undecided(trial: Trial, model: BodyModel, finding: Finding, folder: Path) -> UndecidedError:
+def _undecided(trial: Trial, model: BodyModel, finding: StartSearch, folder: Path) -> UndecidedError:
     """Write the candidates and return the error that names them."""
-    folder.mkdir(parents=True, exist_ok=True)
     frame, best = finding.moment.frames.index, finding.candidates[0]
-    write_json(folder / CANDIDATES, _describe(finding))
-    draw_candidates(
-        folder / CANDIDATES_PICTURE,
-        finding.moment,
-        [(f"{each.probability:.0%}", model.with_pose(each.pose)) for each in finding.candidates],
-    )
+    with open_results(folder):
+        write_json(folder / CANDIDATES, _describe(finding))
+        draw_candidates(
+            folder / CANDIDATES_PICTURE,
+            finding.moment,
+            [(f"{each.probability:.0%}", model.with_pose(each.pose)) for each in finding.candidates],
+        )
     if not best.is_plausible:
         reason = (
             f"what moves in frame {frame} does not look like the body ({best.precision:.0%} of its outline stands out, "
@@ -144,7 +145,7 @@ def _undecided(trial: Trial, model: BodyModel, finding: Finding, folder: Path) -
     )
 
 
-def _describe(finding: Finding) -> dict[str, Any]:
+def _describe(finding: StartSearch) -> dict[str, Any]:
     return {
         "frame": finding.moment.frames.index,
         "time_s": float(finding.moment.frames.time_s),
@@ -166,7 +167,7 @@ def _describe(finding: Finding) -> dict[str, Any]:
     }
 
 
-def _track_back(trial: Trial, model: BodyModel, recording: Recording, finding: Finding) -> tuple[int, Pose]:
+def _track_back(trial: Trial, model: BodyModel, recording: Recording, finding: StartSearch) -> tuple[int, Pose]:
     """Track from the moment of the finding back in time; return the earliest frame that is tracked, and the pose."""
     found, pose = finding.moment.frames.index, finding.candidates[0].pose
     picture_bytes = sum(1.5 * facts.size[0] * facts.size[1] for facts in recording.facts)

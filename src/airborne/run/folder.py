@@ -5,13 +5,18 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from airborne import __version__
+from airborne.body.files import mesh_files
+from airborne.cameras.files import files_beside
 from airborne.errors import ResultError
 from airborne.export import write_json
-from airborne.motion.covariance_file import COVARIANCE_FILE
+from airborne.io.folder_lock import LOCK, refuse_links, sole_writer
+from airborne.motion.covariance_file import COVARIANCE_FILE, LASTING_FILE
 from airborne.motion.run_folder import (
     BODY,
     CALIBRATION,
@@ -30,7 +35,14 @@ from airborne.motion.run_folder import (
 from airborne.trial.file import Trial
 
 _BEFORE_A_RUN = {CANDIDATES, CANDIDATES_PICTURE}  # what a start that is undecided leaves
-_HASHED_BYTES = 8 << 20  # larger files are identified by their first and last so many bytes and their length
+
+
+@contextmanager
+def open_results(folder: Path) -> Iterator[None]:
+    """Be the sole writer into a folder whose results are added to."""
+    with sole_writer(folder):
+        refuse_links(folder)
+        yield
 
 
 def prepare_folder(
@@ -38,16 +50,18 @@ def prepare_folder(
 ) -> bool:
     """Prepare a run's folder; return whether it holds rows of its `table` from which to resume.
 
-    `overwrite` removes the run that the folder holds, finished or not. Raises ResultError for a folder that holds
-    something else, a run with neither `resume` nor `overwrite`, or a run of other inputs.
+    Whoever calls it is the folder's `sole_writer`. `overwrite` removes the run that the folder holds, finished or not.
+    Raises ResultError for a folder that holds something else, a run with neither `resume` nor `overwrite`, or a run of
+    other inputs.
     """
     rows, record = folder / table, folder / RUN_RECORD
-    folder.mkdir(parents=True, exist_ok=True)
+    foreign = {path.name for path in folder.iterdir()} - {LOCK, f"{RUN_RECORD}.part", *_BEFORE_A_RUN}
+    if not record.exists() and not rows.exists() and foreign:
+        raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
+    refuse_links(folder)
     if overwrite and record.exists():
         read_record(record)
         _remove_run(folder)
-    elif not record.exists() and not rows.exists() and {path.name for path in folder.iterdir()} - _BEFORE_A_RUN:
-        raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
     if rows.exists() and not resume:
         raise ResultError(
             f"{folder} already holds a run; give --resume to go on, --overwrite to replace it, or another folder"
@@ -73,6 +87,7 @@ def _remove_run(folder: Path) -> None:
         CALIBRATION,
         BODY,
         COVARIANCE_FILE,
+        LASTING_FILE,
         SMOOTH_RECORD,
         *_BEFORE_A_RUN,
     ):
@@ -100,30 +115,30 @@ def run_identity(trial: Trial, *, live: bool = False) -> dict[str, Any]:
 
 def input_hashes(trial: Trial, *, live: bool = False) -> dict[str, str]:
     """Return the SHA-256 of each input file, by the name that the trial gives it; live video has none."""
-    names = [*(camera.video for camera in trial.camera if not live), *trial.input_files]
+    names = [*(camera.video for camera in trial.camera if not live), *trial.input_files, *_further_files(trial)]
     rest = [trial.start, trial.lights, trial.calibration, trial.body, *trial.camera]
     start = json.dumps([table and table.model_dump() for table in rest])
     hashes = {name: file_digest(trial.path(name)) for name in names}
     return {**hashes, "start and lights": hashlib.sha256(start.encode()).hexdigest()}
 
 
+def _further_files(trial: Trial) -> list[str]:
+    """Return what the named files name in turn: a body's meshes, the other half of a calibration in two files."""
+    body, calibration = trial.body.file, trial.calibration.file
+    meshes = [] if body is None else [str(Path(body).parent / name) for name in mesh_files(trial.path(body))]
+    halves = [] if calibration is None else [path.name for path in files_beside(trial.path(calibration))]
+    return meshes + [str(Path(calibration or "").parent / name) for name in halves]
+
+
 def file_digest(path: Path) -> str:
-    """Return the SHA-256 of a file, of a large one of both ends and the size; of a folder that of its JSON files."""
-    digest = hashlib.sha256()
+    """Return the SHA-256 of a file; of a folder that of its JSON files."""
     if path.is_dir():
+        digest = hashlib.sha256()
         for file in sorted(path.rglob("*.json")):
             digest.update(f"{file.relative_to(path).as_posix()} {file_digest(file)}\n".encode())
         return digest.hexdigest()
-    size = path.stat().st_size
     with path.open("rb") as file:
-        if size <= 2 * _HASHED_BYTES:
-            digest.update(file.read())
-        else:
-            digest.update(file.read(_HASHED_BYTES))
-            file.seek(-_HASHED_BYTES, 2)
-            digest.update(file.read())
-            digest.update(str(size).encode())
-    return digest.hexdigest()
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def list_tables(folder: Path) -> list[str]:

@@ -10,7 +10,6 @@ from itertools import combinations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
 from airborne.body.surface import surface_arrays
@@ -20,10 +19,9 @@ from airborne.errors import MistakesError
 from airborne.rendering import FLAT, render
 from airborne.run.folder import file_digest
 from airborne.trial.file import Trial
+from airborne.types import Mask
 from airborne.video import Recording, VideoFacts, VideoSource
 from airborne.video.decoding import decode, rgb_from_decoded
-
-Mask = NDArray[np.bool_]
 
 _SHORT_SIDE_PX = 180  # of the images compared
 _N_IMAGES, _N_BACKGROUND = 90, 24  # images on each side of the start that are read, and of which the median is made

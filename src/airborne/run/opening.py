@@ -25,6 +25,7 @@ from airborne.video import (
     live_recording,
     open_recording,
 )
+from airborne.video.containers import ADDRESS
 
 AnyRecording = TypeVar("AnyRecording", bound=Recording | LiveRecording, covariant=True)
 
@@ -127,8 +128,9 @@ def _camera_as_saved(rig: Rig, table: CameraTable, size: tuple[int, int]) -> Cam
 
 
 def video_source(trial: Trial, camera: CameraTable) -> VideoSource:
-    """Return a camera's video."""
-    return VideoSource(camera.name, trial.path(camera.video), camera.fields, camera.offset_s, camera.drift_ppm)
+    """Return a camera's video: a file, or the address of a camera on the network."""
+    path = camera.video if camera.video.startswith(ADDRESS) else trial.path(camera.video)
+    return VideoSource(camera.name, path, camera.fields, camera.offset_s, camera.drift_ppm)
 
 
 def past_the_end_error(trial: Trial, recording: Recording | LiveRecording) -> TrialError:

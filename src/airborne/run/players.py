@@ -52,6 +52,11 @@ class PlayersRun:
         """Make the tracker, which checks the players' starts against the cameras."""
         return cls(trial, opened.recording, opened.calibration, players_tracker_of(trial, opened.recording.rig))
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names that figures and videos show."""
+        return tuple(player.name for player in self.trial.players)
+
     def read_done(self, folder: Path) -> tuple[PlayersStep, ...]:
         """Return nothing: a killed run is tracked again from its start, to the same result."""
         return ()
@@ -123,6 +128,9 @@ class PlayersRun:
             "bystanders": [start.name for start in self.trial.players if not start.has_legs],
             "uncertainty": _UNCERTAINTY,
         }
+
+    def keep(self, frames: Frames) -> None:
+        """Keep nothing: players are not checked at the end."""
 
     def warnings(self) -> list[str]:
         """Return what a reader of the numbers must know."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from airborne.cameras import Rig, camera_looking_at
 from airborne.errors import TrialError
+from airborne.io.text import read_text
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.particle import GivenTorsos, legs_tracker
 from airborne.tracking.players import PlayerStart, PlayersTracker
@@ -21,6 +22,7 @@ from airborne.video import Frames, View
 
 _AWAY = np.array([0, -4.0, 0])  # of the artificial cameras [m]
 _TORSO_COLUMNS = ("player", "frame", "x_m", "y_m", "z_m")
+_LARGEST_TABLE_BYTES = 50_000_000  # larger files are refused
 _MOST_FRAMES = 1_000_000  # from the first to the last torso
 
 
@@ -63,19 +65,18 @@ def read_torsos(path: Path, starts: Sequence[PlayerStart], *, first: int) -> Giv
     names = [start.name for start in starts]
     torsos: dict[tuple[int, str], tuple[float, float, float]] = {}
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = csv.DictReader(file)
-            missing = [name for name in _TORSO_COLUMNS if name not in (rows.fieldnames or ())]
-            if missing:
-                raise TrialError(f"{path.name}: no column {', '.join(missing)}; expected {', '.join(_TORSO_COLUMNS)}")
-            for row in rows:
-                if row.get("joint", "torso") == "torso" and row["player"] in names:
-                    x, y, z = (float(row[axis] or math.nan) for axis in _TORSO_COLUMNS[2:])
-                    frame = int(row["frame"])
-                    if not abs(frame - first) <= _MOST_FRAMES:
-                        raise ValueError(f"frame {str(frame)[:20]} lies far beyond the recording")
-                    torsos[frame, row["player"]] = (x, y, z)
-    except (OSError, UnicodeDecodeError, ValueError, TypeError, csv.Error) as error:
+        rows = csv.DictReader(read_text(path, _LARGEST_TABLE_BYTES).splitlines())
+        missing = [name for name in _TORSO_COLUMNS if name not in (rows.fieldnames or ())]
+        if missing:
+            raise TrialError(f"{path.name}: no column {', '.join(missing)}; expected {', '.join(_TORSO_COLUMNS)}")
+        for row in rows:
+            if row.get("joint", "torso") == "torso" and row["player"] in names:
+                x, y, z = (float(row[axis] or math.nan) for axis in _TORSO_COLUMNS[2:])
+                frame = int(row["frame"])
+                if not abs(frame - first) <= _MOST_FRAMES:
+                    raise ValueError(f"frame {str(frame)[:20]} lies far beyond the recording")
+                torsos[frame, row["player"]] = (x, y, z)
+    except (OSError, ValueError, TypeError, csv.Error) as error:
         raise TrialError(f"{path.name}: not a table of torsos ({error}); correct it or leave `torso` out") from error
     positions = np.full((max((frame for frame, _ in torsos), default=first) - first + 1, len(names), 3), np.nan)
     for (frame, name), torso in torsos.items():

@@ -12,7 +12,8 @@ from airborne.trial.file import Trial
 from airborne.video import LiveRecording, Recording
 
 _EXACT_CALIBRATION = (
-    "the calibration comes from a file that does not say how good it is; the standard deviations take it as exact"
+    "the calibration comes from a file that does not say how good it is; the standard deviations of a body's pose take "
+    "what is usual, 0.1°, 10 mm and 0.5 % of the focal length"
 )
 
 

@@ -39,6 +39,7 @@ from airborne.motion.smoothing.tables import (
     write_smooth_joints,
     write_smooth_motion,
 )
+from airborne.run.folder import open_results
 from airborne.types import Array, Progress
 
 Events = dict[str, tuple[Event, ...]]  # by player; of one body under ""
@@ -129,15 +130,15 @@ def smooth_run(
             f"{len(run.time_s)} frames); track more, fill gaps, or set fewer events"
         )
     out = folder if out is None else out
-    out.mkdir(parents=True, exist_ok=True)
-    tables_of(out)
-    tables, files = run.write(out, smoothing, events, progress)
-    if analysis is not None:
-        figures_of(out)
-        write_residuals(out / RESIDUALS_FIGURE, analysis, smoothing.cutoff_hz)
-        files = (*files, RESIDUALS_FIGURE)
-    result = SmoothRun(smoothing, events, analysis, tables, out, (*files, SMOOTH_RECORD))
-    write_json(out / SMOOTH_RECORD, result.to_dict())
+    with open_results(out):
+        tables_of(out)
+        tables, files = run.write(out, smoothing, events, progress)
+        if analysis is not None:
+            figures_of(out)
+            write_residuals(out / RESIDUALS_FIGURE, analysis, smoothing.cutoff_hz)
+            files = (*files, RESIDUALS_FIGURE)
+        result = SmoothRun(smoothing, events, analysis, tables, out, (*files, SMOOTH_RECORD))
+        write_json(out / SMOOTH_RECORD, result.to_dict())
     return result
 
 

@@ -40,6 +40,11 @@ class Subject(Protocol[Found, AnyMotion]):
         """The table that is written as the run goes."""
         ...
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names that figures and videos show."""
+        ...
+
     def read_done(self, folder: Path) -> Iterable[Found]:
         """Return what a killed run found, from which the tracker only learns."""
         ...
@@ -70,6 +75,10 @@ class Subject(Protocol[Found, AnyMotion]):
 
     def draw(self, artists: Sequence[Any], frames: Frames, estimate: Found) -> None:
         """Let the artists draw one time."""
+        ...
+
+    def keep(self, frames: Frames) -> None:
+        """Keep what the end of the run needs of a time's frames."""
         ...
 
     def finish(self, folder: Path) -> tuple[AnyMotion, dict[str, Any]]:

@@ -16,6 +16,8 @@ from airborne.cameras import write_pose2sim
 from airborne.errors import ResultError
 from airborne.export import write_json
 from airborne.export.overlays import OverlaysAs
+from airborne.io.figures import names_not_drawn
+from airborne.io.folder_lock import sole_writer
 from airborne.motion import Motion, PlayersMotion
 from airborne.motion.run_folder import CALIBRATION, SUMMARY
 from airborne.run.body import BodyRun
@@ -26,6 +28,7 @@ from airborne.run.opening import Opened, open_live, open_trial, past_the_end_err
 from airborne.run.players import PlayersRun
 from airborne.run.players_tracker import compile_kernels
 from airborne.run.provenance import provenance_of
+from airborne.run.self_check import alarms
 from airborne.run.subject import AnyMotion, Subject
 from airborne.tracking.tracker import Found, track_frames
 from airborne.trial.file import Trial
@@ -106,6 +109,11 @@ class _Options:
 
 def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> TrackResult:
     """Track an opened subject and write its results; the connection to live cameras ends with the tracking."""
+    with sole_writer(options.folder):
+        return _run_alone(subject, options, connection)
+
+
+def _run_alone(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> TrackResult:
     folder, recording = options.folder, subject.recording
     identity = run_identity(subject.trial, live=options.live)
     goes_on = prepare_folder(folder, identity, subject.table, resume=options.resume, overwrite=options.overwrite)
@@ -117,7 +125,9 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     tracked_s = time.monotonic()
     motion, summary = subject.finish(folder)
     summary |= provenance_of(subject.trial, recording, subject.calibration, identity["inputs"])
-    summary["warnings"] += subject.warnings()
+    summary["warnings"] += [*subject.warnings(), *alarms(summary.get("self_check", []))]
+    if options.drawn is not None:
+        summary["warnings"] += names_not_drawn([subject.trial.name, *recording.rig.names, *subject.names])
     summary["tables"] = list_tables(folder)
     if isinstance(recording, LiveRecording):
         summary["live"] = {
@@ -165,6 +175,7 @@ def _track(
                 if isinstance(recording, LiveRecording):
                     delays_s.append(time.monotonic() - recording.arrival_s)
                 outages.add(observed)
+                subject.keep(observed)
                 subject.draw(artists, observed, estimate)
                 if options.progress is not None:
                     options.progress(number, recording.n_frames)

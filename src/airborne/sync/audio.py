@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import av
 import numpy as np
 from av.audio.resampler import AudioResampler
 from av.error import FFmpegError
@@ -15,6 +14,7 @@ from airborne.errors import VideoError
 from airborne.geometry.robust import robust_sd
 from airborne.sync.offsets import Offsets, fit_line
 from airborne.types import Array, Progress
+from airborne.video.containers import open_file
 from airborne.video.decoding import VideoSource
 
 RATE_HZ = 8000  # 0.125 ms a sample
@@ -65,7 +65,7 @@ def read_sound(source: VideoSource) -> Array:
     """Read one camera's sound: (n,) at 8 kHz, starting at its first image. Raises VideoError."""
     chunks = []
     try:
-        with av.open(source.path) as container:
+        with open_file(source.name, source.path) as container:
             if not container.streams.audio:
                 raise VideoError(
                     f"{source.name}: {source.path} has no sound; synchronise by flash, motion or tracking instead"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,12 +20,19 @@ from airborne.sync.mixed_frames import Blend, blend_of
 from airborne.tracking import Status
 from airborne.tracking.methods import sample_body_colours
 from airborne.tracking.model_based.refined import RefinedState, RefinedTracker
+from airborne.tracking.self_check.check import gather_equations
+from airborne.tracking.self_check.kept_frames import KeptFrames
+from airborne.tracking.self_check.nuisances import MEASURED_SD
+from airborne.tracking.self_check.path import TrackedPath
+from airborne.tracking.self_check.times import camera_times
 from airborne.tracking.time_offsets import CompensatedState, CompensatedTracker, compensate_offsets
 from airborne.trial.file import Trial
 from airborne.types import Array, Progress
 from airborne.video import Frames, Recording
 
 _LEAST_FRAMES = 8  # moments at which the body must be tracked to estimate lags
+_MOST_PASSES = 4  # over the recording, with silhouettes
+_CONVERGED_SDS = 0.3  # a step of theirs below this share of its sd ends the iteration
 _MOMENTS_PER_PERIOD = np.arange(-3, 4) / 2  # that an image may show [its period]
 
 
@@ -43,7 +50,9 @@ def offsets_by_tracking(
     method = {"track": trial.track.model_copy(update={"method": "refined"})}
     measure = _Measure(_with_offsets(trial.model_copy(update=method), start_s), start_s, image_counter(progress))
     start = start_s - start_s[0]
-    lags = find_lags(measure, start, with_drift=with_drift)
+    lags = None if with_drift else _lags_by_silhouettes(measure, start)
+    if lags is None:
+        lags = find_lags(measure, start, with_drift=with_drift)
     names, notes = tuple(camera.name for camera in trial.camera), []
     about = np.where(np.isfinite(lags.lag_s), lags.lag_s, start)
     if mixed := [i for i, blend in enumerate(measure.blends(about, range(len(names)))) if blend.is_mixed]:
@@ -58,6 +67,21 @@ def offsets_by_tracking(
         raise TrialError(f"{', '.join(unknown)}: never sees the tracked body move; synchronise by flash or sound")
     how = "by tracking: every camera's images against the body as all of them see it"
     return Offsets(names, start_s[0] + lags.lag_s, lags.sd_s, lags.drift, lags.drift_sd, how=how, notes=tuple(notes))
+
+
+def _lags_by_silhouettes(measure: _Measure, lag_s: Array) -> CameraLags | None:
+    """Find the lags from where each view shows the body of the run; None for a person, and where scenes are hidden."""
+    zeros, sd_s = np.zeros_like(lag_s), np.zeros_like(lag_s)
+    for _ in range(_MOST_PASSES):
+        measure(lag_s, zeros)
+        found = measure.camera_times()
+        if found is None:
+            return None
+        step, sd_s = found
+        lag_s = lag_s + step
+        if np.all(np.abs(step) <= _CONVERGED_SDS * sd_s):
+            break
+    return CameraLags(lag_s, sd_s, zeros, zeros)
 
 
 def _lags_beside_mixed(
@@ -84,6 +108,8 @@ class _TrackedPath:
     time_s: list[float]  # (n,) of the frames tracked
     poses: list[Pose]
     equations: list[dict[str, tuple[Array, Array]]]
+    index: list[int] = field(default_factory=list)  # (n,) frame numbers
+    kept: KeptFrames = field(default_factory=KeptFrames)
 
     def pose_at(self, time_s: float, within_s: float) -> Pose | None:
         """Interpolate the pose between two tracked ones, if these are no more than within_s apart."""
@@ -100,7 +126,7 @@ class _Measure:
     def __init__(self, trial: Trial, start_s: Array, on_image: Callable[[], None]) -> None:
         self._trial, self._start_s, self._on_image = trial, start_s, on_image
         opened = open_trial(trial)
-        self._recording = opened.recording
+        self._recording, self._calibration = opened.recording, opened.calibration
         self._start = find_first_pose(trial, trial.model(), opened.recording.rig, opened.detections).pose
         self._last: _TrackedPath | None = None
         self._appearance_state: RefinedState | None = None  # of the last pass with all cameras
@@ -137,6 +163,20 @@ class _Measure:
             for i in cameras
         ]
 
+    def camera_times(self) -> tuple[Array, Array] | None:
+        """Return how late the cameras of the last tracking still are, by silhouettes, and sds (c,) [s]."""
+        last, rig = self._last, self._recording.rig
+        assert last is not None
+        model = last.refined.render_model.model
+        if model.has_joints:
+            return None
+        calibration = self._calibration
+        calibrated = {} if calibration is None else {fit.name: fit.covariance for fit in calibration.fits}
+        n = len(last.poses)
+        path = TrackedPath(np.array(last.index), np.array(last.time_s), last.poses, np.zeros((n, 6, 6)))
+        run = gather_equations(model, rig, path, list(last.kept), calibrated=calibrated, body_sd=MEASURED_SD)
+        return None if run is None else camera_times(run, rig)
+
     def _with_lags(self, lag_s: Array, drift: Array) -> Recording:
         rows = zip(self._recording.sources, self._start_s[0] + lag_s, drift, strict=True)
         sources = [
@@ -156,10 +196,12 @@ class _Measure:
                 )
                 tracker = CompensatedTracker(refined)
                 tracked = _TrackedPath(refined, tracker.init(), [], [], [])
+            tracked.kept.add(frames)
             estimate = tracker.search(tracked.state, frames)
             tracked = replace(tracked, state=tracker.learn(tracked.state, frames, estimate))
             if estimate.status is Status.TRACKED and estimate.pose is not None:
                 state = tracked.state
+                tracked.index.append(frames.index)
                 tracked.time_s.append(float(frames.time_s))
                 tracked.poses.append(estimate.pose)
                 compensated = compensate_offsets(frames, state.past)

@@ -12,6 +12,7 @@ import tomlkit
 
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, TrialError
+from airborne.io.writing import write_text
 from airborne.run.opening import open_cameras, video_source
 from airborne.sync import Offsets, offsets_by_flash, offsets_by_motion, offsets_by_sound
 from airborne.sync.from_tracking import offsets_by_tracking
@@ -92,7 +93,7 @@ def write_offsets(path: Path, offsets: Offsets) -> None:
     for number, camera in enumerate(cameras):
         _set_keys(camera, _entries(offsets, number))
     part_file = path.with_name(path.name + ".part")
-    part_file.write_text(tomlkit.dumps(document), encoding="utf-8")
+    write_text(part_file, tomlkit.dumps(document))
     part_file.replace(path)
 
 

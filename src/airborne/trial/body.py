@@ -6,17 +6,18 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from airborne.io.names import CheckedPath
 from airborne.trial.table import SettingsTable
 
 
 class BodyTable(SettingsTable):
     """Which body: a body file, a person of given stature and mass, a measured person, or players' legs."""
 
-    file: str | None = None
+    file: CheckedPath | None = None
     preset: Literal["human18", "legs"] | None = None
     stature_m: float | None = Field(None, gt=0)
     mass_kg: float | None = Field(None, gt=0)
-    measurements: str | None = None
+    measurements: CheckedPath | None = None
 
     @model_validator(mode="after")
     def _check_body(self) -> BodyTable:

@@ -6,14 +6,15 @@ from typing import Literal
 
 from pydantic import model_validator
 
+from airborne.io.names import CheckedPath
 from airborne.trial.table import SettingsTable
 
 
 class CalibrationTable(SettingsTable):
     """Where the cameras come from: a calibration file, or control points."""
 
-    file: str | None = None
-    control_points: str | None = None
+    file: CheckedPath | None = None
+    control_points: CheckedPath | None = None
     method: Literal["lm", "annealing"] = "lm"
     mend: list[str] = []  # cameras to re-resect from the detections of [start]
 

@@ -6,14 +6,15 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from airborne.io.names import CheckedPath, Name
 from airborne.trial.table import SettingsTable
 
 
 class CameraTable(SettingsTable):
     """One camera's video, and how its pixels lie in the calibration's image."""
 
-    name: str
-    video: str
+    name: Name
+    video: CheckedPath  # live also rtsp://...
     fields: Literal["progressive", "top-first", "bottom-first", "auto"] = "progressive"
     offset_s: float = 0.0  # added to this camera's times
     offset_sd_s: float = Field(0.0, ge=0)  # its standard deviation

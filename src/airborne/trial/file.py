@@ -12,6 +12,7 @@ from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_
 from airborne.body import SAMPLED, BodyModel, human18, human18_from_measurements
 from airborne.body.files import read_body
 from airborne.errors import MistakesError, TrialError, list_mistakes
+from airborne.io.names import Name
 from airborne.io.text import list_keys, read_toml
 from airborne.tracking.methods import Settings
 from airborne.tracking.players import PlayerStart
@@ -34,7 +35,7 @@ from airborne.trial.table import SettingsTable
 class Trial(SettingsTable):
     """A whole trial file."""
 
-    name: str
+    name: Name
     camera: Annotated[list[CameraTable], Field(min_length=1)]
     calibration: CalibrationTable
     body: BodyTable
@@ -65,6 +66,15 @@ class Trial(SettingsTable):
             raise ValueError('[[start.player]] goes with body preset = "legs"')
         if is_legs and self.lights is not None:
             raise ValueError("[lights] is not read by methods of players; remove it")
+        return self
+
+    @model_validator(mode="after")
+    def _check_stop(self) -> Trial:
+        stop, frame = self.track.stop, self.start.frame
+        if stop is not None and stop <= frame:
+            raise ValueError(
+                f"track.stop = {stop} leaves no frame, as start.frame = {frame}; give a later one, or none"
+            )
         return self
 
     @model_validator(mode="after")
@@ -222,6 +232,9 @@ def _select_cameras(path: Path, trial: Trial, cameras: Sequence[str]) -> Trial:
     unknown = [name for name in cameras if name not in by_name]
     if unknown:
         raise TrialError(f"{path.name}: no camera {', '.join(unknown)}; it has: {', '.join(by_name)}")
+    twice = [name for name in by_name if cameras.count(name) > 1]
+    if twice:
+        raise TrialError(f"--cameras names {', '.join(twice)} twice; name each camera once")
     mend = [name for name in trial.calibration.mend if name in cameras]
     calibration = trial.calibration.model_copy(update={"mend": mend})
     return trial.model_copy(update={"camera": [by_name[name] for name in cameras], "calibration": calibration})

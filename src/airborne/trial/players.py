@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
-from pydantic import AfterValidator, model_validator
+from pydantic import model_validator
 
 from airborne.body.legs import LEG_POINTS, Legs
 from airborne.errors import BodyError
+from airborne.io.names import ColumnName
 from airborne.tracking.players import PlayerStart
 from airborne.trial.table import SettingsTable, Vector
 
@@ -17,18 +16,10 @@ _FARTHEST_M = 100.0  # no court is larger
 _MOST_UNDER_FLOOR_M = 0.3  # by how much a calibration's floor may be off
 
 
-def _check_name(name: str) -> str:
-    if not name:
-        raise ValueError("must not be empty")
-    if set(name) & set(',"\r\n'):
-        raise ValueError("must not contain a comma, a quote or a line break")
-    return name
-
-
 class PlayerTable(SettingsTable):
     """A player's joints at the first frame; a player with a torso only is a bystander."""
 
-    name: Annotated[str, AfterValidator(_check_name)]
+    name: ColumnName
     joints_m: dict[str, Vector]
 
     @model_validator(mode="after")

@@ -34,11 +34,12 @@ def parse_remainder(path: Path) -> Trial | None:
 def _remove(tables: dict[str, Any], place: Sequence[int | str]) -> bool:
     """Remove the innermost item on the way to a place; False where the way leads nowhere."""
     here: Any = tables
-    holder, key = None, None
+    holder: Any = None
+    key: Any = None
     for step in place:
-        is_index = isinstance(here, list) and isinstance(step, int) and step < len(here)
-        if is_index or (isinstance(here, dict) and step in here):
-            holder, key, here = here, step, here[step]
+        items: Any = dict(enumerate(here)) if isinstance(here, list) else here
+        if isinstance(items, dict) and step in items:
+            holder, key, here = here, step, items[step]
     if holder is None:
         return False
     del holder[key]

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from pydantic import Field, model_validator
 
+from airborne.io.names import CheckedPath
 from airborne.rendering import Lights
 from airborne.tracking.direct_search.stepping import VRule
 from airborne.tracking.methods import Method, Prediction, ScoreName, Settings
@@ -100,7 +101,7 @@ class ParticleSettings(_Settings):
     torso_shift: bool = False  # the whole body moves along with the torso
     resample: Scheme = "systematic"
     resample_when: ResampleWhen = "always"
-    torso: str | None = None  # a table of torsos; None: they are tracked
+    torso: CheckedPath | None = None  # a table of torsos; None: they are tracked
     overlay: Overlay = "paper"  # what the overlay videos show
 
     @property

@@ -11,6 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import Pose
 from airborne.errors import TrialError
 from airborne.geometry.rotations import matrix_from_angles
+from airborne.io.names import CheckedPath
 from airborne.trial.players import PlayerTable
 from airborne.trial.table import SettingsTable, Vector
 
@@ -25,9 +26,9 @@ class StartTable(SettingsTable):
     quaternion_xyzw: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
     somersault_tilt_twist_deg: Vector | None = None
     joint_angles_deg: dict[str, Vector] = {}  # segment -> x, y, z
-    joints_m: dict[str, Vector] | str | None = None  # landmark -> position, or a table of them
-    points_px: str | None = None  # a table of clicked points
-    detections: str | None = None  # .npz, or a folder of folders of OpenPose JSON
+    joints_m: dict[str, Vector] | CheckedPath | None = None  # landmark -> position, or a table of them
+    points_px: CheckedPath | None = None  # a table of clicked points
+    detections: CheckedPath | None = None  # .npz, or a folder of folders of OpenPose JSON
     detections_cameras: dict[str, str] = {}  # camera -> its array or folder
     player: list[PlayerTable] = []
 
@@ -67,7 +68,9 @@ class StartTable(SettingsTable):
             raise ValueError("quaternion_xyzw is all zeros; give x, y, z, w of a rotation, of any length above zero")
         if self.rotation_matrix is not None:
             R = np.array(self.rotation_matrix)
-            if not np.allclose(R @ R.T, np.eye(3), atol=1e-3) or np.linalg.det(R) < 0:
+            with np.errstate(all="ignore"):
+                is_rotation = np.allclose(R @ R.T, np.eye(3), atol=1e-3) and np.linalg.det(R) > 0
+            if not is_rotation:
                 raise ValueError("rotation_matrix is not a rotation: rows must be unit, at right angles, right-handed")
 
     @property

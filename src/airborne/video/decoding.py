@@ -18,6 +18,7 @@ from av.video.stream import VideoStream
 
 from airborne.errors import VideoError
 from airborne.types import Image
+from airborne.video.containers import open_file, video_stream
 from airborne.video.pixels import field_frame, rgb_from_frame
 
 FieldOrder = Literal["progressive", "top-first", "bottom-first"]
@@ -26,10 +27,10 @@ FieldOrderOption = Literal["progressive", "top-first", "bottom-first", "auto"]
 
 @dataclass(frozen=True, slots=True)
 class VideoSource:
-    """One camera's video file."""
+    """One camera's video: a file; live also a pipe, a capture device, or a camera on the network."""
 
     name: str  # the camera's name
-    path: Path
+    path: Path | str  # text: an address, rtsp://...
     fields: FieldOrderOption = "progressive"
     offset_s: Fraction | float = 0  # added to this camera's times [s]
     drift_ppm: Fraction | float = 0  # by how much its clock is slow, in millionths
@@ -143,27 +144,12 @@ def rgb_from_decoded(image: DecodedImage, facts: VideoFacts) -> Image:
 
 @contextmanager
 def _open(source: VideoSource) -> Iterator[tuple[InputContainer, VideoStream]]:
-    path = Path(source.path)
-    if not path.exists():
-        raise VideoError(f"{source.name}: video {path} not found; check its path")
-    if not path.is_file():
-        raise VideoError(f"{source.name}: {path} is no file; give a video, or read pipes and devices with --live")
-    if path.stat().st_size == 0:
-        raise VideoError(f"{source.name}: video {path} is empty (0 bytes); copy it again")
-    try:
-        container = av.open(path)
-    except (FFmpegError, OSError) as error:
-        raise VideoError(
-            f"{source.name}: {path} cannot be opened as a video ({error.strerror}); "
-            "it is of another kind or was cut off; copy or convert it again"
-        ) from error
-    with container:
-        if not container.streams.video:
+    with open_file(source.name, source.path) as container:
+        stream = video_stream(container)
+        if stream is None:
             raise VideoError(
-                f"{source.name}: {path} holds no video stream that can be read; give a video, or copy it again"
+                f"{source.name}: {source.path} holds no video stream that can be read; give a video, or copy it again"
             )
-        stream = container.streams.video[0]
-        stream.thread_type = "NONE"
         yield container, stream
 
 

@@ -80,6 +80,8 @@ class LiveCamera:
                 self._keep(DecodedImage(self.source.trial_time(stamp_s), frame, None), facts, now_s)
         if self.facts is None and not self.stop.is_set():
             raise VideoError(f"{self.source.name}: no image came from {self.source.path}; check what sends them")
+        if self.kind == "network" and not self.stop.is_set():
+            raise VideoError(f"{self.source.path} says nothing any more; check the camera and its network")
 
     def _keep(self, image: DecodedImage, facts: VideoFacts, now_s: float) -> None:
         with self.changed:

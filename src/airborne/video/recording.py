@@ -20,6 +20,7 @@ from airborne.video.prefetch import read_ahead
 from airborne.video.undistortion import Undistortion, undistortion_of
 
 FieldsAs = Literal["rows", "interpolated"]
+_LONGEST_GAP = 30_000  # times without an image of any camera: ten minutes at 50 Hz
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,6 +169,7 @@ def open_recording(
     ordered = tuple(sources[by_name[name]] for name in rig.names)
     ordered_facts = tuple(facts[by_name[name]] if facts else inspect(sources[by_name[name]]) for name in rig.names)
     check_sizes(ordered, rig, ordered_facts)
+    _check_overlap(ordered, ordered_facts)
     recording = Recording(ordered, ordered_facts, rig, fields_as, every, start, stop, lazy)
     recording.events.extend(_notes(ordered, ordered_facts))
     return recording
@@ -182,6 +184,25 @@ def check_sizes(sources: Sequence[VideoSource], rig: Rig, facts: Sequence[VideoF
                 f"{source.name}: {source.path} is {actual} px, but the calibration's camera is {expected} px; "
                 "give the video that was calibrated, or the calibration of this size"
             )
+
+
+def _check_overlap(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> None:
+    """Raise VideoError where a camera has ended, by the files' durations, before all that follow begin."""
+    if any(fact.duration_s is None for fact in facts):
+        return
+    spans = [
+        (source.trial_time(Fraction(0)), source.trial_time(fact.duration_s or Fraction(0)), source.name)
+        for source, fact in zip(sources, facts, strict=True)
+    ]
+    spans.sort()
+    end_s = spans[0][1]
+    for begin_s, own_end_s, name in spans[1:]:
+        if begin_s >= end_s:
+            raise VideoError(
+                f"{name} begins at {float(begin_s):.3f} s, when the cameras before it ({spans[0][2]}, ...) ended at "
+                f"{float(end_s):.3f} s: no two overlap; correct offset_s"
+            )
+        end_s = max(end_s, own_end_s)
 
 
 def _notes(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> Iterator[str]:
@@ -226,10 +247,19 @@ class _Cursor:
 
 
 def _clock(cursors: Sequence[_Cursor], *, start_s: Fraction, period_s: Fraction) -> Iterator[Fraction]:
-    """Yield the first camera's times; over a gap and past its end they go on by the period, until all are over."""
-    time_s = start_s
+    """Yield the first camera's times; over a gap and past its end they go on by the period, until all are over.
+
+    Raises VideoError where no camera has an image for longer than any recording is interrupted.
+    """
+    time_s, n_empty = start_s, 0
     while not all(cursor.is_over(time_s) for cursor in cursors):
         yield time_s
+        n_empty = 0 if any(cursor.image_at(time_s) for cursor in cursors) else n_empty + 1
+        if n_empty > _LONGEST_GAP:
+            raise VideoError(
+                f"no camera has a picture in the {n_empty} frames before {float(time_s):.3f} s, and there are later "
+                "ones; correct offset_s, or convert the videos again"
+            )
         following_s = cursors[0].time_after(time_s)
         if following_s is None or following_s >= time_s + period_s * Fraction(3, 2):
             following_s = time_s + period_s

@@ -1,4 +1,4 @@
-"""Live sources: pipes, capture devices, and files played at their own speed."""
+"""Live sources: pipes, capture devices, cameras on the network, and files played at their own speed."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from pathlib import Path
 from threading import Event
 from typing import Literal
 
-import av
 from av.container import InputContainer
 from av.error import FFmpegError
 from av.video.stream import VideoStream
 
 from airborne.errors import VideoError
+from airborne.video.containers import open_device, open_file, open_network, open_pipe, video_stream
 from airborne.video.decoding import VideoSource
 
-SourceKind = Literal["file", "pipe", "device"]
+SourceKind = Literal["file", "pipe", "device", "network"]
 
 _STDIN = "-"
 POLL_S = 0.1  # how often a waiting reader checks whether it should stop
@@ -28,7 +28,9 @@ _PROBE = {"probesize": "1000000", "analyzeduration": "500000"}  # start early
 
 def kind_of(source: VideoSource) -> SourceKind:
     """Return the kind of a live source; raises VideoError where there is none."""
-    path = Path(source.path)
+    path = source.path
+    if isinstance(path, str):
+        return "network"
     if path.name == _STDIN or path.is_fifo():
         return "pipe"
     if path.is_char_device():
@@ -44,29 +46,27 @@ def open_source(source: VideoSource, stop: Event) -> Iterator[tuple[InputContain
 
     Raises VideoError where there are no images.
     """
-    kind = kind_of(source)
-    pipe = None
+    path, kind, pipe = source.path, kind_of(source), None
     try:
-        if kind == "pipe":
-            pipe = _Pipe(source, stop)
-            container = av.open(pipe, "r", container_options=_PROBE)
+        if isinstance(path, str):
+            container = open_network(path)
+        elif kind == "pipe":
+            pipe = _Pipe(path, stop)
+            container = open_pipe(pipe, _PROBE)
         elif kind == "device":
-            container = av.open(str(source.path), "r", format="v4l2")
+            container = open_device(path)
         else:
-            container = av.open(source.path, "r")
+            container = open_file(source.name, path)
     except (FFmpegError, OSError, ValueError) as error:
         if pipe is not None:
             pipe.close()
         reason = getattr(error, "strerror", None) or error
-        raise VideoError(
-            f"{source.name}: no images come from {source.path} ({reason}); check what sends them"
-        ) from error
+        raise VideoError(f"{source.name}: no images come from {path} ({reason}); check what sends them") from error
     try:
         with container:
-            if not container.streams.video:
-                raise VideoError(f"{source.name}: what comes from {source.path} holds no video; send a video stream")
-            stream = container.streams.video[0]
-            stream.thread_type = "NONE"
+            stream = video_stream(container)
+            if stream is None:
+                raise VideoError(f"{source.name}: what comes from {path} holds no video; send a video stream")
             yield container, stream
     finally:
         if pipe is not None:
@@ -76,10 +76,10 @@ def open_source(source: VideoSource, stop: Event) -> Iterator[tuple[InputContain
 class _Pipe:
     """A pipe, or the standard input, that FFmpeg reads and that can be abandoned at any time."""
 
-    def __init__(self, source: VideoSource, stop: Event) -> None:
-        is_stdin = Path(source.path).name == _STDIN
+    def __init__(self, path: Path, stop: Event) -> None:
+        is_stdin = path.name == _STDIN
         self._stop = stop
-        self._file = sys.stdin.fileno() if is_stdin else os.open(source.path, os.O_RDONLY | os.O_NONBLOCK)
+        self._file = sys.stdin.fileno() if is_stdin else os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         self._is_own = not is_stdin
         self._poll = select.poll()
         self._poll.register(self._file, select.POLLIN | select.POLLHUP)

@@ -15,6 +15,7 @@ from av.filter import Graph
 from av.video.reformatter import ColorRange, Colorspace
 
 from airborne.errors import VideoError
+from airborne.io.writing import explain_full_disk
 from airborne.types import Image
 from airborne.video.decoding import FieldOrder
 from airborne.video.pixels import frame_from_rgb, matrix_for, weave_frame
@@ -28,9 +29,10 @@ _CODED_FIELD_ORDER = {"top-first": 2, "bottom-first": 3}  # FFmpeg's AV_FIELD_TT
 class VideoWriter:
     """Writes an MP4 (H.264, 4:2:0) image by image, in a `with` block.
 
-    The file is written in fragments of about a second, so that what a killed run wrote can be played. An odd width or
-    height is made even by repeating the last column or row. A file of `fields` "top-first" or "bottom-first" takes
-    woven images (see `weave`), is encoded field by field and flagged so; its height is a multiple of four.
+    The file is written in fragments of about a second, so that what a killed run wrote can be played; beside an earlier
+    file, under the name `<stem>.part.mp4`, so that the earlier one can be played until the new one is whole. An odd
+    width or height is made even by repeating the last column or row. A file of `fields` "top-first" or "bottom-first"
+    takes woven images (see `weave`), is encoded field by field and flagged so; its height is a multiple of four.
     """
 
     def __init__(
@@ -43,9 +45,10 @@ class VideoWriter:
         width, height = size
         if fields != "progressive" and height % 4:
             raise VideoError(f"{path}: an interlaced video's height is a multiple of 4, found {height}; pad the image")
-        self.path, self.size = path, size
+        self.path, self.size = (path := Path(path)), size
+        self._unfinished = path.with_suffix(f".part{path.suffix}") if path.is_file() else path
         self._time_base = 1 / Fraction(rate)
-        self._container = av.open(path, "w", format="mp4", options=_FRAGMENTED)
+        self._container = av.open(f"file:{self._unfinished.absolute()}", "w", format="mp4", options=_FRAGMENTED)
         self._stream = self._container.add_stream("libx264", rate=rate, options={"crf": str(crf), "bf": "0"})
         codec = self._stream.codec_context
         codec.width, codec.height, codec.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
@@ -81,7 +84,8 @@ class VideoWriter:
         if self._field_filter is not None:
             self._field_filter.vpush(frame)
             frame = self._field_filter.vpull()
-        self._container.mux(self._stream.encode(frame))
+        with explain_full_disk(self.path):
+            self._container.mux(self._stream.encode(frame))
 
     def __enter__(self) -> Self:
         return self
@@ -89,9 +93,15 @@ class VideoWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Finish the file; after an error too, so that it holds what was written."""
-        self._container.mux(self._stream.encode(None))
-        self._container.close()
+        """Finish the file; after an error too, so that it holds what was written, unless there is an earlier file."""
+        with explain_full_disk(self.path):
+            self._container.mux(self._stream.encode(None))
+            self._container.close()
+        if self._unfinished != self.path:
+            if kind is None:
+                self._unfinished.replace(self.path)
+            else:
+                self._unfinished.unlink()
 
 
 def _field_filter_graph(codec: av.VideoCodecContext, order: str, time_base: Fraction) -> Graph:

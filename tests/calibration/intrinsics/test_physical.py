@@ -8,8 +8,8 @@ from airborne.calibration.intrinsics.physical import (
     Pinhole,
     anneal_pinhole,
     fit_pinhole,
+    parameter_covariance,
     parameter_names,
-    parameter_sd,
 )
 from tests.support.cameras import camera_at, scattered
 from tests.support.tolerances import EXACT, ROUNDTRIP, SOLVED, sampled
@@ -65,7 +65,8 @@ def test_the_standard_deviations_are_those_of_many_fits():
     clicks = [STRAIGHT.px_from_world(WORLD) + rng.normal(0, 0.5, (len(WORLD), 2)) for _ in range(n)]
     fits = [fit_pinhole(STRAIGHT, SEVEN_PARAMETERS, WORLD, px) for px in clicks]
     spread = np.std([[*fit.centre, fit.focal_px] for fit in fits], axis=0)
-    stated = np.mean([parameter_sd(f, SEVEN_PARAMETERS, WORLD, px) for f, px in zip(fits, clicks, strict=True)], axis=0)
+    covariances = [parameter_covariance(f, SEVEN_PARAMETERS, WORLD, px) for f, px in zip(fits, clicks, strict=True)]
+    stated = np.mean([np.sqrt(np.diag(covariance)) for covariance in covariances], axis=0)
     assert np.allclose(spread, stated[3:], rtol=sampled(n))
 
 

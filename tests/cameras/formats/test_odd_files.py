@@ -108,7 +108,7 @@ def test_a_table_that_is_no_cameras_is_reported(tmp_path, text, message):
 
 
 def test_a_file_larger_than_any_calibration_is_not_read(tmp_path):
-    with pytest.raises(CalibrationError, match="is larger than any calibration"):
+    with pytest.raises(CalibrationError, match="larger than 2 MB; expected Pose2Sim"):
         read(tmp_path, " " * 2_000_001)
 
 

@@ -198,6 +198,17 @@ def test_a_jump_cut_off_before_its_peak_has_no_peak():
     assert np.isnan([*jump.foot_height_m, *jump.hip_height_m, *jump.hip_rise_m, *jump.block_s]).all()
 
 
+def test_a_peak_that_one_camera_alone_saw_has_no_height():
+    motion = motion_of(CLEAN)
+    jump = only(motion)
+    in_the_air = (motion.time_s > jump.takeoff_s.value) & (motion.time_s < jump.landing_s.value)
+    status, n_views = motion.status.astype("<U9"), motion.n_views.copy()
+    status[in_the_air], n_views[in_the_air] = "uncertain", 1
+    unseen = only(replace(motion, status=status, n_views=n_views))
+    assert np.isfinite(jump.foot_height_m.value)
+    assert np.isnan(unseen.foot_height_m.value) and np.isnan(unseen.hip_height_m.value)
+
+
 def test_a_clip_that_begins_in_the_air_has_no_takeoff():
     start = round(60 * (CLEAN.takeoff_s + 0.15))
     points = CLEAN.points()[start:, None, :6]

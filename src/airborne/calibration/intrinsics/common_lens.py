@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from airborne.calibration.intrinsics.model_selection import Solution, choose_simplest
-from airborne.calibration.intrinsics.physical import FISHEYE_MODELS, WIDE_MODELS, fit_pose
+from airborne.calibration.intrinsics.physical import FISHEYE_MODELS, WIDE_MODELS, fit_pinhole_pose
 from airborne.types import Array
 
 _MODEL = FISHEYE_MODELS[1]  # of the common lens: few terms that suit most wide lenses
@@ -41,7 +41,7 @@ def common_lens_sd(
         for name, fit in fits.items():
             chosen = choose_simplest(candidates[name])
             start = replace(fit, focal_px=focal, principal_point=middle, terms=terms)
-            common = fit_pose(start, chosen.world, chosen.px)
+            common = fit_pinhole_pose(start, chosen.world, chosen.px)
             rms = np.sqrt(np.mean((common.px_from_world(chosen.world) - chosen.px) ** 2))
             if rms < _PLAUSIBLE * np.sqrt(np.mean(chosen.held_out_px**2)):
                 shifts[name] = chosen.pinhole.R @ (common.centre - chosen.pinhole.centre)

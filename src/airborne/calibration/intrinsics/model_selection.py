@@ -15,7 +15,7 @@ from airborne.calibration.intrinsics.physical import (
     Pinhole,
     PinholeModel,
     fit_pinhole,
-    parameter_sd,
+    parameter_covariance,
 )
 from airborne.types import Array
 
@@ -107,7 +107,7 @@ def place_sd(chosen: Solution, candidates: Sequence[Solution], common_lens_sd_m:
     badly errs alike; the differences to the models that predict held-out points as well; and the shifts (3,) [m] with
     the lens that is common to cameras alike, if there is one.
     """
-    sd = parameter_sd(chosen.pinhole, chosen.model, chosen.world, chosen.px)[3:6]
+    sd = np.sqrt(np.diag(parameter_covariance(chosen.pinhole, chosen.model, chosen.world, chosen.px)))[3:6]
     others = [s.pinhole.centre - chosen.pinhole.centre for s in as_good_as_best(candidates)]
     model_sd = np.hypot(
         np.sqrt(np.mean(np.square(others), axis=0)), 0.0 if common_lens_sd_m is None else common_lens_sd_m

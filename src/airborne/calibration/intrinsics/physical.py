@@ -162,7 +162,7 @@ def fit_pinhole(start: Pinhole, model: PinholeModel, world: Array, px: Array) ->
     return start.apply_step(model, solution.x)
 
 
-def fit_pose(start: Pinhole, world: Array, px: Array) -> Pinhole:
+def fit_pinhole_pose(start: Pinhole, world: Array, px: Array) -> Pinhole:
     """Return the camera near start with its lens kept that projects world (n, 3) [m] closest to px (n, 2) [px]."""
     residual = _residual_of_step(start, SEVEN_PARAMETERS, world, px)
     solution = least_squares(lambda step: residual(np.append(step, 0.0)), np.zeros(6), method="lm", x_scale="jac")
@@ -185,10 +185,10 @@ def anneal_pinhole(start: Pinhole, world: Array, px: Array, *, seed: int) -> Pin
     return start.apply_step(SEVEN_PARAMETERS, solution.x * scale)
 
 
-def parameter_sd(pinhole: Pinhole, model: PinholeModel, world: Array, px: Array) -> Array:
-    """Return the standard deviations (n_parameters,) of a fitted camera's free parameters, from the Jacobian.
+def parameter_covariance(pinhole: Pinhole, model: PinholeModel, world: Array, px: Array) -> Array:
+    """Return the covariance (n_parameters, n_parameters) of a fitted camera's free parameters, from the Jacobian.
 
-    `sqrt(diag((J^T J)^-1) s^2)` with `s^2 = |residual|^2 / (2 n - n_parameters)`.
+    `(J^T J)^-1 s^2` with `s^2 = |residual|^2 / (2 n - n_parameters)`.
     """
     residual = _residual_of_step(pinhole, model, world, px)
     widths = {"focal_px": 1e-3, "u0_px": 1e-3, "v0_px": 1e-3}
@@ -200,7 +200,8 @@ def parameter_sd(pinhole: Pinhole, model: PinholeModel, world: Array, px: Array)
     jacobian = np.column_stack(columns)
     variance = np.sum(residual(np.zeros(model.n_parameters)) ** 2) / (px.size - model.n_parameters)
     scale = np.linalg.norm(jacobian, axis=0)
-    return np.sqrt(variance * np.diag(np.linalg.pinv(jacobian / scale) @ np.linalg.pinv(jacobian / scale).T)) / scale
+    inverse = np.linalg.pinv(jacobian / scale)
+    return variance * (inverse @ inverse.T) / np.outer(scale, scale)
 
 
 def _residual_of_step(start: Pinhole, model: PinholeModel, world: Array, px: Array) -> Callable[[Array], Array]:

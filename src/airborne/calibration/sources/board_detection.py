@@ -20,6 +20,7 @@ from airborne.calibration.sources.boards import NO_CORNERS, Board, DetectedCorne
 from airborne.calibration.sources.files import CameraSource, Sources
 from airborne.cameras.finding import Finding
 from airborne.errors import CalibrationError
+from airborne.io.text import read_bytes, read_text
 from airborne.types import Array, Image, Progress
 from airborne.video import VideoSource, inspect
 from airborne.video.decoding import decode, rgb_from_decoded
@@ -27,6 +28,7 @@ from airborne.video.decoding import decode, rgb_from_decoded
 _MOST_MOMENTS = 240  # at which the board is searched for, evenly spaced over a recording
 _IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 _LARGEST_PICTURE_BYTES = 200_000_000  # larger files are no pictures
+_LARGEST_TABLE_BYTES = 50_000_000  # of time stamps; larger files are refused
 _N_SAMPLES = 12  # images of a camera that test how the board was printed
 _ODD_PICTURES = 2  # a larger difference to the other cameras is reported
 
@@ -156,12 +158,11 @@ def _moments_by_time_stamps(
     """Read a table sync_index,cam_id,frame_time: the n-th row of a camera, by time, is its video's n-th frame."""
     expected = "expected the columns sync_index,cam_id,frame_time"
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            table = list(csv.DictReader(file))
+        table = list(csv.DictReader(read_text(path, _LARGEST_TABLE_BYTES).splitlines()))
         rows = [(int(r["sync_index"]), r["cam_id"].strip(), float(r["frame_time"])) for r in table]
     except OSError as error:
         raise CalibrationError(f"{path} cannot be read ({error.strerror}); give a table of time stamps") from None
-    except (KeyError, ValueError, TypeError, AttributeError, UnicodeDecodeError, csv.Error):
+    except (KeyError, ValueError, TypeError, AttributeError, csv.Error):
         raise CalibrationError(f"{path} is no table of time stamps; {expected}") from None
     if not rows or not np.isfinite([row[2] for row in rows]).all():
         raise CalibrationError(f"{path} holds no time stamps, or one that is no number; {expected}")
@@ -216,20 +217,19 @@ def _read_grey_images(sources: Sources, camera: CameraSource, indices: Container
 
 def _image_paths(sources: Sources, pattern: str) -> list[Path]:
     location = sources.path(pattern)
-    if location.is_dir():
-        paths = sorted(path for path in location.iterdir() if path.suffix.lower() in _IMAGE_SUFFIXES)
-    else:
-        paths = sorted(path for path in location.parent.glob(location.name) if path.suffix.lower() in _IMAGE_SUFFIXES)
+    candidates = location.iterdir() if location.is_dir() else location.parent.glob(location.name)
+    paths = sorted(path for path in candidates if path.suffix.lower() in _IMAGE_SUFFIXES and path.is_file())
     if not paths:
         raise CalibrationError(f"no images at {location}; give a folder or a pattern such as left/*.png")
     return paths
 
 
 def _read_grey_image(path: Path) -> Image:
-    if path.stat().st_size > _LARGEST_PICTURE_BYTES:
-        raise CalibrationError(f"{path} is larger than {_LARGEST_PICTURE_BYTES // 10**6} MB; is it an image?")
     try:
-        grey = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_GRAYSCALE)
+        data = read_bytes(path, _LARGEST_PICTURE_BYTES)
+        grey = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE)
+    except ValueError as error:
+        raise CalibrationError(f"{path}: {error}; is it an image?") from None
     except cv2.error:
         grey = None
     if grey is None:

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
 from airborne.errors import CalibrationError, one_line
+from airborne.io.names import CheckedPath, Name
 from airborne.io.text import list_keys, read_toml
 
 Positive = Annotated[float, Field(gt=0)]
@@ -22,11 +23,11 @@ class _Strict(BaseModel):
 class CameraSource(_Strict):
     """One camera: its recording, or only its image size."""
 
-    name: str
-    video: str | None = None  # shows the board together with the other cameras
-    pictures: str | None = None  # the same as images: a folder or a pattern such as "left/*.png"
-    lens_video: str | None = None  # shows the board to this camera alone, for its lens
-    lens_pictures: str | None = None
+    name: Name
+    video: CheckedPath | None = None  # shows the board together with the other cameras
+    pictures: CheckedPath | None = None  # the same as images: a folder or a pattern such as "left/*.png"
+    lens_video: CheckedPath | None = None  # shows the board to this camera alone, for its lens
+    lens_pictures: CheckedPath | None = None
     size: Annotated[list[Annotated[int, Field(ge=16, le=20000)]], Field(min_length=2, max_length=2)] | None = None
     lens: Literal["brown", "fisheye"] = "brown"
     focal: Literal["auto", "free", "fixed", "shared"] = "auto"  # shared: one focal length for all cameras that say so
@@ -39,13 +40,13 @@ class CameraSource(_Strict):
 class StartSource(_Strict):
     """An existing calibration: the initial values."""
 
-    file: str
+    file: CheckedPath
 
 
 class BoardSource(_Strict):
     """A printed board that is moved about."""
 
-    file: str | None = None
+    file: CheckedPath | None = None
     kind: Literal["charuco", "chessboard"] | None = None  # these, or a file with them
     columns: int | None = None
     rows: int | None = None
@@ -56,7 +57,7 @@ class BoardSource(_Strict):
     legacy: bool | None = None
     two_sided: bool | None = None  # the back is printed with the mirror image
     thickness_m: Annotated[float, Field(ge=0, le=0.2)] | None = None  # of a two-sided board
-    timestamps: str | None = None  # which frames belong together: sync_index,cam_id,frame_time
+    timestamps: CheckedPath | None = None  # which frames belong together: sync_index,cam_id,frame_time
     sync: Literal["auto", "exact", "loose"] = "auto"  # loose: every image may lag behind the others
 
     @model_validator(mode="after")
@@ -69,20 +70,20 @@ class BoardSource(_Strict):
 class PointsSource(_Strict):
     """Points with surveyed positions."""
 
-    file: str
+    file: CheckedPath
 
 
 class CourtSource(_Strict):
     """Clicked points of a volleyball court and net."""
 
-    file: str
+    file: CheckedPath
     net: Literal["men", "women"] | Positive = "men"
 
 
 class WandSource(_Strict):
     """A stick of known length that is waved about."""
 
-    file: str
+    file: CheckedPath
     length_m: Positive | None = None
     lengths_m: list[Positive] | None = None
     pixels: PixelConventionName = "upper-left-1"
@@ -98,7 +99,7 @@ class WandSource(_Strict):
 class DetectionsSource(_Strict):
     """Keypoints of a moving person, detected by a pose network."""
 
-    file: str
+    file: CheckedPath
     cameras: dict[str, str] = {}
 
 
@@ -107,11 +108,11 @@ class WorldTable(_Strict):
 
     frame: Literal["auto", "board", "camera", "start"] = "auto"
     moment: Annotated[int, Field(ge=0)] | None = None  # of the board: the frame at which it defines the world
-    points: str | None = None  # clicked points: point,<camera>_u,<camera>_v,...
+    points: CheckedPath | None = None  # clicked points: point,<camera>_u,<camera>_v,...
     origin: str | None = None
     along_x: str | None = None
     in_xy: str | None = None
-    throw: str | None = None  # tracks of a thrown object: DLTdv's xypts
+    throw: CheckedPath | None = None  # tracks of a thrown object: DLTdv's xypts
     rate_hz: Positive | None = None  # of the throw
     pixels: PixelConventionName = "upper-left-1"
 
@@ -162,9 +163,7 @@ class Sources(_Strict):
         return [kind for kind in kinds if getattr(self, kind) is not None]
 
     def path(self, name: str) -> Path:
-        """Return the path of a file named here; raises CalibrationError for what can be no name."""
-        if not name or "\0" in name:
-            raise CalibrationError("a file's name is empty or holds a zero byte; give the file's path")
+        """Return the path of a file named here."""
         return self._folder / name
 
 

@@ -17,6 +17,7 @@ from airborne.cameras.detections import Detections
 from airborne.cameras.formats.options import FileOptions
 from airborne.errors import CalibrationError
 from airborne.io.text import read_csv
+from airborne.io.writing import write_text
 from airborne.types import Array
 
 _COLUMN = re.compile(r"(.+)_cam_?(\d{1,4})_([uvxyUVXY])")  # DLTdv pt1_cam1_X, Argus track_cam_1_x
@@ -168,5 +169,5 @@ def _read_table(path: Path) -> tuple[list[str], Array]:
 def _write_table(path: Path, header: Sequence[str], values: Array) -> Path:
     rows = np.reshape(values, (len(values), -1))
     lines = (",".join("NaN" if np.isnan(value) else f"{value:.17g}" for value in row) for row in rows)
-    path.write_text("\n".join([",".join(header), *lines]) + "\n", encoding="utf-8")
+    write_text(path, "\n".join([",".join(header), *lines]) + "\n")
     return path

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from airborne.errors import CalibrationError
+from airborne.io.names import file_stem
 from airborne.io.text import read_json
+from airborne.io.writing import write_text
 from airborne.types import Array
 
 _LARGEST_FILE_BYTES = 5_000_000  # an image of a thousand people
@@ -59,14 +61,14 @@ def read_folder(folder: Path, person: int | None = None) -> tuple[Array, int]:
 def write_folders(path: Path, tables: dict[str, Array]) -> None:
     """Write tables (frames, points, 3) of x, y [px] and visibility by camera; points not seen are 0, 0, 0."""
     for camera, table in tables.items():
-        folder = path / f"{camera}_json"
+        folder = path / f"{file_stem(camera)}_json"
         folder.mkdir(parents=True, exist_ok=True)
         for frame, points in enumerate(table):
             is_seen = np.isfinite(points).all(axis=-1) & (points[:, 2] > 0)
             values = np.where(is_seen[:, None], points, 0.0).ravel().tolist()
             people = [{"person_id": [-1], "pose_keypoints_2d": values}] if is_seen.any() else []
             text = json.dumps({"version": 1.3, "people": people})
-            (folder / f"{camera}_{frame:06d}.json").write_text(text, encoding="utf-8")
+            write_text(folder / f"{file_stem(camera)}_{frame:06d}.json", text)
 
 
 def number_at_end(name: str) -> int | None:

@@ -16,6 +16,7 @@ from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.motion import Motion
 from airborne.motion.players import PlayersMotion
 from airborne.motion.smoothing import crossings
+from airborne.motion.uncertainty import standard_deviation
 from airborne.types import Array
 
 _WINDOW_S = 0.16  # of the parabolas that measure the acceleration
@@ -48,7 +49,7 @@ def body_events(motion: Motion, model: BodyModel) -> tuple[Event, ...]:
         height, sd = (table[name].sel(space="z").to_numpy() for name in ("com", "com_sd"))
     else:
         height = (motion.position + motion.R @ ballistic_point(motion))[:, 2]
-        sd = motion.position_sd[:, 2]
+        sd = standard_deviation(motion.covariance[:, 2, 2])
     return find_flight_events(motion.time_s, height, sd**2)
 
 

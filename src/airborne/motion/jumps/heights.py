@@ -125,12 +125,15 @@ def _peak(
     *,
     acceleration_prior: tuple[float, float, float],
 ) -> Array | None:
-    """Draw the peak height of a path in flight (draws,) [m]; None where the frames around it are unknown."""
+    """Draw the peak height of a path in flight (draws,) [m].
+
+    None where the frames around it are unknown, or were seen by fewer than two cameras.
+    """
     height, variance = path[0][:, 2], path[1][:, 2]
     at = _peak_time(track, flight, height)
     if at is None:
         return None
-    near = np.isfinite(height) & (np.abs(track.time_s - at) <= _PEAK_HALF_S)
+    near = np.isfinite(height) & track.is_measured & (np.abs(track.time_s - at) <= _PEAK_HALF_S)
     near[: flight.rows[0]] = near[flight.rows[1] + 1 :] = False
     u = track.time_s[near] - at
     if near.sum() < 5 or u[0] > -_PEAK_HALF_S / 2 or u[-1] < _PEAK_HALF_S / 2:

@@ -14,6 +14,7 @@ from airborne.tracking import Status
 from airborne.types import Array
 
 _UNKNOWN_SD_M = 0.02  # of a joint without a covariance
+_FEWEST_VIEWS = 2  # that tell how high a joint is
 _LEAP_M = 0.05  # beyond the noise
 _MASS_SHARES = {
     "hip": 0.6782 + 0.2832 * 0.5905,
@@ -30,6 +31,7 @@ class LegTrack:
     index: NDArray[np.int64]  # (n,) frame numbers
     time_s: Array  # (n,)
     is_uncertain: NDArray[np.bool_]  # (n,) according to the tracker
+    is_measured: NDArray[np.bool_]  # (n,) by two cameras or more, or tracked
     hips: Array  # (n, 2, 3)
     knees: Array  # (n, 2, 3)
     ankles: Array  # (n, 2, 3)
@@ -97,6 +99,7 @@ def extract_legs(motion: PlayersMotion, player: str) -> LegTrack:
         index=motion.index,
         time_s=motion.time_s,
         is_uncertain=motion.status[:, who] == Status.UNCERTAIN.value,
+        is_measured=(motion.n_views[:, who] >= _FEWEST_VIEWS) | (motion.status[:, who] == Status.TRACKED.value),
         hips=parts["hip"][0],
         knees=parts["knee"][0],
         ankles=parts["ankle"][0],

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from airborne.io.writing import write_text
 from airborne.motion.jumps.jump import Jump, Measurement
 from airborne.motion.tables import cell
 
@@ -69,7 +70,7 @@ def write_jumps(path: Path, jumps: Sequence[Jump]) -> None:
     """
     lines = [",".join(JUMP_COLUMNS)]
     lines += [",".join(_text(value) for value in jump_row(jump).values()) for jump in jumps]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def _with_interval(name: str, measured: Measurement) -> dict[str, str | int | float]:

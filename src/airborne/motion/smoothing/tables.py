@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from airborne.io.writing import write_text
 from airborne.motion.angles import ROOT_ANGLES
 from airborne.motion.flight.phases import Event
 from airborne.motion.smoothing import parabolic_peak
@@ -81,7 +82,7 @@ def write_smooth_events(path: Path, events: Mapping[str, Sequence[Event]], joint
     rows.sort(key=lambda row: (row[0], row[1], row[3]))
     names = ("player", "joint", "event", "time_s", "z_m")
     lines = [",".join(names), *(",".join(cell(value) for value in row) for row in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def _index_columns(table: xr.Dataset) -> _Columns:
@@ -106,4 +107,4 @@ def _component(table: xr.Dataset, name: str, axis: str) -> NDArray:
 def _write(path: Path, columns: _Columns) -> None:
     lines = [",".join(columns)]
     lines += [",".join(map(cell, row)) for row in zip(*(column.tolist() for column in columns.values()), strict=True)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_text(path, "\n".join(lines) + "\n")

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airborne.export import panels
+from airborne.io.figures import save_png
 from airborne.reproduction.block.plan import BLOCK_METHODS, PAPER_PARTS, PAPER_SUCCESS
 from airborne.reproduction.block.summary import Record, Summary, by_sequence, success
 
@@ -111,4 +112,4 @@ def _finish(figure: Figure, axes: Axes, path: Path) -> None:
         handles, labels, loc="outside upper center", ncols=len(labels), fontsize=panels.FONT_PT, frameon=False,
         labelcolor=panels.TEXT,
     )  # fmt: skip
-    figure.savefig(path)
+    save_png(figure, path)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from airborne.cameras import write_pose2sim
+from airborne.io.writing import write_text
 from airborne.synthetic.block.pictures import block_frames
 from airborne.synthetic.block.players import Player
 from airborne.synthetic.block.scene import BlockScene
@@ -42,7 +43,7 @@ def write_block(folder: Path, scene: BlockScene, *, overwrite: bool = False, pro
     _write_json(folder / "players.json", [_player_record(player, scene) for player in scene.players])
     _write_truth(folder / "truth.csv", scene)
     _write_videos(folder, scene, progress)
-    (folder / "trial.toml").write_text(block_toml(scene, starts), encoding="utf-8")
+    write_text(folder / "trial.toml", block_toml(scene, starts))
 
 
 def block_toml(scene: BlockScene, starts: dict[str, dict[str, Array]]) -> str:
@@ -117,4 +118,4 @@ def _write_videos(folder: Path, scene: BlockScene, progress: Progress | None) ->
 
 
 def _write_json(path: Path, value: object) -> None:
-    path.write_text(json.dumps(value, indent=1) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(value, indent=1) + "\n")

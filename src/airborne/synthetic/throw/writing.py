@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from airborne.body.files import write_body
 from airborne.cameras import write_pose2sim
 from airborne.errors import TrialError
+from airborne.io.writing import write_text
 from airborne.synthetic.flight.rigid import SampledFlight
 from airborne.synthetic.flight.somersault import PictureStyle, Skill, SomersaultPreset, Target, somersault_scene
 from airborne.synthetic.throw.measurements import control_points, digitise, lights_table, start_pose
@@ -71,13 +72,13 @@ def write_trial(scene: Scene, folder: Path, *, overwrite: bool = False, progress
     if scene.is_surveyed:
         _write_control_points(folder / "control_points.csv", scene)
         _write_digitised(folder / "digitised.csv", scene, flight)
-        (folder / "lights.json").write_text(json.dumps(lights_table(scene), indent=1) + "\n", encoding="utf-8")
+        write_text(folder / "lights.json", json.dumps(lights_table(scene), indent=1) + "\n")
     if _has_joints(scene):
         _write_landmarks(folder / "truth_joints.csv", scene, flight)
         _write_angles(folder / "truth_angles.csv", scene, flight)
     _write_truth(folder / "truth.csv", scene, flight)
     _write_videos(folder, scene, progress)
-    (folder / "trial.toml").write_text(trial_toml(scene), encoding="utf-8")
+    write_text(folder / "trial.toml", trial_toml(scene))
 
 
 def require_empty(folder: Path, overwrite: bool) -> None:

@@ -1,4 +1,4 @@
-"""Finding a thing: the moments in which it is seen best, its candidate poses there, and a decision."""
+"""StartSearch a thing: the moments in which it is seen best, its candidate poses there, and a decision."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Finding:
+class StartSearch:
     """What was found at the moment in which the body is seen best."""
 
     moment: Moment
@@ -65,7 +65,7 @@ class Finding:
         return best.is_plausible and best.probability >= LEAST_PROBABILITY
 
 
-def find_thing(model: BodyModel, moments: Sequence[Moment]) -> Finding:
+def find_thing(model: BodyModel, moments: Sequence[Moment]) -> StartSearch:
     """Find a rigid body where something stands out; of several moments, the first that decides. Raises TrialError."""
     thing = Thing(RenderModel.of(model))
     seen = [(moment, find_places(moment, thing.radius_m)) for moment in moments]
@@ -94,7 +94,7 @@ def _best_first(seen: Sequence[tuple[Moment, list[Place]]]) -> list[tuple[Moment
     return sorted(seen, key=order)
 
 
-def _find_at(thing: Thing, moment: Moment, places: Sequence[Place]) -> Finding:
+def _find_at(thing: Thing, moment: Moment, places: Sequence[Place]) -> StartSearch:
     poses = [pose for place in places[:_MOST_PLACES] for pose in search_orientations(thing, moment, place)]
     poses = different_poses(thing, moment, poses, N_FITTED)
     if not thing.model.needs_colours:
@@ -109,7 +109,7 @@ def _find_at(thing: Thing, moment: Moment, places: Sequence[Place]) -> Finding:
         if probability[i] >= _LEAST_SHOWN
     ]
     candidates.sort(key=lambda candidate: -candidate.probability)
-    return Finding(moment, tuple(candidates), len(places))
+    return StartSearch(moment, tuple(candidates), len(places))
 
 
 def _probabilities(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> Array:

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene, empty_scene
+from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene, estimate_empty_scene
 from airborne.types import Array
 from airborne.video import Frames, View
 
 _MOST_MOMENTS = 24  # enough for a median, and to meet a body that is seen for a tenth of the time
 _WIDTH_PX = 640  # about the width of the small pictures
 
-Source = tuple[str, bytes]  # camera name and intrinsics: pictures that share them show the scene by the same pixels
+SourceKey = tuple[str, bytes]  # camera name and intrinsics: pictures that share them show the scene by the same pixels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,27 +46,27 @@ def spread_sample(recording: Iterable[Frames], n_expected: int | None) -> list[F
     return kept
 
 
-def empty_scenes(sample: Sequence[Frames]) -> dict[Source, EmptyScene]:
+def empty_scenes(sample: Sequence[Frames]) -> dict[SourceKey, EmptyScene]:
     """Find the empty scene of every camera, and kind of field, that has enough pictures."""
-    pictures: dict[Source, list] = {}
+    pictures: dict[SourceKey, list] = {}
     for frames in sample:
         for view in frames.views:
             if view is not None:
                 pictures.setdefault(source_of(view), []).append(view.rgb)
-    return {source: empty_scene(each) for source, each in pictures.items() if len(each) >= FEWEST_PICTURES}
+    return {source: estimate_empty_scene(each) for source, each in pictures.items() if len(each) >= FEWEST_PICTURES}
 
 
-def look(sample: Sequence[Frames], scenes: Mapping[Source, EmptyScene]) -> list[Moment]:
+def look(sample: Sequence[Frames], scenes: Mapping[SourceKey, EmptyScene]) -> list[Moment]:
     """Compare every picture with the empty scene."""
     return [Moment(frames, tuple(_evidence(view, scenes) for view in frames.views)) for frames in sample]
 
 
-def _evidence(view: View | None, scenes: Mapping[Source, EmptyScene]) -> Array | None:
+def _evidence(view: View | None, scenes: Mapping[SourceKey, EmptyScene]) -> Array | None:
     scene = None if view is None else scenes.get(source_of(view))
     return None if view is None or scene is None else scene.evidence(view.rgb)
 
 
-def source_of(view: View) -> Source:
+def source_of(view: View) -> SourceKey:
     """Return what a view shows the static scene by."""
     return view.camera.name, view.camera.K.tobytes()
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.appearance.empty_scene import EVIDENCE_LIMIT
+from airborne.appearance.empty_scene import PIXEL_EVIDENCE_LIMIT
 from airborne.cameras import Camera, Rig
 from airborne.tracking.first_pose.moments import Moment
 from airborne.types import Array
@@ -111,6 +111,6 @@ def _regions(camera: Camera, nats: NDArray[np.float32]) -> list[MovingRegion]:
         middle = np.array([columns @ np.arange(width), rows @ np.arange(height)]) / max(total, 1e-9)
         low, high = np.array([x, y]), np.array([x + width - 1, y + height - 1])
         is_cut = bool(np.any(low == 0) or np.any(high == np.array(camera.size) - 1))
-        found.append(MovingRegion(camera, low + middle, total / EVIDENCE_LIMIT, is_cut))
+        found.append(MovingRegion(camera, low + middle, total / PIXEL_EVIDENCE_LIMIT, is_cut))
     found.sort(key=lambda region: -region.area_px)
     return found[:_MOST_REGIONS]

@@ -1,4 +1,4 @@
-"""Finding a thing: all orientations at the places where something moves, scored by silhouettes, the best fitted."""
+"""StartSearch a thing: all orientations at the places where something moves, scored by silhouettes, the best fitted."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def log_likelihoods(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> Arra
 
 def _fit(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> list[Pose]:
     """Fit poses to the silhouettes."""
-    regions, probabilities = regions_of(thing, moment, poses)
+    regions, probabilities = candidate_regions(thing, moment, poses)
     dofs = root_only(thing.model)
     return [
         fit_silhouettes(thing.render_model, pose, regions, probabilities, levels=_LEVELS, dofs=dofs) for pose in poses
@@ -156,7 +156,7 @@ def roots_of(poses: Sequence[Pose]) -> tuple[Array, Array]:
     return np.stack([root.rotation.as_matrix() for root in roots]), np.stack([root.translation for root in roots])
 
 
-def regions_of(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> tuple[list[Region], list[Array]]:
+def candidate_regions(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> tuple[list[Region], list[Array]]:
     """Cut out what holds the poses in every view; return the regions and the probabilities in them."""
     bodies = [thing.render_model.with_pose(pose) for pose in poses]
     seen = {

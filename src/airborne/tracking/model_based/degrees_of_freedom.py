@@ -15,7 +15,7 @@ from airborne.body import BodyModel, Pose, PosedBody
 from airborne.body.chain import angles_of, delta_between, move_pose, point_jacobian, segment_jacobians
 from airborne.body.contact import contact_model, overlaps
 from airborne.geometry.rotations import matrix_from_angles
-from airborne.geometry.swing_twist import swing_twist, swing_twist_jacobian
+from airborne.geometry.swing_twist import swing_twist_from_matrix, swing_twist_jacobian
 from airborne.rendering import pose_segments
 from airborne.types import Array
 
@@ -154,7 +154,7 @@ class DegreesOfFreedom:
         columns = 6 + 3 * joints[:, None] + np.arange(3)
         jacobian = swing_twist_jacobian(relative[joints])
         rows[np.arange(len(joints))[:, None], columns] = np.einsum("ki,kij->kj", normal, jacobian)
-        targets = np.einsum("ki,ki->k", normal, bound[joints] - swing_twist(relative[joints]))
+        targets = np.einsum("ki,ki->k", normal, bound[joints] - swing_twist_from_matrix(relative[joints]))
         return rows[:, self.columns] / _LIMIT_SD_RAD, targets / _LIMIT_SD_RAD
 
 

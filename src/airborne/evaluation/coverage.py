@@ -1,4 +1,4 @@
-"""Reliability of stated intervals: how often they hold the error, against how often they should."""
+"""Coverage of stated intervals: how often they hold the error, against how often they should."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from airborne.types import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reliability:
+class Coverage:
     """Shares of errors inside intervals that state 50, 80 and 95 %; NaN for n = 0."""
 
     within_50: float
@@ -29,16 +29,16 @@ class Reliability:
         )
 
 
-def reliability(error: Array, sd: Array) -> Reliability:
+def coverage_of(error: Array, sd: Array) -> Coverage:
     """Count normal errors within their stated intervals; arrays of one shape, those without a finite sd left out."""
     is_known = np.isfinite(sd) & np.isfinite(error)
     error, sd = np.abs(error[is_known]), sd[is_known]
     if not len(error):
-        return Reliability(within_50=math.nan, within_80=math.nan, within_95=math.nan, ece=math.nan, n=0)
+        return Coverage(within_50=math.nan, within_80=math.nan, within_95=math.nan, ece=math.nan, n=0)
     stated = np.array([0.5, 0.8, 0.95])
     shares = np.array([np.mean(error <= ndtri(0.5 + level / 2) * sd) for level in stated])
     within_50, within_80, within_95 = shares.tolist()
-    return Reliability(
+    return Coverage(
         within_50=within_50,
         within_80=within_80,
         within_95=within_95,

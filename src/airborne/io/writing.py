@@ -1,0 +1,34 @@
+"""Files written: where a disk is full, the error names the file and how much is free."""
+
+from __future__ import annotations
+
+import errno
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from airborne.errors import ResultError
+
+_FULL = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC))
+
+
+@contextmanager
+def explain_full_disk(path: Path) -> Iterator[None]:
+    """Raise ResultError, in one line, where what is done here finds no room for a file; other errors pass."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _FULL:
+            raise
+        free_mb = shutil.disk_usage(path.parent).free / 1e6
+        raise ResultError(
+            f"{path} cannot be written ({error.strerror}): {free_mb:.0f} MB are free on its disk, or less is granted; "
+            "make room and give the command again (track: with --resume)"
+        ) from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file."""
+    with explain_full_disk(path):
+        path.write_text(text, encoding="utf-8", newline="\n")

@@ -1,0 +1,67 @@
+"""The self-check of a run of one body: lasting errors and statuses for its motion, findings for its summary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from airborne.body import BodyModel, Pose
+from airborne.calibration.from_points import Calibration
+from airborne.cameras import Rig
+from airborne.motion import Motion
+from airborne.tracking import Status
+from airborne.tracking.self_check.check import SelfCheck, doubts, self_check
+from airborne.tracking.self_check.kept_frames import KeptFrames
+from airborne.tracking.self_check.nuisances import MEASURED_SD, PRESET_SD
+from airborne.tracking.self_check.path import TrackedPath
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CheckedRun:
+    """A finished run after its self-check."""
+
+    motion: Motion  # with lasting errors, doubtful frames uncertain
+    found: SelfCheck | None  # None: too little to say anything
+    doubts: tuple[str, ...]  # sentences
+
+    @property
+    def findings(self) -> list[dict[str, Any]]:
+        """What summary.json holds."""
+        return [] if self.found is None else [finding.to_dict() for finding in self.found.diagnosis.findings]
+
+
+def check_run(
+    motion: Motion,
+    model: BodyModel,
+    rig: Rig,
+    start: Pose,
+    kept: KeptFrames,
+    calibration: Calibration | None,
+    *,
+    is_preset: bool,
+) -> CheckedRun:
+    """Check a finished run by some of its frames, and its first pose."""
+    rows, frames = np.flatnonzero(motion.has_pose), list(kept)
+    if not len(rows) or not frames:
+        return CheckedRun(motion, None, ())
+    poses = [motion.pose(row) for row in rows]
+    path = TrackedPath(motion.index[rows], motion.time_s[rows], poses, motion.covariance[rows, :6, :6])
+    calibrated = {} if calibration is None else {fit.name: fit.covariance for fit in calibration.fits}
+    body_sd = PRESET_SD if is_preset else MEASURED_SD
+    found = self_check(model, rig, path, frames, calibrated=calibrated, body_sd=body_sd)
+    status, sentences = motion.status.astype(f"<U{max(map(len, Status))}"), []
+    for reason, is_doubtful in doubts(model, path, frames, start, found).items():
+        doubtful = rows[is_doubtful & (motion.status[rows] == Status.TRACKED.value)]
+        status[doubtful] = Status.UNCERTAIN.value
+        if len(doubtful):
+            sentences.append(f"self-check: {len(doubtful)} of {len(motion)} frames are uncertain: {reason}")
+    lasting = None if found is None else found.lasting_at(motion.index)
+    return CheckedRun(replace(motion, status=status, lasting=lasting), found, tuple(sentences))
+
+
+def alarms(findings: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the sentences of what is wrong."""
+    return [f"self-check: {finding['sentence']}" for finding in findings if finding["is_alarm"]]

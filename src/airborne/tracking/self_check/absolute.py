@@ -1,0 +1,91 @@
+"""Absolute doubts about a run: what the pictures' change says against the tracked poses, whatever the colours say.
+
+What the body covered at its start and does not cover any more must have changed. A pose elsewhere must not explain
+what stands out from the empty scene better than its own interval allows. No body is faster than people throw.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import Pose
+from airborne.cameras import Camera
+from airborne.rendering.maps import empty_maps, surface_maps
+from airborne.rendering.packing import pack_view
+from airborne.tracking.model_based.render_model import RenderModel
+from airborne.types import Array
+from airborne.video import Frames, View
+
+_ALIKE_GREY = 12.0  # a pixel that has changed by less looks unchanged
+_SEARCH_PX = 4  # a camera held by hand may have moved by this
+_LEAST_VACATED, _MOST_UNCHANGED = 0.15, 1 / 3  # shares: of the body's first mask; of what it has left
+_CLEAR_PX = 3  # from a mask's outline
+_MOST_SPEED_M_S, _MOST_TURN_RAD_S = 40.0, 120.0  # a javelin leaves the hand at 30 m/s, a wrist turns at 60 rad/s
+_MOST_SDS = 4.0  # by which the silhouettes may show a pose elsewhere
+
+
+def has_stayed(render_model: RenderModel, start: Pose, now: Pose, first: Frames, later: Frames) -> bool:
+    """Whether most of what the body covered at its start, and does not cover any more, looks as it did then."""
+    vacated = unchanged = covered = 0
+    for before, after in zip(first.views, later.views, strict=True):
+        if before is None or after is None or not np.array_equal(before.camera.K, after.camera.K):
+            continue
+        was = _mask(render_model, start, before.camera)
+        left = cv2.erode(was, np.ones((5, 5), np.uint8)) > 0
+        left &= cv2.dilate(_mask(render_model, now, after.camera), np.ones((2 * _CLEAR_PX + 1,) * 2, np.uint8)) == 0
+        covered += int(was.sum())
+        vacated += int(left.sum())
+        if left.any():
+            unchanged += int(np.count_nonzero(_change(before, after, left) < _ALIKE_GREY))
+    return vacated > _LEAST_VACATED * covered and unchanged > _MOST_UNCHANGED * vacated
+
+
+def too_fast(time_s: Array, position: Array, rotation_rad: Array) -> NDArray[np.bool_]:
+    """Whether a body moves faster than bodies can, to or from each of its poses: (n,).
+
+    time_s (n,), position (n, 3) [m], rotation_rad (n - 1,) angles between neighbours.
+    """
+    step_s = np.maximum(np.diff(time_s), 1e-6)
+    speed = np.linalg.norm(np.diff(position, axis=0), axis=1) / step_s
+    fast = (speed > _MOST_SPEED_M_S) | (rotation_rad / step_s > _MOST_TURN_RAD_S)
+    return np.concatenate([fast, [False]]) | np.concatenate([[False], fast])
+
+
+def lies_elsewhere(shown: Array, noise: Array, covariance: Array) -> NDArray[np.bool_]:
+    """Whether the silhouettes show the body beside its interval: (n,).
+
+    shown (n, 3) [m]; noise, covariance (n, 3, 3): of what is shown, and of the tracked position.
+    """
+    distance2 = np.einsum("ni,nij,nj->n", shown, np.linalg.inv(noise + covariance), shown)
+    return distance2 > _MOST_SDS**2
+
+
+def spread(doubtful: NDArray[np.bool_], at: NDArray[np.int64], index: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Give every frame the doubt of the moments beside it: `at` (m,) and `index` (n,) are frame numbers."""
+    after = np.clip(np.searchsorted(at, index), 0, len(at) - 1)
+    before = np.clip(np.searchsorted(at, index, side="right") - 1, 0, len(at) - 1)
+    return doubtful[before] | doubtful[after]
+
+
+def _mask(render_model: RenderModel, pose: Pose, camera: Camera) -> NDArray[np.uint8]:
+    posed, maps = render_model.with_pose(pose), empty_maps(camera.size)
+    surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, pack_view(camera), *maps)
+    return (maps.part >= 0).astype(np.uint8)
+
+
+def _change(before: View, after: View, chosen: NDArray[np.bool_]) -> Array:
+    """Return by how much the chosen pixels (h, w) have changed, wherever nearby they have changed least: (m,)."""
+    rows, columns = np.flatnonzero(chosen.any(axis=1)), np.flatnonzero(chosen.any(axis=0))
+    height, width = chosen.shape
+    y0, y1 = max(rows[0] - _SEARCH_PX, 0), min(rows[-1] + 1 + _SEARCH_PX, height)
+    x0, x1 = max(columns[0] - _SEARCH_PX, 0), min(columns[-1] + 1 + _SEARCH_PX, width)
+    images = (view.crop((int(x0), int(y0), int(x1), int(y1))) for view in (before, after))
+    was, now = (cv2.GaussianBlur(np.asarray(rgb), (0, 0), 1.5).astype(np.float32) for rgb in images)
+    inside = chosen[y0:y1, x0:x1]
+    least = np.full(inside.shape, np.inf, np.float32)
+    for dy in range(-_SEARCH_PX, _SEARCH_PX + 1, 2):
+        for dx in range(-_SEARCH_PX, _SEARCH_PX + 1, 2):
+            least = np.minimum(least, np.abs(np.roll(now, (dy, dx), (0, 1)) - was).max(axis=-1))
+    return least[inside]

@@ -1,0 +1,149 @@
+"""What is wrong with a run, by the penalised likelihood of each cause alone, and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from airborne.tracking.self_check.nuisances import Kind, Nuisance, widen
+from airborne.tracking.self_check.solution import NuisanceSolution
+from airborne.types import Array
+
+_ALARM_SDS = 3.0  # from zero: a false alarm in 370, were errors normal
+_LEAST_EVIDENCE = 4.0  # [nats] by which a cause must explain the pictures better than none
+_SAME = 3.0  # [nats] within which two causes cannot be told apart
+_MOST_CAUSES = 3  # that are named one after the other
+# sds of what the silhouettes and their straight-line equations leave open, however many there are
+_MODEL_SD: Mapping[Kind, float] = {
+    "scale": 0.003,
+    "turn_deg": np.radians(0.05),
+    "shift_m": 0.005,
+    "focal": 0.003,
+    "time_s": 0.0003,
+}
+_MODEL_SHARE = 0.02  # the same, as a share of the value
+
+
+@dataclass(frozen=True, slots=True)
+class LikelyCause:
+    """One cause's size, positive where the truth is larger or later than the files say; of three numbers, the norm."""
+
+    subject: str
+    kind: Kind
+    value: float  # share, deg, m, s
+    sd: float
+    is_alarm: bool
+    alternatives: tuple[str, ...] = ()  # sentences of causes that explain the same
+
+    @property
+    def sentence(self) -> str:
+        """Say it, with the causes that cannot be told apart from it."""
+        text = _describe(self.subject, self.kind, self.value, self.sd)
+        if self.alternatives:
+            text += f"; or {'; or '.join(self.alternatives)}: these cannot be told apart"
+        return text
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what summary.json holds."""
+        names = ("subject", "kind", "value", "sd", "is_alarm", "sentence")
+        return {name: getattr(self, name) for name in names}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Diagnosis:
+    """The findings, alarms first, and the parameters with what is known of them."""
+
+    findings: tuple[LikelyCause, ...]
+    theta: Array  # (k,)
+    covariance: Array  # (k, k)
+
+    @property
+    def has_alarm(self) -> bool:
+        """Whether anything is wrong."""
+        return any(finding.is_alarm for finding in self.findings)
+
+
+def name_causes(solution: NuisanceSolution, nuisances: Sequence[Nuisance], prior: Array) -> Diagnosis:
+    """Name the likeliest causes, one after the other while each explains more than chance; list all the others."""
+    named: list[tuple[Nuisance, list[Nuisance]]] = []
+    for _ in range(_MOST_CAUSES):
+        known = [cause for cause, _ in named]
+        scores = _evidence(solution, [n for n in nuisances if n not in known], prior)
+        clear = {n: score for n, score in scores.items() if score > _LEAST_EVIDENCE and _is_clear(solution, n, prior)}
+        if not clear:
+            break
+        best = max(clear, key=lambda n: clear[n])
+        same = [n for n, score in clear.items() if n is not best and score > clear[best] - _SAME]
+        named.append((best, same))
+        prior = widen(prior, best)
+    alarms: list[LikelyCause] = []
+    for best, same in named:
+        without = prior - widen(np.zeros_like(prior), best)
+        others = [LikelyCause(n.subject, n.kind, *_size(solution, n, widen(without, n)), is_alarm=True) for n in same]
+        sentences = tuple(each.sentence for each in others)
+        value, sd = _size(solution, best, prior)
+        alarms += [LikelyCause(best.subject, best.kind, value, sd, is_alarm=True, alternatives=sentences), *others]
+    for nuisance in {each for _, same in named for each in same}:
+        prior = widen(prior, nuisance)
+    listed = {(finding.subject, finding.kind) for finding in alarms}
+    others = [
+        LikelyCause(n.subject, n.kind, *_size(solution, n, prior), is_alarm=False)
+        for n in nuisances
+        if (n.subject, n.kind) not in listed
+    ]
+    theta, covariance, _ = solution.posterior(prior)
+    return Diagnosis((*alarms, *others), theta, covariance)
+
+
+def _evidence(solution: NuisanceSolution, nuisances: Sequence[Nuisance], prior: Array) -> dict[Nuisance, float]:
+    """Return by how much each cause alone makes the pictures likelier [nats], its freedom penalised."""
+    base = _log_likelihood(solution, prior)
+    return {n: _log_likelihood(solution, widen(prior, n)) - base for n in nuisances}
+
+
+def _log_likelihood(solution: NuisanceSolution, prior: Array) -> float:
+    """Return the logarithm of the marginal likelihood, less what does not depend on the prior."""
+    misfit = solution.posterior(prior)[2]
+    occam = np.linalg.slogdet(np.eye(len(prior)) + prior @ solution.H)[1]
+    return -0.5 * (misfit + float(occam))
+
+
+def _is_clear(solution: NuisanceSolution, nuisance: Nuisance, prior: Array) -> bool:
+    value, sd = _size(solution, nuisance, widen(prior, nuisance))
+    return abs(value) > _ALARM_SDS * sd
+
+
+def _size(solution: NuisanceSolution, nuisance: Nuisance, prior: Array) -> tuple[float, float]:
+    """Return a cause's value and sd, in degrees for a turn; of three numbers the norm."""
+    theta, covariance, _ = solution.posterior(prior)
+    mean, block = theta[nuisance.columns], covariance[nuisance.columns, nuisance.columns]
+    value = float(mean[0]) if nuisance.size == 1 else float(np.linalg.norm(mean))
+    direction = mean / max(np.linalg.norm(mean), 1e-12) if nuisance.size > 1 else np.ones(1)
+    variance = max(float(direction @ block @ direction), 0.0)
+    sd = np.sqrt(variance + _MODEL_SD[nuisance.kind] ** 2 + (_MODEL_SHARE * value) ** 2)
+    factor = np.degrees(1.0) if nuisance.kind == "turn_deg" else 1.0
+    return float(factor * value), float(factor * sd)
+
+
+def _describe(subject: str, kind: Kind, value: float, sd: float) -> str:
+    size = abs(value)
+    if kind == "scale":
+        what, than = ("body", "its file") if subject == "body" else ("world", "the calibration")
+        return f"the {what} looks {100 * size:.1f} ± {100 * sd:.1f} % {_larger(value)} than {than} says"
+    if kind == "turn_deg":
+        return f"camera {subject} seems turned by {size:.2f} ± {sd:.2f}°"
+    if kind == "shift_m":
+        return f"camera {subject} seems to stand {1e3 * size:.0f} ± {1e3 * sd:.0f} mm beside its place"
+    if kind == "focal":
+        how = "longer" if value > 0 else "shorter"
+        return (
+            f"the focal length of {subject} seems {100 * size:.1f} ± {100 * sd:.1f} % {how} than the calibration says"
+        )
+    return f"camera {subject} seems {1e3 * size:.1f} ± {1e3 * sd:.1f} ms {'late' if value > 0 else 'early'}"
+
+
+def _larger(value: float) -> str:
+    return "larger" if value > 0 else "smaller"

@@ -1,0 +1,217 @@
+"""The self-check of a run: some of its frames are kept while it is tracked, and looked at again when it has ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import BodyModel, Pose
+from airborne.cameras import Rig
+from airborne.tracking.model_based.render_model import RenderModel
+from airborne.tracking.self_check.absolute import has_stayed, lies_elsewhere, spread, too_fast
+from airborne.tracking.self_check.causes import Diagnosis, name_causes
+from airborne.tracking.self_check.empty_scenes import EmptyScenes
+from airborne.tracking.self_check.free_flight import excess, fall
+from airborne.tracking.self_check.nuisances import (
+    biases,
+    n_parameters,
+    nuisances_of,
+    prior_covariance,
+    shift_covariance,
+    twists,
+    widen,
+)
+from airborne.tracking.self_check.path import TrackedPath
+from airborne.tracking.self_check.registration import draw_silhouette, foreground, outline_of, register
+from airborne.tracking.self_check.solution import Evidence, NuisanceSolution, PoseErrors, pose_errors, solve
+from airborne.types import Array
+from airborne.video import Frames
+
+_MOST_MOMENTS = 16  # at which silhouettes are registered
+_FEWEST_MOMENTS = 3  # with fewer, nothing is said of causes
+
+STAYED = "what the body covered at its start, and does not cover any more, looks as it did then"
+ELSEWHERE = "what stands out from the empty scene lies beside the body by more than its interval"
+FAST = "the body moves faster than bodies do"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunEquations:
+    """What some moments of a run say of its parameters and of its poses."""
+
+    rows: Sequence[int]  # of the path, the moments
+    evidence: Evidence
+    solution: NuisanceSolution
+    errors: PoseErrors
+    prior: Array  # (k, k) what is usual
+
+    @property
+    def says_causes(self) -> bool:
+        """Whether enough moments were registered."""
+        return int(np.count_nonzero(self.evidence.is_seen.any(axis=1))) >= _FEWEST_MOMENTS
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SelfCheck:
+    """What a run says of itself."""
+
+    diagnosis: Diagnosis
+    index: NDArray[np.int64]  # (m,) frames at which silhouettes were registered
+    constant: Array  # (m, 6, 6) covariance of the pose's errors that last all run long [m, rad]
+    added: Array  # (m, 6, 6) of it, what the tracker's own covariances do not hold
+    lies_elsewhere: NDArray[np.bool_]  # (m,) the silhouettes show the body beside its interval
+
+    def lasting_at(self, index: NDArray[np.int64]) -> Array:
+        """Interpolate `added` to other frames: (n, 6, 6)."""
+        return _interpolate(index, self.index, self.added)
+
+    def constant_at(self, index: NDArray[np.int64]) -> Array:
+        """Interpolate `constant` to other frames: (n, 6, 6)."""
+        return _interpolate(index, self.index, self.constant)
+
+
+def self_check(
+    model: BodyModel,
+    rig: Rig,
+    path: TrackedPath,
+    kept: Sequence[Frames],
+    *,
+    calibrated: Mapping[str, Array],
+    body_sd: float,
+) -> SelfCheck | None:
+    """Check a run by some of its frames; None where they show too little.
+
+    calibrated, body_sd: as `prior_covariance` takes them.
+    """
+    run = gather_equations(model, rig, path, kept, calibrated=calibrated, body_sd=body_sd)
+    if run is None:
+        return None
+    rows, evidence, errors = run.rows, run.evidence, run.errors
+    diagnosis = Diagnosis((), np.zeros(len(run.prior)), run.prior)
+    if run.says_causes:
+        diagnosis = name_causes(run.solution, nuisances_of(rig), run.prior)
+    K = errors.by_parameter
+    constant = K @ diagnosis.covariance @ np.swapaxes(K, 1, 2)
+    mean = errors.shown(diagnosis.theta) if diagnosis.has_alarm else K @ diagnosis.theta
+    constant = constant + mean[:, :, None] * mean[:, None, :]
+    added = _positive(constant - K @ shift_covariance(rig) @ np.swapaxes(K, 1, 2))
+    covariance = added[:, :3, :3] + path.covariance[rows, :3, :3]
+    is_seen = (evidence.is_seen.sum(axis=1) > 1) & np.isfinite(covariance).all(axis=(1, 2)) & (not model.has_joints)
+    elsewhere = np.zeros(len(rows), bool)
+    shown = errors.shown(diagnosis.theta)[is_seen, :3]
+    elsewhere[is_seen] = lies_elsewhere(shown, errors.noise[is_seen, :3, :3], covariance[is_seen])
+    return SelfCheck(diagnosis, path.index[rows], constant, added, elsewhere)
+
+
+def doubts(
+    model: BodyModel, path: TrackedPath, kept: Sequence[Frames], start: Pose, found: SelfCheck | None
+) -> dict[str, NDArray[np.bool_]]:
+    """Return which frames of a path are in doubt (n,), by what speaks against them; reasons without a frame too."""
+    render_model, rows = RenderModel.of(model), [path.row(frames.index) for frames in kept]
+    pairs = [(row, frames) for row, frames in zip(rows, kept, strict=True) if row is not None]
+    stayed = [has_stayed(render_model, start, path.poses[row], kept[0], frames) for row, frames in pairs]
+    at = path.index[[row for row, _ in pairs]]
+    none = np.zeros(len(path.index), bool)
+    return {
+        STAYED: spread(np.array(stayed), at, path.index) if pairs else none,
+        ELSEWHERE: none if found is None else spread(found.lies_elsewhere, found.index, path.index),
+        FAST: too_fast(path.time_s, path.positions, path.turns) if len(path.poses) > 1 else none,
+    }
+
+
+def _interpolate(index: NDArray[np.int64], known: NDArray[np.int64], values: Array) -> Array:
+    columns = [np.interp(index, known, column) for column in values.reshape(len(known), -1).T]
+    return np.stack(columns, axis=1).reshape(len(index), 6, 6)
+
+
+def _positive(matrices: Array) -> Array:
+    """Return the nearest matrices (n, 6, 6) without negative eigenvalues."""
+    values, vectors = np.linalg.eigh(matrices)
+    return (vectors * np.maximum(values, 0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+
+
+def gather_equations(
+    model: BodyModel,
+    rig: Rig,
+    path: TrackedPath,
+    kept: Sequence[Frames],
+    *,
+    calibrated: Mapping[str, Array],
+    body_sd: float,
+) -> RunEquations | None:
+    """Look at some frames of a run again; None where none of them shows the body."""
+    seen = [(row, frames) for frames in kept if (row := path.row(frames.index)) is not None]
+    if not seen:
+        return None
+    chosen = np.unique(np.linspace(0, len(seen) - 1, _MOST_MOMENTS).round().astype(int))
+    rows, moments = [seen[i][0] for i in chosen], [seen[i][1] for i in chosen]
+    evidence = _gather(RenderModel.of(model), rig, path, rows, moments, kept)
+    is_drawn = np.asarray(evidence.edge.any(axis=(1, 2, 3)))
+    if not is_drawn.any():
+        return None
+    evidence, rows = evidence.select(is_drawn), list(np.array(rows)[is_drawn])
+    prior = prior_covariance(rig, calibrated, body_sd, is_person=model.has_joints)
+    wide = prior
+    for nuisance in nuisances_of(rig):
+        wide = widen(wide, nuisance)
+    solution, weights = solve(evidence, wide)
+    errors = pose_errors(evidence, weights)
+    return RunEquations(rows, evidence, _with_fall(solution, errors, path, rows), errors, prior)
+
+
+def _gather(
+    render_model: RenderModel,
+    rig: Rig,
+    path: TrackedPath,
+    rows: Sequence[int],
+    moments: Sequence[Frames],
+    kept: Sequence[Frames],
+) -> Evidence:
+    """Register every view of the moments."""
+    n, c, k = len(moments), len(rig), n_parameters(rig)
+    evidence = Evidence(
+        offset=np.zeros((n, c, 4)),
+        by_twist=np.zeros((n, c, 4, 6)),
+        by_parameter=np.zeros((n, c, 4, k)),
+        is_seen=np.zeros((n, c), bool),
+        edge=np.zeros((n, c, 6, 6)),
+        edge_by_parameter=np.zeros((n, c, 6, k)),
+    )
+    empty = EmptyScenes(kept, render_model, path)
+    for i, (row, frames) in enumerate(zip(rows, moments, strict=True)):
+        velocity = path.velocity(row)
+        for j, view in enumerate(frames.views):
+            if view is None:
+                continue
+            posed = render_model.with_pose(path.pose_after(row, view.delay_s))
+            silhouette = draw_silhouette(render_model, posed, view.camera)
+            if silhouette is None:
+                continue
+            outline = outline_of(silhouette, posed)
+            columns, shifts = twists(rig, j, posed.t[0], velocity), biases(rig, j)
+            evidence.edge[i, j] = outline.edge
+            evidence.edge_by_parameter[i, j] = outline.edge @ columns + outline.edge_by_offset @ shifts
+            scene = empty.behind(j, view, silhouette) if silhouette.is_whole else None
+            offset = None if scene is None else register(silhouette, foreground(view.rgb, scene, silhouette))
+            if offset is not None:
+                evidence.offset[i, j], evidence.by_twist[i, j], evidence.is_seen[i, j] = offset, outline.by_twist, True
+                evidence.by_parameter[i, j] = outline.by_twist @ columns + shifts
+    return evidence
+
+
+def _with_fall(
+    solution: NuisanceSolution, errors: PoseErrors, path: TrackedPath, rows: Sequence[int]
+) -> NuisanceSolution:
+    """Add what the fall says of the sizes, where the body falls freely."""
+    poses = [path.poses[row].world_from_root for row in rows]
+    position = np.array([pose.translation for pose in poses])
+    R = np.array([pose.rotation.as_matrix() for pose in poses])
+    found = fall(path.time_s[list(rows)], position + errors.seen[:, :3], R)
+    if found is None:
+        return solution
+    by_position, acceleration, sd = found
+    row = by_position @ errors.seen_by_parameter[:, :3].reshape(len(by_position), -1)
+    return solution.with_row(row, -excess(acceleration), sd)

@@ -1,0 +1,158 @@
+"""Nuisance parameters of a run: what may be wrong with the body, the world and the cameras, and how each would show.
+
+Each of them moves the body in every view by a twist (6,): a translation of the root [m] and a rotation about it [rad],
+in world axes. A body that is larger looks like the same body nearer to each camera, and so on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from airborne.cameras import Camera, Rig
+from airborne.tracking.covariance import SHIFT_SD_PX
+from airborne.tracking.self_check.registration import N_SIMILARITY
+from airborne.types import Array
+
+Kind = Literal["scale", "turn_deg", "shift_m", "focal", "time_s"]
+
+_KINDS_OF_CAMERA: tuple[tuple[Kind, int], ...] = (("turn_deg", 3), ("shift_m", 3), ("focal", 1), ("time_s", 1))
+_PER_CAMERA = 8  # numbers of the kinds above
+# sds of what is usual: of a body measured or fitted, of one by its stature alone, of a world, of other cameras
+MEASURED_SD, PRESET_SD = 0.01, 0.03  # shares of the size
+_SURVEYED_SD, _WORLD_SD = 0.002, 0.01  # of a world of control points, of any other
+_CAMERA_SD: Mapping[Kind, float] = {"turn_deg": np.radians(0.1), "shift_m": 0.01, "focal": 0.005, "time_s": 0.002}
+# sds of what is possible where something is wrong [share, rad, m, share, s]
+_GROSS_SD: Mapping[Kind, float] = {
+    "scale": 0.2,
+    "turn_deg": np.radians(5.0),
+    "shift_m": 0.5,
+    "focal": 0.15,
+    "time_s": 0.1,
+}
+# sds of what a silhouette is off all run long without any such cause: light, shadow, the body's shape
+_BIAS_SD = np.array([0.2, 0.2, np.radians(0.05), 0.003])  # [px, px, rad, log scale]
+_PERSON_BIAS_SD = np.array([1.5, 1.5, np.radians(0.3), 0.015])  # the same of a person: ellipsoids are not skin
+
+
+@dataclass(frozen=True, slots=True)
+class Nuisance:
+    """One cause, of one number or three, and its place in the vector of all parameters."""
+
+    subject: str  # "body", "world", or a camera's name
+    kind: Kind
+    first: int
+    size: int
+
+    @property
+    def columns(self) -> slice:
+        """Its place among the parameters."""
+        return slice(self.first, self.first + self.size)
+
+
+def nuisances_of(rig: Rig) -> list[Nuisance]:
+    """List the causes that a run may have, of a body and the cameras that see it."""
+    listed = [Nuisance("body", "scale", 0, 1), Nuisance("world", "scale", 1, 1)]
+    for camera in rig:
+        for kind, n in _KINDS_OF_CAMERA:
+            listed.append(Nuisance(camera.name, kind, listed[-1].columns.stop, n))
+    return listed
+
+
+def n_parameters(rig: Rig) -> int:
+    """Count the parameters: the causes' and, after them, what each view's silhouette is off all run long."""
+    return 2 + (_PER_CAMERA + N_SIMILARITY) * len(rig)
+
+
+def twists(rig: Rig, camera_index: int, root: Array, velocity: Array) -> Array:
+    """Return how the body's image moves in one view by each parameter: twists (6, n_parameters).
+
+    root (3,) [m], velocity (6,) [m/s, rad/s] of the body. Parameters say how the truth differs from the file: a scale,
+    focal length or body that is larger, a camera that is turned or stands further along its own axes, a later time.
+    """
+    camera = rig.cameras[camera_index]
+    P = np.zeros((6, n_parameters(rig)))
+    P[:3, 0] = camera.centre - root
+    P[:3, 1] = -camera.centre
+    first = 2 + _PER_CAMERA * camera_index
+    P[:, first : first + _PER_CAMERA] = _camera_twists(camera, root, velocity)
+    return P
+
+
+def biases(rig: Rig, camera_index: int) -> Array:
+    """Return how the offset found in one view changes by the parameters beside the twists: (4, n_parameters)."""
+    D = np.zeros((N_SIMILARITY, n_parameters(rig)))
+    first = 2 + _PER_CAMERA * len(rig) + N_SIMILARITY * camera_index
+    D[:, first : first + N_SIMILARITY] = np.eye(N_SIMILARITY)
+    return D
+
+
+def shift_covariance(rig: Rig) -> Array:
+    """Return the part of the parameters' covariance that the tracker's own covariances hold: shifted images."""
+    variance = np.zeros(n_parameters(rig))
+    for i, camera in enumerate(rig):
+        first = 2 + _PER_CAMERA * len(rig) + N_SIMILARITY * i
+        variance[first : first + 2] = SHIFT_SD_PX**2 + camera.shift_sd_px**2
+    return np.diag(variance)
+
+
+def _camera_twists(camera: Camera, root: Array, velocity: Array) -> Array:
+    world_from_camera = camera.camera_from_world.rotation.as_matrix().T
+    arm = root - camera.centre
+    columns = np.zeros((6, _PER_CAMERA))
+    columns[:3, :3] = np.cross(world_from_camera.T, arm).T
+    columns[3:, :3] = world_from_camera
+    columns[:3, 3:6] = -world_from_camera
+    axis = world_from_camera[:, 2]
+    columns[:3, 6] = -(axis @ arm) * axis
+    columns[:, 7] = velocity
+    return columns
+
+
+def prior_covariance(rig: Rig, calibrated: Mapping[str, Array], body_sd: float, *, is_person: bool) -> Array:
+    """Return the covariance (n_parameters, n_parameters) of what is usual; it may be singular.
+
+    calibrated: of the cameras that the calibration knows, the covariance (7, 7) of turn, place [in camera axes] and
+    focal length [share]. Where it knows none, the cameras' common motion counts for nothing: poses are in their world.
+    """
+    covariance = np.zeros((n_parameters(rig),) * 2)
+    covariance[0, 0], covariance[1, 1] = body_sd**2, (_SURVEYED_SD if calibrated else _WORLD_SD) ** 2
+    usual = np.repeat([_CAMERA_SD[kind] for kind, _ in _KINDS_OF_CAMERA], [n for _, n in _KINDS_OF_CAMERA])
+    for i, camera in enumerate(rig):
+        block = slice(2 + _PER_CAMERA * i, 2 + _PER_CAMERA * (i + 1))
+        covariance[block, block] = np.diag(usual**2)
+        if camera.name in calibrated:
+            known = slice(block.start, block.start + 7)
+            covariance[known, known] = calibrated[camera.name]
+    bias = np.arange(2 + _PER_CAMERA * len(rig), len(covariance))
+    covariance[bias, bias] = np.tile((_PERSON_BIAS_SD if is_person else _BIAS_SD) ** 2, len(rig))
+    times = np.arange(len(rig)) * _PER_CAMERA + 9
+    covariance[np.ix_(times, times)] -= _CAMERA_SD["time_s"] ** 2 / len(rig)  # the clock is theirs together
+    return covariance if calibrated else _without_common_motion(covariance, rig)
+
+
+def widen(prior: Array, nuisance: Nuisance) -> Array:
+    """Return the prior with one cause possible that is not usual."""
+    prior = prior.copy()
+    columns = np.arange(nuisance.first, nuisance.first + nuisance.size)
+    prior[columns, columns] += _GROSS_SD[nuisance.kind] ** 2
+    return prior
+
+
+def _without_common_motion(covariance: Array, rig: Rig) -> Array:
+    rows = np.concatenate([np.arange(6) + 2 + _PER_CAMERA * i for i in range(len(rig))])
+    sd = np.sqrt(np.diag(covariance)[rows])
+    common = np.concatenate([_common_motion(camera) for camera in rig])  # (6 c, 6)
+    unit = np.linalg.qr(common / sd[:, None])[0]
+    covariance[np.ix_(rows, rows)] = sd[:, None] * (np.eye(len(rows)) - unit @ unit.T) * sd
+    return covariance
+
+
+def _common_motion(camera: Camera) -> Array:
+    """Return a camera's turn and shift in its own axes when the world as a whole moves: (6, 6)."""
+    R, C = camera.camera_from_world.rotation.as_matrix(), camera.centre
+    cross = np.array([[0, -C[2], C[1]], [C[2], 0, -C[0]], [-C[1], C[0], 0]])
+    return np.block([[np.zeros((3, 3)), -R], [R, -R @ cross]])

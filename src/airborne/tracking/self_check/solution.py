@@ -1,0 +1,137 @@
+"""The nuisance parameters of a run by least squares, with every moment's pose eliminated (Schur complement)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.types import Array
+
+# sds of a view's offset that the same silhouette has at any one moment, at least: px, px, rad, log scale
+_LEAST_NOISE = np.array([0.15, 0.15, np.radians(0.1), 0.002])
+_STRAY = np.array([np.inf, np.inf, 0.15, 0.1])  # a view's turn and scale farther from its median are mistakes
+_ROUNDS = 4  # of estimating the noise and the weights of views that do not fit
+_CLIP = 3.0  # residuals beyond so many sds lose weight
+_POSE_SD = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])  # hold what no view shows [m, rad]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """Offsets of the silhouettes at n moments in c views, and how they change by the poses and by the k parameters."""
+
+    offset: Array  # (n, c, 4); 0 where not seen
+    by_twist: Array  # (n, c, 4, 6) of the pose at that moment
+    by_parameter: Array  # (n, c, 4, k)
+    is_seen: NDArray[np.bool_]  # (n, c)
+    edge: Array  # (n, c, 6, 6) information of the whole outline for the pose, as a tracker uses it
+    edge_by_parameter: Array  # (n, c, 6, k)
+
+    def select(self, chosen: NDArray[np.bool_]) -> Evidence:
+        """Return some of the moments, chosen (n,)."""
+        return Evidence(*(getattr(self, each.name)[chosen] for each in fields(self)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NuisanceSolution:
+    """Normal equations of the parameters, H theta = g, poses eliminated: theta by H; `total` is the misfit of zero."""
+
+    H: Array  # (k, k)
+    g: Array  # (k,)
+    total: float
+
+    def posterior(self, prior: Array) -> tuple[Array, Array, float]:
+        """Return mean (k,), covariance (k, k) and minus twice the log-posterior at the mean for a Gaussian prior.
+
+        The prior (k, k) may be singular.
+        """
+        gain = np.linalg.solve(np.eye(len(self.g)) + prior @ self.H, prior)
+        covariance = (gain + gain.T) / 2
+        mean = covariance @ self.g
+        return mean, covariance, float(self.total - self.g @ mean)
+
+    def with_row(self, row: Array, value: float, sd: float) -> NuisanceSolution:
+        """Add a linear measurement, row (k,) theta = value."""
+        row, value = row / sd, value / sd
+        return NuisanceSolution(self.H + np.outer(row, row), self.g + value * row, self.total + value**2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseErrors:
+    """How far each moment's tracked pose is from the true one [m, rad]: by the silhouettes, and by the parameters."""
+
+    seen: Array  # (n, 6) by the silhouettes if all parameters are zero
+    seen_by_parameter: Array  # (n, 6, k)
+    by_parameter: Array  # (n, 6, k) of a pose tracked by the whole outline
+    noise: Array  # (n, 6, 6) covariance of what the silhouettes show
+
+    def shown(self, theta: Array) -> Array:
+        """Return by how much the silhouettes show the poses off, given the parameters (k,): (n, 6)."""
+        return self.seen + self.seen_by_parameter @ theta
+
+
+def solve(evidence: Evidence, wide: Array) -> tuple[NuisanceSolution, Array]:
+    """Accumulate the equations with the noise that the residuals show; return the weights (n, c, 4) too.
+
+    wide (k, k): prior of the parameters while the noise is estimated.
+    """
+    is_seen = evidence.is_seen & ~_strays(evidence)
+    weights = is_seen[..., None] / (3 * _LEAST_NOISE) ** 2
+    solution = _accumulate(evidence, weights)
+    trust = is_seen.astype(float)
+    for _ in range(_ROUNDS):
+        theta = solution.posterior(wide)[0]
+        errors = pose_errors(evidence, weights)
+        residual = evidence.offset - np.einsum("ncak,k->nca", evidence.by_parameter, theta)
+        residual -= np.einsum("ncai,ni->nca", evidence.by_twist, errors.shown(theta))
+        residual *= is_seen[..., None]
+        inverse = np.linalg.inv(_pose_information(evidence, weights))
+        leverage = np.einsum("ncai,nij,ncaj,nca->nca", evidence.by_twist, inverse, evidence.by_twist, weights)
+        freedom = np.sum(trust[..., None] * (1 - leverage), axis=(0, 1))
+        noise = np.sqrt(np.sum(trust[..., None] * residual**2, axis=(0, 1)) / np.maximum(freedom, 1.0))
+        noise = np.maximum(noise, _LEAST_NOISE)
+        away = np.sqrt(np.mean((residual / noise) ** 2, axis=-1))
+        trust = is_seen * np.minimum(1, _CLIP / np.maximum(away, 1e-9)) ** 2
+        weights = trust[..., None] / noise**2
+        solution = _accumulate(evidence, weights)
+    return solution, weights
+
+
+def _strays(evidence: Evidence) -> NDArray[np.bool_]:
+    """Return which offsets are mistakes, far from what their views have at other moments: (n, c)."""
+    median = np.zeros(evidence.offset.shape[1:])
+    for view, is_seen in enumerate(evidence.is_seen.T):
+        if is_seen.any():
+            median[view] = np.median(evidence.offset[is_seen, view], axis=0)
+    return np.any(np.abs(evidence.offset - median) > _STRAY, axis=-1)
+
+
+def pose_errors(evidence: Evidence, weights: Array) -> PoseErrors:
+    """Return how far the tracked poses are off."""
+    S, A = evidence.by_twist, _pose_information(evidence, weights)
+    b = np.einsum("ncai,nca,nca->ni", S, weights, evidence.offset)
+    C = np.einsum("ncai,nca,ncak->nik", S, weights, evidence.by_parameter)
+    edge = evidence.edge.sum(axis=1)
+    floor = 1e-4 * np.trace(edge, axis1=1, axis2=2)[:, None, None] * np.eye(6) / 6
+    by_parameter = -np.linalg.solve(edge + floor, evidence.edge_by_parameter.sum(axis=1))
+    inverse = np.linalg.inv(A)
+    return PoseErrors((inverse @ b[..., None])[..., 0], -inverse @ C, by_parameter, inverse)
+
+
+def _pose_information(evidence: Evidence, weights: Array) -> Array:
+    S = evidence.by_twist
+    return np.einsum("ncai,nca,ncaj->nij", S, weights, S) + np.diag(1 / _POSE_SD**2)
+
+
+def _accumulate(evidence: Evidence, W: Array) -> NuisanceSolution:
+    """Eliminate each moment's pose (a twist) from the least squares of the offsets."""
+    S, D = evidence.by_twist, evidence.by_parameter
+    A = _pose_information(evidence, W)
+    C = np.einsum("ncai,nca,ncak->nik", S, W, D)
+    b = np.einsum("ncai,nca,nca->ni", S, W, evidence.offset)
+    AC, Ab = np.linalg.solve(A, C), np.linalg.solve(A, b[..., None])[..., 0]
+    H = np.einsum("ncak,nca,ncal->kl", D, W, D) - np.einsum("nik,nil->kl", C, AC)
+    g = np.einsum("ncak,nca,nca->k", D, W, evidence.offset) - np.einsum("nik,ni->k", C, Ab)
+    total = float(np.sum(W * evidence.offset**2) - np.sum(b * Ab))
+    return NuisanceSolution((H + H.T) / 2, g, total)

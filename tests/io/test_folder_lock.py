@@ -1,0 +1,85 @@
+"""One writer a folder: a second one is refused while the first holds the lock, and never after it."""
+
+import os
+import signal
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from airborne.errors import ResultError
+from airborne.io.folder_lock import LOCK, refuse_links, sole_writer
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from airborne.io.folder_lock import sole_writer
+with sole_writer(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+@pytest.fixture
+def holder(tmp_path):
+    """A process that holds the lock of the folder `run`."""
+    process = subprocess.Popen([sys.executable, "-c", HOLD, str(tmp_path / "run")], stdout=subprocess.PIPE)
+    assert process.stdout.readline() == b"held\n"
+    yield process
+    process.kill()
+    process.communicate()
+
+
+def test_the_second_writer_is_told_who_the_first_is(holder, tmp_path):
+    with pytest.raises(ResultError, match=f"being written by another run .process {holder.pid} on ") as caught:
+        sole_writer(tmp_path / "run").__enter__()
+    assert "\n" not in str(caught.value)
+    assert "if that machine is down" not in str(caught.value)
+
+
+def test_a_lock_of_another_machine_says_what_to_do_when_it_is_stale(holder, tmp_path):
+    (tmp_path / "run" / LOCK).write_text("process 1 on elsewhere since 2026-01-01 10:00:00")
+    with pytest.raises(ResultError, match=r"if that machine is down, remove run\.lock"):
+        sole_writer(tmp_path / "run").__enter__()
+
+
+def test_the_lock_is_gone_with_its_process_however_it_ends(holder, tmp_path):
+    holder.send_signal(signal.SIGKILL)
+    holder.wait()
+    assert (tmp_path / "run" / LOCK).exists()
+    with sole_writer(tmp_path / "run"):
+        assert f"process {os.getpid()} on " in (tmp_path / "run" / LOCK).read_text()
+    assert not (tmp_path / "run" / LOCK).exists()
+
+
+def test_two_of_one_process_are_two_writers(tmp_path):
+    with sole_writer(tmp_path / "run"), pytest.raises(ResultError, match="another run"):
+        sole_writer(tmp_path / "run").__enter__()
+
+
+def test_only_one_writes_at_a_time_however_many_come_and_go(tmp_path):
+    writing, most = [], []
+
+    def write(k):
+        try:
+            with sole_writer(tmp_path / "run"):
+                writing.append(k)
+                most.append(len(writing))
+                writing.remove(k)
+        except ResultError:
+            return 0
+        return 1
+
+    with ThreadPoolExecutor(8) as pool:
+        assert sum(pool.map(write, range(2000))) > 0
+    assert max(most) == 1
+
+
+def test_a_link_that_leads_out_of_the_folder_is_refused(tmp_path):
+    (tmp_path / "run" / "tables").mkdir(parents=True)
+    (tmp_path / "run" / "inside").symlink_to("tables")
+    refuse_links(tmp_path / "run")
+    (tmp_path / "run" / "tables" / "angles.csv").symlink_to(tmp_path / "mine")
+    with pytest.raises(ResultError, match=r"angles.csv is a link that leads out of"):
+        refuse_links(tmp_path / "run")

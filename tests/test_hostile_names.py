@@ -1,0 +1,131 @@
+"""Two hundred hostile names in every field of a trial that takes a path: nothing is asked for, hangs, or is written."""
+
+import os
+import signal
+import sys
+
+import pytest
+
+from airborne.cli import main
+from airborne.errors import AirborneError
+from airborne.run.check import check_trial
+from airborne.run.opening import open_trial
+from airborne.trial.file import read_trial
+from tests.support import players_trial as players
+from tests.support.canary import canary, hostile_names, playlists
+
+BODY = (
+    'name = "b"\n[[segment]]\nname = "s"\n[[segment.part]]\nname = "p"\nshape = "mesh"\nfile = {}\n'
+    "colour_srgb = [1, 1, 1]\n"
+)
+START = "position_m = [0.0, 0.0, 1.0]\nsomersault_tilt_twist_deg = [0, 0, 0]\n"
+ONE = (
+    'name = "one"\n[[camera]]\nname = "left"\nvideo = {video}\n[calibration]\n{calibration}\n[body]\n{body}\n'
+    "[start]\n{start}\n"
+)
+WHOLE = {
+    "video": '"left.mkv"',
+    "calibration": 'file = "calib.toml"',
+    "body": 'preset = "human18"\nstature_m = 1.8\nmass_kg = 70',
+    "start": START,
+}
+FIELDS = {  # of one body: what is replaced, with the name in its place
+    "video": ("video", "{}"),
+    "calibration.file": ("calibration", "file = {}"),
+    "calibration.control_points": ("calibration", "control_points = {}"),
+    "body.file": ("body", "file = {}"),
+    "body.measurements": ("body", "measurements = {}"),
+    "start.joints_m": ("start", "joints_m = {}"),
+    "start.points_px": ("start", "points_px = {}"),
+    "start.detections": ("start", "detections = {}"),
+}
+SECONDS = 5  # in which every name is answered
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A stranger's folder with one good trial, pipes and playlists, inside a folder that must not change."""
+    folder = tmp_path / "outside" / "trial"
+    players.write_trial(folder, 2, names=("left",))
+    os.mkfifo(folder / "pipe.fifo")
+    monkeypatch.chdir(folder)
+    return folder
+
+
+@pytest.fixture
+def alarm():
+    """An error after some seconds, to be set again for each name."""
+
+    def too_slow(*_):
+        raise TimeoutError("a name took too long")
+
+    before = signal.signal(signal.SIGALRM, too_slow)
+    yield lambda: signal.alarm(SECONDS)
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def as_toml(name):
+    """A name as a basic string of TOML."""
+    return '"' + "".join(c if c.isalnum() and c.isascii() else f"\\U{ord(c):08x}" for c in name) + '"'
+
+
+def files_below(folder):
+    return sorted(str(path) for path in folder.rglob("*"))
+
+
+def answers(text, path):
+    """Every way in which a trial is opened before it is tracked; the one line of each refusal."""
+    path.write_text(text, encoding="utf-8")
+    yield from check_trial(path).mistakes
+    try:
+        open_trial(read_trial(path))
+    except AirborneError as error:
+        yield str(error)
+
+
+@pytest.mark.parametrize("field", [*FIELDS, "mesh", "torso"])
+def test_no_hostile_name_in_a_trial_does_more_than_one_line(folder, field, alarm):
+    with canary() as watch:
+        names = hostile_names(watch.port)
+        assert len(names) >= 200
+        for name, text in playlists(watch.port).items():
+            (folder / name).write_text(text)
+            names.append(name)
+        path = folder / "hostile.toml"
+        path.touch()
+        (folder / "body.toml").touch()
+        before = files_below(folder.parents[1])
+        for name in names:
+            alarm()
+            if field == "mesh":
+                (folder / "body.toml").write_text(BODY.format(as_toml(name)), encoding="utf-8")
+                text = ONE.format(**WHOLE | {"body": 'file = "body.toml"'})
+            elif field == "torso":
+                text = players.trial_text(("left",), track=f'method = "mixture"\ntorso = {as_toml(name)}')
+            else:
+                key, value = FIELDS[field]
+                text = ONE.format(**WHOLE | {key: value.format(as_toml(name))})
+            lines = list(answers(text, path))
+            assert lines, name
+            assert all("\n" not in line and "\x1b" not in line and len(line) < 1500 for line in lines), name
+        assert files_below(folder.parents[1]) == before
+    assert watch.n_requests == 0
+
+
+@pytest.mark.parametrize("what", ["camera", "player", "trial"])
+def test_no_hostile_name_of_a_thing_writes_outside_the_run(folder, what, capsys, monkeypatch, alarm):
+    with canary() as watch:
+        before = files_below(folder.parents[1])
+        for number, name in enumerate(hostile_names(watch.port)):
+            alarm()
+            text = players.trial_text(("left",), track="stop = 1")
+            old = {"camera": 'name = "left"', "player": 'name = "Anna"', "trial": 'name = "a block"'}[what]
+            (folder / "trial.toml").write_text(text.replace(old, f"name = {as_toml(name)}", 1), encoding="utf-8")
+            monkeypatch.setattr(sys, "argv", ["airborne", "check", str(folder / "trial.toml")])
+            with pytest.raises(SystemExit) as left:
+                main()
+            assert left.value.code in (0, 2, None), (number, name)
+            assert "Traceback" not in "".join(capsys.readouterr())
+        assert files_below(folder.parents[1]) == before
+    assert watch.n_requests == 0

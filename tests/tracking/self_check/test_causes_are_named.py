@@ -1,0 +1,120 @@
+"""A wrong body, camera or clock is named with its size; a run with nothing wrong raises no alarm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.body import Pose
+from airborne.cameras import Rig
+from airborne.tracking.self_check.check import doubts, self_check
+from airborne.tracking.self_check.path import TrackedPath
+from airborne.video import Frames, View
+from tests.support.scenes import CAMERAS, CROSS, FPS, Scene, rigid_body
+
+
+def flung(time_s):
+    """Fast enough that the scene behind the body is seen."""
+    t = float(time_s)
+    place = np.array([-1.0, -0.2, 1.2]) + np.array([4.4, 1.0, 2.2]) * t - 0.5 * np.array([0, 0, 9.81]) * t**2
+    turn = Rotation.from_rotvec(np.array([3.5, 1.0, 3.4]) * t) * Rotation.from_euler("xyz", [0.4, 0.3, 0.9])
+    return Pose(world_from_root=RigidTransform.from_components(place, turn))
+
+
+SCENE = Scene(motion=flung, cameras=CAMERAS[:3])
+INDICES = range(24)
+FRAMES = [SCENE.frames(index) for index in INDICES]
+
+
+def seen_by(rig: Rig, frames: Frames) -> Frames:
+    """The same pictures, by cameras that the files have elsewhere."""
+    views = [View(camera, view.image) for camera, view in zip(rig, frames.views, strict=True) if view is not None]
+    return replace(frames, views=tuple(views))
+
+
+RIG = Rig(SCENE.cameras)
+
+
+def checked(*, rig=RIG, model=CROSS, late_s=0.0):
+    """Check true poses against the pictures, with wrong files; `late_s` of what the second camera shows."""
+    frames = FRAMES
+    if late_s:
+        shift = round(late_s * FPS)
+        frames = [
+            replace(now, views=(now.views[0], later.views[1], now.views[2]))
+            for now, later in zip(FRAMES, FRAMES[shift:], strict=False)
+        ]
+    frames = [seen_by(rig, each) for each in frames]
+    poses = [SCENE.start(each.index) for each in frames]
+    times = np.array([float(each.time_s) for each in frames])
+    own = np.tile(np.diag([1e-3] * 3 + [2e-3] * 3) ** 2, (len(frames), 1, 1))
+    path = TrackedPath(np.array([each.index for each in frames]), times, poses, own)
+    found = self_check(model, rig, path, frames, calibrated={}, body_sd=0.01)
+    assert found is not None
+    return found
+
+
+def turned(degrees):
+    turn = Rotation.from_rotvec([0, np.radians(degrees), 0])
+    places = [RigidTransform.from_rotation(turn) * c.camera_from_world for c in SCENE.cameras]
+    return Rig((SCENE.cameras[0], replace(SCENE.cameras[1], camera_from_world=places[1]), SCENE.cameras[2]))
+
+
+def zoomed(factor):
+    second = SCENE.cameras[1]
+    return Rig((SCENE.cameras[0], replace(second, K=second.K @ np.diag([factor, factor, 1])), SCENE.cameras[2]))
+
+
+def larger(factor):
+    parts = []
+    for part in CROSS.parts:
+        size = "size_m" if hasattr(part.shape, "size_m") else "semi_axes_m"
+        shape = replace(part.shape, **{size: factor * getattr(part.shape, size)})
+        at = RigidTransform.from_components(
+            factor * part.segment_from_part.translation, part.segment_from_part.rotation
+        )
+        parts.append(replace(part, shape=shape, segment_from_part=at))
+    return rigid_body(*parts)
+
+
+def test_nothing_wrong_raises_no_alarm():
+    assert not checked().diagnosis.has_alarm
+
+
+@pytest.mark.parametrize(
+    ("wrong", "subject", "kind", "value"),
+    [
+        ({"model": larger(1.06)}, "body", "scale", 1 / 1.06 - 1),
+        ({"rig": turned(1.5)}, "cam1", "turn_deg", 1.5),
+        ({"rig": zoomed(1.06)}, "cam1", "focal", 1 / 1.06 - 1),
+        ({"late_s": 0.04}, "cam1", "time_s", 0.04),
+    ],
+)
+def test_what_is_wrong_is_named_first_with_its_size(wrong, subject, kind, value):
+    first = checked(**wrong).diagnosis.findings[0]
+    assert first.is_alarm
+    assert (first.subject, first.kind) == (subject, kind)
+    assert abs(first.value - value) < 2.5 * first.sd < 0.5 * abs(value)
+
+
+def test_intervals_widen_by_what_is_wrong():
+    right, wrong = checked(), checked(model=larger(1.06))
+    assert np.all(np.diagonal(wrong.added, axis1=1, axis2=2)[:, :3] >= 0)
+    assert np.trace(wrong.constant.mean(axis=0)[:3, :3]) > np.trace(right.constant.mean(axis=0)[:3, :3])
+
+
+def test_a_mask_that_shrinks_over_an_unchanged_picture_is_doubtful():
+    start = SCENE.start(0)
+    still = [replace(FRAMES[0], index=i) for i in range(8)]
+    far = [start.move(0.5 * i * np.array([0.0, 1.0, 0.0]), np.zeros(3)) for i in range(8)]
+    path = TrackedPath(np.arange(8), np.arange(8) / FPS, far, np.zeros((8, 6, 6)))
+    found = doubts(CROSS, path, [replace(f, views=f.views[:1]) for f in still], start, None)
+    stayed = next(iter(found.values()))
+    assert stayed[4:].all() and not stayed[0]
+
+
+def test_a_body_that_really_leaves_is_not_doubtful():
+    poses = [SCENE.start(i) for i in INDICES]
+    path = TrackedPath(np.arange(24), np.arange(24) / FPS, poses, np.zeros((24, 6, 6)))
+    assert not any(each.any() for each in doubts(CROSS, path, FRAMES, poses[0], None).values())

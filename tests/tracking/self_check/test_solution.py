@@ -1,0 +1,55 @@
+"""Eliminating the poses gives what one large least squares of poses and parameters gives."""
+
+import numpy as np
+
+from airborne.tracking.self_check.free_flight import fall
+from airborne.tracking.self_check.solution import Evidence, pose_errors, solve
+from tests.support.tolerances import SOLVED
+
+
+def random_evidence(theta, *, n=7, c=3, noise=0.0):
+    rng = np.random.default_rng(4)
+    k = len(theta)
+    S, D = rng.normal(0, 300, (n, c, 4, 6)), rng.normal(0, 30, (n, c, 4, k))
+    S[..., 2:, :] /= 500  # the turn and the log scale
+    D[..., 2:, :] /= 500
+    poses = rng.normal(0, 0.01, (n, 6))
+    offset = np.einsum("ncai,ni->nca", S, poses) + np.einsum("ncak,k->nca", D, theta)
+    offset += noise * rng.normal(size=offset.shape) * [1, 1, 0.01, 0.01]
+    edge = np.einsum("ncai,ncaj->ncij", S, S)
+    seen = np.ones((n, c), bool)
+    return Evidence(offset, S, D, seen, edge, np.einsum("ncai,ncak->ncik", S, D)), poses
+
+
+def test_parameters_and_poses_are_found():
+    theta = np.array([0.05, -0.02])
+    evidence, poses = random_evidence(theta)
+    solution, weights = solve(evidence, np.eye(2))
+    mean, covariance, _ = solution.posterior(np.eye(2))
+    np.testing.assert_allclose(mean, theta, atol=5 * SOLVED)
+    assert np.all(np.sqrt(np.diag(covariance)) < 0.01)
+    np.testing.assert_allclose(pose_errors(evidence, weights).shown(mean), poses, atol=5 * SOLVED)
+
+
+def test_a_parameter_without_freedom_stays_zero():
+    evidence, _ = random_evidence(np.array([0.05, -0.02]), noise=0.1)
+    solution, _ = solve(evidence, np.eye(2))
+    mean, covariance, _ = solution.posterior(np.diag([1.0, 0.0]))
+    assert mean[1] == 0 and covariance[1, 1] == 0
+
+
+def test_a_fall_is_measured_whatever_point_of_the_body_is_tracked():
+    t = np.arange(12) / 25
+    angle = 5 * t
+    R = np.stack(
+        [np.cos(angle), -np.sin(angle), 0 * t, np.sin(angle), np.cos(angle), 0 * t, 0 * t, 0 * t, 1 + 0 * t], 1
+    )
+    R = R.reshape(-1, 3, 3) @ np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0.0]])
+    centre = np.outer(t, [1.0, 0.2, 3.0]) - 0.5 * np.outer(t**2, [0, 0, 9.81])
+    found = fall(t, centre + R @ np.array([0.1, 0.2, 0.0]), R)
+    assert found is not None
+    np.testing.assert_allclose(found[1], -9.81, atol=1e-6)
+
+
+def test_a_body_at_rest_does_not_fall():
+    assert fall(np.arange(12) / 25, np.zeros((12, 3)), np.tile(np.eye(3), (12, 1, 1))) is None
