@@ -27,8 +27,9 @@ from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
 LEAST_PROBABILITY = 0.95  # of the best candidate, with which it is taken
-# right bodies had 0.86 and more, other bodies 0.77 at most (`benchmarks/accuracy/find_start.py`, throws 1000-1029)
-_LEAST_AGREEMENT = 0.8  # mean of a mask's precision and recall over what stands out
+# throws 1000-1029 of `benchmarks/accuracy/find_start.py`: right bodies had 0.82 and 0.86 at least, others 0.77 at most
+_LEAST_PRECISION = 0.75  # of a mask over what stands out
+_LEAST_AGREEMENT = 0.8  # mean of its precision and recall
 _MOST_MOMENTS, _MOST_PLACES = 3, 3  # that are searched: about a second each
 _AS_WELL = 0.7  # share of the largest picture of the body that counts as large as any
 _LEAST_SHOWN = 0.01  # probability of a candidate that is listed
@@ -46,7 +47,7 @@ class Candidate:
     @property
     def is_plausible(self) -> bool:
         """Whether its silhouettes agree with what stands out."""
-        return (self.precision + self.recall) / 2 >= _LEAST_AGREEMENT
+        return self.precision >= _LEAST_PRECISION and (self.precision + self.recall) / 2 >= _LEAST_AGREEMENT
 
 
 @dataclass(frozen=True, slots=True, eq=False)
