@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airborne.tracking.model_based.support import count_views, mark_unobserved, widen_unseen
-from airborne.tracking.model_based.uncovered import uncovered_pixels
+from airborne.tracking.model_based.uncovered import find_uncovered_pixels
 from tests.support.people import HUMAN
 from tests.tracking.test_misplaced_limb import FOLDS, LearnedFrame, fold
 
@@ -18,8 +18,10 @@ def frame():
 
 def uncovered_px(frame, pose):
     render_model = frame.render_model
+    posed = render_model.with_pose(pose)
     return [
-        int(each.sum()) for each in uncovered_pixels(render_model, render_model.with_pose(pose), *frame.views(pose))
+        int(each.sum())
+        for each in find_uncovered_pixels(render_model, render_model.with_pose(pose), *frame.views(pose))
     ]
 
 

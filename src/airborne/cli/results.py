@@ -51,7 +51,7 @@ def evaluate_command(
 
     Example: airborne evaluate results truth.csv --digitised digitised.csv --repeat results2
     """
-    from airborne.motion.run_folder import unfinished_note
+    from airborne.motion.run_folder import note_if_unfinished
     from airborne.run.evaluate import assess, evaluate_agreement
 
     others = repeat or joint_angles
@@ -75,5 +75,5 @@ def evaluate_command(
         print(_AGAINST[name])
         print(comparison.describe())
     print(agreement.describe())
-    if (note := unfinished_note(results)) is not None:
+    if (note := note_if_unfinished(results)) is not None:
         print(f"note: {note}")

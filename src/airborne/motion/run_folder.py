@@ -47,7 +47,7 @@ def holds_players(folder: Path) -> bool:
     return (folder / JOINTS).is_file() and not (folder / MOTION).is_file()
 
 
-def unfinished_note(folder: Path) -> str | None:
+def note_if_unfinished(folder: Path) -> str | None:
     """Say that the run in a folder is not finished; None where it is."""
     if (folder / SUMMARY).is_file():
         return None

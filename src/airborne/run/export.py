@@ -20,7 +20,7 @@ from airborne.export.takes import Take, body_take, player_takes, portable_names,
 from airborne.export.trc import write_trc
 from airborne.io.parquet import CAN_WRITE_PARQUET
 from airborne.motion import Motion, has_inertias, landmarks, measure_flight
-from airborne.motion.run_folder import holds_players, read_body_run, read_players_run, unfinished_note
+from airborne.motion.run_folder import holds_players, note_if_unfinished, read_body_run, read_players_run
 from airborne.types import Array, Progress
 
 EXPORT_FORMATS = ("c3d", "trc", "mot", "osim", "gltf", "bvh", "csv", "parquet")
@@ -76,7 +76,7 @@ def export_run(
     target.mkdir(parents=True, exist_ok=True)
     stem = portable_names([folder.resolve().name])[0]
     files = [path for format in wanted for path in _write(format, target, stem, read)]
-    unfinished = [note for note in [unfinished_note(folder)] if note is not None]
+    unfinished = [note for note in [note_if_unfinished(folder)] if note is not None]
     gaps = _gap_notes(read.takes, bool({"mot", "bvh"} & set(wanted)))
     return ExportResult(tuple(files), (*notes, *gaps, *unfinished))
 

@@ -66,7 +66,7 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     if len(trial.camera) < 2:
         raise TrialError(f"{trial.name}: [start] is missing; finding the body needs two cameras: give its pose")
     recording, facts = _open(trial)
-    sample = spread_sample(_counted(recording, progress), recording.n_frames)
+    sample = spread_sample(_report_each(recording, progress), recording.n_frames)
     if not sample:
         raise past_the_end_error(trial, recording)
     scenes = empty_scenes(sample)
@@ -79,7 +79,7 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     if take is not None:
         finding = _take(trial, finding, take)
     elif not finding.is_decided:
-        raise _undecided(trial, model, finding, folder)
+        raise _ask_for_help(trial, model, finding, folder)
     first = finding.candidates[0]
     frame, pose = _track_back(trial, model, recording, finding)
     note = (
@@ -106,7 +106,7 @@ def _open(trial: Trial) -> tuple[Recording, tuple[VideoFacts, ...]]:
     return recording, cameras.facts
 
 
-def _counted(recording: Recording, progress: Progress | None) -> Iterator[Frames]:
+def _report_each(recording: Recording, progress: Progress | None) -> Iterator[Frames]:
     for number, frames in enumerate(recording, start=1):
         if progress is not None:
             progress(number, recording.n_frames)
@@ -122,7 +122,7 @@ def _take(trial: Trial, finding: StartSearch, number: int) -> StartSearch:
     return replace(finding, candidates=(chosen, *(each for each in finding.candidates if each is not chosen)))
 
 
-def _undecided(trial: Trial, model: BodyModel, finding: StartSearch, folder: Path) -> UndecidedError:
+def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: Path) -> UndecidedError:
     """Write the candidates and return the error that names them."""
     frame, best = finding.moment.frames.index, finding.candidates[0]
     with open_results(folder):

@@ -87,7 +87,7 @@ def body_series(
     if digitised is not None:
         rig = read_rig(folder / run_folder.CALIBRATION)
         clicked = [
-            _clicked_poses(path, rig, model, motion=motion, symmetry=symmetry) for path in (digitised, *operators)
+            _poses_from_clicks(path, rig, model, motion=motion, symmetry=symmetry) for path in (digitised, *operators)
         ]
         tracked = root_variables(motion.time_s, motion.position, clicked[0][1])
         references["points digitised"] = common_series([tracked, clicked[0][0]], "the run and the clicked points")
@@ -100,7 +100,7 @@ def body_series(
     return references, repeated
 
 
-def _clicked_poses(
+def _poses_from_clicks(
     path: Path, rig: Rig, model: BodyModel, *, motion: Motion, symmetry: Sequence[np.ndarray]
 ) -> tuple[Variables, np.ndarray]:
     """Return one person's clicked poses at the motion's times, and the motion's R aligned with them by symmetry."""

@@ -133,7 +133,7 @@ def chain_cameras(cameras: Sequence[Camera], views: Views) -> tuple[Rig, RigidTr
     for i in order[1:]:
         j = int(parent[i])
         from_world[int(i)] = (
-            linked_pose(
+            pose_by_link(
                 cameras[i],
                 cameras[j],
                 views,
@@ -201,7 +201,7 @@ def n_shared_moments(views: Views) -> Array:
     return shared
 
 
-def linked_pose(
+def pose_by_link(
     one: Camera,
     other: Camera,
     views: Views,

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from airborne.calibration.initial.chaining import FEWEST_LENS_VIEWS, Views, board_pose, linked_pose, n_shared_moments
+from airborne.calibration.initial.chaining import FEWEST_LENS_VIEWS, Views, board_pose, n_shared_moments, pose_by_link
 from airborne.calibration.sources.boards import mirror_corners
 from airborne.cameras.camera import Camera
 
@@ -40,7 +40,7 @@ def _pair_misfit(cameras: Sequence[Camera], views: Views, pair: tuple[int, int])
         [board_pose(cameras[i], views.board, s)[0] if len(s.corner) else None for s in views.detections[i]]
         for i in pair
     )
-    return linked_pose(cameras[pair[0]], cameras[pair[1]], views, poses=one, other_poses=other, pair=pair)[1]
+    return pose_by_link(cameras[pair[0]], cameras[pair[1]], views, poses=one, other_poses=other, pair=pair)[1]
 
 
 def _mirror(views: Views, camera: int, cameras: Sequence[Camera]) -> Views:

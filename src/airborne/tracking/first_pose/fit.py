@@ -66,7 +66,7 @@ def fit_to_pixels(
     model: BodyModel, rig: Rig, where: str, *, names: Sequence[str], px: Array, weights: Array
 ) -> FirstPose:
     """Fit to image points: px (points, cameras, 2) [px], NaN where missing; weights (points, cameras)."""
-    needed = _required_points(model, where, names)
+    needed = _points_to_find(model, where, names)
     names = [names[i] for i in needed]
     agreed = triangulate_consensus(rig, px[needed], weights[needed])
     is_left_out = np.isfinite(agreed.distance_px) & ~agreed.is_used & (weights[needed] > 0)
@@ -82,7 +82,7 @@ def fit_to_pixels(
 
 def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Array) -> FirstPose:
     """Fit to points (points, 3) [m] of these names."""
-    needed = _required_points(model, where, names)
+    needed = _points_to_find(model, where, names)
     landmarks = landmarks_from_points([names[i] for i in needed], points[needed])
     targets = {landmark.name: landmarks[landmark.name] for landmark in model.landmarks if landmark.name in landmarks}
     try:
@@ -101,7 +101,7 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
     return FirstPose(fit.pose, tuple(note for note in notes if note))
 
 
-def _required_points(model: BodyModel, where: str, names: Sequence[str]) -> list[int]:
+def _points_to_find(model: BodyModel, where: str, names: Sequence[str]) -> list[int]:
     """Return which points determine landmarks of the body; raises TrialError for an unknown name."""
     landmarks = [landmark.name for landmark in model.landmarks]
     of_networks = {*chain.from_iterable(NETWORKS.values())}

@@ -92,7 +92,7 @@ def search_orientations(thing: Thing, moment: Moment, place: Place) -> list[Pose
     R = super_fibonacci(_N_ORIENTATIONS)
     t = place.position - R @ thing.centre
     for number, blur in enumerate(_BLURS):
-        maps = _blurred_maps(moment, place, blur * thing.radius_m)
+        maps = _blur_maps(moment, place, blur * thing.radius_m)
         if number == 0:
             scores = _scores(thing, maps, R, t)
             best = _apart(thing, R, t, scores, _N_KEPT)
@@ -179,7 +179,7 @@ def full_maps(moment: Moment, planes: Sequence[Array | None]) -> EvidenceMaps:
     return evidence_maps([camera for camera, _ in kept], [plane for _, plane in kept])
 
 
-def _blurred_maps(moment: Moment, place: Place, blur_m: float) -> EvidenceMaps:
+def _blur_maps(moment: Moment, place: Place, blur_m: float) -> EvidenceMaps:
     cameras, planes = [], []
     for view, nats in zip(moment.frames.views, moment.evidence, strict=True):
         if view is None or nats is None:

@@ -27,7 +27,7 @@ from airborne.tracking.model_based.misplaced_limbs import find_misplaced_limbs, 
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
 from airborne.tracking.model_based.support import count_views
-from airborne.tracking.model_based.uncovered import uncovered_pixels
+from airborne.tracking.model_based.uncovered import find_uncovered_pixels
 from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
@@ -159,7 +159,7 @@ class Fitter:
     def _n_views_uncovered(self, pose: Pose, learned: LearnedRegions) -> int:
         """Count the views in which something like a limb stands out that the body does not cover."""
         posed = self.render_model.with_pose(pose)
-        uncovered = uncovered_pixels(self.render_model, posed, learned.regions, learned.posteriors)
+        uncovered = find_uncovered_pixels(self.render_model, posed, learned.regions, learned.posteriors)
         return sum(bool(each.any()) for each in uncovered)
 
     def _stages_at(self, reduction: int) -> list[DegreesOfFreedom]:

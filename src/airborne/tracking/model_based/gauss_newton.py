@@ -18,7 +18,7 @@ from airborne.tracking.model_based.blur import gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, PosePrior
 from airborne.tracking.model_based.kernel_arguments import Comparison, Paint
 from airborne.tracking.model_based.normal_equations import (
-    known_light_equations,
+    equations_of_known_light,
     photometric_equations,
     silhouette_equations,
 )
@@ -239,7 +239,7 @@ def _add_image_equations(
         paint = Paint(render_model.albedo, render_model.is_faceted)
         return np.array(photometric_equations(*args, paint, view.light, iterations, sums, blocks))
     lamps, ambient = view.light
-    return np.array(known_light_equations(*args, render_model.is_faceted, lamps, ambient, sums, blocks))
+    return np.array(equations_of_known_light(*args, render_model.is_faceted, lamps, ambient, sums, blocks))
 
 
 def _shape_error_gradients(B: Array, posed: PosedBody, view: ViewBuffers) -> Array:

@@ -53,7 +53,7 @@ def photometric_equations(body, projection, observation, comparison, maps, paint
 
 
 @kernel(fastmath=True)
-def known_light_equations(body, projection, observation, comparison, maps, is_faceted, lamps, ambient, sums, blocks):
+def equations_of_known_light(body, projection, observation, comparison, maps, is_faceted, lamps, ambient, sums, blocks):
     """Add one view's equations under known lights, in shares of full sRGB; lamps (l, 8), ambient as in `draw_maps`."""
     x0, y0, x1, y1 = comparison.window
     owner, nearness = _draw(body, projection, maps, comparison.window)

@@ -19,7 +19,7 @@ _WIDTH_M = 0.03  # thinner things are no limb
 _AREA_M2 = 0.03 * 0.09  # a forearm seen end on and half covered
 
 
-def uncovered_pixels(
+def find_uncovered_pixels(
     render_model: RenderModel, posed: PosedBody, regions: Sequence[Region], posteriors: Sequence[Array]
 ) -> list[NDArray[np.bool_]]:
     """Return for each region which pixels (h, w) are like the body, wide enough for a limb, and not covered."""
