@@ -19,10 +19,7 @@ def frame():
 def uncovered_px(frame, pose):
     render_model = frame.render_model
     posed = render_model.with_pose(pose)
-    return [
-        int(each.sum())
-        for each in find_uncovered_pixels(render_model, render_model.with_pose(pose), *frame.views(pose))
-    ]
+    return [int(each.sum()) for each in find_uncovered_pixels(render_model, posed, *frame.views(pose))]
 
 
 def test_nothing_stands_out_of_the_true_pose(frame):
