@@ -122,7 +122,7 @@ def test_progressive_trial_has_frames_at_its_rate(tmp_path):
 def test_folder_with_something_in_it_is_left_alone_unless_overwritten(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     scene = small_scene(n_pictures=2)
-    with pytest.raises(TrialError, match="is not empty; give another folder, or overwrite it"):
+    with pytest.raises(TrialError, match="is not empty; give a new folder, or empty this one"):
         write_trial(scene, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
     write_trial(scene, tmp_path, overwrite=True)
