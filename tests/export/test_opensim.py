@@ -197,10 +197,10 @@ def test_angles_are_ours_in_degrees_and_unwrapped(tmp_path):
 def test_names_of_a_body_file_become_names_that_opensim_takes(opensim, tmp_path):
     part = BOX.segments[0].parts
     model = BodyModel(
-        "Übung / 1",
+        "Übung | 1",
         (
             Segment("the trunk", None, np.zeros(3), part),
-            Segment("l/arm", "the trunk", np.array([0, 0, 0.3]), part),
+            Segment("l|arm", "the trunk", np.array([0, 0, 0.3]), part),
             Segment("l arm", "the trunk", np.array([0, 0, 0.4]), part),
         ),
     )

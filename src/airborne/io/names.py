@@ -8,10 +8,7 @@ from typing import Annotated
 from pydantic import AfterValidator
 
 _LONGEST_NAME = 80  # characters
-_LONGEST_PART, _LONGEST_PATH = (
-    255,
-    1000,
-)  # bytes of a file's name, and of a path below a folder, as file systems have it
+_LONGEST_PART, _LONGEST_PATH = 255, 1000  # bytes of a file name, and of a path below a folder: of file systems
 _LONGEST_STEM = 160  # bytes of a name in a file's name, which also has a word before it and an ending
 
 
