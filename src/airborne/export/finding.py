@@ -7,14 +7,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from matplotlib.figure import Figure
 
 from airborne.appearance.empty_scene import EmptyScene
 from airborne.body import PosedBody
 from airborne.cameras import Camera
-from airborne.export.palette import ESTIMATE_RGB, TEXT_RGB, hex_colour
-from airborne.export.panels import FONT_PT, WIDTH_IN
-from airborne.export.sheet import SHEET_DPI, draw_cell
+from airborne.export.palette import ESTIMATE_RGB
+from airborne.export.sheet import cell_figure
 from airborne.export.views import cached_surface_arrays
 from airborne.io.figures import save_png
 from airborne.rendering import FLAT, render
@@ -23,6 +21,7 @@ from airborne.types import Image
 from airborne.video import View
 
 _TITLES = ("empty scene", "what stands out", "where the body was found")
+_ASPECT = 0.8  # height over width of a cell: whole images are wider than high
 _MARGIN = 0.6  # around a candidate, as a share of its size
 
 
@@ -37,7 +36,7 @@ def draw_empty_scene(path: Path, moment: Moment, scenes: Mapping[SourceKey, Empt
         grey = np.repeat((255 * shown).astype(np.uint8)[..., None], 3, axis=2)
         square = [_square_pixels(image, view.camera) for image in (empty, grey, _with_outline(view, posed))]
         rows.append(square)
-    save_png(_figure(rows, names, _TITLES), path)
+    save_png(cell_figure(rows, names, _TITLES, aspect=_ASPECT), path)
 
 
 def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, PosedBody]]) -> None:
@@ -45,7 +44,7 @@ def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, 
     views = [view for view in moment.frames.views if view is not None]
     rows = [[_near(_with_outline(view, posed), view.camera, posed) for view in views] for _, posed in candidates]
     names = [f"{number}: {label}" for number, (label, _) in enumerate(candidates, start=1)]
-    save_png(_figure(rows, names, [view.camera.name for view in views]), path)
+    save_png(cell_figure(rows, names, [view.camera.name for view in views], aspect=_ASPECT), path)
 
 
 def _with_outline(view: View, posed: PosedBody) -> Image:
@@ -71,17 +70,3 @@ def _square_pixels(image: Image, camera: Camera) -> Image:
     """Stretch the rows of a field to square pixels."""
     height = round(image.shape[0] * camera.K[0, 0] / camera.K[1, 1])
     return np.asarray(cv2.resize(image, (image.shape[1], height), interpolation=cv2.INTER_LINEAR), np.uint8)
-
-
-def _figure(rows: Sequence[Sequence[Image | None]], names: Sequence[str], titles: Sequence[str]) -> Figure:
-    cell_in = (WIDTH_IN - 0.5) / len(titles)
-    figure = Figure((WIDTH_IN, 0.4 + 0.8 * cell_in * len(rows)), dpi=SHEET_DPI)
-    figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.02, wspace=0, hspace=0)
-    grid = figure.subplots(len(rows), len(titles), squeeze=False)
-    for axes, title in zip(grid[0], titles, strict=True):
-        axes.set_title(title, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
-    for i, (row, name) in enumerate(zip(rows, names, strict=True)):
-        for axes, cell in zip(grid[i], row, strict=True):
-            draw_cell(axes, cell)
-        grid[i, 0].set_ylabel(name, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
-    return figure

@@ -6,13 +6,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from matplotlib.figure import Figure
-
 from airborne.body import PosedBody
 from airborne.cameras import Camera, Rig
-from airborne.export.palette import TEXT_RGB, hex_colour
-from airborne.export.panels import FONT_PT, WIDTH_IN
-from airborne.export.sheet import SHEET_DPI, draw_cell
+from airborne.export.sheet import cell_figure
 from airborne.export.views import cached_surface_arrays, crop_camera, resample_view
 from airborne.io.figures import save_png
 from airborne.rendering import FLAT, mask_picture, match_picture, model_picture, render, through_mask
@@ -38,7 +34,7 @@ class MatchingPicture:
         if self._is_drawn or posed is None or status is not Status.TRACKED:
             return
         rows = [_row(view, camera, posed) for view, camera in zip(frames.views, self._cameras, strict=True)]
-        save_png(_figure(rows, [camera.name for camera in self._cameras]), self._path)
+        save_png(cell_figure(rows, [camera.name for camera in self._cameras], TITLES), self._path)
         self._is_drawn = True
 
     def __enter__(self) -> Self:
@@ -62,17 +58,3 @@ def _row(view: View | None, camera: Camera, posed: PosedBody) -> list[Image | No
         through_mask(observed, rendering),
         match_picture(observed, rendering),
     ]
-
-
-def _figure(rows: list[list[Image | None]], names: list[str]) -> Figure:
-    cell_in = (WIDTH_IN - 0.5) / len(TITLES)
-    figure = Figure((WIDTH_IN, 0.4 + cell_in * len(rows)), dpi=SHEET_DPI)
-    figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.02, wspace=0, hspace=0)
-    grid = figure.subplots(len(rows), len(TITLES), squeeze=False)
-    for axes, title in zip(grid[0], TITLES, strict=True):
-        axes.set_title(title, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
-    for i, (row, name) in enumerate(zip(rows, names, strict=True)):
-        for axes, cell in zip(grid[i], row, strict=True):
-            draw_cell(axes, cell)
-        grid[i, 0].set_ylabel(name, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
-    return figure

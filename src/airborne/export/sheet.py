@@ -111,3 +111,20 @@ def draw_cell(axes: Axes, cell: Image | None) -> None:
         axes.text(0.5, 0.5, "no picture", ha="center", va="center", fontsize=FONT_PT - 2, transform=axes.transAxes)
     else:
         axes.imshow(cell)
+
+
+def cell_figure(
+    rows: Sequence[Sequence[Image | None]], names: Sequence[str], titles: Sequence[str], *, aspect: float = 1.0
+) -> Figure:
+    """Return a figure of report width, images in rows with names, titles above; aspect: height over width of a cell."""
+    cell_in = (WIDTH_IN - 0.5) / len(titles)
+    figure = Figure((WIDTH_IN, 0.4 + aspect * cell_in * len(rows)), dpi=SHEET_DPI)
+    figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.02, wspace=0, hspace=0)
+    grid = figure.subplots(len(rows), len(titles), squeeze=False)
+    for axes, title in zip(grid[0], titles, strict=True):
+        axes.set_title(title, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
+    for i, (row, name) in enumerate(zip(rows, names, strict=True)):
+        for axes, cell in zip(grid[i], row, strict=True):
+            draw_cell(axes, cell)
+        grid[i, 0].set_ylabel(name, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
+    return figure

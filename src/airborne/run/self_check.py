@@ -13,7 +13,7 @@ from airborne.calibration.from_points import Calibration
 from airborne.cameras import Rig
 from airborne.motion import Motion
 from airborne.tracking import Status
-from airborne.tracking.self_check.check import SelfCheck, doubts, self_check
+from airborne.tracking.self_check.check import SelfCheck, doubts, gather_equations, self_check
 from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.self_check.nuisances import MEASURED_SD, PRESET_SD
 from airborne.tracking.self_check.path import TrackedPath
@@ -51,7 +51,8 @@ def check_run(
     path = TrackedPath(motion.index[rows], motion.time_s[rows], poses, motion.covariance[rows, :6, :6])
     calibrated = {} if calibration is None else {fit.name: fit.covariance for fit in calibration.fits}
     body_sd = PRESET_SD if is_preset else MEASURED_SD
-    found = self_check(model, rig, path, frames, calibrated=calibrated, body_sd=body_sd)
+    run = gather_equations(model, rig, path, frames, calibrated=calibrated, body_sd=body_sd)
+    found = None if run is None else self_check(run, model, rig, path)
     status, sentences = motion.status.astype(f"<U{max(map(len, Status))}"), []
     for reason, is_doubtful in doubts(model, path, frames, start, found).items():
         doubtful = rows[is_doubtful & (motion.status[rows] == Status.TRACKED.value)]

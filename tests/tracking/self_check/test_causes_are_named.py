@@ -8,7 +8,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
 from airborne.cameras import Rig
-from airborne.tracking.self_check.check import doubts, self_check
+from airborne.tracking.self_check.check import doubts, gather_equations, self_check
 from airborne.tracking.self_check.path import TrackedPath
 from airborne.video import Frames, View
 from tests.support.scenes import CAMERAS, CROSS, FPS, Scene, rigid_body
@@ -50,9 +50,9 @@ def checked(*, rig=RIG, model=CROSS, late_s=0.0):
     times = np.array([float(each.time_s) for each in frames])
     own = np.tile(np.diag([1e-3] * 3 + [2e-3] * 3) ** 2, (len(frames), 1, 1))
     path = TrackedPath(np.array([each.index for each in frames]), times, poses, own)
-    found = self_check(model, rig, path, frames, calibrated={}, body_sd=0.01)
-    assert found is not None
-    return found
+    run = gather_equations(model, rig, path, frames, calibrated={}, body_sd=0.01)
+    assert run is not None
+    return self_check(run, model, rig, path)
 
 
 def turned(degrees):

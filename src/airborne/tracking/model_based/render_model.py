@@ -76,6 +76,12 @@ class RenderModel:
                 J[..., columns] = J[..., columns] @ (np.eye(3) - unobservable.T @ unobservable)
         return J
 
+    def draw(self, posed: PosedBody, camera: Camera) -> SurfaceMaps:
+        """Draw what each pixel of a camera's whole image shows."""
+        maps = empty_maps(camera.size)
+        surface_maps(self.shapes, self.geometry, posed.R, posed.t, pack_view(camera), *maps)
+        return maps
+
     def draw_parts(self, posed: PosedBody, region: Region) -> NDArray[np.int16]:
         """Draw which part each pixel of a region shows: (h, w), -1 where none."""
         maps = empty_maps(region.camera.size)

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from airborne.body import Pose
 from airborne.cameras import Camera
-from airborne.rendering.maps import empty_maps, surface_maps
-from airborne.rendering.packing import pack_view
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 from airborne.video import Frames, View
@@ -70,9 +68,7 @@ def spread(doubtful: NDArray[np.bool_], at: NDArray[np.int64], index: NDArray[np
 
 
 def _mask(render_model: RenderModel, pose: Pose, camera: Camera) -> NDArray[np.uint8]:
-    posed, maps = render_model.with_pose(pose), empty_maps(camera.size)
-    surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, pack_view(camera), *maps)
-    return (maps.part >= 0).astype(np.uint8)
+    return (render_model.draw(render_model.with_pose(pose), camera).part >= 0).astype(np.uint8)
 
 
 def _change(before: View, after: View, chosen: NDArray[np.bool_]) -> Array:

@@ -73,22 +73,8 @@ class SelfCheck:
         return _interpolate(index, self.index, self.constant)
 
 
-def self_check(
-    model: BodyModel,
-    rig: Rig,
-    path: TrackedPath,
-    kept: Sequence[Frames],
-    *,
-    calibrated: Mapping[str, Array],
-    body_sd: float,
-) -> SelfCheck | None:
-    """Check a run by some of its frames; None where they show too little.
-
-    calibrated, body_sd: as `prior_covariance` takes them.
-    """
-    run = gather_equations(model, rig, path, kept, calibrated=calibrated, body_sd=body_sd)
-    if run is None:
-        return None
+def self_check(run: RunEquations, model: BodyModel, rig: Rig, path: TrackedPath) -> SelfCheck:
+    """Check a run by the equations gathered from some of its frames."""
     rows, evidence, errors = run.rows, run.evidence, run.errors
     diagnosis = Diagnosis((), np.zeros(len(run.prior)), run.prior)
     if run.says_causes:
@@ -142,7 +128,10 @@ def gather_equations(
     calibrated: Mapping[str, Array],
     body_sd: float,
 ) -> RunEquations | None:
-    """Look at some frames of a run again; None where none of them shows the body."""
+    """Look at some frames of a run again; None where none of them shows the body.
+
+    calibrated, body_sd: as `prior_covariance` takes them.
+    """
     seen = [(row, frames) for frames in kept if (row := path.row(frames.index)) is not None]
     if not seen:
         return None

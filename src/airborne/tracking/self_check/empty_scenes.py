@@ -8,8 +8,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.rendering.maps import empty_maps, surface_maps
-from airborne.rendering.packing import pack_view
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.self_check.path import TrackedPath
 from airborne.tracking.self_check.registration import Silhouette
@@ -39,9 +37,8 @@ class EmptyScenes:
                 if row is None:
                     continue
                 small = view.camera.resample(scale=(_REDUCTION, _REDUCTION), size=(width, height))
-                posed, maps = render_model.with_pose(path.pose_after(row, view.delay_s)), empty_maps(small.size)
-                surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, pack_view(small), *maps)
-                covered += maps.part >= 0
+                posed = render_model.with_pose(path.pose_after(row, view.delay_s))
+                covered += render_model.draw(posed, small).part >= 0
 
     def behind(self, number: int, view: View, silhouette: Silhouette) -> NDArray[np.uint8] | None:
         """Return the empty scene in a silhouette's box (h, w, 3); None where too few images show it."""

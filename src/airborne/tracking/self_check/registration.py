@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from airborne.body import PosedBody
 from airborne.cameras import Camera
-from airborne.rendering.maps import empty_maps, surface_maps
-from airborne.rendering.packing import pack_view
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
@@ -81,8 +79,7 @@ def draw_silhouette(render_model: RenderModel, posed: PosedBody, camera: Camera)
         return None
     offset = (x0 + (to_view[0] - 1) / 2, y0 + (to_view[1] - 1) / 2)
     own = camera.resample(scale=(to_view[0], to_view[1]), offset=offset, size=(width, height))
-    maps = empty_maps(own.size)
-    surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, pack_view(own), *maps)
+    maps = render_model.draw(posed, own)
     mask = (maps.part >= 0).astype(np.float32)
     middle = ((low + high) / 2 - offset) / to_view
     is_whole = bool(np.all(low > 0) and np.all(high < size - 1))
@@ -92,9 +89,8 @@ def draw_silhouette(render_model: RenderModel, posed: PosedBody, camera: Camera)
 
 def _mask_corners(render_model: RenderModel, posed: PosedBody, camera: Camera) -> tuple[Array, Array] | None:
     """Return the corners of the body's mask in the image [px]; None where it is not there."""
-    maps = empty_maps(camera.size)
-    surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, pack_view(camera), *maps)
-    rows, columns = np.flatnonzero((maps.part >= 0).any(axis=1)), np.flatnonzero((maps.part >= 0).any(axis=0))
+    mask = render_model.draw(posed, camera).part >= 0
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not len(rows):
         return None
     return np.array([columns[0], rows[0]], float), np.array([columns[-1], rows[-1]], float)
