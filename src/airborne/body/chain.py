@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body.model import BodyModel, Pose, PosedBody
-from airborne.geometry.joint_rotations import compose_rotation_vectors, rotation_vectors_between
+from airborne.geometry.joint_rotations import compose_rotation_vectors, motion_between, rotation_vectors_between
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.types import Array
 
@@ -37,8 +37,7 @@ def move_pose(pose: Pose, delta: Array) -> Pose:
 
 def delta_between(earlier: Pose, later: Pose) -> Array:
     """Return the change (6 + 3 joints,) from one pose to another: the inverse of `move_pose`."""
-    a, b = earlier.world_from_root, later.world_from_root
-    root = np.concatenate([b.translation - a.translation, (b.rotation * a.rotation.inv()).as_rotvec()])
+    root = motion_between(earlier.world_from_root.as_matrix(), later.world_from_root.as_matrix())
     n_joints = max(len(earlier.joint_angles), len(later.joint_angles))
     if not n_joints:
         return root
