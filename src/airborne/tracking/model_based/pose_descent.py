@@ -17,6 +17,7 @@ from airborne.tracking.model_based.twist_equations import Sums, add_score_covari
 from airborne.types import Array
 
 _SHORTER = 0.4  # factor on a step that does not lower the objective
+_LEAST_SHARE = 0.1  # of a step: three losses; where none of them gains, the refitted light only fluctuates
 _SLACK = 1e-3  # of the objective: the refitted light makes it fluctuate
 
 
@@ -114,7 +115,7 @@ def descend_pose(
     descent = descend(
         _Iterate(evaluate(pose, True), dofs, prior),
         lambda pose: _Iterate(evaluate(pose, False), dofs, prior),
-        BacktrackingRule(overstep, _SHORTER),
+        BacktrackingRule(overstep, _SHORTER, _LEAST_SHARE),
         most_steps=most_steps - 1,
         least_predicted=(0.5 * tolerance * len(dofs.columns), 0.0),
         slack=_SLACK,
