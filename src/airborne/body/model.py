@@ -169,6 +169,11 @@ class BodyModel:
         names = [segment.name for segment in self.segments]
         return np.array([-1 if s.parent is None else names.index(s.parent) for s in self.segments])
 
+    @cached_property
+    def joints_m(self) -> Array:
+        """Where every segment's joint lies in its parent: (segments, 3) [m]."""
+        return np.array([segment.joint_m for segment in self.segments], float)
+
     @property
     def n_joints(self) -> int:
         """The number of joints: every segment but the root has one."""

@@ -61,7 +61,7 @@ def map_to_dofs(
     J = np.ascontiguousarray(render_model.jacobian(posed, dofs))
     d = J.shape[-1]
     A, g = np.zeros((d, d)), np.zeros(d)
-    map_equations(sums.curvature, sums.g, J, A, g)
+    map_equations(sums.A, sums.g, J, A, g)
     cost, total, weight = totals
     noise = correlated * (total / weight if weight > 0 else 1.0)
     rows = [each.reshape(-1, *J.shape[:2]) for each in blocks] + list(shifted)
