@@ -10,7 +10,7 @@ from airborne.calibration.bundle.lenses import project_with_jacobian
 from airborne.calibration.intrinsics.physical import Pinhole, PinholeModel
 from airborne.types import Array
 
-_MOST_ITERATIONS = 40
+_MOST_ITERATIONS = 40  # of a fit, as of `fit_pinhole`; from the fit to all points most end after three
 _FIRST_DAMPING, _DAMPING_FACTOR = 1e-3, 10.0  # of equations whose diagonal is 1 (Marquardt 1963)
 _CONVERGED = 1e-10  # share of the squared error that a further step would gain
 
