@@ -24,7 +24,7 @@ from scipy.special import stdtrit
 from airborne.constants import NORMAL_QUANTILE_975
 from airborne.evaluation.compare import nan_to_none
 from airborne.evaluation.icc import Reliability, reliability
-from airborne.geometry.quantiles import chi2_quantile
+from airborne.geometry.sampling import chi2_quantile
 from airborne.motion.jumps.jump import UNKNOWN, Measurement
 from airborne.types import Array
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from scipy.special import fdtri
 
-from airborne.geometry.quantiles import chi2_quantile
+from airborne.geometry.sampling import chi2_quantile
 from airborne.motion.jumps.jump import UNKNOWN, Measurement
 from airborne.types import Array
 

@@ -15,7 +15,7 @@ from airborne.evaluation.compare import match_times, nan_to_none, or_dash, span
 from airborne.evaluation.jump_errors import JumpErrors, compare_jumps
 from airborne.evaluation.players_truth import read_players_truth, read_reference_jumps
 from airborne.evaluation.success import Cover, success_cover
-from airborne.geometry.quantiles import chi2_quantile
+from airborne.geometry.sampling import chi2_quantile
 from airborne.motion.players import PlayersMotion, read_players
 from airborne.tracking import Status
 from airborne.types import Array

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.constants import GRAVITY_M_S2
-from airborne.geometry.quantiles import chi2_quantile
+from airborne.geometry.sampling import chi2_quantile
 from airborne.motion.free_fall import (
     SWAY_M,
     SideLikelihood,
