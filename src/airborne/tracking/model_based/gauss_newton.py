@@ -45,7 +45,7 @@ _CLIP_MASK = 0.5  # the same, of a mask
 _OVERSTEP = 1.6  # robust weights and the refitted light make each step too short by about this factor
 _MOST_STEPS = 12  # at each level of a body with joints
 _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
-_CONVERGED = 1 / 3  # squared length of the last step, in sds of the pose, for each degree of freedom
+_CONVERGED = 1  # squared length of the last step, in sds of the pose, for each degree of freedom
 SHAPE_SD_M = 0.007  # model error: how far a person's segment lies from the ellipsoid that fits its image
 
 
