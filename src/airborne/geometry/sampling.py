@@ -1,4 +1,4 @@
-"""Quantiles and even samples, without SciPy's statistics, which take half a second to import. Arrays only."""
+"""Quantiles and even samples; SciPy's statistics, which take half a second to import, only where needed. Arrays only."""
 
 from __future__ import annotations
 
@@ -20,3 +20,13 @@ def latin_hypercube(dimensions: int, n: int, *, seed: int) -> Array:
     rng = np.random.default_rng(seed)
     strata = rng.permuted(np.tile(np.arange(n), (dimensions, 1)), axis=1).T
     return (strata + rng.random((n, dimensions))) / n
+
+
+def sobol_points(dimensions: int, n: int, *, seed: int) -> Array:
+    """Return n points (n, dimensions) of a scrambled Sobol sequence, even in many coordinates together, as limbs need.
+
+    Of a limb's nine coordinates a Latin hypercube missed poses that this finds.
+    """
+    from scipy.stats import qmc
+
+    return qmc.Sobol(dimensions, rng=seed).random(n)
