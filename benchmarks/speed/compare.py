@@ -19,6 +19,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.stats import binom
@@ -44,7 +45,7 @@ def tracking(trial_file: Path, stop: int | None, keep: bool) -> Callable[[], tup
     trial = read_trial(trial_file, {} if stop is None else {"stop": stop})
     opened = open_trial(trial)
     frames = list(opened.recording) if keep else opened.recording
-    subject = PlayersRun.open(trial, opened) if trial.has_players else BodyRun.open(trial, opened)
+    subject: Any = PlayersRun.open(trial, opened) if trial.has_players else BodyRun.open(trial, opened)
     tracker = subject.see(next(iter(frames))).tracker()
 
     def track() -> tuple[float, int]:
@@ -160,7 +161,9 @@ def compare(road: str, trees: tuple[Path, Path], scenes: Path, rounds: int, boun
         worker.close()
     ratio, low, high = median_interval(times[:, 0] / times[:, 1])
     now, then = np.median(times, axis=0) * 1e3
-    in_c = "" if bound is None or road == "command" else "  ({:.0f} C, {:.0f} C)".format(*np.median(times / bounds[:, None], axis=0))
+    in_c = ""
+    if bound is not None and road != "command":
+        in_c = "  ({:.0f} C, {:.0f} C)".format(*np.median(times / bounds[:, None], axis=0))
     print(f"{road:<8}{now:9.2f} ms now{then:9.2f} ms then{in_c}  ratio {ratio:.3f} [{low:.3f}, {high:.3f}]", flush=True)
 
 

@@ -1,4 +1,4 @@
-"""Quantiles and even samples; SciPy's statistics, which take half a second to import, only where needed. Arrays only."""
+"""Quantiles and even samples; SciPy's statistics, half a second of imports, only where needed. Arrays only."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import dual_annealing, least_squares
@@ -148,10 +149,11 @@ def fit_pinhole(start: Pinhole, model: PinholeModel, world: Array, px: Array) ->
     """Return the camera near start that projects world (n, 3) [m] closest to px (n, 2) [px], by Levenberg-Marquardt."""
     start, n = start.with_lens(model), model.n_parameters
     residual = _residual_of_step(start, model, world, px)
+    slopes: Any = _slopes_of_step(start, model, world)
     solution = least_squares(
         residual,
         np.zeros(n),
-        jac=_slopes_of_step(start, model, world),
+        jac=slopes,
         method="lm",
         x_scale="jac",
         xtol=1e-10,
