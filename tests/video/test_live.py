@@ -49,9 +49,9 @@ class Sender(threading.Thread):
             stream = container.add_stream("mpeg2video", rate=RATE, options={"qmin": "1", "qmax": "2", "g": "1"})
             stream.width, stream.height = SIZE
             stream.pix_fmt = "yuv420p"
-            begun_s = time.monotonic()
+            self.begun_s = time.monotonic()
             for k in range(self.n):
-                time.sleep(max(begun_s + k / RATE - time.monotonic(), 0))
+                time.sleep(max(self.begun_s + k / RATE - time.monotonic(), 0))
                 if self.gone_after is not None and k > self.gone_after:
                     break
                 if k in self.silent:
@@ -144,6 +144,26 @@ def test_cameras_that_end_early_leave_the_others_even_if_one_was_the_clock(tmp_p
     assert max(seen) == 39
     assert all(numbers[0] is None for index, numbers in seen.items() if index > 14)
     assert all(numbers[1] is not None for index, numbers in seen.items() if index > 14)
+
+
+def test_a_camera_that_goes_away_comes_back_at_the_times_of_its_arrival(tmp_path):
+    again = Sender(tmp_path / "cam2", 150)
+    with record_pipes(tmp_path, 200, cam2={"gone_after": 20}) as recording:
+        clock = next(each for each in threading.enumerate() if isinstance(each, Sender) and each.path.name == "cam1")
+        seen = {}
+        for frames in recording:
+            if frames.index >= 30 and again.ident is None:
+                again.start()
+            seen[frames.index] = levels_of(frames)
+        events = recording.events
+    again.join(5)
+    shown = [(index, numbers[1]) for index, numbers in seen.items() if numbers[1] is not None]
+    later = [(index - number) % 56 for index, number in shown if index > 30]
+    assert max(number for index, number in shown if index <= 30) == 20
+    assert len(later) > 40
+    assert np.ptp(later) <= 1
+    assert np.mean(later) == pytest.approx((again.begun_s - clock.begun_s) * RATE, abs=2)
+    assert [event for event in events if "came back 1×" in event and event.startswith("cam2")]
 
 
 def test_files_play_at_their_own_speed_and_nothing_is_missed_while_the_first_images_are_looked_at(tmp_path):
