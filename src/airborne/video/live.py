@@ -8,6 +8,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
+from statistics import median
 from threading import Condition, Event, Thread
 
 from airborne.cameras import Rig
@@ -22,7 +23,7 @@ from airborne.video.undistortion import Undistortion, undistortion_of
 _BUFFER_LENGTH = 16  # images of a camera that wait to be matched, the newest
 _LONGEST_WAIT_S, _LONGEST_WAIT_PERIODS = 0.25, _BUFFER_LENGTH - 4  # of an image, for those of the other cameras
 _RETRY_S = 0.5  # before a source whose sender went away is opened again
-_CLOCK_LENGTH = 50  # images whose promptest one says what their stamps count from
+_CLOCK_LENGTH = 50  # images that say how far arrivals are behind stamps
 _CLOCK_S = 0.5  # of images that come again, to learn that
 _MICRO = 1_000_000  # to a second: the clock of a stream that has none
 
@@ -47,6 +48,7 @@ class LiveCamera:
     has_ended: bool = False  # nobody sends any more
     is_away: bool = False  # waited for in vain, and nothing has come since
     delays_s: deque[float] = field(default_factory=lambda: deque(maxlen=_CLOCK_LENGTH))  # of arrivals behind stamps
+    shift_s: Fraction = Fraction(0)  # added to the stamps of a sender that came back, which count from its first image
     n_received: int = 0
     n_returns: int = 0  # senders that came after the first one had ended
     n_used: int = 0
@@ -69,7 +71,8 @@ class LiveCamera:
             self.stop.wait(_RETRY_S)
 
     def _read(self) -> None:
-        known, delay_s, shift_s = self.facts, min(self.delays_s, default=0.0), Fraction(0)
+        known = self.facts
+        delay_s = (median(self.delays_s) if self.delays_s else 0.0) - float(self.shift_s)  # the last ones came at once
         with open_source(self.source, self.stop) as (container, stream):
             tick = stream.time_base or Fraction(1, _MICRO)
             size = None if known is None else known.size_before_rotation
@@ -91,10 +94,9 @@ class LiveCamera:
                     stamp_s = Fraction(round((now_s - start_s) * _MICRO), _MICRO) + 1 / facts.frame_rate
                 self.delays_s.append(now_s - float(stamp_s))
                 if known is not None and (now_s < opened_s + _CLOCK_S or len(self.delays_s) == 1):
-                    shift_s = Fraction(round((min(self.delays_s) - delay_s) * _MICRO), _MICRO)
+                    self.shift_s = Fraction(round((min(self.delays_s) - delay_s) * _MICRO), _MICRO)
                     continue
-                stamp_s += shift_s  # of a sender that came back: its stamps count from its own first image
-                self._keep(DecodedImage(self.source.trial_time(stamp_s), frame, None), facts, now_s)
+                self._keep(DecodedImage(self.source.trial_time(stamp_s + self.shift_s), frame, None), facts, now_s)
         if self.facts is None and not self.stop.is_set():
             raise VideoError(f"{self.source.name}: no image came from {self.source.path}; check what sends them")
         if self.kind == "network" and not self.stop.is_set():
