@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import multiprocessing
 import os
 import random
 import shutil
@@ -22,6 +23,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import BinaryIO
 
@@ -92,12 +94,12 @@ def soak_live(folder: Path, seconds: float) -> dict[str, object]:
     write_trial(folder / "clips", CLIP, names=NAMES)
     (folder / "live.toml").write_text(trial_text(NAMES, video=f"{folder.as_posix()}/{{}}.ts"), encoding="utf-8")
     shutil.copyfile(folder / "clips" / "calib.toml", folder / "calib.toml")
-    counts: dict[str, int] = {}
     for name in NAMES:
         os.mkfifo(folder / f"{name}.ts")
-    senders = [threading.Thread(target=_send, args=(folder, name, seconds, counts)) for name in NAMES]
-    for sender in senders:
-        sender.start()
+    context = multiprocessing.get_context("spawn")  # whose memory is not ours
+    received, sent = context.Pipe(duplex=False)
+    senders = context.Process(target=_send_all, args=(folder, seconds, sent))
+    senders.start()
     samples = Samples()
     run = track_trial(
         read_trial(folder / "live.toml"),
@@ -106,8 +108,8 @@ def soak_live(folder: Path, seconds: float) -> dict[str, object]:
         pictures=False,
         progress=lambda step, _: samples.take(step) if step % RATE == 1 else None,
     )
-    for sender in senders:
-        sender.join()
+    counts = received.recv()
+    senders.join()
     returns = [event for event in run.summary["events"] if "came back" in event]
     return {
         "sent": counts,
@@ -116,6 +118,17 @@ def soak_live(folder: Path, seconds: float) -> dict[str, object]:
         "frames": len(run.motion),
         **samples.slopes(),
     }
+
+
+def _send_all(folder: Path, seconds: float, sent: Connection) -> None:
+    """Send into every pipe, and then how many images each was sent."""
+    counts: dict[str, int] = {}
+    threads = [threading.Thread(target=_send, args=(folder, name, seconds, counts)) for name in NAMES]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    sent.send(counts)
 
 
 def _send(folder: Path, name: str, seconds: float, counts: dict[str, int]) -> None:
