@@ -41,14 +41,26 @@ class PersonFit:
     picture: Path
 
 
-def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: StageProgress | None = None) -> PersonFit:
+def fit_person(
+    trial: Trial,
+    output: Path,
+    *,
+    n_frames: int = 5,
+    skeleton: str | None = None,
+    progress: StageProgress | None = None,
+) -> PersonFit:
     """Fit a trial's body to the person in its images; write the body file, and beside it `fit_body.png`.
 
-    The joints come from the detections of the trial's [start], or for one frame from its joints_m.
+    The joints come from the detections of the trial's [start], or for one frame from its joints_m; `skeleton` says
+    whose points the detections are where neither the trial nor their files do.
     Raises an AirborneError for input that cannot be used.
     """
     if n_frames < 1:
         raise TrialError(f"frames is {n_frames}; expected at least 1 frame to fit the body to")
+    if skeleton is not None:
+        if trial.start.detections is None:
+            raise TrialError(f"{trial.name}: skeleton goes with detections under [start]; the trial has none")
+        trial = trial.model_copy(update={"start": trial.start.model_copy(update={"skeleton": skeleton})})
     report = progress or (lambda what, done, total: None)
     model = trial.model()
     opened = open_trial(trial)
