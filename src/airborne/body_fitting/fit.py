@@ -136,8 +136,8 @@ def fit_body(
     """
     if not observations:
         raise BodyError("no frame to fit the body to; give at least one with known landmarks")
-    landmarks = tuple(_landmarks(model, each) for each in observations)
-    lengths = fit_lengths(model, np.stack(landmarks))
+    landmarks = tuple(_landmarks(model, each.landmarks) for each in observations)
+    lengths = measure_lengths(model, [each.landmarks for each in observations])
     start = with_segment_lengths(model, lengths)
     all_times = (*observations, *scenery)
     initial = tuple(_pose_from_landmarks(start, each, weights) for each in observations)
@@ -256,17 +256,22 @@ def _prior_sd(model: BodyModel) -> Array:
     return np.repeat(_PRIOR_SD, [3, 3, 3 * (len(model.segments) - 1)])
 
 
-def _landmarks(model: BodyModel, observation: BodyObservation) -> Array:
+def measure_lengths(model: BodyModel, landmarks: Sequence[Mapping[str, Array]]) -> dict[str, float]:
+    """Measure the segments' lengths, relative to the model's, by the landmarks (3,) [m] of some times."""
+    return fit_lengths(model, np.stack([_landmarks(model, each) for each in landmarks]))
+
+
+def _landmarks(model: BodyModel, positions: Mapping[str, Array]) -> Array:
     """Return the landmarks' positions in the model's order: (landmarks, 3) [m], NaN where unknown."""
     unknown = np.full(3, np.nan)
-    return np.array([observation.landmarks.get(mark.name, unknown) for mark in model.landmarks], float)
+    return np.array([positions.get(mark.name, unknown) for mark in model.landmarks], float)
 
 
 def _pose_from_landmarks(
     model: BodyModel, observation: BodyObservation, weights: Mapping[str, float] | None, near: Pose | None = None
 ) -> Pose:
     """Fit a pose to landmarks; from a pose `near` by, unless it leads to none that is close."""
-    pairs = zip(model.landmarks, _landmarks(model, observation), strict=True)
+    pairs = zip(model.landmarks, _landmarks(model, observation.landmarks), strict=True)
     targets = {mark.name: at for mark, at in pairs if np.isfinite(at).all()}
     fit = fit_pose(model, targets, weights=weights, start=near, seeks_swap=False)
     if near is not None and fit.rms_m > _FAR_RMS_M:
