@@ -54,6 +54,11 @@ def shape_parameters(model: BodyModel) -> tuple[ShapeParameter, ...]:
     return tuple(parameters)
 
 
+def segments_of(model: BodyModel, stem: str) -> list[str]:
+    """Return the segments of a name without its side."""
+    return [segment.name for segment in model.segments if stem_of(segment.name) == stem]
+
+
 def apply_shape(base: BodyModel, parameters: Sequence[ShapeParameter], shape: Array) -> BodyModel:
     """Return the body of a shape (k,), which is 0 for `base`."""
     bordered = (
