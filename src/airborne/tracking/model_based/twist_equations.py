@@ -21,7 +21,7 @@ class Sums(NamedTuple):
     A pixel belongs to one segment, so only the chain of joints couples two of them: see `map_equations`.
     """
 
-    A: Any  # (s, 6, 6) curvature; the lower triangles are filled
+    A: Any  # (s, 6, 6) curvature
     g: Any  # (s, 6) gradient
     B: Any  # (s, 6, 3) change of g by an image shifted right or down by a pixel, or an outline a pixel wider
 
@@ -29,11 +29,6 @@ class Sums(NamedTuple):
     def zero(cls, n_segments: int) -> Sums:
         """Return sums of zero."""
         return cls(np.zeros((n_segments, 6, 6)), np.zeros((n_segments, 6)), np.zeros((n_segments, 6, 3)))
-
-    @property
-    def curvature(self) -> np.ndarray:
-        """A with both triangles (s, 6, 6)."""
-        return self.A + np.tril(self.A, -1).swapaxes(1, 2)
 
 
 def new_blocks(width: int, height: int, n_segments: int) -> np.ndarray:
@@ -120,6 +115,10 @@ def accumulate(residual, shape, coverage, owner, nearness, projection, observati
                 B_e[i, 2] += ai * out_x + bi * out_y
                 for j in range(i + 1):
                     A_e[i, j] += ai * a[j] + bi * b[j]
+    for e in range(len(A)):
+        for i in range(6):
+            for j in range(i):
+                A[e, j, i] = A[e, i, j]
     for row in range(blocks.shape[0]):
         for column in range(blocks.shape[1]):
             for e in range(len(g)):
