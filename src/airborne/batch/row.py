@@ -20,7 +20,13 @@ Row = Mapping[str, Any]
 _STATUSES = ("tracked", "uncertain", "lost")
 _OF_A_BODY = ("median_position_sd_mm", "median_rotation_sd_deg", "somersault_rev", "twist_rev")
 _OF_A_FLIGHT = ("fitted_gravity_m_s2", "ballistic_rms_mm")
-_OF_A_JUMP = ("hip_height_m", "foot_height_m", "flight_s")  # of the highest of a trial's jumps
+_OF_A_JUMP = (
+    "hip_height_m",
+    "foot_height_m",
+    "takeoff_s",
+    "landing_s",
+    "flight_s",
+)  # of the highest of a trial's jumps
 
 
 def row_of(folder: Path) -> Row:
