@@ -17,11 +17,9 @@ if TYPE_CHECKING:
 _TOPIC = "airborne"  # of the events that tell of frames
 _CONNECT_S = 10  # to reach a scheduler
 _DASHBOARD = "127.0.0.1:8787"  # for this machine alone; any other port where it is taken
-_MOST_DEATHS = 5  # of workers with one task, before the task counts as their cause
 # one task runs, none waits at a worker: the longest go first, and a dead worker costs what it ran
 _SETTINGS = {
     "distributed.scheduler.worker-saturation": 1.0,
-    "distributed.scheduler.allowed-failures": _MOST_DEATHS,
     "distributed.scheduler.work-stealing": False,
     "distributed.admin.large-graph-warning-threshold": "1GB",
 }
@@ -88,7 +86,7 @@ def do_tasks(
 ) -> Iterator[Outcome]:
     """Do tasks on a cluster, the first first, and yield each one's outcome when it ends.
 
-    A task whose worker dies is done again by another, and so goes on where it stopped; the fifth death fails it.
+    A task whose worker dies is done again by another, and so goes on where it stopped; after a few deaths it fails.
     """
     from distributed import as_completed
 
@@ -127,7 +125,7 @@ def _describe_end(future: Any) -> str:
     error = future.exception()
     if isinstance(error, KilledWorker):
         return (
-            f"{_MOST_DEATHS} workers died with it, of too little memory or killed; give each more with --memory, "
+            "worker after worker died with it, of too little memory or killed; give each more with --memory, "
             "or start fewer"
         )
     return " ".join(f"unexpected {type(error).__name__}: {error}".split())[:400]

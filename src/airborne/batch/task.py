@@ -142,8 +142,8 @@ def look_up(task: Task, trial: Trial) -> tuple[State, dict[str, Any] | None]:
     """Return what the folder holds of a trial, and what the trial's inputs are; None where one is missing."""
     try:
         identity = run_identity(trial)
-    except OSError:
-        return "new", None  # tracking says which input is missing
+    except (OSError, ValueError):
+        return "new", None  # tracking says which input is missing or damaged
     try:
         known = read_json(task.record)["identity"]
     except (OSError, ValueError, KeyError, TypeError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from airborne.trial.file import read_tables
 
 TABLE = "trials.csv"
 _ALWAYS_TRIAL = "trial.toml"  # the name of a trial file that is named after its folder
+_MEANT_AS_TRIAL = re.compile(r"^\s*(\[\[camera\]\]|session\s*=)", re.MULTILINE)
 _TABLE_FORM = "a table of trials has a line of names, one of them trial, then a line for each trial"
 
 
@@ -57,11 +59,13 @@ def list_trials(what: str) -> list[BatchTrial]:
 
 
 def _is_trial(path: Path) -> bool:
-    """Tell whether a TOML file is a trial, or may be meant as one: one that cannot be read is not passed over."""
+    """Tell whether a TOML file is a trial, or may be meant as one: one with a mistake is not passed over."""
     try:
         tables = read_toml(path)
-    except (OSError, tomllib.TOMLDecodeError):
-        return True
+    except OSError:
+        return False
+    except tomllib.TOMLDecodeError:
+        return path.name == _ALWAYS_TRIAL or _MEANT_AS_TRIAL.search(path.read_text(errors="replace")) is not None
     return path.name == _ALWAYS_TRIAL or "session" in tables or {"name", "camera"} <= tables.keys()
 
 

@@ -47,8 +47,8 @@ def describe_study(comparisons: Sequence[Comparison], events: Sequence[str], *, 
     text.append(
         "Each athlete's mean in each condition has the variance of a mean of his trials, pooled within athletes and "
         "conditions, which holds the error of the measurement. Differences of conditions were pooled over athletes "
-        "with random effects: the variance between athletes by Paule and Mandel (1982), 95 % intervals by Hartung and Knapp "
-        "(2001) with Student's t."
+        "with random effects: the variance between athletes by Paule and Mandel (1982), 95 % intervals by Hartung and "
+        "Knapp (2001) with Student's t."
     )
     if "between trials" in levels:
         text.append("With a single athlete, the interval is Welch's, of trials, and holds for that athlete only.")
