@@ -8,6 +8,8 @@ from pathlib import Path
 from airborne.batch.task import Outcome, Task
 from airborne.batch.trials import BatchTrial
 
+SLEEP_S = 0.02
+
 
 def tasks(folder: Path, n: int):
     return [Task(BatchTrial(f"t{k:04}", Path(f"t{k:04}.toml"), {}), folder, pictures=False) for k in range(n)]
@@ -22,7 +24,7 @@ def note_name(task, report):
 
 
 def sleep_shortly(task, report):
-    time.sleep(0.02)
+    time.sleep(SLEEP_S)
     return Outcome(task.trial.name, "done")
 
 
@@ -36,5 +38,6 @@ def die_once(task, report):
 
 def always_die(task, report):
     if task.trial.name == "t0001":
+        time.sleep(0.5)  # the outcome of the task before lies at this worker until it is fetched
         os.kill(os.getpid(), signal.SIGKILL)
     return note_name(task, report)
