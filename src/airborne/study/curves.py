@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
+from numpy.typing import NDArray
 
 from airborne.errors import ResultError, require_choice
+from airborne.io.text import read_csv
 from airborne.motion.run_folder import JOINTS
-from airborne.study.trials import StudyTrial
+from airborne.study.trials import LARGEST, StudyTrial
 from airborne.types import Array
 
 NODES = 100  # of a curve between two events: one a percent
@@ -21,6 +22,8 @@ _TURN = re.compile(r"turn-([1-9]\d?)")
 _OF_THE_ROW = {"take-off": "takeoff_s", "landing": "landing_s"}
 _WIDE = ("tables/angles.csv", "tables/flight.csv")
 _LONG = {JOINTS: ("m", "sd_m"), "tables/joint_angles.csv": ("deg", "{axis}_deg_sd")}  # unit and sd of x_m, x_deg
+_JOINT_TABLES = [Path(name).name for name in _LONG]
+_FORM = "a run's table has a line of names, time_s among them, and as many cells in each line"
 _FEWEST = 3  # known frames of a curve
 
 
@@ -40,33 +43,29 @@ def read_curve(trial: StudyTrial, variable: str) -> Curve:
     """
     for name in _WIDE:
         table = _read(trial.folder / name)
-        if table is not None and variable in table:
-            sd = table[f"{variable}_sd"] if f"{variable}_sd" in table else np.full(len(table), np.nan)
-            return _known(trial, variable, table["time_s"], table[variable], sd)
+        if variable in table:
+            return _known(trial, variable, table["time_s"], table[variable], table.get(f"{variable}_sd"))
     named = re.fullmatch(r"(.+)_([xyz])_(m|deg)", variable)
-    for name, (unit, sd_column) in _LONG.items():
+    for name, (unit, sd) in _LONG.items():
         table = _read(trial.folder / name)
-        if table is None or named is None or named[3] != unit:
+        if not table or named is None or named[3] != unit:
             continue
-        table = table[table["joint"] == named[1]]
+        mask = table["joint"] == named[1]
         if "player" in table:
-            table = table[table["player"] == trial.athlete]
-        if len(table):
-            sd = table[sd_column.format(axis=named[2])]
-            return _known(trial, variable, table["time_s"], table[f"{named[2]}_{unit}"], sd)
+            mask &= table["player"] == trial.athlete
+        column = table.get(f"{named[2]}_{unit}")
+        if mask.any() and column is not None:
+            stated = table.get(sd.format(axis=named[2]), np.full(len(mask), ""))
+            return _known(trial, variable, table["time_s"][mask], column[mask], stated[mask])
     raise ResultError(f"{trial.name}: its run has no {variable}; it has: {', '.join(list_curves(trial)[:40])}")
 
 
 def list_curves(trial: StudyTrial) -> list[str]:
     """Return the names of all curves of a trial's run."""
-    names = []
-    for name in _WIDE:
-        table = _read(trial.folder / name)
-        columns = [] if table is None else [each for each in table if not each.endswith("_sd")]
-        names += [each for each in columns if each not in ("frame", "time_s", "is_singular")]
+    wide = [column for name in _WIDE for column in _read(trial.folder / name)]
+    names = [each for each in wide if not each.endswith("_sd") and each not in ("frame", "time_s", "is_singular")]
     for name, (unit, _) in _LONG.items():
-        table = _read(trial.folder / name)
-        joints = [] if table is None else list(dict.fromkeys(table["joint"]))
+        joints = dict.fromkeys(_read(trial.folder / name).get("joint", np.array([])).tolist())
         names += [f"{joint}_{axis}_{unit}" for joint in joints for axis in "xyz"]
     return names
 
@@ -127,15 +126,34 @@ def _turn_s(trial: StudyTrial, n: int, since_s: float) -> float:
     return float(np.interp(n, turned[k - 1 : k + 1], angle.time_s[k - 1 : k + 1]))
 
 
-def _read(path: Path) -> pd.DataFrame | None:
-    return pd.read_csv(path) if path.is_file() else None
+def _read(path: Path) -> dict[str, NDArray[np.str_]]:
+    """Read the columns of a run's table; none where there is no table. Raises ResultError where it is damaged."""
+    if not path.is_file():
+        return {}
+    (_, names), *rows = read_csv(path, _FORM, ResultError) or [(1, [""])]
+    cells = [row for _, row in rows if len(row) == len(names)]
+    needed = {"time_s", "joint"} if path.name in _JOINT_TABLES else {"time_s"}
+    if not needed <= set(names) or len(cells) < len(rows):
+        raise ResultError(f"{path} is damaged; {_FORM}; track the trial again")
+    return dict(zip(names, np.array(cells, str).reshape(len(cells), len(names)).T, strict=True))
 
 
-def _known(trial: StudyTrial, variable: str, time_s: pd.Series, values: pd.Series, sd: pd.Series | Array) -> Curve:
-    columns = [np.asarray(each, float) for each in (time_s, values, sd)]
-    is_known = np.isfinite(columns[1])
-    if is_known.sum() < _FEWEST:
+def _known(
+    trial: StudyTrial,
+    variable: str,
+    time_s: NDArray[np.str_],
+    values: NDArray[np.str_],
+    sd: NDArray[np.str_] | None,
+) -> Curve:
+    """Return the curve of three columns where its values are known."""
+    texts = (time_s, values, np.full(len(values), "") if sd is None else sd)
+    try:
+        numbers = [np.where(each == "", "nan", each).astype(float) for each in texts]
+    except ValueError as error:
+        raise ResultError(f"{trial.name}: {variable} is damaged ({str(error)[:60]}); track the trial again") from None
+    is_known = np.isfinite(numbers[0]) & (np.abs(numbers[1]) < LARGEST)
+    if is_known.sum() < _FEWEST or (np.diff(numbers[0][is_known]) <= 0).any():
         raise ResultError(
             f"{trial.name}: {variable} is known in {is_known.sum()} frames, {_FEWEST} at least are needed"
         )
-    return Curve(*(column[is_known] for column in columns))
+    return Curve(*(column[is_known] for column in numbers))

@@ -11,6 +11,7 @@ from airborne.io.text import read_csv
 
 TABLE = "trials.csv"
 ATHLETE, CONDITION = "athlete", "condition"  # the labels that a study needs
+LARGEST = 1e100  # no measurement is larger, and its square is still a number
 _FORM = "the table of a batch has columns trial, athlete, condition, status, folder"
 _NEEDED = {"trial", "status", "error", "folder", CONDITION}
 
@@ -28,9 +29,10 @@ class StudyTrial:
     def number(self, name: str) -> float | None:
         """Return a number of the row; None where there is none."""
         try:
-            return float(self.row[name])
+            value = float(self.row[name])
         except (KeyError, ValueError):
             return None
+        return value if abs(value) < LARGEST else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +57,15 @@ def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
     folder holds no table, or none of the trials can be compared.
     """
     (_, names), *lines = read_csv(folder / TABLE, _FORM, ResultError) or [(1, [""])]
-    if not set(names) >= _NEEDED:
-        raise ResultError(f"{folder / TABLE}: lacks {', '.join(sorted(_NEEDED - set(names)))}; {_FORM}")
+    if not set(names) >= _NEEDED or len(set(names)) < len(names):
+        raise ResultError(
+            f"{folder / TABLE}: lacks {', '.join(sorted(_NEEDED - set(names))) or 'names of its own'}; {_FORM}"
+        )
     trials, left_out = [], []
     for _, cells in lines:
-        row = dict(zip(names, cells, strict=False))
+        if len(cells) != len(names):
+            raise ResultError(f"{folder / TABLE}: {len(cells)} cells in a row, expected {len(names)}; {_FORM}")
+        row = dict(zip(names, cells, strict=True))
         athlete = row.get(ATHLETE) or row.get("player", "")
         if conditions and row[CONDITION] not in conditions:
             continue
