@@ -32,10 +32,13 @@ ORDER = [
     "run",
     "body_fitting",
     "sync",
+    "batch",
+    "study",
     "interface",
     "cli",
 ]  # a room may import what stands before it, and itself
-PACKAGES = [room for room in ORDER if room not in ("io", "trial", "run", "body_fitting", "interface", "cli")]
+OF_TRIALS = ("trial", "run", "body_fitting", "batch", "study", "interface", "cli")  # their files are imported by name
+PACKAGES = [room for room in ORDER if room not in ("io", *OF_TRIALS)]
 FOR_ALL = {"", "errors", "types", "constants"}  # the package's own name holds its version
 NOUNS = ("cameras", "video", "body")  # packages whose public names are values with a meaning, not arrays
 KERNELS = [

@@ -11,8 +11,10 @@ import typer
 
 from airborne import __version__
 from airborne.cli import reproduce, results, synth, track
+from airborne.cli.batch import batch_command, new_command
 from airborne.cli.calibrate import calibrate_command
 from airborne.cli.check import check_command
+from airborne.cli.compare import compare_command
 from airborne.cli.console import STOPPED, UNDECIDED, refuse, stop
 from airborne.cli.convert import convert_command
 from airborne.cli.export import export_command
@@ -28,6 +30,9 @@ _COMMANDS = {
     "find": find_command,
     "frame": frame_command,
     "track": track.track_command,
+    "new": new_command,
+    "batch": batch_command,
+    "compare": compare_command,
     "calibrate": calibrate_command,
     "sync": sync_command,
     "convert": convert_command,
