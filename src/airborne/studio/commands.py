@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 _RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
+STOPPED = 130  # the exit code of a command that was stopped
 _PATIENCE_S = 10.0  # for a process that was told to stop
 
 

@@ -30,7 +30,7 @@ def draw_cameras(
             scene.sphere(0.012 * reach / 4).material(_POINT_COLOUR).move(*map(float, point))
         if path is not None:
             draw_path(scene, path)
-    away = middle + reach * np.array([0.9, -1.1, 0.75])
+    away = middle + reach * np.array([0.7, -0.9, 0.55])
     place = dict(zip(("x", "y", "z"), map(float, away), strict=True))
     scene.move_camera(**place, look_at_x=middle[0], look_at_y=middle[1], look_at_z=middle[2], duration=0)
     return scene

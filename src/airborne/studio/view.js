@@ -164,6 +164,7 @@ export default {
     drawOver(pen, place, i) {
       const lines = [...((this.shown && this.shown.overlay.items) || []), ...(this.items || [])];
       for (const item of lines) if (item.pane === i) this.drawItem(pen, place, item);
+      this.labels = [];
       for (const mark of this.marks || []) if (mark.pane === i) this.drawMark(pen, place, mark);
     },
     drawItem(pen, place, item) {
@@ -192,6 +193,11 @@ export default {
         }
         pen.stroke();
       }
+      const box = [x + 9, y - 19, 7 * (mark.label || "").length, 14]; // a label that would hide another is left out
+      const hides = ([left, top, width, height]) =>
+        box[0] < left + width && left < box[0] + box[2] && box[1] < top + height && top < box[1] + box[3];
+      if (!chosen && this.labels.some(hides)) return;
+      this.labels.push(box);
       this.write(pen, mark.label || "", x + 9, y - 7, mark.colour);
     },
     drawLoupe(pen, place, i) {
@@ -284,11 +290,10 @@ export default {
       this.drag = null;
       if (!drag) return;
       if (drag.moved && this.dragged) this.$emit("move", { ...this.dragged, frame: this.wanted });
-      else if (!drag.moved && drag.mark) this.$emit("select", { id: drag.mark.id });
-      else if (!drag.moved && this.picking) {
+      else if (!drag.moved && this.picking) { // the server knows whether the mark close by or a new point is meant
         const [u, v] = this.toVideo(this.layout()[drag.pane], at.x, at.y);
-        this.$emit("pick", { pane: drag.pane, u, v, frame: this.wanted });
-      }
+        this.$emit("pick", { pane: drag.pane, u, v, near: drag.mark ? drag.mark.id : null });
+      } else if (!drag.moved && drag.mark) this.$emit("select", { id: drag.mark.id });
       this.draw();
     },
     on_pointerleave() { this.pointer = null; this.draw(); },

@@ -45,11 +45,14 @@ class View(Element, component="view.js", default_classes="view"):
         frame: int,
         overlay: str = "",
         on_frame: Callable[[int], Any] | None = None,
-        on_pick: Callable[[int, float, float], Any] | None = None,
+        on_pick: Callable[[int, float, float, str | None], Any] | None = None,
         on_move: Callable[[str, float, float], Any] | None = None,
         on_select: Callable[[str | None], Any] | None = None,
     ) -> None:
-        """Show a trial's videos; `overlay` is the address of what lies over each frame, with {frame} in it."""
+        """Show a trial's videos; `overlay` is the address of what lies over each frame, with {frame} in it.
+
+        `on_pick` gets camera number, pixel, and the mark close by if there is one; `on_move` and `on_select` a mark.
+        """
         super().__init__()
         self._props["panes"] = [
             {"name": name, "width": size[0], "height": size[1], "url": f"/image/{k}/{{frame}}?{hash(shown.sources)}"}
@@ -62,7 +65,9 @@ class View(Element, component="view.js", default_classes="view"):
         self._props["picking"] = False
         self.show_over((), ())
         self._listen("frame", on_frame, lambda args: (int(args["frame"]),))
-        self._listen("pick", on_pick, lambda args: (int(args["pane"]), float(args["u"]), float(args["v"])))
+        self._listen(
+            "pick", on_pick, lambda args: (int(args["pane"]), float(args["u"]), float(args["v"]), args["near"])
+        )
         self._listen("move", on_move, lambda args: (str(args["id"]), float(args["u"]), float(args["v"])))
         self._listen("select", on_select, lambda args: (args["id"],))
 
@@ -81,10 +86,10 @@ class View(Element, component="view.js", default_classes="view"):
         self._props["selected"] = selected or ""
         self.update()
 
-    def pick(self, is_picking: bool) -> None:
-        """Let clicks pick points, or not."""
-        self._props["picking"] = is_picking
-        self.update()
+    def start_picking(self) -> None:
+        """Let clicks pick points."""
+        self._props["picking"] = True
+        self.classes("picking")
 
     def set_overlay(self, overlay: str) -> None:
         """Show what lies at another address over each frame."""

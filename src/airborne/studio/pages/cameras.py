@@ -31,7 +31,6 @@ async def cameras_page(session: Session) -> None:
         shown = await work("indexing the videos", session.shown)
         if shown is None:
             return
-        names = shown.names
         wanted = {camera.calibrated_as or camera.name for camera in project.cameras}
         files = await in_thread(_list_calibrations, session.folder, wanted)
         surveys = await in_thread(list_surveys, session.folder)
@@ -51,7 +50,6 @@ async def cameras_page(session: Session) -> None:
             rig = await work("reading the calibration", session.rig)
             if rig is not None:
                 _show_rig(rig)
-        ui.label(f"cameras: {', '.join(names)}").classes("soft small")
 
 
 def _chooser(session: Session, files: list[str], surveys: list[str], table: dict) -> None:

@@ -6,11 +6,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from nicegui import ui
+from nicegui.events import KeyEventArguments
 
 from airborne.calibration.from_points import Calibration, calibrate
 from airborne.errors import AirborneError
 from airborne.studio.clicks import Clicked, count_clicked, read_clicked
-from airborne.studio.pages.layout import complain, errors_shown, in_thread
+from airborne.studio.pages.layout import Latest, complain, errors_shown
+from airborne.studio.pages.point_list import PointList
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import FEWEST_POINTS
 from airborne.studio.session import Session
@@ -31,6 +33,7 @@ class ControlPointsPanel:
     chosen: str  # the point that the next click sets
     selected: str | None = None  # the mark that arrow keys move: "point|camera"
     fits: dict[str, tuple[bytes, Calibration | str]] = field(default_factory=dict)  # camera -> of which clicks, and it
+    latest: Latest = field(default_factory=Latest)
 
     @classmethod
     async def open(cls, session: Session, shown: ShownTrial, file: str) -> ControlPointsPanel | None:
@@ -57,6 +60,7 @@ class ControlPointsPanel:
 
     def build(self) -> None:
         """Lay out the pictures and the list of points."""
+        ui.keyboard(on_key=self.step)
         with ui.element("div").classes("split"):
             with ui.element("div").classes("wide"):
                 self.view = View(
@@ -67,25 +71,26 @@ class ControlPointsPanel:
                     on_move=self.move,
                     on_select=self.select,
                 )
-                self.view.pick(True)
-                self.view.classes("picking")
+                self.view.start_picking()
             with ui.element("div").classes("side"):
                 self.state = ui.refreshable(self._list_state)
                 with ui.element("div").classes("card"):
                     self.state()
-                self.list = ui.refreshable(self._list_points)
-                with ui.element("div").classes("card points").style("flex: 1; overflow-y: auto"):
-                    self.list()
+                    ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
+                self.list = PointList(self.shown.names, self.choose)
 
     def turn_to(self, frame: int) -> None:
         """Note the frame in view."""
         self.session.frame = frame
 
-    async def pick(self, pane: int, u: float, v: float) -> None:
-        """Set the chosen point in a camera, and go on to the next one that this camera lacks."""
-        camera, name = self.shown.names[pane], self.chosen
-        self.save(self.clicked.click(name, camera, (u, v)), f"{name} clicked in {camera}")
-        self.selected = f"{name}|{camera}"
+    async def pick(self, pane: int, u: float, v: float, near: str | None) -> None:
+        """Set the chosen point in a camera; where it is set already, a click close to a mark chooses that."""
+        camera = self.shown.names[pane]
+        if near is not None and np.isfinite(self.clicked.at(self.chosen, camera)[0]):
+            await self.select(near)
+            return
+        self.save(self.clicked.click(self.chosen, camera, (u, v)), f"{self.chosen} clicked in {camera}")
+        self.selected = f"{self.chosen}|{camera}"
         await self.update()
 
     async def move(self, mark: str, u: float, v: float) -> None:
@@ -106,6 +111,12 @@ class ControlPointsPanel:
         """Choose the point that the next clicks set."""
         self.chosen, self.selected = name, None
         await self.update()
+
+    async def step(self, event: KeyEventArguments) -> None:
+        """Choose the next point, or the one before."""
+        if event.action.keydown and event.key in ("n", "p"):
+            row = self.clicked.names.index(self.chosen) + (1 if event.key == "n" else -1)
+            await self.choose(self.clicked.names[row % len(self.clicked.names)])
 
     async def remove(self) -> None:
         """Take the chosen click back."""
@@ -131,14 +142,17 @@ class ControlPointsPanel:
             if px is None or count_clicked(self.clicked, camera) < FEWEST_POINTS:
                 self.fits.pop(camera, None)
             elif self.fits.get(camera, (b"",))[0] != px.tobytes():
-                self.fits[camera] = px.tobytes(), await in_thread(_fit, self.clicked, camera, self.shown.sizes)
+                fit = await self.latest.do(_fit, self.clicked, camera, self.shown.sizes)
+                if fit is None:
+                    return
+                self.fits[camera] = px.tobytes(), fit
         self.show()
 
     def show(self) -> None:
         """Show marks and lists as they are now."""
         marks = [mark for pane, camera in enumerate(self.shown.names) for mark in self._marks(pane, camera)]
-        self.view.show_over(marks, (), self.selected)
-        self.list.refresh()
+        self.view.show_over(sorted(marks, key=lambda mark: mark["colour"] != _CHOSEN), (), self.selected)
+        self.list.show(self.clicked.names, self.chosen, self._off_px)
         self.state.refresh()
 
     def _marks(self, pane: int, camera: str) -> list[Mark]:
@@ -162,14 +176,13 @@ class ControlPointsPanel:
         assert self.clicked.world is not None
         return fit.rig[camera].px_from_world(self.clicked.world) if isinstance(fit, Calibration) else None
 
-    def residual_px(self, name: str, camera: str) -> float:
-        """Return how far a click lies from where its camera sees the point [px]; NaN where unknown."""
-        seen_at = self.predicted(camera)
-        return (
-            np.nan
-            if seen_at is None
-            else float(np.linalg.norm(seen_at[self.clicked.names.index(name)] - self.clicked.at(name, camera)))
-        )
+    def _off_px(self, name: str) -> tuple[Array, Array]:
+        """Say of a point whether it is clicked, and how far from where the camera sees it, in each camera [px]."""
+        px = np.stack([self.clicked.at(name, camera) for camera in self.shown.names])
+        row, none = self.clicked.names.index(name), np.full(2, np.nan)
+        seen_at = [self.predicted(camera) for camera in self.shown.names]
+        to = np.stack([none if each is None else each[row] for each in seen_at])
+        return np.isfinite(px[:, 0]), np.linalg.norm(to - px, axis=1)
 
     def _list_state(self) -> None:
         for camera in self.shown.names:
@@ -186,19 +199,6 @@ class ControlPointsPanel:
             with ui.element("div"):
                 ui.label(camera).classes("name")
                 ui.label(text).classes(f"{tone} small")
-        ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
-
-    def _list_points(self) -> None:
-        for name in self.clicked.names:
-            classes = "point here" if name == self.chosen else "point"
-            with ui.element("button").classes(classes).on("click", lambda name=name: self.choose(name)):
-                ui.label(name)
-                ui.element("div").classes("gap")
-                for camera in self.shown.names:
-                    is_set = np.isfinite(self.clicked.at(name, camera)[0])
-                    residual = self.residual_px(name, camera)
-                    text = "–" if not is_set else "•" if np.isnan(residual) else f"{residual:.1f}"
-                    ui.label(text).classes("n").props(f'title="{camera} [px]"')
 
 
 def _fit(clicked: Clicked, camera: str, sizes: dict[str, tuple[int, int]]) -> Calibration | str:

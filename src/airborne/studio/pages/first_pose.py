@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from nicegui import ui
+from nicegui.events import KeyEventArguments
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Pose
@@ -17,9 +18,10 @@ from airborne.errors import AirborneError, TrialError
 from airborne.io.text import read_json
 from airborne.motion.run_folder import CANDIDATES
 from airborne.studio.clicks import Clicked, read_clicked
-from airborne.studio.commands import Command
+from airborne.studio.commands import STOPPED, Command
 from airborne.studio.outlines import outline_items
-from airborne.studio.pages.layout import complain, errors_shown, framed, in_thread, work
+from airborne.studio.pages.layout import Latest, complain, errors_shown, framed, in_thread, work
+from airborne.studio.pages.point_list import PointList
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.view import Item, Mark, View
@@ -30,6 +32,7 @@ POINTS = "start_points.csv"
 _CLICK_SD_PX = 1.0  # of a careful click, right and down: the band is two of these
 _COLOURS = ("#56b4e9", "#e69f00", "#cc79a7", "#009e73", "#f0e442", "#d55e00")  # of cameras, in order
 _POSE_COLOUR = "#f0e442"
+_NEEDED = ("hip_left", "hip_right", "shoulder_left", "shoulder_right")
 _UNDECIDED = 3  # the exit code of `airborne find`
 _BY_HAND = ("position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg")
 _OTHER_WAYS = (*_BY_HAND, "find", "joints_m", "points_px", "detections", "detections_cameras")
@@ -78,13 +81,15 @@ class _Panel:
     says: str = ""
     candidates: tuple[dict[str, Any], ...] = ()  # where `find` was undecided
     found: dict[str, Any] | None = None  # the [start] to write for the pose that is shown
+    outline: list[dict[str, Any]] = field(default_factory=list)  # of the pose
+    latest: Latest = field(default_factory=Latest)
 
     @property
     def landmarks(self) -> list[str]:
         """The landmarks that can be clicked, those that are needed first."""
         names = [landmark.name for landmark in self.model.landmarks]
-        needed = ("hip_left", "hip_right", "shoulder_left", "shoulder_right")
-        return sorted(names, key=lambda name: (name not in needed, names.index(name)))
+        needed = [name for name in _NEEDED if name in names]
+        return [*needed, *(name for name in names if name not in needed)]
 
     def build(self) -> None:
         """Lay out the pictures and what can be done."""
@@ -101,16 +106,38 @@ class _Panel:
                     on_select=self.select,
                 )
             with ui.element("div").classes("side"):
-                self.doing = ui.refreshable(self._list_doing)
                 with ui.element("div").classes("card"):
-                    self.doing()
+                    if not has_joints:
+                        self._build_search()
+                    self.note = ui.label().classes("small")
+                    self.use = ui.button("Use this pose", on_click=self.write).props("unelevated")
+                    if has_joints:
+                        ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
                 if has_joints:
-                    self.view.pick(True)
                     self.chosen = self.landmarks[0]
-                    self.list = ui.refreshable(self._list_landmarks)
-                    with ui.element("div").classes("card points").style("flex: 1; overflow-y: auto"):
-                        self.list()
+                    self.view.start_picking()
+                    ui.keyboard(on_key=self.step)
+                    self.list = PointList(self.shown.names, self.choose)
         self.timer = ui.timer(0.5, self.watch_search, active="find" in self.session.commands)
+
+    def _build_search(self) -> None:
+        with ui.element("div").classes("row-line"):
+            self.find = ui.button("Find it", on_click=self.search).props("unelevated")
+            self.spinner = ui.spinner()
+            self.seconds = ui.label().classes("small")
+            self.halt = ui.button("Stop", on_click=self.stop_search).props("flat dense")
+        self.choices = ui.refreshable(self._list_candidates)
+        self.choices()
+        self._show_search()
+
+    def _show_search(self) -> None:
+        """Show the buttons that the search has now."""
+        command = self.session.commands.get("find")
+        is_running = command is not None and command.is_running
+        self.find.set_visibility(not is_running)
+        for each in (self.spinner, self.seconds, self.halt):
+            each.set_visibility(is_running)
+        self.seconds.set_text(f"looking for the body: {command.seconds:.0f} s" if command is not None else "")
 
     def turn_to(self, frame: int) -> None:
         """Note the frame in view."""
@@ -133,13 +160,19 @@ class _Panel:
         words = ["find", self.session.path.name, "-o", f"{FOLDER}/find", "--json"]
         self.session.commands["find"] = Command(words, self.session.folder)
         self.timer.activate()
-        self.doing.refresh()
+        self._show_search()
+
+    async def stop_search(self) -> None:
+        """Stop the search."""
+        command = self.session.commands.get("find")
+        if command is not None:
+            await in_thread(command.stop)
 
     async def watch_search(self) -> None:
         """Look whether the search has ended, and show what it found."""
         command = self.session.commands.get("find")
+        self._show_search()
         if command is None or command.is_running:
-            self.doing.refresh()
             return
         self.timer.deactivate()
         del self.session.commands["find"]
@@ -153,11 +186,12 @@ class _Panel:
             self.candidates = tuple({**each, "frame": document["frame"]} for each in document["candidates"])
             self.says = "The pictures do not decide between these poses; choose the right one."
             await self.take(0)
-        elif command.code is not None and command.code < 0:
+        elif command.code == STOPPED:
             self.says = "stopped"
         else:
             complain(command.complaint())
-        self.doing.refresh()
+        self.choices.refresh()
+        await self.update()
 
     async def take(self, number: int) -> None:
         """Show one of the candidates."""
@@ -172,9 +206,12 @@ class _Panel:
 
     # clicking it
 
-    async def pick(self, pane: int, u: float, v: float) -> None:
-        """Set the chosen landmark in a camera."""
+    async def pick(self, pane: int, u: float, v: float, near: str | None) -> None:
+        """Set the chosen landmark in a camera; where it is set already, a click close to a mark chooses that."""
         camera = self.shown.names[pane]
+        if near is not None and np.isfinite(self._at(self.chosen, camera)[0]):
+            await self.select(near)
+            return
         self.save(self.clicked.click(self.chosen, camera, (u, v)), f"{self.chosen} clicked in {camera}")
         self.selected = f"{self.chosen}|{camera}"
         await self.fit()
@@ -191,12 +228,18 @@ class _Panel:
         self.selected = mark
         if mark is not None:
             self.chosen = mark.rsplit("|", 1)[0]
-        await self.update()
+        self.show()
 
     async def choose(self, name: str) -> None:
         """Choose the landmark that the next clicks set."""
         self.chosen, self.selected = name, None
-        await self.update()
+        self.show()
+
+    async def step(self, event: KeyEventArguments) -> None:
+        """Choose the next landmark, or the one before."""
+        if event.action.keydown and event.key in ("n", "p"):
+            row = self.landmarks.index(self.chosen) + (1 if event.key == "n" else -1)
+            await self.choose(self.landmarks[row % len(self.landmarks)])
 
     async def remove(self) -> None:
         """Take the chosen click back."""
@@ -215,16 +258,30 @@ class _Panel:
             self.clicked = clicked
 
     async def fit(self) -> None:
-        """Fit the body to the clicks, or say what is missing."""
-        self.found, self.pose = None, None
-        try:
-            first = await in_thread(_fit, self.model, self.rig, self.clicked, self.shown.names)
-        except AirborneError as error:
-            self.says = str(error)
-        else:
-            self.pose, self.says = first.pose, " ".join(first.notes)
+        """Fit the body to the clicks, or say what is missing; the clicks are shown at once."""
+        self.found, self.pose, self.outline, self.says = None, None, [], "fitting the body"
+        self.show()
+        solved = await self.latest.do(self._solve, self.clicked)
+        if solved is None:
+            return
+        self.pose, self.outline, self.says = solved
+        if self.pose is not None:
             self.found = {"frame": self.session.frame, "points_px": POINTS}
-        await self.update()
+        self.show()
+
+    def _solve(self, clicked: Clicked) -> tuple[Pose | None, list[dict[str, Any]], str]:
+        """Return the pose that the clicks give, its outline, and what the fit says."""
+        px = np.stack([np.stack([clicked.at(name, camera) for camera in self.rig.names]) for name in clicked.names])
+        try:
+            first = fit_to_pixels(
+                self.model, self.rig, "clicks", names=clicked.names, px=px, weights=np.ones(px.shape[:-1])
+            )
+        except AirborneError as error:
+            return None, [], str(error)
+        return first.pose, self._outline(first.pose), " ".join(first.notes)
+
+    def _outline(self, pose: Pose) -> list[dict[str, Any]]:
+        return outline_items(self.model.with_pose(pose), self.rig.select(self.shown.names).cameras, _POSE_COLOUR)
 
     # writing and showing it
 
@@ -237,16 +294,20 @@ class _Panel:
             ui.notify("the first pose is written into the trial", type="positive")
 
     async def update(self) -> None:
-        """Show all as it is now."""
-        items: list[Any] = list(self._curves()) if self.model.has_joints else []
+        """Show all as it is now, the pose's outline too."""
         if self.pose is not None:
-            posed = self.model.with_pose(self.pose)
-            cameras = self.rig.select(self.shown.names).cameras
-            items += await in_thread(outline_items, posed, cameras, _POSE_COLOUR)
+            self.outline = await in_thread(self._outline, self.pose)
+        self.show()
+
+    def show(self) -> None:
+        """Show marks, curves, outline and buttons as they are now."""
+        items: list[Any] = [*self._curves(), *self.outline] if self.model.has_joints else self.outline
         self.view.show_over(self._marks() if self.model.has_joints else (), items, self.selected)
-        self.doing.refresh()
+        stored = "The outline is the pose that the trial has." if self.pose is not None and self.found is None else ""
+        self.note.set_text(self.says or stored)
+        self.use.set_visibility(self.found is not None)
         if self.model.has_joints:
-            self.list.refresh()
+            self.list.show(self.landmarks, self.chosen, self._off_px)
 
     def _curves(self) -> list[Item]:
         """Return the epipolar curves of the chosen landmark's clicks, with their bands."""
@@ -287,7 +348,7 @@ class _Panel:
                         "colour": colour,
                     }
                     marks.append({**mark, "to": to[pane].tolist()} if np.isfinite(to[pane]).all() else mark)
-        return marks
+        return sorted(marks, key=lambda mark: mark.get("colour") != _POSE_COLOUR)
 
     def _at(self, name: str, camera: str) -> np.ndarray:
         return self.clicked.at(name, camera) if name in self.clicked.names else np.full(2, np.nan)
@@ -298,46 +359,15 @@ class _Panel:
         point = self.rig.points_from_px(px)
         return np.stack([self.rig[camera].px_from_world(point) for camera in self.shown.names])
 
-    def _list_doing(self) -> None:
-        command = self.session.commands.get("find")
-        if not self.model.has_joints:
-            with ui.element("div").classes("row-line"):
-                if command is not None and command.is_running:
-                    ui.spinner()
-                    ui.label(f"looking for the body: {command.seconds:.0f} s").classes("small")
-                    ui.button("Stop", on_click=lambda: command.stop()).props("flat dense")
-                else:
-                    ui.button("Find it", on_click=self.search).props("unelevated")
-            for number, each in enumerate(self.candidates):
-                ui.button(
-                    f"pose {number + 1}: {each['probability']:.0%}", on_click=lambda number=number: self.take(number)
-                ).props("flat dense")
-        if self.says:
-            ui.label(self.says).classes("small")
-        if self.found is not None:
-            ui.button("Use this pose", on_click=self.write).props("unelevated")
-        elif self.pose is not None:
-            ui.label("The outline is the pose that the trial has.").classes("soft small")
-        if self.model.has_joints:
-            ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
+    def _off_px(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Say of a landmark whether it is clicked, and how far from where the cameras agree, in each camera [px]."""
+        px = np.stack([self._at(name, camera) for camera in self.shown.names])
+        return np.isfinite(px[:, 0]), np.linalg.norm(self._seen_at(name) - px, axis=1)
 
-    def _list_landmarks(self) -> None:
-        for name in self.landmarks:
-            classes = "point here" if name == self.chosen else "point"
-            with ui.element("button").classes(classes).on("click", lambda name=name: self.choose(name)):
-                ui.label(name)
-                ui.element("div").classes("gap")
-                to = self._seen_at(name)
-                for pane, camera in enumerate(self.shown.names):
-                    px = self._at(name, camera)
-                    off = float(np.linalg.norm(to[pane] - px))
-                    text = "–" if np.isnan(px[0]) else "•" if np.isnan(off) else f"{off:.1f}"
-                    ui.label(text).classes("n").props(f'title="{camera} [px]"')
-
-
-def _fit(model: BodyModel, rig: Rig, clicked: Clicked, cameras: list[str]):
-    px = np.stack([np.stack([clicked.at(name, camera) for camera in rig.names]) for name in clicked.names])
-    return fit_to_pixels(model, rig, "clicks", names=clicked.names, px=px, weights=np.ones(px.shape[:-1]))
+    def _list_candidates(self) -> None:
+        for number, each in enumerate(self.candidates):
+            text = f"pose {number + 1}: {each['probability']:.0%}"
+            ui.button(text, on_click=lambda number=number: self.take(number)).props("flat dense")
 
 
 def _read_points(session: Session) -> Clicked:

@@ -25,7 +25,8 @@ _KEYS = {
     "0": "whole pictures",
     "click": "set the chosen point",
     "arrows": "move the chosen point by 0.1 px; with Shift by 1 px",
-    "Esc": "choose no point",
+    "N P": "choose the next point, the one before",
+    "Esc": "choose no mark",
     "Ctrl+Z, Ctrl+Y": "undo, redo",
     "?": "this sheet",
 }
@@ -137,6 +138,22 @@ async def in_thread(function: Callable[..., _T], *arguments: object) -> _T:
     finally:
         if client.id not in Client.instances:
             raise asyncio.CancelledError
+
+
+class Latest:
+    """Slow work of which only the last that was asked for matters: one at a time, and what is overtaken is left out."""
+
+    def __init__(self) -> None:
+        """Begin with nothing asked for."""
+        self._lock, self._asked = asyncio.Lock(), 0
+
+    async def do(self, function: Callable[..., _T], *arguments: object) -> _T | None:
+        """Do something in a thread; None where something else was asked for meanwhile."""
+        self._asked += 1
+        asked = self._asked
+        async with self._lock:
+            result = await in_thread(function, *arguments) if asked == self._asked else None
+        return result if asked == self._asked else None
 
 
 async def work(what: str, function: Callable[[], _T]) -> _T | None:

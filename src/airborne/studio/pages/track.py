@@ -9,7 +9,7 @@ from nicegui import ui
 from airborne.errors import AirborneError, TrialError, count
 from airborne.io.names import check_name
 from airborne.motion.run_folder import MOTION, SUMMARY
-from airborne.studio.commands import Command
+from airborne.studio.commands import STOPPED, Command
 from airborne.studio.outlines import run_rows
 from airborne.studio.pages.layout import complain, framed, in_thread, work
 from airborne.studio.pictures import ShownTrial
@@ -67,8 +67,11 @@ class _Panel:
         with ui.element("div").classes("row-line"):
             self.name = ui.input("folder of the run", value=name, on_change=lambda: self.look(anew=True))
             self.name.props("outlined dense").style("width: 200px")
-            self.buttons = ui.refreshable(self._buttons)
-            self.buttons()
+            self.begin = ui.button("Track", on_click=lambda: self.start()).props("unelevated")
+            self.resume = ui.button("Go on", on_click=lambda: self.start("--resume")).props("unelevated")
+            self.again = ui.button("Track again", on_click=lambda: self.start("--overwrite")).props("outline")
+            self.halt = ui.button("Stop", on_click=self.stop).props("unelevated color=grey-8")
+            self._show_buttons()
             self.bar = ui.linear_progress(0, show_value=False, size="10px").props("rounded").style("width: 220px")
             self.says = ui.label().classes("small soft")
         self.view = View(self.shown, frame=self.session.frame, overlay=self._overlay, on_frame=self.turn_to)
@@ -103,19 +106,19 @@ class _Panel:
         words = ["track", self.session.path.name, "-o", self.name.value, *options]
         self.session.commands["track"] = Command(words, self.session.folder)
         self.n_done = -1
-        self.buttons.refresh()
+        self._show_buttons()
 
     async def stop(self) -> None:
         """Stop the run; its frames stay."""
         if self._command is not None:
             await in_thread(self._command.stop)
-        self.buttons.refresh()
+        self._show_buttons()
 
     async def look(self, *, anew: bool = False) -> None:
         """Show how far the run is, and its newest frame."""
         if anew:
             self.view.set_overlay(self._overlay)
-            self.buttons.refresh()
+            self._show_buttons()
         folder = self.session.folder / self.name.value
         try:
             n_done, newest = await in_thread(run_rows, folder)
@@ -132,7 +135,7 @@ class _Panel:
             self.view.run_method("refresh")
             if newest is not None and self._is_running:
                 self.view.go(newest)
-            self.buttons.refresh()
+            self._show_buttons()
 
     def _say_progress(self, command: Command, n_done: int) -> None:
         left = ""
@@ -149,21 +152,18 @@ class _Panel:
         if command.code == 0:
             self.says.text = command.output().splitlines()[0]
             ui.notify("tracked; the report is in the step Results", type="positive")
-        elif command.code == 130:  # as after Ctrl-C
+        elif command.code == STOPPED:
             self.says.text = "stopped"
         else:
             self.says.text = ""
             complain(command.complaint())
-        self.buttons.refresh()
+        self._show_buttons()
 
-    def _buttons(self) -> None:
-        folder = self.session.folder / self.name.value
-        if self._is_running:
-            ui.button("Stop", on_click=self.stop).props("unelevated color=grey-8")
-        elif (folder / SUMMARY).is_file():
-            ui.button("Track again", on_click=lambda: self.start("--overwrite")).props("outline")
-        elif (folder / MOTION).is_file():
-            ui.button("Go on", on_click=lambda: self.start("--resume")).props("unelevated")
-            ui.button("Track again", on_click=lambda: self.start("--overwrite")).props("outline")
-        else:
-            ui.button("Track", on_click=lambda: self.start()).props("unelevated")
+    def _show_buttons(self) -> None:
+        """Show the buttons that the run has now."""
+        folder, is_running = self.session.folder / self.name.value, self._is_running
+        is_begun, is_finished = (folder / MOTION).is_file(), (folder / SUMMARY).is_file()
+        self.halt.set_visibility(is_running)
+        self.begin.set_visibility(not is_running and not is_begun)
+        self.resume.set_visibility(not is_running and is_begun and not is_finished)
+        self.again.set_visibility(not is_running and is_begun)
