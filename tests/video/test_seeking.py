@@ -59,9 +59,9 @@ def test_every_image_in_any_order_is_the_one_that_decoding_in_order_gives(source
 
 
 def test_a_number_that_is_not_there_is_refused(sources):
-    with ImageReader(sources[0], index_images(sources[0])) as reader:
-        with pytest.raises(VideoError, match="there is no image 20; the last is 19"):
-            reader.image(20)
+    reader = ImageReader(sources[0], index_images(sources[0]))
+    with pytest.raises(VideoError, match="there is no image 20; the last is 19"):
+        reader.image(20)
 
 
 def test_frames_of_the_trial_show_the_images_that_a_recording_gives(tmp_path):

@@ -15,8 +15,8 @@ _BEYOND = 0.5  # of the picture's size: how far outside it the curve goes on
 def epipolar_curve(seen_by: Camera, px: Array, shown_in: Camera, sd_px: float = 1.0) -> tuple[Array, Array]:
     """Return the curve (n, 2) [px] of a point px (2,) in another camera's picture, and its standard deviation (n,).
 
-    The deviation is across the curve [px], of a click whose right and down have `sd_px` each. Empty where the ray passes
-    the picture by.
+    The deviation is across the curve [px], of a click whose right and down have `sd_px` each. Empty where the ray
+    passes the picture by.
     """
     h = 0.5  # px
     clicks = np.asarray(px, float) + np.array([[0, 0], [h, 0], [-h, 0], [0, h], [0, -h]])

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import re
 import secrets
-from collections.abc import Awaitable, Callable, MutableMapping
-from typing import Any
 from urllib.parse import parse_qs
 
-Message = MutableMapping[str, Any]
-Receive, Send = Callable[[], Awaitable[Message]], Callable[[Message], Awaitable[None]]
-App = Callable[[Message, Receive, Send], Awaitable[None]]
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 _SCRIPT = re.compile(rb"<script(?= |>)")  # what comes from files stands in the page with its < escaped
 _POLICY = (
@@ -25,12 +21,12 @@ FILE_POLICY = "sandbox; default-src 'none'; img-src 'self' data:; media-src 'sel
 class Guard:
     """Lets requests pass that name this server, come from its own pages, and bring the token; all others end here."""
 
-    def __init__(self, app: App, *, token: str, port: int) -> None:
+    def __init__(self, app: ASGIApp, *, token: str, port: int) -> None:
         """Stand before an ASGI application that listens at a port of the loopback."""
         self._app, self._token, self._cookie = app, token, f"airborne-{port}"
         self._hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
 
-    async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
@@ -52,7 +48,7 @@ class Guard:
     def _is_token(self, text: str) -> bool:
         return secrets.compare_digest(text.encode(), self._token.encode())
 
-    async def _admit(self, scope: Message, send: Send) -> None:
+    async def _admit(self, scope: Scope, send: Send) -> None:
         """Give the browser the token as a cookie, and take it out of the address."""
         cookie = f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
         headers = [(b"location", scope["raw_path"].partition(b"?")[0]), (b"set-cookie", cookie.encode())]
@@ -100,7 +96,7 @@ def _cookie(header: str, name: str) -> str:
     return next((value for key, _, value in pairs if key == name), "")
 
 
-async def _refuse(scope: Message, send: Send, reason: str) -> None:
+async def _refuse(scope: Scope, send: Send, reason: str) -> None:
     if scope["type"] == "websocket":
         await send({"type": "websocket.close", "code": 1008})
         return

@@ -11,7 +11,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from airborne.body import PosedBody
+from airborne.body import BodyModel, PosedBody
 from airborne.body.files import read_body
 from airborne.cameras import Camera, Rig, read_rig
 from airborne.errors import ResultError
@@ -59,7 +59,7 @@ def run_overlay(run: Path, frame: int, cameras: Sequence[str]) -> dict[str, Any]
     label = f"frame {frame}   {opened.motion.time_s[row]:.3f} s   {status}"
     if not opened.motion.has_pose[row]:
         return {"items": [], "label": label}
-    posed = read_body_cached(run / BODY, _stamp(run / BODY)).with_pose(opened.motion.pose(row))
+    posed = run_body(run).with_pose(opened.motion.pose(row))
     return {"items": outline_items(posed, opened.rig.select(cameras).cameras, _COLOURS[status]), "label": label}
 
 
@@ -88,6 +88,11 @@ def run_rows(run: Path) -> tuple[int, int | None]:
     return len(motion), int(motion.index[-1]) if len(motion) else None
 
 
+def run_body(run: Path) -> BodyModel:
+    """Return the body of a run."""
+    return _read_body(run / BODY, _stamp(run / BODY))
+
+
 def run_motion(run: Path) -> Motion:
     """Return the motion of a run of one body."""
     return _open(run, _stamp(run / MOTION)).motion
@@ -105,8 +110,7 @@ def _read_players(run: Path, stamp: Any) -> PlayersMotion:
 
 
 @lru_cache(maxsize=8)
-def read_body_cached(path: Path, stamp: Any):
-    """Read a body file once for each version of it."""
+def _read_body(path: Path, stamp: Any) -> BodyModel:
     return read_body(path)
 
 

@@ -12,10 +12,11 @@ from fastapi.responses import FileResponse, JSONResponse, Response
 
 from airborne.errors import AirborneError, ResultError
 from airborne.studio.guard import FILE_POLICY
-from airborne.studio.outlines import run_curves, run_overlay
+from airborne.studio.outlines import run_body, run_curves, run_overlay
 from airborne.studio.pictures import thumbnail
 from airborne.studio.project import list_runs, list_videos
 from airborne.studio.session import Session
+from airborne.studio.stage import part_stl
 from airborne.video import VideoSource
 from airborne.video.decoding import decode, inspect, rgb_from_decoded
 
@@ -41,6 +42,10 @@ def add_routes(app: FastAPI, session: Session) -> None:
     @app.get("/curves/{run}")
     async def curves(run: str) -> Response:
         return await _answer(lambda: _json(run_curves(find_run(session.folder, run))))
+
+    @app.get("/mesh/{run}/{part}")
+    async def mesh(run: str, part: int) -> Response:
+        return await _answer(lambda: _mesh(find_run(session.folder, run), part))
 
     @app.get("/file/{run}/{name:path}")
     async def file(run: str, name: str) -> Response:
@@ -76,6 +81,10 @@ async def _answer(make: Callable[[], Response]) -> Response:
 
 def _json(value: Any) -> Response:
     return JSONResponse(value, headers={"cache-control": "no-store"})
+
+
+def _mesh(run: Path, part: int) -> Response:
+    return Response(part_stl(run_body(run), part), media_type="model/stl", headers={"cache-control": "no-store"})
 
 
 def _jpeg(session: Session, camera: int, frame: int) -> Response:

@@ -6,6 +6,7 @@ import asyncio
 import secrets
 import socket
 import webbrowser
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 from nicegui import app, ui
@@ -71,7 +72,7 @@ def serve(path: Path, *, port: int, browser: bool) -> None:
     )
 
 
-def _page(build, session: Session):
+def _page(build: Callable[[Session], Awaitable[None]], session: Session) -> Callable[[], Awaitable[None]]:
     """Bind a page to the session: NiceGUI takes a page's arguments from the address."""
 
     async def page() -> None:

@@ -93,10 +93,12 @@ class Session:
         with self._lock:
             known = self._known.get(name)
         if known is None or known[0] != stamp:
+            made: Any
             try:
-                known = stamp, make()
+                made = make()
             except AirborneError as error:
-                known = stamp, error
+                made = error
+            known = stamp, made
             with self._lock:
                 self._known[name] = known
         if isinstance(known[1], AirborneError):

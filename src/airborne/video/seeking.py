@@ -61,9 +61,10 @@ def index_images(source: VideoSource) -> ImageIndex:
         tick_s = stream.time_base or Fraction(1, 1_000_000)
         shown = (packet for packet in container.demux(stream) if packet.size and not packet.is_discard)
         stamps = [(packet.pts, packet.is_keyframe) for packet in shown]
-    if all(stamp is not None for stamp, _ in stamps):
-        keys = np.array(sorted({stamp for stamp, is_key in stamps if is_key}), np.int64)
-        ticks = np.array(sorted({stamp for stamp, _ in stamps}), np.int64)
+    timed = [(stamp, is_key) for stamp, is_key in stamps if stamp is not None]
+    if len(timed) == len(stamps):
+        keys = np.array(sorted({stamp for stamp, is_key in timed if is_key}), np.int64)
+        ticks = np.array(sorted({stamp for stamp, _ in timed}), np.int64)
         return ImageIndex(facts, ticks - ticks[0], keys - ticks[0], int(ticks[0]), tick_s)
     with ExitStack() as stack:
         container, stream = _open(source, stack)

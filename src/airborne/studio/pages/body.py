@@ -53,16 +53,13 @@ def _person_card(session: Session, table: dict[str, Any]) -> None:
             field.props("outlined dense")
 
         def save() -> None:
-            if not (_is_in(stature.value, _STATURE_M) and _is_in(mass.value, _MASS_KG)):
+            stature_m, mass_kg = float(stature.value or 0), float(mass.value or 0)
+            if not (_STATURE_M[0] <= stature_m <= _STATURE_M[1] and _MASS_KG[0] <= mass_kg <= _MASS_KG[1]):
                 complain("give a stature in metres, such as 1.75, and a mass in kilograms, such as 70")
                 return
-            _save(session, {"preset": "human18", "stature_m": float(stature.value), "mass_kg": float(mass.value)})
+            _save(session, {"preset": "human18", "stature_m": stature_m, "mass_kg": mass_kg})
 
         ui.button("Use this person", on_click=save).props("unelevated")
-
-
-def _is_in(value: float | None, span: tuple[float, float]) -> bool:
-    return value is not None and span[0] <= value <= span[1]
 
 
 def _describe(model: BodyModel) -> str:

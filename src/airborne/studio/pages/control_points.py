@@ -151,7 +151,7 @@ class ControlPointsPanel:
     def show(self) -> None:
         """Show marks and lists as they are now."""
         marks = [mark for pane, camera in enumerate(self.shown.names) for mark in self._marks(pane, camera)]
-        self.view.show_over(sorted(marks, key=lambda mark: mark["colour"] != _CHOSEN), (), self.selected)
+        self.view.show_over(sorted(marks, key=lambda mark: mark.get("colour") != _CHOSEN), (), self.selected)
         self.list.show(self.clicked.names, self.chosen, self._off_px)
         self.state.refresh()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -367,7 +368,7 @@ class _Panel:
     def _list_candidates(self) -> None:
         for number, each in enumerate(self.candidates):
             text = f"pose {number + 1}: {each['probability']:.0%}"
-            ui.button(text, on_click=lambda number=number: self.take(number)).props("flat dense")
+            ui.button(text, on_click=partial(self.take, number)).props("flat dense")
 
 
 def _read_points(session: Session) -> Clicked:

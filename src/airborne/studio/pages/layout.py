@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from nicegui import Client, run, ui
 
@@ -134,7 +134,7 @@ async def in_thread(function: Callable[..., _T], *arguments: object) -> _T:
     """Do something that takes time without holding up other windows; what asked ends here if its own is closed."""
     client = ui.context.client
     try:
-        return await run.io_bound(function, *arguments)
+        return cast(_T, await run.io_bound(function, *arguments))
     finally:
         if client.id not in Client.instances:
             raise asyncio.CancelledError

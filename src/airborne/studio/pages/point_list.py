@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
+from functools import partial
 
 import numpy as np
 from nicegui import ui
@@ -38,7 +39,7 @@ class PointList:
         with self._card:
             for name in names:
                 with ui.element("button").classes("point") as row:
-                    row.on("click", lambda name=name: self._choose(name))
+                    row.on("click", partial(self._choose, name), args=[])
                     ui.label(name)
                     ui.element("div").classes("gap")
                     labels = [ui.label().classes("n").props(f'title="{camera} [px]"') for camera in self._cameras]

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 from nicegui import ui
 
 from airborne.cameras import read_rig
 from airborne.motion.run_folder import CALIBRATION, holds_players
-from airborne.studio.outlines import run_motion
+from airborne.studio.outlines import run_body, run_motion
 from airborne.studio.pages.layout import complain, framed, in_thread, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
 from airborne.studio.session import Session
-from airborne.studio.stage import draw_cameras
+from airborne.studio.stage import BodyOnStage, draw_cameras
 from airborne.studio.view import Curves, View
 from airborne.tracking import Status
 
+_AROUND_M = 2.0  # how far from the path the scene is looked at from
 _HELP = "Step through the run: pictures, curves and scene share one frame. Bands are two standard deviations."
 
 
@@ -49,18 +52,37 @@ async def review_page(session: Session) -> None:
 
 
 async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
+    bodies: list[Callable[[int], None]] = []
+
     def turn_to(frame: int) -> None:
         session.frame = frame
+        for show in bodies:
+            show(frame)
 
     with ui.element("div").classes("split"):
         with ui.element("div").classes("wide"):
             View(shown, frame=session.frame, overlay=f"/overlay/{folder.name}/{{frame}}", on_frame=turn_to)
         if not holds_players(folder):
             with ui.element("div").classes("side"):
-                motion = await in_thread(run_motion, folder)
-                middle = motion.position[motion.has_pose].mean(axis=0) if motion.has_pose.any() else None
-                draw_cameras(read_rig(folder / CALIBRATION), path=motion.position, middle=middle)
+                bodies.append(await _stage(folder))
     Curves(f"/curves/{folder.name}", frame=session.frame)
+
+
+async def _stage(folder: Path) -> Callable[[int], None]:
+    """Build the scene of a run of one body; return what shows a frame in it."""
+    motion = await in_thread(run_motion, folder)
+    model = await in_thread(run_body, folder)
+    rig, path = read_rig(folder / CALIBRATION), motion.position[motion.has_pose]
+    near = {"middle": path.mean(axis=0), "away_m": _AROUND_M + float(np.ptp(path, axis=0).max())} if len(path) else {}
+    scene = draw_cameras(rig, path=motion.position, **near)
+    body = BodyOnStage(scene, model, f"/mesh/{folder.name}/{{part}}")
+    rows = {int(frame): row for row, frame in enumerate(motion.index) if motion.has_pose[row]}
+
+    def show(frame: int) -> None:
+        row = rows.get(frame)
+        body.show(None if row is None else motion.pose(row))
+
+    return show
 
 
 def _jump(session: Session, name: str, status: Status) -> None:

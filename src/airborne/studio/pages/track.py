@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from nicegui import ui
 
@@ -78,8 +79,13 @@ class _Panel:
         ui.timer(_LOOK_EVERY_S, self.look)
 
     @property
+    def folder(self) -> Path:
+        """The run's folder."""
+        return self.session.folder / ((self.name.value or "").replace("/", "_").lstrip(".") or "results")
+
+    @property
     def _overlay(self) -> str:
-        return f"/overlay/{self.name.value}/{{frame}}"
+        return f"/overlay/{self.folder.name}/{{frame}}"
 
     @property
     def _command(self) -> Command | None:
@@ -98,12 +104,12 @@ class _Panel:
         if self._is_running:
             return
         try:
-            check_name(self.name.value)
+            check_name(self.folder.name)
             self.session.project().trial()
         except (ValueError, TrialError) as error:
             complain(str(error))
             return
-        words = ["track", self.session.path.name, "-o", self.name.value, *options]
+        words = ["track", self.session.path.name, "-o", self.folder.name, *options]
         self.session.commands["track"] = Command(words, self.session.folder)
         self.n_done = -1
         self._show_buttons()
@@ -119,7 +125,7 @@ class _Panel:
         if anew:
             self.view.set_overlay(self._overlay)
             self._show_buttons()
-        folder = self.session.folder / self.name.value
+        folder = self.folder
         try:
             n_done, newest = await in_thread(run_rows, folder)
         except AirborneError:
@@ -161,7 +167,7 @@ class _Panel:
 
     def _show_buttons(self) -> None:
         """Show the buttons that the run has now."""
-        folder, is_running = self.session.folder / self.name.value, self._is_running
+        folder, is_running = self.folder, self._is_running
         is_begun, is_finished = (folder / MOTION).is_file(), (folder / SUMMARY).is_file()
         self.halt.set_visibility(is_running)
         self.begin.set_visibility(not is_running and not is_begun)
