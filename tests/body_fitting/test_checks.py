@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform
 
 from airborne.body import Pose, human18, with_segment_lengths
+from airborne.body.shaping import with_joint_widths
 from airborne.body_fitting.checks import (
     check_joints,
     check_lengths,
@@ -39,6 +40,12 @@ def test_lengths_near_the_statures_shares_are_taken_without_a_word():
     assert check({"thigh": 1.14, "forearm": 0.86}) == []
 
 
+def test_the_width_of_the_hips_is_checked_too():
+    wide = with_joint_widths(BODY, {"pelvis": 1.2})
+    (warning,) = check_lengths(length_ratios(wide, BODY), POINTS, in_cam2)
+    assert warning.startswith("hip width 1.20 of the length that the stature gives; check the clicks of hip")
+
+
 def test_an_unusual_length_is_warned_of_with_the_clicks_to_check():
     (warning,) = check({"thigh": 1.2})
     assert warning == (
@@ -57,7 +64,7 @@ def test_impossible_lengths_are_refused_and_named():
 
 def test_lengths_that_are_all_off_alike_question_the_stature_and_the_scale():
     with pytest.raises(BodyError, match=r"all lengths are about 1\.40 of it: check the stature, and the calibration's"):
-        check(dict.fromkeys(POINTS, 1.4))
+        check({stem: 1.4 for stem in POINTS if "width" not in stem})
 
 
 def test_a_body_is_compared_with_the_person_of_its_own_height():

@@ -105,7 +105,19 @@ def length_ratios(model: BodyModel, reference: BodyModel) -> dict[str, float]:
         own, other = (_length_m(body, segment.name) for body in (model, reference))
         if segment.parts and own > 0 and other > 0:
             ratios.setdefault(stem_of(segment.name), own / other)
-    return ratios
+    widths = joint_widths_m(model), joint_widths_m(reference)
+    return ratios | {f"{joint} width": own / widths[1][joint] for joint, own in widths[0].items() if joint in widths[1]}
+
+
+def joint_widths_m(model: BodyModel) -> dict[str, float]:
+    """Return how far apart the hips are, and the shoulders, in the zero pose [m]."""
+    posed = model.with_pose(Pose(world_from_root=RigidTransform.identity()))
+    at = {mark.name: position for mark, position in zip(model.landmarks, posed.landmarks, strict=True)}
+    return {
+        joint: float(np.linalg.norm(at[f"{joint}_left"] - at[f"{joint}_right"]))
+        for joint in ("hip", "shoulder")
+        if {f"{joint}_left", f"{joint}_right"} <= set(at)
+    }
 
 
 def points_of_lengths(model: BodyModel) -> dict[str, list[str]]:
@@ -121,7 +133,7 @@ def points_of_lengths(model: BodyModel) -> dict[str, list[str]]:
         is_limb = segment.name.endswith(("_left", "_right")) and len(at_ends) > 1
         ends = at_ends if is_limb or not children else map(stem_of, CORE)  # the trunk is measured as a whole
         points[stem_of(segment.name)] = [point for point in dict.fromkeys(ends) if point != "neck"]
-    return points
+    return points | {f"{joint} width": [joint] for joint in joint_widths_m(model)}
 
 
 def _length_m(model: BodyModel, name: str) -> float:

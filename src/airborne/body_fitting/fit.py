@@ -18,6 +18,7 @@ from airborne.body.chain import delta_between
 from airborne.body.inverse_kinematics import fit_lengths, fit_pose
 from airborne.body.outfits import Border, with_borders
 from airborne.body.shaping import with_mass, with_segment_lengths
+from airborne.body_fitting.checks import joint_widths_m
 from airborne.body_fitting.clothes import find_borders, sample_clothing
 from airborne.body_fitting.composites import NO_MISFIT, composite_equations, misfit
 from airborne.body_fitting.shape import (
@@ -71,6 +72,7 @@ class BodyFit:
     start_poses: tuple[Pose, ...]  # from the landmarks alone
     lengths: dict[str, float]  # segment without its side -> factor on the given body
     girths: dict[str, tuple[float, float]]  # across, on the given body
+    joint_widths: dict[str, float]  # hip, shoulder -> factor on the given body's distance of left and right
     borders: dict[str, Border]
     rms_light: tuple[float, float]  # before and after: robust, blurred, of the images around the body; 0..1
     landmark_rms_m: tuple[float, float]  # before and after
@@ -189,6 +191,7 @@ def fit_body(
         start_poses=before[1],
         lengths=lengths_of(level.parameters, state.shape, lengths),
         girths=girths_of(level.parameters, state.shape),
+        joint_widths={joint: own / joint_widths_m(model)[joint] for joint, own in joint_widths_m(fitted).items()},
         borders=borders_of(level.parameters, state.shape),
         rms_light=lights,
         landmark_rms_m=(_landmark_rms_m(*before, landmarks), _landmark_rms_m(fitted, state.poses, landmarks)),

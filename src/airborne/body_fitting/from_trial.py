@@ -118,6 +118,8 @@ def describe_fit(person: PersonFit) -> str:
         wide, deep = fit.girths[stem]
         girth = f"{wide:.2f}" if wide == deep else f"{wide:.2f} {deep:.2f}"
         lines.append(f"{stem:<12}{length:5.2f}   {girth}")
+    widths = [f"{joint}s {ratio:.2f}" for joint, ratio in fit.joint_widths.items()]
+    lines.append(f"distance of left and right joints: {', '.join(widths)}")
     borders = [f"{stem} at {border.share:.2f}" for stem, border in fit.borders.items()]
     lines.append(f"colours change along: {', '.join(borders) or 'no segment'}")
     colours: dict[str, str] = {}

@@ -18,7 +18,7 @@ from airborne.body.shaping import length_axis
 from airborne.body_fitting.shape import ShapeParameter, segments_of
 from airborne.types import Array
 
-N_AFFINE = 13
+N_AFFINE = 13  # numbers of a motion
 _SKEW = -np.array([[[int((i - j) * (j - k) * (k - i) / 2) for k in range(3)] for j in range(3)] for i in range(3)])
 
 
@@ -58,6 +58,11 @@ class ShapeMotion:
             start, end = extent_m(model, name, axis)
             self.border[index, segment] = end - start
             self.axis[segment, axis] = 1
+            return
+        if parameter.kind == "width":
+            for child, each in enumerate(model.segments):
+                if each.parent == name and each.name.endswith(("_left", "_right")):
+                    self.joint[index, child] = each.joint_m * [1, 0, 0]
             return
         on_axis = np.arange(3) == along
         if parameter.kind == "length":
