@@ -89,7 +89,7 @@ def test_arm_swings_through_the_singular_hang_without_a_jump_flagged_there():
 
 
 def test_deviations_are_those_of_sampled_poses():
-    rng, covariance, n = np.random.default_rng(6), np.diag(np.full(HUMAN.n_dofs, 1e-4)), 600
+    rng, covariance, n = np.random.default_rng(6), np.diag(np.full(HUMAN.n_dofs, 1e-4)), 200
     pose = posed(shoulder_left=[(FORWARD, 10)], upper_arm_left=[(FORWARD, 70), (LEFT, -20)], shank_left=[(LEFT, 40)])
     table = isb_angles(motion_of(HUMAN, [pose], covariance=covariance), HUMAN)
     drawn = isb_angles(motion_of(HUMAN, [shaken(rng, pose, covariance) for _ in range(n)]), HUMAN)

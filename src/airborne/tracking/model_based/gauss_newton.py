@@ -43,11 +43,13 @@ _FINE_SIGMA_PX = 1.2  # of a full frame
 _CLIP = 0.1  # linear light, 0..1: a residual this large has a quarter of the weight
 _CLIP_LIT = 0.5  # the same under known lights, where no shadow or highlight has to be left out
 _CLIP_MASK = 0.5  # the same, of a mask
+_PATCH = 8.0  # by this factor more pixels of a person are taken for body, or not, together; chosen as _SHAPE_WIDTH_M
 _OVERSTEP = 1.6  # robust weights and the refitted light make each step too short by about this factor
 _MOST_STEPS = 12  # at each level of a body with joints
 _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
 _CONVERGED = 1 / 3  # squared length of the last step, in sds of the pose, for each degree of freedom
 SHAPE_SD_M = 0.007  # model error: how far a person's segment lies from the ellipsoid that fits its image
+_SHAPE_WIDTH_M = 0.075  # along which that error is the same; chosen on synthetic somersaults
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +113,7 @@ def fit_silhouettes(
                 shifted=[],
                 totals=totals,
                 correlated=correlated,
+                shared=_PATCH * correlated if dofs.moves_joints else correlated,
             )
 
         pose, _ = descend_pose(evaluate, dofs, pose, prior, most_steps=steps, overstep=1.0)
@@ -200,6 +203,8 @@ def _image_evaluator(
     taps = [(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma)) for sigma in rows_sigma_px]
     correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px or [_FINE_SIGMA_PX]))
     shifts = [shift_sds_px(region) for _, region in views_and_regions]
+    shape_px = [_shape_error_px(view, bodies[0]) for view, _ in views_and_regions] if dofs.moves_joints else []
+    shared = max(correlated, float(np.mean(shape_px or [0.0])))
 
     def evaluate(pose: Pose, is_first: bool) -> PoseEquations:
         posed, n = render_model.with_pose(pose), len(render_model.model.segments)
@@ -224,6 +229,7 @@ def _image_evaluator(
             shifted=shifted,
             totals=totals,
             correlated=correlated,
+            shared=shared,
         )
 
     return evaluate, correlated
@@ -260,6 +266,12 @@ def _shape_error_gradients(B: Array, posed: PosedBody, view: ViewBuffers) -> Arr
     rows = np.zeros((n, 2, n, 6))
     rows[np.arange(n), :, np.arange(n)] = np.swapaxes(B[..., :2], 1, 2) * sd_px[..., None]
     return rows.reshape(2 * n, n, 6)
+
+
+def _shape_error_px(view: ViewBuffers, posed: PosedBody) -> float:
+    """Return how many pixels of a view have their shape error in common."""
+    depth_m = max(float(posed.t[0] @ view.packed_view[6:9] + view.packed_view[11]), 0.1)
+    return float(view.K[0, 0] * view.K[1, 1]) * (_SHAPE_WIDTH_M / depth_m) ** 2
 
 
 def _window_around(pixels: NDArray[np.bool_], whole: Window) -> Window:
