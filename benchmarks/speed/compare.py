@@ -160,7 +160,7 @@ def compare(road: str, trees: tuple[Path, Path], scenes: Path, rounds: int, boun
         worker.close()
     ratio, low, high = median_interval(times[:, 0] / times[:, 1])
     now, then = np.median(times, axis=0) * 1e3
-    in_c = "" if bound is None else "  ({:.0f} C, {:.0f} C)".format(*np.median(times / bounds[:, None], axis=0))
+    in_c = "" if bound is None or road == "command" else "  ({:.0f} C, {:.0f} C)".format(*np.median(times / bounds[:, None], axis=0))
     print(f"{road:<8}{now:9.2f} ms now{then:9.2f} ms then{in_c}  ratio {ratio:.3f} [{low:.3f}, {high:.3f}]", flush=True)
 
 

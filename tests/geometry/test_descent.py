@@ -68,7 +68,7 @@ def test_a_descent_that_is_cut_short_says_so(rule):
     assert (end.outcome, end.n_steps) == (Outcome.OUT_OF_STEPS, 2)
 
 
-@pytest.mark.parametrize("rule", [MARQUARDT, NIELSEN], ids=lambda rule: type(rule).__name__)
+@EVERY
 def test_a_descent_that_only_leads_uphill_is_stuck_where_it_began(rule):
     end = run(rule, (-1.2, 1.0, 0.0), sign=-1.0, most_steps=200)
     assert end.outcome is Outcome.STUCK
