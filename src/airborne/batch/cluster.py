@@ -34,14 +34,14 @@ def open_client(scheduler: str | None, n_workers: int, memory: str) -> Iterator[
     AirborneError where Dask is not installed or the scheduler cannot be reached.
     """
     try:
-        import dask
+        from dask import config
         from distributed import Client, LocalCluster
     except ImportError:
         raise AirborneError("batches need Dask; install the extra: pip install 'airborne[batch]'") from None
     for logger in ("distributed", "distributed.client"):  # what goes wrong is told once, by the row of its trial
         logging.getLogger(logger).setLevel(logging.CRITICAL)
     with ExitStack() as stack:
-        stack.enter_context(dask.config.set(_SETTINGS))
+        stack.enter_context(config.set(_SETTINGS))
         if scheduler is None:
             address: Any = stack.enter_context(
                 LocalCluster(

@@ -54,8 +54,10 @@ def run_batch(
         try:
             with open_client(machines.scheduler, n_workers, machines.memory) as client:
                 say(f"dashboard: {client.dashboard_link}")
-                if not client.scheduler_info()["workers"]:
-                    say(f"waiting for workers; start them with: dask worker {client.scheduler.address} --nthreads 1")
+                info = client.scheduler_info()
+                if not info["workers"]:
+                    address = info["address"]
+                    say(f"waiting for workers; start them with: dask worker {address} --nthreads 1")
                 with show_progress(len(tasks)) as progress:
                     for outcome in do_tasks(client, tasks, report=progress.tell):
                         outcomes[outcome.name] = outcome

@@ -91,7 +91,7 @@ def _describe(path: Path, labels: Mapping[str, str]) -> BatchTrial:
         check_column(file_stem(name))
     except ValueError as error:
         raise TrialError(f"{path}: {error}") from None
-    return BatchTrial(name, path, _own_labels(path) | labels)
+    return BatchTrial(name, path, _own_labels(path) | dict(labels))
 
 
 def _own_labels(path: Path) -> dict[str, str]:
