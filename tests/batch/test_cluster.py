@@ -2,11 +2,15 @@
 
 import csv
 import json
+import os
 import re
 import shutil
 import subprocess
 import sys
+import time
+from contextlib import contextmanager
 
+import dask
 import pytest
 
 from airborne.batch.cluster import do_tasks, open_client
@@ -19,10 +23,38 @@ from airborne.synthetic.throw.writing import write_trial
 from tests.support import batch_work
 from tests.support.broken_trials import WAYS
 from tests.support.commands import in_process
+from tests.support.places import ROOT
 from tests.support.run_files import contents_of
 from tests.support.synthetic import small_scene
 
 pytestmark = pytest.mark.filterwarnings("default")  # those of Dask's own are not ours
+
+
+@contextmanager
+def started_dask(place):
+    """A scheduler's address, with one worker, started as the docs say; and their processes."""
+    file, command = place / "scheduler.json", [sys.executable, "-m", "dask"]
+    here = ["--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file), "--no-dashboard"]
+    paths = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+    quiet = {
+        "cwd": place,
+        "env": os.environ | {"PYTHONPATH": paths},
+        "stdout": subprocess.DEVNULL,
+        "stderr": subprocess.DEVNULL,
+    }
+    processes = [subprocess.Popen([*command, "scheduler", *here], **quiet)]
+    worker = [*command, "worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-dashboard"]
+    processes.append(subprocess.Popen(worker, **quiet))
+    try:
+        while not file.is_file():
+            assert processes[0].poll() is None
+            time.sleep(0.1)
+        yield json.loads(file.read_text())["address"], processes
+    finally:
+        for process in reversed(processes):
+            process.terminate()
+        for process in processes:
+            process.wait(60)
 
 
 def ends(tmp_path, work, n=4):
@@ -39,7 +71,8 @@ def test_a_worker_that_dies_costs_its_task_another_attempt(tmp_path):
 
 
 def test_a_task_that_kills_every_worker_fails_alone(tmp_path):
-    outcomes = ends(tmp_path, batch_work.always_die, n=3)
+    with dask.config.set({"distributed.scheduler.allowed-failures": 1}):
+        outcomes = ends(tmp_path, batch_work.always_die, n=3)
     assert [outcomes[f"t000{k}"].status for k in range(3)] == ["done", "failed", "done"]
     assert "worker after worker died" in outcomes["t0001"].error
 
@@ -47,6 +80,18 @@ def test_a_task_that_kills_every_worker_fails_alone(tmp_path):
 def test_no_scheduler_at_an_address_is_one_line():
     with pytest.raises(AirborneError, match="no scheduler answers at tcp"), open_client("tcp://127.0.0.1:1", 1, "auto"):
         pass
+
+
+def test_a_lost_scheduler_ends_a_batch_without_a_word_of_its_own(tmp_path, capfd):
+    with started_dask(tmp_path) as (address, processes), open_client(address, 1, "auto") as client:
+        ended = []
+        for outcome in do_tasks(client, batch_work.tasks(tmp_path, 400), work=batch_work.sleep_shortly):
+            ended.append(outcome)
+            if len(ended) == 3:
+                processes[0].kill()
+    assert 3 <= len(ended) < 400
+    assert not [each for each in ended if each.error]
+    assert "Traceback" not in capfd.readouterr().err
 
 
 @pytest.fixture(scope="module")
@@ -60,27 +105,12 @@ def season(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
-def scheduler(tmp_path_factory):
-    """The address of a scheduler with one worker, started as the docs say."""
-    place = tmp_path_factory.mktemp("dask")
-    file = place / "scheduler.json"
-    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
-    started = [subprocess.Popen([*command, "--scheduler-file", str(file), "--no-dashboard"], cwd=place)]
-    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(file), "--nthreads", "1"]
-    started.append(subprocess.Popen([*worker, "--no-dashboard"], cwd=place))
-    try:
-        while not file.is_file():
-            started[0].poll()
-            assert started[0].returncode is None
-        yield json.loads(file.read_text())["address"]
-    finally:
-        for process in reversed(started):
-            process.terminate()
-            process.wait(30)
+def test_a_batch_by_address_is_what_one_on_this_machine_is(season, tmp_path, capsys):
+    with started_dask(tmp_path) as (scheduler, _):
+        check_batches(season, scheduler, tmp_path, capsys)
 
 
-def test_a_batch_by_address_is_what_one_on_this_machine_is(season, scheduler, tmp_path, capsys):
+def check_batches(season, scheduler, tmp_path, capsys):
     for name, where in (("here", ["--workers", 1]), ("there", ["--scheduler", scheduler])):
         assert in_process("batch", season, "-o", tmp_path / name, "--no-pictures", *where) == 1
     said = capsys.readouterr()

@@ -48,6 +48,7 @@ def test_a_tables_columns_are_labels_over_those_of_the_file(tmp_path):
         ("trial,condition\nx\n", "row 2: 1 cells, expected 2"),
         ("trial\nx\na/x\n", "two trials are called x"),
         ("trial\n", "no trial is there"),
+        ("trial,status\nx,good\n", "a label is called status"),
     ],
 )
 def test_a_table_that_does_not_fit_is_one_line(tmp_path, table, said):

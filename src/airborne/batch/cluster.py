@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import warnings
+import logging
+from asyncio import CancelledError
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 _TOPIC = "airborne"  # of the events that tell of frames
 _CONNECT_S = 10  # to reach a scheduler
-_DASHBOARD = "127.0.0.1:8787"  # for this machine alone; any other port where it is taken
+_DASHBOARD = "127.0.0.1:0"  # for this machine alone, on any port
 # one task runs, none waits at a worker: the longest go first, and a dead worker costs what it ran
 _SETTINGS = {
     "distributed.scheduler.worker-saturation": 1.0,
@@ -33,13 +34,14 @@ def open_client(scheduler: str | None, n_workers: int, memory: str) -> Iterator[
     AirborneError where Dask is not installed or the scheduler cannot be reached.
     """
     try:
-        import dask
+        from dask import config
         from distributed import Client, LocalCluster
     except ImportError:
         raise AirborneError("batches need Dask; install the extra: pip install 'airborne[batch]'") from None
-    with ExitStack() as stack, warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Port 8787 is already in use")
-        stack.enter_context(dask.config.set(_SETTINGS))
+    for logger in ("distributed", "distributed.client"):  # what goes wrong is told once, by the row of its trial
+        logging.getLogger(logger).setLevel(logging.CRITICAL)
+    with ExitStack() as stack:
+        stack.enter_context(config.set(_SETTINGS))
         if scheduler is None:
             address: Any = stack.enter_context(
                 LocalCluster(
@@ -47,7 +49,7 @@ def open_client(scheduler: str | None, n_workers: int, memory: str) -> Iterator[
                     threads_per_worker=1,
                     memory_limit=memory,
                     dashboard_address=_DASHBOARD,
-                    silence_logs=50,  # a worker that dies is told once, by the row of its trial
+                    silence_logs=logging.CRITICAL,
                 )
             )
         else:
@@ -87,6 +89,7 @@ def do_tasks(
     """Do tasks on a cluster, the first first, and yield each one's outcome when it ends.
 
     A task whose worker dies is done again by another, and so goes on where it stopped; after a few deaths it fails.
+    Ends early where the scheduler is lost.
     """
     from distributed import as_completed
 
@@ -100,9 +103,14 @@ def do_tasks(
     try:
         for future in as_completed(futures):
             if future.status == "finished":
-                yield future.result()
-            else:
-                yield Outcome(names[str(future.key)], "failed", _describe_end(future))
+                try:
+                    yield future.result()
+                except CancelledError:  # the scheduler went between
+                    return
+            elif future.status == "error":
+                yield Outcome(names[str(future.key)], "failed", _describe_end(future.exception()))
+            else:  # the scheduler is gone, and with it all the others
+                return
             future.release()
     finally:
         client.unsubscribe_topic(_TOPIC)
@@ -116,13 +124,10 @@ def _work_and_tell(work: Callable[[Task, Report], Outcome], task: Task) -> Outco
     return work(task, lambda *progress: worker.log_event(_TOPIC, progress))
 
 
-def _describe_end(future: Any) -> str:
-    """Say in one line why a future holds no outcome."""
+def _describe_end(error: BaseException | None) -> str:
+    """Say in one line why a task brought no outcome."""
     from distributed import KilledWorker
 
-    if future.status != "error":
-        return "not tracked: the scheduler was lost; give the command again"
-    error = future.exception()
     if isinstance(error, KilledWorker):
         return (
             "worker after worker died with it, of too little memory or killed; give each more with --memory, "

@@ -89,10 +89,10 @@ def _session_text(cameras: Sequence[str], video: str, *, calibration: str, body:
     )
     tables = tomlkit.aot()
     for name in cameras:
-        tables.append(_table({"name": name, "video": video.replace(f"{{{_CAMERA}}}", name)}))
+        tables.append(tomlkit.item({"name": name, "video": video.replace(f"{{{_CAMERA}}}", name)}))
     document["camera"] = tables
-    document["calibration"] = _table({"file": calibration})
-    document["body"] = _table({"file": body})
+    document["calibration"] = {"file": calibration}
+    document["body"] = {"file": body}
     return tomlkit.dumps(document)
 
 
@@ -103,12 +103,6 @@ def _trial_text(labels: Mapping[str, str]) -> str:
     document["session"] = f"../{SESSION}"
     document["labels"] = inline
     return tomlkit.dumps(document)
-
-
-def _table(values: Mapping[str, str]) -> tomlkit.items.Table:
-    table = tomlkit.table()
-    table.update(values)
-    return table
 
 
 def _write_new(path: Path, text: str) -> None:

@@ -25,6 +25,7 @@ class BatchProgress:
         """Begin with nothing done; `live` is the display of a terminal, None where lines are printed."""
         self._live, self._total = live, n_trials
         self._running: dict[str, tuple[float, int, int | None]] = {}  # start [s], frames done and expected
+        self._ended: set[str] = set()
         self._counts = dict.fromkeys(("done", "unchanged", "failed"), 0)
         columns = (BarColumn(), MofNCompleteColumn(), TextColumn("trials"), TimeRemainingColumn())
         self._bar = Progress(*columns, console=errors)
@@ -32,6 +33,8 @@ class BatchProgress:
 
     def tell(self, name: str, done: int, total: int | None) -> None:
         """Note how many of a trial's frames are done."""
+        if name in self._ended:  # told late
+            return
         start_s = self._running.get(name, (time.monotonic(),))[0]
         self._running[name] = (start_s, done, total)
         self._show()
@@ -39,6 +42,7 @@ class BatchProgress:
     def end(self, outcome: Outcome) -> None:
         """Note that a trial has ended."""
         self._running.pop(outcome.name, None)
+        self._ended.add(outcome.name)
         self._counts[outcome.status] += 1
         self._bar.advance(self._bar_task)
         n_ended = sum(self._counts.values())

@@ -16,7 +16,7 @@ from airborne.io.text import read_json
 from airborne.motion.flight.phases import find_flight_events
 from airborne.motion.run_folder import SUMMARY
 
-Row = Mapping[str, Any]
+Row = dict[str, Any]
 _STATUSES = ("tracked", "uncertain", "lost")
 _OF_A_BODY = ("median_position_sd_mm", "median_rotation_sd_deg", "somersault_rev", "twist_rev")
 _OF_A_FLIGHT = ("fitted_gravity_m_s2", "ballistic_rms_mm")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from airborne.batch.cluster import count_cores, do_tasks, open_client
 from airborne.batch.progress import show_progress
-from airborne.batch.table import write_outputs
+from airborne.batch.table import not_reached, write_outputs
 from airborne.batch.task import LOGS, THUMBNAILS, Outcome, Task, look_up
 from airborne.batch.trials import BatchTrial
 from airborne.errors import AirborneError, ResultError
@@ -54,15 +54,17 @@ def run_batch(
         try:
             with open_client(machines.scheduler, n_workers, machines.memory) as client:
                 say(f"dashboard: {client.dashboard_link}")
-                if not client.scheduler_info()["workers"]:
-                    say(f"waiting for workers; start them with: dask worker {client.scheduler.address} --nthreads 1")
+                info = client.scheduler_info()
+                if not info["workers"]:
+                    address = info["address"]
+                    say(f"waiting for workers; start them with: dask worker {address} --nthreads 1")
                 with show_progress(len(tasks)) as progress:
                     for outcome in do_tasks(client, tasks, report=progress.tell):
                         outcomes[outcome.name] = outcome
                         progress.end(outcome)
         finally:
             files = write_outputs(folder, trials, outcomes) if outcomes else []
-    return BatchResult(tuple(outcomes[trial.name] for trial in trials), tuple(files))
+    return BatchResult(tuple(outcomes.get(trial.name, not_reached(trial)) for trial in trials), tuple(files))
 
 
 def plan_tasks(trials: Sequence[BatchTrial], folder: Path, *, pictures: bool) -> list[Task]:

@@ -19,7 +19,6 @@ from airborne.motion.run_folder import REPORT
 from airborne.motion.tables import cell
 
 PAGE = "index.html"
-_NOT_REACHED = Outcome("", "failed", "not tracked: the batch was stopped; give the command again")
 _ON_THE_PAGE = ("share_tracked", "somersault_rev", "twist_rev", "L_kg_m2_s", "com_rise_m", "hip_height_m", "n_alarms")
 
 
@@ -29,7 +28,7 @@ def write_outputs(folder: Path, trials: Sequence[BatchTrial], outcomes: Mapping[
     The table is in the order of the trials and holds nothing that depends on when or where they were tracked.
     """
     names = label_names(trials)
-    ends = [outcomes.get(trial.name, _NOT_REACHED) for trial in trials]
+    ends = [outcomes.get(trial.name, not_reached(trial)) for trial in trials]
     rows = [
         {"trial": trial.name, **dict.fromkeys(names, ""), **trial.labels}
         | {"status": "failed" if end.status == "failed" else "done", "error": end.error}
@@ -49,6 +48,13 @@ def write_outputs(folder: Path, trials: Sequence[BatchTrial], outcomes: Mapping[
         parquet.write_parquet(written[-1], values, {}, {"units": "at the end of each name"})
     write_text(written[1], _page(folder, rows, names))
     return written
+
+
+def not_reached(trial: BatchTrial) -> Outcome:
+    """Return the outcome of a trial that was not tracked before the batch ended."""
+    return Outcome(
+        trial.name, "failed", "not tracked: the batch was stopped, or its scheduler lost; give the command again"
+    )
 
 
 def _page(folder: Path, rows: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> str:

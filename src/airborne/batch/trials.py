@@ -16,6 +16,7 @@ from airborne.io.text import read_csv, read_toml
 from airborne.trial.file import read_tables
 
 TABLE = "trials.csv"
+_OWN_COLUMNS = ("trial", "status", "error", "folder")  # of the batch's table
 _ALWAYS_TRIAL = "trial.toml"  # the name of a trial file that is named after its folder
 _MEANT_AS_TRIAL = re.compile(r"^\s*(\[\[camera\]\]|session\s*=)", re.MULTILINE)
 _TABLE_FORM = "a table of trials has a line of names, one of them trial, then a line for each trial"
@@ -91,7 +92,11 @@ def _describe(path: Path, labels: Mapping[str, str]) -> BatchTrial:
         check_column(file_stem(name))
     except ValueError as error:
         raise TrialError(f"{path}: {error}") from None
-    return BatchTrial(name, path, _own_labels(path) | labels)
+    labels = _own_labels(path) | dict(labels)
+    own = [label for label in labels if label in _OWN_COLUMNS]
+    if own:
+        raise TrialError(f"{path}: a label is called {own[0]}, as a column of the batch's table is; rename it")
+    return BatchTrial(name, path, labels)
 
 
 def _own_labels(path: Path) -> dict[str, str]:

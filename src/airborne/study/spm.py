@@ -7,12 +7,14 @@ the smooth noise of a whole curve exceeds with probability alpha.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.errors import AirborneError
 from airborne.study.random_effects import Difference
-from airborne.types import Array
+from airborne.types import Array, Mask
 
 _FEWEST_NODES = 5  # of a curve that can be tested
 _FEWEST = 3  # athletes or trials a sample: residuals need some
@@ -47,17 +49,17 @@ def compare_curves(difference: Difference, alpha: float) -> CurveTest:
         return CurveTest(t, np.nan, ())
     a, b = a[:, tested], b[:, tested]
     found = ttest_paired(b, a) if difference.level == "within athletes" else ttest2(b, a, equal_var=False)
-    inference = found.inference(alpha, two_tailed=True, interp=True)
+    inference: Any = found.inference(alpha, two_tailed=True)
     t[tested] = inference.z
     clusters = [(tested[0] + each.endpoints[0], tested[0] + each.endpoints[1], each.P) for each in inference.clusters]
     return CurveTest(t, float(inference.zstar), tuple((float(low), float(high), float(p)) for low, high, p in clusters))
 
 
-def _varies(values: Array) -> Array:
+def _varies(values: Array) -> Mask:
     return np.ptp(values, axis=0) > 0
 
 
-def _longest_run(mask: Array) -> Array:
+def _longest_run(mask: Mask) -> NDArray[np.intp]:
     """Return the indices of the longest run of a mask (nodes,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]))).reshape(-1, 2)
     first, last = max(edges, key=lambda edge: edge[1] - edge[0], default=(0, 0))

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from airborne.errors import AirborneError
 from airborne.io.names import file_stem
 from airborne.io.writing import write_text
 from airborne.motion.tables import cell
@@ -39,6 +40,10 @@ def write_comparison(
     """
     require_events(events)
     check_spm1d()
+    try:
+        stems = [file_stem(variable) for variable in variables]
+    except ValueError as error:
+        raise AirborneError(f"--variable: {error}") from None
     study = read_study(batch, conditions)
     compared = [compare_trials(study, variable, events, real_time=real_time) for variable in variables]
     folder.mkdir(parents=True, exist_ok=True)
@@ -47,8 +52,8 @@ def write_comparison(
     if any(each.axis is not None for each in compared):
         _write_table(folder / CURVES, (row for each in compared for row in _curve_rows(each)))
         _write_table(folder / CLUSTERS, (row for each in compared for row in _clusters(each)))
-    for each in compared:
-        write_comparison_figures(folder, each, file_stem(each.variable))
+    for each, stem in zip(compared, stems, strict=True):
+        write_comparison_figures(folder, each, stem)
     text = describe_study(compared, events, real_time=real_time)
     left_out = "".join(f"{line}\n" for line in study.left_out)
     text = text.replace("\nReferences\n", f"{left_out}\nReferences\n") if left_out else text
