@@ -16,8 +16,8 @@ from airborne.types import Image
 from airborne.video import VideoSource
 from airborne.video.seeking import ImageIndex, ImageReader, TrialClock, index_images, match_images
 
-_MOST_BYTES = 200_000_000  # of JPEG that are kept
-_AHEAD = 6  # pictures made beyond the one that was asked for
+_MOST_BYTES = 100_000_000  # of JPEG that are kept
+_AHEAD = 4  # pictures made beyond the one that was asked for
 _QUALITY = 92  # of 100
 _MOST_OPEN = 32  # files
 
