@@ -73,7 +73,11 @@ class _Panel:
             self.again = ui.button("Track again", on_click=lambda: self.start("--overwrite")).props("outline")
             self.halt = ui.button("Stop", on_click=self.stop).props("unelevated color=grey-8")
             self._show_buttons()
-            self.bar = ui.linear_progress(0, show_value=False, size="10px").props("rounded").style("width: 220px")
+            self.bar = (
+                ui.linear_progress(0, show_value=False, size="10px")
+                .props("rounded aria-label=progress")
+                .style("width: 220px")
+            )
             self.says = ui.label().classes("small soft")
         self.view = View(self.shown, frame=self.session.frame, overlay=self._overlay, on_frame=self.turn_to)
         ui.timer(_LOOK_EVERY_S, self.look)
