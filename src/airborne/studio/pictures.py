@@ -141,7 +141,8 @@ class Pictures:
     def show(self, tables: tuple[CameraTable, ...], source_of: Callable[[CameraTable], VideoSource]) -> ShownTrial:
         """Match the images of a trial's cameras. Raises VideoError."""
         sources = tuple(map(source_of, tables))
-        indexes = tuple(map(self.index, sources))
+        with ThreadPoolExecutor(len(sources)) as readers:
+            indexes = tuple(readers.map(self.index, sources))
         return ShownTrial(tables, sources, indexes, match_images(sources, indexes))
 
     def _video(self, source: VideoSource) -> _Video:

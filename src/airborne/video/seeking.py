@@ -80,7 +80,7 @@ def index_images(source: VideoSource) -> ImageIndex:
 class TrialClock(NamedTuple):
     """Which image of each camera belongs to each frame of a trial, as `Recording` has it."""
 
-    times_s: Sequence[float]  # (n,) on the trial's clock [s]
+    times_s: NDArray[np.float64]  # (n,) on the trial's clock [s]
     images: NDArray[np.int64]  # (n, cameras) image numbers; -1 where a camera has none
 
     def __len__(self) -> int:
