@@ -42,5 +42,7 @@ class PointList:
                     row.on("click", partial(self._choose, name), args=[])
                     ui.label(name)
                     ui.element("div").classes("gap")
-                    labels = [ui.label().classes("n").props(f'title="{camera} [px]"') for camera in self._cameras]
+                    labels = [ui.label().classes("n") for _ in self._cameras]
+                    for label, camera in zip(labels, self._cameras, strict=True):
+                        label._props["title"] = f"{camera} [px]"  # a camera's name may hold quotes
                 self._rows[name] = row, labels

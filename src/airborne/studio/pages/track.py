@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import quote
 
 from nicegui import ui
 
@@ -89,7 +90,7 @@ class _Panel:
 
     @property
     def _overlay(self) -> str:
-        return f"/overlay/{self.folder.name}/{{frame}}"
+        return f"/overlay/{quote(self.folder.name)}/{{frame}}"
 
     @property
     def _command(self) -> Command | None:
