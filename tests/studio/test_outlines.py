@@ -10,7 +10,7 @@ from airborne.body import Pose
 from airborne.body.files import read_body
 from airborne.cameras import Rig, camera_looking_at
 from airborne.motion import read_players
-from airborne.studio.outlines import outline_items, run_curves, run_overlay
+from airborne.studio.outlines import outline_items, run_curves, run_overlay, run_rows
 from airborne.studio.stage import part_stl
 from tests.support.places import THROWN_CROSS
 from tests.support.players_trial import rig, write_run
@@ -56,3 +56,9 @@ def test_a_part_of_a_body_is_a_mesh_in_its_segment(cross):
     stl = part_stl(cross, 1)
     corners = np.frombuffer(stl[84:], np.dtype([("normal", "<3f4"), ("corners", "<9f4"), ("rest", "<u2")]))["corners"]
     assert np.ptp(corners.reshape(-1, 3), axis=0) == pytest.approx([0.6, 0.06, 0.045])
+
+
+def test_rows_of_a_run_are_counted_while_it_goes_on(tmp_path):
+    assert run_rows(tmp_path) == (0, None)
+    (tmp_path / "motion.csv").write_text("frame,time_s\n4,0.1\n6,0.2\n8,0")
+    assert run_rows(tmp_path) == (2, 6)
