@@ -107,7 +107,7 @@ def test_nothing_outside_the_folder_is_read(studio):
     ]
     crafted = [crafted[k] for k in rng.permutation(len(crafted))[:N_CRAFTED]]
     crafted += [f"/thumbnail/{quote(name)}" for name in ("link.mp4", "../secret.mp4", "/etc/passwd")]
-    crafted += ["/file/escape/secret.txt", "/file/results/link/secret.txt", "/file/.airborne/command.log", "/file/../x"]
+    crafted += ["/file/escape/secret.txt", "/file/results/link/secret.txt", "/file/.airborne/find.log", "/file/../x"]
     for path in crafted:
         status, headers, body = ask(studio, path)
         assert SECRET.encode() not in body, path

@@ -1,9 +1,16 @@
 """Files of a trial are written whole, edits are undone and done again, earlier versions are kept."""
 
+import subprocess
+import sys
+import time
+
+import numpy as np
 import pytest
 
 from airborne.errors import TrialError
 from airborne.studio.writing import FOLDER, KEPT, Editor
+
+N_KILLS = 6
 
 
 @pytest.fixture
@@ -57,3 +64,23 @@ def test_nothing_is_written_outside_the_folder(tmp_path, name):
     with pytest.raises(TrialError, match="leads out of"):
         Editor(folder).write(name, "x", "attack")
     assert (tmp_path / "other.toml").read_text() == "theirs"
+
+
+def test_a_file_is_whole_whenever_its_writer_is_killed(tmp_path):
+    code = (
+        "import sys; from pathlib import Path; from airborne.studio.writing import Editor\n"
+        "editor = Editor(Path(sys.argv[1]))\n"
+        "for number in range(10**9): editor.write('a.csv', f'{number}\\n' * 20_000, 'click')"
+    )
+    path, rng = tmp_path / "a.csv", np.random.default_rng(0)
+    for _ in range(N_KILLS):
+        before = path.stat().st_mtime_ns if path.exists() else 0
+        with subprocess.Popen([sys.executable, "-c", code, str(tmp_path)]) as process:
+            while not path.exists() or path.stat().st_mtime_ns == before:
+                time.sleep(0.01)
+            time.sleep(rng.uniform(0, 0.1))
+            process.kill()
+        lines = path.read_text().splitlines()
+        assert len(lines) == 20_000
+        assert len(set(lines)) == 1
+        assert 1 <= len(list((tmp_path / FOLDER / "versions").iterdir())) <= KEPT + 1

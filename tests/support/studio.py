@@ -39,10 +39,11 @@ def open_studio(path: Path, *options: str) -> Iterator[str]:
 @contextmanager
 def open_page(address: str, requests: list[str] | None = None) -> Iterator:
     """Open an address in a real browser; skip without one. Every request is noted, none may leave this computer."""
-    playwright = pytest.importorskip("playwright.sync_api")
+    reason = "THE STUDIO IS NOT TESTED IN A BROWSER: playwright is not installed; pip install -e '.[test]'"
+    playwright = pytest.importorskip("playwright.sync_api", reason=reason)
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
-        pytest.skip("no Chromium is installed: the studio is not tested in a browser")
+        pytest.skip("THE STUDIO IS NOT TESTED IN A BROWSER: no Chromium is installed; apt-get install chromium")
     with playwright.sync_playwright() as driver:
         chromium = driver.chromium.launch(executable_path=browser, args=["--no-sandbox", "--enable-unsafe-swiftshader"])
         context = chromium.new_context(viewport=SIZE)

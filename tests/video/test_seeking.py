@@ -1,6 +1,7 @@
 """Any image of a file in any order is the image that reading from the start gives at that place."""
 
 from fractions import Fraction
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ def clips(folder):
     """Files of all the kinds that number their images differently."""
     yield VideoSource("intra", write_clip(folder / "intra.mkv", numbered(20)))
     yield VideoSource("b frames", h264(folder / "b.mp4", textured(40)))
+    yield VideoSource("long groups", h264(folder / "long.mp4", textured(100), options={"g": "90", "bf": "3"}))
     yield VideoSource("open groups", h264(folder / "open.mp4", textured(40), options={"x264-params": "open-gop=1"}))
     yield VideoSource("no index", h264(folder / "b.ts", textured(40)))
     yield VideoSource("matroska", h264(folder / "b.mkv", textured(40)))
@@ -41,6 +43,11 @@ def whole_image(image, facts):
     return rgb if image.parity is None else fill_rows(rgb, image.parity, facts.size[1])
 
 
+def times_s(index):
+    numbers, unit = index.times()
+    return [Fraction(int(number), unit) for number in numbers]
+
+
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory):
     return list(clips(tmp_path_factory.mktemp("clips")))
@@ -52,7 +59,7 @@ def test_every_image_in_any_order_is_the_one_that_decoding_in_order_gives(source
         facts = inspect(source)
         images = [(image.time_s, whole_image(image, facts)) for image in decode(source, facts)]
         index = index_images(source)
-        assert index.times_s() == [time_s for time_s, _ in images], source.name
+        assert times_s(index) == [time_s for time_s, _ in images], source.name
         with ImageReader(source, index) as reader:
             for number in [*range(3), *rng.permutation(len(images)), len(images) - 1]:
                 assert np.array_equal(reader.image(int(number)), images[number][1]), (source.name, number)
@@ -62,6 +69,22 @@ def test_a_number_that_is_not_there_is_refused(sources):
     reader = ImageReader(sources[0], index_images(sources[0]))
     with pytest.raises(VideoError, match="there is no image 20; the last is 19"):
         reader.image(20)
+
+
+def test_frames_of_a_trial_with_gaps_are_those_of_a_recording(tmp_path):
+    stamps = [0, 20, 40, 140, 160, 180, 200, 330, 350, 370]  # ms
+    times = {"time_base": Fraction(1, 1000), "rate": Fraction(50)}
+    clips = [
+        write_clip(tmp_path / "a.mkv", numbered(10), stamps=stamps, **times),
+        write_clip(tmp_path / "b.mkv", numbered(30, start=40), rate=Fraction(50)),
+        write_clip(tmp_path / "c.mkv", numbered(1, start=80), rate=Fraction(50)),
+    ]
+    for order in permutations(range(3)):
+        sources = [VideoSource("abc"[k], clips[k], offset_s=0.005 * k) for k in order]
+        clock = match_images(sources, [index_images(source) for source in sources])
+        frames = list(open_recording(sources, plain_rig(*("abc"[k] for k in order))))
+        assert list(clock.times_s) == [float(each.time_s) for each in frames]
+        assert (clock.images < 0).tolist() == [[view is None for view in each.views] for each in frames]
 
 
 def test_frames_of_the_trial_show_the_images_that_a_recording_gives(tmp_path):
@@ -91,7 +114,7 @@ def test_a_damaged_image_is_none_and_its_neighbours_keep_their_numbers(tmp_path)
     index = index_images(source)
     intact = {image.time_s: image for image in decode(source, index.facts)}
     with ImageReader(source, index) as reader:
-        for number, time_s in enumerate(index.times_s()):
+        for number, time_s in enumerate(times_s(index)):
             image = reader.image(number)
             if time_s in intact and image is not None:
                 assert np.array_equal(image, whole_image(intact[time_s], index.facts)), number

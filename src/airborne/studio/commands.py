@@ -9,6 +9,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from airborne.studio.writing import FOLDER
+
 _RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
 STOPPED = 130  # the exit code of a command that was stopped
 _PATIENCE_S = 10.0  # for a process that was told to stop
@@ -22,7 +24,7 @@ class Command:
         self.words = tuple(words)
         self.started_s = time.monotonic()
         self._out: bytes = b""
-        self._log = (folder / ".airborne").joinpath("command.log")
+        self._log = folder / FOLDER / f"{words[0]}.log"
         self._log.parent.mkdir(exist_ok=True)
         self._file = self._log.open("w+b")
         self._process = subprocess.Popen(

@@ -14,7 +14,6 @@ import numpy as np
 from airborne.body import BodyModel, PosedBody
 from airborne.body.files import read_body
 from airborne.cameras import Camera, Rig, read_rig
-from airborne.errors import ResultError
 from airborne.export.palette import STATUS_RGB, hex_colour
 from airborne.export.views import cached_surface_arrays
 from airborne.motion import Motion, PlayersMotion, read_motion
@@ -81,11 +80,10 @@ def run_curves(run: Path) -> dict[str, Any]:
 
 
 def run_rows(run: Path) -> tuple[int, int | None]:
-    """Return how many frames a run holds so far, and the last one's number."""
-    if not (run / MOTION).is_file():
-        return 0, None
-    motion = _open(run, _stamp(run / MOTION)).motion
-    return len(motion), int(motion.index[-1]) if len(motion) else None
+    """Return how many frames a run of one body holds so far, and the last one's number."""
+    path = run / MOTION
+    rows = path.read_bytes().split(b"\n")[1:-1] if path.is_file() else []  # without the header and a torn last line
+    return len(rows), int(rows[-1].partition(b",")[0]) if rows else None
 
 
 def run_body(run: Path) -> BodyModel:
@@ -146,14 +144,13 @@ def _players_overlay(motion: PlayersMotion, cameras: Sequence[Camera], frame: in
 
 
 def _players_curves(motion: PlayersMotion) -> dict[str, Any]:
-    feet = [motion.joints.index(name) for name in ("foot_left", "foot_right") if name in motion.joints]
-    if not feet:
-        raise ResultError("the run holds no feet")
+    limb = next(limb for limb in reversed(_LIMBS) if f"{limb}_left" in motion.joints)
+    lower = [motion.joints.index(f"{limb}_{side}") for side in ("left", "right")]
     worst = {Status.TRACKED.value: 0, Status.UNCERTAIN.value: 1, Status.LOST.value: 2}
     statuses = [max(map(str, row), key=lambda each: worst[each]) for row in motion.status]
-    lowest = np.min(motion.points[:, :, feet, 2], axis=2)
+    lowest = np.min(motion.points[:, :, lower, 2], axis=2)
     series = [
-        {"name": f"{name}: lower foot", "unit": "m", "value": _plain(lowest[:, k]), "sd": []}
+        {"name": f"{name}: lower {limb}", "unit": "m", "value": _plain(lowest[:, k]), "sd": []}
         for k, name in enumerate(motion.players)
     ]
     frames, times = motion.index.tolist(), motion.time_s.tolist()

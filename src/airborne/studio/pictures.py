@@ -16,8 +16,8 @@ from airborne.types import Image
 from airborne.video import VideoSource
 from airborne.video.seeking import ImageIndex, ImageReader, TrialClock, index_images, match_images
 
-_MOST_BYTES = 200_000_000  # of JPEG that are kept
-_AHEAD = 6  # pictures made beyond the one that was asked for
+_MOST_BYTES = 100_000_000  # of JPEG that are kept
+_AHEAD = 4  # pictures made beyond the one that was asked for
 _QUALITY = 92  # of 100
 _MOST_OPEN = 32  # files
 
@@ -141,7 +141,8 @@ class Pictures:
     def show(self, tables: tuple[CameraTable, ...], source_of: Callable[[CameraTable], VideoSource]) -> ShownTrial:
         """Match the images of a trial's cameras. Raises VideoError."""
         sources = tuple(map(source_of, tables))
-        indexes = tuple(map(self.index, sources))
+        with ThreadPoolExecutor(len(sources)) as readers:
+            indexes = tuple(readers.map(self.index, sources))
         return ShownTrial(tables, sources, indexes, match_images(sources, indexes))
 
     def _video(self, source: VideoSource) -> _Video:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from airborne.studio.stage import part_stl
 from airborne.video import VideoSource
 from airborne.video.decoding import decode, inspect, rgb_from_decoded
 
+_WORKERS = ThreadPoolExecutor(4, thread_name_prefix="answers")  # more would only hold more pictures at once
 _THUMBNAIL_PX = 240  # wide
 _KEEP = {"cache-control": "private, max-age=3600"}
 
@@ -73,7 +75,7 @@ def _overlay(session: Session, name: str, frame: int) -> dict[str, Any]:
 async def _answer(make: Callable[[], Response]) -> Response:
     """Make an answer in a thread; what is not there is a plain line."""
     try:
-        return await asyncio.to_thread(make)
+        return await asyncio.get_running_loop().run_in_executor(_WORKERS, make)
     except (AirborneError, OSError) as error:
         reason = str(error) if isinstance(error, AirborneError) else "it cannot be read"
         return Response(reason, status_code=404, media_type="text/plain")

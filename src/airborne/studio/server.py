@@ -66,6 +66,7 @@ def serve(path: Path, *, port: int, browser: bool) -> None:
         reload=False,
         tailwind=False,
         title="Airborne",
+        language="en-US",
         show_welcome_message=False,
         gzip_middleware_factory=None,
         favicon=_STYLE.with_name("icon.svg"),

@@ -27,6 +27,7 @@ export default {
     this.canvas.view = this; // where a pixel is on the screen: for those who look from outside
     this.pens = this.canvas.getContext("2d");
     this.cache = new Map();
+    this.underway = new Map();
     this.zooms = this.panes.map(() => ({ scale: 1, u: 0, v: 0 })); // v, u: what is moved to the pane's corner
     this.pointer = null;
     this.drag = null;
@@ -60,20 +61,23 @@ export default {
     // frames
     refresh() { this.cache.clear(); this.go(this.wanted, true); },
     show(frame) { this.go(frame); },
-    async fetchPane(pane, frame) {
-      const answer = await fetch(pane.url.replace("{frame}", frame));
+    async fetchPane(pane, frame, signal) {
+      const answer = await fetch(pane.url.replace("{frame}", frame), { signal });
       return answer.status === 200 ? createImageBitmap(await answer.blob()) : null;
     },
-    async fetchOverlay(frame) {
+    async fetchOverlay(frame, signal) {
       if (!this.overlay) return { items: [] };
-      const answer = await fetch(this.overlay.replace("{frame}", frame), { cache: "no-store" });
+      const answer = await fetch(this.overlay.replace("{frame}", frame), { cache: "no-store", signal });
       return answer.ok ? answer.json() : { items: [] };
     },
     load(frame) {
       if (!this.cache.has(frame)) {
-        const all = Promise.all([this.fetchOverlay(frame), ...this.panes.map((pane) => this.fetchPane(pane, frame))]);
-        this.cache.set(frame, all.then(([overlay, ...pictures]) => ({ frame, overlay, pictures })));
-        all.catch(() => this.cache.delete(frame));
+        const stop = new AbortController(), { signal } = stop;
+        const parts = [this.fetchOverlay(frame, signal), ...this.panes.map((pane) => this.fetchPane(pane, frame, signal))];
+        const all = Promise.all(parts).then(([overlay, ...pictures]) => ({ frame, overlay, pictures }));
+        this.cache.set(frame, all);
+        this.underway.set(frame, stop);
+        all.catch(() => this.cache.get(frame) === all && this.cache.delete(frame)).finally(() => this.underway.delete(frame));
         for (const old of this.cache.keys()) {
           if (this.cache.size <= KEPT_FRAMES) break;
           if (old !== frame && old !== this.wanted) this.cache.delete(old);
@@ -86,6 +90,8 @@ export default {
       const direction = Math.sign(frame - this.wanted) || 1;
       const begun = performance.now();
       this.wanted = frame;
+      for (const [other, stop] of this.underway) // what was fetched ahead of another place only stands in the way
+        if (Math.abs(other - frame) > AHEAD) { this.cache.delete(other); stop.abort(); }
       if (!silent) window.dispatchEvent(new CustomEvent("airborne-frame", { detail: { frame, from: this } }));
       let loaded = null;
       try { loaded = await this.load(frame); } catch { return; }
@@ -95,9 +101,9 @@ export default {
       this.canvas.dataset.frame = frame;
       this.canvas.dataset.ms = (performance.now() - begun).toFixed(1);
       this.$emit("frame", { frame });
-      for (let k = 1; k <= AHEAD; k++) {
+      for (let k = 1; k <= AHEAD && this.wanted === frame; k++) {
         const next = frame + k * direction;
-        if (next >= 0 && next < this.n_frames) this.load(next).catch(() => {});
+        if (next >= 0 && next < this.n_frames) await this.load(next).catch(() => {});
       }
     },
     // places

@@ -80,7 +80,7 @@ class View(Element, component="view.js", default_classes="view"):
 
         self.on(name, handle, throttle=0.1 if name == "frame" else 0.0)
 
-    def show_over(self, marks: Sequence[Mark], items: Sequence[Item], selected: str | None = None) -> None:
+    def show_over(self, marks: Sequence[Mark], items: Sequence[Any], selected: str | None = None) -> None:
         """Show marks to grab and lines over the pictures."""
         self._props["marks"], self._props["items"] = list(marks), list(items)
         self._props["selected"] = selected or ""

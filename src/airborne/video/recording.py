@@ -68,13 +68,13 @@ class Recording:
         undistortions = [self._undistortions(camera, facts) for camera, facts in zip(self.rig, self.facts, strict=True)]
         with ExitStack() as open_files:
             cursors = [
-                Cursor(open_files.enter_context(closing(self._decode_on_clock(source, facts))), half_s=period_s / 2)
+                _Cursor(open_files.enter_context(closing(self._decode_on_clock(source, facts))), half_s=period_s / 2)
                 for source, facts in zip(self.sources, self.facts, strict=True)
             ]
             # nothing is converted yet in a lazy recording: threads would only wait for a core
             parallel = map if self.is_lazy else open_files.enter_context(ThreadPoolExecutor(len(cursors))).map
             conversions = [ConversionCache(min(facts.size)) for facts in self.facts]
-            times = clock_times(cursors, start_s=self.sources[0].trial_time(Fraction(0)), period_s=period_s)
+            times = _clock(cursors, start_s=self.sources[0].trial_time(Fraction(0)), period_s=period_s)
             for index, time_s in enumerate(times):
                 if self.stop is not None and index >= self.stop:
                     return
@@ -213,7 +213,7 @@ def _notes(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> Itera
             yield f"{source.name}: read as {fact.fields}, though the file's flags say {fact.flagged_order}"
 
 
-class Cursor:
+class _Cursor:
     """One camera's images, read once in order, with the next one always at hand."""
 
     def __init__(self, images: Iterator[DecodedImage], *, half_s: Fraction) -> None:
@@ -246,7 +246,7 @@ class Cursor:
             self._current, self._next = self._next, next(self._pictures, None)
 
 
-def clock_times(cursors: Sequence[Cursor], *, start_s: Fraction, period_s: Fraction) -> Iterator[Fraction]:
+def _clock(cursors: Sequence[_Cursor], *, start_s: Fraction, period_s: Fraction) -> Iterator[Fraction]:
     """Yield the first camera's times; over a gap and past its end they go on by the period, until all are over.
 
     Raises VideoError where no camera has an image for longer than any recording is interrupted.

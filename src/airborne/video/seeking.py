@@ -26,10 +26,11 @@ from airborne.video.decoding import (
     inspect,
     intact_frames,
     rgb_from_decoded,
-    snap_to_grid,
 )
 from airborne.video.fields import fill_rows
-from airborne.video.recording import Cursor, clock_times
+
+_REORDERED = 20  # frames: more than any codec sends before or after the place where it shows them
+_MOST_FRAMES = 5_000_000  # of a trial: 28 hours at 50 Hz
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,11 +47,15 @@ class ImageIndex:
         """Return the number of images; each of two fields is one."""
         return len(self.ticks) * len(self.facts.parities)
 
-    def times_s(self) -> list[Fraction]:
-        """Return the time of every image since the first, as `decode` gives it [s]."""
-        rate, later_s = self.facts.frame_rate, [j / self.facts.image_rate for j in range(len(self.facts.parities))]
-        frames_s = (snap_to_grid(int(ticks) * self.tick_s, rate, self.tick_s) for ticks in self.ticks)
-        return [time_s + field_s for time_s in frames_s for field_s in later_s]
+    def times(self) -> tuple[NDArray[np.int64], int]:
+        """Return the time of every image since the first, as `decode` gives it, and how many units a second has."""
+        rate, tick_s, n = self.facts.frame_rate, self.tick_s, len(self.facts.parities)
+        unit = lcm(tick_s.denominator, rate.numerator * n)
+        tick, frame = round(unit * tick_s), round(unit / rate)
+        stamps = self.ticks * tick
+        snapped = (stamps + frame // 2) // frame * frame
+        frames = np.where(np.abs(snapped - stamps) <= tick, snapped, stamps)
+        return (frames[:, None] + frame // n * np.arange(n)).ravel(), unit
 
 
 def index_images(source: VideoSource) -> ImageIndex:
@@ -75,7 +80,7 @@ def index_images(source: VideoSource) -> ImageIndex:
 class TrialClock(NamedTuple):
     """Which image of each camera belongs to each frame of a trial, as `Recording` has it."""
 
-    times_s: Sequence[float]  # (n,) on the trial's clock [s]
+    times_s: NDArray[np.float64]  # (n,) on the trial's clock [s]
     images: NDArray[np.int64]  # (n, cameras) image numbers; -1 where a camera has none
 
     def __len__(self) -> int:
@@ -84,32 +89,48 @@ class TrialClock(NamedTuple):
 
 
 def match_images(sources: Sequence[VideoSource], indexes: Sequence[ImageIndex]) -> TrialClock:
-    """Match the images of several cameras by their times; the first camera is the clock."""
-    times_s = [
-        [source.trial_time(time_s) for time_s in index.times_s()]
-        for source, index in zip(sources, indexes, strict=True)
-    ]
+    """Match the images of several cameras by their times, as `Recording` does; the first camera is the clock."""
+    images = [index.times() for index in indexes]
+    starts = [source.trial_time(Fraction(0)) for source in sources]
+    paces = [source.trial_time(Fraction(1)) - start for source, start in zip(sources, starts, strict=True)]
     period_s = 1 / indexes[0].facts.image_rate
-    scale = 2 * lcm(period_s.denominator, *{time_s.denominator for each in times_s for time_s in each})
-    period = period_s * scale  # whole numbers from here on: exact, and faster than fractions
-    cursors = [Cursor(_Images([int(time_s * scale) for time_s in each]), half_s=period / 2) for each in times_s]
-    times, numbers = [], []
-    for time in clock_times(cursors, start_s=times_s[0][0] * scale, period_s=period):
-        images = [cursor.image_at(time) for cursor in cursors]
-        times.append(float(time / scale))
-        numbers.append([-1 if image is None else image.parity or 0 for image in images])
-    return TrialClock(times, np.array(numbers, np.int64).reshape(-1, len(sources)))
+    per_unit = [pace / unit for pace, (_, unit) in zip(paces, images, strict=True)]
+    scale = 2 * lcm(*(each.denominator for each in (period_s, *starts, *per_unit)))
+    times = [
+        np.array(numbers, object) * int(each * scale) + int(start * scale)  # whole numbers of any size: exact
+        for (numbers, _), each, start in zip(images, per_unit, starts, strict=True)
+    ]
+    period, last = int(period_s * scale), max(each[-1] for each in times)
+    if last - times[0][0] > _MOST_FRAMES * period:
+        raise VideoError(
+            f"{sources[0].name}: over {_MOST_FRAMES} frames to its end or another's; convert the videos again"
+        )
+    clock = np.array(_clock(times[0].tolist(), period, last), object)
+    matched = [_nearest(each, clock, period // 2) for each in times]
+    return TrialClock((clock / scale).astype(float), np.stack(matched, axis=1))
 
 
-class _Images(Iterator[DecodedImage]):
-    """Images that are only counted: each has its number in the place of the parity, and no pixels."""
+def _clock(own: Sequence[int], period: int, last: int) -> list[int]:
+    """Return a camera's own times; over a gap and past its end they go on by the period, to the last of all images."""
+    clock: list[int] = []
+    for time, following in zip(own, [*own[1:], last + period + period // 2], strict=True):
+        clock.append(time)
+        while following >= clock[-1] + period * 3 // 2 and last > clock[-1] + period - period // 2:
+            clock.append(clock[-1] + period)
+    return clock
 
-    def __init__(self, times: Sequence[int]) -> None:
-        self._times = iter(enumerate(times))
 
-    def __next__(self) -> DecodedImage:
-        number, time = next(self._times)
-        return DecodedImage(Fraction(time), None, number)  # type: ignore[arg-type]
+def _nearest(times: NDArray[np.object_], clock: NDArray[np.object_], half: int) -> NDArray[np.int64]:
+    """Return the number of the image nearest to each time of the clock, the later of two; -1 beyond half a period."""
+    later = (
+        np.searchsorted(times, clock, side="right").clip(1, len(times) - 1)
+        if len(times) > 1
+        else np.zeros(len(clock), int)
+    )
+    earlier = np.maximum(later - 1, 0)
+    number = np.where(times[later] - clock <= clock - times[earlier], later, earlier)
+    offset = times[number] - clock
+    return np.where((offset > -half) & (offset <= half), number, -1).astype(np.int64)
 
 
 class ImageReader:
@@ -119,6 +140,7 @@ class ImageReader:
         """Open nothing yet; call `close` at the end."""
         self._source, self.index = source, index
         self._stack = ExitStack()
+        self._stream: VideoStream | None = None
         self._frames: Iterator[tuple[int, av.VideoFrame]] = iter(())
         self._current: tuple[int, av.VideoFrame] | None = None  # the last that was decoded
 
@@ -131,7 +153,7 @@ class ImageReader:
             raise VideoError(f"{self._source.name}: there is no image {number}; the last is {len(self.index) - 1}")
         facts = self.index.facts
         row, j = divmod(number, len(facts.parities))
-        frame = self._frame_at(int(self.index.ticks[row]))
+        frame = self._frame_at(row)
         if frame is None:
             return None
         parity = facts.parities[j]
@@ -141,7 +163,7 @@ class ImageReader:
     def close(self) -> None:
         """Close the file."""
         self._stack.close()
-        self._frames, self._current = iter(()), None
+        self._stream, self._frames, self._current = None, iter(()), None
 
     def __enter__(self) -> Self:
         return self
@@ -149,10 +171,13 @@ class ImageReader:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _frame_at(self, ticks: int) -> av.VideoFrame | None:
+    def _frame_at(self, row: int) -> av.VideoFrame | None:
+        ticks, near = int(self.index.ticks[row]), int(self.index.ticks[max(0, row - _REORDERED)])
         if self._current is None or not self._key_before(ticks) <= self._current[0] <= ticks:
             self._go_before(ticks)
         while self._current is not None and self._current[0] < ticks:
+            if self._stream is not None:  # far from the place, frames that no other is predicted from are left out
+                self._stream.codec_context.skip_frame = "NONREF" if self._current[0] < near else "DEFAULT"
             self._current = next(self._frames, None)
         return self._current[1] if self._current is not None and self._current[0] == ticks else None
 
@@ -173,6 +198,7 @@ class ImageReader:
         """Open the file anew, at a key frame or at the start, and decode one frame."""
         self.close()
         container, stream = _open(self._source, self._stack)
+        self._stream = stream
         if key is not None:
             container.seek(key + self.index.first, stream=stream, backward=True)
         self._frames = self._decode(container, stream, self.index.first if key is None else key + self.index.first)

@@ -17,7 +17,7 @@ from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import FEWEST_POINTS
 from airborne.studio.session import Session
 from airborne.studio.view import Mark, View
-from airborne.types import Array
+from airborne.types import Array, Mask
 
 _CLICKED, _CHOSEN, _PREDICTED = "#56b4e9", "#f0e442", "#c8cdd3"
 
@@ -176,7 +176,7 @@ class ControlPointsPanel:
         assert self.clicked.world is not None
         return fit.rig[camera].px_from_world(self.clicked.world) if isinstance(fit, Calibration) else None
 
-    def _off_px(self, name: str) -> tuple[Array, Array]:
+    def _off_px(self, name: str) -> tuple[Mask, Array]:
         """Say of a point whether it is clicked, and how far from where the camera sees it, in each camera [px]."""
         px = np.stack([self.clicked.at(name, camera) for camera in self.shown.names])
         row, none = self.clicked.names.index(name), np.full(2, np.nan)

@@ -66,7 +66,8 @@ async def framed(
 
     with ui.element("div").classes("bar"):
         ui.label("Airborne").classes("name")
-        ui.label(str(session.path)).classes("path small")
+        name = f"{session.folder.name}/{session.path.name}"
+        ui.label(name).classes("path small").tooltip(str(session.path))
         ui.element("div").classes("gap")
         undo = ui.button(icon="undo", on_click=lambda: move("undo")).props("flat round dense aria-label=Undo")
         redo = ui.button(icon="redo", on_click=lambda: move("redo")).props("flat round dense aria-label=Redo")
@@ -78,7 +79,7 @@ async def framed(
         await look()
         ui.timer(_LOOK_EVERY_S, look)
         ui.keyboard(on_key=lambda event: _key(event, sheet, move), ignore=["input", "select", "textarea"])
-        with ui.element("main").classes("main" if scrolls else "main still"):
+        with ui.element("div").classes("main" if scrolls else "main still"):  # the page has a <main> already
             ui.html(f"<h1>{title}</h1>", sanitize=False)
             if text:
                 ui.label(text).classes("help")

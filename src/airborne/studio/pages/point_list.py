@@ -10,7 +10,7 @@ from nicegui import ui
 from nicegui.element import Element
 from nicegui.elements.label import Label
 
-from airborne.types import Array
+from airborne.types import Array, Mask
 
 _NOT_CLICKED, _CLICKED = "–", "•"
 
@@ -24,7 +24,7 @@ class PointList:
         self._rows: dict[str, tuple[Element, list[Label]]] = {}
         self._card = ui.element("div").classes("card points").style("flex: 1; overflow-y: auto")
 
-    def show(self, names: Sequence[str], chosen: str, off_px: Callable[[str], tuple[Array, Array]]) -> None:
+    def show(self, names: Sequence[str], chosen: str, off_px: Callable[[str], tuple[Mask, Array]]) -> None:
         """Show the points; `off_px` says of one whether it is clicked, and how far off, in each camera [px]."""
         if list(self._rows) != list(names):
             self._build(names)
@@ -42,5 +42,7 @@ class PointList:
                     row.on("click", partial(self._choose, name), args=[])
                     ui.label(name)
                     ui.element("div").classes("gap")
-                    labels = [ui.label().classes("n").props(f'title="{camera} [px]"') for camera in self._cameras]
+                    labels = [ui.label().classes("n") for _ in self._cameras]
+                    for label, camera in zip(labels, self._cameras, strict=True):
+                        label._props["title"] = f"{camera} [px]"  # a camera's name may hold quotes
                 self._rows[name] = row, labels

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 from nicegui import ui
@@ -61,11 +62,11 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
 
     with ui.element("div").classes("split"):
         with ui.element("div").classes("wide"):
-            View(shown, frame=session.frame, overlay=f"/overlay/{folder.name}/{{frame}}", on_frame=turn_to)
+            View(shown, frame=session.frame, overlay=f"/overlay/{quote(folder.name)}/{{frame}}", on_frame=turn_to)
         if not holds_players(folder):
             with ui.element("div").classes("side"):
                 bodies.append(await _stage(folder))
-    Curves(f"/curves/{folder.name}", frame=session.frame)
+    Curves(f"/curves/{quote(folder.name)}", frame=session.frame)
 
 
 async def _stage(folder: Path) -> Callable[[int], None]:
@@ -75,7 +76,7 @@ async def _stage(folder: Path) -> Callable[[int], None]:
     rig, path = read_rig(folder / CALIBRATION), motion.position[motion.has_pose]
     near = {"middle": path.mean(axis=0), "away_m": _AROUND_M + float(np.ptp(path, axis=0).max())} if len(path) else {}
     scene = draw_cameras(rig, path=motion.position, **near)
-    body = BodyOnStage(scene, model, f"/mesh/{folder.name}/{{part}}")
+    body = BodyOnStage(scene, model, f"/mesh/{quote(folder.name)}/{{part}}")
     rows = {int(frame): row for row, frame in enumerate(motion.index) if motion.has_pose[row]}
 
     def show(frame: int) -> None:

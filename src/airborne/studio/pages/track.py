@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import quote
 
 from nicegui import ui
 
@@ -59,11 +60,14 @@ class _Panel:
     shown: ShownTrial
     n_frames: int
     n_done: int = -1  # frames of the run, when it was looked at last
+    n_before: int = 0  # of them, when it was resumed
+    ended: Command | None = None  # the run whose end was told
 
     def build(self) -> None:
         """Lay out the bar, the pictures, and a look at the run every second."""
         runs = list_runs(self.session.folder)
-        command = self.session.commands.get("track")
+        command = self._command
+        self.ended = None if self._is_running else command
         name = command.words[3] if command is not None else runs[0].name if runs else "results"
         with ui.element("div").classes("row-line"):
             self.name = ui.input("folder of the run", value=name, on_change=lambda: self.look(anew=True))
@@ -73,7 +77,11 @@ class _Panel:
             self.again = ui.button("Track again", on_click=lambda: self.start("--overwrite")).props("outline")
             self.halt = ui.button("Stop", on_click=self.stop).props("unelevated color=grey-8")
             self._show_buttons()
-            self.bar = ui.linear_progress(0, show_value=False, size="10px").props("rounded").style("width: 220px")
+            self.bar = (
+                ui.linear_progress(0, show_value=False, size="10px")
+                .props("rounded aria-label=progress")
+                .style("width: 220px")
+            )
             self.says = ui.label().classes("small soft")
         self.view = View(self.shown, frame=self.session.frame, overlay=self._overlay, on_frame=self.turn_to)
         ui.timer(_LOOK_EVERY_S, self.look)
@@ -85,7 +93,7 @@ class _Panel:
 
     @property
     def _overlay(self) -> str:
-        return f"/overlay/{self.folder.name}/{{frame}}"
+        return f"/overlay/{quote(self.folder.name)}/{{frame}}"
 
     @property
     def _command(self) -> Command | None:
@@ -110,6 +118,7 @@ class _Panel:
             complain(str(error))
             return
         words = ["track", self.session.path.name, "-o", self.folder.name, *options]
+        self.n_before = run_rows(self.folder)[0] if "--resume" in options else 0
         self.session.commands["track"] = Command(words, self.session.folder)
         self.n_done = -1
         self._show_buttons()
@@ -125,16 +134,13 @@ class _Panel:
         if anew:
             self.view.set_overlay(self._overlay)
             self._show_buttons()
-        folder = self.folder
-        try:
-            n_done, newest = await in_thread(run_rows, folder)
-        except AirborneError:
-            return  # the first line is being written
+        n_done, newest = await in_thread(run_rows, self.folder)
         command = self._command
-        if command is not None and not command.is_running:
-            self._say_end(command)
-        elif command is not None:
+        if command is not None and command.is_running:
             self._say_progress(command, n_done)
+        elif command is not None and command is not self.ended:
+            self.ended = command
+            self._say_end(command)
         if n_done != self.n_done:
             self.n_done = n_done
             self.bar.value = n_done / max(self.n_frames, 1)
@@ -145,8 +151,8 @@ class _Panel:
 
     def _say_progress(self, command: Command, n_done: int) -> None:
         left = ""
-        if n_done > 2:
-            left = f", about {command.seconds / n_done * (self.n_frames - n_done):.0f} s left"
+        if (n_own := n_done - self.n_before) > 2:
+            left = f", about {command.seconds / n_own * (self.n_frames - n_done):.0f} s left"
         self.says.text = (
             f"{n_done} of {count(self.n_frames, 'frame')}, {command.seconds:.0f} s{left}"
             if n_done
@@ -154,7 +160,6 @@ class _Panel:
         )
 
     def _say_end(self, command: Command) -> None:
-        del self.session.commands["track"]
         if command.code == 0:
             self.says.text = command.output().splitlines()[0]
             ui.notify("tracked; the report is in the step Results", type="positive")

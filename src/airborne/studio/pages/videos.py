@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import quote
 
 from nicegui import ui
 
@@ -87,7 +88,8 @@ def _card(choice: _Choice, facts: VideoFacts | str) -> None:
             ui.label(choice.video).classes("name")
             ui.label(facts).classes("bad small")
             return
-        ui.element("img").props(f'src="/thumbnail/{choice.video}" alt="first picture of {choice.video}"')
+        picture = ui.element("img").props(f"src=/thumbnail/{quote(choice.video)}")
+        picture._props["alt"] = f"first picture of {choice.video}"  # a file's name may hold quotes
         ui.checkbox(choice.video).bind_value(choice, "is_camera").props("dense")
         ui.label(_describe(facts)).classes("soft small")
         ui.input("name of the camera").bind_value(choice, "name").props("dense outlined")
