@@ -73,7 +73,9 @@ def read_project(folder: Path, path: Path) -> Project:
     if not path.is_file():
         return Project(folder, path, {}, (), None)
     try:
-        tables = read_tables(path)
+        tables, base = read_tables(path)
+        if base != path.parent:
+            raise TrialError(f"{path.name}: its session is in another folder; put the trial beside it")
         cameras = tables.get("camera", [])
         return Project(folder, path, tables, tuple(CameraTable(**table) for table in cameras), None)
     except (AirborneError, ValidationError, TypeError) as error:
