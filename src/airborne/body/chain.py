@@ -8,6 +8,7 @@ of poses are over the same numbers in the same order.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,8 +138,13 @@ def angles_of(pose: Pose, n_joints: int) -> Array:
 
 def _is_carried(model: BodyModel) -> NDArray[np.bool_]:
     """Say which segments each joint carries along: (segments, joints); joint k belongs to segment k + 1."""
-    carried = np.zeros((len(model.segments), len(model.segments)), bool)
-    for segment, parent in enumerate(model.parents[1:], start=1):
+    return _carried(tuple(model.parents.tolist()))
+
+
+@lru_cache(maxsize=64)
+def _carried(parents: tuple[int, ...]) -> NDArray[np.bool_]:
+    carried = np.zeros((len(parents), len(parents)), bool)
+    for segment, parent in enumerate(parents[1:], start=1):
         carried[segment] = carried[parent]
         carried[segment, segment] = True
     return carried[:, 1:]
