@@ -37,9 +37,10 @@ from airborne.calibration.sources.files import read_sources
 from airborne.calibration.sources.wand import read_wand
 from airborne.cameras import PixelConvention, read_detections, read_rig, write_rig
 from airborne.cameras.clicks import read_clicks, read_positions
-from airborne.cameras.detections import NETWORKS, Detections, write_detections
+from airborne.cameras.detections import Detections, write_detections
 from airborne.cameras.formats.dltdv import read_digitisation, triangulate_digitisation, write_digitisation
 from airborne.cameras.formats.options import FileOptions
+from airborne.cameras.skeletons import SKELETONS
 from airborne.errors import AirborneError
 from airborne.evaluation import read_clicked_frames, read_joint_paths, read_players_truth, read_truth
 from airborne.evaluation.players_truth import read_reference_jumps
@@ -108,7 +109,8 @@ def points_in_pictures(folder):
     yield case("places", places, lambda: read_positions(places))
     rig = three_cameras()
     px = np.stack([camera.px_from_world(scattered(5 * 26).reshape(5, 26, 3)) for camera in rig], axis=2)
-    seen = Detections(cameras=rig.names, points=NETWORKS[26], px=px, visibility=np.full(px.shape[:-1], 0.9))
+    points = SKELETONS["HALPE_26"].points
+    seen = Detections(cameras=rig.names, points=points, px=px, visibility=np.full(px.shape[:-1], 0.9))
     npz = folder / "detections.npz"
     write_detections(npz, seen)
     yield case("detections npz", npz, lambda: read_detections(npz, CAMERAS))

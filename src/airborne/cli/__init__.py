@@ -20,12 +20,14 @@ from airborne.cli.convert import convert_command
 from airborne.cli.export import export_command
 from airborne.cli.find import find_command, frame_command
 from airborne.cli.smooth import smooth_command
+from airborne.cli.studio import studio_command
 from airborne.cli.sync import sync_command
 from airborne.errors import AirborneError, UndecidedError
 
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
 _COMMANDS = {
     "demo": track.demo_command,
+    "studio": studio_command,
     "check": check_command,
     "find": find_command,
     "frame": frame_command,
