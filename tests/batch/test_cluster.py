@@ -10,9 +10,9 @@ import sys
 import time
 from contextlib import contextmanager
 
-import dask
 import pytest
 
+from airborne.batch import cluster
 from airborne.batch.cluster import do_tasks, open_client
 from airborne.batch.run import run_batch
 from airborne.batch.table import write_outputs
@@ -70,9 +70,9 @@ def test_a_worker_that_dies_costs_its_task_another_attempt(tmp_path):
     assert outcomes["t0000"].row == {"n_frames": 1}
 
 
-def test_a_task_that_kills_every_worker_fails_alone(tmp_path):
-    with dask.config.set({"distributed.scheduler.allowed-failures": 1}):
-        outcomes = ends(tmp_path, batch_work.always_die, n=3)
+def test_a_task_that_kills_every_worker_fails_alone(tmp_path, monkeypatch):
+    monkeypatch.setitem(cluster._SETTINGS, "distributed.scheduler.allowed-failures", 1)
+    outcomes = ends(tmp_path, batch_work.always_die, n=3)
     assert [outcomes[f"t000{k}"].status for k in range(3)] == ["done", "failed", "done"]
     assert "worker after worker died" in outcomes["t0001"].error
 

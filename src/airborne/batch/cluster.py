@@ -18,8 +18,11 @@ if TYPE_CHECKING:
 _TOPIC = "airborne"  # of the events that tell of frames
 _CONNECT_S = 10  # to reach a scheduler
 _DASHBOARD = "127.0.0.1:0"  # for this machine alone, on any port
-# one task runs, none waits at a worker: the longest go first, and a dead worker costs what it ran
+# one task runs, none waits at a worker: the longest go first, and a dead worker costs what it ran; only many deaths are
+# a task's own fault; a worker that is killed again while it starts is not given up
 _SETTINGS = {
+    "distributed.scheduler.allowed-failures": 10,
+    "distributed.deploy.lost-worker-timeout": "30 days",
     "distributed.scheduler.worker-saturation": 1.0,
     "distributed.scheduler.work-stealing": False,
     "distributed.admin.large-graph-warning-threshold": "1GB",
@@ -49,6 +52,7 @@ def open_client(scheduler: str | None, n_workers: int, memory: str) -> Iterator[
                     threads_per_worker=1,
                     memory_limit=memory,
                     dashboard_address=_DASHBOARD,
+                    preload=do_task.__module__,  # so that no task waits for imports, or dies of them
                     silence_logs=logging.CRITICAL,
                 )
             )
