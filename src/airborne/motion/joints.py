@@ -22,7 +22,7 @@ from airborne.motion.motion import Motion
 from airborne.motion.uncertainty import propagate_variances, standard_deviation
 from airborne.types import Array
 
-_OPEN_SD_RAD = 0.5  # of an angle that counts as unobserved
+OPEN_SD_RAD = 0.5  # of an angle that counts as unobserved
 _UNCERTAIN_SD_M = 0.05  # of a landmark; the same as of a whole body
 _STRAINED_RAD, _STRAINED_FRAMES = np.radians(3.0), 3  # beyond a limit by more than its sd, in so many frames on end
 
@@ -114,7 +114,7 @@ def joint_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
             variance[row, joint] = propagate_variances(
                 by_rotation_vector[row, joint], motion.covariance[row, block, block]
             )
-    variance[variance > _OPEN_SD_RAD**2] = np.inf
+    variance[variance > OPEN_SD_RAD**2] = np.inf
     dimensions = ("time", "joint", "axis")
     variables = {
         "angle": (dimensions, np.rad2deg(radians), {"units": "deg", "order": "x, y, z, body-fixed"}),

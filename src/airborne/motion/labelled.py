@@ -9,6 +9,7 @@ import xarray as xr
 
 from airborne.body import BodyModel
 from airborne.motion.angles import root_angles
+from airborne.motion.isb_angles import isb_angles
 from airborne.motion.joints import joint_angles, joint_statuses, landmarks
 from airborne.motion.jumps.jump import Jump
 from airborne.motion.jumps.table import JUMP_COLUMNS, jump_row
@@ -70,10 +71,11 @@ def label_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
     """Label a body's angles [deg]: `somersault`, `tilt`, `twist` (time) of the root, each with `_sd`; and its joints'.
 
     `angle` and `angle_sd` (time, joint, axis) are those of `joint_angles`; `is_singular` (time) tells where the root's
-    are ambiguous, `joint_is_singular` (time, joint) where a joint's are. Raises ResultError for another body's motion.
+    are ambiguous, `joint_is_singular` (time, joint) where a joint's are. `isb_angle` and the others are those of
+    `isb_angles`. Raises ResultError for another body's motion.
     """
-    joints = joint_angles(motion, model)
-    return root_angles(motion).assign(joints.rename(is_singular="joint_is_singular").data_vars)
+    joints = joint_angles(motion, model).rename(is_singular="joint_is_singular")
+    return root_angles(motion).assign(joints.data_vars).assign(isb_angles(motion, model).data_vars)
 
 
 def label_jumps(jumps: Sequence[Jump]) -> xr.Dataset:

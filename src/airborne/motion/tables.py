@@ -12,6 +12,7 @@ from airborne.io.parquet import CAN_WRITE_PARQUET, write_parquet
 from airborne.io.writing import write_text
 from airborne.motion.angles import ROOT_ANGLES, root_angles
 from airborne.motion.flight.momentum_table import measure_flight
+from airborne.motion.isb_angles import isb_angles
 from airborne.motion.joints import joint_angles, joint_statuses, landmarks
 from airborne.motion.motion import Motion
 from airborne.types import Array
@@ -93,7 +94,7 @@ def write_joints(path: Path, motion: Motion, model: BodyModel) -> None:
 
 
 def write_joint_angles(path: Path, motion: Motion, model: BodyModel) -> None:
-    """Write joint_angles.csv, long: one row per frame and joint, named by its segment; degrees, and is_singular.
+    """Write joint_angles.csv, long: a row per frame and joint, named by its segment; degrees, in x-y-z and ISB's way.
 
     Raises ResultError for another body's motion.
     """
@@ -101,7 +102,12 @@ def write_joint_angles(path: Path, motion: Motion, model: BodyModel) -> None:
     columns = _long(motion, np.array(motion.joints, np.str_))
     columns |= {f"{axis}_deg": table["angle"].sel(axis=axis).to_numpy().ravel() for axis in "xyz"}
     columns |= {f"{axis}_deg_sd": table["angle_sd"].sel(axis=axis).to_numpy().ravel() for axis in "xyz"}
-    _write_csv(path, columns | {"is_singular": table["is_singular"].to_numpy().astype(int).ravel()})
+    columns["is_singular"] = table["is_singular"].to_numpy().astype(int).ravel()
+    isb = isb_angles(motion, model)
+    columns["isb_sequence"] = np.tile(isb["isb_sequence"].to_numpy(), len(motion))
+    columns |= {f"isb_{k}_deg": isb["isb_angle"].sel(rotation=k).to_numpy().ravel() for k in (1, 2, 3)}
+    columns |= {f"isb_{k}_deg_sd": isb["isb_angle_sd"].sel(rotation=k).to_numpy().ravel() for k in (1, 2, 3)}
+    _write_csv(path, columns | {"isb_is_singular": isb["isb_is_singular"].to_numpy().astype(int).ravel()})
 
 
 def write_flight(path: Path, motion: Motion, model: BodyModel) -> None:

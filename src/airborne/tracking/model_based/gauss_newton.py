@@ -7,16 +7,17 @@ Far out, the blurred mask is fitted to the blurred probability of each pixel to 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.appearance.model import Appearance, Region
 from airborne.body import Pose, PosedBody
-from airborne.tracking.model_based.blur import gaussian_taps
+from airborne.tracking.model_based.blur import RADIUS_PX, gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, PosePrior
-from airborne.tracking.model_based.kernel_arguments import Comparison, Paint
+from airborne.tracking.model_based.kernel_arguments import Comparison, Paint, Window
 from airborne.tracking.model_based.normal_equations import (
     equations_of_known_light,
     photometric_equations,
@@ -42,11 +43,13 @@ _FINE_SIGMA_PX = 1.2  # of a full frame
 _CLIP = 0.1  # linear light, 0..1: a residual this large has a quarter of the weight
 _CLIP_LIT = 0.5  # the same under known lights, where no shadow or highlight has to be left out
 _CLIP_MASK = 0.5  # the same, of a mask
+_PATCH = 8.0  # by this factor more pixels of a person are taken for body, or not, together; chosen as _SHAPE_WIDTH_M
 _OVERSTEP = 1.6  # robust weights and the refitted light make each step too short by about this factor
 _MOST_STEPS = 12  # at each level of a body with joints
 _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
-_CONVERGED = 1 / 3  # squared length of the last step, in sds of the pose, for each degree of freedom
+_CONVERGED, _CONVERGED_STIFF = 1 / 3, 1  # squared length of the last step, in sds, for each degree of freedom
 SHAPE_SD_M = 0.007  # model error: how far a person's segment lies from the ellipsoid that fits its image
+_SHAPE_WIDTH_M = 0.075  # along which that error is the same; chosen on synthetic somersaults
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +113,7 @@ def fit_silhouettes(
                 shifted=[],
                 totals=totals,
                 correlated=correlated,
+                shared=_PATCH * correlated if dofs.moves_joints else correlated,
             )
 
         pose, _ = descend_pose(evaluate, dofs, pose, prior, most_steps=steps, overstep=1.0)
@@ -130,9 +134,9 @@ def fit_images(
     Of several starts, the one that ends in the best agreement with images and prior is returned.
     """
     evaluate, correlated = _image_evaluator(render_model, poses, regions, appearance, dofs=dofs)
-    most_steps = _MOST_STEPS if dofs.moves_joints else _MOST_STEPS_STIFF
+    most_steps, converged = (_MOST_STEPS, _CONVERGED) if dofs.moves_joints else (_MOST_STEPS_STIFF, _CONVERGED_STIFF)
     ends = [
-        descend_pose(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, tolerance=_CONVERGED)
+        descend_pose(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, tolerance=converged)
         for pose in poses
     ]
     noise = min(equations.noise for _, equations in ends)
@@ -148,30 +152,36 @@ def linearise_images(
     return evaluate(pose, True)
 
 
-def image_cost(render_model: RenderModel, bodies: Sequence[PosedBody], region: Region, appearance: Appearance) -> Array:
-    """Return minus the log-likelihood of one image for each of several bodies, the light and noise of the first."""
-    view, n = image_buffers(render_model, bodies[:1], region, appearance), len(render_model.model.segments)
+def rises_without(
+    render_model: RenderModel, posed: PosedBody, others: Mapping[int, PosedBody], region: Region, appearance: Appearance
+) -> Array:
+    """Return by how much minus the log-likelihood of one image rises as each of some segments is taken away: (k,).
+
+    others: the same body without each segment. Light and noise are those of the whole body, and only the pixels around
+    those that the segment covers are compared: no others change.
+    """
+    view, n = image_buffers(render_model, [posed], region, appearance), len(render_model.model.segments)
+    rises = np.zeros(len(others))
     if not view.is_visible:
-        return np.zeros(len(bodies))
+        return rises
     rows_sigma_px = max(_FINE_SIGMA_PX * region.aspect, 0.5)
     taps = gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(rows_sigma_px)
-    totals = np.array(
-        [
-            _add_image_equations(
-                render_model,
-                posed,
-                view,
-                taps=taps,
-                iterations=0 if k else 3,
-                sums=Sums.zero(n),
-                blocks=_blocks(view, n),
-            )
-            for k, posed in enumerate(bodies)
-        ]
-    )
-    cost, total, weight = totals.T
-    noise = 4 * np.pi * _FINE_SIGMA_PX * rows_sigma_px * total[0] / weight[0] if weight[0] > 0 else 1.0
-    return 0.5 * cost / max(noise, 1e-9)
+
+    def totals(posed: PosedBody, window: Window, iterations: int) -> Array:
+        part = view._replace(window=window)
+        sums, blocks = Sums.zero(n), _blocks(part, n)
+        args = render_model, posed, part
+        return _add_image_equations(*args, taps=taps, iterations=iterations, sums=sums, blocks=blocks)
+
+    _, total, weight = totals(posed, view.window, 3)
+    noise = max(4 * np.pi * _FINE_SIGMA_PX * rows_sigma_px * total / weight, 1e-9) if weight > 0 else 1.0
+    drawn = view.maps.part
+    owner = np.where(drawn < 0, -1, render_model.segment_of_part[drawn])
+    for k, (segment, other) in enumerate(others.items()):
+        if (owner == segment).any():
+            window = _window_around(owner == segment, view.window)
+            rises[k] = 0.5 * (totals(other, window, 0)[0] - totals(posed, window, 0)[0]) / noise
+    return rises
 
 
 def _image_evaluator(
@@ -193,6 +203,8 @@ def _image_evaluator(
     taps = [(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma)) for sigma in rows_sigma_px]
     correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px or [_FINE_SIGMA_PX]))
     shifts = [shift_sds_px(region) for _, region in views_and_regions]
+    shape_px = [_shape_error_px(view, bodies[0]) for view, _ in views_and_regions] if dofs.moves_joints else []
+    shared = max(correlated, float(np.mean(shape_px or [0.0])))
 
     def evaluate(pose: Pose, is_first: bool) -> PoseEquations:
         posed, n = render_model.with_pose(pose), len(render_model.model.segments)
@@ -217,6 +229,7 @@ def _image_evaluator(
             shifted=shifted,
             totals=totals,
             correlated=correlated,
+            shared=shared,
         )
 
     return evaluate, correlated
@@ -253,6 +266,21 @@ def _shape_error_gradients(B: Array, posed: PosedBody, view: ViewBuffers) -> Arr
     rows = np.zeros((n, 2, n, 6))
     rows[np.arange(n), :, np.arange(n)] = np.swapaxes(B[..., :2], 1, 2) * sd_px[..., None]
     return rows.reshape(2 * n, n, 6)
+
+
+def _shape_error_px(view: ViewBuffers, posed: PosedBody) -> float:
+    """Return how many pixels of a view have their shape error in common."""
+    depth_m = max(float(posed.t[0] @ view.packed_view[6:9] + view.packed_view[11]), 0.1)
+    return float(view.K[0, 0] * view.K[1, 1]) * (_SHAPE_WIDTH_M / depth_m) ** 2
+
+
+def _window_around(pixels: NDArray[np.bool_], whole: Window) -> Window:
+    """Return the part of a window, with a rim, in which the blurred residual changes as some pixels (H, W) do."""
+    rows, columns = np.flatnonzero(pixels.any(axis=1)), np.flatnonzero(pixels.any(axis=0))
+    rim = 2 * RADIUS_PX + 1
+    x0, x1 = max(int(columns[0]) - rim, whole.x0), min(int(columns[-1]) + rim + 1, whole.x1)
+    y0, y1 = max(int(rows[0]) - rim, whole.y0), min(int(rows[-1]) + rim + 1, whole.y1)
+    return Window(x0, y0, x1, y1)
 
 
 def _blocks(view: ViewBuffers, n_segments: int) -> Array:

@@ -17,6 +17,7 @@ from airborne.tracking.model_based.twist_equations import Sums, add_score_covari
 from airborne.types import Array
 
 _SHORTER = 0.4  # factor on a step that does not lower the objective
+_LEAST_SHARE = 0.1  # of a step: three losses; where none of them gains, the refitted light only fluctuates
 _SLACK = 1e-3  # of the objective: the refitted light makes it fluctuate
 
 
@@ -31,6 +32,7 @@ class PoseEquations:
     patches: Sequence[Array]  # (n, segments, 6) gradients that vary together: of blocks, of shifted images
     cost: float  # robust squared residual
     noise: float  # mean square of the weighted residual, times how many pixels share it
+    misfit: float  # the same where the shape is wrong, too: a pose is weighed against its prior by this
 
     def covariance(self) -> Array:
         """Return the covariance (d, d) of the free degrees of freedom."""
@@ -55,16 +57,20 @@ def map_to_dofs(
     shifted: Sequence[Array],
     totals: Array,
     correlated: float,
+    shared: float,
 ) -> PoseEquations:
-    """Map the segments' equations through the chain of joints."""
+    """Map the segments' equations through the chain of joints.
+
+    correlated, shared: how many pixels have their noise in common, and how many what the wrong shape adds.
+    """
     J = np.ascontiguousarray(render_model.jacobian(posed, dofs))
     d = J.shape[-1]
     A, g = np.zeros((d, d)), np.zeros(d)
-    map_equations(sums.curvature, sums.g, J, A, g)
+    map_equations(sums.A, sums.g, J, A, g)
     cost, total, weight = totals
-    noise = correlated * (total / weight if weight > 0 else 1.0)
+    residual = total / weight if weight > 0 else 1.0
     rows = [each.reshape(-1, *J.shape[:2]) for each in blocks] + list(shifted)
-    return PoseEquations(pose, A, g, J, rows, float(cost), float(noise))
+    return PoseEquations(pose, A, g, J, rows, float(cost), float(correlated * residual), float(shared * residual))
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,24 +82,24 @@ class _Iterate:
     prior: PosePrior | None
 
     @property
-    def noise(self) -> float:
+    def misfit(self) -> float:
         """Variance of the residual here."""
-        return max(self.equations.noise, 1e-9)
+        return max(self.equations.misfit, 1e-9)
 
     @cached_property
     def delta(self) -> Array:
         """The whole step: (d,)."""
         equations = self.equations
-        return self.dofs.solve_step(equations.pose, equations.A / self.noise, equations.g / self.noise, self.prior)
+        return self.dofs.solve_step(equations.pose, equations.A / self.misfit, equations.g / self.misfit, self.prior)
 
     def cost(self, reference: _Iterate) -> float:
-        """Return minus the log-posterior, with the noise of the reference."""
-        return self.equations.objective(reference.noise, self.dofs.prior_cost(self.equations.pose, self.prior))
+        """Return minus the log-posterior, with the misfit of the reference."""
+        return self.equations.objective(reference.misfit, self.dofs.prior_cost(self.equations.pose, self.prior))
 
     def step(self, share: float) -> tuple[Pose, float]:
         """Return the pose after a share of the step, and the decrease that the images predict of the whole."""
         pose = self.dofs.update(self.equations.pose, share * self.delta)
-        return pose, 0.5 * float(self.delta @ self.equations.A @ self.delta) / self.noise
+        return pose, 0.5 * float(self.delta @ self.equations.A @ self.delta) / self.misfit
 
 
 def descend_pose(
@@ -114,7 +120,7 @@ def descend_pose(
     descent = descend(
         _Iterate(evaluate(pose, True), dofs, prior),
         lambda pose: _Iterate(evaluate(pose, False), dofs, prior),
-        BacktrackingRule(overstep, _SHORTER),
+        BacktrackingRule(overstep, _SHORTER, _LEAST_SHARE),
         most_steps=most_steps - 1,
         least_predicted=(0.5 * tolerance * len(dofs.columns), 0.0),
         slack=_SLACK,

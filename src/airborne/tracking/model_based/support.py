@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from airborne.appearance.model import Appearance, Region
 from airborne.body import BodyModel, Pose, PosedBody
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
-from airborne.tracking.model_based.gauss_newton import image_cost
+from airborne.tracking.model_based.gauss_newton import rises_without
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
@@ -34,9 +34,8 @@ def count_views(
     for region in regions:
         R, t = region.packed_view[:9].reshape(3, 3), region.packed_view[9:12]
         behind = -R.T @ t - _BEHIND_M * R[2]
-        bodies = [posed, *(_without(posed, int(segment), behind) for segment in segments)]
-        cost = image_cost(render_model, bodies, region, appearance)
-        counts[segments] += cost[1:] - cost[0] > _STRONG_NATS
+        others = {int(segment): _without(posed, int(segment), behind) for segment in segments}
+        counts[segments] += rises_without(render_model, posed, others, region, appearance) > _STRONG_NATS
     return counts
 
 

@@ -1,0 +1,101 @@
+"""Joint angles in the sequences that the ISB recommends.
+
+Source: Wu et al. 2002 (J. Biomech. 35, 543-548) for trunk, hip and ankle, 2005 (J. Biomech. 38, 981-992) for shoulder,
+elbow and wrist; the knee as Grood and Suntay 1983.
+
+ISB axes: X forward, Y up, Z to the right; every angle is right-handed about its axis. The left side is mirrored, so
+that its angles have the meaning of the right side's.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from airborne.body import BodyModel
+from airborne.geometry.axis_sequences import angles_from_rotation, continue_angles, is_singular, sequence_angles
+from airborne.geometry.rotations import matrix_from_angles
+from airborne.motion.joints import OPEN_SD_RAD, require_body
+from airborne.motion.motion import Motion
+from airborne.motion.uncertainty import propagate_variances, standard_deviation
+from airborne.types import Array
+
+_X, _Y, _Z = np.array([0.0, -1, 0]), np.array([0.0, 0, 1]), np.array([-1.0, 0, 0])  # ISB's axes in those of the body
+_WRIST_X, _WRIST_Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])  # palms toward the thighs
+_PRONATED_RAD = np.pi / 2  # the model's zero pose has its palms toward the thighs, the ISB's forward
+_MIRRORED = np.array([1.0, -1.0, -1.0])  # a rotation vector seen in a mirror of the median plane
+
+
+class _Sequence(NamedTuple):
+    """How one joint's rotation is told."""
+
+    name: str
+    axes: Array  # (3, 3) rows, in the body's axes
+    third_at_zero_rad: float = 0.0  # the third angle in the model's zero pose
+
+
+_CARDAN = _Sequence("ZXY", np.stack([_Z, _X, _Y]))
+_OF_RIGHT = {
+    **dict.fromkeys(("thigh", "shank", "foot"), _CARDAN),
+    "shoulder": _Sequence("YXZ", np.stack([_Y, _X, _Z])),
+    "upper_arm": _Sequence("YXY", np.stack([_Y, _X, _Y])),
+    "forearm": _CARDAN._replace(third_at_zero_rad=_PRONATED_RAD),
+    "hand": _Sequence("ZXY", np.stack([_WRIST_Z, _WRIST_X, _Y])),
+}
+_OF_SEGMENT = (
+    dict.fromkeys(("torso", "chest", "head"), _CARDAN)
+    | {f"{name}_right": sequence for name, sequence in _OF_RIGHT.items()}
+    | {f"{name}_left": sequence._replace(axes=sequence.axes * _MIRRORED) for name, sequence in _OF_RIGHT.items()}
+)
+_GIRDLE, _UPPER_ARM = "shoulder", "upper_arm"  # an upper arm's angles are those against the thorax
+
+
+def isb_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
+    """Compute the joint angles [deg] in ISB's sequences, continuous over time, with standard deviations.
+
+    Of the segments of `human18`; of others NaN, and no sequence. An upper arm's are those against the thorax. Standard
+    deviations and singular frames as of `joint_angles`. Raises ResultError for another body's motion.
+    """
+    require_body(motion, model)
+    angles, variance = np.full((2, len(motion), len(motion.joints), 3), np.nan)
+    singular, names = np.zeros(angles.shape[:2], bool), [""] * len(motion.joints)
+    R = matrix_from_angles(motion.joint_angles)
+    for joint, segment in enumerate(motion.joints):
+        sequence = _OF_SEGMENT.get(segment)
+        if sequence is None:
+            continue
+        names[joint], axes = sequence.name, sequence.axes
+        path = _joints_between(model, joint)
+        turned = R[:, path[0]] if len(path) == 1 else R[:, path[0]] @ R[:, joint]
+        angles[:, joint] = continue_angles(sequence_angles(turned, axes), axes)
+        singular[:, joint] = is_singular(angles[:, joint], axes)
+        own = angles_from_rotation(angles[:, joint], axes)
+        jacobian = np.concatenate([own @ np.swapaxes(R[:, joint], -1, -2), own][-len(path) :], axis=-1)
+        columns = np.concatenate([np.arange(6 + 3 * k, 9 + 3 * k) for k in path])
+        for row in np.flatnonzero(motion.has_pose):
+            covariance = motion.covariance[row][np.ix_(columns, columns)]
+            variance[row, joint] = propagate_variances(jacobian[row], covariance)
+        angles[:, joint, 2] += sequence.third_at_zero_rad
+    variance[variance > OPEN_SD_RAD**2] = np.inf
+    dimensions = ("time", "joint", "rotation")
+    variables = {
+        "isb_angle": (dimensions, np.rad2deg(angles), {"units": "deg", "order": "as isb_sequence, body-fixed"}),
+        "isb_angle_sd": (dimensions, np.rad2deg(standard_deviation(variance)), {"units": "deg"}),
+        "isb_is_singular": (dimensions[:2], singular),
+        "isb_sequence": (dimensions[1:2], np.array(names)),
+    }
+    coordinates = {
+        "time": ("time", motion.time_s, {"units": "s"}),
+        "joint": np.array(motion.joints, np.str_),
+        "rotation": [1, 2, 3],
+    }
+    return xr.Dataset(variables, coordinates)
+
+
+def _joints_between(model: BodyModel, joint: int) -> list[int]:
+    """Return the joints from the segment that a joint's angles are told against to its own, proximal first."""
+    name, parent = model.segments[joint + 1].name, int(model.parents[joint + 1])
+    is_arm = name.startswith(_UPPER_ARM) and model.segments[parent].name.startswith(_GIRDLE)
+    return [parent - 1, joint] if is_arm else [joint]
