@@ -216,7 +216,12 @@ def _step(level: _Level, state: _Iterate) -> _Iterate | None:
         rows = np.where(level.is_known(index)[:, None], rows, 0.0)
         H = np.tensordot(J, A @ J, axes=([0, 1], [0, 1]))
         systems.append(
-            (H, np.tensordot(J, g, axes=2 * [[0, 1]]), rows.T @ rows, rows.T @ level.landmark_residuals(posed, index))
+            (
+                H,
+                np.tensordot(J, g, axes=([0, 1], [0, 1])),
+                rows.T @ rows,
+                rows.T @ level.landmark_residuals(posed, index),
+            )
         )
     noise = total.noise
     systems = [(H / noise + J, g / noise + j) for H, g, J, j in systems]
