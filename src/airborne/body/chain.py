@@ -138,11 +138,11 @@ def angles_of(pose: Pose, n_joints: int) -> Array:
 
 def _is_carried(model: BodyModel) -> NDArray[np.bool_]:
     """Say which segments each joint carries along: (segments, joints); joint k belongs to segment k + 1."""
-    return _carried(tuple(model.parents.tolist()))
+    return _is_descendant(tuple(model.parents.tolist()))
 
 
 @lru_cache(maxsize=64)
-def _carried(parents: tuple[int, ...]) -> NDArray[np.bool_]:
+def _is_descendant(parents: tuple[int, ...]) -> NDArray[np.bool_]:
     carried = np.zeros((len(parents), len(parents)), bool)
     for segment, parent in enumerate(parents[1:], start=1):
         carried[segment] = carried[parent]

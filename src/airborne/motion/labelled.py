@@ -9,7 +9,7 @@ import xarray as xr
 
 from airborne.body import BodyModel
 from airborne.motion.angles import root_angles
-from airborne.motion.isb_angles import isb_angles
+from airborne.motion.isb import isb_angles
 from airborne.motion.joints import joint_angles, joint_statuses, landmarks
 from airborne.motion.jumps.jump import Jump
 from airborne.motion.jumps.table import JUMP_COLUMNS, jump_row

@@ -12,7 +12,7 @@ from airborne.io.parquet import CAN_WRITE_PARQUET, write_parquet
 from airborne.io.writing import write_text
 from airborne.motion.angles import ROOT_ANGLES, root_angles
 from airborne.motion.flight.momentum_table import measure_flight
-from airborne.motion.isb_angles import isb_angles
+from airborne.motion.isb import isb_angles
 from airborne.motion.joints import joint_angles, joint_statuses, landmarks
 from airborne.motion.motion import Motion
 from airborne.types import Array

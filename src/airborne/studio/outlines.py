@@ -42,7 +42,7 @@ def outline_items(posed: PosedBody, cameras: Sequence[Camera], colour: str) -> l
         contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
         for contour in contours:
             line = camera.distort_px(cv2.approxPolyDP(contour, 0.7, True)[:, 0].astype(float))
-            items.append({"pane": pane, "points": _rounded(line), "colour": colour, "width": 2, "closed": True})
+            items.append({"pane": pane, "points": _round(line), "colour": colour, "width": 2, "closed": True})
     return items
 
 
@@ -134,7 +134,7 @@ def _players_overlay(motion: PlayersMotion, cameras: Sequence[Camera], frame: in
                     text = name if side == "left" else ""
                     item = {
                         "pane": pane,
-                        "points": _rounded(line),
+                        "points": _round(line),
                         "colour": _COLOURS[status],
                         "width": 2.5,
                         "text": text,
@@ -161,7 +161,7 @@ def _plain(values: Iterable[float]) -> list[float | None]:
     return [round(float(value), 5) if np.isfinite(value) else None for value in values]
 
 
-def _rounded(points: np.ndarray) -> list[list[float]]:
+def _round(points: np.ndarray) -> list[list[float]]:
     return np.round(points, 2).tolist()
 
 

@@ -22,7 +22,7 @@ from airborne.video import VideoSource
 TRIAL = "trial.toml"
 VIDEO_ENDINGS = {".mp4", ".mov", ".avi", ".mkv", ".mts", ".m2ts", ".ts", ".mxf", ".webm", ".m4v", ".mpg", ".dv"}
 FEWEST_POINTS = 6  # that determine a camera
-State = Literal["empty", "ready", "needs you"]
+StepState = Literal["empty", "ready", "needs you"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,40 +131,40 @@ def list_runs(folder: Path) -> list[Path]:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class StudioStep:
     """One step on the way, and what is to be done there."""
 
     name: str
     address: str
-    state: State
+    state: StepState
     says: str
 
 
-def steps(project: Project) -> list[Step]:
+def steps(project: Project) -> list[StudioStep]:
     """Return the steps on the way to a report, with their states."""
     return list(_steps(project))
 
 
-def _steps(project: Project) -> Iterator[Step]:
+def _steps(project: Project) -> Iterator[StudioStep]:
     n = len(project.cameras)
     missing = [each.video for each in project.cameras if not (project.folder / each.video).is_file()]
     if missing:
-        yield Step("Videos", "/", "needs you", f"{', '.join(missing)} not found")
+        yield StudioStep("Videos", "/", "needs you", f"{', '.join(missing)} not found")
     elif n:
-        yield Step("Videos", "/", "ready", f"{n} cameras" if n > 1 else "1 camera")
+        yield StudioStep("Videos", "/", "ready", f"{n} cameras" if n > 1 else "1 camera")
     else:
-        yield Step("Videos", "/", "needs you", project.mistake or "choose the cameras")
-    yield Step("Cameras", "/cameras", *_cameras_state(project))
+        yield StudioStep("Videos", "/", "needs you", project.mistake or "choose the cameras")
+    yield StudioStep("Cameras", "/cameras", *_cameras_state(project))
     body = project.table("body")
     what = body.get("file") or body.get("preset") or body.get("measurements")
-    yield Step(
+    yield StudioStep(
         "Body", "/body", "ready" if what else "needs you" if n else "empty", str(what or "choose what is tracked")
     )
-    yield Step("First pose", "/start", *_start_state(project))
+    yield StudioStep("First pose", "/start", *_start_state(project))
     yield from _run_steps(project)
 
 
-def _cameras_state(project: Project) -> tuple[State, str]:
+def _cameras_state(project: Project) -> tuple[StepState, str]:
     table = project.table("calibration")
     if "file" in table:
         return (
@@ -185,7 +185,7 @@ def _cameras_state(project: Project) -> tuple[State, str]:
     return ("needs you", f"click points in {', '.join(few)}") if few else ("ready", "control points")
 
 
-def _start_state(project: Project) -> tuple[State, str]:
+def _start_state(project: Project) -> tuple[StepState, str]:
     start = project.table("start")
     if start and not start.get("find"):
         return "ready", f"frame {start.get('frame', 0)}"
@@ -194,17 +194,17 @@ def _start_state(project: Project) -> tuple[State, str]:
     return "needs you", "where is the body?"
 
 
-def _run_steps(project: Project) -> Iterator[Step]:
+def _run_steps(project: Project) -> Iterator[StudioStep]:
     runs = list_runs(project.folder)
     is_prepared = all(project.table(name) for name in ("calibration", "body"))
     if runs:
-        yield Step("Track", "/track", "ready", runs[0].name)
+        yield StudioStep("Track", "/track", "ready", runs[0].name)
     else:
-        yield Step("Track", "/track", "needs you" if is_prepared else "empty", "follow the body")
-    yield Step("Review", "/review", "ready" if runs else "empty", runs[0].name if runs else "no run yet")
+        yield StudioStep("Track", "/track", "needs you" if is_prepared else "empty", "follow the body")
+    yield StudioStep("Review", "/review", "ready" if runs else "empty", runs[0].name if runs else "no run yet")
     finished = [run for run in runs if (run / SUMMARY).is_file()]
     reports = [run for run in finished if (run / REPORT).is_file()]
-    yield Step(
+    yield StudioStep(
         "Results",
         "/results",
         "ready" if finished else "empty",

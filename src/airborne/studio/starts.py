@@ -32,7 +32,7 @@ def read_points(session: Session, frame: int) -> Clicked:
     return read_clicked(path) if path.is_file() else Clicked((), None, {})
 
 
-def stored_pose(session: Session) -> tuple[int, Pose] | None:
+def read_pose(session: Session) -> tuple[int, Pose] | None:
     """Return the frame and pose that the trial has by hand; None where it has another start, or none."""
     try:
         start = session.project().trial().start

@@ -35,7 +35,7 @@ class Item(TypedDict, total=False):
     text: str  # at the first point
 
 
-class View(Element, component="view.js", default_classes="view"):
+class CameraViews(Element, component="view.js", default_classes="view"):
     """All cameras of a trial, at one frame."""
 
     def __init__(

@@ -32,7 +32,7 @@ def refit_pinholes(
     residual, J = _linearise(R, parameters, own, world, px, kept, start.lens == "fisheye")
     is_open = np.ones(n_fits, bool)
     for _ in range(_MOST_ITERATIONS):
-        step, predicted = _damped_step(residual, J, damping)
+        step, predicted = _levenberg_step(residual, J, damping)
         cost = np.sum(residual**2, axis=1)
         is_open &= predicted > _CONVERGED * cost
         if not is_open.any():
@@ -70,7 +70,7 @@ def _linearise(
     return residual.reshape(n_fits, 2 * n), J.reshape(n_fits, 2 * n, -1)
 
 
-def _damped_step(residual: Array, J: Array, damping: Array) -> tuple[Array, Array]:
+def _levenberg_step(residual: Array, J: Array, damping: Array) -> tuple[Array, Array]:
     """Return the steps (f, p) of least squares, damped (f,), and the decrease of the squared error they predict (f,).
 
     By the QR decomposition: the terms of a lens may nearly cancel.

@@ -8,7 +8,7 @@ from nicegui import ui
 
 from airborne.body import BodyModel
 from airborne.errors import AirborneError, count
-from airborne.studio.pages.layout import complain, errors_shown, framed, in_thread
+from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame
 from airborne.studio.project import list_bodies
 from airborne.studio.session import Session
 from airborne.trial.body import BodyTable
@@ -23,7 +23,7 @@ async def body_page(session: Session) -> None:
         "A thing needs a body file with its measured solids and colours. "
         "A person is made of stature and mass; the colours are taken from the video."
     )
-    async with framed(session, "Body", "What is tracked?", text, scrolls=True):
+    async with page_frame(session, "Body", "What is tracked?", text, scrolls=True):
         table = session.project().table("body")
         bodies = await in_thread(list_bodies, session.folder)
         with ui.element("div").classes("row-line").style("align-items: stretch"):

@@ -10,7 +10,7 @@ from airborne.cameras import Rig, read_rig
 from airborne.errors import AirborneError
 from airborne.studio.clicks import list_surveys
 from airborne.studio.pages.control_points import ControlPointsPanel
-from airborne.studio.pages.layout import errors_shown, framed, in_thread, work
+from airborne.studio.pages.layout import errors_shown, in_thread, page_frame, work
 from airborne.studio.session import Session
 from airborne.studio.stage import draw_cameras
 
@@ -23,7 +23,7 @@ _HELP = (
 
 async def cameras_page(session: Session) -> None:
     """Let the user choose a calibration file, or a survey and click its points."""
-    async with framed(session, "Cameras", "Where are the cameras?", _HELP) as changed:
+    async with page_frame(session, "Cameras", "Where are the cameras?", _HELP) as changed:
         project = session.project()
         if not project.cameras:
             ui.label("Choose the cameras first, in the step Videos.").classes("warn")

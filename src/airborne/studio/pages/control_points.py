@@ -16,7 +16,7 @@ from airborne.studio.pages.point_list import PointList
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import FEWEST_POINTS
 from airborne.studio.session import Session
-from airborne.studio.view import Mark, View
+from airborne.studio.view import CameraViews, Mark
 from airborne.types import Array, Mask
 
 _CLICKED, _CHOSEN, _PREDICTED = "#56b4e9", "#f0e442", "#c8cdd3"
@@ -63,7 +63,7 @@ class ControlPointsPanel:
         ui.keyboard(on_key=self.step)
         with ui.element("div").classes("split"):
             with ui.element("div").classes("wide"):
-                self.view = View(
+                self.view = CameraViews(
                     self.shown,
                     frame=self.session.frame,
                     on_frame=self.turn_to,
@@ -157,7 +157,7 @@ class ControlPointsPanel:
 
     def _marks(self, pane: int, camera: str) -> list[Mark]:
         marks: list[Mark] = []
-        seen_at = self.predicted(camera)
+        seen_at = self.predict(camera)
         for row, name in enumerate(self.clicked.names):
             u, v = map(float, self.clicked.at(name, camera))
             to = seen_at[row] if seen_at is not None else np.full(2, np.nan)
@@ -170,7 +170,7 @@ class ControlPointsPanel:
                 marks.append({"pane": pane, "u": to[0], "v": to[1], "label": label, "colour": _PREDICTED})
         return marks
 
-    def predicted(self, camera: str) -> Array | None:
+    def predict(self, camera: str) -> Array | None:
         """Return where a solved camera sees every point: (n, 2) [px]."""
         fit = self.fits.get(camera, (b"", ""))[1]
         assert self.clicked.world is not None
@@ -180,7 +180,7 @@ class ControlPointsPanel:
         """Say of a point whether it is clicked, and how far from where the camera sees it, in each camera [px]."""
         px = np.stack([self.clicked.at(name, camera) for camera in self.shown.names])
         row, none = self.clicked.names.index(name), np.full(2, np.nan)
-        seen_at = [self.predicted(camera) for camera in self.shown.names]
+        seen_at = [self.predict(camera) for camera in self.shown.names]
         to = np.stack([none if each is None else each[row] for each in seen_at])
         return np.isfinite(px[:, 0]), np.linalg.norm(to - px, axis=1)
 

@@ -17,8 +17,8 @@ from airborne.studio.commands import STOPPED, Command
 from airborne.studio.pages.layout import complain, errors_shown, in_thread
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
-from airborne.studio.starts import pose_of, pose_outline, stored_pose, write_start
-from airborne.studio.view import View
+from airborne.studio.starts import pose_of, pose_outline, read_pose, write_start
+from airborne.studio.view import CameraViews
 from airborne.studio.writing import FOLDER
 
 _HELP = "The body is looked for where it stands out from the empty scene, which takes a minute or two."
@@ -45,7 +45,7 @@ class FindPanel:
         ui.label(_HELP).classes("help")
         with ui.element("div").classes("split"):
             with ui.element("div").classes("wide"):
-                self.view = View(self.shown, frame=self.frame, on_frame=self.turn_to)
+                self.view = CameraViews(self.shown, frame=self.frame, on_frame=self.turn_to)
             with ui.element("div").classes("side"), ui.element("div").classes("card"):
                 with ui.element("div").classes("row-line"):
                     self.find = ui.button("Find it", on_click=self.search).props("unelevated")
@@ -59,7 +59,7 @@ class FindPanel:
         self.timer = ui.timer(_LOOK_EVERY_S, self.watch, active="find" in self.session.commands)
         self._show_search()
         self.use.set_visibility(False)
-        if (stored := stored_pose(self.session)) is not None:
+        if (stored := read_pose(self.session)) is not None:
             await self.draw(*stored)
             self.note.set_text("The outline is the pose that the trial has.")
 

@@ -7,14 +7,14 @@ from nicegui import ui
 from airborne.errors import AirborneError
 from airborne.studio.pages.click_pose import ClickPanel
 from airborne.studio.pages.find_pose import FindPanel
-from airborne.studio.pages.layout import complain, framed, in_thread, work
+from airborne.studio.pages.layout import complain, in_thread, page_frame, work
 from airborne.studio.session import Session
 
 
 async def first_pose_page(session: Session) -> None:
     """Let the user find or click the pose at one frame, and write it into the trial."""
     project = session.project()
-    async with framed(session, "First pose", "Where is the body at the start?", "") as changed:
+    async with page_frame(session, "First pose", "Where is the body at the start?", "") as changed:
         missing = [name for name in ("camera", "calibration", "body") if not project.tables.get(name)]
         if missing:
             ui.label(f"This step needs the steps before it: {', '.join(missing)}.").classes("warn")

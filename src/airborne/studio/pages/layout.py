@@ -33,7 +33,7 @@ _KEYS = {
 
 
 @asynccontextmanager
-async def framed(
+async def page_frame(
     session: Session,
     here: str,
     title: str,

@@ -12,7 +12,7 @@ from airborne.errors import count
 from airborne.io.text import read_json
 from airborne.motion.run_folder import REPORT, SUMMARY, note_if_unfinished
 from airborne.run.folder import list_tables
-from airborne.studio.pages.layout import framed
+from airborne.studio.pages.layout import page_frame
 from airborne.studio.project import list_runs
 from airborne.studio.session import Session
 
@@ -30,7 +30,7 @@ _NUMBERS = {
 
 async def results_page(session: Session) -> None:
     """Show every run of the folder, the newest first."""
-    async with framed(session, "Results", "What came of it", _HELP, scrolls=True):
+    async with page_frame(session, "Results", "What came of it", _HELP, scrolls=True):
         runs = list_runs(session.folder)
         if not runs:
             ui.label("There is no run yet; see the step Track.").classes("warn")

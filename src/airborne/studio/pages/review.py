@@ -12,12 +12,12 @@ from nicegui import ui
 from airborne.cameras import read_rig
 from airborne.motion.run_folder import CALIBRATION, holds_players
 from airborne.studio.outlines import run_body, run_motion
-from airborne.studio.pages.layout import complain, framed, in_thread, work
+from airborne.studio.pages.layout import complain, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
 from airborne.studio.session import Session
 from airborne.studio.stage import BodyOnStage, draw_cameras
-from airborne.studio.view import Curves, View
+from airborne.studio.view import CameraViews, Curves
 from airborne.tracking import Status
 
 _AROUND_M = 2.0  # how far from the path the scene is looked at from
@@ -26,7 +26,7 @@ _HELP = "Step through the run: pictures, curves and scene share one frame. Bands
 
 async def review_page(session: Session) -> None:
     """Show a run."""
-    async with framed(session, "Review", "Is it right?", _HELP):
+    async with page_frame(session, "Review", "Is it right?", _HELP):
         runs = list_runs(session.folder)
         if not runs:
             ui.label("There is no run yet; see the step Track.").classes("warn")
@@ -62,7 +62,9 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
 
     with ui.element("div").classes("split"):
         with ui.element("div").classes("wide"):
-            View(shown, frame=session.frame, overlay=f"/overlay/{quote(folder.name)}/{{frame}}", on_frame=turn_to)
+            CameraViews(
+                shown, frame=session.frame, overlay=f"/overlay/{quote(folder.name)}/{{frame}}", on_frame=turn_to
+            )
         if not holds_players(folder):
             with ui.element("div").classes("side"):
                 bodies.append(await _stage(folder))

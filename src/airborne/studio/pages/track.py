@@ -13,11 +13,11 @@ from airborne.io.names import check_name
 from airborne.motion.run_folder import MOTION, SUMMARY
 from airborne.studio.commands import STOPPED, Command
 from airborne.studio.outlines import run_rows
-from airborne.studio.pages.layout import complain, framed, in_thread, work
+from airborne.studio.pages.layout import complain, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
 from airborne.studio.session import Session
-from airborne.studio.view import View
+from airborne.studio.view import CameraViews
 
 _LOOK_EVERY_S = 1.0  # at a run that goes on
 _HELP = (
@@ -28,7 +28,7 @@ _HELP = (
 
 async def track_page(session: Session) -> None:
     """Start, watch, stop and resume a run."""
-    async with framed(session, "Track", "Follow the body", _HELP):
+    async with page_frame(session, "Track", "Follow the body", _HELP):
         project = session.project()
         missing = [name for name in ("camera", "calibration", "body") if not project.tables.get(name)]
         if missing:
@@ -83,7 +83,7 @@ class _Panel:
                 .style("width: 220px")
             )
             self.says = ui.label().classes("small soft")
-        self.view = View(self.shown, frame=self.session.frame, overlay=self._overlay, on_frame=self.turn_to)
+        self.view = CameraViews(self.shown, frame=self.session.frame, overlay=self._overlay, on_frame=self.turn_to)
         ui.timer(_LOOK_EVERY_S, self.look)
 
     @property

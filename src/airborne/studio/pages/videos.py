@@ -10,7 +10,7 @@ from nicegui import ui
 
 from airborne.errors import AirborneError
 from airborne.io.names import check_name
-from airborne.studio.pages.layout import complain, errors_shown, framed, in_thread
+from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame
 from airborne.studio.project import Project, list_outer_videos, list_videos
 from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_cameras
@@ -39,7 +39,7 @@ async def videos_page(session: Session) -> None:
         "Tick the files that are cameras of one recording; the first one is the clock. "
         "A file that holds two fields in a picture gives twice as many images a second."
     )
-    async with framed(session, "Videos", "Which videos are the cameras?", text, scrolls=True):
+    async with page_frame(session, "Videos", "Which videos are the cameras?", text, scrolls=True):
         project = session.project()
         if project.mistake:
             ui.label(project.mistake).classes("bad")

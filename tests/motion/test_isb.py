@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
-from airborne.motion.isb_angles import isb_angles
+from airborne.motion.isb import isb_angles
 from tests.support.motions import motion_of, shaken
 from tests.support.people import HUMAN
 from tests.support.tolerances import ROUNDTRIP, sampled
