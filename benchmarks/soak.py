@@ -1,10 +1,10 @@
 """A soak: memory, descriptors and threads that should stay flat, and nothing lost that is not counted.
 
 `python benchmarks/soak.py trials [--times 10000] [--minutes M]`: trials of three frames, one after the other in one
-process. `python benchmarks/soak.py live [--minutes 30]`: three paced pipes whose cameras stall, fall silent, come back,
-and send garbage. `python benchmarks/soak.py long [--minutes 10]`: a recording of 1920×1080 pixels. Players whose
-tracker needs no pictures stand in for those that are tracked, as what is around the tracker is tested; `trials` also
-tracks a body.
+process. `python benchmarks/soak.py live [--minutes 30]`: three paced pipes whose cameras stall, fall silent, vanish,
+come back, and send garbage. `python benchmarks/soak.py long [--minutes 10]`: a recording of 1920×1080 pixels. Players
+whose tracker needs no pictures stand in for those that are tracked, as what is around the tracker is tested; `trials`
+also tracks a body.
 Prints one JSON object: of everything sampled the slope a step with its 95 % interval, after the first fifth.
 """
 
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import multiprocessing
 import os
 import random
 import shutil
@@ -22,10 +23,13 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
+from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import BinaryIO
 
 import av
 import numpy as np
+from av.container import OutputContainer
 from scipy.stats import linregress, t
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -35,6 +39,7 @@ from airborne.run import players
 from airborne.run.track import track_trial
 from airborne.synthetic.throw.writing import write_trial as write_scene
 from airborne.trial.file import read_trial
+from airborne.types import Image
 from tests.support.players_trial import StandIn, camera, trial_text, write_trial
 from tests.support.synthetic import small_scene
 
@@ -89,12 +94,12 @@ def soak_live(folder: Path, seconds: float) -> dict[str, object]:
     write_trial(folder / "clips", CLIP, names=NAMES)
     (folder / "live.toml").write_text(trial_text(NAMES, video=f"{folder.as_posix()}/{{}}.ts"), encoding="utf-8")
     shutil.copyfile(folder / "clips" / "calib.toml", folder / "calib.toml")
-    counts: dict[str, int] = {}
     for name in NAMES:
         os.mkfifo(folder / f"{name}.ts")
-    senders = [threading.Thread(target=_send, args=(folder, name, seconds, counts)) for name in NAMES]
-    for sender in senders:
-        sender.start()
+    context = multiprocessing.get_context("spawn")  # whose memory is not ours
+    received, sent = context.Pipe(duplex=False)
+    senders = context.Process(target=_send_all, args=(folder, seconds, sent))
+    senders.start()
     samples = Samples()
     run = track_trial(
         read_trial(folder / "live.toml"),
@@ -103,31 +108,59 @@ def soak_live(folder: Path, seconds: float) -> dict[str, object]:
         pictures=False,
         progress=lambda step, _: samples.take(step) if step % RATE == 1 else None,
     )
-    for sender in senders:
-        sender.join()
-    return {"sent": counts, "live": run.summary["live"], "frames": len(run.motion), **samples.slopes()}
+    counts = received.recv()
+    senders.join()
+    returns = [event for event in run.summary["events"] if "came back" in event]
+    return {
+        "sent": counts,
+        "live": run.summary["live"],
+        "returns": returns,
+        "frames": len(run.motion),
+        **samples.slopes(),
+    }
+
+
+def _send_all(folder: Path, seconds: float, sent: Connection) -> None:
+    """Send into every pipe, and then how many images each was sent."""
+    counts: dict[str, int] = {}
+    threads = [threading.Thread(target=_send, args=(folder, name, seconds, counts)) for name in NAMES]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    sent.send(counts)
 
 
 def _send(folder: Path, name: str, seconds: float, counts: dict[str, int]) -> None:
-    """Send images at their rate as an MPEG transport stream, with what goes wrong with cameras in between."""
-    rng, start_s, n_sent = random.Random(name), time.monotonic(), 0
-    with open(folder / f"{name}.ts", "wb", buffering=0) as pipe, av.open(pipe, "w", format="mpegts") as container:
-        with av.open(folder / "clips" / f"{name}.mkv") as clip:
-            images = [frame.to_ndarray(format="rgb24") for frame in clip.decode(video=0)]
-        stream = container.add_stream("libx264", rate=RATE, options={"bf": "0", "g": "10", "preset": "ultrafast"})
-        stream.width, stream.height, stream.pix_fmt = images[0].shape[1], images[0].shape[0], "yuv420p"
-        while (now_s := time.monotonic() - start_s) < seconds:
-            if n_sent > RATE and rng.random() < 0.01:
-                time.sleep(rng.choice([0.1, 0.5, 3.0]))  # stalls, or falls silent
-            if n_sent > RATE and rng.random() < 0.01:
-                pipe.write(rng.randbytes(rng.choice([188, 5000])))
-            frame = av.VideoFrame.from_ndarray(images[n_sent % len(images)])
-            frame.pts, frame.time_base = round(now_s * RATE), Fraction(1, RATE)
-            container.mux(stream.encode(frame))
-            n_sent += 1
-            time.sleep(max(0.0, start_s + now_s + 1 / RATE - time.monotonic()))
-        container.mux(stream.encode(None))
-    counts[name] = n_sent
+    """Send images at their rate, with what goes wrong with cameras in between; the last 15 s without vanishing."""
+    rng, end_s = random.Random(name), time.monotonic() + seconds
+    with av.open(folder / "clips" / f"{name}.mkv") as clip:
+        images = [frame.to_ndarray(format="rgb24") for frame in clip.decode(video=0)]
+    while time.monotonic() < end_s:
+        with open(folder / f"{name}.ts", "wb", buffering=0) as pipe, av.open(pipe, "w", format="mpegts") as container:
+            counts[name] = counts.get(name, 0) + _send_stream(pipe, container, images, rng, end_s)
+        time.sleep(min(rng.uniform(0.0, 4.0), max(0.0, end_s - time.monotonic())))
+
+
+def _send_stream(
+    pipe: BinaryIO, container: OutputContainer, images: list[Image], rng: random.Random, end_s: float
+) -> int:
+    """Send an MPEG transport stream until it vanishes, or to the end; return the number of images sent."""
+    stream = container.add_stream("libx264", rate=RATE, options={"bf": "0", "g": "10", "preset": "ultrafast"})
+    stream.width, stream.height, stream.pix_fmt = images[0].shape[1], images[0].shape[0], "yuv420p"
+    start_s, n_sent = time.monotonic(), 0
+    while (now_s := time.monotonic()) < end_s and (n_sent < 10 * RATE or now_s > end_s - 15 or rng.random() > 0.001):
+        if n_sent > RATE and rng.random() < 0.01:
+            time.sleep(rng.choice([0.1, 0.5, 3.0]))  # stalls, or falls silent
+        if n_sent > RATE and rng.random() < 0.01:
+            pipe.write(rng.randbytes(rng.choice([188, 5000])))
+        frame = av.VideoFrame.from_ndarray(images[n_sent % len(images)])
+        frame.pts, frame.time_base = round((now_s - start_s) * RATE), Fraction(1, RATE)
+        container.mux(stream.encode(frame))
+        n_sent += 1
+        time.sleep(max(0.0, now_s + 1 / RATE - time.monotonic()))
+    container.mux(stream.encode(None))
+    return n_sent
 
 
 def soak_long(folder: Path, seconds: float) -> dict[str, object]:

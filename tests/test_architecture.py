@@ -32,10 +32,14 @@ ORDER = [
     "run",
     "body_fitting",
     "sync",
+    "batch",
+    "study",
+    "studio",
     "interface",
     "cli",
 ]  # a room may import what stands before it, and itself
-PACKAGES = [room for room in ORDER if room not in ("io", "trial", "run", "body_fitting", "interface", "cli")]
+OF_TRIALS = ("trial", "run", "body_fitting", "batch", "study", "interface", "cli")  # their files are imported by name
+PACKAGES = [room for room in ORDER if room not in ("io", *OF_TRIALS)]
 FOR_ALL = {"", "errors", "types", "constants"}  # the package's own name holds its version
 NOUNS = ("cameras", "video", "body")  # packages whose public names are values with a meaning, not arrays
 KERNELS = [
@@ -185,6 +189,11 @@ def test_no_room_imports_the_public_interface(path):
     ) == "__init__.py"
 
 
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_only_its_command_imports_the_studio(path):
+    assert "studio" not in layers_of(path.read_text()) or layer_of(path) == "studio" or name_of(path) == "cli/studio.py"
+
+
 @pytest.mark.parametrize("name", KERNELS)
 def test_array_kernels_know_no_nouns(name):
     assert layers_of((SOURCE / name).read_text()) & set(NOUNS) == set()
@@ -228,7 +237,7 @@ def test_every_package_says_what_it_is_and_what_is_public(package):
 
 
 def test_the_command_line_opens_without_numbers_and_figures():
-    heavy = ["numpy", "scipy", "numba", "cv2", "pydantic", "matplotlib"]
+    heavy = ["numpy", "scipy", "numba", "cv2", "pydantic", "matplotlib", "nicegui"]
     code = f"import sys, airborne.cli; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.stderr == ""

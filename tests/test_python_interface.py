@@ -20,7 +20,7 @@ from tests.support.places import ROOT, THROWN_CROSS
 
 PAGE = ROOT / "docs" / "reference" / "python.md"
 STUDY = ROOT / "examples" / "study.ipynb"
-HEAVY = ("cv2", "matplotlib", "numba", "numpy", "pydantic", "rich", "scipy", "xarray")
+HEAVY = ("cv2", "matplotlib", "nicegui", "numba", "numpy", "pydantic", "rich", "scipy", "xarray")
 
 
 def snippets():

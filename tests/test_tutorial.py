@@ -1,32 +1,16 @@
 """The tutorial is done from its first line to its last: every file written, every command and snippet run."""
 
 import re
-import shlex
-import shutil
 
 import matplotlib as mpl
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from airborne.cli import app
+from tests.support.pages import STEPS, run
 from tests.support.places import ROOT
 
 PAGE = ROOT / "docs" / "tutorials" / "first-trial.md"
-STEPS = re.compile(r"(?:`([\w./-]+)`[^`\n]*:\n\n)?^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILES = {"my-throw/body.toml", "my-throw/start.csv", "my-throw/trial.toml"}
-
-
-def run(line):
-    """Run one line of a shell block: a copy, or a command of ours."""
-    program, *words = shlex.split(line)
-    if program == "cp":
-        shutil.copytree(ROOT / words[1], words[2])
-        return ""
-    assert program == "airborne", line
-    done = CliRunner().invoke(app, words, catch_exceptions=False)
-    assert done.exit_code == 0, done.output
-    return done.output
 
 
 @pytest.fixture(scope="module")

@@ -36,15 +36,26 @@ def test_the_description_names_lengths_girths_borders_colours_and_residuals(tmp_
         start_poses=(),
         lengths={"torso": 1.02, "thigh": 0.95},
         girths={"torso": (1.1, 0.9), "thigh": (1.05, 1.05)},
+        joint_widths={"hip": 1.04, "shoulder": 0.97},
         borders={"thigh": Border(0.72, 2)},
         rms_light=(0.04, 0.02),
         landmark_rms_m=(0.015, 0.012),
     )
-    lines = describe_fit(PersonFit(fit, (0, 50), tmp_path / "fit_body.png")).splitlines()
+    person = PersonFit(fit, (0, 50), tmp_path / "fit_body.png", ("cam2 disagrees",))
+    lines = describe_fit(person).splitlines()
     assert lines[0] == "fitted to frames 0, 50"
     assert "torso        1.02   1.10 0.90" in lines
     assert "thigh        0.95   1.05" in lines
+    assert "distance of left and right joints: hips 1.04, shoulders 0.97" in lines
     assert "colours change along: thigh at 0.72" in lines
     assert any("thigh_shorts 196 32 44" in line for line in lines)
     assert "residual: 10.20 to 5.10 (linear light, 0 to 255)" in lines
     assert "joints: 15 to 12 mm off (RMS)" in lines
+    assert lines[-1] == "note: cam2 disagrees"
+
+
+def test_a_skeleton_without_detections_and_a_folder_that_is_not_there_are_refused(by_hand, tmp_path):
+    with pytest.raises(TrialError, match=r"skeleton goes with detections under \[start\]"):
+        fit_person(by_hand, tmp_path / "person.toml", skeleton="BODY_25")
+    with pytest.raises(TrialError, match="there is no folder"):
+        fit_person(by_hand, tmp_path / "none" / "person.toml")

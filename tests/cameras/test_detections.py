@@ -5,7 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from airborne.cameras.detections import NETWORKS, Detections, landmarks_from_points, read_detections
+from airborne.cameras.detections import (
+    Detections,
+    camera_names,
+    landmarks_from_points,
+    read_detections,
+    write_detections,
+)
+from airborne.cameras.skeletons import SKELETONS
 from airborne.errors import CalibrationError
 
 
@@ -30,7 +37,7 @@ def save_json(folder, camera, found, name="{camera}_{frame:012d}_keypoints.json"
 def test_array_of_each_camera_is_read_as_it_is(tmp_path):
     one, two = table(), table(seed=1)
     found = read_detections(save(tmp_path, left=one, right=two), ["right", "left"])
-    assert (found.cameras, found.points) == (("right", "left"), NETWORKS[17])
+    assert (found.cameras, found.points) == (("right", "left"), SKELETONS["COCO"].points)
     np.testing.assert_array_equal(found.px, np.stack([two[..., :2], one[..., :2]], axis=2))
     np.testing.assert_array_equal(found.visibility, np.stack([two[..., 2], one[..., 2]], axis=2))
 
@@ -82,11 +89,11 @@ def test_folder_of_json_reads_as_the_array_does(tmp_path):
     values = {"left": table(4, 25), "right": table(4, 25, 1)}
     for camera, found in values.items():
         save_json(tmp_path / "pose", f"{camera}_json", found[:, None])
-    from_json = read_detections(tmp_path / "pose", list(values))
-    from_array = read_detections(save(tmp_path, **values), list(values))
+    from_json = read_detections(tmp_path / "pose", list(values), skeleton="BODY_25")
+    from_array = read_detections(save(tmp_path, **values), list(values), skeleton="body25")
     np.testing.assert_array_equal(from_json.px, from_array.px)
-    assert from_json.points == from_array.points == NETWORKS[25]
-    by_name = read_detections(tmp_path / "pose", ["a"], {"a": "right_json"})
+    assert from_json.points == from_array.points == SKELETONS["BODY_25"].points
+    by_name = read_detections(tmp_path / "pose", ["a"], {"a": "right_json"}, skeleton="BODY_25")
     np.testing.assert_array_equal(by_name.px[:, :, 0], from_array.px[:, :, 1])
 
 
@@ -162,20 +169,72 @@ def test_people_of_changing_length_are_refused(tmp_path):
         read_detections(tmp_path, ["a"])
 
 
-@pytest.mark.parametrize("count", NETWORKS)
-def test_every_network_names_each_point_once_and_both_sides_alike(count):
-    names = NETWORKS[count]
+@pytest.mark.parametrize("skeleton", SKELETONS.values(), ids=lambda skeleton: skeleton.name)
+def test_every_network_names_each_point_once_and_both_sides_alike(skeleton):
+    names = skeleton.points
+    assert len(names) <= skeleton.n_points
     assert len(set(names)) == len(names)
     assert {name.replace("left", "right") for name in names} == {name for name in names if "left" not in name}
     assert {"hip_left", "shoulder_right", "ankle_left", "wrist_right", "nose"} <= set(names)
 
 
-def test_networks_are_in_the_order_of_their_makers():
-    assert [NETWORKS[33].index(name) for name in ("shoulder_left", "hip_right", "toe_left")] == [11, 24, 31]
-    assert [NETWORKS[25].index(name) for name in ("mid_hip", "knee_left", "toe_left", "heel_right")] == [8, 13, 19, 24]
-    assert [NETWORKS[26].index(name) for name in ("mid_shoulder", "toe_right", "heel_right")] == [18, 21, 25]
-    assert [NETWORKS[18].index(name) for name in ("elbow_left", "hip_right", "ear_left")] == [6, 8, 17]
-    assert [NETWORKS[133].index(name) for name in ("toe_left", "heel_left", "heel_right")] == [17, 19, 22]
+@pytest.mark.parametrize(
+    ("skeleton", "names", "places"),
+    [
+        ("BLAZEPOSE", ("shoulder_left", "hip_right", "toe_left"), [11, 24, 31]),
+        ("BODY_25", ("mid_hip", "knee_left", "toe_left", "heel_right"), [8, 13, 19, 24]),
+        ("BODY_25B", ("hip_right", "toe_left", "heel_right"), [12, 19, 24]),
+        ("HALPE_26", ("mid_shoulder", "toe_right", "heel_right"), [18, 21, 25]),
+        ("COCO_18", ("elbow_left", "hip_right", "ear_left"), [6, 8, 17]),
+        ("COCO_133", ("toe_left", "heel_left", "heel_right"), [17, 19, 22]),
+    ],
+)
+def test_networks_are_in_the_order_of_their_makers(skeleton, names, places):
+    assert [SKELETONS[skeleton].points.index(name) for name in names] == places
+
+
+def test_points_of_two_networks_are_refused_until_one_is_named(tmp_path):
+    path = save(tmp_path, a=table(points=25))
+    with pytest.raises(CalibrationError, match=r"25 points per image may be BODY_25 or BODY_25B.*--skeleton BODY_25$"):
+        read_detections(path, ["a"])
+    for name in ("BODY_25", "BODY_25B"):
+        assert read_detections(path, ["a"], skeleton=name).points == SKELETONS[name].points
+
+
+def test_files_say_their_skeleton(tmp_path):
+    px = table(points=25)[:, :, None]
+    given = Detections(cameras=("a",), points=SKELETONS["BODY_25B"].points, px=px[..., :2], visibility=px[..., 2])
+    for path, as_folder in ((tmp_path / "pose", True), (tmp_path / "found.npz", False)):
+        write_detections(path, given, as_folder=as_folder)
+        found = read_detections(path, ["a"])
+        assert (found.points, found.notes) == (given.points, ())
+        assert camera_names(path) == ("a",)
+        with pytest.raises(CalibrationError, match="is BODY_25 and BODY_25B; expected one"):
+            read_detections(path, ["a"], skeleton="BODY_25")
+
+
+def test_points_of_the_only_network_of_that_number_are_taken(tmp_path):
+    for skeleton in (None, "Halpe-26"):
+        found = read_detections(save(tmp_path, a=table(points=26)), ["a"], skeleton=skeleton)
+        assert found.points == SKELETONS["HALPE_26"].points
+
+
+@pytest.mark.parametrize(
+    ("skeleton", "said"),
+    [
+        ("BODY_25", "17 points per image are those of COCO; skeleton BODY_25 has 25"),
+        ("SMPL", "no skeleton 'SMPL'; expected one of COCO, COCO_18, BODY_25, BODY_25B, HALPE_26"),
+    ],
+)
+def test_a_skeleton_that_does_not_fit_is_refused(tmp_path, skeleton, said):
+    with pytest.raises(CalibrationError, match=said):
+        read_detections(save(tmp_path, a=table()), ["a"], skeleton=skeleton)
+
+
+def test_a_camera_may_be_called_skeleton(tmp_path):
+    path = save(tmp_path, skeleton=table())
+    assert camera_names(path) == ("skeleton",)
+    assert read_detections(path, ["skeleton"]).points == SKELETONS["COCO"].points
 
 
 def test_landmarks_lie_between_their_points():

@@ -12,7 +12,7 @@ from tests.support.tolerances import EXACT, SOLVED
 
 MARQUARDT = MarquardtRule(first=1e-3, down=5, up=4, least=1e-9, most=1e8)
 NIELSEN = NielsenRule(first=1e-3, least=1e-12, most=1e8, least_factor=0.1)
-BACKTRACKING = BacktrackingRule(first=1.0, factor=0.4)
+BACKTRACKING = BacktrackingRule(first=1.0, factor=0.4, least=1e-3)
 EVERY = pytest.mark.parametrize("rule", [MARQUARDT, NIELSEN, BACKTRACKING], ids=lambda rule: type(rule).__name__)
 
 
@@ -68,7 +68,7 @@ def test_a_descent_that_is_cut_short_says_so(rule):
     assert (end.outcome, end.n_steps) == (Outcome.OUT_OF_STEPS, 2)
 
 
-@pytest.mark.parametrize("rule", [MARQUARDT, NIELSEN], ids=lambda rule: type(rule).__name__)
+@EVERY
 def test_a_descent_that_only_leads_uphill_is_stuck_where_it_began(rule):
     end = run(rule, (-1.2, 1.0, 0.0), sign=-1.0, most_steps=200)
     assert end.outcome is Outcome.STUCK

@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose, human18
 from airborne.cameras import Rig, write_pose2sim
-from airborne.cameras.detections import NETWORKS
+from airborne.cameras.skeletons import SKELETONS
 from airborne.errors import BodyError, CalibrationError, TrialError
 from airborne.run import detections as trial_detections
 from airborne.run import first_pose
@@ -41,6 +41,7 @@ def resect_moved_cameras(trial, rig):
 
 MODEL = human18(1.7, 60.0)
 NAMES = [landmark.name for landmark in MODEL.landmarks]
+COCO = SKELETONS["COCO"].points
 CENTRES = {"cam1": (-4, -5, 1.5), "cam2": (4, -5, 2), "cam3": (6, 3, 2.5), "cam4": (-5, 4, 2.0)}
 RIG = Rig(
     tuple(
@@ -84,8 +85,7 @@ def coco(points):
     side = 0.07 * (points[..., NAMES.index("shoulder_left"), :] - points[..., NAMES.index("shoulder_right"), :])
     positions = {"nose": head, "eye_left": head, "eye_right": head, "ear_left": head + side, "ear_right": head - side}
     return np.stack(
-        [positions.get(name, points[..., NAMES.index(name) if name in NAMES else 0, :]) for name in NETWORKS[17]],
-        axis=-2,
+        [positions.get(name, points[..., NAMES.index(name) if name in NAMES else 0, :]) for name in COCO], axis=-2
     )
 
 
@@ -124,7 +124,7 @@ def off_m(pose, frame=0, names=NAMES):
     return max(np.linalg.norm(result[NAMES.index(name)] - TRUE[frame, NAMES.index(name)]) for name in names)
 
 
-ON_COCO = [name for name in NAMES if name in NETWORKS[17]]
+ON_COCO = [name for name in NAMES if name in COCO]
 
 
 def test_root_and_joint_angles_set_by_hand(trial):
@@ -200,8 +200,8 @@ def test_a_field_takes_the_detections_of_its_frame(trial):
 
 def test_camera_that_saw_something_else_is_left_out_and_named(trial):
     tables = detections()
-    tables["cam3"][0, NETWORKS[17].index("wrist_left")] += [25, 0, 0]
-    tables["cam3"][0, NETWORKS[17].index("nose")] += [25, 0, 0]
+    tables["cam3"][0, COCO.index("wrist_left")] += [25, 0, 0]
+    tables["cam3"][0, COCO.index("nose")] += [25, 0, 0]
     result = find_first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG)
     assert off_m(result.pose, 0, ON_COCO) < 2e-3
     assert result.notes[0] == (
@@ -213,7 +213,7 @@ def test_missing_limb_is_named(trial):
     tables = detections()
     for name in ("wrist_left", "elbow_left"):
         for table in tables.values():
-            table[:, NETWORKS[17].index(name), 2] = 0.1
+            table[:, COCO.index(name), 2] = 0.1
     notes = find_first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG).notes
     assert any("no place of elbow_left, wrist_left; " in note for note in notes)
 
@@ -221,7 +221,7 @@ def test_missing_limb_is_named(trial):
 def test_detections_that_do_not_determine_a_pose_are_refused(trial):
     tables = detections()
     for table in tables.values():
-        table[:, NETWORKS[17].index("hip_left"), 2] = 0.0
+        table[:, COCO.index("hip_left"), 2] = 0.0
     with pytest.raises(TrialError, match=r"found\.npz, frame 0: a pose needs both hips .* not given: hip_left"):
         find_first_pose(trial(DETECTIONS, tables=tables), MODEL, RIG)
     with pytest.raises(TrialError, match=r"found\.npz, frame 40: a pose needs both hips"):

@@ -19,12 +19,14 @@ import traceback
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import count
 from pathlib import Path
 
 import numpy as np
 
 from airborne import cli
+from airborne.batch.trials import list_trials
 from airborne.body import human18
 from airborne.body.files import read_body, write_body
 from airborne.body.measurements import read_measurements, write_measurements
@@ -35,9 +37,10 @@ from airborne.calibration.sources.files import read_sources
 from airborne.calibration.sources.wand import read_wand
 from airborne.cameras import PixelConvention, read_detections, read_rig, write_rig
 from airborne.cameras.clicks import read_clicks, read_positions
-from airborne.cameras.detections import NETWORKS, Detections, write_detections
+from airborne.cameras.detections import Detections, write_detections
 from airborne.cameras.formats.dltdv import read_digitisation, triangulate_digitisation, write_digitisation
 from airborne.cameras.formats.options import FileOptions
+from airborne.cameras.skeletons import SKELETONS
 from airborne.errors import AirborneError
 from airborne.evaluation import read_clicked_frames, read_joint_paths, read_players_truth, read_truth
 from airborne.evaluation.players_truth import read_reference_jumps
@@ -47,11 +50,14 @@ from airborne.motion import MotionWriter, read_estimates, read_players
 from airborne.run.evaluate import assess
 from airborne.run.folder import holds_run_of
 from airborne.run.players_tracker import read_torsos
+from airborne.study.comparison import compare_trials
+from airborne.study.trials import read_study
 from airborne.tracking.players import PlayerStart
 from airborne.trial.file import read_trial
 from airborne.video.decoding import VideoSource, inspect
 from tests.body.test_measurements import PERSON
 from tests.support import players_trial as players
+from tests.support.athletes import write_results
 from tests.support.cameras import LENS, scattered, three_cameras
 from tests.support.motions import run_with_gap
 from tests.support.mutations import MUTATORS
@@ -103,7 +109,8 @@ def points_in_pictures(folder):
     yield case("places", places, lambda: read_positions(places))
     rig = three_cameras()
     px = np.stack([camera.px_from_world(scattered(5 * 26).reshape(5, 26, 3)) for camera in rig], axis=2)
-    seen = Detections(cameras=rig.names, points=NETWORKS[26], px=px, visibility=np.full(px.shape[:-1], 0.9))
+    points = SKELETONS["HALPE_26"].points
+    seen = Detections(cameras=rig.names, points=points, px=px, visibility=np.full(px.shape[:-1], 0.9))
     npz = folder / "detections.npz"
     write_detections(npz, seen)
     yield case("detections npz", npz, lambda: read_detections(npz, CAMERAS))
@@ -174,6 +181,19 @@ def trials(folder):
         return trial.players if trial.has_players else (trial.settings, trial.model())
 
     yield example_case("trial", folder, "trial.toml", whole)
+    shared = folder / "shared"
+    shared.mkdir()
+    for name in ("calib_true.toml", "cross.toml"):
+        (shared / name).write_bytes((EXAMPLE / name).read_bytes())
+    (shared / "one.toml").write_text('session = "session.toml"\nlabels = { athlete = "anna", n = 1 }\n')
+    (shared / "session.toml").write_text(
+        'camera = [{ name = "left", video = "{athlete}_{n}.mp4" }]\ncalibration = { file = "calib_true.toml" }\n'
+        'body = { preset = "human18", stature_m = 1.7, mass_kg = 60 }\n[athletes.anna.body]\nfile = "cross.toml"\n'
+    )
+    yield case("session", shared / "session.toml", lambda: whole(shared / "one.toml"))
+    yield case("trial of a session", shared / "one.toml", lambda: whole(shared / "one.toml"))
+    (shared / "trials.csv").write_text("trial,athlete,condition\none,anna,dry\nother.toml,berta,wet\n")
+    yield case("table of trials", shared / "trials.csv", lambda: list_trials(str(shared)))
     legs = folder / "legs"
     legs.mkdir()
     write_rig(legs / "calib.toml", players.rig())
@@ -230,6 +250,13 @@ def results(folder):
     angles = folder / "angles.csv"
     angles.write_text("time_s,knee_x_rad,knee_y_rad,knee_z_rad\n0,0.1,0.2,0.3\n0.02,0.1,,0.3\n")
     yield case("joint angles", angles, lambda: read_joint_angles(angles))
+    throws = [(f"{who}{what}", who, what) for who in ("anna", "bea") for what in ("dry", "wet")]
+    rows = [{"trial": name, "athlete": who, "condition": what, "rise_m": len(name)} for name, who, what in throws]
+    batch = write_results(folder / "batch", rows, {name: [0.0, 90.0, 200.0, 270.0] for name, _, _ in throws})
+    yield case("table of a batch", batch / "trials.csv", lambda: compare_trials(read_study(batch), "rise_m", ()))
+    compare_curves = partial(compare_trials, variable="somersault_deg", events=("start", "end"))
+    tables = batch / "annadry" / "tables" / "angles.csv"
+    yield case("curve of a study", tables, lambda: compare_curves(read_study(batch)))
 
 
 def commands(folder):

@@ -6,11 +6,12 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.cameras import Rig
-from airborne.cameras.detections import NETWORKS, Detections
+from airborne.cameras.detections import Detections
+from airborne.cameras.skeletons import SKELETONS
 from tests.support.cameras import LENS, camera_at
 
 CENTRES = {"left": (-4, -5, 1.5), "right": (4, -5, 2), "side": (6, 3, 2.5), "back": (-5, 4, 2.0)}
-HALPE = NETWORKS[26]
+HALPE = SKELETONS["HALPE_26"].points
 
 
 def four_cameras() -> Rig:

@@ -49,9 +49,9 @@ class Sender(threading.Thread):
             stream = container.add_stream("mpeg2video", rate=RATE, options={"qmin": "1", "qmax": "2", "g": "1"})
             stream.width, stream.height = SIZE
             stream.pix_fmt = "yuv420p"
-            begun_s = time.monotonic()
+            self.begun_s = time.monotonic()
             for k in range(self.n):
-                time.sleep(max(begun_s + k / RATE - time.monotonic(), 0))
+                time.sleep(max(self.begun_s + k / RATE - time.monotonic(), 0))
                 if self.gone_after is not None and k > self.gone_after:
                     break
                 if k in self.silent:
@@ -144,6 +144,29 @@ def test_cameras_that_end_early_leave_the_others_even_if_one_was_the_clock(tmp_p
     assert max(seen) == 39
     assert all(numbers[0] is None for index, numbers in seen.items() if index > 14)
     assert all(numbers[1] is not None for index, numbers in seen.items() if index > 14)
+
+
+def test_a_camera_that_goes_away_comes_back_at_the_times_of_its_arrival(tmp_path):
+    again = [Sender(tmp_path / "cam2", n, gone_after=n - 10) for n in (90, 150)]
+    with record_pipes(tmp_path, 360, cam2={"gone_after": 50}) as recording:
+        clock = next(each for each in threading.enumerate() if isinstance(each, Sender) and each.path.name == "cam2")
+        seen = {}
+        for frames in recording:
+            if frames.index >= 60 and again[0].ident is None:
+                again[0].start()
+            if frames.index >= 210 and again[1].ident is None:
+                again[1].start()
+            seen[frames.index] = levels_of(frames)
+        events = recording.events
+    shown = [(index, numbers[1]) for index, numbers in seen.items() if numbers[1] is not None]
+    assert max(number for index, number in shown if index <= 60) == 50
+    for sender, first, last in ((again[0], 61, 209), (again[1], 210, 360)):
+        sender.join(5)
+        later = [(index - number) % 56 for index, number in shown if first <= index <= last]
+        assert len(later) > 20
+        assert np.ptp(later) <= 1
+        assert np.mean(later) == pytest.approx((sender.begun_s - clock.begun_s) * RATE % 56, abs=2)
+    assert [event for event in events if "came back 2×" in event and event.startswith("cam2")]
 
 
 def test_files_play_at_their_own_speed_and_nothing_is_missed_while_the_first_images_are_looked_at(tmp_path):

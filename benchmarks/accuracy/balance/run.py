@@ -1,9 +1,9 @@
 """Track the whole man on the beam: `python benchmarks/accuracy/balance/run.py [FOLDER] [--body person.toml]`.
 
 FOLDER holds the recording `balance`; by default it is looked for beside the project. Without `--body` a person of
-1.72 m and 66 kg is first fitted to the recording (`airborne fit-body`), which takes minutes. All four cameras are used:
-cam03, whose extrinsics are off, is mended by the detections; cam01 and cam02 were saved scaled and cropped. Nothing
-here is exact: the detections and the other system's joints are good for 30 to 50 mm.
+1.72 m and 66 kg is first fitted to the recording (`airborne fit-body`). All four cameras are used: cam03, whose
+extrinsics are off, is mended by the detections; cam01 and cam02 were saved scaled and cropped. Nothing here is exact:
+the detections and the other system's joints are good for 30 to 50 mm.
 """
 
 from __future__ import annotations

@@ -13,6 +13,8 @@ from airborne.kernels import kernel
 
 BINS_PER_CHANNEL = 32  # of sRGB: 5 of its 8 bits
 EVIDENCE_LIMIT = 5.0  # [nats] bound of a single pixel's evidence
+_MOST = np.float32(1 / (1 + np.exp(-EVIDENCE_LIMIT)))  # posterior of that evidence, and of minus it
+_LEAST = np.float32(1) - _MOST
 _FLOOR = np.float32(2e-5)  # probability of a bin that was never observed
 _BIN_AT_PEAK = np.float32(37.1)  # a bin's volume times the Student density's peak at an sd of one grey level
 _HALF = np.float32(0.5)  # a float32, so that the kernel computes in single precision
@@ -79,7 +81,7 @@ def log_odds(posterior, out):
             out[y, x] = min(max(np.log(p / (np.float32(1) - p)), -limit), limit)
 
 
-@kernel(fastmath=True)
+@kernel  # under fast maths every pixel's logarithm is taken, and thrown away outside the mask: seven times slower
 def posterior_sums(posterior, part, margin_u, margin_v):
     """Sum the posterior (h, w) over a mask, part (h, w) >= 0, and around it.
 
@@ -88,19 +90,22 @@ def posterior_sums(posterior, part, margin_u, margin_v):
     """
     h, w = part.shape
     x0, y0, x1, y1 = w, h, -1, -1
-    pixels, inside, nats = 0.0, 0.0, 0.0
+    pixels, inside, nats = 0, 0.0, 0.0
     for y in range(h):
+        before = pixels
         for x in range(w):
             if part[y, x] >= 0:
-                x0, x1, y0, y1 = min(x0, x), max(x1, x), min(y0, y), max(y1, y)
-                p = min(max(posterior[y, x], np.float32(1e-6)), np.float32(1 - 1e-6))
+                x0, x1 = min(x0, x), max(x1, x)
                 pixels += 1
+                p = posterior[y, x]
                 inside += p
-                nats += min(max(np.log(p / (1 - p)), -EVIDENCE_LIMIT), EVIDENCE_LIMIT)
+                p = min(max(p, _LEAST), _MOST)
+                nats += np.log(p / (np.float32(1) - p))
+        if pixels > before:
+            y0, y1 = min(y0, y), y
     near = 0.0
     for y in range(max(y0 - margin_v, 0), min(y1 + margin_v + 1, h)):
-        for x in range(max(x0 - margin_u, 0), min(x1 + margin_u + 1, w)):
-            near += posterior[y, x]
+        near += posterior[y, max(x0 - margin_u, 0) : min(x1 + margin_u + 1, w)].sum()
     return pixels, inside, near, nats
 
 

@@ -8,13 +8,15 @@ of poses are over the same numbers in the same order.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body.model import BodyModel, Pose, PosedBody
-from airborne.geometry.joint_rotations import compose_rotation_vectors, rotation_vectors_between
+from airborne.geometry.joint_rotations import compose_rotation_vectors, motion_between, rotation_vectors_between
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
+from airborne.kernels import kernel
 from airborne.types import Array
 
 _LOCKED = 1e-8  # cosine of the middle angle below which the other two are one angle
@@ -37,8 +39,7 @@ def move_pose(pose: Pose, delta: Array) -> Pose:
 
 def delta_between(earlier: Pose, later: Pose) -> Array:
     """Return the change (6 + 3 joints,) from one pose to another: the inverse of `move_pose`."""
-    a, b = earlier.world_from_root, later.world_from_root
-    root = np.concatenate([b.translation - a.translation, (b.rotation * a.rotation.inv()).as_rotvec()])
+    root = motion_between(earlier.world_from_root.as_matrix(), later.world_from_root.as_matrix())
     n_joints = max(len(earlier.joint_angles), len(later.joint_angles))
     if not n_joints:
         return root
@@ -85,11 +86,31 @@ def segment_jacobians(posed: PosedBody, origin: Array) -> Array:
     Rows are the translation of that point of the segment which is now at `origin` (3,) world [m], and the segment's
     rotation vector [rad], both in world axes.
     """
-    jacobian = np.zeros((len(posed.R), 6, 6 + 3 * (len(posed.R) - 1)))
-    jacobian[:, :3] = point_jacobian(posed, np.arange(len(posed.R)), origin)
-    jacobian[:, 3:, 3:6] = np.eye(3)
-    axes = np.where(_is_carried(posed.model)[:, :, None, None], posed.R[1:], 0.0)
-    jacobian[:, 3:, 6:] = np.moveaxis(axes, 1, 2).reshape(len(posed.R), 3, -1)
+    return _segment_jacobians(posed.model.parents, posed.R, posed.t, np.asarray(origin, float))
+
+
+@kernel
+def _segment_jacobians(parents, R, t, origin):
+    n = len(R)
+    jacobian = np.zeros((n, 6, 3 + 3 * n))
+    for segment in range(n):
+        joint = segment
+        while True:  # from the segment to the root, which rotates about the world's axes
+            x, y, z = origin[0] - t[joint, 0], origin[1] - t[joint, 1], origin[2] - t[joint, 2]
+            for a in range(3):
+                column = 3 + 3 * joint + a
+                i, j, k = R[joint, 0, a], R[joint, 1, a], R[joint, 2, a]
+                if joint == 0:
+                    i, j, k = 1.0 * (a == 0), 1.0 * (a == 1), 1.0 * (a == 2)
+                jacobian[segment, 0, column] = j * z - k * y
+                jacobian[segment, 1, column] = k * x - i * z
+                jacobian[segment, 2, column] = i * y - j * x
+                jacobian[segment, 3, column], jacobian[segment, 4, column], jacobian[segment, 5, column] = i, j, k
+            if joint == 0:
+                break
+            joint = parents[joint]
+        for a in range(3):
+            jacobian[segment, a, a] = 1.0
     return jacobian
 
 
@@ -117,8 +138,13 @@ def angles_of(pose: Pose, n_joints: int) -> Array:
 
 def _is_carried(model: BodyModel) -> NDArray[np.bool_]:
     """Say which segments each joint carries along: (segments, joints); joint k belongs to segment k + 1."""
-    carried = np.zeros((len(model.segments), len(model.segments)), bool)
-    for segment, parent in enumerate(model.parents[1:], start=1):
+    return _carried(tuple(model.parents.tolist()))
+
+
+@lru_cache(maxsize=64)
+def _carried(parents: tuple[int, ...]) -> NDArray[np.bool_]:
+    carried = np.zeros((len(parents), len(parents)), bool)
+    for segment, parent in enumerate(parents[1:], start=1):
         carried[segment] = carried[parent]
         carried[segment, segment] = True
     return carried[:, 1:]

@@ -52,12 +52,14 @@ def fit_pose(
     *,
     weights: Mapping[str, float] | None = None,
     start: Pose | None = None,
+    seeks_swap: bool = True,
 ) -> PoseFit:
     """Find the pose whose landmarks lie nearest to targets: landmark -> (3,) world [m], NaN where unknown.
 
     `weights` are those of each landmark's squared distance, 1 where not named. The search starts from `start`; without
-    one it needs both hips and both shoulders, or, for a body without these, any three landmarks not on a line. Raises
-    BodyError for landmarks that the body does not have, and where too few have targets.
+    one it needs both hips and both shoulders, or, for a body without these, any three landmarks not on a line, and
+    unless `seeks_swap` is False, a note says where left and right seem exchanged. Raises BodyError for landmarks that
+    the body does not have, and where too few have targets.
     """
     names = [landmark.name for landmark in model.landmarks]
     unknown = [name for name in targets if name not in names]
@@ -71,7 +73,7 @@ def fit_pose(
     _check(problem, names, has_start=start is not None)
     pose, residual_m, rms_m = _fit(problem, start)
     note = None
-    if start is None and rms_m > _SUSPECT_M:
+    if seeks_swap and start is None and rms_m > _SUSPECT_M:
         other = [names.index(_other_side(name)) if _other_side(name) in names else i for i, name in enumerate(names)]
         swapped_m = _fit(replace(problem, targets=positions[other]), None)[2]
         if swapped_m < _SWAPPED_SHARE * rms_m:

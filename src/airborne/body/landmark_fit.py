@@ -108,9 +108,11 @@ class _Iterate:
 def _equations(problem: LandmarkProblem, state: PoseState) -> tuple[float, Array, Array]:
     """Return half the squared residuals, their gradient and Gauss-Newton Hessian."""
     has_target, scale = problem.is_given, (problem.root_weights / problem.sd_m)[problem.is_given]
-    posed = PosedBody(problem.model, *_forward_kinematics(problem.model, state))
-    points = posed.landmarks[has_target]
-    jacobian = point_jacobian(posed, problem.segments[has_target], points)
+    rotations = matrix_from_angles(state.angles)
+    posed = PosedBody(problem.model, *_forward_kinematics(problem.model, state, rotations))
+    own = problem.segments[has_target]
+    points = np.einsum("nij,nj->ni", posed.R[own], problem.local[has_target]) + posed.t[own]
+    jacobian = point_jacobian(posed, own, points)
     n_joints = len(state.angles)
     J = (scale[:, None, None] * jacobian).reshape(-1, 6 + 3 * n_joints)
     r = (scale[:, None] * (points - problem.targets[has_target])).ravel()
@@ -119,21 +121,24 @@ def _equations(problem: LandmarkProblem, state: PoseState) -> tuple[float, Array
     gradient[6:] += deviation / _JOINT_SD_RAD
     hessian[range(6, len(hessian)), range(6, len(hessian))] += _JOINT_SD_RAD**-2
     cost = float(r @ r + deviation @ deviation) / 2
-    limits, rotations = problem.model.limits, matrix_from_angles(state.angles)
+    limits = problem.model.limits
     excess = limits.excess(rotations) / _LIMIT_SD_RAD
-    for joint in np.flatnonzero(np.any(excess != 0, axis=-1)):
-        own, size = slice(6 + 3 * joint, 9 + 3 * joint), np.linalg.norm(excess[joint])
-        jacobian = swing_twist_jacobian(limits.relative(rotations)[joint]) / _LIMIT_SD_RAD
-        row = (excess[joint] / size) @ jacobian
-        gradient[own] += size * row
-        hessian[own, own] += np.outer(row, row)
-        cost += float(size**2) / 2
+    joints = np.flatnonzero(np.any(excess != 0, axis=-1))
+    jacobians = swing_twist_jacobian(limits.relative(rotations)[joints]) / _LIMIT_SD_RAD
+    size = np.linalg.norm(excess[joints], axis=1)
+    rows = ((excess[joints] / size[:, None])[:, None] @ jacobians)[:, 0]
+    own = 6 + 3 * joints[:, None] + np.arange(3)
+    gradient[own] += size[:, None] * rows
+    hessian[own[:, :, None], own[:, None]] += rows[:, :, None] * rows[:, None]
+    cost += float(size @ size) / 2
     return cost, gradient, hessian
 
 
-def _forward_kinematics(model: BodyModel, state: PoseState) -> tuple[Array, Array]:
-    """Return world from segment, rotations (..., segments, 3, 3) and translations (..., segments, 3) [m]."""
-    rotations = matrix_from_angles(state.angles)  # (..., joints, 3, 3)
+def _forward_kinematics(model: BodyModel, state: PoseState, rotations: Array) -> tuple[Array, Array]:
+    """Return world from segment, rotations (..., segments, 3, 3) and translations (..., segments, 3) [m].
+
+    rotations (..., joints, 3, 3): the state's angles as matrices.
+    """
     R, t = (
         [np.broadcast_to(state.R, (*rotations.shape[:-3], 3, 3))],
         [np.broadcast_to(state.t, (*rotations.shape[:-3], 3))],
@@ -146,7 +151,7 @@ def _forward_kinematics(model: BodyModel, state: PoseState) -> tuple[Array, Arra
 
 def landmark_positions(problem: LandmarkProblem, state: PoseState) -> Array:
     """Return the landmarks' positions: (..., landmarks, 3) world [m]."""
-    R, t = _forward_kinematics(problem.model, state)
+    R, t = _forward_kinematics(problem.model, state, matrix_from_angles(state.angles))
     return np.einsum("...nij,nj->...ni", R[..., problem.segments, :, :], problem.local) + t[..., problem.segments, :]
 
 

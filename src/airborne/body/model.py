@@ -11,6 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body.limits import FREE, JointLimits
 from airborne.errors import BodyError
+from airborne.geometry.joint_rotations import move_matrix
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.io.names import check_column, check_name
 from airborne.types import Array
@@ -115,11 +116,9 @@ class Pose:
 
     def move(self, translation_m: Array, rotation_vector: Array) -> Pose:
         """Translate by (3,) [m] and rotate about the root by a rotation vector (3,) [rad], both in world axes."""
-        root = self.world_from_root
-        moved = RigidTransform.from_components(
-            root.translation + translation_m, Rotation.from_rotvec(rotation_vector) * root.rotation
-        )
-        return replace(self, world_from_root=moved)
+        translation, vector = np.ascontiguousarray(translation_m, float), np.ascontiguousarray(rotation_vector, float)
+        moved = move_matrix(self.world_from_root.as_matrix(), translation, vector)
+        return replace(self, world_from_root=RigidTransform(moved, normalize=False))
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,6 +168,11 @@ class BodyModel:
         """The index of each segment's parent, -1 for the root: (segments,)."""
         names = [segment.name for segment in self.segments]
         return np.array([-1 if s.parent is None else names.index(s.parent) for s in self.segments])
+
+    @cached_property
+    def joints_m(self) -> Array:
+        """Where every segment's joint lies in its parent: (segments, 3) [m]."""
+        return np.array([segment.joint_m for segment in self.segments], float)
 
     @property
     def n_joints(self) -> int:

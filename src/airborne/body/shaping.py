@@ -35,6 +35,21 @@ def with_girths(model: BodyModel, scales: Mapping[str, float | tuple[float, floa
     return _scale(model, scales, along=False)
 
 
+def with_joint_widths(model: BodyModel, scales: Mapping[str, float]) -> BodyModel:
+    """Return the body with the joints of segments' left and right children further apart, by factors.
+
+    The segments' own surfaces stay. Raises BodyError for an unknown segment, or a factor out of range.
+    """
+    factors = _per_segment(model, scales)
+    segments = tuple(
+        replace(segment, joint_m=segment.joint_m * [float(factors[segment.parent]), 1, 1])
+        if segment.parent in factors and segment.name.endswith(("_left", "_right"))
+        else segment
+        for segment in model.segments
+    )
+    return BodyModel(model.name, segments, model.landmarks)
+
+
 def with_mass(model: BodyModel, mass_kg: float) -> BodyModel:
     """Return the body with a total mass [kg], distributed as before; BodyError where a segment's is not known."""
     if not 0 < mass_kg < np.inf:

@@ -1,22 +1,24 @@
-"""How a body's composite images change with its shape and its poses, by finite differences of rendered images.
+"""How a body's composite images change with its shape and its poses.
 
 The same composite as `gauss_newton.fit_images`, the lit body over the empty scene, blurred, with the same robust
-cost; here the body is rendered twice per parameter for its derivative, so that any parameter will do.
+cost; here a segment's surface may also change its shape, so that its motion is affine.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.appearance.lighting import fit_light, shade_body
+from airborne.appearance.lighting import fit_light, flatten_shading, shade_body
 from airborne.body import PosedBody
+from airborne.body_fitting.affine_equations import add_affine_equations
+from airborne.body_fitting.shape_motion import N_AFFINE
 from airborne.rendering.maps import surface_maps
-from airborne.tracking.model_based.blur import RADIUS_PX, blur_planes, gaussian_taps
+from airborne.tracking.model_based.blur import blur_planes, gaussian_taps
+from airborne.tracking.model_based.owners import REACH_PX, find_owners
 from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers
 from airborne.tracking.model_based.twist_equations import BLOCK_PX
 from airborne.types import Array
@@ -25,7 +27,6 @@ _SIGMA_PX = 1.2  # of the blur
 _SCALE_LIGHT = 0.1  # linear light, 0..1, of the robust cost: a residual this large has a quarter of the weight
 _CORRELATED_PX = BLOCK_PX**2  # pixels that share the error of an approximate shape
 _LIGHT_ROUNDS = 3  # reweightings of the light
-_NEAR_PX = 4  # beyond this from the mask, a small step changes nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,42 +67,42 @@ def misfit(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -> Mi
     return _weigh(view, _residual(view, _compose(render_model, posed, view)))[0]
 
 
-PosedModel = tuple[RenderModel, PosedBody]
-
-
 def composite_equations(
-    render_model: RenderModel,
-    posed: PosedBody,
-    view: ViewBuffers,
-    steps: Sequence[tuple[PosedModel, PosedModel | None, float]],
+    render_model: RenderModel, posed: PosedBody, view: ViewBuffers, border_axes: Array
 ) -> tuple[Misfit, Array, Array]:
-    """Return a view's misfit and the normal equations H (d, d), g (d,) of d parameters: H step = g.
+    """Return a view's misfit and the normal equations of its segments' affine motions: A (s, 13, 13), g (s, 13).
 
-    steps: for each parameter the body a step up; the body a step down, or None for the body as it is; and the
-    difference of the parameter between the two.
+    border_axes (s, 3): along which each segment's border of colours moves, world. Refits the view's light in place.
     """
     _fit_light(render_model, posed, view)
-    here = _compose(render_model, posed, view)
-    residual = _residual(view, here)
+    part, inverse_depth, normals = view.maps
+    covered = part >= 0
+    lit = np.zeros((3, *part.shape), np.float32)
+    shade_body(part, normals, render_model.albedo, view.light, 0, 0, lit)
+    background = view.observation.background
+    residual = _residual(view, np.where(covered, lit, background))
     total, weights = _weigh(view, residual)
-    near = cv2.dilate((view.maps.part >= 0).astype(np.uint8), np.ones((2 * _NEAR_PX + 1,) * 2, np.uint8)) > 0
-    rows, across = _box(near)
-    columns = np.zeros((len(steps), 3, rows.stop - rows.start, across.stop - across.start), np.float32)
-    for column, (above, below, step) in zip(columns, steps, strict=True):
-        change = (_compose(*above, view) - (here if below is None else _compose(*below, view)))[:, rows, across]
-        v, u = _box(np.abs(change).max(axis=0, initial=0) > 0, RADIUS_PX)
-        if v.stop > v.start:
-            blurred = np.empty_like(change[:, v, u])
-            blur_planes(np.ascontiguousarray(change[:, v, u]), *_taps(view), blurred)
-            column[:, v, u] = blurred / np.float32(step)
-    weight = np.tile(weights[rows, across].ravel(), 3)
-    flat = columns.reshape(len(steps), -1)
-    weighted_columns = flat * weight
-    return (
-        total,
-        (weighted_columns @ flat.T).astype(float),
-        (weighted_columns @ residual[:, rows, across].ravel()).astype(float),
+    coverage, shape = np.empty((1, *part.shape), np.float32), np.empty_like(lit)
+    blur_planes(covered[None].astype(np.float32), *_taps(view), coverage)
+    flatten_shading(part, render_model.is_faceted, 0, 0, lit)
+    blur_planes(lit, *_taps(view), shape)
+    owner, nearness = np.empty(part.shape, np.int16), np.empty(part.shape, np.float32)
+    find_owners(part, inverse_depth, render_model.segment_of_part, 0, 0, owner, nearness)
+    n = len(posed.R)
+    A, g = np.zeros((n, N_AFFINE, N_AFFINE)), np.zeros((n, N_AFFINE))
+    add_affine_equations(
+        *(residual, shape, coverage[0], weights, owner, nearness),
+        *(_inner_borders(part, owner), border_axes, background, view.projection(posed), A, g),
     )
+    return total, A + np.tril(A, -1).swapaxes(1, 2), g
+
+
+def _inner_borders(part: NDArray[np.int16], owner: NDArray[np.int16]) -> NDArray[np.bool_]:
+    """Mark the pixels (h, w) near to which their segment changes colour, and no other segment or scene lies."""
+    size = np.ones((2 * REACH_PX + 1,) * 2, np.uint8)
+    parts, owners = part + 1, owner + 1
+    changes = cv2.dilate(parts, size) != cv2.erode(parts, size)
+    return changes & (cv2.dilate(owners, size) == cv2.erode(owners, size))
 
 
 def _fit_light(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -> None:
@@ -147,14 +148,3 @@ def _taps(view: ViewBuffers) -> tuple[Array, Array]:
     """Return the blur's taps along rows and columns; a field's rows are twice as far apart."""
     aspect = float(view.K[1, 1] / view.K[0, 0])
     return gaussian_taps(_SIGMA_PX), gaussian_taps(max(_SIGMA_PX * aspect, 0.5))
-
-
-def _box(mask: NDArray[np.bool_], margin: int = 0) -> tuple[slice, slice]:
-    """Return the bounding rows and columns of a mask, with a margin; empty where the mask is."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if not len(rows):
-        return slice(0, 0), slice(0, 0)
-    return (
-        slice(max(int(rows[0]) - margin, 0), int(rows[-1]) + 1 + margin),
-        slice(max(int(columns[0]) - margin, 0), int(columns[-1]) + 1 + margin),
-    )

@@ -11,12 +11,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose, PosedBody
-from airborne.body.chain import delta_between, move_pose
+from airborne.body.chain import delta_between
 from airborne.body.inverse_kinematics import fit_lengths, fit_pose
 from airborne.body.outfits import Border, with_borders
 from airborne.body.shaping import with_mass, with_segment_lengths
+from airborne.body_fitting.checks import joint_widths_m
 from airborne.body_fitting.clothes import find_borders, sample_clothing
 from airborne.body_fitting.composites import NO_MISFIT, composite_equations, misfit
 from airborne.body_fitting.shape import (
@@ -28,6 +30,7 @@ from airborne.body_fitting.shape import (
     lengths_of,
     shape_parameters,
 )
+from airborne.body_fitting.shape_motion import N_AFFINE, ShapeMotion
 from airborne.body_fitting.views import LEAST_MARGIN_PX, compare_fits, learn_background, pose_views, prepare_views
 from airborne.errors import BodyError
 from airborne.tracking.image_regions import reduce_frames
@@ -42,8 +45,8 @@ _PRIOR_SD = (0.1, 0.2, 0.25)  # of a pose about that of the landmarks: root [m],
 _MOST_STEPS = 4  # a level
 _CONVERGED = 1.0  # a step must gain more log-likelihood than this [nats]
 _BACKTRACK, _MOST_BACKTRACKS = 0.4, 3  # factor on a step that does not gain, and how often
+_FAR_RMS_M = 0.05  # of landmarks: a pose further off is looked for anew
 _MARGIN_M = 0.1  # around the body, for its motion
-_LEVER_M = 0.3  # a rotation that moves a point at this distance by a pixel is a step
 _MASK_GIRTHS = (
     1.5,
     1.25,
@@ -69,6 +72,7 @@ class BodyFit:
     start_poses: tuple[Pose, ...]  # from the landmarks alone
     lengths: dict[str, float]  # segment without its side -> factor on the given body
     girths: dict[str, tuple[float, float]]  # across, on the given body
+    joint_widths: dict[str, float]  # hip, shoulder -> factor on the given body's distance of left and right
     borders: dict[str, Border]
     rms_light: tuple[float, float]  # before and after: robust, blurred, of the images around the body; 0..1
     landmark_rms_m: tuple[float, float]  # before and after
@@ -90,7 +94,6 @@ class _Level:
     landmarks: tuple[Array, ...]  # (landmarks, 3) per observation
     weights: Array  # (landmarks,) of their squared distances
     views: tuple[tuple[ViewBuffers, ...], ...]  # of each observation
-    step_m: float  # about a pixel
 
     @property
     def shape_precision(self) -> Array:
@@ -101,10 +104,19 @@ class _Level:
         """Return the render model of a shape."""
         return RenderModel.of(apply_shape(self.base, self.parameters, shape))
 
+    @property
+    def landmark_scale(self) -> Array:
+        """One over the sd of each landmark's coordinates: (3 landmarks,) [1/m]."""
+        return np.repeat(np.sqrt(self.weights) / JOINT_SD_M, 3)
+
+    def is_known(self, index: int) -> NDArray[np.bool_]:
+        """Whether an observation has each landmark's coordinates: (3 landmarks,)."""
+        return np.isfinite(self.landmarks[index]).ravel()
+
     def landmark_residuals(self, posed: PosedBody, index: int) -> Array:
         """Return the landmarks' residuals in sds: (3 landmarks,); 0 where unknown."""
-        residuals = (self.landmarks[index] - posed.landmarks) / JOINT_SD_M * np.sqrt(self.weights)[:, None]
-        return np.where(np.isfinite(residuals), residuals, 0.0).ravel()
+        residuals = (self.landmarks[index] - posed.landmarks).ravel() * self.landmark_scale
+        return np.where(self.is_known(index), residuals, 0.0)
 
 
 def fit_body(
@@ -126,11 +138,14 @@ def fit_body(
     """
     if not observations:
         raise BodyError("no frame to fit the body to; give at least one with known landmarks")
-    landmarks = tuple(_landmarks(model, each) for each in observations)
-    lengths = fit_lengths(model, np.stack(landmarks))
+    landmarks = tuple(_landmarks(model, each.landmarks) for each in observations)
+    lengths = measure_lengths(model, [each.landmarks for each in observations])
     start = with_segment_lengths(model, lengths)
     all_times = (*observations, *scenery)
-    initial = tuple(_pose_from_landmarks(start, each, weights) for each in all_times)
+    initial = tuple(_pose_from_landmarks(start, each, weights) for each in observations)
+    for each in scenery:
+        nearest = min(range(len(observations)), key=lambda i: abs(observations[i].frames.index - each.frames.index))
+        initial += (_pose_from_landmarks(start, each, weights, initial[nearest]),)
     parameters = shape_parameters(start)
     state = _Iterate(np.zeros(len(parameters)), initial[: len(observations)])
     report = progress or (lambda done, total: None)
@@ -156,7 +171,6 @@ def fit_body(
             landmarks=landmarks,
             weights=np.array([(weights or {}).get(mark.name, 1.0) for mark in model.landmarks]),
             views=prepare_views(dressed, state.poses, observed, background, margin_px=margin_px),
-            step_m=1 / px_per_m,
         )
         for step in range(_MOST_STEPS):
             report(number * _MOST_STEPS + step, _MOST_STEPS * len(levels_px_per_m))
@@ -177,6 +191,7 @@ def fit_body(
         start_poses=before[1],
         lengths=lengths_of(level.parameters, state.shape, lengths),
         girths=girths_of(level.parameters, state.shape),
+        joint_widths={joint: own / joint_widths_m(model)[joint] for joint, own in joint_widths_m(fitted).items()},
         borders=borders_of(level.parameters, state.shape),
         rms_light=lights,
         landmark_rms_m=(_landmark_rms_m(*before, landmarks), _landmark_rms_m(fitted, state.poses, landmarks)),
@@ -186,29 +201,23 @@ def fit_body(
 def _step(level: _Level, state: _Iterate) -> _Iterate | None:
     """Take a Gauss-Newton step of shape and poses, with backtracking; None where no step gains enough."""
     here = level.render_model(state.shape)
-    size = [level.step_m / parameter.size_m for parameter in level.parameters]
-    shape_steps = [
-        (level.render_model(state.shape + h * unit), level.render_model(state.shape - h * unit), 2 * h)
-        for h, unit in zip(size, np.eye(len(size)), strict=True)
-    ]
-    freedom, k = all_joints(here.model), len(size)
+    motion = ShapeMotion.of(here.model, level.parameters)
+    freedom, k = all_joints(here.model), len(level.parameters)
     total, systems = NO_MISFIT, []
     for index, (pose, views) in enumerate(zip(state.poses, level.views, strict=True)):
         posed = here.with_pose(pose)
-        steps: list = [((up, up.with_pose(pose)), (down, down.with_pose(pose)), step) for up, down, step in shape_steps]
-        steps += _pose_steps(here, pose, level.step_m)
-        H, g = np.zeros((len(steps),) * 2), np.zeros(len(steps))
+        border_axes = np.einsum("sij,sj->si", posed.R, motion.axis)
+        A, g = np.zeros((len(posed.R), N_AFFINE, N_AFFINE)), np.zeros((len(posed.R), N_AFFINE))
         for view in views:
-            view_misfit, own_H, own_g = composite_equations(here, posed, view, steps)
-            total, H, g = total + view_misfit, H + own_H, g + own_g
-        ends = [(up[1], posed if down is None else down[1], step) for up, down, step in steps]
-        rows = np.array(
-            [
-                (level.landmark_residuals(down, index) - level.landmark_residuals(up, index)) / step
-                for up, down, step in ends
-            ]
-        ).T
-        systems.append((H, g, rows.T @ rows, rows.T @ level.landmark_residuals(posed, index)))
+            view_misfit, own_A, own_g = composite_equations(here, posed, view, border_axes)
+            total, A, g = total + view_misfit, A + own_A, g + own_g
+        J = motion.surface_jacobian(posed)
+        rows = level.landmark_scale[:, None] * motion.landmark_jacobian(posed).reshape(-1, J.shape[-1])
+        rows = np.where(level.is_known(index)[:, None], rows, 0.0)
+        H = np.tensordot(J, A @ J, axes=([0, 1], [0, 1]))
+        systems.append(
+            (H, np.tensordot(J, g, axes=2 * [[0, 1]]), rows.T @ rows, rows.T @ level.landmark_residuals(posed, index))
+        )
     noise = total.noise
     systems = [(H / noise + J, g / noise + j) for H, g, J, j in systems]
     S, s = np.diag(level.shape_precision), -level.shape_precision * state.shape
@@ -233,15 +242,6 @@ def _step(level: _Level, state: _Iterate) -> _Iterate | None:
     return None
 
 
-def _pose_steps(here: RenderModel, pose: Pose, step_m: float) -> list:
-    """Return the body a step up along each degree of freedom, for `composites.composite_equations`."""
-    steps = []
-    for i, unit in enumerate(np.eye(6 + 3 * (len(here.model.segments) - 1))):
-        h = step_m if i < 3 else step_m / _LEVER_M
-        steps.append(((here, here.with_pose(move_pose(pose, h * unit))), None, h))
-    return steps
-
-
 def _objective(level: _Level, state: _Iterate, noise: float) -> float:
     """Return the negative log-posterior: images, landmarks and priors."""
     here = level.render_model(state.shape)
@@ -259,15 +259,27 @@ def _prior_sd(model: BodyModel) -> Array:
     return np.repeat(_PRIOR_SD, [3, 3, 3 * (len(model.segments) - 1)])
 
 
-def _landmarks(model: BodyModel, observation: BodyObservation) -> Array:
+def measure_lengths(model: BodyModel, landmarks: Sequence[Mapping[str, Array]]) -> dict[str, float]:
+    """Measure the segments' lengths, relative to the model's, by the landmarks (3,) [m] of some times."""
+    return fit_lengths(model, np.stack([_landmarks(model, each) for each in landmarks]))
+
+
+def _landmarks(model: BodyModel, positions: Mapping[str, Array]) -> Array:
     """Return the landmarks' positions in the model's order: (landmarks, 3) [m], NaN where unknown."""
     unknown = np.full(3, np.nan)
-    return np.array([observation.landmarks.get(mark.name, unknown) for mark in model.landmarks], float)
+    return np.array([positions.get(mark.name, unknown) for mark in model.landmarks], float)
 
 
-def _pose_from_landmarks(model: BodyModel, observation: BodyObservation, weights: Mapping[str, float] | None) -> Pose:
-    pairs = zip(model.landmarks, _landmarks(model, observation), strict=True)
-    return fit_pose(model, {mark.name: at for mark, at in pairs if np.isfinite(at).all()}, weights=weights).pose
+def _pose_from_landmarks(
+    model: BodyModel, observation: BodyObservation, weights: Mapping[str, float] | None, near: Pose | None = None
+) -> Pose:
+    """Fit a pose to landmarks; from a pose `near` by, unless it leads to none that is close."""
+    pairs = zip(model.landmarks, _landmarks(model, observation.landmarks), strict=True)
+    targets = {mark.name: at for mark, at in pairs if np.isfinite(at).all()}
+    fit = fit_pose(model, targets, weights=weights, start=near, seeks_swap=False)
+    if near is not None and fit.rms_m > _FAR_RMS_M:
+        return fit_pose(model, targets, weights=weights, seeks_swap=False).pose
+    return fit.pose
 
 
 def _landmark_rms_m(model: BodyModel, poses: Sequence[Pose], landmarks: Sequence[Array]) -> float:

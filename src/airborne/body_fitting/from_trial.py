@@ -14,9 +14,18 @@ from numpy.typing import NDArray
 from airborne.body import BodyModel, Pose, surface_arrays
 from airborne.body.files import write_body
 from airborne.body.inverse_kinematics import CORE
-from airborne.body_fitting.fit import BodyFit, BodyObservation, fit_body
+from airborne.body.shaping import with_segment_lengths
+from airborne.body_fitting.checks import (
+    check_joints,
+    check_lengths,
+    length_ratios,
+    person_of_shares,
+    points_of_lengths,
+)
+from airborne.body_fitting.clicks import Clicks
+from airborne.body_fitting.fit import BodyFit, BodyObservation, fit_body, measure_lengths
 from airborne.cameras.clicks import read_positions
-from airborne.errors import TrialError
+from airborne.errors import BodyError, TrialError
 from airborne.export.views import crop_camera, resample_view
 from airborne.rendering import FLAT, render
 from airborne.run.detections import landmarks_over_time
@@ -39,38 +48,66 @@ class PersonFit:
     fit: BodyFit
     frames: tuple[int, ...]  # that it was fitted to
     picture: Path
+    notes: tuple[str, ...] = ()  # of the input, and on what looks unusual, one line each
 
 
-def fit_person(trial: Trial, output: Path, *, n_frames: int = 5, progress: StageProgress | None = None) -> PersonFit:
+def fit_person(
+    trial: Trial,
+    output: Path,
+    *,
+    n_frames: int = 5,
+    skeleton: str | None = None,
+    progress: StageProgress | None = None,
+) -> PersonFit:
     """Fit a trial's body to the person in its images; write the body file, and beside it `fit_body.png`.
 
-    The joints come from the detections of the trial's [start], or for one frame from its joints_m.
+    The joints come from the detections of the trial's [start], or for one frame from its joints_m; `skeleton` says
+    whose points the detections are where neither the trial nor their files do.
     Raises an AirborneError for input that cannot be used.
     """
     if n_frames < 1:
         raise TrialError(f"frames is {n_frames}; expected at least 1 frame to fit the body to")
+    if not output.absolute().parent.is_dir():
+        raise TrialError(f"{output}: there is no folder {output.parent}; make it, or give another path")
+    if skeleton is not None:
+        if trial.start.detections is None:
+            raise TrialError(f"{trial.name}: skeleton goes with detections under [start]; the trial has none")
+        trial = trial.model_copy(update={"start": trial.start.model_copy(update={"skeleton": skeleton})})
     report = progress or (lambda what, done, total: None)
     model = trial.model()
     opened = open_trial(trial)
     recording = opened.recording
     landmarks = _landmarks_by_frame(trial, opened)
     chosen, around = _choose_frames(trial, landmarks, n_frames)
-    observations = _read(recording, landmarks, sorted({*chosen, *around}), report)
-    missing = [index for index in chosen if index not in observations]
-    if missing:
-        raise TrialError(f"{trial.name}: the videos end before frame {missing[0]}, which has detections")
-    fit = fit_body(
-        model,
-        [observations[index] for index in chosen],
-        scenery=[observations[index] for index in around if index in observations],
-        weights=LANDMARK_WEIGHTS,
-        mass_kg=trial.body.mass_kg,
-        progress=lambda done, total: report("fitting", done, total),
-    )
+    clicks = None if opened.detections is None else Clicks.of(recording, opened.detections, chosen)
+    look, notes = (lambda points: "", []) if clicks is None else (clicks.camera_to_check, clicks.notes)
+    shares, points = model if trial.body.preset else person_of_shares(model), points_of_lengths(model)
+    try:
+        measured = with_segment_lengths(model, measure_lengths(model, [landmarks[index] for index in chosen]))
+        check_lengths(length_ratios(measured, shares), points, look)
+        observations = _read(recording, landmarks, sorted({*chosen, *around}), report)
+        missing = [index for index in chosen if index not in observations]
+        if missing:
+            raise TrialError(f"{trial.name}: the videos end before frame {missing[0]}, which has detections")
+        fit = fit_body(
+            model,
+            [observations[index] for index in chosen],
+            scenery=[observations[index] for index in around if index in observations],
+            weights=LANDMARK_WEIGHTS,
+            mass_kg=trial.body.mass_kg,
+            progress=lambda done, total: report("fitting", done, total),
+        )
+        seen = [observations[index].landmarks for index in chosen]
+        warnings = check_joints(fit.model, fit.poses, seen, weights=LANDMARK_WEIGHTS, frames=chosen, look=look)
+        warnings += check_lengths(length_ratios(fit.model, shares), points, look)
+    except BodyError as error:
+        raise BodyError("; ".join([f"{trial.name}: {error}", *recording.events])) from error
     picture = output.with_name(PICTURE)
     write_body(output, fit.model)
     picture.write_bytes(_contact_sheet(fit, [observations[index].frames for index in chosen]))
-    return PersonFit(fit, tuple(chosen), picture)
+    return PersonFit(
+        fit, tuple(chosen), picture, tuple(dict.fromkeys([*model.notes, *recording.events, *notes, *warnings]))
+    )
 
 
 def describe_fit(person: PersonFit) -> str:
@@ -81,6 +118,8 @@ def describe_fit(person: PersonFit) -> str:
         wide, deep = fit.girths[stem]
         girth = f"{wide:.2f}" if wide == deep else f"{wide:.2f} {deep:.2f}"
         lines.append(f"{stem:<12}{length:5.2f}   {girth}")
+    widths = [f"{joint}s {ratio:.2f}" for joint, ratio in fit.joint_widths.items()]
+    lines.append(f"distance of left and right joints: {', '.join(widths)}")
     borders = [f"{stem} at {border.share:.2f}" for stem, border in fit.borders.items()]
     lines.append(f"colours change along: {', '.join(borders) or 'no segment'}")
     colours: dict[str, str] = {}
@@ -93,7 +132,7 @@ def describe_fit(person: PersonFit) -> str:
     lines.append(f"residual: {before * 255:.2f} to {after * 255:.2f} (linear light, 0 to 255)")
     before, after = fit.landmark_rms_m
     lines.append(f"joints: {before * 1e3:.0f} to {after * 1e3:.0f} mm off (RMS)")
-    return "\n".join(lines)
+    return "\n".join([*lines, *(f"note: {note}" for note in person.notes)])
 
 
 def _landmarks_by_frame(trial: Trial, opened: Opened[Recording]) -> dict[int, dict[str, Array]]:

@@ -9,12 +9,14 @@ from typing import Literal
 import numpy as np
 
 from airborne.body import BodyModel, Box, Ellipsoid, Part
+from airborne.body.inverse_kinematics import CORE
 from airborne.body.outfits import Border, extent_m, with_borders
-from airborne.body.shaping import length_axis, with_girths, with_segment_lengths
+from airborne.body.shaping import length_axis, with_girths, with_joint_widths, with_segment_lengths
 from airborne.body_fitting.clothes import stem_of
 from airborne.types import Array
 
 _LENGTH_SD, _END_LENGTH_SD, _GIRTH_SD = 0.03, 0.08, 0.12  # of a factor; END: of a segment without children
+_WIDTH_SD = 0.05  # of a factor on the distance of the hips: wider, the thighs' outlines draw it apart
 _BORDER_SD = 0.05  # of a border's share, about the detected one
 _INSIDE = 0.02, 0.98  # shares of a segment within which a border stays
 
@@ -24,15 +26,15 @@ class ShapeParameter:
     """One parameter of a shape."""
 
     stem: str  # the segment without its side
-    kind: Literal["length", "girth", "border"]
+    kind: Literal["length", "width", "girth", "border"]
     size_m: float  # what it scales
-    sd: float  # of a length or girth: of its logarithm; of a border: of its share
+    sd: float  # of a border: of its share; else of the logarithm
     axis: int | None = None  # of a girth: the first or the second axis across; None: both
     border: Border | None = None  # of a border: where it is at 0
 
 
 def shape_parameters(model: BodyModel) -> tuple[ShapeParameter, ...]:
-    """List the parameters: every segment's length and girth; of one without a side, two girths."""
+    """List the parameters: every segment's length and girth; of one without a side, two girths; the hips' width."""
     parameters: list[ShapeParameter] = []
     for segment in model.segments:
         stem = stem_of(segment.name)
@@ -51,7 +53,22 @@ def shape_parameters(model: BodyModel) -> tuple[ShapeParameter, ...]:
             ]
         else:
             parameters.append(ShapeParameter(stem, "girth", float(half[across].mean()), _GIRTH_SD))
+        width_m = joint_width_m(model, segment.name)
+        if width_m:
+            parameters.append(ShapeParameter(stem, "width", width_m, _WIDTH_SD))
     return tuple(parameters)
+
+
+def joint_width_m(model: BodyModel, name: str) -> float:
+    """Return how far apart the hips' or shoulders' joints are that a segment carries on either side [m]; else 0."""
+    owners = [mark.segment for mark in model.landmarks if mark.name in CORE and not mark.position_m.any()]
+    x_m = [segment.joint_m[0] for segment in model.segments if segment.parent == name and segment.name in owners]
+    return float(np.ptp(x_m)) if len(x_m) > 1 else 0.0
+
+
+def segments_of(model: BodyModel, stem: str) -> list[str]:
+    """Return the segments of a name without its side."""
+    return [segment.name for segment in model.segments if stem_of(segment.name) == stem]
 
 
 def apply_shape(base: BodyModel, parameters: Sequence[ShapeParameter], shape: Array) -> BodyModel:
@@ -59,7 +76,8 @@ def apply_shape(base: BodyModel, parameters: Sequence[ShapeParameter], shape: Ar
     bordered = (
         with_borders(base, borders_of(parameters, shape)) if any(parameter.border for parameter in parameters) else base
     )
-    return with_girths(with_segment_lengths(bordered, lengths_of(parameters, shape)), girths_of(parameters, shape))
+    longer = with_segment_lengths(bordered, lengths_of(parameters, shape))
+    return with_girths(with_joint_widths(longer, widths_of(parameters, shape)), girths_of(parameters, shape))
 
 
 def border_parameters(model: BodyModel, borders: Mapping[str, Border | None]) -> tuple[ShapeParameter, ...]:
@@ -92,6 +110,15 @@ def lengths_of(
         parameter.stem: by_stem.get(parameter.stem, 1.0) * float(np.exp(value))
         for parameter, value in zip(parameters, shape, strict=True)
         if parameter.kind == "length"
+    }
+
+
+def widths_of(parameters: Sequence[ShapeParameter], shape: Array) -> dict[str, float]:
+    """Return a shape's factors of the distance of a segment's joints, left to right, by stem."""
+    return {
+        parameter.stem: float(np.exp(value))
+        for parameter, value in zip(parameters, shape, strict=True)
+        if parameter.kind == "width"
     }
 
 

@@ -1,8 +1,6 @@
 """2D detections: a person's keypoints in every camera's images, found by a pose network or clicked.
 
-Keypoints have our own names (`hip_left`, `toe_right`, ...), whichever set the network uses; the set is recognised by
-its length: COCO 17, OpenPose's COCO 18, BODY_25, HALPE 26, BlazePose 33, and the first points of COCO-WholeBody 133
-and HALPE 136.
+Keypoints have our own names (`hip_left`, `toe_right`, ...), whichever skeleton the network uses: see `skeletons`.
 """
 
 from __future__ import annotations
@@ -15,10 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.cameras.formats.openpose import camera_folders, number_at_end, read_folder, write_folders
+from airborne.cameras.skeletons import LANDMARK_RECIPES, SKELETONS, choose_skeleton
 from airborne.errors import CalibrationError
 from airborne.io.names import check_name
 from airborne.io.npz import read_arrays, write_arrays
 from airborne.types import Array
+
+_SKELETON = "skeleton"  # the array of a .npz that names its skeleton
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -68,27 +69,34 @@ class Detections:
 
 
 def read_detections(
-    path: Path, cameras: Sequence[str], named: Mapping[str, str] | None = None, *, person: int | None = None
+    path: Path,
+    cameras: Sequence[str],
+    named: Mapping[str, str] | None = None,
+    *,
+    person: int | None = None,
+    skeleton: str | None = None,
 ) -> Detections:
     """Read the detections of the cameras from a `.npz` file or a folder of OpenPose JSON.
 
     `.npz`: one array (frames, points, 3) a camera, x, y [px] and visibility. Folder: `<camera>_json` or `<camera>`
     below it, one file a frame, the frame being the last number of the file's name. An array or folder belongs to a
     camera by `named`, by its name, or by the number that it ends in. Of several people in an image the one with the
-    highest confidence is taken, or the one with the index `person` in each file. Raises CalibrationError where a camera
-    is missing, or where two people have about the same confidence and `person` does not say which.
+    highest confidence is taken, or the one with the index `person` in each file. Which points they are say a string
+    `skeleton` in the `.npz` or in the JSON files, or the argument. Raises CalibrationError where a camera is missing,
+    where two people have about the same confidence and `person` does not say which, and for an unknown skeleton.
     """
     if path.is_dir():
         folders = camera_folders(path)
         named = {camera: name.removesuffix("_json") for camera, name in (named or {}).items()}
         key_of = _match_cameras(str(path), cameras, list(folders), named)
-        tables, notes = {}, []
+        tables, notes, said = {}, [], set()
         for camera, name in key_of.items():
-            tables[camera], n_people = read_folder(folders[name], person)
+            tables[camera], n_people, own = read_folder(folders[name], person)
+            said |= own
             if n_people > 1:
                 which = "the one detected most surely" if person is None else f"number {person} of each"
                 notes.append(f"{camera}: up to {n_people} people in an image; took {which}")
-        return _detections(str(path), tables, tuple(notes))
+        return _detections(str(path), tables, said, skeleton, tuple(notes))
     try:
         arrays = read_arrays(path)
     except OSError as error:
@@ -97,8 +105,9 @@ def read_detections(
         raise CalibrationError(
             f"{path} is not a .npz of numbers; expected one array (frames, points, 3) a camera"
         ) from None
+    said = {str(arrays.pop(_SKELETON))} if _names_skeleton(arrays) else set()
     key_of = _match_cameras(path.name, cameras, list(arrays), named or {})
-    return _detections(path.name, {camera: arrays[name] for camera, name in key_of.items()})
+    return _detections(path.name, {camera: arrays[name] for camera, name in key_of.items()}, said, skeleton)
 
 
 def camera_names(path: Path) -> tuple[str, ...]:
@@ -106,30 +115,37 @@ def camera_names(path: Path) -> tuple[str, ...]:
     if path.is_dir():
         return tuple(camera_folders(path))
     try:
-        return tuple(read_arrays(path))
+        arrays = read_arrays(path)
     except (OSError, ValueError) as error:
         raise CalibrationError(f"{path} is not a .npz of numbers ({error}); give a .npz or a folder") from None
+    return tuple(name for name in arrays if name != _SKELETON or not _names_skeleton(arrays))
+
+
+def _names_skeleton(arrays: Mapping[str, NDArray]) -> bool:
+    """Say whether a file's arrays hold the skeleton's name, and not a camera called so."""
+    return _SKELETON in arrays and arrays[_SKELETON].dtype.kind == "U" and arrays[_SKELETON].size == 1
 
 
 def write_detections(path: Path, detections: Detections, *, as_folder: bool = False) -> None:
-    """Write detections as `.npz`, or as a folder of OpenPose JSON.
+    """Write detections as `.npz`, or as a folder of OpenPose JSON, with the name of their skeleton.
 
-    Raises CalibrationError where the points are no network's: a reader tells them by the length of their list.
+    Raises CalibrationError where the points are no network's.
     """
-    names = NETWORKS.get(len(detections.points))
-    if names != detections.points:
+    n_points = len(detections.points)
+    names = [each.name for each in SKELETONS.values() if (each.n_points, each.points) == (n_points, detections.points)]
+    if not names:
         raise CalibrationError(
-            f"{len(detections.points)} points ({', '.join(detections.points[:3])}, ...) are not a pose network's, "
-            "which are told by their number; write a table (.csv)"
+            f"{n_points} points ({', '.join(detections.points[:3])}, ...) are not a pose network's; "
+            "write a table (.csv)"
         )
     tables = {
         camera: np.concatenate([detections.px[:, :, k], detections.visibility[:, :, k, None]], axis=-1)
         for k, camera in enumerate(detections.cameras)
     }
     if as_folder:
-        write_folders(path, tables)
+        write_folders(path, tables, names[0])
     else:
-        write_arrays(path, tables)
+        write_arrays(path, {**tables, _SKELETON: np.array(names[0])})
 
 
 def _match_cameras(where: str, cameras: Sequence[str], keys: Sequence[str], named: Mapping[str, str]) -> dict[str, str]:
@@ -151,7 +167,9 @@ def _match_cameras(where: str, cameras: Sequence[str], keys: Sequence[str], name
     return key_of
 
 
-def _detections(where: str, tables: Mapping[str, Array], notes: tuple[str, ...] = ()) -> Detections:
+def _detections(
+    where: str, tables: Mapping[str, Array], said: set[str], skeleton: str | None, notes: tuple[str, ...] = ()
+) -> Detections:
     """Stack the cameras' tables (frames, points, 3); shorter ones are padded with NaN."""
     if not tables:
         raise CalibrationError(
@@ -165,12 +183,12 @@ def _detections(where: str, tables: Mapping[str, Array], notes: tuple[str, ...] 
                 "expected numbers (frames, points, 3): x, y, visibility"
             )
         n_points[camera] = table.shape[1]
-    count = max(n_points.values())
-    if len(set(n_points.values())) > 1 or count not in NETWORKS:
+    count, known = max(n_points.values()), list(dict.fromkeys(each.n_points for each in SKELETONS.values()))
+    if len(set(n_points.values())) > 1 or count not in known:
         counts = ", ".join(f"{camera} {n}" for camera, n in n_points.items())
-        expected = ", ".join(map(str, NETWORKS))
+        expected = ", ".join(map(str, known))
         raise CalibrationError(f"{where}: points per image: {counts}; expected the same for all, one of {expected}")
-    names = NETWORKS[count]
+    names = choose_skeleton(where, count, said, skeleton).points
     values = np.full((max(map(len, tables.values())), len(names), len(tables), 3), np.nan)
     for column, table in enumerate(tables.values()):
         values[: len(table), :, column] = table[:, : len(names)]
@@ -194,50 +212,3 @@ def landmarks_from_points(names: Sequence[str], points: Array) -> dict[str, Arra
                 between = points[..., [names.index(name) for name in recipe], :]
                 landmarks[landmark] = np.einsum("...pi,p->...i", between, np.array(list(recipe.values())))
     return landmarks
-
-
-def _both_sides(*names: str) -> tuple[str, ...]:
-    return tuple(f"{name}_{side}" for name in names for side in ("left", "right"))
-
-
-def _limb(side: str, *names: str) -> tuple[str, ...]:
-    return tuple(f"{name}_{side}" for name in names)
-
-
-_COCO = ("nose", *_both_sides("eye", "ear", "shoulder", "elbow", "wrist", "hip", "knee", "ankle"))
-_HALPE = (*_COCO, "head_top", "mid_shoulder", "mid_hip", *_both_sides("toe", "small_toe", "heel"))
-_ARM, _LEG, _TOES = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"), ("toe", "small_toe", "heel")
-_FACE = ("eye_right", "eye_left", "ear_right", "ear_left")
-_RIGHT_FIRST = ("nose", "mid_shoulder", *_limb("right", *_ARM), *_limb("left", *_ARM))
-_EYES = (*_limb("left", "inner_eye", "eye", "outer_eye"), *_limb("right", "inner_eye", "eye", "outer_eye"))
-
-NETWORKS: dict[int, tuple[str, ...]] = {
-    17: _COCO,
-    18: (*_RIGHT_FIRST, *_limb("right", *_LEG), *_limb("left", *_LEG), *_FACE),
-    25: (
-        *(*_RIGHT_FIRST, "mid_hip", *_limb("right", *_LEG), *_limb("left", *_LEG), *_FACE),
-        *(*_limb("left", *_TOES), *_limb("right", *_TOES)),
-    ),
-    26: _HALPE,
-    33: (
-        *("nose", *_EYES, *_both_sides("ear", "mouth", "shoulder", "elbow", "wrist")),
-        *_both_sides("little_knuckle", "index_knuckle", "thumb", "hip", "knee", "ankle", "heel", "toe"),
-    ),
-    133: (*_COCO, *_limb("left", *_TOES), *_limb("right", *_TOES)),
-    136: _HALPE,
-}  # how many points a network keeps -> their names, in its order
-
-
-def _recipes(side: str) -> dict[str, tuple[dict[str, float], ...]]:
-    toe, small, heel = _limb(side, *_TOES)
-    return {
-        f"hand_{side}": ({f"index_knuckle_{side}": 0.5, f"little_knuckle_{side}": 0.5},),
-        f"foot_{side}": ({heel: 0.25, toe: 0.375, small: 0.375}, {heel: 0.25, toe: 0.75}),
-    }
-
-
-LANDMARK_RECIPES: dict[str, tuple[dict[str, float], ...]] = {
-    "head": ({"ear_left": 0.5, "ear_right": 0.5},),
-    **_recipes("left"),
-    **_recipes("right"),
-}  # landmark -> shares of the points that it lies between, the first recipe that can be followed

@@ -11,23 +11,30 @@ import typer
 
 from airborne import __version__
 from airborne.cli import reproduce, results, synth, track
+from airborne.cli.batch import batch_command, new_command
 from airborne.cli.calibrate import calibrate_command
 from airborne.cli.check import check_command
+from airborne.cli.compare import compare_command
 from airborne.cli.console import STOPPED, UNDECIDED, refuse, stop
 from airborne.cli.convert import convert_command
 from airborne.cli.export import export_command
 from airborne.cli.find import find_command, frame_command
 from airborne.cli.smooth import smooth_command
+from airborne.cli.studio import studio_command
 from airborne.cli.sync import sync_command
 from airborne.errors import AirborneError, UndecidedError
 
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
 _COMMANDS = {
     "demo": track.demo_command,
+    "studio": studio_command,
     "check": check_command,
     "find": find_command,
     "frame": frame_command,
     "track": track.track_command,
+    "new": new_command,
+    "batch": batch_command,
+    "compare": compare_command,
     "calibrate": calibrate_command,
     "sync": sync_command,
     "convert": convert_command,

@@ -32,6 +32,9 @@ def convert_command(
         Path | None, typer.Option(help="Cameras of points: their names, sizes, and positions for DLTdv's xyzpts.")
     ] = None,
     person: Annotated[int | None, typer.Option(min=0, help="Which of several people in OpenPose's files.")] = None,
+    skeleton: Annotated[
+        str | None, typer.Option(help="Whose points detections are, if IN does not say: BODY_25, BODY_25B, ...")
+    ] = None,
 ) -> None:
     """Convert cameras, clicked points or detections; the format of IN follows from its content. DLT defaults: DLTdv 8.
 
@@ -46,7 +49,7 @@ def convert_command(
     options = {
         **{"--size": size, "--unit": unit, "--origin": origin, "--pixel-base": pixel_base, "--to-unit": to_unit},
         **{"--to-origin": to_origin, "--to-pixel-base": to_pixel_base, "--cameras": cameras},
-        **{"--calibration": calibration, "--person": person},
+        **{"--calibration": calibration, "--person": person, "--skeleton": skeleton},
     }
     conversion = ConversionOptions(
         to=to,
@@ -57,6 +60,7 @@ def convert_command(
         cameras=tuple(name.strip() for name in (cameras or "").split(",") if name.strip()),
         calibration=calibration,
         person=person,
+        skeleton=skeleton,
         given_options=frozenset(name for name, value in options.items() if value is not None),
     )
     print(convert_file(source, target, conversion).describe())

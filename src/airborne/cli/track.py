@@ -197,6 +197,9 @@ def fit_body_command(
     trial: Annotated[Path, typer.Argument(help="The trial's TOML file; its [start] has detections or joints_m.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The body file to write.")],
     frames: Annotated[int, typer.Option(min=1, help="How many frames to fit the body to.")] = 5,
+    skeleton: Annotated[
+        str | None, typer.Option(help="Whose points the detections are, if their files do not say: BODY_25, ...")
+    ] = None,
 ) -> None:
     """Fit the trial's body to the person in its videos: lengths, girths, colours and their borders.
 
@@ -207,7 +210,11 @@ def fit_body_command(
 
     with progress("reading and fitting") as report:
         fitted = fit_person(
-            read_trial(trial), output, n_frames=frames, progress=lambda what, done, total: report(done, total)
+            read_trial(trial),
+            output,
+            n_frames=frames,
+            skeleton=skeleton,
+            progress=lambda what, done, total: report(done, total),
         )
     print(f"{describe_fit(fitted)}\nbody: {output}\npicture: {fitted.picture}")
 

@@ -19,11 +19,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, t
+from scipy.special import stdtrit
 
 from airborne.constants import NORMAL_QUANTILE_975
 from airborne.evaluation.compare import nan_to_none
 from airborne.evaluation.icc import Reliability, reliability
+from airborne.geometry.sampling import chi2_quantile
 from airborne.motion.jumps.jump import UNKNOWN, Measurement
 from airborne.types import Array
 
@@ -161,11 +162,11 @@ def limits_of_agreement(components: VarianceComponents) -> tuple[Measurement, Me
         (components.within_share * components.within, components.within_freedom),
     )
     parts = tuple((variance, freedom) for variance, freedom in parts if freedom > 0)
-    less = math.sqrt(sum((v * (1 - f / chi2.ppf(0.975, f))) ** 2 for v, f in parts))
-    more = math.sqrt(sum((v * (f / chi2.ppf(0.025, f) - 1)) ** 2 for v, f in parts))
+    less = math.sqrt(sum((v * (1 - f / chi2_quantile(0.975, f))) ** 2 for v, f in parts))
+    more = math.sqrt(sum((v * (f / chi2_quantile(0.025, f) - 1)) ** 2 for v, f in parts))
     narrower = sd - math.sqrt(max(components.total - less, 0.0))
     wider = math.sqrt(components.total + more) - sd
-    shift = float(t.ppf(0.975, components.mean_freedom)) * components.mean_se
+    shift = float(stdtrit(components.mean_freedom, 0.975)) * components.mean_se
     inner, outer = math.hypot(shift, NORMAL_QUANTILE_975 * narrower), math.hypot(shift, NORMAL_QUANTILE_975 * wider)
     low, high = components.mean - NORMAL_QUANTILE_975 * sd, components.mean + NORMAL_QUANTILE_975 * sd
     return Measurement(low, low - outer, low + inner), Measurement(high, high - inner, high + outer)
@@ -179,7 +180,7 @@ def scale_measurement(measured: Measurement, factor: float) -> Measurement:
 def _t_interval(value: float, se: float, freedom: float) -> Measurement:
     if not freedom > 0:
         return Measurement(value, math.nan, math.nan)
-    half = float(t.ppf(0.975, freedom)) * se
+    half = float(stdtrit(freedom, 0.975)) * se
     return Measurement(value, value - half, value + half)
 
 

@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from scipy.stats import chi2, f
+from scipy.special import fdtri
 
+from airborne.geometry.sampling import chi2_quantile
 from airborne.motion.jumps.jump import UNKNOWN, Measurement
 from airborne.types import Array
 
@@ -66,7 +67,7 @@ def sd_with_interval(variance: float, freedom: float) -> Measurement:
     """Return the square root of an estimated variance with its 95 % interval."""
     if not freedom > 0:
         return UNKNOWN
-    low, high = (math.sqrt(variance * freedom / float(chi2.ppf(p, freedom))) for p in (0.975, 0.025))
+    low, high = (math.sqrt(variance * freedom / float(chi2_quantile(p, freedom))) for p in (0.975, 0.025))
     return Measurement(math.sqrt(variance), low, high)
 
 
@@ -74,8 +75,8 @@ def _icc_from_f_ratio(rows: float, error: float, *, k: int, freedom: tuple[float
     if not error > 0:
         return Measurement(1.0, 1.0, 1.0) if rows > 0 else UNKNOWN
     ratio = rows / error
-    low = ratio / float(f.ppf(0.975, *freedom))
-    high = ratio * float(f.ppf(0.975, *freedom[::-1]))
+    low = ratio / float(fdtri(*freedom, 0.975))
+    high = ratio * float(fdtri(*freedom[::-1], 0.975))
     return Measurement(*((each - 1) / (each + k - 1) for each in (ratio, low, high)))
 
 
@@ -88,7 +89,7 @@ def _absolute_agreement(rows: float, columns: float, residual: float, *, n: int,
         return Measurement(value, math.nan, math.nan)
     a, b = k * value / (n * (1 - value)), 1 + k * value * (n - 1) / (n * (1 - value))
     v = (a * columns + b * residual) ** 2 / ((a * columns) ** 2 / (k - 1) + (b * residual) ** 2 / (freedom * (k - 1)))
-    above, below = float(f.ppf(0.975, freedom, v)), float(f.ppf(0.975, v, freedom))
+    above, below = float(fdtri(freedom, v, 0.975)), float(fdtri(v, freedom, 0.975))
     shared = k * columns + (k * n - k - n) * residual
     low = n * (rows - above * residual) / (above * shared + n * rows)
     high = n * (below * rows - residual) / (shared + n * below * rows)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from airborne.cameras import Rig, read_rig
 from airborne.errors import ResultError
@@ -16,6 +15,7 @@ from airborne.evaluation.compare import match_times, nan_to_none, or_dash, span
 from airborne.evaluation.jump_errors import JumpErrors, compare_jumps
 from airborne.evaluation.players_truth import read_players_truth, read_reference_jumps
 from airborne.evaluation.success import Cover, success_cover
+from airborne.geometry.sampling import chi2_quantile
 from airborne.motion.players import PlayersMotion, read_players
 from airborne.tracking import Status
 from airborne.types import Array
@@ -235,7 +235,7 @@ def _within_95(error: Array, covariance: Array) -> float:
         return math.nan
     error, covariance = error[is_definite], covariance[is_definite]
     squared = np.einsum("ni,ni->n", error, np.linalg.solve(covariance, error[..., None])[..., 0])
-    return float(np.mean(squared <= chi2.ppf(0.95, 3)))
+    return float(np.mean(squared <= chi2_quantile(0.95, 3)))
 
 
 def _pcp(pair: _Pair) -> float:

@@ -47,8 +47,8 @@ _FROM: Mapping[str, frozenset[str]] = {
     "dlt": frozenset({"--unit", "--size"}) | _PIXELS,
     "dltdv": frozenset({"--unit", "--size"}) | _PIXELS | _NAMES,
     "digitised": _NAMES,
-    "npz": _NAMES,
-    "openpose": _NAMES | {"--person"},
+    "npz": _NAMES | {"--skeleton"},
+    "openpose": _NAMES | {"--person", "--skeleton"},
 }  # the options that apply to a file that is read
 _TO: Mapping[str, frozenset[str]] = {
     **dict.fromkeys(FORMATS, frozenset()),
@@ -68,6 +68,7 @@ class ConversionOptions:
     cameras: tuple[str, ...] = ()  # the names of the cameras of points
     calibration: Path | None = None  # cameras that triangulate the points
     person: int | None = None  # of OpenPose's people
+    skeleton: str | None = None  # of detections
     given_options: frozenset[str] = frozenset()  # the options that were given
 
 
@@ -228,7 +229,9 @@ def _read_points(source: Path, kind: str, options: ConversionOptions, rig: Rig |
         if not names:
             raise AirborneError(f"{source}: say which cameras its columns are of: --cameras cam1,cam2,...")
         return Digitisation(points=_by_frame(read_clicked_frames(source, names), names))
-    return Digitisation(points=read_detections(source, names or camera_names(source), person=options.person))
+    return Digitisation(
+        points=read_detections(source, names or camera_names(source), person=options.person, skeleton=options.skeleton)
+    )
 
 
 def _by_frame(digitised: DigitisedPoints, cameras: tuple[str, ...]) -> Detections:

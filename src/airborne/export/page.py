@@ -1,4 +1,4 @@
-"""Self-contained web pages from the templates in `templates/`: no script, no font, no file beside them."""
+"""Web pages from the templates in `templates/`, which need no network; a report also no script, no file beside it."""
 
 from __future__ import annotations
 
@@ -42,6 +42,11 @@ def render_report(
     shares = [(str(status), summary[f"n_{status}"], hex_colour(STATUS_RGB[status])) for status in Status]
     shared = {"summary": summary, "alarms": alarms, "fine_text": fine_text, "definitions": definitions}
     return _environment().get_template(template).render(shared | values, shares=shares)
+
+
+def render_page(template: str, **values: Any) -> str:
+    """Return a page from a template of its own; all text is escaped."""
+    return _environment().get_template(template).render(values)
 
 
 def label(key: str) -> str:

@@ -88,10 +88,11 @@ class NielsenRule:
 
 @dataclass(frozen=True, slots=True)
 class BacktrackingRule:
-    """The share of the undamped step: the same at every new iterate, shorter after each loss."""
+    """The share of the undamped step: the same at every new iterate, shorter after each loss, down to the least."""
 
     first: float
     factor: float
+    least: float
 
     def after_gain(self, value: float, ratio: float) -> float:
         """Return the first share."""
@@ -102,8 +103,8 @@ class BacktrackingRule:
         return value * self.factor
 
     def is_exhausted(self, value: float) -> bool:
-        """Never: the number of steps is bounded."""
-        return False
+        """Whether the share is below the least."""
+        return value < self.least
 
 
 class Iterate(Protocol):

@@ -119,11 +119,17 @@ def calibrate(
 
 
 def fit_body(
-    trial: Trial | FilePath, output: FilePath, *, n_frames: int = 5, progress: bool | StageProgress = False
+    trial: Trial | FilePath,
+    output: FilePath,
+    *,
+    n_frames: int = 5,
+    skeleton: str | None = None,
+    progress: bool | StageProgress = False,
 ) -> PersonFit:
     """Fit a trial's body to the person in its images, and write the body file; as `airborne fit-body` does.
 
-    The trial's [start] has detections or joints_m. Raises an AirborneError for input that cannot be used.
+    The trial's [start] has detections or joints_m; `skeleton` says whose points detections are where their files do
+    not. Raises an AirborneError for input that cannot be used.
 
     >>> fit_body("trial.toml", "person.toml")
     Traceback (most recent call last):
@@ -131,7 +137,7 @@ def fit_body(
     """
     trial = trial if isinstance(trial, Trial) else read_trial(trial)
     with _reporting_stages(progress) as report:
-        return fit_person(trial, Path(output), n_frames=n_frames, progress=report)
+        return fit_person(trial, Path(output), n_frames=n_frames, skeleton=skeleton, progress=report)
 
 
 def evaluate(

@@ -20,8 +20,7 @@ def pose_segments(model: BodyModel, root_R: Array, root_t: Array, joint_angles: 
     n, s = len(root_R), len(model.segments)
     R, t = np.empty((n, s, 3, 3)), np.empty((n, s, 3))
     R[:, 0], t[:, 0] = root_R, root_t
-    joints = np.array([segment.joint_m for segment in model.segments], float)
-    _chain(model.parents, joints, np.ascontiguousarray(joint_angles, float), R, t)
+    _chain(model.parents, model.joints_m, np.ascontiguousarray(joint_angles, float), R, t)
     return R, t
 
 

@@ -53,7 +53,7 @@ def read_trial_detections(trial: Trial, facts: Sequence[VideoFacts]) -> TrialDet
     if start.detections is None:
         return None
     names = [camera.name for camera in trial.camera]
-    frames = read_detections(trial.path(start.detections), names, start.detections_cameras)
+    frames = read_detections(trial.path(start.detections), names, start.detections_cameras, skeleton=start.skeleton)
     return TrialDetections(frames, tuple(trial.camera), tuple(facts))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from array import array
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from functools import partial
@@ -155,10 +156,10 @@ def _open_live(trial: Trial, stack: ExitStack, progress: Progress | None) -> Ope
 
 def _track(
     subject: Subject[Found, AnyMotion], options: _Options, *, resume: bool
-) -> tuple[Subject[Found, AnyMotion], list[float]]:
+) -> tuple[Subject[Found, AnyMotion], array[float]]:
     """Track every frame, written and drawn at once; return the subject as seen, and live frames' delays [s]."""
     folder, drawn, recording = options.folder, options.drawn, subject.recording
-    delays_s: list[float] = []
+    delays_s = array("d")
     outages = Outages(recording.rig.names)
     with ExitStack() as stack:
         frames = stack.enter_context(closing(iter(recording)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import cv2
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from airborne.appearance.model import Region
 from airborne.body import PosedBody, SurfaceArrays
+from airborne.kernels import kernel
 from airborne.rendering.packing import pack_view, shift_view
 from airborne.video import Frames, View
 
@@ -53,40 +55,73 @@ def share_in_view(body: PosedBody, geometry: SurfaceArrays, frames: Frames) -> f
     shares = [0.0]
     for view in frames.views:
         if view is not None:
-            px = view.camera.px_from_world(points)
-            with np.errstate(invalid="ignore"):
-                shares.append(float(np.mean(np.all((px >= 0) & (px < view.camera.size), axis=1))))
+            shares.append(_project(points, pack_view(view.camera), view.camera.K, *view.camera.size)[4])
     return max(shares)
 
 
 def bounding_points(body: PosedBody, geometry: SurfaceArrays) -> NDArray:
     """Return world points (n, 3) [m] whose hull holds the body: corners, and the boxes around the ellipsoids."""
-    segments = geometry.polygon_segment.repeat(np.diff(geometry.start))
-    corners = np.einsum("nij,nj->ni", body.R[segments], geometry.corners) + body.t[segments]
-    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8)
-    boxes = (geometry.ellipsoid_axes * geometry.ellipsoid_semi_axes[:, None]) @ signs
-    local = geometry.ellipsoid_centre[:, None] + boxes.transpose(0, 2, 1)
-    owner = geometry.ellipsoid_segment
-    box_corners = np.einsum("nij,nkj->nki", body.R[owner], local) + body.t[owner][:, None]
-    return np.concatenate([corners, box_corners.reshape(-1, 3)])
+    return _bounding_points(geometry, np.ascontiguousarray(body.R, float), np.ascontiguousarray(body.t, float))
+
+
+@kernel
+def _bounding_points(geometry, R, t):
+    n_corners, n_ellipsoids = len(geometry.corners), len(geometry.ellipsoid_segment)
+    points, local = np.empty((n_corners + 8 * n_ellipsoids, 3)), np.empty(3)
+    for p in range(len(geometry.polygon_segment)):
+        for n in range(geometry.start[p], geometry.start[p + 1]):
+            _place(R, t, geometry.polygon_segment[p], geometry.corners[n], points[n])
+    for n in range(8 * n_ellipsoids):
+        e, signs = n // 8, n % 8
+        local[:] = geometry.ellipsoid_centre[e]
+        for axis in range(3):
+            half = (
+                geometry.ellipsoid_semi_axes[e, axis] if (signs >> axis) & 1 else -geometry.ellipsoid_semi_axes[e, axis]
+            )
+            for i in range(3):
+                local[i] += geometry.ellipsoid_axes[e, i, axis] * half
+        _place(R, t, geometry.ellipsoid_segment[e], local, points[n_corners + n])
+    return points
+
+
+@kernel
+def _place(R, t, segment, local, point):
+    for i in range(3):
+        a, b, c = R[segment, i, 0], R[segment, i, 1], R[segment, i, 2]
+        point[i] = t[segment, i] + a * local[0] + b * local[1] + c * local[2]
+
+
+@kernel
+def _project(points, view, K, width, height):
+    """Return the box x0, y0, x1, y1 of world points (n, 3) in a packed view, and the share that lies in its image.
+
+    Points behind the camera are left out; where all are, the box is empty.
+    """
+    x0, y0, x1, y1, n_inside = np.inf, np.inf, -np.inf, -np.inf, 0
+    for n in range(len(points)):
+        p, q, r = points[n, 0], points[n, 1], points[n, 2]
+        x = view[0] * p + view[1] * q + view[2] * r + view[9]
+        y = view[3] * p + view[4] * q + view[5] * r + view[10]
+        z = view[6] * p + view[7] * q + view[8] * r + view[11]
+        if z > 0:
+            u, v = (K[0, 0] * x + K[0, 1] * y) / z + K[0, 2], (K[1, 0] * x + K[1, 1] * y) / z + K[1, 2]
+            x0, y0, x1, y1 = min(x0, u), min(y0, v), max(x1, u), max(y1, v)
+            n_inside += 0 <= u < width and 0 <= v < height
+    return x0, y0, x1, y1, n_inside / len(points)
 
 
 def _region(view: View, points: NDArray, margin_px: float) -> Region | None:
     camera, packed = view.camera, pack_view(view.camera)
-    xyz = points @ packed[:9].reshape(3, 3).T + packed[9:12]
-    xyz = xyz[xyz[:, 2] > 0]
-    if not len(xyz):
+    left, top, right, bottom, _ = _project(points, packed, camera.K, *camera.size)
+    if left > right:
         return None
-    px = (xyz[:, :2] / xyz[:, 2:]) @ camera.K[:2, :2].T + camera.K[:2, 2]
-    margin = margin_px * np.array([1, camera.K[1, 1] / camera.K[0, 0]])
-    size = np.array(camera.size)
-    low = np.clip(np.floor(px.min(axis=0) - margin), 0, size).astype(int)
-    high = np.clip(np.ceil(px.max(axis=0) + margin) + 1, 0, size).astype(int)
-    width, height = (high - low) // _ROUND_TO_PX * _ROUND_TO_PX
+    margin_v = margin_px * camera.K[1, 1] / camera.K[0, 0]
+    x0, x1 = _span(left - margin_px, right + margin_px, camera.size[0])
+    y0, y1 = _span(top - margin_v, bottom + margin_v, camera.size[1])
+    width, height = ((end - begin) // _ROUND_TO_PX * _ROUND_TO_PX for begin, end in ((x0, x1), (y0, y1)))
     if min(width, height) < 2 * _ROUND_TO_PX:
         return None
-    x0, y0 = int(low[0]), int(low[1])
-    own = camera.resample(scale=(1, 1), offset=(x0, y0), size=(int(width), int(height)))
+    own = camera.resample(scale=(1, 1), offset=(x0, y0), size=(width, height))
     return Region(
         camera=own,
         corner=(x0, y0),
@@ -95,3 +130,8 @@ def _region(view: View, points: NDArray, margin_px: float) -> Region | None:
         source=(camera.name, camera.K.tobytes()),
         packed_view=shift_view(packed, x0, y0),
     )
+
+
+def _span(low: float, high: float, size: int) -> tuple[int, int]:
+    """Return the whole pixels from low up to high that an image of this size has: the first, and one past the last."""
+    return math.floor(min(max(low, 0), size)), math.ceil(min(max(high + 1, 0), size))

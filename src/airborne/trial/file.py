@@ -12,7 +12,7 @@ from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_
 from airborne.body import SAMPLED, BodyModel, human18, human18_from_measurements
 from airborne.body.files import read_body
 from airborne.errors import MistakesError, TrialError, list_mistakes
-from airborne.io.names import Name
+from airborne.io.names import ColumnName, Name, check_path
 from airborne.io.text import list_keys, read_toml
 from airborne.tracking.methods import Settings
 from airborne.tracking.players import PlayerStart
@@ -20,6 +20,7 @@ from airborne.trial.body import BodyTable
 from airborne.trial.calibration import CalibrationTable
 from airborne.trial.cameras import CameraTable
 from airborne.trial.lights import LightsTable
+from airborne.trial.session import join_session
 from airborne.trial.settings import (
     BODY_METHODS,
     METHODS,
@@ -36,6 +37,7 @@ class Trial(SettingsTable):
     """A whole trial file."""
 
     name: Name
+    labels: dict[ColumnName, str | int | float] = {}  # athlete, condition, whatever tells trials apart
     camera: Annotated[list[CameraTable], Field(min_length=1)]
     calibration: CalibrationTable
     body: BodyTable
@@ -162,13 +164,28 @@ class Trial(SettingsTable):
 
 def parse_trial(path: Path, track: dict[str, Any] | None = None, given_as: str = "{} = {!r}") -> Trial:
     """Read a trial's tables, but look for none of the files that they name; raises TrialError."""
-    trial = _validate(read_tables(path), track or {}, path.name, given_as)
-    trial._folder = path.parent
+    tables, folder = read_tables(path)
+    trial = _validate(tables, track or {}, path.name, given_as)
+    trial._folder = folder
     return trial
 
 
-def read_tables(path: Path) -> dict[str, Any]:
-    """Read a trial's TOML as it stands there; raises TrialError."""
+def read_tables(path: Path) -> tuple[dict[str, Any], Path]:
+    """Read a trial's tables, joined with those of the session that it names, and the folder of their paths.
+
+    Paths are relative to the session's file where there is one, else to the trial's. Raises TrialError.
+    """
+    tables = _read_toml(path)
+    if "session" not in tables:
+        return tables, path.parent
+    try:
+        session = path.parent / check_path(tables["session"])
+    except (AttributeError, ValueError):
+        raise TrialError(f"{path.name}: session: expected the path of a session's TOML file") from None
+    return join_session(tables, _read_toml(session), path), session.parent
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
     try:
         return read_toml(path)
     except OSError as error:

@@ -18,7 +18,7 @@ def parse_remainder(path: Path) -> Trial | None:
 
     None where it cannot be read without them. Raises TrialError for a file without tables.
     """
-    tables = deepcopy(read_tables(path))
+    tables, folder = deepcopy(read_tables(path))
     for _ in range(_MOST_MISTAKES):
         try:
             trial = Trial(**tables)
@@ -26,7 +26,7 @@ def parse_remainder(path: Path) -> Trial | None:
             if not any(_remove(tables, place) for place in error.places[:1]):
                 return None
         else:
-            trial._folder = path.parent
+            trial._folder = folder
             return trial
     return None
 

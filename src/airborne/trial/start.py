@@ -30,6 +30,7 @@ class StartTable(SettingsTable):
     points_px: CheckedPath | None = None  # a table of clicked points
     detections: CheckedPath | None = None  # .npz, or a folder of folders of OpenPose JSON
     detections_cameras: dict[str, str] = {}  # camera -> its array or folder
+    skeleton: str | None = None  # whose points the detections are; None: as their files say
     player: list[PlayerTable] = []
 
     @model_validator(mode="after")
@@ -54,6 +55,8 @@ class StartTable(SettingsTable):
             raise ValueError("every player is a bystander; give one of them the points of the legs too")
         if self.detections_cameras and self.detections is None:
             raise ValueError("detections_cameras goes with detections")
+        if self.skeleton is not None and self.detections is None:
+            raise ValueError("skeleton goes with detections")
         if by_hand & self.model_fields_set:
             self._check_rotation()
         return self

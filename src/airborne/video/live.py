@@ -8,6 +8,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
+from statistics import median
 from threading import Condition, Event, Thread
 
 from airborne.cameras import Rig
@@ -16,11 +17,14 @@ from airborne.video.decoding import DecodedImage, VideoFacts, VideoSource, facts
 from airborne.video.frames import Frames, View
 from airborne.video.lazy import ConversionCache, lazy_view
 from airborne.video.recording import check_sizes
-from airborne.video.sources import POLL_S, SourceKind, kind_of, open_source
+from airborne.video.sources import POLL_S, SourceKind, is_stdin, kind_of, open_source
 from airborne.video.undistortion import Undistortion, undistortion_of
 
 _BUFFER_LENGTH = 16  # images of a camera that wait to be matched, the newest
 _LONGEST_WAIT_S, _LONGEST_WAIT_PERIODS = 0.25, _BUFFER_LENGTH - 4  # of an image, for those of the other cameras
+_RETRY_S = 0.5  # before a source whose sender went away is opened again
+_CLOCK_LENGTH = 50  # images that say how far arrivals are behind stamps
+_CLOCK_S = 0.5  # of images that come again, to learn that
 _MICRO = 1_000_000  # to a second: the clock of a stream that has none
 
 
@@ -41,29 +45,40 @@ class LiveCamera:
     stop: Event
     facts: VideoFacts | None = None
     error: VideoError | None = None
-    has_ended: bool = False
+    has_ended: bool = False  # nobody sends any more
     is_away: bool = False  # waited for in vain, and nothing has come since
+    delays_s: deque[float] = field(default_factory=lambda: deque(maxlen=_CLOCK_LENGTH))  # of arrivals behind stamps
+    shift_s: Fraction = Fraction(0)  # added to the stamps of a sender that came back, which count from its first image
     n_received: int = 0
+    n_returns: int = 0  # senders that came after the first one had ended
     n_used: int = 0
     buffer: deque[_Arrival] = field(default_factory=lambda: deque(maxlen=_BUFFER_LENGTH))
 
     def run(self) -> None:
-        """Read to the end; an error is stored for the waiting thread."""
-        try:
-            self._read()
-        except VideoError as error:
+        """Read to the end, and again where a sender comes back; an error is stored for the waiting thread."""
+        while not self.stop.is_set():
+            error = None
+            try:
+                self._read()
+            except VideoError as failure:
+                error = failure
             with self.changed:
                 self.error = error
-        finally:
-            with self.changed:
                 self.has_ended = True
                 self.changed.notify_all()
+            if self.facts is None or self.kind == "file" or is_stdin(self.source):
+                return
+            self.stop.wait(_RETRY_S)
 
     def _read(self) -> None:
+        known = self.facts
+        delay_s = (median(self.delays_s) if self.delays_s else 0.0) - float(self.shift_s)  # the last ones came at once
         with open_source(self.source, self.stop) as (container, stream):
             tick = stream.time_base or Fraction(1, _MICRO)
-            start_s = 0.0
-            for n_ticks, frame in intact_frames(container, stream, size=None):
+            size = None if known is None else known.size_before_rotation
+            self.delays_s.clear()
+            start_s = opened_s = time.monotonic()
+            for n_ticks, frame in intact_frames(container, stream, size=size):
                 if self.n_received == 1:
                     while not self.begin.wait(POLL_S) and not self.stop.is_set():
                         pass
@@ -77,7 +92,11 @@ class LiveCamera:
                 now_s = time.monotonic()
                 if self.kind == "device" and self.n_received:
                     stamp_s = Fraction(round((now_s - start_s) * _MICRO), _MICRO) + 1 / facts.frame_rate
-                self._keep(DecodedImage(self.source.trial_time(stamp_s), frame, None), facts, now_s)
+                self.delays_s.append(now_s - float(stamp_s))
+                if known is not None and (now_s < opened_s + _CLOCK_S or len(self.delays_s) == 1):
+                    self.shift_s = Fraction(round((min(self.delays_s) - delay_s) * _MICRO), _MICRO)
+                    continue
+                self._keep(DecodedImage(self.source.trial_time(stamp_s + self.shift_s), frame, None), facts, now_s)
         if self.facts is None and not self.stop.is_set():
             raise VideoError(f"{self.source.name}: no image came from {self.source.path}; check what sends them")
         if self.kind == "network" and not self.stop.is_set():
@@ -87,7 +106,9 @@ class LiveCamera:
         with self.changed:
             self.facts = facts
             self.n_received += 1
-            self.is_away = False
+            self.n_returns += self.has_ended
+            self.is_away = self.has_ended = False
+            self.error = None
             self.buffer.append(_Arrival(image, now_s))
             self.changed.notify_all()
 
@@ -109,9 +130,10 @@ class LiveRecording:
     The first camera is the clock while it delivers, then the next one. Every other camera contributes its nearest
     image, if within half of the clock's period. Times are the stamps of files and pipes, counted from each one's
     first image, and for capture devices the moments of arrival. A time whose images are incomplete waits for a
-    quarter of a second at most; the missing camera then counts as away until it comes back. Whatever is older than
-    the last frames is dropped. After the first images the cameras pause until more is asked for, so that preparing
-    on the first ones misses nothing of a file.
+    quarter of a second at most; the missing camera then counts as away until it comes back. What is sent by a pipe, a
+    device or a network camera is opened again after its end, until all have ended. Whatever is older than the last
+    frames is dropped. After the first images the cameras pause until more is asked for, so that preparing on the
+    first ones misses nothing of a file.
     """
 
     cameras: Sequence[LiveCamera]
@@ -214,6 +236,11 @@ class LiveRecording:
         for camera in self.cameras:
             if camera.error is not None:
                 self.events.append(f"{camera.source.name}: the images broke off: {camera.error}")
+            if camera.n_returns:
+                self.events.append(
+                    f"{camera.source.name}: went away and came back {camera.n_returns}×; "
+                    "from then on its times follow its images' arrival"
+                )
 
 
 @contextmanager

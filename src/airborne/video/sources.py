@@ -31,13 +31,18 @@ def kind_of(source: VideoSource) -> SourceKind:
     path = source.path
     if isinstance(path, str):
         return "network"
-    if path.name == _STDIN or path.is_fifo():
+    if is_stdin(source) or path.is_fifo():
         return "pipe"
     if path.is_char_device():
         return "device"
     if path.is_file():
         return "file"
     raise VideoError(f"{source.name}: {path} is no file, pipe or capture device; check its path")
+
+
+def is_stdin(source: VideoSource) -> bool:
+    """Say whether a source is the standard input, which cannot be opened again."""
+    return isinstance(source.path, Path) and source.path.name == _STDIN
 
 
 @contextmanager
@@ -77,10 +82,9 @@ class _Pipe:
     """A pipe, or the standard input, that FFmpeg reads and that can be abandoned at any time."""
 
     def __init__(self, path: Path, stop: Event) -> None:
-        is_stdin = path.name == _STDIN
         self._stop = stop
-        self._file = sys.stdin.fileno() if is_stdin else os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-        self._is_own = not is_stdin
+        self._is_own = path.name != _STDIN
+        self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK) if self._is_own else sys.stdin.fileno()
         self._poll = select.poll()
         self._poll.register(self._file, select.POLLIN | select.POLLHUP)
 

@@ -36,9 +36,18 @@ class VideoWriter:
     """
 
     def __init__(
-        self, path: Path, *, size: tuple[int, int], rate: Fraction, fields: FieldOrder = "progressive", crf: int = 18
+        self,
+        path: Path,
+        *,
+        size: tuple[int, int],
+        rate: Fraction,
+        fields: FieldOrder = "progressive",
+        crf: int = 18,
+        preset: str = "medium",
     ) -> None:
         """Start a file of images of `size` (width, height) [px] at `rate` [1/s]; `crf` 0 is lossless, 51 worst.
+
+        preset: of x264, "ultrafast" to "veryslow": how much time is spent on a smaller file of the same quality.
 
         Raises VideoError where the file cannot be written or the height does not suit the fields.
         """
@@ -49,7 +58,9 @@ class VideoWriter:
         self._unfinished = path.with_suffix(f".part{path.suffix}") if path.is_file() else path
         self._time_base = 1 / Fraction(rate)
         self._container = av.open(f"file:{self._unfinished.absolute()}", "w", format="mp4", options=_FRAGMENTED)
-        self._stream = self._container.add_stream("libx264", rate=rate, options={"crf": str(crf), "bf": "0"})
+        self._stream = self._container.add_stream(
+            "libx264", rate=rate, options={"crf": str(crf), "preset": preset, "bf": "0"}
+        )
         codec = self._stream.codec_context
         codec.width, codec.height, codec.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
         codec.gop_size = round(rate) or 1

@@ -5,7 +5,7 @@ import numpy as np
 from airborne.calibration.intrinsics.model_selection import candidates_for, choose_simplest, leave_one_out
 from airborne.calibration.intrinsics.physical import PINHOLE_MODELS, SEVEN_PARAMETERS, fit_pinhole
 from tests.calibration.intrinsics.test_physical import STRAIGHT, TRUTH, WORLD
-from tests.support.tolerances import ROUNDTRIP
+from tests.support.tolerances import ROUNDTRIP, SOLVED
 
 
 def solutions_of(truth, sd_px=0.5, seed=0):
@@ -19,6 +19,16 @@ def test_a_held_out_point_has_no_say():
     solution = leave_one_out(fit_pinhole(STRAIGHT, SEVEN_PARAMETERS, WORLD, px), SEVEN_PARAMETERS, WORLD, px)
     assert np.allclose(solution.held_out_px[3], [40, -30], atol=1e3 * ROUNDTRIP)
     assert np.linalg.norm(solution.residual_px[3]) < 45
+
+
+def test_refits_taken_together_are_the_fits_of_each_alone():
+    for solution in solutions_of(TRUTH):
+        for k in (0, 5, len(WORLD) - 1):
+            alone = fit_pinhole(
+                solution.pinhole, solution.model, np.delete(WORLD, k, axis=0), np.delete(solution.px, k, axis=0)
+            )
+            difference = solution.refits[k].px_from_world(WORLD) - alone.px_from_world(WORLD)
+            np.testing.assert_allclose(difference, 0, atol=SOLVED)
 
 
 def test_held_out_errors_exceed_residuals():

@@ -122,7 +122,7 @@ class SingleView:
 
     def _map_to_dofs(self, pose, sums):
         J = self._render_model.jacobian(self.with_pose(pose), self.dofs)
-        return Equations(np.einsum("sia,sij,sjb->ab", J, sums.curvature, J), np.einsum("sia,si->a", J, sums.g))
+        return Equations(np.einsum("sia,sij,sjb->ab", J, sums.A, J), np.einsum("sia,si->a", J, sums.g))
 
 
 class Equations(NamedTuple):

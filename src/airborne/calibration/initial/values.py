@@ -70,7 +70,8 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
     fisheyes = [camera.name for camera in sources.camera if camera.lens == "fisheye"]
     detections = None
     if sources.detections is not None:
-        detections = read_detections(sources.path(sources.detections.file), sources.names, sources.detections.cameras)
+        own = sources.detections
+        detections = read_detections(sources.path(own.file), sources.names, own.cameras, skeleton=own.skeleton)
     if "control points" in points and start_rig is None:
         table = points["control points"]
         unknown = [name for name in _common(table.cameras, sizes) if name not in lenses]

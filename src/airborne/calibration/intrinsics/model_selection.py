@@ -17,6 +17,7 @@ from airborne.calibration.intrinsics.physical import (
     fit_pinhole,
     parameter_covariance,
 )
+from airborne.calibration.intrinsics.refits import refit_pinholes
 from airborne.types import Array
 
 _MOST_ALONE, _N_FOLDS = 30, 10  # points left out one by one; of more points every tenth at once
@@ -55,7 +56,7 @@ def leave_one_out(pinhole: Pinhole, model: PinholeModel, world: Array, px: Array
     """Refit a pinhole by least squares without each point, of many points without every tenth, from the fit to all."""
     n = len(world)
     fold = np.arange(n) if n <= _MOST_ALONE else np.arange(n) % _N_FOLDS
-    refits = [fit_pinhole(pinhole, model, world[fold != k], px[fold != k]) for k in range(fold.max() + 1)]
+    refits = refit_pinholes(pinhole, model, world, px, fold != np.arange(fold.max() + 1)[:, None])
     return Solution(model, pinhole, tuple(refits[k] for k in fold), world, px)
 
 
@@ -120,12 +121,9 @@ def _jackknife_sd(solution: Solution) -> Array:
     centres = np.array([p.centre for p in dict.fromkeys(solution.refits)])
     if len(solution.world) > _MOST_ALONE:
         part = _parts_of_image(solution.px)
-        centres = np.array(
-            [
-                fit_pinhole(solution.pinhole, solution.model, solution.world[part != k], solution.px[part != k]).centre
-                for k in range(part.max() + 1)
-            ]
-        )
+        kept = part != np.arange(part.max() + 1)[:, None]
+        refits = refit_pinholes(solution.pinhole, solution.model, solution.world, solution.px, kept)
+        centres = np.array([refit.centre for refit in refits])
     return np.sqrt((len(centres) - 1) * np.var(centres, axis=0))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from scipy.optimize import dual_annealing, least_squares
@@ -149,16 +148,15 @@ def fit_pinhole(start: Pinhole, model: PinholeModel, world: Array, px: Array) ->
     """Return the camera near start that projects world (n, 3) [m] closest to px (n, 2) [px], by Levenberg-Marquardt."""
     start, n = start.with_lens(model), model.n_parameters
     residual = _residual_of_step(start, model, world, px)
-    slopes: Any = _slopes_of_step(start, model, world) if model in WIDE_MODELS else "2-point"
     solution = least_squares(
         residual,
         np.zeros(n),
-        jac=slopes,
+        jac=_slopes_of_step(start, model, world),
         method="lm",
         x_scale="jac",
         xtol=1e-10,
         ftol=1e-10,
-        max_nfev=_MOST_ITERATIONS * (n + 1 if slopes == "2-point" else 1),
+        max_nfev=_MOST_ITERATIONS,
     )
     return start.apply_step(model, solution.x)
 

@@ -101,6 +101,7 @@ class DetectionsSource(_Strict):
 
     file: CheckedPath
     cameras: dict[str, str] = {}
+    skeleton: str | None = None  # whose points they are; None: as the file says
 
 
 class WorldTable(_Strict):

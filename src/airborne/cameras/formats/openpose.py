@@ -24,8 +24,8 @@ def camera_folders(path: Path) -> dict[str, Path]:
     return {folder.name.removesuffix("_json"): folder for folder in sorted(path.iterdir()) if folder.is_dir()}
 
 
-def read_folder(folder: Path, person: int | None = None) -> tuple[Array, int]:
-    """Read a camera's JSON files: (frames, points, 3), NaN where nobody is; and the most people in one image.
+def read_folder(folder: Path, person: int | None = None) -> tuple[Array, int, set[str]]:
+    """Read a camera's JSON files: (frames, points, 3), NaN where nobody is; the most people in one image; skeletons.
 
     person: the person's index in every file, from 0; None takes the one with the highest confidence. Raises
     CalibrationError where two have about the same.
@@ -37,9 +37,10 @@ def read_folder(folder: Path, person: int | None = None) -> tuple[Array, int]:
         )
     last = max(number for number in files if number is not None)
     keypoints: dict[int, Array] = {}
-    n_people = 0
+    n_people, skeletons = 0, set()
     for frame, path in files.items():
-        people = _people(path)
+        people, skeleton = _people(path)
+        skeletons |= set() if skeleton is None else {skeleton}
         n_people = max(n_people, len(people))
         one_person = _choose_person(people, person, path)
         if one_person is not None and frame is not None:
@@ -55,10 +56,10 @@ def read_folder(folder: Path, person: int | None = None) -> tuple[Array, int]:
     table = np.full((last + 1, n_points, 3), np.nan)
     for frame, one in keypoints.items():
         table[frame] = one
-    return table, n_people
+    return table, n_people, skeletons
 
 
-def write_folders(path: Path, tables: dict[str, Array]) -> None:
+def write_folders(path: Path, tables: dict[str, Array], skeleton: str) -> None:
     """Write tables (frames, points, 3) of x, y [px] and visibility by camera; points not seen are 0, 0, 0."""
     for camera, table in tables.items():
         folder = path / f"{file_stem(camera)}_json"
@@ -67,7 +68,7 @@ def write_folders(path: Path, tables: dict[str, Array]) -> None:
             is_seen = np.isfinite(points).all(axis=-1) & (points[:, 2] > 0)
             values = np.where(is_seen[:, None], points, 0.0).ravel().tolist()
             people = [{"person_id": [-1], "pose_keypoints_2d": values}] if is_seen.any() else []
-            text = json.dumps({"version": 1.3, "people": people})
+            text = json.dumps({"version": 1.3, "skeleton": skeleton, "people": people})
             write_text(folder / f"{file_stem(camera)}_{frame:06d}.json", text)
 
 
@@ -91,17 +92,19 @@ def _choose_person(people: list[Array], person: int | None, path: Path) -> Array
     return max(people, key=lambda one: float(one[:, 2].sum()))
 
 
-def _people(path: Path) -> list[Array]:
-    """Read the people (points, 3) of one OpenPose file."""
+def _people(path: Path) -> tuple[list[Array], str | None]:
+    """Read the people (points, 3) of one OpenPose file, and the name of their skeleton where it says that."""
     try:
         if path.stat().st_size > _LARGEST_FILE_BYTES:
             raise CalibrationError(f"{path} is larger than any image's detections ({path.stat().st_size} bytes)")
         document = read_json(path)
         people = [np.array(person["pose_keypoints_2d"], float).reshape(-1, 3) for person in document["people"]]
+        skeleton = document.get("skeleton")
     except OSError as error:
         raise CalibrationError(f"{path} cannot be read ({error.strerror})") from None
-    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         raise CalibrationError(
             f"{path} is not OpenPose JSON; expected people[].pose_keypoints_2d = [x, y, confidence, ...]"
         ) from None
-    return [np.where(np.abs(one) < 1e9, one, 0.0) for one in people if len(one)]
+    known = [np.where(np.abs(one) < 1e9, one, 0.0) for one in people if len(one)]
+    return known, skeleton if isinstance(skeleton, str) else None

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from airborne.constants import GRAVITY_M_S2
+from airborne.geometry.sampling import chi2_quantile
 from airborne.motion.free_fall import (
     SWAY_M,
     SideLikelihood,
@@ -178,7 +178,7 @@ def _noise_scale(track: LegTrack, rows: tuple[int, int]) -> float:
     residual = np.linalg.solve(L, height - free_fall_height(u))
     residual = residual - line @ np.linalg.lstsq(line, residual, rcond=None)[0]
     chi_squared, freedom = float(residual @ residual), len(u) - 2
-    return chi_squared / freedom if chi_squared > chi2.ppf(0.99, freedom) else 1.0
+    return chi_squared / freedom if chi_squared > chi2_quantile(0.99, freedom) else 1.0
 
 
 def _event_grid(track: LegTrack, rows: tuple[int, int], is_takeoff: bool, floor: NDArray[np.bool_]) -> Array | None:

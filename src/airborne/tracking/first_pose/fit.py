@@ -13,7 +13,8 @@ from airborne.body import BodyModel, Pose
 from airborne.body.inverse_kinematics import fit_pose
 from airborne.cameras import Rig
 from airborne.cameras.consensus import triangulate_consensus
-from airborne.cameras.detections import LANDMARK_RECIPES, NETWORKS, Detections, landmarks_from_points
+from airborne.cameras.detections import Detections, landmarks_from_points
+from airborne.cameras.skeletons import LANDMARK_RECIPES, SKELETONS
 from airborne.errors import BodyError, TrialError
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.types import Array
@@ -104,7 +105,7 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
 def _points_to_find(model: BodyModel, where: str, names: Sequence[str]) -> list[int]:
     """Return which points determine landmarks of the body; raises TrialError for an unknown name."""
     landmarks = [landmark.name for landmark in model.landmarks]
-    of_networks = {*chain.from_iterable(NETWORKS.values())}
+    of_networks = {*chain.from_iterable(skeleton.points for skeleton in SKELETONS.values())}
     unknown = [name for name in names if name not in landmarks and name not in of_networks]
     if unknown:
         raise TrialError(

@@ -11,12 +11,12 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from airborne.appearance.model import Region
 from airborne.body import BodyModel, Pose, SurfaceArrays
 from airborne.body.symmetry import continuous_axes, symmetries
 from airborne.geometry.rotations import super_fibonacci
+from airborne.geometry.sampling import latin_hypercube
 from airborne.rendering import FLAT, EvidenceMaps, ScoreRule, evidence_maps, mask_evidence, pack_targets, score
 from airborne.tracking.first_pose.moments import Moment
 from airborne.tracking.first_pose.places import Place
@@ -98,7 +98,7 @@ def search_orientations(thing: Thing, moment: Moment, place: Place) -> list[Pose
             best = _apart(thing, R, t, scores, _N_KEPT)
             R, t = R[best], t[best]
             continue
-        steps = ndtri(qmc.Sobol(6, rng=number).random(_N_AROUND * _N_KEPT)[: _N_AROUND * len(R)]) / 2 ** (number - 1)
+        steps = ndtri(latin_hypercube(6, _N_AROUND * _N_KEPT, seed=number)[: _N_AROUND * len(R)]) / 2 ** (number - 1)
         steps[: len(R)] = 0
         parent = np.arange(len(steps)) % len(R)
         turned = Rotation.from_rotvec(_WIDTH_RAD * steps[:, 3:]).as_matrix() @ R[parent]

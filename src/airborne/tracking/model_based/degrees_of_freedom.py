@@ -46,12 +46,12 @@ class DegreesOfFreedom:
     """The degrees of freedom that a fit may change."""
 
     model: BodyModel
-    columns: NDArray[np.int64]  # (d,) indices into a delta
+    columns: NDArray[np.int64]  # (d,) indices into a delta, those of the root first
 
     @property
     def moves_joints(self) -> bool:
         """Whether any joint may move, not the root alone."""
-        return bool(np.any(self.columns >= 6))
+        return bool(self.columns[-1] >= 6)
 
     @property
     def _damping(self) -> Array:

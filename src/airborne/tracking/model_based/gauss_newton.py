@@ -47,7 +47,7 @@ _PATCH = 8.0  # by this factor more pixels of a person are taken for body, or no
 _OVERSTEP = 1.6  # robust weights and the refitted light make each step too short by about this factor
 _MOST_STEPS = 12  # at each level of a body with joints
 _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
-_CONVERGED = 1 / 3  # squared length of the last step, in sds of the pose, for each degree of freedom
+_CONVERGED, _CONVERGED_STIFF = 1 / 3, 1  # squared length of the last step, in sds, for each degree of freedom
 SHAPE_SD_M = 0.007  # model error: how far a person's segment lies from the ellipsoid that fits its image
 _SHAPE_WIDTH_M = 0.075  # along which that error is the same; chosen on synthetic somersaults
 
@@ -134,9 +134,9 @@ def fit_images(
     Of several starts, the one that ends in the best agreement with images and prior is returned.
     """
     evaluate, correlated = _image_evaluator(render_model, poses, regions, appearance, dofs=dofs)
-    most_steps = _MOST_STEPS if dofs.moves_joints else _MOST_STEPS_STIFF
+    most_steps, converged = (_MOST_STEPS, _CONVERGED) if dofs.moves_joints else (_MOST_STEPS_STIFF, _CONVERGED_STIFF)
     ends = [
-        descend_pose(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, tolerance=_CONVERGED)
+        descend_pose(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, tolerance=converged)
         for pose in poses
     ]
     noise = min(equations.noise for _, equations in ends)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from airborne.appearance.foreground import log_odds
 from airborne.appearance.model import Appearance, Region
 from airborne.body import Pose
+from airborne.geometry.sampling import latin_hypercube
 from airborne.rendering import EvidenceMaps, evidence_maps, mask_evidence
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.render_model import RenderModel, reduce_region
@@ -57,7 +57,7 @@ def search_globally(
     R, t = np.stack([body.R for body in bodies]), np.stack([body.t for body in bodies])
     width = np.array([search_range.position_sd_m] * 3 + [search_range.rotation_sd_rad] * 3)
     for number, (n_proposals, n_survivors) in enumerate(_ROUNDS):
-        steps = ndtri(qmc.Sobol(6, rng=number).random(n_proposals)) * width / 2**number
+        steps = ndtri(latin_hypercube(6, n_proposals, seed=number)) * width / 2**number
         parents = np.arange(n_proposals) % len(origin)
         moved = np.concatenate(
             [deltas[parents, :3] + steps[:, :3], _compose_rotations(steps[:, 3:], deltas[parents, 3:])], axis=1

@@ -27,7 +27,7 @@ def silhouette_equations(body, projection, observation, comparison, maps, sums, 
     owner, nearness = _draw(body, projection, maps, comparison.window)
     residual = np.empty((1, y1 - y0, x1 - x0), np.float32)
     blur_planes(observation.observed[:, y0:y1, x0:x1], comparison.taps_u, comparison.taps_v, residual)
-    coverage = _mask_coverage(maps.part, comparison)
+    _, coverage = _mask_coverage(maps.part, comparison)
     shape = np.empty_like(residual)
     for y in range(y1 - y0):
         for x in range(x1 - x0):
@@ -85,13 +85,14 @@ def _draw(body, projection, maps, window):
 
 @kernel(fastmath=True)
 def _mask_coverage(part, comparison):
+    """Return the mask in the window, 0 or 1, and the same blurred: (1, h, w) each."""
     x0, y0, x1, y1 = comparison.window
     mask, coverage = np.empty((1, y1 - y0, x1 - x0), np.float32), np.empty((1, y1 - y0, x1 - x0), np.float32)
     for y in range(y1 - y0):
         for x in range(x1 - x0):
             mask[0, y, x] = 1.0 if part[y + y0, x + x0] >= 0 else 0.0
     blur_planes(mask, comparison.taps_u, comparison.taps_v, coverage)
-    return coverage
+    return mask, coverage
 
 
 @kernel(fastmath=True)
@@ -100,15 +101,16 @@ def _composite_equations(lit, is_faceted, part, owner, nearness, projection, obs
     observed, background = observation.observed, observation.background
     taps_u, taps_v = comparison.taps_u, comparison.taps_v
     x0, y0 = comparison.window.x0, comparison.window.y0
+    mask, coverage = _mask_coverage(part, comparison)
     sharp, residual = np.empty_like(lit), np.empty_like(lit)
     for k in range(3):
         for y in range(lit.shape[1]):
-            for x in range(lit.shape[2]):
-                rendered = lit[k, y, x] if part[y + y0, x + x0] >= 0 else background[k, y + y0, x + x0]
-                sharp[k, y, x] = observed[k, y + y0, x + x0] - rendered
+            for x in range(lit.shape[2]):  # by the mask's 0 or 1, without a branch: several pixels at a time
+                behind = background[k, y + y0, x + x0]
+                sharp[k, y, x] = observed[k, y + y0, x + x0] - behind - mask[0, y, x] * (lit[k, y, x] - behind)
     blur_planes(sharp, taps_u, taps_v, residual)
-    coverage = _mask_coverage(part, comparison)
-    flatten_shading(part, is_faceted, x0, y0, lit)
+    if not is_faceted.all():
+        flatten_shading(part, is_faceted, x0, y0, lit)
     shape = sharp
     blur_planes(lit, taps_u, taps_v, shape)
     return accumulate(residual, shape, coverage[0], owner, nearness, projection, observation, comparison, sums, blocks)

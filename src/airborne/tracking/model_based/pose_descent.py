@@ -17,6 +17,7 @@ from airborne.tracking.model_based.twist_equations import Sums, add_score_covari
 from airborne.types import Array
 
 _SHORTER = 0.4  # factor on a step that does not lower the objective
+_LEAST_SHARE = 0.1  # of a step: three losses; where none of them gains, the refitted light only fluctuates
 _SLACK = 1e-3  # of the objective: the refitted light makes it fluctuate
 
 
@@ -65,7 +66,7 @@ def map_to_dofs(
     J = np.ascontiguousarray(render_model.jacobian(posed, dofs))
     d = J.shape[-1]
     A, g = np.zeros((d, d)), np.zeros(d)
-    map_equations(sums.curvature, sums.g, J, A, g)
+    map_equations(sums.A, sums.g, J, A, g)
     cost, total, weight = totals
     residual = total / weight if weight > 0 else 1.0
     rows = [each.reshape(-1, *J.shape[:2]) for each in blocks] + list(shifted)
@@ -119,7 +120,7 @@ def descend_pose(
     descent = descend(
         _Iterate(evaluate(pose, True), dofs, prior),
         lambda pose: _Iterate(evaluate(pose, False), dofs, prior),
-        BacktrackingRule(overstep, _SHORTER),
+        BacktrackingRule(overstep, _SHORTER, _LEAST_SHARE),
         most_steps=most_steps - 1,
         least_predicted=(0.5 * tolerance * len(dofs.columns), 0.0),
         slack=_SLACK,

@@ -61,9 +61,9 @@ class RenderModel:
 
     def with_pose(self, pose: Pose) -> PosedBody:
         """Pose the body; the same as `BodyModel.with_pose`."""
-        root = pose.world_from_root
+        root = pose.world_from_root.as_matrix()[None]
         joints = pose.joint_angles if pose.joint_angles.size else np.zeros((self.model.n_joints, 3))
-        R, t = pose_segments(self.model, root.rotation.as_matrix()[None], root.translation[None], joints[None])
+        R, t = pose_segments(self.model, root[:, :3, :3], root[:, :3, 3], joints[None])
         return PosedBody(self.model, R[0], t[0])
 
     def jacobian(self, posed: PosedBody, dofs: DegreesOfFreedom) -> Array:

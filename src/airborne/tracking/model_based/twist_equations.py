@@ -21,7 +21,7 @@ class Sums(NamedTuple):
     A pixel belongs to one segment, so only the chain of joints couples two of them: see `map_equations`.
     """
 
-    A: Any  # (s, 6, 6) curvature; the lower triangles are filled
+    A: Any  # (s, 6, 6) curvature
     g: Any  # (s, 6) gradient
     B: Any  # (s, 6, 3) change of g by an image shifted right or down by a pixel, or an outline a pixel wider
 
@@ -29,11 +29,6 @@ class Sums(NamedTuple):
     def zero(cls, n_segments: int) -> Sums:
         """Return sums of zero."""
         return cls(np.zeros((n_segments, 6, 6)), np.zeros((n_segments, 6)), np.zeros((n_segments, 6, 3)))
-
-    @property
-    def curvature(self) -> np.ndarray:
-        """A with both triangles (s, 6, 6)."""
-        return self.A + np.tril(self.A, -1).swapaxes(1, 2)
 
 
 def new_blocks(width: int, height: int, n_segments: int) -> np.ndarray:
@@ -56,23 +51,23 @@ def accumulate(residual, shape, coverage, owner, nearness, projection, observati
     c, h, w = residual.shape
     x0, y0, clip = comparison.window.x0, comparison.window.y0, comparison.clip
     fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
-    a, b = np.zeros(6), np.zeros(6)
+    a, b, e2_of_row = np.zeros(6), np.zeros(6), np.empty(w, np.float32)
     cost, total, weight_sum = 0.0, 0.0, 0.0
-    inverse_clip2, aspect = 1.0 / (clip * clip), fy / fx
+    inverse_clip2, aspect = np.float32(1.0 / (clip * clip)), fy / fx
     for y in range(1, h - 1):
         ry = (y + y0 - cy) / fy
+        e2_of_row[:] = 0
+        for k in range(c):
+            for x in range(1, w - 1):
+                e2_of_row[x] += residual[k, y, x] * residual[k, y, x]
         for x in range(1, w - 1):
-            m = coverage[y, x]
-            e2 = 0.0
-            for k in range(c):
-                e2 += residual[k, y, x] * residual[k, y, x]
-            down = 1.0 / (1.0 + e2 * inverse_clip2)
-            weight = certainty[y + y0, x + x0]
-            cost += weight * e2 * down
-            e = owner[y, x]
+            cost += certainty[y + y0, x + x0] * e2_of_row[x] / (np.float32(1) + e2_of_row[x] * inverse_clip2)
+        for x in range(1, w - 1):
+            m, e, e2 = coverage[y, x], owner[y, x], e2_of_row[x]
             if m < _EDGE or e < 0:
                 continue
-            weight *= down * down
+            down = 1.0 / (1.0 + e2 * inverse_clip2)
+            weight = certainty[y + y0, x + x0] * down * down
             sxx, sxy, syy, sx, sy = 0.0, 0.0, 0.0, 0.0, 0.0
             mx = 0.5 * (coverage[y, x + 1] - coverage[y, x - 1])
             my = 0.5 * (coverage[y + 1, x] - coverage[y - 1, x])
@@ -91,8 +86,8 @@ def accumulate(residual, shape, coverage, owner, nearness, projection, observati
             if sxx + syy < 1e-10:
                 continue
             inv_z = nearness[y, x]
-            rx = (x + x0 - cx) / fx
-            px, py, pz = rx / inv_z - view[9], ry / inv_z - view[10], 1.0 / inv_z - view[11]
+            z, rx = 1.0 / inv_z, (x + x0 - cx) / fx
+            px, py, pz = rx * z - view[9], ry * z - view[10], z - view[11]
             ox = view[0] * px + view[3] * py + view[6] * pz - origin[0]
             oy = view[1] * px + view[4] * py + view[7] * pz - origin[1]
             oz = view[2] * px + view[5] * py + view[8] * pz - origin[2]
@@ -120,6 +115,10 @@ def accumulate(residual, shape, coverage, owner, nearness, projection, observati
                 B_e[i, 2] += ai * out_x + bi * out_y
                 for j in range(i + 1):
                     A_e[i, j] += ai * a[j] + bi * b[j]
+    for e in range(len(A)):
+        for i in range(6):
+            for j in range(i):
+                A[e, j, i] = A[e, i, j]
     for row in range(blocks.shape[0]):
         for column in range(blocks.shape[1]):
             for e in range(len(g)):

@@ -1,0 +1,136 @@
+"""Tasks on Dask's distributed scheduler: on this machine, or on any by the scheduler's address."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from asyncio import CancelledError
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, Any
+
+from airborne.batch.task import Outcome, Report, Task, do_task
+from airborne.errors import AirborneError, count
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+_TOPIC = "airborne"  # of the events that tell of frames
+_CONNECT_S = 10  # to reach a scheduler
+_DASHBOARD = "127.0.0.1:0"  # for this machine alone, on any port
+# one task runs, none waits at a worker: the longest go first, and a dead worker costs what it ran
+_SETTINGS = {
+    "distributed.scheduler.worker-saturation": 1.0,
+    "distributed.scheduler.work-stealing": False,
+    "distributed.admin.large-graph-warning-threshold": "1GB",
+}
+
+
+@contextmanager
+def open_client(scheduler: str | None, n_workers: int, memory: str) -> Iterator[Client]:
+    """Connect to a scheduler by its address, or start one with workers of one thread on this machine.
+
+    `memory` is each worker's, as "4GB", or "auto": an equal share; a worker that needs more is started anew. Raises
+    AirborneError where Dask is not installed or the scheduler cannot be reached.
+    """
+    try:
+        from dask import config
+        from distributed import Client, LocalCluster
+    except ImportError:
+        raise AirborneError("batches need Dask; install the extra: pip install 'airborne[batch]'") from None
+    for logger in ("distributed", "distributed.client"):  # what goes wrong is told once, by the row of its trial
+        logging.getLogger(logger).setLevel(logging.CRITICAL)
+    with ExitStack() as stack:
+        stack.enter_context(config.set(_SETTINGS))
+        if scheduler is None:
+            address: Any = stack.enter_context(
+                LocalCluster(
+                    n_workers=n_workers,
+                    threads_per_worker=1,
+                    memory_limit=memory,
+                    dashboard_address=_DASHBOARD,
+                    silence_logs=logging.CRITICAL,
+                )
+            )
+        else:
+            address = scheduler
+        try:
+            client = stack.enter_context(Client(address, timeout=_CONNECT_S))
+        except (OSError, ValueError, TimeoutError) as error:
+            raise AirborneError(
+                f"no scheduler answers at {scheduler} ({str(error).splitlines()[0][:120]}); "
+                "start one with: dask scheduler"
+            ) from None
+        wrong = [name for name, each in client.scheduler_info(n_workers=-1)["workers"].items() if each["nthreads"] != 1]
+        if wrong:
+            raise AirborneError(
+                f"{count(len(wrong), 'worker')} of {scheduler} run several threads ({wrong[0]}); "
+                "start them with --nthreads 1"
+            )
+        yield client
+
+
+def count_cores() -> int:
+    """Return how many cores this process may use."""
+    try:
+        from dask.system import CPU_COUNT
+    except ImportError:
+        return 1  # nothing is started without Dask
+    return CPU_COUNT
+
+
+def do_tasks(
+    client: Client,
+    tasks: Sequence[Task],
+    *,
+    work: Callable[[Task, Report], Outcome] = do_task,
+    report: Report = lambda name, done, total: None,
+) -> Iterator[Outcome]:
+    """Do tasks on a cluster, the first first, and yield each one's outcome when it ends.
+
+    A task whose worker dies is done again by another, and so goes on where it stopped; after a few deaths it fails.
+    Ends early where the scheduler is lost.
+    """
+    from distributed import as_completed
+
+    client.subscribe_topic(_TOPIC, lambda event: report(*event[1]))
+    batch = hashlib.sha256(str(tasks[0].batch).encode()).hexdigest()[:12]
+    names = {f"airborne-{batch}-{task.trial.name}": task.trial.name for task in tasks}
+    futures = [
+        client.submit(_work_and_tell, work, task, key=key, priority=-rank, pure=False)
+        for rank, (key, task) in enumerate(zip(names, tasks, strict=True))
+    ]
+    try:
+        for future in as_completed(futures):
+            if future.status == "finished":
+                try:
+                    yield future.result()
+                except CancelledError:  # the scheduler went between
+                    return
+            elif future.status == "error":
+                yield Outcome(names[str(future.key)], "failed", _describe_end(future.exception()))
+            else:  # the scheduler is gone, and with it all the others
+                return
+            future.release()
+    finally:
+        client.unsubscribe_topic(_TOPIC)
+
+
+def _work_and_tell(work: Callable[[Task, Report], Outcome], task: Task) -> Outcome:
+    """Do a task on a worker, and tell the batch of its frames."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    return work(task, lambda *progress: worker.log_event(_TOPIC, progress))
+
+
+def _describe_end(error: BaseException | None) -> str:
+    """Say in one line why a task brought no outcome."""
+    from distributed import KilledWorker
+
+    if isinstance(error, KilledWorker):
+        return (
+            "worker after worker died with it, of too little memory or killed; give each more with --memory, "
+            "or start fewer"
+        )
+    return " ".join(f"unexpected {type(error).__name__}: {error}".split())[:400]

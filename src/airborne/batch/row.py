@@ -1,0 +1,95 @@
+"""The row of one finished run in a batch's table: its headline numbers, what it found wrong, what it was made by."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from airborne.constants import NORMAL_QUANTILE_975
+from airborne.io.text import read_json
+from airborne.motion.flight.phases import find_flight_events
+from airborne.motion.run_folder import SUMMARY
+
+Row = dict[str, Any]
+_STATUSES = ("tracked", "uncertain", "lost")
+_OF_A_BODY = ("median_position_sd_mm", "median_rotation_sd_deg", "somersault_rev", "twist_rev")
+_OF_A_FLIGHT = ("fitted_gravity_m_s2", "ballistic_rms_mm")
+_OF_A_JUMP = (
+    "hip_height_m",
+    "foot_height_m",
+    "takeoff_s",
+    "landing_s",
+    "flight_s",
+)  # of the highest of a trial's jumps
+
+
+def row_of(folder: Path) -> Row:
+    """Return the columns of the finished run in a folder, in the order of the table; those that it lacks are left out.
+
+    A number's standard deviation, where the run states one, is `<name>_sd`.
+    """
+    summary = read_json(folder / SUMMARY)
+    n = summary["n_frames"]
+    row: dict[str, Any] = {"n_frames": n} | {f"share_{name}": summary[f"n_{name}"] / n for name in _STATUSES}
+    row |= {name: summary[name] for name in ("duration_s", "rate_hz", *_OF_A_BODY) if name in summary}
+    if "tilt_range_deg" in summary:
+        row |= dict(zip(("tilt_least_deg", "tilt_most_deg"), summary["tilt_range_deg"], strict=True))
+    row |= _flight(summary.get("flight", {})) | _jump(folder / "tables" / "flight.csv")
+    if "jumps" in summary:
+        row |= _highest_jump(summary["jumps"])
+    findings = summary.get("self_check") or []
+    alarms = [each["sentence"] for each in findings if each["is_alarm"]]
+    row |= {"n_alarms": len(alarms), "findings": "; ".join(alarms), "n_warnings": len(summary["warnings"])}
+    return row | {"version": summary["versions"]["airborne"]}
+
+
+def _flight(flight: Mapping[str, Any]) -> Row:
+    """Return the angular momentum and how free the flight was."""
+    momentum = flight.get("angular_momentum_kg_m2_s")
+    if momentum is None or None in momentum:
+        return {}
+    named = dict(zip((f"L_{axis}_kg_m2_s" for axis in "xyz"), momentum, strict=True))
+    return named | {"L_kg_m2_s": math.hypot(*momentum)} | {name: flight[name] for name in _OF_A_FLIGHT}
+
+
+def _jump(path: Path) -> Row:
+    """Return take-off, landing and rise of the first whole flight of a body with masses."""
+    if not path.is_file():
+        return {}
+    table = pd.read_csv(path).dropna(subset="com_z_m")
+    time_s, height_m, sd = (table[name].to_numpy(float) for name in ("time_s", "com_z_m", "com_z_m_sd"))
+    for start, end in pairwise(find_flight_events(time_s, height_m, sd**2)):
+        inside = np.flatnonzero((time_s >= start.time_s) & (time_s <= end.time_s))
+        if (start.name, end.name) == ("take-off", "landing") and len(inside):
+            peak = inside[np.argmax(height_m[inside])]
+            low, low_sd = (float(np.interp(start.time_s, time_s, values)) for values in (height_m, sd))
+            return {
+                "takeoff_s": start.time_s,
+                "landing_s": end.time_s,
+                "flight_s": end.time_s - start.time_s,
+                "com_rise_m": float(height_m[peak]) - low,
+                "com_rise_m_sd": math.hypot(float(sd[peak]), low_sd),
+            }
+    return {}
+
+
+def _highest_jump(jumps: list[dict[str, Any]]) -> Row:
+    """Return how many jumps players made, and the highest by the hips, its sd from its 95 % interval."""
+    known = [jump for jump in jumps if isinstance(jump.get(_OF_A_JUMP[0]), float)]
+    row: dict[str, Any] = {"n_jumps": len(jumps)}
+    if not known:
+        return row
+    highest = max(known, key=lambda jump: jump[_OF_A_JUMP[0]])
+    row["player"] = highest["player"]
+    for name in _OF_A_JUMP:
+        low, high = highest.get(f"{name}_low"), highest.get(f"{name}_high")
+        row[name] = highest.get(name)
+        if low is not None and high is not None:
+            row[f"{name}_sd"] = (high - low) / (2 * NORMAL_QUANTILE_975)
+    return row

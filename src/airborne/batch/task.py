@@ -1,0 +1,172 @@
+"""One trial of a batch, as a worker does it: tracked, resumed, or left alone; its log and what is remembered of it."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Literal
+
+import cv2
+
+from airborne import __version__
+from airborne.batch.row import Row, row_of
+from airborne.batch.trials import BatchTrial
+from airborne.errors import AirborneError
+from airborne.export import write_json
+from airborne.io.text import read_json
+from airborne.motion.run_folder import MOTION, REPORT, SUMMARY
+from airborne.run.folder import run_identity
+from airborne.run.track import track_trial
+from airborne.trial.file import Trial, read_trial
+
+Status = Literal["done", "unchanged", "failed"]
+State = Literal["new", "stopped", "changed", "unchanged"]  # what a folder holds of a trial
+
+LOGS, THUMBNAILS = "logs", "thumbnails"  # folders of a batch beside those of its trials
+_THUMBNAIL_PX = 160  # width, so that a row of the page is a finger high
+_SECONDS_A_REPORT = 1.0  # between reports of a trial's frames
+_SHOWN = ("matching.png", "heights.png", "through_mask.png", "pose.png")  # of a run's figures, which is the thumbnail
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A trial and the batch's folder; travels to a worker, which sees the same files."""
+
+    trial: BatchTrial
+    batch: Path  # absolute
+    pictures: bool
+    version: str = __version__  # of whoever gave it
+
+    @property
+    def folder(self) -> Path:
+        """Where the trial's run lies."""
+        return self.batch / self.trial.name
+
+    @property
+    def log(self) -> Path:
+        """Where the trial's log lies."""
+        return self.batch / LOGS / f"{self.trial.name}.log"
+
+    @property
+    def record(self) -> Path:
+        """Where is remembered of which inputs the folder's run is."""
+        return self.batch / LOGS / f"{self.trial.name}.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a task ended."""
+
+    name: str
+    status: Status
+    error: str = ""  # one line, of a failed one
+    row: Row = field(default_factory=dict)  # of the batch's table
+
+
+Report = Callable[[str, int, int | None], None]  # the trial's name, frames done and expected
+
+
+def do_task(task: Task, report: Report = lambda name, done, total: None) -> Outcome:
+    """Bring a trial's run to its end: track it, go on where it stopped, or find that nothing has changed.
+
+    Whatever goes wrong is one line of the outcome, and more in the log.
+    """
+    started_s = time.monotonic()
+    task.log.parent.mkdir(parents=True, exist_ok=True)
+    with task.log.open("a", encoding="utf-8") as log:
+
+        def note(text: str) -> None:
+            log.write(f"{datetime.now():%F %T} {text}\n")
+            log.flush()
+
+        note(f"process {os.getpid()} on {platform.node()}: {task.trial.path}, airborne {__version__}")
+        status: Status = "failed"
+        error, row = "", {}
+        try:
+            status = _bring_to_end(task, report, note)
+            row = row_of(task.folder)
+            if row["share_lost"] == 1:
+                status, error = "failed", "nothing was found in any frame; look at the overlays and correct [start]"
+        except AirborneError as problem:
+            error = str(problem)
+        except OSError as problem:
+            error = f"{problem.filename or task.trial.path}: {problem.strerror or problem}"
+        except Exception as problem:
+            log.write(traceback.format_exc())
+            error = f"unexpected {type(problem).__name__}: {problem}; {LOGS}/{task.log.name} says where"
+        error = " ".join(error.split())
+        note(f"{status} after {time.monotonic() - started_s:.1f} s{f': {error}' if error else ''}")
+    return Outcome(task.trial.name, status, error, row)
+
+
+def _bring_to_end(task: Task, report: Report, note: Callable[[str], None]) -> Status:
+    """Track a trial as far as that is needed, and return how."""
+    if task.version != __version__:
+        raise AirborneError(
+            f"the worker has airborne {__version__}, the batch {task.version}; install the same on every machine"
+        )
+    trial = read_trial(task.trial.path)
+    state, identity = look_up(task, trial)
+    note(state)
+    if state != "unchanged":
+        if identity is not None:
+            write_json(task.record, {"identity": identity})
+        next_s = 0.0
+
+        def tell(done: int, total: int | None) -> None:
+            nonlocal next_s
+            if time.monotonic() >= next_s:
+                next_s = time.monotonic() + _SECONDS_A_REPORT
+                report(task.trial.name, done, total)
+                note(f"frame {done} of {total or 'unknown'}")
+
+        track_trial(
+            trial,
+            task.folder,
+            resume=state != "changed",
+            overwrite=state == "changed",
+            pictures=task.pictures,
+            progress=tell,
+        )
+        _write_thumbnail(task)
+    return "unchanged" if state == "unchanged" else "done"
+
+
+def look_up(task: Task, trial: Trial) -> tuple[State, dict[str, Any] | None]:
+    """Return what the folder holds of a trial, and what the trial's inputs are; None where one is missing."""
+    try:
+        identity = run_identity(trial)
+    except (OSError, ValueError):
+        return "new", None  # tracking says which input is missing or damaged
+    try:
+        known = read_json(task.record)["identity"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return ("stopped" if (task.folder / MOTION).is_file() else "new"), identity
+    if known != identity:
+        return "changed", identity
+    is_finished = (task.folder / SUMMARY).is_file() and (not task.pictures or (task.folder / REPORT).is_file())
+    return ("unchanged" if is_finished else "stopped"), identity
+
+
+def thumbnail_of(batch: Path, name: str) -> Path:
+    """Return where a trial's thumbnail lies."""
+    return batch / THUMBNAILS / f"{name}.jpg"
+
+
+def _write_thumbnail(task: Task) -> None:
+    """Shrink one of a run's figures; a run without pictures has none."""
+    figures = task.folder / "figures"
+    found = [figures / name for name in _SHOWN if (figures / name).is_file()] or sorted(figures.glob("*.png"))
+    image = cv2.imread(str(found[0])) if found else None
+    if image is None:
+        return
+    path = thumbnail_of(task.batch, task.trial.name)
+    path.parent.mkdir(exist_ok=True)
+    height = max(round(image.shape[0] * _THUMBNAIL_PX / image.shape[1]), 1)
+    cv2.imwrite(str(path), cv2.resize(image, (_THUMBNAIL_PX, height), interpolation=cv2.INTER_AREA))

@@ -1,0 +1,94 @@
+"""Tables of points clicked in the cameras' pictures, finished or not: surveyed control points, landmarks of a body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from airborne.calibration.sources.control_points import ControlPoints
+from airborne.cameras.clicks import read_named_numbers
+from airborne.errors import AirborneError
+from airborne.types import Array
+
+_WORLD = ("x_m", "y_m", "z_m")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clicked:
+    """Named points and where they were clicked."""
+
+    names: tuple[str, ...]
+    world: Array | None  # (n, 3) [m]; None where the table has no positions
+    px: Mapping[str, Array]  # camera -> (n, 2) [px]; NaN where not clicked
+
+    def at(self, name: str, camera: str) -> Array:
+        """Return where a point was clicked: (2,) [px], NaN where it was not."""
+        return self.px[camera][self.names.index(name)] if camera in self.px else np.full(2, np.nan)
+
+    def click(self, name: str, camera: str, px: Sequence[float]) -> Clicked:
+        """Return the table with a point clicked; NaN takes a click back."""
+        names = self.names if name in self.names else (*self.names, name)
+        grown = {
+            key: np.vstack([value, np.full((len(names) - len(value), 2), np.nan)]) for key, value in self.px.items()
+        }
+        column = grown.get(camera, np.full((len(names), 2), np.nan)).copy()
+        column[names.index(name)] = np.round(px, 2)
+        return replace(self, names=names, px={**grown, camera: column})
+
+    def text(self, cameras: Sequence[str]) -> str:
+        """Write the table; cameras without a column get one, and points without a click keep their row."""
+        columns = [*cameras, *(camera for camera in self.px if camera not in cameras)]
+        lines = [",".join(["point", *(_WORLD if self.world is not None else ()), *_heads(columns)])]
+        for row, name in enumerate(self.names):
+            cells = [] if self.world is None else [_cell(value, 6) for value in self.world[row]]
+            cells += [_cell(value, 2) for camera in columns for value in self.at(name, camera)]
+            lines.append(",".join([name, *cells]))
+        return "\n".join(lines) + "\n"
+
+    def control_points(self, cameras: Sequence[str]) -> ControlPoints:
+        """Return them as control points of these cameras; only with positions."""
+        assert self.world is not None
+        px = np.stack([self.px.get(camera, np.full((len(self.names), 2), np.nan)) for camera in cameras], axis=1)
+        return ControlPoints(names=self.names, world=self.world, cameras=tuple(cameras), px=px)
+
+
+def read_clicked(path: Path) -> Clicked:
+    """Read a table `point[,x_m,y_m,z_m][,<camera>_u,<camera>_v,...]`. Raises CalibrationError."""
+    names, columns, values = read_named_numbers(path, "point", "expected point,x_m,y_m,z_m,cam1_u,cam1_v,...")
+    cameras = dict.fromkeys(column[:-2] for column in columns if column[-2:] in ("_u", "_v"))
+    px = {}
+    for camera in cameras:
+        pair = [f"{camera}_u", f"{camera}_v"]
+        if all(column in columns for column in pair):
+            px[camera] = values[:, [columns.index(column) for column in pair]]
+    has_world = all(axis in columns for axis in _WORLD)
+    world = values[:, [columns.index(axis) for axis in _WORLD]] if has_world else None
+    return Clicked(names, world, px)
+
+
+def count_clicked(clicked: Clicked, camera: str) -> int:
+    """Return how many points are clicked in a camera."""
+    return int(np.isfinite(clicked.px[camera][:, 0]).sum()) if camera in clicked.px else 0
+
+
+def list_surveys(folder: Path) -> list[str]:
+    """List the tables of a folder that hold positions of named points."""
+    found = []
+    for path in sorted(folder.glob("*.csv")):
+        try:
+            if read_clicked(path).world is not None:
+                found.append(path.name)
+        except AirborneError:  # another table
+            continue
+    return found
+
+
+def _heads(cameras: Sequence[str]) -> list[str]:
+    return [f"{camera}_{axis}" for camera in cameras for axis in "uv"]
+
+
+def _cell(value: float, digits: int) -> str:
+    return "" if np.isnan(value) else repr(round(float(value), digits))

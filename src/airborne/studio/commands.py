@@ -1,0 +1,79 @@
+"""Commands of the command line that the studio starts: each in a process of its own, which can be stopped."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from airborne.studio.writing import FOLDER
+
+_RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
+STOPPED = 130  # the exit code of a command that was stopped
+_PATIENCE_S = 10.0  # for a process that was told to stop
+
+
+class Command:
+    """One command, running or ended."""
+
+    def __init__(self, words: Sequence[str], folder: Path) -> None:
+        """Start `airborne` with these words in a folder."""
+        self.words = tuple(words)
+        self.started_s = time.monotonic()
+        self._out: bytes = b""
+        self._log = folder / FOLDER / f"{words[0]}.log"
+        self._log.parent.mkdir(exist_ok=True)
+        self._file = self._log.open("w+b")
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _RUN, *words],
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=self._file,
+        )
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it goes on."""
+        return self._process.poll() is None
+
+    @property
+    def code(self) -> int | None:
+        """The exit code; None while it runs."""
+        return self._process.poll()
+
+    @property
+    def seconds(self) -> float:
+        """How long it has been running."""
+        return time.monotonic() - self.started_s
+
+    @property
+    def line(self) -> str:
+        """The command as one would type it."""
+        return " ".join(["airborne", *self.words])
+
+    def output(self) -> str:
+        """Return what an ended command printed."""
+        if self._process.stdout is not None and not self._process.stdout.closed:
+            with self._process.stdout as stdout:
+                self._out = stdout.read()
+        return self._out.decode(errors="replace")
+
+    def complaint(self) -> str:
+        """Return the last line of an ended command's errors."""
+        self._file.seek(0)
+        lines = self._file.read().decode(errors="replace").strip().splitlines()
+        return lines[-1].removeprefix("airborne: ") if lines else f"it ended with the code {self.code}"
+
+    def stop(self) -> None:
+        """Stop it as Ctrl-C does, and wait for its end."""
+        if self.is_running:
+            self._process.send_signal(signal.SIGINT)
+            try:
+                self._process.wait(_PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()

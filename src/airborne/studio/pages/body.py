@@ -1,0 +1,77 @@
+"""The step Body: what is tracked, a body file of the folder or a person of given size."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from nicegui import ui
+
+from airborne.body import BodyModel
+from airborne.errors import AirborneError, count
+from airborne.studio.pages.layout import complain, errors_shown, framed, in_thread
+from airborne.studio.project import list_bodies
+from airborne.studio.session import Session
+from airborne.trial.body import BodyTable
+
+_KEYS = ("file", "preset", "stature_m", "mass_kg", "measurements")
+_STATURE_M, _MASS_KG = (0.5, 2.6), (10.0, 300.0)  # that are taken for a person's
+
+
+async def body_page(session: Session) -> None:
+    """Let the user choose a body file, or say how tall and heavy the person is."""
+    text = (
+        "A thing needs a body file with its measured solids and colours. "
+        "A person is made of stature and mass; the colours are taken from the video."
+    )
+    async with framed(session, "Body", "What is tracked?", text, scrolls=True):
+        table = session.project().table("body")
+        bodies = await in_thread(list_bodies, session.folder)
+        with ui.element("div").classes("row-line").style("align-items: stretch"):
+            if bodies:
+                _thing_card(session, bodies, table)
+            _person_card(session, table)
+
+
+def _thing_card(session: Session, bodies: dict[str, BodyModel], table: dict[str, Any]) -> None:
+    with ui.element("div").classes("card").style("width: 360px"):
+        ui.label("A body file").classes("name")
+        present = table.get("file")
+        choice = ui.select(
+            list(bodies), label="file", value=present if present in bodies else next(iter(bodies))
+        ).props("outlined dense options-dense")
+        says = ui.label().classes("soft small")
+        says.bind_text_from(choice, "value", lambda name: _describe(bodies[name]))
+        ui.button("Use this body", on_click=lambda: _save(session, {"file": choice.value})).props("unelevated")
+
+
+def _person_card(session: Session, table: dict[str, Any]) -> None:
+    with ui.element("div").classes("card").style("width: 360px"):
+        ui.label("A person").classes("name")
+        stature = ui.number("stature [m]", value=table.get("stature_m", 1.75), step=0.01, format="%.2f")
+        mass = ui.number("mass [kg]", value=table.get("mass_kg", 70.0), step=0.5, format="%.1f")
+        for field in (stature, mass):
+            field.props("outlined dense")
+
+        def save() -> None:
+            stature_m, mass_kg = float(stature.value or 0), float(mass.value or 0)
+            if not (_STATURE_M[0] <= stature_m <= _STATURE_M[1] and _MASS_KG[0] <= mass_kg <= _MASS_KG[1]):
+                complain("give a stature in metres, such as 1.75, and a mass in kilograms, such as 70")
+                return
+            _save(session, {"preset": "human18", "stature_m": stature_m, "mass_kg": mass_kg})
+
+        ui.button("Use this person", on_click=save).props("unelevated")
+
+
+def _describe(model: BodyModel) -> str:
+    parts = sum(len(segment.parts) for segment in model.segments)
+    return f"{model.name}: {count(len(model.segments), 'segment')}, {count(parts, 'solid')}"
+
+
+def _save(session: Session, values: dict[str, Any]) -> None:
+    with errors_shown():
+        try:
+            BodyTable(**values)
+        except ValueError as error:
+            raise AirborneError(str(error)) from None
+        session.set_table("body", {**dict.fromkeys(_KEYS), **values}, "body chosen")
+        ui.notify("the body is written into the trial", type="positive")

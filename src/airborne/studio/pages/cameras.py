@@ -1,0 +1,109 @@
+"""The step Cameras: a calibration file, or surveyed points clicked in every camera's picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from nicegui import ui
+
+from airborne.cameras import Rig, read_rig
+from airborne.errors import AirborneError
+from airborne.studio.clicks import list_surveys
+from airborne.studio.pages.control_points import ControlPointsPanel
+from airborne.studio.pages.layout import errors_shown, framed, in_thread, work
+from airborne.studio.session import Session
+from airborne.studio.stage import draw_cameras
+
+_ENDINGS = (".toml", ".txt", ".xcp", ".yml", ".yaml", ".csv")
+_HELP = (
+    "Open the calibration of any program, or click surveyed points: six in each camera at least, spread over the space "
+    "in which the body moves. Each residual is drawn ten times as long as soon as a camera is determined."
+)
+
+
+async def cameras_page(session: Session) -> None:
+    """Let the user choose a calibration file, or a survey and click its points."""
+    async with framed(session, "Cameras", "Where are the cameras?", _HELP) as changed:
+        project = session.project()
+        if not project.cameras:
+            ui.label("Choose the cameras first, in the step Videos.").classes("warn")
+            return
+        shown = await work("indexing the videos", session.shown)
+        if shown is None:
+            return
+        wanted = {camera.calibrated_as or camera.name for camera in project.cameras}
+        files = await in_thread(_list_calibrations, session.folder, wanted)
+        surveys = await in_thread(list_surveys, session.folder)
+        table = project.table("calibration")
+        if not files and not surveys and not table:
+            ui.label(
+                "The folder holds neither a calibration of these cameras nor a table of surveyed points "
+                "(point,x_m,y_m,z_m); put one there, then reload this page."
+            ).classes("warn")
+            return
+        _chooser(session, files, surveys, table)
+        if table.get("control_points"):
+            panel = await ControlPointsPanel.open(session, shown, str(table["control_points"]))
+            if panel is not None:
+                changed.append(panel.reread)
+        elif table.get("file"):
+            rig = await work("reading the calibration", session.rig)
+            if rig is not None:
+                _show_rig(rig)
+
+
+def _chooser(session: Session, files: list[str], surveys: list[str], table: dict) -> None:
+    def use(key: str, name: str) -> None:
+        if table.get(key) == name:
+            return
+        with errors_shown():
+            other = "control_points" if key == "file" else "file"
+            session.set_table("calibration", {key: name, other: None}, f"calibration by {name}")
+            ui.navigate.reload()
+
+    with ui.element("div").classes("row-line"):
+        if files:
+            present = table.get("file")
+            ui.select(
+                files,
+                label="calibration file",
+                value=present if present in files else None,
+                on_change=lambda event: use("file", event.value),
+            ).props("outlined dense options-dense").style("min-width: 260px")
+        if surveys:
+            present = table.get("control_points")
+            ui.select(
+                surveys,
+                label="surveyed points",
+                value=present if present in surveys else None,
+                on_change=lambda event: use("control_points", event.value),
+            ).props("outlined dense options-dense").style("min-width: 260px")
+
+
+def _list_calibrations(folder: Path, wanted: set[str]) -> list[str]:
+    """List the files of a folder that hold a calibration of these cameras."""
+    found = []
+    for path in sorted(folder.iterdir()):
+        if not path.name.lower().endswith(_ENDINGS) or not path.is_file():
+            continue
+        try:
+            rig = read_rig(path)
+        except (AirborneError, OSError):
+            continue
+        if wanted <= set(rig.names):
+            found.append(path.name)
+    return found
+
+
+def _show_rig(rig: Rig) -> None:
+    with ui.element("div").classes("split"):
+        with ui.element("div").classes("wide"):
+            draw_cameras(rig)
+        with ui.element("div").classes("side"), ui.element("div").classes("card"):
+            for camera in rig:
+                x, y, z = camera.centre
+                ui.label(camera.name).classes("name")
+                ui.label(
+                    f"at {x:.2f}, {y:.2f}, {z:.2f} m; focal length {camera.K[0, 0]:.0f} px; "
+                    f"{camera.size[0]}×{camera.size[1]} px"
+                ).classes("soft small")

@@ -1,0 +1,169 @@
+"""What all pages share: the bar, the rail of steps, the sheet of keys, errors and long work told to the user."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from typing import TypeVar, cast
+
+from nicegui import Client, run, ui
+
+from airborne.errors import AirborneError
+from airborne.studio.project import steps
+from airborne.studio.session import Session
+
+_T = TypeVar("_T")
+_LOOK_EVERY_S = 1.0  # for changes by other windows and other programs
+_BLUE = "#0072b2"  # of buttons: dark enough for white letters
+_KEYS = {
+    "← →": "one frame back or on; with Shift ten",
+    ", .": "one frame back or on, also while a point is chosen",
+    "Home End": "first and last frame",
+    "wheel": "zoom where the pointer is",
+    "drag": "move the picture; a point where one is grabbed",
+    "0": "whole pictures",
+    "click": "set the chosen point",
+    "arrows": "move the chosen point by 0.1 px; with Shift by 1 px",
+    "N P": "choose the next point, the one before",
+    "Esc": "choose no mark",
+    "Ctrl+Z, Ctrl+Y": "undo, redo",
+    "?": "this sheet",
+}
+
+
+@asynccontextmanager
+async def framed(
+    session: Session,
+    here: str,
+    title: str,
+    text: str,
+    *,
+    scrolls: bool = False,
+) -> AsyncIterator[list[Callable[[], Awaitable[None]]]]:
+    """Lay out a page: `here` is its step, `text` its help. What it yields takes what to call when a file has changed.
+
+    What stands in it is built once the window is there, so that it may take its time.
+    """
+    changed: list[Callable[[], Awaitable[None]]] = []
+    ui.colors(primary=_BLUE)
+    sheet, known = _sheet(), [session.stamp]
+
+    async def move(verb: str) -> None:
+        with errors_shown():
+            what = session.editor.undo() if verb == "undo" else session.editor.redo()
+            ui.notify(f"{'undone' if verb == 'undo' else 'done again'}: {what}")
+            await look()
+
+    async def look() -> None:
+        undo.set_enabled(session.editor.last is not None)
+        redo.set_enabled(session.editor.next is not None)
+        if known[0] != (stamp := session.stamp):
+            known[0] = stamp
+            rail.refresh()
+            for tell in changed:
+                await tell()
+
+    with ui.element("div").classes("bar"):
+        ui.label("Airborne").classes("name")
+        name = f"{session.folder.name}/{session.path.name}"
+        ui.label(name).classes("path small").tooltip(str(session.path))
+        ui.element("div").classes("gap")
+        undo = ui.button(icon="undo", on_click=lambda: move("undo")).props("flat round dense aria-label=Undo")
+        redo = ui.button(icon="redo", on_click=lambda: move("redo")).props("flat round dense aria-label=Redo")
+        ui.button("Keys  ?", on_click=sheet.open).props("flat dense")
+    with ui.element("div").classes("body"):
+        with ui.element("nav").classes("rail").props("aria-label=steps"):
+            rail = ui.refreshable(lambda: _rail(session, here))
+            rail()
+        await look()
+        ui.timer(_LOOK_EVERY_S, look)
+        ui.keyboard(on_key=lambda event: _key(event, sheet, move), ignore=["input", "select", "textarea"])
+        with ui.element("div").classes("main" if scrolls else "main still"):  # the page has a <main> already
+            ui.html(f"<h1>{title}</h1>", sanitize=False)
+            if text:
+                ui.label(text).classes("help")
+            await ui.context.client.connected()
+            yield changed
+
+
+async def _key(event, sheet: ui.dialog, move: Callable[[str], Awaitable[None]]) -> None:
+    if not event.action.keydown:
+        return
+    if event.key == "?":
+        sheet.open()
+    elif event.modifiers.ctrl and event.key in ("z", "y"):
+        await move("undo" if event.key == "z" else "redo")
+
+
+def _rail(session: Session, here: str) -> None:
+    for number, step in enumerate(steps(session.project()), start=1):
+        state = {"ready": "ready", "needs you": "needs", "empty": "empty"}[step.state]
+        classes = f"{state} here" if step.name == here else state
+        with ui.element("a").props(f'href="{step.address}"').classes(classes) as link:
+            if step.name == here:
+                link.props("aria-current=step")
+            ui.label("✓" if step.state == "ready" else str(number)).classes("number")
+            ui.label(step.name).classes("title")
+            ui.label(step.says).classes("says")
+
+
+def _sheet() -> ui.dialog:
+    with ui.dialog() as dialog, ui.card():
+        ui.html("<h2>Keys</h2>", sanitize=False)
+        rows = "".join(f"<tr><th><kbd>{key}</kbd></th><td>{what}</td></tr>" for key, what in _KEYS.items())
+        ui.html(f'<table class="plain">{rows}</table>', sanitize=False)
+        ui.button("Close", on_click=dialog.close).props("flat")
+    return dialog
+
+
+@contextmanager
+def errors_shown() -> Iterator[None]:
+    """Show a user's error as a line on the page."""
+    try:
+        yield
+    except AirborneError as error:
+        complain(error)
+
+
+def complain(error: AirborneError | str) -> None:
+    """Show what is wrong."""
+    ui.notify(str(error), type="warning", multi_line=True, timeout=10_000, close_button="Close")
+
+
+async def in_thread(function: Callable[..., _T], *arguments: object) -> _T:
+    """Do something that takes time without holding up other windows; what asked ends here if its own is closed."""
+    client = ui.context.client
+    try:
+        return cast(_T, await run.io_bound(function, *arguments))
+    finally:
+        if client.id not in Client.instances:
+            raise asyncio.CancelledError
+
+
+class Latest:
+    """Slow work of which only the last that was asked for matters: one at a time, and what is overtaken is left out."""
+
+    def __init__(self) -> None:
+        """Begin with nothing asked for."""
+        self._lock, self._asked = asyncio.Lock(), 0
+
+    async def do(self, function: Callable[..., _T], *arguments: object) -> _T | None:
+        """Do something in a thread; None where something else was asked for meanwhile."""
+        self._asked += 1
+        asked = self._asked
+        async with self._lock:
+            result = await in_thread(function, *arguments) if asked == self._asked else None
+        return result if asked == self._asked else None
+
+
+async def work(what: str, function: Callable[[], _T]) -> _T | None:
+    """Do something slow in a thread, saying what; None where it ends in an error, which is shown."""
+    note = ui.notification(what, spinner=True, timeout=None, type="ongoing")
+    try:
+        result = await in_thread(function)
+    except AirborneError as error:
+        complain(error)
+        result = None
+    note.dismiss()
+    return result

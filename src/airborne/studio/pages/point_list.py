@@ -1,0 +1,48 @@
+"""The list of points beside the pictures; each row says how far the point's clicks lie from where they should."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Sequence
+from functools import partial
+
+import numpy as np
+from nicegui import ui
+from nicegui.element import Element
+from nicegui.elements.label import Label
+
+from airborne.types import Array, Mask
+
+_NOT_CLICKED, _CLICKED = "–", "•"
+
+
+class PointList:
+    """Rows that stay the same elements while what they say changes, so that no click on them is lost."""
+
+    def __init__(self, cameras: Sequence[str], choose: Callable[[str], Awaitable[None]]) -> None:
+        """Begin without rows; `choose` is called with a row's point."""
+        self._cameras, self._choose = cameras, choose
+        self._rows: dict[str, tuple[Element, list[Label]]] = {}
+        self._card = ui.element("div").classes("card points").style("flex: 1; overflow-y: auto")
+
+    def show(self, names: Sequence[str], chosen: str, off_px: Callable[[str], tuple[Mask, Array]]) -> None:
+        """Show the points; `off_px` says of one whether it is clicked, and how far off, in each camera [px]."""
+        if list(self._rows) != list(names):
+            self._build(names)
+        for name, (row, labels) in self._rows.items():
+            row.classes(replace="point here" if name == chosen else "point")
+            for label, is_clicked, off in zip(labels, *off_px(name), strict=True):
+                label.set_text(_NOT_CLICKED if not is_clicked else _CLICKED if np.isnan(off) else f"{off:.1f}")
+
+    def _build(self, names: Sequence[str]) -> None:
+        self._card.clear()
+        self._rows = {}
+        with self._card:
+            for name in names:
+                with ui.element("button").classes("point") as row:
+                    row.on("click", partial(self._choose, name), args=[])
+                    ui.label(name)
+                    ui.element("div").classes("gap")
+                    labels = [ui.label().classes("n") for _ in self._cameras]
+                    for label, camera in zip(labels, self._cameras, strict=True):
+                        label._props["title"] = f"{camera} [px]"  # a camera's name may hold quotes
+                self._rows[name] = row, labels

@@ -1,0 +1,82 @@
+"""The step Results: a finished run's headline numbers, its report and its tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from nicegui import ui
+
+from airborne.errors import count
+from airborne.io.text import read_json
+from airborne.motion.run_folder import REPORT, SUMMARY, note_if_unfinished
+from airborne.run.folder import list_tables
+from airborne.studio.pages.layout import framed
+from airborne.studio.project import list_runs
+from airborne.studio.session import Session
+
+_HELP = "The report stands alone: one file, to be sent or printed. Tables open in any spreadsheet."
+_NUMBERS = {
+    "n_frames": "frames",
+    "n_tracked": "tracked",
+    "n_uncertain": "uncertain",
+    "n_lost": "lost",
+    "median_position_sd_mm": "median sd of position [mm]",
+    "median_rotation_sd_deg": "median sd of rotation [°]",
+    "method": "method",
+}
+
+
+async def results_page(session: Session) -> None:
+    """Show every run of the folder, the newest first."""
+    async with framed(session, "Results", "What came of it", _HELP, scrolls=True):
+        runs = list_runs(session.folder)
+        if not runs:
+            ui.label("There is no run yet; see the step Track.").classes("warn")
+        for each in runs:
+            with ui.element("div").classes("card"):
+                _run_card(each)
+
+
+def _run_card(folder: Path) -> None:
+    ui.label(folder.name).classes("name")
+    note = note_if_unfinished(folder)
+    if note is not None:
+        ui.label(note).classes("warn small")
+    if (folder / REPORT).is_file():
+        _link(folder, REPORT, "Open the report")
+    if note is None:
+        _numbers(read_json(folder / SUMMARY))
+    ui.label("Tables").classes("soft")
+    with ui.element("div").classes("row-line"):
+        for name in list_tables(folder):
+            _link(folder, name, name)
+
+
+def _numbers(summary: dict[str, Any]) -> None:
+    with ui.element("table").classes("plain"):
+        for key, words in _NUMBERS.items():
+            if isinstance(value := summary.get(key), int | float | str):
+                with ui.element("tr"):
+                    for tag, text in (
+                        ("th", words),
+                        ("td", f"{value:.3g}" if isinstance(value, float) else str(value)),
+                    ):
+                        with ui.element(tag):
+                            ui.label(text)
+    findings = summary.get("self_check") or []
+    alarms = [finding for finding in findings if finding["is_alarm"]]
+    title = f"Self-check: {count(len(alarms), 'alarm')}" if alarms else "Self-check: nothing seems wrong"
+    if findings:
+        with ui.expansion(title, value=bool(alarms)).props("dense"):
+            for finding in findings:
+                ui.label(finding["sentence"]).classes("bad small" if finding["is_alarm"] else "soft small")
+    for text in summary.get("warnings") or []:
+        ui.label(text).classes("warn small")
+
+
+def _link(folder: Path, name: str, text: str) -> None:
+    address = f"/file/{quote(folder.name)}/{quote(name)}"
+    with ui.element("a").props(f'href="{address}" target="_blank" rel="noopener"').classes("plain"):
+        ui.label(text)

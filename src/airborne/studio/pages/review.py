@@ -1,0 +1,104 @@
+"""The step Review: a run's views in step with its curves and a 3D scene, one cursor over all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+from nicegui import ui
+
+from airborne.cameras import read_rig
+from airborne.motion.run_folder import CALIBRATION, holds_players
+from airborne.studio.outlines import run_body, run_motion
+from airborne.studio.pages.layout import complain, framed, in_thread, work
+from airborne.studio.pictures import ShownTrial
+from airborne.studio.project import list_runs
+from airborne.studio.session import Session
+from airborne.studio.stage import BodyOnStage, draw_cameras
+from airborne.studio.view import Curves, View
+from airborne.tracking import Status
+
+_AROUND_M = 2.0  # how far from the path the scene is looked at from
+_HELP = "Step through the run: pictures, curves and scene share one frame. Bands are two standard deviations."
+
+
+async def review_page(session: Session) -> None:
+    """Show a run."""
+    async with framed(session, "Review", "Is it right?", _HELP):
+        runs = list_runs(session.folder)
+        if not runs:
+            ui.label("There is no run yet; see the step Track.").classes("warn")
+            return
+        shown = await work("indexing the videos", session.shown)
+        if shown is None:
+            return
+        names = [each.name for each in runs]
+
+        async def change() -> None:
+            content.clear()
+            with content:
+                await _show_run(session, shown, session.folder / choice.value)
+
+        with ui.element("div").classes("row-line"):
+            choice = ui.select(names, label="run", value=names[0], on_change=change)
+            choice.props("outlined dense options-dense").style("min-width: 180px")
+            jumps = ui.element("div").classes("row-line")
+        content = ui.element("div").classes("split").style("flex-direction: column")
+        with jumps:
+            ui.button("next uncertain", on_click=lambda: _jump(session, choice.value, Status.UNCERTAIN)).props("flat")
+            ui.button("next lost", on_click=lambda: _jump(session, choice.value, Status.LOST)).props("flat")
+        await change()
+
+
+async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
+    bodies: list[Callable[[int], None]] = []
+
+    def turn_to(frame: int) -> None:
+        session.frame = frame
+        for show in bodies:
+            show(frame)
+
+    with ui.element("div").classes("split"):
+        with ui.element("div").classes("wide"):
+            View(shown, frame=session.frame, overlay=f"/overlay/{quote(folder.name)}/{{frame}}", on_frame=turn_to)
+        if not holds_players(folder):
+            with ui.element("div").classes("side"):
+                bodies.append(await _stage(folder))
+    Curves(f"/curves/{quote(folder.name)}", frame=session.frame)
+
+
+async def _stage(folder: Path) -> Callable[[int], None]:
+    """Build the scene of a run of one body; return what shows a frame in it."""
+    motion = await in_thread(run_motion, folder)
+    model = await in_thread(run_body, folder)
+    rig, path = read_rig(folder / CALIBRATION), motion.position[motion.has_pose]
+    near = {"middle": path.mean(axis=0), "away_m": _AROUND_M + float(np.ptp(path, axis=0).max())} if len(path) else {}
+    scene = draw_cameras(rig, path=motion.position, **near)
+    body = BodyOnStage(scene, model, f"/mesh/{quote(folder.name)}/{{part}}")
+    rows = {int(frame): row for row, frame in enumerate(motion.index) if motion.has_pose[row]}
+
+    def show(frame: int) -> None:
+        row = rows.get(frame)
+        body.show(None if row is None else motion.pose(row))
+
+    return show
+
+
+def _jump(session: Session, name: str, status: Status) -> None:
+    """Show the next frame of a status after the one in view, or the first."""
+    folder = session.folder / name
+    if holds_players(folder):
+        complain("players have a status each; step through the strip below the curves")
+        return
+    motion = run_motion(folder)
+    frames = motion.index[motion.status == status.value]
+    if not len(frames):
+        ui.notify(f"no frame is {status.value}")
+        return
+    later = frames[frames > session.frame]
+    ui.run_javascript(
+        'window.dispatchEvent(new CustomEvent("airborne-frame", '
+        f"{{detail: {{frame: {int(later[0] if len(later) else frames[0])}, from: null}}}}))"
+    )

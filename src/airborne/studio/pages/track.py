@@ -1,0 +1,180 @@
+"""The step Track: `airborne track` in a process of its own, its overlays as they come."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+from nicegui import ui
+
+from airborne.errors import AirborneError, TrialError, count
+from airborne.io.names import check_name
+from airborne.motion.run_folder import MOTION, SUMMARY
+from airborne.studio.commands import STOPPED, Command
+from airborne.studio.outlines import run_rows
+from airborne.studio.pages.layout import complain, framed, in_thread, work
+from airborne.studio.pictures import ShownTrial
+from airborne.studio.project import list_runs
+from airborne.studio.session import Session
+from airborne.studio.view import View
+
+_LOOK_EVERY_S = 1.0  # at a run that goes on
+_HELP = (
+    "Tracking runs in a process of its own: go on working, or close the browser. "
+    "A run that is stopped keeps its frames and goes on where it was."
+)
+
+
+async def track_page(session: Session) -> None:
+    """Start, watch, stop and resume a run."""
+    async with framed(session, "Track", "Follow the body", _HELP):
+        project = session.project()
+        missing = [name for name in ("camera", "calibration", "body") if not project.tables.get(name)]
+        if missing:
+            ui.label(f"This step needs the steps before it: {', '.join(missing)}.").classes("warn")
+            return
+        shown = await work("indexing the videos", session.shown)
+        if shown is None:
+            return
+        try:
+            n_frames = _n_frames(session, len(shown.clock))
+        except AirborneError as error:
+            complain(error)
+            return
+        _Panel(session, shown, n_frames).build()
+
+
+def _n_frames(session: Session, n_images: int) -> int:
+    """Return how many frames are tracked; the trial is checked on the way."""
+    trial = session.project().trial()
+    stop = n_images if trial.track.stop is None else min(n_images, trial.track.stop)
+    return len(range(trial.start.frame, stop, trial.track.every))
+
+
+@dataclass(eq=False)
+class _Panel:
+    """One window that watches the run."""
+
+    session: Session
+    shown: ShownTrial
+    n_frames: int
+    n_done: int = -1  # frames of the run, when it was looked at last
+    n_before: int = 0  # of them, when it was resumed
+    ended: Command | None = None  # the run whose end was told
+
+    def build(self) -> None:
+        """Lay out the bar, the pictures, and a look at the run every second."""
+        runs = list_runs(self.session.folder)
+        command = self._command
+        self.ended = None if self._is_running else command
+        name = command.words[3] if command is not None else runs[0].name if runs else "results"
+        with ui.element("div").classes("row-line"):
+            self.name = ui.input("folder of the run", value=name, on_change=lambda: self.look(anew=True))
+            self.name.props("outlined dense").style("width: 200px")
+            self.begin = ui.button("Track", on_click=lambda: self.start()).props("unelevated")
+            self.resume = ui.button("Go on", on_click=lambda: self.start("--resume")).props("unelevated")
+            self.again = ui.button("Track again", on_click=lambda: self.start("--overwrite")).props("outline")
+            self.halt = ui.button("Stop", on_click=self.stop).props("unelevated color=grey-8")
+            self._show_buttons()
+            self.bar = (
+                ui.linear_progress(0, show_value=False, size="10px")
+                .props("rounded aria-label=progress")
+                .style("width: 220px")
+            )
+            self.says = ui.label().classes("small soft")
+        self.view = View(self.shown, frame=self.session.frame, overlay=self._overlay, on_frame=self.turn_to)
+        ui.timer(_LOOK_EVERY_S, self.look)
+
+    @property
+    def folder(self) -> Path:
+        """The run's folder."""
+        return self.session.folder / ((self.name.value or "").replace("/", "_").lstrip(".") or "results")
+
+    @property
+    def _overlay(self) -> str:
+        return f"/overlay/{quote(self.folder.name)}/{{frame}}"
+
+    @property
+    def _command(self) -> Command | None:
+        return self.session.commands.get("track")
+
+    @property
+    def _is_running(self) -> bool:
+        return self._command is not None and self._command.is_running
+
+    def turn_to(self, frame: int) -> None:
+        """Note the frame in view."""
+        self.session.frame = frame
+
+    def start(self, *options: str) -> None:
+        """Start `airborne track`."""
+        if self._is_running:
+            return
+        try:
+            check_name(self.folder.name)
+            self.session.project().trial()
+        except (ValueError, TrialError) as error:
+            complain(str(error))
+            return
+        words = ["track", self.session.path.name, "-o", self.folder.name, *options]
+        self.n_before = run_rows(self.folder)[0] if "--resume" in options else 0
+        self.session.commands["track"] = Command(words, self.session.folder)
+        self.n_done = -1
+        self._show_buttons()
+
+    async def stop(self) -> None:
+        """Stop the run; its frames stay."""
+        if self._command is not None:
+            await in_thread(self._command.stop)
+        self._show_buttons()
+
+    async def look(self, *, anew: bool = False) -> None:
+        """Show how far the run is, and its newest frame."""
+        if anew:
+            self.view.set_overlay(self._overlay)
+            self._show_buttons()
+        n_done, newest = await in_thread(run_rows, self.folder)
+        command = self._command
+        if command is not None and command.is_running:
+            self._say_progress(command, n_done)
+        elif command is not None and command is not self.ended:
+            self.ended = command
+            self._say_end(command)
+        if n_done != self.n_done:
+            self.n_done = n_done
+            self.bar.value = n_done / max(self.n_frames, 1)
+            self.view.run_method("refresh")
+            if newest is not None and self._is_running:
+                self.view.go(newest)
+            self._show_buttons()
+
+    def _say_progress(self, command: Command, n_done: int) -> None:
+        left = ""
+        if (n_own := n_done - self.n_before) > 2:
+            left = f", about {command.seconds / n_own * (self.n_frames - n_done):.0f} s left"
+        self.says.text = (
+            f"{n_done} of {count(self.n_frames, 'frame')}, {command.seconds:.0f} s{left}"
+            if n_done
+            else (f"opening videos, {command.seconds:.0f} s")
+        )
+
+    def _say_end(self, command: Command) -> None:
+        if command.code == 0:
+            self.says.text = command.output().splitlines()[0]
+            ui.notify("tracked; the report is in the step Results", type="positive")
+        elif command.code == STOPPED:
+            self.says.text = "stopped"
+        else:
+            self.says.text = ""
+            complain(command.complaint())
+        self._show_buttons()
+
+    def _show_buttons(self) -> None:
+        """Show the buttons that the run has now."""
+        folder, is_running = self.folder, self._is_running
+        is_begun, is_finished = (folder / MOTION).is_file(), (folder / SUMMARY).is_file()
+        self.halt.set_visibility(is_running)
+        self.begin.set_visibility(not is_running and not is_begun)
+        self.resume.set_visibility(not is_running and is_begun and not is_finished)
+        self.again.set_visibility(not is_running and is_begun)

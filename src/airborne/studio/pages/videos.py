@@ -1,0 +1,132 @@
+"""The step Videos: which files are cameras, what they are called, and how they are read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+from nicegui import ui
+
+from airborne.errors import AirborneError
+from airborne.io.names import check_name
+from airborne.studio.pages.layout import complain, errors_shown, framed, in_thread
+from airborne.studio.project import Project, list_outer_videos, list_videos
+from airborne.studio.session import Session
+from airborne.studio.trial_edits import with_cameras
+from airborne.video import VideoFacts, VideoSource, inspect
+
+_FIELDS = {
+    "progressive": "whole pictures",
+    "top-first": "two fields, top first",
+    "bottom-first": "two fields, bottom first",
+}
+
+
+@dataclass(slots=True)
+class _Choice:
+    """What the user says of one file."""
+
+    video: str
+    is_camera: bool
+    name: str
+    fields: str
+
+
+async def videos_page(session: Session) -> None:
+    """Show the folder's videos, and write those chosen as cameras into the trial."""
+    text = (
+        "Tick the files that are cameras of one recording; the first one is the clock. "
+        "A file that holds two fields in a picture gives twice as many images a second."
+    )
+    async with framed(session, "Videos", "Which videos are the cameras?", text, scrolls=True):
+        project = session.project()
+        if project.mistake:
+            ui.label(project.mistake).classes("bad")
+        order = [camera.video for camera in project.cameras]  # the trial's, as its first camera is the clock
+        files = list_videos(session.folder)
+        files.sort(key=lambda path: order.index(path.name) if path.name in order else len(order))
+        if outer := list_outer_videos(session.folder):
+            ui.label(
+                f"{', '.join(outer)}: a link that leads out of this folder is not followed; copy the file"
+            ).classes("warn")
+        if not files:
+            ui.label(f"{session.folder} holds no videos; copy them there, then reload this page.").classes("warn")
+            return
+        choices: list[_Choice] = []
+        with ui.element("div").classes("files"):
+            for path in files:
+                facts = await in_thread(_facts, path)
+                choices.append(_choose(project, path, facts))
+                _card(choices[-1], facts)
+        with ui.element("div").classes("row-line"):
+            ui.button("Use these cameras", on_click=lambda: _save(session, choices)).props("unelevated")
+            ui.label(f"writes {session.path.name}").classes("soft small")
+
+
+def _facts(path: Path) -> VideoFacts | str:
+    try:
+        return inspect(VideoSource(path.name, path))
+    except AirborneError as error:
+        return str(error)
+
+
+def _choose(project: Project, path: Path, facts: VideoFacts | str) -> _Choice:
+    """Return what the trial says of a file; of one that it does not name, what the file's flags say."""
+    camera = next((each for each in project.cameras if each.video == path.name), None)
+    if camera is not None:
+        fields = camera.fields if camera.fields in _FIELDS else "progressive"
+        return _Choice(path.name, True, camera.name, fields)
+    if isinstance(facts, str):
+        return _Choice(path.name, False, path.stem, "progressive")
+    return _Choice(path.name, not project.cameras, path.stem, facts.flagged_order)
+
+
+def _card(choice: _Choice, facts: VideoFacts | str) -> None:
+    with ui.element("div").classes("card"):
+        if isinstance(facts, str):
+            ui.label(choice.video).classes("name")
+            ui.label(facts).classes("bad small")
+            return
+        picture = ui.element("img").props(f"src=/thumbnail/{quote(choice.video)}")
+        picture._props["alt"] = f"first picture of {choice.video}"  # a file's name may hold quotes
+        ui.checkbox(choice.video).bind_value(choice, "is_camera").props("dense")
+        ui.label(_describe(facts)).classes("soft small")
+        ui.input("name of the camera").bind_value(choice, "name").props("dense outlined")
+        ui.select(_FIELDS, label="pictures are").bind_value(choice, "fields").props("dense outlined options-dense")
+        if facts.flagged_order != "progressive":
+            ui.label(f"the file's flags say {_FIELDS[facts.flagged_order]}").classes("soft small")
+
+
+def _describe(facts: VideoFacts) -> str:
+    length = "" if facts.duration_s is None else f", {float(facts.duration_s):.1f} s"
+    return f"{facts.size[0]}×{facts.size[1]} px, {float(facts.frame_rate):.5g} pictures/s{length}"
+
+
+def _save(session: Session, choices: list[_Choice]) -> None:
+    chosen = [choice for choice in choices if choice.is_camera]
+    if not chosen:
+        complain("no video is ticked; tick those that are cameras")
+        return
+    names = [choice.name for choice in chosen]
+    try:
+        list(map(check_name, names))
+    except ValueError as error:
+        complain(str(error))
+        return
+    if len(set(names)) < len(names):
+        complain("two cameras have the same name; give each its own")
+        return
+    tables = [
+        {
+            "name": choice.name,
+            "video": choice.video,
+            "fields": choice.fields if choice.fields != "progressive" else None,
+        }
+        for choice in chosen
+    ]
+    with errors_shown():
+        session.edit_trial(
+            lambda text: with_cameras(text, session.folder.name, tables), f"{len(chosen)} cameras chosen"
+        )
+        ui.notify(f"{session.path.name} is written: {', '.join(names)}", type="positive")

@@ -1,0 +1,212 @@
+"""What lies in the opened folder: its trial as far as it is written, its videos, its runs, and what comes next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import ValidationError
+
+from airborne.body import BodyModel
+from airborne.body.files import read_body
+from airborne.errors import AirborneError, TrialError
+from airborne.motion.run_folder import JOINTS, MOTION, REPORT, SUMMARY
+from airborne.studio.clicks import count_clicked, read_clicked
+from airborne.studio.writing import FOLDER
+from airborne.trial.cameras import CameraTable
+from airborne.trial.file import Trial, parse_trial, read_tables
+from airborne.video import VideoSource
+
+TRIAL = "trial.toml"
+VIDEO_ENDINGS = {".mp4", ".mov", ".avi", ".mkv", ".mts", ".m2ts", ".ts", ".mxf", ".webm", ".m4v", ".mpg", ".dv"}
+FEWEST_POINTS = 6  # that determine a camera
+State = Literal["empty", "ready", "needs you"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Project:
+    """One folder and one trial in it, which may be unfinished, or not be there yet."""
+
+    folder: Path
+    path: Path  # of the trial's file
+    tables: Mapping[str, Any]  # as they stand in it
+    cameras: tuple[CameraTable, ...]
+    mistake: str | None  # why the file, or its cameras, cannot be read
+
+    def table(self, name: str) -> dict[str, Any]:
+        """Return a table of the trial; empty where it is missing."""
+        found = self.tables.get(name)
+        return dict(found) if isinstance(found, dict) else {}
+
+    @property
+    def cameras_stamp(self) -> str:
+        """What changes whenever the cameras do."""
+        return repr(self.cameras)
+
+    def source(self, camera: CameraTable) -> VideoSource:
+        """Return a camera's video; raises TrialError for one outside the opened folder."""
+        path = self.file(camera.video)
+        return VideoSource(camera.name, path, camera.fields, camera.offset_s, camera.drift_ppm)
+
+    def file(self, name: str) -> Path:
+        """Return the path of a file that the trial names; raises TrialError for one outside the opened folder."""
+        path = self.folder / name
+        if not is_inside(self.folder, path):
+            raise TrialError(f"{name} lies outside {self.folder}; open the folder that holds both, or copy it there")
+        return path
+
+    def trial(self) -> Trial:
+        """Return the trial; raises TrialError where it is unfinished."""
+        return parse_trial(self.path)
+
+    def model(self) -> BodyModel:
+        """Return the trial's body; raises AirborneError where there is none."""
+        if not self.table("body"):
+            raise TrialError("no body yet; choose one in the step Body")
+        return self.trial().model()
+
+
+def read_project(folder: Path, path: Path) -> Project:
+    """Read what there is of a trial."""
+    if not path.is_file():
+        return Project(folder, path, {}, (), None)
+    try:
+        tables, base = read_tables(path)
+        if base != path.parent:
+            raise TrialError(f"{path.name}: its session is in another folder; put the trial beside it")
+        cameras = tables.get("camera", [])
+        return Project(folder, path, tables, tuple(CameraTable(**table) for table in cameras), None)
+    except (AirborneError, ValidationError, TypeError) as error:
+        return Project(folder, path, {}, (), str(error).splitlines()[0])
+
+
+def find_trial(path: Path) -> tuple[Path, Path]:
+    """Return the folder and the trial's file that a path means; raises TrialError."""
+    path = path.absolute()
+    if path.is_file():
+        read_tables(path)
+        return path.parent, path
+    if not path.is_dir():
+        raise TrialError(f"{path} is not there; give a folder of videos, or a trial's TOML file")
+    return path, path / TRIAL
+
+
+def list_videos(folder: Path) -> list[Path]:
+    """List the video files of a folder, without links that lead out of it."""
+    return [path for path in _videos(folder) if is_inside(folder, path)]
+
+
+def list_outer_videos(folder: Path) -> list[str]:
+    """List the links to videos elsewhere, which are not read."""
+    return [path.name for path in _videos(folder) if not is_inside(folder, path)]
+
+
+def _videos(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.suffix.lower() in VIDEO_ENDINGS and path.is_file())
+
+
+def is_inside(folder: Path, path: Path) -> bool:
+    """Say whether a path lies in a folder once all links are followed."""
+    return path.resolve().is_relative_to(folder.resolve())
+
+
+def list_bodies(folder: Path) -> dict[str, BodyModel]:
+    """Return the body files of a folder, by name."""
+    found = {}
+    for path in sorted(folder.glob("*.toml")):
+        try:
+            found[path.name] = read_body(path)
+        except (AirborneError, OSError):
+            continue
+    return found
+
+
+def list_runs(folder: Path) -> list[Path]:
+    """List the folders of runs, the newest first."""
+    folders = [path for path in folder.iterdir() if path.is_dir() and path.name != FOLDER and not path.is_symlink()]
+    runs = [path for path in folders if (path / MOTION).is_file() or (path / JOINTS).is_file()]
+    return sorted(runs, key=lambda path: path.stat().st_mtime, reverse=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step on the way, and what is to be done there."""
+
+    name: str
+    address: str
+    state: State
+    says: str
+
+
+def steps(project: Project) -> list[Step]:
+    """Return the steps on the way to a report, with their states."""
+    return list(_steps(project))
+
+
+def _steps(project: Project) -> Iterator[Step]:
+    n = len(project.cameras)
+    missing = [each.video for each in project.cameras if not (project.folder / each.video).is_file()]
+    if missing:
+        yield Step("Videos", "/", "needs you", f"{', '.join(missing)} not found")
+    elif n:
+        yield Step("Videos", "/", "ready", f"{n} cameras" if n > 1 else "1 camera")
+    else:
+        yield Step("Videos", "/", "needs you", project.mistake or "choose the cameras")
+    yield Step("Cameras", "/cameras", *_cameras_state(project))
+    body = project.table("body")
+    what = body.get("file") or body.get("preset") or body.get("measurements")
+    yield Step(
+        "Body", "/body", "ready" if what else "needs you" if n else "empty", str(what or "choose what is tracked")
+    )
+    yield Step("First pose", "/start", *_start_state(project))
+    yield from _run_steps(project)
+
+
+def _cameras_state(project: Project) -> tuple[State, str]:
+    table = project.table("calibration")
+    if "file" in table:
+        return (
+            ("ready", str(table["file"]))
+            if (project.folder / str(table["file"])).is_file()
+            else (
+                "needs you",
+                f"{table['file']} not found",
+            )
+        )
+    if "control_points" not in table:
+        return ("needs you" if project.cameras else "empty"), "calibrate them"
+    try:
+        clicked = read_clicked(project.folder / str(table["control_points"]))
+    except AirborneError as error:
+        return "needs you", str(error)
+    few = [each.name for each in project.cameras if count_clicked(clicked, each.name) < FEWEST_POINTS]
+    return ("needs you", f"click points in {', '.join(few)}") if few else ("ready", "control points")
+
+
+def _start_state(project: Project) -> tuple[State, str]:
+    start = project.table("start")
+    if start and not start.get("find"):
+        return "ready", f"frame {start.get('frame', 0)}"
+    if not project.table("body") or not project.table("calibration"):
+        return "empty", "where the body is"
+    return "needs you", "where is the body?"
+
+
+def _run_steps(project: Project) -> Iterator[Step]:
+    runs = list_runs(project.folder)
+    is_prepared = all(project.table(name) for name in ("calibration", "body"))
+    if runs:
+        yield Step("Track", "/track", "ready", runs[0].name)
+    else:
+        yield Step("Track", "/track", "needs you" if is_prepared else "empty", "follow the body")
+    yield Step("Review", "/review", "ready" if runs else "empty", runs[0].name if runs else "no run yet")
+    finished = [run for run in runs if (run / SUMMARY).is_file()]
+    reports = [run for run in finished if (run / REPORT).is_file()]
+    yield Step(
+        "Results",
+        "/results",
+        "ready" if finished else "empty",
+        "report" if reports else "tables" if finished else "no run yet",
+    )

@@ -1,0 +1,118 @@
+"""What pages fetch beside themselves: pictures, thumbnails, outlines and curves of runs, files of runs."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.responses import FileResponse, JSONResponse, Response
+
+from airborne.errors import AirborneError, ResultError
+from airborne.studio.guard import FILE_POLICY
+from airborne.studio.outlines import run_body, run_curves, run_overlay
+from airborne.studio.pictures import thumbnail
+from airborne.studio.project import list_runs, list_videos
+from airborne.studio.session import Session
+from airborne.studio.stage import part_stl
+from airborne.video import VideoSource
+from airborne.video.decoding import decode, inspect, rgb_from_decoded
+
+_WORKERS = ThreadPoolExecutor(4, thread_name_prefix="answers")  # more would only hold more pictures at once
+_THUMBNAIL_PX = 240  # wide
+_KEEP = {"cache-control": "private, max-age=3600"}
+
+
+def add_routes(app: FastAPI, session: Session) -> None:
+    """Add the routes of a session; every name in an address is one of a list, none is a path."""
+
+    @app.get("/image/{camera}/{frame}")
+    async def image(camera: int, frame: int) -> Response:
+        return await _answer(lambda: _jpeg(session, camera, frame))
+
+    @app.get("/thumbnail/{name}")
+    async def first_picture(name: str) -> Response:
+        return await _answer(lambda: _thumbnail(session.folder, name))
+
+    @app.get("/overlay/{run}/{frame}")
+    async def overlay(run: str, frame: int) -> Response:
+        return await _answer(lambda: _json(_overlay(session, run, frame)))
+
+    @app.get("/curves/{run}")
+    async def curves(run: str) -> Response:
+        return await _answer(lambda: _json(run_curves(find_run(session.folder, run))))
+
+    @app.get("/mesh/{run}/{part}")
+    async def mesh(run: str, part: int) -> Response:
+        return await _answer(lambda: _mesh(find_run(session.folder, run), part))
+
+    @app.get("/file/{run}/{name:path}")
+    async def file(run: str, name: str) -> Response:
+        return await _answer(lambda: _file(find_run(session.folder, run), name))
+
+
+def _find_run(folder: Path, name: str) -> Path | None:
+    return next((run for run in list_runs(folder) if run.name == name), None)
+
+
+def find_run(folder: Path, name: str) -> Path:
+    """Return a run of the folder by its name; raises ResultError."""
+    run = _find_run(folder, name)
+    if run is None:
+        raise ResultError(f"there is no run {name}")
+    return run
+
+
+def _overlay(session: Session, name: str, frame: int) -> dict[str, Any]:
+    """Return what a run draws over a frame; nothing where it has not begun."""
+    run = _find_run(session.folder, name)
+    return run_overlay(run, frame, session.shown().names) if run is not None else {"items": [], "label": ""}
+
+
+async def _answer(make: Callable[[], Response]) -> Response:
+    """Make an answer in a thread; what is not there is a plain line."""
+    try:
+        return await asyncio.get_running_loop().run_in_executor(_WORKERS, make)
+    except (AirborneError, OSError) as error:
+        reason = str(error) if isinstance(error, AirborneError) else "it cannot be read"
+        return Response(reason, status_code=404, media_type="text/plain")
+
+
+def _json(value: Any) -> Response:
+    return JSONResponse(value, headers={"cache-control": "no-store"})
+
+
+def _mesh(run: Path, part: int) -> Response:
+    return Response(part_stl(run_body(run), part), media_type="model/stl", headers={"cache-control": "no-store"})
+
+
+def _jpeg(session: Session, camera: int, frame: int) -> Response:
+    shown = session.shown()
+    if not (0 <= camera < len(shown.sources) and 0 <= frame < len(shown.clock)):
+        return Response(status_code=404)
+    number = int(shown.clock.images[frame, camera])
+    jpeg = None if number < 0 else session.pictures.jpeg(shown.sources[camera], number)
+    if jpeg is None:
+        return Response(status_code=204)  # this camera has no picture then
+    return Response(jpeg, media_type="image/jpeg", headers=_KEEP)
+
+
+def _thumbnail(folder: Path, name: str) -> Response:
+    path = next((path for path in list_videos(folder) if path.name == name), None)
+    if path is None:
+        return Response(status_code=404)
+    source = VideoSource(name, path)
+    facts = inspect(source)
+    first = next(decode(source, facts))
+    jpeg = thumbnail(rgb_from_decoded(first, facts), _THUMBNAIL_PX)
+    return Response(jpeg, media_type="image/jpeg", headers=_KEEP)
+
+
+def _file(run: Path, name: str) -> Response:
+    path = (run / name).resolve()
+    if not (path.is_relative_to(run.resolve()) and path.is_file()):
+        return Response(status_code=404)
+    return FileResponse(path, headers={"content-security-policy": FILE_POLICY, "cache-control": "no-store"})

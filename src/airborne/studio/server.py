@@ -1,0 +1,91 @@
+"""The studio's server: its pages, its pictures, and nothing else; on the loopback alone."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+import socket
+import webbrowser
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+from nicegui import app, ui
+from nicegui.server import Server
+
+from airborne.errors import AirborneError
+from airborne.studio.guard import Guard
+from airborne.studio.pages.body import body_page
+from airborne.studio.pages.cameras import cameras_page
+from airborne.studio.pages.first_pose import first_pose_page
+from airborne.studio.pages.results import results_page
+from airborne.studio.pages.review import review_page
+from airborne.studio.pages.track import track_page
+from airborne.studio.pages.videos import videos_page
+from airborne.studio.project import find_trial
+from airborne.studio.routes import add_routes
+from airborne.studio.session import Session
+
+_HOST = "127.0.0.1"
+_SOON_S = 0.05  # between looks whether the server listens
+_STYLE = Path(__file__).with_name("studio.css")
+_PAGES = {
+    "/": videos_page,
+    "/cameras": cameras_page,
+    "/body": body_page,
+    "/start": first_pose_page,
+    "/track": track_page,
+    "/review": review_page,
+    "/results": results_page,
+}
+
+
+def serve(path: Path, *, port: int, browser: bool) -> None:
+    """Serve a folder, or one of its trials, until the process is stopped. Raises AirborneError."""
+    session = Session(*find_trial(path))
+    port, token = _free_port(port), secrets.token_urlsafe(24)
+    address = f"http://{_HOST}:{port}/?token={token}"
+    for url, build in _PAGES.items():
+        ui.page(url, title=f"Airborne: {session.folder.name}")(_page(build, session))
+    add_routes(app, session)
+    ui.add_css(_STYLE, shared=True)
+    app.add_middleware(Guard, token=token, port=port)
+
+    async def announce() -> None:
+        while not Server.instance.started:
+            await asyncio.sleep(_SOON_S)
+        print(f"airborne studio: {address}\nCtrl-C ends it", flush=True)
+        if browser:
+            webbrowser.open(address)
+
+    app.on_startup(announce)
+    app.on_shutdown(lambda: [command.stop() for command in session.commands.values()])
+    ui.run(
+        host=_HOST,
+        port=port,
+        show=False,
+        reload=False,
+        tailwind=False,
+        title="Airborne",
+        language="en-US",
+        show_welcome_message=False,
+        gzip_middleware_factory=None,
+        favicon=_STYLE.with_name("icon.svg"),
+    )
+
+
+def _page(build: Callable[[Session], Awaitable[None]], session: Session) -> Callable[[], Awaitable[None]]:
+    """Bind a page to the session: NiceGUI takes a page's arguments from the address."""
+
+    async def page() -> None:
+        await build(session)
+
+    return page
+
+
+def _free_port(port: int) -> int:
+    with socket.socket() as probe:
+        try:
+            probe.bind((_HOST, port))
+        except OSError as error:
+            raise AirborneError(f"port {port} cannot be used ({error.strerror}); give another, or none") from None
+        return probe.getsockname()[1]

@@ -1,0 +1,114 @@
+"""What all windows of the studio share: the opened trial, its pictures and cameras, the frame in view, its edits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from pathlib import Path
+from threading import Lock
+from typing import Any, TypeVar
+
+from airborne.cameras import Rig
+from airborne.errors import AirborneError, TrialError
+from airborne.run.opening import calibrated_cameras
+from airborne.studio.commands import Command
+from airborne.studio.pictures import Pictures, ShownTrial
+from airborne.studio.project import Project, read_project
+from airborne.studio.trial_edits import with_table
+from airborne.studio.writing import Editor
+from airborne.trial.body import BodyTable
+from airborne.trial.calibration import CalibrationTable
+from airborne.trial.file import Trial
+
+_T = TypeVar("_T")
+
+
+class Session:
+    """One opened folder; everything that lasts is in its files, all else is computed from them anew."""
+
+    def __init__(self, folder: Path, path: Path) -> None:
+        """Open a folder and a trial in it, which may not be there yet."""
+        self.folder, self.path = folder, path
+        self.pictures, self.editor = Pictures(), Editor(folder)
+        self.frame = 0  # in view
+        self.commands: dict[str, Command] = {}  # that were started here, by what they do
+        self._known: dict[str, tuple[Hashable, Any]] = {}
+        self._lock = Lock()
+
+    @property
+    def stamp(self) -> Hashable:
+        """What changes whenever a file of the folder does, or an edit may be undone that could not before."""
+        tables = [path for path in self.folder.iterdir() if path.suffix in (".toml", ".csv", ".json") or path.is_dir()]
+        return tuple(map(_stamp, sorted(tables))), self.editor.last, self.editor.next
+
+    def project(self) -> Project:
+        """Return the trial as its file has it now."""
+        return self._keep("project", _stamp(self.path), lambda: read_project(self.folder, self.path))
+
+    def shown(self) -> ShownTrial:
+        """Return the trial's videos to look at; slow at first. Raises AirborneError where there are none."""
+        project = self.project()
+        if not project.cameras:
+            raise TrialError("no cameras yet; choose them in the step Videos")
+        sources = tuple(map(project.source, project.cameras))
+        stamp = sources, project.cameras_stamp, tuple(_stamp(Path(source.path)) for source in sources)
+        return self._keep("shown", stamp, lambda: self.pictures.show(project.cameras, project.source))
+
+    def rig(self) -> Rig:
+        """Return the cameras of the trial's videos; slow at first. Raises AirborneError where there are none."""
+        project = self.project()
+        table = project.table("calibration")
+        if not table:
+            raise TrialError("the cameras are not calibrated yet; see the step Cameras")
+        files = [project.file(str(table[key])) for key in ("file", "control_points") if key in table]
+        stamp = project.cameras_stamp, repr(table), tuple(map(_stamp, files))
+        return self._keep("rig", stamp, lambda: calibrated_cameras(self._draft(), self.shown().sizes)[0])
+
+    def edit(self, name: str, text: str, what: str) -> None:
+        """Write a file of the folder."""
+        self.editor.write(name, text, what)
+
+    def edit_trial(self, change: Callable[[str], str], what: str) -> None:
+        """Change the trial's text."""
+        text = self.path.read_text(encoding="utf-8") if self.path.is_file() else ""
+        self.edit(self.path.name, change(text), what)
+
+    def set_table(self, head: str, values: dict[str, Any], what: str) -> None:
+        """Set values in a table of the trial; None takes a key away."""
+        self.edit_trial(lambda text: with_table(text, head, values), what)
+
+    def _draft(self) -> Trial:
+        """Return the trial as far as its cameras go, whatever else is missing."""
+        project = self.project()
+        trial = Trial(
+            name="draft",
+            camera=[camera.model_dump(exclude_unset=True) for camera in project.cameras],
+            calibration=CalibrationTable(**project.table("calibration")).model_dump(exclude={"mend"}),
+            body=BodyTable(preset="human18", stature_m=1.8, mass_kg=70.0).model_dump(exclude_none=True),
+        )
+        trial._folder = self.folder
+        return trial
+
+    def _keep(self, name: str, stamp: Hashable, make: Callable[[], _T]) -> _T:
+        """Return what was made for this stamp, else make it; an error is kept too."""
+        with self._lock:
+            known = self._known.get(name)
+        if known is None or known[0] != stamp:
+            made: Any
+            try:
+                made = make()
+            except AirborneError as error:
+                made = error
+            known = stamp, made
+            with self._lock:
+                self._known[name] = known
+        if isinstance(known[1], AirborneError):
+            raise known[1]
+        return known[1]
+
+
+def _stamp(path: Path) -> Hashable:
+    try:
+        status = path.stat()
+    except OSError:
+        return path.name, 0, 0
+    return path.name, status.st_mtime_ns, status.st_size

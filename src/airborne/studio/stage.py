@@ -1,0 +1,100 @@
+"""The 3D scene: cameras, the floor, points and paths."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import pairwise
+
+import numpy as np
+from nicegui import ui
+from nicegui.elements.scene.objects.group import Group
+from nicegui.elements.scene.scene import Scene
+from trimesh.exchange.stl import export_stl
+
+from airborne.body import BodyModel, Pose
+from airborne.cameras import Camera, Rig
+from airborne.errors import ResultError
+from airborne.export.part_meshes import part_colour, segment_mesh
+from airborne.types import Array
+
+_CAMERA_COLOUR, _PATH_COLOUR = "#1f2429", "#0072b2"
+_FROM = np.array([0.7, -0.9, 0.55])  # the side and height from which the scene is seen first
+_FRUSTUM_SHARE = 0.12  # of the distance between camera and middle
+
+
+def draw_cameras(
+    rig: Rig, path: Array | None = None, *, middle: Array | None = None, away_m: float | None = None
+) -> Scene:
+    """Show cameras and a path (n, 3) [m], NaN leaves gaps; seen from `away_m` beside the `middle` (3,) [m]."""
+    centres = np.stack([camera.centre for camera in rig])
+    middle = _middle(rig) if middle is None else middle
+    reach = float(np.median(np.linalg.norm(centres - middle, axis=1)))
+    with ui.scene(grid=(60, 60), background_color="#f6f7f8").style("width: 100%; flex: 1; min-height: 180px") as scene:
+        for camera in rig:
+            _frustum(scene, camera, _FRUSTUM_SHARE * reach)
+        if path is not None:
+            pairs = [(a, b) for a, b in pairwise(path) if np.isfinite([a, b]).all()]
+            _lines(scene, pairs, _PATH_COLOUR)
+    x, y, z = map(float, middle + (away_m or reach) * _FROM)
+    scene.move_camera(x, y, z, look_at_x=middle[0], look_at_y=middle[1], look_at_z=middle[2], duration=0)
+    return scene
+
+
+class BodyOnStage:
+    """A run's body in the scene, which takes any pose."""
+
+    def __init__(self, scene: Scene, model: BodyModel, address: str) -> None:
+        """Draw the body's parts; `address` gives the mesh of each, with {part} in it."""
+        self._scene, self._model, number = scene, model, 0
+        self._groups: list[Group] = []
+        with scene:
+            for segment in model.segments:
+                with scene.group().visible(False) as group:
+                    for part in segment.parts:
+                        red, green, blue = (round(float(level)) for level in part_colour(part))
+                        scene.stl(address.format(part=number)).material(f"#{red:02x}{green:02x}{blue:02x}")
+                        number += 1
+                self._groups.append(group)
+
+    def show(self, pose: Pose | None) -> None:
+        """Show the body in a pose; None hides it."""
+        posed = None if pose is None else self._model.with_pose(pose)
+        for k, group in enumerate(self._groups):
+            group.visible(posed is not None)
+            if posed is not None:
+                x, y, z = map(float, posed.t[k])
+                group.move(x, y, z).rotate_R(posed.R[k].tolist())
+
+
+def part_stl(model: BodyModel, number: int) -> bytes:
+    """Return a part of a body in its segment's frame, as a binary STL; parts are counted over all segments."""
+    parts = [part for segment in model.segments for part in segment.parts]
+    if not 0 <= number < len(parts):
+        raise ResultError(f"the body has {len(parts)} parts, no part {number}")
+    return export_stl(segment_mesh(parts[number]))
+
+
+def _frustum(scene: Scene, camera: Camera, depth: float) -> None:
+    width, height = camera.size
+    corners = np.array([[0, 0], [width, 0], [width, height], [0, height]], float)
+    xy = (corners - camera.K[:2, 2]) @ np.linalg.inv(camera.K[:2, :2]).T
+    ends = camera.camera_from_world.inv().apply(np.append(xy, np.ones((4, 1)), axis=1) * depth)
+    _lines(scene, [(camera.centre, end) for end in ends], _CAMERA_COLOUR)
+    _lines(scene, list(zip(ends, np.roll(ends, -1, axis=0), strict=True)), _CAMERA_COLOUR)
+    x, y, z = map(float, camera.centre)
+    scene.text(camera.name, "font-size: 13px; color: #1f2429; padding-left: 8px").move(x, y, z)
+
+
+def _lines(scene: Scene, pairs: Iterable[tuple[Array, Array]], colour: str) -> None:
+    for start, end in pairs:
+        scene.line([float(value) for value in start], [float(value) for value in end]).material(colour)
+
+
+def _middle(rig: Rig) -> Array:
+    """Return the point nearest to all optical axes: (3,) [m]."""
+    A, b = np.zeros((3, 3)), np.zeros(3)
+    for camera in rig:
+        axis = camera.camera_from_world.rotation.inv().apply([0.0, 0.0, 1.0])
+        across = np.eye(3) - np.outer(axis, axis)
+        A, b = A + across, b + across @ camera.centre
+    return np.linalg.lstsq(A, b, rcond=None)[0]

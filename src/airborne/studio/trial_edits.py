@@ -1,0 +1,62 @@
+"""Changes of a trial's TOML text: comments, order and everything else in it stay."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import AoT
+
+from airborne.errors import TrialError
+
+
+def with_cameras(text: str, name: str, cameras: Sequence[Mapping[str, Any]]) -> str:
+    """Return a trial's text with these cameras, `name` for a trial without one.
+
+    Of a video that was a camera before, keys not given keep their values; None takes a key away.
+    """
+    document = _parse(text)
+    if "name" not in document:
+        document.add("name", tomlkit.item(name))
+    present = document.get("camera")
+    old = {str(table.get("video")): table for table in present} if isinstance(present, AoT) else {}
+    tables = tomlkit.aot()
+    for camera in cameras:
+        table = old.get(str(camera["video"]), tomlkit.table())
+        for key, value in camera.items():
+            _set(table, key, value)
+        tables.append(table)
+    if present is None:
+        document.add("camera", tables)
+    else:
+        document["camera"] = tables
+    return tomlkit.dumps(document)
+
+
+def with_table(text: str, head: str, values: Mapping[str, Any]) -> str:
+    """Return a trial's text with values in a table, made if need be; None takes a key away."""
+    document = _parse(text)
+    table = document.get(head)
+    if table is None:
+        table = tomlkit.table()
+        document.add(head, table)
+    assert isinstance(table, dict)
+    for key, value in values.items():
+        _set(table, key, value)
+    return tomlkit.dumps(document)
+
+
+def _set(table: Any, key: str, value: Any) -> None:
+    if value is None:
+        table.pop(key, None)
+    else:
+        table[key] = value
+
+
+def _parse(text: str) -> tomlkit.TOMLDocument:
+    try:
+        return tomlkit.parse(text)
+    except TOMLKitError as error:
+        raise TrialError(f"the trial file is no TOML: {error}; correct it by hand") from None

@@ -1,0 +1,330 @@
+// One canvas with every camera's picture at one frame and all that lies over it, drawn in one stroke.
+// Pixels are the video's own: (0, 0) is the centre of the top-left one.
+const KEPT_FRAMES = 16; // decoded, for all cameras
+const AHEAD = 4; // frames fetched in the direction of travel
+const GRAB_PX = 9; // on the screen: how near a mark must be to be grabbed
+const STILL_PX = 3; // a pointer that moves less has clicked
+const LOUPE = 8; // times as large as the video
+const GAP = 4; // between pictures
+
+export default {
+  template: `<canvas class="view" tabindex="0" role="img" :aria-label="label"></canvas>`,
+  props: {
+    panes: Array, // {name, width, height, url: "/image/cam/{frame}"}
+    n_frames: Number,
+    frame: Number, // at first
+    overlay: String, // "/overlay/what/{frame}": items of each frame; or none
+    marks: Array, // {id, pane, u, v, label, colour, to: [u, v]}: points to grab
+    items: Array, // {pane, points, colour, width, closed, fill, text}
+    selected: String, // a mark's id
+    picking: Boolean, // a click picks a point
+    label: String,
+  },
+  emits: ["pick", "move", "select", "frame"],
+  data: () => ({ wanted: 0, shown: null }),
+  mounted() {
+    this.canvas = this.$el;
+    this.canvas.view = this; // where a pixel is on the screen: for those who look from outside
+    this.pens = this.canvas.getContext("2d");
+    this.cache = new Map();
+    this.underway = new Map();
+    this.zooms = this.panes.map(() => ({ scale: 1, u: 0, v: 0 })); // v, u: what is moved to the pane's corner
+    this.pointer = null;
+    this.drag = null;
+    this.dragged = null; // a mark on its way
+    this.canvas.addEventListener("wheel", this.onWheel, { passive: false });
+    for (const name of ["pointerdown", "pointermove", "pointerup", "pointerleave", "dblclick", "keydown"])
+      this.canvas.addEventListener(name, this["on_" + name]);
+    this.onOther = (event) => event.detail.from !== this && this.go(event.detail.frame, true);
+    window.addEventListener("airborne-frame", this.onOther);
+    this.sizes = new ResizeObserver(() => this.draw());
+    this.sizes.observe(this.canvas);
+    this.go(this.frame || 0, true);
+  },
+  unmounted() {
+    this.sizes.disconnect();
+    window.removeEventListener("airborne-frame", this.onOther);
+  },
+  watch: {
+    marks() { this.dragged = null; this.draw(); },
+    items() { this.draw(); },
+    selected() { this.draw(); },
+    picking() { this.draw(); },
+    overlay() { this.refresh(); },
+    panes(now, before) {
+      if (JSON.stringify(now) === JSON.stringify(before)) return;
+      if (this.zooms.length !== this.panes.length) this.zooms = this.panes.map(() => ({ scale: 1, u: 0, v: 0 }));
+      this.refresh();
+    },
+  },
+  methods: {
+    // frames
+    refresh() { this.cache.clear(); this.go(this.wanted, true); },
+    show(frame) { this.go(frame); },
+    async fetchPane(pane, frame, signal) {
+      const answer = await fetch(pane.url.replace("{frame}", frame), { signal });
+      return answer.status === 200 ? createImageBitmap(await answer.blob()) : null;
+    },
+    async fetchOverlay(frame, signal) {
+      if (!this.overlay) return { items: [] };
+      const answer = await fetch(this.overlay.replace("{frame}", frame), { cache: "no-store", signal });
+      return answer.ok ? answer.json() : { items: [] };
+    },
+    load(frame) {
+      if (!this.cache.has(frame)) {
+        const stop = new AbortController(), { signal } = stop;
+        const parts = [this.fetchOverlay(frame, signal), ...this.panes.map((pane) => this.fetchPane(pane, frame, signal))];
+        const all = Promise.all(parts).then(([overlay, ...pictures]) => ({ frame, overlay, pictures }));
+        this.cache.set(frame, all);
+        this.underway.set(frame, stop);
+        all.catch(() => this.cache.get(frame) === all && this.cache.delete(frame)).finally(() => this.underway.delete(frame));
+        for (const old of this.cache.keys()) {
+          if (this.cache.size <= KEPT_FRAMES) break;
+          if (old !== frame && old !== this.wanted) this.cache.delete(old);
+        }
+      }
+      return this.cache.get(frame);
+    },
+    async go(frame, silent) {
+      frame = Math.max(0, Math.min(this.n_frames - 1, Math.round(frame)));
+      const direction = Math.sign(frame - this.wanted) || 1;
+      const begun = performance.now();
+      this.wanted = frame;
+      for (const [other, stop] of this.underway) // what was fetched ahead of another place only stands in the way
+        if (Math.abs(other - frame) > AHEAD) { this.cache.delete(other); stop.abort(); }
+      if (!silent) window.dispatchEvent(new CustomEvent("airborne-frame", { detail: { frame, from: this } }));
+      let loaded = null;
+      try { loaded = await this.load(frame); } catch { return; }
+      if (this.wanted !== frame) return;
+      this.shown = loaded;
+      this.draw();
+      this.canvas.dataset.frame = frame;
+      this.canvas.dataset.ms = (performance.now() - begun).toFixed(1);
+      this.$emit("frame", { frame });
+      for (let k = 1; k <= AHEAD && this.wanted === frame; k++) {
+        const next = frame + k * direction;
+        if (next >= 0 && next < this.n_frames) await this.load(next).catch(() => {});
+      }
+    },
+    // places
+    layout() {
+      const box = this.canvas.getBoundingClientRect(), n = this.panes.length;
+      let best = { scale: 0 };
+      for (let columns = 1; columns <= n; columns++) {
+        const rows = Math.ceil(n / columns);
+        const w = (box.width - (columns - 1) * GAP) / columns, h = (box.height - (rows - 1) * GAP) / rows;
+        const scale = Math.min(...this.panes.map((pane) => Math.min(w / pane.width, h / pane.height)));
+        if (scale > best.scale) best = { scale, columns, w, h };
+      }
+      return this.panes.map((pane, i) => {
+        const x = (i % best.columns) * (best.w + GAP), y = Math.floor(i / best.columns) * (best.h + GAP);
+        const fit = Math.min(best.w / pane.width, best.h / pane.height), zoom = this.zooms[i];
+        const scale = fit * zoom.scale;
+        const left = x + (best.w - fit * pane.width) / 2, top = y + (best.h - fit * pane.height) / 2;
+        return { x: left, y: top, w: fit * pane.width, h: fit * pane.height, fit, scale, u0: zoom.u, v0: zoom.v };
+      });
+    },
+    toScreen(place, u, v) { return [place.x + (u + 0.5 - place.u0) * place.scale, place.y + (v + 0.5 - place.v0) * place.scale]; },
+    toVideo(place, x, y) { return [(x - place.x) / place.scale + place.u0 - 0.5, (y - place.y) / place.scale + place.v0 - 0.5]; },
+    paneAt(x, y) { return this.layout().findIndex((p) => x >= p.x && x < p.x + p.w && y >= p.y && y < p.y + p.h); },
+    hold(i) { // the picture fills its pane
+      const zoom = this.zooms[i], pane = this.panes[i];
+      zoom.u = Math.max(0, Math.min(zoom.u, pane.width * (1 - 1 / zoom.scale)));
+      zoom.v = Math.max(0, Math.min(zoom.v, pane.height * (1 - 1 / zoom.scale)));
+    },
+    // drawing
+    draw() {
+      if (!this.canvas) return;
+      const box = this.canvas.getBoundingClientRect(), ratio = window.devicePixelRatio || 1;
+      if (!box.width || !this.panes.length) return;
+      const [width, height] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
+      if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
+      const pen = this.pens;
+      pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+      pen.fillStyle = "#16191d";
+      pen.fillRect(0, 0, box.width, box.height);
+      this.layout().forEach((place, i) => this.drawPane(pen, place, i));
+    },
+    drawPane(pen, place, i) {
+      pen.save();
+      pen.beginPath();
+      pen.rect(place.x, place.y, place.w, place.h);
+      pen.clip();
+      this.drawPicture(pen, place, i);
+      this.drawOver(pen, place, i);
+      if (this.picking && this.pointer && this.pointer.pane === i) this.drawLoupe(pen, place, i);
+      pen.restore();
+      const overlay = this.shown && this.shown.overlay;
+      const text = this.panes[i].name + (i === 0 && overlay && overlay.label ? "   " + overlay.label : "");
+      this.write(pen, text, place.x + 8, place.y + 18, "#ffffff");
+    },
+    drawPicture(pen, place, i) {
+      const pane = this.panes[i], picture = this.shown && this.shown.pictures[i];
+      pen.fillStyle = "#2a2f36";
+      pen.fillRect(place.x, place.y, place.w, place.h);
+      const [x, y] = this.toScreen(place, -0.5, -0.5);
+      pen.imageSmoothingEnabled = place.scale < 3;
+      if (picture) pen.drawImage(picture, x, y, pane.width * place.scale, pane.height * place.scale);
+      else if (this.shown) this.write(pen, "no picture", place.x + place.w / 2 - 30, place.y + place.h / 2, "#c8cdd3");
+    },
+    drawOver(pen, place, i) {
+      const lines = [...((this.shown && this.shown.overlay.items) || []), ...(this.items || [])];
+      for (const item of lines) if (item.pane === i) this.drawItem(pen, place, item);
+      this.labels = [];
+      for (const mark of this.marks || []) if (mark.pane === i) this.drawMark(pen, place, mark);
+    },
+    drawItem(pen, place, item) {
+      pen.beginPath();
+      item.points.forEach((point, k) => pen[k ? "lineTo" : "moveTo"](...this.toScreen(place, ...point)));
+      if (item.closed) pen.closePath();
+      if (item.fill) { pen.fillStyle = item.fill; pen.fill(); }
+      if (item.colour) { pen.strokeStyle = item.colour; pen.lineWidth = item.width || 1.5; pen.stroke(); }
+      if (item.text) this.write(pen, item.text, ...this.toScreen(place, ...item.points[0]), item.colour);
+    },
+    drawMark(pen, place, mark) {
+      const [u, v] = this.dragged && this.dragged.id === mark.id ? [this.dragged.u, this.dragged.v] : [mark.u, mark.v];
+      const [x, y] = this.toScreen(place, u, v), chosen = mark.id === this.selected, r = chosen ? 9 : 6;
+      for (const [colour, width] of [["rgba(0,0,0,0.6)", 3.5], [mark.colour, 1.5]]) {
+        pen.strokeStyle = colour;
+        pen.lineWidth = width;
+        pen.beginPath();
+        for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+          pen.moveTo(x + 2 * dx, y + 2 * dy);
+          pen.lineTo(x + r * dx, y + r * dy);
+        }
+        if (chosen) { pen.moveTo(x + 12, y); pen.arc(x, y, 12, 0, 2 * Math.PI); }
+        if (mark.to) { // ten times the residual
+          pen.moveTo(x, y);
+          pen.lineTo(x + 10 * (mark.to[0] - u) * place.scale, y + 10 * (mark.to[1] - v) * place.scale);
+        }
+        pen.stroke();
+      }
+      const box = [x + 9, y - 19, 7 * (mark.label || "").length, 14]; // a label that would hide another is left out
+      const hides = ([left, top, width, height]) =>
+        box[0] < left + width && left < box[0] + box[2] && box[1] < top + height && top < box[1] + box[3];
+      if (!chosen && this.labels.some(hides)) return;
+      this.labels.push(box);
+      this.write(pen, mark.label || "", x + 9, y - 7, mark.colour);
+    },
+    drawLoupe(pen, place, i) {
+      const picture = this.shown && this.shown.pictures[i];
+      if (!picture) return;
+      const side = Math.min(150, place.w / 3), { x, y } = this.pointer, [u, v] = this.toVideo(place, x, y);
+      const left = x - place.x > place.w / 2 ? place.x + 6 : place.x + place.w - side - 6, top = place.y + place.h - side - 6;
+      const times = Math.max(LOUPE * place.fit, 2 * place.scale, 4), across = side / times;
+      pen.save();
+      pen.beginPath();
+      pen.rect(left, top, side, side);
+      pen.clip();
+      pen.fillStyle = "#000";
+      pen.fillRect(left, top, side, side);
+      pen.imageSmoothingEnabled = false;
+      const near = { x: left, y: top, scale: times, u0: u + 0.5 - across / 2, v0: v + 0.5 - across / 2 };
+      const [px, py] = this.toScreen(near, -0.5, -0.5);
+      pen.drawImage(picture, px, py, picture.width * times, this.panes[i].height * times);
+      this.drawOver(pen, near, i);
+      pen.strokeStyle = "rgba(255,255,255,0.9)";
+      pen.lineWidth = 1;
+      pen.strokeRect(left + 0.5, top + 0.5, side - 1, side - 1);
+      pen.beginPath();
+      for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+        pen.moveTo(left + side / 2 + 4 * dx, top + side / 2 + 4 * dy);
+        pen.lineTo(left + side / 2 + 20 * dx, top + side / 2 + 20 * dy);
+      }
+      pen.stroke();
+      this.write(pen, `${u.toFixed(1)}, ${v.toFixed(1)}`, left + 5, top + side - 6, "#ffffff");
+      pen.restore();
+    },
+    write(pen, text, x, y, colour) {
+      if (!text) return;
+      pen.font = "12px system-ui, sans-serif";
+      pen.lineWidth = 3;
+      pen.strokeStyle = "rgba(0,0,0,0.75)";
+      pen.strokeText(text, x, y);
+      pen.fillStyle = colour || "#ffffff";
+      pen.fillText(text, x, y);
+    },
+    // hands
+    place(event) {
+      const box = this.canvas.getBoundingClientRect(), x = event.clientX - box.left, y = event.clientY - box.top;
+      return { x, y, pane: this.paneAt(x, y) };
+    },
+    markAt({ x, y, pane }) {
+      const place = this.layout()[pane];
+      const far = (mark) => { const [mx, my] = this.toScreen(place, mark.u, mark.v); return Math.hypot(mx - x, my - y); };
+      const near = (this.marks || []).filter((mark) => mark.pane === pane && mark.id && far(mark) < GRAB_PX);
+      return near.sort((a, b) => far(a) - far(b))[0];
+    },
+    onWheel(event) {
+      event.preventDefault();
+      const at = this.place(event);
+      if (at.pane < 0) return;
+      const before = this.toVideo(this.layout()[at.pane], at.x, at.y), zoom = this.zooms[at.pane];
+      zoom.scale = Math.max(1, Math.min(40, zoom.scale * Math.exp(-event.deltaY / 400)));
+      const after = this.toVideo(this.layout()[at.pane], at.x, at.y);
+      zoom.u += before[0] - after[0];
+      zoom.v += before[1] - after[1];
+      this.hold(at.pane);
+      this.draw();
+    },
+    on_pointerdown(event) {
+      this.canvas.focus();
+      const at = this.place(event);
+      if (at.pane < 0 || event.button !== 0) return;
+      this.canvas.setPointerCapture(event.pointerId);
+      const mark = this.markAt(at), zoom = this.zooms[at.pane];
+      this.drag = { ...at, mark, u: zoom.u, v: zoom.v, moved: false };
+    },
+    on_pointermove(event) {
+      this.pointer = this.place(event);
+      const drag = this.drag;
+      if (drag) {
+        const dx = this.pointer.x - drag.x, dy = this.pointer.y - drag.y, place = this.layout()[drag.pane];
+        drag.moved ||= Math.hypot(dx, dy) > STILL_PX;
+        if (drag.moved && drag.mark) {
+          const { id, u, v } = drag.mark;
+          this.dragged = { id, u: u + dx / place.scale, v: v + dy / place.scale };
+        } else if (drag.moved) {
+          Object.assign(this.zooms[drag.pane], { u: drag.u - dx / place.scale, v: drag.v - dy / place.scale });
+          this.hold(drag.pane);
+        }
+      }
+      this.draw();
+    },
+    on_pointerup(event) {
+      const drag = this.drag, at = this.place(event);
+      this.drag = null;
+      if (!drag) return;
+      if (drag.moved && this.dragged) this.$emit("move", { ...this.dragged, frame: this.wanted });
+      else if (!drag.moved && this.picking) { // the server knows whether the mark close by or a new point is meant
+        const [u, v] = this.toVideo(this.layout()[drag.pane], at.x, at.y);
+        this.$emit("pick", { pane: drag.pane, u, v, near: drag.mark ? drag.mark.id : null });
+      } else if (!drag.moved && drag.mark) this.$emit("select", { id: drag.mark.id });
+      this.draw();
+    },
+    on_pointerleave() { this.pointer = null; this.draw(); },
+    on_dblclick(event) {
+      const { pane } = this.place(event);
+      if (pane >= 0 && !this.picking) { this.zooms[pane] = { scale: 1, u: 0, v: 0 }; this.draw(); }
+    },
+    on_keydown(event) {
+      const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+      const mark = (this.marks || []).find((each) => each.id === this.selected && each.id);
+      if (mark && event.key in arrows) {
+        const step = event.shiftKey ? 1 : 0.1, [du, dv] = arrows[event.key];
+        const from = this.dragged && this.dragged.id === mark.id ? this.dragged : mark;
+        this.dragged = { id: mark.id, u: from.u + du * step, v: from.v + dv * step };
+        this.draw();
+        this.$emit("move", { ...this.dragged, frame: this.wanted });
+      } else if (event.key === "ArrowLeft" || event.key === "ArrowRight")
+        this.go(this.wanted + arrows[event.key][0] * (event.shiftKey ? 10 : 1));
+      else if (event.key === "," || event.key === ".") this.go(this.wanted + (event.key === "." ? 1 : -1));
+      else if (event.key === "Home") this.go(0);
+      else if (event.key === "End") this.go(this.n_frames - 1);
+      else if (event.key === "Escape") this.$emit("select", { id: null });
+      else if (event.key === "0") { this.zooms = this.panes.map(() => ({ scale: 1, u: 0, v: 0 })); this.draw(); }
+      else return;
+      event.preventDefault();
+    },
+  },
+};

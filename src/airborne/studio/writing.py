@@ -1,0 +1,102 @@
+"""Text files of a trial's folder, written whole or not at all; earlier versions are kept, and edits undone."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from airborne.errors import TrialError
+from airborne.io.writing import explain_full_disk
+
+KEPT = 10  # earlier versions of a file
+FOLDER = ".airborne"  # inside the trial's folder: earlier versions, and what the studio remembers
+
+
+@dataclass(frozen=True, slots=True)
+class Edit:
+    """One change of one file."""
+
+    what: str  # it was for, in the user's words
+    path: Path
+    before: str | None  # None: there was no file
+    after: str | None
+
+
+class Editor:
+    """Writes the files of one folder and remembers its edits, to undo and redo them."""
+
+    def __init__(self, folder: Path) -> None:
+        """Begin without edits."""
+        self.folder = folder
+        self._done: list[Edit] = []
+        self._undone: list[Edit] = []
+
+    def write(self, name: str, text: str, what: str) -> None:
+        """Write a text file of the folder; raises TrialError for a name that leads out of it."""
+        path = self.folder / name
+        edit = Edit(what, path, _read(path), text)
+        if edit.before == text:
+            return
+        self._replace(path, text)
+        self._done.append(edit)
+        self._undone.clear()
+
+    @property
+    def last(self) -> str | None:
+        """What `undo` would undo."""
+        return self._done[-1].what if self._done else None
+
+    @property
+    def next(self) -> str | None:
+        """What `redo` would do again."""
+        return self._undone[-1].what if self._undone else None
+
+    def undo(self) -> str:
+        """Take the last edit back; return what it was."""
+        return self._move(self._done, self._undone, "undo")
+
+    def redo(self) -> str:
+        """Do the edit again that was undone last; return what it was."""
+        return self._move(self._undone, self._done, "redo")
+
+    def _move(self, source: list[Edit], target: list[Edit], verb: str) -> str:
+        if not source:
+            raise TrialError(f"there is nothing to {verb}")
+        edit = source[-1]
+        present, text = (edit.after, edit.before) if verb == "undo" else (edit.before, edit.after)
+        if _read(edit.path) != present:
+            raise TrialError(f"{edit.path.name} was changed elsewhere since; its earlier versions are in {FOLDER}")
+        self._replace(edit.path, text)
+        target.append(source.pop())
+        return edit.what
+
+    def _replace(self, path: Path, text: str | None) -> None:
+        if not path.resolve().is_relative_to(self.folder.resolve()) or path.is_symlink():
+            raise TrialError(f"{path} leads out of {self.folder}; nothing is written there")
+        _keep(self.folder / FOLDER / "versions", path)
+        if text is None:
+            path.unlink(missing_ok=True)
+            return
+        part = path.with_name(f"{path.name}.part")
+        with explain_full_disk(path), part.open("w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+
+
+def _read(path: Path) -> str | None:
+    return path.read_text(encoding="utf-8") if path.is_file() else None
+
+
+def _keep(folder: Path, path: Path) -> None:
+    """Keep a file's present version beside its last ones: <name>.1, <name>.2, ..., the newest with the highest."""
+    if not path.is_file():
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    endings = [file.name.removeprefix(f"{path.name}.") for file in folder.glob(f"{path.name}.*")]
+    numbers = sorted(int(ending) for ending in endings if ending.isdecimal())
+    (folder / f"{path.name}.{numbers[-1] + 1 if numbers else 1}").write_bytes(path.read_bytes())
+    for number in numbers[: max(0, len(numbers) + 1 - KEPT)]:
+        (folder / f"{path.name}.{number}").unlink()

@@ -1,0 +1,159 @@
+"""Curves of runs on one time: real, or normalised between events."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.errors import ResultError, require_choice
+from airborne.io.text import read_csv
+from airborne.motion.run_folder import JOINTS
+from airborne.study.trials import LARGEST, StudyTrial
+from airborne.types import Array
+
+NODES = 100  # of a curve between two events: one a percent
+EVENTS = ("start", "end", "take-off", "landing", "turn-1")  # turn-2, ... too
+_TURN = re.compile(r"turn-([1-9]\d?)")
+_OF_THE_ROW = {"take-off": "takeoff_s", "landing": "landing_s"}
+_WIDE = ("tables/angles.csv", "tables/flight.csv")
+_LONG = {JOINTS: ("m", "sd_m"), "tables/joint_angles.csv": ("deg", "{axis}_deg_sd")}  # unit and sd of x_m, x_deg
+_JOINT_TABLES = [Path(name).name for name in _LONG]
+_FORM = "a run's table has a line of names, time_s among them, and as many cells in each line"
+_FEWEST = 3  # known frames of a curve
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """A variable of one run over its known frames."""
+
+    time_s: Array  # (n,)
+    values: Array  # (n,)
+    sd: Array  # (n,), NaN where the run states none
+
+
+def read_curve(trial: StudyTrial, variable: str) -> Curve:
+    """Read a variable of a trial's run: a column of angles.csv or flight.csv, or `<joint>_x_m`, `<joint>_x_deg`.
+
+    Raises ResultError where the run has none, or hardly any frames of it.
+    """
+    for name in _WIDE:
+        table = _read(trial.folder / name)
+        if variable in table:
+            return _known(trial, variable, table["time_s"], table[variable], table.get(f"{variable}_sd"))
+    named = re.fullmatch(r"(.+)_([xyz])_(m|deg)", variable)
+    for name, (unit, sd) in _LONG.items():
+        table = _read(trial.folder / name)
+        if not table or named is None or named[3] != unit:
+            continue
+        mask = table["joint"] == named[1]
+        if "player" in table:
+            mask &= table["player"] == trial.athlete
+        column = table.get(f"{named[2]}_{unit}")
+        if mask.any() and column is not None:
+            stated = table.get(sd.format(axis=named[2]), np.full(len(mask), ""))
+            return _known(trial, variable, table["time_s"][mask], column[mask], stated[mask])
+    raise ResultError(f"{trial.name}: its run has no {variable}; it has: {', '.join(list_curves(trial)[:40])}")
+
+
+def list_curves(trial: StudyTrial) -> list[str]:
+    """Return the names of all curves of a trial's run."""
+    wide = [column for name in _WIDE for column in _read(trial.folder / name)]
+    names = [each for each in wide if not each.endswith("_sd") and each not in ("frame", "time_s", "is_singular")]
+    for name, (unit, _) in _LONG.items():
+        joints = dict.fromkeys(_read(trial.folder / name).get("joint", np.array([])).tolist())
+        names += [f"{joint}_{axis}_{unit}" for joint in joints for axis in "xyz"]
+    return names
+
+
+def event_times(trial: StudyTrial, curve: Curve, events: Sequence[str]) -> list[float]:
+    """Return the times of events [s], in their order.
+
+    `start` and `end` are the curve's; take-off and landing those of the trial's row; `turn-2` is when the body has
+    turned twice, by the somersault, since the first event. Raises ResultError for one that the run has not.
+    """
+    times: list[float] = []
+    for name in events:
+        if name in ("start", "end"):
+            time_s = float(curve.time_s[0 if name == "start" else -1])
+        elif name in _OF_THE_ROW:
+            stated = trial.number(_OF_THE_ROW[name])
+            time_s = np.nan if stated is None else stated
+        else:
+            time_s = _turn_s(trial, int(name.removeprefix("turn-")), times[0] if times else float(curve.time_s[0]))
+        if not np.isfinite(time_s) or (times and time_s <= times[-1]):
+            raise ResultError(f"{trial.name}: no {name}{f' after {events[len(times) - 1]}' if times else ''}")
+        times.append(time_s)
+    if times[0] < curve.time_s[0] or times[-1] > curve.time_s[-1]:
+        raise ResultError(f"{trial.name}: the curve does not reach from {events[0]} to {events[-1]}")
+    return times
+
+
+def require_events(events: Sequence[str]) -> None:
+    """Raise AirborneError where one of the events is none, or there are fewer than two."""
+    for name in events:
+        if not _TURN.fullmatch(name):
+            require_choice(name, EVENTS, "event")
+    if len(events) < 2:
+        raise ResultError(f"events {', '.join(events) or 'none'}: give two or more, such as take-off,landing")
+
+
+def normalise(curve: Curve, times: Sequence[float]) -> tuple[Array, Array]:
+    """Return a curve and its variance at 101 nodes between each two events, ends shared: (nodes,) each."""
+    share = np.linspace(0, len(times) - 1, NODES * (len(times) - 1) + 1)
+    return sample(curve, np.interp(share, np.arange(len(times)), times))
+
+
+def sample(curve: Curve, time_s: Array) -> tuple[Array, Array]:
+    """Return a curve and its variance at some times, linear between the known frames; 0 where none is stated."""
+    sd = np.interp(time_s, curve.time_s, np.where(np.isfinite(curve.sd), curve.sd, 0.0))
+    return np.interp(time_s, curve.time_s, curve.values), sd**2
+
+
+def _turn_s(trial: StudyTrial, n: int, since_s: float) -> float:
+    angle = read_curve(trial, "somersault_deg")
+    turned = np.abs(angle.values - np.interp(since_s, angle.time_s, angle.values)) / 360
+    after = np.flatnonzero((angle.time_s > since_s) & (turned >= n))
+    if not len(after):
+        return np.nan
+    k = after[0]
+    if k == 0 or turned[k - 1] >= n:
+        return float(angle.time_s[k])
+    return float(np.interp(n, turned[k - 1 : k + 1], angle.time_s[k - 1 : k + 1]))
+
+
+def _read(path: Path) -> dict[str, NDArray[np.str_]]:
+    """Read the columns of a run's table; none where there is no table. Raises ResultError where it is damaged."""
+    if not path.is_file():
+        return {}
+    (_, names), *rows = read_csv(path, _FORM, ResultError) or [(1, [""])]
+    cells = [row for _, row in rows if len(row) == len(names)]
+    needed = {"time_s", "joint"} if path.name in _JOINT_TABLES else {"time_s"}
+    if not needed <= set(names) or len(cells) < len(rows):
+        raise ResultError(f"{path} is damaged; {_FORM}; track the trial again")
+    return dict(zip(names, np.array(cells, str).reshape(len(cells), len(names)).T, strict=True))
+
+
+def _known(
+    trial: StudyTrial,
+    variable: str,
+    time_s: NDArray[np.str_],
+    values: NDArray[np.str_],
+    sd: NDArray[np.str_] | None,
+) -> Curve:
+    """Return the curve of three columns where its values are known."""
+    texts = (time_s, values, np.full(len(values), "") if sd is None else sd)
+    try:
+        numbers = [np.where(each == "", "nan", each).astype(float) for each in texts]
+    except ValueError as error:
+        raise ResultError(f"{trial.name}: {variable} is damaged ({str(error)[:60]}); track the trial again") from None
+    is_known = np.isfinite(numbers[0]) & (np.abs(numbers[1]) < LARGEST)
+    if is_known.sum() < _FEWEST or (np.diff(numbers[0][is_known]) <= 0).any():
+        raise ResultError(
+            f"{trial.name}: {variable} is known in {is_known.sum()} frames, {_FEWEST} at least are needed"
+        )
+    return Curve(*(column[is_known] for column in numbers))

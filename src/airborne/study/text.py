@@ -1,0 +1,138 @@
+"""The methods paragraph of a comparison, and its results as sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from airborne import __version__
+from airborne.errors import count
+from airborne.study.comparison import ALPHA, Comparison, Contrast
+
+_REFERENCES = {
+    "random effects": (
+        "Hartung J, Knapp G (2001). A refined method for the meta-analysis of controlled clinical trials with binary "
+        "outcome. Statistics in Medicine 20, 3875-3889.",
+        "Paule RC, Mandel J (1982). Consensus values and weighting factors. Journal of Research of the National Bureau "
+        "of Standards 87, 377-385.",
+    ),
+    "numbers": (
+        "Holm S (1979). A simple sequentially rejective multiple test procedure. Scand. J. Statistics 6, 65-70.",
+    ),
+    "curves": (
+        "Pataky TC (2012). One-dimensional statistical parametric mapping in Python. Computer Methods in Biomechanics "
+        "and Biomedical Engineering 15, 295-301.",
+    ),
+}
+_LEVELS = {
+    "within athletes": "within {} who have both",
+    "between athletes": "between athletes ({}), as too few have both",
+    "between trials": "between the trials of one athlete, and so of that athlete only",
+}
+
+
+def describe_study(comparisons: Sequence[Comparison], events: Sequence[str], *, real_time: bool) -> str:
+    """Return a methods paragraph, one of results, what was left out, and the references."""
+    curves = [each for each in comparisons if each.axis is not None]
+    numbers = [each for each in comparisons if each.axis is None]
+    levels = dict.fromkeys(contrast.difference.level for each in comparisons for contrast in each.contrasts)
+    text = [f"Trials were measured with Airborne {__version__}."]
+    if curves and real_time:
+        text.append(f"Curves were compared in real time since {events[0]}, as far as the shortest trial reaches.")
+    elif curves:
+        text.append(
+            f"Curves were normalised in time, piecewise linearly between {', '.join(events)}, to 101 nodes a stretch."
+        )
+    text.append(
+        "Each athlete's mean in each condition has the variance of a mean of his trials, pooled within athletes and "
+        "conditions, which holds the error of the measurement. Differences of conditions were pooled over athletes "
+        "with random effects: the variance between athletes by Paule and Mandel (1982), 95 % intervals by Hartung and "
+        "Knapp (2001) with Student's t."
+    )
+    if "between trials" in levels:
+        text.append("With a single athlete, the interval is Welch's, of trials, and holds for that athlete only.")
+    if numbers:
+        text.append("P values of all pairs of conditions were adjusted after Holm (1979).")
+    if curves:
+        text.append(
+            "Curves of the athletes' means were compared by two-sided t-tests with one-dimensional statistical "
+            f"parametric mapping (Pataky 2012, spm1d), alpha = {ALPHA:g} for all pairs of conditions together."
+        )
+    text.append(
+        "The minimal (smallest) detectable change of a single trial is 1.96 sqrt(2) times the standard deviation "
+        "within athletes and conditions."
+    )
+    lines = ["Methods", " ".join(text), "", "Results"]
+    lines += [f"{each.title}: {sentence}" for each in comparisons for sentence in _results(each)]
+    left_out = list(dict.fromkeys(line for each in comparisons for line in each.left_out))
+    lines += [
+        "",
+        "Left out",
+        *(left_out or ["nothing"]),
+        "",
+        "References",
+        *_references(numbers=numbers, curves=curves),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _references(**used: Sequence[Comparison]) -> list[str]:
+    names = ["random effects", *(name for name, comparisons in used.items() if comparisons)]
+    return sorted(reference for name in names for reference in _REFERENCES[name])
+
+
+def _results(comparison: Comparison) -> list[str]:
+    spread = comparison.spread
+    sentences = [
+        _number(each, comparison) if comparison.axis is None else _curve(each, comparison)
+        for each in comparison.contrasts
+    ]
+    typical = (float(np.median(each)) for each in (spread.sd_within, spread.sd_measurement, spread.mdc))
+    within, measured, mdc = typical
+    where = "" if comparison.axis is None else "median over the curve: "
+    sentences.append(
+        f"{where}standard deviation of trials of one athlete and condition {within:.3g} (the runs state {measured:.3g} "
+        f"for the measurement, errors included that trials share); minimal detectable change of a trial {mdc:.3g}."
+    )
+    return sentences
+
+
+def _number(contrast: Contrast, comparison: Comparison) -> str:
+    difference = contrast.difference
+    return (
+        f"{contrast.b} minus {contrast.a} {difference.value[0]:.4g}, 95 % interval {difference.low[0]:.4g} to "
+        f"{difference.high[0]:.4g}, {_format_p(contrast.p_holm)}; {_describe_level(contrast, comparison)}."
+    )
+
+
+def _curve(contrast: Contrast, comparison: Comparison) -> str:
+    test, axis = contrast.test, comparison.axis
+    assert test is not None and axis is not None, "a curve has a test"
+    level = _describe_level(contrast, comparison)
+    if not np.isfinite(test.threshold):
+        return f"{contrast.b} minus {contrast.a} could not be tested: too few, or all the same; {level}."
+    if not test.clusters:
+        return f"{contrast.b} and {contrast.a} do not differ anywhere, |t| below {test.threshold:.3g}; {level}."
+    nodes = np.arange(len(axis))
+    spans = [
+        f"from {np.interp(low, nodes, axis):.3g} to {np.interp(high, nodes, axis):.3g} ({_format_p(p)})"
+        for low, high, p in test.clusters
+    ]
+    return (
+        f"{contrast.b} and {contrast.a} differ, |t| above {test.threshold:.3g}, {', '.join(spans)} of "
+        f"{comparison.axis_label}; {level}."
+    )
+
+
+def _describe_level(contrast: Contrast, comparison: Comparison) -> str:
+    a, b = contrast.difference.samples
+    level = contrast.difference.level
+    n = count(len(a), "athlete") if level == "within athletes" else f"{len(a)} and {len(b)}"
+    return _LEVELS[level].format(n)
+
+
+def _format_p(p: float | None) -> str:
+    if p is None or not np.isfinite(p):
+        return "p unknown"
+    return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"

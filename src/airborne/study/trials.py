@@ -1,0 +1,85 @@
+"""The trials of a study, read back from the table of a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from airborne.errors import ResultError
+from airborne.io.text import read_csv
+
+TABLE = "trials.csv"
+ATHLETE, CONDITION = "athlete", "condition"  # the labels that a study needs
+LARGEST = 1e100  # no measurement is larger, and its square is still a number
+_FORM = "the table of a batch has columns trial, athlete, condition, status, folder"
+_NEEDED = {"trial", "status", "error", "folder", CONDITION}
+
+
+@dataclass(frozen=True, slots=True)
+class StudyTrial:
+    """A trial whose run is finished: its place in the study, its run's folder, its row of the table."""
+
+    name: str
+    athlete: str
+    condition: str
+    folder: Path
+    row: Mapping[str, str]
+
+    def number(self, name: str) -> float | None:
+        """Return a number of the row; None where there is none."""
+        try:
+            value = float(self.row[name])
+        except (KeyError, ValueError):
+            return None
+        return value if abs(value) < LARGEST else None
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """Trials to be compared, and what was left out of them, a line each."""
+
+    trials: tuple[StudyTrial, ...]
+    conditions: tuple[str, ...]  # in the order in which they are compared
+    left_out: tuple[str, ...]
+
+    @property
+    def columns(self) -> list[str]:
+        """The columns of the table that hold numbers."""
+        names = dict.fromkeys(name for trial in self.trials for name in trial.row)
+        return [name for name in names if any(trial.number(name) is not None for trial in self.trials)]
+
+
+def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
+    """Read the finished trials of a batch's folder, of some conditions, in their order, or of all.
+
+    The athlete of a run of players is the one who jumped highest, where no label says it. Raises ResultError where the
+    folder holds no table, or none of the trials can be compared.
+    """
+    (_, names), *lines = read_csv(folder / TABLE, _FORM, ResultError) or [(1, [""])]
+    if not set(names) >= _NEEDED or len(set(names)) < len(names):
+        raise ResultError(
+            f"{folder / TABLE}: lacks {', '.join(sorted(_NEEDED - set(names))) or 'names of its own'}; {_FORM}"
+        )
+    trials, left_out = [], []
+    for _, cells in lines:
+        if len(cells) != len(names):
+            raise ResultError(f"{folder / TABLE}: {len(cells)} cells in a row, expected {len(names)}; {_FORM}")
+        row = dict(zip(names, cells, strict=True))
+        athlete = row.get(ATHLETE) or row.get("player", "")
+        if conditions and row[CONDITION] not in conditions:
+            continue
+        if row["status"] != "done":
+            left_out.append(f"{row['trial']}: failed: {row['error']}")
+        elif not athlete or not row[CONDITION]:
+            left_out.append(f"{row['trial']}: has no label {CONDITION if athlete else ATHLETE}")
+        else:
+            trials.append(StudyTrial(row["trial"], athlete, row[CONDITION], folder / row["folder"], row))
+    if not trials:
+        why = f"; {left_out[0]}" if left_out else ""
+        raise ResultError(f"{folder / TABLE}: no finished trial with labels {ATHLETE} and {CONDITION}{why}")
+    found = dict.fromkeys(trial.condition for trial in trials)
+    missing = [name for name in conditions if name not in found]
+    if missing:
+        raise ResultError(f"{folder / TABLE}: no finished trial of condition {missing[0]}; it has: {', '.join(found)}")
+    return Study(tuple(trials), tuple(conditions) or tuple(found), tuple(left_out))

@@ -1,0 +1,49 @@
+"""A session file: the tables that many trials share, filled in for one of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from airborne.errors import TrialError
+
+_PLACE = re.compile(r"\{([^{}]*)\}")  # in a text of a session: {athlete}
+
+
+def join_session(tables: dict[str, Any], session: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Return the tables of a trial that names a session: each the trial's own, else its athlete's, else the session's.
+
+    The trial's name is that of its file `path` where it gives none. In the session's texts `{trial}` is the trial's
+    name and `{athlete}`, or any other word in braces, the trial's label of that name. Raises TrialError where a trial
+    lacks one.
+    """
+    tables = {"name": path.stem, **{key: value for key, value in tables.items() if key != "session"}}
+    labels = tables.get("labels", {})
+    words = {**(labels if isinstance(labels, dict) else {}), "trial": tables["name"]}
+    athletes = session.get("athletes", {})
+    own = athletes.get(str(words.get("athlete")), {}) if isinstance(athletes, dict) else None
+    if not isinstance(own, dict):
+        raise TrialError(
+            f"{path.name}: its session's athletes are no tables; expected [athletes.NAME.body] or the like"
+        )
+    shared = {key: value for key, value in session.items() if key != "athletes"} | own
+    return {key: _fill(value, words, path) for key, value in shared.items() if key not in tables} | tables
+
+
+def _fill(value: Any, words: Mapping[str, Any], path: Path) -> Any:
+    """Return a value of a session with the words in braces filled in, at any depth."""
+    if isinstance(value, dict):
+        return {key: _fill(item, words, path) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_fill(item, words, path) for item in value]
+    if not isinstance(value, str):
+        return value
+    unknown = [word for word in _PLACE.findall(value) if word not in words]
+    if unknown:
+        raise TrialError(
+            f"{path.name}: the session's '{value[:80]}' needs the label {unknown[0][:40]}; this trial has: "
+            f"{', '.join(map(str, words))}; add it to its [labels]"
+        )
+    return _PLACE.sub(lambda found: str(words[found[1]]), value)

@@ -1,0 +1,226 @@
+"""Images of a file in any order: when each is shown, read off its packets, and each decoded when it is asked for."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from fractions import Fraction
+from math import lcm
+from typing import NamedTuple, Self
+
+import av
+import numpy as np
+from av.container import InputContainer
+from av.video.stream import VideoStream
+from numpy.typing import NDArray
+
+from airborne.errors import VideoError
+from airborne.types import Image
+from airborne.video.containers import open_file, video_stream
+from airborne.video.decoding import (
+    DecodedImage,
+    VideoFacts,
+    VideoSource,
+    inspect,
+    intact_frames,
+    rgb_from_decoded,
+)
+from airborne.video.fields import fill_rows
+
+_REORDERED = 20  # frames: more than any codec sends before or after the place where it shows them
+_MOST_FRAMES = 5_000_000  # of a trial: 28 hours at 50 Hz
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImageIndex:
+    """When each frame of a file is shown. Where a file is damaged, frames are listed that cannot be decoded."""
+
+    facts: VideoFacts
+    ticks: NDArray[np.int64]  # (frames,) since the first frame, ascending
+    keys: NDArray[np.int64]  # (keys,) those of frames from which decoding may begin, ascending; none: the start alone
+    first: int  # stamp of the first frame in the file [ticks]
+    tick_s: Fraction
+
+    def __len__(self) -> int:
+        """Return the number of images; each of two fields is one."""
+        return len(self.ticks) * len(self.facts.parities)
+
+    def times(self) -> tuple[NDArray[np.int64], int]:
+        """Return the time of every image since the first, as `decode` gives it, and how many units a second has."""
+        rate, tick_s, n = self.facts.frame_rate, self.tick_s, len(self.facts.parities)
+        unit = lcm(tick_s.denominator, rate.numerator * n)
+        tick, frame = round(unit * tick_s), round(unit / rate)
+        stamps = self.ticks * tick
+        snapped = (stamps + frame // 2) // frame * frame
+        frames = np.where(np.abs(snapped - stamps) <= tick, snapped, stamps)
+        return (frames[:, None] + frame // n * np.arange(n)).ravel(), unit
+
+
+def index_images(source: VideoSource) -> ImageIndex:
+    """List a file's images by its packets; a file whose packets have no times is decoded once. Raises VideoError."""
+    facts = inspect(source)
+    with ExitStack() as stack:
+        container, stream = _open(source, stack)
+        tick_s = stream.time_base or Fraction(1, 1_000_000)
+        shown = (packet for packet in container.demux(stream) if packet.size and not packet.is_discard)
+        stamps = [(packet.pts, packet.is_keyframe) for packet in shown]
+    timed = [(stamp, is_key) for stamp, is_key in stamps if stamp is not None]
+    if len(timed) == len(stamps):
+        keys = np.array(sorted({stamp for stamp, is_key in timed if is_key}), np.int64)
+        ticks = np.array(sorted({stamp for stamp, _ in timed}), np.int64)
+        return ImageIndex(facts, ticks - ticks[0], keys - ticks[0], int(ticks[0]), tick_s)
+    with ExitStack() as stack:
+        container, stream = _open(source, stack)
+        ticks = np.array([n for n, _ in intact_frames(container, stream, size=facts.size_before_rotation)], np.int64)
+    return ImageIndex(facts, ticks, np.zeros(0, np.int64), 0, tick_s)
+
+
+class TrialClock(NamedTuple):
+    """Which image of each camera belongs to each frame of a trial, as `Recording` has it."""
+
+    times_s: NDArray[np.float64]  # (n,) on the trial's clock [s]
+    images: NDArray[np.int64]  # (n, cameras) image numbers; -1 where a camera has none
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.images)
+
+
+def match_images(sources: Sequence[VideoSource], indexes: Sequence[ImageIndex]) -> TrialClock:
+    """Match the images of several cameras by their times, as `Recording` does; the first camera is the clock."""
+    images = [index.times() for index in indexes]
+    starts = [source.trial_time(Fraction(0)) for source in sources]
+    paces = [source.trial_time(Fraction(1)) - start for source, start in zip(sources, starts, strict=True)]
+    period_s = 1 / indexes[0].facts.image_rate
+    per_unit = [pace / unit for pace, (_, unit) in zip(paces, images, strict=True)]
+    scale = 2 * lcm(*(each.denominator for each in (period_s, *starts, *per_unit)))
+    times = [
+        np.array(numbers, object) * int(each * scale) + int(start * scale)  # whole numbers of any size: exact
+        for (numbers, _), each, start in zip(images, per_unit, starts, strict=True)
+    ]
+    period, last = int(period_s * scale), max(each[-1] for each in times)
+    if last - times[0][0] > _MOST_FRAMES * period:
+        raise VideoError(
+            f"{sources[0].name}: over {_MOST_FRAMES} frames to its end or another's; convert the videos again"
+        )
+    clock = np.array(_clock(times[0].tolist(), period, last), object)
+    matched = [_nearest(each, clock, period // 2) for each in times]
+    return TrialClock((clock / scale).astype(float), np.stack(matched, axis=1))
+
+
+def _clock(own: Sequence[int], period: int, last: int) -> list[int]:
+    """Return a camera's own times; over a gap and past its end they go on by the period, to the last of all images."""
+    clock: list[int] = []
+    for time, following in zip(own, [*own[1:], last + period + period // 2], strict=True):
+        clock.append(time)
+        while following >= clock[-1] + period * 3 // 2 and last > clock[-1] + period - period // 2:
+            clock.append(clock[-1] + period)
+    return clock
+
+
+def _nearest(times: NDArray[np.object_], clock: NDArray[np.object_], half: int) -> NDArray[np.int64]:
+    """Return the number of the image nearest to each time of the clock, the later of two; -1 beyond half a period."""
+    later = (
+        np.searchsorted(times, clock, side="right").clip(1, len(times) - 1)
+        if len(times) > 1
+        else np.zeros(len(clock), int)
+    )
+    earlier = np.maximum(later - 1, 0)
+    number = np.where(times[later] - clock <= clock - times[earlier], later, earlier)
+    offset = times[number] - clock
+    return np.where((offset > -half) & (offset <= half), number, -1).astype(np.int64)
+
+
+class ImageReader:
+    """Decodes any image of a file; images in order cost one decoding each. Not for several threads at once."""
+
+    def __init__(self, source: VideoSource, index: ImageIndex) -> None:
+        """Open nothing yet; call `close` at the end."""
+        self._source, self.index = source, index
+        self._stack = ExitStack()
+        self._stream: VideoStream | None = None
+        self._frames: Iterator[tuple[int, av.VideoFrame]] = iter(())
+        self._current: tuple[int, av.VideoFrame] | None = None  # the last that was decoded
+
+    def image(self, number: int) -> Image | None:
+        """Return an image (h, w, 3) sRGB as the file holds it, a field with rows between its own filled in.
+
+        None where it is damaged. Raises VideoError for a number that is not there.
+        """
+        if not 0 <= number < len(self.index):
+            raise VideoError(f"{self._source.name}: there is no image {number}; the last is {len(self.index) - 1}")
+        facts = self.index.facts
+        row, j = divmod(number, len(facts.parities))
+        frame = self._frame_at(row)
+        if frame is None:
+            return None
+        parity = facts.parities[j]
+        rgb = rgb_from_decoded(DecodedImage(Fraction(0), frame, parity), facts)
+        return rgb if parity is None else fill_rows(rgb, parity, facts.size[1])
+
+    def close(self) -> None:
+        """Close the file."""
+        self._stack.close()
+        self._stream, self._frames, self._current = None, iter(()), None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _frame_at(self, row: int) -> av.VideoFrame | None:
+        ticks, near = int(self.index.ticks[row]), int(self.index.ticks[max(0, row - _REORDERED)])
+        if self._current is None or not self._key_before(ticks) <= self._current[0] <= ticks:
+            self._go_before(ticks)
+        while self._current is not None and self._current[0] < ticks:
+            if self._stream is not None:  # far from the place, frames that no other is predicted from are left out
+                self._stream.codec_context.skip_frame = "NONREF" if self._current[0] < near else "DEFAULT"
+            self._current = next(self._frames, None)
+        return self._current[1] if self._current is not None and self._current[0] == ticks else None
+
+    def _key_before(self, ticks: int) -> int:
+        row = bisect_right(self.index.keys, ticks)
+        return int(self.index.keys[row - 1]) if row else 0
+
+    def _go_before(self, ticks: int) -> None:
+        """Begin to decode at the last key frame from which a frame is reached; some containers seek past it."""
+        keys = self.index.keys[: bisect_right(self.index.keys, ticks)]
+        for key in keys[:0:-1]:
+            self._begin(int(key))
+            if self._current is not None and self._current[0] <= ticks:
+                return
+        self._begin(None)
+
+    def _begin(self, key: int | None) -> None:
+        """Open the file anew, at a key frame or at the start, and decode one frame."""
+        self.close()
+        container, stream = _open(self._source, self._stack)
+        self._stream = stream
+        if key is not None:
+            container.seek(key + self.index.first, stream=stream, backward=True)
+        self._frames = self._decode(container, stream, self.index.first if key is None else key + self.index.first)
+        self._current = next(self._frames, None)
+
+    def _decode(
+        self, container: InputContainer, stream: VideoStream, start: int
+    ) -> Iterator[tuple[int, av.VideoFrame]]:
+        """Yield intact frames from a stamp on; those before it may lack what they are predicted from."""
+        if not len(self.index.keys):
+            yield from intact_frames(container, stream, size=self.index.facts.size_before_rotation)
+            return
+        first: int | None = None
+        for ticks, frame in intact_frames(container, stream, size=self.index.facts.size_before_rotation):
+            first = (frame.pts or 0) - ticks if first is None else first
+            if ticks + first >= start:
+                yield ticks + first - self.index.first, frame
+
+
+def _open(source: VideoSource, stack: ExitStack) -> tuple[InputContainer, VideoStream]:
+    container = stack.enter_context(open_file(source.name, source.path))
+    stream = video_stream(container)
+    if stream is None:
+        raise VideoError(f"{source.name}: {source.path} holds no video stream; give a video, or copy it again")
+    return container, stream

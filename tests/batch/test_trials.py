@@ -1,0 +1,103 @@
+"""Which trials a batch runs: folders, patterns, tables; names that would clash; the files of `airborne new`."""
+
+import pytest
+
+from airborne.batch.new import write_study
+from airborne.batch.run import plan_tasks
+from airborne.batch.trials import label_names, list_trials
+from airborne.errors import AirborneError
+from airborne.trial.file import read_trial
+
+TRIAL = 'name = "a"\ncamera = []\nlabels = { condition = "dry", day = 2, athlete = "anna" }\n'
+
+
+def write(path, text=TRIAL):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+
+
+def names(what):
+    return [trial.name for trial in list_trials(str(what))]
+
+
+def test_a_folders_trials_are_its_trial_files_at_any_depth(tmp_path):
+    write(tmp_path / "b.toml")
+    write(tmp_path / "a" / "trial.toml")
+    write(tmp_path / "c.toml", 'session = "session.toml"')
+    write(tmp_path / "session.toml", "camera = []")
+    write(tmp_path / "calib.toml", "[cam1]\nname = 'x'")
+    write(tmp_path / "broken.toml", "name =\n[[camera]]")
+    write(tmp_path / "body.toml", "name =")
+    assert names(tmp_path) == ["a", "b", "broken", "c"], "a file that cannot be read is not passed over"
+    assert set(names(tmp_path / "?.toml")) == {"b", "c"}
+
+
+def test_a_tables_columns_are_labels_over_those_of_the_file(tmp_path):
+    write(tmp_path / "t" / "x.toml")
+    write(tmp_path / "trials.csv", "trial,condition,judge\nt/x,wet,7\nt/y.toml,dry,\n")
+    first, second = list_trials(str(tmp_path))
+    assert (first.name, first.labels) == ("x", {"condition": "wet", "day": "2", "athlete": "anna", "judge": "7"})
+    assert second.path == tmp_path / "t" / "y.toml"
+    assert label_names([first, second])[:2] == ["athlete", "condition"]
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("name,condition\nx,wet\n", "one of them trial"),
+        ("trial,condition\nx\n", "row 2: 1 cells, expected 2"),
+        ("trial\nx\na/x\n", "two trials are called x"),
+        ("trial\n", "no trial is there"),
+        ("trial,status\nx,good\n", "a label is called status"),
+    ],
+)
+def test_a_table_that_does_not_fit_is_one_line(tmp_path, table, said):
+    write(tmp_path / "trials.csv", table)
+    with pytest.raises(AirborneError, match=said):
+        list_trials(str(tmp_path / "trials.csv"))
+
+
+def test_a_trial_may_not_have_the_name_of_the_batchs_own_folder(tmp_path):
+    write(tmp_path / "logs.toml")
+    with pytest.raises(AirborneError, match="called logs"):
+        plan_tasks(list_trials(str(tmp_path)), tmp_path / "out", pictures=False)
+
+
+def test_the_longest_go_first(tmp_path):
+    for name, size in (("short", 10), ("long", 1000)):
+        (tmp_path / f"{name}.mp4").write_bytes(bytes(size))
+        camera = f'camera = [{{ name = "c", video = "{name}.mp4" }}]'
+        rest = 'calibration = { file = "calib.toml" }\nbody = { preset = "human18", stature_m = 1.7, mass_kg = 60 }'
+        write(tmp_path / f"{name}.toml", f'name = "{name}"\n{camera}\n{rest}\n')
+    (tmp_path / "calib.toml").touch()
+    write(tmp_path / "broken.toml", "name = ")
+    tasks = plan_tasks(list_trials(str(tmp_path / "[bls]*.toml")), tmp_path / "out", pictures=False)
+    assert [task.trial.name for task in tasks] == ["long", "short", "broken"]
+
+
+def test_new_writes_a_session_and_a_trial_for_each_set_of_videos(tmp_path):
+    for name in ("anna/dry_1_left.mp4", "anna/dry_1_right.mp4", "anna/wet_1_left.mp4", "anna/notes.txt"):
+        write(tmp_path / "videos" / name, "")
+    study = write_study(tmp_path / "videos", "{athlete}/{condition}_{number}_{camera}.mp4", tmp_path / "study")
+    assert [path.name for path in study.trials] == ["anna_dry_1.toml", "anna_wet_1.toml"]
+    assert study.notes == ("anna_wet_1.toml: no video of right; give it its own [[camera]] tables",)
+    for name in ("calib.toml", "body.toml"):
+        write(tmp_path / "study" / name, "")
+    trial = read_trial(study.trials[0])
+    assert [camera.name for camera in trial.camera] == ["left", "right"]
+    assert all(trial.path(camera.video).is_file() for camera in trial.camera)
+    assert [each.labels["condition"] for each in list_trials(str(tmp_path / "study"))] == ["dry", "wet"]
+
+
+def test_new_leaves_files_that_exist_alone(tmp_path):
+    write(tmp_path / "videos" / "x_left.mp4", "")
+    write(tmp_path / "study" / "session.toml", "# mine\n")
+    study = write_study(tmp_path / "videos", "{number}_{camera}.mp4", tmp_path / "study")
+    assert study.session.read_text() == "# mine\n"
+
+
+@pytest.mark.parametrize("pattern", ["{camera}.mp4", "{number}.mp4", "{a}_{a}_{camera}.mp4", "{day}/{camera}.mov"])
+def test_a_pattern_that_fits_nothing_is_one_line(tmp_path, pattern):
+    write(tmp_path / "x_left.mp4", "")
+    with pytest.raises(AirborneError, match=r"expected \{camera\}|no video's path fits"):
+        write_study(tmp_path, pattern, tmp_path / "study")

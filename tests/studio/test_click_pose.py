@@ -1,0 +1,68 @@
+"""A person's first pose by clicks in a real browser: landmarks, a pixel off, become the pose that the command finds."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.body import SAMPLED, Pose, human18
+from airborne.cameras import Rig, camera_looking_at, write_pose2sim
+from airborne.run.first_pose import find_first_pose
+from airborne.trial.file import read_trial
+from tests.support.clips import write_clip
+from tests.support.studio import at_pixel, open_page, open_studio, wait_for_frame
+
+SIZE = (640, 480)
+FRAME = 3
+MOST_OFF_M = 0.035  # four pixels at the body, each click having one as its deviation, right and down
+LANDMARKS = ("hip_left", "hip_right", "shoulder_left", "shoulder_right", "knee_left", "knee_right")
+TRIAL = """name = "person"
+camera = [{ name = "a", video = "a.mp4" }, { name = "b", video = "b.mp4" }]
+calibration = { file = "calib.toml" }
+body = { preset = "human18", stature_m = 1.75, mass_kg = 70.0 }
+"""
+
+
+@pytest.fixture(scope="module")
+def rig():
+    places = {"a": [3.0, -4.0, 1.5], "b": [-4.0, -3.0, 1.2]}
+    return Rig(tuple(camera_looking_at(n, p, [0, 0, 1.1], focal_px=600, size=SIZE) for n, p in places.items()))
+
+
+@pytest.fixture(scope="module")
+def folder(rig, tmp_path_factory):
+    """A trial without a start, whose videos show nothing."""
+    folder = tmp_path_factory.mktemp("studio") / "person"
+    folder.mkdir()
+    grey = [np.full((SIZE[1], SIZE[0], 3), 110, np.uint8)] * 6
+    for name in rig.names:
+        write_clip(folder / f"{name}.mp4", grey, codec="libx264", pix_fmt="yuv420p")
+    write_pose2sim(folder / "calib.toml", rig)
+    (folder / "trial.toml").write_text(TRIAL)
+    return folder
+
+
+def test_clicked_landmarks_become_the_first_pose(rig, folder):
+    model = human18(1.75, 70.0, outfit=SAMPLED)
+    true = Pose(world_from_root=RigidTransform.from_components([0.1, 0.0, 1.0], Rotation.from_rotvec([0, 0, 0.4])))
+    names, points = [each.name for each in model.landmarks], model.with_pose(true).landmarks
+    rng = np.random.default_rng(0)
+    with open_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
+        wait_for_frame(page, 0)
+        for frame in range(1, FRAME + 1):
+            page.locator("canvas.view").press(".")
+            wait_for_frame(page, frame)
+        page.get_by_text(f"No landmark is clicked in frame {FRAME} yet.").wait_for()
+        for name in LANDMARKS:
+            page.locator(".point", has_text=name).click()
+            for pane, camera in enumerate(rig):
+                px = camera.px_from_world(points[names.index(name)]) + rng.standard_normal(2)
+                page.mouse.click(*at_pixel(page, pane, *px))
+            page.locator(".point.here", has_text=name).get_by_text(".").nth(1).wait_for()
+        page.get_by_role("button", name="Use this pose").click(timeout=120_000)
+        page.get_by_text("the first pose is written into the trial").wait_for()
+    trial = read_trial(folder / "trial.toml")
+    assert (trial.start.frame, trial.start.points_px) == (FRAME, f"start_points_{FRAME}.csv")
+    pose = find_first_pose(trial, trial.model(), rig, None).pose
+    rows = [names.index(name) for name in LANDMARKS]
+    off_m = np.linalg.norm(model.with_pose(pose).landmarks[rows] - points[rows], axis=1)
+    assert off_m.max() < MOST_OFF_M

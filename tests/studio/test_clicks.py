@@ -1,0 +1,42 @@
+"""Tables of clicked points: read in any state of completion, and written so that the command line reads them."""
+
+import numpy as np
+
+from airborne.calibration.sources.control_points import read_control_points
+from airborne.cameras.clicks import read_clicks
+from airborne.studio.clicks import Clicked, count_clicked, list_surveys, read_clicked
+
+SURVEY = "point,x_m,y_m,z_m\nP1,0.0,1.25,0.5\nP2,1.0,2.0,-0.125\n"
+
+
+def test_a_survey_without_clicks_grows_into_control_points(tmp_path):
+    path = tmp_path / "survey.csv"
+    path.write_text(SURVEY)
+    clicked = read_clicked(path)
+    assert count_clicked(clicked, "left") == 0
+    clicked = clicked.click("P2", "left", (10.123, 20.5)).click("P1", "right", (1, 2))
+    path.write_text(clicked.text(["left", "right"]))
+    points = read_control_points(path)
+    assert points.names == ("P1", "P2")
+    assert np.array_equal(points.world, [[0, 1.25, 0.5], [1, 2, -0.125]])
+    assert np.array_equal(points.px, [[[np.nan] * 2, [1, 2]], [[10.12, 20.5], [np.nan] * 2]], equal_nan=True)
+
+
+def test_a_click_is_taken_back(tmp_path):
+    clicked = Clicked((), None, {}).click("hip_left", "left", (1, 2)).click("hip_left", "left", (np.nan, np.nan))
+    assert clicked.text(["left"]) == "point,left_u,left_v\nhip_left,,\n"
+
+
+def test_landmarks_are_read_as_clicks(tmp_path):
+    clicked = Clicked((), None, {}).click("hip_left", "left", (1, 2)).click("hip_right", "right", (3, 4))
+    (tmp_path / "points.csv").write_text(clicked.text(["left", "right"]))
+    names, px = read_clicks(tmp_path / "points.csv", ("left", "right"))
+    assert names == ("hip_left", "hip_right")
+    assert np.array_equal(px, [[[1, 2], [np.nan] * 2], [[np.nan] * 2, [3, 4]]], equal_nan=True)
+
+
+def test_surveys_are_told_from_other_tables(tmp_path):
+    (tmp_path / "survey.csv").write_text(SURVEY)
+    (tmp_path / "clicks.csv").write_text("point,a_u,a_v\nP1,1,2\n")
+    (tmp_path / "truth.csv").write_text("field,time_s\n0,0.0\n")
+    assert list_surveys(tmp_path) == ["survey.csv"]

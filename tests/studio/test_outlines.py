@@ -1,0 +1,64 @@
+"""What lies over the pictures of a run: outlines where the body is, lines down players' legs; and its curves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform
+
+from airborne.body import Pose
+from airborne.body.files import read_body
+from airborne.cameras import Rig, camera_looking_at
+from airborne.motion import read_players
+from airborne.studio.outlines import outline_items, run_curves, run_overlay, run_rows
+from airborne.studio.stage import part_stl
+from tests.support.places import THROWN_CROSS
+from tests.support.players_trial import rig, write_run
+
+
+@pytest.fixture(scope="module")
+def cross():
+    return read_body(THROWN_CROSS / "cross.toml")
+
+
+def test_an_outline_goes_round_the_body_where_the_bent_lens_shows_it(cross):
+    camera = camera_looking_at("a", [3, -2, 1.5], [0, 0, 1], focal_px=700, size=(640, 480))
+    bent = replace(camera, distortion=np.array([-0.3, 0.1, 0, 0, 0]))
+    posed = cross.with_pose(Pose(world_from_root=RigidTransform.from_translation([0.5, 0.6, 0.7])))
+    (item,) = outline_items(posed, Rig((bent,)).cameras, "#ffffff")
+    corners = np.array([[x, y, z] for x in (-0.03, 0.03) for y in (-0.45, 0.45) for z in (-0.0225, 0.0225)])
+    seen = bent.px_from_world(corners + np.array([0.5, 0.6, 0.7]))
+    line = np.array(item["points"])
+    outer = seen[[seen[:, 0].argmin(), seen[:, 0].argmax()]]
+    assert np.linalg.norm(line[:, None] - outer, axis=2).min(axis=0).max() < 2.5
+    assert (item["pane"], item["closed"]) == (0, True)
+
+
+def test_players_have_lines_down_both_legs_in_each_camera(tmp_path):
+    run = write_run(tmp_path / "run")
+    motion = read_players(run / "joints.csv")
+    overlay = run_overlay(run, 3, ("right", "left"))
+    assert len(overlay["items"]) == 2 * 2 * len(motion.players)
+    first = overlay["items"][0]
+    hip = motion.points[3, 0, motion.joints.index("hip_left")]
+    assert first["points"][0] == pytest.approx(rig()["right"].px_from_world(hip), abs=0.01)
+    assert run_overlay(run, 99, ("right", "left"))["items"] == []
+
+
+def test_curves_of_players_are_of_what_is_lowest(tmp_path):
+    curves = run_curves(write_run(tmp_path / "run"))
+    assert curves["frame"] == list(range(12))
+    assert [each["name"].split(":")[0] for each in curves["series"]] == ["Anna", "number 7"]
+    assert set(curves["status"]) <= {"tracked", "uncertain", "lost"}
+
+
+def test_a_part_of_a_body_is_a_mesh_in_its_segment(cross):
+    stl = part_stl(cross, 1)
+    corners = np.frombuffer(stl[84:], np.dtype([("normal", "<3f4"), ("corners", "<9f4"), ("rest", "<u2")]))["corners"]
+    assert np.ptp(corners.reshape(-1, 3), axis=0) == pytest.approx([0.6, 0.06, 0.045])
+
+
+def test_rows_of_a_run_are_counted_while_it_goes_on(tmp_path):
+    assert run_rows(tmp_path) == (0, None)
+    (tmp_path / "motion.csv").write_text("frame,time_s\n4,0.1\n6,0.2\n8,0")
+    assert run_rows(tmp_path) == (2, 6)

@@ -1,0 +1,44 @@
+"""Pictures are kept within a number of bytes, whatever is looked at, and what is damaged is no picture."""
+
+import cv2
+import numpy as np
+import pytest
+
+from airborne.studio.pictures import Pictures, _Store
+from airborne.trial.cameras import CameraTable
+from airborne.video import VideoSource
+from tests.support.clips import numbered, write_clip
+
+
+def test_the_store_forgets_what_was_asked_for_longest_ago():
+    store = _Store(most_bytes=100)
+    source = VideoSource("a", "unused")
+    for number in range(4):
+        store.add((source, number), bytes(40))
+        store.find((source, 0))
+    assert [store.find((source, number))[0] for number in range(4)] == [True, False, False, True]
+    store.add((source, 0), None)  # damaged: known, and no bytes
+    assert store.find((source, 0)) == (True, None)
+
+
+@pytest.fixture
+def source(tmp_path):
+    return VideoSource("a", write_clip(tmp_path / "a.mkv", numbered(30)))
+
+
+def test_pictures_of_any_number_come_as_jpeg(source):
+    pictures = Pictures()
+    for number in (0, 29, 3, 4, 5, 0):
+        image = cv2.imdecode(np.frombuffer(pictures.jpeg(source, number), np.uint8), cv2.IMREAD_COLOR)
+        assert image[5, 5].tolist() == pytest.approx([2 * number] * 3, abs=2)
+
+
+def test_a_trial_is_shown_with_its_sizes_and_clock(source, tmp_path):
+    tables = (CameraTable(name="a", video="a.mkv"), CameraTable(name="b", video="a.mkv", offset_s=0.1))
+    shown = Pictures().show(
+        tables, lambda table: VideoSource(table.name, tmp_path / table.video, offset_s=table.offset_s)
+    )
+    assert shown.sizes == {"a": (64, 48), "b": (64, 48)}
+    assert len(shown.clock) == 35
+    assert shown.clock.images[7].tolist() == [7, 2]
+    assert shown.clock.images[34].tolist() == [-1, 29]

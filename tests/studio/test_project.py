@@ -1,0 +1,59 @@
+"""The steps' states are computed from the trial's files."""
+
+import shutil
+
+import pytest
+
+from airborne.errors import TrialError
+from airborne.studio.project import find_trial, read_project, steps
+from tests.support.places import THROWN_CROSS
+
+
+def states(folder):
+    return {step.name: step.state for step in steps(read_project(folder, folder / "trial.toml"))}
+
+
+def test_a_folder_of_videos_needs_cameras_first(tmp_path):
+    assert states(tmp_path) == {
+        "Videos": "needs you",
+        **dict.fromkeys(["Cameras", "Body", "First pose", "Track", "Review", "Results"], "empty"),
+    }
+
+
+def test_a_prepared_trial_lacks_only_the_run(tmp_path):
+    folder = shutil.copytree(THROWN_CROSS, tmp_path / "cross")
+    assert states(folder) == {
+        **dict.fromkeys(["Videos", "Cameras", "Body", "First pose"], "ready"),
+        "Track": "needs you",
+        "Review": "empty",
+        "Results": "empty",
+    }
+
+
+def test_what_is_missing_is_said(tmp_path):
+    folder = shutil.copytree(THROWN_CROSS, tmp_path / "cross")
+    (folder / "cam2.mp4").unlink()
+    rows = (folder / "control_points.csv").read_text().splitlines()
+    (folder / "control_points.csv").write_text("\n".join(rows[:5]))
+    said = {step.name: step.says for step in steps(read_project(folder, folder / "trial.toml"))}
+    assert said["Videos"] == "cam2.mp4 not found"
+    assert said["Cameras"] == "click points in cam1, cam2, cam3"
+
+
+def test_a_trial_that_cannot_be_read_says_why(tmp_path):
+    (tmp_path / "trial.toml").write_text("[[camera]]\nname = 3\n")
+    assert read_project(tmp_path, tmp_path / "trial.toml").mistake is not None
+
+
+def test_a_video_outside_the_folder_is_refused(tmp_path):
+    (tmp_path / "in").mkdir()
+    (tmp_path / "out.mp4").write_bytes(b"0")
+    (tmp_path / "in" / "trial.toml").write_text('[[camera]]\nname = "a"\nvideo = "../out.mp4"\n')
+    project = read_project(tmp_path / "in", tmp_path / "in" / "trial.toml")
+    with pytest.raises(TrialError, match=r"\.\./out\.mp4 lies outside"):
+        project.source(project.cameras[0])
+
+
+def test_a_path_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(TrialError, match="give a folder of videos"):
+        find_trial(tmp_path / "nothing")

@@ -1,0 +1,103 @@
+"""In a real browser: the frame that is asked for is the one that is shown, and clicks land to a tenth of a pixel."""
+
+from fractions import Fraction
+
+import pytest
+
+from airborne.studio.clicks import read_clicked
+from airborne.video import VideoWriter, weave
+from tests.support.clips import write_clip
+from tests.support.studio import at_pixel, burn_numbers, open_page, open_studio, read_number, wait_for_frame
+
+N = 60
+IRREGULAR = [40 * k + (k * k) % 19 for k in range(N)]  # ms
+SURVEY = "point,x_m,y_m,z_m\n" + "".join(f"P{k},{k % 3},{k // 3},{k % 2}\n" for k in range(8))
+TRIAL = """name = "numbers"
+camera = [
+    { name = "b frames", video = "b.mp4" },
+    { name = "fields", video = "fields.mp4", fields = "top-first" },
+    { name = "variable", video = "variable.mp4" },
+]
+calibration = { control_points = "survey.csv" }
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A trial whose cameras carry their image numbers, on a clock of 25 pictures a second."""
+    folder = tmp_path_factory.mktemp("studio") / "numbers"
+    folder.mkdir()
+    images = burn_numbers(N)
+    h264 = {"codec": "libx264", "pix_fmt": "yuv420p", "options": {"g": "12", "bf": "3", "crf": "10"}}
+    write_clip(folder / "b.mp4", images, rate=Fraction(25), **h264)
+    write_clip(
+        folder / "variable.mp4", images, rate=Fraction(25), time_base=Fraction(1, 1000), stamps=IRREGULAR, **h264
+    )
+    with VideoWriter(folder / "fields.mp4", size=(320, 240), rate=Fraction(25), fields="top-first", crf=4) as writer:
+        for top, bottom in zip(images[::2], images[1::2], strict=True):
+            writer.write(weave(top[::2], bottom[1::2]))
+    (folder / "trial.toml").write_text(TRIAL)
+    (folder / "survey.csv").write_text(SURVEY)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def address(folder):
+    with open_studio(folder) as address:
+        yield address.replace("/?", "/cameras?")
+
+
+def expected(frame):
+    """What each camera's picture carries at a frame of the first camera: 25 Hz, 50 fields/s, a variable rate."""
+    stamps = [abs(stamp - 40 * frame) for stamp in IRREGULAR]
+    return [frame, 2 * frame if 2 * frame < N else None, stamps.index(min(stamps)) if min(stamps) <= 20 else None]
+
+
+def test_the_frame_shown_is_the_one_asked_for(address):
+    requests = []
+    with open_page(address, requests) as page:
+        wait_for_frame(page, 0)
+        frame, canvas = 0, page.locator("canvas.view")
+        canvas.focus()
+        keys = ["ArrowRight"] * 5 + ["Shift+ArrowRight"] * 2 + [".", ",", "Shift+ArrowLeft", "End", "ArrowLeft", "Home"]
+        steps = {"ArrowRight": 1, "ArrowLeft": -1, "Shift+ArrowRight": 10, "Shift+ArrowLeft": -10, ".": 1, ",": -1}
+        for key in keys:
+            canvas.press(key)
+            frame = {"End": N - 1, "Home": 0}.get(key, frame + steps.get(key, 0))
+            wait_for_frame(page, frame)
+            for pane, number in enumerate(expected(frame)):
+                if number is not None:
+                    assert read_number(page, pane) == number, (key, frame, pane)
+    assert {request.split("/")[2] for request in requests} == {address.split("/")[2]}
+
+
+def test_a_click_lands_to_the_tenth_of_a_pixel_and_arrows_move_it_by_one(address, folder):
+    with open_page(address) as page:
+        wait_for_frame(page, 0)
+        canvas = page.locator("canvas.view")
+        page.mouse.move(*at_pixel(page, 0, 200, 160))
+        page.mouse.wheel(0, -1200)  # about twenty times
+        page.mouse.click(*at_pixel(page, 0, 203.37, 158.62))
+        page.get_by_text("P0 –").or_(page.locator(".point.here")).first.wait_for()
+        page.wait_for_function("() => document.querySelector('canvas.view').view.selected != ''")
+        u, v = read_clicked(folder / "survey.csv").at("P0", "b frames")
+        assert (u, v) == (pytest.approx(203.37, abs=0.06), pytest.approx(158.62, abs=0.06))
+        for key in ("ArrowLeft", "ArrowLeft", "ArrowUp", "Shift+ArrowDown"):
+            canvas.press(key)
+            page.wait_for_timeout(300)
+        moved = read_clicked(folder / "survey.csv").at("P0", "b frames")
+        assert moved == pytest.approx([u - 0.2, v + 0.9], abs=0.02)
+        page.keyboard.press("Control+z")
+        page.wait_for_timeout(1500)
+        assert read_clicked(folder / "survey.csv").at("P0", "b frames") == pytest.approx([u - 0.2, v - 0.1], abs=0.02)
+
+
+def test_two_windows_see_the_same(address, folder):
+    with open_page(address) as page:
+        wait_for_frame(page, 0)
+        other = page.context.new_page()
+        other.goto(address)
+        wait_for_frame(other, 0)
+        page.mouse.click(*at_pixel(page, 1, 100.0, 120.0))
+        marks = "() => document.querySelector('canvas.view').view.marks"
+        other.wait_for_function(f"{marks[6:]}.some(mark => mark.id?.endsWith('|fields'))")

@@ -1,0 +1,117 @@
+"""The studio as a process, and a browser that looks at it."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+SIZE = {"width": 1280, "height": 720}
+N_BITS, BLOCK_PX = 10, 24  # of numbers burnt into pictures
+
+
+@contextmanager
+def open_studio(path: Path, *options: str) -> Iterator[str]:
+    """Start the studio of a folder or trial; yield its address, with the token."""
+    command = [sys.executable, "-c", RUN, "studio", str(path), "--no-browser", *options]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    env = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}  # NiceGUI looks at it
+    with subprocess.Popen(command, cwd=path.parent, env=env, **pipes) as process:
+        try:
+            line = process.stdout.readline()
+            found = re.search(r"http://\S+", line)
+            assert found, line + process.stderr.read()
+            yield found.group(0)
+        finally:
+            process.terminate()
+            said = process.communicate(timeout=30)[1]
+    assert "Traceback" not in said, said
+
+
+@contextmanager
+def open_page(address: str, requests: list[str] | None = None) -> Iterator:
+    """Open an address in a real browser; skip without one. Every request is noted, none may leave this computer."""
+    reason = "THE STUDIO IS NOT TESTED IN A BROWSER: playwright is not installed; pip install -e '.[test]'"
+    playwright = pytest.importorskip("playwright.sync_api", reason=reason)
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        pytest.skip("THE STUDIO IS NOT TESTED IN A BROWSER: no Chromium is installed; apt-get install chromium")
+    with playwright.sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=browser, args=["--no-sandbox", "--enable-unsafe-swiftshader"])
+        context = chromium.new_context(viewport=SIZE)
+        errors: list[str] = []
+        host = address.split("/")[2]
+
+        def note(route):
+            if requests is not None:
+                requests.append(route.request.url)
+            if route.request.url.split("/")[2] == host:
+                route.continue_()
+            else:
+                route.abort()
+
+        context.route(re.compile("^https?:"), note)
+        page = context.new_page()
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+        page.goto(address)
+        yield page
+        assert errors == []
+        chromium.close()
+
+
+def wait_for_frame(page, frame: int) -> None:
+    """Wait until the pictures show a frame."""
+    page.wait_for_function("frame => document.querySelector('canvas.view')?.dataset.frame == frame", arg=str(frame))
+
+
+def at_pixel(page, pane: int, u: float, v: float) -> tuple[float, float]:
+    """Return where on the page a pixel of a camera's picture is."""
+    script = """([pane, u, v]) => {
+        const canvas = document.querySelector("canvas.view"), box = canvas.getBoundingClientRect();
+        const view = canvas.view;
+        const [x, y] = view.toScreen(view.layout()[pane], u, v);
+        return [box.left + x, box.top + y];
+    }"""
+    return tuple(page.evaluate(script, [pane, u, v]))
+
+
+def read_number(page, pane: int) -> int:
+    """Read the number that is burnt into a camera's picture, off the canvas."""
+    script = """([pane, places]) => {
+        const canvas = document.querySelector("canvas.view"), view = canvas.view;
+        const pens = canvas.getContext("2d"), ratio = window.devicePixelRatio;
+        return places.map(([u, v]) => {
+            const [x, y] = view.toScreen(view.layout()[pane], u, v);
+            return pens.getImageData(Math.round(x * ratio), Math.round(y * ratio), 1, 1).data[1];
+        });
+    }"""
+    levels = page.evaluate(script, [pane, [bit_place(bit) for bit in range(N_BITS)]])
+    return sum(int(level > 127) << bit for bit, level in enumerate(levels))
+
+
+def bit_place(bit: int) -> list[float]:
+    """Return the middle of a bit's block in a picture that carries its number [px]."""
+    return [BLOCK_PX * (bit + 1) - 0.5, 1.5 * BLOCK_PX + 40]
+
+
+def burn_numbers(n: int, size: tuple[int, int] = (320, 240)) -> list[np.ndarray]:
+    """Return grey pictures that carry their number as black and white blocks."""
+    width, height = size
+    images = []
+    for number in range(n):
+        image = np.full((height, width, 3), 90, np.uint8)
+        for bit in range(N_BITS):
+            u, v = bit_place(bit)
+            left, top, half = round(u + 0.5), round(v), BLOCK_PX // 2
+            image[top - half : top + half, left - half : left + half] = 235 if number >> bit & 1 else 20
+        images.append(image)
+    return images
