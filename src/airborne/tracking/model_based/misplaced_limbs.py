@@ -16,7 +16,6 @@ from airborne.body.chain import angles_near
 from airborne.body.limits import JointLimits
 from airborne.geometry.joint_rotations import compose_rotation_vectors
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
-from airborne.geometry.sampling import latin_hypercube
 from airborne.rendering import EvidenceMaps, mask_evidence, pose_segments
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
 from airborne.tracking.model_based.render_model import RenderModel
@@ -61,7 +60,7 @@ def search_limb(
     anywhere = np.concatenate([angles, _all_over(limits, joints, angles[0])])
     angles = _best(render_model, root, anywhere, maps, _ROUNDS[0][1])
     for number, (n_proposals, n_survivors) in enumerate(_ROUNDS):
-        steps = ndtri(latin_hypercube(3 * len(limb), n_proposals, seed=number)) * reach / 2**number
+        steps = ndtri(_sobol(3 * len(limb), n_proposals, seed=number)) * reach / 2**number
         proposed = angles[np.arange(n_proposals) % len(angles)]
         angles_of_limb = np.ascontiguousarray(proposed[:, joints]).reshape(-1, 3)
         turned = compose_rotation_vectors(angles_of_limb, steps.reshape(-1, 3)).reshape(n_proposals, len(limb), 3)
@@ -82,8 +81,15 @@ def _best(render_model: RenderModel, root: RigidTransform, angles: Array, maps: 
 def _all_over(limits: JointLimits, joints: NDArray[np.int64], angles: Array) -> Array:
     """Return joint angles (n, joints, 3) with one limb's joints anywhere in their ranges, as far as these are large."""
     turned = limits.coordinates(matrix_from_angles(angles[joints]))
-    anywhere = (2 * latin_hypercube(turned.size, _N_WIDE, seed=0).reshape(-1, *turned.shape) - 1) * limits.half_rad
+    anywhere = (2 * _sobol(turned.size, _N_WIDE, seed=0).reshape(-1, *turned.shape) - 1) * limits.half_rad
     turned = limits.nearest(np.where((limits.half_rad > _LARGE_RAD) & np.isfinite(anywhere), anywhere, turned))
     proposed = np.broadcast_to(angles, (_N_WIDE, *angles.shape)).copy()
     proposed[:, joints] = angles_from_matrix(limits.rotation(turned))
     return proposed
+
+
+def _sobol(d: int, n: int, *, seed: int) -> Array:
+    """Return n points of a Sobol sequence (n, d), in [0, 1): a Latin hypercube misses an arm, of 12 dimensions."""
+    from scipy.stats import qmc  # loaded where a limb is looked for: it takes long
+
+    return qmc.Sobol(d, rng=seed).random(n)
