@@ -1,0 +1,25 @@
+"""Pixels that err together, as a person is no set of ellipsoids, say less of a pose than as many independent ones."""
+
+import pytest
+
+from airborne.tracking.model_based.degrees_of_freedom import all_joints, root_only
+from airborne.tracking.model_based.gauss_newton import linearise_images
+from tests.support.people import FOCAL_PX, HUMAN
+from tests.tracking.test_misplaced_limb import LearnedFrame
+
+WIDTH_M, DISTANCE_M = 0.075, 4.03  # along which the error is the same; from the cameras to the person
+BLURRED_PX = 18.1  # 4 pi 1.2^2: how many pixels share the blurred noise
+
+
+@pytest.fixture(scope="module")
+def frame():
+    return LearnedFrame()
+
+
+@pytest.mark.parametrize(
+    ("dofs", "shared_px"), [(root_only, BLURRED_PX), (all_joints, (WIDTH_M * FOCAL_PX / DISTANCE_M) ** 2)]
+)
+def test_pixels_within_a_limbs_width_share_their_error_where_joints_move(frame, dofs, shared_px):
+    regions, _ = frame.views(frame.truth)
+    equations = linearise_images(frame.render_model, frame.truth, regions, frame.appearance, dofs=dofs(HUMAN))
+    assert equations.misfit / equations.noise == pytest.approx(shared_px / BLURRED_PX, rel=0.1)
