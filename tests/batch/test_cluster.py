@@ -16,7 +16,7 @@ from airborne.batch import cluster
 from airborne.batch.cluster import do_tasks, open_client
 from airborne.batch.run import run_batch
 from airborne.batch.table import write_outputs
-from airborne.batch.task import Outcome
+from airborne.batch.task import TaskOutcome
 from airborne.batch.trials import BatchTrial, list_trials
 from airborne.errors import AirborneError
 from airborne.synthetic.throw.writing import write_trial
@@ -145,7 +145,7 @@ def test_a_batch_that_cannot_start_exits_with_2(tmp_path, season, capsys):
 
 def test_a_stopped_batch_says_what_was_not_tracked(tmp_path):
     trials = [BatchTrial(name, tmp_path / f"{name}.toml", {"athlete": "<b>anna"}) for name in ("a", "b")]
-    write_outputs(tmp_path, trials, {"b": Outcome("b", "done", row={"n_frames": 3, "share_tracked": 1.0})})
+    write_outputs(tmp_path, trials, {"b": TaskOutcome("b", "done", row={"n_frames": 3, "share_tracked": 1.0})})
     with (tmp_path / "trials.csv").open() as file:
         first, second = csv.DictReader(file)
     assert (first["status"], second["status"], second["n_frames"]) == ("failed", "done", "3")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from airborne.batch.row import row_of
-from airborne.batch.task import Task, do_task, look_up
+from airborne.batch.task import Task, do_task, inspect_folder
 from airborne.batch.trials import list_trials
 from airborne.run.track import track_trial
 from airborne.synthetic.throw.writing import write_trial
@@ -57,12 +57,12 @@ def test_only_what_is_missing_or_changed_is_tracked(good, tmp_path):
     shutil.copytree(good, folder)
     task = task_of(folder, tmp_path / "out")
     assert [do_task(task).status for _ in range(2)] == ["done", "unchanged"]
-    assert look_up(task_of(folder, tmp_path / "out", pictures=True), read_trial(task.trial.path))[0] == "stopped"
+    assert inspect_folder(task_of(folder, tmp_path / "out", pictures=True), read_trial(task.trial.path))[0] == "stopped"
     (tmp_path / "out" / "throw" / "summary.json").unlink()
-    assert look_up(task, read_trial(task.trial.path))[0] == "stopped"
+    assert inspect_folder(task, read_trial(task.trial.path))[0] == "stopped"
     text = (folder / "trial.toml").read_text()
     (folder / "trial.toml").write_text(text.replace("stop = 4", "stop = 3"))
-    assert look_up(task, read_trial(task.trial.path))[0] == "changed"
+    assert inspect_folder(task, read_trial(task.trial.path))[0] == "changed"
     again = do_task(task)
     assert (again.status, again.row["n_frames"]) == ("done", 3)
 

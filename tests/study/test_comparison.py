@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from airborne.errors import AirborneError
 from airborne.study.comparison import compare_trials
-from airborne.study.curves import Curve, event_times, normalise, read_curve
+from airborne.study.curves import RunCurve, event_times, normalise_time, read_curve
 from airborne.study.random_effects import Cells, estimate_difference
 from airborne.study.spm import compare_curves
 from airborne.study.trials import read_study
@@ -68,14 +68,14 @@ def test_events_cut_and_stretch_a_curve(results):
     assert (takeoff, landing) == (0.1, 1.0)
     values = np.interp([takeoff, turn], curve.time_s, curve.values)
     np.testing.assert_allclose(values[1] - values[0], 360, rtol=1e-6)
-    at_nodes, variance = normalise(curve, [takeoff, turn, landing])
+    at_nodes, variance = normalise_time(curve, [takeoff, turn, landing])
     np.testing.assert_allclose(at_nodes[[0, 100]], values, rtol=ROUNDTRIP)
     assert len(at_nodes) == 201 and (variance == 1).all()
 
 
 def test_a_straight_line_stays_one_between_two_events():
-    curve = Curve(np.array([0.0, 0.3, 1.0]), np.array([0.0, 3.0, 10.0]), np.full(3, np.nan))
-    values, variance = normalise(curve, [0.1, 0.9])
+    curve = RunCurve(np.array([0.0, 0.3, 1.0]), np.array([0.0, 3.0, 10.0]), np.full(3, np.nan))
+    values, variance = normalise_time(curve, [0.1, 0.9])
     np.testing.assert_allclose(values, np.linspace(1, 9, 101), rtol=ROUNDTRIP)
     assert not variance.any(), "an unknown standard deviation counts as none"
 

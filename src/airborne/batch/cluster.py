@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
-from airborne.batch.task import Outcome, Report, Task, do_task
+from airborne.batch.task import Report, Task, TaskOutcome, do_task
 from airborne.errors import AirborneError, count
 
 if TYPE_CHECKING:
@@ -87,9 +87,9 @@ def do_tasks(
     client: Client,
     tasks: Sequence[Task],
     *,
-    work: Callable[[Task, Report], Outcome] = do_task,
+    work: Callable[[Task, Report], TaskOutcome] = do_task,
     report: Report = lambda name, done, total: None,
-) -> Iterator[Outcome]:
+) -> Iterator[TaskOutcome]:
     """Do tasks on a cluster, the first first, and yield each one's outcome when it ends.
 
     A task whose worker dies is done again by another, and so goes on where it stopped; after a few deaths it fails.
@@ -112,7 +112,7 @@ def do_tasks(
                 except CancelledError:  # the scheduler went between
                     return
             elif future.status == "error":
-                yield Outcome(names[str(future.key)], "failed", _describe_end(future.exception()))
+                yield TaskOutcome(names[str(future.key)], "failed", _describe_end(future.exception()))
             else:  # the scheduler is gone, and with it all the others
                 return
             future.release()
@@ -120,7 +120,7 @@ def do_tasks(
         client.unsubscribe_topic(_TOPIC)
 
 
-def _work_and_tell(work: Callable[[Task, Report], Outcome], task: Task) -> Outcome:
+def _work_and_tell(work: Callable[[Task, Report], TaskOutcome], task: Task) -> TaskOutcome:
     """Do a task on a worker, and tell the batch of its frames."""
     from distributed import get_worker
 

@@ -20,7 +20,7 @@ _WORD = re.compile(r"\{(\w+)\}")
 
 
 @dataclass(frozen=True, slots=True)
-class Study:
+class NewStudy:
     """What was written: the session's file, the trials' files, and what is incomplete, a line each."""
 
     session: Path
@@ -30,7 +30,7 @@ class Study:
 
 def write_study(
     videos: Path, pattern: str, folder: Path, *, calibration: str = "calib.toml", body: str = "body.toml"
-) -> Study:
+) -> NewStudy:
     """Write session.toml and trials/<name>.toml into a folder, for the videos whose paths below `videos` fit a pattern.
 
     Words in braces, as in "{athlete}_{condition}_{number}_{camera}.mp4", become labels; `{camera}` tells the videos of
@@ -59,7 +59,7 @@ def write_study(
         missing = [camera for camera in cameras if camera not in by_camera]
         if missing:
             notes.append(f"{files[-1].name}: no video of {', '.join(missing)}; give it its own [[camera]] tables")
-    return Study(session, tuple(files), tuple(notes))
+    return NewStudy(session, tuple(files), tuple(notes))
 
 
 def _match(videos: Path, pattern: str) -> dict[tuple[str, ...], dict[str, Path]]:

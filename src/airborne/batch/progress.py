@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from airborne.batch.task import Outcome
+from airborne.batch.task import TaskOutcome
 from airborne.io.terminal import errors
 
 _MOST_SHOWN = 20  # trials that run, of which a line each is shown
@@ -39,7 +39,7 @@ class BatchProgress:
         self._running[name] = (start_s, done, total)
         self._show()
 
-    def end(self, outcome: Outcome) -> None:
+    def end(self, outcome: TaskOutcome) -> None:
         """Note that a trial has ended."""
         self._running.pop(outcome.name, None)
         self._ended.add(outcome.name)

@@ -16,7 +16,7 @@ from airborne.io.text import read_json
 from airborne.motion.flight.phases import find_flight_events
 from airborne.motion.run_folder import SUMMARY
 
-Row = dict[str, Any]
+TableRow = dict[str, Any]
 _STATUSES = ("tracked", "uncertain", "lost")
 _OF_A_BODY = ("median_position_sd_mm", "median_rotation_sd_deg", "somersault_rev", "twist_rev")
 _OF_A_FLIGHT = ("fitted_gravity_m_s2", "ballistic_rms_mm")
@@ -29,7 +29,7 @@ _OF_A_JUMP = (
 )  # of the highest of a trial's jumps
 
 
-def row_of(folder: Path) -> Row:
+def row_of(folder: Path) -> TableRow:
     """Return the columns of the finished run in a folder, in the order of the table; those that it lacks are left out.
 
     A number's standard deviation, where the run states one, is `<name>_sd`.
@@ -49,7 +49,7 @@ def row_of(folder: Path) -> Row:
     return row | {"version": summary["versions"]["airborne"]}
 
 
-def _flight(flight: Mapping[str, Any]) -> Row:
+def _flight(flight: Mapping[str, Any]) -> TableRow:
     """Return the angular momentum and how free the flight was."""
     momentum = flight.get("angular_momentum_kg_m2_s")
     if momentum is None or None in momentum:
@@ -58,7 +58,7 @@ def _flight(flight: Mapping[str, Any]) -> Row:
     return named | {"L_kg_m2_s": math.hypot(*momentum)} | {name: flight[name] for name in _OF_A_FLIGHT}
 
 
-def _jump(path: Path) -> Row:
+def _jump(path: Path) -> TableRow:
     """Return take-off, landing and rise of the first whole flight of a body with masses."""
     if not path.is_file():
         return {}
@@ -79,7 +79,7 @@ def _jump(path: Path) -> Row:
     return {}
 
 
-def _highest_jump(jumps: list[dict[str, Any]]) -> Row:
+def _highest_jump(jumps: list[dict[str, Any]]) -> TableRow:
     """Return how many jumps players made, and the highest by the hips, its sd from its 95 % interval."""
     known = [jump for jump in jumps if isinstance(jump.get(_OF_A_JUMP[0]), float)]
     row: dict[str, Any] = {"n_jumps": len(jumps)}

@@ -9,7 +9,7 @@ from pathlib import Path
 from airborne.batch.cluster import count_cores, do_tasks, open_client
 from airborne.batch.progress import show_progress
 from airborne.batch.table import not_reached, write_outputs
-from airborne.batch.task import LOGS, THUMBNAILS, Outcome, Task, look_up
+from airborne.batch.task import LOGS, THUMBNAILS, Task, TaskOutcome, inspect_folder
 from airborne.batch.trials import BatchTrial
 from airborne.errors import AirborneError, ResultError
 from airborne.io.folder_lock import sole_writer
@@ -20,7 +20,7 @@ from airborne.trial.file import read_trial
 class BatchResult:
     """How the trials of a batch ended, in the order of its table, and the files that it wrote."""
 
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[TaskOutcome, ...]
     files: tuple[Path, ...]
 
 
@@ -49,7 +49,7 @@ def run_batch(
     machines = machines or Machines()
     tasks = plan_tasks(trials, folder, pictures=pictures)
     n_workers = min(machines.workers or count_cores(), len(tasks))
-    outcomes: dict[str, Outcome] = {}
+    outcomes: dict[str, TaskOutcome] = {}
     with sole_writer(folder):
         try:
             with open_client(machines.scheduler, n_workers, machines.memory) as client:
@@ -96,7 +96,7 @@ def describe_plan(tasks: Sequence[Task]) -> list[str]:
     lines = []
     for task in tasks:
         try:
-            lines.append(f"{task.trial.name}: {words[look_up(task, read_trial(task.trial.path))[0]]}")
+            lines.append(f"{task.trial.name}: {words[inspect_folder(task, read_trial(task.trial.path))[0]]}")
         except AirborneError as error:
             lines.append(f"{task.trial.name}: cannot be tracked: {error}")
     return lines

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from airborne.batch.task import LOGS, Outcome, thumbnail_of
+from airborne.batch.task import LOGS, TaskOutcome, thumbnail_of
 from airborne.batch.trials import TABLE, BatchTrial, label_names
 from airborne.errors import count
 from airborne.export.page import label, render_page
@@ -22,7 +22,7 @@ PAGE = "index.html"
 _ON_THE_PAGE = ("share_tracked", "somersault_rev", "twist_rev", "L_kg_m2_s", "com_rise_m", "hip_height_m", "n_alarms")
 
 
-def write_outputs(folder: Path, trials: Sequence[BatchTrial], outcomes: Mapping[str, Outcome]) -> list[Path]:
+def write_outputs(folder: Path, trials: Sequence[BatchTrial], outcomes: Mapping[str, TaskOutcome]) -> list[Path]:
     """Write trials.csv, with pyarrow also trials.parquet, and index.html; return their paths.
 
     The table is in the order of the trials and holds nothing that depends on when or where they were tracked.
@@ -50,9 +50,9 @@ def write_outputs(folder: Path, trials: Sequence[BatchTrial], outcomes: Mapping[
     return written
 
 
-def not_reached(trial: BatchTrial) -> Outcome:
+def not_reached(trial: BatchTrial) -> TaskOutcome:
     """Return the outcome of a trial that was not tracked before the batch ended."""
-    return Outcome(
+    return TaskOutcome(
         trial.name, "failed", "not tracked: the batch was stopped, or its scheduler lost; give the command again"
     )
 

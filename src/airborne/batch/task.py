@@ -15,7 +15,7 @@ from typing import Any, Literal
 import cv2
 
 from airborne import __version__
-from airborne.batch.row import Row, row_of
+from airborne.batch.row import TableRow, row_of
 from airborne.batch.trials import BatchTrial
 from airborne.errors import AirborneError
 from airborne.export import write_json
@@ -25,8 +25,8 @@ from airborne.run.folder import run_identity
 from airborne.run.track import track_trial
 from airborne.trial.file import Trial, read_trial
 
-Status = Literal["done", "unchanged", "failed"]
-State = Literal["new", "stopped", "changed", "unchanged"]  # what a folder holds of a trial
+TaskStatus = Literal["done", "unchanged", "failed"]
+FolderState = Literal["new", "stopped", "changed", "unchanged"]  # what a folder holds of a trial
 
 LOGS, THUMBNAILS = "logs", "thumbnails"  # folders of a batch beside those of its trials
 _THUMBNAIL_PX = 160  # width, so that a row of the page is a finger high
@@ -60,19 +60,19 @@ class Task:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class TaskOutcome:
     """How a task ended."""
 
     name: str
-    status: Status
+    status: TaskStatus
     error: str = ""  # one line, of a failed one
-    row: Row = field(default_factory=dict)  # of the batch's table
+    row: TableRow = field(default_factory=dict)  # of the batch's table
 
 
 Report = Callable[[str, int, int | None], None]  # the trial's name, frames done and expected
 
 
-def do_task(task: Task, report: Report = lambda name, done, total: None) -> Outcome:
+def do_task(task: Task, report: Report = lambda name, done, total: None) -> TaskOutcome:
     """Bring a trial's run to its end: track it, go on where it stopped, or find that nothing has changed.
 
     Whatever goes wrong is one line of the outcome, and more in the log.
@@ -86,7 +86,7 @@ def do_task(task: Task, report: Report = lambda name, done, total: None) -> Outc
             log.flush()
 
         note(f"process {os.getpid()} on {platform.node()}: {task.trial.path}, airborne {__version__}")
-        status: Status = "failed"
+        status: TaskStatus = "failed"
         error, row = "", {}
         try:
             status = _bring_to_end(task, report, note)
@@ -102,17 +102,17 @@ def do_task(task: Task, report: Report = lambda name, done, total: None) -> Outc
             error = f"unexpected {type(problem).__name__}: {problem}; {LOGS}/{task.log.name} says where"
         error = " ".join(error.split())
         note(f"{status} after {time.monotonic() - started_s:.1f} s{f': {error}' if error else ''}")
-    return Outcome(task.trial.name, status, error, row)
+    return TaskOutcome(task.trial.name, status, error, row)
 
 
-def _bring_to_end(task: Task, report: Report, note: Callable[[str], None]) -> Status:
+def _bring_to_end(task: Task, report: Report, note: Callable[[str], None]) -> TaskStatus:
     """Track a trial as far as that is needed, and return how."""
     if task.version != __version__:
         raise AirborneError(
             f"the worker has airborne {__version__}, the batch {task.version}; install the same on every machine"
         )
     trial = read_trial(task.trial.path)
-    state, identity = look_up(task, trial)
+    state, identity = inspect_folder(task, trial)
     note(state)
     if state != "unchanged":
         if identity is not None:
@@ -138,7 +138,7 @@ def _bring_to_end(task: Task, report: Report, note: Callable[[str], None]) -> St
     return "unchanged" if state == "unchanged" else "done"
 
 
-def look_up(task: Task, trial: Trial) -> tuple[State, dict[str, Any] | None]:
+def inspect_folder(task: Task, trial: Trial) -> tuple[FolderState, dict[str, Any] | None]:
     """Return what the folder holds of a trial, and what the trial's inputs are; None where one is missing."""
     try:
         identity = run_identity(trial)

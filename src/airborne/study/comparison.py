@@ -10,7 +10,7 @@ import numpy as np
 
 from airborne.errors import ResultError
 from airborne.export.page import label
-from airborne.study.curves import NODES, Curve, event_times, list_curves, normalise, read_curve, sample
+from airborne.study.curves import NODES, RunCurve, event_times, list_curves, normalise_time, read_curve, sample
 from airborne.study.random_effects import Cells, Difference, Spread, estimate_difference, within_spread
 from airborne.study.spm import CurveTest, compare_curves
 from airborne.study.trials import Study, StudyTrial
@@ -31,7 +31,7 @@ class Contrast:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Comparison:
+class VariableComparison:
     """A variable of a study: a number of each trial, or a curve."""
 
     variable: str
@@ -50,7 +50,9 @@ class Comparison:
         return label(self.variable)
 
 
-def compare_trials(study: Study, variable: str, events: Sequence[str], *, real_time: bool = False) -> Comparison:
+def compare_trials(
+    study: Study, variable: str, events: Sequence[str], *, real_time: bool = False
+) -> VariableComparison:
     """Compare a column of the batch's table, or a curve of the runs between events, across conditions.
 
     Normalised, each stretch from event to event takes 100 %; in real time, seconds since the first event, as far as
@@ -76,19 +78,19 @@ def compare_trials(study: Study, variable: str, events: Sequence[str], *, real_t
 
 
 def _sample_all(
-    curves: Sequence[tuple[Curve, list[float]]], *, real_time: bool
+    curves: Sequence[tuple[RunCurve, list[float]]], *, real_time: bool
 ) -> tuple[Array, list[tuple[Array, Array]]]:
     """Return the common axis, and each curve with its variance on it."""
     if not real_time:
         n = len(curves[0][1]) - 1
-        return np.linspace(0, 100 * n, NODES * n + 1), [normalise(curve, times) for curve, times in curves]
+        return np.linspace(0, 100 * n, NODES * n + 1), [normalise_time(curve, times) for curve, times in curves]
     shortest_s = min(times[-1] - times[0] for _, times in curves)
     period_s = float(np.median([np.median(np.diff(curve.time_s)) for curve, _ in curves]))
     axis = np.arange(0, shortest_s + period_s / 1e6, period_s)
     return axis, [sample(curve, times[0] + axis) for curve, times in curves]
 
 
-def _compare_numbers(study: Study, variable: str) -> Comparison:
+def _compare_numbers(study: Study, variable: str) -> VariableComparison:
     trials = [trial for trial in study.trials if trial.number(variable) is not None]
     left_out = [f"{trial.name}: no {variable}" for trial in study.trials if trial not in trials]
     values = np.array([[trial.number(variable)] for trial in trials], float)
@@ -106,7 +108,7 @@ def _compare(
     axis: Array | None,
     axis_label: str,
     left_out: Sequence[str],
-) -> Comparison:
+) -> VariableComparison:
     athletes = tuple(dict.fromkeys(trial.athlete for trial in trials))
     present = {trial.condition for trial in trials}
     conditions = tuple(name for name in study.conditions if name in present)
@@ -123,7 +125,7 @@ def _compare(
     is_number = axis is None
     adjusted = adjust_holm([float(each.p[0]) for each in differences]) if is_number else [None] * len(pairs)
     tests = [None if is_number else compare_curves(each, ALPHA / len(pairs)) for each in differences]
-    return Comparison(
+    return VariableComparison(
         variable=variable,
         axis=axis,
         axis_label=axis_label,

@@ -17,7 +17,7 @@ from airborne.study.trials import LARGEST, StudyTrial
 from airborne.types import Array
 
 NODES = 100  # of a curve between two events: one a percent
-EVENTS = ("start", "end", "take-off", "landing", "turn-1")  # turn-2, ... too
+CURVE_EVENTS = ("start", "end", "take-off", "landing", "turn-1")  # turn-2, ... too
 _TURN = re.compile(r"turn-([1-9]\d?)")
 _OF_THE_ROW = {"take-off": "takeoff_s", "landing": "landing_s"}
 _WIDE = ("tables/angles.csv", "tables/flight.csv")
@@ -28,7 +28,7 @@ _FEWEST = 3  # known frames of a curve
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Curve:
+class RunCurve:
     """A variable of one run over its known frames."""
 
     time_s: Array  # (n,)
@@ -36,7 +36,7 @@ class Curve:
     sd: Array  # (n,), NaN where the run states none
 
 
-def read_curve(trial: StudyTrial, variable: str) -> Curve:
+def read_curve(trial: StudyTrial, variable: str) -> RunCurve:
     """Read a variable of a trial's run: a column of angles.csv or flight.csv, or `<joint>_x_m`, `<joint>_x_deg`.
 
     Raises ResultError where the run has none, or hardly any frames of it.
@@ -44,7 +44,7 @@ def read_curve(trial: StudyTrial, variable: str) -> Curve:
     for name in _WIDE:
         table = _read(trial.folder / name)
         if variable in table:
-            return _known(trial, variable, table["time_s"], table[variable], table.get(f"{variable}_sd"))
+            return _drop_unknown(trial, variable, table["time_s"], table[variable], table.get(f"{variable}_sd"))
     named = re.fullmatch(r"(.+)_([xyz])_(m|deg)", variable)
     for name, (unit, sd) in _LONG.items():
         table = _read(trial.folder / name)
@@ -56,7 +56,7 @@ def read_curve(trial: StudyTrial, variable: str) -> Curve:
         column = table.get(f"{named[2]}_{unit}")
         if mask.any() and column is not None:
             stated = table.get(sd.format(axis=named[2]), np.full(len(mask), ""))
-            return _known(trial, variable, table["time_s"][mask], column[mask], stated[mask])
+            return _drop_unknown(trial, variable, table["time_s"][mask], column[mask], stated[mask])
     raise ResultError(f"{trial.name}: its run has no {variable}; it has: {', '.join(list_curves(trial)[:40])}")
 
 
@@ -70,7 +70,7 @@ def list_curves(trial: StudyTrial) -> list[str]:
     return names
 
 
-def event_times(trial: StudyTrial, curve: Curve, events: Sequence[str]) -> list[float]:
+def event_times(trial: StudyTrial, curve: RunCurve, events: Sequence[str]) -> list[float]:
     """Return the times of events [s], in their order.
 
     `start` and `end` are the curve's; take-off and landing those of the trial's row; `turn-2` is when the body has
@@ -97,18 +97,18 @@ def require_events(events: Sequence[str]) -> None:
     """Raise AirborneError where one of the events is none, or there are fewer than two."""
     for name in events:
         if not _TURN.fullmatch(name):
-            require_choice(name, EVENTS, "event")
+            require_choice(name, CURVE_EVENTS, "event")
     if len(events) < 2:
         raise ResultError(f"events {', '.join(events) or 'none'}: give two or more, such as take-off,landing")
 
 
-def normalise(curve: Curve, times: Sequence[float]) -> tuple[Array, Array]:
+def normalise_time(curve: RunCurve, times: Sequence[float]) -> tuple[Array, Array]:
     """Return a curve and its variance at 101 nodes between each two events, ends shared: (nodes,) each."""
     share = np.linspace(0, len(times) - 1, NODES * (len(times) - 1) + 1)
     return sample(curve, np.interp(share, np.arange(len(times)), times))
 
 
-def sample(curve: Curve, time_s: Array) -> tuple[Array, Array]:
+def sample(curve: RunCurve, time_s: Array) -> tuple[Array, Array]:
     """Return a curve and its variance at some times, linear between the known frames; 0 where none is stated."""
     sd = np.interp(time_s, curve.time_s, np.where(np.isfinite(curve.sd), curve.sd, 0.0))
     return np.interp(time_s, curve.time_s, curve.values), sd**2
@@ -138,13 +138,13 @@ def _read(path: Path) -> dict[str, NDArray[np.str_]]:
     return dict(zip(names, np.array(cells, str).reshape(len(cells), len(names)).T, strict=True))
 
 
-def _known(
+def _drop_unknown(
     trial: StudyTrial,
     variable: str,
     time_s: NDArray[np.str_],
     values: NDArray[np.str_],
     sd: NDArray[np.str_] | None,
-) -> Curve:
+) -> RunCurve:
     """Return the curve of three columns where its values are known."""
     texts = (time_s, values, np.full(len(values), "") if sd is None else sd)
     try:
@@ -156,4 +156,4 @@ def _known(
         raise ResultError(
             f"{trial.name}: {variable} is known in {is_known.sum()} frames, {_FEWEST} at least are needed"
         )
-    return Curve(*(column[is_known] for column in numbers))
+    return RunCurve(*(column[is_known] for column in numbers))

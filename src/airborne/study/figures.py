@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from airborne.export import panels
 from airborne.export.page import label
 from airborne.io.figures import save_png
-from airborne.study.comparison import Comparison, Contrast
+from airborne.study.comparison import Contrast, VariableComparison
 from airborne.types import Array
 
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito
@@ -22,7 +22,7 @@ _COLUMNS = 3  # of the athletes' panels
 _DPI = 300  # of print
 
 
-def write_comparison_figures(folder: Path, comparison: Comparison, stem: str) -> list[Path]:
+def write_comparison_figures(folder: Path, comparison: VariableComparison, stem: str) -> list[Path]:
     """Draw a comparison, and its athletes one by one; return the paths."""
     paths = [folder / f"{stem}.png", folder / f"{stem}_athletes.png"]
     if comparison.axis is None:
@@ -33,7 +33,7 @@ def write_comparison_figures(folder: Path, comparison: Comparison, stem: str) ->
     return paths
 
 
-def _curves(comparison: Comparison, axis: Array) -> Figure:
+def _curves(comparison: VariableComparison, axis: Array) -> Figure:
     """Draw the conditions' means of athletes ± sd; below for each pair the difference and Student's t."""
     contrasts = comparison.contrasts
     rows = 1 + 2 * len(contrasts)
@@ -78,7 +78,7 @@ def _draw_test(axes: Axes, axis: Array, contrast: Contrast) -> None:
     panels.label_panel(axes, "SPM{t}")
 
 
-def _athletes(comparison: Comparison, axis: Array) -> Figure:
+def _athletes(comparison: VariableComparison, axis: Array) -> Figure:
     """Draw each athlete's trials, mean ± sd by condition."""
     cells, n = comparison.cells, len(comparison.athletes)
     columns = min(_COLUMNS, n)
@@ -109,7 +109,7 @@ def _band(axes: Axes, axis: Array, values: Array, *, colour: str, text: str) -> 
         axes.fill_between(axis, mean - sd, mean + sd, color=colour, alpha=0.2, linewidth=0)
 
 
-def _numbers(comparison: Comparison) -> Figure:
+def _numbers(comparison: VariableComparison) -> Figure:
     """Draw every trial by condition, and each athlete's means joined."""
     figure = Figure((panels.WIDTH_IN / 2, 1.3 * _PANEL_IN), layout="constrained")
     axes, cells = figure.subplots(), comparison.cells

@@ -8,7 +8,7 @@ import numpy as np
 
 from airborne import __version__
 from airborne.errors import count
-from airborne.study.comparison import ALPHA, Comparison, Contrast
+from airborne.study.comparison import ALPHA, Contrast, VariableComparison
 
 _REFERENCES = {
     "random effects": (
@@ -32,7 +32,7 @@ _LEVELS = {
 }
 
 
-def describe_study(comparisons: Sequence[Comparison], events: Sequence[str], *, real_time: bool) -> str:
+def describe_study(comparisons: Sequence[VariableComparison], events: Sequence[str], *, real_time: bool) -> str:
     """Return a methods paragraph, one of results, what was left out, and the references."""
     curves = [each for each in comparisons if each.axis is not None]
     numbers = [each for each in comparisons if each.axis is None]
@@ -77,12 +77,12 @@ def describe_study(comparisons: Sequence[Comparison], events: Sequence[str], *, 
     return "\n".join(lines) + "\n"
 
 
-def _references(**used: Sequence[Comparison]) -> list[str]:
+def _references(**used: Sequence[VariableComparison]) -> list[str]:
     names = ["random effects", *(name for name, comparisons in used.items() if comparisons)]
     return sorted(reference for name in names for reference in _REFERENCES[name])
 
 
-def _results(comparison: Comparison) -> list[str]:
+def _results(comparison: VariableComparison) -> list[str]:
     spread = comparison.spread
     sentences = [
         _number(each, comparison) if comparison.axis is None else _curve(each, comparison)
@@ -98,7 +98,7 @@ def _results(comparison: Comparison) -> list[str]:
     return sentences
 
 
-def _number(contrast: Contrast, comparison: Comparison) -> str:
+def _number(contrast: Contrast, comparison: VariableComparison) -> str:
     difference = contrast.difference
     return (
         f"{contrast.b} minus {contrast.a} {difference.value[0]:.4g}, 95 % interval {difference.low[0]:.4g} to "
@@ -106,7 +106,7 @@ def _number(contrast: Contrast, comparison: Comparison) -> str:
     )
 
 
-def _curve(contrast: Contrast, comparison: Comparison) -> str:
+def _curve(contrast: Contrast, comparison: VariableComparison) -> str:
     test, axis = contrast.test, comparison.axis
     assert test is not None and axis is not None, "a curve has a test"
     level = _describe_level(contrast, comparison)
@@ -125,7 +125,7 @@ def _curve(contrast: Contrast, comparison: Comparison) -> str:
     )
 
 
-def _describe_level(contrast: Contrast, comparison: Comparison) -> str:
+def _describe_level(contrast: Contrast, comparison: VariableComparison) -> str:
     a, b = contrast.difference.samples
     level = contrast.difference.level
     n = count(len(a), "athlete") if level == "within athletes" else f"{len(a)} and {len(b)}"

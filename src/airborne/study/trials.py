@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from airborne.batch.trials import TABLE
 from airborne.errors import ResultError
 from airborne.io.text import read_csv
 
-TABLE = "trials.csv"
 ATHLETE, CONDITION = "athlete", "condition"  # the labels that a study needs
 LARGEST = 1e100  # no measurement is larger, and its square is still a number
 _FORM = "the table of a batch has columns trial, athlete, condition, status, folder"

@@ -14,7 +14,7 @@ from airborne.errors import AirborneError
 from airborne.io.names import file_stem
 from airborne.io.writing import write_text
 from airborne.motion.tables import cell
-from airborne.study.comparison import Comparison, compare_trials
+from airborne.study.comparison import VariableComparison, compare_trials
 from airborne.study.curves import require_events
 from airborne.study.figures import write_comparison_figures
 from airborne.study.spm import check_spm1d
@@ -71,7 +71,7 @@ def _write_table(path: Path, rows: Iterator[Mapping[str, Any]]) -> None:
     write_text(path, text.getvalue())
 
 
-def _means(comparison: Comparison) -> Iterator[dict[str, Any]]:
+def _means(comparison: VariableComparison) -> Iterator[dict[str, Any]]:
     """Yield each athlete's mean and sd in each condition, of a number; then all athletes' (the sd between them)."""
     if comparison.axis is not None:
         return
@@ -91,7 +91,7 @@ def _mean_row(variable: str, condition: str, athlete: str, values: np.ndarray) -
     return row | {"n": len(values), "mean": float(values.mean()), "sd": sd}
 
 
-def _differences(comparison: Comparison) -> Iterator[dict[str, Any]]:
+def _differences(comparison: VariableComparison) -> Iterator[dict[str, Any]]:
     """Yield the difference of each pair of conditions; of a curve that where it is largest."""
     spread = comparison.spread
     for each in comparison.contrasts:
@@ -117,7 +117,7 @@ def _differences(comparison: Comparison) -> Iterator[dict[str, Any]]:
         }
 
 
-def _curve_rows(comparison: Comparison) -> Iterator[dict[str, Any]]:
+def _curve_rows(comparison: VariableComparison) -> Iterator[dict[str, Any]]:
     """Yield every node of the conditions' means of athletes, and of the differences with their intervals and t."""
     axis, cells = comparison.axis, comparison.cells
     if axis is None:
@@ -148,7 +148,7 @@ def _curve_rows(comparison: Comparison) -> Iterator[dict[str, Any]]:
             }
 
 
-def _clusters(comparison: Comparison) -> Iterator[dict[str, Any]]:
+def _clusters(comparison: VariableComparison) -> Iterator[dict[str, Any]]:
     """Yield the stretches of a curve in which two conditions differ."""
     axis = comparison.axis
     for each in comparison.contrasts:

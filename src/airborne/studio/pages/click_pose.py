@@ -191,7 +191,7 @@ class ClickPanel:
 
     def _marks(self) -> Iterator[Mark]:
         for name in self.clicked.names:
-            to = self._agreed_px(name)
+            to = self._consensus_px(name)
             for pane, camera in enumerate(self.shown.names):
                 u, v = map(float, self._at(name, camera))
                 if np.isfinite(u):
@@ -209,7 +209,7 @@ class ClickPanel:
     def _at(self, name: str, camera: str) -> Array:
         return self.clicked.at(name, camera) if name in self.clicked.names else np.full(2, np.nan)
 
-    def _agreed_px(self, name: str) -> Array:
+    def _consensus_px(self, name: str) -> Array:
         """Return where the cameras see the point they agree on best: (cameras, 2) [px], NaN with fewer than two."""
         px = np.stack([self._at(name, camera) for camera in self.rig.names])
         point = self.rig.points_from_px(px)
@@ -218,4 +218,4 @@ class ClickPanel:
     def _off_px(self, name: str) -> tuple[Mask, Array]:
         """Say of a landmark whether it is clicked, and how far from where the cameras agree, in each camera [px]."""
         px = np.stack([self._at(name, camera) for camera in self.shown.names])
-        return np.isfinite(px[:, 0]), np.linalg.norm(self._agreed_px(name) - px, axis=1)
+        return np.isfinite(px[:, 0]), np.linalg.norm(self._consensus_px(name) - px, axis=1)
