@@ -5,7 +5,7 @@ import signal
 import time
 from pathlib import Path
 
-from airborne.batch.task import Outcome, Task
+from airborne.batch.task import Task, TaskOutcome
 from airborne.batch.trials import BatchTrial
 
 SLEEP_S = 0.02
@@ -20,12 +20,12 @@ def note_name(task, report):
     report(task.trial.name, 1, 1)
     with (task.batch / task.trial.name).open("a") as file:
         file.write(f"{os.getpid()}\n")
-    return Outcome(task.trial.name, "done", row={"n_frames": 1})
+    return TaskOutcome(task.trial.name, "done", row={"n_frames": 1})
 
 
 def sleep_shortly(task, report):
     time.sleep(SLEEP_S)
-    return Outcome(task.trial.name, "done")
+    return TaskOutcome(task.trial.name, "done")
 
 
 def die_once(task, report):
