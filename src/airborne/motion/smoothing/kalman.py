@@ -9,11 +9,11 @@ discrete noise of a continuous white jerk). With white noise alone the result is
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+from scipy.optimize import OptimizeResult, minimize_scalar
 
 from airborne.kernels import kernel
 from airborne.motion.free_fall import GENERIC_NOISE
@@ -86,7 +86,7 @@ def maximum_likelihood_density(time_s: Array, values: Array, noise: MeasurementN
         return -kalman_filter(state_space_model(time_s, values, noise, 10.0**log_density), values)[-1]
 
     result = minimize_scalar(cost, bounds=_LOG_DENSITY, method="bounded", options={"xatol": _LOG_STEP})
-    return float(10.0**result.x)
+    return float(10.0 ** cast(OptimizeResult, result).x)
 
 
 def state_space_model(time_s: Array, values: Array, noise: MeasurementNoise, density: float) -> StateSpaceModel:
