@@ -383,3 +383,11 @@ def test_plain_turns_are_written_in_plain_degrees_and_nothing_needless(tmp_path)
     assert "rotation_deg = [10.0, 20.0, 30.0]" in text
     for needless in ("rotation_deg = [0", "slab_m", "limits_deg", "inertia", "landmark", "-0.0,"):
         assert needless not in text
+
+
+@pytest.mark.parametrize("text", ["[[segment]]\nname = 3\n", "segment", "name = 'a'\n"])
+def test_the_meshes_of_a_damaged_file_are_refused_in_one_line(tmp_path, text):
+    (tmp_path / "body.toml").write_text(text)
+    with pytest.raises(BodyError, match=r"^body\.toml") as error:
+        mesh_files(tmp_path / "body.toml")
+    assert "\n" not in str(error.value)

@@ -100,23 +100,27 @@ class _BodyTable(_Strict):
 
 def read_body(path: Path) -> BodyModel:
     """Read a body file; raises BodyError, naming the file and what is wrong, for anything unusable."""
-    try:
-        document = read_toml(path)
-        if "segment" not in document:
-            raise BodyError(f"{path.name} is no body file: it has no [[segment]] (found {list_keys(document)})")
-        table = _BodyTable.model_validate(document)
-    except OSError as error:
-        raise BodyError(f"{path.name}: cannot be read ({error.strerror})") from error
-    except tomllib.TOMLDecodeError as error:
-        raise BodyError(f"{path.name}: not a TOML file: {error}; expected a body's [[segment]] tables") from error
-    except ValidationError as error:
-        raise BodyError(f"{path.name}: {one_line(error, document, _BodyTable)}") from error
+    table = _read_table(path)
     segments = tuple(_segment(segment, path) for segment in table.segment)
     landmarks = tuple(Landmark(mark.name, mark.segment, np.array(mark.position_m)) for mark in table.landmark)
     try:
         return BodyModel(table.name, segments, landmarks)
     except BodyError as error:
         raise BodyError(f"{path.name}: {error}") from error
+
+
+def _read_table(path: Path) -> _BodyTable:
+    try:
+        document = read_toml(path)
+        if "segment" not in document:
+            raise BodyError(f"{path.name} is no body file: it has no [[segment]] (found {list_keys(document)})")
+        return _BodyTable.model_validate(document)
+    except OSError as error:
+        raise BodyError(f"{path.name}: cannot be read ({error.strerror})") from error
+    except tomllib.TOMLDecodeError as error:
+        raise BodyError(f"{path.name}: not a TOML file: {error}; expected a body's [[segment]] tables") from error
+    except ValidationError as error:
+        raise BodyError(f"{path.name}: {one_line(error, document, _BodyTable)}") from error
 
 
 def _segment(table: _SegmentTable, path: Path) -> Segment:
@@ -193,9 +197,8 @@ def _shape(table: _PartTable, path: Path) -> Shape:
 
 
 def mesh_files(path: Path) -> list[str]:
-    """Return the mesh files that a readable body file names, relative to it."""
-    table = _BodyTable.model_validate(read_toml(path))
-    return [part.file for segment in table.segment for part in segment.part if part.file is not None]
+    """Return the mesh files that a body file names, relative to it; raises BodyError for a file that cannot be read."""
+    return [part.file for segment in _read_table(path).segment for part in segment.part if part.file is not None]
 
 
 def write_body(path: Path, model: BodyModel) -> None:
