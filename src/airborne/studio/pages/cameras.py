@@ -62,22 +62,15 @@ def _chooser(session: Session, files: list[str], surveys: list[str], table: dict
             ui.navigate.reload()
 
     with ui.element("div").classes("row-line"):
-        if files:
-            present = table.get("file")
-            ui.select(
-                files,
-                label="calibration file",
-                value=present if present in files else None,
-                on_change=lambda event: use("file", event.value),
-            ).props("outlined dense options-dense").style("min-width: 260px")
-        if surveys:
-            present = table.get("control_points")
-            ui.select(
-                surveys,
-                label="surveyed points",
-                value=present if present in surveys else None,
-                on_change=lambda event: use("control_points", event.value),
-            ).props("outlined dense options-dense").style("min-width: 260px")
+        for key, names, label in (("file", files, "calibration file"), ("control_points", surveys, "surveyed points")):
+            if names:
+                present = table.get(key)
+                ui.select(
+                    names,
+                    label=label,
+                    value=present if present in names else None,
+                    on_change=lambda event, key=key: use(key, event.value),
+                ).props("outlined dense options-dense").style("min-width: 260px")
 
 
 def _list_calibrations(folder: Path, wanted: set[str]) -> list[str]:
