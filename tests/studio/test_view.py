@@ -7,7 +7,7 @@ import pytest
 from airborne.studio.clicks import read_clicked
 from airborne.video import VideoWriter, weave
 from tests.support.clips import write_clip
-from tests.support.studio import at_pixel, burn_numbers, open_page, open_studio, read_number, wait_for_frame
+from tests.support.studio import at_pixel, burn_numbers, go_home, open_page, open_studio, read_number, wait_for_frame
 
 N = 60
 IRREGULAR = [40 * k + (k * k) % 19 for k in range(N)]  # ms
@@ -56,7 +56,7 @@ def expected(frame):
 def test_the_frame_shown_is_the_one_asked_for(address):
     requests = []
     with open_page(address, requests) as page:
-        wait_for_frame(page, 0)
+        go_home(page)
         frame, canvas = 0, page.locator("canvas.view")
         canvas.focus()
         keys = ["ArrowRight"] * 5 + ["Shift+ArrowRight"] * 2 + [".", ",", "Shift+ArrowLeft", "End", "ArrowLeft", "Home"]
@@ -73,7 +73,7 @@ def test_the_frame_shown_is_the_one_asked_for(address):
 
 def test_a_click_lands_to_the_tenth_of_a_pixel_and_arrows_move_it_by_one(address, folder):
     with open_page(address) as page:
-        wait_for_frame(page, 0)
+        go_home(page)
         canvas = page.locator("canvas.view")
         page.mouse.move(*at_pixel(page, 0, 200, 160))
         page.mouse.wheel(0, -1200)  # about twenty times
@@ -94,10 +94,10 @@ def test_a_click_lands_to_the_tenth_of_a_pixel_and_arrows_move_it_by_one(address
 
 def test_two_windows_see_the_same(address, folder):
     with open_page(address) as page:
-        wait_for_frame(page, 0)
+        go_home(page)
         other = page.context.new_page()
         other.goto(address)
-        wait_for_frame(other, 0)
+        go_home(other)
         page.mouse.click(*at_pixel(page, 1, 100.0, 120.0))
         marks = "() => document.querySelector('canvas.view').view.marks"
         other.wait_for_function(f"{marks[6:]}.some(mark => mark.id?.endsWith('|fields'))")

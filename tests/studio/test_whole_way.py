@@ -11,12 +11,11 @@ import pytest
 from airborne.calibration.sources.control_points import read_control_points
 from airborne.motion import read_motion
 from tests.support.places import ROOT, THROWN_CROSS
-from tests.support.studio import at_pixel, open_page, open_studio, wait_for_frame
+from tests.support.studio import MINUTE, at_pixel, open_page, open_studio, wait_for_frame
 
 MOST_CLICKS = 60
 CLICK_SD_PX = 1.0
 N_POINTS = 12  # surveyed points that are clicked in all three cameras
-MINUTES = 60_000  # ms
 WORST_MM = 6.0  # RMS error of the cross's place
 
 
@@ -72,7 +71,7 @@ def click_control_points(user, folder):
         for pane in range(3):
             user.click_pixel(pane, points.px[row, pane])
         user.page.keyboard.press("n")
-    user.page.get_by_text("12 points, residual").nth(2).wait_for(timeout=MINUTES)
+    user.page.get_by_text("12 points, residual").nth(2).wait_for()
 
 
 def draw_docs(page):
@@ -99,7 +98,7 @@ def test_the_thrown_cross_from_videos_to_report(folder):
     requests = []
     with open_studio(folder) as address, open_page(address, requests) as page:
         user = User(page)
-        page.get_by_text("Use these cameras").wait_for(timeout=MINUTES)
+        page.get_by_text("Use these cameras").wait_for()
         user.press("Use these cameras")
         page.get_by_text("3 cameras", exact=True).wait_for()
         user.go("Cameras")
@@ -113,12 +112,12 @@ def test_the_thrown_cross_from_videos_to_report(folder):
         user.go("First pose")
         wait_for_frame(page, 0)
         user.press("Find it")
-        page.get_by_role("button", name="Use this pose").wait_for(timeout=10 * MINUTES)
+        page.get_by_role("button", name="Use this pose").wait_for(timeout=10 * MINUTE)
         user.press("Use this pose")
         page.get_by_text("frame 0", exact=True).wait_for()
         user.go("Track")
         user.press("Track")
-        page.get_by_text("tracked; the report is in the step Results").wait_for(timeout=10 * MINUTES)
+        page.get_by_text("tracked; the report is in the step Results").wait_for(timeout=10 * MINUTE)
         user.go("Review")
         wait_for_frame(page, page.locator("canvas.view").evaluate("canvas => canvas.view.frame"))
         draw_docs(page)

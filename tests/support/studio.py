@@ -15,6 +15,7 @@ import pytest
 RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SIZE = {"width": 1280, "height": 720}
+MINUTE = 60_000  # ms
 N_BITS, BLOCK_PX = 10, 24  # of numbers burnt into pictures
 
 
@@ -59,6 +60,7 @@ def open_page(address: str, requests: list[str] | None = None) -> Iterator:
                 route.abort()
 
         context.route(re.compile("^https?:"), note)
+        context.set_default_timeout(MINUTE)
         page = context.new_page()
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
@@ -66,6 +68,12 @@ def open_page(address: str, requests: list[str] | None = None) -> Iterator:
         yield page
         assert errors == []
         chromium.close()
+
+
+def go_home(page) -> None:
+    """Go to the first frame: a page opens where the last one was."""
+    page.locator("canvas.view").press("Home")
+    wait_for_frame(page, 0)
 
 
 def wait_for_frame(page, frame: int) -> None:
