@@ -268,7 +268,7 @@ def test_exact_time_does_not_pass_through_a_float(tmp_path):
         (lambda text: "", "is empty"),
         (lambda text: text.replace(",tracked,", ",found,"), "line 2: 'found'"),
         (lambda text: text.replace("\n1,", "\n1,1,"), "line 3: .* cells, expected"),
-        (lambda text: text.replace("\n1,", "\n0,"), "line 3: frame 0 after frame 0"),
+        (lambda text: text.replace("\n1,", "\n0,"), "line 3: frame 0 a second time"),
         (lambda text: text.replace("\n1,", "\nx,"), "line 3: .*'x'"),
         (lambda text: text.replace(",1001/60000,", ",1001/0,"), "line 3"),
     ],

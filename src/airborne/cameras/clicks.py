@@ -12,11 +12,11 @@ from airborne.io.text import read_csv
 from airborne.types import Array
 
 
-def read_clicks(path: Path, cameras: Sequence[str]) -> tuple[tuple[str, ...], Array]:
+def read_clicks(path: Path, cameras: Sequence[str], fewest: int = 2) -> tuple[tuple[str, ...], Array]:
     """Read a table `point,<camera>_u,<camera>_v,...`: the points' names and their pixels (points, cameras, 2) [px].
 
-    NaN where a point is not seen: blank, NaN or no columns. Raises CalibrationError where fewer than two of the cameras
-    have columns, and for a table that does not say this.
+    NaN where a point is not seen: blank, NaN or no columns. Raises CalibrationError where fewer than `fewest` of the
+    cameras have columns, and for a table that does not say this.
     """
     expected = "expected point,<camera>_u,<camera>_v,..."
     names, columns, values = read_named_numbers(path, "point", expected)
@@ -24,10 +24,10 @@ def read_clicks(path: Path, cameras: Sequence[str]) -> tuple[tuple[str, ...], Ar
     if unknown:
         raise CalibrationError(f"{path.name}: column '{unknown[0]}' is not <camera>_u or <camera>_v; {expected}")
     with_columns = [name for name in cameras if f"{name}_u" in columns and f"{name}_v" in columns]
-    if len(with_columns) < 2:
+    if len(with_columns) < fewest:
         raise CalibrationError(
             f"{path.name}: has columns _u and _v of {', '.join(with_columns) or 'none'} of the cameras "
-            f"{', '.join(cameras)}; a position needs two of them"
+            f"{', '.join(cameras)}; {'a position needs two of them' if fewest > 1 else 'give one of them'}"
         )
     px = np.full((len(names), len(cameras), 2), np.nan)
     for name in with_columns:

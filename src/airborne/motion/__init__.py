@@ -7,7 +7,7 @@ Independent of cameras, images and truth.
 """
 
 from airborne.motion.angles import root_angles
-from airborne.motion.files import MotionWriter, read_estimates, read_motion, revise_motion
+from airborne.motion.files import MotionWriter, drop_rows, read_estimates, read_motion, revise_motion, sort_rows
 from airborne.motion.flight.momentum_table import FlightSummary, flight_summary, has_inertias, measure_flight
 from airborne.motion.joints import JointStatus, joint_angles, joint_statuses, landmarks
 from airborne.motion.jumps.heights import measure_jumps
@@ -26,6 +26,7 @@ __all__ = [
     "PlayersMotion",
     "PlayersWriter",
     "dataset",
+    "drop_rows",
     "flight_summary",
     "has_inertias",
     "joint_angles",
@@ -38,6 +39,7 @@ __all__ = [
     "read_players",
     "revise_motion",
     "root_angles",
+    "sort_rows",
     "write_angles",
     "write_flight",
     "write_joint_angles",

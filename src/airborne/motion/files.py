@@ -9,6 +9,7 @@ import csv
 import math
 import os
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -94,15 +95,15 @@ def read_estimates(path: Path) -> list[Estimate]:
 
     A torn last line is dropped. Covariances are made symmetric from their upper triangles; the joints' part is NaN
     without covariance.bin beside the file. Raises ResultError in one line for a file that is missing or no motion.csv,
-    and for the covariance.bin of another run.
+    and for the covariance.bin of another run. They come in the order of time, whatever that of the rows.
     """
-    return _parse(path)[1]
+    return sorted(_parse(path)[1], key=lambda estimate: estimate.index)
 
 
 def read_motion(path: Path) -> Motion:
     """Read motion.csv as a `Motion`, with the lasting errors beside it; the rules are those of `read_estimates`."""
     joints, estimates = _parse(path)
-    motion = Motion.collect(estimates, joints)
+    motion = Motion.collect(sorted(estimates, key=lambda estimate: estimate.index), joints)
     lasting = read_covariances(path.with_name(LASTING_FILE), len(motion), size=6)
     return motion if np.isnan(lasting).any() else replace(motion, lasting=lasting)
 
@@ -121,6 +122,30 @@ def revise_motion(path: Path, motion: Motion) -> None:
         write_covariances(path.with_name(LASTING_FILE), motion.lasting)
     unfinished = path.with_name(path.name + ".part")
     unfinished.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    unfinished.replace(path)
+
+
+def drop_rows(path: Path, is_dropped: Callable[[int], bool]) -> None:
+    """Take the rows of some frames out of motion.csv and covariance.bin; a run that is resumed tracks them again."""
+    estimates = _parse(path)[1]
+    _rewrite(path, [row for row, estimate in enumerate(estimates) if not is_dropped(estimate.index)])
+
+
+def sort_rows(path: Path) -> None:
+    """Bring the rows of motion.csv and covariance.bin into the order of time; those tracked again come last."""
+    index = [estimate.index for estimate in _parse(path)[1]]
+    if index != sorted(index):
+        _rewrite(path, sorted(range(len(index)), key=index.__getitem__))
+
+
+def _rewrite(path: Path, rows: Sequence[int]) -> None:
+    """Keep some rows, in this order."""
+    (joints, estimates), lines = _parse(path), _whole_lines(path).splitlines(keepends=True)
+    covariance = Motion.collect([estimates[row] for row in rows], joints).covariance
+    unfinished = path.with_name(path.name + ".part")
+    unfinished.write_bytes(b"".join([lines[0], *(lines[1 + row] for row in rows)]))
+    if joints:
+        write_covariances(path.with_name(COVARIANCE_FILE), covariance)
     unfinished.replace(path)
 
 
@@ -148,12 +173,14 @@ def _parse(path: Path) -> tuple[tuple[str, ...], list[Estimate]]:
     covariances = read_covariances(
         path.with_name(COVARIANCE_FILE), len(rows[1:]) if joints else 0, size=6 + 3 * len(joints)
     )
+    seen: set[int] = set()
     for number, cells in enumerate(rows[1:], start=2):
         try:
             covariance = covariances[number - 2] if joints else None
             estimate = _estimate(dict(zip(header, cells, strict=True)), len(joints), covariance)
-            if estimates and estimate.index <= estimates[-1].index:
-                raise ValueError(f"frame {estimate.index} after frame {estimates[-1].index}, expected a later one")
+            if estimate.index in seen:
+                raise ValueError(f"frame {estimate.index} a second time, expected each once")
+            seen.add(estimate.index)
             estimates.append(estimate)
         except (ValueError, ZeroDivisionError) as error:
             reason = f"{len(cells)} cells, expected {len(header)}" if len(cells) != len(header) else error

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,6 +23,7 @@ from airborne.motion import (
     read_estimates,
     read_motion,
     revise_motion,
+    sort_rows,
     write_angles,
     write_flight,
     write_joint_angles,
@@ -34,15 +35,19 @@ from airborne.motion.tables import write_uncertainty
 from airborne.rendering import FLAT, render
 from airborne.run.find import FoundStart
 from airborne.run.first_pose import find_first_pose
+from airborne.run.keys import tracked_keys
 from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
 from airborne.tracking import Estimate
+from airborne.tracking.both_directions import track_between_keys
 from airborne.tracking.estimate import unknown_segments
+from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.methods import sample_body_colours, tracker_of
 from airborne.tracking.self_check.kept_frames import KeptFrames
-from airborne.tracking.tracker import Tracker
+from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
 from airborne.video import Frames, Recording
+from airborne.video.rereading import Rereading
 
 _UNCERTAINTY = (
     "Standard deviations of position and orientation include image noise, light, and edges not where the drawn "
@@ -63,6 +68,7 @@ class BodyRun:
     model: BodyModel
     start: Pose
     found: FoundStart | None = None  # where the start was looked for
+    keys: Mapping[int, PoseEvidence] = field(default_factory=dict)  # of later frames, in the order of time
     kept: KeptFrames = field(default_factory=KeptFrames)  # grows while the run is tracked
 
     table = MOTION
@@ -73,17 +79,18 @@ class BodyRun:
         model = trial.model()
         first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
         found_notes = () if found is None else (found.note,)
-        opened.recording.events.extend([*model.notes, *found_notes, *first.notes])
-        return cls(trial, opened.recording, opened.calibration, model, first.pose, found)
+        keys, missed = tracked_keys(trial, model, opened.recording)
+        opened.recording.events.extend([*model.notes, *found_notes, *first.notes, *missed])
+        return cls(trial, opened.recording, opened.calibration, model, first.pose, found, keys)
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names that figures show."""
         return tuple(segment.name for segment in self.model.segments)
 
-    def read_done(self, folder: Path) -> list[Estimate]:
-        """Return the estimates that a killed run left: from their frames the tracker only learns."""
-        return read_estimates(folder / self.table)
+    def read_done(self, folder: Path) -> dict[int, Estimate]:
+        """Return the estimates that an earlier run left: from their frames the tracker only learns."""
+        return {estimate.index: estimate for estimate in read_estimates(folder / self.table)}
 
     def copy_inputs(self, folder: Path) -> None:
         """Write the body beside the results, for `airborne evaluate` and for other tools."""
@@ -104,9 +111,21 @@ class BodyRun:
             self.recording.events.append(OUT_OF_SIGHT)
         return replace(self, model=model)
 
-    def tracker(self) -> Tracker[Any, Estimate]:
-        """Return the tracker of the trial's method."""
-        return tracker_of(self.trial.settings, self.model, self.start)
+    def track(
+        self,
+        frames: Iterable[Frames],
+        write: Callable[[Estimate], None],
+        done: Mapping[int, Estimate],
+        tick: Callable[[int], None],
+    ) -> Iterator[tuple[Frames, Estimate]]:
+        """Yield each time's frames with the body's estimate there, written; between keys it is tracked both ways."""
+        tracker = tracker_of(self.trial.settings, self.model, self.start, self.keys)
+        if not self.keys or self.trial.directions == "forward":
+            return track_frames(tracker, frames, write, done)
+        recording = self.recording
+        frames_to_track = range(recording.start, max(self.keys) + 1, recording.every)
+        reader, keys = Rereading(recording), list(self.keys)
+        return track_between_keys(tracker, self.model, reader, frames_to_track, keys, write, done, tick)
 
     def writer(self, folder: Path, *, resume: bool) -> MotionWriter:
         """Return what writes the estimates."""
@@ -141,6 +160,7 @@ class BodyRun:
 
     def finish(self, folder: Path) -> tuple[Motion, dict[str, Any]]:
         """Check the run and write the tables; return the motion and the beginning of the summary."""
+        sort_rows(folder / self.table)
         motion, model = read_motion(folder / self.table), self.model
         checked = check_run(
             motion,

@@ -15,6 +15,7 @@ from airborne.cameras.detections import Detections, landmarks_from_points, read_
 from airborne.tracking.first_pose import LEAST_VISIBILITY
 from airborne.trial.cameras import CameraTable
 from airborne.trial.file import Trial
+from airborne.trial.pose_forms import PoseForms
 from airborne.types import Array
 from airborne.video import VideoFacts
 
@@ -49,11 +50,15 @@ class TrialDetections:
 
 def read_trial_detections(trial: Trial, facts: Sequence[VideoFacts]) -> TrialDetections | None:
     """Read the trial's detections; None where its start has none. `facts` are of its videos."""
-    start = trial.start
-    if start.detections is None:
+    return read_forms_detections(trial, trial.start, facts)
+
+
+def read_forms_detections(trial: Trial, forms: PoseForms, facts: Sequence[VideoFacts]) -> TrialDetections | None:
+    """Read the detections of a start or a key; None where it has none."""
+    if forms.detections is None:
         return None
     names = [camera.name for camera in trial.camera]
-    frames = read_detections(trial.path(start.detections), names, start.detections_cameras, skeleton=start.skeleton)
+    frames = read_detections(trial.path(forms.detections), names, forms.detections_cameras, skeleton=forms.skeleton)
     return TrialDetections(frames, tuple(trial.camera), tuple(facts))
 
 

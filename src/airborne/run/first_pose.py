@@ -6,9 +6,9 @@ import numpy as np
 
 from airborne.body import BodyModel
 from airborne.cameras import Rig
-from airborne.cameras.clicks import read_clicks, read_positions
 from airborne.errors import TrialError
 from airborne.run.detections import TrialDetections
+from airborne.run.landmarks import read_pixels, read_points
 from airborne.tracking.first_pose import FirstPose, fit_to_detections, fit_to_pixels, fit_to_points, pose_by_hand
 from airborne.trial.file import Trial
 
@@ -25,12 +25,10 @@ def find_first_pose(trial: Trial, model: BodyModel, rig: Rig, detections: TrialD
         where = f"{start.detections}, frame {start.frame}"
         return fit_to_detections(model, rig, where, detections.at_image(start.frame))
     if start.points_px is not None:
-        names, px = read_clicks(trial.path(start.points_px), rig.names)
-        return fit_to_pixels(model, rig, start.points_px, names=names, px=px, weights=np.ones(px.shape[:-1]))
+        names, px = read_pixels(trial, start.points_px, rig.names)
+        where = start.points_px if isinstance(start.points_px, str) else "start.points_px"
+        return fit_to_pixels(model, rig, where, names=names, px=px, weights=np.ones(px.shape[:-1]))
     if start.joints_m is None:
         return pose_by_hand(model, start.world_from_root, start.joint_angles_deg)
-    if isinstance(start.joints_m, dict):
-        where, points = "start.joints_m", {name: np.array(point) for name, point in start.joints_m.items()}
-    else:
-        where, points = start.joints_m, read_positions(trial.path(start.joints_m))
-    return fit_to_points(model, where, list(points), np.stack(list(points.values())))
+    where = start.joints_m if isinstance(start.joints_m, str) else "start.joints_m"
+    return fit_to_points(model, where, *read_points(trial, start.joints_m))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from airborne.cameras.files import files_beside
 from airborne.errors import ResultError
 from airborne.export import write_json
 from airborne.io.folder_lock import LOCK, refuse_links, sole_writer
+from airborne.motion import drop_rows
 from airborne.motion.covariance_file import COVARIANCE_FILE, LASTING_FILE
 from airborne.motion.run_folder import (
     BODY,
@@ -51,8 +53,8 @@ def prepare_folder(
     """Prepare a run's folder; return whether it holds rows of its `table` from which to resume.
 
     Whoever calls it is the folder's `sole_writer`. `overwrite` removes the run that the folder holds, finished or not.
-    Raises ResultError for a folder that holds something else, a run with neither `resume` nor `overwrite`, or a run of
-    other inputs.
+    A run of other keys alone loses the rows that these touch, which are then tracked again. Raises ResultError for a
+    folder that holds something else, a run with neither `resume` nor `overwrite`, or a run of other inputs.
     """
     rows, record = folder / table, folder / RUN_RECORD
     foreign = {path.name for path in folder.iterdir()} - {LOCK, f"{RUN_RECORD}.part", *_BEFORE_A_RUN}
@@ -71,9 +73,29 @@ def prepare_folder(
         return False
     recorded = read_record(record)
     changed = [name for name in identity if recorded.get(name) != identity[name]]
-    if changed:
+    if changed == ["keys"]:
+        again = stretches_of(recorded.get("keys") or {}, identity["keys"])
+        drop_rows(rows, lambda frame: any(before < frame < after for before, after in again))
+        write_json(record, identity)
+    elif changed:
         raise ResultError(f"{folder} holds another run (other {', other '.join(changed)}); track into another folder")
     return True
+
+
+def stretches_of(old: Mapping[str, str], new: Mapping[str, str]) -> list[tuple[float, float]]:
+    """Return what changed keys touch: between which frames, both outside, is tracked again.
+
+    Keys are digests by their frames, the start's among them: those that stay the same bound the stretches.
+    """
+    same = [int(frame) for frame in new if old.get(frame) == new[frame]]
+    moved = [int(frame) for frame in {*old, *new} if old.get(frame) != new.get(frame)]
+    return [
+        (
+            max((each for each in same if each < frame), default=-math.inf),
+            min((each for each in same if each > frame), default=math.inf),
+        )
+        for frame in moved
+    ]
 
 
 def _remove_run(folder: Path) -> None:
@@ -107,10 +129,21 @@ def run_identity(trial: Trial, *, live: bool = False) -> dict[str, Any]:
     """Return what two runs share if one can resume the other."""
     settings = {
         "inputs": input_hashes(trial, live=live),
+        "keys": _key_digests(trial),
         "settings": trial.track.model_dump(),
         "version": __version__,
     }
     return json.loads(json.dumps(settings))
+
+
+def _key_digests(trial: Trial) -> dict[str, str]:
+    """Return a digest of each key and its files, by its frame; the start, which other digests hold, is the first."""
+    digests = {str(trial.start.frame): "start"}
+    for key in trial.key:
+        files = {name: file_digest(trial.path(name)) for name in key.source_files}
+        said = json.dumps([key.model_dump(), files])
+        digests[str(key.frame)] = hashlib.sha256(said.encode()).hexdigest()
+    return digests
 
 
 def input_hashes(trial: Trial, *, live: bool = False) -> dict[str, str]:

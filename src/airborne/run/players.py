@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +21,7 @@ from airborne.run.opening import Opened
 from airborne.run.players_tracker import players_tracker_of
 from airborne.tracking import Status
 from airborne.tracking.players import PlayersStep, PlayersTracker, StepTracker
-from airborne.tracking.tracker import Tracker
+from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
 from airborne.trial.settings import BodySettings
 from airborne.video import Frames, LiveRecording, Recording
@@ -57,9 +57,9 @@ class PlayersRun:
         """The names that figures and videos show."""
         return tuple(player.name for player in self.trial.players)
 
-    def read_done(self, folder: Path) -> tuple[PlayersStep, ...]:
+    def read_done(self, folder: Path) -> dict[int, PlayersStep]:
         """Return nothing: a killed run is tracked again from its start, to the same result."""
-        return ()
+        return {}
 
     def copy_inputs(self, folder: Path) -> None:
         """Write nothing: players have no body file."""
@@ -68,9 +68,15 @@ class PlayersRun:
         """Return the players as they are; their trackers learn from the first frames themselves."""
         return self
 
-    def tracker(self) -> Tracker[Any, PlayersStep]:
-        """Return the tracker of the trial's method."""
-        return StepTracker(self.players)
+    def track(
+        self,
+        frames: Iterable[Frames],
+        write: Callable[[PlayersStep], None],
+        done: Mapping[int, PlayersStep],
+        tick: Callable[[int], None],
+    ) -> Iterator[tuple[Frames, PlayersStep]]:
+        """Yield each time's frames with the players' step there, written."""
+        return track_frames(StepTracker(self.players), frames, write, done)
 
     def writer(self, folder: Path, *, resume: bool) -> PlayersWriter:
         """Return what writes the estimates; rows that are there already stay."""

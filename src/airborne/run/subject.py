@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Protocol, Self, TypeVar
@@ -10,7 +10,7 @@ from typing import Any, Protocol, Self, TypeVar
 from airborne.calibration.from_points import Calibration
 from airborne.export.overlays import OverlaysAs
 from airborne.motion import Motion, PlayersMotion
-from airborne.tracking.tracker import Found, Tracker
+from airborne.tracking.tracker import Found
 from airborne.trial.file import Trial
 from airborne.video import Frames, LiveRecording, Recording
 
@@ -45,8 +45,8 @@ class Subject(Protocol[Found, AnyMotion]):
         """The names that figures and videos show."""
         ...
 
-    def read_done(self, folder: Path) -> Iterable[Found]:
-        """Return what a killed run found, from which the tracker only learns."""
+    def read_done(self, folder: Path) -> Mapping[int, Found]:
+        """Return what an earlier run found, by frames, where the tracker only learns."""
         ...
 
     def copy_inputs(self, folder: Path) -> None:
@@ -57,8 +57,17 @@ class Subject(Protocol[Found, AnyMotion]):
         """Return the subject with what the first frames show of it."""
         ...
 
-    def tracker(self) -> Tracker[Any, Found]:
-        """Return its tracker."""
+    def track(
+        self,
+        frames: Iterable[Frames],
+        write: Callable[[Found], None],
+        done: Mapping[int, Found],
+        tick: Callable[[int], None],
+    ) -> Iterator[tuple[Frames, Found]]:
+        """Yield each time's frames with what is found there, written; what is `done` is left as it is.
+
+        `tick` takes how many times are done where the tracker goes over some of them before it yields.
+        """
         ...
 
     def writer(self, folder: Path, *, resume: bool) -> AbstractContextManager[Any]:

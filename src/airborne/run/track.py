@@ -31,7 +31,7 @@ from airborne.run.players_tracker import compile_kernels
 from airborne.run.provenance import provenance_of
 from airborne.run.self_check import alarms
 from airborne.run.subject import AnyMotion, Subject
-from airborne.tracking.tracker import Found, track_frames
+from airborne.tracking.tracker import Found
 from airborne.trial.file import Trial
 from airborne.types import Progress
 from airborne.video import LiveRecording, Outages
@@ -60,8 +60,9 @@ def track_trial(
     """Track a trial, a body or players, and write the results into a folder.
 
     `resume` continues a run that was killed, to the same result; of players by tracking again from the start, their
-    rows stay. `live`, for players, reads pipes, capture devices, or files at their own speed, drops frames rather than
-    fall behind, and ends with them or with KeyboardInterrupt. `pictures=False` leaves out videos, figures and report.
+    rows stay. Where [[key]] tables have changed since, the frames between the keys beside them are tracked again.
+    `live`, for players, reads pipes, capture devices, or files at their own speed, drops frames rather than fall
+    behind, and ends with them or with KeyboardInterrupt. `pictures=False` leaves out videos, figures and report.
     `overwrite` replaces the run that the folder holds. `first_frame` tracks one frame and draws it, without a report.
     `take` chooses one of the poses that were found, from 1, where the trial leaves its start to be found.
     Raises an AirborneError for input that cannot be used, and for a folder that holds another run.
@@ -167,10 +168,21 @@ def _track(
         if first is None:
             raise past_the_end_error(subject.trial, recording)
         subject = subject.see(first)
-        done = subject.read_done(folder) if resume else ()
+        done = subject.read_done(folder) if resume else {}
         writer = stack.enter_context(subject.writer(folder, resume=resume))
         artists = [stack.enter_context(artist) for artist in subject.artists(folder, drawn)] if drawn else []
-        tracked = track_frames(subject.tracker(), chain([first], frames), partial(subject.write, writer), done)
+
+        most = 0
+
+        def tick(n_done: int) -> None:
+            nonlocal most
+            most = max(
+                most, n_done
+            )  # frames that were gone over in both directions are counted before they are yielded
+            if options.progress is not None:
+                options.progress(most, recording.n_frames)
+
+        tracked = subject.track(chain([first], frames), partial(subject.write, writer), done, tick)
         try:
             for number, (observed, estimate) in enumerate(tracked, start=1):
                 if isinstance(recording, LiveRecording):
@@ -178,8 +190,7 @@ def _track(
                 outages.add(observed)
                 subject.keep(observed)
                 subject.draw(artists, observed, estimate)
-                if options.progress is not None:
-                    options.progress(number, recording.n_frames)
+                tick(number)
         except KeyboardInterrupt:
             if not delays_s:  # only a live run ends like this
                 raise

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -15,6 +15,7 @@ from airborne.rendering import FLAT, RULES, Lights, render
 from airborne.tracking import predictors
 from airborne.tracking.direct_search.stepping import VRule
 from airborne.tracking.direct_search.trackers import DirectTracker, Search, simplex_search, stepping_search
+from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.model_based.refined import RefinedTracker
 from airborne.tracking.time_offsets import CompensatedTracker
 from airborne.tracking.tracker import Tracker
@@ -35,8 +36,8 @@ FIELD_MODES: dict[Method, Literal["rows", "interpolated"]] = {
 _DIRECT = frozenset({"colour", "scale", "v_rule", "steps_mm", "steps_deg"})
 UNREAD_SETTINGS: dict[str, frozenset[str]] = {  # keys of a run's record that its method makes no use of
     **dict.fromkeys(("refined", "joint", "hierarchical"), _DIRECT),
-    "stepping": frozenset({"fixed_shape"}),
-    "simplex": frozenset({"fixed_shape", "v_rule", "steps_mm", "steps_deg"}),
+    "stepping": frozenset({"fixed_shape", "directions"}),
+    "simplex": frozenset({"fixed_shape", "directions", "v_rule", "steps_mm", "steps_deg"}),
     **dict.fromkeys(("mixture", "framework"), frozenset({"swing"})),
 }
 _SIMPLEX_SIZE = np.array([0.03] * 3 + [0.06] * 3)  # [m], [rad]
@@ -57,12 +58,14 @@ class Settings:
     fixed_shape: bool = False  # joints stay as they are at the start; stepping and simplex never move them
 
 
-def tracker_of(settings: Settings, model: BodyModel, start: Pose) -> Tracker:
-    """Make the tracker of a method, with the time offsets of late views compensated."""
-    return CompensatedTracker(_tracker_of(settings, model, start))
+def tracker_of(
+    settings: Settings, model: BodyModel, start: Pose, keys: Mapping[int, PoseEvidence] | None = None
+) -> CompensatedTracker:
+    """Make the tracker of a method, with the time offsets of late views compensated; `keys` by their frames."""
+    return CompensatedTracker(_tracker_of(settings, model, start, keys))
 
 
-def _tracker_of(settings: Settings, model: BodyModel, start: Pose) -> Tracker:
+def _tracker_of(settings: Settings, model: BodyModel, start: Pose, keys: Mapping[int, PoseEvidence] | None) -> Tracker:
     if settings.method in ("refined", "joint", "hierarchical"):
         return RefinedTracker(
             model,
@@ -71,6 +74,7 @@ def _tracker_of(settings: Settings, model: BodyModel, start: Pose) -> Tracker:
             lights=settings.lights if settings.is_light_exact else None,
             order=settings.method,
             fixed_shape=settings.fixed_shape,
+            keys=keys,
         )
     predict: Callable = {
         "smooth": predictors.linear,

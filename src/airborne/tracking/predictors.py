@@ -53,3 +53,19 @@ def ballistic(past: PoseHistory, time_s: Fraction) -> Pose:
     now, before = past[-1][0], past[-2][0]
     ahead, step = float(time_s - now), float(now - before)
     return quadratic(past, time_s).move(0.5 * FREE_FALL_M_S2 * ahead * (ahead + step), np.zeros(3))
+
+
+def correct_past(past: PoseHistory, time_s: Fraction, pose: Pose) -> PoseHistory:
+    """Move past poses along with the last prediction to where the body turns out to be: what is kept is the motion."""
+    predicted = linear(past, time_s)
+    return tuple((then, move_pose(pose, delta_between(predicted, earlier))) for then, earlier in past)
+
+
+def turn_past(past: PoseHistory) -> PoseHistory:
+    """Return the past of a body that is tracked back in time from the last pose, with times counted backward.
+
+    What lies before in that direction is the future: the motion goes on as it came.
+    """
+    now, pose = past[-1]
+    ahead = ((then - 2 * now, move_pose(pose, -delta_between(pose, earlier))) for then, earlier in past[:-1])
+    return (*ahead, (-now, pose))

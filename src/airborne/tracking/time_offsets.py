@@ -7,6 +7,7 @@ person's limbs are assumed to move with the root.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -17,8 +18,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import Pose
 from airborne.body.chain import delta_between
 from airborne.tracking.estimate import Estimate
-from airborne.tracking.predictors import PoseHistory
-from airborne.tracking.tracker import Tracker
+from airborne.tracking.predictors import PoseHistory, turn_past
 from airborne.types import Array
 from airborne.video import Frames, View
 
@@ -42,7 +42,7 @@ class CompensatedTracker:
     search's pose. Before there are two poses, views later than 2 ms are left out, if others remain.
     """
 
-    def __init__(self, tracker: Tracker) -> None:
+    def __init__(self, tracker: Any) -> None:
         self._tracker = tracker
 
     def init(self) -> CompensatedState:
@@ -61,6 +61,14 @@ class CompensatedTracker:
         """Return the state after the frames, given their estimate."""
         past = state.past if estimate.pose is None else _extend(state.past, frames, estimate.pose)
         return CompensatedState(self._tracker.learn(state.inner, compensate_offsets(frames, past), estimate), past)
+
+    def turn(self, state: CompensatedState) -> CompensatedState:
+        """Return the state from which the body is tracked back in time."""
+        return CompensatedState(self._tracker.turn(state.inner), turn_past(state.past))
+
+    def weigh(self, state: CompensatedState, frames: Frames, poses: Sequence[Pose]) -> Array:
+        """Return minus the log-likelihood of the images in each of several poses: (n,) [nat]."""
+        return self._tracker.weigh(state.inner, compensate_offsets(frames, state.past), poses)
 
 
 def compensate_offsets(frames: Frames, past: PoseHistory, degree: int = 2) -> Frames:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Protocol, TypeVar
 
 from airborne.video import Frames
@@ -40,15 +40,15 @@ def track_frames(
     tracker: Tracker[StateT, Found],
     frames: Iterable[Frames],
     write: Callable[[Found], None],
-    done: Iterable[Found] = (),
+    done: Mapping[int, Found] | None = None,
 ) -> Iterator[tuple[Frames, Found]]:
     """Yield each time's frames with their estimate, written as soon as it is found.
 
-    The first estimates may be `done`, written by a run that was stopped: from their frames the tracker only learns.
+    Estimates of some frames, by their numbers, may be `done` by an earlier run: there the tracker only learns.
     """
-    state, known = tracker.init(), iter(done)
+    state, known = tracker.init(), done or {}
     for observed in frames:
-        estimate = next(known, None)
+        estimate = known.get(observed.index)
         if estimate is None:
             estimate = tracker.search(state, observed)
             write(estimate)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,13 +20,16 @@ from airborne.tracking.players import PlayerStart
 from airborne.trial.body import BodyTable
 from airborne.trial.calibration import CalibrationTable
 from airborne.trial.cameras import CameraTable
+from airborne.trial.keys import KeyTable
 from airborne.trial.lights import LightsTable
 from airborne.trial.session import join_session
 from airborne.trial.settings import (
     BODY_METHODS,
+    KEY_METHODS,
     METHODS,
     PLAYERS_METHODS,
     BodySettings,
+    Directions,
     ParticleSettings,
     TrackSettings,
 )
@@ -42,6 +46,7 @@ class Trial(SettingsTable):
     calibration: CalibrationTable
     body: BodyTable
     start: StartTable = Field(default_factory=lambda: StartTable(find=True))
+    key: list[KeyTable] = []  # what is known of the pose at later frames
     lights: LightsTable | None = None
     track: TrackSettings = Field(default_factory=BodySettings, validate_default=True)
 
@@ -77,6 +82,29 @@ class Trial(SettingsTable):
             raise ValueError(
                 f"track.stop = {stop} leaves no frame, as start.frame = {frame}; give a later one, or none"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _check_keys(self) -> Trial:
+        frames = [key.frame for key in self.key]
+        if frames and self.track.method not in KEY_METHODS:
+            raise ValueError(f"[[key]] is not read by method '{self.track.method}'; use {', '.join(KEY_METHODS)}")
+        twice = sorted({frame for frame in frames if frames.count(frame) > 1})
+        if twice:
+            raise ValueError(f"two [[key]] tables are of frame {twice[0]}; join them in one")
+        early = [frame for frame in frames if frame <= self.start.frame and not self.start.find]
+        if early:
+            raise ValueError(f"[[key]] of frame {early[0]}: not after start.frame = {self.start.frame}, the first key")
+        return self
+
+    @model_validator(mode="after")
+    def _check_clicks(self) -> Trial:
+        names = [camera.name for camera in self.camera]
+        tables = [forms.points_px for forms in (self.start, *self.key) if isinstance(forms.points_px, dict)]
+        clicked = {camera for table in tables for by_camera in table.values() for camera in by_camera}
+        unknown = sorted(clicked - set(names))
+        if unknown:
+            raise ValueError(f"points_px: no camera {', '.join(unknown)}; there are: {', '.join(names)}")
         return self
 
     @model_validator(mode="after")
@@ -131,6 +159,11 @@ class Trial(SettingsTable):
         lights = self.lights
         return self.track.with_lights(lights and lights.lights, is_exact=lights is not None and lights.is_exact)
 
+    @property
+    def directions(self) -> Directions:
+        """In which directions a body is tracked between its keys."""
+        return self.track.directions if isinstance(self.track, BodySettings) else "forward"
+
     def model(self) -> BodyModel:
         """Return the body; a person by preset or measurements takes its colours from the video.
 
@@ -153,7 +186,7 @@ class Trial(SettingsTable):
 
     @property
     def input_files(self) -> tuple[str, ...]:
-        """The files and folders that the trial names beside its videos."""
+        """The files and folders that the trial names beside its videos, without those of its keys."""
         optional = (self.body.source_file, self.calibration.file, self.calibration.control_points, self.torso)
         return (*(name for name in optional if name is not None), *self.start.source_files)
 
@@ -236,11 +269,12 @@ def _validate(table: dict[str, Any], changes: dict[str, Any], where: str, given_
 def list_wrong_names(trial: Trial) -> list[str]:
     """List names of cameras that are not unique, and of files that do not exist."""
     names = [camera.name for camera in trial.camera]
+    folders = {forms.detections for forms in (trial.start, *trial.key)}
     same = [f"two cameras share a name: {', '.join(names)}; give each its own"]
     return same * (len(set(names)) < len(names)) + [
         f"{name} not found beside it"
-        for name in trial.input_files
-        if not (trial.path(name).is_file() or (name == trial.start.detections and trial.path(name).is_dir()))
+        for name in (*trial.input_files, *chain.from_iterable(key.source_files for key in trial.key))
+        if not (trial.path(name).is_file() or (name in folders and trial.path(name).is_dir()))
     ]
 
 

@@ -21,6 +21,7 @@ from airborne.trial.table import SettingsTable
 StepSizes = list[Annotated[float, Field(gt=0)]]
 CapsuleMethod = Literal["blocker"]
 Overlay = Literal["paper", "broadcast"]
+Directions = Literal["both", "forward"]
 
 
 class _Settings(SettingsTable):
@@ -46,6 +47,7 @@ class BodySettings(_Settings):
 
     method: Method = "refined"
     prediction: Prediction = "smooth"
+    directions: Directions = "both"  # between [[key]] tables: forward and backward, or forward alone
     fixed_shape: bool = False  # joint angles stay those of the start; stepping and simplex never change them
     colour: ScoreName = "normalised"  # stepping and simplex: paper B's score
     v_rule: VRule = "v_sym"  # stepping
@@ -116,3 +118,4 @@ TrackSettings = Annotated[BodySettings | CapsuleSettings | ParticleSettings, Fie
 BODY_METHODS: tuple[str, ...] = get_args(Method)
 PLAYERS_METHODS: tuple[str, ...] = (*get_args(CapsuleMethod), *reversed(get_args(LegsMethod)))
 METHODS = (*BODY_METHODS, *PLAYERS_METHODS)
+KEY_METHODS = ("refined", "joint", "hierarchical")  # those that read [[key]]

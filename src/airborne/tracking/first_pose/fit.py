@@ -36,7 +36,10 @@ class FirstPose:
 
 
 def pose_by_hand(
-    model: BodyModel, world_from_root: RigidTransform, joint_angles_deg: Mapping[str, Sequence[float]]
+    model: BodyModel,
+    world_from_root: RigidTransform,
+    joint_angles_deg: Mapping[str, Sequence[float]],
+    where: str = "start",
 ) -> FirstPose:
     """Return a pose set by hand: segment -> x, y, z [deg], other joints straight. Raises TrialError."""
     joints = [segment.name for segment in model.segments[1:]]
@@ -44,13 +47,13 @@ def pose_by_hand(
     for name, xyz in joint_angles_deg.items():
         if name not in joints:
             raise TrialError(
-                f"start.joint_angles_deg: body '{model.name}' has no joint '{name}'; "
+                f"{where}.joint_angles_deg: body '{model.name}' has no joint '{name}'; "
                 f"it has: {', '.join(joints) or 'none'}"
             )
         angles[joints.index(name)] = np.radians(xyz)
     is_out = np.any(np.abs(model.limits.excess(matrix_from_angles(angles))) > _ROUNDING_RAD, axis=1)
     beyond = [name for name, out in zip(joints, is_out, strict=True) if out and name in joint_angles_deg]
-    notes = (f"start.joint_angles_deg: {', '.join(beyond)} beyond the body's joint limits",) if beyond else ()
+    notes = (f"{where}.joint_angles_deg: {', '.join(beyond)} beyond the body's joint limits",) if beyond else ()
     return FirstPose(Pose(world_from_root=world_from_root, joint_angles=angles), notes)
 
 
@@ -102,8 +105,8 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
     return FirstPose(fit.pose, tuple(note for note in notes if note))
 
 
-def _points_to_find(model: BodyModel, where: str, names: Sequence[str]) -> list[int]:
-    """Return which points determine landmarks of the body; raises TrialError for an unknown name."""
+def check_points(model: BodyModel, where: str, names: Sequence[str]) -> None:
+    """Raise TrialError for a name that is neither a landmark of the body nor a network's point."""
     landmarks = [landmark.name for landmark in model.landmarks]
     of_networks = {*chain.from_iterable(skeleton.points for skeleton in SKELETONS.values())}
     unknown = [name for name in names if name not in landmarks and name not in of_networks]
@@ -111,6 +114,12 @@ def _points_to_find(model: BodyModel, where: str, names: Sequence[str]) -> list[
         raise TrialError(
             f"{where}: body '{model.name}' has no landmark {', '.join(unknown)}; it has: {', '.join(landmarks)}"
         )
+
+
+def _points_to_find(model: BodyModel, where: str, names: Sequence[str]) -> list[int]:
+    """Return which points determine landmarks of the body; raises TrialError for an unknown name."""
+    check_points(model, where, names)
+    landmarks = [landmark.name for landmark in model.landmarks]
     recipes = chain.from_iterable(LANDMARK_RECIPES[landmark] for landmark in landmarks if landmark in LANDMARK_RECIPES)
     parts = {*landmarks, *chain.from_iterable(recipes)}
     return [i for i, name in enumerate(names) if name in parts]

@@ -17,6 +17,7 @@ from airborne.body.contact import contact_model, overlaps
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.geometry.swing_twist import swing_twist_from_matrix, swing_twist_jacobian
 from airborne.rendering import pose_segments
+from airborne.tracking.evidence import PoseEvidence
 from airborne.types import Array
 
 _LIMIT_SD_RAD = np.radians(3.0)  # sd of how far a joint may go beyond its limits
@@ -29,10 +30,11 @@ _DAMPING_SD_M, _DAMPING_SD_RAD = 0.5, 1.0  # hold what the images do not show
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosePrior:
-    """A Gaussian about an expected pose; limited joints also have sds of half their range about the zero pose."""
+    """A Gaussian about an expected pose, and evidence; limited joints also have half their range as sd about zero."""
 
     expected: Pose
     sd: Array  # (6 + 3 joints,) [m, rad]
+    evidence: PoseEvidence | None = None
 
     def widen(self, columns: NDArray[np.integer]) -> PosePrior:
         """Return the prior with a wide sd for some degrees of freedom."""
@@ -85,6 +87,10 @@ class DegreesOfFreedom:
             g -= precision * delta_between(prior.expected, pose)[self.columns]
             rows, away = self.rest_residuals(pose)
             H, g = H + rows.T @ rows, g - rows.T @ away
+            if prior.evidence is not None:
+                rows, away = prior.evidence.residuals(pose)
+                rows = rows[:, self.columns]
+                H, g = H + rows.T @ rows, g - rows.T @ away
         delta = np.linalg.solve(H, g)
         for _ in range(_LIMIT_ROUNDS):
             rows, targets = self._walls(pose, delta)
@@ -105,7 +111,8 @@ class DegreesOfFreedom:
             return 0.5 * float(possible @ possible)
         away = delta_between(prior.expected, pose)[self.columns] / prior.sd[self.columns]
         rest = self.rest_residuals(pose)[1]
-        return 0.5 * float(away @ away + rest @ rest + possible @ possible)
+        known = np.zeros(0) if prior.evidence is None else prior.evidence.residuals(pose)[1]
+        return 0.5 * float(away @ away + rest @ rest + possible @ possible + known @ known)
 
     def rest_residuals(self, pose: Pose) -> tuple[Array, Array]:
         """Return how far limited joints are from the zero pose, in half ranges: rows (k, d), values (k,)."""

@@ -19,7 +19,14 @@ from airborne.tracking.model_based.degrees_of_freedom import (
     proximal_to_distal,
     root_only,
 )
-from airborne.tracking.model_based.gauss_newton import NEAR, Fit, PyramidLevels, fit_images, fit_silhouettes
+from airborne.tracking.model_based.gauss_newton import (
+    NEAR,
+    Fit,
+    PyramidLevels,
+    fit_images,
+    fit_silhouettes,
+    image_evaluator,
+)
 from airborne.tracking.model_based.global_search import region_evidence
 from airborne.tracking.model_based.learning import learn_missing_backgrounds
 from airborne.tracking.model_based.left_right_swap import swap_limbs
@@ -111,6 +118,15 @@ class Fitter:
             fit = fit_images(self.render_model, poses, learned.regions, appearance, dofs=dofs, prior=prior)
             poses = [fit.pose]
         return fit_images(self.render_model, poses, learned.regions, appearance, dofs=last, prior=prior)
+
+    def weigh(self, poses: Sequence[Pose], learned: LearnedRegions) -> Array:
+        """Return minus the log-likelihood of the images in each pose, by the noise of the best one: (n,) [nat]."""
+        appearance = self._complete(poses[0], learned)
+        args = self.render_model, poses, learned.regions, appearance
+        evaluate, _ = image_evaluator(*args, dofs=self.stages[-1])
+        equations = [evaluate(pose, True) for pose in poses]
+        noise = min(each.noise for each in equations)
+        return np.array([each.objective(noise, 0.0) for each in equations])
 
     def judge(self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> JudgedFit:
         """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it."""

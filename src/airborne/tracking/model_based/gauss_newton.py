@@ -133,7 +133,7 @@ def fit_images(
 
     Of several starts, the one that ends in the best agreement with images and prior is returned.
     """
-    evaluate, correlated = _image_evaluator(render_model, poses, regions, appearance, dofs=dofs)
+    evaluate, correlated = image_evaluator(render_model, poses, regions, appearance, dofs=dofs)
     most_steps, converged = (_MOST_STEPS, _CONVERGED) if dofs.moves_joints else (_MOST_STEPS_STIFF, _CONVERGED_STIFF)
     ends = [
         descend_pose(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, tolerance=converged)
@@ -148,7 +148,7 @@ def linearise_images(
     render_model: RenderModel, pose: Pose, regions: Sequence[Region], appearance: Appearance, *, dofs: DegreesOfFreedom
 ) -> PoseEquations:
     """Return the normal equations of the images at one pose, without moving it."""
-    evaluate, _ = _image_evaluator(render_model, [pose], regions, appearance, dofs=dofs)
+    evaluate, _ = image_evaluator(render_model, [pose], regions, appearance, dofs=dofs)
     return evaluate(pose, True)
 
 
@@ -184,7 +184,7 @@ def rises_without(
     return rises
 
 
-def _image_evaluator(
+def image_evaluator(
     render_model: RenderModel,
     poses: Sequence[Pose],
     regions: Sequence[Region],

@@ -6,7 +6,7 @@ A rigid body has the six degrees of freedom of its root. A body with joints is f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -18,11 +18,13 @@ from airborne.body.chain import delta_between, move_pose
 from airborne.rendering import Lights
 from airborne.tracking import predictors
 from airborne.tracking.estimate import Estimate, Status, lost_estimate
+from airborne.tracking.evidence import PoseEvidence
+from airborne.tracking.first_pose.join_evidence import join_evidence
 from airborne.tracking.image_regions import crop_regions, reduce_frames, share_in_view
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior, joints_of
 from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegions, Order
-from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next
+from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
 from airborne.tracking.model_based.learning import learn_appearance
 from airborne.tracking.model_based.recovery import recover
 from airborne.tracking.model_based.render_model import RenderModel
@@ -68,11 +70,13 @@ class RefinedTracker:
         lights: Lights | None = None,
         order: Order = "refined",
         fixed_shape: bool = False,
+        keys: Mapping[int, PoseEvidence] | None = None,
     ) -> None:
         self.render_model = RenderModel.of(model, lights)
         self._fitter = Fitter.of(self.render_model, order, fixed_shape=fixed_shape)
         self._start, self._posed_start = start, self.render_model.with_pose(start)
         self._predict = PREDICTIONS[prediction]
+        self._keys = keys or {}
 
     def init(self) -> RefinedState:
         """Return the state before the first frame."""
@@ -81,7 +85,12 @@ class RefinedTracker:
     def search(self, state: RefinedState, frames: Frames) -> Estimate:
         """Find the body in the frames, without learning from them."""
         frames = self.reduce_frames(frames)
-        found = self._search_later(state, frames) if state.past else self._search_first(frames)
+        if not state.past:
+            found = self._search_first(frames)
+        elif frames.index in self._keys:
+            found = self._search_at_key(state, frames, self._keys[frames.index])
+        else:
+            found = self._search_later(state, frames)
         return self._estimate(frames, found, state.reference)
 
     def learn(self, state: RefinedState, frames: Frames, estimate: Estimate) -> RefinedState:
@@ -89,7 +98,10 @@ class RefinedTracker:
         if estimate.pose is None:
             return state
         frames = self.reduce_frames(frames)
-        past = (*state.past, (frames.time_s, estimate.pose))[-_HISTORY:]
+        before = state.past
+        if frames.index in self._keys and before:
+            before = predictors.correct_past(before, frames.time_s, estimate.pose)
+        past = (*before, (frames.time_s, estimate.pose))[-_HISTORY:]
         if estimate.status is not Status.TRACKED and state.past:
             return replace(state, past=past, covariance=estimate.covariance)
         posed = self.render_model.with_pose(estimate.pose)
@@ -99,6 +111,16 @@ class RefinedTracker:
         if learned.regions:
             reference = reference.update(self._fitter.agreement(estimate.pose, learned))
         return RefinedState(past, learned.appearance, reference, estimate.covariance)
+
+    def turn(self, state: RefinedState) -> RefinedState:
+        """Return the state from which the body is tracked back in time: the past is as it would be met then."""
+        return replace(state, past=predictors.turn_past(state.past))
+
+    def weigh(self, state: RefinedState, frames: Frames, poses: Sequence[Pose]) -> Array:
+        """Return minus the log-likelihood of the images in each of several poses: (n,) [nat]."""
+        frames = self.reduce_frames(frames)
+        learned = regions_near(self._fitter, poses, frames, state.appearance)
+        return self._fitter.weigh(poses, learned) if learned.regions else np.zeros(len(poses))
 
     def reduce_frames(self, frames: Frames) -> Frames:
         """Reduce the images of a body whose joints move: finer ones show more detail than the model has."""
@@ -123,6 +145,19 @@ class RefinedTracker:
             return found or recovered
         return recovered if recovered.agreement.evidence > found.agreement.evidence else found
 
+    def _search_at_key(self, state: RefinedState, frames: Frames, evidence: PoseEvidence) -> JudgedFit | None:
+        """Fit from the pose that the evidence gives, which a lost limb's prediction cannot hold back."""
+        gap_s = float(frames.time_s - state.past[-1][0])
+        sds = [
+            max(start, now + 0.5 * later * gap_s**2)
+            for start, (now, later) in zip(_START_SD, _EXPECTED_SD, strict=True)
+        ]
+        expected = predictors.linear(state.past, frames.time_s)
+        wide = np.repeat(np.minimum(sds, 1.5), [3, 3, 3 * self._fitter.model.n_joints])
+        pose = join_evidence(expected, wide, evidence)
+        prior = PosePrior(pose, wide, evidence)
+        return fit_next(self._fitter, [pose], frames, state.appearance, reference=state.reference, prior=prior)
+
     def _estimate(self, frames: Frames, found: JudgedFit | None, reference: Reference) -> Estimate:
         if found is None:
             return lost_estimate(frames.index, frames.time_s)
@@ -137,6 +172,8 @@ class RefinedTracker:
             status = status if reference.is_learned else Status.UNCERTAIN
         if agreement.n_views_of is not None:
             covariance = widen_unseen(covariance, self._fitter.model, agreement.n_views_of)
+        if frames.index in self._keys:
+            covariance = self._keys[frames.index].add_to(covariance, fit.pose)
         posed = self.render_model.with_pose(fit.pose)
         if share_in_view(posed, self.render_model.geometry, frames) < _LEAST_IN_VIEW:
             status = Status.UNCERTAIN
