@@ -24,7 +24,7 @@ _LIMIT_SD_RAD = np.radians(3.0)  # sd of how far a joint may go beyond its limit
 _OVERLAP_SD_M = 0.01  # sd of how far segments may pass through each other, beyond what flesh gives way
 _LIMIT_ROUNDS = 3  # of finding which limits a step reaches
 _BEYOND_RAD = 1e-6  # rounding
-_WIDE_SD = 1.5  # [m, rad]
+WIDE_SD = 1.5  # [m, rad]
 _DAMPING_SD_M, _DAMPING_SD_RAD = 0.5, 1.0  # hold what the images do not show
 
 
@@ -39,7 +39,7 @@ class PosePrior:
     def widen(self, columns: NDArray[np.integer]) -> PosePrior:
         """Return the prior with a wide sd for some degrees of freedom."""
         sd = self.sd.copy()
-        sd[columns] = _WIDE_SD
+        sd[columns] = WIDE_SD
         return replace(self, sd=sd)
 
 

@@ -21,7 +21,7 @@ from airborne.tracking.estimate import Estimate, Status, lost_estimate
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.first_pose.join_evidence import join_evidence
 from airborne.tracking.image_regions import crop_regions, reduce_frames, share_in_view
-from airborne.tracking.model_based.degrees_of_freedom import PosePrior, joints_of
+from airborne.tracking.model_based.degrees_of_freedom import WIDE_SD, PosePrior, joints_of
 from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegions, Order
 from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
@@ -85,10 +85,10 @@ class RefinedTracker:
     def search(self, state: RefinedState, frames: Frames) -> Estimate:
         """Find the body in the frames, without learning from them."""
         frames = self.reduce_frames(frames)
-        if not state.past:
-            found = self._search_first(frames)
-        elif frames.index in self._keys:
+        if frames.index in self._keys:
             found = self._search_at_key(state, frames, self._keys[frames.index])
+        elif not state.past:
+            found = self._search_first(frames)
         else:
             found = self._search_later(state, frames)
         return self._estimate(frames, found, state.reference)
@@ -147,15 +147,15 @@ class RefinedTracker:
 
     def _search_at_key(self, state: RefinedState, frames: Frames, evidence: PoseEvidence) -> JudgedFit | None:
         """Fit from the pose that the evidence gives, which a lost limb's prediction cannot hold back."""
+        if not state.past:
+            pose = join_evidence(self._start, self._repeat(np.full(3, WIDE_SD)), evidence)
+            return fit_first(self._fitter, pose, frames, PosePrior(pose, self._repeat(_START_SD), evidence))
         gap_s = float(frames.time_s - state.past[-1][0])
-        sds = [
-            max(start, now + 0.5 * later * gap_s**2)
-            for start, (now, later) in zip(_START_SD, _EXPECTED_SD, strict=True)
-        ]
         expected = predictors.linear(state.past, frames.time_s)
-        wide = np.repeat(np.minimum(sds, 1.5), [3, 3, 3 * self._fitter.model.n_joints])
-        pose = join_evidence(expected, wide, evidence)
-        prior = PosePrior(pose, wide, evidence)
+        grown = [now + 0.5 * later * gap_s**2 for now, later in _EXPECTED_SD]
+        sds = self._repeat(np.maximum(_START_SD, grown))
+        pose = join_evidence(expected, sds, evidence)
+        prior = PosePrior(pose, sds, evidence)
         return fit_next(self._fitter, [pose], frames, state.appearance, reference=state.reference, prior=prior)
 
     def _estimate(self, frames: Frames, found: JudgedFit | None, reference: Reference) -> Estimate:
@@ -191,7 +191,11 @@ class RefinedTracker:
         """Return the prior about an expected pose where joints move, by the sds of `_EXPECTED_SD`; None elsewhere."""
         if not self._fitter.moves_joints:
             return None
-        return PosePrior(expected, np.repeat(np.minimum(sds, 1.5), [3, 3, 3 * self._fitter.model.n_joints]))
+        return PosePrior(expected, self._repeat(sds))
+
+    def _repeat(self, sds: Sequence[float] | Array) -> Array:
+        """Return the sds of position, rotation and joints for every degree of freedom: (6 + 3 joints,)."""
+        return np.repeat(np.minimum(sds, WIDE_SD), [3, 3, 3 * self._fitter.model.n_joints])
 
 
 def _shrink_unobserved(last: Pose, predicted: Pose, covariance: Array) -> Pose:
