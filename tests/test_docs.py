@@ -34,6 +34,7 @@ from airborne.trial.body import BodyTable
 from airborne.trial.calibration import CalibrationTable
 from airborne.trial.cameras import CameraTable
 from airborne.trial.file import Trial, read_trial
+from airborne.trial.keys import KeyTable
 from airborne.trial.lights import LampTable, LightsTable
 from airborne.trial.players import PlayerTable
 from airborne.trial.settings import PLAYERS_METHODS, BodySettings, ParticleSettings
@@ -130,8 +131,8 @@ def test_every_command_has_a_page_of_help_with_an_example_that_exists(name):
 
 
 def test_help_shows_square_brackets():
-    text = CliRunner().invoke(app, ["fit-body", "--help"]).output
-    assert "its [start] has detections" in " ".join(text.split())
+    text = CliRunner().invoke(app, ["track", "--help"]).output
+    assert "what changed [[key]] tables touch" in " ".join(text.replace("│", " ").split())
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -177,6 +178,7 @@ MODELS = {
     "`[calibration]`": CalibrationTable,
     "`[body]`": BodyTable,
     "`[start]`": StartTable,
+    "`[[key]]`": KeyTable,
     "`[[start.player]]`": PlayerTable,
     "`[lights]`": LightsTable,
     "`[[lights.lamp]]`": LampTable,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.errors import TrialError
-from airborne.run.players_tracker import players_tracker_of, read_torsos
+from airborne.run.players_tracker import player_starts, players_tracker_of, read_torsos
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.methods import UNREAD_SETTINGS
 from airborne.tracking.particle import LegsTracker
@@ -37,10 +37,44 @@ def complaint(folder, text, **kwargs):
 def test_players_and_bystanders_are_read_with_their_points(folder):
     trial = read(folder, trial_text())
     assert trial.has_players
-    assert [start.name for start in trial.players] == [*PLAYERS, BYSTANDER]
-    anna, _, referee = trial.players
+    assert [start.name for start in player_starts(trial, rig())] == [*PLAYERS, BYSTANDER]
+    anna, _, referee = player_starts(trial, rig())
     np.testing.assert_array_equal(anna.joints_m["knee_left"], [-0.72, 0.0, 0.5])
     assert list(referee.joints_m) == ["torso"]
+
+
+@pytest.mark.parametrize("inline", [True, False])
+def test_clicked_players_start_where_the_clicks_of_two_cameras_meet(folder, inline):
+    text, metres = trial_text(), player_starts(read(folder, trial_text()), rig())
+    head = text[: text.index("[[start.player]]")]
+    for start in metres:
+        clicks = {
+            point: {c.name: c.px_from_world(at).round(3).tolist() for c in rig()}
+            for point, at in start.joints_m.items()
+        }
+        if inline:
+            head += f'[[start.player]]\nname = "{start.name}"\n[start.player.points_px]\n'
+            for point, by_camera in clicks.items():
+                head += f"{point} = {{ " + ", ".join(f"{name} = {px}" for name, px in by_camera.items()) + " }\n"
+        else:
+            head += f'[[start.player]]\nname = "{start.name}"\npoints_px = "{start.name}.csv"\n'
+            rows = [",".join(["point", *(f"{c.name}_{axis}" for c in rig() for axis in "uv")])]
+            rows += [",".join([point, *(str(n) for px in by.values() for n in px)]) for point, by in clicks.items()]
+            (folder / f"{start.name}.csv").write_text("\n".join(rows))
+    for clicked, start in zip(player_starts(read(folder, head), rig()), metres, strict=True):
+        assert clicked.name == start.name
+        for point, at in start.joints_m.items():
+            np.testing.assert_allclose(clicked.joints_m[point], at, atol=1e-3)
+
+
+def test_a_point_clicked_in_one_camera_only_is_refused(folder):
+    text = trial_text()
+    head = text[: text.index("[[start.player]]")]
+    points = read(folder, text).start.player[0].joints_m
+    table = ", ".join(f"{point} = {{ left = [100.0, 100.0] }}" for point in points)
+    trial = read(folder, f'{head}[[start.player]]\nname = "anna"\npoints_px = {{ {table} }}\n')
+    with pytest.raises(TrialError, match="no two cameras agree where torso"):
+        player_starts(trial, rig())
 
 
 def test_legs_are_tracked_by_blocker_by_default(folder):
@@ -68,7 +102,7 @@ def test_settings_of_the_filters_may_stay_in_a_file_tracked_by_blocker(folder):
 
 def test_the_shared_clip_is_read_as_it_is(shared_data):
     trial = read_trial(shared_data("block_jump") / "trial.toml")
-    (blocker,) = trial.players
+    (blocker,) = player_starts(trial, rig())
     assert (blocker.name, len(blocker.joints_m), trial.track.method) == ("blocker1", 9, "blocker")
 
 
@@ -179,7 +213,8 @@ TORSOS = "player,frame,x_m,y_m,z_m\n" + "".join(
 
 def test_given_torsos_follow_the_players_order_and_hold_over_gaps(folder):
     (folder / "torso.csv").write_text(TORSOS)
-    starts = read(folder, trial_text(start="frame = 2", track='method = "mixture"\ntorso = "torso.csv"')).players
+    trial = read(folder, trial_text(start="frame = 2", track='method = "mixture"\ntorso = "torso.csv"'))
+    starts = player_starts(trial, rig())
     given = read_torsos(folder / "torso.csv", starts, first=2)
     assert given.positions.shape == (4, 3, 3)
     np.testing.assert_allclose(
@@ -193,7 +228,7 @@ def test_torsos_of_a_joints_table_are_those_of_its_torso_rows(folder):
         f"{name},0,torso,{x},0.0,1.2\n{name},0,hip_left,9,9,9\n" for name, x in {**PLAYERS, BYSTANDER: 0.0}.items()
     )
     (folder / "joints.csv").write_text("player,frame,joint,x_m,y_m,z_m\n" + rows)
-    given = read_torsos(folder / "joints.csv", read(folder, trial_text()).players, first=0)
+    given = read_torsos(folder / "joints.csv", player_starts(read(folder, trial_text()), rig()), first=0)
     np.testing.assert_array_equal(given.positions[0, :, 0], [*PLAYERS.values(), 0.0])
 
 

@@ -24,14 +24,18 @@ from airborne.body_fitting.checks import (
 )
 from airborne.body_fitting.clicks import Clicks
 from airborne.body_fitting.fit import BodyFit, BodyObservation, fit_body, measure_lengths
-from airborne.cameras.clicks import read_positions
+from airborne.cameras import Rig
+from airborne.cameras.detections import landmarks_from_points
 from airborne.errors import BodyError, TrialError
 from airborne.export.views import crop_camera, resample_view
 from airborne.rendering import FLAT, render
 from airborne.run.detections import landmarks_over_time
+from airborne.run.landmarks import read_points, triangulate_clicks
 from airborne.run.opening import Opened, open_trial
 from airborne.tracking.first_pose import LANDMARK_WEIGHTS
 from airborne.trial.file import Trial
+from airborne.trial.keys import KeyTable
+from airborne.trial.start import StartTable
 from airborne.types import Array, StageProgress
 from airborne.video import Frames, Recording
 
@@ -61,7 +65,8 @@ def fit_person(
 ) -> PersonFit:
     """Fit a trial's body to the person in its images; write the body file, and beside it `fit_body.png`.
 
-    The joints come from the detections of the trial's [start], or for one frame from its joints_m; `skeleton` says
+    The joints come from the detections of the trial's [start], or from the joints_m or points_px of it and of the keys,
+    for one frame each; `skeleton` says
     whose points the detections are where neither the trial nor their files do.
     Raises an AirborneError for input that cannot be used.
     """
@@ -151,11 +156,24 @@ def _landmarks_by_frame(trial: Trial, opened: Opened[Recording]) -> dict[int, di
             index: {name: position for name, position in positions.items() if np.isfinite(position).all()}
             for index, positions in at.items()
         }
-    if isinstance(trial.start.joints_m, dict):
-        return {trial.start.frame: {name: np.array(position) for name, position in trial.start.joints_m.items()}}
-    if trial.start.joints_m is not None:
-        return {trial.start.frame: read_positions(trial.path(trial.start.joints_m))}
-    raise TrialError(f"{trial.name}: fitting the body needs known joints; give detections or joints_m under [start]")
+    given = {forms.frame: _landmarks_of(trial, forms, recording.rig) for forms in (trial.start, *trial.key)}
+    known = {frame: landmarks for frame, landmarks in given.items() if landmarks}
+    if not known:
+        raise TrialError(
+            f"{trial.name}: fitting the body needs known joints; give detections, joints_m or points_px under [start] "
+            "or [[key]]"
+        )
+    return known
+
+
+def _landmarks_of(trial: Trial, forms: StartTable | KeyTable, rig: Rig) -> dict[str, Array]:
+    """Return the landmarks that a start or a key gives in metres or clicked in two cameras; none of other forms."""
+    if forms.joints_m is not None:
+        names, points = read_points(trial, forms.joints_m)
+        return dict(zip(names, points, strict=True))
+    if forms.points_px is not None:
+        return landmarks_from_points(*triangulate_clicks(trial, forms.points_px, rig, f"frame {forms.frame}"))
+    return {}
 
 
 def _choose_frames(trial: Trial, landmarks: dict[int, dict[str, Array]], n: int) -> tuple[list[int], list[int]]:

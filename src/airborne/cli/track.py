@@ -47,7 +47,9 @@ def track_command(
     trial: Annotated[Path, typer.Argument(help="The trial's TOML file.")],
     output: Out,
     *,
-    resume: Annotated[bool, typer.Option(help="Resume a run that was stopped.")] = False,
+    resume: Annotated[
+        bool, typer.Option(help="Resume a run that was stopped, or track again what changed [[key]] tables touch.")
+    ] = False,
     overwrite: Annotated[bool, typer.Option(help="Replace the run that the folder holds.")] = False,
     first_frame: Annotated[
         bool,
@@ -195,7 +197,7 @@ def _describe_sd(sd: float, unit: str) -> str:
 
 
 def fit_body_command(
-    trial: Annotated[Path, typer.Argument(help="The trial's TOML file; its [start] has detections or joints_m.")],
+    trial: Annotated[Path, typer.Argument(help="The trial's TOML file, with detections, joints_m or points_px.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The body file to write.")],
     frames: Annotated[int, typer.Option(min=1, help="How many frames to fit the body to.")] = 5,
     skeleton: Annotated[

@@ -122,7 +122,7 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
     elif trial.has_players:
         checks.attempt(
             lambda: players_tracker_of(trial, recording.rig),
-            lambda _: f"start: frame {trial.start.frame}, {', '.join(player.name for player in trial.players)}",
+            lambda _: f"start: frame {trial.start.frame}, {', '.join(player.name for player in trial.start.player)}",
         )
     elif trial.start.find:
         checks.add("start: not given; the body is looked for when the trial is tracked")

@@ -107,4 +107,4 @@ def _pose(key: KeyTable, model: BodyModel) -> tuple[Pose | None, Array]:
         if name in [segment.name for segment in model.segments[1:]]:
             sds[3 + 3 * model.index_of(name) : 6 + 3 * model.index_of(name)] = turn
     root = RigidTransform.from_components(key.position_m or np.zeros(3), key.rotation or Rotation.identity())
-    return pose_by_hand(model, root, key.joint_angles_deg, "key").pose, sds
+    return pose_by_hand(model, root, key.joint_angles_deg, f"key of frame {key.frame}").pose, sds

@@ -6,8 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from airborne.cameras import Rig
 from airborne.cameras.clicks import read_clicks, read_positions
+from airborne.cameras.consensus import triangulate_consensus
+from airborne.errors import TrialError
 from airborne.trial.file import Trial
+from airborne.trial.table import Clicks
 from airborne.types import Array
 
 
@@ -19,7 +23,7 @@ def read_points(trial: Trial, joints_m: Mapping[str, Sequence[float]] | str) -> 
 
 def read_pixels(
     trial: Trial,
-    points_px: Mapping[str, Mapping[str, Sequence[float]]] | str,
+    points_px: Clicks | str,
     cameras: Sequence[str],
     *,
     fewest: int = 2,
@@ -36,3 +40,18 @@ def read_pixels(
             if camera in cameras:  # the trial has it, but a run may leave it out
                 px[row, cameras.index(camera)] = pixel
     return names, px
+
+
+def triangulate_clicks(trial: Trial, points_px: Clicks | str, rig: Rig, where: str) -> tuple[tuple[str, ...], Array]:
+    """Return the names of clicked points and their positions (points, 3) world [m].
+
+    Raises TrialError for a point on which no two cameras agree.
+    """
+    names, px = read_pixels(trial, points_px, rig.names)
+    agreed = triangulate_consensus(rig, px, np.ones(px.shape[:-1]))
+    missing = [name for name, point in zip(names, agreed.points, strict=True) if np.isnan(point).any()]
+    if missing:
+        raise TrialError(
+            f"{trial.name}: {where}: no two cameras agree where {', '.join(missing)} is; click it in two or more"
+        )
+    return names, agreed.points

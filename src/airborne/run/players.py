@@ -18,9 +18,9 @@ from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.table import jump_row, write_jumps
 from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, videos_of
 from airborne.run.opening import Opened
-from airborne.run.players_tracker import players_tracker_of
+from airborne.run.players_tracker import player_starts, players_tracker_of
 from airborne.tracking import Status
-from airborne.tracking.players import PlayersStep, PlayersTracker, StepTracker
+from airborne.tracking.players import PlayersStep, PlayerStart, PlayersTracker, StepTracker
 from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
 from airborne.trial.settings import BodySettings
@@ -44,18 +44,22 @@ class PlayersRun:
     recording: Recording | LiveRecording
     calibration: Calibration | None
     players: PlayersTracker
+    starts: tuple[PlayerStart, ...]
 
     table = JOINTS
 
     @classmethod
     def open(cls, trial: Trial, opened: Opened[Recording | LiveRecording]) -> PlayersRun:
         """Make the tracker, which checks the players' starts against the cameras."""
-        return cls(trial, opened.recording, opened.calibration, players_tracker_of(trial, opened.recording.rig))
+        rig = opened.recording.rig
+        return cls(
+            trial, opened.recording, opened.calibration, players_tracker_of(trial, rig), player_starts(trial, rig)
+        )
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names that figures and videos show."""
-        return tuple(player.name for player in self.trial.players)
+        return tuple(start.name for start in self.starts)
 
     def read_done(self, folder: Path) -> dict[int, PlayersStep]:
         """Return nothing: a killed run is tracked again from its start, to the same result."""
@@ -96,7 +100,7 @@ class PlayersRun:
             recording.rig,
             recording.rate,
             style=track.overlay,
-            starts=self.trial.players,
+            starts=self.starts,
             drawn=drawn,
         )
 
@@ -131,7 +135,7 @@ class PlayersRun:
             "duration_s": float(motion.time_s[-1] - motion.time_s[0]),
             "rate_hz": round(float(recording.rate), 6),
             "players": {name: _player(motion, k, len(recording.rig)) for k, name in enumerate(motion.players)},
-            "bystanders": [start.name for start in self.trial.players if not start.has_legs],
+            "bystanders": [start.name for start in self.starts if not start.has_legs],
             "uncertainty": _UNCERTAINTY,
         }
 

@@ -13,10 +13,12 @@ import numpy as np
 from airborne.cameras import Rig, camera_looking_at
 from airborne.errors import TrialError
 from airborne.io.text import read_text
+from airborne.run.landmarks import read_points, triangulate_clicks
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.particle import GivenTorsos, legs_tracker
 from airborne.tracking.players import PlayerStart, PlayersTracker
 from airborne.trial.file import Trial
+from airborne.trial.players import start_of
 from airborne.trial.settings import ParticleSettings
 from airborne.video import Frames, View
 
@@ -31,7 +33,7 @@ def players_tracker_of(trial: Trial, rig: Rig) -> PlayersTracker:
 
     Raises TrialError for a player whom no camera sees at the start, and for an unusable table of torsos.
     """
-    starts = trial.players
+    starts = player_starts(trial, rig)
     for start in starts:
         _check_visible(trial, start, rig)
     if not isinstance(trial.track, ParticleSettings):
@@ -40,9 +42,33 @@ def players_tracker_of(trial: Trial, rig: Rig) -> PlayersTracker:
     return legs_tracker(trial.track.filter, rig, starts, torso)
 
 
+def player_starts(trial: Trial, rig: Rig) -> tuple[PlayerStart, ...]:
+    """Return where every player and bystander starts; what was clicked is triangulated.
+
+    Raises TrialError for points that cannot be a player's, or that fewer than two cameras see.
+    """
+    starts = []
+    for player in trial.start.player:
+        if player.joints_m is not None:
+            names, points = read_points(trial, player.joints_m)
+        else:
+            assert player.points_px is not None, "checked with the table"
+            names, points = triangulate_clicks(trial, player.points_px, rig, f"player '{player.name}'")
+        try:
+            starts.append(start_of(player.name, dict(zip(names, points.tolist(), strict=True))))
+        except ValueError as error:
+            raise TrialError(f"{trial.name}: {error}") from None
+    return tuple(starts)
+
+
 def compile_kernels(trial: Trial) -> None:
-    """Take two steps on empty images, so that the tracker's kernels are compiled before live frames arrive."""
-    at = np.mean([point for start in trial.players for point in start.joints_m.values()], axis=0)
+    """Take two steps on empty images, so that the tracker's kernels are compiled before live frames arrive.
+
+    Not where players are clicked or in tables: their places need the cameras, which are not there yet.
+    """
+    if any(not isinstance(player.joints_m, dict) for player in trial.start.player):
+        return
+    at = np.mean([point for player in trial.start.player for point in (player.joints_m or {}).values()], axis=0)
     size = (640, 480)
     asides = zip(trial.camera, np.linspace([-1, 0, 0], [1, 0, 0], len(trial.camera)), strict=True)
     cameras = [

@@ -16,7 +16,6 @@ from airborne.errors import MistakesError, TrialError, list_mistakes
 from airborne.io.names import ColumnName, Name, check_path
 from airborne.io.text import list_keys, read_toml
 from airborne.tracking.methods import Settings
-from airborne.tracking.players import PlayerStart
 from airborne.trial.body import BodyTable
 from airborne.trial.calibration import CalibrationTable
 from airborne.trial.cameras import CameraTable
@@ -100,8 +99,9 @@ class Trial(SettingsTable):
     @model_validator(mode="after")
     def _check_clicks(self) -> Trial:
         names = [camera.name for camera in self.camera]
-        tables = [forms.points_px for forms in (self.start, *self.key) if isinstance(forms.points_px, dict)]
-        clicked = {camera for table in tables for by_camera in table.values() for camera in by_camera}
+        tables = [forms.points_px for forms in (self.start, *self.start.player, *self.key)]
+        inline = [table for table in tables if isinstance(table, dict)]
+        clicked = {camera for table in inline for by_camera in table.values() for camera in by_camera}
         unknown = sorted(clicked - set(names))
         if unknown:
             raise ValueError(f"points_px: no camera {', '.join(unknown)}; there are: {', '.join(names)}")
@@ -145,11 +145,6 @@ class Trial(SettingsTable):
     def has_players(self) -> bool:
         """Whether this is a trial of players' legs, and not of one body."""
         return bool(self.start.player)
-
-    @property
-    def players(self) -> tuple[PlayerStart, ...]:
-        """Where every player and bystander starts."""
-        return tuple(player.start for player in self.start.player)
 
     @property
     def settings(self) -> Settings:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
+
 import numpy as np
 from pydantic import model_validator
 
 from airborne.body.legs import LEG_POINTS, Legs
 from airborne.errors import BodyError
-from airborne.io.names import ColumnName
+from airborne.io.names import CheckedPath, ColumnName
 from airborne.tracking.players import PlayerStart
-from airborne.trial.table import SettingsTable, Vector
+from airborne.trial.table import Clicks, SettingsTable, Vector
 
 _FEET = ("foot_left", "foot_right")
 _FARTHEST_M = 100.0  # no court is larger
@@ -17,48 +19,68 @@ _MOST_UNDER_FLOOR_M = 0.3  # by how much a calibration's floor may be off
 
 
 class PlayerTable(SettingsTable):
-    """A player's joints at the first frame; a player with a torso only is a bystander."""
+    """A player's joints at the first frame, in metres or clicked; a player with a torso only is a bystander."""
 
     name: ColumnName
-    joints_m: dict[str, Vector]
+    joints_m: dict[str, Vector] | CheckedPath | None = None  # point -> position, or a table of them
+    points_px: Clicks | CheckedPath | None = None  # point -> camera -> u, v, or a table of clicked points
 
     @model_validator(mode="after")
     def _check_points(self) -> PlayerTable:
-        names = ("torso", *LEG_POINTS, *_FEET)
-        unknown = [name for name in self.joints_m if name not in names]
-        missing = [name for name in names[:-2] if name not in self.joints_m]
-        if unknown:
-            raise ValueError(f"player '{self.name}': no point {', '.join(unknown)}; there are: {', '.join(names)}")
-        if "torso" in missing or (self.has_legs and missing):
-            raise ValueError(
-                f"player '{self.name}': joints_m has no {', '.join(missing)}; give all of {', '.join(names[:-2])}, "
-                "or the torso alone of a bystander"
-            )
-        far = [name for name, point in self.joints_m.items() if max(map(abs, point)) > _FARTHEST_M]
-        if far:
-            raise ValueError(f"player '{self.name}': {far[0]} lies over {_FARTHEST_M:g} m away; give metres")
-        if self.has_legs:
-            self._check_legs()
+        if (self.joints_m is None) == (self.points_px is None):
+            raise ValueError(f"player '{self.name}': give joints_m or points_px, one of them")
+        if isinstance(self.joints_m, dict):
+            start_of(self.name, self.joints_m)
+        elif isinstance(self.points_px, dict):
+            check_point_names(self.name, self.points_px)
         return self
 
-    def _check_legs(self) -> None:
-        points = np.array([self.joints_m[name] for name in LEG_POINTS])
-        if points[:2, 2].min() < points[4:, 2].max():
-            raise ValueError(f"player '{self.name}': a hip lies lower than an ankle; were they exchanged?")
-        under_m = -float(points[:, 2].min())
-        if under_m > _MOST_UNDER_FLOOR_M:
-            raise ValueError(f"player '{self.name}': a joint lies {under_m:.2f} m under the floor, which must be z = 0")
-        try:
-            Legs.from_points(np.array(self.joints_m["torso"]), points)
-        except BodyError as error:
-            raise ValueError(f"player '{self.name}': {error}") from error
+    @property
+    def source_files(self) -> list[str]:
+        """The files that define it."""
+        return [name for name in (self.joints_m, self.points_px) if isinstance(name, str)]
 
     @property
-    def has_legs(self) -> bool:
-        """Whether the player is tracked, not a bystander."""
-        return set(self.joints_m) != {"torso"}
+    def is_bystander(self) -> bool:
+        """Whether the trial file itself says that only the torso is given."""
+        points = self.joints_m if self.points_px is None else self.points_px
+        return isinstance(points, dict) and set(points) == {"torso"}
 
-    @property
-    def start(self) -> PlayerStart:
-        """The start as the trackers take it."""
-        return PlayerStart(name=self.name, joints_m={name: np.array(point) for name, point in self.joints_m.items()})
+
+def start_of(name: str, joints_m: Mapping[str, Sequence[float]]) -> PlayerStart:
+    """Return a player's start of joints in metres; raises ValueError for those that cannot be a player's."""
+    check_point_names(name, joints_m)
+    start = PlayerStart(name=name, joints_m={joint: np.array(point, float) for joint, point in joints_m.items()})
+    far = [joint for joint, point in start.joints_m.items() if np.abs(point).max() > _FARTHEST_M]
+    if far:
+        raise ValueError(f"player '{name}': {far[0]} lies over {_FARTHEST_M:g} m away; give metres")
+    if start.has_legs:
+        _check_legs(start)
+    return start
+
+
+def check_point_names(name: str, points: Iterable[str]) -> None:
+    """Raise ValueError for a point that a player does not have, and where one is missing."""
+    given, names = set(points), ("torso", *LEG_POINTS, *_FEET)
+    unknown = [point for point in points if point not in names]
+    missing = [point for point in names[:-2] if point not in given]
+    if unknown:
+        raise ValueError(f"player '{name}': no point {', '.join(unknown)}; there are: {', '.join(names)}")
+    if "torso" in missing or (given != {"torso"} and missing):
+        raise ValueError(
+            f"player '{name}': joints_m has no {', '.join(missing)}; give all of {', '.join(names[:-2])}, "
+            "or the torso alone of a bystander"
+        )
+
+
+def _check_legs(start: PlayerStart) -> None:
+    name, points = start.name, np.array([start.joints_m[point] for point in LEG_POINTS])
+    if points[:2, 2].min() < points[4:, 2].max():
+        raise ValueError(f"player '{name}': a hip lies lower than an ankle; were they exchanged?")
+    under_m = -float(points[:, 2].min())
+    if under_m > _MOST_UNDER_FLOOR_M:
+        raise ValueError(f"player '{name}': a joint lies {under_m:.2f} m under the floor, which must be z = 0")
+    try:
+        Legs.from_points(np.array(start.joints_m["torso"]), points)
+    except BodyError as error:
+        raise ValueError(f"player '{name}': {error}") from error

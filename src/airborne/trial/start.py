@@ -37,7 +37,7 @@ class StartTable(PoseForms):
         names = [player.name for player in self.player]
         if len(set(names)) != len(names):
             raise ValueError(f"two players share a name: {', '.join(names)}; give each its own")
-        if names and not any(player.has_legs for player in self.player):
+        if names and all(player.is_bystander for player in self.player):
             raise ValueError("every player is a bystander; give one of them the points of the legs too")
         if BY_HAND & self.model_fields_set:
             if self.position_m is None:
@@ -45,6 +45,11 @@ class StartTable(PoseForms):
             if self.rotation is None:
                 raise ValueError("give rotation_matrix, quaternion_xyzw or somersault_tilt_twist_deg, one of them")
         return self
+
+    @property
+    def source_files(self) -> list[str]:
+        """The files and folders that define it, and those of the players."""
+        return [*super().source_files, *(name for player in self.player for name in player.source_files)]
 
     @property
     def pose(self) -> Pose:
