@@ -1,0 +1,111 @@
+"""One key changed in a finished run: only the frames between the keys beside it are tracked again."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from airborne.errors import ResultError
+from airborne.run.track import track_trial
+from airborne.tracking.model_based.refined import RefinedTracker
+from airborne.trial.file import Trial, read_trial
+from airborne.trial.keys import KeyTable
+
+LAST = 13
+
+
+def key(thrown_cross, frame: int, **changes) -> KeyTable:
+    """The digitised pose of a frame, 10 mm beside it."""
+    with (thrown_cross / "truth.csv").open() as file:
+        row = next(row for row in csv.DictReader(file) if int(row["field"]) == frame)
+    place = [round(float(row[axis]) + 0.01, 3) for axis in ("x_m", "y_m", "z_m")]
+    return KeyTable(**{"frame": frame, "position_m": place, **changes})
+
+
+@pytest.fixture(scope="module")
+def cross(thrown_cross):
+    def with_keys(*keys: KeyTable) -> Trial:
+        return read_trial(thrown_cross / "trial.toml", {"stop": LAST}).model_copy(update={"key": list(keys)})
+
+    return with_keys
+
+
+@pytest.fixture(scope="module")
+def run(cross, thrown_cross, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("keys") / "run"
+    track_trial(cross(key(thrown_cross, 4), key(thrown_cross, 8)), folder, pictures=False)
+    return folder
+
+
+def poses(folder) -> dict[int, tuple[str, ...]]:
+    """The rows of motion.csv without the columns that the self-check of the whole run writes."""
+    with (folder / "motion.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    return {
+        int(row["frame"]): tuple(value for name, value in row.items() if not name.endswith("_sd") and name != "status")
+        for row in rows
+    }
+
+
+def searched(monkeypatch) -> set[int]:
+    frames: set[int] = set()
+    search = RefinedTracker.search
+
+    def noted(self, state, observed):
+        frames.add(observed.index)
+        return search(self, state, observed)
+
+    monkeypatch.setattr(RefinedTracker, "search", noted)
+    return frames
+
+
+def test_frames_between_the_neighbours_of_a_changed_key_are_tracked_again(
+    cross, thrown_cross, run, tmp_path, monkeypatch
+):
+    before, found = poses(run), searched(monkeypatch)
+    assert list(before) == list(range(LAST))
+    changed = cross(key(thrown_cross, 4, sd_m=0.002), key(thrown_cross, 8))
+    summary = track_trial(changed, run, resume=True, pictures=False).summary
+    assert found == {1, 2, 3, 4, 5, 6, 7}
+    after = poses(run)
+    assert list(after) == list(range(LAST))
+    assert all(after[frame] == before[frame] for frame in (0, *range(8, LAST)))
+    assert after[4] != before[4]
+    assert summary["n_lost"] == 0
+    found.clear()
+    track_trial(changed, run, resume=True, pictures=False)
+    assert found == set()
+    assert poses(run) == after
+
+
+def test_a_key_past_the_last_one_touches_what_follows(cross, thrown_cross, run, monkeypatch):
+    found = searched(monkeypatch)
+    keys = [key(thrown_cross, 4, sd_m=0.002), key(thrown_cross, 8), key(thrown_cross, 11)]
+    track_trial(cross(*keys), run, resume=True, pictures=False)
+    assert found == {9, 10, 11, 12}
+
+
+def test_another_start_is_another_run(cross, run, thrown_cross):
+    trial = cross(key(thrown_cross, 4))
+    other = trial.model_copy(update={"start": trial.start.model_copy(update={"position_m": [0.0, 0.0, 1.0]})})
+    with pytest.raises(ResultError, match="holds another run"):
+        track_trial(other, run, resume=True, pictures=False)
+
+
+def test_a_key_that_is_not_tracked_is_said_to_be_unused(cross, thrown_cross, tmp_path):
+    trial = cross(key(thrown_cross, 5), key(thrown_cross, 30))
+    every = trial.model_copy(update={"track": trial.track.model_copy(update={"every": 2, "stop": 3})})
+    events = track_trial(every, tmp_path / "run", pictures=False).summary["events"]
+    assert any("[[key]] of frame 5, 30 is not used" in event for event in events)
+
+
+def test_keys_bring_no_harm(run, thrown_cross):
+    with (thrown_cross / "truth.csv").open() as file:
+        true = {int(row["field"]): [float(row[axis]) for axis in ("x_m", "y_m", "z_m")] for row in csv.DictReader(file)}
+    with (run / "motion.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    off_mm = [
+        1e3 * np.linalg.norm(np.array([float(row[axis]) for axis in ("x_m", "y_m", "z_m")]) - true[int(row["frame"])])
+        for row in rows
+    ]
+    assert np.max(off_mm) < 5
