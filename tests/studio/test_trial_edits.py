@@ -1,7 +1,10 @@
 """Edits of a trial's text keep its comments and all that they do not speak of."""
 
+import pytest
+
+from airborne.errors import TrialError
 from airborne.io.text import parse_toml
-from airborne.studio.trial_edits import with_cameras, with_table
+from airborne.studio.trial_edits import with_cameras, with_click, with_table
 
 TEXT = """# filmed on a Sunday
 name = "throw"
@@ -44,3 +47,28 @@ def test_tables_are_made_changed_and_rid_of_keys():
     text = with_table(text, "start", {"frame": 3, "position_m": [0.1, 0.2, 1.0]})
     assert parse_toml(text)["start"] == {"frame": 3, "position_m": [0.1, 0.2, 1.0]}
     assert parse_toml(text)["track"] == {"method": "refined"}
+
+
+def test_a_click_is_written_into_the_key_of_its_frame():
+    text = with_click(TEXT, 9, "wrist_left", "left", (100.04, 50))
+    text = with_click(text, 9, "wrist_left", "right", (1, 2))
+    text = with_click(text, 9, "wrist_left", "left", (101, 51))
+    text = with_click(text, 4, "knee_left", "left", (3, 4))
+    assert parse_toml(text) == parse_toml(TEXT) | {
+        "key": [
+            {"frame": 9, "points_px": {"wrist_left": {"left": [101.0, 51.0], "right": [1.0, 2.0]}}},
+            {"frame": 4, "points_px": {"knee_left": {"left": [3.0, 4.0]}}},
+        ]
+    }
+    assert "# behind the net" in text
+
+
+def test_a_key_that_says_more_keeps_it():
+    text = with_click(f"{TEXT}\n[[key]]\nframe = 9\nsd_px = 2.0   # careful\n", 9, "wrist_left", "left", (1, 2))
+    assert parse_toml(text)["key"] == [{"frame": 9, "sd_px": 2.0, "points_px": {"wrist_left": {"left": [1.0, 2.0]}}}]
+    assert "# careful" in text
+
+
+def test_a_key_whose_clicks_are_in_a_table_of_their_own_is_left_alone():
+    with pytest.raises(TrialError, match=r"has its clicks in clicks.csv; correct them there"):
+        with_click(f'{TEXT}\n[[key]]\nframe = 9\npoints_px = "clicks.csv"\n', 9, "wrist_left", "left", (1, 2))

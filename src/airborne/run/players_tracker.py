@@ -66,9 +66,10 @@ def compile_kernels(trial: Trial) -> None:
 
     Not where players are clicked or in tables: their places need the cameras, which are not there yet.
     """
-    if any(not isinstance(player.joints_m, dict) for player in trial.start.player):
+    given = [player.joints_m for player in trial.start.player if isinstance(player.joints_m, dict)]
+    if len(given) < len(trial.start.player):
         return
-    at = np.mean([point for player in trial.start.player for point in (player.joints_m or {}).values()], axis=0)
+    at = np.mean([point for joints_m in given for point in joints_m.values()], axis=0)
     size = (640, 480)
     asides = zip(trial.camera, np.linspace([-1, 0, 0], [1, 0, 0], len(trial.camera)), strict=True)
     cameras = [

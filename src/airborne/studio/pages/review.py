@@ -12,6 +12,7 @@ from nicegui import ui
 from airborne.cameras import read_rig
 from airborne.motion.run_folder import CALIBRATION, holds_players
 from airborne.studio.outlines import run_body, run_motion
+from airborne.studio.pages.correct import Correction
 from airborne.studio.pages.layout import complain, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
@@ -54,6 +55,10 @@ async def review_page(session: Session) -> None:
 
 async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
     bodies: list[Callable[[int], None]] = []
+    correction = None if holds_players(folder) else Correction(session, shown, folder)
+    if correction is not None:
+        correction.build()
+        bodies.append(correction.turn_to)
 
     def turn_to(frame: int) -> None:
         session.frame = frame
@@ -62,10 +67,15 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
 
     with ui.element("div").classes("split"):
         with ui.element("div").classes("wide"):
-            CameraViews(
-                shown, frame=session.frame, overlay=f"/overlay/{quote(folder.name)}/{{frame}}", on_frame=turn_to
+            view = CameraViews(
+                shown,
+                frame=session.frame,
+                overlay=f"/overlay/{quote(folder.name)}/{{frame}}",
+                on_frame=turn_to,
+                on_move=None if correction is None else correction.move,
             )
-        if not holds_players(folder):
+        if correction is not None:
+            correction.view = view
             with ui.element("div").classes("side"):
                 bodies.append(await _stage(folder))
     Curves(f"/curves/{quote(folder.name)}", frame=session.frame)

@@ -1,0 +1,62 @@
+"""A joint dragged in a view, in a real browser: a key at that frame, from which the run is tracked again."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from airborne.cameras import read_rig
+from airborne.io.text import read_toml
+from airborne.motion import read_motion
+from airborne.run.track import track_trial
+from airborne.trial.file import read_trial
+from tests.support.places import THROWN_CROSS
+from tests.support.studio import MINUTE, at_pixel, go_home, open_page, open_studio, wait_for_frame
+
+FRAME, LAST, CAMERA, DRAGGED_PX = 3, 6, 1, (16.0, -12.0)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The thrown cross, its first frames tracked."""
+    folder = tmp_path_factory.mktemp("studio") / "cross"
+    shutil.copytree(THROWN_CROSS, folder)
+    trial = folder / "trial.toml"
+    trial.write_text(f"{trial.read_text()}\nstop = {LAST}\n")
+    track_trial(read_trial(trial), folder / "results", pictures=False)
+    return folder
+
+
+def test_a_dragged_joint_is_a_key_and_its_frames_are_tracked_again(folder):
+    run = folder / "results"
+    before, rig = read_motion(run / "motion.csv"), read_rig(run / "calib.toml")
+    model = read_trial(folder / "trial.toml").model()
+    name = model.landmarks[0].name
+    u, v = rig.cameras[CAMERA].px_from_world(model.with_pose(before.pose(FRAME)).landmarks[0])
+    with open_studio(folder / "trial.toml") as address, open_page(address.replace("/?", "/review?")) as page:
+        wait_for_frame(page, 0)
+        go_home(page)
+        page.get_by_role("switch", name="Correct").click()
+        for frame in range(1, FRAME + 1):
+            page.locator("canvas.view").press(".")
+            wait_for_frame(page, frame)
+        page.wait_for_function(
+            "([id, u]) => document.querySelector('canvas.view').view.marks.some("
+            "(mark) => mark.id === id && Math.abs(mark.u - u) < 1)",
+            arg=[f"{name}|{rig.names[CAMERA]}", float(u)],
+        )
+        page.mouse.move(*at_pixel(page, CAMERA, u, v))
+        page.mouse.down()
+        page.mouse.move(*at_pixel(page, CAMERA, u + DRAGGED_PX[0], v + DRAGGED_PX[1]), steps=5)
+        page.mouse.up()
+        page.get_by_text(f"{name} corrected in {rig.names[CAMERA]}, frame {FRAME}").first.wait_for()
+        page.get_by_role("button", name="Track again around it").click()
+        page.get_by_text("tracked again", exact=True).wait_for(timeout=5 * MINUTE)
+    (key,) = read_toml(folder / "trial.toml")["key"]
+    assert key["frame"] == FRAME
+    np.testing.assert_allclose(key["points_px"][name][rig.names[CAMERA]], np.add([u, v], DRAGGED_PX), atol=1.5)
+    after = read_motion(run / "motion.csv")
+    assert after.index.tolist() == before.index.tolist() == list(range(LAST))
+    assert np.array_equal(after.position[0], before.position[0])
+    assert not np.array_equal(after.position[FRAME], before.position[FRAME])
+    assert np.linalg.norm(after.position - before.position, axis=1).max() < 0.02
