@@ -1,14 +1,16 @@
 """A person's own body from a trial: what cannot be fitted is refused in one line."""
 
+import numpy as np
 import pytest
 
 from airborne.body import ATHLETE, human18
 from airborne.body.outfits import Border
 from airborne.body_fitting.fit import BodyFit
-from airborne.body_fitting.from_trial import PersonFit, describe_fit, fit_person
+from airborne.body_fitting.from_trial import PersonFit, _landmarks_of, describe_fit, fit_person
 from airborne.errors import TrialError
 from airborne.trial.examples import example_trial
-from airborne.trial.file import read_trial
+from airborne.trial.file import Trial, read_trial
+from tests.support.people_seen import four_cameras
 
 
 @pytest.fixture(scope="module")
@@ -17,9 +19,27 @@ def by_hand():
 
 
 def test_a_start_set_by_hand_does_not_say_where_the_joints_are(by_hand, tmp_path):
-    with pytest.raises(TrialError, match="detections or joints_m under"):
+    with pytest.raises(TrialError, match="joints_m or points_px under"):
         fit_person(by_hand, tmp_path / "person.toml")
     assert not list(tmp_path.iterdir())
+
+
+def test_clicks_of_the_start_and_of_keys_say_where_the_joints_are():
+    rig, points = four_cameras(), {"hip_left": [0.1, 0.0, 0.9], "shoulder_left": [0.15, 0.0, 1.4]}
+    clicks = {name: {c.name: c.px_from_world(np.array(at)).tolist() for c in rig} for name, at in points.items()}
+    head = {
+        "name": "a jump",
+        "camera": [{"name": name, "video": f"{name}.mp4"} for name in rig.names],
+        "calibration": {"file": "calib.toml"},
+        "body": {"preset": "human18", "stature_m": 1.8, "mass_kg": 75.0},
+        "start": {"points_px": clicks},
+        "key": [{"frame": 7, "joints_m": points}, {"frame": 9, "position_m": [0, 0, 1]}],
+    }
+    trial = Trial(**head)
+    for forms in (trial.start, trial.key[0]):
+        found = _landmarks_of(trial, forms, rig)
+        assert all(np.allclose(found[name], at, atol=1e-6) for name, at in points.items())
+    assert _landmarks_of(trial, trial.key[1], rig) == {}
 
 
 def test_no_frames_are_refused(by_hand, tmp_path):

@@ -173,6 +173,40 @@ def test_points_clicked_in_the_images(trial, tmp_path):
         find_first_pose(trial('[start]\npoints_px = "clicks.csv"\n'), MODEL, RIG)
 
 
+def inline(px, leave_out=()) -> str:
+    """A [start] with clicks in the trial file itself; `leave_out` are pairs of a landmark and a camera."""
+    rows = [
+        f"{name} = {{ "
+        + ", ".join(f"{camera} = {at[i].tolist()}" for camera, at in px.items() if (name, camera) not in leave_out)
+        + " }"
+        for i, name in enumerate(NAMES)
+    ]
+    return "[start.points_px]\n" + "\n".join(rows)
+
+
+def test_points_clicked_in_the_trial_file_itself(trial):
+    px = {camera.name: camera.px_from_world(TRUE[0]) for camera in RIG}
+    assert off_m(find_first_pose(trial(inline(px)), MODEL, RIG).pose) < 1e-3
+    with pytest.raises(TrialError, match="points_px: no camera cam9"):
+        trial(inline(px).replace("cam4 =", "cam9 ="))
+
+
+def test_a_click_in_one_camera_alone_constrains_the_start(trial):
+    """The hand's end of a forearm is known across the line of sight of one camera, and nearer to it than without."""
+    px = {camera.name: camera.px_from_world(TRUE[0]) for camera in RIG}
+    arm = ("wrist_left", "hand_left")
+    unseen = [(name, camera) for name in arm for camera in RIG.names]
+    without = find_first_pose(trial(inline(px, unseen)), MODEL, RIG)
+    lone = find_first_pose(trial(inline(px, [each for each in unseen if each != ("wrist_left", "cam1")])), MODEL, RIG)
+    index, camera = NAMES.index("wrist_left"), RIG["cam1"]
+    off_px = [
+        np.linalg.norm(camera.px_from_world(MODEL.with_pose(each.pose).landmarks[index]) - px["cam1"][index])
+        for each in (without, lone)
+    ]
+    assert off_px[1] < 0.8 * off_px[0]  # of images so small that a click is worth little
+    assert any("wrist_left clicked in one camera" in note for note in lone.notes)
+
+
 def test_detections_at_the_first_frame_tracked(trial):
     given = trial(DETECTIONS + "frame = 7\n", tables=detections())
     result = find_first_pose(given, MODEL, RIG)

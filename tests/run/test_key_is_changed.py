@@ -1,6 +1,7 @@
 """One key changed in a finished run: only the frames between the keys beside it are tracked again."""
 
 import csv
+import json
 
 import numpy as np
 import pytest
@@ -83,6 +84,18 @@ def test_a_key_past_the_last_one_touches_what_follows(cross, thrown_cross, run, 
     keys = [key(thrown_cross, 4, sd_m=0.002), key(thrown_cross, 8), key(thrown_cross, 11)]
     track_trial(cross(*keys), run, resume=True, pictures=False)
     assert found == {9, 10, 11, 12}
+
+
+def test_a_record_without_keys_is_that_of_a_run_without_keys(cross, tmp_path, monkeypatch):
+    trial = cross().model_copy(update={"track": cross().track.model_copy(update={"stop": 2})})
+    track_trial(trial, tmp_path / "run", pictures=False)
+    record = tmp_path / "run" / "run.json"
+    written = json.loads(record.read_text())
+    assert written.pop("keys") == {"0": "start"}
+    record.write_text(json.dumps(written))
+    found = searched(monkeypatch)
+    track_trial(trial, tmp_path / "run", resume=True, pictures=False)
+    assert found == set()
 
 
 def test_another_start_is_another_run(cross, run, thrown_cross):

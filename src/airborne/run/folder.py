@@ -36,6 +36,7 @@ from airborne.motion.run_folder import (
 )
 from airborne.trial.file import Trial
 
+START = "start"  # stands for the digest of the first key, which other digests hold
 _BEFORE_A_RUN = {CANDIDATES, CANDIDATES_PICTURE}  # what a start that is undecided leaves
 
 
@@ -71,10 +72,11 @@ def prepare_folder(
     if not rows.exists():
         write_json(record, identity)
         return False
-    recorded = read_record(record)
+    first = {frame: digest for frame, digest in identity["keys"].items() if digest == START}
+    recorded = {"keys": first, **read_record(record)}  # older records have no keys
     changed = [name for name in identity if recorded.get(name) != identity[name]]
     if changed == ["keys"]:
-        again = stretches_of(recorded.get("keys") or {}, identity["keys"])
+        again = stretches_of(recorded["keys"], identity["keys"])
         drop_rows(rows, lambda frame: any(before < frame < after for before, after in again))
         write_json(record, identity)
     elif changed:
@@ -138,7 +140,7 @@ def run_identity(trial: Trial, *, live: bool = False) -> dict[str, Any]:
 
 def _key_digests(trial: Trial) -> dict[str, str]:
     """Return a digest of each key and its files, by its frame; the start, which other digests hold, is the first."""
-    digests = {str(trial.start.frame): "start"}
+    digests = {str(trial.start.frame): START}
     for key in trial.key:
         files = {name: file_digest(trial.path(name)) for name in key.source_files}
         said = json.dumps([key.model_dump(), files])

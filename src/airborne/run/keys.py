@@ -28,7 +28,7 @@ def read_keys(trial: Trial, model: BodyModel, rig: Rig, facts: Sequence[VideoFac
     Raises TrialError where one names what the body does not have, CalibrationError for unusable tables.
     """
     keys = sorted(trial.key, key=lambda key: key.frame)
-    return {key.frame: _evidence(trial, key, model, rig, facts) for key in keys}
+    return {key.frame: evidence_of(trial, key, model, rig, facts) for key in keys}
 
 
 def tracked_keys(trial: Trial, model: BodyModel, recording: Recording) -> tuple[dict[int, PoseEvidence], list[str]]:
@@ -42,7 +42,8 @@ def tracked_keys(trial: Trial, model: BodyModel, recording: Recording) -> tuple[
     return {frame: key for frame, key in keys.items() if frame in frames}, [note] if missed else []
 
 
-def _evidence(trial: Trial, key: KeyTable, model: BodyModel, rig: Rig, facts: Sequence[VideoFacts]) -> PoseEvidence:
+def evidence_of(trial: Trial, key: KeyTable, model: BodyModel, rig: Rig, facts: Sequence[VideoFacts]) -> PoseEvidence:
+    """Return what a key says of the pose; the errors are those of `read_keys`."""
     where, names = f"key of frame {key.frame}", [landmark.name for landmark in model.landmarks]
     root_weights = np.sqrt([LANDMARK_WEIGHTS.get(name, 1.0) for name in names])
     positions = np.full((len(names), 3), np.nan)
