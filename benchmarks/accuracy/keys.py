@@ -1,9 +1,9 @@
 """Measure what a key is worth, forward alone and in both directions: `python benchmarks/accuracy/keys.py [FOLDER]`.
 
-Six synthetic people whose limbs swing fast, with a key in the last of 16 frames (about 4 minutes); and, given the folder
-of somersault_2, that recording with a key at frame 55 (about 4 minutes more). A key's joints are clicked in every view:
-the true ones projected, with an error of half a pixel of small images, of one pixel of the recording. The tracker sees no
-truth. `--seeds 11-14` takes other people, and writes no rows.
+Six synthetic people whose limbs swing fast, with a key in the last of 16 frames (about 4 minutes); and, given the
+folder of somersault_2, that recording with a key at frame 55 (about 4 minutes more). A key's joints are clicked in
+every view: the true ones projected, with an error of half a pixel of small images, of one pixel of the recording.
+The tracker sees no truth. `--seeds 11-14` takes other people, and writes no rows.
 """
 
 from __future__ import annotations
@@ -18,12 +18,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT)]
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from rows import append
-from tests.support.people import CAMERAS, HELD, HUMAN, PLACE, landmark_errors_mm, person, wrong
-from tests.support.scenes import Scene, clutter
 
 from airborne.body import Pose
 from airborne.body.chain import clamp_to_limits
@@ -36,6 +34,8 @@ from airborne.tracking.methods import Settings, tracker_of
 from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial, read_trial
 from airborne.trial.keys import KeyTable
+from tests.support.people import CAMERAS, HELD, HUMAN, PLACE, landmark_errors_mm, person, wrong
+from tests.support.scenes import Scene, clutter
 
 _SEEDS, _N, _SPEED, _CAMERAS = range(30, 36), 16, 8.0, 3
 _LANDMARKS = [landmark.name for landmark in HUMAN.landmarks]
