@@ -29,7 +29,10 @@ TABLES = {
     *("joints.csv", "tables/joints.parquet", "jumps.csv"),
     *("summary.json", "run.json", "calib.toml"),
 }
-PICTURES = {"report.html", "figures/heights.png", "videos/overlay_left.mp4", "videos/overlay_right.mp4"}
+PICTURES = {
+    *("report.html", "figures/heights.png"),
+    *("videos/overlay_left.mp4", "videos/overlay_right.mp4", "videos/pictures.json"),
+}
 
 
 @pytest.fixture(autouse=True)
