@@ -97,7 +97,7 @@ def measure_people(seeds: range) -> list[dict]:
         scene = scene_of(seed)
         tracker = tracker_of(Settings(), HUMAN, wrong(scene.start(), seed=seed), {key: clicks_of(scene, key)})
         forward = track_frames(tracker, (scene.frames(i) for i in range(_N)), lambda estimate: None)
-        both = track_between_keys(tracker, HUMAN, _Reader(scene), range(_N), [key], lambda estimate: None)
+        both = track_between_keys(tracker, HUMAN, _Reader(scene), range(_N), keys=[key], write=lambda estimate: None)
         for name, run in (("forward", forward), ("both", both)):
             rows = [(estimate, landmark_errors_mm(scene, estimate)) for _, estimate in run if estimate.pose is not None]
             found[name] += rows[:-1]

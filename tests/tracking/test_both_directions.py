@@ -59,7 +59,7 @@ def scene():
 def track(scene, keys, done=None):
     tracker = Searches(tracker_of(Settings(), CROSS, scene.start(), keys))
     written = []
-    run = track_between_keys(tracker, CROSS, Reader(scene), FRAMES, list(keys), written.append, done)
+    run = track_between_keys(tracker, CROSS, Reader(scene), FRAMES, keys=list(keys), write=written.append, done=done)
     return [estimate for _, estimate in run], written, tracker.frames
 
 
@@ -108,7 +108,7 @@ def test_of_a_changed_key_only_the_frames_between_its_neighbours_are_searched(sc
 def test_without_keys_it_is_the_plain_loop(scene):
     tracker = tracker_of(Settings(), CROSS, scene.start())
     plain = track_frames(tracker, (scene.frames(i) for i in FRAMES[:4]), lambda estimate: None)
-    both = track_between_keys(tracker, CROSS, Reader(scene), FRAMES, [], lambda estimate: None)
+    both = track_between_keys(tracker, CROSS, Reader(scene), FRAMES, keys=[], write=lambda estimate: None)
     assert bits(e for _, e in plain) == bits(e for (_, e), _ in zip(both, range(4), strict=False))
 
 

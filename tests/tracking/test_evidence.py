@@ -7,7 +7,7 @@ import pytest
 
 from airborne.body.chain import delta_between, move_pose
 from airborne.tracking.evidence import PoseEvidence
-from airborne.tracking.first_pose.join_evidence import join_evidence
+from airborne.tracking.first_pose.evidence_fit import join_evidence
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior, all_joints
 from tests.support.people import HUMAN, THREE, swinging, wrong
 

@@ -36,7 +36,7 @@ from airborne.motion.tables import write_uncertainty
 from airborne.rendering import FLAT, render
 from airborne.run.find import FoundStart
 from airborne.run.first_pose import find_first_pose
-from airborne.run.keys import tracked_keys
+from airborne.run.keys import keys_of_frames
 from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
 from airborne.tracking import Estimate
@@ -80,7 +80,7 @@ class BodyRun:
         model = trial.model()
         first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
         found_notes = () if found is None else (found.note,)
-        keys, missed = tracked_keys(trial, model, opened.recording)
+        keys, missed = keys_of_frames(trial, model, opened.recording)
         opened.recording.events.extend([*model.notes, *found_notes, *first.notes, *missed])
         return cls(trial, opened.recording, opened.calibration, model, first.pose, found, keys)
 
@@ -126,7 +126,9 @@ class BodyRun:
         recording = self.recording
         frames_to_track = range(recording.start, max(self.keys) + 1, recording.every)
         reader, keys = Rereading(recording), list(self.keys)
-        return track_between_keys(tracker, self.model, reader, frames_to_track, keys, write, done, tick)
+        return track_between_keys(
+            tracker, self.model, reader, frames_to_track, keys=keys, write=write, done=done, tick=tick
+        )
 
     def writer(self, folder: Path, *, resume: bool) -> MotionWriter:
         """Return what writes the estimates."""

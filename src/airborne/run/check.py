@@ -11,7 +11,7 @@ from airborne.errors import AirborneError, MistakesError, TrialError, count
 from airborne.run.body import OUT_OF_SIGHT, is_seen
 from airborne.run.detections import read_trial_detections
 from airborne.run.first_pose import find_first_pose
-from airborne.run.keys import tracked_keys
+from airborne.run.keys import keys_of_frames
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files
 from airborne.run.opening import Opened, calibrated_cameras, open_trial, past_the_end_error, video_source
 from airborne.run.players_tracker import players_tracker_of
@@ -134,7 +134,7 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
         )
         if trial.key:
             checks.attempt(
-                lambda: tracked_keys(trial, model, recording),
+                lambda: keys_of_frames(trial, model, recording),
                 lambda keys: "; ".join([f"keys: {len(keys[0])} of {len(trial.key)} are used", *keys[1]]),
             )
         if first is not None and not is_seen(model.with_pose(first.pose), recording.rig):

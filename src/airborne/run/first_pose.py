@@ -10,10 +10,10 @@ from airborne.body import BodyModel
 from airborne.cameras import Rig
 from airborne.errors import TrialError
 from airborne.run.detections import TrialDetections
-from airborne.run.keys import evidence_of
-from airborne.run.landmarks import read_pixels, read_points
+from airborne.run.keys import read_key
+from airborne.run.landmarks import read_joint_positions, read_pixels
 from airborne.tracking.first_pose import FirstPose, fit_to_detections, fit_to_pixels, fit_to_points, pose_by_hand
-from airborne.tracking.first_pose.join_evidence import join_evidence
+from airborne.tracking.first_pose.evidence_fit import join_evidence
 from airborne.tracking.model_based.refined import START_SD
 from airborne.trial.file import Trial
 from airborne.trial.keys import KeyTable
@@ -35,17 +35,17 @@ def find_first_pose(trial: Trial, model: BodyModel, rig: Rig, detections: TrialD
         where = start.points_px if isinstance(start.points_px, str) else "start.points_px"
         first = fit_to_pixels(model, rig, where, names=names, px=px, weights=np.ones(px.shape[:-1]))
         lone = [name for name, n in zip(names, np.isfinite(px).all(axis=-1).sum(axis=-1), strict=True) if n == 1]
-        return _add_lone_clicks(trial, model, rig, first, lone) if lone else first
+        return _add_lone_clicks(trial, model, rig, first, names=lone) if lone else first
     if start.joints_m is None:
         return pose_by_hand(model, start.world_from_root, start.joint_angles_deg)
     where = start.joints_m if isinstance(start.joints_m, str) else "start.joints_m"
-    return fit_to_points(model, where, *read_points(trial, start.joints_m))
+    return fit_to_points(model, where, *read_joint_positions(trial, start.joints_m))
 
 
-def _add_lone_clicks(trial: Trial, model: BodyModel, rig: Rig, first: FirstPose, names: Sequence[str]) -> FirstPose:
+def _add_lone_clicks(trial: Trial, model: BodyModel, rig: Rig, first: FirstPose, *, names: Sequence[str]) -> FirstPose:
     """Add what points that are clicked in one camera alone say to a pose that the others gave."""
     clicks = KeyTable(frame=trial.start.frame, points_px=trial.start.points_px)
-    evidence = evidence_of(trial, clicks, model, rig, ())
+    evidence = read_key(trial, clicks, model, rig=rig, facts=())
     sds = np.repeat(START_SD, [3, 3, 3 * model.n_joints])
     note = f"start.points_px: {', '.join(names)} clicked in one camera: placed across its line of sight alone"
     return FirstPose(join_evidence(first.pose, sds, evidence), (*first.notes, note))

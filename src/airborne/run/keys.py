@@ -13,9 +13,9 @@ from airborne.cameras import Rig
 from airborne.cameras.detections import landmarks_from_points
 from airborne.errors import TrialError
 from airborne.run.detections import read_forms_detections
-from airborne.run.landmarks import read_pixels, read_points
+from airborne.run.landmarks import read_joint_positions, read_pixels
 from airborne.tracking.evidence import PoseEvidence
-from airborne.tracking.first_pose import LANDMARK_WEIGHTS, LEAST_VISIBILITY, check_points, pose_by_hand
+from airborne.tracking.first_pose import LANDMARK_WEIGHTS, LEAST_VISIBILITY, check_landmark_names, pose_by_hand
 from airborne.trial.file import Trial
 from airborne.trial.keys import KeyTable
 from airborne.types import Array
@@ -28,10 +28,10 @@ def read_keys(trial: Trial, model: BodyModel, rig: Rig, facts: Sequence[VideoFac
     Raises TrialError where one names what the body does not have, CalibrationError for unusable tables.
     """
     keys = sorted(trial.key, key=lambda key: key.frame)
-    return {key.frame: evidence_of(trial, key, model, rig, facts) for key in keys}
+    return {key.frame: read_key(trial, key, model, rig=rig, facts=facts) for key in keys}
 
 
-def tracked_keys(trial: Trial, model: BodyModel, recording: Recording) -> tuple[dict[int, PoseEvidence], list[str]]:
+def keys_of_frames(trial: Trial, model: BodyModel, recording: Recording) -> tuple[dict[int, PoseEvidence], list[str]]:
     """Read the keys; return those of frames that are tracked, and a note on the others."""
     ends = [end for end in (recording.n_images, recording.stop) if end is not None]
     frames = range(recording.start, min(ends, default=sys.maxsize), recording.every)
@@ -42,14 +42,14 @@ def tracked_keys(trial: Trial, model: BodyModel, recording: Recording) -> tuple[
     return {frame: key for frame, key in keys.items() if frame in frames}, [note] if missed else []
 
 
-def evidence_of(trial: Trial, key: KeyTable, model: BodyModel, rig: Rig, facts: Sequence[VideoFacts]) -> PoseEvidence:
+def read_key(trial: Trial, key: KeyTable, model: BodyModel, *, rig: Rig, facts: Sequence[VideoFacts]) -> PoseEvidence:
     """Return what a key says of the pose; the errors are those of `read_keys`."""
     where, names = f"key of frame {key.frame}", [landmark.name for landmark in model.landmarks]
     root_weights = np.sqrt([LANDMARK_WEIGHTS.get(name, 1.0) for name in names])
     positions = np.full((len(names), 3), np.nan)
     if key.joints_m is not None:
-        positions = _by_landmark(model, where, *read_points(trial, key.joints_m))
-    px, px_sds = _pixels(trial, key, model, rig, facts, where)
+        positions = _by_landmark(model, where, *read_joint_positions(trial, key.joints_m))
+    px, px_sds = _pixels(trial, key, model, rig=rig, facts=facts, where=where)
     landmark, camera = np.nonzero(np.isfinite(px).all(axis=-1))
     known = np.flatnonzero(np.isfinite(positions).all(axis=-1))
     undistorted = [rig.cameras[c].undistort_px(px[i, c]) for i, c in zip(landmark, camera, strict=True)]
@@ -71,7 +71,7 @@ def evidence_of(trial: Trial, key: KeyTable, model: BodyModel, rig: Rig, facts: 
 
 
 def _pixels(
-    trial: Trial, key: KeyTable, model: BodyModel, rig: Rig, facts: Sequence[VideoFacts], where: str
+    trial: Trial, key: KeyTable, model: BodyModel, *, rig: Rig, facts: Sequence[VideoFacts], where: str
 ) -> tuple[Array, Array]:
     """Return clicks and detections of every landmark: pixels (landmarks, cameras, 2), NaN where none, and their sds."""
     px = np.full((len(model.landmarks), len(rig), 2), np.nan)
@@ -88,7 +88,7 @@ def _pixels(
 
 def _by_landmark(model: BodyModel, where: str, names: Sequence[str], points: Array) -> Array:
     """Return named points (points, ...) by the body's landmarks (landmarks, ...), NaN where there is none."""
-    check_points(model, where, names)
+    check_landmark_names(model, where, names)
     flat = landmarks_from_points(names, points.reshape(len(names), -1))
     of_body = np.full((len(model.landmarks), *points.shape[1:]), np.nan)
     for index, landmark in enumerate(model.landmarks):

@@ -11,11 +11,11 @@ from airborne.cameras.clicks import read_clicks, read_positions
 from airborne.cameras.consensus import triangulate_consensus
 from airborne.errors import TrialError
 from airborne.trial.file import Trial
-from airborne.trial.table import Clicks
+from airborne.trial.table import ClickTable
 from airborne.types import Array
 
 
-def read_points(trial: Trial, joints_m: Mapping[str, Sequence[float]] | str) -> tuple[list[str], Array]:
+def read_joint_positions(trial: Trial, joints_m: Mapping[str, Sequence[float]] | str) -> tuple[list[str], Array]:
     """Return the names of points and their positions (points, 3) world [m], NaN where blank."""
     points = read_positions(trial.path(joints_m)) if isinstance(joints_m, str) else joints_m
     return list(points), np.array(list(points.values()), float).reshape(-1, 3)
@@ -23,7 +23,7 @@ def read_points(trial: Trial, joints_m: Mapping[str, Sequence[float]] | str) -> 
 
 def read_pixels(
     trial: Trial,
-    points_px: Clicks | str,
+    points_px: ClickTable | str,
     cameras: Sequence[str],
     *,
     fewest: int = 2,
@@ -42,7 +42,9 @@ def read_pixels(
     return names, px
 
 
-def triangulate_clicks(trial: Trial, points_px: Clicks | str, rig: Rig, where: str) -> tuple[tuple[str, ...], Array]:
+def triangulate_clicks(
+    trial: Trial, points_px: ClickTable | str, rig: Rig, where: str
+) -> tuple[tuple[str, ...], Array]:
     """Return the names of clicked points and their positions (points, 3) world [m].
 
     Raises TrialError for a point on which no two cameras agree.

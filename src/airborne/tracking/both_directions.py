@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from airborne.body import BodyModel, Pose
 from airborne.tracking.estimate import Estimate
-from airborne.tracking.join_passes import Passes, differences, join_passes
+from airborne.tracking.passes import Passes, differences, join_passes
 from airborne.tracking.tracker import Tracker
 from airborne.types import Array
 from airborne.video import Frames
@@ -44,6 +44,7 @@ def track_between_keys(
     model: BodyModel,
     reader: FrameReader,
     frames: range,
+    *,
     keys: Sequence[int],
     write: Callable[[Estimate], None],
     done: Mapping[int, Estimate] | None = None,
@@ -69,7 +70,7 @@ def track_between_keys(
                 tick(n_before + n_tracked // 2)
 
             stretch = range(start, stop, frames.step)
-            ahead = _track_both_ways(tracker, model, reader, state, stretch, known, report)
+            ahead = _track_both_ways(tracker, model, reader, state=state, stretch=stretch, known=known, report=report)
         for observed in reader.forward(start, stop):
             estimate = known.get(observed.index)
             if estimate is None:
@@ -83,6 +84,7 @@ def _track_both_ways(
     tracker: TurningTracker,
     model: BodyModel,
     reader: FrameReader,
+    *,
     state: Any,
     stretch: range,
     known: Mapping[int, Estimate],

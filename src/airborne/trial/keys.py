@@ -8,16 +8,16 @@ from pydantic import Field, model_validator
 
 from airborne.trial.pose_forms import BY_HAND, PoseForms
 
-Positive = Annotated[float, Field(gt=0)]
+_Positive = Annotated[float, Field(gt=0)]
 
 
 class KeyTable(PoseForms):
     """Evidence of the pose at one frame, in any of the forms of [start], several of them together, or parts of one."""
 
     frame: Annotated[int, Field(ge=0)]
-    sd_m: Positive = 0.03  # of position_m and joints_m: what a person takes for a joint's centre
-    sd_px: Positive = 5.0  # of points_px and detections
-    sd_deg: Positive = 10.0  # of the rotation and of joint_angles_deg
+    sd_m: _Positive = 0.03  # of position_m and joints_m: what a person takes for a joint's centre
+    sd_px: _Positive = 5.0  # of points_px and detections
+    sd_deg: _Positive = 10.0  # of the rotation and of joint_angles_deg
 
     @model_validator(mode="after")
     def _check_key(self) -> KeyTable:

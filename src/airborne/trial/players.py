@@ -11,7 +11,7 @@ from airborne.body.legs import LEG_POINTS, Legs
 from airborne.errors import BodyError
 from airborne.io.names import CheckedPath, ColumnName
 from airborne.tracking.players import PlayerStart
-from airborne.trial.table import Clicks, SettingsTable, Vector
+from airborne.trial.table import ClickTable, SettingsTable, Vector
 
 _FEET = ("foot_left", "foot_right")
 _FARTHEST_M = 100.0  # no court is larger
@@ -23,7 +23,7 @@ class PlayerTable(SettingsTable):
 
     name: ColumnName
     joints_m: dict[str, Vector] | CheckedPath | None = None  # point -> position, or a table of them
-    points_px: Clicks | CheckedPath | None = None  # point -> camera -> u, v, or a table of clicked points
+    points_px: ClickTable | CheckedPath | None = None  # point -> camera -> u, v, or a table of clicked points
 
     @model_validator(mode="after")
     def _check_points(self) -> PlayerTable:

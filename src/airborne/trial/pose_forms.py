@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.io.names import CheckedPath
-from airborne.trial.table import Clicks, SettingsTable, Vector
+from airborne.trial.table import ClickTable, SettingsTable, Vector
 
 BY_HAND = frozenset(
     {"position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg"}
@@ -26,7 +26,7 @@ class PoseForms(SettingsTable):
     somersault_tilt_twist_deg: Vector | None = None
     joint_angles_deg: dict[str, Vector] = {}  # segment -> x, y, z
     joints_m: dict[str, Vector] | CheckedPath | None = None  # landmark -> position, or a table of them
-    points_px: Clicks | CheckedPath | None = None  # landmark -> camera -> u, v, or a table
+    points_px: ClickTable | CheckedPath | None = None  # landmark -> camera -> u, v, or a table
     detections: CheckedPath | None = None  # .npz, or a folder of folders of OpenPose JSON
     detections_cameras: dict[str, str] = {}  # camera -> its array or folder
     skeleton: str | None = None  # whose points the detections are; None: as their files say

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Pixel = Annotated[list[float], Field(min_length=2, max_length=2)]
-Clicks = dict[str, dict[str, Pixel]]  # point -> camera -> u, v
+ClickTable = dict[str, dict[str, Pixel]]  # point -> camera -> u, v
 
 
 class SettingsTable(BaseModel):

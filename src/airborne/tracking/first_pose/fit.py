@@ -105,7 +105,7 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
     return FirstPose(fit.pose, tuple(note for note in notes if note))
 
 
-def check_points(model: BodyModel, where: str, names: Sequence[str]) -> None:
+def check_landmark_names(model: BodyModel, where: str, names: Sequence[str]) -> None:
     """Raise TrialError for a name that is neither a landmark of the body nor a network's point."""
     landmarks = [landmark.name for landmark in model.landmarks]
     of_networks = {*chain.from_iterable(skeleton.points for skeleton in SKELETONS.values())}
@@ -118,7 +118,7 @@ def check_points(model: BodyModel, where: str, names: Sequence[str]) -> None:
 
 def _points_to_find(model: BodyModel, where: str, names: Sequence[str]) -> list[int]:
     """Return which points determine landmarks of the body; raises TrialError for an unknown name."""
-    check_points(model, where, names)
+    check_landmark_names(model, where, names)
     landmarks = [landmark.name for landmark in model.landmarks]
     recipes = chain.from_iterable(LANDMARK_RECIPES[landmark] for landmark in landmarks if landmark in LANDMARK_RECIPES)
     parts = {*landmarks, *chain.from_iterable(recipes)}

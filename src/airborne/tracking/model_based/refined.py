@@ -19,7 +19,7 @@ from airborne.rendering import Lights
 from airborne.tracking import predictors
 from airborne.tracking.estimate import Estimate, Status, lost_estimate
 from airborne.tracking.evidence import PoseEvidence
-from airborne.tracking.first_pose.join_evidence import join_evidence
+from airborne.tracking.first_pose.evidence_fit import join_evidence
 from airborne.tracking.image_regions import crop_regions, reduce_frames, share_in_view
 from airborne.tracking.model_based.degrees_of_freedom import WIDE_SD, PosePrior, joints_of
 from airborne.tracking.model_based.first_frame import fit_first

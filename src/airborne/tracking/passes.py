@@ -29,7 +29,7 @@ _STATUS_ORDER = (Status.TRACKED, Status.UNCERTAIN, Status.LOST)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Difference:
+class PassDifference:
     """How two estimates of one time differ."""
 
     delta: Array  # (6 + 3 joints,) from the forward to the backward one; empty where either has no pose
@@ -44,7 +44,7 @@ class Passes:
 
     forward: Estimate
     backward: Estimate
-    difference: Difference
+    difference: PassDifference
     nats: Array | None  # minus the log-likelihood of the images in each candidate
 
 
@@ -55,10 +55,10 @@ def parts_of(model: BodyModel) -> list[NDArray[np.int64]]:
     return [np.flatnonzero(column == each) for each in np.unique(column)]
 
 
-def differences(model: BodyModel, forward: Estimate, backward: Estimate) -> Difference:
+def differences(model: BodyModel, forward: Estimate, backward: Estimate) -> PassDifference:
     """Compare two estimates part by part; where the trunks disagree, everything is one part."""
     if forward.pose is None or backward.pose is None:
-        return Difference(np.zeros(0), (), False, ())
+        return PassDifference(np.zeros(0), (), False, ())
     delta = delta_between(forward.pose, backward.pose)
     covariance = _covariance(forward, len(delta)) + _covariance(backward, len(delta))
     parts, here, there = parts_of(model), model.with_pose(forward.pose), model.with_pose(backward.pose)
@@ -71,9 +71,9 @@ def differences(model: BodyModel, forward: Estimate, backward: Estimate) -> Diff
     )
     is_far = bool(np.any(off_m > _APART_M))
     if 0 in apart:
-        return Difference(delta, tuple(range(len(parts))), is_far, (forward.pose, backward.pose))
+        return PassDifference(delta, tuple(range(len(parts))), is_far, (forward.pose, backward.pose))
     candidates = (forward.pose, *(_with_limbs(model, forward.pose, backward.pose, [k]) for k in apart)) if apart else ()
-    return Difference(delta, apart, is_far, candidates)
+    return PassDifference(delta, apart, is_far, candidates)
 
 
 def _part_of_landmarks(model: BodyModel) -> NDArray[np.int64]:

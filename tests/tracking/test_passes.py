@@ -8,7 +8,7 @@ import pytest
 
 from airborne.body.chain import delta_between, move_pose
 from airborne.tracking.estimate import Estimate, Status, lost_estimate
-from airborne.tracking.join_passes import Passes, differences, join_passes, parts_of
+from airborne.tracking.passes import Passes, differences, join_passes, parts_of
 from tests.support.people import HUMAN, swinging
 
 TRUTH = swinging(0)
