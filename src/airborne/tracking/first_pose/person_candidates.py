@@ -1,0 +1,123 @@
+"""StartSearch a person: some moments are searched a little, the best one on; its candidate poses, and a decision."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import BodyModel, Pose
+from airborne.errors import BodyError, TrialError
+from airborne.rendering import mask_evidence
+from airborne.tracking import Status
+from airborne.tracking.first_pose.candidates import Candidate, StartSearch
+from airborne.tracking.first_pose.moments import Moment
+from airborne.tracking.first_pose.person import Person, Poses, apart
+from airborne.tracking.first_pose.person_search import Judge, first_poses, improve
+from airborne.tracking.first_pose.places import Place, find_places
+from airborne.tracking.first_pose.postures import is_person
+from airborne.tracking.methods import sample_body_colours
+from airborne.tracking.model_based.refined import RefinedTracker
+from airborne.tracking.model_based.render_model import RenderModel
+from airborne.types import Array
+
+_N_MOMENTS = 3  # that are searched a little: about 7 s each
+_N_ROUNDS = 5  # of the best of them, and of the next where it does not decide: about 2 s each
+_MOST_SEARCHED = 2  # moments, with all rounds
+_N_KEPT, _N_FITTED = 8, 3  # candidates, and how many of them are fitted to the images
+_APART_M = 0.1  # mean distance of landmarks by which candidates differ: the first frame's fit makes up for less
+_JUDGED_PER_NAT = 0.01  # of the judge's measure that makes a pose e times likelier
+_LEAST_PRECISION, _LEAST_RECALL = 0.7, 0.7  # of a mask over what stands out, and the other way round
+_LEAST_SHOWN = 0.01  # probability of a candidate that is listed
+
+
+def find_person(model: BodyModel, moments: Sequence[Moment]) -> StartSearch:
+    """Find a person where something stands out. Raises TrialError."""
+    if not is_person(model):
+        raise TrialError(
+            "[start] is missing; a body with joints is found if its segments are named as those of human18: give "
+            "joints_m, points_px or detections under [start]"
+        )
+    person = Person(RenderModel.of(model))
+    seen = [(moment, find_places(moment, person.radius_m)) for moment in moments]
+    seen = [(moment, places) for moment, places in seen if places]
+    if not seen:
+        raise TrialError(
+            "[start] is missing, and nothing is seen to move in two cameras at once; give joints_m, points_px or "
+            "detections under [start]"
+        )
+    searches = [_search_a_little(person, moment, places[0]) for moment, places in _spread(seen)]
+    searches.sort(key=lambda search: -search[0](search[1]).max())
+    n_moving = {id(moment): len(places) for moment, places in seen}
+    findings = []
+    for judge, poses in searches[:_MOST_SEARCHED]:
+        findings.append(StartSearch(judge.moment, _search_on(judge, poses), n_moving[id(judge.moment)]))
+        if findings[-1].is_decided:
+            return findings[-1]
+    return findings[0]
+
+
+def _spread(seen: Sequence[tuple[Moment, list[Place]]]) -> list[tuple[Moment, list[Place]]]:
+    """Return some of the moments in which the body is seen best, apart in time."""
+    times = [float(moment.frames.time_s) for moment, _ in seen]
+    least_s = (max(times) - min(times)) / (_N_MOMENTS + 2)
+    chosen: list[tuple[Moment, list[Place]]] = []
+    for moment, places in sorted(seen, key=lambda each: each[1][0].rank, reverse=True):
+        if all(abs(float(moment.frames.time_s - other.frames.time_s)) > least_s for other, _ in chosen):
+            chosen.append((moment, places))
+    return chosen[:_N_MOMENTS]
+
+
+def _search_a_little(person: Person, moment: Moment, place: Place) -> tuple[Judge, Poses]:
+    poses, judge = first_poses(person, moment, place)
+    poses = improve(judge, poses, n_kept=24, n_moves=64, seed=1, is_rough=True)
+    return judge, improve(judge, poses, n_kept=12, n_moves=64, seed=2)
+
+
+def _search_on(judge: Judge, poses: Poses) -> tuple[Candidate, ...]:
+    """Improve poses and fit the best to the images; return the candidates, the likeliest first."""
+    person = judge.person
+    for number in range(_N_ROUNDS):
+        poses = improve(judge, poses, n_kept=_N_KEPT, n_moves=128, seed=10 + number)
+    poses = poses[apart(person.landmarks(poses), judge(poses), _N_KEPT, _APART_M)]
+    fitted, is_tracked = zip(
+        *(_fit_image(person, judge.moment, pose) for pose in poses[:_N_FITTED].each()), strict=True
+    )
+    poses = Poses.join(Poses.of(fitted), poses[_N_FITTED:])
+    is_tracked = np.array([*is_tracked, *[False] * (len(poses) - len(fitted))])
+    best = apart(person.landmarks(poses), judge(poses), _N_KEPT, _APART_M)
+    return _candidates(judge, poses[best], is_tracked[best])
+
+
+def _fit_image(person: Person, moment: Moment, pose: Pose) -> tuple[Pose, bool]:
+    """Fit a pose to the small images themselves, as the first frame of a run is; say whether it is tracked there."""
+    try:
+        model = sample_body_colours(person.model, pose, moment.frames)
+    except BodyError:
+        return pose, False
+    tracker = RefinedTracker(model, pose)
+    fitted = tracker.search(tracker.init(), moment.frames)
+    return (pose, False) if fitted.pose is None else (fitted.pose, fitted.status is Status.TRACKED)
+
+
+def _candidates(judge: Judge, poses: Poses, is_tracked: NDArray[np.bool_]) -> tuple[Candidate, ...]:
+    nats = judge(poses) / _JUDGED_PER_NAT
+    likelihood = np.exp(nats - nats.max())
+    probability = likelihood / likelihood.sum()
+    precision, recall = _agreement(judge, poses)
+    is_plausible = is_tracked & (precision >= _LEAST_PRECISION) & (recall >= _LEAST_RECALL)
+    return tuple(
+        Candidate(pose, float(probability[i]), float(precision[i]), float(recall[i]), bool(is_plausible[i]))
+        for i, pose in enumerate(poses.each())
+        if probability[i] >= _LEAST_SHOWN
+    )
+
+
+def _agreement(judge: Judge, poses: Poses) -> tuple[Array, Array]:
+    """Return which share of each mask stands out, and which share of what stands out it covers, over all views."""
+    geometry, segments = judge.person.render_model.geometry, judge.person.segments(poses)
+    standing_out, ones = judge.silhouettes.standing_out, judge.silhouettes.ones
+    inside = mask_evidence(geometry, standing_out, *segments).sum(axis=1)
+    area = mask_evidence(geometry, ones, *segments).sum(axis=1)
+    return inside / np.maximum(area, 1), inside / max(float(standing_out.totals.sum()), 1)
