@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -36,7 +37,9 @@ class PixelColours:
         stands_out = [plane > 0 for plane in silhouettes.planes]
         features = [_features(image) for image in silhouettes.images]
         pixels = np.concatenate([each[here] for each, here in zip(features, stands_out, strict=True)])
-        centres, _ = kmeans2(pixels, _N_COLOURS, minit="++", rng=np.random.default_rng(0))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a colour that no pixel has does no harm
+            centres, _ = kmeans2(pixels, min(_N_COLOURS, len(pixels)), minit="++", rng=np.random.default_rng(0))
         tree = KDTree(centres)
         colours = [np.where(here, tree.query(each)[1], -1) for each, here in zip(features, stands_out, strict=True)]
         return cls(silhouettes.cameras, colours, len(pixels))

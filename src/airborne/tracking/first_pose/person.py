@@ -123,9 +123,11 @@ class Person:
         return np.einsum("nkij,kj->nki", R[:, own], local) + t[:, own]
 
     def middles(self, poses: Poses) -> Array:
-        """Return the middles of the surfaces, by area: (n, 3) [m]."""
+        """Return the middles of the ellipsoids' surfaces, by area: (n, 3) [m]."""
         geometry, (R, t) = self.render_model.geometry, self.segments(poses)
         own = geometry.ellipsoid_segment
+        if not len(own):  # a body of meshes
+            return self.landmarks(poses).mean(axis=1)
         centres = np.einsum("nsij,sj->nsi", R[:, own], geometry.ellipsoid_centre) + t[:, own]
         a, b, c = geometry.ellipsoid_semi_axes.T
         return np.average(centres, axis=1, weights=a * b + b * c + a * c)

@@ -1,32 +1,29 @@
-"""StartSearch a person: some moments are searched a little, the best one on; its candidate poses, and a decision."""
+"""Candidate poses of a person, and a decision: some moments are searched a little, the best of them on."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airborne.body import BodyModel, Pose
-from airborne.errors import BodyError, TrialError
+from airborne.body import BodyModel
+from airborne.errors import TrialError
 from airborne.rendering import mask_evidence
-from airborne.tracking import Status
 from airborne.tracking.first_pose.candidates import Candidate, StartSearch
 from airborne.tracking.first_pose.moments import Moment
-from airborne.tracking.first_pose.person import Person, Poses, apart
-from airborne.tracking.first_pose.person_search import Judge, first_poses, improve
+from airborne.tracking.first_pose.person import Person, Poses, Silhouettes, apart
+from airborne.tracking.first_pose.person_search import Judge, first_poses, improve, polish
 from airborne.tracking.first_pose.places import Place, find_places
 from airborne.tracking.first_pose.postures import is_person
-from airborne.tracking.methods import sample_body_colours
-from airborne.tracking.model_based.refined import RefinedTracker
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
 _N_MOMENTS = 3  # that are searched a little: about 7 s each
 _N_ROUNDS = 5  # of the best of them, and of the next where it does not decide: about 2 s each
 _MOST_SEARCHED = 2  # moments, with all rounds
-_N_KEPT, _N_FITTED = 8, 3  # candidates, and how many of them are fitted to the images
+_N_KEPT = 8  # candidates
 _APART_M = 0.1  # mean distance of landmarks by which candidates differ: the first frame's fit makes up for less
+_LEAST_APART_M = 0.05  # the same of those that are polished
 _JUDGED_PER_NAT = 0.01  # of the judge's measure that makes a pose e times likelier
 _LEAST_PRECISION, _LEAST_RECALL = 0.7, 0.7  # of a mask over what stands out, and the other way round
 _LEAST_SHOWN = 0.01  # probability of a candidate that is listed
@@ -41,7 +38,7 @@ def find_person(model: BodyModel, moments: Sequence[Moment]) -> StartSearch:
         )
     person = Person(RenderModel.of(model))
     seen = [(moment, find_places(moment, person.radius_m)) for moment in moments]
-    seen = [(moment, places) for moment, places in seen if places]
+    seen = [(moment, places) for moment, places in seen if places and _n_views(person, moment, places[0]) > 1]
     if not seen:
         raise TrialError(
             "[start] is missing, and nothing is seen to move in two cameras at once; give joints_m, points_px or "
@@ -56,6 +53,11 @@ def find_person(model: BodyModel, moments: Sequence[Moment]) -> StartSearch:
         if findings[-1].is_decided:
             return findings[-1]
     return findings[0]
+
+
+def _n_views(person: Person, moment: Moment, place: Place) -> int:
+    """Count the views that show what lies around a place."""
+    return len(Silhouettes.around(person, moment, place.position).cameras)
 
 
 def _spread(seen: Sequence[tuple[Moment, list[Place]]]) -> list[tuple[Moment, list[Place]]]:
@@ -76,42 +78,27 @@ def _search_a_little(person: Person, moment: Moment, place: Place) -> tuple[Judg
 
 
 def _search_on(judge: Judge, poses: Poses) -> tuple[Candidate, ...]:
-    """Improve poses and fit the best to the images; return the candidates, the likeliest first."""
+    """Improve poses and polish the best; return the candidates, the likeliest first."""
     person = judge.person
     for number in range(_N_ROUNDS):
-        poses = improve(judge, poses, n_kept=_N_KEPT, n_moves=128, seed=10 + number)
-    poses = poses[apart(person.landmarks(poses), judge(poses), _N_KEPT, _APART_M)]
-    fitted, is_tracked = zip(
-        *(_fit_image(person, judge.moment, pose) for pose in poses[:_N_FITTED].each()), strict=True
-    )
-    poses = Poses.join(Poses.of(fitted), poses[_N_FITTED:])
-    is_tracked = np.array([*is_tracked, *[False] * (len(poses) - len(fitted))])
-    best = apart(person.landmarks(poses), judge(poses), _N_KEPT, _APART_M)
-    return _candidates(judge, poses[best], is_tracked[best])
+        poses = improve(judge, poses, n_kept=_N_KEPT, n_moves=128, seed=10 + number, narrower=0.75**number)
+    poses = poses[apart(person.landmarks(poses), judge(poses), _N_KEPT, _LEAST_APART_M)]
+    poses = Poses.of([polish(judge, pose) for pose in poses.each()])
+    return _candidates(judge, poses[apart(person.landmarks(poses), judge(poses), _N_KEPT, _APART_M)])
 
 
-def _fit_image(person: Person, moment: Moment, pose: Pose) -> tuple[Pose, bool]:
-    """Fit a pose to the small images themselves, as the first frame of a run is; say whether it is tracked there."""
-    try:
-        model = sample_body_colours(person.model, pose, moment.frames)
-    except BodyError:
-        return pose, False
-    tracker = RefinedTracker(model, pose)
-    fitted = tracker.search(tracker.init(), moment.frames)
-    return (pose, False) if fitted.pose is None else (fitted.pose, fitted.status is Status.TRACKED)
-
-
-def _candidates(judge: Judge, poses: Poses, is_tracked: NDArray[np.bool_]) -> tuple[Candidate, ...]:
+def _candidates(judge: Judge, poses: Poses) -> tuple[Candidate, ...]:
     nats = judge(poses) / _JUDGED_PER_NAT
     likelihood = np.exp(nats - nats.max())
     probability = likelihood / likelihood.sum()
     precision, recall = _agreement(judge, poses)
-    is_plausible = is_tracked & (precision >= _LEAST_PRECISION) & (recall >= _LEAST_RECALL)
-    return tuple(
+    is_plausible = (precision >= _LEAST_PRECISION) & (recall >= _LEAST_RECALL)
+    found = [
         Candidate(pose, float(probability[i]), float(precision[i]), float(recall[i]), bool(is_plausible[i]))
         for i, pose in enumerate(poses.each())
         if probability[i] >= _LEAST_SHOWN
-    )
+    ]
+    return tuple(sorted(found, key=lambda candidate: -candidate.probability))
 
 
 def _agreement(judge: Judge, poses: Poses) -> tuple[Array, Array]:

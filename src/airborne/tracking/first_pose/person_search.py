@@ -15,7 +15,7 @@ from scipy.special import ndtri
 
 from airborne.appearance.model import Region
 from airborne.body import BodyModel, Pose, PosedBody
-from airborne.body.chain import clamp_to_limits, joint_angles_of
+from airborne.body.chain import clamp_to_limits, joint_angles_of, move_pose
 from airborne.body.limits import JointLimits
 from airborne.geometry.joint_rotations import compose_rotation_vectors
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles, super_fibonacci
@@ -37,15 +37,17 @@ from airborne.types import Array
 _N_ORIENTATIONS = 300  # about 20 degrees from any orientation to the nearest
 _BLUR_M, _LIMB_BLUR_M = 0.11, 0.06  # of the evidence: for postures, and for their limbs
 _N_BEST, _N_STARTS, _N_FITTED = 6000, 160, 48  # postures looked at, apart in their trunks, fitted with their limbs
-_APART_M = 0.1  # mean distance of landmarks by which the first poses differ
+_APART_M, _LEAST_APART_M = 0.1, 0.05  # mean distance of landmarks by which poses differ: the first, and the last
 _FAR: PyramidLevels = ((4, 4), (2, 3))  # reduction of the small pictures, steps
-_FINE: PyramidLevels = ((2, 3), (1, 3))
+_FINE: PyramidLevels = ((2, 3), (1, 3))  # the same
 _FIT_SD = 1.0  # [m, rad] of a fit's prior about where it starts
 _REACH_RAD = 0.5  # sd of a limb's moves, for each joint and axis
 _N_JUDGED = 5  # moves of a limb that are judged by colours too
 _COLOUR_WEIGHT = 1.0  # of a nat a pixel about colours, against all of the evidence
 _MARGIN_PX = 16  # around the poses, of the small pictures
 _TRUNK_SD_RAD, _TRUNK_SD_M = 0.35, 0.03  # of the trunk's turns
+_N_POLISHED, _N_SMALL, _SHARE_MOVED = 20, 48, 0.25  # rounds, moves in each, share of the joints that one moves
+_POLISH_SD_M, _POLISH_SD_RAD = 0.02, 0.15  # of the first round's moves
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])  # about a segment's long axis
 
 
@@ -84,18 +86,45 @@ def first_poses(person: Person, moment: Moment, place: Place) -> tuple[Poses, Ju
     return poses, Judge(person, moment, sharp, PixelColours.of(sharp), colour_classes(person.model))
 
 
-def improve(judge: Judge, poses: Poses, *, n_kept: int, n_moves: int, seed: int, is_rough: bool = False) -> Poses:
-    """Move and fit the best poses; return them and what became of them."""
+def improve(
+    judge: Judge, poses: Poses, *, n_kept: int, n_moves: int, seed: int, narrower: float = 1.0, is_rough: bool = False
+) -> Poses:
+    """Move and fit the best poses; return them, where they were moved to, and where the fit ended from there.
+
+    `narrower` is a factor on moves that are not all over the ranges.
+    """
     person = judge.person
-    least_m = 0.08 if is_rough else 0.05
-    poses = poses[apart(person.landmarks(poses), judge(poses), n_kept, least_m)]
+    poses = poses[apart(person.landmarks(poses), judge(poses), n_kept, 0.8 * _APART_M if is_rough else _LEAST_APART_M)]
     moved = poses
     if not is_rough:
-        moved = Poses.join(
-            poses, _mirror(person, poses[:4]), _turn_trunk(person, poses[:3], seed), _swap(person, poses[:3])
-        )
-    moved = _move_limbs(person, moved, judge.silhouettes, n_moves, seed=seed, judge=None if is_rough else judge)
-    return Poses.join(poses, _fit(person, judge.moment, moved, _FAR if is_rough else _FINE))
+        best = poses[:3]
+        turned = _turn_trunk(person, best, seed, narrower)
+        moved = Poses.join(poses, _mirror(person, best), turned, _swap(person, best))
+    moved = _move_limbs(
+        person, moved, judge.silhouettes, n_moves, seed=seed, narrower=narrower, judge=None if is_rough else judge
+    )
+    return Poses.join(poses, moved, _fit(person, judge.moment, moved, _FAR if is_rough else _FINE))
+
+
+def polish(judge: Judge, pose: Pose, seed: int = 0) -> Pose:
+    """Search around a pose for a better one by small random moves, narrower from round to round.
+
+    Fits to silhouettes end beside the best pose, by what the body's shape is off and by limbs that hide each other.
+    """
+    person, rng = judge.person, np.random.default_rng(seed)
+    n_dofs = person.model.n_dofs
+    best = Poses.of([pose])
+    best_value = judge(best)[0]
+    for number in range(_N_POLISHED):
+        sd = np.repeat([_POLISH_SD_M, _POLISH_SD_RAD], [3, n_dofs - 3]) * 0.85**number
+        is_moved = np.repeat(rng.random((_N_SMALL, n_dofs // 3)) < _SHARE_MOVED, 3, axis=1)
+        deltas = rng.normal(0, sd, (_N_SMALL, n_dofs)) * is_moved
+        tried = Poses.of([clamp_to_limits(person.model, move_pose(best.each()[0], delta)) for delta in deltas])
+        tried = tried[np.argsort(-judge.shares(tried), kind="stable")[:_N_JUDGED]]
+        values = judge(tried)
+        if values.max() > best_value:
+            best, best_value = tried[values.argmax() : values.argmax() + 1], values.max()
+    return best.each()[0]
 
 
 def _pose_library(person: Person, silhouettes: Silhouettes, at: Array) -> Poses:
@@ -113,14 +142,21 @@ def _pose_library(person: Person, silhouettes: Silhouettes, at: Array) -> Poses:
 
 
 def _move_limbs(
-    person: Person, poses: Poses, silhouettes: Silhouettes, n: int, *, seed: int, judge: Judge | None = None
+    person: Person,
+    poses: Poses,
+    silhouettes: Silhouettes,
+    n: int,
+    *,
+    seed: int,
+    narrower: float = 1.0,
+    judge: Judge | None = None,
 ) -> Poses:
     """Move one limb after the other to where it covers most: n moves anywhere, and n near where it is."""
     angles = poses.angles.copy()
     for limb in person.limbs:
         joints = limb.segments - 1
         moves = np.concatenate(
-            [angles[:, None, joints], _limb_moves(person.model, limb, angles[:, joints], n, seed)], axis=1
+            [angles[:, None, joints], _limb_moves(person.model, limb, angles[:, joints], n, seed, narrower)], axis=1
         )
         m, k = moves.shape[:2]
         tried = np.repeat(angles, k, axis=0)
@@ -153,14 +189,14 @@ def _covered_by_limb(person: Person, limb: Limb, moved: Poses, silhouettes: Silh
     return out
 
 
-def _limb_moves(model: BodyModel, limb: Limb, angles: Array, n: int, seed: int) -> Array:
+def _limb_moves(model: BodyModel, limb: Limb, angles: Array, n: int, seed: int, narrower: float) -> Array:
     """Return a limb's joint angles, n anywhere and n near `angles` (m, joints, 3): (m, 2 n, joints, 3)."""
     m, joints = angles.shape[:2]
     shape = (m, n, joints, 3)
     limits = JointLimits.stack(model.segments[segment].limits for segment in limb.segments)
     anywhere = limb_postures(model, limb.segments, n, seed)
     points = np.clip(sobol_points(3 * joints, n, seed=seed + 1), 1e-3, 1 - 1e-3)
-    steps = ndtri(points).reshape(n, joints, 3) * np.minimum(limits.half_rad / 2, _REACH_RAD)
+    steps = ndtri(points).reshape(n, joints, 3) * np.minimum(limits.half_rad / 2, narrower * _REACH_RAD)
     near = compose_rotation_vectors(
         np.ascontiguousarray(np.broadcast_to(angles[:, None], shape)).reshape(-1, 3),
         np.ascontiguousarray(np.broadcast_to(steps, shape)).reshape(-1, 3),
@@ -180,16 +216,16 @@ def _mirror(person: Person, poses: Poses) -> Poses:
     return replace(mirrored, t=mirrored.t + person.middles(poses) - person.middles(mirrored))
 
 
-def _turn_trunk(person: Person, poses: Poses, seed: int) -> Poses:
+def _turn_trunk(person: Person, poses: Poses, seed: int, narrower: float) -> Poses:
     """Turn trunks a little, twice each; the limbs stay as they are turned."""
     rng = np.random.default_rng(seed)
     poses = poses[np.repeat(np.arange(len(poses)), 2)]
     R, _ = person.segments(poses)
     moved = {int(segment) for limb in person.limbs for segment in limb.segments}
     trunk = [i for i in range(R.shape[1]) if i not in moved]
-    turns = Rotation.from_rotvec(rng.normal(0, _TRUNK_SD_RAD, (len(poses), 3))).as_matrix()
+    turns = Rotation.from_rotvec(rng.normal(0, narrower * _TRUNK_SD_RAD, (len(poses), 3))).as_matrix()
     R[:, trunk] = turns[:, None] @ R[:, trunk]
-    return _with_rotations(person, replace(poses, t=poses.t + rng.normal(0, _TRUNK_SD_M, poses.t.shape)), R)
+    return _with_rotations(person, replace(poses, t=poses.t + rng.normal(0, narrower * _TRUNK_SD_M, poses.t.shape)), R)
 
 
 def _with_rotations(person: Person, poses: Poses, R: Array) -> Poses:
