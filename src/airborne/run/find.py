@@ -178,9 +178,10 @@ def _track_back(trial: Trial, model: BodyModel, recording: Recording, finding: S
     tracker = RefinedTracker(sample_body_colours(model, pose, backward[0]), pose)
     earliest = found, pose
     for frames, estimate in track_frames(tracker, backward, lambda estimate: None):
-        if estimate.status is not Status.TRACKED or estimate.pose is None:
+        if estimate.status is Status.TRACKED and estimate.pose is not None:
+            earliest = frames.index, estimate.pose
+        elif frames.index < found:  # a first frame may be uncertain: nothing was learned before it
             break
-        earliest = frames.index, estimate.pose
     return earliest
 
 
