@@ -28,8 +28,8 @@ def find_command(
 
     with progress("looking for the body") as report:
         found = find_start(read_trial(trial), output, take=take, progress=report)
-    keys = {"frame", "position_m", "quaternion_xyzw", "joint_angles_deg"}
-    start = found.trial.start.model_dump(include=keys, exclude_defaults=True)
+    keys = ["frame", "position_m", "quaternion_xyzw", *(["joint_angles_deg"] if found.model.has_joints else [])]
+    start = found.trial.start.model_dump(include={*keys})
     if as_json:
         print(json.dumps({**start, "probability": found.finding.candidates[0].probability, "note": found.note}))
     else:

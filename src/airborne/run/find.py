@@ -158,7 +158,7 @@ def _describe(model: BodyModel, finding: StartSearch) -> dict[str, Any]:
                 "somersault_tilt_twist_deg": np.degrees(
                     angles_from_matrix(each.pose.world_from_root.rotation.as_matrix())
                 ).tolist(),
-                **_joint_angles(model, each.pose),
+                **({"joint_angles_deg": _joint_angles_deg(model, each.pose)} if model.has_joints else {}),
             }
             for number, each in enumerate(finding.candidates, start=1)
         ],
@@ -191,14 +191,12 @@ def _with_start(trial: Trial, model: BodyModel, frame: int, pose: Pose) -> Trial
         frame=frame,
         position_m=root.translation.tolist(),
         quaternion_xyzw=root.rotation.as_quat().tolist(),
-        **_joint_angles(model, pose),
+        joint_angles_deg=_joint_angles_deg(model, pose),
     )
     return trial.model_copy(update={"start": start})
 
 
-def _joint_angles(model: BodyModel, pose: Pose) -> dict[str, dict[str, list[float]]]:
-    """Return the joints' angles as [start] has them [deg]; nothing for a body without joints."""
-    if not model.has_joints:
-        return {}
+def _joint_angles_deg(model: BodyModel, pose: Pose) -> dict[str, list[float]]:
+    """Return the joints' angles as [start] has them; none for a body without joints."""
     names = (segment.name for segment in model.segments[1:])
-    return {"joint_angles_deg": dict(zip(names, np.degrees(pose.joint_angles).tolist(), strict=True))}
+    return dict(zip(names, np.degrees(pose.joint_angles).tolist(), strict=True)) if model.has_joints else {}

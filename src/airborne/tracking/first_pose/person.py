@@ -176,7 +176,7 @@ class Silhouettes:
     @cached_property
     def standing_out(self) -> EvidenceMaps:
         """One where a pixel stands out, for `mask_evidence`."""
-        return evidence_maps(self.cameras, [plane > 0 for plane in self.planes])
+        return evidence_maps(self.cameras, [(plane > 0).astype(np.float32) for plane in self.planes])
 
     @cached_property
     def ones(self) -> EvidenceMaps:

@@ -57,7 +57,8 @@ def library(model: BodyModel) -> Array:
     out = np.zeros((len(_LEGS) * len(_ARMS), len(names), 3))
     for angles, (legs, arms) in zip(out, product(_LEGS.values(), _ARMS.values()), strict=True):
         rows = dict(zip(names, angles, strict=True))  # views of one posture's rows
-        for leg, arm, side, sign in zip(legs, arms, ("left", "right"), (-1, 1), strict=False):
+        left, right, flexion = legs
+        for leg, arm, side, sign in zip((left, right), arms, ("left", "right"), (-1, 1), strict=True):
             hip, abduction, knee = leg
             rows[f"thigh_{side}"][:] = -hip, sign * abduction, 0
             rows[f"shank_{side}"][0] = knee
@@ -66,7 +67,7 @@ def library(model: BodyModel) -> Array:
             rows[f"upper_arm_{side}"][:] = -shoulder, sign * abduction, 0
             rows[f"forearm_{side}"][0] = -elbow
         for name, share in _TRUNK.items():
-            rows[name][0] = share * legs[2]
+            rows[name][0] = share * flexion
     return angles_from_matrix(model.limits.clamp(matrix_from_angles(np.radians(out))))
 
 
