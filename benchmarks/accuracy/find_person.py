@@ -2,7 +2,7 @@
 
 30 synthetic people in flight, each with a posture, clothes, hall and three or four cameras of its own, drawn with a
 skin that is not the body tracked (about 40 minutes); `--quick` takes 2, `--seeds 5100-5129` others, and neither writes
-rows. Right is a mean error of the landmarks up to 60 mm once the pose is fitted.
+rows. Right is a mean error of the landmarks up to 60 mm.
 """
 
 from __future__ import annotations
