@@ -105,16 +105,6 @@ def test_what_cannot_be_found_is_said(path, tmp_path):
         find.find_start(few, tmp_path)
 
 
-def test_a_person_is_not_found_by_itself(path, tmp_path):
-    text = path.read_text(encoding="utf-8").replace(
-        'file = "cross.toml"', 'preset = "human18"\nstature_m = 1.8\nmass_kg = 70'
-    )
-    person = path.parent / "person.toml"
-    person.write_text(text, encoding="utf-8")
-    with pytest.raises(TrialError, match="a body with joints is not found by itself yet"):
-        find.find_start(read_trial(person), tmp_path)
-
-
 def test_check_says_that_the_body_will_be_looked_for(path):
     checks = check_trial(path)
     assert checks.mistakes == []

@@ -21,16 +21,19 @@ def find_command(
 
     Example: airborne find trial.toml
     """
+    import tomlkit
+
     from airborne.run.find import find_start
     from airborne.trial.file import read_trial
 
     with progress("looking for the body") as report:
         found = find_start(read_trial(trial), output, take=take, progress=report)
-    start = found.trial.start.model_dump(include={"frame", "position_m", "quaternion_xyzw"})
+    keys = ["frame", "position_m", "quaternion_xyzw", *(["joint_angles_deg"] if found.model.has_joints else [])]
+    start = found.trial.start.model_dump(include={*keys})
     if as_json:
         print(json.dumps({**start, "probability": found.finding.candidates[0].probability, "note": found.note}))
     else:
-        print("\n".join(["[start]", *(f"{key} = {value}" for key, value in start.items())]))
+        print(tomlkit.dumps({"start": start}), end="")
         print(f"# {found.note}")
 
 

@@ -22,6 +22,7 @@ from airborne.run.opening import open_cameras, past_the_end_error, video_source
 from airborne.tracking import Status
 from airborne.tracking.first_pose.candidates import StartSearch, find_thing
 from airborne.tracking.first_pose.moments import SourceKey, empty_scenes, look, spread_sample
+from airborne.tracking.first_pose.person_candidates import find_person
 from airborne.tracking.methods import sample_body_colours
 from airborne.tracking.model_based.refined import RefinedTracker
 from airborne.tracking.tracker import track_frames
@@ -58,11 +59,6 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     UndecidedError is raised; `take` chooses one of them, from 1. Raises TrialError where nothing can be found.
     """
     model = trial.model()
-    if model.has_joints:
-        raise TrialError(
-            f"{trial.name}: [start] is missing; a body with joints is not found by itself yet: give joints_m, "
-            "points_px or detections under [start]"
-        )
     if len(trial.camera) < 2:
         raise TrialError(f"{trial.name}: [start] is missing; finding the body needs two cameras: give its pose")
     recording, facts = _open(trial)
@@ -75,7 +71,8 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
             f"{trial.name}: {len(sample)} frames are too few to tell the empty scene, {FEWEST_PICTURES} at least; "
             "give the pose under [start]"
         )
-    finding = find_thing(model, look(sample, scenes))
+    search = find_person if model.has_joints else find_thing
+    finding = search(model, look(sample, scenes))
     if take is not None:
         finding = _take(trial, finding, take)
     elif not finding.is_decided:
@@ -86,7 +83,7 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
         f"[start] was found: the body stands out best in frame {finding.moment.frames.index} "
         f"(probability {first.probability:.3g}) and can be followed back to frame {frame}"
     )
-    return FoundStart(_with_start(trial, frame, pose), model, finding, scenes, facts, note)
+    return FoundStart(_with_start(trial, model, frame, pose), model, finding, scenes, facts, note)
 
 
 def _open(trial: Trial) -> tuple[Recording, tuple[VideoFacts, ...]]:
@@ -126,7 +123,7 @@ def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: 
     """Write the candidates and return the error that names them."""
     frame, best = finding.moment.frames.index, finding.candidates[0]
     with open_results(folder):
-        write_json(folder / CANDIDATES, _describe(finding))
+        write_json(folder / CANDIDATES, _describe(model, finding))
         draw_candidates(
             folder / CANDIDATES_PICTURE,
             finding.moment,
@@ -134,8 +131,8 @@ def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: 
         )
     if not best.is_plausible:
         reason = (
-            f"what moves in frame {frame} does not look like the body ({best.precision:.0%} of its outline stands out, "
-            f"and covers {best.recall:.0%} of what does); check [body] and [calibration]"
+            f"no pose agrees with what moves in frame {frame} (of the likeliest, {best.precision:.0%} of the outline "
+            f"stands out, and covers {best.recall:.0%} of what does); check [body] and [calibration]"
         )
     else:
         reason = f"{len(finding.candidates)} poses in frame {frame} look alike, the likeliest {best.probability:.0%}"
@@ -145,7 +142,7 @@ def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: 
     )
 
 
-def _describe(finding: StartSearch) -> dict[str, Any]:
+def _describe(model: BodyModel, finding: StartSearch) -> dict[str, Any]:
     return {
         "frame": finding.moment.frames.index,
         "time_s": float(finding.moment.frames.time_s),
@@ -161,6 +158,7 @@ def _describe(finding: StartSearch) -> dict[str, Any]:
                 "somersault_tilt_twist_deg": np.degrees(
                     angles_from_matrix(each.pose.world_from_root.rotation.as_matrix())
                 ).tolist(),
+                **({"joint_angles_deg": _joint_angles_deg(model, each.pose)} if model.has_joints else {}),
             }
             for number, each in enumerate(finding.candidates, start=1)
         ],
@@ -180,15 +178,25 @@ def _track_back(trial: Trial, model: BodyModel, recording: Recording, finding: S
     tracker = RefinedTracker(sample_body_colours(model, pose, backward[0]), pose)
     earliest = found, pose
     for frames, estimate in track_frames(tracker, backward, lambda estimate: None):
-        if estimate.status is not Status.TRACKED or estimate.pose is None:
+        if estimate.status is Status.TRACKED and estimate.pose is not None:
+            earliest = frames.index, estimate.pose
+        elif frames.index < found:  # a first frame may be uncertain: nothing was learned before it
             break
-        earliest = frames.index, estimate.pose
     return earliest
 
 
-def _with_start(trial: Trial, frame: int, pose: Pose) -> Trial:
+def _with_start(trial: Trial, model: BodyModel, frame: int, pose: Pose) -> Trial:
     root = pose.world_from_root
     start = StartTable(
-        frame=frame, position_m=root.translation.tolist(), quaternion_xyzw=root.rotation.as_quat().tolist()
+        frame=frame,
+        position_m=root.translation.tolist(),
+        quaternion_xyzw=root.rotation.as_quat().tolist(),
+        joint_angles_deg=_joint_angles_deg(model, pose),
     )
     return trial.model_copy(update={"start": start})
+
+
+def _joint_angles_deg(model: BodyModel, pose: Pose) -> dict[str, list[float]]:
+    """Return the joints' angles as [start] has them; none for a body without joints."""
+    names = (segment.name for segment in model.segments[1:])
+    return dict(zip(names, np.degrees(pose.joint_angles).tolist(), strict=True)) if model.has_joints else {}

@@ -43,11 +43,7 @@ class Candidate:
     probability: float
     precision: float  # share of its mask that stands out from the empty scene
     recall: float  # share of what stands out there that its mask covers
-
-    @property
-    def is_plausible(self) -> bool:
-        """Whether its silhouettes agree with what stands out."""
-        return self.precision >= _LEAST_PRECISION and (self.precision + self.recall) / 2 >= _LEAST_AGREEMENT
+    is_plausible: bool  # its silhouettes agree with what stands out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,8 +99,9 @@ def _find_at(thing: Thing, moment: Moment, places: Sequence[Place]) -> StartSear
         poses = different_poses(thing, moment, [*fitted, *poses[len(fitted) :]], N_FITTED)
     probability = _probabilities(thing, moment, poses)
     precision, recall = _agreement(thing, moment, places, poses)
+    is_plausible = (precision >= _LEAST_PRECISION) & (precision + recall >= 2 * _LEAST_AGREEMENT)
     candidates = [
-        Candidate(pose, float(probability[i]), float(precision[i]), float(recall[i]))
+        Candidate(pose, float(probability[i]), float(precision[i]), float(recall[i]), bool(is_plausible[i]))
         for i, pose in enumerate(poses)
         if probability[i] >= _LEAST_SHOWN
     ]
