@@ -14,7 +14,7 @@ from airborne.run.keys import read_key
 from airborne.run.landmarks import read_joint_positions, read_pixels
 from airborne.tracking.first_pose import FirstPose, fit_to_detections, fit_to_pixels, fit_to_points, pose_by_hand
 from airborne.tracking.first_pose.evidence_fit import join_evidence
-from airborne.tracking.model_based.refined import START_SD
+from airborne.tracking.model_based.refined import FIRST_POSE_SD
 from airborne.trial.file import Trial
 from airborne.trial.keys import KeyTable
 
@@ -46,6 +46,6 @@ def _add_lone_clicks(trial: Trial, model: BodyModel, rig: Rig, first: FirstPose,
     """Add what points that are clicked in one camera alone say to a pose that the others gave."""
     clicks = KeyTable(frame=trial.start.frame, points_px=trial.start.points_px)
     evidence = read_key(trial, clicks, model, rig=rig, facts=())
-    sds = np.repeat(START_SD, [3, 3, 3 * model.n_joints])
+    sds = np.repeat(FIRST_POSE_SD, [3, 3, 3 * model.n_joints])
     note = f"start.points_px: {', '.join(names)} clicked in one camera: placed across its line of sight alone"
     return FirstPose(join_evidence(first.pose, sds, evidence), (*first.notes, note))

@@ -8,7 +8,7 @@ from airborne.rendering import pose_segments
 from airborne.tracking.first_pose import person_candidates
 from airborne.tracking.first_pose.colour_information import PixelColours, colour_classes
 from airborne.tracking.first_pose.moments import empty_scenes, look, spread_sample
-from airborne.tracking.first_pose.person import Person, Poses, Silhouettes, apart
+from airborne.tracking.first_pose.person import JointedBody, PoseSet, SilhouetteEvidence, apart
 from airborne.tracking.first_pose.person_candidates import find_person
 from airborne.tracking.first_pose.person_search import _mirror
 from airborne.tracking.first_pose.postures import library, limb_postures
@@ -19,7 +19,7 @@ from tests.support.scenes import FIGURE
 
 TIMES = range(0, 36, 3)
 SCENE = person(cameras=CAMERAS)
-PERSON = Person(RenderModel.of(HUMAN))
+PERSON = JointedBody(RenderModel.of(HUMAN))
 
 
 @pytest.fixture(scope="module")
@@ -40,18 +40,18 @@ def test_a_person_in_the_air_is_found(moments, monkeypatch):
 
 def test_colours_tell_a_pose_from_its_mirror_image(moments):
     moment = moments[4]
-    true = Poses.of([SCENE.start(moment.frames.index)])
-    silhouettes = Silhouettes.around(PERSON, moment, PERSON.middles(true)[0])
+    true = PoseSet.of([SCENE.start(moment.frames.index)])
+    silhouettes = SilhouetteEvidence.around(PERSON, moment, PERSON.middles(true)[0])
     colours, classes = PixelColours.of(silhouettes), colour_classes(HUMAN)
     told = [
         colours.information(PERSON.render_model, posed, classes)
-        for posed in PERSON.bodies(Poses.join(true, _mirror(PERSON, true)))
+        for posed in PERSON.bodies(PoseSet.join(true, _mirror(PERSON, true)))
     ]
     assert told[0] > told[1] + 0.02
 
 
 def test_a_mirror_image_exchanges_left_and_right_where_they_are():
-    straight = Poses(np.eye(3)[None], np.zeros((1, 3)), np.zeros((1, HUMAN.n_joints, 3)))
+    straight = PoseSet(np.eye(3)[None], np.zeros((1, 3)), np.zeros((1, HUMAN.n_joints, 3)))
     names = [landmark.name for landmark in HUMAN.landmarks]
     here, there = PERSON.landmarks(straight)[0], PERSON.landmarks(_mirror(PERSON, straight))[0]
     for name in ("knee", "wrist"):

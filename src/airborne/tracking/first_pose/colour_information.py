@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 
 from airborne.body import BodyModel, PosedBody
 from airborne.cameras import Camera
-from airborne.tracking.first_pose.person import Silhouettes
+from airborne.tracking.first_pose.person import SilhouetteEvidence
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
@@ -32,7 +32,7 @@ class PixelColours:
     n: int  # pixels that stand out
 
     @classmethod
-    def of(cls, silhouettes: Silhouettes) -> PixelColours:
+    def of(cls, silhouettes: SilhouetteEvidence) -> PixelColours:
         """Sort what stands out by its colours."""
         stands_out = [plane > 0 for plane in silhouettes.planes]
         features = [_features(image) for image in silhouettes.images]

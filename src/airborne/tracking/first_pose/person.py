@@ -24,7 +24,7 @@ _ROOM = 1.3  # half of the window around a place, in halves of the body's length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Poses:
+class PoseSet:
     """Many poses of one body."""
 
     R: Array  # (n, 3, 3) world from root
@@ -34,11 +34,11 @@ class Poses:
     def __len__(self) -> int:
         return len(self.R)
 
-    def __getitem__(self, rows: NDArray[np.integer] | slice) -> Poses:
-        return Poses(self.R[rows], self.t[rows], self.angles[rows])
+    def __getitem__(self, rows: NDArray[np.integer] | slice) -> PoseSet:
+        return PoseSet(self.R[rows], self.t[rows], self.angles[rows])
 
     @classmethod
-    def of(cls, poses: Sequence[Pose]) -> Poses:
+    def of(cls, poses: Sequence[Pose]) -> PoseSet:
         """Stack poses."""
         roots = [pose.world_from_root for pose in poses]
         return cls(
@@ -48,7 +48,7 @@ class Poses:
         )
 
     @classmethod
-    def join(cls, *poses: Poses) -> Poses:
+    def join(cls, *poses: PoseSet) -> PoseSet:
         """Put one after the other."""
         return cls(*(np.concatenate([getattr(each, name) for each in poses]) for name in ("R", "t", "angles")))
 
@@ -70,7 +70,7 @@ class Limb:
 
 
 @dataclass(frozen=True, eq=False)
-class Person:
+class JointedBody:
     """A body with joints."""
 
     render_model: RenderModel
@@ -83,7 +83,7 @@ class Person:
     @cached_property
     def radius_m(self) -> float:
         """Half of its length with straight joints, between the outermost joints."""
-        upright = Poses(np.eye(3)[None], np.zeros((1, 3)), np.zeros((1, self.model.n_joints, 3)))
+        upright = PoseSet(np.eye(3)[None], np.zeros((1, 3)), np.zeros((1, self.model.n_joints, 3)))
         return float(np.ptp(self.segments(upright)[1], axis=1).max() / 2)
 
     @cached_property
@@ -111,18 +111,18 @@ class Person:
         own = [self.model.index_of(each.segment) for each in self.model.landmarks]
         return [i for i, segment in enumerate(own) if segment not in moved]
 
-    def segments(self, poses: Poses) -> tuple[Array, Array]:
+    def segments(self, poses: PoseSet) -> tuple[Array, Array]:
         """Return all segments' rotations (n, s, 3, 3) and origins (n, s, 3) [m]."""
         return pose_segments(self.model, poses.R, poses.t, poses.angles)
 
-    def landmarks(self, poses: Poses) -> Array:
+    def landmarks(self, poses: PoseSet) -> Array:
         """Return where the landmarks are: (n, landmarks, 3) [m]."""
         R, t = self.segments(poses)
         own = [self.model.index_of(each.segment) for each in self.model.landmarks]
         local = np.array([each.position_m for each in self.model.landmarks])
         return np.einsum("nkij,kj->nki", R[:, own], local) + t[:, own]
 
-    def middles(self, poses: Poses) -> Array:
+    def middles(self, poses: PoseSet) -> Array:
         """Return the middles of the ellipsoids' surfaces, by area: (n, 3) [m]."""
         geometry, (R, t) = self.render_model.geometry, self.segments(poses)
         own = geometry.ellipsoid_segment
@@ -132,13 +132,13 @@ class Person:
         a, b, c = geometry.ellipsoid_semi_axes.T
         return np.average(centres, axis=1, weights=a * b + b * c + a * c)
 
-    def bodies(self, poses: Poses) -> list[PosedBody]:
+    def bodies(self, poses: PoseSet) -> list[PosedBody]:
         """Pose the body."""
         return [PosedBody(self.model, R, t) for R, t in zip(*self.segments(poses), strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
-class Silhouettes:
+class SilhouetteEvidence:
     """What stands out around a place, in the views that show it."""
 
     cameras: Sequence[Camera]
@@ -146,7 +146,9 @@ class Silhouettes:
     images: Sequence[NDArray[np.uint8]]  # (h, w, 3)
 
     @classmethod
-    def around(cls, person: Person, moment: Moment, at: Array, *, scale: int = 1, blur_m: float = 0.0) -> Silhouettes:
+    def around(
+        cls, person: JointedBody, moment: Moment, at: Array, *, scale: int = 1, blur_m: float = 0.0
+    ) -> SilhouetteEvidence:
         """Blur and reduce the evidence of a moment around a place (3,)."""
         cameras, planes, images = [], [], []
         for view, nats in zip(moment.frames.views, moment.evidence, strict=True):
@@ -188,7 +190,7 @@ class Silhouettes:
         """The sum of all positive evidence."""
         return float(sum(np.maximum(plane, 0).sum() for plane in self.planes))
 
-    def shares(self, person: Person, poses: Poses) -> Array:
+    def shares(self, person: JointedBody, poses: PoseSet) -> Array:
         """Return the share of the evidence that each pose's mask covers: (n,)."""
         segments = person.segments(poses)
         scores = mask_evidence(person.render_model.geometry, self.maps, *segments, threads=THREADS)

@@ -11,7 +11,7 @@ from airborne.errors import TrialError
 from airborne.rendering import mask_evidence
 from airborne.tracking.first_pose.candidates import Candidate, StartSearch
 from airborne.tracking.first_pose.moments import Moment
-from airborne.tracking.first_pose.person import Person, Poses, Silhouettes, apart
+from airborne.tracking.first_pose.person import JointedBody, PoseSet, SilhouetteEvidence, apart
 from airborne.tracking.first_pose.person_search import Judge, first_poses, improve, polish
 from airborne.tracking.first_pose.places import Place, find_places
 from airborne.tracking.first_pose.postures import is_person
@@ -36,7 +36,7 @@ def find_person(model: BodyModel, moments: Sequence[Moment]) -> StartSearch:
             "[start] is missing; a body with joints is found if its segments are named as those of human18: give "
             "joints_m, points_px or detections under [start]"
         )
-    person = Person(RenderModel.of(model))
+    person = JointedBody(RenderModel.of(model))
     seen = [(moment, find_places(moment, person.radius_m)) for moment in moments]
     seen = [(moment, places) for moment, places in seen if places and _n_views(person, moment, places[0]) > 1]
     if not seen:
@@ -55,9 +55,9 @@ def find_person(model: BodyModel, moments: Sequence[Moment]) -> StartSearch:
     return findings[0]
 
 
-def _n_views(person: Person, moment: Moment, place: Place) -> int:
+def _n_views(person: JointedBody, moment: Moment, place: Place) -> int:
     """Count the views that show what lies around a place."""
-    return len(Silhouettes.around(person, moment, place.position).cameras)
+    return len(SilhouetteEvidence.around(person, moment, place.position).cameras)
 
 
 def _spread(seen: Sequence[tuple[Moment, list[Place]]]) -> list[tuple[Moment, list[Place]]]:
@@ -71,23 +71,23 @@ def _spread(seen: Sequence[tuple[Moment, list[Place]]]) -> list[tuple[Moment, li
     return chosen[:_N_MOMENTS]
 
 
-def _search_a_little(person: Person, moment: Moment, place: Place) -> tuple[Judge, Poses]:
+def _search_a_little(person: JointedBody, moment: Moment, place: Place) -> tuple[Judge, PoseSet]:
     poses, judge = first_poses(person, moment, place)
     poses = improve(judge, poses, n_kept=24, n_moves=64, seed=1, is_rough=True)
     return judge, improve(judge, poses, n_kept=12, n_moves=64, seed=2)
 
 
-def _search_on(judge: Judge, poses: Poses) -> tuple[Candidate, ...]:
+def _search_on(judge: Judge, poses: PoseSet) -> tuple[Candidate, ...]:
     """Improve poses and polish the best; return the candidates, the likeliest first."""
     person = judge.person
     for number in range(_N_ROUNDS):
         poses = improve(judge, poses, n_kept=_N_KEPT, n_moves=128, seed=10 + number, narrower=0.75**number)
     poses = poses[apart(person.landmarks(poses), judge(poses), _N_KEPT, _LEAST_APART_M)]
-    poses = Poses.of([polish(judge, pose) for pose in poses.each()])
+    poses = PoseSet.of([polish(judge, pose) for pose in poses.each()])
     return _candidates(judge, poses[apart(person.landmarks(poses), judge(poses), _N_KEPT, _APART_M)])
 
 
-def _candidates(judge: Judge, poses: Poses) -> tuple[Candidate, ...]:
+def _candidates(judge: Judge, poses: PoseSet) -> tuple[Candidate, ...]:
     nats = judge(poses) / _JUDGED_PER_NAT
     likelihood = np.exp(nats - nats.max())
     probability = likelihood / likelihood.sum()
@@ -101,7 +101,7 @@ def _candidates(judge: Judge, poses: Poses) -> tuple[Candidate, ...]:
     return tuple(sorted(found, key=lambda candidate: -candidate.probability))
 
 
-def _agreement(judge: Judge, poses: Poses) -> tuple[Array, Array]:
+def _agreement(judge: Judge, poses: PoseSet) -> tuple[Array, Array]:
     """Return which share of each mask stands out, and which share of what stands out it covers, over all views."""
     geometry, segments = judge.person.render_model.geometry, judge.person.segments(poses)
     standing_out, ones = judge.silhouettes.standing_out, judge.silhouettes.ones

@@ -24,7 +24,7 @@ from airborne.rendering import mask_evidence
 from airborne.rendering.threads import in_threads
 from airborne.tracking.first_pose.colour_information import PixelColours, colour_classes
 from airborne.tracking.first_pose.moments import Moment
-from airborne.tracking.first_pose.person import THREADS, Limb, Person, Poses, Silhouettes, apart
+from airborne.tracking.first_pose.person import THREADS, JointedBody, Limb, PoseSet, SilhouetteEvidence, apart
 from airborne.tracking.first_pose.places import Place
 from airborne.tracking.first_pose.postures import library, limb_postures
 from airborne.tracking.image_regions import crop_regions
@@ -55,28 +55,28 @@ _HALF_TURN = np.diag([-1.0, -1.0, 1.0])  # about a segment's long axis
 class Judge:
     """What one moment shows of a person, and how well poses agree with it."""
 
-    person: Person
+    person: JointedBody
     moment: Moment
-    silhouettes: Silhouettes
+    silhouettes: SilhouetteEvidence
     colours: PixelColours
     classes: NDArray[np.int64]  # (parts,)
 
-    def shares(self, poses: Poses) -> Array:
+    def shares(self, poses: PoseSet) -> Array:
         """Return the shares of the evidence that the masks cover: (n,)."""
         return self.silhouettes.shares(self.person, poses)
 
-    def __call__(self, poses: Poses) -> Array:
+    def __call__(self, poses: PoseSet) -> Array:
         """Return how well each pose agrees: (n,)."""
         render_model = self.person.render_model
         told = [self.colours.information(render_model, posed, self.classes) for posed in self.person.bodies(poses)]
         return self.shares(poses) + _COLOUR_WEIGHT * np.array(told)
 
 
-def first_poses(person: Person, moment: Moment, place: Place) -> tuple[Poses, Judge]:
+def first_poses(person: JointedBody, moment: Moment, place: Place) -> tuple[PoseSet, Judge]:
     """Return poses to start from, and what judges them."""
 
-    def silhouettes(scale: int, blur_m: float) -> Silhouettes:
-        return Silhouettes.around(person, moment, place.position, scale=scale, blur_m=blur_m)
+    def silhouettes(scale: int, blur_m: float) -> SilhouetteEvidence:
+        return SilhouetteEvidence.around(person, moment, place.position, scale=scale, blur_m=blur_m)
 
     poses = _pose_library(person, silhouettes(4, _BLUR_M), place.position)
     poses = _move_limbs(person, poses, silhouettes(4, _LIMB_BLUR_M), 64, seed=0)
@@ -87,8 +87,8 @@ def first_poses(person: Person, moment: Moment, place: Place) -> tuple[Poses, Ju
 
 
 def improve(
-    judge: Judge, poses: Poses, *, n_kept: int, n_moves: int, seed: int, narrower: float = 1.0, is_rough: bool = False
-) -> Poses:
+    judge: Judge, poses: PoseSet, *, n_kept: int, n_moves: int, seed: int, narrower: float = 1.0, is_rough: bool = False
+) -> PoseSet:
     """Move and fit the best poses; return them, where they were moved to, and where the fit ended from there.
 
     `narrower` is a factor on moves that are not all over the ranges.
@@ -99,11 +99,11 @@ def improve(
     if not is_rough:
         best = poses[:3]
         turned = _turn_trunk(person, best, seed, narrower)
-        moved = Poses.join(poses, _mirror(person, best), turned, _swap(person, best))
+        moved = PoseSet.join(poses, _mirror(person, best), turned, _swap(person, best))
     moved = _move_limbs(
         person, moved, judge.silhouettes, n_moves, seed=seed, narrower=narrower, judge=None if is_rough else judge
     )
-    return Poses.join(poses, moved, _fit(person, judge.moment, moved, _FAR if is_rough else _FINE))
+    return PoseSet.join(poses, moved, _fit(person, judge.moment, moved, _FAR if is_rough else _FINE))
 
 
 def polish(judge: Judge, pose: Pose, seed: int = 0) -> Pose:
@@ -113,13 +113,13 @@ def polish(judge: Judge, pose: Pose, seed: int = 0) -> Pose:
     """
     person, rng = judge.person, np.random.default_rng(seed)
     n_dofs = person.model.n_dofs
-    best = Poses.of([pose])
+    best = PoseSet.of([pose])
     best_value = judge(best)[0]
     for number in range(_N_POLISHED):
         sd = np.repeat([_POLISH_SD_M, _POLISH_SD_RAD], [3, n_dofs - 3]) * 0.85**number
         is_moved = np.repeat(rng.random((_N_SMALL, n_dofs // 3)) < _SHARE_MOVED, 3, axis=1)
         deltas = rng.normal(0, sd, (_N_SMALL, n_dofs)) * is_moved
-        tried = Poses.of([clamp_to_limits(person.model, move_pose(best.each()[0], delta)) for delta in deltas])
+        tried = PoseSet.of([clamp_to_limits(person.model, move_pose(best.each()[0], delta)) for delta in deltas])
         tried = tried[np.argsort(-judge.shares(tried), kind="stable")[:_N_JUDGED]]
         values = judge(tried)
         if values.max() > best_value:
@@ -127,14 +127,14 @@ def polish(judge: Judge, pose: Pose, seed: int = 0) -> Pose:
     return best.each()[0]
 
 
-def _pose_library(person: Person, silhouettes: Silhouettes, at: Array) -> Poses:
+def _pose_library(person: JointedBody, silhouettes: SilhouetteEvidence, at: Array) -> PoseSet:
     """Return the postures and orientations that cover most, apart in their trunks, their middles at a place."""
     postures, R = library(person.model), super_fibonacci(_N_ORIENTATIONS)
     n = len(postures)
-    upright = Poses(np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3)), postures)
+    upright = PoseSet(np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3)), postures)
     middle = person.middles(upright)
     t = at - np.einsum("oij,nj->noi", R, middle).reshape(-1, 3)
-    poses = Poses(np.tile(R, (n, 1, 1)), t, np.repeat(postures, len(R), axis=0))
+    poses = PoseSet(np.tile(R, (n, 1, 1)), t, np.repeat(postures, len(R), axis=0))
     shares = silhouettes.shares(person, poses)
     best = np.argsort(-shares, kind="stable")[:_N_BEST]
     trunks = person.landmarks(poses[best])[:, person.trunk]
@@ -142,15 +142,15 @@ def _pose_library(person: Person, silhouettes: Silhouettes, at: Array) -> Poses:
 
 
 def _move_limbs(
-    person: Person,
-    poses: Poses,
-    silhouettes: Silhouettes,
+    person: JointedBody,
+    poses: PoseSet,
+    silhouettes: SilhouetteEvidence,
     n: int,
     *,
     seed: int,
     narrower: float = 1.0,
     judge: Judge | None = None,
-) -> Poses:
+) -> PoseSet:
     """Move one limb after the other to where it covers most: n moves anywhere, and n near where it is."""
     angles = poses.angles.copy()
     for limb in person.limbs:
@@ -161,8 +161,8 @@ def _move_limbs(
         m, k = moves.shape[:2]
         tried = np.repeat(angles, k, axis=0)
         tried[:, joints] = moves.reshape(m * k, -1, 3)
-        moved = Poses(np.repeat(poses.R, k, axis=0), np.repeat(poses.t, k, axis=0), tried)
-        covered = _covered_by_limb(person, limb, moved, silhouettes, k)
+        moved = PoseSet(np.repeat(poses.R, k, axis=0), np.repeat(poses.t, k, axis=0), tried)
+        covered = _limb_coverage(person, limb, moved, silhouettes, k)
         best = covered.argmax(axis=1)
         if judge is not None:
             order = np.argsort(-covered, axis=1, kind="stable")[:, :_N_JUDGED]
@@ -173,7 +173,7 @@ def _move_limbs(
     return replace(poses, angles=angles)
 
 
-def _covered_by_limb(person: Person, limb: Limb, moved: Poses, silhouettes: Silhouettes, k: int) -> Array:
+def _limb_coverage(person: JointedBody, limb: Limb, moved: PoseSet, silhouettes: SilhouetteEvidence, k: int) -> Array:
     """Return what a limb covers beyond the rest of the body, of moves (m k) that k by k share it: (m, k)."""
     R, t = person.segments(moved)
     out = np.zeros((len(R) // k, k))
@@ -205,7 +205,7 @@ def _limb_moves(model: BodyModel, limb: Limb, angles: Array, n: int, seed: int, 
     return np.concatenate([np.broadcast_to(anywhere, shape), near.reshape(shape)], axis=1)
 
 
-def _mirror(person: Person, poses: Poses) -> Poses:
+def _mirror(person: JointedBody, poses: PoseSet) -> PoseSet:
     """Turn bodies about their long axes and exchange left and right: silhouettes hardly tell them apart."""
     names = [segment.name for segment in person.model.segments]
     other = {"left": "right", "right": "left"}
@@ -216,7 +216,7 @@ def _mirror(person: Person, poses: Poses) -> Poses:
     return replace(mirrored, t=mirrored.t + person.middles(poses) - person.middles(mirrored))
 
 
-def _turn_trunk(person: Person, poses: Poses, seed: int, narrower: float) -> Poses:
+def _turn_trunk(person: JointedBody, poses: PoseSet, seed: int, narrower: float) -> PoseSet:
     """Turn trunks a little, twice each; the limbs stay as they are turned."""
     rng = np.random.default_rng(seed)
     poses = poses[np.repeat(np.arange(len(poses)), 2)]
@@ -228,10 +228,10 @@ def _turn_trunk(person: Person, poses: Poses, seed: int, narrower: float) -> Pos
     return _with_rotations(person, replace(poses, t=poses.t + rng.normal(0, narrower * _TRUNK_SD_M, poses.t.shape)), R)
 
 
-def _with_rotations(person: Person, poses: Poses, R: Array) -> Poses:
+def _with_rotations(person: JointedBody, poses: PoseSet, R: Array) -> PoseSet:
     """Return poses with all segments turned to R (n, s, 3, 3), as far as the joints allow."""
     angles = joint_angles_of(person.model, R)
-    return Poses.of(
+    return PoseSet.of(
         [
             clamp_to_limits(
                 person.model,
@@ -242,12 +242,12 @@ def _with_rotations(person: Person, poses: Poses, R: Array) -> Poses:
     )
 
 
-def _swap(person: Person, poses: Poses) -> Poses:
+def _swap(person: JointedBody, poses: PoseSet) -> PoseSet:
     """Exchange the arms of bodies, and the legs."""
-    return Poses.of([swapped for pose in poses.each() for swapped in swap_limbs(person.model, pose)])
+    return PoseSet.of([swapped for pose in poses.each() for swapped in swap_limbs(person.model, pose)])
 
 
-def _fit(person: Person, moment: Moment, poses: Poses, levels: PyramidLevels) -> Poses:
+def _fit(person: JointedBody, moment: Moment, poses: PoseSet, levels: PyramidLevels) -> PoseSet:
     """Fit everything to the silhouettes."""
     regions, probabilities = _regions(person, moment, poses)
     dofs, sd = all_joints(person.model), np.full(person.model.n_dofs, _FIT_SD)
@@ -256,10 +256,10 @@ def _fit(person: Person, moment: Moment, poses: Poses, levels: PyramidLevels) ->
         prior = PosePrior(pose, sd)
         return fit_silhouettes(person.render_model, pose, regions, probabilities, levels=levels, dofs=dofs, prior=prior)
 
-    return Poses.of([fit(pose) for pose in poses.each()])
+    return PoseSet.of([fit(pose) for pose in poses.each()])
 
 
-def _regions(person: Person, moment: Moment, poses: Poses) -> tuple[list[Region], list[Array]]:
+def _regions(person: JointedBody, moment: Moment, poses: PoseSet) -> tuple[list[Region], list[Array]]:
     """Cut out what holds the poses in every view; return the regions and the probabilities in them."""
     seen = {
         (view.camera.name, view.camera.K.tobytes()): plane

@@ -45,7 +45,7 @@ PREDICTIONS: dict[str, tuple[Callable[[predictors.PoseHistory, Fraction], Pose],
 }
 # sds of a predicted pose: at once, and its growth by unknown acceleration [per s²]
 _EXPECTED_SD = (0.05, 30.0), (0.15, 150.0), (0.08, 120.0)  # root's position [m], root's rotation [rad], joints [rad]
-START_SD = (0.1, 0.3, 0.5)  # the same of a first pose set by hand: [m], [rad], [rad]
+FIRST_POSE_SD = (0.1, 0.3, 0.5)  # the same of a first pose set by hand: [m], [rad], [rad]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +127,7 @@ class RefinedTracker:
         return reduce_frames(frames, self._posed_start, _MOST_PX_PER_M) if self._fitter.moves_joints else frames
 
     def _search_first(self, frames: Frames) -> JudgedFit | None:
-        return fit_first(self._fitter, self._start, frames, self._prior(self._start, START_SD))
+        return fit_first(self._fitter, self._start, frames, self._prior(self._start, FIRST_POSE_SD))
 
     def _search_later(self, state: RefinedState, frames: Frames) -> JudgedFit | None:
         last_s, last = state.past[-1]
@@ -149,11 +149,11 @@ class RefinedTracker:
         """Fit from the pose that the evidence gives, which a lost limb's prediction cannot hold back."""
         if not state.past:
             pose = join_evidence(self._start, self._repeat(np.full(3, WIDE_SD)), evidence)
-            return fit_first(self._fitter, pose, frames, PosePrior(pose, self._repeat(START_SD), evidence))
+            return fit_first(self._fitter, pose, frames, PosePrior(pose, self._repeat(FIRST_POSE_SD), evidence))
         gap_s = float(frames.time_s - state.past[-1][0])
         expected = predictors.linear(state.past, frames.time_s)
         grown = [now + 0.5 * later * gap_s**2 for now, later in _EXPECTED_SD]
-        sds = self._repeat(np.maximum(START_SD, grown))
+        sds = self._repeat(np.maximum(FIRST_POSE_SD, grown))
         pose = join_evidence(expected, sds, evidence)
         prior = PosePrior(pose, sds, evidence)
         return fit_next(self._fitter, [pose], frames, state.appearance, reference=state.reference, prior=prior)
