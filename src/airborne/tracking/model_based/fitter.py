@@ -32,7 +32,7 @@ from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
 
-_MOVED_NATS = 7.0  # by which a limb's new place must be likelier: one limb in a thousand is lost in a frame
+_LOST_NATS = 7.0  # what a limb costs that is not where it was expected: one in a thousand is lost in a frame
 _FEWEST_VIEWS = 2  # in which something uncovered asks for a limb
 _TRUNK_AT = 4  # images at this reduction show the limbs of a body with joints; more reduced ones, its trunk alone
 
@@ -153,8 +153,9 @@ class Fitter:
         ]
         widened = None if prior is None else prior.widen(dofs.columns)
         moved = self.fit_images(poses, learned, widened)
-        noise = min(fit.equations.noise, moved.equations.noise)
-        return moved if moved.objective(noise, widened) + _MOVED_NATS < fit.objective(noise, widened) else fit
+        misfit = min(fit.equations.misfit, moved.equations.misfit)
+        lost = _LOST_NATS + fit.objective(misfit, widened)
+        return moved if _LOST_NATS + moved.objective(misfit, widened) < min(lost, fit.objective(misfit, prior)) else fit
 
     def _n_views_uncovered(self, pose: Pose, learned: LearnedRegions) -> int:
         """Count the views in which something like a limb stands out that the body does not cover."""
