@@ -119,11 +119,11 @@ class Fitter:
         seen = learned.regions, learned.posteriors
         misplaced = find_misplaced_limbs(self.render_model, fit.pose, *seen)
         for limb in misplaced:
-            fit = self._refit_limb(fit, limb, guesses, learned, prior)
+            fit, prior = self._refit_limb(fit, limb, guesses, learned, prior)
         for limb in limbs_of(self.model):
             if self._n_views_uncovered(fit.pose, learned) < _FEWEST_VIEWS:
                 break
-            fit = self._refit_limb(fit, limb, guesses, learned, prior)
+            fit, prior = self._refit_limb(fit, limb, guesses, learned, prior)
         misplaced = find_misplaced_limbs(self.render_model, fit.pose, *seen)
         segments = tuple(int(segment) for limb in misplaced for segment in limb)
         n_views_of = count_views(self.render_model, fit.pose, learned.regions, self._complete(fit.pose, learned))
@@ -142,8 +142,11 @@ class Fitter:
         guesses: Sequence[Pose],
         learned: LearnedRegions,
         prior: PosePrior | None,
-    ) -> Fit:
-        """Search for a limb, from where the fit and the guesses have it and from anywhere; return the better fit."""
+    ) -> tuple[Fit, PosePrior | None]:
+        """Search for a limb, from where the fit and the guesses have it and from anywhere; return the better fit.
+
+        The prior is returned too, wide for a limb that was moved.
+        """
         seen = learned.regions, learned.posteriors
         expected = [replace(fit.pose, joint_angles=_with_limb(fit.pose, guess, limb)) for guess in guesses]
         dofs = joints_of(self.model, limb)
@@ -154,8 +157,8 @@ class Fitter:
         widened = None if prior is None else prior.widen(dofs.columns)
         moved = self.fit_images(poses, learned, widened)
         misfit = min(fit.equations.misfit, moved.equations.misfit)
-        lost = _LOST_NATS + fit.objective(misfit, widened)
-        return moved if _LOST_NATS + moved.objective(misfit, widened) < min(lost, fit.objective(misfit, prior)) else fit
+        stays = min(fit.objective(misfit, prior), fit.objective(misfit, widened) + _LOST_NATS)
+        return (moved, widened) if moved.objective(misfit, widened) + _LOST_NATS < stays else (fit, prior)
 
     def _n_views_uncovered(self, pose: Pose, learned: LearnedRegions) -> int:
         """Count the views in which something like a limb stands out that the body does not cover."""
