@@ -19,25 +19,26 @@ SUMMARY, REPORT, RUN_RECORD = "summary.json", "report.html", "run.json"
 CALIBRATION, BODY = "calib.toml", "body.toml"
 SMOOTH_RECORD = "smooth.json"
 CANDIDATES, CANDIDATES_PICTURE = "candidates.json", "candidates.png"  # of a start that is undecided
+PICTURES = "pictures.json"  # beside the videos: some of their pictures
 FOLDERS = ("tables", "figures", "videos")
 
 
 def tables_of(folder: Path) -> Path:
     """Return where a run's further tables lie, made if need be."""
-    return _made(folder / FOLDERS[0])
+    return _create(folder / FOLDERS[0])
 
 
 def figures_of(folder: Path) -> Path:
     """Return where a run's figures lie, made if need be."""
-    return _made(folder / FOLDERS[1])
+    return _create(folder / FOLDERS[1])
 
 
 def videos_of(folder: Path) -> Path:
     """Return where a run's videos lie, made if need be."""
-    return _made(folder / FOLDERS[2])
+    return _create(folder / FOLDERS[2])
 
 
-def _made(folder: Path) -> Path:
+def _create(folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
