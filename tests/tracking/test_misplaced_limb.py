@@ -9,7 +9,8 @@ from airborne.appearance.model import Appearance
 from airborne.body import Pose
 from airborne.body.chain import clamp_to_limits
 from airborne.tracking.image_regions import crop_regions
-from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
+from airborne.tracking.model_based.degrees_of_freedom import PosePrior, limb_of_segment
+from airborne.tracking.model_based.fitter import Fitter, LearnedRegions
 from airborne.tracking.model_based.global_search import region_evidence
 from airborne.tracking.model_based.misplaced_limbs import find_misplaced_limbs, search_limb
 from airborne.tracking.model_based.render_model import RenderModel
@@ -93,3 +94,27 @@ def test_start_with_one_limb_folded_wrong_is_put_right_in_the_first_frame(name):
     estimates = track(SCENE, range(1), tracker(SCENE, fold(SCENE.start(), name, (FOLDS | FOREARM)[name])))
     assert statuses(estimates) == ["tracked"]
     assert mean_errors_mm(SCENE, estimates).max() < 5
+
+
+@pytest.mark.parametrize("names", [("upper_arm_left",), ("thigh_right", "upper_arm_left")])
+def test_limbs_that_are_not_where_they_were_expected_are_moved_and_stay(frame, names):
+    expected = frame.truth
+    for name in names:
+        expected = fold(expected, name, FOLDS[name])
+    prior = PosePrior(expected, np.full(HUMAN.n_dofs, 0.1))
+    learned = LearnedRegions(*frame.views(expected), frame.appearance)
+    fitter = Fitter.of(frame.render_model, "refined", fixed_shape=False)
+    judged = fitter.judge(fitter.fit_images([expected], learned, prior), [expected], learned, prior)
+    for name in names:
+        assert frame.off_mm(expected, limb_with(name)) > 450
+        assert frame.off_mm(judged.fit.pose, limb_with(name)) < 60
+
+
+def test_limb_that_was_expected_stays_where_one_colour_shows_no_better_place(frame):
+    expected = frame.truth
+    prior = PosePrior(expected, np.full(HUMAN.n_dofs, 0.1))
+    learned = LearnedRegions(*frame.views(expected), frame.appearance)
+    fitter = Fitter.of(frame.render_model, "refined", fixed_shape=False)
+    folded = [fold(expected, name, turn) for name, turn in FOLDS.items()]
+    judged = fitter.judge(fitter.fit_images([expected], learned, prior), folded, learned, prior)
+    assert frame.off_mm(judged.fit.pose, np.arange(len(HUMAN.segments))) < 20

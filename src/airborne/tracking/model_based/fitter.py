@@ -39,7 +39,7 @@ from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
 
-_MOVED_NATS = 7.0  # by which a limb's new place must be likelier: one limb in a thousand is lost in a frame
+_LOST_NATS = 7.0  # what a limb costs that is not where it was expected: one in a thousand is lost in a frame
 _FEWEST_VIEWS = 2  # in which something uncovered asks for a limb
 _TRUNK_AT = 4  # images at this reduction show the limbs of a body with joints; more reduced ones, its trunk alone
 
@@ -135,11 +135,11 @@ class Fitter:
         seen = learned.regions, learned.posteriors
         misplaced = find_misplaced_limbs(self.render_model, fit.pose, *seen)
         for limb in misplaced:
-            fit = self._refit_limb(fit, limb, guesses, learned, prior)
+            fit, prior = self._refit_limb(fit, limb, guesses, learned, prior)
         for limb in limbs_of(self.model):
             if self._n_views_uncovered(fit.pose, learned) < _FEWEST_VIEWS:
                 break
-            fit = self._refit_limb(fit, limb, guesses, learned, prior)
+            fit, prior = self._refit_limb(fit, limb, guesses, learned, prior)
         misplaced = find_misplaced_limbs(self.render_model, fit.pose, *seen)
         segments = tuple(int(segment) for limb in misplaced for segment in limb)
         n_views_of = count_views(self.render_model, fit.pose, learned.regions, self._complete(fit.pose, learned))
@@ -158,8 +158,11 @@ class Fitter:
         guesses: Sequence[Pose],
         learned: LearnedRegions,
         prior: PosePrior | None,
-    ) -> Fit:
-        """Search for a limb, from where the fit and the guesses have it and from anywhere; return the better fit."""
+    ) -> tuple[Fit, PosePrior | None]:
+        """Search for a limb, from where the fit and the guesses have it and from anywhere; return the better fit.
+
+        The prior is returned too, wide for a limb that was moved.
+        """
         seen = learned.regions, learned.posteriors
         expected = [replace(fit.pose, joint_angles=_with_limb(fit.pose, guess, limb)) for guess in guesses]
         dofs = joints_of(self.model, limb)
@@ -169,8 +172,9 @@ class Fitter:
         ]
         widened = None if prior is None else prior.widen(dofs.columns)
         moved = self.fit_images(poses, learned, widened)
-        noise = min(fit.equations.noise, moved.equations.noise)
-        return moved if moved.objective(noise, widened) + _MOVED_NATS < fit.objective(noise, widened) else fit
+        misfit = min(fit.equations.misfit, moved.equations.misfit)
+        stays = min(fit.objective(misfit, prior), fit.objective(misfit, widened) + _LOST_NATS)
+        return (moved, widened) if moved.objective(misfit, widened) + _LOST_NATS < stays else (fit, prior)
 
     def _n_views_uncovered(self, pose: Pose, learned: LearnedRegions) -> int:
         """Count the views in which something like a limb stands out that the body does not cover."""
