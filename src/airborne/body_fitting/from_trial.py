@@ -30,7 +30,7 @@ from airborne.errors import BodyError, TrialError
 from airborne.export.views import crop_camera, resample_view
 from airborne.rendering import FLAT, render
 from airborne.run.detections import landmarks_over_time
-from airborne.run.landmarks import read_points, triangulate_clicks
+from airborne.run.landmarks import read_joint_positions, triangulate_clicks
 from airborne.run.opening import Opened, open_trial
 from airborne.tracking.first_pose import LANDMARK_WEIGHTS
 from airborne.trial.file import Trial
@@ -169,7 +169,7 @@ def _landmarks_by_frame(trial: Trial, opened: Opened[Recording]) -> dict[int, di
 def _landmarks_of(trial: Trial, forms: StartTable | KeyTable, rig: Rig) -> dict[str, Array]:
     """Return the landmarks that a start or a key gives in metres or clicked in two cameras; none of other forms."""
     if forms.joints_m is not None:
-        names, points = read_points(trial, forms.joints_m)
+        names, points = read_joint_positions(trial, forms.joints_m)
         return dict(zip(names, points, strict=True))
     if forms.points_px is not None:
         return landmarks_from_points(*triangulate_clicks(trial, forms.points_px, rig, f"frame {forms.frame}"))

@@ -13,7 +13,7 @@ import numpy as np
 from airborne.cameras import Rig, camera_looking_at
 from airborne.errors import TrialError
 from airborne.io.text import read_text
-from airborne.run.landmarks import read_points, triangulate_clicks
+from airborne.run.landmarks import read_joint_positions, triangulate_clicks
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.particle import GivenTorsos, legs_tracker
 from airborne.tracking.players import PlayerStart, PlayersTracker
@@ -50,7 +50,7 @@ def player_starts(trial: Trial, rig: Rig) -> tuple[PlayerStart, ...]:
     starts = []
     for player in trial.start.player:
         if player.joints_m is not None:
-            names, points = read_points(trial, player.joints_m)
+            names, points = read_joint_positions(trial, player.joints_m)
         else:
             assert player.points_px is not None, "checked with the table"
             names, points = triangulate_clicks(trial, player.points_px, rig, f"player '{player.name}'")
