@@ -1,5 +1,8 @@
 """Edits of a trial's text keep its comments and all that they do not speak of."""
 
+import pytest
+
+from airborne.errors import TrialError
 from airborne.io.text import parse_toml
 from airborne.studio.trial_edits import with_cameras, with_table
 
@@ -44,3 +47,11 @@ def test_tables_are_made_changed_and_rid_of_keys():
     text = with_table(text, "start", {"frame": 3, "position_m": [0.1, 0.2, 1.0]})
     assert parse_toml(text)["start"] == {"frame": 3, "position_m": [0.1, 0.2, 1.0]}
     assert parse_toml(text)["track"] == {"method": "refined"}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"), [("start = 3\n", "start is no table"), ("a = [" + "1," * 60_000 + "]", "larger")]
+)
+def test_what_cannot_be_edited_is_one_line(text, said):
+    with pytest.raises(TrialError, match=said):
+        with_table(text, "start", {"frame": 1})

@@ -242,6 +242,9 @@ def _check_order(path: Path, table: pd.DataFrame, frame: NDArray[np.int64], n_jo
     tiled = [np.reshape(each, frame.shape) for each in codes]
     is_regular = all((each == each[0]).all() for each in tiled) and (frame == frame[:, :1]).all()
     n_names = len(set(tiled[0][0].tolist())) * n_joints
+    unknown = set(table["status"].unique()) - {status.value for status in Status}
+    if unknown:
+        raise ResultError(f"{path}: '{str(unknown.pop())[:40]}' is no status; correct the line or track again")
     if not is_regular or n_names != frame.shape[1] or (np.diff(frame[:, 0]) <= 0).any():
         raise ResultError(f"{path}: the rows of some frame, or their order, differ from the first frame's; track again")
 

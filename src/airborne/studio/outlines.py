@@ -23,6 +23,7 @@ from airborne.tracking import Status
 
 _COLOURS = {status.value: hex_colour(rgb) for status, rgb in STATUS_RGB.items()}
 _LIMBS = ("hip", "knee", "ankle", "foot")  # in order down a leg
+_MOST_DIGITS = 10  # of a frame's number
 _PATH_COLOUR = "rgba(255,255,255,0.55)"
 
 
@@ -83,7 +84,8 @@ def run_rows(run: Path) -> tuple[int, int | None]:
     """Return how many frames a run of one body holds so far, and the last one's number."""
     path = run / MOTION
     rows = path.read_bytes().split(b"\n")[1:-1] if path.is_file() else []  # without the header and a torn last line
-    return len(rows), int(rows[-1].partition(b",")[0]) if rows else None
+    newest = rows[-1].partition(b",")[0] if rows else b""
+    return len(rows), int(newest) if newest.isdigit() and len(newest) < _MOST_DIGITS else None
 
 
 def run_body(run: Path) -> BodyModel:

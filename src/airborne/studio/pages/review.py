@@ -56,7 +56,7 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
     bodies: list[Callable[[int], None]] = []
 
     def turn_to(frame: int) -> None:
-        session.frame = frame
+        session.go(frame=frame)
         for show in bodies:
             show(frame)
 
