@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 _TOPIC = "airborne"  # of the events that tell of frames
+_LEAST_BYTES = 500_000_000  # a worker takes 300 MB with everything loaded
 _CONNECT_S = 10  # to reach a scheduler
 _DASHBOARD = "127.0.0.1:0"  # for this machine alone, on any port
 # one task runs, none waits at a worker: the longest go first, and a dead worker costs what it ran; only many deaths are
@@ -33,14 +34,16 @@ _SETTINGS = {
 def open_client(scheduler: str | None, n_workers: int, memory: str) -> Iterator[Client]:
     """Connect to a scheduler by its address, or start one with workers of one thread on this machine.
 
-    `memory` is each worker's, as "4GB", or "auto": an equal share; a worker that needs more is started anew. Raises
-    AirborneError where Dask is not installed or the scheduler cannot be reached.
+    `memory` is each worker's, as "4GB", or "auto": an equal share; a worker that needs more is started anew. Workers of
+    another machine keep what they were started with, and `memory` is the least of it. Raises AirborneError where Dask
+    is not installed, the scheduler cannot be reached, or there is not so much memory.
     """
     try:
         from dask import config
         from distributed import Client, LocalCluster
     except ImportError:
         raise AirborneError("batches need Dask; install the extra: pip install 'airborne[batch]'") from None
+    least_bytes = _parse_memory(memory, n_workers if scheduler is None else 0)
     for logger in ("distributed", "distributed.client"):  # what goes wrong is told once, by the row of its trial
         logging.getLogger(logger).setLevel(logging.CRITICAL)
     with ExitStack() as stack:
@@ -65,22 +68,51 @@ def open_client(scheduler: str | None, n_workers: int, memory: str) -> Iterator[
                 f"no scheduler answers at {scheduler} ({str(error).splitlines()[0][:120]}); "
                 "start one with: dask scheduler"
             ) from None
-        wrong = [name for name, each in client.scheduler_info(n_workers=-1)["workers"].items() if each["nthreads"] != 1]
+        workers = client.scheduler_info(n_workers=-1)["workers"]
+        wrong = [name for name, each in workers.items() if each["nthreads"] != 1]
         if wrong:
             raise AirborneError(
                 f"{count(len(wrong), 'worker')} of {scheduler} run several threads ({wrong[0]}); "
                 "start them with --nthreads 1"
             )
+        small = [name for name, each in workers.items() if 0 < each["memory_limit"] < least_bytes]
+        if scheduler is not None and small:
+            raise AirborneError(
+                f"{count(len(small), 'worker')} of {scheduler} may use less than {memory} ({small[0]}); "
+                f"start them with --memory-limit {memory}"
+            )
         yield client
 
 
-def count_cores() -> int:
-    """Return how many cores this process may use."""
+def _parse_memory(memory: str, n_workers: int) -> int:
+    """Return the memory of a worker [bytes], 0 for "auto"; raises AirborneError where this machine has less."""
+    from dask.utils import format_bytes, parse_bytes
+    from distributed.system import MEMORY_LIMIT
+
+    if memory == "auto":
+        return 0
+    try:
+        n_bytes = parse_bytes(memory)
+    except ValueError:
+        raise AirborneError(f"memory {memory[:40]}: expected a size such as 4GB") from None
+    if n_bytes < _LEAST_BYTES:
+        raise AirborneError(f"memory {memory}: a worker needs {format_bytes(_LEAST_BYTES)} at least")
+    if n_bytes * n_workers > MEMORY_LIMIT:
+        raise AirborneError(
+            f"{count(n_workers, 'worker')} of {memory} are more than the {format_bytes(MEMORY_LIMIT)} of this machine; "
+            f"give --workers {MEMORY_LIMIT // n_bytes or 1}, or less --memory"
+        )
+    return n_bytes
+
+
+def count_workers(memory: str) -> int:
+    """Return how many workers of so much memory this machine can have: one for each core, if there is room."""
     try:
         from dask.system import CPU_COUNT
+        from distributed.system import MEMORY_LIMIT
     except ImportError:
         return 1  # nothing is started without Dask
-    return CPU_COUNT
+    return max(1, min(CPU_COUNT, MEMORY_LIMIT // (_parse_memory(memory, 1) or 1)))
 
 
 def do_tasks(

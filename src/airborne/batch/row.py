@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from airborne.constants import NORMAL_QUANTILE_975
 from airborne.errors import ResultError
-from airborne.io.text import read_bytes
+from airborne.io.text import read_csv
 from airborne.motion.flight.phases import find_flight_events
 from airborne.motion.run_folder import FLIGHT, SUMMARY, read_summary
 
 TableRow = dict[str, Any]
-_LARGEST_TABLE_BYTES = 500_000_000  # an hour at 1000 frames a second
+_HIGHEST_M = 1e6  # of a centre of mass: no height beyond it
 _STATUSES = ("tracked", "uncertain", "lost")
 _OF_A_BODY = ("median_position_sd_mm", "median_rotation_sd_deg", "somersault_rev", "twist_rev")
 _OF_A_FLIGHT = ("fitted_gravity_m_s2", "ballistic_rms_mm")
@@ -74,8 +72,13 @@ def _jump(path: Path) -> TableRow:
     """Return take-off, landing and rise of the first whole flight of a body with masses."""
     if not path.is_file():
         return {}
-    table = pd.read_csv(BytesIO(read_bytes(path, _LARGEST_TABLE_BYTES))).dropna(subset="com_z_m")
-    time_s, height_m, sd = (table[name].to_numpy(float) for name in ("time_s", "com_z_m", "com_z_m_sd"))
+    (_, names), *rows = read_csv(path, "expected a flight's table", ResultError)
+    columns = [names.index(name) for name in ("time_s", "com_z_m", "com_z_m_sd")]
+    values = np.array([[float(cells[k] or "nan") for k in columns] for _, cells in rows]).reshape(-1, 3)
+    time_s, height_m, sd = values[np.isfinite(values[:, 1])].T
+    if not ((np.diff(time_s) > 0).all() and (np.abs(height_m) < _HIGHEST_M).all()):
+        raise ValueError(f"{FLIGHT}: times that do not increase, or heights that none can have")
+    sd = np.where(np.abs(sd) < _HIGHEST_M, sd, np.inf)
     for start, end in pairwise(find_flight_events(time_s, height_m, sd**2)):
         inside = np.flatnonzero((time_s >= start.time_s) & (time_s <= end.time_s))
         if (start.name, end.name) == ("take-off", "landing") and len(inside):

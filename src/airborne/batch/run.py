@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from airborne.batch.cluster import count_cores, do_tasks, open_client
+from airborne.batch.cluster import count_workers, do_tasks, open_client
 from airborne.batch.progress import show_progress
 from airborne.batch.table import not_reached, write_outputs
 from airborne.batch.task import LOGS, THUMBNAILS, Task, TaskOutcome, inspect_folder
@@ -48,7 +48,7 @@ def run_batch(
     """
     machines = machines or Machines()
     tasks = plan_tasks(trials, folder, pictures=pictures)
-    n_workers = min(machines.workers or count_cores(), len(tasks))
+    n_workers = min(machines.workers or count_workers(machines.memory), len(tasks))
     outcomes: dict[str, TaskOutcome] = {}
     with sole_writer(folder):
         try:

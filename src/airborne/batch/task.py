@@ -26,7 +26,7 @@ from airborne.run.folder import run_identity
 from airborne.run.track import track_trial
 from airborne.trial.file import Trial, read_trial
 
-TaskStatus = Literal["done", "unchanged", "failed"]
+TaskStatus = Literal["done", "unchanged", "failed", "not run"]
 FolderState = Literal["new", "stopped", "changed", "unchanged"]  # what a folder holds of a trial
 
 LOGS, THUMBNAILS = "logs", "thumbnails"  # folders of a batch beside those of its trials
@@ -65,7 +65,7 @@ class TaskOutcome:
 
     name: str
     status: TaskStatus
-    error: str = ""  # one line, of a failed one
+    error: str = ""  # one line, of one that failed or was not run
     row: TableRow = field(default_factory=dict)  # of the batch's table
 
 

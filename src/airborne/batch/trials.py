@@ -18,7 +18,7 @@ from airborne.trial.file import read_tables
 TABLE = "trials.csv"
 _OWN_COLUMNS = ("trial", "status", "error", "folder")  # of the batch's table
 _ALWAYS_TRIAL = "trial.toml"  # the name of a trial file that is named after its folder
-_MEANT_AS_TRIAL = re.compile(r"^\s*(\[\[camera\]\]|session\s*=)", re.MULTILINE)
+_MEANT_AS_TRIAL = re.compile(r"^[ \t]*(\[\[camera\]\]|session[ \t]*=)", re.MULTILINE)
 _HEAD_BYTES = 100_000  # of a file that is no TOML, in which words of a trial are looked for
 _TABLE_FORM = "a table of trials has a line of names, one of them trial, then a line for each trial"
 

@@ -70,7 +70,7 @@ def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
         if conditions and row[CONDITION] not in conditions:
             continue
         if row["status"] != "done":
-            left_out.append(f"{row['trial']}: failed: {row['error']}")
+            left_out.append(f"{row['trial']}: {row['status']}: {row['error']}")
         elif not athlete or not row[CONDITION]:
             left_out.append(f"{row['trial']}: has no label {CONDITION if athlete else ATHLETE}")
         else:
