@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import multiprocessing
+import os
+import sys
 from asyncio import CancelledError
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from multiprocessing import forkserver
 from typing import TYPE_CHECKING, Any
 
 from airborne.batch.task import Report, Task, TaskOutcome, do_task
@@ -19,6 +23,8 @@ _TOPIC = "airborne"  # of the events that tell of frames
 _LEAST_BYTES = 500_000_000  # a worker takes 300 MB with everything loaded
 _CONNECT_S = 10  # to reach a scheduler
 _DASHBOARD = "127.0.0.1:0"  # for this machine alone, on any port
+_ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")  # each worker has
+_FORKS = sys.platform == "linux"  # elsewhere a forked process may not use what its parent has loaded
 # one task runs, none waits at a worker: the longest go first, and a dead worker costs what it ran; only many deaths are
 # a task's own fault; a worker that is killed again while it starts is not given up
 _SETTINGS = {
@@ -27,7 +33,29 @@ _SETTINGS = {
     "distributed.scheduler.worker-saturation": 1.0,
     "distributed.scheduler.work-stealing": False,
     "distributed.admin.large-graph-warning-threshold": "1GB",
+    # what would take 4 % of two cores: the dashboard has no profile
+    "distributed.worker.profile.enabled": False,
+    "distributed.worker.profile.interval": "1s",
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.admin.system-monitor.interval": "5s",
+    "distributed.worker.multiprocessing-method": "forkserver" if _FORKS else "spawn",
 }
+
+
+def import_for_workers() -> None:
+    """Start the process that this machine's workers are forked from: it imports all, so that each is there at once and
+    shares that memory. Returns before it has done so.
+    """  # noqa: D205
+    if not _FORKS:
+        return
+    multiprocessing.get_context("forkserver").set_forkserver_preload([do_task.__module__, "distributed.nanny"])
+    known = {name: os.environ.get(name) for name in _ONE_THREAD}
+    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    try:
+        forkserver.ensure_running()
+    finally:
+        for name, value in known.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
 @contextmanager
@@ -49,6 +77,7 @@ def open_client(scheduler: str | None, n_workers: int, memory: str) -> Iterator[
     with ExitStack() as stack:
         stack.enter_context(config.set(_SETTINGS))
         if scheduler is None:
+            import_for_workers()
             address: Any = stack.enter_context(
                 LocalCluster(
                     n_workers=n_workers,

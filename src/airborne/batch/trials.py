@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from airborne.errors import AirborneError, TrialError
-from airborne.io.names import check_column, file_stem
+from airborne.io.names import check_column, check_path, file_stem
 from airborne.io.text import read_csv, read_toml
 from airborne.trial.file import read_tables
 
@@ -86,8 +86,11 @@ def _read_rows(path: Path) -> list[tuple[Path, dict[str, str]]]:
         if len(cells) != len(names):
             raise TrialError(f"{path}, row {line}: {len(cells)} cells, expected {len(names)}")
         labels = dict(zip(names, cells, strict=True))
-        file = path.parent / labels.pop("trial")
-        found.append((file if file.suffix == ".toml" else file.with_name(f"{file.name}.toml"), labels))
+        try:
+            file = check_path(labels.pop("trial"))
+        except ValueError as error:
+            raise TrialError(f"{path}, row {line}: {error}") from None
+        found.append((path.parent / (file if file.endswith(".toml") else f"{file}.toml"), labels))
     return found
 
 
