@@ -16,7 +16,7 @@ def states(folder):
 def test_a_folder_of_videos_needs_cameras_first(tmp_path):
     assert states(tmp_path) == {
         "Videos": "needs you",
-        **dict.fromkeys(["Cameras", "Body", "First pose", "Track", "Review", "Results"], "empty"),
+        **dict.fromkeys(["Cameras", "Body", "First pose", "Track", "Review", "Digitise", "Results"], "empty"),
     }
 
 
@@ -26,6 +26,7 @@ def test_a_prepared_trial_lacks_only_the_run(tmp_path):
         **dict.fromkeys(["Videos", "Cameras", "Body", "First pose"], "ready"),
         "Track": "needs you",
         "Review": "empty",
+        "Digitise": "empty",
         "Results": "empty",
     }
 

@@ -21,9 +21,8 @@ from airborne.body.stadia import SolidProperties, Stadium, circle, dome, half_so
 from airborne.errors import BodyError
 from airborne.types import Array
 
-FOOT_SLOPE_RAD = np.radians(
-    22.0
-)  # the line from the ankle to the ball of the foot falls by this when the sole is level
+# the line from the ankle to the ball of the foot falls by this when the sole is level
+FOOT_SLOPE_RAD = np.radians(22.0)
 _DENSITIES = {  # [kg/m^3], Dempster's, as in Yeadon (1990-II)
     "head": 1110.0,
     "shoulders": 1040.0,

@@ -16,18 +16,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body.limits import FREE, JointLimits
 from airborne.body.mesh_files import read_mesh
-from airborne.body.model import (
-    WHOLE,
-    BodyModel,
-    Box,
-    Ellipsoid,
-    Inertia,
-    Landmark,
-    Mesh,
-    Part,
-    Segment,
-    Shape,
-)
+from airborne.body.model import WHOLE, BodyModel, Box, Ellipsoid, Inertia, Landmark, Mesh, Part, Segment, Shape
 from airborne.errors import BodyError, one_line
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.io.names import CheckedPath

@@ -47,11 +47,8 @@ _CONVERGED = 1.0  # a step must gain more log-likelihood than this [nats]
 _BACKTRACK, _MOST_BACKTRACKS = 0.4, 3  # factor on a step that does not gain, and how often
 _FAR_RMS_M = 0.05  # of landmarks: a pose further off is looked for anew
 _MARGIN_M = 0.1  # around the body, for its motion
-_MASK_GIRTHS = (
-    1.5,
-    1.25,
-    1.15,
-)  # factors on the girths of the body that masks the person when the background is learned, by level
+# factors on the girths of the body that masks the person when the background is learned, by level
+_MASK_GIRTHS = (1.5, 1.25, 1.15)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,6 +18,7 @@ _SOME_FAILED = 1  # the exit code, also where some were not run
 def batch_command(
     trials: Annotated[str, typer.Argument(help="A folder of trials, a quoted pattern, or a CSV with a column trial.")],
     output: Out,
+    *,
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes on this machine; as many as cores by default.")
     ] = None,
@@ -67,6 +68,7 @@ def batch_command(
 
 def new_command(
     videos: Annotated[Path, typer.Argument(help="The folder of the videos.")],
+    *,
     pattern: Annotated[str, typer.Option(help="How their paths below it are made; words in braces become labels.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for session.toml and trials/.")],
     calibration: Annotated[str, typer.Option(help="The calibration file, as seen from the output.")] = "calib.toml",

@@ -21,6 +21,7 @@ def calibrate_command(
             help="A file of sources (.toml); or a table of control points (.csv); or with --board each camera's video."
         ),
     ],
+    *,
     output: Annotated[Path, typer.Option("-o", "--output", help="Calibration file to write (Pose2Sim TOML).")],
     size: Annotated[
         str | None,

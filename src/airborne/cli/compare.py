@@ -13,6 +13,7 @@ from airborne.cli.console import Out
 def compare_command(
     results: Annotated[Path, typer.Argument(help="The folder of a batch, whose trials have athlete and condition.")],
     output: Out,
+    *,
     variable: Annotated[
         list[str], typer.Option(help="A column of trials.csv, or a curve such as com_z_m; may be repeated.")
     ],

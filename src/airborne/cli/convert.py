@@ -17,6 +17,7 @@ _Corner = Literal["upper-left", "lower-left"]
 def convert_command(
     source: Annotated[Path, typer.Argument(metavar="IN", help="Cameras, clicked points or detections; any format.")],
     target: Annotated[Path, typer.Argument(metavar="OUT", help="File to write; its name tells the format.")],
+    *,
     to: Annotated[str | None, typer.Option(help="Format of OUT, if its name does not tell.")] = None,
     size: Annotated[
         str | None, typer.Option(help="Image size WIDTHxHEIGHT, or name=WIDTHxHEIGHT,..., if IN does not hold it.")

@@ -13,6 +13,7 @@ from airborne.cli.console import Json, progress
 
 def export_command(
     results: Annotated[Path, typer.Argument(help="Folder of a run, finished or not.")],
+    *,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for the files; the run's folder `export`.")
     ] = None,

@@ -34,6 +34,7 @@ def reproduce_rigid_command(
 
 def reproduce_blockjump_command(
     output: Out = Path("reproduced-blockjump"),
+    *,
     quick: Annotated[bool, typer.Option("--quick", help="Two sequences, two seeds: about a minute.")] = False,
     seeds: Annotated[int | None, typer.Option(min=1, help="Seeds of each method; 5 unless --quick.")] = None,
     processes: Annotated[int | None, typer.Option(min=1, help="Sequences at a time; by default one per core.")] = None,

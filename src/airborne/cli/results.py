@@ -25,6 +25,7 @@ def evaluate_command(
             help="True poses: field,time_s,x_m,y_m,z_m,r00,...,r22; of players frame,time_s,player,l_hip_x,l_hip_y,..."
         ),
     ] = None,
+    *,
     digitised: Annotated[
         Path | None, typer.Option(help="Points clicked by hand, to compare with, as the rigid-body paper does.")
     ] = None,

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 def smooth_command(
     results: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    *,
     butterworth: Annotated[
         str | None,
         typer.Option(help="Cut-off in Hz of a zero-lag Butterworth filter, or auto: that of the residual analysis."),

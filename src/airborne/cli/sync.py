@@ -13,6 +13,7 @@ from airborne.cli.console import Json, progress
 
 def sync_command(
     trial: Annotated[Path, typer.Argument(help="The trial's TOML file; the offsets are written into it.")],
+    *,
     by: Annotated[
         Literal["auto", "flash", "sound", "motion", "tracking"],
         typer.Option(help="What the offsets come from; auto: motion, then tracking of the body."),

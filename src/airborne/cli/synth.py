@@ -29,6 +29,7 @@ def synth_cross_command(
 
 def synth_somersault_command(
     output: Out,
+    *,
     preset: Annotated[
         Literal["paper", "moving-arms", "pike"], typer.Option(help="11 poses of one shape, or motion at 50 frames/s.")
     ] = "paper",
@@ -54,6 +55,7 @@ def synth_somersault_command(
 def synth_block_command(
     output: Out,
     seed: Seed = 0,
+    *,
     blockers: Annotated[int, typer.Option(min=1, max=3, help="How many players jump to block.")] = 1,
     difficulty: Annotated[
         Literal["easy", "default", "hard"], typer.Option(help="Clothes, players in the way, noise, calibration.")

@@ -38,7 +38,7 @@ def demo_command(
     run = _track(trial, output, resume=False, overwrite=overwrite, pictures=True)
     if not as_json:
         print(_describe(run.summary, output))
-    evaluate_command(output, trial.parent / "truth.csv", trial.parent / "digitised.csv", as_json=as_json)
+    evaluate_command(output, trial.parent / "truth.csv", digitised=trial.parent / "digitised.csv", as_json=as_json)
     if not as_json:
         print(f"report: {output / 'report.html'}")
 
@@ -46,6 +46,7 @@ def demo_command(
 def track_command(
     trial: Annotated[Path, typer.Argument(help="The trial's TOML file.")],
     output: Out,
+    *,
     resume: Annotated[bool, typer.Option(help="Resume a run that was stopped.")] = False,
     overwrite: Annotated[bool, typer.Option(help="Replace the run that the folder holds.")] = False,
     first_frame: Annotated[

@@ -90,7 +90,12 @@ def read_clicked_frames(path: Path, cameras: Sequence[str]) -> DigitisedPoints:
 
 
 def write_clicked_frames(path: Path, digitised: DigitisedPoints, cameras: Sequence[str]) -> None:
-    """Write clicked points as `read_clicked_frames` reads them, blank where a point was not clicked."""
+    """Write clicked points as `read_clicked_frames` reads them."""
+    write_text(path, format_clicked_frames(digitised, cameras))
+
+
+def format_clicked_frames(digitised: DigitisedPoints, cameras: Sequence[str]) -> str:
+    """Return the table that `read_clicked_frames` reads, blank where a point was not clicked."""
     header = [
         "frame",
         *(f"{point}_{camera}_{axis}" for point in digitised.points for camera in cameras for axis in "uv"),
@@ -98,7 +103,13 @@ def write_clicked_frames(path: Path, digitised: DigitisedPoints, cameras: Sequen
     rows = [header]
     for frame, px in zip(digitised.index, digitised.px, strict=True):
         rows.append([str(frame), *("" if np.isnan(value) else repr(float(value)) for value in px.ravel())])
-    write_text(path, "".join(",".join(row) + "\n" for row in rows))
+    return "".join(",".join(row) + "\n" for row in rows)
+
+
+def box_ends(model: BodyModel) -> list[str]:
+    """Return the names of the points that a body's boxes have: `<part>_minus` and `<part>_plus` of each."""
+    boxes = [part.name for segment in model.segments for part in segment.parts if isinstance(part.shape, Box)]
+    return [f"{name}_{end}" for name in boxes for end in ("minus", "plus")]
 
 
 def body_points(model: BodyModel, points: Sequence[str]) -> Array:

@@ -27,12 +27,12 @@ _TELLING = ("matching.png", "heights.png", "through_mask.png", "pose.png")  # fi
 
 def tables_of(folder: Path) -> Path:
     """Return where a run's further tables lie, made if need be."""
-    return _made(folder / FOLDERS[0])
+    return _create(folder / FOLDERS[0])
 
 
 def figures_of(folder: Path) -> Path:
     """Return where a run's figures lie, made if need be."""
-    return _made(folder / FOLDERS[1])
+    return _create(folder / FOLDERS[1])
 
 
 def list_figures(folder: Path) -> list[Path]:
@@ -43,10 +43,10 @@ def list_figures(folder: Path) -> list[Path]:
 
 def videos_of(folder: Path) -> Path:
     """Return where a run's videos lie, made if need be."""
-    return _made(folder / FOLDERS[2])
+    return _create(folder / FOLDERS[2])
 
 
-def _made(folder: Path) -> Path:
+def _create(folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 

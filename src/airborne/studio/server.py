@@ -16,6 +16,7 @@ from airborne.errors import AirborneError
 from airborne.studio.guard import Guard
 from airborne.studio.pages.body import body_page
 from airborne.studio.pages.cameras import cameras_page
+from airborne.studio.pages.digitise import digitise_page
 from airborne.studio.pages.first_pose import first_pose_page
 from airborne.studio.pages.results import results_page
 from airborne.studio.pages.review import review_page
@@ -35,6 +36,7 @@ _PAGES = {
     "/start": first_pose_page,
     "/track": track_page,
     "/review": review_page,
+    "/digitise": digitise_page,
     "/results": results_page,
 }
 

@@ -28,6 +28,7 @@ export default {
     this.pens = this.canvas.getContext("2d");
     this.cache = new Map();
     this.underway = new Map();
+    this.alone = -1; // the only camera shown; -1: all
     this.zooms = this.panes.map(() => ({ scale: 1, u: 0, v: 0 })); // v, u: what is moved to the pane's corner
     this.pointer = null;
     this.drag = null;
@@ -53,7 +54,10 @@ export default {
     overlay() { this.refresh(); },
     panes(now, before) {
       if (JSON.stringify(now) === JSON.stringify(before)) return;
-      if (this.zooms.length !== this.panes.length) this.zooms = this.panes.map(() => ({ scale: 1, u: 0, v: 0 }));
+      if (this.zooms.length !== this.panes.length) {
+        this.zooms = this.panes.map(() => ({ scale: 1, u: 0, v: 0 }));
+        this.alone = -1;
+      }
       this.refresh();
     },
   },
@@ -108,7 +112,7 @@ export default {
     },
     // places
     layout() {
-      const box = this.canvas.getBoundingClientRect(), n = this.panes.length;
+      const box = this.canvas.getBoundingClientRect(), n = this.alone < 0 ? this.panes.length : 1;
       let best = { scale: 0 };
       for (let columns = 1; columns <= n; columns++) {
         const rows = Math.ceil(n / columns);
@@ -117,7 +121,9 @@ export default {
         if (scale > best.scale) best = { scale, columns, w, h };
       }
       return this.panes.map((pane, i) => {
-        const x = (i % best.columns) * (best.w + GAP), y = Math.floor(i / best.columns) * (best.h + GAP);
+        if (this.alone >= 0 && i !== this.alone) return { x: 0, y: 0, w: 0, h: 0, fit: 1, scale: 1, u0: 0, v0: 0 };
+        const at = this.alone < 0 ? i : 0;
+        const x = (at % best.columns) * (best.w + GAP), y = Math.floor(at / best.columns) * (best.h + GAP);
         const fit = Math.min(best.w / pane.width, best.h / pane.height), zoom = this.zooms[i];
         const scale = fit * zoom.scale;
         const left = x + (best.w - fit * pane.width) / 2, top = y + (best.h - fit * pane.height) / 2;
@@ -143,7 +149,7 @@ export default {
       pen.setTransform(ratio, 0, 0, ratio, 0, 0);
       pen.fillStyle = "#16191d";
       pen.fillRect(0, 0, box.width, box.height);
-      this.layout().forEach((place, i) => this.drawPane(pen, place, i));
+      this.layout().forEach((place, i) => place.w && this.drawPane(pen, place, i));
     },
     drawPane(pen, place, i) {
       pen.save();
@@ -321,6 +327,7 @@ export default {
       else if (event.key === "," || event.key === ".") this.go(this.wanted + (event.key === "." ? 1 : -1));
       else if (event.key === "Home") this.go(0);
       else if (event.key === "End") this.go(this.n_frames - 1);
+      else if (event.key === "c") { this.alone = this.alone + 1 < this.panes.length ? this.alone + 1 : -1; this.draw(); }
       else if (event.key === "Escape") this.$emit("select", { id: null });
       else if (event.key === "0") { this.zooms = this.panes.map(() => ({ scale: 1, u: 0, v: 0 })); this.draw(); }
       else return;

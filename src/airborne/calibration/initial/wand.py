@@ -25,9 +25,8 @@ from airborne.types import Array
 
 _EPIPOLAR_LIMIT_SHARE = 0.003  # of an image's longer side: how far a marker may lie from its epipolar line
 _LEAST_SHARED, _LEAST_FRAMES = 15, 10  # markers that two cameras must both see, and in how many frames
-_FOCAL_RATIOS = np.geomspace(
-    0.45, 3.6, 10
-)  # focal length over the image's longer side: fields of view of 96 to 16 degrees
+# focal length over the image's longer side: fields of view of 96 to 16 degrees
+_FOCAL_RATIOS = np.geomspace(0.45, 3.6, 10)
 _N_SAMPLE_FRAMES = 120  # frames that test a focal length
 _LEAST_FRONT = 0.75  # share of the markers in front of both cameras
 _MOST_LENGTH_VARIATION = 0.2  # relative standard deviation of the wand's length: beyond it a pair is useless

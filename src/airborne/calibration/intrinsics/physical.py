@@ -15,9 +15,8 @@ from airborne.cameras.camera import Camera, Lens
 from airborne.cameras.distortion import distort, distort_fisheye, undistort, undistort_fisheye
 from airborne.types import Array
 
-_ANNEALING_BOUNDS = np.array(
-    [*[np.radians(10)] * 3, *[0.5] * 3, 0.2]
-)  # rotation [rad], shift [m], share of the focal length
+# rotation [rad], shift [m], share of the focal length
+_ANNEALING_BOUNDS = np.array([*[np.radians(10)] * 3, *[0.5] * 3, 0.2])
 _ANNEALING_ROUNDS = 100  # of the global search
 
 

@@ -21,9 +21,8 @@ from airborne.motion.jumps.leg_track import LegTrack
 from airborne.motion.local_polynomials import N_DRAWS, local_fits
 from airborne.types import Array
 
-_SURELY_OFF_M = (
-    0.12  # of both ankles over their standing height: a heel rises by some 0.10 m while the toes still touch
-)
+# of both ankles over their standing height: a heel rises by some 0.10 m while the toes still touch
+_SURELY_OFF_M = 0.12
 # of a flight; a dip below the level that is bridged; the same where joints are lost
 _SHORTEST_S, _DIP_S, _BRIDGE_S = 0.1, 0.06, 0.3
 _EARLIER_S, _LATER_S = 0.14, 0.06  # search window of an event, about the time at which the ankles pass that height

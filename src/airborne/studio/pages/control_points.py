@@ -2,38 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 from nicegui import ui
-from nicegui.events import KeyEventArguments
 
 from airborne.calibration.from_points import Calibration, calibrate
 from airborne.errors import AirborneError
 from airborne.studio.clicks import Clicked, count_clicked, read_clicked
-from airborne.studio.pages.layout import Latest, complain, errors_shown
+from airborne.studio.pages.layout import complain, errors_shown
 from airborne.studio.pages.point_list import PointList
+from airborne.studio.pages.points_panel import CHOSEN_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import FEWEST_POINTS
 from airborne.studio.session import Session
-from airborne.studio.view import CameraViews, Mark
+from airborne.studio.view import Mark
 from airborne.types import Array, Mask
 
-_CLICKED, _CHOSEN, _PREDICTED = "#56b4e9", "#f0e442", "#c8cdd3"
+_CLICKED, _PREDICTED = "#56b4e9", "#c8cdd3"
 
 
-@dataclass(eq=False)
-class ControlPointsPanel:
+class ControlPointsPanel(PointsPanel):
     """One window's work at a table of surveyed points; the clicks are in the file."""
 
-    session: Session
-    shown: ShownTrial
-    file: str
-    clicked: Clicked
-    chosen: str  # the point that the next click sets
-    selected: str | None = None  # the mark that arrow keys move: "point|camera"
-    fits: dict[str, tuple[bytes, Calibration | str]] = field(default_factory=dict)  # camera -> of which clicks, and it
-    latest: Latest = field(default_factory=Latest)
+    def __init__(self, session: Session, shown: ShownTrial, file: str, clicked: Clicked) -> None:
+        """Begin with the first point of a table."""
+        super().__init__(session, shown, clicked, clicked.names[0])
+        self._file = file
+        self.fits: dict[str, tuple[bytes, Calibration | str]] = {}  # camera -> of which clicks, and it
 
     @classmethod
     async def open(cls, session: Session, shown: ShownTrial, file: str) -> ControlPointsPanel | None:
@@ -45,33 +39,34 @@ class ControlPointsPanel:
         except AirborneError as error:
             complain(error)
             return None
-        panel = cls(session, shown, file, clicked, clicked.names[0])
+        panel = cls(session, shown, file, clicked)
         panel.build()
-        await panel.update()
+        await panel.solve()
         return panel
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The surveyed points."""
+        return self.clicked.names
+
+    @property
+    def file(self) -> str:
+        """The table of surveyed points."""
+        return self._file
 
     async def reread(self) -> None:
         """Show what the table holds now: another window, undo or another program may have changed it."""
         with errors_shown():
             clicked = read_clicked(self.session.project().file(self.file))
-            if clicked.text(self.shown.names) != self.clicked.text(self.shown.names):
+            if self.text(clicked) != self.text(self.clicked):
                 self.clicked = clicked
-                await self.update()
+                await self.solve()
 
     def build(self) -> None:
         """Lay out the pictures and the list of points."""
-        ui.keyboard(on_key=self.step)
         with ui.element("div").classes("split"):
             with ui.element("div").classes("wide"):
-                self.view = CameraViews(
-                    self.shown,
-                    frame=self.session.frame,
-                    on_frame=self.turn_to,
-                    on_pick=self.pick,
-                    on_move=self.move,
-                    on_select=self.select,
-                )
-                self.view.start_picking()
+                self.build_views(self.session.frame)
             with ui.element("div").classes("side"):
                 self.state = ui.refreshable(self._list_state)
                 with ui.element("div").classes("card"):
@@ -79,62 +74,7 @@ class ControlPointsPanel:
                     ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
                 self.list = PointList(self.shown.names, self.choose)
 
-    def turn_to(self, frame: int) -> None:
-        """Note the frame in view."""
-        self.session.go(frame=frame)
-
-    async def pick(self, pane: int, u: float, v: float, near: str | None) -> None:
-        """Set the chosen point in a camera; where it is set already, a click close to a mark chooses that."""
-        camera = self.shown.names[pane]
-        if near is not None and np.isfinite(self.clicked.at(self.chosen, camera)[0]):
-            await self.select(near)
-            return
-        self.save(self.clicked.click(self.chosen, camera, (u, v)), f"{self.chosen} clicked in {camera}")
-        self.selected = f"{self.chosen}|{camera}"
-        await self.update()
-
-    async def move(self, mark: str, u: float, v: float) -> None:
-        """Move a click."""
-        name, camera = mark.rsplit("|", 1)
-        self.save(self.clicked.click(name, camera, (u, v)), f"{name} moved in {camera}")
-        self.chosen, self.selected = name, mark
-        await self.update()
-
-    async def select(self, mark: str | None) -> None:
-        """Choose a mark, or none."""
-        self.selected = mark
-        if mark is not None:
-            self.chosen = mark.rsplit("|", 1)[0]
-        await self.update()
-
-    async def choose(self, name: str) -> None:
-        """Choose the point that the next clicks set."""
-        self.chosen, self.selected = name, None
-        await self.update()
-
-    async def step(self, event: KeyEventArguments) -> None:
-        """Choose the next point, or the one before."""
-        if event.action.keydown and event.key in ("n", "p"):
-            row = self.clicked.names.index(self.chosen) + (1 if event.key == "n" else -1)
-            await self.choose(self.clicked.names[row % len(self.clicked.names)])
-
-    async def remove(self) -> None:
-        """Take the chosen click back."""
-        if self.selected is None:
-            complain("choose a click first: click on its mark")
-            return
-        name, camera = self.selected.rsplit("|", 1)
-        self.save(self.clicked.click(name, camera, (np.nan, np.nan)), f"{name} taken back in {camera}")
-        self.selected = None
-        await self.update()
-
-    def save(self, clicked: Clicked, what: str) -> None:
-        """Write the table."""
-        with errors_shown():
-            self.session.edit(self.file, clicked.text(self.shown.names), what)
-            self.clicked = clicked
-
-    async def update(self) -> None:
+    async def solve(self) -> None:
         """Solve the cameras whose clicks have changed, and show all again."""
         self.show()
         for camera in self.shown.names:
@@ -151,7 +91,7 @@ class ControlPointsPanel:
     def show(self) -> None:
         """Show marks and lists as they are now."""
         marks = [mark for pane, camera in enumerate(self.shown.names) for mark in self._marks(pane, camera)]
-        self.view.show_over(sorted(marks, key=lambda mark: mark.get("colour") != _CHOSEN), (), self.selected)
+        self.view.show_over(sorted(marks, key=lambda mark: mark.get("colour") != CHOSEN_COLOUR), (), self.selected)
         self.list.show(self.clicked.names, self.chosen, self._off_px)
         self.state.refresh()
 
@@ -162,7 +102,7 @@ class ControlPointsPanel:
             u, v = map(float, self.clicked.at(name, camera))
             to = seen_at[row] if seen_at is not None else np.full(2, np.nan)
             if np.isfinite(u):
-                colour = _CHOSEN if name == self.chosen else _CLICKED
+                colour = CHOSEN_COLOUR if name == self.chosen else _CLICKED
                 mark: Mark = {"id": f"{name}|{camera}", "pane": pane, "u": u, "v": v, "label": name, "colour": colour}
                 marks.append({**mark, "to": to.tolist()} if np.isfinite(to).all() else mark)
             elif np.isfinite(to).all():
@@ -178,7 +118,7 @@ class ControlPointsPanel:
 
     def _off_px(self, name: str) -> tuple[Mask, Array]:
         """Say of a point whether it is clicked, and how far from where the camera sees it, in each camera [px]."""
-        px = np.stack([self.clicked.at(name, camera) for camera in self.shown.names])
+        px = self.px(name, self.shown.names)
         row, none = self.clicked.names.index(name), np.full(2, np.nan)
         seen_at = [self.predict(camera) for camera in self.shown.names]
         to = np.stack([none if each is None else each[row] for each in seen_at])

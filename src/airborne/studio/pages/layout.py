@@ -23,6 +23,7 @@ _KEYS = {
     "wheel": "zoom where the pointer is",
     "drag": "move the picture; a point where one is grabbed",
     "0": "whole pictures",
+    "C": "one camera alone, the next one, all of them",
     "click": "set the chosen point",
     "arrows": "move the chosen point by 0.1 px; with Shift by 1 px",
     "N P": "choose the next point, the one before",

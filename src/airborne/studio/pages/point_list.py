@@ -22,7 +22,7 @@ class PointList:
         """Begin without rows; `choose` is called with a row's point."""
         self._cameras, self._choose = cameras, choose
         self._rows: dict[str, tuple[Element, list[Label]]] = {}
-        self._card = ui.element("div").classes("card points").style("flex: 1; overflow-y: auto")
+        self._card = ui.element("div").classes("card points").style("flex: 1; min-height: 120px; overflow-y: auto")
 
     def show(self, names: Sequence[str], chosen: str, off_px: Callable[[str], tuple[Mask, Array]]) -> None:
         """Show the points; `off_px` says of one whether it is clicked, and how far off, in each camera [px]."""

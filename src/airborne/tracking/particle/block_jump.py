@@ -17,7 +17,7 @@ from airborne.tracking.particle.swing import Swing, draw_directions, draw_length
 from airborne.types import Array
 
 _LEG_LENGTH_SD_M, _HIPS_LENGTH_SD_M = 0.03, 0.02  # of delta_z
-_POSITION_SD_M = {"hips": 0.05, "knees": 0.07, "ankles": 0.10}
+_POSITION_SD_M = {"hips": 0.05, "knees": 0.07, "ankles": 0.10}  # of a joint about its last place
 _OUTWARD = (1.0, -1.0)  # left is where the line from the right hip to the left one points
 _SHORTEST_ROD_M = 0.01  # keeps a rod's direction defined
 

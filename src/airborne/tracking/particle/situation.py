@@ -13,7 +13,7 @@ from airborne.tracking.particle.observations import LegsObservation
 from airborne.tracking.particle.settings import EstimateAs
 from airborne.types import Array
 
-_MAX_SPEED_M_S = {"hips": 3.5, "knees": 4.5, "ankles": 7.0}
+_MAX_SPEED_M_S = {"hips": 3.5, "knees": 4.5, "ankles": 7.0}  # of a block's approach and take-off; by hand
 _RANDOM_WALK_Z_SD_M = 0.05  # of the random walk, each frame
 N_TOP = 10  # combinations in the mean "top10_mean"
 

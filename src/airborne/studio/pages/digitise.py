@@ -1,0 +1,276 @@
+"""The step Digitise: named points clicked frame by frame, by one person, to compare a run or other people with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from nicegui import ui
+
+from airborne.body import BodyModel
+from airborne.cameras import Rig
+from airborne.errors import AirborneError, count
+from airborne.motion.run_folder import holds_players
+from airborne.run.evaluate import assess, evaluate_agreement
+from airborne.studio.clicks import Clicked
+from airborne.studio.digitising import (
+    Repetition,
+    add_points,
+    clicks_of_frame,
+    default_points,
+    joint_paths_text,
+    list_repetitions,
+    parse_repetition,
+    predict_click,
+    read_digitising,
+    record_text,
+    set_frame,
+    table_text,
+)
+from airborne.studio.outlines import run_motion
+from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
+from airborne.studio.pages.point_list import PointList
+from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PointsPanel
+from airborne.studio.pictures import ShownTrial
+from airborne.studio.project import list_runs
+from airborne.studio.session import Session
+from airborne.studio.view import Item, Mark
+from airborne.types import Array, Mask
+
+_HELP = (
+    "Click the chosen point in each camera; C shows one camera alone. Grey marks say where your own clicks before and "
+    "after let the point be expected. Leave the epipolar help off where a run shall be compared without bias."
+)
+_PREDICTED = "#c8cdd3"
+_AFTER = {"point": "the next point", "frame": "the next frame", "stay": "nothing"}
+
+
+async def digitise_page(session: Session) -> None:
+    """Let one person digitise points, and compare."""
+    async with page_frame(session, "Digitise", "Where do you see it?", _HELP) as changed:
+        if not session.project().cameras:
+            ui.label("This step needs the step Videos first.").classes("warn")
+            return
+        shown = await work("indexing the videos", session.shown)
+        if shown is None:
+            return
+        try:
+            model = await in_thread(session.project().model)
+        except AirborneError:  # points can be digitised before there is a body
+            model = None
+        with errors_shown():
+            panel = DigitisePanel(session, shown, model)
+            changed.append(panel.reread)
+            panel.build()
+
+
+class DigitisePanel(PointsPanel):
+    """One window's digitising; each person's repetition has a table of its own."""
+
+    def __init__(self, session: Session, shown: ShownTrial, model: BodyModel | None) -> None:
+        """Begin with the clicks that lie in the folder, or with none."""
+        known = list_repetitions(session.folder)
+        self.who = known[-1] if known else Repetition("A", 1)
+        self.model, self.frame = model, session.frame
+        self.extra: list[str] = []  # points that were named here
+        self.rig: Rig | None = None  # for the epipolar help
+        self.then = "point"
+        super().__init__(session, shown, Clicked((), None, {}), "")
+        self.table = self._read()
+        self.chosen = self.names[0] if self.names else ""
+        self.clicked = self._of_frame()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The points of the table, those of the body, and those named here."""
+        return self.table.points
+
+    @property
+    def file(self) -> str:
+        """The table of the person and repetition."""
+        return self.who.file
+
+    def text(self, clicked: Clicked) -> str:
+        """Return the whole table, with the clicks of the frame in view."""
+        cameras = self.shown.names
+        return table_text(set_frame(self.table, self.frame, clicked, cameras), cameras)
+
+    def build(self) -> None:
+        """Lay out the pictures, who digitises, the points, and what can be compared."""
+        with ui.element("div").classes("split"):
+            with ui.element("div").classes("wide"):
+                self.build_views(self.frame)
+            with ui.element("div").classes("side"):
+                with ui.element("div").classes("card"):
+                    self._build_who()
+                self.list = PointList(self.shown.names, self.choose)
+                with ui.element("div").classes("card"):
+                    self._build_points()
+                    self._build_comparison()
+        self.show()
+
+    def _build_who(self) -> None:
+        with ui.element("div").classes("row-line"):
+            operator = ui.input("operator", value=self.who.operator).props("dense outlined").style("width: 90px")
+            number = ui.number("repetition", value=self.who.number, min=1, max=99, format="%d")
+            number.props("dense outlined").style("width: 85px")
+            change = ui.button("Change", on_click=lambda: self.change_who(operator.value or "", number.value))
+            change.props("flat dense")
+        self.note = ui.label().classes("small")
+        with ui.element("div").classes("row-line"):
+            then = ui.select(_AFTER, label="after a click choose", value=self.then, on_change=self._set_then)
+            then.props("outlined dense options-dense").style("width: 130px")
+            ui.switch("epipolar help", value=False, on_change=lambda event: self.set_help(bool(event.value)))
+
+    def _build_points(self) -> None:
+        with ui.element("div").classes("row-line"):
+            name = ui.input("another point").props("dense outlined").style("width: 130px")
+            ui.button("Add", on_click=lambda: self.add(name.value or "")).props("flat dense")
+            ui.button("Take back", on_click=self.remove).props("flat dense").tooltip("the chosen click")
+
+    def _build_comparison(self) -> None:
+        runs = [run for run in list_runs(self.session.folder) if not holds_players(run)]
+        if not runs:
+            ui.label("Once there is a run, the clicks can be compared with it here.").classes("soft small")
+            return
+        with ui.element("div").classes("row-line"):
+            choice = ui.select([run.name for run in runs], label="run", value=runs[0].name)
+            choice.props("outlined dense options-dense").style("width: 110px")
+            ui.button("Compare", on_click=lambda: self.compare(self.session.folder / choice.value)).props("flat dense")
+            agree = ui.button("Agreement", on_click=lambda: self.agree(self.session.folder / choice.value))
+            agree.props("flat dense").tooltip("of the run and of all who digitised")
+
+    async def turn_to(self, frame: int) -> None:
+        """Show the clicks of another frame."""
+        if frame != self.frame:
+            self.frame = frame
+            self.session.go(frame=frame)
+            self.selected = None
+            self.clicked = self._of_frame()
+            self.show()
+
+    async def reread(self) -> None:
+        """Show the clicks that the table holds now: undo or another window may have changed it."""
+        with errors_shown():
+            table = self._read()
+            cameras = self.shown.names
+            if table_text(table, cameras) != table_text(self.table, cameras):
+                self.table, self.clicked = table, clicks_of_frame(table, self.frame, cameras)
+                self.show()
+
+    async def pick(self, pane: int, u: float, v: float, near: str | None) -> None:
+        """Set the chosen point in a camera, and go on as the user wants to."""
+        if not self.chosen:
+            complain("name a point first")
+            return
+        before = self.clicked
+        await super().pick(pane, u, v, near)
+        if self.clicked is before or self.then == "stay":
+            return
+        if self.then == "frame":
+            self.view.go(self.frame + 1)
+        elif all(np.isfinite(self.px(self.chosen, self.shown.names)[:, 0])):
+            await self.choose(self.after(self.chosen, 1))
+
+    async def solve(self) -> None:
+        """Read back what was written."""
+        self.table = self._read()
+        self.show()
+
+    async def change_who(self, operator: str, number: float | None) -> None:
+        """Digitise as somebody else, or once more."""
+        with errors_shown():
+            self.who = parse_repetition(operator, number)
+            self.table, self.selected = self._read(), None
+            self.clicked = self._of_frame()
+            self.show()
+
+    async def set_help(self, is_on: bool) -> None:
+        """Show the epipolar curves of the chosen point's clicks, or no more; that it was on is noted for good."""
+        with errors_shown():
+            self.rig = await in_thread(self.session.rig) if is_on else None
+            if is_on:
+                self.session.edit(self.who.record, record_text(self.who, epipolar_help=True), "epipolar help used")
+        self.show()
+
+    async def add(self, name: str) -> None:
+        """Add a point of the user's own."""
+        name = name.strip()
+        if not name.replace("_", "").replace("-", "").isalnum() or len(name) > 40:
+            complain("a point's name is 1 to 40 letters, digits, hyphens and underscores")
+            return
+        self.extra.append(name)
+        self.table = add_points(self.table, [name])
+        self.clicked = self._of_frame()
+        await self.choose(name)
+
+    async def compare(self, run: Path) -> None:
+        """Compare a run with these clicks, into its summary and report too."""
+        found = await work("comparing", lambda: self._compare(run))
+        if found is not None:
+            _tell(found)
+
+    def _compare(self, run: Path) -> str:
+        path = self.session.folder / self.file
+        if self.model is not None and self.model.has_joints:
+            paths = path.with_name(f"{path.stem}_joints.csv")
+            self.session.edit(paths.name, joint_paths_text(self.table, self.session.rig(), run_motion(run)), "joints")
+            return assess(run, None, None, paths)["joints"].describe()
+        return assess(run, None, path)["digitised"].describe()
+
+    async def agree(self, run: Path) -> None:
+        """Say how well all people and repetitions agree with each other and with a run."""
+        own = self.session.folder / self.file
+        others = [self.session.folder / each.file for each in list_repetitions(self.session.folder)]
+        others = [path for path in others if path != own]
+        found = await work("comparing", lambda: evaluate_agreement(run, digitised=own, operators=others).describe())
+        if found is not None:
+            _tell(found)
+
+    def show(self) -> None:
+        """Show marks, curves and lists as they are now."""
+        items: list[Item] = [] if self.rig is None else list(self.epipolar_items(self.chosen, self.rig))
+        marks = sorted(self._marks(), key=lambda mark: mark.get("colour") != CHOSEN_COLOUR)
+        self.view.show_over(marks, items, self.selected)
+        self.list.show(self.names, self.chosen, self._off_px)
+        n_frames = int(np.isfinite(self.table.px).any(axis=(1, 2, 3)).sum())
+        n_clicks = int(np.isfinite(self.table.px[..., 0]).sum())
+        self.note.set_text(f"frame {self.frame}; {count(n_clicks, 'click')} in {count(n_frames, 'frame')}: {self.file}")
+
+    def _marks(self) -> Iterator[Mark]:
+        for name in self.names:
+            for pane, camera in enumerate(self.shown.names):
+                u, v = map(float, self.at(name, camera))
+                colour = CHOSEN_COLOUR if name == self.chosen else CAMERA_COLOURS[pane % len(CAMERA_COLOURS)]
+                if np.isfinite(u):
+                    yield {"id": f"{name}|{camera}", "pane": pane, "u": u, "v": v, "label": name, "colour": colour}
+                    continue
+                u, v = map(float, predict_click(self.table, self.frame, name, pane))
+                if np.isfinite(u):
+                    label = f"{name}?" if name == self.chosen else ""
+                    yield {"pane": pane, "u": u, "v": v, "label": label, "colour": _PREDICTED}
+
+    def _off_px(self, name: str) -> tuple[Mask, Array]:
+        """Say in which cameras a point is clicked; with the help, how far from where the cameras agree [px]."""
+        px = self.px(name, self.shown.names)
+        if self.rig is None:
+            return np.isfinite(px[:, 0]), np.full(len(px), np.nan)
+        return np.isfinite(px[:, 0]), np.linalg.norm(self.consensus_px(name, self.rig) - px, axis=1)
+
+    def _set_then(self, event) -> None:
+        self.then = event.value
+
+    def _read(self):
+        points = (*default_points(self.model), *self.extra)
+        return read_digitising(self.session.folder / self.file, self.shown.names, points)
+
+    def _of_frame(self) -> Clicked:
+        return clicks_of_frame(self.table, self.frame, self.shown.names)
+
+
+def _tell(text: str) -> None:
+    """Show a comparison's tables."""
+    with ui.dialog(value=True) as dialog, ui.card().style("max-width: 90vw"):
+        ui.label(text).style("white-space: pre; overflow: auto; font: 12px ui-monospace, monospace")
+        ui.button("Close", on_click=dialog.close).props("flat")
