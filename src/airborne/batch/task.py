@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import cv2
+import numpy as np
 
 from airborne import __version__
 from airborne.batch.row import TableRow, row_of
@@ -166,4 +167,4 @@ def _write_thumbnail(task: Task) -> None:
     if image is not None:
         path = thumbnail_of(task.batch, task.trial.name)
         path.parent.mkdir(exist_ok=True)
-        path.write_bytes(thumbnail(image[..., ::-1], _THUMBNAIL_PX))
+        path.write_bytes(thumbnail(np.asarray(image[..., ::-1], np.uint8), _THUMBNAIL_PX))
