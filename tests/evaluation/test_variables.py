@@ -1,5 +1,7 @@
 """What is compared: coordinates in mm, angles on the circle, at common times."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -11,6 +13,7 @@ from airborne.evaluation.variables import (
     common_series,
     headline_series,
     joint_angle_variables,
+    jump_series,
     point_variables,
     read_joint_angles,
     root_variables,
@@ -116,3 +119,17 @@ def test_joint_angles_are_read_and_a_broken_file_gets_one_line(tmp_path):
     path.write_text("time_s,knee_x_rad,knee_y_rad,knee_z_rad\n1,1,1,1\n0,1,1,1\n")
     with pytest.raises(ResultError, match="must grow"):
         read_joint_angles(path)
+
+
+def test_jumps_are_compared_in_millimetres_and_milliseconds_and_one_not_found_is_unknown():
+    def jump(height_m):
+        names = ("foot_height_m", "hip_height_m", "flight_time_height_m", "takeoff_speed_height_m", "hip_rise_m")
+        values = dict.fromkeys((*names, "takeoff_s", "landing_s", "flight_s"), SimpleNamespace(value=height_m))
+        return SimpleNamespace(player="Anna", number=2, **values)
+
+    series = jump_series([(jump(0.5), jump(0.55)), (jump(0.25), None)])
+    assert {one.unit for one in series} == {"mm", "ms"}
+    for one in series:
+        np.testing.assert_allclose(one.values, [[550, 500], [np.nan, 250]])
+        assert one.individual.tolist() == ["Anna jump 2"] * 2
+    assert len(headline_series(series)) == len(series)

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from airborne.evaluation import DigitisedPoses, Truth
 from airborne.export import panels, write_errors, write_figures, write_pose
 from airborne.export.error_figures import _align_by_symmetry, _align_rows, _differences, _match_revolutions
-from airborne.export.figures import _joint_panels, write_flight_figure, write_joints_figure
+from airborne.export.figures import write_flight_figure, write_joints_figure
+from airborne.motion.joints import main_joints
 from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run
 from tests.support.tolerances import ROUNDTRIP
 
@@ -188,8 +189,8 @@ def test_the_legend_lies_within_the_figure_however_much_it_has_to_say(tmp_path, 
 
 
 def test_other_bodies_show_their_first_joints():
-    assert _joint_panels(["flipper", "tail"]) == [("flipper", "flipper, x", 1.0), ("tail", "tail, x", 1.0)]
-    assert len(_joint_panels([f"link {k}" for k in range(30)])) == 8
+    assert main_joints(["flipper", "tail"]) == [("flipper", "flipper, x", 1.0), ("tail", "tail, x", 1.0)]
+    assert len(main_joints([f"link {k}" for k in range(30)])) == 8
 
 
 def test_the_height_of_a_falling_rigid_body_is_a_parabola_and_its_momentum_is_none(tmp_path, plotted):

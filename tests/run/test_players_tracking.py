@@ -29,7 +29,10 @@ TABLES = {
     *("joints.csv", "tables/joints.parquet", "jumps.csv"),
     *("summary.json", "run.json", "calib.toml"),
 }
-PICTURES = {"report.html", "figures/heights.png", "videos/overlay_left.mp4", "videos/overlay_right.mp4"}
+PICTURES = {
+    *("report.html", "figures/heights.png"),
+    *("videos/overlay_left.mp4", "videos/overlay_right.mp4", "videos/pictures.json"),
+}
 
 
 @pytest.fixture(autouse=True)
@@ -96,7 +99,7 @@ def test_videos_and_report_are_written_on_request(path, tmp_path):
     assert set(files_of(tmp_path / "run")) == TABLES | PICTURES
     report = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     assert "number 7: 3 of 12 frames are uncertain" in report
-    assert report.count("<img") == 1 and "http" not in report.split("<style>")[0]
+    assert report.count("<img") == 1 and "http:" not in report.split("<style>")[0]
 
 
 def test_everything_that_a_run_leaves_is_documented(path, tmp_path):

@@ -1,11 +1,11 @@
-"""The studio as a process, and a browser that looks at it."""
+"""The studio as a process, and a browser that looks at it, or at a report."""
 
 import os
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -40,6 +40,24 @@ def open_studio(path: Path, *options: str) -> Iterator[str]:
 @contextmanager
 def open_page(address: str, requests: list[str] | None = None) -> Iterator:
     """Open an address in a real browser; skip without one. Every request is noted, none may leave this computer."""
+    host = address.split("/")[2]
+    with _browser_page(lambda url: url.split("/")[2] == host, requests) as page:
+        page.goto(address)
+        yield page
+
+
+@contextmanager
+def open_file(path: Path) -> Iterator:
+    """Open a page from a file in a real browser; skip without one. Any request fails the test."""
+    requests: list[str] = []
+    with _browser_page(lambda url: False, requests) as page:
+        page.goto(path.absolute().as_uri())
+        yield page
+    assert requests == []
+
+
+@contextmanager
+def _browser_page(is_allowed: Callable[[str], bool], requests: list[str] | None) -> Iterator:
     reason = "THE STUDIO IS NOT TESTED IN A BROWSER: playwright is not installed; pip install -e '.[test]'"
     playwright = pytest.importorskip("playwright.sync_api", reason=reason)
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
@@ -49,12 +67,11 @@ def open_page(address: str, requests: list[str] | None = None) -> Iterator:
         chromium = driver.chromium.launch(executable_path=browser, args=["--no-sandbox", "--enable-unsafe-swiftshader"])
         context = chromium.new_context(viewport=SIZE)
         errors: list[str] = []
-        host = address.split("/")[2]
 
         def note(route):
             if requests is not None:
                 requests.append(route.request.url)
-            if route.request.url.split("/")[2] == host:
+            if is_allowed(route.request.url):
                 route.continue_()
             else:
                 route.abort()
@@ -64,7 +81,6 @@ def open_page(address: str, requests: list[str] | None = None) -> Iterator:
         page = context.new_page()
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
-        page.goto(address)
         yield page
         assert errors == []
         chromium.close()

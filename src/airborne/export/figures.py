@@ -17,17 +17,11 @@ from airborne.export import panels
 from airborne.export.error_figures import write_digitised, write_errors
 from airborne.io.figures import save_png
 from airborne.motion import Motion, has_inertias, joint_angles, measure_flight, root_angles
+from airborne.motion.joints import main_joints
 from airborne.types import Array
 
 _AXIS_STYLES = (("x", "-", "#0072b2"), ("y", "--", "#cc79a7"), ("z", ":", "#333333"))
-_FLEXION = {  # of a person: the segment that a joint turns, the joint, and the sign of its x angle in flexion
-    "upper_arm": ("shoulder", -1.0),
-    "forearm": ("elbow", -1.0),
-    "thigh": ("hip", -1.0),
-    "shank": ("knee", 1.0),
-}
 _TWO_SD = "± 2 standard deviations; unseen where thinner than the line"
-_MOST_JOINTS = 8  # of a body that is not a person
 
 
 def write_figures(
@@ -126,7 +120,7 @@ def joints_figure(motion: Motion, model: BodyModel) -> Figure:
 
     Raises ResultError where the motion is another body's.
     """
-    table, joint_panels = joint_angles(motion, model), _joint_panels(motion.joints)
+    table, joint_panels = joint_angles(motion, model), main_joints(motion.joints)
     unobservable, singular = np.zeros((2, len(motion)), bool)
     figure, grid = panels.panel_figure(-(-len(joint_panels) // 2), 2, row_in=1.6)
     cells = [axes for row in grid for axes in row]
@@ -148,17 +142,6 @@ def joints_figure(motion: Motion, model: BodyModel) -> Figure:
         *panels.singular_handles(singular, "y near ±90°: x and z mix"),
     ]
     return panels.add_legend(figure, motion, [panels.band_handle(_TWO_SD), *handles])
-
-
-def _joint_panels(joints: Sequence[str]) -> list[tuple[str, str, float]]:
-    """Choose the joints to draw: segment, label and sign of the x angle."""
-    person = [
-        (f"{segment}_{side}", f"{joint} {side}", sign)
-        for segment, (joint, sign) in _FLEXION.items()
-        for side in ("left", "right")
-    ]
-    present = [panel for panel in person if panel[0] in joints]
-    return present or [(segment, f"{segment}, x", 1.0) for segment in joints[:_MOST_JOINTS]]
 
 
 def write_flight_figure(path: Path, motion: Motion, model: BodyModel) -> None:

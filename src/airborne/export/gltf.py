@@ -46,7 +46,12 @@ def gltf_bytes(posed: PosedBody, *, is_binary: bool) -> bytes:
 
 
 def write_animation(path: Path, takes: Sequence[Take]) -> None:
-    """Write the bodies of takes with the same frames as one animation (.glb) that begins at 0 s.
+    """Write `animation_bytes` as a .glb."""
+    path.write_bytes(animation_bytes(takes))
+
+
+def animation_bytes(takes: Sequence[Take]) -> bytes:
+    """Return the bodies of takes with the same frames as one animation, a .glb, that begins at 0 s.
 
     A body is hidden (scaled to nothing) from a frame without a complete pose to the next with one, and left out if it
     never has one.
@@ -69,7 +74,7 @@ def write_animation(path: Path, takes: Sequence[Take]) -> None:
             scales = np.repeat(has_pose[changes, None].astype(float), 3, axis=1)
             change_times = document.accessor(seconds[changes], bounds=True)
             document.move(nodes[0], "scale", change_times, scales, interpolation="STEP")
-    path.write_bytes(document.binary())
+    return document.binary()
 
 
 class _Document:

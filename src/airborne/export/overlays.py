@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 
 from airborne.body import PosedBody
 from airborne.cameras import Camera, Rig
+from airborne.export.film import Film
 from airborne.export.palette import STATUS_RGB
 from airborne.export.views import cached_surface_arrays, resample_view
 from airborne.io.names import file_stem
 from airborne.io.writing import explain_full_disk
+from airborne.motion.run_folder import PICTURES
 from airborne.rendering import FLAT, render
 from airborne.tracking import Status
 from airborne.types import Image
@@ -47,7 +49,10 @@ class _Still:
 
 
 class CameraVideos:
-    """`overlay_<camera>.mp4` of each camera, written frame by frame; use it in a `with` block."""
+    """`overlay_<camera>.mp4` of each camera, written frame by frame, and some pictures of them for the report.
+
+    Use it in a `with` block.
+    """
 
     def __init__(self, folder: Path, rig: Rig, rate: Fraction, drawn: OverlaysAs = "videos") -> None:
         """Start a file for each camera of the rig, whose sizes are those of whole frames; "stills" as PNG.
@@ -67,9 +72,12 @@ class CameraVideos:
                 for camera in self.cameras
             ]
             self._stack = stack.pop_all()
+        self._film = Film(folder / PICTURES, [camera.name for camera in rig]) if drawn == "videos" else None
 
-    def write(self, images: Iterable[Image]) -> None:
+    def write(self, frame: int, images: Sequence[Image]) -> None:
         """Append one image of each camera."""
+        if self._film is not None:
+            self._film.add(frame, images)
         for image, writer in zip(images, self._writers, strict=True):
             writer.write(image)
 
@@ -81,6 +89,8 @@ class CameraVideos:
     ) -> None:
         """Finish the files; after an error too, so that they hold what was written."""
         self._stack.__exit__(kind, error, trace)
+        if self._film is not None:
+            self._film.write()
 
 
 class OverlayVideos:
@@ -116,7 +126,7 @@ class OverlayVideos:
                 _draw_border(image, STATUS_RGB[status])
             draw_label(image, time_label(frames, status), STATUS_RGB[status])
             images.append(image)
-        self._videos.write(images)
+        self._videos.write(frames.index, images)
 
     def __enter__(self) -> Self:
         return self

@@ -1,8 +1,9 @@
-"""Web pages from the templates in `templates/`, which need no network; a report also no script, no file beside it."""
+"""Web pages from the templates in `templates/`, which need no network; a report also no file beside it."""
 
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -97,6 +98,7 @@ def _environment() -> Environment:
     )
     environment.filters |= {
         "text": format_value,
+        "plain_script": lambda text: re.sub(r"^export ", "", text, flags=re.MULTILINE),  # one script, not modules
         "base64": _base64,
         "records_table": _records_table,
         "settings_table": settings_table,

@@ -70,7 +70,7 @@ class PlayersOverlayVideos:
                     _draw_rods(image, camera, player, points=points, status=of_player)
                 draw_label(image, time_label(frames, status), STATUS_RGB[status])
             images.append(image)
-        self._videos.write(images)
+        self._videos.write(frames.index, images)
 
     def __enter__(self) -> Self:
         return self

@@ -14,6 +14,7 @@ from airborne.export.page import UNKNOWN_TEXT, render_report
 from airborne.export.palette import STATUS_RGB, hex_colour
 from airborne.export.report import DEFINITIONS
 from airborne.export.summary import json_ready
+from airborne.export.viewer import players_viewer
 from airborne.io.figures import save_png
 from airborne.io.writing import write_text
 from airborne.motion import PlayersMotion
@@ -74,6 +75,7 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
         heights_to_quote=[
             (_interval_cm(row, "hips"), f"{row['player']}, jump {row['jump']}: hips") for row in summary["jumps"]
         ],
+        viewer=players_viewer(folder, motion),
         jumps_caption=_JUMPS_CAPTION,
         heights=figures_of(folder) / HEIGHTS_FIGURE,
         heights_caption=_FIGURE_CAPTION,

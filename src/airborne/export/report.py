@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from airborne.errors import ResultError
 from airborne.export.page import UNKNOWN_TEXT, HtmlTable, render_report
 from airborne.export.summary import body_warnings, headline, json_ready
+from airborne.export.viewer import Viewer
 from airborne.io.writing import write_text
 from airborne.motion import Motion
 from airborne.motion.flight.momentum_table import GRAVITY_M_S2
@@ -100,10 +101,11 @@ _UNCERTAINTY = (
 )
 
 
-def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
+def write_report(folder: Path, summary: Mapping[str, Any], viewer: Viewer | None = None) -> Path:
     """Write report.html into the folder of a run, and return its path.
 
-    `summary` is what `write_json` writes into summary.json: `name`, the numbers of `headline`, and where known
+    `viewer` is what `body_viewer` returns. `summary` is what `write_json` writes into summary.json: `name`, the numbers
+    of `headline`, and where known
 
     - `uncertainty`: in one or two sentences, which errors the standard deviations contain and which they do not
     - `warnings`: sentences on what may be wrong with the result, beside those of the headline
@@ -136,6 +138,7 @@ def write_report(folder: Path, summary: Mapping[str, Any]) -> Path:
         figures=[(name, *texts) for name, texts in _FIGURES.items()],
         folder=figures_of(folder),
         self_check=_self_check_table(summary.get("self_check", [])),
+        viewer=viewer,
         flight_table=_flight_table(summary["flight"]) if summary.get("flight") else None,
     )
     write_text(path, html)

@@ -16,6 +16,7 @@ from airborne.cameras import Camera, Rig
 from airborne.export.palette import STATUS_RGB, TEXT_RGB, hex_colour
 from airborne.export.panels import FONT_PT, WIDTH_IN
 from airborne.export.views import cached_surface_arrays, crop_camera, resample_view
+from airborne.geometry.even_sample import EvenSample
 from airborne.io.figures import save_png
 from airborne.rendering import FLAT, render, through_mask
 from airborne.tracking import Status
@@ -23,7 +24,7 @@ from airborne.types import Image
 from airborne.video import Frames, View
 
 _N_COLUMNS = 8  # moments shown
-N_BUFFERED = 32  # columns buffered while tracking; when full, every second one is dropped
+N_BUFFERED = 32  # columns kept while tracking
 SHEET_DPI = 200  # of a sheet in print
 BACKGROUND_GREY = 205  # around the model
 
@@ -46,21 +47,19 @@ class ContactSheet:
         path.unlink(missing_ok=True)
         self._path = path
         self._cameras = [camera.without_distortion() for camera in rig]
-        self._columns: list[_Column] = []
-        self._every, self._n_offered = 1, 0
+        self._columns: EvenSample[_Column] = EvenSample(N_BUFFERED)
 
     def write(self, frames: Frames, posed: PosedBody | None, status: Status) -> None:
         """Add what every camera saw at one time, except where the body is lost."""
         if posed is None or status is Status.LOST:
             return
-        if self._n_offered % self._every == 0:
-            if len(self._columns) == N_BUFFERED:
-                self._columns, self._every = self._columns[::2], 2 * self._every
-            title = f"frame {frames.index}\n{float(frames.time_s):.3f} s"
-            colour = hex_colour(STATUS_RGB[status] if status is not Status.TRACKED else TEXT_RGB)
-            cells = [_cell(view, camera, posed) for view, camera in zip(frames.views, self._cameras, strict=True)]
-            self._columns.append(_Column(title, colour, cells))
-        self._n_offered += 1
+        self._columns.offer(lambda: self._column(frames, posed, status))
+
+    def _column(self, frames: Frames, posed: PosedBody, status: Status) -> _Column:
+        title = f"frame {frames.index}\n{float(frames.time_s):.3f} s"
+        colour = hex_colour(STATUS_RGB[status] if status is not Status.TRACKED else TEXT_RGB)
+        cells = [_cell(view, camera, posed) for view, camera in zip(frames.views, self._cameras, strict=True)]
+        return _Column(title, colour, cells)
 
     def __enter__(self) -> Self:
         return self
@@ -69,11 +68,11 @@ class ContactSheet:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Write the sheet; after an error too, with what was collected."""
-        n = len(self._columns)
-        if n:
-            selected = np.linspace(0, n - 1, min(n, _N_COLUMNS)).round().astype(int)
+        columns = list(self._columns)
+        if columns:
+            selected = np.linspace(0, len(columns) - 1, min(len(columns), _N_COLUMNS)).round().astype(int)
             names = [camera.name for camera in self._cameras]
-            save_png(_sheet_figure([self._columns[i] for i in selected], names), self._path)
+            save_png(_sheet_figure([columns[i] for i in selected], names), self._path)
 
 
 def _sheet_figure(columns: Sequence[_Column], names: Sequence[str]) -> Figure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 from itertools import pairwise
 
@@ -34,6 +35,15 @@ class JointStatus(StrEnum):
     UNCERTAIN = "uncertain"
     UNKNOWN = "unknown"  # the images do not show where it is: what stands there is a guess
     LOST = "lost"
+
+
+_FLEXION = {  # of a person: the segment that a joint turns, the joint, and the sign of its x angle in flexion
+    "upper_arm": ("shoulder", -1.0),
+    "forearm": ("elbow", -1.0),
+    "thigh": ("hip", -1.0),
+    "shank": ("knee", 1.0),
+}
+_MOST_JOINTS = 8  # of a body that is not a person, shown
 
 
 def landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
@@ -138,3 +148,14 @@ def require_body(motion: Motion, model: BodyModel) -> None:
         raise ResultError(
             f"the motion has the joints {joints_text}; body '{model.name}' has {expected}; give the run's body"
         )
+
+
+def main_joints(joints: Sequence[str]) -> list[tuple[str, str, float]]:
+    """Choose the joints that are shown: segment, label and sign of the x angle; of a person flexion is positive."""
+    person = [
+        (f"{segment}_{side}", f"{joint} {side}", sign)
+        for segment, (joint, sign) in _FLEXION.items()
+        for side in ("left", "right")
+    ]
+    present = [panel for panel in person if panel[0] in joints]
+    return present or [(segment, f"{segment}, x", 1.0) for segment in joints[:_MOST_JOINTS]]

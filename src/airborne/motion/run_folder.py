@@ -19,6 +19,7 @@ SUMMARY, REPORT, RUN_RECORD = "summary.json", "report.html", "run.json"
 CALIBRATION, BODY = "calib.toml", "body.toml"
 SMOOTH_RECORD = "smooth.json"
 CANDIDATES, CANDIDATES_PICTURE = "candidates.json", "candidates.png"  # of a start that is undecided
+PICTURES = "pictures.json"  # beside the videos: some of their pictures
 FOLDERS = ("tables", "figures", "videos")
 ANGLES, JOINT_ANGLES, FLIGHT = (f"{FOLDERS[0]}/{name}.csv" for name in ("angles", "joint_angles", "flight"))
 _COUNTS = {"name", "n_frames", "n_tracked", "n_uncertain", "n_lost"}  # that every summary holds

@@ -15,6 +15,7 @@ from airborne.calibration.from_points import Calibration
 from airborne.cameras import Camera
 from airborne.export import ContactSheet, MatchingPicture, OverlayVideos, headline, write_figures, write_report
 from airborne.export.overlays import OverlaysAs
+from airborne.export.viewer import body_viewer
 from airborne.motion import (
     Motion,
     MotionWriter,
@@ -181,7 +182,7 @@ class BodyRun:
         write_figures(figures_of(folder), motion, self.model)
         if self.found is not None:
             self.found.draw(folder)
-        write_report(folder, summary)
+        write_report(folder, summary, body_viewer(folder, motion, self.model))
 
     def warnings(self) -> list[str]:
         """Return what a reader of the numbers must know beside the uncertainty."""

@@ -39,6 +39,7 @@ from airborne.evaluation.variables import (
 )
 from airborne.export import write_figures, write_json, write_report
 from airborne.export.analysis_figures import write_bland_altman, write_identity
+from airborne.export.viewer import body_viewer
 from airborne.io.writing import write_text
 from airborne.motion import run_folder
 from airborne.motion.run_folder import check_record, holds_players, read_body_run
@@ -80,7 +81,7 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
             write_figures(
                 run_folder.figures_of(folder), motion, model, truth=true_poses, digitised=clicked, symmetries=symmetry
             )
-            write_report(folder, summary)
+            write_report(folder, summary, body_viewer(folder, motion, model))
     return comparisons
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.responses import FileResponse, JSONResponse, Response
 
+from airborne import export
 from airborne.errors import AirborneError, ResultError
 from airborne.export.pictures import thumbnail
 from airborne.studio.guard import FILE_POLICY
@@ -23,6 +24,7 @@ from airborne.video.decoding import decode, inspect, rgb_from_decoded
 
 _WORKERS = ThreadPoolExecutor(4, thread_name_prefix="answers")  # more would only hold more pictures at once
 _THUMBNAIL_PX = 240  # wide
+_CURVES = Path(export.__file__).parent / "templates" / "curves.js"  # drawn alike in the report
 _KEEP = {"cache-control": "private, max-age=3600"}
 
 
@@ -36,6 +38,10 @@ def add_routes(app: FastAPI, session: Session) -> None:
     @app.get("/thumbnail/{name}")
     async def first_picture(name: str) -> Response:
         return await _answer(lambda: _thumbnail(session.folder, name))
+
+    @app.get("/parts/curves.js")
+    async def curves_script() -> Response:
+        return Response(_CURVES.read_text(encoding="utf-8"), media_type="text/javascript", headers=_KEEP)
 
     @app.get("/overlay/{run}/{frame}")
     async def overlay(run: str, frame: int) -> Response:

@@ -7,7 +7,9 @@ import pytest
 
 from airborne.calibration.bundle import FreeParameters, adjust
 from airborne.calibration.initial.wand import initial_rig_from_wand
+from airborne.calibration.initial.wand_fisheyes import initial_rig_from_wand_and_fisheyes
 from airborne.calibration.sources.wand import wand_source
+from airborne.cameras import Rig
 from airborne.errors import CalibrationError
 from tests.support import wand_waving as waving
 
@@ -104,3 +106,20 @@ def test_two_cameras_out_of_step_are_refused():
     px[:, :, 1] = np.roll(px[:, :, 1], 10, axis=0)
     with pytest.raises(CalibrationError, match=r"does not tie cam2 to cam1|the wand's length varies"):
         initial_rig_from_wand(replace(tracks, px=px), waving.SIZES)
+
+
+def test_fisheyes_whose_focal_length_nobody_knows_are_placed():
+    rng = np.random.default_rng(8)
+    rig = Rig(tuple(replace(each, lens="fisheye", distortion=np.zeros(4)) for each in waving.hall((900.0,) * 4)))
+    tracks = waving.tracks(rng, rig, 200, stray_share=0.05)
+    start = initial_rig_from_wand_and_fisheyes(tracks, waving.SIZES, {}, rig.names)
+    assert all(camera.lens == "fisheye" for camera in start)
+    assert np.abs(waving.focal_errors(rig, start)).max() < 0.15, "one of a few focal lengths for all of them"
+    assert waving.misplaced_m(rig, start).max() < 1.5  # of some 20 m between them
+
+
+def test_where_no_focal_length_fits_the_first_refusal_is_said():
+    rng, rig = np.random.default_rng(9), waving.hall()
+    few = waving.tracks(rng, rig, 4)
+    with pytest.raises(CalibrationError, match="frames"):
+        initial_rig_from_wand_and_fisheyes(few, waving.SIZES, {}, rig.names)

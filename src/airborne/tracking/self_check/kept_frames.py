@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from airborne.geometry.even_sample import EvenSample
 from airborne.video import Frames
 
 _MOST_BYTES = 120e6  # of all that are kept
@@ -13,23 +14,17 @@ _MOST_KEPT, _FEWEST_KEPT = 24, 8  # frames, whatever their bytes
 
 
 class KeptFrames:
-    """Frames of a run, spread evenly over all of it: every second one is let go whenever there are too many."""
+    """Frames spread evenly over a run, as many as may be."""
 
     def __init__(self) -> None:
-        self._stride, self._n, self._most = 1, 0, 0
-        self._kept: list[tuple[int, Frames]] = []
+        self._kept: EvenSample[Frames] | None = None
 
     def add(self, frames: Frames) -> None:
         """Keep the frames, or not."""
-        if not self._most:
+        if self._kept is None:
             size = sum(view.rgb.nbytes for view in frames.views if view is not None)
-            self._most = int(np.clip(_MOST_BYTES / max(size, 1), _FEWEST_KEPT, _MOST_KEPT))
-        if self._n % self._stride == 0:
-            self._kept.append((self._n, frames))
-        self._n += 1
-        if len(self._kept) > self._most:
-            self._stride *= 2
-            self._kept = [each for each in self._kept if each[0] % self._stride == 0]
+            self._kept = EvenSample(int(np.clip(_MOST_BYTES / max(size, 1), _FEWEST_KEPT, _MOST_KEPT)))
+        self._kept.offer(lambda: frames)
 
     def __iter__(self) -> Iterator[Frames]:
-        return (frames for _, frames in self._kept)
+        return iter(() if self._kept is None else self._kept)

@@ -1,0 +1,110 @@
+// Curves over time with bands of two standard deviations, and a strip that says how each frame went; one cursor.
+const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000", "#8a6d00"];
+const STATUS = { tracked: "#009e73", uncertain: "#e69f00", lost: "#d55e00" };
+const STRIP = 12, LEFT = 58, RIGHT = 10, TOP = 20, BOTTOM = 18;
+
+// data: {frame, time_s, status, series: [{name, unit, value, sd}]}; null where nothing is known
+export function drawCurves(canvas, data, now) {
+  const box = canvas.getBoundingClientRect(), ratio = window.devicePixelRatio || 1;
+  if (!box.width) return;
+  Object.assign(canvas, { width: Math.round(box.width * ratio), height: Math.round(box.height * ratio) });
+  const pen = canvas.getContext("2d");
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, box.width, box.height);
+  if (!data || !data.frame.length) return;
+  const { frame, status, series } = data, { first, last } = spanOf(data);
+  const width = box.width - LEFT - RIGHT, bottom = box.height - BOTTOM - STRIP - 4, height = bottom - TOP;
+  const x = (each) => LEFT + ((each - first) / (last - first)) * width;
+  const [low, high] = rangeOf(series), y = (value) => bottom - ((value - low) / (high - low)) * height;
+  drawAxes(pen, low, high, y, box.width, series.length ? series[0].unit : "");
+  series.forEach((each, k) => drawCurve(pen, each, COLOURS[k % COLOURS.length], frame, x, y));
+  for (const name of ["tracked", "uncertain", "lost"]) { // the worst of the frames that share a column is drawn last
+    pen.fillStyle = STATUS[name];
+    frame.forEach((each, k) => {
+      const wide = Math.min(Math.max(1.5, width / (last - first)), LEFT + width + 1.5 - x(each));
+      if (status[k] === name) pen.fillRect(x(each), bottom + 4, wide, STRIP);
+    });
+  }
+  drawLegend(pen, series);
+  const at = x(Math.max(first, Math.min(last, now))), row = frame.indexOf(now);
+  pen.strokeStyle = "#1f2429";
+  pen.beginPath();
+  pen.moveTo(at, TOP - 4);
+  pen.lineTo(at, bottom + STRIP + 6);
+  pen.stroke();
+  const time = row < 0 ? "" : `   ${data.time_s[row].toFixed(3)} s   ${status[row]}`;
+  pen.fillStyle = "#5d666f";
+  pen.textAlign = "left";
+  pen.fillText(`frame ${now}${time}`, LEFT, box.height - 4);
+}
+
+// The frame at a place of the pointer.
+export function frameAt(canvas, data, clientX) {
+  const box = canvas.getBoundingClientRect(), { first, last } = spanOf(data);
+  const share = (clientX - box.left - LEFT) / (box.width - LEFT - RIGHT);
+  return Math.round(first + Math.max(0, Math.min(1, share)) * (last - first));
+}
+
+function spanOf({ frame }) { return { first: frame[0], last: Math.max(frame[frame.length - 1], frame[0] + 1) }; }
+
+function rangeOf(series) {
+  let low = Infinity, high = -Infinity;
+  for (const each of series) for (const value of each.value) if (value !== null) { low = Math.min(low, value); high = Math.max(high, value); }
+  if (!(low < high)) return [low - 0.5 || 0, high + 0.5 || 1];
+  const rim = 0.06 * (high - low);
+  return [low - rim, high + rim];
+}
+
+function drawAxes(pen, low, high, y, width, unit) {
+  pen.font = "11px system-ui, sans-serif";
+  pen.textAlign = "right";
+  const rough = (high - low) / 4, power = 10 ** Math.floor(Math.log10(rough));
+  const step = power * [1, 2, 5, 10].find((each) => each * power >= rough);
+  for (let value = Math.ceil(low / step) * step; value <= high; value += step) {
+    pen.fillStyle = "#5d666f";
+    pen.fillText(`${Number(value.toPrecision(6))} ${unit}`, LEFT - 6, y(value) + 4);
+    pen.strokeStyle = "#eceff1";
+    pen.beginPath();
+    pen.moveTo(LEFT, y(value));
+    pen.lineTo(width - RIGHT, y(value));
+    pen.stroke();
+  }
+}
+
+function drawCurve(pen, { value, sd }, colour, frame, x, y) {
+  if (sd && sd.length) {
+    pen.fillStyle = colour + "33";
+    for (let k = 1; k < frame.length; k++) {
+      if ([value[k - 1], value[k], sd[k - 1], sd[k]].some((each) => each === null)) continue;
+      pen.beginPath();
+      pen.moveTo(x(frame[k - 1]), y(value[k - 1] + 2 * sd[k - 1]));
+      pen.lineTo(x(frame[k]), y(value[k] + 2 * sd[k]));
+      pen.lineTo(x(frame[k]), y(value[k] - 2 * sd[k]));
+      pen.lineTo(x(frame[k - 1]), y(value[k - 1] - 2 * sd[k - 1]));
+      pen.fill();
+    }
+  }
+  pen.strokeStyle = colour;
+  pen.lineWidth = 1.5;
+  pen.beginPath();
+  let isOpen = false;
+  frame.forEach((each, k) => {
+    if (value[k] === null) { isOpen = false; return; }
+    pen[isOpen ? "lineTo" : "moveTo"](x(each), y(value[k]));
+    isOpen = true;
+  });
+  pen.stroke();
+  pen.lineWidth = 1;
+}
+
+function drawLegend(pen, series) {
+  let left = LEFT;
+  pen.textAlign = "left";
+  series.forEach((each, k) => {
+    pen.fillStyle = COLOURS[k % COLOURS.length];
+    pen.fillRect(left, 8, 12, 3);
+    pen.fillStyle = "#1f2429";
+    pen.fillText(each.name, left + 16, 13);
+    left += 28 + pen.measureText(each.name).width;
+  });
+}
