@@ -1,5 +1,6 @@
 """Smooth motions are labelled arrays with units and a history; bodies and players alike."""
 
+import csv
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from airborne.motion.smoothing.smoother import (
     smooth_players,
     smooth_root,
 )
+from airborne.motion.smoothing.tables import write_smooth_joint_angles
 from tests.support.jumping import Jumper
 from tests.support.jumping import motion_of as jump_of
 from tests.support.motions import figure, motion_of, shaken, small_covariance, swinging
@@ -71,9 +73,14 @@ def test_landmarks_and_the_centre_of_mass_are_smoothed():
     assert np.isfinite(result["position_sd"].to_numpy()).all()
 
 
-def test_joints_are_smoothed_as_rotations_and_their_angles_run_on():
+def test_joints_are_smoothed_as_rotations_and_their_angles_run_on(tmp_path):
     true, noisy = swing(sd=0.05)
     result = smooth_joint_angles(noisy, BODY, BUTTERWORTH, [])
+    write_smooth_joint_angles(tmp_path / "angles.csv", result)
+    rows = list(csv.DictReader((tmp_path / "angles.csv").read_text().splitlines()))
+    assert len(rows) == result["angle"].isel(axis=0).size
+    assert float(rows[-1]["z_deg"]) == pytest.approx(float(result["angle"].sel(axis="z")[-1, -1]), abs=1e-4)
+    assert {"joint", "wx_deg_s", "sd_deg", "w_sd_deg_s", "is_singular"} <= set(rows[0])
     error = np.deg2rad(result["angle"].to_numpy()) - true.joint_angles
     assert np.std(error) < 0.8 * np.std(noisy.joint_angles - true.joint_angles)
     assert result["velocity"].attrs["units"] == "deg/s"
