@@ -14,6 +14,7 @@ import numpy as np
 from airborne.body import BodyModel, PosedBody
 from airborne.body.files import read_body
 from airborne.cameras import Camera, Rig, read_rig
+from airborne.errors import ResultError
 from airborne.export.palette import STATUS_RGB, hex_colour
 from airborne.export.views import cached_surface_arrays
 from airborne.motion import Motion, PlayersMotion, read_motion
@@ -146,7 +147,9 @@ def _players_overlay(motion: PlayersMotion, cameras: Sequence[Camera], frame: in
 
 
 def _players_curves(motion: PlayersMotion) -> dict[str, Any]:
-    limb = next(limb for limb in reversed(_LIMBS) if f"{limb}_left" in motion.joints)
+    limb = next((limb for limb in reversed(_LIMBS) if {f"{limb}_left", f"{limb}_right"} <= set(motion.joints)), None)
+    if limb is None:
+        raise ResultError("the run holds no legs; track again")
     lower = [motion.joints.index(f"{limb}_{side}") for side in ("left", "right")]
     worst = {Status.TRACKED.value: 0, Status.UNCERTAIN.value: 1, Status.LOST.value: 2}
     statuses = [max(map(str, row), key=lambda each: worst[each]) for row in motion.status]

@@ -110,7 +110,7 @@ def normalise_time(curve: RunCurve, times: Sequence[float]) -> tuple[Array, Arra
 
 def sample(curve: RunCurve, time_s: Array) -> tuple[Array, Array]:
     """Return a curve and its variance at some times, linear between the known frames; 0 where none is stated."""
-    sd = np.interp(time_s, curve.time_s, np.where(np.isfinite(curve.sd), curve.sd, 0.0))
+    sd = np.interp(time_s, curve.time_s, np.where(np.abs(curve.sd) < LARGEST, curve.sd, 0.0))
     return np.interp(time_s, curve.time_s, curve.values), sd**2
 
 
