@@ -31,7 +31,7 @@ import psutil
 import rows
 from scipy.ndimage import gaussian_filter1d
 
-from airborne.batch.cluster import do_tasks, open_client
+from airborne.batch.cluster import do_tasks, import_for_workers, open_client
 from airborne.batch.task import Task
 from airborne.batch.trials import list_trials
 from airborne.run.track import track_trial
@@ -106,6 +106,7 @@ def bench_one(folder: Path, n: int, workers: int) -> list[dict]:
     season = write_season(folder / "season", n)
     one_s = alone(season, folder / "one")
     start_s = time.monotonic()
+    import_for_workers()
     tasks = [Task(trial, folder / "many", pictures=False) for trial in list_trials(str(season))]
     with open_client(None, workers, "auto") as client:
         started_s = time.monotonic() - start_s

@@ -1,9 +1,10 @@
 """Runs that are killed at random moments and resumed, and runs that are started while another writes.
 
-`python benchmarks/kills.py kills|overlaps --times N [--minutes M] [--seed K] [--cold]`: tracks two tiny trials, a
-thrown cross without pictures and two players with them, and compares every file but `summary.json` and `report.html`,
+`python benchmarks/kills.py kills|overlaps|studio --times N [--minutes M] [--seed K] [--cold]`: tracks two tiny trials,
+a thrown cross without pictures and two players with them, and compares every file but `summary.json` and `report.html`,
 which hold times, with those of a run that was left alone. `--cold` begins every chain without compiled kernels. Each
-run is a process, forked from this one, that SIGKILL ends. Prints one JSON object.
+run is a process, forked from this one, that SIGKILL ends. `studio` kills an editing session and opens the folder again:
+every edit that was told as done must be there, and page and frame. Prints one JSON object.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import contextlib
 import json
 import os
 import random
+import shutil
 import signal
 import sys
 import tempfile
@@ -26,13 +28,16 @@ import numba
 from airborne.errors import AirborneError
 from airborne.run import track
 from airborne.synthetic.throw.writing import write_trial as write_scene
+from airborne.trial.examples import example_trial
 from airborne.trial.file import read_trial
 from tests.support.players_trial import write_trial
 from tests.support.run_files import contents_of
+from tests.support.studio_edits import edits_found, kill_while_editing
 from tests.support.synthetic import small_scene
 
 WITH_TIMES = ("summary.json", "report.html")
 MOST_KILLS = 4  # in a chain, before a run is left alone
+EDITING_S = 3.0  # at most, before the studio is killed
 REFUSED = 2  # exit code of a run that was refused in one line
 
 
@@ -105,15 +110,31 @@ def overlap(trial: Path, out: Path, cache: Path | None, longest_s: float, rng: r
     return [wait(first), wait(second)]
 
 
+def kill_studio(times: int, end_s: float, rng: random.Random) -> dict[str, int]:
+    """Kill an editing session of the studio at random moments; count the edits, and those that were lost."""
+    counts = {"studio": 0, "edits": 0, "lost": 0}
+    with tempfile.TemporaryDirectory() as name:
+        folder = shutil.copytree(example_trial("thrown_cross").parent, Path(name) / "cross")
+        while counts["studio"] < times and time.monotonic() < end_s:
+            last = kill_while_editing(folder, EDITING_S, rng)
+            counts["studio"] += 1
+            counts["edits"] = last
+            counts["lost"] += not all(last <= number <= last + 1 for number in edits_found(folder))
+    return counts
+
+
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("what", choices=["kills", "overlaps"])
+    parser.add_argument("what", choices=["kills", "overlaps", "studio"])
     parser.add_argument("--times", type=int, default=100)
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--cold", action="store_true")
     options = parser.parse_args()
     rng, end_s = random.Random(options.seed), time.monotonic() + 60 * options.minutes
+    if options.what == "studio":
+        print(json.dumps(kill_studio(options.times, end_s, rng)))
+        return
     counts = {"chains": 0, "identical": 0, options.what: 0, "refused": 0}
     differing = []
     with tempfile.TemporaryDirectory() as name:

@@ -57,9 +57,9 @@ def started_dask(place):
             process.wait(60)
 
 
-def ends(tmp_path, work, n=4):
+def ends(tmp_path, work, n=4, memory="auto"):
     tasks = batch_work.tasks(tmp_path, n)
-    with open_client(None, 1, "auto") as client:
+    with open_client(None, 1, memory) as client:
         return {outcome.name: outcome for outcome in do_tasks(client, tasks, work=work)}
 
 
@@ -75,6 +75,30 @@ def test_a_task_that_kills_every_worker_fails_alone(tmp_path, monkeypatch):
     outcomes = ends(tmp_path, batch_work.always_die, n=3)
     assert [outcomes[f"t000{k}"].status for k in range(3)] == ["done", "failed", "done"]
     assert "worker after worker died" in outcomes["t0001"].error
+
+
+def test_a_task_that_takes_more_memory_than_declared_fails_alone(tmp_path, monkeypatch):
+    monkeypatch.setitem(cluster._SETTINGS, "distributed.scheduler.allowed-failures", 1)
+    outcomes = ends(tmp_path, batch_work.take_a_gigabyte, n=3, memory="600MB")
+    assert [outcomes[f"t000{k}"].status for k in range(3)] == ["done", "failed", "done"]
+    assert "give each more with --memory" in outcomes["t0001"].error
+
+
+@pytest.mark.parametrize(
+    ("memory", "said"),
+    [
+        ("much", "memory much: expected a size such as 4GB"),
+        ("1MB", "a worker needs .* at least"),
+        ("9PB", "2 workers of 9PB are more than the .* of this machine; give --workers 1, or less --memory"),
+    ],
+)
+def test_memory_that_cannot_be_kept_is_one_line(memory, said):
+    with pytest.raises(AirborneError, match=said), open_client(None, 2, memory):
+        pass
+
+
+def test_there_are_as_many_workers_as_memory_holds():
+    assert cluster.count_workers("auto") >= cluster.count_workers("1GB") >= 1
 
 
 def test_no_scheduler_at_an_address_is_one_line():
@@ -148,9 +172,10 @@ def test_a_stopped_batch_says_what_was_not_tracked(tmp_path):
     write_outputs(tmp_path, trials, {"b": TaskOutcome("b", "done", row={"n_frames": 3, "share_tracked": 1.0})})
     with (tmp_path / "trials.csv").open() as file:
         first, second = csv.DictReader(file)
-    assert (first["status"], second["status"], second["n_frames"]) == ("failed", "done", "3")
+    assert (first["status"], second["status"], second["n_frames"]) == ("not run", "done", "3")
     assert "the batch was stopped" in first["error"]
     page = (tmp_path / "index.html").read_text()
+    assert "2 trials, 1 not run" in page
     assert "<b>anna" not in page and "&lt;b&gt;anna" in page
     assert "http" not in page, "it needs no network"
 

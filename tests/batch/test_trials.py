@@ -49,6 +49,10 @@ def test_a_tables_columns_are_labels_over_those_of_the_file(tmp_path):
         ("trial\nx\na/x\n", "two trials are called x"),
         ("trial\n", "no trial is there"),
         ("trial,status\nx,good\n", "a label is called status"),
+        ("trial,\nx,good\n", "a name has 1 to 80 characters"),
+        (f"trial,{'a' * 90}\nx,good\n", "a name has 1 to 80 characters"),
+        ("trial\n.x\n", "begins with no dot"),
+        ("trial\na\x1b[31m\n", "no control character"),
     ],
 )
 def test_a_table_that_does_not_fit_is_one_line(tmp_path, table, said):
@@ -101,3 +105,17 @@ def test_a_pattern_that_fits_nothing_is_one_line(tmp_path, pattern):
     write(tmp_path / "x_left.mp4", "")
     with pytest.raises(AirborneError, match=r"expected \{camera\}|no video's path fits"):
         write_study(tmp_path, pattern, tmp_path / "study")
+
+
+def test_a_huge_file_is_not_read_to_find_out_whether_it_is_a_trial(tmp_path):
+    with (tmp_path / "huge.toml").open("wb") as file:
+        file.truncate(20_000_000_000)  # a hole: it takes no room on the disk
+    write(tmp_path / "a.toml")
+    assert names(tmp_path) == ["a"]
+
+
+def test_a_long_name_of_many_bytes_is_cut_so_that_its_files_can_be_written(tmp_path):
+    write(tmp_path / ("選" * 79) / "trial.toml")
+    (trial,) = list_trials(str(tmp_path))
+    assert len(trial.name.encode()) <= 160
+    (tmp_path / f"{trial.name}.json").touch()

@@ -8,7 +8,7 @@ import pytest
 
 from airborne.errors import AirborneError, ResultError
 from airborne.io.figures import names_not_drawn
-from airborne.io.writing import explain_full_disk, write_text
+from airborne.io.writing import explain_full_disk, replace_text, write_text
 from airborne.video import VideoWriter
 from tests.support.run_files import contents_of
 
@@ -50,3 +50,14 @@ def test_a_file_that_is_written_anew_stays_as_it_was_until_it_is_whole(tmp_path)
         writer.write(image)
         raise RuntimeError
     assert contents_of(tmp_path) == whole
+
+
+def test_a_file_is_replaced_through_no_link_and_over_a_killed_writers_rest(tmp_path):
+    other = tmp_path / "other.txt"
+    other.write_text("theirs")
+    (tmp_path / "a.txt.part").symlink_to(other)
+    replace_text(tmp_path / "a.txt", "ours")
+    (tmp_path / "a.txt.part").write_text("torn")
+    replace_text(tmp_path / "a.txt", "again", is_durable=False)
+    assert other.read_text() == "theirs"
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "again", "other.txt": "theirs"}

@@ -31,7 +31,8 @@ def run(tmp_path, thrown_cross):
         for item in estimates:
             writer.append(item)
     shutil.copyfile(thrown_cross / "cross.toml", folder / "body.toml")
-    (folder / "summary.json").write_text('{"name": "run"}\n')
+    counts = '"n_frames": 1, "n_tracked": 1, "n_uncertain": 0, "n_lost": 0'
+    (folder / "summary.json").write_text(f'{{"name": "run", {counts}}}\n')
     motion, body = Motion.collect(estimates), read_body(folder / "body.toml")
     write_joints(tmp_path / "higher.csv", replace(motion, position=motion.position + np.array([0, 0, 0.01])), body)
     return folder

@@ -72,3 +72,11 @@ def test_a_key_that_says_more_keeps_it():
 def test_a_key_whose_clicks_are_in_a_table_of_their_own_is_left_alone():
     with pytest.raises(TrialError, match=r"has its clicks in clicks.csv; correct them there"):
         with_click(f'{TEXT}\n[[key]]\nframe = 9\npoints_px = "clicks.csv"\n', 9, "wrist_left", "left", (1, 2))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"), [("start = 3\n", "start is no table"), ("a = [" + "1," * 60_000 + "]", "larger")]
+)
+def test_what_cannot_be_edited_is_one_line(text, said):
+    with pytest.raises(TrialError, match=said):
+        with_table(text, "start", {"frame": 1})

@@ -7,7 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from airborne.errors import TrialError
+from airborne.errors import AirborneError, TrialError
+from airborne.studio.session import Session
 from airborne.studio.writing import FOLDER, KEPT, Editor
 
 N_KILLS = 6
@@ -84,3 +85,20 @@ def test_a_file_is_whole_whenever_its_writer_is_killed(tmp_path):
         assert len(lines) == 20_000
         assert len(set(lines)) == 1
         assert 1 <= len(list((tmp_path / FOLDER / "versions").iterdir())) <= KEPT + 1
+
+
+@pytest.mark.parametrize("link", [FOLDER, f"{FOLDER}/versions", f"{FOLDER}/track.log"])
+def test_nothing_is_kept_through_a_link_that_leads_elsewhere(tmp_path, link):
+    folder, elsewhere = tmp_path / "trial", tmp_path / "elsewhere"
+    (folder / link).parent.mkdir(parents=True)
+    elsewhere.mkdir()
+    (folder / link).symlink_to(elsewhere)
+    with pytest.raises(AirborneError, match="link"):
+        Session(folder, folder / "trial.toml")
+    assert not list(elsewhere.iterdir())
+
+
+def test_a_file_that_is_no_text_is_one_line(tmp_path):
+    (tmp_path / "trial.toml").write_bytes(b"name = '\xff'")
+    with pytest.raises(TrialError, match=r"trial\.toml cannot be read \(it is not a text file\)"):
+        Editor(tmp_path).write("trial.toml", "x", "edit")

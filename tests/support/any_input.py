@@ -57,6 +57,7 @@ from airborne.trial.file import read_trial
 from airborne.video.decoding import VideoSource, inspect
 from tests.body.test_measurements import PERSON
 from tests.support import players_trial as players
+from tests.support.any_study import batches, clocks, studio
 from tests.support.athletes import write_results
 from tests.support.cameras import LENS, scattered, three_cameras
 from tests.support.motions import run_with_gap
@@ -68,7 +69,10 @@ CORPUS = Path(__file__).resolve().parents[1] / "corpus"  # a folder a reader
 CPU_LIMIT_S = 4.0
 MEMORY_LIMIT_BYTES = 1_000_000_000  # above what the process takes with everything loaded
 CAMERAS = ("left", "right", "side")
-WEIGHTS = {"video": 0.2, "command line": 0.3, "mesh.ply": 0.5, "mesh.stl": 0.5, "run summary": 0.3}
+WEIGHTS = {
+    **{"video": 0.25, "images of a video": 0.25, "sound": 0.5},
+    **{"command line": 0.3, "mesh.ply": 0.5, "mesh.stl": 0.5, "run summary": 0.3},
+}
 
 
 @dataclass(frozen=True)
@@ -355,6 +359,11 @@ def cases(folder):
         inner = folder / f"{i}"
         inner.mkdir()
         yield from make(inner)
+    for make in (studio, batches, clocks):
+        inner = folder / make.__name__
+        inner.mkdir()
+        for name, path, read in make(inner):
+            yield case(name, path, read)
 
 
 def main():

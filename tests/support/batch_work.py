@@ -41,3 +41,12 @@ def always_die(task, report):
         time.sleep(0.5)  # the outcome of the task before lies at this worker until it is fetched
         os.kill(os.getpid(), signal.SIGKILL)
     return note_name(task, report)
+
+
+def take_a_gigabyte(task, report):
+    """Take more memory than a worker has, in one task, until somebody ends that."""
+    taken = []
+    while task.trial.name == "t0001" and len(taken) < 100:
+        taken.append(b"x" * 10_000_000)
+        time.sleep(0.01)
+    return note_name(task, report)

@@ -122,7 +122,9 @@ def write_run(folder: Path, n=12) -> Path:
             seen = SimpleNamespace(index=index, time_s=Fraction(index, RATE), views=(True, True))
             writer.append(tracker.step(0, seen)[1])
     write_pose2sim(folder / "calib.toml", rig())
-    (folder / "summary.json").write_text('{"name": "a block"}\n', encoding="utf-8")
+    (folder / "summary.json").write_text(
+        '{"name": "a block", "n_frames": 1, "n_tracked": 1, "n_uncertain": 0, "n_lost": 0}\n', encoding="utf-8"
+    )
     return folder
 
 

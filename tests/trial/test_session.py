@@ -3,7 +3,7 @@
 import pytest
 
 from airborne.errors import TrialError
-from airborne.trial.file import read_trial
+from airborne.trial.file import read_tables, read_trial
 from airborne.trial.remainder import parse_remainder
 
 SESSION = """
@@ -77,3 +77,10 @@ def test_the_rest_of_a_trial_with_mistakes_keeps_its_session(tmp_path):
     trial = parse_remainder(write(tmp_path, 'labels = { athlete = "anna" }\nwrong = 1'))
     assert trial is not None
     assert trial.path("calib.toml").is_file()
+
+
+def test_a_short_label_cannot_make_a_short_session_a_huge_text(tmp_path):
+    (tmp_path / "session.toml").write_text("x = '" + "{athlete}" * 100_000 + "'")
+    (tmp_path / "one.toml").write_text(f"session = 'session.toml'\nlabels = {{ athlete = '{'a' * 100_000}' }}")
+    with pytest.raises(TrialError, match="label athlete is too long; give it 80 characters at most"):
+        read_tables(tmp_path / "one.toml")

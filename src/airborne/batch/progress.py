@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from airborne.batch.task import TaskOutcome
+from airborne.batch.task import TaskOutcome, TaskStatus
 from airborne.io.terminal import errors
 
 _MOST_SHOWN = 20  # trials that run, of which a line each is shown
@@ -26,7 +26,7 @@ class BatchProgress:
         self._live, self._total = live, n_trials
         self._running: dict[str, tuple[float, int, int | None]] = {}  # start [s], frames done and expected
         self._ended: set[str] = set()
-        self._counts = dict.fromkeys(("done", "unchanged", "failed"), 0)
+        self._counts: dict[TaskStatus, int] = {"done": 0, "unchanged": 0, "failed": 0}
         columns = (BarColumn(), MofNCompleteColumn(), TextColumn("trials"), TimeRemainingColumn())
         self._bar = Progress(*columns, console=errors)
         self._bar_task = self._bar.add_task("", total=n_trials)

@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from airborne.constants import NORMAL_QUANTILE_975
-from airborne.io.text import read_json
+from airborne.errors import ResultError
+from airborne.io.text import read_csv
 from airborne.motion.flight.phases import find_flight_events
-from airborne.motion.run_folder import SUMMARY
+from airborne.motion.run_folder import FLIGHT, SUMMARY, read_summary
 
 TableRow = dict[str, Any]
+_HIGHEST_M = 1e6  # of a centre of mass: no height beyond it
 _STATUSES = ("tracked", "uncertain", "lost")
 _OF_A_BODY = ("median_position_sd_mm", "median_rotation_sd_deg", "somersault_rev", "twist_rev")
 _OF_A_FLIGHT = ("fitted_gravity_m_s2", "ballistic_rms_mm")
@@ -32,15 +33,24 @@ _OF_A_JUMP = (
 def row_of(folder: Path) -> TableRow:
     """Return the columns of the finished run in a folder, in the order of the table; those that it lacks are left out.
 
-    A number's standard deviation, where the run states one, is `<name>_sd`.
+    A number's standard deviation, where the run states one, is `<name>_sd`. Raises ResultError for a damaged run.
     """
-    summary = read_json(folder / SUMMARY)
+    summary = read_summary(folder)
+    try:
+        return _columns(folder, summary)
+    except (LookupError, TypeError, ValueError, AttributeError, ZeroDivisionError, OverflowError) as error:
+        raise ResultError(
+            f"{folder}: its tables or {SUMMARY} are damaged ({type(error).__name__}: {str(error)[:80]}); remove it"
+        ) from None
+
+
+def _columns(folder: Path, summary: Mapping[str, Any]) -> TableRow:
     n = summary["n_frames"]
     row: dict[str, Any] = {"n_frames": n} | {f"share_{name}": summary[f"n_{name}"] / n for name in _STATUSES}
     row |= {name: summary[name] for name in ("duration_s", "rate_hz", *_OF_A_BODY) if name in summary}
     if "tilt_range_deg" in summary:
         row |= dict(zip(("tilt_least_deg", "tilt_most_deg"), summary["tilt_range_deg"], strict=True))
-    row |= _flight(summary.get("flight", {})) | _jump(folder / "tables" / "flight.csv")
+    row |= _flight(summary.get("flight", {})) | _jump(folder / FLIGHT)
     if "jumps" in summary:
         row |= _highest_jump(summary["jumps"])
     findings = summary.get("self_check") or []
@@ -62,8 +72,13 @@ def _jump(path: Path) -> TableRow:
     """Return take-off, landing and rise of the first whole flight of a body with masses."""
     if not path.is_file():
         return {}
-    table = pd.read_csv(path).dropna(subset="com_z_m")
-    time_s, height_m, sd = (table[name].to_numpy(float) for name in ("time_s", "com_z_m", "com_z_m_sd"))
+    (_, names), *rows = read_csv(path, "expected a flight's table", ResultError)
+    columns = [names.index(name) for name in ("time_s", "com_z_m", "com_z_m_sd")]
+    values = np.array([[float(cells[k] or "nan") for k in columns] for _, cells in rows]).reshape(-1, 3)
+    time_s, height_m, sd = values[np.isfinite(values[:, 1])].T
+    if not ((np.diff(time_s) > 0).all() and (np.abs(height_m) < _HIGHEST_M).all()):
+        raise ValueError(f"{FLIGHT}: times that do not increase, or heights that none can have")
+    sd = np.where(np.abs(sd) < _HIGHEST_M, sd, np.inf)
     for start, end in pairwise(find_flight_events(time_s, height_m, sd**2)):
         inside = np.flatnonzero((time_s >= start.time_s) & (time_s <= end.time_s))
         if (start.name, end.name) == ("take-off", "landing") and len(inside):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from airborne.batch.cluster import count_cores, do_tasks, open_client
+from airborne.batch.cluster import count_workers, do_tasks, import_for_workers, open_client
 from airborne.batch.progress import show_progress
 from airborne.batch.table import not_reached, write_outputs
 from airborne.batch.task import LOGS, THUMBNAILS, Task, TaskOutcome, inspect_folder
@@ -47,8 +47,10 @@ def run_batch(
     meanwhile. Raises AirborneError where nothing can start; what goes wrong with a trial is its outcome.
     """
     machines = machines or Machines()
+    if machines.scheduler is None:
+        import_for_workers()  # while the trials are looked at
     tasks = plan_tasks(trials, folder, pictures=pictures)
-    n_workers = min(machines.workers or count_cores(), len(tasks))
+    n_workers = min(machines.workers or count_workers(machines.memory), len(tasks))
     outcomes: dict[str, TaskOutcome] = {}
     with sole_writer(folder):
         try:

@@ -19,6 +19,7 @@ from airborne.motion.run_folder import REPORT
 from airborne.motion.tables import cell
 
 PAGE = "index.html"
+_ORDER = ("failed", "not run", "done")  # of the page's rows
 _ON_THE_PAGE = ("share_tracked", "somersault_rev", "twist_rev", "L_kg_m2_s", "com_rise_m", "hip_height_m", "n_alarms")
 
 
@@ -31,7 +32,7 @@ def write_outputs(folder: Path, trials: Sequence[BatchTrial], outcomes: Mapping[
     ends = [outcomes.get(trial.name, not_reached(trial)) for trial in trials]
     rows = [
         {"trial": trial.name, **dict.fromkeys(names, ""), **trial.labels}
-        | {"status": "failed" if end.status == "failed" else "done", "error": end.error}
+        | {"status": "done" if end.status == "unchanged" else end.status, "error": end.error}
         | {"folder": trial.name, **end.row}
         for trial, end in zip(trials, ends, strict=True)
     ]
@@ -52,26 +53,27 @@ def write_outputs(folder: Path, trials: Sequence[BatchTrial], outcomes: Mapping[
 
 def not_reached(trial: BatchTrial) -> TaskOutcome:
     """Return the outcome of a trial that was not tracked before the batch ended."""
-    return TaskOutcome(
-        trial.name, "failed", "not tracked: the batch was stopped, or its scheduler lost; give the command again"
-    )
+    return TaskOutcome(trial.name, "not run", "the batch was stopped, or its scheduler lost; give the command again")
 
 
 def _page(folder: Path, rows: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> str:
-    """Return the page of a batch: failures first, then alarms, else in the table's order."""
+    """Return the page of a batch: failures first, then what was not run, then alarms, else in the table's order."""
     shown = [name for name in _ON_THE_PAGE if any(row.get(name) is not None for row in rows)]
-    ordered = sorted(rows, key=lambda row: (row["status"] != "failed", not row.get("n_alarms")))
-    n_failed = sum(row["status"] == "failed" for row in rows)
+    ordered = sorted(rows, key=lambda row: (_ORDER.index(row["status"]), not row.get("n_alarms")))
+    counts = {status: sum(row["status"] == status for row in rows) for status in _ORDER}
     return render_page(
         "batch.html.j2",
-        title=f"{count(len(rows), 'trial')}, {n_failed} failed",
+        title=", ".join(
+            [count(len(rows), "trial"), *(f"{n} {status}" for status, n in counts.items() if n and status != "done")]
+        ),
         headers=[label(name) for name in ("trial", *labels, "status", *shown)],
         rows=[
             {
                 "name": row["trial"],
                 "cells": [row.get(name) for name in (*labels, "status", *shown)],
                 "report": _link(folder, folder / row["folder"] / REPORT),
-                "log": f"{LOGS}/{quote(row['trial'])}.log",
+                "status": row["status"],
+                "log": _link(folder, folder / LOGS / f"{row['trial']}.log"),
                 "thumbnail": _link(folder, thumbnail_of(folder, row["trial"])),
                 "remark": row["error"] or row.get("findings", ""),
             }

@@ -13,25 +13,26 @@ from pathlib import Path
 from typing import Any, Literal
 
 import cv2
+import numpy as np
 
 from airborne import __version__
 from airborne.batch.row import TableRow, row_of
 from airborne.batch.trials import BatchTrial
 from airborne.errors import AirborneError
 from airborne.export import write_json
+from airborne.export.pictures import thumbnail
 from airborne.io.text import read_json
-from airborne.motion.run_folder import MOTION, REPORT, SUMMARY
+from airborne.motion.run_folder import MOTION, REPORT, SUMMARY, list_figures
 from airborne.run.folder import run_identity
 from airborne.run.track import track_trial
 from airborne.trial.file import Trial, read_trial
 
-TaskStatus = Literal["done", "unchanged", "failed"]
+TaskStatus = Literal["done", "unchanged", "failed", "not run"]
 FolderState = Literal["new", "stopped", "changed", "unchanged"]  # what a folder holds of a trial
 
 LOGS, THUMBNAILS = "logs", "thumbnails"  # folders of a batch beside those of its trials
 _THUMBNAIL_PX = 160  # width, so that a row of the page is a finger high
 _SECONDS_A_REPORT = 1.0  # between reports of a trial's frames
-_SHOWN = ("matching.png", "heights.png", "through_mask.png", "pose.png")  # of a run's figures, which is the thumbnail
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +66,7 @@ class TaskOutcome:
 
     name: str
     status: TaskStatus
-    error: str = ""  # one line, of a failed one
+    error: str = ""  # one line, of one that failed or was not run
     row: TableRow = field(default_factory=dict)  # of the batch's table
 
 
@@ -160,13 +161,10 @@ def thumbnail_of(batch: Path, name: str) -> Path:
 
 
 def _write_thumbnail(task: Task) -> None:
-    """Shrink one of a run's figures; a run without pictures has none."""
-    figures = task.folder / "figures"
-    found = [figures / name for name in _SHOWN if (figures / name).is_file()] or sorted(figures.glob("*.png"))
-    image = cv2.imread(str(found[0])) if found else None
-    if image is None:
-        return
-    path = thumbnail_of(task.batch, task.trial.name)
-    path.parent.mkdir(exist_ok=True)
-    height = max(round(image.shape[0] * _THUMBNAIL_PX / image.shape[1]), 1)
-    cv2.imwrite(str(path), cv2.resize(image, (_THUMBNAIL_PX, height), interpolation=cv2.INTER_AREA))
+    """Reduce one of a run's figures; a run without pictures has none."""
+    figures = list_figures(task.folder)
+    image = cv2.imread(str(figures[0])) if figures else None
+    if image is not None:
+        path = thumbnail_of(task.batch, task.trial.name)
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(thumbnail(np.asarray(image[..., ::-1], np.uint8), _THUMBNAIL_PX))

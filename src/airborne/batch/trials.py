@@ -11,14 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from airborne.errors import AirborneError, TrialError
-from airborne.io.names import check_column, file_stem
+from airborne.io.names import check_column, check_path, file_stem
 from airborne.io.text import read_csv, read_toml
 from airborne.trial.file import read_tables
 
 TABLE = "trials.csv"
 _OWN_COLUMNS = ("trial", "status", "error", "folder")  # of the batch's table
 _ALWAYS_TRIAL = "trial.toml"  # the name of a trial file that is named after its folder
-_MEANT_AS_TRIAL = re.compile(r"^\s*(\[\[camera\]\]|session\s*=)", re.MULTILINE)
+_MEANT_AS_TRIAL = re.compile(r"^[ \t]*(\[\[camera\]\]|session[ \t]*=)", re.MULTILINE)
+_HEAD_BYTES = 100_000  # of a file that is no TOML, in which words of a trial are looked for
 _TABLE_FORM = "a table of trials has a line of names, one of them trial, then a line for each trial"
 
 
@@ -66,8 +67,13 @@ def _is_trial(path: Path) -> bool:
     except OSError:
         return False
     except tomllib.TOMLDecodeError:
-        return path.name == _ALWAYS_TRIAL or _MEANT_AS_TRIAL.search(path.read_text(errors="replace")) is not None
+        return path.name == _ALWAYS_TRIAL or _MEANT_AS_TRIAL.search(_read_head(path)) is not None
     return path.name == _ALWAYS_TRIAL or "session" in tables or {"name", "camera"} <= tables.keys()
+
+
+def _read_head(path: Path) -> str:
+    with path.open("rb") as file:
+        return file.read(_HEAD_BYTES).decode(errors="replace")
 
 
 def _read_rows(path: Path) -> list[tuple[Path, dict[str, str]]]:
@@ -80,16 +86,20 @@ def _read_rows(path: Path) -> list[tuple[Path, dict[str, str]]]:
         if len(cells) != len(names):
             raise TrialError(f"{path}, row {line}: {len(cells)} cells, expected {len(names)}")
         labels = dict(zip(names, cells, strict=True))
-        file = path.parent / labels.pop("trial")
-        found.append((file if file.suffix == ".toml" else file.with_name(f"{file.name}.toml"), labels))
+        try:
+            file = check_path(labels.pop("trial"))
+        except ValueError as error:
+            raise TrialError(f"{path}, row {line}: {error}") from None
+        found.append((path.parent / (file if file.endswith(".toml") else f"{file}.toml"), labels))
     return found
 
 
 def _describe(path: Path, labels: Mapping[str, str]) -> BatchTrial:
     path = path.absolute()
-    name = path.parent.name if path.name == _ALWAYS_TRIAL else path.stem
     try:
-        check_column(file_stem(name))
+        name = check_column(file_stem(path.parent.name if path.name == _ALWAYS_TRIAL else path.stem))
+        for label in labels:
+            check_column(label)
     except ValueError as error:
         raise TrialError(f"{path}: {error}") from None
     labels = _own_labels(path) | dict(labels)

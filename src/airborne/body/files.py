@@ -24,6 +24,8 @@ from airborne.io.text import list_keys, read_toml
 from airborne.io.writing import write_text
 
 _Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+_Coordinate = Annotated[float, Field(ge=-1000, le=1000)]  # [m]: a typing error beyond it
+_Position = Annotated[list[_Coordinate], Field(min_length=3, max_length=3)]
 _Matrix = Annotated[list[_Vector], Field(min_length=3, max_length=3)]
 _Bound = Annotated[float, Field(allow_inf_nan=True)]  # inf: no bound
 _Range = Annotated[list[_Bound], Field(min_length=2, max_length=2)]
@@ -46,7 +48,7 @@ class _PartTable(_Strict):
     semi_axes_m: _Vector | None = None
     file: CheckedPath | None = None
     scale: float = Field(1.0, gt=0)  # metres per unit of the mesh file
-    centre_m: _Vector = [0.0, 0.0, 0.0]
+    centre_m: _Position = [0.0, 0.0, 0.0]
     rotation_deg: _Vector = [0.0, 0.0, 0.0]  # about the segment's x, then the new y, then the new z
     colour_srgb: Annotated[list[_Channel], Field(min_length=3, max_length=3)] | None = None
     colour: Literal["sample"] | None = None
@@ -55,14 +57,14 @@ class _PartTable(_Strict):
 
 class _InertiaTable(_Strict):
     mass_kg: float = Field(gt=0)
-    centre_m: _Vector
+    centre_m: _Position
     tensor_kg_m2: _Matrix
 
 
 class _LandmarkTable(_Strict):
     name: str
     segment: str
-    position_m: _Vector = [0.0, 0.0, 0.0]
+    position_m: _Position = [0.0, 0.0, 0.0]
 
 
 class _LimitsTable(_Strict):
@@ -74,7 +76,7 @@ class _LimitsTable(_Strict):
 class _SegmentTable(_Strict):
     name: str
     parent: str | None = None
-    joint_m: _Vector = [0.0, 0.0, 0.0]
+    joint_m: _Position = [0.0, 0.0, 0.0]
     limits: _LimitsTable | None = None
     limits_deg: Annotated[list[_Range], Field(min_length=3, max_length=3)] | None = None  # x-y-z angles; older files
     part: list[_PartTable] = []

@@ -12,7 +12,7 @@ import typer
 
 from airborne.cli.console import Json, Out, errors, stop
 
-_SOME_FAILED = 1  # the exit code
+_SOME_FAILED = 1  # the exit code, also where some were not run
 
 
 def batch_command(
@@ -56,13 +56,13 @@ def batch_command(
     counts = Counter(outcome.status for outcome in result.outcomes)
     failed = {outcome.name: outcome.error for outcome in result.outcomes if outcome.status == "failed"}
     if as_json:
-        print(
-            json.dumps({"counts": counts, "failed": failed, "files": list(map(str, result.files))}, ensure_ascii=False)
-        )
+        told = {"counts": counts, "failed": failed, "files": list(map(str, result.files))}
+        print(json.dumps(told, ensure_ascii=False))
     else:
-        print(f"{counts['done']} tracked, {counts['unchanged']} unchanged, {counts['failed']} failed")
+        left = f", {counts['not run']} not run: give the command again" if counts["not run"] else ""
+        print(f"{counts['done']} tracked, {counts['unchanged']} unchanged, {counts['failed']} failed{left}")
         print(f"results: {', '.join(map(str, result.files))}")
-    if failed:
+    if failed or counts["not run"]:
         raise typer.Exit(_SOME_FAILED)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from airborne.io.writing import write_text
+from airborne.io.writing import replace_text
 from airborne.motion import Motion, root_angles
 from airborne.tracking import Status
 from airborne.types import Array
@@ -90,9 +90,7 @@ def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
 def write_json(path: Path, values: Mapping[str, Any]) -> None:
     """Write a dictionary as JSON; NaN and infinite numbers become null. The file appears whole or not at all."""
     text = json.dumps(json_ready(values), indent=2, ensure_ascii=False, allow_nan=False)
-    unfinished = path.with_name(path.name + ".part")
-    write_text(unfinished, text + "\n")
-    unfinished.replace(path)
+    replace_text(path, text + "\n")
 
 
 def json_ready(value: Any) -> Any:

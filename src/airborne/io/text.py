@@ -11,9 +11,12 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import tomlkit
 import yaml
+from tomlkit.exceptions import TOMLKitError
 
 _LARGEST_TOML_BYTES = 5_000_000  # larger files are refused
+_LARGEST_EDITABLE = 100_000  # characters, likewise: they are parsed slowly
 _LARGEST_JSON_BYTES = 50_000_000  # likewise
 _LARGEST_CSV_BYTES = 50_000_000  # likewise
 _MOST_BRACKETS = 200  # in a flat YAML file
@@ -119,6 +122,18 @@ def read_csv(path: Path, expected: str, error: type[Exception]) -> list[tuple[in
     except csv.Error as failure:
         raise error(f"{path}, row {reader.line_num}: not a table with commas ({failure}); {expected}") from None
     return [(line, row) for line, row in rows if any(row)]
+
+
+def parse_editable_toml(text: str) -> tomlkit.TOMLDocument:
+    """Parse TOML that keeps its comments and order. Raises ValueError for anything else, also if too large."""
+    if len(text) > _LARGEST_EDITABLE:
+        raise ValueError(f"larger than {_LARGEST_EDITABLE / 1e3:g} kB")
+    try:
+        return tomlkit.parse(text)
+    except RecursionError:
+        raise ValueError("nested too deep") from None
+    except TOMLKitError as error:
+        raise ValueError(" ".join(str(error).split())[:160]) from None
 
 
 def parse_toml(text: str) -> dict[str, Any]:

@@ -1,8 +1,9 @@
-"""Files written: where a disk is full, the error names the file and how much is free."""
+"""Files written, whole or not at all: where a disk is full, the error names the file and how much is free."""
 
 from __future__ import annotations
 
 import errno
+import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,3 +33,16 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file."""
     with explain_full_disk(path):
         path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def replace_text(path: Path, text: str, *, is_durable: bool = True) -> None:
+    """Write a text file whole or not at all, and through no link; it survives a power cut unless not `is_durable`."""
+    part = path.with_name(f"{path.name}.part")
+    with explain_full_disk(path):
+        part.unlink(missing_ok=True)  # a killed writer's, or a link that leads elsewhere
+        with part.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+            if is_durable:
+                file.flush()
+                os.fsync(file.fileno())
+        part.replace(path)

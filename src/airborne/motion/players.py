@@ -23,6 +23,7 @@ from airborne.tracking.players import PlayerEstimate
 from airborne.types import Array
 
 _UPPER = np.triu_indices(3)  # of the covariance of a position
+_FARTHEST_M = 1e6  # of a joint: no coordinate beyond it
 _POSITION = ("x_m", "y_m", "z_m")
 _COVARIANCE = tuple(f"cov_{'xyz'[i]}{'xyz'[j]}_m2" for i, j in zip(*_UPPER, strict=True))
 PLAYERS_COLUMNS = ("player", "frame", "time_s", "status", "joint", *_POSITION, "sd_m", *_COVARIANCE, "score", "n_views")
@@ -232,7 +233,7 @@ def _table(path: Path, n_bytes: int) -> pd.DataFrame:
             return pd.read_csv(
                 io.BytesIO(data), dtype=types, na_values=unknown, keep_default_na=False, low_memory=False
             )
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise ResultError(f"{path}: {str(error).splitlines()[0][:200]}; correct the line or track again") from None
 
 
@@ -242,6 +243,11 @@ def _check_order(path: Path, table: pd.DataFrame, frame: NDArray[np.int64], n_jo
     tiled = [np.reshape(each, frame.shape) for each in codes]
     is_regular = all((each == each[0]).all() for each in tiled) and (frame == frame[:, :1]).all()
     n_names = len(set(tiled[0][0].tolist())) * n_joints
+    if (table[list(_POSITION)].abs().to_numpy() > _FARTHEST_M).any():
+        raise ResultError(f"{path}: a joint is farther than {_FARTHEST_M:g} m; correct the line or track again")
+    unknown = set(table["status"].unique()) - {status.value for status in Status}
+    if unknown:
+        raise ResultError(f"{path}: '{str(unknown.pop())[:40]}' is no status; correct the line or track again")
     if not is_regular or n_names != frame.shape[1] or (np.diff(frame[:, 0]) <= 0).any():
         raise ResultError(f"{path}: the rows of some frame, or their order, differ from the first frame's; track again")
 

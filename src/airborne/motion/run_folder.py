@@ -21,6 +21,9 @@ SMOOTH_RECORD = "smooth.json"
 CANDIDATES, CANDIDATES_PICTURE = "candidates.json", "candidates.png"  # of a start that is undecided
 PICTURES = "pictures.json"  # beside the videos: some of their pictures
 FOLDERS = ("tables", "figures", "videos")
+ANGLES, JOINT_ANGLES, FLIGHT = (f"{FOLDERS[0]}/{name}.csv" for name in ("angles", "joint_angles", "flight"))
+_COUNTS = {"name", "n_frames", "n_tracked", "n_uncertain", "n_lost"}  # that every summary holds
+_TELLING = ("matching.png", "heights.png", "through_mask.png", "pose.png")  # figures that tell most of a run
 
 
 def tables_of(folder: Path) -> Path:
@@ -31,6 +34,12 @@ def tables_of(folder: Path) -> Path:
 def figures_of(folder: Path) -> Path:
     """Return where a run's figures lie, made if need be."""
     return _create(folder / FOLDERS[1])
+
+
+def list_figures(folder: Path) -> list[Path]:
+    """List a run's figures, that first which tells most of it."""
+    found = sorted((folder / FOLDERS[1]).glob("*.png"))
+    return sorted(found, key=lambda path: _TELLING.index(path.name) if path.name in _TELLING else len(_TELLING))
 
 
 def videos_of(folder: Path) -> Path:
@@ -76,6 +85,30 @@ def read_players_run(folder: Path) -> PlayersMotion:
     """Return the motion of the run of players in a folder. Raises ResultError as `read_body_run` does."""
     check_record(folder)
     return read_players(folder / JOINTS)
+
+
+def read_summary(folder: Path) -> dict[str, Any]:
+    """Read the summary of a finished run. Raises ResultError where it is missing or damaged."""
+    path = folder / SUMMARY
+    try:
+        summary = read_json(path)
+    except (OSError, ValueError) as error:
+        raise ResultError(f"{path} cannot be read ({str(error)[:120]}); correct it, or track again") from None
+    if not isinstance(summary, dict) or not _is_summary(summary):
+        raise ResultError(f"{path} holds no summary of a run; correct it, or track again")
+    return summary
+
+
+def _is_summary(summary: dict[str, Any]) -> bool:
+    """Tell whether a document is a summary: its counts are there, its findings and warnings of the right kind."""
+    findings, warnings = summary.get("self_check") or [], summary.get("warnings") or []
+    return (
+        summary.keys() >= _COUNTS
+        and isinstance(findings, list)
+        and isinstance(warnings, list)
+        and all(isinstance(each, str) for each in warnings)
+        and all(isinstance(each, dict) and {"sentence", "is_alarm"} <= each.keys() for each in findings)
+    )
 
 
 def check_record(folder: Path) -> None:

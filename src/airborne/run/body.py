@@ -31,7 +31,17 @@ from airborne.motion import (
     write_joints,
     write_motion_parquet,
 )
-from airborne.motion.run_folder import BODY, JOINTS, MOTION, figures_of, tables_of, videos_of
+from airborne.motion.run_folder import (
+    ANGLES,
+    BODY,
+    FLIGHT,
+    JOINT_ANGLES,
+    JOINTS,
+    MOTION,
+    figures_of,
+    tables_of,
+    videos_of,
+)
 from airborne.motion.tables import write_uncertainty
 from airborne.rendering import FLAT, render
 from airborne.run.find import FoundStart
@@ -206,11 +216,11 @@ def write_tables(folder: Path, motion: Motion, model: BodyModel) -> None:
     tables = tables_of(folder)
     write_joints(folder / JOINTS, motion, model)
     write_motion_parquet(tables / "motion.parquet", motion)
-    write_angles(tables / "angles.csv", motion)
+    write_angles(folder / ANGLES, motion)
     if motion.joints:
-        write_joint_angles(tables / "joint_angles.csv", motion, model)
+        write_joint_angles(folder / JOINT_ANGLES, motion, model)
     if _has_flight(motion, model):
-        write_flight(tables / "flight.csv", motion, model)
+        write_flight(folder / FLIGHT, motion, model)
 
 
 def _has_flight(motion: Motion, model: BodyModel) -> bool:

@@ -40,7 +40,6 @@ from airborne.evaluation.variables import (
 from airborne.export import write_figures, write_json, write_report
 from airborne.export.analysis_figures import write_bland_altman, write_identity
 from airborne.export.viewer import body_viewer
-from airborne.io.text import read_json
 from airborne.io.writing import write_text
 from airborne.motion import run_folder
 from airborne.motion.run_folder import check_record, holds_players, read_body_run
@@ -104,13 +103,7 @@ def _add_to_summary(folder: Path, comparisons: Comparisons) -> dict:
     path = folder / run_folder.SUMMARY
     if not path.is_file() or not os.access(folder, os.W_OK):
         return {}
-    try:
-        summary = read_json(path)
-    except (OSError, ValueError) as error:
-        raise ResultError(f"{path} cannot be read ({str(error)[:120]}); correct it, or remove it") from None
-    if not isinstance(summary, dict):
-        raise ResultError(f"{path} holds no summary of a run; correct it, or remove it")
-    summary |= {name: comparison.to_dict() for name, comparison in comparisons.items()}
+    summary = run_folder.read_summary(folder) | {name: each.to_dict() for name, each in comparisons.items()}
     write_json(path, summary)
     return summary
 

@@ -15,11 +15,10 @@ from airborne.cameras import Rig, read_rig
 from airborne.errors import AirborneError, ResultError, require_choice
 from airborne.export.figures import flight_figure, joints_figure, pose_figure
 from airborne.export.players_report import heights_figure
-from airborne.io.text import read_json
 from airborne.motion import Motion, PlayersMotion, measure_flight, measure_jumps
 from airborne.motion.labelled import label_angles, label_joints, label_jumps, label_players
 from airborne.motion.motion import dataset
-from airborne.motion.run_folder import holds_players, read_body_run, read_players_run
+from airborne.motion.run_folder import holds_players, read_body_run, read_players_run, read_summary
 
 _FIGURES = {"joints": joints_figure, "flight": flight_figure}
 
@@ -64,11 +63,7 @@ class Run:
     @property
     def summary(self) -> dict[str, Any]:
         """What summary.json holds now: headline numbers, method, versions; and comparisons with references."""
-        path = self.folder / "summary.json"
-        try:
-            return read_json(path)
-        except (OSError, ValueError) as error:
-            raise ResultError(f"{path} cannot be read ({error}); finish the run, or track again") from None
+        return read_summary(self.folder)
 
     @cached_property
     def motion(self) -> Motion:

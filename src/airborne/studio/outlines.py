@@ -14,6 +14,7 @@ import numpy as np
 from airborne.body import BodyModel, PosedBody
 from airborne.body.files import read_body
 from airborne.cameras import Camera, Rig, read_rig
+from airborne.errors import ResultError
 from airborne.export.palette import STATUS_RGB, hex_colour
 from airborne.export.views import cached_surface_arrays
 from airborne.motion import Motion, PlayersMotion, read_motion
@@ -23,6 +24,7 @@ from airborne.tracking import Status
 
 _COLOURS = {status.value: hex_colour(rgb) for status, rgb in STATUS_RGB.items()}
 _LIMBS = ("hip", "knee", "ankle", "foot")  # in order down a leg
+_MOST_DIGITS = 10  # of a frame's number
 _PATH_COLOUR = "rgba(255,255,255,0.55)"
 
 
@@ -83,7 +85,8 @@ def run_rows(run: Path) -> tuple[int, int | None]:
     """Return how many frames a run of one body holds so far, and the last one's number."""
     path = run / MOTION
     rows = path.read_bytes().split(b"\n")[1:-1] if path.is_file() else []  # without the header and a torn last line
-    return len(rows), int(rows[-1].partition(b",")[0]) if rows else None
+    newest = rows[-1].partition(b",")[0] if rows else b""
+    return len(rows), int(newest) if newest.isdigit() and len(newest) < _MOST_DIGITS else None
 
 
 def run_body(run: Path) -> BodyModel:
@@ -144,7 +147,9 @@ def _players_overlay(motion: PlayersMotion, cameras: Sequence[Camera], frame: in
 
 
 def _players_curves(motion: PlayersMotion) -> dict[str, Any]:
-    limb = next(limb for limb in reversed(_LIMBS) if f"{limb}_left" in motion.joints)
+    limb = next((limb for limb in reversed(_LIMBS) if {f"{limb}_left", f"{limb}_right"} <= set(motion.joints)), None)
+    if limb is None:
+        raise ResultError("the run holds no legs; track again")
     lower = [motion.joints.index(f"{limb}_{side}") for side in ("left", "right")]
     worst = {Status.TRACKED.value: 0, Status.UNCERTAIN.value: 1, Status.LOST.value: 2}
     statuses = [max(map(str, row), key=lambda each: worst[each]) for row in motion.status]

@@ -8,17 +8,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from threading import Lock
 
-import cv2
-import numpy as np
-
+from airborne.export.pictures import encode_jpeg
 from airborne.trial.cameras import CameraTable
-from airborne.types import Image
 from airborne.video import VideoSource
 from airborne.video.seeking import ImageIndex, ImageReader, TrialClock, index_images, match_images
 
 _MOST_BYTES = 100_000_000  # of JPEG that are kept
 _AHEAD = 4  # pictures made beyond the one that was asked for
-_QUALITY = 92  # of 100
 _MOST_OPEN = 32  # files
 
 Key = tuple[VideoSource, int]
@@ -152,16 +148,3 @@ class Pictures:
             if len(self._videos) > _MOST_OPEN:
                 self._helpers.submit(self._videos.popitem(last=False)[1].close)
         return video
-
-
-def encode_jpeg(image: Image, quality: int = _QUALITY) -> bytes:
-    """Encode an image (h, w, 3) sRGB."""
-    is_done, jpeg = cv2.imencode(".jpg", np.ascontiguousarray(image[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, quality])
-    assert is_done
-    return jpeg.tobytes()
-
-
-def thumbnail(image: Image, width: int) -> bytes:
-    """Encode an image reduced to a width [px]."""
-    height = max(1, round(image.shape[0] * width / image.shape[1]))
-    return encode_jpeg(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8))

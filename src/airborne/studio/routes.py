@@ -13,9 +13,9 @@ from fastapi.responses import FileResponse, JSONResponse, Response
 
 from airborne import export
 from airborne.errors import AirborneError, ResultError
+from airborne.export.pictures import thumbnail
 from airborne.studio.guard import FILE_POLICY
 from airborne.studio.outlines import run_body, run_curves, run_overlay
-from airborne.studio.pictures import thumbnail
 from airborne.studio.project import list_runs, list_videos
 from airborne.studio.session import Session
 from airborne.studio.stage import part_stl

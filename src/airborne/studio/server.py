@@ -45,9 +45,10 @@ def serve(path: Path, *, port: int, browser: bool) -> None:
     """Serve a folder, or one of its trials, until the process is stopped. Raises AirborneError."""
     session = Session(*find_trial(path))
     port, token = _free_port(port), secrets.token_urlsafe(24)
-    address = f"http://{_HOST}:{port}/?token={token}"
+    here = session.place.page if session.place.page in _PAGES else "/"
+    address = f"http://{_HOST}:{port}{here}?token={token}"
     for url, build in _PAGES.items():
-        ui.page(url, title=f"Airborne: {session.folder.name}")(_page(build, session))
+        ui.page(url, title=f"Airborne: {session.folder.name}")(_page(url, build, session))
     add_routes(app, session)
     ui.add_css(_STYLE, shared=True)
     app.add_middleware(Guard, token=token, port=port)
@@ -75,10 +76,11 @@ def serve(path: Path, *, port: int, browser: bool) -> None:
     )
 
 
-def _page(build: Callable[[Session], Awaitable[None]], session: Session) -> Callable[[], Awaitable[None]]:
+def _page(url: str, build: Callable[[Session], Awaitable[None]], session: Session) -> Callable[[], Awaitable[None]]:
     """Bind a page to the session: NiceGUI takes a page's arguments from the address."""
 
     async def page() -> None:
+        session.go(page=url)
         await build(session)
 
     return page

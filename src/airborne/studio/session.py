@@ -12,9 +12,10 @@ from airborne.errors import AirborneError, TrialError
 from airborne.run.opening import calibrated_cameras
 from airborne.studio.commands import Command
 from airborne.studio.pictures import Pictures, ShownTrial
+from airborne.studio.place import Place, read_place, write_place
 from airborne.studio.project import Project, read_project
 from airborne.studio.trial_edits import with_table
-from airborne.studio.writing import Editor
+from airborne.studio.writing import Editor, read_if_there, refuse_outer_links
 from airborne.trial.body import BodyTable
 from airborne.trial.calibration import CalibrationTable
 from airborne.trial.file import Trial
@@ -26,13 +27,26 @@ class Session:
     """One opened folder; everything that lasts is in its files, all else is computed from them anew."""
 
     def __init__(self, folder: Path, path: Path) -> None:
-        """Open a folder and a trial in it, which may not be there yet."""
+        """Open a folder and a trial in it, which may not be there yet. Raises AirborneError for links out of it."""
+        refuse_outer_links(folder)
         self.folder, self.path = folder, path
         self.pictures, self.editor = Pictures(), Editor(folder)
-        self.frame = 0  # in view
+        self.place = read_place(folder)
         self.commands: dict[str, Command] = {}  # that were started here, by what they do
         self._known: dict[str, tuple[Hashable, Any]] = {}
         self._lock = Lock()
+
+    @property
+    def frame(self) -> int:
+        """The frame in view."""
+        return self.place.frame
+
+    def go(self, *, page: str | None = None, frame: int | None = None) -> None:
+        """Note the page, or the frame, in view."""
+        place = Place(self.place.page if page is None else page, self.place.frame if frame is None else frame)
+        if place != self.place:
+            self.place = place
+            write_place(self.folder, place)
 
     @property
     def stamp(self) -> Hashable:
@@ -69,8 +83,7 @@ class Session:
 
     def edit_trial(self, change: Callable[[str], str], what: str) -> None:
         """Change the trial's text."""
-        text = self.path.read_text(encoding="utf-8") if self.path.is_file() else ""
-        self.edit(self.path.name, change(text), what)
+        self.edit(self.path.name, change(read_if_there(self.path) or ""), what)
 
     def set_table(self, head: str, values: dict[str, Any], what: str) -> None:
         """Set values in a table of the trial; None takes a key away."""

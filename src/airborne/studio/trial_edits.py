@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import tomlkit
-from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT
 
 from airborne.errors import TrialError
+from airborne.io.text import parse_editable_toml
 
 
 def with_cameras(text: str, name: str, cameras: Sequence[Mapping[str, Any]]) -> str:
@@ -42,7 +42,8 @@ def with_table(text: str, head: str, values: Mapping[str, Any]) -> str:
     if table is None:
         table = tomlkit.table()
         document.add(head, table)
-    assert isinstance(table, dict)
+    if not isinstance(table, dict):
+        raise TrialError(f"{head} is no table of the trial; correct the file by hand")
     for key, value in values.items():
         _set(table, key, value)
     return tomlkit.dumps(document)
@@ -79,6 +80,6 @@ def _set(table: Any, key: str, value: Any) -> None:
 
 def _parse(text: str) -> tomlkit.TOMLDocument:
     try:
-        return tomlkit.parse(text)
-    except TOMLKitError as error:
-        raise TrialError(f"the trial file is no TOML: {error}; correct it by hand") from None
+        return parse_editable_toml(text)
+    except ValueError as error:
+        raise TrialError(f"the trial file cannot be edited: {error}; correct it by hand") from None

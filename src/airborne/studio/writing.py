@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from airborne.errors import TrialError
-from airborne.io.writing import explain_full_disk
+from airborne.io.folder_lock import refuse_links
+from airborne.io.text import read_text
+from airborne.io.writing import replace_text
 
 KEPT = 10  # earlier versions of a file
+_LARGEST_BYTES = 50_000_000  # of a file that is edited
 FOLDER = ".airborne"  # inside the trial's folder: earlier versions, and what the studio remembers
 
 
@@ -35,7 +37,7 @@ class Editor:
     def write(self, name: str, text: str, what: str) -> None:
         """Write a text file of the folder; raises TrialError for a name that leads out of it."""
         path = self.folder / name
-        edit = Edit(what, path, _read(path), text)
+        edit = Edit(what, path, read_if_there(path), text)
         if edit.before == text:
             return
         self._replace(path, text)
@@ -65,7 +67,7 @@ class Editor:
             raise TrialError(f"there is nothing to {verb}")
         edit = source[-1]
         present, text = (edit.after, edit.before) if verb == "undo" else (edit.before, edit.after)
-        if _read(edit.path) != present:
+        if read_if_there(edit.path) != present:
             raise TrialError(f"{edit.path.name} was changed elsewhere since; its earlier versions are in {FOLDER}")
         self._replace(edit.path, text)
         target.append(source.pop())
@@ -78,16 +80,24 @@ class Editor:
         if text is None:
             path.unlink(missing_ok=True)
             return
-        part = path.with_name(f"{path.name}.part")
-        with explain_full_disk(path), part.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
+        replace_text(path, text)
 
 
-def _read(path: Path) -> str | None:
-    return path.read_text(encoding="utf-8") if path.is_file() else None
+def refuse_outer_links(folder: Path) -> None:
+    """Raise AirborneError where what the studio keeps in a folder would be written elsewhere through a link."""
+    if (folder / FOLDER).is_symlink():
+        raise TrialError(f"{folder / FOLDER} is a link, through which nothing is written; remove it")
+    refuse_links(folder / FOLDER)
+
+
+def read_if_there(path: Path) -> str | None:
+    """Return a text file of the folder, None where it is not there. Raises TrialError for what is no text."""
+    try:
+        return read_text(path, _LARGEST_BYTES)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise TrialError(f"{path.name} cannot be read ({error}); correct it, or move it away") from None
 
 
 def _keep(folder: Path, path: Path) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from airborne.errors import ResultError, require_choice
 from airborne.io.text import read_csv
-from airborne.motion.run_folder import JOINTS
+from airborne.motion.run_folder import ANGLES, FLIGHT, JOINT_ANGLES, JOINTS
 from airborne.study.trials import LARGEST, StudyTrial
 from airborne.types import Array
 
@@ -20,8 +20,8 @@ NODES = 100  # of a curve between two events: one a percent
 CURVE_EVENTS = ("start", "end", "take-off", "landing", "turn-1")  # turn-2, ... too
 _TURN = re.compile(r"turn-([1-9]\d?)")
 _OF_THE_ROW = {"take-off": "takeoff_s", "landing": "landing_s"}
-_WIDE = ("tables/angles.csv", "tables/flight.csv")
-_LONG = {JOINTS: ("m", "sd_m"), "tables/joint_angles.csv": ("deg", "{axis}_deg_sd")}  # unit and sd of x_m, x_deg
+_WIDE = (ANGLES, FLIGHT)
+_LONG = {JOINTS: ("m", "sd_m"), JOINT_ANGLES: ("deg", "{axis}_deg_sd")}  # unit and sd of x_m, x_deg
 _JOINT_TABLES = [Path(name).name for name in _LONG]
 _FORM = "a run's table has a line of names, time_s among them, and as many cells in each line"
 _FEWEST = 3  # known frames of a curve
@@ -110,7 +110,7 @@ def normalise_time(curve: RunCurve, times: Sequence[float]) -> tuple[Array, Arra
 
 def sample(curve: RunCurve, time_s: Array) -> tuple[Array, Array]:
     """Return a curve and its variance at some times, linear between the known frames; 0 where none is stated."""
-    sd = np.interp(time_s, curve.time_s, np.where(np.isfinite(curve.sd), curve.sd, 0.0))
+    sd = np.interp(time_s, curve.time_s, np.where(np.abs(curve.sd) < LARGEST, curve.sd, 0.0))
     return np.interp(time_s, curve.time_s, curve.values), sd**2
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from airborne.batch.trials import TABLE
 from airborne.errors import ResultError
+from airborne.io.names import check_path
 from airborne.io.text import read_csv
 
 ATHLETE, CONDITION = "athlete", "condition"  # the labels that a study needs
@@ -70,11 +71,11 @@ def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
         if conditions and row[CONDITION] not in conditions:
             continue
         if row["status"] != "done":
-            left_out.append(f"{row['trial']}: failed: {row['error']}")
+            left_out.append(f"{row['trial']}: {row['status']}: {row['error']}")
         elif not athlete or not row[CONDITION]:
             left_out.append(f"{row['trial']}: has no label {CONDITION if athlete else ATHLETE}")
         else:
-            trials.append(StudyTrial(row["trial"], athlete, row[CONDITION], folder / row["folder"], row))
+            trials.append(StudyTrial(row["trial"], athlete, row[CONDITION], _folder_of(folder, row), row))
     if not trials:
         why = f"; {left_out[0]}" if left_out else ""
         raise ResultError(f"{folder / TABLE}: no finished trial with labels {ATHLETE} and {CONDITION}{why}")
@@ -83,3 +84,11 @@ def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
     if missing:
         raise ResultError(f"{folder / TABLE}: no finished trial of condition {missing[0]}; it has: {', '.join(found)}")
     return Study(tuple(trials), tuple(conditions) or tuple(found), tuple(left_out))
+
+
+def _folder_of(folder: Path, row: Mapping[str, str]) -> Path:
+    """Return where a trial's run lies; raises ResultError where nothing can lie there."""
+    try:
+        return folder / check_path(row["folder"])
+    except ValueError as error:
+        raise ResultError(f"{folder / TABLE}, folder of {row['trial'][:80]}: {error}") from None

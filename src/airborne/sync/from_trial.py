@@ -12,7 +12,8 @@ import tomlkit
 
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, TrialError
-from airborne.io.writing import write_text
+from airborne.io.text import parse_editable_toml
+from airborne.io.writing import replace_text
 from airborne.run.opening import open_cameras, video_source
 from airborne.sync import Offsets, offsets_by_flash, offsets_by_motion, offsets_by_sound
 from airborne.sync.from_tracking import offsets_by_tracking
@@ -85,16 +86,17 @@ def write_offsets(path: Path, offsets: Offsets) -> None:
 
     Raises TrialError where the file's cameras are not those of the offsets.
     """
-    document = tomlkit.parse(path.read_text(encoding="utf-8-sig"))
+    try:
+        document = parse_editable_toml(path.read_text(encoding="utf-8-sig"))
+    except ValueError as error:
+        raise TrialError(f"{path}: cannot be edited ({error}); write the offsets into it by hand") from None
     cameras: Any = document.get("camera", [])
     names = [camera.get("name") for camera in cameras]
     if names != list(offsets.names):
         raise TrialError(f"{path}: has the cameras {names}, but offsets are of {list(offsets.names)}; run sync again")
     for number, camera in enumerate(cameras):
         _set_keys(camera, _entries(offsets, number))
-    part_file = path.with_name(path.name + ".part")
-    write_text(part_file, tomlkit.dumps(document))
-    part_file.replace(path)
+    replace_text(path, tomlkit.dumps(document))
 
 
 def _set_keys(table: Any, entries: dict[str, float]) -> None:

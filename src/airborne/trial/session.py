@@ -9,6 +9,7 @@ from typing import Any
 
 from airborne.errors import TrialError
 
+_LONGEST_WORD = 80  # characters of a label, which a session may repeat
 _PLACE = re.compile(r"\{([^{}]*)\}")  # in a text of a session: {athlete}
 
 
@@ -23,6 +24,11 @@ def join_session(tables: dict[str, Any], session: dict[str, Any], path: Path) ->
     labels = tables.get("labels", {})
     words = {**(labels if isinstance(labels, dict) else {}), "trial": tables["name"]}
     athletes = session.get("athletes", {})
+    long = [key for key, value in words.items() if len(str(value)) > _LONGEST_WORD]
+    if long:
+        raise TrialError(
+            f"{path.name}: the label {str(long[0])[:40]} is too long; give it {_LONGEST_WORD} characters at most"
+        )
     own = athletes.get(str(words.get("athlete")), {}) if isinstance(athletes, dict) else None
     if not isinstance(own, dict):
         raise TrialError(

@@ -167,8 +167,11 @@ def _moments_by_time_stamps(
     if not rows or not np.isfinite([row[2] for row in rows]).all():
         raise CalibrationError(f"{path} holds no time stamps, or one that is no number; {expected}")
     ids = {row[1] for row in rows}
-    moment = {sync: m for m, sync in enumerate(sorted({row[0] for row in rows}))}
-    time_s = np.array([np.mean([row[2] for row in rows if moment[row[0]] == m]) for m in range(len(moment))])
+    stamps_s: dict[int, list[float]] = {sync: [] for sync in sorted({row[0] for row in rows})}
+    for sync, _, stamp_s in rows:
+        stamps_s[sync].append(stamp_s)
+    moment = {sync: m for m, sync in enumerate(stamps_s)}
+    time_s = np.array([np.mean(each) for each in stamps_s.values()])
     moments, findings = [], []
     for camera in cameras:
         key = _stamp_id(camera.name, ids)

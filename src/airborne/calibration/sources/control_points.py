@@ -15,6 +15,7 @@ from airborne.io.text import read_csv
 from airborne.types import Array
 
 _WORLD_COLUMNS = ("x_m", "y_m", "z_m")
+_MOST_COLUMNS = 1000  # two for each camera
 _EXPECTED = "expected point,x_m,y_m,z_m,cam1_u,cam1_v,..."
 
 
@@ -46,6 +47,8 @@ def read_control_points(path: str | Path, scene_points: dict[str, ScenePoint] | 
     """
     path = Path(path)
     header, *rows = _read_rows(path)
+    if len(header) > _MOST_COLUMNS:
+        raise CalibrationError(f"{path}: {len(header)} columns, expected {_MOST_COLUMNS} at most; {_EXPECTED}")
     column = {name: i for i, name in enumerate(header)}
     cameras = _check_header(path, header, needs_world=not scene_points)
     n = len(header)

@@ -68,7 +68,8 @@ class ClickPanel(PointsPanel):
     async def turn_to(self, frame: int) -> None:
         """Show the clicks of another frame."""
         if frame != self.frame:
-            self.frame = self.session.frame = frame
+            self.frame = frame
+            self.session.go(frame=frame)
             self.selected = None
             self.show()
             await self.reread()

@@ -144,7 +144,8 @@ class DigitisePanel(PointsPanel):
     async def turn_to(self, frame: int) -> None:
         """Show the clicks of another frame."""
         if frame != self.frame:
-            self.frame = self.session.frame = frame
+            self.frame = frame
+            self.session.go(frame=frame)
             self.selected = None
             self.clicked = self._of_frame()
             self.show()

@@ -65,7 +65,8 @@ class FindPanel:
 
     def turn_to(self, frame: int) -> None:
         """Show the outline in its own frame only."""
-        self.frame = self.session.frame = frame
+        self.frame = frame
+        self.session.go(frame=frame)
         self.view.show_over((), self.outline if frame == self.at else ())
 
     def search(self) -> None:

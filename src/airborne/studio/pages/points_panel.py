@@ -68,7 +68,7 @@ class PointsPanel:
 
     async def turn_to(self, frame: int) -> None:
         """Note the frame in view."""
-        self.session.frame = frame
+        self.session.go(frame=frame)
 
     async def pick(self, pane: int, u: float, v: float, near: str | None) -> None:
         """Set the chosen point in a camera; where it is set already, a click close to a mark chooses that."""

@@ -8,9 +8,8 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from airborne.errors import count
-from airborne.io.text import read_json
-from airborne.motion.run_folder import REPORT, SUMMARY, note_if_unfinished
+from airborne.errors import ResultError, count
+from airborne.motion.run_folder import REPORT, note_if_unfinished, read_summary
 from airborne.run.folder import list_tables
 from airborne.studio.pages.layout import page_frame
 from airborne.studio.project import list_runs
@@ -47,7 +46,10 @@ def _run_card(folder: Path) -> None:
     if (folder / REPORT).is_file():
         _link(folder, REPORT, "Open the report")
     if note is None:
-        _numbers(read_json(folder / SUMMARY))
+        try:
+            _numbers(read_summary(folder))
+        except ResultError as error:
+            ui.label(str(error)).classes("bad small")
     ui.label("Tables").classes("soft")
     with ui.element("div").classes("row-line"):
         for name in list_tables(folder):

@@ -61,7 +61,7 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
         bodies.append(correction.turn_to)
 
     def turn_to(frame: int) -> None:
-        session.frame = frame
+        session.go(frame=frame)
         for show in bodies:
             show(frame)
 

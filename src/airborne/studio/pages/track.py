@@ -15,7 +15,7 @@ from airborne.studio.commands import STOPPED, Command
 from airborne.studio.outlines import run_rows
 from airborne.studio.pages.layout import complain, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
-from airborne.studio.project import list_runs
+from airborne.studio.project import is_inside, list_runs
 from airborne.studio.session import Session
 from airborne.studio.view import CameraViews
 
@@ -105,7 +105,7 @@ class _Panel:
 
     def turn_to(self, frame: int) -> None:
         """Note the frame in view."""
-        self.session.frame = frame
+        self.session.go(frame=frame)
 
     def start(self, *options: str) -> None:
         """Start `airborne track`."""
@@ -113,6 +113,8 @@ class _Panel:
             return
         try:
             check_name(self.folder.name)
+            if not is_inside(self.session.folder, self.folder):
+                raise TrialError(f"{self.folder.name} is a link that leads out of the folder; give another name")
             self.session.project().trial()
         except (ValueError, TrialError) as error:
             complain(str(error))
