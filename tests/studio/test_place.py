@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from airborne.studio.place import Place, read_place, write_place
+from airborne.studio.place import LastView, read_place, write_place
 from airborne.studio.session import Session
 from airborne.studio.writing import FOLDER
 from tests.support.places import THROWN_CROSS
@@ -17,19 +17,19 @@ N_KILLS = 2  # more: benchmarks/kills.py studio
 
 def test_page_and_frame_are_found_again(tmp_path):
     session = Session(tmp_path, tmp_path / "trial.toml")
-    assert session.place == Place("/", 0)
+    assert session.place == LastView("/", 0)
     session.go(page="/review")
     session.go(frame=17)
-    assert Session(tmp_path, tmp_path / "trial.toml").place == Place("/review", 17)
+    assert Session(tmp_path, tmp_path / "trial.toml").place == LastView("/review", 17)
 
 
 @pytest.mark.parametrize(
     "text", ["", "[", "[1]", '{"page": 3, "frame": 1}', '{"page": "/", "frame": -1}', '{"page": "/"}']
 )
 def test_a_place_that_is_none_is_the_beginning(tmp_path, text):
-    write_place(tmp_path, Place("/track", 3))
+    write_place(tmp_path, LastView("/track", 3))
     (tmp_path / FOLDER / "place.json").write_text(text)
-    assert read_place(tmp_path) == Place()
+    assert read_place(tmp_path) == LastView()
 
 
 def test_no_edit_is_lost_when_the_studio_is_killed(tmp_path):
@@ -42,9 +42,9 @@ def test_no_edit_is_lost_when_the_studio_is_killed(tmp_path):
 
 
 def test_the_address_that_is_printed_is_the_page_that_was_open(tmp_path):
-    write_place(tmp_path, Place("/videos/../etc", 3))
+    write_place(tmp_path, LastView("/videos/../etc", 3))
     with open_studio(tmp_path) as address:
         assert "/?token=" in address
-    write_place(tmp_path, Place("/review", 3))
+    write_place(tmp_path, LastView("/review", 3))
     with open_studio(tmp_path) as address:
         assert "/review?token=" in address

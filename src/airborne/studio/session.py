@@ -12,7 +12,7 @@ from airborne.errors import AirborneError, TrialError
 from airborne.run.opening import calibrated_cameras
 from airborne.studio.commands import Command
 from airborne.studio.pictures import Pictures, ShownTrial
-from airborne.studio.place import Place, read_place, write_place
+from airborne.studio.place import LastView, read_place, write_place
 from airborne.studio.project import Project, read_project
 from airborne.studio.trial_edits import with_table
 from airborne.studio.writing import Editor, read_if_there, refuse_outer_links
@@ -43,7 +43,7 @@ class Session:
 
     def go(self, *, page: str | None = None, frame: int | None = None) -> None:
         """Note the page, or the frame, in view."""
-        place = Place(self.place.page if page is None else page, self.place.frame if frame is None else frame)
+        place = LastView(self.place.page if page is None else page, self.place.frame if frame is None else frame)
         if place != self.place:
             self.place = place
             write_place(self.folder, place)
