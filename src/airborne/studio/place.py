@@ -14,25 +14,25 @@ _FILE = "place.json"
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class LastView:
     """A page of the studio and a frame of the trial."""
 
     page: str = "/"  # its address
     frame: int = 0
 
 
-def read_place(folder: Path) -> Place:
+def read_place(folder: Path) -> LastView:
     """Return where the user was in a folder; the beginning where nothing, or nothing sensible, is remembered."""
     try:
         known = read_json(folder / FOLDER / _FILE)
         page, frame = known["page"], known["frame"]
     except (OSError, ValueError, KeyError, TypeError):
-        return Place()
+        return LastView()
     is_sensible = isinstance(page, str) and isinstance(frame, int) and 0 <= frame < 2**31
-    return Place(page, frame) if is_sensible else Place()
+    return LastView(page, frame) if is_sensible else LastView()
 
 
-def write_place(folder: Path, place: Place) -> None:
+def write_place(folder: Path, place: LastView) -> None:
     """Remember where the user is."""
     (folder / FOLDER).mkdir(exist_ok=True)
     replace_text(folder / FOLDER / _FILE, json.dumps(asdict(place)) + "\n", is_durable=False)
