@@ -182,7 +182,7 @@ def trials(folder):
 
     def whole(path):
         trial = read_trial(path)
-        return trial.players if trial.has_players else (trial.settings, trial.model())
+        return trial.start.player if trial.has_players else (trial.settings, trial.model())
 
     yield example_case("trial", folder, "trial.toml", whole)
     shared = folder / "shared"
