@@ -37,7 +37,6 @@ def trial(tmp_path_factory) -> Path:
             shutil.copyfile(path, folder / path.name)
     exact = ('control_points = "control_points.csv"', CALIBRATED)  # saves each run the fit of the cameras
     edit_trial(folder / "trial.toml", "trial.toml", ("[track]", f"[track]\nstop = {SHORT}"), exact)
-    edit_trial(folder / "trial.toml", "whole.toml", (f"stop = {SHORT}", ""))
     edit_trial(folder / "trial.toml", "long.toml", (f"stop = {SHORT}", f"stop = {LONG}"))
     return folder / "trial.toml"
 
@@ -61,8 +60,9 @@ def edit_trial(path: Path, name: str, *replacements: tuple[str, str]) -> Path:
 
 
 def start_command(*arguments) -> subprocess.Popen:
-    """Start a command of its own process."""
-    command = [sys.executable, "-c", "from airborne.cli import main; main()", *map(str, arguments)]
+    """Start a command of its own process, which Ctrl-C reaches even where the tests run in a shell's background."""
+    heed = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    command = [sys.executable, "-c", f"{heed}; from airborne.cli import main; main()", *map(str, arguments)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
@@ -232,8 +232,8 @@ def test_a_killed_run_is_readable_and_resumes_to_the_same_bytes(trial, tmp_path)
 
 
 def test_ctrl_c_stops_with_one_line_and_keeps_the_frames(trial, tmp_path):
-    whole = trial.with_name("whole.toml")  # all of it by simplex, slow enough not to end before the signal
-    process = start_command("track", whole, "-o", tmp_path / "run", "--no-pictures", "--method", "simplex")
+    long = trial.with_name("long.toml")  # by simplex, slow enough not to end before the signal
+    process = start_command("track", long, "-o", tmp_path / "run", "--no-pictures", "--method", "simplex")
     wait_for_rows(process, tmp_path / "run" / "motion.csv", 1)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=PATIENCE_S)
