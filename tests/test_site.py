@@ -106,5 +106,5 @@ def test_every_command_and_room_has_its_reference(site):
     commands = (site / "reference" / "commands.html").read_text(encoding="utf-8")
     for name in ("airborne track", "airborne fit-body", "airborne synth block"):
         assert f">{name}<" in commands
-    assert "its [start] has detections" in commands
+    assert "is [start] right?" in commands
     assert "px_from_world" in (site / "reference" / "python" / "airborne.cameras.html").read_text(encoding="utf-8")
