@@ -46,11 +46,16 @@ def tracking(trial_file: Path, stop: int | None, keep: bool) -> Callable[[], tup
     opened = open_trial(trial)
     frames = list(opened.recording) if keep else opened.recording
     subject: Any = PlayersRun.open(trial, opened) if trial.has_players else BodyRun.open(trial, opened)
-    tracker = subject.see(next(iter(frames))).tracker()
+    subject = subject.see(next(iter(frames)))
+
+    def steps() -> Any:
+        if hasattr(subject, "track"):
+            return subject.track(frames, lambda found: None, {}, lambda n_done: None)
+        return track_frames(subject.tracker(), frames, lambda found: None)  # of revisions without keys
 
     def track() -> tuple[float, int]:
         begun = time.process_time()
-        n = sum(1 for _ in track_frames(tracker, frames, lambda found: None))
+        n = sum(1 for _ in steps())
         return time.process_time() - begun, n
 
     return track
