@@ -9,6 +9,7 @@ from airborne.errors import AirborneError
 from airborne.run.keys import read_keys
 from airborne.trial.file import Trial, list_wrong_names
 from tests.support.people import THREE
+from tests.support.scenes import CROSS
 
 MODEL, RIG = human18(), Rig(THREE)
 LANDMARKS = [landmark.name for landmark in MODEL.landmarks]
@@ -109,3 +110,13 @@ def test_a_missing_table_is_named(tmp_path):
     given = trial({"frame": 9, "points_px": "clicks.csv"})
     given._folder = tmp_path
     assert any("clicks.csv" in line for line in list_wrong_names(given))
+
+
+def test_a_click_outside_the_image_is_refused():
+    said = complaint({"frame": 9, "points_px": {"wrist_left": {"cam1": [30000.0, 120.0]}}})
+    assert "wrist_left is clicked at 30000, 120 in cam1, whose images have" in said
+
+
+def test_a_thing_has_no_landmarks_of_a_person():
+    with pytest.raises(AirborneError, match="has no landmark elbow_left; it has: "):
+        read_keys(trial({"frame": 9, "joints_m": {"elbow_left": [0, 0, 1]}}), CROSS, RIG, ())

@@ -81,9 +81,22 @@ def _pixels(
         row = detections.at_image(key.frame).above_visibility(LEAST_VISIBILITY)
         px = _by_landmark(model, where, row.points, row.px[0])
     if key.points_px is not None:
-        clicked = _by_landmark(model, where, *read_pixels(trial, key.points_px, rig.names, fewest=1))
+        names, read = read_pixels(trial, key.points_px, rig.names, fewest=1)
+        _check_inside(f"{trial.name}: {where}", names, read, rig)
+        clicked = _by_landmark(model, where, names, read)
         px = np.where(np.isfinite(clicked), clicked, px)
     return px, sds
+
+
+def _check_inside(where: str, names: Sequence[str], px: Array, rig: Rig) -> None:
+    """Raise TrialError for a click (points, cameras, 2) [px] outside its camera's image."""
+    sizes = np.array([camera.size for camera in rig])
+    for point, camera in np.argwhere(((px < -0.5) | (px > sizes - 0.5)).any(axis=-1)):
+        (u, v), (width, height) = px[point, camera], sizes[camera]
+        raise TrialError(
+            f"{where}: {names[point]} is clicked at {u:g}, {v:g} in {rig.names[camera]}, whose images have "
+            f"{width}×{height} px; correct it"
+        )
 
 
 def _by_landmark(model: BodyModel, where: str, names: Sequence[str], points: Array) -> Array:

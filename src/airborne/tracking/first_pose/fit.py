@@ -106,10 +106,11 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
 
 
 def check_landmark_names(model: BodyModel, where: str, names: Sequence[str]) -> None:
-    """Raise TrialError for a name that is neither a landmark of the body nor a network's point."""
+    """Raise TrialError for a name that is neither a landmark of the body nor, of one with joints, a network's point."""
     landmarks = [landmark.name for landmark in model.landmarks]
     of_networks = {*chain.from_iterable(skeleton.points for skeleton in SKELETONS.values())}
-    unknown = [name for name in names if name not in landmarks and name not in of_networks]
+    known = {*landmarks, *of_networks} if model.has_joints else {*landmarks}
+    unknown = [name for name in names if name not in known]
     if unknown:
         raise TrialError(
             f"{where}: body '{model.name}' has no landmark {', '.join(unknown)}; it has: {', '.join(landmarks)}"
