@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from airborne.errors import AirborneError
+from airborne.evaluation import format_clicked_frames
 from airborne.studio.digitising import (
     Repetition,
     clicks_of_frame,
@@ -12,7 +13,6 @@ from airborne.studio.digitising import (
     predict_click,
     read_digitising,
     set_frame,
-    table_text,
 )
 
 CAMERAS = ("left", "far_left")
@@ -34,7 +34,7 @@ def table(tmp_path):
 
 def test_what_is_written_is_read_again(table, tmp_path):
     path = tmp_path / "digitised_A_1.csv"
-    path.write_text(table_text(table, CAMERAS))
+    path.write_text(format_clicked_frames(table, CAMERAS))
     again = read_digitising(path, CAMERAS, ())
     assert again.points == ("bar_minus", "bar_plus", "hand") and again.index.tolist() == [2, 4, 8]
     np.testing.assert_array_equal(again.px, table.px)
@@ -44,7 +44,7 @@ def test_what_is_written_is_read_again(table, tmp_path):
 
 def test_a_click_taken_back_leaves_a_blank(table):
     table = digitise(table, 4, "hand", "left", (np.nan, np.nan))
-    assert table_text(table, CAMERAS).splitlines()[2] == "4,,,,,,,20.0,5.0,,,,"
+    assert format_clicked_frames(table, CAMERAS).splitlines()[2] == "4,,,,,,,20.0,5.0,,,,"
 
 
 def test_a_point_is_expected_on_the_line_through_the_two_nearest_frames(table):

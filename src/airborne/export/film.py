@@ -11,6 +11,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from airborne.export.pictures import encode_jpeg
 from airborne.geometry.even_sample import EvenSample
 from airborne.io.writing import write_text
 from airborne.types import Image
@@ -52,5 +53,5 @@ def _encode(image: Image) -> str:
     height, width = image.shape[:2]
     share = min(1.0, _LONGEST_SIDE_PX / max(height, width))
     size = (max(1, round(share * width)), max(1, round(share * height)))
-    small = cv2.resize(np.ascontiguousarray(image[..., ::-1]), size, interpolation=cv2.INTER_AREA)
-    return base64.b64encode(cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()).decode()
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.uint8)
+    return base64.b64encode(encode_jpeg(small, _QUALITY)).decode()

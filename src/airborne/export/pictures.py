@@ -10,9 +10,9 @@ from airborne.types import Image
 _QUALITY = 92  # of 100
 
 
-def encode_jpeg(image: Image) -> bytes:
+def encode_jpeg(image: Image, quality: int = _QUALITY) -> bytes:
     """Encode an image (h, w, 3) sRGB."""
-    is_done, jpeg = cv2.imencode(".jpg", np.ascontiguousarray(image[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    is_done, jpeg = cv2.imencode(".jpg", np.ascontiguousarray(image[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, quality])
     assert is_done
     return jpeg.tobytes()
 

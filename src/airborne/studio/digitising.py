@@ -13,7 +13,7 @@ import numpy as np
 from airborne.body import BodyModel
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, ResultError
-from airborne.evaluation import DigitisedPoints, box_ends, format_clicked_frames, read_clicked_frames
+from airborne.evaluation import DigitisedPoints, box_ends, read_clicked_frames
 from airborne.motion import Motion
 from airborne.studio.clicks import Clicked
 from airborne.types import Array
@@ -98,11 +98,6 @@ def set_frame(table: DigitisedPoints, frame: int, clicked: Clicked, cameras: Seq
     return replace(table, index=index[order], px=every[order])
 
 
-def table_text(table: DigitisedPoints, cameras: Sequence[str]) -> str:
-    """Return the table's text."""
-    return format_clicked_frames(table, cameras)
-
-
 def predict_click(table: DigitisedPoints, frame: int, point: str, camera: int) -> Array:
     """Return where a point is expected (2,) [px], on a line through its clicks in the two nearest frames; NaN if far.
 
@@ -121,9 +116,9 @@ def predict_click(table: DigitisedPoints, frame: int, point: str, camera: int) -
     return px[a] + share * (px[b] - px[a])
 
 
-def record_text(who: Repetition, *, epipolar_help: bool) -> str:
-    """Return what is noted of how clicks were made: help from the other cameras makes them depend on each other."""
-    return json.dumps({"operator": who.operator, "repetition": who.number, "epipolar_help": epipolar_help}) + "\n"
+def record_text(who: Repetition) -> str:
+    """Return what is noted of clicks made with help from the other cameras, which makes them depend on each other."""
+    return json.dumps({"operator": who.operator, "repetition": who.number, "epipolar_help": True}) + "\n"
 
 
 def joint_paths_text(table: DigitisedPoints, rig: Rig, motion: Motion) -> str:

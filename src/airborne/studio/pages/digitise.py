@@ -11,6 +11,7 @@ from nicegui import ui
 from airborne.body import BodyModel
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, count
+from airborne.evaluation import format_clicked_frames
 from airborne.motion.run_folder import holds_players
 from airborne.run.evaluate import assess, evaluate_agreement
 from airborne.studio.clicks import Clicked
@@ -26,7 +27,6 @@ from airborne.studio.digitising import (
     read_digitising,
     record_text,
     set_frame,
-    table_text,
 )
 from airborne.studio.outlines import run_motion
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
@@ -94,7 +94,7 @@ class DigitisePanel(PointsPanel):
     def text(self, clicked: Clicked) -> str:
         """Return the whole table, with the clicks of the frame in view."""
         cameras = self.shown.names
-        return table_text(set_frame(self.table, self.frame, clicked, cameras), cameras)
+        return format_clicked_frames(set_frame(self.table, self.frame, clicked, cameras), cameras)
 
     def build(self) -> None:
         """Lay out the pictures, who digitises, the points, and what can be compared."""
@@ -155,7 +155,7 @@ class DigitisePanel(PointsPanel):
         with errors_shown():
             table = self._read()
             cameras = self.shown.names
-            if table_text(table, cameras) != table_text(self.table, cameras):
+            if format_clicked_frames(table, cameras) != format_clicked_frames(self.table, cameras):
                 self.table, self.clicked = table, clicks_of_frame(table, self.frame, cameras)
                 self.show()
 
@@ -191,7 +191,7 @@ class DigitisePanel(PointsPanel):
         with errors_shown():
             self.rig = await in_thread(self.session.rig) if is_on else None
             if is_on:
-                self.session.edit(self.who.record, record_text(self.who, epipolar_help=True), "epipolar help used")
+                self.session.edit(self.who.record, record_text(self.who), "epipolar help used")
         self.show()
 
     async def add(self, name: str) -> None:

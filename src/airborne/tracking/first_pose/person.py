@@ -15,6 +15,7 @@ from airborne.body import BodyModel, Pose, PosedBody, SurfaceArrays
 from airborne.cameras import Camera
 from airborne.rendering import EvidenceMaps, evidence_maps, mask_evidence, pose_segments
 from airborne.tracking.first_pose.moments import Moment
+from airborne.tracking.first_pose.rigid_search import roots_of
 from airborne.tracking.model_based.degrees_of_freedom import limbs_of
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
@@ -40,12 +41,7 @@ class PoseSet:
     @classmethod
     def of(cls, poses: Sequence[Pose]) -> PoseSet:
         """Stack poses."""
-        roots = [pose.world_from_root for pose in poses]
-        return cls(
-            np.stack([root.rotation.as_matrix() for root in roots]),
-            np.stack([root.translation for root in roots]),
-            np.stack([pose.joint_angles for pose in poses]),
-        )
+        return cls(*roots_of(poses), np.stack([pose.joint_angles for pose in poses]))
 
     @classmethod
     def join(cls, *poses: PoseSet) -> PoseSet:
