@@ -7,9 +7,15 @@ import pytest
 from matplotlib.figure import Figure
 
 from airborne.evaluation import DigitisedPoses, Truth
-from airborne.export import panels, write_errors, write_figures, write_pose
-from airborne.export.error_figures import _align_by_symmetry, _align_rows, _differences, _match_revolutions
-from airborne.export.figures import write_flight_figure, write_joints_figure
+from airborne.export import panels
+from airborne.export.error_figures import (
+    _align_by_symmetry,
+    _align_rows,
+    _differences,
+    _match_revolutions,
+    write_errors,
+)
+from airborne.export.figures import write_figures, write_flight_figure, write_joints_figure, write_pose
 from airborne.motion.joints import main_joints
 from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run
 from tests.support.tolerances import ROUNDTRIP

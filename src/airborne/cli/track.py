@@ -167,14 +167,14 @@ def _describe_results(output: Path) -> str:
 
 
 def _describe(summary: dict, output: Path) -> str:
-    from airborne.export.players_report import players_summary
-
     counts = ", ".join(f"{summary[f'n_{status}']} {status}" for status in ("tracked", "uncertain", "lost"))
     n, rate_hz = summary["n_frames"], summary["rate_hz"]
     lines = [f"{count(n, 'frame')}{f' at {rate_hz:.5g} Hz' if n > 1 else ''}: {counts}"]
     drawn = [path.relative_to(output).as_posix() for path in _overlays(output)]
     look = f"look at the first frame in {', '.join(drawn)}, " if drawn else ""
     if "players" in summary:
+        from airborne.export.players_report import players_summary
+
         lines += players_summary(summary)
         if n == summary["n_lost"]:
             lines.append(f"no player was found in any frame: {look}correct [[start.player]]")

@@ -61,7 +61,7 @@ def pose_figure(motion: Motion) -> Figure:
 
     Lost frames are gaps, shaded; frames in which some direction is unobservable are hatched.
     """
-    table, singular, unobservable = (
+    angles, singular, unobservable = (
         root_angles(motion),
         panels.singular_frames(motion),
         panels.unobservable_frames(motion),
@@ -71,7 +71,7 @@ def pose_figure(motion: Motion) -> Figure:
         left, right = grid[k]
         for axes, label, values, sd, mask in (
             (left, f"{axis} [m]", motion.position[:, k], motion.position_sd[:, k], unobservable[0]),
-            (right, f"{angle} [°]", table[angle].to_numpy(), table[f"{angle}_sd"].to_numpy(), unobservable[1]),
+            (right, f"{angle} [°]", angles.deg[:, k], angles.sd_deg[:, k], unobservable[1]),
         ):
             panels.draw_band(axes, motion.time_s, values, sd)
             panels.draw_estimate(axes, motion, values)

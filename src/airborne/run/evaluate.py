@@ -37,8 +37,10 @@ from airborne.evaluation.agreement_text import agreement_table, methods_text, re
 from airborne.evaluation.variables import (
     headline_series,
 )
-from airborne.export import write_figures, write_json, write_report
+from airborne.export import write_json
 from airborne.export.analysis_figures import write_bland_altman, write_identity
+from airborne.export.figures import write_figures
+from airborne.export.report import write_report
 from airborne.export.viewer import body_viewer
 from airborne.io.writing import write_text
 from airborne.motion import run_folder
