@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -231,3 +232,15 @@ def bench_command(as_json: Json = False) -> None:
 
     speeds = measure_speed()
     print(json.dumps(speeds) if as_json else "\n".join(f"{name}: {value:.3g}" for name, value in speeds.items()))
+
+
+def warm_command() -> None:
+    """Compile now what the first runs would compile, for machines that are prepared; about a minute, once.
+
+    Example: airborne warm
+    """
+    from airborne.run.warm import warm_kernels
+
+    begun_s = time.monotonic()
+    warm_kernels()
+    print(f"kernels are ready after {time.monotonic() - begun_s:.0f} s")

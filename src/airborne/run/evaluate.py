@@ -39,7 +39,7 @@ from airborne.evaluation.variables import (
 )
 from airborne.export import write_json
 from airborne.export.analysis_figures import write_bland_altman, write_identity
-from airborne.export.figures import write_figures
+from airborne.export.error_figures import write_digitised, write_errors
 from airborne.export.report import write_report
 from airborne.export.viewer import body_viewer
 from airborne.io.writing import write_text
@@ -80,9 +80,11 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
     with open_results(folder):
         summary = _add_to_summary(folder, comparisons)
         if summary and (folder / run_folder.REPORT).is_file():
-            write_figures(
-                run_folder.figures_of(folder), motion, model, truth=true_poses, digitised=clicked, symmetries=symmetry
-            )
+            figures = run_folder.figures_of(folder)
+            if true_poses is not None:
+                write_errors(figures / "errors.png", motion, true_poses, symmetry)
+            if clicked is not None:
+                write_digitised(figures / "digitised.png", motion, clicked, symmetry)
             write_report(folder, summary, body_viewer(folder, motion, model))
     return comparisons
 
