@@ -16,7 +16,7 @@ from airborne.cli.batch import batch_command, new_command
 from airborne.cli.calibrate import calibrate_command
 from airborne.cli.check import check_command
 from airborne.cli.compare import compare_command
-from airborne.cli.console import STOPPED, UNDECIDED, refuse, stop
+from airborne.cli.console import STOPPED, UNDECIDED, refuse, show_notes, stop
 from airborne.cli.convert import convert_command
 from airborne.cli.export import export_command
 from airborne.cli.find import find_command, frame_command
@@ -45,6 +45,7 @@ _COMMANDS = {
     "evaluate": results.evaluate_command,
     "export": export_command,
     "bench": track.bench_command,
+    "warm": track.warm_command,
 }
 _SYNTH = {
     "cross": synth.synth_cross_command,
@@ -74,6 +75,7 @@ app.add_typer(_group(_REPRODUCE, "Repeat a paper's experiment: its table beside 
 def main() -> None:
     """Run the command line; a user's error is one line on stderr and exit code 2."""
     os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", _MOST_PIXELS)  # read when OpenCV is loaded
+    show_notes()
     try:
         code = app(standalone_mode=False)
         if code == STOPPED:  # typer's answer to Ctrl-C
