@@ -49,26 +49,42 @@ def with_table(text: str, head: str, values: Mapping[str, Any]) -> str:
     return tomlkit.dumps(document)
 
 
-def with_click(text: str, frame: int, point: str, camera: str, px: Sequence[float]) -> str:
-    """Return a trial's text with a point clicked at a frame: in the [[key]] of that frame, made if need be.
+def with_clicks(text: str, frame: int, camera: str, clicks: Mapping[str, Sequence[float]]) -> str:
+    """Return a trial's text with points clicked in a camera: in the [[key]] of that frame, made if need be.
 
     Raises TrialError where that key has its clicks in a table of their own.
     """
     document = _parse(text)
+    key = _key(document, frame)
+    points = key.setdefault("points_px", tomlkit.table())
+    if not isinstance(points, dict):
+        raise TrialError(f"the key of frame {frame} has its clicks in {points}; correct them there")
+    for point, px in clicks.items():
+        old = {name: [float(n) for n in at] for name, at in points.get(point, {}).items()}
+        inline = tomlkit.inline_table()
+        inline.update({**old, camera: [round(float(n), 1) for n in px]})
+        points[point] = inline
+    return tomlkit.dumps(document)
+
+
+def with_key(text: str, frame: int, values: Mapping[str, Any]) -> str:
+    """Return a trial's text with values in the [[key]] of a frame, made if need be; None takes a key away."""
+    document = _parse(text)
+    key = _key(document, frame)
+    for name, value in values.items():
+        _set(key, name, value)
+    return tomlkit.dumps(document)
+
+
+def _key(document: tomlkit.TOMLDocument, frame: int) -> Any:
+    """Return the [[key]] of a frame, made if need be."""
     keys = document.setdefault("key", tomlkit.aot())
     key = next((each for each in keys if each.get("frame") == frame), None)
     if key is None:
         key = tomlkit.table()
         key.add("frame", frame)
         keys.append(key)
-    points = key.setdefault("points_px", tomlkit.table())
-    if not isinstance(points, dict):
-        raise TrialError(f"the key of frame {frame} has its clicks in {points}; correct them there")
-    clicks = {name: [float(n) for n in at] for name, at in points.get(point, {}).items()}
-    inline = tomlkit.inline_table()
-    inline.update({**clicks, camera: [round(float(n), 1) for n in px]})
-    points[point] = inline
-    return tomlkit.dumps(document)
+    return key
 
 
 def _set(table: Any, key: str, value: Any) -> None:
