@@ -87,3 +87,9 @@ def test_a_turn_takes_the_place_of_the_other_forms_in_its_key():
     text = with_key(text, 9, {"somersault_tilt_twist_deg": None, "quaternion_xyzw": [0.0, 0.0, 0.0, 1.0]})
     assert parse_toml(text)["key"] == [{"frame": 9, "sd_deg": 4.0, "quaternion_xyzw": [0.0, 0.0, 0.0, 1.0]}]
     assert "# careful" in text
+
+
+def test_cameras_that_stand_in_one_line_keep_what_is_said_of_them():
+    text = 'name = "two"\ncamera = [{ name = "a", video = "a.mp4", drift_ppm = 3.0 }]\nbody = { file = "b.toml" }\n'
+    after = parse_toml(with_cameras(text, "two", [{"video": "a.mp4", "offset_s": 0.5}]))
+    assert after == {**parse_toml(text), "camera": [{"name": "a", "video": "a.mp4", "drift_ppm": 3.0, "offset_s": 0.5}]}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,15 @@ from airborne.tracking.first_pose import fit_to_pixels, pose_by_hand
 
 POSE_COLOUR = "#f0e442"
 _BY_HAND = ("position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg")
-_WAYS = (*_BY_HAND, "find", "joints_m", "points_px", "detections", "detections_cameras")  # a start has one of them
+_WAYS = (
+    *_BY_HAND,
+    "player",
+    "find",
+    "joints_m",
+    "points_px",
+    "detections",
+    "detections_cameras",
+)  # a start has one of them
 
 
 def points_name(frame: int) -> str:
@@ -30,6 +39,16 @@ def read_points(session: Session, frame: int) -> Clicked:
     """Read the landmarks clicked in a frame; none where there is no table. Raises CalibrationError."""
     path = session.folder / points_name(frame)
     return read_clicked(path) if path.is_file() else Clicked((), None, {})
+
+
+def player_file(player: str, frame: int) -> str:
+    """Return the name of the table of a player's points clicked in a frame."""
+    return f"start_{player}_{frame}.csv"
+
+
+def read_player(folder: Path, player: str, frame: int) -> Clicked:
+    """Read a player's points clicked in a frame. Raises CalibrationError."""
+    return read_clicked(folder / player_file(player, frame))
 
 
 def read_pose(session: Session, model: BodyModel) -> tuple[int, Pose] | None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import tomlkit
-from tomlkit.items import AoT
+from tomlkit.items import Table
 
 from airborne.errors import TrialError
 from airborne.io.text import parse_editable_toml
@@ -21,10 +21,11 @@ def with_cameras(text: str, name: str, cameras: Sequence[Mapping[str, Any]]) -> 
     if "name" not in document:
         document.add("name", tomlkit.item(name))
     present = document.get("camera")
-    old = {str(table.get("video")): table for table in present} if isinstance(present, AoT) else {}
+    old = {str(table.get("video")): table for table in present if isinstance(table, dict)} if present else {}
     tables = tomlkit.aot()
     for camera in cameras:
-        table = old.get(str(camera["video"]), tomlkit.table())
+        known = old.get(str(camera["video"]), {})
+        table = known if isinstance(known, Table) else tomlkit.item(dict(known))
         for key, value in camera.items():
             _set(table, key, value)
         tables.append(table)
@@ -73,6 +74,21 @@ def with_key(text: str, frame: int, values: Mapping[str, Any]) -> str:
     key = _key(document, frame)
     for name, value in values.items():
         _set(key, name, value)
+    return tomlkit.dumps(document)
+
+
+def with_players(text: str, frame: int, files: Mapping[str, str]) -> str:
+    """Return a trial's text whose start is these players: name -> table of clicked points."""
+    document = _parse(text)
+    start, players = tomlkit.table(), tomlkit.aot()
+    start.add("frame", frame)
+    for name, file in files.items():
+        player = tomlkit.table()
+        player.update({"name": name, "points_px": file})
+        players.append(player)
+    start.add("player", players)
+    document.pop("start", None)
+    document.add("start", start)
     return tomlkit.dumps(document)
 
 

@@ -20,7 +20,7 @@ from airborne.types import Array
 
 CAMERA_COLOURS = ("#56b4e9", "#e69f00", "#cc79a7", "#009e73", "#0072b2", "#d55e00")  # in order
 CHOSEN_COLOUR = "#f0e442"
-_CLICK_SD_PX = 1.0  # of a careful click, right and down: the band is two of these
+CLICK_SD_PX = 1.0  # of a careful click, right and down: the band is two of these
 
 
 class PointsPanel:
@@ -144,7 +144,7 @@ class PointsPanel:
             for pane, other in enumerate(self.shown.names):
                 if other == camera or not np.isfinite(px).all():
                     continue
-                curve, sd = epipolar_curve(rig[camera], px, rig[other], _CLICK_SD_PX)
+                curve, sd = epipolar_curve(rig[camera], px, rig[other], CLICK_SD_PX)
                 if len(curve) < 2:
                     continue
                 tangent = np.gradient(curve, axis=0)
