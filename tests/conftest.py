@@ -1,6 +1,8 @@
 """What every test may use, the order in which test files start, and which tests are quick."""
 
 import os
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
@@ -16,6 +18,14 @@ SLOW_FILES = Path(__file__).with_name("slow_files.txt")  # CPU seconds and file,
 
 def pytest_addoption(parser):
     parser.addoption("--skipped", action="store_true", help="run what the last run skipped; another skip is a failure")
+
+
+def pytest_sessionstart(session):
+    """Compile the kernels of a fresh clone once, on two cores, before two workers each do so."""
+    config = session.config
+    is_controller = config.getoption("numprocesses", None) and not hasattr(config, "workerinput")
+    if is_controller and not any((ROOT / "src").rglob("*.nbc")) and "NUMBA_CACHE_DIR" not in os.environ:
+        subprocess.run([sys.executable, "-c", "from airborne.run.warm import warm_kernels; warm_kernels()"], check=True)
 
 
 def pytest_configure(config):
