@@ -249,3 +249,10 @@ def test_tracking_loads_no_figures_and_no_windows():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.stderr == ""
     assert done.stdout.strip() == "[]"
+
+
+def test_a_run_without_pictures_loads_no_library_of_figures_or_labelled_tables():
+    heavy = ("matplotlib", "xarray", "pandas", "trimesh", "jinja2", "nicegui", "dask", "pyarrow")
+    code = f"import sys, airborne.run.track, airborne.trial.file; print(*({{*sys.modules}} & {{*{heavy}}}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []

@@ -5,7 +5,7 @@ beforehand; of `length` that of a whole run without pictures, from the trial fil
 
     picture     the same body in pixels, in larger pictures; `reading` is the same for decoding and conversion alone
     body        picture and body grow together
-    cameras     1 to 8 on an arc
+    cameras     2 to 8 on an arc
     segments    a bar in one piece to twelve pieces with joints, of the same size
     players     1 to 3 blockers, images decoded as they are needed
     length      the same motion forth and back, one to eight times
@@ -60,6 +60,7 @@ N_FIELDS = 8  # tracked for one cost; of the first nothing is counted
 BAR_M = (1.2, 0.09, 0.05)  # of `segments`
 FLOORS = {"picture": 0.2, "length": 1.02}  # largest exponents
 FACTORS = ("picture", "body", "cameras", "segments", "players", "length")
+PEAK_GB: dict[tuple[Path, int], float] = {}  # memory of whole runs, by folder and number of frames
 Cost = Callable[[], float]  # seconds of CPU
 Points = dict[float, Cost]  # costs by the factor's size
 
@@ -162,8 +163,8 @@ def cameras(quick: bool, folder: Path) -> dict[str, Points]:
     scene = replace(cross_scene(seed=SEED), n_pictures=N_FIELDS, rig=rig)
     frames = list(islice(scene_frames(scene), N_FIELDS))
     points: Points = {}
-    for n in (2, 4) if quick else (1, 2, 4, 8):
-        chosen = {1: [2], 2: [2, 5], 4: [0, 2, 5, 7], 8: range(8)}[n]
+    for n in (2, 4) if quick else (2, 4, 8):
+        chosen = {2: [2, 5], 4: [0, 2, 5, 7], 8: range(8)}[n]
         own = [replace(each, views=tuple(each.views[k] for k in chosen)) for each in frames]
         points[n] = thing_cost(scene, own)
     return {"cameras": points}
@@ -226,8 +227,8 @@ def length(quick: bool, folder: Path) -> dict[str, Points]:
             with VideoWriter(own / name, size=images[0].shape[1::-1], rate=50) as writer:  # pyright: ignore
                 for image in turns * [*images, *reversed(images)]:
                     writer.write(image)
-        costs[n] = lambda own=own, n=n: whole_run(own, n)[0]
-        memory[n] = lambda own=own, n=n: whole_run(own, n)[1]
+        costs[n] = lambda own=own, n=n: whole_run(own, n)
+        memory[n] = lambda own=own, n=n: PEAK_GB[own, n]
     return {"length": costs, "length, peak memory": memory}
 
 
@@ -237,11 +238,12 @@ def read_images(path: Path) -> list[np.ndarray]:
         return [frame.to_ndarray(format="rgb24") for frame in file.decode(video=0)]
 
 
-def whole_run(folder: Path, n: int) -> tuple[float, float]:
-    """Track n frames of a trial in a process of its own; return its CPU time [s] and peak memory [GB]."""
+def whole_run(folder: Path, n: int) -> float:
+    """Track n frames of a trial in a process of its own; return its CPU time [s], and note its peak memory."""
     words = [sys.executable, __file__, "--run", str(folder / "trial.toml"), str(n)]
     answer = subprocess.run(words, capture_output=True, text=True, check=True, env=os.environ)
-    return tuple(json.loads(answer.stdout.splitlines()[-1]))
+    cpu_s, PEAK_GB[folder, n] = json.loads(answer.stdout.splitlines()[-1])
+    return cpu_s
 
 
 def run_once(path: Path, n: int) -> None:
@@ -267,20 +269,26 @@ def exponent(sizes: np.ndarray, costs: np.ndarray, has_fixed_cost: bool) -> floa
     return best[1]
 
 
-def report(name: str, points: Points, rounds: int) -> dict[str, Any]:
-    """Measure in turns, print, and return a row."""
+def report(name: str, points: Points, rounds: int) -> list[dict[str, Any]]:
+    """Measure in turns, print, and return rows."""
     sizes = np.array(list(points), float)
-    if name not in ("length", "length, peak memory"):
+    if not name.startswith("length"):
         for cost in points.values():
             cost()  # compiles
     costs = np.array([[cost() for cost in points.values()] for _ in range(rounds)])
     values = np.array([exponent(sizes, row, has_fixed_cost=name == "length") for row in costs])
     middle, low, high = median_interval(values)
-    shown = ", ".join(f"{x:g}: {1e3 * t:.3g}" for x, t in zip(sizes, np.median(costs, axis=0), strict=True))
-    print(f"{name}: {shown} (ms; of memory MB); exponent {middle:.2f} [{low:.2f}, {high:.2f}]", flush=True)
-    row = {"data": f"synthetic, {name} {shown}", "method": "blocker" if name == "players" else "refined", "unit": ""}
-    row |= {"metric": "exponent of cost", "value": middle, "n": rounds, "interval": f"{low:.2f} to {high:.2f}"}
-    return row | ({"floor": str(FLOORS[name])} if name in FLOORS else {})
+    what, unit = ("peak memory", "MB") if name.endswith("memory") else ("CPU", "ms")
+    base = {"data": f"synthetic, {name}", "method": "blocker" if name == "players" else "refined", "n": rounds}
+    rows = [
+        {**base, "metric": f"{what} at {size:g}", "unit": unit, "value": float(1e3 * cost)}
+        for size, cost in zip(sizes, np.median(costs, axis=0), strict=True)
+    ]
+    shown = ", ".join(f"{row['metric'].split()[-1]}: {row['value']:.3g}" for row in rows)
+    print(f"{name}: {shown} {unit}; exponent {middle:.2f} [{low:.2f}, {high:.2f}]", flush=True)
+    floor = {"floor": str(FLOORS[name])} if name in FLOORS else {}
+    fitted = {"metric": "exponent of cost", "unit": "", "value": middle, "interval": f"{low:.2f} to {high:.2f}"}
+    return [*rows, {**base, **fitted, **floor}]
 
 
 def main() -> None:
@@ -295,7 +303,8 @@ def main() -> None:
     for factor in given.only:
         with tempfile.TemporaryDirectory() as name:
             measured = globals()[factor](given.quick, Path(name))
-            rows += [report(key, points, 1 if given.quick else given.rounds) for key, points in measured.items()]
+            for key, points in measured.items():
+                rows += report(key, points, 1 if given.quick else given.rounds)
     if given.rows:
         append("speed", rows)
 

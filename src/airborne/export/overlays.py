@@ -34,7 +34,7 @@ _LINE_SHARE = 1 / 240  # of the image's height
 _TEXT_SHARE = 1 / 30  # of the image's height
 _MISSING_GREY = 40  # stands in for an image that is missing
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
-_PRESET, _CRF = "ultrafast", 20  # of the encoder: a third of the time of "veryfast" at 18, and no larger files
+_PRESET, _CRF = "ultrafast", 20  # of the encoder: docs/speed.md has what it costs and saves
 
 
 @dataclass(frozen=True, slots=True)

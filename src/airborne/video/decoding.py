@@ -6,6 +6,7 @@ from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 from typing import Literal, NamedTuple, get_args
 
@@ -45,7 +46,12 @@ class VideoSource:
 
         Offset and drift are taken as the decimals written in the trial file, not as their nearest binary numbers.
         """
-        return Fraction(str(self.offset_s)) + time_s * (1 + Fraction(str(self.drift_ppm)) / 1_000_000)
+        return _as_written(self.offset_s) + time_s * (1 + _as_written(self.drift_ppm) / 1_000_000)
+
+
+@cache
+def _as_written(number: Fraction | float) -> Fraction:
+    return Fraction(str(number))
 
 
 @dataclass(frozen=True, slots=True)
