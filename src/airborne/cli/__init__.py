@@ -18,6 +18,7 @@ from airborne.cli.compare import compare_command
 from airborne.cli.console import STOPPED, UNDECIDED, refuse, stop
 from airborne.cli.convert import convert_command
 from airborne.cli.export import export_command
+from airborne.cli.film import film_command
 from airborne.cli.find import find_command, frame_command
 from airborne.cli.smooth import smooth_command
 from airborne.cli.studio import studio_command
@@ -42,6 +43,7 @@ _COMMANDS = {
     "smooth": smooth_command,
     "evaluate": results.evaluate_command,
     "export": export_command,
+    "film": film_command,
     "bench": track.bench_command,
 }
 _SYNTH = {
