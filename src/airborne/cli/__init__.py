@@ -19,6 +19,7 @@ from airborne.cli.compare import compare_command
 from airborne.cli.console import STOPPED, UNDECIDED, refuse, show_notes, stop
 from airborne.cli.convert import convert_command
 from airborne.cli.export import export_command
+from airborne.cli.film import film_command
 from airborne.cli.find import find_command, frame_command
 from airborne.cli.smooth import smooth_command
 from airborne.cli.studio import studio_command
@@ -44,6 +45,7 @@ _COMMANDS = {
     "smooth": smooth_command,
     "evaluate": results.evaluate_command,
     "export": export_command,
+    "film": film_command,
     "bench": track.bench_command,
     "warm": track.warm_command,
 }

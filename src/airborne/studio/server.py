@@ -30,6 +30,7 @@ from airborne.studio.session import Session
 
 _HOST = "127.0.0.1"
 _SOON_S = 0.05  # between looks whether the server listens
+_PATIENCE_S = 20.0  # for a window whose computer is busy: sooner taken for closed, it would begin anew
 _STYLE = Path(__file__).with_name("studio.css")
 _PAGES = {
     "/": videos_page,
@@ -76,6 +77,7 @@ def serve(path: Path, *, port: int, browser: bool) -> None:
         language="en-US",
         show_welcome_message=False,
         gzip_middleware_factory=None,
+        reconnect_timeout=_PATIENCE_S,
         favicon=_STYLE.with_name("icon.svg"),
     )
 

@@ -136,7 +136,10 @@ def complain(error: AirborneError | str) -> None:
 
 async def in_thread(function: Callable[..., _T], *arguments: object) -> _T:
     """Do something that takes time without holding up other windows; what asked ends here if its own is closed."""
-    client = ui.context.client
+    try:
+        client = ui.context.client
+    except RuntimeError:  # it was closed while this waited for its turn
+        raise asyncio.CancelledError from None
     try:
         return cast(_T, await run.io_bound(function, *arguments))
     finally:

@@ -12,6 +12,7 @@ from airborne.errors import ResultError, count
 from airborne.motion.run_folder import REPORT, note_if_unfinished, read_summary
 from airborne.run.folder import list_tables
 from airborne.studio.pages.layout import page_frame
+from airborne.studio.pages.make_files import Making
 from airborne.studio.project import list_runs
 from airborne.studio.session import Session
 
@@ -35,10 +36,10 @@ async def results_page(session: Session) -> None:
             ui.label("There is no run yet; see the step Track.").classes("warn")
         for each in runs:
             with ui.element("div").classes("card"):
-                _run_card(each)
+                _run_card(session, each)
 
 
-def _run_card(folder: Path) -> None:
+def _run_card(session: Session, folder: Path) -> None:
     ui.label(folder.name).classes("name")
     note = note_if_unfinished(folder)
     if note is not None:
@@ -54,6 +55,7 @@ def _run_card(folder: Path) -> None:
     with ui.element("div").classes("row-line"):
         for name in list_tables(folder):
             _link(folder, name, name)
+    Making(session, folder)
 
 
 def _numbers(summary: dict[str, Any]) -> None:

@@ -1,0 +1,241 @@
+"""How long the studio makes its user wait, in a real browser: stepping, jumping, dragging, opening long videos.
+
+    python benchmarks/speed/studio.py [--minutes 10] [--steps 60] [--rows]
+
+A person moves before three 1080p cameras that show moving noise; a run's outlines lie over the pictures. Times are the
+browser's, from the key or the pointer to the finished drawing, on the page Track, which has no 3D scene: a browser
+without a graphics card draws that for seconds. Memory is what the server's process holds. They are wall times: the load
+of the machine is printed beside them. `--rows` appends to benchmarks/results/studio.csv.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import sys
+import tempfile
+import time
+from fractions import Fraction
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+import av
+import numpy as np
+from rows import append
+
+from airborne.cameras import Rig, camera_looking_at, write_pose2sim
+from airborne.video import VideoWriter
+from tests.support.person_run import PERSON_TABLE, write_person_run
+from tests.support.studio import at_pixel, open_page, open_studio, wait_for_frame
+
+SIZE, RATE, NOISE = (1920, 1080), 50, 8
+PLACES = {"left": [3.0, -4.0, 1.5], "right": [-4.0, -3.0, 1.2], "behind": [0.5, 5.0, 1.4]}
+ARM = """() => { // the outline's outermost point at the height of the left forearm, in the first picture
+    const { points } = document.querySelector("canvas.view").view.nowItems().find((each) => each.pane === 0);
+    const v = points.map((point) => point[1]), top = Math.min(...v), high = Math.max(...v) - top;
+    const arm = points.filter((point) => Math.abs(point[1] - top - 0.42 * high) < 0.05 * high);
+    const [u, at] = arm.reduce((a, b) => a[0] > b[0] ? a : b);
+    return [u - 4, at];
+}"""
+N_JUMPS, N_DRAGS, DRAG_PX = 20, 3, 300.0
+LONG = "four 1080p videos of {:g} min"
+FLOORS = {"step": 80, "jump": 300, "drag": 50, "release": 150, "open": 2000, "memory": 1000}
+
+
+def write_second(path: Path) -> None:
+    """Write a second of a coarse pattern that moves, under noise: 8 Mbit or so."""
+    rng = np.random.default_rng(0)
+    coarse = rng.integers(60, 190, (SIZE[1] // 24, SIZE[0] // 24, 3), dtype=np.uint8)
+    image = np.kron(coarse, np.ones((24, 24, 1), np.uint8))
+    grain = rng.integers(0, NOISE, image.shape, dtype=np.uint8)
+    with VideoWriter(path, size=(image.shape[1], image.shape[0]), rate=Fraction(RATE)) as writer:
+        for k in range(RATE):
+            writer.write(np.roll(image, 4 * k, axis=1) + np.roll(grain, (37 * k, 91 * k), axis=(0, 1)))
+
+
+def repeat_clip(second: Path, path: Path, seconds: int) -> None:
+    """Repeat the packets of a second, without encoding them again."""
+    with av.open(str(second)) as source:
+        packets = [packet for packet in source.demux(video=0) if packet.size]
+        stamps = [(packet.pts, packet.dts) for packet in packets]
+        with av.open(str(path), "w") as target:
+            stream = target.add_stream_from_template(source.streams.video[0])
+            for k in range(seconds):
+                for packet, (pts, dts) in zip(packets, stamps, strict=True):
+                    shift = round(k / packet.time_base)
+                    packet.pts, packet.dts, packet.stream = pts + shift, dts + shift, stream
+                    target.mux(packet)
+
+
+def write_trial(folder: Path, second: Path, names: list[str], seconds: int) -> None:
+    """Write a trial whose cameras show the same clip."""
+    folder.mkdir()
+    repeat_clip(second, folder / f"{names[0]}.mp4", seconds)
+    for name in names[1:]:
+        os.link(folder / f"{names[0]}.mp4", folder / f"{name}.mp4")
+    cameras = "".join(f'[[camera]]\nname = "{name}"\nvideo = "{name}.mp4"\n' for name in names)
+    (folder / "trial.toml").write_text(
+        f'name = "waiting"\ncalibration = {{ file = "calib.toml" }}\n{PERSON_TABLE}\n{cameras}'
+    )
+
+
+def write_run(folder: Path, n: int) -> Rig:
+    """Write a run of a person who moves, and the trial's calibration."""
+    with av.open(str(folder / "left.mp4")) as file:
+        size = (file.streams.video[0].width, file.streams.video[0].height)
+    rig = Rig(tuple(camera_looking_at(name, at, [0, 0, 1.1], focal_px=1500, size=size) for name, at in PLACES.items()))
+    write_pose2sim(folder / "calib.toml", rig)
+    write_person_run(folder / "results", rig, n, Fraction(RATE))
+    return rig
+
+
+def step_ms(page, n: int) -> list[float]:
+    """Step from frame to frame; return how long each took."""
+    canvas, taken = page.locator("canvas.view"), []
+    canvas.press("Home")
+    wait_for_frame(page, 0)
+    for frame in range(1, n + 1):
+        canvas.press(".")
+        wait_for_frame(page, frame)
+        taken.append(shown_ms(page))
+    return taken
+
+
+def jump_ms(page, n_frames: int) -> list[float]:
+    """Jump to frames anywhere; return how long each took."""
+    rng, taken = np.random.default_rng(0), []
+    for frame in rng.integers(0, n_frames, N_JUMPS).tolist():
+        page.evaluate("frame => document.querySelector('canvas.view').view.go(frame)", frame)
+        wait_for_frame(page, frame)
+        taken.append(shown_ms(page))
+        page.wait_for_timeout(300)  # someone looks
+    return taken
+
+
+def shown_ms(page) -> float:
+    """Return how long the frame in view took."""
+    return float(page.evaluate("document.querySelector('canvas.view').dataset.ms"))
+
+
+def drag_ms(page, rig: Rig, steps: int) -> tuple[list[float], list[float]]:
+    """Drag a forearm to and fro; return how long the outline took to follow, and the body to be solved at the end."""
+    page.get_by_role("button", name="Place it by hand").click()
+    page.wait_for_function("document.querySelector('canvas.view').view.nowItems().length >= 3")
+    on_way, at_end = [], []
+    for _ in range(N_DRAGS):
+        start = np.array(page.evaluate(ARM), float)
+        page.mouse.move(*at_pixel(page, 0, *start))
+        page.mouse.down()
+        page.mouse.move(*at_pixel(page, 0, *np.add(start, [25.0, 0.0])))
+        for k in range(steps):
+            angle = 2 * np.pi * k / steps
+            n = count_drags(page)
+            way = [25 + DRAG_PX / 2 * np.sin(angle) ** 2, -DRAG_PX / 2 * np.sin(angle / 2)]
+            page.mouse.move(*at_pixel(page, 0, *np.add(start, way)))
+            page.wait_for_function("n => Number(document.querySelector('canvas.view').dataset.drags || 0) > n", arg=n)
+            on_way.append(float(page.evaluate("document.querySelector('canvas.view').dataset.dragMs")))
+        n = count_drags(page)
+        page.mouse.up()
+        page.wait_for_function("n => Number(document.querySelector('canvas.view').dataset.drags || 0) > n", arg=n)
+        page.wait_for_function("document.querySelector('canvas.view').view.live === null")
+        at_end.append(float(page.evaluate("document.querySelector('canvas.view').dataset.dragMs")))
+    return on_way, at_end
+
+
+def count_drags(page) -> int:
+    """Return how many movements were answered."""
+    return int(page.evaluate("document.querySelector('canvas.view').dataset.drags || 0"))
+
+
+def server() -> tuple[float, float]:
+    """Return the memory [MB] and the CPU time so far [s] of the studio, a child of this process."""
+    pages, ticks = 0, 0
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            words = status.read_text().rpartition(")")[2].split()
+            line = status.with_name("cmdline").read_bytes()
+        except OSError:  # it has ended
+            continue
+        if int(words[1]) == os.getpid() and b"studio" in line:
+            pages, ticks = int(status.with_name("statm").read_text().split()[1]), int(words[11]) + int(words[12])
+    return pages * resource.getpagesize() / 1e6, ticks / os.sysconf("SC_CLK_TCK")
+
+
+def measure_short(folder: Path, second: Path, steps: int) -> dict[str, list[float]]:
+    """Measure steps, jumps and drags on a clip of 20 seconds."""
+    write_trial(folder, second, list(PLACES), 20)
+    rig = write_run(folder, 20 * RATE)
+    with open_studio(folder) as address, open_page(address.replace("/?", "/track?")) as page:
+        wait_for_frame(page, 0)
+        page.wait_for_timeout(3000)  # what the kernels compile, once
+        begun_s = server()[1]
+        steps_ms, stepped_s = step_ms(page, steps), server()[1]
+        jumps_ms, jumped_s = jump_ms(page, 20 * RATE), server()[1]
+        page.goto(address.split("?")[0] + "start")
+        page.wait_for_function("document.querySelector('canvas.view')?.dataset.frame !== undefined")
+        before_s = server()[1]
+        drags_ms, releases_ms = drag_ms(page, rig, steps)
+        dragged_s = server()[1]
+    cpu_ms = {
+        "step, server's CPU": [1e3 * (stepped_s - begun_s) / steps],
+        "jump, server's CPU": [1e3 * (jumped_s - stepped_s) / N_JUMPS],  # what is made ahead of it too
+        "drag, server's CPU": [1e3 * (dragged_s - before_s) / len(drags_ms)],
+    }
+    return {"step": steps_ms, "jump": jumps_ms, "drag": drags_ms[5:], "release": releases_ms, **cpu_ms}
+
+
+def measure_long(folder: Path, second: Path, minutes: float) -> dict[str, list[float]]:
+    """Measure the first picture of four long videos, and memory after jumps through them."""
+    write_trial(folder, second, ["a", "b", "c", "d"], round(60 * minutes))
+    (folder / "calib.toml").unlink(missing_ok=True)
+    with open_studio(folder) as address, open_page(address) as page:
+        page.get_by_text("Use these cameras").wait_for()
+        begun = time.monotonic()
+        page.goto(address.split("?")[0] + "track")
+        wait_for_frame(page, 0)
+        taken_ms = 1e3 * (time.monotonic() - begun)
+        jumps_ms = jump_ms(page, round(60 * minutes) * RATE)
+        return {"open": [taken_ms], "long jump": jumps_ms, "memory": [server()[0]]}
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=10.0, help="of the long videos")
+    parser.add_argument("--steps", type=int, default=60)
+    parser.add_argument("--rows", action="store_true", help="append to benchmarks/results/studio.csv")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory(dir=Path.home()) as name:
+        second = Path(name) / "second.mp4"
+        write_second(second)
+        before = os.getloadavg()[0]
+        found = measure_short(Path(name) / "short", second, given.steps)
+        found |= measure_long(Path(name) / "long", second, given.minutes)
+    load = f"load {before:.1f} to {os.getloadavg()[0]:.1f} of {os.cpu_count()} cores"
+    print(json.dumps({"load": load, **{key: np.round(value, 1).tolist() for key, value in found.items()}}))
+    rows = [
+        {
+            "data": LONG.format(given.minutes) if key in ("open", "long jump", "memory") else "three 1080p cameras",
+            "method": load,
+            "metric": f"{key}, {'95th percentile' if len(values) > 1 else 'once'}",
+            "unit": "MB" if key == "memory" else "ms",
+            "value": float(np.percentile(values, 95)),
+            "n": len(values),
+            "floor": FLOORS.get(key, FLOORS["jump"] if key == "long jump" else ""),
+            "interval": f"median {np.median(values):.3g}",
+        }
+        for key, values in found.items()
+    ]
+    if given.rows:
+        append("studio", rows)
+    else:
+        for row in rows:
+            print(f"{row['metric']:<30}{row['value']:>8.1f} {row['unit']}  floor {row['floor']}  {row['interval']}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,69 @@
+"""A film of a stretch: as many pictures as frames, the cameras side by side over the curves."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from PIL import Image as GifPicture
+
+from airborne.cameras import Rig, camera_looking_at
+from airborne.errors import ResultError
+from airborne.run.film import write_film
+from airborne.video import VideoSource, VideoWriter, inspect
+from airborne.video.seeking import ImageReader, index_images
+from tests.support.person_run import write_person_run
+
+SIZE, N, RATE = (320, 240), 12, Fraction(50)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A run whose overlay videos grow brighter with every frame, in the second camera faster."""
+    run = tmp_path_factory.mktemp("film") / "results"
+    places = {"a": [3.0, -4.0, 1.5], "b": [-4.0, -3.0, 1.2]}
+    rig = Rig(tuple(camera_looking_at(n, p, [0, 0, 1.1], focal_px=300, size=SIZE) for n, p in places.items()))
+    write_person_run(run, rig, N, RATE)
+    (run / "videos").mkdir()
+    for name, step in (("a", 5), ("b", 15)):
+        with VideoWriter(run / "videos" / f"overlay_{name}.mp4", size=SIZE, rate=RATE) as writer:
+            for k in range(N):
+                writer.write(np.full((SIZE[1], SIZE[0], 3), 20 + step * k, np.uint8))
+    return run
+
+
+def test_a_stretch_shows_its_frames_and_a_cursor_over_the_curves(run, tmp_path):
+    assert write_film(run, tmp_path / "film.mp4", first=3, last=8) == 6
+    source = VideoSource("film", tmp_path / "film.mp4")
+    assert inspect(source).frame_rate == RATE
+    with ImageReader(source, index_images(source)) as reader:
+        assert len(reader.index) == 6
+        images = [reader.image(k).astype(int) for k in range(6)]
+    for k, image in enumerate(images):
+        assert image.shape[1] == 2 * SIZE[0] and image.shape[0] > SIZE[1]
+        middles = [image[120, x].mean() for x in (160, 480)]
+        np.testing.assert_allclose(middles, [20 + 5 * (3 + k), 20 + 15 * (3 + k)], atol=4)
+        below = image[SIZE[1] + 4 :].sum(axis=2).mean(axis=0)
+        assert abs(int(np.argmin(below)) - k / 5 * (image.shape[1] - 1)) <= 3
+
+
+def test_a_gif_leaves_pictures_out_that_browsers_would_slow_down(run, tmp_path):
+    write_film(run, tmp_path / "film.gif")
+    with GifPicture.open(tmp_path / "film.gif") as film:
+        assert (film.n_frames, film.info["duration"]) == (N // 2, 40)
+
+
+@pytest.mark.parametrize(
+    ("name", "frames", "said"),
+    [("film.avi", {}, "films are .mp4 or .gif"), ("film.mp4", {"first": 40}, "holds frames 0 to 11, none of 40 to 11")],
+)
+def test_what_cannot_be_filmed_is_one_line(run, tmp_path, name, frames, said):
+    with pytest.raises(ResultError, match=said):
+        write_film(run, tmp_path / name, **frames)
+
+
+def test_a_run_without_pictures_says_so(run, tmp_path):
+    (tmp_path / "bare").mkdir()
+    for name in ("motion.csv", "covariance.bin", "body.toml", "calib.toml"):
+        (tmp_path / "bare" / name).write_bytes((run / name).read_bytes())
+    with pytest.raises(ResultError, match="has no videos of overlays; track again without"):
+        write_film(tmp_path / "bare", tmp_path / "film.mp4")
