@@ -35,7 +35,7 @@ class PixelColours:
     def of(cls, silhouettes: SilhouetteEvidence) -> PixelColours:
         """Sort what stands out by its colours."""
         stands_out = [plane > 0 for plane in silhouettes.planes]
-        features = [_features(image) for image in silhouettes.images]
+        features = [colour_features(image) for image in silhouettes.images]
         pixels = np.concatenate([each[here] for each, here in zip(features, stands_out, strict=True)])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # a colour that no pixel has does no harm
@@ -69,8 +69,8 @@ def colour_classes(model: BodyModel) -> NDArray[np.int64]:
     return np.unique(names, return_inverse=True)[1].astype(np.int64)
 
 
-def _features(rgb: NDArray[np.uint8]) -> Array:
-    """Return hue and saturation, and brightness with less weight: (..., 3)."""
+def colour_features(rgb: NDArray[np.uint8]) -> Array:
+    """Return by what pixels' colours are sorted: hue and saturation, and brightness with less weight: (..., 3)."""
     level = rgb.astype(float) + _BLACK
     total = level.sum(axis=-1)
     return np.stack(
