@@ -9,8 +9,8 @@ import pytest
 from airborne.errors import TrialError
 from airborne.tracking.capsules.first_frame import points_of
 from airborne.tracking.capsules.jumper import JOINTS
+from airborne.tracking.capsules.standing import stance, states_of
 from airborne.tracking.first_pose.players import PlayersSearch, find_players
-from airborne.tracking.first_pose.standing import stance, states_of
 from tests.support.jumping_scenes import Hall, hop
 
 AT_NET = {"left": (-0.1, -0.7), "right": (0.9, -0.6)}

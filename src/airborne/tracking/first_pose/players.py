@@ -11,16 +11,16 @@ from scipy.special import expit
 
 from airborne.errors import TrialError
 from airborne.tracking.capsules.first_frame import FirstFrameFit, fit_first_frame, points_of
-from airborne.tracking.capsules.jumper import JOINTS
-from airborne.tracking.capsules.tracker import occluding_capsules
-from airborne.tracking.first_pose.players_search import (
+from airborne.tracking.capsules.floor_search import (
     Stander,
     count_standing,
     find_standers,
     lies_in,
     told_on_grid,
 )
-from airborne.tracking.first_pose.standing import KNEES, ColourViews
+from airborne.tracking.capsules.jumper import JOINTS
+from airborne.tracking.capsules.standing import KNEES, ColourViews
+from airborne.tracking.capsules.tracker import occluding_capsules
 from airborne.tracking.players import PlayerStart
 from airborne.types import Array
 from airborne.video import Frames, View
@@ -31,16 +31,16 @@ _NEAR_NET_M = 1.5  # of the net's plane, half of the front zone
 _BEYOND_M = 2.5  # on the other side of the net: who stands there is seen behind the blockers
 _BOTH_SIDES_M = 2.0  # cameras whose mean lies nearer to the net's plane stand on both sides
 _AS_WELL = 0.7  # share of what players tell at most, which counts as much as any
-_MOST_MOMENTS, _MOST_SEARCHED = 8, 2  # that are looked at, and searched: about 0.5 and 3 s each
+_MOST_MOMENTS, _MOST_SEARCHED = 8, 3  # that are looked at, and searched until two agree on how many are there
 # chosen on synthetic blocks 3001 to 3008
-_TOLD, _TOLD_SD = 1.5, 0.07  # [nat m2] that are as likely a player as none, and their logistic scale
+_TOLD, _TOLD_SD = 1.1, 0.07  # [nat m2] that are as likely a player as none, and their logistic scale
+_LEAST_TOLD = 1.5  # [nat m2] of a player whose pose is trusted: others were partly hidden, or in the air
 _TOLD_PER_NAT = 0.01  # share of what is told that makes a direction e times likelier
 _NET_NATS = 3.0  # for facing the net, of players near it
 _LEAST_EVIDENCE = 1.2  # [nat a pixel] of the fitted player
 _DEEPEST = 1.35  # [rad] flexion of knees, beyond which a stance is not trusted
 _ALIKE_M = 0.06  # mean distance of the legs' joints, below which poses are the same
 _LOOSER = 3.0  # than joints set by hand
-_N_FITS = 2  # of each player, beside the others as fitted
 _MOST_CANDIDATES, _LEAST_SHOWN = 8, 0.01  # number and probability of those that are listed
 
 
@@ -84,6 +84,16 @@ class PlayersSearch:
     candidates: tuple[PlayersCandidate, ...]  # the likeliest first
 
     @property
+    def n_players(self) -> int:
+        """How many players the likeliest candidate has."""
+        return len(self.candidates[0].players)
+
+    @property
+    def told(self) -> float:
+        """What these tell in all [nat m2]."""
+        return sum(player.told for player in self.candidates[0].players)
+
+    @property
     def is_decided(self) -> bool:
         """Whether the likeliest candidate can be taken."""
         return self.candidates[0].is_plausible and self.candidates[0].probability >= LEAST_PROBABILITY
@@ -97,19 +107,20 @@ def find_players(sample: Sequence[Frames], whole: Callable[[int], Frames], *, ne
     """
     sample = [frames for frames in sample if sum(view is not None for view in frames.views) > 1]
     moments = [_Moment.of(frames, near_net=near_net) for frames in sample[:: -(-len(sample) // _MOST_MOMENTS) or 1]]
-    findings = []
+    findings: list[PlayersSearch] = []
     for moment in _best_first(moments)[:_MOST_SEARCHED]:
         findings.append(moment.search(whole))
-        if findings[-1].is_decided:
-            return findings[-1]
-    findings = [finding for finding in findings if finding.candidates[0].players]
-    if not findings:
+        most = max(finding.n_players for finding in findings)
+        complete = [finding for finding in findings if finding.n_players == most]
+        if len(complete) > 1 and any(finding.is_decided for finding in complete):
+            break
+    if not findings or most == 0:
         where = "at the net" if near_net else "on the court"
         raise TrialError(
             f"[start] is missing, and no player is seen to stand {where}, whose middle must be the world's origin, x "
             "along the net; give [[start.player]] tables"
         )
-    return max(findings, key=lambda finding: sum(player.told for player in finding.candidates[0].players))
+    return max(complete, key=lambda finding: (finding.is_decided, finding.told))
 
 
 def _best_first(moments: Sequence[_Moment]) -> list[_Moment]:
@@ -166,10 +177,10 @@ def _fit(standers: Sequence[Stander], others: Sequence[Array], frames: Frames) -
     """Fit each player's model from all its stances, beside the others as they are likeliest."""
     states = [stander.states[0] for stander in standers]
     found: list[list[FoundPlayer]] = [[] for _ in standers]
-    for _ in range(_N_FITS):
+    for n in (1, None):  # first the likeliest stances, then all beside these
         for i, stander in enumerate(standers):
             beside = [*others, *states[:i], *states[i + 1 :]]
-            fits = [_fit_one(state, beside, frames) for state in stander.states]
+            fits = [_fit_one(state, beside, frames) for state in stander.states[:n]]
             found[i] = [_found(fit, stander, number) for number, fit in enumerate(fits)]
             states[i] = found[i][0].state
     return found
@@ -183,7 +194,8 @@ def _fit_one(state: Array, others: Sequence[Array], frames: Frames) -> FirstFram
 def _found(fit: FirstFrameFit, stander: Stander, number: int) -> FoundPlayer:
     evidence, area = fit.fit.owned.sum(axis=(0, 1, 2))
     per_px = float(evidence / area) if area > 0 else 0.0
-    is_plausible = per_px > _LEAST_EVIDENCE and stander.stances[number, KNEES].mean() < _DEEPEST
+    is_deep = stander.stances[number, KNEES].mean() > _DEEPEST
+    is_plausible = stander.told[number] > _LEAST_TOLD and per_px > _LEAST_EVIDENCE and not is_deep
     joints_m = dict(zip(JOINTS, fit.fit.points, strict=True))
     return FoundPlayer(joints_m, fit.fit.state, float(stander.told[number]), per_px, bool(is_plausible))
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 from scipy.spatial import ConvexHull, KDTree
 
+from airborne.appearance.colour_features import colour_features
 from airborne.kernels import kernel
 from airborne.tracking.capsules.equations import N_CAPSULES, N_POINTS, classes_with, pose_state
 from airborne.tracking.capsules.first_frame import average_shape
@@ -19,18 +20,19 @@ from airborne.tracking.capsules.kernel_arguments import NOBODY
 from airborne.tracking.capsules.outlines import draw_labels, project_capsules
 from airborne.tracking.capsules.surface_colours import class_image
 from airborne.tracking.capsules.views import pack_camera
-from airborne.tracking.first_pose.colour_information import colour_features
 from airborne.types import Array
 from airborne.video import View
 
 # columns of a stance: x, y, heading; the pelvis' side and forward lean, the trunk's bend; of both legs in turn the
 # hip's flexion and abduction, knee and ankle; stature; where shorts and socks end (shares); height of the lower foot
-X, Y, HEADING, SIDE, LEAN, BEND = range(6)
+X, Y, HEADING, SIDE, LEAN, BEND = range(6)  # columns
 HIPS, ASIDE, KNEES, ANKLES = (slice(i, i + 2) for i in (6, 8, 10, 12))
-STATURE, SHORTS, SOCKS, HEIGHT = range(14, 18)
+STATURE, SHORTS, SOCKS, HEIGHT = range(14, 18)  # columns
+# first spread of a search [m, rad, shares]
 STANCE_SD = np.array(
     [0.15, 0.15, 0.4, 0.08, 0.15, 0.12] + [0.2] * 2 + [0.1] * 2 + [0.25] * 2 + [0.15] * 2 + [0.05] * 3 + [0.1]
 )
+# of what standing people do, least and greatest
 _LIMITS = np.array(
     [(-np.inf, np.inf)] * 3
     + [(-0.3, 0.3), (-0.4, 1.1), (-0.2, 0.7)]
@@ -40,9 +42,9 @@ _LIMITS = np.array(
     + [(-0.6, 0.85)] * 2
     + [(1.5, 2.15), (0.2, 0.9), (0.05, 0.7), (0.0, 1.0)]
 ).T
-_STATURE_M, _STATURE_SD_M = 1.86, 0.09  # of volleyball players
-_POSTURE_SD = np.array([0.4, 0.5, 0.25, 0.15])  # legs alike (hips, knees), feet level, side lean [rad]
-_POSTURE_WEIGHT = 0.0064  # [nat m2] of one squared sd: a box of 8 cm that does not tell its colour
+_STATURE_M, _STATURE_SD_M = 1.86, 0.07  # of volleyball players
+_POSTURE_SD = np.array([0.25, 0.3, 0.2, 0.12])  # legs alike (hips, knees), feet level, side lean [rad]
+_POSTURE_WEIGHT = 0.01  # [nat m2] of one squared sd, half a nat where 1 % of what a player tells, 2 nat m2, is one
 
 _N_COLOURS = 24  # that the pixels are sorted into
 _MOST_PIXELS = 30000  # that the colours are chosen by

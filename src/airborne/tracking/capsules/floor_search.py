@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airborne.tracking.first_pose.standing import (
+from airborne.tracking.capsules.standing import (
     STANCE_SD,
     ColourViews,
     X,
@@ -24,10 +24,10 @@ _KNEES = (0.4, 0.8, 1.2)  # [rad] the crouches on the grid
 _FACING = np.pi  # toward the net, on the grid
 _HEADINGS = (np.pi, 0.0)  # from which a stance is improved
 _APART_M = 0.5  # of two players on the grid
-_LEAST_TOLD = 0.5  # [nat m2] on the grid; what tells less is nobody
+_LEAST_TOLD = 0.7  # [nat m2] on the grid; what tells less is nobody
 _LEAST_STANDING = 0.9  # [nat m2] on the grid, what is more counts for a moment: ghosts between players tell less
 _MOST_PLAYERS = 16  # of two teams with their substitutes on the floor
-_AS_WELL = 0.9  # share of what the best stance tells, with which another is kept
+_AS_WELL = 0.95  # share of what the best stance tells, with which another is kept
 _N_DRAWS, _N_BEST, _N_ROUNDS = 150, 20, 12  # of the cross-entropy search
 _RATE, _LEAST_SHARE = 0.7, 0.03  # of a new mean and spread; least spread, of the first
 
