@@ -120,7 +120,8 @@ def find_players(sample: Sequence[Frames], whole: Callable[[int], Frames], *, ne
             f"[start] is missing, and no player is seen to stand {where}, whose middle must be the world's origin, x "
             "along the net; give [[start.player]] tables"
         )
-    return max(complete, key=lambda finding: (finding.is_decided, finding.told))
+    decided = (finding for finding in complete if finding.is_decided)
+    return next(decided, max(complete, key=lambda finding: finding.told))
 
 
 def _best_first(moments: Sequence[_Moment]) -> list[_Moment]:
