@@ -102,7 +102,7 @@ if __name__ == "__main__":
         "find_players",
         "block_jump and blocks",
         verdict,
-        seeds=(4000, 4019),
+        seeds=(4100, 4119),
         n_quick=1,
         floors=(">= 85", "<= 3"),
         recordings=recordings,

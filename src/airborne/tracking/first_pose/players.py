@@ -19,7 +19,7 @@ from airborne.tracking.capsules.floor_search import (
     told_on_grid,
 )
 from airborne.tracking.capsules.jumper import JOINTS
-from airborne.tracking.capsules.standing import KNEES, ColourViews
+from airborne.tracking.capsules.standing import HEIGHT, KNEES, ColourViews
 from airborne.tracking.capsules.tracker import occluding_capsules
 from airborne.tracking.players import PlayerStart
 from airborne.types import Array
@@ -40,6 +40,7 @@ _NET_NATS = 3.0  # for facing the net, of players near it
 _LEAST_EVIDENCE = 1.2  # [nat a pixel] of the fitted player
 _DEEPEST = 1.35  # [rad] flexion of knees, beyond which a stance is not trusted
 _ALIKE_M = 0.06  # mean distance of the legs' joints, below which poses are the same
+_HIGHEST_M = 0.06  # of the lower foot over the floor: in the air legs bend as no stance does
 _LOOSER = 3.0  # than joints set by hand
 _MOST_CANDIDATES, _LEAST_SHOWN = 8, 0.01  # number and probability of those that are listed
 
@@ -195,8 +196,9 @@ def _fit_one(state: Array, others: Sequence[Array], frames: Frames) -> FirstFram
 def _found(fit: FirstFrameFit, stander: Stander, number: int) -> FoundPlayer:
     evidence, area = fit.fit.owned.sum(axis=(0, 1, 2))
     per_px = float(evidence / area) if area > 0 else 0.0
-    is_deep = stander.stances[number, KNEES].mean() > _DEEPEST
-    is_plausible = stander.told[number] > _LEAST_TOLD and per_px > _LEAST_EVIDENCE and not is_deep
+    stance = stander.stances[number]
+    stands = stance[KNEES].mean() < _DEEPEST and stance[HEIGHT] < _HIGHEST_M
+    is_plausible = stander.told[number] > _LEAST_TOLD and per_px > _LEAST_EVIDENCE and stands
     joints_m = dict(zip(JOINTS, fit.fit.points, strict=True))
     return FoundPlayer(joints_m, fit.fit.state, float(stander.told[number]), per_px, bool(is_plausible))
 
