@@ -43,7 +43,7 @@ _BLOCK_JUMP = Path(__file__).resolve().parents[3] / "shared" / "data" / "block_j
 def verdict(seed: int) -> tuple[str, float]:
     """Find the players of one block; return right, wrong or undecided, and the CPU time [s] without rendering."""
     scene = block_scene(seed, n_blockers=1 + seed % 3)
-    whole = {frames.index: frames for frames in block_frames(scene, every=_EVERY)}
+    whole = {frames.index: frames for frames in block_frames(scene, range(0, scene.n_frames, _EVERY))}
     sample = spread_sample(whole.values(), len(whole))
     start_s = time.process_time()
     finding = find_players(sample, whole.__getitem__)

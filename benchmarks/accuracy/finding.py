@@ -24,6 +24,7 @@ def measure(
     seeds: tuple[int, int],
     n_quick: int,
     floors: tuple[str, str],
+    found_is: str = "start found",
     recordings: Sequence[Callable[[], Verdict]] = (),
 ) -> None:
     """Measure scenes of the seeds (first, last) or of those asked for, after recordings; write the rows of a full run.
@@ -41,7 +42,7 @@ def measure(
     words, n = [word for word, _ in found], len(found)
     base = {"data": f"{data} {first}-{last}", "method": "find", "n": n}
     rows = [
-        {**base, "metric": "start found", "unit": "%", "value": 100 * words.count("right") / n, "floor": floors[0]},
+        {**base, "metric": found_is, "unit": "%", "value": _percent(words, "right"), "floor": floors[0]},
         {
             **base,
             "metric": "wrong and decided",
@@ -49,7 +50,7 @@ def measure(
             "value": 100 * words.count("wrong") / n,
             "floor": floors[1],
         },
-        {**base, "metric": "undecided", "unit": "%", "value": 100 * words.count("undecided") / n},
+        {**base, "metric": "undecided", "unit": "%", "value": _percent(words, "undecided")},
         {**base, "metric": "CPU time, median", "unit": "s", "value": float(np.median([cpu_s for _, cpu_s in found]))},
     ]
     if options.quick or options.seeds != usual:
@@ -57,3 +58,7 @@ def measure(
             print(f"{row['metric']}: {row['value']:.3g} {row['unit']}  {row.get('floor', '')}")
     else:
         append(name, rows)
+
+
+def _percent(words: Sequence[str], word: str) -> float:
+    return 100 * words.count(word) / len(words)
