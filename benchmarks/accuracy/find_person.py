@@ -7,7 +7,6 @@ rows. Right is a mean error of the landmarks up to 60 mm.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from fractions import Fraction
@@ -16,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from rows import append
+from finding import measure
 
 from airborne.body import BodyModel, human18
 from airborne.body.outfits import SAMPLED, Outfit
@@ -167,29 +166,12 @@ def verdict(seed: int) -> tuple[str, float]:
     return word, cpu_s
 
 
-def main() -> None:
-    """Measure, and write the rows of a full run."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--seeds", default="5000-5029")
-    options = parser.parse_args()
-    first, last = (int(number) for number in options.seeds.split("-"))
-    seeds = range(first, min(last, first + 1) + 1) if options.quick else range(first, last + 1)
-    found = [verdict(seed) for seed in seeds]
-    words, n = [word for word, _ in found], len(found)
-    base = {"data": f"people {seeds[0]}-{seeds[-1]}", "method": "find", "n": n}
-    rows = [
-        {**base, "metric": "start found", "unit": "%", "value": 100 * words.count("right") / n, "floor": ">= 80"},
-        {**base, "metric": "wrong and decided", "unit": "%", "value": 100 * words.count("wrong") / n, "floor": "<= 3"},
-        {**base, "metric": "undecided", "unit": "%", "value": 100 * words.count("undecided") / n},
-        {**base, "metric": "CPU time, median", "unit": "s", "value": float(np.median([cpu_s for _, cpu_s in found]))},
-    ]
-    if options.quick or options.seeds != "5000-5029":
-        for row in rows:
-            print(f"{row['metric']}: {row['value']:.3g} {row['unit']}  {row.get('floor', '')}")
-    else:
-        append("find_person", rows)
-
-
 if __name__ == "__main__":
-    main()
+    measure(
+        "find_person",
+        "people",
+        verdict,
+        seeds=(5000, 5029),
+        n_quick=2,
+        floors=(">= 80", "<= 3"),
+    )

@@ -7,7 +7,6 @@ is up to the body's symmetries, within 50 mm and 10 degrees.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 import time
@@ -17,9 +16,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from rows import append
+from finding import measure
 
 from airborne.body import BodyModel, Box, Part, Pose, Segment
 from airborne.cameras import Rig, camera_looking_at
@@ -152,29 +151,13 @@ def verdict_of_example() -> tuple[str, float]:
     return "right" if right else "wrong", cpu_s
 
 
-def main() -> None:
-    """Measure, and write the rows of a full run."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--seeds", default="0-39")
-    options = parser.parse_args()
-    first, last = (int(number) for number in options.seeds.split("-"))
-    seeds = range(first, min(last, first + 4) + 1) if options.quick else range(first, last + 1)
-    found = [verdict_of_example(), *(verdict(seed) for seed in seeds)]
-    words, n = [word for word, _ in found], len(found)
-    base = {"data": f"thrown cross and throws {seeds[0]}-{seeds[-1]}", "method": "find", "n": n}
-    rows = [
-        {**base, "metric": "start found", "unit": "%", "value": 100 * words.count("right") / n, "floor": ">= 95"},
-        {**base, "metric": "wrong and decided", "unit": "%", "value": 100 * words.count("wrong") / n, "floor": "<= 1"},
-        {**base, "metric": "undecided", "unit": "%", "value": 100 * words.count("undecided") / n},
-        {**base, "metric": "CPU time, median", "unit": "s", "value": float(np.median([cpu_s for _, cpu_s in found]))},
-    ]
-    if options.quick or options.seeds != "0-39":
-        for row in rows:
-            print(f"{row['metric']}: {row['value']:.3g} {row['unit']}  {row.get('floor', '')}")
-    else:
-        append("find_start", rows)
-
-
 if __name__ == "__main__":
-    main()
+    measure(
+        "find_start",
+        "thrown cross and throws",
+        verdict,
+        seeds=(0, 39),
+        n_quick=5,
+        floors=(">= 95", "<= 1"),
+        recordings=[verdict_of_example],
+    )

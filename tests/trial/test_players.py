@@ -254,3 +254,12 @@ def test_every_setting_named_as_unread_is_one_of_its_method():
     for method, unread in UNREAD_SETTINGS.items():
         (kind,) = (kind for kind in kinds if method in get_args(kind.model_fields["method"].annotation))
         assert unread <= set(kind.model_fields)
+
+
+def test_players_without_a_start_are_looked_for_at_the_net(folder):
+    text = trial_text()
+    head = text[: text.index("[start]")]
+    trial = read(folder, head)
+    assert trial.has_players and trial.start.find and trial.start.near_net
+    assert not read(folder, head + "[start]\nfind = true\nnear_net = false\n").start.near_net
+    assert "near_net goes with find = true" in complaint(folder, text.replace("[start]", "[start]\nnear_net = true", 1))

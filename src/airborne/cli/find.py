@@ -17,23 +17,24 @@ def find_command(
     take: Annotated[int | None, typer.Option(min=1, help="Which of the poses in candidates.json.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Look for the body in the videos, and print the [start] that was found. Exit code 3: undecided.
+    """Look for the body, or the players, in the videos, and print the [start] that was found. Exit code 3: undecided.
 
     Example: airborne find trial.toml
     """
     import tomlkit
 
     from airborne.run.find import find_start
+    from airborne.run.find_players import find_players_start
     from airborne.trial.file import read_trial
 
-    with progress("looking for the body") as report:
-        found = find_start(read_trial(trial), output, take=take, progress=report)
-    keys = ["frame", "position_m", "quaternion_xyzw", *(["joint_angles_deg"] if found.model.has_joints else [])]
-    start = found.trial.start.model_dump(include={*keys})
+    checked = read_trial(trial)
+    find = find_players_start if checked.has_players else find_start
+    with progress(f"looking for the {'players' if checked.has_players else 'body'}") as report:
+        found = find(checked, output, take=take, progress=report)
     if as_json:
-        print(json.dumps({**start, "probability": found.finding.candidates[0].probability, "note": found.note}))
+        print(json.dumps({**found.start, "probability": found.finding.candidates[0].probability, "note": found.note}))
     else:
-        print(tomlkit.dumps({"start": start}), end="")
+        print(tomlkit.dumps({"start": found.start}), end="")
         print(f"# {found.note}")
 
 

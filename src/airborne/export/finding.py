@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.appearance.empty_scene import EmptyScene
 from airborne.body import PosedBody
@@ -15,9 +16,10 @@ from airborne.export.mosaic import ColumnTitle, write_mosaic
 from airborne.export.palette import ESTIMATE_RGB
 from airborne.export.views import cached_surface_arrays
 from airborne.rendering import FLAT, render
+from airborne.tracking.capsules.surface_colours import class_image
 from airborne.tracking.first_pose.moments import Moment, SourceKey, source_of
-from airborne.types import Image
-from airborne.video import View
+from airborne.types import Array, Image
+from airborne.video import Frames, View
 
 _TITLES = ("empty scene", "what stands out", "where the body was found")
 _ASPECT = 0.8  # height over width of a cell: whole images are wider than high
@@ -46,6 +48,33 @@ def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, 
     write_mosaic(path, rows, names, [ColumnTitle(view.camera.name) for view in views], aspect=_ASPECT)
 
 
+def draw_player_candidates(path: Path, frames: Frames, candidates: Sequence[tuple[str, Sequence[Array]]]) -> None:
+    """Draw the outlines of candidates' players, states (35,), one row a candidate, in every view."""
+    views = [view for view in frames.views if view is not None]
+    images = [[_with_players(view, states) for view in views] for _, states in candidates]
+    boxes = [_box_of(view.camera, [state for _, states in candidates for state in states]) for view in views]
+    rows = [[image[box] for image, box in zip(row, boxes, strict=True)] for row in images]
+    names = [f"{number}: {label}" for number, (label, _) in enumerate(candidates, start=1)]
+    save_png(cell_figure(rows, names, [view.camera.name for view in views], aspect=_ASPECT), path)
+
+
+def _with_players(view: View, states: Sequence[Array]) -> Image:
+    image = view.rgb.copy()
+    for state in states:
+        mask = (class_image(state, view.camera, 1.0) >= 0).astype(np.uint8)
+        contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        image = cv2.drawContours(image, contours, -1, ESTIMATE_RGB, 1)
+    return np.asarray(image, np.uint8)
+
+
+def _box_of(camera: Camera, states: Sequence[Array]) -> tuple[slice, slice]:
+    """Return the rows and columns around players; all of them where the view shows none."""
+    mask = np.zeros(camera.size[::-1], bool)
+    for state in states:
+        mask |= class_image(state, camera, 1.0) >= 0
+    return _around(mask) if mask.any() else (slice(None), slice(None))
+
+
 def _with_outline(view: View, posed: PosedBody) -> Image:
     mask = render(cached_surface_arrays(posed.model), posed, view.camera, FLAT).mask.astype(np.uint8)
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
@@ -55,14 +84,17 @@ def _with_outline(view: View, posed: PosedBody) -> Image:
 def _near(image: Image, camera: Camera, posed: PosedBody) -> Image | None:
     """Cut out what lies around the body; None where the view does not show it."""
     mask = render(cached_surface_arrays(posed.model), posed, camera, FLAT).mask
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if not len(rows):
-        return None
+    return _square_pixels(image[_around(mask)], camera) if mask.any() else None
+
+
+def _around(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
+    """Return the rows and columns of a mask, with a margin."""
     spans = []
-    for ends, length in ((rows, mask.shape[0]), (columns, mask.shape[1])):
+    for axis in (1, 0):
+        ends, length = np.flatnonzero(mask.any(axis=axis)), mask.shape[1 - axis]
         room = int(_MARGIN * (ends[-1] - ends[0] + 1))
         spans.append(slice(max(ends[0] - room, 0), min(ends[-1] + room + 1, length)))
-    return _square_pixels(image[spans[0], spans[1]], camera)
+    return spans[0], spans[1]
 
 
 def _square_pixels(image: Image, camera: Camera) -> Image:

@@ -119,13 +119,14 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
     recording = opened.recording
     if recording.n_frames == 0:
         checks.mistakes.append(str(past_the_end_error(trial, recording)))
+    elif trial.start.find:
+        who = "players are" if trial.has_players else "body is"
+        checks.add(f"start: not given; the {who} looked for when the trial is tracked")
     elif trial.has_players:
         checks.attempt(
             lambda: players_tracker_of(trial, recording.rig),
             lambda _: f"start: frame {trial.start.frame}, {', '.join(player.name for player in trial.start.player)}",
         )
-    elif trial.start.find:
-        checks.add("start: not given; the body is looked for when the trial is tracked")
     else:
         model = trial.model()
         first = checks.attempt(

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from airborne.tracking import Status
 from airborne.tracking.first_pose.candidates import StartSearch, find_thing
 from airborne.tracking.first_pose.moments import SourceKey, empty_scenes, look, spread_sample
 from airborne.tracking.first_pose.person_candidates import find_person
+from airborne.tracking.first_pose.players import PlayersSearch
 from airborne.tracking.methods import sample_body_colours
 from airborne.tracking.model_based.refined import RefinedTracker
 from airborne.tracking.tracker import track_frames
@@ -29,6 +30,8 @@ from airborne.trial.file import Trial
 from airborne.trial.start import StartTable
 from airborne.types import Progress
 from airborne.video import Frames, Recording, VideoFacts, open_recording
+
+Search = TypeVar("Search", StartSearch, PlayersSearch)
 
 _MOST_IMAGES = 1500  # of each camera that are looked at
 _MOST_BYTES = 4e8  # of decoded pictures that are kept to track back through
@@ -44,6 +47,12 @@ class FoundStart:
     scenes: Mapping[SourceKey, EmptyScene]
     facts: tuple[VideoFacts, ...]
     note: str  # what the user should know, in one line
+
+    @property
+    def start(self) -> dict[str, Any]:
+        """The [start] as a trial file has it."""
+        angles = ["joint_angles_deg"] if self.model.has_joints else []
+        return self.trial.start.model_dump(include={"frame", "position_m", "quaternion_xyzw", *angles})
 
     def draw(self, folder: Path) -> None:
         """Draw the empty scene, what stands out from it and the body there."""
@@ -62,8 +71,8 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     model = trial.model()
     if len(trial.camera) < 2:
         raise TrialError(f"{trial.name}: [start] is missing; finding the body needs two cameras: give its pose")
-    recording, facts = _open(trial)
-    sample = spread_sample(_report_each(recording, progress), recording.n_frames)
+    recording, facts = open_for_look(trial)
+    sample = spread_sample(report_each(recording, progress), recording.n_frames)
     if not sample:
         raise past_the_end_error(trial, recording)
     scenes = empty_scenes(sample)
@@ -75,7 +84,7 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     search = find_person if model.has_joints else find_thing
     finding = search(model, look(sample, scenes))
     if take is not None:
-        finding = _take(trial, finding, take)
+        finding = take_candidate(trial, finding, take)
     elif not finding.is_decided:
         raise _ask_for_help(trial, model, finding, folder)
     first = finding.candidates[0]
@@ -87,7 +96,7 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     return FoundStart(_with_start(trial, model, frame, pose), model, finding, scenes, facts, note)
 
 
-def _open(trial: Trial) -> tuple[Recording, tuple[VideoFacts, ...]]:
+def open_for_look(trial: Trial) -> tuple[Recording, tuple[VideoFacts, ...]]:
     """Open the videos for a look: images are converted only where they are used."""
     cameras = open_cameras(trial)
     start = trial.start.frame
@@ -104,14 +113,15 @@ def _open(trial: Trial) -> tuple[Recording, tuple[VideoFacts, ...]]:
     return recording, cameras.facts
 
 
-def _report_each(recording: Recording, progress: Progress | None) -> Iterator[Frames]:
+def report_each(recording: Recording, progress: Progress | None) -> Iterator[Frames]:
+    """Yield the frames, and report how many were."""
     for number, frames in enumerate(recording, start=1):
         if progress is not None:
             progress(number, recording.n_frames)
         yield frames
 
 
-def _take(trial: Trial, finding: StartSearch, number: int) -> StartSearch:
+def take_candidate(trial: Trial, finding: Search, number: int) -> Search:
     """Put a candidate first."""
     n = len(finding.candidates)
     if not 1 <= number <= n:
@@ -171,10 +181,7 @@ def _describe(model: BodyModel, finding: StartSearch) -> dict[str, Any]:
 def _track_back(trial: Trial, model: BodyModel, recording: Recording, finding: StartSearch) -> tuple[int, Pose]:
     """Track from the moment of the finding back in time; return the earliest frame that is tracked, and the pose."""
     found, pose = finding.moment.frames.index, finding.candidates[0].pose
-    picture_bytes = sum(1.5 * facts.size[0] * facts.size[1] for facts in recording.facts)
-    most = max(2, int(_MOST_BYTES / picture_bytes))
-    earlier = replace(recording, start=trial.start.frame, stop=found + 1)
-    kept = deque(earlier, maxlen=most)
+    kept = frames_up_to(trial, recording, found)
     if not kept:
         return found, pose
     backward = [replace(frames, time_s=-frames.time_s) for frames in reversed(kept)]
@@ -186,6 +193,13 @@ def _track_back(trial: Trial, model: BodyModel, recording: Recording, finding: S
         elif frames.index < found:  # a first frame may be uncertain: nothing was learned before it
             break
     return earliest
+
+
+def frames_up_to(trial: Trial, recording: Recording, index: int) -> Sequence[Frames]:
+    """Return the frames from the trial's first, or as many as memory holds, up to one; decoded."""
+    picture_bytes = sum(1.5 * facts.size[0] * facts.size[1] for facts in recording.facts)
+    most = max(2, int(_MOST_BYTES / picture_bytes))
+    return deque(replace(recording, start=trial.start.frame, stop=index + 1), maxlen=most)
 
 
 def _with_start(trial: Trial, model: BodyModel, frame: int, pose: Pose) -> Trial:

@@ -87,8 +87,10 @@ class PlayersRun:
         return PlayersWriter(folder / self.table, self.players.joints, resume=resume)
 
     def write(self, writer: PlayersWriter, estimate: PlayersStep) -> None:
-        """Write one time's estimates."""
+        """Write one time's estimates; what there is to say of them becomes an event of the recording."""
         writer.append(estimate.players)
+        notes = (f"{each.player}, frame {each.index}: {each.note}" for each in estimate.players if each.note)
+        self.recording.events.extend(notes)
 
     def artists(self, folder: Path, drawn: OverlaysAs) -> Iterator[AbstractContextManager[Any]]:
         """Return what draws the frames while they are tracked."""

@@ -23,7 +23,8 @@ from airborne.motion import Motion, PlayersMotion
 from airborne.motion.run_folder import CALIBRATION, SUMMARY
 from airborne.run.body import BodyRun
 from airborne.run.drawing import DrawingThread
-from airborne.run.find import find_start
+from airborne.run.find import FoundStart, find_start
+from airborne.run.find_players import FoundPlayers, find_players_start
 from airborne.run.folder import list_tables, prepare_folder, run_identity
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files
 from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
@@ -79,9 +80,12 @@ def track_trial(
     if not live:
         refuse_same_files(trial)
     started_s = time.monotonic()
-    found = None
+    found: FoundStart | FoundPlayers | None = None
+    if live and trial.start.find:
+        raise ResultError("a live run looks for nobody; give [[start.player]] tables")
     if trial.start.find:
-        found = find_start(trial, folder, take=take, progress=progress)
+        find = find_players_start if trial.has_players else find_start
+        found = find(trial, folder, take=take, progress=progress)
         trial = found.trial
     elif take is not None:
         raise ResultError("--take chooses between poses that were found; this trial's [start] says where the body is")
@@ -90,11 +94,13 @@ def track_trial(
     drawn = None if not pictures else "stills" if first_frame else "videos"
     options = _Options(folder, started_s, resume, overwrite, live, drawn, progress)
     with ExitStack() as stack:
+        facts = None if found is None else found.facts
         if trial.has_players:
-            opened = _open_live(trial, stack, progress) if live else open_trial(trial)
+            opened = _open_live(trial, stack, progress) if live else open_trial(trial, facts)
+            opened.recording.events.extend([] if found is None else [found.note])
             return _run(PlayersRun.open(trial, opened), options, stack)
-        opened = open_trial(trial, None if found is None else found.facts)
-        body = BodyRun.open(trial, opened, found)
+        opened = open_trial(trial, facts)
+        body = BodyRun.open(trial, opened, found if isinstance(found, FoundStart) else None)
         refuse_mix_ups(body.recording, body.model, body.start)
         return _run(body, options, stack)
 

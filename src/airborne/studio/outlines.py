@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -136,22 +136,24 @@ def _players_overlay(motion: PlayersMotion, cameras: Sequence[Camera], frame: in
         status = str(motion.status[row, player])
         if status == Status.LOST.value:
             continue
-        for side in ("left", "right"):
-            names = [f"{limb}_{side}" for limb in _LIMBS if f"{limb}_{side}" in motion.joints]
-            points = motion.points[row, player, [motion.joints.index(each) for each in names]]
-            for pane, camera in enumerate(cameras):
-                line = camera.px_from_world(points)
-                if np.isfinite(line).all():
-                    text = name if side == "left" else ""
-                    item = {
-                        "pane": pane,
-                        "points": _round(line),
-                        "colour": _COLOURS[status],
-                        "width": 2.5,
-                        "text": text,
-                    }
-                    items.append(item)
+        joints_m = dict(zip(motion.joints, motion.points[row, player], strict=True))
+        items += legs_items(name, joints_m, cameras, _COLOURS[status])
     return {"items": items, "label": f"frame {frame}   {motion.time_s[row]:.3f} s"}
+
+
+def legs_items(
+    name: str, joints_m: Mapping[str, Sequence[float]], cameras: Sequence[Camera], colour: str
+) -> list[dict[str, Any]]:
+    """Return the lines of a player's legs in every camera; joint -> position [m]."""
+    items = []
+    for side in ("left", "right"):
+        points = np.array([joints_m[f"{limb}_{side}"] for limb in _LIMBS if f"{limb}_{side}" in joints_m])
+        for pane, camera in enumerate(cameras):
+            line = camera.px_from_world(points)
+            if np.isfinite(line).all():
+                text = name if side == "left" else ""
+                items.append({"pane": pane, "points": _round(line), "colour": colour, "width": 2.5, "text": text})
+    return items
 
 
 def _players_curves(motion: PlayersMotion) -> dict[str, Any]:

@@ -60,10 +60,11 @@ def read_pose(session: Session, model: BodyModel) -> tuple[int, Pose] | None:
         return None
 
 
-def pose_of(start: dict[str, Any]) -> Pose:
-    """Return the pose of a [start] with position and quaternion."""
+def pose_of(model: BodyModel, start: dict[str, Any]) -> Pose:
+    """Return the pose of a [start] with position, quaternion, and angles of joints if it has them."""
     rotation = Rotation.from_quat(start["quaternion_xyzw"])
-    return Pose(world_from_root=RigidTransform.from_components(start["position_m"], rotation))
+    root = RigidTransform.from_components(start["position_m"], rotation)
+    return pose_by_hand(model, root, start.get("joint_angles_deg", {})).pose
 
 
 def start_of(model: BodyModel, frame: int, pose: Pose) -> dict[str, Any]:

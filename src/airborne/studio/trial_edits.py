@@ -77,14 +77,14 @@ def with_key(text: str, frame: int, values: Mapping[str, Any]) -> str:
     return tomlkit.dumps(document)
 
 
-def with_players(text: str, frame: int, files: Mapping[str, str]) -> str:
-    """Return a trial's text whose start is these players: name -> table of clicked points."""
+def with_players(text: str, frame: int, start_of: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return a trial's text whose start is these players: name -> its `points_px` or `joints_m`."""
     document = _parse(text)
     start, players = tomlkit.table(), tomlkit.aot()
     start.add("frame", frame)
-    for name, file in files.items():
+    for name, points in start_of.items():
         player = tomlkit.table()
-        player.update({"name": name, "points_px": file})
+        player.update({"name": name, **points})
         players.append(player)
     start.add("player", players)
     document.pop("start", None)

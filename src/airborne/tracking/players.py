@@ -38,6 +38,7 @@ class PlayerEstimate:
     covariance: Array  # (joints, 3, 3) [m²], of each joint for itself
     score: float  # mean log-likelihood of the estimate [nat]; NaN when lost
     n_views: int  # cameras that were used and in which the player was not occluded
+    note: str = ""  # what the user should know of this time, in one line
 
 
 def lost_player_estimate(player: str, frames: Frames, n_joints: int) -> PlayerEstimate:

@@ -66,8 +66,10 @@ class Trial(SettingsTable):
     @model_validator(mode="after")
     def _check_players(self) -> Trial:
         is_legs = self.body.preset == "legs"
-        if is_legs and not self.start.player:
-            raise ValueError('body preset "legs" needs [[start.player]] tables: where every player is at the start')
+        if is_legs and not (self.start.player or self.start.find):
+            raise ValueError('body preset "legs" needs [[start.player]] tables, or find = true: where the players are')
+        if "near_net" in self.start.model_fields_set and not (is_legs and self.start.find):
+            raise ValueError('near_net goes with find = true and body preset = "legs"')
         if self.start.player and not is_legs:
             raise ValueError('[[start.player]] goes with body preset = "legs"')
         if is_legs and self.lights is not None:
@@ -144,7 +146,7 @@ class Trial(SettingsTable):
     @property
     def has_players(self) -> bool:
         """Whether this is a trial of players' legs, and not of one body."""
-        return bool(self.start.player)
+        return self.body.preset == "legs"
 
     @property
     def settings(self) -> Settings:

@@ -16,7 +16,8 @@ from airborne.trial.pose_forms import BY_HAND, PoseForms
 class StartTable(PoseForms):
     """The first pose: set by hand, or found from positions of the body's landmarks; or those of several players."""
 
-    find: bool = False  # the body is looked for, from `frame` on
+    find: bool = False  # the body, or the players, are looked for, from `frame` on
+    near_net: bool = True  # of players that are looked for: those at the net alone
     frame: Annotated[int, Field(ge=0)] = 0
     player: list[PlayerTable] = []
 

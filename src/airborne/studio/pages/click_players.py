@@ -125,8 +125,9 @@ class PlayersPanel(PointsPanel):
                 raise AirborneError(
                     f"click the torso and all points of the legs of {', '.join(missing)} in two cameras"
                 )
+            players = {name: {"points_px": file} for name, file in files.items()}
             what = f"{count(len(files), 'player')} set"
-            self.session.edit_trial(lambda text: with_players(text, self.frame, files), what)
+            self.session.edit_trial(lambda text: with_players(text, self.frame, players), what)
             ui.notify("the first poses are written into the trial", type="positive")
 
     def show(self) -> None:

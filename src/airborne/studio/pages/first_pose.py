@@ -1,15 +1,21 @@
-"""The step First pose: a thing is looked for, a person's landmarks are clicked."""
+"""The step First pose: a body or players are looked for, or landmarks are clicked."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
 
 from nicegui import ui
 
 from airborne.errors import AirborneError
 from airborne.studio.pages.click_players import PlayersPanel
 from airborne.studio.pages.click_pose import ClickPanel
+from airborne.studio.pages.find_players import FindPlayersPanel
 from airborne.studio.pages.find_pose import FindPanel
 from airborne.studio.pages.layout import complain, in_thread, page_frame, work
 from airborne.studio.session import Session
+
+_CLICK, _FIND = "Click the points", "Let it be found"
 
 
 async def first_pose_page(session: Session) -> None:
@@ -27,17 +33,34 @@ async def first_pose_page(session: Session) -> None:
         frame = int(project.table("start").get("frame", session.frame))
         if project.table("body").get("preset") == "legs":
             players = PlayersPanel(session, shown, rig, frame)
-            changed.append(players.reread)
-            await players.build()
+            await _build_either(players, FindPlayersPanel(session, shown, rig, frame), changed)
             return
         try:
             model = await in_thread(project.model)
         except AirborneError as error:
             complain(error)
             return
+        find = FindPanel(session, shown, rig, model, frame)
         if model.has_joints:
             panel = ClickPanel(session, shown, rig, model, frame)
-            changed.append(panel.reread)
-            await panel.build()
+            await _build_either(panel, find, changed)
         else:
-            await FindPanel(session, shown, rig, model, frame).build()
+            await find.build()
+
+
+async def _build_either(
+    click: ClickPanel | PlayersPanel, find: FindPanel | FindPlayersPanel, changed: list[Callable[[], Any]]
+) -> None:
+    """Lay out the panel for clicks, or the one that finds, as the user chooses."""
+
+    async def build() -> None:
+        changed[:] = [each for each in changed if each != click.reread]
+        area.clear()
+        with area:
+            await (find if choice.value == _FIND else click).build()
+        if choice.value == _CLICK:
+            changed.append(click.reread)
+
+    choice = ui.toggle([_CLICK, _FIND], value=_CLICK, on_change=build).props("dense no-caps")
+    area = ui.element("div").style("display: contents")
+    await build()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -75,8 +75,8 @@ class CameraSetup:
     bounds: list[ImageBounds]  # of the drawables
 
 
-def block_frames(scene: BlockScene) -> Iterator[Frames]:
-    """Record a scene frame by frame, in memory; the views' cameras are the calibrated ones.
+def block_frames(scene: BlockScene, indices: Iterable[int] | None = None) -> Iterator[Frames]:
+    """Record a scene frame by frame, or these frames of it, in memory; the views' cameras are the calibrated ones.
 
     The same scene gives the same pixels.
     """
@@ -87,7 +87,7 @@ def block_frames(scene: BlockScene) -> Iterator[Frames]:
         _camera_setup(rng, scene, camera.name, objects=objects, pool=pool, drawables=drawables)
         for camera in scene.calibrated_rig
     ]
-    for index in range(scene.n_frames):
+    for index in range(scene.n_frames) if indices is None else indices:
         rng = np.random.default_rng([scene.seed, 23, index])
         images = [
             _draw_image(rng, setup, drawables, pool, index=index, quality=scene.difficulty.jpeg_quality)

@@ -50,6 +50,13 @@ def points_of(state: Array) -> Array:
     return points
 
 
+def average_shape(stature_m: float) -> Array:
+    """Return the lengths and radii (17,) of an average person [m]; where shorts and socks end as shares."""
+    lengths = _LENGTHS * stature_m
+    lengths[SHORTS_END : SOCK_END + 1] = _LENGTHS[SHORTS_END : SOCK_END + 1]
+    return np.concatenate([lengths, _RADII * stature_m])
+
+
 def start_state(name: str, joints_m: Mapping[str, Array]) -> Array:
     """Return the state (35,) nearest to hand-set joints; raises TrialError or BodyError where they are unusable."""
     missing = [joint for joint in ("torso", *LEG_POINTS) if joint not in joints_m]
@@ -57,9 +64,8 @@ def start_state(name: str, joints_m: Mapping[str, Array]) -> Array:
         raise TrialError(f"player '{name}' has no {', '.join(missing)} in [start]; give torso, hips, knees and ankles")
     legs = Legs.from_points(joints_m["torso"], np.array([joints_m[joint] for joint in LEG_POINTS]))
     stature_m = (legs.thigh_m + legs.shank_m) * _STATURE_PER_LEG
-    state = np.concatenate([np.zeros(N_DOF), _LENGTHS * stature_m, _RADII * stature_m])
+    state = np.concatenate([np.zeros(N_DOF), average_shape(stature_m)])
     lengths = state[N_DOF : N_DOF + N_LENGTHS]
-    lengths[SHORTS_END : SOCK_END + 1] = _LENGTHS[SHORTS_END : SOCK_END + 1]
     lengths[[PELVIS, THIGH, SHANK]] = legs.half_pelvis_m, legs.thigh_m, legs.shank_m
     lengths[TRUNK] = 2 * legs.torso_to_hips_m - lengths[WAIST]
     hips = (np.asarray(joints_m["hip_left"]) + joints_m["hip_right"]) / 2
@@ -79,15 +85,19 @@ def start_state(name: str, joints_m: Mapping[str, Array]) -> Array:
     return state
 
 
-def fit_first_frame(name: str, joints_m: Mapping[str, Array], frames: Frames, others: Capsules) -> FirstFrameFit:
+def fit_first_frame(
+    name: str, joints_m: Mapping[str, Array], frames: Frames, others: Capsules, *, looser: float = 1.0
+) -> FirstFrameFit:
     """Fit pose and shape to the first frame, with the colours relearned in each round.
+
+    Joints that were not set by hand are `looser` by a factor.
 
     Raises TrialError where no camera shows the player.
     """
     state = start_state(name, joints_m)
     anchors = np.array([joints_m.get(joint, np.full(3, np.nan)) for joint in JOINTS], float)
     sd = np.concatenate([_POSE_SD, _LENGTH_SD, _RADIUS_SD * state[N_DOF + N_LENGTHS :]])
-    prior = JumperPrior(state.copy(), np.diag(1 / sd**2), anchors, _ANCHOR_SD_M)
+    prior = JumperPrior(state.copy(), np.diag(1 / sd**2), anchors, looser * _ANCHOR_SD_M)
     borders = [N_DOF + SHORTS_END, N_DOF + SOCK_END]
     for number in range(_ROUNDS):
         regions = player_regions(frames, state[:3])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -14,6 +14,7 @@ from airborne.tracking.capsules.first_frame import fit_first_frame, points_of, s
 from airborne.tracking.capsules.fit import JumperFit, JumperPrior, fit_jumper
 from airborne.tracking.capsules.jumper import CAPSULES, FOOT_HEIGHT_M, JOINTS, N_DOF, PELVIS, SKIN, SURFACE_CLASSES
 from airborne.tracking.capsules.kernel_arguments import Capsules
+from airborne.tracking.capsules.recovery import UNOCCLUDED, find_again, is_due
 from airborne.tracking.capsules.surface_colours import (
     COLOUR_UPDATE_S,
     SurfaceColours,
@@ -21,7 +22,8 @@ from airborne.tracking.capsules.surface_colours import (
     occlusion_chance,
     update_colours,
 )
-from airborne.tracking.capsules.views import EvidenceTable, MapScale, map_evidence, player_regions
+from airborne.tracking.capsules.track import Track, evidence_per_px
+from airborne.tracking.capsules.views import EvidenceTable, map_evidence, player_regions
 from airborne.tracking.estimate import Status
 from airborne.tracking.players import PlayerEstimate, PlayerStart, lost_player_estimate
 from airborne.tracking.time_offsets import compensate_at_velocity
@@ -44,22 +46,6 @@ _SHAPE = np.arange(N_DOF + PELVIS, N_DOF + N_LENGTHS)  # the constant lengths in
 _STEP_M = 1e-4  # of the finite differences
 # (classes, halves of capsules)
 _HALVES_OF_CLASS = (CAPSULES[:, :2].ravel() == np.arange(len(SURFACE_CLASSES))[:, None]).astype(float)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Track:
-    """What the next frame needs of one player."""
-
-    time_s: Fraction
-    filtered: GaussianState
-    state: Array  # (35,) the last estimate; its shape is constant
-    sliding: Array  # (4,) in the first frame
-    shape_covariance: Array  # (5, 5) of the constant lengths [m2]
-    colours: SurfaceColours
-    colours_updated_s: Fraction  # of the last update of its colours
-    tables: tuple[EvidenceTable, ...]  # of each camera
-    scale: MapScale
-    reference_evidence: float  # running reference of the evidence per pixel [nat]
 
 
 class Blocker:
@@ -89,7 +75,27 @@ class Blocker:
             )
             tracks[name], estimate = _track_player(name, track, frames, predicted=expected[name], occluders=occluders)
             estimates.append(estimate)
-        return tracks, tuple(estimates)
+        return self._look_for_lost(tracks, {each.player: each for each in estimates}, frames)
+
+    def _look_for_lost(
+        self, tracks: dict[str, Track], estimates: dict[str, PlayerEstimate], frames: Frames
+    ) -> tuple[dict[str, Track], tuple[PlayerEstimate, ...]]:
+        """Look for the players who have been lost for a while."""
+        for name, estimate in estimates.items():
+            lost_s = (tracks[name].lost_s or frames.time_s) if estimate.status is Status.LOST else None
+            tracks[name] = replace(tracks[name], lost_s=lost_s)
+        lost = {name: track for name, track in tracks.items() if is_due(track, frames.time_s)}
+        if lost:
+            seen = [track.state for track in tracks.values() if track.lost_s is None]
+            found, unclear = find_again(lost, seen, frames)
+            for name, track in lost.items():
+                is_unclear = name in unclear
+                note = "not taken up again: two could be meant" if is_unclear and not track.is_unclear else ""
+                tracks[name] = replace(track, searched_s=frames.time_s, is_unclear=is_unclear)
+                estimates[name] = replace(estimates[name], note=note)
+                if name in found:
+                    tracks[name], estimates[name] = _take_up(name, tracks[name], found[name], frames)
+        return tracks, tuple(estimates.values())
 
     def _first(self, frames: Frames) -> tuple[dict[str, Track], tuple[PlayerEstimate, ...]]:
         tracks, estimates = {}, []
@@ -109,7 +115,7 @@ class Blocker:
                 frames.time_s,
                 _tables(first.colours),
                 first.scale,
-                _evidence_per_px(first.fit.owned),
+                evidence_per_px(first.fit.owned),
             )
             n_views = _n_unoccluded(
                 first.colours.occlusion, [v for v, view in enumerate(frames.views) if view is not None]
@@ -162,7 +168,7 @@ def _track_player(
     information = np.linalg.inv(expected.covariance[:N_FREE, :N_FREE])
     prior = JumperPrior(expected.free, information, _contact_points(track.state), np.full(N_POINTS, _SLIP_SD_M))
     fitted = fit_jumper(state, prior, region_maps, occluders)
-    evidence = _evidence_per_px(fitted.owned)
+    evidence = evidence_per_px(fitted.owned)
     if evidence < max(_LOST_SHARE * track.reference_evidence, _LEAST_EVIDENCE):
         return replace(track, filtered=expected, time_s=frames.time_s), lost_player_estimate(name, frames, len(JOINTS))
     filtered = update(expected, fitted.state[:N_FREE], np.linalg.inv(fitted.information))
@@ -181,6 +187,16 @@ def _track_player(
             colours = update_colours(replace(track.colours, occlusion=occlusion), track.state, regions, occluders)
             return replace(track, colours=colours, colours_updated_s=frames.time_s, tables=_tables(colours)), estimate
     return _with_occlusion(track, occlusion), estimate
+
+
+def _take_up(name: str, track: Track, fitted: JumperFit, frames: Frames) -> tuple[Track, PlayerEstimate]:
+    """Go on with a player who was found again."""
+    away_s = float(frames.time_s - (track.lost_s or frames.time_s))
+    filtered = state_at_rest(fitted.state[:N_FREE], np.linalg.inv(fitted.information))
+    colours = replace(track.colours, occlusion=np.full_like(track.colours.occlusion, UNOCCLUDED))
+    track = replace(track, filtered=filtered, state=fitted.state, colours=colours, tables=_tables(colours), lost_s=None)
+    estimate = _estimate(name, frames, track, fitted=fitted, n_views=0)
+    return track, replace(estimate, note=f"found again after {away_s:.2g} s")
 
 
 def _contact_points(state: Array) -> Array:
@@ -238,7 +254,7 @@ def _estimate(name: str, frames: Frames, track: Track, *, fitted: JumperFit, n_v
         status=Status.TRACKED if is_certain else Status.UNCERTAIN,
         points=fitted.points,
         covariance=covariance,
-        score=_evidence_per_px(fitted.owned),
+        score=evidence_per_px(fitted.owned),
         n_views=n_views,
     )
 
@@ -249,8 +265,3 @@ def _length_jacobian(state: Array) -> Array:
     shifted = np.tile(state, (len(_SHAPE), 1))
     shifted[np.arange(len(_SHAPE)), _SHAPE] += _STEP_M
     return np.stack([(points_of(each) - points) / _STEP_M for each in shifted], axis=-1)
-
-
-def _evidence_per_px(owned: Array) -> float:
-    evidence, area = owned.sum(axis=(0, 1, 2))
-    return float(evidence / area) if area > 0 else 0.0

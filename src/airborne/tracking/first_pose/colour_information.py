@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 from scipy.spatial import KDTree
 
+from airborne.appearance.colour_features import colour_features
 from airborne.body import BodyModel, PosedBody
 from airborne.cameras import Camera
 from airborne.tracking.first_pose.person import SilhouetteEvidence
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.types import Array
 
 _N_COLOURS = 12  # that the pixels of a body are sorted into
-_BLACK = 30.0  # [grey levels] added to all channels: dark pixels have no hue
-_BRIGHTNESS_WEIGHT = 0.5  # of brightness, which shading changes, beside hue
 _SKIN = {"face", "hand"}  # parts of one colour: what tells a face from hair
 
 
@@ -35,7 +33,7 @@ class PixelColours:
     def of(cls, silhouettes: SilhouetteEvidence) -> PixelColours:
         """Sort what stands out by its colours."""
         stands_out = [plane > 0 for plane in silhouettes.planes]
-        features = [_features(image) for image in silhouettes.images]
+        features = [colour_features(image) for image in silhouettes.images]
         pixels = np.concatenate([each[here] for each, here in zip(features, stands_out, strict=True)])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # a colour that no pixel has does no harm
@@ -67,12 +65,3 @@ def colour_classes(model: BodyModel) -> NDArray[np.int64]:
             name = part.name.removesuffix("_left").removesuffix("_right")
             names.append("skin" if kind in _SKIN or name in _SKIN else f"{kind} {name}")
     return np.unique(names, return_inverse=True)[1].astype(np.int64)
-
-
-def _features(rgb: NDArray[np.uint8]) -> Array:
-    """Return hue and saturation, and brightness with less weight: (..., 3)."""
-    level = rgb.astype(float) + _BLACK
-    total = level.sum(axis=-1)
-    return np.stack(
-        [level[..., 0] / total * 6, level[..., 2] / total * 6, _BRIGHTNESS_WEIGHT * np.log(total / 3 / 100)], axis=-1
-    )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
@@ -13,9 +12,9 @@ from scipy.special import expit
 from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene, estimate_empty_scene
 from airborne.types import Array
 from airborne.video import Frames, View
+from airborne.video.shrink import shrink
 
 _MOST_MOMENTS = 24  # enough for a median, and to meet a body that is seen for a tenth of the time
-_WIDTH_PX = 640  # about the width of the small pictures
 
 SourceKey = tuple[str, bytes]  # camera name and intrinsics: pictures that share them show the scene by the same pixels
 
@@ -39,7 +38,7 @@ def spread_sample(recording: Iterable[Frames], n_expected: int | None) -> list[F
     for number, frames in enumerate(recording):
         if number % stride:
             continue
-        views = tuple(None if view is None else _shrink(view) for view in frames.views)
+        views = tuple(None if view is None else shrink(view) for view in frames.views)
         kept.append(Frames(frames.index, frames.time_s, views))
         if len(kept) > _MOST_MOMENTS:
             stride, kept = 2 * stride, kept[::2]
@@ -69,18 +68,3 @@ def _evidence(view: View | None, scenes: Mapping[SourceKey, EmptyScene]) -> Arra
 def source_of(view: View) -> SourceKey:
     """Return what a view shows the static scene by."""
     return view.camera.name, view.camera.K.tobytes()
-
-
-def _shrink(view: View) -> View:
-    """Average areas of about square pixels: fields keep their rows until their columns are as wide."""
-    camera, rgb = view.camera, view.rgb
-    columns = max(1, round(camera.size[0] / _WIDTH_PX))
-    rows = max(1, round(columns * camera.K[1, 1] / camera.K[0, 0]))
-    if columns == rows == 1:
-        return View(camera, rgb, view.delay_s)
-    size = camera.size[0] // columns, camera.size[1] // rows
-    small = cv2.resize(rgb[: size[1] * rows, : size[0] * columns], size, interpolation=cv2.INTER_AREA)
-    middle = ((columns - 1) / 2, (rows - 1) / 2)
-    return View(
-        camera.resample(scale=(columns, rows), offset=middle, size=size), np.asarray(small, np.uint8), view.delay_s
-    )

@@ -1,0 +1,150 @@
+"""The start of a trial of players found in its videos: who stands at the net, followed back to the first frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from airborne.errors import TrialError, UndecidedError
+from airborne.export import write_json
+from airborne.export.finding import draw_player_candidates
+from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE
+from airborne.run.find import frames_up_to, open_for_look, report_each, take_candidate
+from airborne.run.folder import open_results
+from airborne.run.opening import past_the_end_error
+from airborne.tracking import Status
+from airborne.tracking.capsules import Blocker
+from airborne.tracking.first_pose.moments import spread_sample
+from airborne.tracking.first_pose.players import PlayersSearch, find_players
+from airborne.tracking.players import PlayerStart
+from airborne.trial.file import Trial
+from airborne.trial.players import PlayerTable
+from airborne.trial.start import StartTable
+from airborne.types import Progress
+from airborne.video import Frames, Recording, VideoFacts
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundPlayers:
+    """Where a trial's players are, and what they were found by."""
+
+    trial: Trial  # with the start that was found
+    finding: PlayersSearch
+    facts: tuple[VideoFacts, ...]
+    note: str  # what the user should know, in one line
+
+    @property
+    def start(self) -> dict[str, Any]:
+        """The [start] as a trial file has it."""
+        players = [player.model_dump(include={"name", "joints_m"}) for player in self.trial.start.player]
+        return {"frame": self.trial.start.frame, "player": players}
+
+
+def find_players_start(
+    trial: Trial, folder: Path, *, take: int | None = None, progress: Progress | None = None
+) -> FoundPlayers:
+    """Find the players of a trial that says nothing of them, and the earliest frame from which they can be followed.
+
+    Where the pictures do not decide who is there, or which way they face, candidates.json and a picture are written
+    into `folder` and UndecidedError is raised; `take` chooses one of them, from 1. Raises TrialError where nobody is.
+    """
+    if len(trial.camera) < 2:
+        raise TrialError(f"{trial.name}: [start] is missing; finding players needs two cameras: give [[start.player]]")
+    recording, facts = open_for_look(trial)
+    sample = spread_sample(report_each(recording, progress), recording.n_frames)
+    if not sample:
+        raise past_the_end_error(trial, recording)
+
+    def whole(index: int) -> Frames:
+        return next(iter(replace(recording, start=index, stop=index + 1)))
+
+    finding = find_players(sample, whole, near_net=trial.start.near_net)
+    if take is not None:
+        finding = take_candidate(trial, finding, take)
+    elif not finding.is_decided:
+        raise _ask_for_help(trial, finding, folder)
+    first = finding.candidates[0]
+    frame, starts = _track_back(trial, recording, finding)
+    note = (
+        f"[[start.player]] were found: {len(starts)} stand out best in frame {finding.frames.index} "
+        f"(probability {first.probability:.3g}) and can be followed back to frame {frame}"
+    )
+    return FoundPlayers(_with_start(trial, frame, starts), finding, facts, note)
+
+
+def _ask_for_help(trial: Trial, finding: PlayersSearch, folder: Path) -> UndecidedError:
+    """Write the candidates and return the error that names them."""
+    frame, best = finding.frames.index, finding.candidates[0]
+    with open_results(folder):
+        write_json(folder / CANDIDATES, _describe(finding))
+        draw_player_candidates(
+            folder / CANDIDATES_PICTURE,
+            finding.frames,
+            [(f"{each.probability:.0%}", [player.state for player in each.players]) for each in finding.candidates],
+        )
+    if best.is_plausible:
+        n = len(finding.candidates)
+        reason = (
+            f"who stands there in frame {frame}, and which way; the likeliest of {n} is so by {best.probability:.0%}"
+        )
+    else:
+        reason = f"nobody is seen well in frame {frame}; check [calibration], whose world must be the court's"
+    return UndecidedError(
+        f"{trial.name}: the players' start is undecided: {reason}; look at {folder / CANDIDATES_PICTURE}, then give "
+        "--take 1 (or another number), or [[start.player]] tables"
+    )
+
+
+def _describe(finding: PlayersSearch) -> dict[str, Any]:
+    return {
+        "frame": finding.frames.index,
+        "time_s": float(finding.frames.time_s),
+        "candidates": [
+            {
+                "number": number,
+                "probability": round(each.probability, 4),
+                "players": [
+                    {
+                        "name": start.name,
+                        "told": round(player.told, 3),
+                        "evidence": round(player.evidence, 3),
+                        "joints_m": _rounded(start),
+                    }
+                    for start, player in zip(each.starts, each.players, strict=True)
+                ],
+            }
+            for number, each in enumerate(finding.candidates, start=1)
+        ],
+    }
+
+
+def _track_back(trial: Trial, recording: Recording, finding: PlayersSearch) -> tuple[int, tuple[PlayerStart, ...]]:
+    """Track from the moment of the finding back in time; return the earliest frame in which all are, and where."""
+    found, starts = finding.frames.index, finding.candidates[0].starts
+    kept = frames_up_to(trial, recording, found)
+    tracker = Blocker(starts)
+    state, earliest = tracker.init(), (found, starts)
+    for frames in reversed(kept):
+        state, estimates = tracker.step(state, replace(frames, time_s=-frames.time_s))
+        statuses = {estimate.status for estimate in estimates}
+        if Status.LOST in statuses:
+            break
+        if statuses == {Status.TRACKED}:
+            joints = [dict(zip(tracker.joints, estimate.points, strict=True)) for estimate in estimates]
+            starts = tuple(
+                PlayerStart(name=each.player, joints_m=points) for each, points in zip(estimates, joints, strict=True)
+            )
+            earliest = frames.index, starts
+    return earliest
+
+
+def _with_start(trial: Trial, frame: int, starts: Sequence[PlayerStart]) -> Trial:
+    players = [PlayerTable(name=start.name, joints_m=_rounded(start)) for start in starts]
+    return trial.model_copy(update={"start": StartTable(frame=frame, player=players)})
+
+
+def _rounded(start: PlayerStart) -> dict[str, list[float]]:
+    """Return joints to a tenth of a millimetre."""
+    return {joint: [round(x, 4) for x in point.tolist()] for joint, point in start.joints_m.items()}

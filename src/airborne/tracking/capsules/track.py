@@ -1,0 +1,36 @@
+"""What is kept of a player from frame to frame, and the evidence of a fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from airborne.tracking.capsules.dynamics import GaussianState
+from airborne.tracking.capsules.surface_colours import SurfaceColours
+from airborne.tracking.capsules.views import EvidenceTable, MapScale
+from airborne.types import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """What the next frame needs of one player."""
+
+    time_s: Fraction
+    filtered: GaussianState
+    state: Array  # (35,) the last estimate; its shape is constant
+    sliding: Array  # (4,) in the first frame
+    shape_covariance: Array  # (5, 5) of the constant lengths [m2]
+    colours: SurfaceColours
+    colours_updated_s: Fraction  # of the last update of its colours
+    tables: tuple[EvidenceTable, ...]  # of each camera
+    scale: MapScale
+    reference_evidence: float  # running reference of the evidence per pixel [nat]
+    lost_s: Fraction | None = None  # since when the player is lost
+    searched_s: Fraction | None = None  # of the last look for a lost player
+    is_unclear: bool = False  # that look left open who is meant, which was said
+
+
+def evidence_per_px(owned: Array) -> float:
+    """Return the mean evidence of the pixels that capsules own (views, capsules, 2, 2): [nat]."""
+    evidence, area = owned.sum(axis=(0, 1, 2))
+    return float(evidence / area) if area > 0 else 0.0

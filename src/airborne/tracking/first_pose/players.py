@@ -1,0 +1,245 @@
+"""The players at the net found where they stand: moments, players, the directions that they face, and a decision."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.special import expit
+
+from airborne.errors import TrialError
+from airborne.tracking.capsules.first_frame import FirstFrameFit, fit_first_frame, points_of
+from airborne.tracking.capsules.floor_search import (
+    Stander,
+    count_standing,
+    find_standers,
+    lies_in,
+    told_on_grid,
+)
+from airborne.tracking.capsules.jumper import JOINTS
+from airborne.tracking.capsules.standing import HEIGHT, KNEES, ColourViews
+from airborne.tracking.capsules.tracker import occluding_capsules
+from airborne.tracking.players import PlayerStart
+from airborne.types import Array
+from airborne.video import Frames, View
+
+LEAST_PROBABILITY = 0.95  # of the likeliest candidate, with which it is taken
+_COURT_M = (4.5, 9.0)  # half width and half length (FIVB rules of volleyball, 1.1)
+_NEAR_NET_M = 1.5  # of the net's plane, half of the front zone
+_BEYOND_M = 2.5  # on the other side of the net: who stands there is seen behind the blockers
+_BOTH_SIDES_M = 2.0  # cameras whose mean lies nearer to the net's plane stand on both sides
+_AS_WELL = 0.7  # share of what players tell at most, which counts as much as any
+_MOST_MOMENTS, _MOST_SEARCHED = 8, 3  # that are looked at, and searched until two agree on how many are there
+# chosen on synthetic blocks 3001 to 3008
+_TOLD, _TOLD_SD = 1.1, 0.07  # [nat m2] that are as likely a player as none, and their logistic scale
+_LEAST_TOLD = 1.5  # [nat m2] of a player whose pose is trusted: others were partly hidden, or in the air
+_TOLD_PER_NAT = 0.01  # share of what is told that makes a direction e times likelier
+_NET_NATS = 3.0  # for facing the net, of players near it
+_LEAST_EVIDENCE = 1.2  # [nat a pixel] of the fitted player
+_DEEPEST = 1.35  # [rad] flexion of knees, beyond which a stance is not trusted
+_ALIKE_M = 0.06  # mean distance of the legs' joints, below which poses are the same
+_HIGHEST_M = 0.06  # of the lower foot over the floor: in the air legs bend as no stance does
+_LOOSER = 3.0  # than joints set by hand
+_MOST_CANDIDATES, _LEAST_SHOWN = 8, 0.01  # number and probability of those that are listed
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundPlayer:
+    """A player who may stand there, in one pose."""
+
+    joints_m: dict[str, Array]  # joint -> (3,) world [m]
+    state: Array  # (35,)
+    told: float  # [nat m2]
+    evidence: float  # [nat a pixel] of the fit
+    is_plausible: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlayersCandidate:
+    """Players who may be all that stand there."""
+
+    players: tuple[FoundPlayer, ...]  # from left to right
+    probability: float
+
+    @property
+    def is_plausible(self) -> bool:
+        """Whether there are any, and all look like players."""
+        return bool(self.players) and all(player.is_plausible for player in self.players)
+
+    @property
+    def starts(self) -> tuple[PlayerStart, ...]:
+        """Where they start, by names."""
+        return tuple(
+            PlayerStart(name=f"player{number}", joints_m=player.joints_m)
+            for number, player in enumerate(self.players, start=1)
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlayersSearch:
+    """What was found at the moment in which players are seen best."""
+
+    frames: Frames
+    candidates: tuple[PlayersCandidate, ...]  # the likeliest first
+
+    @property
+    def n_players(self) -> int:
+        """How many players the likeliest candidate has."""
+        return len(self.candidates[0].players)
+
+    @property
+    def told(self) -> float:
+        """What these tell in all [nat m2]."""
+        return sum(player.told for player in self.candidates[0].players)
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether the likeliest candidate can be taken."""
+        return self.candidates[0].is_plausible and self.candidates[0].probability >= LEAST_PROBABILITY
+
+
+def find_players(sample: Sequence[Frames], whole: Callable[[int], Frames], *, near_net: bool = True) -> PlayersSearch:
+    """Find the players at the net, or all on the cameras' half of the court, at the best of some times.
+
+    `sample` holds small pictures, `whole` returns those of a frame's number in full size. The world is the court's: its
+    origin in the middle on the floor, x along the net. Raises TrialError where nobody is found.
+    """
+    sample = [frames for frames in sample if sum(view is not None for view in frames.views) > 1]
+    moments = [_Moment.of(frames, near_net=near_net) for frames in sample[:: -(-len(sample) // _MOST_MOMENTS) or 1]]
+    findings: list[PlayersSearch] = []
+    for moment in _best_first(moments)[:_MOST_SEARCHED]:
+        findings.append(moment.search(whole))
+        most = max(finding.n_players for finding in findings)
+        complete = [finding for finding in findings if finding.n_players == most]
+        if len(complete) > 1 and any(finding.is_decided for finding in complete):
+            break
+    if not findings or most == 0:
+        where = "at the net" if near_net else "on the court"
+        raise TrialError(
+            f"[start] is missing, and no player is seen to stand {where}, whose middle must be the world's origin, x "
+            "along the net; give [[start.player]] tables"
+        )
+    decided = (finding for finding in complete if finding.is_decided)
+    return next(decided, max(complete, key=lambda finding: finding.told))
+
+
+def _best_first(moments: Sequence[_Moment]) -> list[_Moment]:
+    """Sort moments by what players at the net tell; those in which they tell about as much as ever by time."""
+    told = [moment.told for moment in moments]
+    best = [moment for moment, each in zip(moments, told, strict=True) if each >= _AS_WELL * max(told)]
+    rest = [(each, moment) for moment, each in zip(moments, told, strict=True) if each < _AS_WELL * max(told)]
+    return [*best, *(moment for _, moment in sorted(rest, key=lambda pair: -pair[0]))]
+
+
+@dataclass(frozen=True, eq=False)
+class _Moment:
+    """A time, and where players are looked for."""
+
+    frames: Frames
+    views: ColourViews
+    zone: Array  # (2, 2) where players are looked for, from and to x, y [m]
+    wanted: Array  # (2, 2) where they are wanted
+    near_net: bool
+
+    @classmethod
+    def of(cls, frames: Frames, *, near_net: bool) -> _Moment:
+        views = [view for view in frames.views if view is not None]
+        zone, wanted = _zones(views, near_net=near_net)
+        return cls(frames, ColourViews.of(views, zone), zone, wanted, near_net)
+
+    @property
+    def told(self) -> float:
+        """What players there may tell in all [nat m2]."""
+        return count_standing(*told_on_grid(self.views, self.wanted))
+
+    def search(self, whole: Callable[[int], Frames]) -> PlayersSearch:
+        """Find the players and fit them to the whole pictures."""
+        standers = list(find_standers(self.views, self.zone, self.wanted))
+        wanted = [stander for stander in standers if lies_in(self.wanted, stander.floor_m)]
+        others = [stander.states[0] for stander in standers if not lies_in(self.wanted, stander.floor_m)]
+        wanted.sort(key=lambda stander: stander.floor_m[0])
+        found = _fit(wanted, others, whole(self.frames.index))
+        return PlayersSearch(self.frames, _candidates(wanted, found, near_net=self.near_net))
+
+
+def _zones(views: Sequence[View], *, near_net: bool) -> tuple[Array, Array]:
+    """Return where players are looked for, and where they are wanted, from and to x, y: (2, 2) each [m]."""
+    half_width, half_length = _COURT_M
+    y = float(np.mean([view.camera.centre[1] for view in views]))
+    ends = np.array([half_length, half_length] if abs(y) < _BOTH_SIDES_M else [half_length, 0.0])
+    seen, wanted = np.maximum(ends, _BEYOND_M), np.minimum(ends, _NEAR_NET_M) if near_net else ends
+    if y > 0:
+        seen, wanted = seen[::-1], wanted[::-1]
+    return tuple(np.array([[-half_width, -zone[0]], [half_width, zone[1]]]) for zone in (seen, wanted))
+
+
+def _fit(standers: Sequence[Stander], others: Sequence[Array], frames: Frames) -> list[list[FoundPlayer]]:
+    """Fit each player's model from all its stances, beside the others as they are likeliest."""
+    states = [stander.states[0] for stander in standers]
+    found: list[list[FoundPlayer]] = [[] for _ in standers]
+    for n in (1, None):  # first the likeliest stances, then all beside these
+        for i, stander in enumerate(standers):
+            beside = [*others, *states[:i], *states[i + 1 :]]
+            fits = [_fit_one(state, beside, frames) for state in stander.states[:n]]
+            found[i] = [_found(fit, stander, number) for number, fit in enumerate(fits)]
+            states[i] = found[i][0].state
+    return found
+
+
+def _fit_one(state: Array, others: Sequence[Array], frames: Frames) -> FirstFrameFit:
+    joints_m = dict(zip(JOINTS, points_of(state), strict=True))
+    return fit_first_frame("found", joints_m, frames, occluding_capsules(state, others), looser=_LOOSER)
+
+
+def _found(fit: FirstFrameFit, stander: Stander, number: int) -> FoundPlayer:
+    evidence, area = fit.fit.owned.sum(axis=(0, 1, 2))
+    per_px = float(evidence / area) if area > 0 else 0.0
+    stance = stander.stances[number]
+    stands = stance[KNEES].mean() < _DEEPEST and stance[HEIGHT] < _HIGHEST_M
+    is_plausible = stander.told[number] > _LEAST_TOLD and per_px > _LEAST_EVIDENCE and stands
+    joints_m = dict(zip(JOINTS, fit.fit.points, strict=True))
+    return FoundPlayer(joints_m, fit.fit.state, float(stander.told[number]), per_px, bool(is_plausible))
+
+
+def _candidates(
+    standers: Sequence[Stander], found: Sequence[Sequence[FoundPlayer]], *, near_net: bool
+) -> tuple[PlayersCandidate, ...]:
+    """Combine who is a player and how each stands; the likeliest first."""
+    options = []
+    for stander, poses in zip(standers, found, strict=True):
+        there = float(expit((stander.told[0] - _TOLD) / _TOLD_SD))
+        each = [(there * p, player) for p, player in _distinct_poses(poses, near_net=near_net)]
+        options.append([option for option in [(1 - there, None), *each] if option[0] > _LEAST_SHOWN / 2])
+    candidates = []
+    for chosen in product(*options):
+        players = tuple(player for _, player in chosen if player is not None)
+        candidates.append(PlayersCandidate(players, float(np.prod([p for p, _ in chosen]))))
+    candidates.sort(key=lambda candidate: -candidate.probability)
+    return tuple(candidates[:1] + [each for each in candidates[1:_MOST_CANDIDATES] if each.probability > _LEAST_SHOWN])
+
+
+def _distinct_poses(poses: Sequence[FoundPlayer], *, near_net: bool) -> list[tuple[float, FoundPlayer]]:
+    """Return a player's poses with their probabilities, those that the fit made alike as one."""
+    told = np.array([pose.told for pose in poses])
+    nats = told / told.max() / _TOLD_PER_NAT
+    if near_net:
+        nats = nats + _NET_NATS * np.array([_faces_net(pose) for pose in poses])
+    likelihood = np.exp(nats - nats.max())
+    merged: list[tuple[float, FoundPlayer]] = []
+    for i in np.argsort(-likelihood):
+        p, legs = float(likelihood[i] / likelihood.sum()), points_of(poses[i].state)[:-1]
+        away_m = [np.linalg.norm(points_of(other.state)[:-1] - legs, axis=1).mean() for _, other in merged]
+        alike = int(np.argmin(away_m)) if away_m and min(away_m) < _ALIKE_M else None
+        if alike is None:
+            merged.append((p, poses[i]))
+        else:
+            merged[alike] = merged[alike][0] + p, merged[alike][1]
+    return merged
+
+
+def _faces_net(player: FoundPlayer) -> bool:
+    """Return whether the left hip lies where it does when the net, y = 0, is in front."""
+    across, y = player.joints_m["hip_left"] - player.joints_m["hip_right"], player.joints_m["torso"][1]
+    return bool(across[0] * y > 0)

@@ -1,0 +1,25 @@
+"""Small pictures of large ones."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from airborne.video.frames import View
+
+_WIDTH_PX = 640  # about the width of the small pictures
+
+
+def shrink(view: View) -> View:
+    """Return a view about 640 columns wide, averages of areas that are about square."""
+    camera, rgb = view.camera, view.rgb
+    columns = max(1, round(camera.size[0] / _WIDTH_PX))
+    rows = max(1, round(columns * camera.K[1, 1] / camera.K[0, 0]))
+    if columns == rows == 1:
+        return View(camera, rgb, view.delay_s)
+    size = camera.size[0] // columns, camera.size[1] // rows
+    small = cv2.resize(rgb[: size[1] * rows, : size[0] * columns], size, interpolation=cv2.INTER_AREA)
+    middle = ((columns - 1) / 2, (rows - 1) / 2)
+    return View(
+        camera.resample(scale=(columns, rows), offset=middle, size=size), np.asarray(small, np.uint8), view.delay_s
+    )

@@ -1,0 +1,53 @@
+"""Players who are out of sight for a while are found again, each as who it is; where two could be meant, it is said."""
+
+import numpy as np
+
+from airborne.tracking import Status
+from airborne.tracking.capsules import Blocker
+from airborne.tracking.capsules.recovery import identity_probabilities
+from tests.support.jumping_scenes import Hall, hop
+
+AWAY = range(3, 23)  # frames at 50 a second
+BACK = 30
+
+
+def elsewhere(before, after):
+    """Somebody who stands at one place until out of sight, then at another."""
+    first, second = hop(before, heading=np.pi, late_s=9), hop(after, heading=np.pi, late_s=9)
+    return lambda t: first(0.0) if t * 50 < AWAY.stop else second(0.0)
+
+
+def run(hall: Hall):
+    tracker = Blocker(hall.starts())
+    state, steps = tracker.init(), []
+    for index in range(BACK):
+        state, estimates = tracker.step(state, hall.frames(index))
+        steps.append(estimates)
+    return [list(each) for each in zip(*steps, strict=True)]
+
+
+def test_a_player_who_was_out_of_sight_is_found_again_where_it_came_back():
+    hall = Hall({"a": elsewhere((0.0, -0.6), (0.7, -0.3))}, is_there=lambda index: index not in AWAY)
+    (estimates,) = run(hall)
+    assert [each.status for each in estimates[6 : AWAY.stop - 1]] == [Status.LOST] * (AWAY.stop - 7)
+    assert sum(each.note.startswith("found again after 0.") for each in estimates) == 1
+    assert estimates[-1].status is not Status.LOST
+    off_m = np.linalg.norm(estimates[-1].points - hall.truth("a", BACK - 1), axis=1)
+    assert off_m[:6].mean() < 0.05
+
+
+def test_identities_are_those_that_fit_all_of_the_lost_best():
+    nats = np.array([[6.0, 5.0], [6.0, -2.0]])  # both are like the first, only one of them like the second
+    probability = identity_probabilities(nats)
+    assert probability[0, 1] > 0.95 and probability[1, 0] > 0.95
+    assert probability.sum(axis=0).max() < 1 + 1e-12
+
+
+def test_two_who_could_both_be_meant_are_not_told_apart():
+    probability = identity_probabilities(np.array([[6.0, 6.1]]))
+    assert probability.max() < 0.95 < probability.sum()
+
+
+def test_nobody_like_a_lost_player_is_nobody():
+    assert identity_probabilities(np.array([[-8.0]])).max() < 0.01
+    assert identity_probabilities(np.empty((2, 0))).shape == (2, 0)
