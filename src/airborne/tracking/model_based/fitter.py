@@ -39,7 +39,7 @@ from airborne.tracking.model_based.misplaced_limbs import (
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
 from airborne.tracking.model_based.support import count_views
-from airborne.tracking.model_based.uncovered import find_uncovered_pixels
+from airborne.tracking.model_based.uncovered import find_uncovered_pixels, uncovered_beside
 from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
@@ -48,6 +48,7 @@ LOST_NATS = (
     10.0  # what a limb costs that is not where it was expected; of synthetic limbs moved at 7, a third more were wrong
 )
 _N_FITTED = 3  # places of a limb that are fitted to the images
+_BESIDE_M2 = 6e-4  # uncovered beside a limb; on synthetic people such limbs hold half of the joints over 0.1 m off
 _FEWEST_VIEWS = 2  # in which something uncovered asks for a limb
 _TRUNK_AT = 4  # images at this reduction show the limbs of a body with joints; more reduced ones, its trunk alone
 
@@ -146,22 +147,17 @@ class Fitter:
         """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it."""
         if not self.moves_joints:
             return JudgedFit(fit, self.agreement(fit.pose, learned))
-        misplaced, begun = find_misplaced_limbs(self.render_model, fit.pose, *learned.seen), fit.pose
-        for limb in misplaced:
-            fit, prior = self._refit_limb(fit, limb, guesses, learned, prior)
-        for limb in limbs_of(self.model):
-            if self._n_views_uncovered(fit.pose, learned) < _FEWEST_VIEWS:
-                break
-            fit, prior = self._refit_limb(fit, limb, guesses, learned, prior)
-        limbs = limbs_of(self.model)
-        moved = [int(limb[0]) for limb in limbs if limb_distance(self.model, begun, fit.pose, limb) > DISTINCT_M]
-        return replace(self.assess(fit, learned), moved=tuple(moved))
+        refitted, limbs = self._refit_limbs(fit, guesses, learned, prior), limbs_of(self.model)
+        moved = [limb for limb in limbs if limb_distance(self.model, fit.pose, refitted.pose, limb) > DISTINCT_M]
+        return replace(self.assess(refitted, learned), moved=tuple(int(limb[0]) for limb in moved))
 
     def assess(self, fit: Fit, learned: LearnedRegions) -> JudgedFit:
         """Judge a fit as it is."""
         misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.seen)
         segments = tuple(int(segment) for limb in misplaced for segment in limb)
         n_views_of = count_views(self.render_model, fit.pose, learned.regions, self._complete(fit.pose, learned))
+        for limb in self._limbs_beside_uncovered(fit.pose, learned):  # it may be there: no better than one view
+            n_views_of[limb] = np.minimum(n_views_of[limb], 1)
         return JudgedFit(fit, replace(self.agreement(fit.pose, learned), misplaced=segments, n_views_of=n_views_of))
 
     def place_cost(self, fit: Fit, learned: LearnedRegions, misfit: float, prior: PosePrior | None) -> float:
@@ -177,6 +173,32 @@ class Fitter:
         """Return the appearance with a background in every region."""
         posed = self.render_model.with_pose(pose)
         return learn_missing_backgrounds(self.render_model, posed, learned.regions, learned.appearance)
+
+    def _refit_limbs(self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> Fit:
+        """Search for the limbs that cover what is unlike the body, or beside which, or anywhere, what is stands out.
+
+        None is searched for again before another has moved.
+        """
+        limbs, tried = limbs_of(self.model), set[int]()
+
+        def search(limb: NDArray[np.int64], fit: Fit, prior: PosePrior | None) -> tuple[Fit, PosePrior | None]:
+            if int(limb[0]) in tried:
+                return fit, prior
+            moved, prior = self._refit_limb(fit, limb, guesses, learned, prior)
+            if moved is not fit:
+                tried.clear()
+            tried.add(int(limb[0]))
+            return moved, prior
+
+        for limb in find_misplaced_limbs(self.render_model, fit.pose, *learned.seen):
+            fit, prior = search(limb, fit, prior)
+        for limb in self._limbs_beside_uncovered(fit.pose, learned):
+            fit, prior = search(limb, fit, prior)
+        for limb in limbs:
+            if self._n_views_uncovered(fit.pose, learned) < _FEWEST_VIEWS:
+                break
+            fit, prior = search(limb, fit, prior)
+        return fit
 
     def _refit_limb(
         self,
@@ -212,6 +234,12 @@ class Fitter:
         posed = self.render_model.with_pose(pose)
         uncovered = find_uncovered_pixels(self.render_model, posed, learned.regions, learned.posteriors)
         return sum(bool(each.any()) for each in uncovered)
+
+    def _limbs_beside_uncovered(self, pose: Pose, learned: LearnedRegions) -> list[NDArray[np.int64]]:
+        """Return the limbs beside which more than a rim stands uncovered, in two views."""
+        beside_m2 = uncovered_beside(self.render_model, self.render_model.with_pose(pose), *learned.seen)
+        limbs = limbs_of(self.model)
+        return [limb for limb in limbs if np.sum(beside_m2[:, limb].sum(axis=1) > _BESIDE_M2) >= _FEWEST_VIEWS]
 
     def _stages_at(self, reduction: int) -> list[DegreesOfFreedom]:
         trunk, everything = self.stages[0], self.stages[-1]
