@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,7 @@ def compare_recording(folder: Path) -> JointComparison:
 def compare_synthetic(n: int | None = None) -> JointComparison:
     """Track the synthetic somersault, or its first n frames, and compare it with its true joints."""
     scene = somersault_scene("moving-arms", target="skin", style="exact")
-    frames, model = list(scene_frames(scene))[:n], scene.tracking_body
+    frames, model = list(islice(scene_frames(scene), n)), scene.tracking_body
     time_s = np.array([float(scene.time_s(i)) for i in range(len(frames))])
     flight, rng = scene.flight(time_s), np.random.default_rng(7)
     off = np.append(START_M * np.array([1, 1, -1]) / np.sqrt(3), START_RAD * np.sign(rng.normal(size=model.n_dofs - 3)))

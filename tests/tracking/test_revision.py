@@ -47,11 +47,11 @@ class Lost:
     def learn(self, state, frames, estimate):
         return state / 2 + estimate.score
 
-    def revise(self, moments, state):
-        first = self.found_again[moments[-1].frames.index]
+    def revise(self, records, state):
+        first = self.found_again[records[-1].frames.index]
         return {
             each.frames.index: replace(each.estimate, score=each.estimate.score + 1000, moved=())
-            for each in moments[:-1]
+            for each in records[:-1]
             if each.frames.index >= first
         }
 

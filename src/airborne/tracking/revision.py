@@ -22,7 +22,7 @@ _MOST_BYTES = 6e8  # of pictures held at once: fewer frames of large ones are he
 
 
 @dataclass(slots=True, eq=False)
-class Moment:
+class FrameRecord:
     """One time that is held: its frames, what the tracker knew before them, and what it found."""
 
     frames: Frames
@@ -36,8 +36,8 @@ class Moment:
 class RevisingTracker(Tracker[Any, Estimate], Protocol):
     """A tracker of a body with limbs, which may say later where a limb has been."""
 
-    def revise(self, moments: Sequence[Moment], state: Any) -> dict[int, Estimate]:
-        """Return better estimates of earlier moments, by frame, given the newest one and the state after it."""
+    def revise(self, records: Sequence[FrameRecord], state: Any) -> dict[int, Estimate]:
+        """Return better estimates of earlier records, by frame, given the newest one and the state after it."""
         ...
 
 
@@ -54,54 +54,56 @@ def track_with_revision(
 
     `tick` takes how many frames are tracked.
     """
-    state, known, held = tracker.init(), done or {}, deque[Moment]()
+    state, known, held = tracker.init(), done or {}, deque[FrameRecord]()
     for number, observed in enumerate(frames, start=1):
         before, estimate = state, known.get(observed.index)
-        moment = Moment(observed, before, estimate or tracker.search(before, observed), observed.index, bool(estimate))
-        held.append(moment)
-        state = tracker.learn(before, observed, moment.estimate)
-        if estimate is None and moment.estimate.moved:
+        record = FrameRecord(
+            observed, before, estimate or tracker.search(before, observed), observed.index, bool(estimate)
+        )
+        held.append(record)
+        state = tracker.learn(before, observed, record.estimate)
+        if estimate is None and record.estimate.moved:
             state = _revise(tracker, held, state)
         tick(number)
         while len(held) > min(lag, _most_held(observed)):
             yield from _release(held, write)
             held.popleft()
-    while any(not moment.is_out for moment in held):
+    while any(not record.is_out for record in held):
         yield from _release(held, write)
         held.popleft()
 
 
-def _revise(tracker: RevisingTracker, held: Sequence[Moment], state: Any) -> Any:
-    """Replace what is revised of the moments that are held; return the state after the newest."""
+def _revise(tracker: RevisingTracker, held: Sequence[FrameRecord], state: Any) -> Any:
+    """Replace what is revised of the records that are held; return the state after the newest."""
     revised, newest = tracker.revise(list(held), state), held[-1]
-    is_open = [not (moment.is_out or moment.is_known) for moment in held]
-    changed = [k for k, moment in enumerate(held) if is_open[k] and moment.frames.index in revised]
+    is_open = [not (record.is_out or record.is_known) for record in held]
+    changed = [k for k, record in enumerate(held) if is_open[k] and record.frames.index in revised]
     if not changed:
         return state
     before = held[changed[0]].state
     for k in range(changed[0], len(held)):
-        moment = held[k]
-        moment.state, moment.last = before, newest.frames.index
-        moment.estimate = revised.get(moment.frames.index, moment.estimate)
-        before = tracker.learn(before, moment.frames, moment.estimate)
+        record = held[k]
+        record.state, record.last = before, newest.frames.index
+        record.estimate = revised.get(record.frames.index, record.estimate)
+        before = tracker.learn(before, record.frames, record.estimate)
     return before
 
 
-def _release(held: Sequence[Moment], write: Callable[[Estimate], None]) -> Iterator[tuple[Frames, Estimate]]:
-    """Write and yield the oldest moment, if that is to be done yet, and with it what one revision changed."""
-    last, due = held[0].last, list[Moment]()
-    for moment in held:
-        if moment.frames.index > last:
+def _release(held: Sequence[FrameRecord], write: Callable[[Estimate], None]) -> Iterator[tuple[Frames, Estimate]]:
+    """Write and yield the oldest record, if that is to be done yet, and with it what one revision changed."""
+    last, due = held[0].last, list[FrameRecord]()
+    for record in held:
+        if record.frames.index > last:
             break
-        last = max(last, moment.last)
-        if not moment.is_out:
-            due.append(moment)
-    for moment in due:
-        if not moment.is_known:
-            write(moment.estimate)
-    for moment in due:
-        moment.is_out = True
-        yield moment.frames, moment.estimate
+        last = max(last, record.last)
+        if not record.is_out:
+            due.append(record)
+    for record in due:
+        if not record.is_known:
+            write(record.estimate)
+    for record in due:
+        record.is_out = True
+        yield record.frames, record.estimate
 
 
 def _most_held(frames: Frames) -> int:

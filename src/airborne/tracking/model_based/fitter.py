@@ -39,7 +39,7 @@ from airborne.tracking.model_based.misplaced_limbs import (
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
 from airborne.tracking.model_based.support import count_views
-from airborne.tracking.model_based.uncovered import find_uncovered_pixels, uncovered_beside
+from airborne.tracking.model_based.uncovered import find_uncovered_pixels, uncovered_area
 from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
@@ -62,7 +62,7 @@ class LearnedRegions:
     appearance: Appearance
 
     @property
-    def seen(self) -> tuple[Sequence[Region], Sequence[Array]]:
+    def views(self) -> tuple[Sequence[Region], Sequence[Array]]:
         """The regions and their posteriors."""
         return self.regions, self.posteriors
 
@@ -153,7 +153,7 @@ class Fitter:
 
     def assess(self, fit: Fit, learned: LearnedRegions) -> JudgedFit:
         """Judge a fit as it is."""
-        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.seen)
+        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
         segments = tuple(int(segment) for limb in misplaced for segment in limb)
         n_views_of = count_views(self.render_model, fit.pose, learned.regions, self._complete(fit.pose, learned))
         for limb in self._limbs_beside_uncovered(fit.pose, learned):  # it may be there: no better than one view
@@ -184,13 +184,13 @@ class Fitter:
         def search(limb: NDArray[np.int64], fit: Fit, prior: PosePrior | None) -> tuple[Fit, PosePrior | None]:
             if int(limb[0]) in tried:
                 return fit, prior
-            moved, prior = self._refit_limb(fit, limb, guesses, learned, prior)
+            moved, prior = self._refit_limb(fit, limb, guesses, learned, prior=prior)
             if moved is not fit:
                 tried.clear()
             tried.add(int(limb[0]))
             return moved, prior
 
-        for limb in find_misplaced_limbs(self.render_model, fit.pose, *learned.seen):
+        for limb in find_misplaced_limbs(self.render_model, fit.pose, *learned.views):
             fit, prior = search(limb, fit, prior)
         for limb in self._limbs_beside_uncovered(fit.pose, learned):
             fit, prior = search(limb, fit, prior)
@@ -206,18 +206,18 @@ class Fitter:
         limb: NDArray[np.int64],
         guesses: Sequence[Pose],
         learned: LearnedRegions,
+        *,
         prior: PosePrior | None,
     ) -> tuple[Fit, PosePrior | None]:
         """Search for a limb, from where the fit and the guesses have it and from anywhere; return the better fit.
 
         The prior is returned too, wide for a limb that was moved.
         """
-        seen = learned.seen
         expected = [replace(fit.pose, joint_angles=with_limb(fit.pose, guess, limb)) for guess in guesses]
         dofs = joints_of(self.model, limb)
         poses = [
-            fit_silhouettes(self.render_model, pose, *seen, levels=NEAR, dofs=dofs)
-            for pose in search_limb(self.render_model, [fit.pose, *expected], limb, region_evidence(*seen))
+            fit_silhouettes(self.render_model, pose, *learned.views, levels=NEAR, dofs=dofs)
+            for pose in search_limb(self.render_model, [fit.pose, *expected], limb, region_evidence(*learned.views))
         ]
         poses.sort(key=lambda pose: self.agreement(pose, learned).evidence, reverse=True)
         widened = None if prior is None else prior.widen(dofs.columns)
@@ -237,7 +237,7 @@ class Fitter:
 
     def _limbs_beside_uncovered(self, pose: Pose, learned: LearnedRegions) -> list[NDArray[np.int64]]:
         """Return the limbs beside which more than a rim stands uncovered, in two views."""
-        beside_m2 = uncovered_beside(self.render_model, self.render_model.with_pose(pose), *learned.seen)
+        beside_m2 = uncovered_area(self.render_model, self.render_model.with_pose(pose), *learned.views)
         limbs = limbs_of(self.model)
         return [limb for limb in limbs if np.sum(beside_m2[:, limb].sum(axis=1) > _BESIDE_M2) >= _FEWEST_VIEWS]
 

@@ -52,7 +52,7 @@ def follow_back(
     """Follow a limb back through earlier times, the latest first; return those from which on it is better so."""
     past, path, gained = [(-newest[0].time_s, newest[1])], list[BackwardFit](), [0.0]
     for frames, found in earlier:
-        step = _fit_back(fitter, limb, past, frames, found, appearance=appearance, prior_of=prior_of)
+        step = _fit_back(fitter, limb, frames, found, past=past, appearance=appearance, prior_of=prior_of)
         if step is None:
             break
         if limb_distance(fitter.model, step.fit.pose, found, limb) < _MEET_M:
@@ -69,10 +69,10 @@ def follow_back(
 def _fit_back(
     fitter: Fitter,
     limb: NDArray[np.int64],
-    past: predictors.PoseHistory,
     frames: Frames,
     found: Pose,
     *,
+    past: predictors.PoseHistory,
     appearance: Appearance,
     prior_of: PriorOf,
 ) -> BackwardFit | None:
@@ -84,7 +84,7 @@ def _fit_back(
     dofs = joints_of(fitter.model, limb)
     prior = prior_of(expected, gap_s)
     widened = None if prior is None else prior.widen(dofs.columns)
-    start = fit_silhouettes(fitter.render_model, expected, *learned.seen, levels=NEAR, dofs=dofs, prior=prior)
+    start = fit_silhouettes(fitter.render_model, expected, *learned.views, levels=NEAR, dofs=dofs, prior=prior)
     there, here = fitter.fit_images([start], learned, prior), fitter.fit_images([found], learned, prior_of(found, 0.0))
     misfit = min(each.equations.misfit for each in (there, here))
     costs = [fitter.place_cost(each, learned, misfit, widened) for each in (here, there)]

@@ -31,7 +31,7 @@ from airborne.tracking.model_based.recovery import recover
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import Reference, status_of
 from airborne.tracking.model_based.support import mark_unobserved, widen_unseen
-from airborne.tracking.revision import Moment
+from airborne.tracking.revision import FrameRecord
 from airborne.types import Array
 from airborne.video import Frames
 
@@ -129,9 +129,9 @@ class RefinedTracker:
         learned = regions_near(self._fitter, poses, frames, state.appearance)
         return self._fitter.weigh(poses, learned) if learned.regions else np.zeros(len(poses))
 
-    def revise(self, moments: Sequence[Moment], state: RefinedState) -> dict[int, Estimate]:
-        """Return better estimates of earlier moments, where limbs that the newest moved have been by then."""
-        newest, revised = moments[-1], dict[int, Estimate]()
+    def revise(self, records: Sequence[FrameRecord], state: RefinedState) -> dict[int, Estimate]:
+        """Return better estimates of earlier records, where limbs that the newest moved have been by then."""
+        newest, revised = records[-1], dict[int, Estimate]()
         for limb in limbs_of(self._fitter.model):
             if limb[0] not in newest.estimate.moved or newest.estimate.pose is None:
                 continue
@@ -139,25 +139,25 @@ class RefinedTracker:
                 self._fitter,
                 limb,
                 (newest.frames, newest.estimate.pose),
-                self._found_before(moments[:-1], revised),
+                self._poses_before(records[:-1], revised),
                 appearance=state.appearance,
                 prior_of=self._prior_after,
             )
             for step in path:
-                moment = next(each for each in moments if each.frames.index == step.index)
+                record = next(each for each in records if each.frames.index == step.index)
                 judged = self._fitter.assess(step.fit, step.learned)
-                revised[step.index] = self._estimate(self.reduce_frames(moment.frames), judged, moment.state.reference)
+                revised[step.index] = self._estimate(self.reduce_frames(record.frames), judged, record.state.reference)
         return revised
 
-    def _found_before(
-        self, moments: Sequence[Moment], revised: Mapping[int, Estimate]
+    def _poses_before(
+        self, records: Sequence[FrameRecord], revised: Mapping[int, Estimate]
     ) -> Iterator[tuple[Frames, Pose]]:
-        """Yield the frames and poses of moments, the latest first, as far back as the body was found."""
-        for moment in reversed(moments):
-            pose = revised.get(moment.frames.index, moment.estimate).pose
+        """Yield the frames and poses of records, the latest first, as far back as the body was found."""
+        for record in reversed(records):
+            pose = revised.get(record.frames.index, record.estimate).pose
             if pose is None:
                 return
-            yield self.reduce_frames(moment.frames), pose
+            yield self.reduce_frames(record.frames), pose
 
     def reduce_frames(self, frames: Frames) -> Frames:
         """Reduce the images of a body whose joints move: finer ones show more detail than the model has."""
