@@ -18,7 +18,7 @@ from airborne.tracking.tracker import Tracker
 from airborne.video import Frames
 
 LAG = 16  # frames; on synthetic somersaults no limb was followed back by more than 11
-_MOST_BYTES = 6e8  # of pictures held at once: fewer frames of large ones are held
+_MOST_BYTES = 3e8  # of pictures held at once, and as much of backgrounds: fewer frames of large ones are held
 
 
 @dataclass(slots=True, eq=False)
