@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from airborne.tracking.model_based.degrees_of_freedom import limbs_of
+from airborne.tracking.model_based.fitter import Fitter, LearnedRegions
 from airborne.tracking.model_based.support import count_views, mark_unobserved, widen_unseen
-from airborne.tracking.model_based.uncovered import find_uncovered_pixels
+from airborne.tracking.model_based.uncovered import find_uncovered_pixels, uncovered_area
 from tests.support.people import HUMAN
 from tests.tracking.test_misplaced_limb import FOLDS, LearnedFrame, fold
 
@@ -29,6 +31,28 @@ def test_nothing_stands_out_of_the_true_pose(frame):
 @pytest.mark.parametrize("name", FOLDS)
 def test_limb_that_the_model_has_elsewhere_stands_out_in_two_views(frame, name):
     assert sum(px > 0 for px in uncovered_px(frame, fold(frame.truth, name, FOLDS[name]))) >= 2
+
+
+def test_what_stands_uncovered_is_measured_and_has_a_nearest_segment(frame):
+    render_model = frame.render_model
+    wrong = fold(frame.truth, "thigh_right", FOLDS["thigh_right"])
+    beside_m2, of_truth_m2 = (
+        uncovered_area(render_model, render_model.with_pose(pose), *frame.views(pose)) for pose in (wrong, frame.truth)
+    )
+    assert of_truth_m2.max() == 0
+    per_m2 = np.array(uncovered_px(frame, wrong))
+    assert np.all((beside_m2.sum(axis=1) > 0) >= (per_m2 > 0)) and beside_m2.max() > 6e-4
+
+
+def test_joints_of_a_limb_beside_which_something_stands_uncovered_are_worth_one_view(frame):
+    fitter = Fitter.of(frame.render_model, "refined", fixed_shape=False)
+    most = {}
+    for name, pose in (("true", frame.truth), ("wrong", fold(frame.truth, "thigh_right", FOLDS["thigh_right"]))):
+        learned = LearnedRegions(*frame.views(pose), frame.appearance)
+        agreement = fitter.assess(fitter.fit_images([pose], learned, None), learned).agreement
+        most[name] = [int(agreement.n_views_of[limb].max()) for limb in limbs_of(HUMAN)]
+    assert min(most["true"]) >= 2
+    assert min(most["wrong"]) <= 1
 
 
 def test_views_show_the_limbs_of_the_true_pose(frame):

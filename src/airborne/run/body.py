@@ -53,6 +53,7 @@ from airborne.tracking.both_directions import track_between_keys
 from airborne.tracking.estimate import unknown_segments
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.methods import sample_body_colours, tracker_of
+from airborne.tracking.revision import track_with_revision
 from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
@@ -128,10 +129,15 @@ class BodyRun:
         done: Mapping[int, Estimate],
         tick: Callable[[int], None],
     ) -> Iterator[tuple[Frames, Estimate]]:
-        """Yield each time's frames with the body's estimate there, written; between keys it is tracked both ways."""
+        """Yield each time's frames with the body's estimate there, written; between keys it is tracked both ways.
+
+        Without keys, limbs that were found again are followed back from there.
+        """
         tracker = tracker_of(self.trial.settings, self.model, self.start, self.keys)
-        if not self.keys or self.trial.directions == "forward":
+        if self.trial.directions == "forward" or not (self.keys or tracker.revises):
             return track_frames(tracker, frames, write, done)
+        if not self.keys:
+            return track_with_revision(tracker, frames, write, done, tick=tick)
         recording = self.recording
         frames_to_track = range(recording.start, max(self.keys) + 1, recording.every)
         reader, keys = Rereading(recording), list(self.keys)

@@ -38,6 +38,7 @@ class Estimate:
     pose: Pose | None
     covariance: Array | None
     n_views: int  # cameras with an image that shows the body
+    moved: tuple[int, ...] = ()  # first segments of limbs found away from where they had been followed to
 
 
 def lost_estimate(index: int, time_s: Fraction) -> Estimate:

@@ -19,6 +19,7 @@ from airborne.body import Pose
 from airborne.body.chain import delta_between
 from airborne.tracking.estimate import Estimate
 from airborne.tracking.predictors import PoseHistory, turn_past
+from airborne.tracking.revision import FrameRecord
 from airborne.types import Array
 from airborne.video import Frames, View
 
@@ -45,6 +46,11 @@ class CompensatedTracker:
     def __init__(self, tracker: Any) -> None:
         self._tracker = tracker
 
+    @property
+    def revises(self) -> bool:
+        """Whether what was found may be revised later."""
+        return bool(getattr(self._tracker, "revises", False))
+
     def init(self) -> CompensatedState:
         """Return the state before the first frame."""
         return CompensatedState(self._tracker.init())
@@ -66,9 +72,20 @@ class CompensatedTracker:
         """Return the state from which the body is tracked back in time."""
         return CompensatedState(self._tracker.turn(state.inner), turn_past(state.past))
 
+    def revise(self, records: Sequence[FrameRecord], state: CompensatedState) -> dict[int, Estimate]:
+        """Return better estimates of earlier records, given the newest one and the state after it."""
+        return self._tracker.revise([_compensate_record(record) for record in records], state.inner)
+
     def weigh(self, state: CompensatedState, frames: Frames, poses: Sequence[Pose]) -> Array:
         """Return minus the log-likelihood of the images in each of several poses: (n,) [nat]."""
         return self._tracker.weigh(state.inner, compensate_offsets(frames, state.past), poses)
+
+
+def _compensate_record(record: FrameRecord) -> FrameRecord:
+    """Compensate a record's frames, by the motion that ends in what was found there."""
+    past, pose = record.state.past, record.estimate.pose
+    past = past if pose is None else _extend(past, record.frames, pose)
+    return replace(record, frames=compensate_offsets(record.frames, past), state=record.state.inner)
 
 
 def compensate_offsets(frames: Frames, past: PoseHistory, degree: int = 2) -> Frames:

@@ -158,7 +158,7 @@ class Trial(SettingsTable):
 
     @property
     def directions(self) -> Directions:
-        """In which directions a body is tracked between its keys."""
+        """In which directions a body is tracked between its keys, and limbs that were found again."""
         return self.track.directions if isinstance(self.track, BodySettings) else "forward"
 
     def model(self) -> BodyModel:

@@ -47,7 +47,7 @@ class BodySettings(_Settings):
 
     method: Method = "refined"
     prediction: Prediction = "smooth"
-    directions: Directions = "both"  # between [[key]] tables: forward and backward, or forward alone
+    directions: Directions = "both"  # between [[key]] tables and of limbs found again; or forward alone
     fixed_shape: bool = False  # joint angles stay those of the start; stepping and simplex never change them
     colour: ScoreName = "normalised"  # stepping and simplex: paper B's score
     v_rule: VRule = "v_sym"  # stepping

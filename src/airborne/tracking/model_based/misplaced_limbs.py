@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform
 from scipy.special import ndtri
 
 from airborne.appearance.model import Region
-from airborne.body import Pose
+from airborne.body import BodyModel, Pose
 from airborne.body.chain import angles_near
 from airborne.body.limits import JointLimits
 from airborne.geometry.joint_rotations import compose_rotation_vectors
@@ -22,9 +22,11 @@ from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
-_ROUNDS = ((512, 16), (256, 3))  # proposals, survivors; the sds are halved in each round
+_N_FIRST = 24  # survivors of the starts
+_ROUNDS = ((512, 24), (512, 16), (512, 5))  # proposals, survivors; the sds are halved in each round
 _REACH_RAD = 0.7  # sd of the first proposals, for each joint and axis
 _N_WIDE, _LARGE_RAD = 1024, np.radians(50)  # starts all over the ranges, of those axes whose half is larger
+DISTINCT_M = 0.1  # two places of a limb, of which some joint is this far apart: about the width of an arm
 _FEWEST_PX = 25  # a segment with fewer visible pixels in a view is occluded there, not misplaced
 _MISPLACED = 0.5  # share of the body's precision, below which a segment is misplaced
 
@@ -52,31 +54,54 @@ def search_limb(
 ) -> list[Pose]:
     """Return the poses with the most evidence when one limb moves from where the given poses have it.
 
-    The poses differ in that limb only. The search starts from all over the joints' ranges too.
+    The poses differ in that limb only, and each from every other. The search starts from all over the joints' ranges
+    too.
     """
     joints, root = limb - 1, poses[0].world_from_root
     angles = np.stack([pose.joint_angles for pose in poses])  # (candidates, joints, 3)
     limits = JointLimits.stack(render_model.model.segments[segment].limits for segment in limb)
     reach = np.minimum(limits.half_rad.ravel() / 2, _REACH_RAD)  # a hinge is searched about its one axis
     anywhere = np.concatenate([angles, _all_over(limits, joints, angles[0])])
-    angles = _best(render_model, root, anywhere, maps, _ROUNDS[0][1])
+    angles = _best(render_model, root, anywhere, limb=limb, maps=maps, n=_N_FIRST)
     for number, (n_proposals, n_survivors) in enumerate(_ROUNDS):
         steps = ndtri(sobol_points(3 * len(limb), n_proposals, seed=number)) * reach / 2**number
         proposed = angles[np.arange(n_proposals) % len(angles)]
         angles_of_limb = np.ascontiguousarray(proposed[:, joints]).reshape(-1, 3)
         turned = compose_rotation_vectors(angles_of_limb, steps.reshape(-1, 3)).reshape(n_proposals, len(limb), 3)
         proposed[:, joints] = angles_near(limits.clamp(matrix_from_angles(turned)), turned)
-        angles = _best(render_model, root, np.concatenate([angles, proposed]), maps, n_survivors)
+        proposed = np.concatenate([angles, proposed])
+        angles = _best(render_model, root, proposed, limb=limb, maps=maps, n=n_survivors)
     return [replace(poses[0], joint_angles=each) for each in angles]
 
 
-def _best(render_model: RenderModel, root: RigidTransform, angles: Array, maps: EvidenceMaps, n: int) -> Array:
-    """Return the n joint angles (n, joints, 3) of most evidence, best first."""
+def limb_distance(model: BodyModel, pose: Pose, other: Pose, limb: NDArray[np.int64]) -> float:
+    """Return how far apart a limb's joints and landmarks are in two poses, at most [m]."""
+    is_mark = np.isin([model.index_of(landmark.segment) for landmark in model.landmarks], limb)
+    bodies = [model.with_pose(each) for each in (pose, other)]
+    points = [np.concatenate([body.t[limb], body.landmarks[is_mark]]) for body in bodies]
+    return float(np.linalg.norm(points[0] - points[1], axis=1).max())
+
+
+def _best(
+    render_model: RenderModel,
+    root: RigidTransform,
+    angles: Array,
+    *,
+    limb: NDArray[np.int64],
+    maps: EvidenceMaps,
+    n: int,
+) -> Array:
+    """Return the n joint angles (n, joints, 3) of most evidence, best first, that have the limb in different places."""
     R = np.broadcast_to(root.rotation.as_matrix(), (len(angles), 3, 3))
     t = np.broadcast_to(root.translation, (len(angles), 3))
-    segments = pose_segments(render_model.model, R, t, angles)
-    scores = mask_evidence(render_model.geometry, maps, *segments).sum(axis=1)
-    return angles[np.argsort(-scores, kind="stable")[:n]]
+    R, t = pose_segments(render_model.model, R, t, angles)
+    scores = mask_evidence(render_model.geometry, maps, R, t).sum(axis=1)
+    left, best = np.argsort(-scores, kind="stable"), []
+    while len(left) and len(best) < n:
+        best.append(left[0])
+        away_m = np.linalg.norm(t[left][:, limb] - t[left[0], limb], axis=-1).max(axis=1)
+        left = left[away_m > DISTINCT_M]
+    return angles[best]
 
 
 def _all_over(limits: JointLimits, joints: NDArray[np.int64], angles: Array) -> Array:

@@ -33,6 +33,7 @@ class PoseEquations:
     cost: float  # robust squared residual
     noise: float  # mean square of the weighted residual, times how many pixels share it
     misfit: float  # the same where the shape is wrong, too: a pose is weighed against its prior by this
+    shared: float  # pixels that err together where the shape is wrong
 
     def covariance(self) -> Array:
         """Return the covariance (d, d) of the free degrees of freedom."""
@@ -70,7 +71,8 @@ def map_to_dofs(
     cost, total, weight = totals
     residual = total / weight if weight > 0 else 1.0
     rows = [each.reshape(-1, *J.shape[:2]) for each in blocks] + list(shifted)
-    return PoseEquations(pose, A, g, J, rows, float(cost), float(correlated * residual), float(shared * residual))
+    noise, misfit = float(correlated * residual), float(shared * residual)
+    return PoseEquations(pose, A, g, J, rows, float(cost), noise, misfit, shared)
 
 
 @dataclass(frozen=True, eq=False)

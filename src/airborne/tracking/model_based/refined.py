@@ -6,7 +6,7 @@ A rigid body has the six degrees of freedom of its root. A body with joints is f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -21,15 +21,17 @@ from airborne.tracking.estimate import Estimate, Status, lost_estimate
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.first_pose.evidence_fit import join_evidence
 from airborne.tracking.image_regions import crop_regions, reduce_frames, share_in_view
-from airborne.tracking.model_based.degrees_of_freedom import WIDE_SD, PosePrior, joints_of
+from airborne.tracking.model_based.degrees_of_freedom import WIDE_SD, PosePrior, joints_of, limbs_of
 from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegions, Order
 from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
 from airborne.tracking.model_based.learning import learn_appearance
+from airborne.tracking.model_based.limb_revision import follow_back
 from airborne.tracking.model_based.recovery import recover
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import Reference, status_of
 from airborne.tracking.model_based.support import mark_unobserved, widen_unseen
+from airborne.tracking.revision import FrameRecord
 from airborne.types import Array
 from airborne.video import Frames
 
@@ -78,6 +80,11 @@ class RefinedTracker:
         self._predict = PREDICTIONS[prediction]
         self._keys = keys or {}
 
+    @property
+    def revises(self) -> bool:
+        """Whether what was found may be revised later: where limbs were."""
+        return self._fitter.moves_joints
+
     def init(self) -> RefinedState:
         """Return the state before the first frame."""
         return RefinedState()
@@ -122,6 +129,36 @@ class RefinedTracker:
         learned = regions_near(self._fitter, poses, frames, state.appearance)
         return self._fitter.weigh(poses, learned) if learned.regions else np.zeros(len(poses))
 
+    def revise(self, records: Sequence[FrameRecord], state: RefinedState) -> dict[int, Estimate]:
+        """Return better estimates of earlier records, where limbs that the newest moved have been by then."""
+        newest, revised = records[-1], dict[int, Estimate]()
+        for limb in limbs_of(self._fitter.model):
+            if limb[0] not in newest.estimate.moved or newest.estimate.pose is None:
+                continue
+            path = follow_back(
+                self._fitter,
+                limb,
+                (newest.frames, newest.estimate.pose),
+                self._poses_before(records[:-1], revised),
+                appearance=state.appearance,
+                prior_of=self._prior_after,
+            )
+            for step in path:
+                record = next(each for each in records if each.frames.index == step.index)
+                judged = self._fitter.assess(step.fit, step.learned)
+                revised[step.index] = self._estimate(self.reduce_frames(record.frames), judged, record.state.reference)
+        return revised
+
+    def _poses_before(
+        self, records: Sequence[FrameRecord], revised: Mapping[int, Estimate]
+    ) -> Iterator[tuple[Frames, Pose]]:
+        """Yield the frames and poses of records, the latest first, as far back as the body was found."""
+        for record in reversed(records):
+            pose = revised.get(record.frames.index, record.estimate).pose
+            if pose is None:
+                return
+            yield self.reduce_frames(record.frames), pose
+
     def reduce_frames(self, frames: Frames) -> Frames:
         """Reduce the images of a body whose joints move: finer ones show more detail than the model has."""
         return reduce_frames(frames, self._posed_start, _MOST_PX_PER_M) if self._fitter.moves_joints else frames
@@ -135,7 +172,7 @@ class RefinedTracker:
         predicted = [predict(state.past, frames.time_s) for predict in self._predict]
         if self._fitter.moves_joints and state.covariance is not None:
             predicted = [_shrink_unobserved(last, pose, state.covariance) for pose in predicted]
-        prior = self._prior(predicted[-1], [now + 0.5 * later * gap_s**2 for now, later in _EXPECTED_SD])
+        prior = self._prior_after(predicted[-1], gap_s)
         args = self._fitter, predicted, frames, state.appearance
         found = fit_next(*args, reference=state.reference, prior=prior)
         if found is not None and not found.agreement.is_suspect(state.reference):
@@ -186,7 +223,12 @@ class RefinedTracker:
             pose=fit.pose,
             covariance=covariance,
             n_views=agreement.n_views,
+            moved=found.moved,
         )
+
+    def _prior_after(self, expected: Pose, gap_s: float) -> PosePrior | None:
+        """Return the prior about a pose that was predicted over a gap."""
+        return self._prior(expected, [now + 0.5 * later * gap_s**2 for now, later in _EXPECTED_SD])
 
     def _prior(self, expected: Pose, sds: Sequence[float]) -> PosePrior | None:
         """Return the prior about an expected pose where joints move, by the sds of `_EXPECTED_SD`; None elsewhere."""

@@ -22,24 +22,52 @@ _AREA_M2 = 0.03 * 0.09  # a forearm seen end on and half covered
 def find_uncovered_pixels(
     render_model: RenderModel, posed: PosedBody, regions: Sequence[Region], posteriors: Sequence[Array]
 ) -> list[NDArray[np.bool_]]:
-    """Return for each region which pixels (h, w) are like the body, wide enough for a limb, and not covered."""
+    """Return for each region which pixels (h, w) are like the body, not covered, wide and large enough for a limb."""
     return [
-        _in_one_view(render_model, posed, region, posterior)
+        _in_one_view(render_model, posed, region, posterior)[0]
         for region, posterior in zip(regions, posteriors, strict=True)
     ]
 
 
-def _in_one_view(render_model: RenderModel, posed: PosedBody, region: Region, posterior: Array) -> NDArray[np.bool_]:
+def uncovered_area(
+    render_model: RenderModel, posed: PosedBody, regions: Sequence[Region], posteriors: Sequence[Array]
+) -> Array:
+    """Return how much stands uncovered, as wide as a limb, nearest to each segment: (views, segments) [m²].
+
+    Smaller patches count than those that `find_uncovered_pixels` returns.
+    """
+    views = zip(regions, posteriors, strict=True)
+    return np.array([_in_one_view(render_model, posed, *view)[1] for view in views]).reshape(-1, len(posed.R))
+
+
+def _in_one_view(
+    render_model: RenderModel, posed: PosedBody, region: Region, posterior: Array
+) -> tuple[NDArray[np.bool_], Array]:
+    """Return the pixels (h, w) of large uncovered patches, and the area beside each segment: (segments,) [m²]."""
     depth_m = float(np.median(posed.t @ region.packed_view[6:9] + region.packed_view[11]))
     px_per_m = np.array([region.camera.K[0, 0], region.camera.K[1, 1]]) / max(depth_m, 0.1)
-    covered = (render_model.draw_parts(posed, region) >= 0).astype(np.uint8)
+    part = render_model.draw_parts(posed, region)
+    covered = (part >= 0).astype(np.uint8)
     near = cv2.dilate(covered, _ellipse(2 * _RIM_M * px_per_m))
     stands_out = ((posterior > _BODY_LIKE) & (near == 0)).astype(np.uint8)
     opened = cv2.morphologyEx(stands_out, cv2.MORPH_OPEN, _ellipse(_WIDTH_M * px_per_m))
+    if not opened.any() or not covered.any():
+        return opened > 0, np.zeros(len(posed.R))
     _, label, stats, _ = cv2.connectedComponentsWithStats(opened, connectivity=8)
     is_large = stats[:, cv2.CC_STAT_AREA] >= _AREA_M2 * px_per_m.prod()
     is_large[0] = False
-    return is_large[label]
+    owner = _nearest_part(part)[opened > 0]
+    n_px = np.bincount(render_model.segment_of_part[owner], minlength=len(posed.R))
+    return is_large[label], n_px / px_per_m.prod()
+
+
+def _nearest_part(part: NDArray[np.int16]) -> NDArray[np.int16]:
+    """Return the part that is nearest to each pixel, given those (h, w) that pixels show, -1 where none."""
+    is_empty = (part < 0).astype(np.uint8)
+    _, label = cv2.distanceTransformWithLabels(is_empty, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    part_of_label = np.full(int(label.max()) + 1, -1, np.int16)
+    part_of_label[label[part >= 0]] = part[part >= 0]
+    return part_of_label[label]
 
 
 def _ellipse(size_px: Array) -> NDArray[np.uint8]:

@@ -1,0 +1,104 @@
+"""How far the joints of a person are off, and whether they say so: `python benchmarks/accuracy/person_reliability.py`.
+
+The two somersaults of `../shared/data` (`--data FOLDER` for another place), tracked as their trials say, and the
+synthetic somersault with a smooth skin. Of each: the mean joint error, without each joint's constant offset (two
+definitions of a joint), the largest; joints that are called tracked and are more than 100 mm off; the reliability
+diagram, stated against found coverage, and its ECE. About 3 minutes. `--quick` tracks 12 frames of the synthetic one
+and writes no rows. The trackers see no truth.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from rows import ROOT, append
+
+from airborne.body.chain import move_pose
+from airborne.evaluation import JointComparison, compare_joints, read_joint_paths
+from airborne.evaluation.joint_files import JointPaths
+from airborne.motion import Motion
+from airborne.motion.run_folder import read_body_run
+from airborne.run.track import track_trial
+from airborne.synthetic import scene_frames
+from airborne.synthetic.flight.somersault import somersault_scene
+from airborne.tracking.methods import Settings, tracker_of
+from airborne.tracking.revision import track_with_revision
+from airborne.trial.file import read_trial
+
+FLOORS = {"somersault_1": (30, 13, 100), "somersault_2": (34, 18, 120)}  # mm: mean, without offset, largest
+START_M, START_RAD = 0.025, np.radians(3.0)  # by which the synthetic start is wrong, in position and in every rotation
+N_QUICK = 12
+
+
+def compare_recording(folder: Path) -> JointComparison:
+    """Track a recording and compare it with its true joints."""
+    with tempfile.TemporaryDirectory() as results:
+        track_trial(read_trial(folder / "trial.toml"), Path(results) / "run", pictures=False)
+        motion, model = read_body_run(Path(results) / "run")
+    return compare_joints(motion, model, read_joint_paths(folder / "truth_joints.csv"))
+
+
+def compare_synthetic(n: int | None = None) -> JointComparison:
+    """Track the synthetic somersault, or its first n frames, and compare it with its true joints."""
+    scene = somersault_scene("moving-arms", target="skin", style="exact")
+    frames, model = list(islice(scene_frames(scene), n)), scene.tracking_body
+    time_s = np.array([float(scene.time_s(i)) for i in range(len(frames))])
+    flight, rng = scene.flight(time_s), np.random.default_rng(7)
+    off = np.append(START_M * np.array([1, 1, -1]) / np.sqrt(3), START_RAD * np.sign(rng.normal(size=model.n_dofs - 3)))
+    tracker = tracker_of(Settings(), model, move_pose(flight.pose(0), off))
+    estimates = [estimate for _, estimate in track_with_revision(tracker, frames, lambda estimate: None)]
+    motion = Motion.collect(estimates, tuple(segment.name for segment in model.segments[1:]))
+    points = np.array([model.with_pose(flight.pose(i)).landmarks for i in range(len(frames))])
+    truth = JointPaths(names=tuple(each.name for each in model.landmarks), time_s=time_s, points=points)
+    return compare_joints(motion, model, truth)
+
+
+def rows_of(data: str, found: JointComparison) -> list[dict]:
+    """Return the rows of one recording."""
+    floors = dict(zip(("mean", "without", "largest"), FLOORS.get(data, ("", "", "")), strict=True))
+    common = {"data": data, "method": "refined", "n": found.whole.n}
+    whole, held = found.whole, found.coverage
+    return [
+        {**common, "metric": "mean joint error", "unit": "mm", "value": whole.mean_mm, "floor": floors["mean"]},
+        {**common, "metric": "the same without constant offsets", "unit": "mm",
+         "value": whole.mean_without_offset_mm, "floor": floors["without"]},
+        {**common, "metric": "largest joint error", "unit": "mm", "value": whole.largest_mm,
+         "floor": floors["largest"]},
+        {**common, "metric": "joints tracked", "unit": "", "value": found.share_tracked},
+        {**common, "metric": "of them more than 100 mm off", "unit": "", "value": found.n_far, "floor": "0"},
+        {**common, "metric": "held by the 50 % interval", "unit": "", "value": held.within_50},
+        {**common, "metric": "held by the 80 % interval", "unit": "", "value": held.within_80},
+        {**common, "metric": "held by the 95 % interval", "unit": "", "value": held.within_95,
+         "floor": "0.88..0.99"},
+        {**common, "metric": "ECE", "unit": "", "value": held.ece, "floor": 0.08},
+    ]  # fmt: skip
+
+
+def main() -> None:
+    """Measure, print, and without `--quick` append the rows."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="12 frames of the synthetic somersault, no rows")
+    parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data", help="where the recordings are")
+    options = parser.parse_args()
+    if options.quick:
+        for row in rows_of("synthetic somersault", compare_synthetic(N_QUICK)):
+            print(f"{row['metric']:<40}{row['value']:>10.3g} {row['unit']}")
+        return
+    append("person_reliability", rows_of("synthetic somersault", compare_synthetic()))
+    for name in FLOORS:
+        if not (options.data / name).is_dir():
+            print(f"{options.data / name} is not there: {name} is left out")
+            continue
+        append("person_reliability", rows_of(name, compare_recording(options.data / name)))
+
+
+if __name__ == "__main__":
+    main()
