@@ -55,7 +55,7 @@ def draw_player_candidates(path: Path, frames: Frames, candidates: Sequence[tupl
     boxes = [_box_of(view.camera, [state for _, states in candidates for state in states]) for view in views]
     rows = [[image[box] for image, box in zip(row, boxes, strict=True)] for row in images]
     names = [f"{number}: {label}" for number, (label, _) in enumerate(candidates, start=1)]
-    save_png(cell_figure(rows, names, [view.camera.name for view in views], aspect=_ASPECT), path)
+    write_mosaic(path, rows, names, [ColumnTitle(view.camera.name) for view in views], aspect=_ASPECT)
 
 
 def _with_players(view: View, states: Sequence[Array]) -> Image:

@@ -49,7 +49,7 @@ def write_film(
         readers = [stack.enter_context(reader) for reader in _open(folder, len(index))]
         pictures = _draw(readers, rows, time_s, series, _WIDEST_PX[path.suffix.lower()])
         rate = readers[0].index.facts.frame_rate
-        _write(path, _counted(pictures, len(rows), progress), rate)
+        _write(path, _count_frames(pictures, len(rows), progress), rate)
     return len(rows)
 
 
@@ -128,7 +128,7 @@ def _cycle(n: int) -> list[tuple[int, int, int]]:
     return [_COLOURS[k % len(_COLOURS)] for k in range(n)]
 
 
-def _counted(pictures: Iterator[Image], n: int, progress: Progress | None) -> Iterator[Image]:
+def _count_frames(pictures: Iterator[Image], n: int, progress: Progress | None) -> Iterator[Image]:
     for done, picture in enumerate(pictures, start=1):
         yield picture
         if progress is not None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 from scipy.spatial import ConvexHull, KDTree
 
-from airborne.appearance.colour_features import colour_features
+from airborne.appearance.colour_features import features_of
 from airborne.kernels import kernel
 from airborne.tracking.capsules.equations import N_CAPSULES, N_POINTS, classes_with, pose_state
 from airborne.tracking.capsules.first_frame import average_shape
@@ -111,7 +111,7 @@ class ColourViews:
     @classmethod
     def of(cls, views: Sequence[View], zone: Array) -> ColourViews:
         """Sort the colours of what players in a zone of the floor (2, 2), from and to x, y [m], may cover."""
-        features = [colour_features(view.rgb) for view in views]
+        features = [features_of(view.rgb) for view in views]
         here = np.concatenate([each[_shows(view, zone)] for view, each in zip(views, features, strict=True)])
         rng = np.random.default_rng(0)
         here = here[rng.choice(len(here), min(len(here), _MOST_PIXELS), replace=False)]
@@ -130,7 +130,7 @@ class ColourViews:
             left.append(np.where(is_covered, np.int16(-1), colours))
         return ColourViews(self.views, self.cameras, left)
 
-    def tell(self, states: Array) -> Array:
+    def measure_information(self, states: Array) -> Array:
         """Return how much players (n, 35) tell of the colours around them: (n,) [nat m2].
 
         Log-likelihood ratio of the colours given the surface classes, whose colours are the same in all views, to the

@@ -77,7 +77,7 @@ def photometric_equations(body, projection, observation, comparison, maps, paint
     fit_light(observation.observed, maps.part, maps.normals, paint.albedo, light, iterations, x0, y0, x1, y1)
     lit = np.empty(maps.normals.shape, np.float32)
     shade_body(maps.part, maps.normals, paint.albedo, light, x0, y0, lit[:, y0:y1, x0:x1])
-    return _lit_equations(
+    return _sum_equations(
         lit, paint.is_faceted, maps, owner, nearness, projection, observation, comparison, sums, blocks
     )
 
@@ -96,7 +96,7 @@ def equations_of_known_light(body, projection, observation, comparison, maps, is
         for y in range(h):
             for x in range(w):
                 lit[k, y, x] = min(colour[y, x, k] * np.float32(1 / 255), np.float32(1))
-    return _lit_equations(lit, is_faceted, maps, owner, nearness, projection, observation, comparison, sums, blocks)
+    return _sum_equations(lit, is_faceted, maps, owner, nearness, projection, observation, comparison, sums, blocks)
 
 
 @kernel(fastmath=True)
@@ -112,7 +112,7 @@ def _draw(body, projection, maps):
 
 
 @kernel(fastmath=True)
-def _lit_equations(lit, is_faceted, maps, owner, nearness, projection, observation, comparison, sums, blocks):
+def _sum_equations(lit, is_faceted, maps, owner, nearness, projection, observation, comparison, sums, blocks):
     """Compare the image with the lit body (3, H, W) in front of the background."""
     flat = lit
     if not is_faceted.all():
