@@ -6,7 +6,7 @@ import pytest
 from airborne.tracking.model_based.degrees_of_freedom import limbs_of
 from airborne.tracking.model_based.fitter import Fitter, LearnedRegions
 from airborne.tracking.model_based.support import count_views, mark_unobserved, widen_unseen
-from airborne.tracking.model_based.uncovered import find_uncovered_pixels, uncovered_area
+from airborne.tracking.model_based.uncovered import area_beside, find_uncovered_pixels
 from tests.support.people import HUMAN
 from tests.tracking.test_misplaced_limb import FOLDS, LearnedFrame, fold
 
@@ -37,7 +37,7 @@ def test_what_stands_uncovered_is_measured_and_has_a_nearest_segment(frame):
     render_model = frame.render_model
     wrong = fold(frame.truth, "thigh_right", FOLDS["thigh_right"])
     beside_m2, of_truth_m2 = (
-        uncovered_area(render_model, render_model.with_pose(pose), *frame.views(pose)) for pose in (wrong, frame.truth)
+        area_beside(render_model, render_model.with_pose(pose), *frame.views(pose)) for pose in (wrong, frame.truth)
     )
     assert of_truth_m2.max() == 0
     per_m2 = np.array(uncovered_px(frame, wrong))

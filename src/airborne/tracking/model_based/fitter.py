@@ -39,7 +39,7 @@ from airborne.tracking.model_based.misplaced_limbs import (
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
 from airborne.tracking.model_based.support import count_views
-from airborne.tracking.model_based.uncovered import find_uncovered_pixels, uncovered_area
+from airborne.tracking.model_based.uncovered import area_beside, find_uncovered_pixels
 from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
@@ -237,7 +237,7 @@ class Fitter:
 
     def _limbs_beside_uncovered(self, pose: Pose, learned: LearnedRegions) -> list[NDArray[np.int64]]:
         """Return the limbs beside which more than a rim stands uncovered, in two views."""
-        beside_m2 = uncovered_area(self.render_model, self.render_model.with_pose(pose), *learned.views)
+        beside_m2 = area_beside(self.render_model, self.render_model.with_pose(pose), *learned.views)
         limbs = limbs_of(self.model)
         return [limb for limb in limbs if np.sum(beside_m2[:, limb].sum(axis=1) > _BESIDE_M2) >= _FEWEST_VIEWS]
 

@@ -29,7 +29,7 @@ def find_uncovered_pixels(
     ]
 
 
-def uncovered_area(
+def area_beside(
     render_model: RenderModel, posed: PosedBody, regions: Sequence[Region], posteriors: Sequence[Array]
 ) -> Array:
     """Return how much stands uncovered, as wide as a limb, nearest to each segment: (views, segments) [m²].
