@@ -65,6 +65,7 @@ def _nearest_part(part: NDArray[np.int16]) -> NDArray[np.int16]:
     """Return the part that is nearest to each pixel, given those (h, w) that pixels show, -1 where none."""
     is_empty = (part < 0).astype(np.uint8)
     _, label = cv2.distanceTransformWithLabels(is_empty, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    label = np.asarray(label, np.int64)
     part_of_label = np.full(int(label.max()) + 1, -1, np.int16)
     part_of_label[label[part >= 0]] = part[part >= 0]
     return part_of_label[label]
