@@ -12,7 +12,7 @@ from airborne.rendering.maps import empty_maps
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.blur import RADIUS_PX, blur_planes, gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, root_only
-from airborne.tracking.model_based.kernel_arguments import Comparison, Paint, Projection, Window
+from airborne.tracking.model_based.kernel_arguments import Comparison, Paint, Projection
 from airborne.tracking.model_based.normal_equations import observe, photometric_equations, silhouette_equations
 from airborne.tracking.model_based.owners import REACH_PX, find_owners, mask_box
 from airborne.tracking.model_based.render_model import RenderModel
@@ -113,7 +113,7 @@ class SingleView:
     def _common(self, pose, clip):
         posed, region, taps = self.with_pose(pose), self._region, gaussian_taps(1.2)
         projection = Projection(posed.R, posed.t, region.packed_view, region.camera.K, posed.t[0])
-        comparison = Comparison(Window(0, 0, *region.camera.size), taps, taps, clip)
+        comparison = Comparison(taps, taps, clip)
         return self._render_model.body, projection, comparison, empty_maps(region.camera.size)
 
     def _blocks(self):

@@ -79,6 +79,8 @@ class DegreesOfFreedom:
 
         H (d, d), g (d,) in units of the noise's variance.
         """
+        if not self.moves_joints and prior is None:
+            return np.linalg.solve(H + np.diag(self._damping), g)
         rows, depth = self._overlap_residuals(pose)
         H, g = H + np.diag(self._damping) + rows.T @ rows, g - rows.T @ depth
         if prior is not None:

@@ -42,7 +42,6 @@ class Projection(NamedTuple):
 class Comparison(NamedTuple):
     """How an image is compared."""
 
-    window: Window  # what of it
     taps_u: Any  # (5,) of the blur along rows
     taps_v: Any  # (5,) along columns
     clip: float  # the residual at which a pixel's weight has fallen to a quarter
