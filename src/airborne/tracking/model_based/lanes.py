@@ -12,7 +12,7 @@ import numpy as np
 
 from airborne.kernels import kernel
 
-LANES = 16
+LANES = 16  # pixels computed together, as in `rendering.rows`
 STRIP = 8 * LANES  # pixels of a row that are taken at once
 f4 = np.float32
 EDGE = f4(0.01)  # blurred coverage below which a pixel is not used
