@@ -7,13 +7,24 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import SAMPLED, Pose, human18
 from airborne.cameras import Rig, camera_looking_at, write_pose2sim
 from airborne.run.first_pose import find_first_pose
+from airborne.studio.starts import standing_pose
 from airborne.trial.file import read_trial
 from tests.support.clips import write_clip
 from tests.support.studio import at_pixel, open_page, open_studio, wait_for_frame
 
 SIZE = (640, 480)
-FRAME = 3
+FRAME, N_FRAMES = 3, 6
 MOST_OFF_M = 0.035  # four pixels at the body, each click having one as its deviation, right and down
+NEAR_PX, MOVED_M, TURNED = 4.0, 0.25, np.radians(3)
+TRUNK = """pane => {
+    const { view } = document.querySelector("canvas.view");
+    const { points } = view.nowItems().find((item) => item.grab && item.pane === pane);
+    return [0, 1].map((axis) => {
+        const all = points.map((point) => point[axis]);
+        const share = axis ? 0.33 : 0.5; // the chest of a body that stands
+        return (1 - share) * Math.min(...all) + share * Math.max(...all);
+    });
+}"""
 LANDMARKS = ("hip_left", "hip_right", "shoulder_left", "shoulder_right", "knee_left", "knee_right")
 TRIAL = """name = "person"
 camera = [{ name = "a", video = "a.mp4" }, { name = "b", video = "b.mp4" }]
@@ -33,7 +44,7 @@ def folder(rig, tmp_path_factory):
     """A trial without a start, whose videos show nothing."""
     folder = tmp_path_factory.mktemp("studio") / "person"
     folder.mkdir()
-    grey = [np.full((SIZE[1], SIZE[0], 3), 110, np.uint8)] * 6
+    grey = [np.full((SIZE[1], SIZE[0], 3), 110, np.uint8)] * N_FRAMES
     for name in rig.names:
         write_clip(folder / f"{name}.mp4", grey, codec="libx264", pix_fmt="yuv420p")
     write_pose2sim(folder / "calib.toml", rig)
@@ -66,3 +77,44 @@ def test_clicked_landmarks_become_the_first_pose(rig, folder):
     rows = [names.index(name) for name in LANDMARKS]
     off_m = np.linalg.norm(model.with_pose(pose).landmarks[rows] - points[rows], axis=1)
     assert off_m.max() < MOST_OFF_M
+
+
+def drag_trunk(page, pane, by_px, *, held=None):
+    """Drag the body by its trunk in a picture."""
+    u, v = page.evaluate(TRUNK, pane)
+    if held is not None:
+        page.keyboard.down(held)
+    page.mouse.move(*at_pixel(page, pane, u, v))
+    page.mouse.down()
+    page.mouse.move(*at_pixel(page, pane, u + by_px[0], v + by_px[1]), steps=8)
+    page.mouse.up()
+    if held is not None:
+        page.keyboard.up(held)
+    for what in ("pulling", "live"):
+        page.wait_for_function(f"document.querySelector('canvas.view').view.{what} === null")
+
+
+def test_a_body_placed_by_hand_goes_where_drags_put_it(rig, folder):
+    first, second = np.array([40.0, -18.0]), np.array([-55.0, 6.0])
+    with open_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
+        page.locator("canvas.view").press("End")
+        page.get_by_text(f"No landmark is clicked in frame {N_FRAMES - 1} yet.").wait_for()
+        page.get_by_role("button", name="Place it by hand").click()
+        page.wait_for_function("document.querySelector('canvas.view').view.nowItems().length >= 2")
+        drag_trunk(page, 0, first)
+        page.get_by_text("The pose was set by hand.").wait_for()
+        drag_trunk(page, 1, second)
+        page.get_by_role("button", name="Use this pose").click()
+        page.get_by_text("the first pose is written into the trial").wait_for()
+        before = read_trial(folder / "trial.toml").start
+        drag_trunk(page, 0, (25.0, 0.0), held="Shift")
+        page.get_by_role("button", name="Use this pose").click()
+        page.wait_for_timeout(500)
+    after = read_trial(folder / "trial.toml").start
+    assert before.frame == N_FRAMES - 1 and before.points_px is None
+    standing = standing_pose(human18(1.75, 70.0, outfit=SAMPLED), rig).world_from_root.translation
+    moved_px = rig["a"].px_from_world(np.array(before.position_m)) - rig["a"].px_from_world(standing)
+    np.testing.assert_allclose(moved_px, first, atol=NEAR_PX)  # the second drag has kept what the first one set
+    assert np.linalg.norm(np.array(before.position_m) - standing) > MOVED_M
+    assert before.rotation.magnitude() < 1e-6 < TURNED < after.rotation.magnitude()
+    np.testing.assert_allclose(after.position_m, before.position_m, atol=1e-4)

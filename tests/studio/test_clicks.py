@@ -1,10 +1,12 @@
 """Tables of clicked points: read in any state of completion, and written so that the command line reads them."""
 
 import numpy as np
+import pytest
 
 from airborne.calibration.sources.control_points import read_control_points
+from airborne.cameras import Rig, camera_looking_at
 from airborne.cameras.clicks import read_clicks
-from airborne.studio.clicks import Clicked, count_clicked, list_surveys, read_clicked
+from airborne.studio.clicks import Clicked, count_clicked, list_surveys, measure_between, read_clicked
 
 SURVEY = "point,x_m,y_m,z_m\nP1,0.0,1.25,0.5\nP2,1.0,2.0,-0.125\n"
 
@@ -40,3 +42,15 @@ def test_surveys_are_told_from_other_tables(tmp_path):
     (tmp_path / "clicks.csv").write_text("point,a_u,a_v\nP1,1,2\n")
     (tmp_path / "truth.csv").write_text("field,time_s\n0,0.0\n")
     assert list_surveys(tmp_path) == ["survey.csv"]
+
+
+def test_the_deviation_of_a_length_is_that_of_lengths_from_many_clicks():
+    places = {"a": [3.0, -4.0, 1.5], "b": [-4.0, -3.0, 1.2], "c": [0.0, 5.0, 1.4]}
+    rig = Rig(tuple(camera_looking_at(n, p, [0, 0, 1.1], focal_px=600, size=(640, 480)) for n, p in places.items()))
+    ends, rng = np.array([[0.0, 0.1, 0.2], [0.3, -0.2, 1.5]]), np.random.default_rng(5)
+    px = np.stack([[camera.px_from_world(end) for camera in rig] for end in ends])
+    px[1, 2] = np.nan  # the second end is clicked in two cameras
+    clicks = px + rng.standard_normal((400, *px.shape))
+    measured = np.array([measure_between(rig, *each, sd_px=1.0) for each in clicks])
+    assert measured[:, 0].mean() == pytest.approx(np.linalg.norm(ends[1] - ends[0]), abs=0.002)
+    assert measured[:, 0].std() == pytest.approx(measured[:, 1].mean(), rel=0.12)

@@ -4,6 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from airborne.cameras import read_rig
 from airborne.io.text import read_toml
@@ -13,7 +14,7 @@ from airborne.trial.file import read_trial
 from tests.support.places import THROWN_CROSS
 from tests.support.studio import MINUTE, at_pixel, go_home, open_page, open_studio, wait_for_frame
 
-FRAME, LAST, CAMERA, DRAGGED_PX = 3, 6, 1, (16.0, -12.0)
+FRAME, TURNED, LAST, CAMERA, DRAGGED_PX = 3, 4, 6, 1, (16.0, -12.0)
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +28,35 @@ def folder(tmp_path_factory):
     return folder
 
 
-def test_a_dragged_joint_is_a_key_and_its_frames_are_tracked_again(folder):
+def wait_for_mark(page, mark, u):
+    """Wait until a joint is shown where it is in the frame."""
+    script = """([id, u]) => {
+        const { view } = document.querySelector("canvas.view");
+        return view.marks.some((mark) => mark.id === id && Math.abs(mark.u - u) < 1);
+    }"""
+    page.wait_for_function(script, arg=[mark, float(u)])
+
+
+def turn_by_hand(page, middle_px):
+    """Drag the end of the body that is farthest from its middle, with Shift."""
+    script = """([pane, u0, v0]) => {
+        const { view } = document.querySelector("canvas.view");
+        const points = view.nowItems().filter((item) => item.grab && item.pane === pane).flatMap((item) => item.points);
+        const far = ([u, v]) => Math.hypot(u - u0, v - v0);
+        return points.length ? points.reduce((a, b) => far(a) > far(b) ? a : b) : null;
+    }"""
+    arguments = [CAMERA, *map(float, middle_px)]
+    page.wait_for_function(script, arg=arguments)
+    u, v = page.evaluate(script, arguments)
+    page.keyboard.down("Shift")
+    page.mouse.move(*at_pixel(page, CAMERA, u, v))
+    page.mouse.down()
+    page.mouse.move(*at_pixel(page, CAMERA, u + 8, v + 8), steps=4)
+    page.mouse.up()
+    page.keyboard.up("Shift")
+
+
+def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked_again(folder):
     run = folder / "results"
     before, rig = read_motion(run / "motion.csv"), read_rig(run / "calib.toml")
     model = read_trial(folder / "trial.toml").model()
@@ -40,19 +69,24 @@ def test_a_dragged_joint_is_a_key_and_its_frames_are_tracked_again(folder):
         for frame in range(1, FRAME + 1):
             page.locator("canvas.view").press(".")
             wait_for_frame(page, frame)
-        page.wait_for_function(
-            "([id, u]) => document.querySelector('canvas.view').view.marks.some("
-            "(mark) => mark.id === id && Math.abs(mark.u - u) < 1)",
-            arg=[f"{name}|{rig.names[CAMERA]}", float(u)],
-        )
+        wait_for_mark(page, f"{name}|{rig.names[CAMERA]}", u)
         page.mouse.move(*at_pixel(page, CAMERA, u, v))
         page.mouse.down()
         page.mouse.move(*at_pixel(page, CAMERA, u + DRAGGED_PX[0], v + DRAGGED_PX[1]), steps=5)
         page.mouse.up()
         page.get_by_text(f"{name} corrected in {rig.names[CAMERA]}, frame {FRAME}").first.wait_for()
+        page.locator("canvas.view").press(".")
+        wait_for_frame(page, TURNED)
+        later = rig.cameras[CAMERA].px_from_world(model.with_pose(before.pose(TURNED)).landmarks[0])
+        wait_for_mark(page, f"{name}|{rig.names[CAMERA]}", later[0])
+        turn_by_hand(page, rig.cameras[CAMERA].px_from_world(before.position[TURNED]))
+        page.get_by_text(f"body turned, frame {TURNED}").first.wait_for()
         page.get_by_role("button", name="Track again around it").click()
         page.get_by_text("tracked again", exact=True).wait_for(timeout=5 * MINUTE)
-    (key,) = read_toml(folder / "trial.toml")["key"]
+    key, turned = read_toml(folder / "trial.toml")["key"]
+    assert turned["frame"] == TURNED
+    was, now = Rotation.from_quat(before.quaternion[TURNED]), Rotation.from_quat(turned["quaternion_xyzw"])
+    assert np.radians(2) < (was.inv() * now).magnitude() < np.radians(40)
     assert key["frame"] == FRAME
     np.testing.assert_allclose(key["points_px"][name][rig.names[CAMERA]], np.add([u, v], DRAGGED_PX), atol=1.5)
     after = read_motion(run / "motion.csv")

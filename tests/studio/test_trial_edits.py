@@ -4,7 +4,7 @@ import pytest
 
 from airborne.errors import TrialError
 from airborne.io.text import parse_toml
-from airborne.studio.trial_edits import with_cameras, with_click, with_table
+from airborne.studio.trial_edits import with_cameras, with_clicks, with_key, with_table
 
 TEXT = """# filmed on a Sunday
 name = "throw"
@@ -50,10 +50,10 @@ def test_tables_are_made_changed_and_rid_of_keys():
 
 
 def test_a_click_is_written_into_the_key_of_its_frame():
-    text = with_click(TEXT, 9, "wrist_left", "left", (100.04, 50))
-    text = with_click(text, 9, "wrist_left", "right", (1, 2))
-    text = with_click(text, 9, "wrist_left", "left", (101, 51))
-    text = with_click(text, 4, "knee_left", "left", (3, 4))
+    text = with_clicks(TEXT, 9, "left", {"wrist_left": (100.04, 50)})
+    text = with_clicks(text, 9, "right", {"wrist_left": (1, 2)})
+    text = with_clicks(text, 9, "left", {"wrist_left": (101, 51)})
+    text = with_clicks(text, 4, "left", {"knee_left": (3, 4)})
     assert parse_toml(text) == parse_toml(TEXT) | {
         "key": [
             {"frame": 9, "points_px": {"wrist_left": {"left": [101.0, 51.0], "right": [1.0, 2.0]}}},
@@ -64,14 +64,14 @@ def test_a_click_is_written_into_the_key_of_its_frame():
 
 
 def test_a_key_that_says_more_keeps_it():
-    text = with_click(f"{TEXT}\n[[key]]\nframe = 9\nsd_px = 2.0   # careful\n", 9, "wrist_left", "left", (1, 2))
+    text = with_clicks(f"{TEXT}\n[[key]]\nframe = 9\nsd_px = 2.0   # careful\n", 9, "left", {"wrist_left": (1, 2)})
     assert parse_toml(text)["key"] == [{"frame": 9, "sd_px": 2.0, "points_px": {"wrist_left": {"left": [1.0, 2.0]}}}]
     assert "# careful" in text
 
 
 def test_a_key_whose_clicks_are_in_a_table_of_their_own_is_left_alone():
     with pytest.raises(TrialError, match=r"has its clicks in clicks.csv; correct them there"):
-        with_click(f'{TEXT}\n[[key]]\nframe = 9\npoints_px = "clicks.csv"\n', 9, "wrist_left", "left", (1, 2))
+        with_clicks(f'{TEXT}\n[[key]]\nframe = 9\npoints_px = "clicks.csv"\n', 9, "left", {"wrist_left": (1, 2)})
 
 
 @pytest.mark.parametrize(
@@ -80,3 +80,16 @@ def test_a_key_whose_clicks_are_in_a_table_of_their_own_is_left_alone():
 def test_what_cannot_be_edited_is_one_line(text, said):
     with pytest.raises(TrialError, match=said):
         with_table(text, "start", {"frame": 1})
+
+
+def test_a_turn_takes_the_place_of_the_other_forms_in_its_key():
+    text = f"{TEXT}\n[[key]]\nframe = 9\nsomersault_tilt_twist_deg = [1, 2, 3]\nsd_deg = 4.0   # careful\n"
+    text = with_key(text, 9, {"somersault_tilt_twist_deg": None, "quaternion_xyzw": [0.0, 0.0, 0.0, 1.0]})
+    assert parse_toml(text)["key"] == [{"frame": 9, "sd_deg": 4.0, "quaternion_xyzw": [0.0, 0.0, 0.0, 1.0]}]
+    assert "# careful" in text
+
+
+def test_cameras_that_stand_in_one_line_keep_what_is_said_of_them():
+    text = 'name = "two"\ncamera = [{ name = "a", video = "a.mp4", drift_ppm = 3.0 }]\nbody = { file = "b.toml" }\n'
+    after = parse_toml(with_cameras(text, "two", [{"video": "a.mp4", "offset_s": 0.5}]))
+    assert after == {**parse_toml(text), "camera": [{"name": "a", "video": "a.mp4", "drift_ppm": 3.0, "offset_s": 0.5}]}

@@ -11,10 +11,9 @@ import pytest
 from airborne.calibration.sources.control_points import read_control_points
 from airborne.motion import read_motion
 from tests.support.places import ROOT, THROWN_CROSS
-from tests.support.studio import MINUTE, at_pixel, open_page, open_studio, wait_for_frame
+from tests.support.studio import MINUTE, User, open_page, open_studio, wait_for_frame
 
 MOST_CLICKS = 60
-CLICK_SD_PX = 1.0
 N_POINTS = 12  # surveyed points that are clicked in all three cameras
 WORST_MM = 6.0  # RMS error of the cross's place
 
@@ -40,28 +39,6 @@ def chosen_points():
     return replace(
         points, names=tuple(points.names[k] for k in kept), world=points.world[kept], px=points.px[kept], sd_m=None
     )
-
-
-class User:
-    """Someone at the page, whose clicks are counted."""
-
-    def __init__(self, page):
-        self.page, self.clicks, self.rng = page, 0, np.random.default_rng(3)
-
-    def click(self, found):
-        found.first.click()
-        self.clicks += 1
-
-    def go(self, step):
-        self.click(self.page.locator("nav a", has=self.page.get_by_text(step, exact=True)))
-
-    def press(self, button):
-        self.click(self.page.get_by_role("button", name=button, exact=True))
-
-    def click_pixel(self, pane, px):
-        u, v = px + CLICK_SD_PX * self.rng.standard_normal(2)
-        self.page.mouse.click(*at_pixel(self.page, pane, u, v))
-        self.clicks += 1
 
 
 def click_control_points(user, folder):

@@ -16,6 +16,7 @@ RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SIZE = {"width": 1280, "height": 720}
 MINUTE = 60_000  # ms
+CLICK_SD_PX = 1.0  # of a user's clicks, right and down
 N_BITS, BLOCK_PX = 10, 24  # of numbers burnt into pictures
 
 
@@ -139,3 +140,32 @@ def burn_numbers(n: int, size: tuple[int, int] = (320, 240)) -> list[np.ndarray]
             image[top - half : top + half, left - half : left + half] = 235 if number >> bit & 1 else 20
         images.append(image)
     return images
+
+
+class User:
+    """Someone at the page, whose clicks are counted."""
+
+    def __init__(self, page):
+        self.page, self.clicks, self.rng = page, 0, np.random.default_rng(3)
+
+    def click(self, found):
+        found.first.click()
+        self.clicks += 1
+
+    def go(self, step):
+        self.click(self.page.locator("nav a", has=self.page.get_by_text(step, exact=True)))
+
+    def press(self, button):
+        self.click(self.page.get_by_role("button", name=button, exact=True))
+
+    def click_pixel(self, pane, px):
+        u, v = px + CLICK_SD_PX * self.rng.standard_normal(2)
+        self.page.mouse.click(*at_pixel(self.page, pane, u, v))
+        self.clicks += 1
+
+    def choose_point(self, name):
+        """Press N until a point of the list is chosen."""
+        script = "before => document.querySelector('.point.here')?.firstElementChild.textContent !== before"
+        while (chosen := self.page.locator(".point.here").first.locator("div").first.text_content()) != name:
+            self.page.keyboard.press("n")
+            self.page.wait_for_function(script, arg=chosen)

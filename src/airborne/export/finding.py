@@ -11,10 +11,9 @@ import numpy as np
 from airborne.appearance.empty_scene import EmptyScene
 from airborne.body import PosedBody
 from airborne.cameras import Camera
+from airborne.export.mosaic import ColumnTitle, write_mosaic
 from airborne.export.palette import ESTIMATE_RGB
-from airborne.export.sheet import cell_figure
 from airborne.export.views import cached_surface_arrays
-from airborne.io.figures import save_png
 from airborne.rendering import FLAT, render
 from airborne.tracking.first_pose.moments import Moment, SourceKey, source_of
 from airborne.types import Image
@@ -36,7 +35,7 @@ def draw_empty_scene(path: Path, moment: Moment, scenes: Mapping[SourceKey, Empt
         grey = np.repeat((255 * shown).astype(np.uint8)[..., None], 3, axis=2)
         square = [_square_pixels(image, view.camera) for image in (empty, grey, _with_outline(view, posed))]
         rows.append(square)
-    save_png(cell_figure(rows, names, _TITLES, aspect=_ASPECT), path)
+    write_mosaic(path, rows, names, [ColumnTitle(text) for text in _TITLES], aspect=_ASPECT)
 
 
 def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, PosedBody]]) -> None:
@@ -44,7 +43,7 @@ def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, 
     views = [view for view in moment.frames.views if view is not None]
     rows = [[_near(_with_outline(view, posed), view.camera, posed) for view in views] for _, posed in candidates]
     names = [f"{number}: {label}" for number, (label, _) in enumerate(candidates, start=1)]
-    save_png(cell_figure(rows, names, [view.camera.name for view in views], aspect=_ASPECT), path)
+    write_mosaic(path, rows, names, [ColumnTitle(view.camera.name) for view in views], aspect=_ASPECT)
 
 
 def _with_outline(view: View, posed: PosedBody) -> Image:

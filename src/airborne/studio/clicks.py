@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from airborne.calibration.sources.control_points import ControlPoints
+from airborne.cameras import Rig
 from airborne.cameras.clicks import read_named_numbers
 from airborne.errors import AirborneError
 from airborne.types import Array
 
+_STEP_M = 1e-4  # of differences
 _WORLD = ("x_m", "y_m", "z_m")
 
 
@@ -72,6 +74,25 @@ def read_clicked(path: Path) -> Clicked:
 def count_clicked(clicked: Clicked, camera: str) -> int:
     """Return how many points are clicked in a camera."""
     return int(np.isfinite(clicked.px[camera][:, 0]).sum()) if camera in clicked.px else 0
+
+
+def measure_between(rig: Rig, first: Array, second: Array, *, sd_px: float) -> tuple[float, float]:
+    """Return how far two clicked points are apart, and its deviation [m]; clicks are (cameras, 2) [px], NaN: none."""
+    ends = [rig.points_from_px(px) for px in (first, second)]
+    along = ends[1] - ends[0]
+    far_m = float(np.linalg.norm(along))
+    variances = [_covariance(rig, px, end, sd_px) for px, end in zip((first, second), ends, strict=True)]
+    towards = along / far_m if far_m else np.zeros(3)
+    return far_m, float(np.sqrt(towards @ (variances[0] + variances[1]) @ towards))
+
+
+def _covariance(rig: Rig, px: Array, point: Array, sd_px: float) -> Array:
+    """Return the covariance (3, 3) [m^2] of a point that clicks (cameras, 2) [px] give."""
+    seen = [camera for camera, at in zip(rig, px, strict=True) if np.isfinite(at).all()]
+    shifts = np.concatenate([_STEP_M * np.eye(3), -_STEP_M * np.eye(3)])
+    J = np.concatenate([(moved[:3] - moved[3:]).T for moved in (each.px_from_world(point + shifts) for each in seen)])
+    J /= 2 * _STEP_M
+    return sd_px**2 * np.linalg.inv(J.T @ J)
 
 
 def list_surveys(folder: Path) -> list[str]:

@@ -35,16 +35,24 @@ class _BodyRun:
     rows: dict[int, int]  # frame -> row
 
 
-def outline_items(posed: PosedBody, cameras: Sequence[Camera], colour: str) -> list[dict[str, Any]]:
-    """Return a body's outline in every camera, one closed line for each part that is seen alone."""
+def outline_items(
+    posed: PosedBody, cameras: Sequence[Camera], colour: str, *, step: int = 1, grab: bool = False
+) -> list[dict[str, Any]]:
+    """Return a body's outline in every camera, one closed line for each part that is seen alone.
+
+    `step` is how many pixels of the video one of the outline has; `grab` lets the body be taken there.
+    """
     surface = cached_surface_arrays(posed.model)
     items = []
     for pane, camera in enumerate(cameras):
-        mask = render(surface, posed, camera.without_distortion(), FLAT).mask.astype(np.uint8)
+        width, height = camera.size
+        drawn = camera.without_distortion().resample(scale=(step, step), size=(-(-width // step), -(-height // step)))
+        mask = render(surface, posed, drawn, FLAT).mask.astype(np.uint8)
         contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
         for contour in contours:
-            line = camera.distort_px(cv2.approxPolyDP(contour, 0.7, True)[:, 0].astype(float))
-            items.append({"pane": pane, "points": _round(line), "colour": colour, "width": 2, "closed": True})
+            line = camera.distort_px(step * cv2.approxPolyDP(contour, 0.7, True)[:, 0].astype(float))
+            item = {"pane": pane, "points": _round(line), "colour": colour, "width": 2, "closed": True}
+            items.append({**item, "grab": True} if grab else item)
     return items
 
 

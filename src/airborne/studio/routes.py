@@ -35,6 +35,10 @@ def add_routes(app: FastAPI, session: Session) -> None:
     async def image(camera: int, frame: int) -> Response:
         return await _answer(lambda: _jpeg(session, camera, frame))
 
+    @app.get("/picture/{camera}/{number}")
+    async def own_picture(camera: int, number: int) -> Response:
+        return await _answer(lambda: _picture(session, camera, number))
+
     @app.get("/thumbnail/{name}")
     async def first_picture(name: str) -> Response:
         return await _answer(lambda: _thumbnail(session.folder, name))
@@ -99,7 +103,14 @@ def _jpeg(session: Session, camera: int, frame: int) -> Response:
     shown = session.shown()
     if not (0 <= camera < len(shown.sources) and 0 <= frame < len(shown.clock)):
         return Response(status_code=404)
-    number = int(shown.clock.images[frame, camera])
+    return _picture(session, camera, int(shown.clock.images[frame, camera]))
+
+
+def _picture(session: Session, camera: int, number: int) -> Response:
+    """Return a picture of a camera by its number in the file."""
+    shown = session.shown()
+    if not (0 <= camera < len(shown.sources) and number < len(shown.indexes[camera])):
+        return Response(status_code=404)
     jpeg = None if number < 0 else session.pictures.jpeg(shown.sources[camera], number)
     if jpeg is None:
         return Response(status_code=204)  # this camera has no picture then

@@ -20,6 +20,8 @@ from airborne.studio.pages.digitise import digitise_page
 from airborne.studio.pages.first_pose import first_pose_page
 from airborne.studio.pages.results import results_page
 from airborne.studio.pages.review import review_page
+from airborne.studio.pages.ruler import ruler_page
+from airborne.studio.pages.sync import sync_page
 from airborne.studio.pages.track import track_page
 from airborne.studio.pages.videos import videos_page
 from airborne.studio.project import find_trial
@@ -31,8 +33,10 @@ _SOON_S = 0.05  # between looks whether the server listens
 _STYLE = Path(__file__).with_name("studio.css")
 _PAGES = {
     "/": videos_page,
+    "/sync": sync_page,
     "/cameras": cameras_page,
     "/body": body_page,
+    "/ruler": ruler_page,
     "/start": first_pose_page,
     "/track": track_page,
     "/review": review_page,

@@ -27,7 +27,7 @@ def draw_cameras(
 ) -> Scene:
     """Show cameras and a path (n, 3) [m], NaN leaves gaps; seen from `away_m` beside the `middle` (3,) [m]."""
     centres = np.stack([camera.centre for camera in rig])
-    middle = _middle(rig) if middle is None else middle
+    middle = middle_of_view(rig) if middle is None else middle
     reach = float(np.median(np.linalg.norm(centres - middle, axis=1)))
     with ui.scene(grid=(60, 60), background_color="#f6f7f8").style("width: 100%; flex: 1; min-height: 180px") as scene:
         for camera in rig:
@@ -90,7 +90,7 @@ def _lines(scene: Scene, pairs: Iterable[tuple[Array, Array]], colour: str) -> N
         scene.line([float(value) for value in start], [float(value) for value in end]).material(colour)
 
 
-def _middle(rig: Rig) -> Array:
+def middle_of_view(rig: Rig) -> Array:
     """Return the point nearest to all optical axes: (3,) [m]."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for camera in rig:

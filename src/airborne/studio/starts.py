@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Pose
+from airborne.body.chain import angles_of
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, TrialError
 from airborne.studio.clicks import Clicked, read_clicked
-from airborne.studio.outlines import outline_items
 from airborne.studio.session import Session
-from airborne.tracking.first_pose import fit_to_pixels
+from airborne.studio.stage import middle_of_view
+from airborne.tracking.first_pose import fit_to_pixels, pose_by_hand
 
 POSE_COLOUR = "#f0e442"
 _BY_HAND = ("position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg")
-_WAYS = (*_BY_HAND, "find", "joints_m", "points_px", "detections", "detections_cameras")  # a start has one of them
+_WAYS = (
+    *_BY_HAND,
+    "player",
+    "find",
+    "joints_m",
+    "points_px",
+    "detections",
+    "detections_cameras",
+)  # a start has one of them
 
 
 def points_name(frame: int) -> str:
@@ -32,11 +41,21 @@ def read_points(session: Session, frame: int) -> Clicked:
     return read_clicked(path) if path.is_file() else Clicked((), None, {})
 
 
-def read_pose(session: Session) -> tuple[int, Pose] | None:
+def player_file(player: str, frame: int) -> str:
+    """Return the name of the table of a player's points clicked in a frame."""
+    return f"start_{player}_{frame}.csv"
+
+
+def read_player(folder: Path, player: str, frame: int) -> Clicked:
+    """Read a player's points clicked in a frame. Raises CalibrationError."""
+    return read_clicked(folder / player_file(player, frame))
+
+
+def read_pose(session: Session, model: BodyModel) -> tuple[int, Pose] | None:
     """Return the frame and pose that the trial has by hand; None where it has another start, or none."""
     try:
         start = session.project().trial().start
-        return start.frame, start.pose
+        return start.frame, pose_by_hand(model, start.world_from_root, start.joint_angles_deg).pose
     except TrialError:
         return None
 
@@ -47,23 +66,32 @@ def pose_of(start: dict[str, Any]) -> Pose:
     return Pose(world_from_root=RigidTransform.from_components(start["position_m"], rotation))
 
 
+def start_of(model: BodyModel, frame: int, pose: Pose) -> dict[str, Any]:
+    """Return the [start] of a pose: position, quaternion, and the angles of joints that are not straight."""
+    root = pose.world_from_root
+    quaternion = root.rotation.as_quat().round(6).tolist()
+    start = {"frame": frame, "position_m": root.translation.round(4).tolist(), "quaternion_xyzw": quaternion}
+    angles = np.degrees(angles_of(pose, model.n_joints)).round(1).tolist()
+    bent = {segment.name: xyz for segment, xyz in zip(model.segments[1:], angles, strict=True) if any(xyz)}
+    return {**start, "joint_angles_deg": bent} if bent else start
+
+
+def standing_pose(model: BodyModel, rig: Rig) -> Pose:
+    """Return the pose to begin with by hand: upright, joints straight, where the cameras look."""
+    root = RigidTransform.from_components(middle_of_view(rig), Rotation.identity())
+    return Pose(world_from_root=root, joint_angles=np.zeros((model.n_joints, 3)))
+
+
 def write_start(session: Session, start: dict[str, Any]) -> None:
     """Write a [start] into the trial, in the place of any other. Raises TrialError."""
     session.set_table("start", {**dict.fromkeys(_WAYS), **start}, "first pose set")
 
 
-def pose_outline(model: BodyModel, rig: Rig, cameras: Sequence[str], pose: Pose) -> list[dict[str, Any]]:
-    """Return the outline of a pose in the cameras' pictures."""
-    return outline_items(model.with_pose(pose), rig.select(cameras).cameras, POSE_COLOUR)
-
-
-def fit_clicks(
-    model: BodyModel, rig: Rig, cameras: Sequence[str], clicked: Clicked
-) -> tuple[list[dict[str, Any]] | None, str]:
-    """Fit a body to clicked landmarks: its outline, None where they do not determine it, and what there is to say."""
+def fit_clicks(model: BodyModel, rig: Rig, clicked: Clicked) -> tuple[Pose | None, str]:
+    """Fit a body to clicked landmarks: its pose, None where they do not determine it, and what there is to say."""
     px = np.stack([np.stack([clicked.at(name, camera) for camera in rig.names]) for name in clicked.names])
     try:
         first = fit_to_pixels(model, rig, "clicks", names=clicked.names, px=px, weights=np.ones(px.shape[:-1]))
     except AirborneError as error:
         return None, str(error)
-    return pose_outline(model, rig, cameras, first.pose), " ".join(first.notes)
+    return first.pose, " ".join(first.notes)

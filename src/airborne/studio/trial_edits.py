@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import tomlkit
-from tomlkit.items import AoT
+from tomlkit.items import Table
 
 from airborne.errors import TrialError
 from airborne.io.text import parse_editable_toml
@@ -21,10 +21,11 @@ def with_cameras(text: str, name: str, cameras: Sequence[Mapping[str, Any]]) -> 
     if "name" not in document:
         document.add("name", tomlkit.item(name))
     present = document.get("camera")
-    old = {str(table.get("video")): table for table in present} if isinstance(present, AoT) else {}
+    old = {str(table.get("video")): table for table in present if isinstance(table, dict)} if present else {}
     tables = tomlkit.aot()
     for camera in cameras:
-        table = old.get(str(camera["video"]), tomlkit.table())
+        known = old.get(str(camera["video"]), {})
+        table = known if isinstance(known, Table) else tomlkit.item(dict(known))
         for key, value in camera.items():
             _set(table, key, value)
         tables.append(table)
@@ -49,26 +50,57 @@ def with_table(text: str, head: str, values: Mapping[str, Any]) -> str:
     return tomlkit.dumps(document)
 
 
-def with_click(text: str, frame: int, point: str, camera: str, px: Sequence[float]) -> str:
-    """Return a trial's text with a point clicked at a frame: in the [[key]] of that frame, made if need be.
+def with_clicks(text: str, frame: int, camera: str, clicks: Mapping[str, Sequence[float]]) -> str:
+    """Return a trial's text with points clicked in a camera: in the [[key]] of that frame, made if need be.
 
     Raises TrialError where that key has its clicks in a table of their own.
     """
     document = _parse(text)
+    key = _key(document, frame)
+    points = key.setdefault("points_px", tomlkit.table())
+    if not isinstance(points, dict):
+        raise TrialError(f"the key of frame {frame} has its clicks in {points}; correct them there")
+    for point, px in clicks.items():
+        old = {name: [float(n) for n in at] for name, at in points.get(point, {}).items()}
+        inline = tomlkit.inline_table()
+        inline.update({**old, camera: [round(float(n), 1) for n in px]})
+        points[point] = inline
+    return tomlkit.dumps(document)
+
+
+def with_key(text: str, frame: int, values: Mapping[str, Any]) -> str:
+    """Return a trial's text with values in the [[key]] of a frame, made if need be; None takes a key away."""
+    document = _parse(text)
+    key = _key(document, frame)
+    for name, value in values.items():
+        _set(key, name, value)
+    return tomlkit.dumps(document)
+
+
+def with_players(text: str, frame: int, files: Mapping[str, str]) -> str:
+    """Return a trial's text whose start is these players: name -> table of clicked points."""
+    document = _parse(text)
+    start, players = tomlkit.table(), tomlkit.aot()
+    start.add("frame", frame)
+    for name, file in files.items():
+        player = tomlkit.table()
+        player.update({"name": name, "points_px": file})
+        players.append(player)
+    start.add("player", players)
+    document.pop("start", None)
+    document.add("start", start)
+    return tomlkit.dumps(document)
+
+
+def _key(document: tomlkit.TOMLDocument, frame: int) -> Any:
+    """Return the [[key]] of a frame, made if need be."""
     keys = document.setdefault("key", tomlkit.aot())
     key = next((each for each in keys if each.get("frame") == frame), None)
     if key is None:
         key = tomlkit.table()
         key.add("frame", frame)
         keys.append(key)
-    points = key.setdefault("points_px", tomlkit.table())
-    if not isinstance(points, dict):
-        raise TrialError(f"the key of frame {frame} has its clicks in {points}; correct them there")
-    clicks = {name: [float(n) for n in at] for name, at in points.get(point, {}).items()}
-    inline = tomlkit.inline_table()
-    inline.update({**clicks, camera: [round(float(n), 1) for n in px]})
-    points[point] = inline
-    return tomlkit.dumps(document)
+    return key
 
 
 def _set(table: Any, key: str, value: Any) -> None:

@@ -15,12 +15,14 @@ export default {
     frame: Number, // at first
     overlay: String, // "/overlay/what/{frame}": items of each frame; or none
     marks: Array, // {id, pane, u, v, label, colour, to: [u, v]}: points to grab
-    items: Array, // {pane, points, colour, width, closed, fill, text}
+    items: Array, // {pane, points, colour, width, closed, fill, text, grab: a drag that begins in it holds the body}
     selected: String, // a mark's id
     picking: Boolean, // a click picks a point
+    apart: Boolean, // its frames are its own, not those of the page
+    follows: Boolean, // the server draws what is dragged, anew for every movement
     label: String,
   },
-  emits: ["pick", "move", "select", "frame"],
+  emits: ["pick", "move", "select", "frame", "drag"],
   data: () => ({ wanted: 0, shown: null }),
   mounted() {
     this.canvas = this.$el;
@@ -33,10 +35,13 @@ export default {
     this.pointer = null;
     this.drag = null;
     this.dragged = null; // a mark on its way
+    this.live = null; // {marks, items} in the place of the page's own while the body is dragged
+    this.pulling = null; // the movement that the server answers now
+    this.pull = null; // the newest one after it
     this.canvas.addEventListener("wheel", this.onWheel, { passive: false });
     for (const name of ["pointerdown", "pointermove", "pointerup", "pointerleave", "dblclick", "keydown"])
       this.canvas.addEventListener(name, this["on_" + name]);
-    this.onOther = (event) => event.detail.from !== this && this.go(event.detail.frame, true);
+    this.onOther = (event) => event.detail.from !== this && !this.apart && this.go(event.detail.frame, true);
     window.addEventListener("airborne-frame", this.onOther);
     this.sizes = new ResizeObserver(() => this.draw());
     this.sizes.observe(this.canvas);
@@ -47,8 +52,8 @@ export default {
     window.removeEventListener("airborne-frame", this.onOther);
   },
   watch: {
-    marks() { this.dragged = null; this.draw(); },
-    items() { this.draw(); },
+    marks() { this.dragged = null; this.live = null; this.draw(); },
+    items() { this.live = null; this.draw(); },
     selected() { this.draw(); },
     picking() { this.draw(); },
     overlay() { this.refresh(); },
@@ -96,7 +101,7 @@ export default {
       this.wanted = frame;
       for (const [other, stop] of this.underway) // what was fetched ahead of another place only stands in the way
         if (Math.abs(other - frame) > AHEAD) { this.cache.delete(other); stop.abort(); }
-      if (!silent) window.dispatchEvent(new CustomEvent("airborne-frame", { detail: { frame, from: this } }));
+      if (!silent && !this.apart) window.dispatchEvent(new CustomEvent("airborne-frame", { detail: { frame, from: this } }));
       let loaded = null;
       try { loaded = await this.load(frame); } catch { return; }
       if (this.wanted !== frame) return;
@@ -174,15 +179,20 @@ export default {
       else if (this.shown) this.write(pen, "no picture", place.x + place.w / 2 - 30, place.y + place.h / 2, "#c8cdd3");
     },
     drawOver(pen, place, i) {
-      const lines = [...((this.shown && this.shown.overlay.items) || []), ...(this.items || [])];
+      const lines = [...((this.shown && this.shown.overlay.items) || []), ...this.nowItems()];
       for (const item of lines) if (item.pane === i) this.drawItem(pen, place, item);
       this.labels = [];
-      for (const mark of this.marks || []) if (mark.pane === i) this.drawMark(pen, place, mark);
+      for (const mark of this.nowMarks()) if (mark.pane === i) this.drawMark(pen, place, mark);
     },
-    drawItem(pen, place, item) {
+    nowMarks() { return (this.live || this).marks || []; },
+    nowItems() { return (this.live || this).items || []; },
+    trace(pen, place, item) {
       pen.beginPath();
       item.points.forEach((point, k) => pen[k ? "lineTo" : "moveTo"](...this.toScreen(place, ...point)));
       if (item.closed) pen.closePath();
+    },
+    drawItem(pen, place, item) {
+      this.trace(pen, place, item);
       if (item.fill) { pen.fillStyle = item.fill; pen.fill(); }
       if (item.colour) { pen.strokeStyle = item.colour; pen.lineWidth = item.width || 1.5; pen.stroke(); }
       if (item.text) this.write(pen, item.text, ...this.toScreen(place, ...item.points[0]), item.colour);
@@ -258,8 +268,39 @@ export default {
     markAt({ x, y, pane }) {
       const place = this.layout()[pane];
       const far = (mark) => { const [mx, my] = this.toScreen(place, mark.u, mark.v); return Math.hypot(mx - x, my - y); };
-      const near = (this.marks || []).filter((mark) => mark.pane === pane && mark.id && far(mark) < GRAB_PX);
+      const near = this.nowMarks().filter((mark) => mark.pane === pane && mark.id && far(mark) < GRAB_PX);
       return near.sort((a, b) => far(a) - far(b))[0];
+    },
+    isOnBody({ x, y, pane }) {
+      const pen = this.pens, place = this.layout()[pane], ratio = window.devicePixelRatio || 1;
+      return this.nowItems().some((item) => {
+        if (!item.grab || item.pane !== pane) return false;
+        this.trace(pen, place, item);
+        pen.lineWidth = GRAB_PX;
+        return pen.isPointInPath(x * ratio, y * ratio) || pen.isPointInStroke(x * ratio, y * ratio);
+      });
+    },
+    // dragging: one movement is at the server at a time, and after it the newest
+    ask(event, ended) {
+      const { pane, x, y, mark } = this.drag, place = this.layout()[pane], at = this.place(event);
+      const from = mark ? [mark.u, mark.v] : this.toVideo(place, x, y);
+      const [u, v] = [from[0] + (at.x - x) / place.scale, from[1] + (at.y - y) / place.scale];
+      this.pull = { n: this.drag.n, pane, from, u, v, id: mark ? mark.id : null, turn: event.shiftKey, ended, at: performance.now() };
+      if (!this.pulling) this.send();
+    },
+    send() {
+      [this.pulling, this.pull] = [this.pull, null];
+      if (this.pulling) this.$emit("drag", this.pulling);
+    },
+    follow(n, marks, items) { // the server's answer
+      const answered = this.pulling;
+      if (!answered) return;
+      if (answered.n === n && items) this.live = { marks: marks || this.marks, items };
+      if (marks) this.dragged = null; // the server's is where the body can reach
+      this.draw();
+      this.canvas.dataset.dragMs = (performance.now() - answered.at).toFixed(1);
+      this.canvas.dataset.drags = 1 + Number(this.canvas.dataset.drags || 0);
+      this.send();
     },
     onWheel(event) {
       event.preventDefault();
@@ -279,7 +320,8 @@ export default {
       if (at.pane < 0 || event.button !== 0) return;
       this.canvas.setPointerCapture(event.pointerId);
       const mark = this.markAt(at), zoom = this.zooms[at.pane];
-      this.drag = { ...at, mark, u: zoom.u, v: zoom.v, moved: false };
+      const holds = this.follows && (mark ? mark.holds : this.isOnBody(at));
+      this.drag = { ...at, mark, holds, n: (this.n_drags = (this.n_drags || 0) + 1), u: zoom.u, v: zoom.v, moved: false };
     },
     on_pointermove(event) {
       this.pointer = this.place(event);
@@ -287,20 +329,24 @@ export default {
       if (drag) {
         const dx = this.pointer.x - drag.x, dy = this.pointer.y - drag.y, place = this.layout()[drag.pane];
         drag.moved ||= Math.hypot(dx, dy) > STILL_PX;
+        if (drag.moved && drag.holds) this.ask(event, false);
         if (drag.moved && drag.mark) {
           const { id, u, v } = drag.mark;
           this.dragged = { id, u: u + dx / place.scale, v: v + dy / place.scale };
-        } else if (drag.moved) {
+        } else if (drag.moved && !drag.holds) {
           Object.assign(this.zooms[drag.pane], { u: drag.u - dx / place.scale, v: drag.v - dy / place.scale });
           this.hold(drag.pane);
         }
-      }
+      } else if (this.follows && this.pointer.pane >= 0)
+        this.canvas.style.cursor = this.markAt(this.pointer) || this.isOnBody(this.pointer) ? "grab" : "";
       this.draw();
     },
     on_pointerup(event) {
       const drag = this.drag, at = this.place(event);
+      if (drag && drag.moved && drag.holds) this.ask(event, true);
       this.drag = null;
       if (!drag) return;
+      if (drag.moved && drag.holds) return;
       if (drag.moved && this.dragged) this.$emit("move", { ...this.dragged, frame: this.wanted });
       else if (!drag.moved && this.picking) { // the server knows whether the mark close by or a new point is meant
         const [u, v] = this.toVideo(this.layout()[drag.pane], at.x, at.y);

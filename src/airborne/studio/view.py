@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, TypedDict
 
 from nicegui.element import Element
@@ -21,6 +22,7 @@ class Mark(TypedDict, total=False):
     label: str
     colour: str
     to: list[float]  # where the cameras see it [px]; the difference is drawn ten times as long
+    holds: bool  # whether the body follows where it is dragged
 
 
 class Item(TypedDict, total=False):
@@ -33,6 +35,20 @@ class Item(TypedDict, total=False):
     closed: bool
     fill: str
     text: str  # at the first point
+    grab: bool  # a drag that begins in it holds the body
+
+
+@dataclass(frozen=True, slots=True)
+class Drag:
+    """A movement of the pointer that holds the body, or a mark."""
+
+    number: int  # of the drag, which has many movements
+    pane: int  # number of the camera
+    start: tuple[float, float]  # where the body was taken [px]
+    px: tuple[float, float]  # where the pointer has it now
+    mark: str | None
+    turns: bool  # Shift is down
+    has_ended: bool
 
 
 class CameraViews(Element, component="view.js", default_classes="view"):
@@ -43,23 +59,31 @@ class CameraViews(Element, component="view.js", default_classes="view"):
         shown: ShownTrial,
         *,
         frame: int,
+        camera: int | None = None,
         overlay: str = "",
         on_frame: Callable[[int], Any] | None = None,
         on_pick: Callable[[int, float, float, str | None], Any] | None = None,
         on_move: Callable[[str, float, float], Any] | None = None,
         on_select: Callable[[str | None], Any] | None = None,
+        on_drag: Callable[[Drag], Any] | None = None,
     ) -> None:
-        """Show a trial's videos; `overlay` is the address of what lies over each frame, with {frame} in it.
+        """Show a trial's videos, or one `camera` alone, picture by picture as its file has them.
 
+        `overlay` is the address of what lies over each frame, with {frame} in it.
         `on_pick` gets camera number, pixel, and the mark close by if there is one; `on_move` and `on_select` a mark.
+        `on_drag` gets the movements of what can be grabbed, and answers each with `follow`.
         """
         super().__init__()
+        kind = "image" if camera is None else "picture"
         self._props["panes"] = [
-            {"name": name, "width": size[0], "height": size[1], "url": f"/image/{k}/{{frame}}?{hash(shown.sources)}"}
+            {"name": name, "width": size[0], "height": size[1], "url": f"/{kind}/{k}/{{frame}}?{hash(shown.sources)}"}
             for k, (name, size) in enumerate(shown.sizes.items())
+            if camera in (None, k)
         ]
-        self._props["n_frames"] = len(shown.clock)
-        self._props["frame"] = min(frame, len(shown.clock) - 1)
+        n_frames = len(shown.clock) if camera is None else len(shown.indexes[camera])
+        self._props["n_frames"] = n_frames
+        self._props["frame"] = min(frame, n_frames - 1)
+        self._props["apart"] = camera is not None
         self._props["overlay"] = overlay
         self._props["label"] = f"pictures of {', '.join(shown.names)}"
         self._props["picking"] = False
@@ -70,6 +94,8 @@ class CameraViews(Element, component="view.js", default_classes="view"):
         )
         self._listen("move", on_move, lambda args: (str(args["id"]), float(args["u"]), float(args["v"])))
         self._listen("select", on_select, lambda args: (args["id"],))
+        self._props["follows"] = on_drag is not None
+        self._listen("drag", on_drag, lambda args: (_read_drag(args),))
 
     def _listen(self, name: str, handler: Callable[..., Any] | None, read: Callable[[dict], tuple]) -> None:
         if handler is None:
@@ -86,6 +112,10 @@ class CameraViews(Element, component="view.js", default_classes="view"):
         self._props["selected"] = selected or ""
         self.update()
 
+    def follow(self, drag: Drag, marks: Sequence[Mark] | None, items: Sequence[Any] | None) -> None:
+        """Answer a movement: show this until the page's own marks and lines change; None leaves them as they are."""
+        self.run_method("follow", drag.number, marks, items)
+
     def start_picking(self) -> None:
         """Let clicks pick points."""
         self._props["picking"] = True
@@ -99,6 +129,19 @@ class CameraViews(Element, component="view.js", default_classes="view"):
     def go(self, frame: int) -> None:
         """Show a frame, in every part of the page."""
         self.run_method("show", frame)
+
+
+def _read_drag(args: dict) -> Drag:
+    (x, y), mark = args["from"], args["id"]
+    return Drag(
+        number=int(args["n"]),
+        pane=int(args["pane"]),
+        start=(float(x), float(y)),
+        px=(float(args["u"]), float(args["v"])),
+        mark=None if mark is None else str(mark),
+        turns=bool(args["turn"]),
+        has_ended=bool(args["ended"]),
+    )
 
 
 class Curves(Element, component="curves.js", default_classes="curves"):

@@ -8,10 +8,13 @@ from nicegui import ui
 
 from airborne.body import BodyModel
 from airborne.errors import AirborneError, count
+from airborne.io.text import parse_editable_toml
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame
 from airborne.studio.project import list_bodies
 from airborne.studio.session import Session
+from airborne.studio.trial_edits import with_table
 from airborne.trial.body import BodyTable
+from airborne.trial.settings import PLAYERS_METHODS
 
 _KEYS = ("file", "preset", "stature_m", "mass_kg", "measurements")
 _STATURE_M, _MASS_KG = (0.5, 2.6), (10.0, 300.0)  # that are taken for a person's
@@ -30,6 +33,10 @@ async def body_page(session: Session) -> None:
             if bodies:
                 _thing_card(session, bodies, table)
             _person_card(session, table)
+            _players_card(session)
+        if session.project().table("calibration"):
+            with ui.element("a").props('href="/ruler"').classes("plain"):
+                ui.label("Measure a length in the pictures")
 
 
 def _thing_card(session: Session, bodies: dict[str, BodyModel], table: dict[str, Any]) -> None:
@@ -62,6 +69,14 @@ def _person_card(session: Session, table: dict[str, Any]) -> None:
         ui.button("Use this person", on_click=save).props("unelevated")
 
 
+def _players_card(session: Session) -> None:
+    with ui.element("div").classes("card").style("width: 360px"):
+        ui.label("Players").classes("name")
+        text = "Hips, knees and feet of any number of players, such as blockers at the net."
+        ui.label(text).classes("soft small")
+        ui.button("Use players", on_click=lambda: _save(session, {"preset": "legs"})).props("unelevated")
+
+
 def _describe(model: BodyModel) -> str:
     parts = sum(len(segment.parts) for segment in model.segments)
     return f"{model.name}: {count(len(model.segments), 'segment')}, {count(parts, 'solid')}"
@@ -73,5 +88,14 @@ def _save(session: Session, values: dict[str, Any]) -> None:
             BodyTable(**values)
         except ValueError as error:
             raise AirborneError(str(error)) from None
-        session.set_table("body", {**dict.fromkeys(_KEYS), **values}, "body chosen")
+        session.edit_trial(lambda text: _with_body(text, values), "body chosen")
         ui.notify("the body is written into the trial", type="positive")
+
+
+def _with_body(text: str, values: dict[str, Any]) -> str:
+    """Return a trial's text with another body, and with a method that can track it."""
+    text = with_table(text, "body", {**dict.fromkeys(_KEYS), **values})
+    method = parse_editable_toml(text).get("track", {}).get("method")
+    if values.get("preset") == "legs":
+        return text if method in PLAYERS_METHODS else with_table(text, "track", {"method": PLAYERS_METHODS[0]})
+    return with_table(text, "track", {"method": None}) if method in PLAYERS_METHODS else text

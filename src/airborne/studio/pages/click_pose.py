@@ -8,16 +8,26 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from airborne.body import BodyModel
+from airborne.body import BodyModel, Pose
 from airborne.cameras import Rig
 from airborne.studio.clicks import Clicked
 from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, PointsPanel
+from airborne.studio.pages.pose_hand import DRAG_HELP, PoseHand
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
-from airborne.studio.starts import POSE_COLOUR, fit_clicks, points_name, read_points, write_start
-from airborne.studio.view import Mark
+from airborne.studio.starts import (
+    POSE_COLOUR,
+    fit_clicks,
+    points_name,
+    read_points,
+    read_pose,
+    standing_pose,
+    start_of,
+    write_start,
+)
+from airborne.studio.view import Drag, Mark
 from airborne.types import Array, Mask
 
 _NEEDED = ("hip_left", "hip_right", "shoulder_left", "shoulder_right")
@@ -37,7 +47,9 @@ class ClickPanel(PointsPanel):
         self._landmarks = [*needed, *(name for name in landmarks if name not in needed)]
         super().__init__(session, shown, Clicked((), None, {}), self._landmarks[0])
         self.rig, self.model, self.frame = rig, model, frame
-        self.outline: list[dict[str, Any]] = []  # of the body fitted to the clicks
+        self.hand = PoseHand(model, rig.select(shown.names).cameras, lambda pose: None)
+        self.is_by_hand = False  # the pose, not fitted to the clicks
+        self.outline: list[dict[str, Any]] = []  # of the pose
         self.says = ""
 
     @property
@@ -52,25 +64,49 @@ class ClickPanel(PointsPanel):
 
     async def build(self) -> None:
         """Lay out the pictures and the list of landmarks, and show the clicks that there are."""
-        ui.label(_HELP).classes("help")
+        ui.label(f"{_HELP} {DRAG_HELP}").classes("help")
         with ui.element("div").classes("split"):
             with ui.element("div").classes("wide"):
-                self.build_views(self.frame)
+                self.build_views(self.frame, on_drag=self.drag)
             with ui.element("div").classes("side"):
                 with ui.element("div").classes("card"):
                     self.note = ui.label().classes("small")
                     self.use = ui.button("Use this pose", on_click=self.write).props("unelevated")
                     ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
+                    ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
                 self.list = PointList(self.shown.names, self.choose)
         self.show()
         await self.reread()
+        stored = read_pose(self.session, self.model)
+        if stored is not None and stored[0] == self.frame:
+            await self.place(stored[1], "The outline is the pose that the trial has.")
+
+    async def begin_by_hand(self) -> None:
+        """Show the body upright where the cameras look, to be dragged."""
+        await self.place(standing_pose(self.model, self.rig), "Drag the body, its limbs, and with Shift its turn.")
+
+    async def place(self, pose: Pose, says: str) -> None:
+        """Show a pose that is not fitted to the clicks."""
+        self.hand.place(pose)
+        self.is_by_hand, self.says, self.outline = True, says, self.hand.items()
+        self.show()
+
+    async def drag(self, drag: Drag) -> None:
+        """Let the body follow the pointer; a click that is dragged is moved at the end."""
+        did_move = await self.hand.follow(self.view, drag)
+        if did_move and drag.has_ended and drag.mark is None:
+            self.is_by_hand, self.says, self.outline = True, "The pose was set by hand.", self.hand.items()
+            self.show()
+        elif drag.has_ended and drag.mark is not None:
+            await self.move(drag.mark, *drag.px)
 
     async def turn_to(self, frame: int) -> None:
         """Show the clicks of another frame."""
         if frame != self.frame:
             self.frame = frame
             self.session.go(frame=frame)
-            self.selected = None
+            self.selected, self.outline, self.says = None, [], ""
+            self.hand.place(None)
             self.show()
             await self.reread()
 
@@ -84,20 +120,24 @@ class ClickPanel(PointsPanel):
 
     async def solve(self) -> None:
         """Fit the body to the clicks, or say what is missing; the clicks are shown at once."""
-        self.outline, self.says = [], "fitting the body" if self.clicked.names else ""
+        self.is_by_hand, self.says = False, "fitting the body" if self.clicked.names else ""
         self.show()
         if not self.clicked.names:
             return
-        solved = await self.latest.do(fit_clicks, self.model, self.rig, self.shown.names, self.clicked)
-        if solved is not None:
-            outline, self.says = solved
-            self.outline = outline or []
+        solved = await self.latest.do(fit_clicks, self.model, self.rig, self.clicked)
+        if solved is not None and not self.is_by_hand:  # set since
+            pose, self.says = solved
+            self.hand.place(pose)
+            self.outline = self.hand.items()
             self.show()
 
     def write(self) -> None:
-        """Write the clicks' frame and table into the trial."""
+        """Write the clicks' frame and table into the trial, or the pose that was set by hand."""
+        start: dict[str, Any] = {"frame": self.frame, "points_px": self.file}
+        if self.is_by_hand and self.hand.pose is not None:
+            start = start_of(self.model, self.frame, self.hand.pose)
         with errors_shown():
-            write_start(self.session, {"frame": self.frame, "points_px": self.file})
+            write_start(self.session, start)
             ui.notify("the first pose is written into the trial", type="positive")
 
     def show(self) -> None:
@@ -123,6 +163,7 @@ class ClickPanel(PointsPanel):
                         "v": v,
                         "label": name,
                         "colour": colour,
+                        "holds": True,
                     }
                     yield {**mark, "to": to[pane].tolist()} if np.isfinite(to[pane]).all() else mark
 

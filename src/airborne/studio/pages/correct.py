@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from nicegui import ui
 
-from airborne.cameras import read_rig
+from airborne.body import Pose
+from airborne.cameras import Camera, read_rig
 from airborne.errors import TrialError
 from airborne.motion.run_folder import CALIBRATION
 from airborne.studio.commands import STOPPED, Command
+from airborne.studio.dragging import carried_landmarks, landmarks_px
 from airborne.studio.outlines import run_body, run_motion
 from airborne.studio.pages.layout import complain, errors_shown
+from airborne.studio.pages.pose_hand import PoseHand
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
-from airborne.studio.trial_edits import with_click
-from airborne.studio.view import CameraViews, Mark
+from airborne.studio.trial_edits import with_clicks, with_key
+from airborne.studio.view import CameraViews, Drag, Mark
+from airborne.trial.keys import KeyTable
 from airborne.trial.settings import KEY_METHODS
+from airborne.types import Array
 
 _JOINT_COLOUR, _CLICK_COLOUR = "#ffffff", "#f0e442"
 _LOOK_EVERY_S = 0.5  # at a run that goes on
@@ -31,6 +38,8 @@ class Correction:
         self.session, self.shown, self.folder = session, shown, folder
         self.view: CameraViews | None = None
         self.command: Command | None = None
+        cameras = read_rig(folder / CALIBRATION).select(shown.names).cameras
+        self.hand = PoseHand(run_body(folder), cameras, lambda pose: self._marks(pose, {}))
 
     def build(self) -> None:
         """Lay out the switch, the button that tracks again, and what there is to say."""
@@ -42,14 +51,60 @@ class Correction:
         ui.timer(_LOOK_EVERY_S, self.look)
 
     def turn_to(self, frame: int) -> None:
-        """Show the joints of a frame, to be grabbed."""
+        """Show the body of a frame and its joints, to be grabbed."""
+        if self.view is None:
+            return
+        with errors_shown():
+            motion = run_motion(self.folder)
+            rows = np.flatnonzero((motion.index == frame) & motion.has_pose)
+            self.hand.place(motion.pose(rows[0]) if self.switch.value and len(rows) else None)
+            self._show(frame)
+
+    def _show(self, frame: int) -> None:
         if self.view is not None:
-            with errors_shown():
-                self.view.show_over(self._marks(frame) if self.switch.value else [], [])
+            is_on = bool(self.switch.value)
+            self.view.show_over(self._marks(self.hand.pose, self._clicked(frame)) if is_on else [], self.hand.items())
 
     def move(self, mark: str, u: float, v: float) -> None:
-        """Write where a joint was dragged to as a click of the frame's key."""
+        """Write where a joint is as a click of the frame's key."""
         name, camera = mark.rsplit("|", 1)
+        self._write({name: np.array([u, v])}, camera, name)
+
+    async def drag(self, drag: Drag) -> None:
+        """Let the body follow the pointer; at the end, write what was moved into the frame's key."""
+        if not await self.hand.follow(self.view, drag) or not drag.has_ended:
+            return
+        camera, pose, grip = self.hand.cameras[drag.pane], self.hand.pose, self.hand.grip
+        assert pose is not None and grip is not None
+        if drag.mark is not None:
+            self.move(drag.mark, *drag.px)
+        elif drag.turns:
+            self._write_turn(pose)
+        else:
+            names = carried_landmarks(self.hand.model, grip)
+            clicks = landmarks_px(self.hand.model, pose, camera, names)
+            self._write(dict(clicks), camera.name, self.hand.model.segments[grip.segment].name)
+
+    def _write_turn(self, pose: Pose) -> None:
+        """Write the body's orientation into the frame's key."""
+        x, y, z, w = (round(float(each), 5) for each in pose.world_from_root.rotation.as_quat())
+        others = {"rotation_matrix": None, "somersault_tilt_twist_deg": None}
+        frame, values = self.session.frame, {**others, "quaternion_xyzw": [x, y, z, w]}
+        sd = _default_sd("sd_deg")
+        self._edit(lambda text: with_key(text, frame, values), f"body turned, frame {frame}", f", ± {sd:g}°")
+
+    def _write(self, clicks: dict[str, Array], camera: str, what: str) -> None:
+        """Write where a camera sees landmarks of the body into the frame's key."""
+        frame, sd_px = self.session.frame, _default_sd("sd_px")
+        view = next(each for each in self.hand.cameras if each.name == camera)
+        plain = {name: px.tolist() for name, px in clicks.items()}
+        self._edit(
+            lambda text: with_clicks(text, frame, camera, plain),
+            f"{what} corrected in {camera}, frame {frame}",
+            f", ± {sd_px:g} px{_across(view, self.hand.pose, sd_px)}",
+        )
+
+    def _edit(self, change: Callable[[str], str], what: str, sd: str) -> None:
         frame = self.session.frame
         with errors_shown():
             trial = self.session.project().trial()
@@ -57,11 +112,10 @@ class Correction:
                 raise TrialError(f"frame {trial.start.frame} is the start; correct it in the step First pose")
             if trial.track.method not in KEY_METHODS:
                 raise TrialError(f"method '{trial.track.method}' reads no corrections; use {', '.join(KEY_METHODS)}")
-            what = f"{name} corrected in {camera}, frame {frame}"
-            self.session.edit_trial(lambda text: with_click(text, frame, name, camera, (u, v)), what)
-            self.says.set_text(what)
+            self.session.edit_trial(change, what)
+            self.says.set_text(what + sd)
             self.again.set_visibility(True)
-        self.turn_to(frame)
+        self._show(frame)
 
     def track(self) -> None:
         """Track again what the corrections touch, as `airborne track --resume` does."""
@@ -90,23 +144,42 @@ class Correction:
             self.view.run_method("refresh")
         self.turn_to(self.session.frame)
 
-    def _marks(self, frame: int) -> list[Mark]:
-        """Return the landmarks of the run in every view, in their place those that the frame's key has clicked."""
-        motion, model = run_motion(self.folder), run_body(self.folder)
-        rows = np.flatnonzero((motion.index == frame) & motion.has_pose)
-        rig = read_rig(self.folder / CALIBRATION).select(self.shown.names)
-        points = np.full((len(model.landmarks), 3), np.nan)
-        if len(rows):
-            points = model.with_pose(motion.pose(rows[0])).landmarks
+    def _clicked(self, frame: int) -> dict[str, Any]:
+        """Return the clicks that the frame's key holds: landmark -> camera -> (2,) [px]."""
         keys = self.session.project().tables.get("key", [])
         clicked = next((key.get("points_px") for key in keys if key.get("frame") == frame), None)
+        return clicked if isinstance(clicked, dict) else {}
+
+    def _marks(self, pose: Pose | None, clicked: dict[str, Any]) -> list[Mark]:
+        """Return the landmarks of a pose in every view, in their place those that are clicked."""
+        model = self.hand.model
+        points = np.full((len(model.landmarks), 3), np.nan) if pose is None else model.with_pose(pose).landmarks
         marks: list[Mark] = []
         for landmark, point in zip(model.landmarks, points, strict=True):
-            own = clicked.get(landmark.name, {}) if isinstance(clicked, dict) else {}
-            for pane, camera in enumerate(rig):
+            own = clicked.get(landmark.name, {})
+            for pane, camera in enumerate(self.hand.cameras):
                 u, v = map(float, own.get(camera.name, camera.px_from_world(point)))
                 if np.isfinite([u, v]).all():
-                    mark: Mark = {"id": f"{landmark.name}|{camera.name}", "pane": pane, "u": u, "v": v}
+                    mark: Mark = {
+                        "id": f"{landmark.name}|{camera.name}",
+                        "pane": pane,
+                        "u": u,
+                        "v": v,
+                        "holds": pose is not None,
+                    }
                     colour, label = (_CLICK_COLOUR, landmark.name) if camera.name in own else (_JOINT_COLOUR, "")
                     marks.append({**mark, "label": label, "colour": colour})
         return marks
+
+
+def _default_sd(key: str) -> float:
+    """Return the deviation that a key has where it names none."""
+    return float(KeyTable.model_fields[key].default)
+
+
+def _across(camera: Camera, pose: Pose | None, sd_px: float) -> str:
+    """Say how far across the line of sight a deviation is at the body."""
+    if pose is None:
+        return ""
+    depth_m = camera.camera_from_world.apply(pose.world_from_root.translation)[2]
+    return f" ({1e3 * sd_px * depth_m / camera.K[0, 0]:.0f} mm at the body)"

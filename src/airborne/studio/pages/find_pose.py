@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -15,10 +15,11 @@ from airborne.io.text import read_json
 from airborne.motion.run_folder import CANDIDATES
 from airborne.studio.commands import STOPPED, Command
 from airborne.studio.pages.layout import complain, errors_shown, in_thread
+from airborne.studio.pages.pose_hand import DRAG_HELP, PoseHand
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
-from airborne.studio.starts import pose_of, pose_outline, read_pose, write_start
-from airborne.studio.view import CameraViews
+from airborne.studio.starts import pose_of, read_pose, standing_pose, start_of, write_start
+from airborne.studio.view import CameraViews, Drag
 from airborne.studio.writing import FOLDER
 
 _HELP = "The body is looked for where it stands out from the empty scene, which takes a minute or two."
@@ -36,22 +37,23 @@ class FindPanel:
     model: BodyModel
     frame: int  # in view
     at: int = -1  # the frame of the outline
-    outline: list[dict[str, Any]] = field(default_factory=list)
     found: dict[str, Any] | None = None  # the [start] to write
     candidates: tuple[dict[str, Any], ...] = ()  # where the search was undecided
 
     async def build(self) -> None:
         """Lay out the pictures and what can be done, and show the pose that the trial has."""
-        ui.label(_HELP).classes("help")
+        ui.label(f"{_HELP} {DRAG_HELP}").classes("help")
+        self.hand = PoseHand(self.model, self.rig.select(self.shown.names).cameras, lambda pose: None)
         with ui.element("div").classes("split"):
             with ui.element("div").classes("wide"):
-                self.view = CameraViews(self.shown, frame=self.frame, on_frame=self.turn_to)
+                self.view = CameraViews(self.shown, frame=self.frame, on_frame=self.turn_to, on_drag=self.drag)
             with ui.element("div").classes("side"), ui.element("div").classes("card"):
                 with ui.element("div").classes("row-line"):
                     self.find = ui.button("Find it", on_click=self.search).props("unelevated")
                     self.spinner = ui.spinner()
                     self.seconds = ui.label().classes("small")
                     self.halt = ui.button("Stop", on_click=self.stop).props("flat dense")
+                    self.by_hand = ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
                 self.choices = ui.refreshable(self._list_candidates)
                 self.choices()
                 self.note = ui.label().classes("small")
@@ -59,7 +61,7 @@ class FindPanel:
         self.timer = ui.timer(_LOOK_EVERY_S, self.watch, active="find" in self.session.commands)
         self._show_search()
         self.use.set_visibility(False)
-        if (stored := read_pose(self.session)) is not None:
+        if (stored := read_pose(self.session, self.model)) is not None:
             await self.draw(*stored)
             self.note.set_text("The outline is the pose that the trial has.")
 
@@ -67,7 +69,19 @@ class FindPanel:
         """Show the outline in its own frame only."""
         self.frame = frame
         self.session.go(frame=frame)
-        self.view.show_over((), self.outline if frame == self.at else ())
+        self.view.show_over((), self.hand.items() if frame == self.at else ())
+
+    async def begin_by_hand(self) -> None:
+        """Show the body upright where the cameras look, to be dragged."""
+        await self.draw(self.frame, standing_pose(self.model, self.rig))
+
+    async def drag(self, drag: Drag) -> None:
+        """Let the body follow the pointer."""
+        if await self.hand.follow(self.view, drag) and drag.has_ended and self.hand.pose is not None:
+            self.found = start_of(self.model, self.at, self.hand.pose)
+            self.note.set_text("The outline is the pose that was set by hand.")
+            self.use.set_visibility(True)
+            self.turn_to(self.frame)
 
     def search(self) -> None:
         """Start `airborne find`."""
@@ -115,7 +129,7 @@ class FindPanel:
     async def draw(self, frame: int, pose: Pose) -> None:
         """Show a pose's outline in its frame."""
         self.at = frame
-        self.outline = await in_thread(pose_outline, self.model, self.rig, self.shown.names, pose)
+        self.hand.place(pose)
         self.view.go(frame)
         self.turn_to(frame)
 
@@ -131,6 +145,7 @@ class FindPanel:
         command = self.session.commands.get("find")
         is_running = command is not None and command.is_running
         self.find.set_visibility(not is_running)
+        self.by_hand.set_visibility(not is_running)
         for each in (self.spinner, self.seconds, self.halt):
             each.set_visibility(is_running)
         self.seconds.set_text(f"looking for the body: {command.seconds:.0f} s" if command is not None else "")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from airborne.errors import AirborneError
+from airborne.studio.pages.click_players import PlayersPanel
 from airborne.studio.pages.click_pose import ClickPanel
 from airborne.studio.pages.find_pose import FindPanel
 from airborne.studio.pages.layout import complain, in_thread, page_frame, work
@@ -23,12 +24,17 @@ async def first_pose_page(session: Session) -> None:
         rig = await work("calibrating the cameras", session.rig)
         if shown is None or rig is None:
             return
+        frame = int(project.table("start").get("frame", session.frame))
+        if project.table("body").get("preset") == "legs":
+            players = PlayersPanel(session, shown, rig, frame)
+            changed.append(players.reread)
+            await players.build()
+            return
         try:
             model = await in_thread(project.model)
         except AirborneError as error:
             complain(error)
             return
-        frame = int(project.table("start").get("frame", session.frame))
         if model.has_joints:
             panel = ClickPanel(session, shown, rig, model, frame)
             changed.append(panel.reread)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from nicegui import ui
@@ -14,12 +15,12 @@ from airborne.studio.clicks import Clicked
 from airborne.studio.pages.layout import Latest, complain, errors_shown
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
-from airborne.studio.view import CameraViews, Item
+from airborne.studio.view import CameraViews, Drag, Item
 from airborne.types import Array
 
 CAMERA_COLOURS = ("#56b4e9", "#e69f00", "#cc79a7", "#009e73", "#0072b2", "#d55e00")  # in order
 CHOSEN_COLOUR = "#f0e442"
-_CLICK_SD_PX = 1.0  # of a careful click, right and down: the band is two of these
+CLICK_SD_PX = 1.0  # of a careful click, right and down: the band is two of these
 
 
 class PointsPanel:
@@ -53,7 +54,7 @@ class PointsPanel:
         """Show marks and lists as they are now."""
         raise NotImplementedError
 
-    def build_views(self, frame: int) -> None:
+    def build_views(self, frame: int, on_drag: Callable[[Drag], Any] | None = None) -> None:
         """Lay out the pictures; keys choose points."""
         ui.keyboard(on_key=self.step)
         self.view = CameraViews(
@@ -63,6 +64,7 @@ class PointsPanel:
             on_pick=self.pick,
             on_move=self.move,
             on_select=self.select,
+            on_drag=on_drag,
         )
         self.view.start_picking()
 
@@ -142,7 +144,7 @@ class PointsPanel:
             for pane, other in enumerate(self.shown.names):
                 if other == camera or not np.isfinite(px).all():
                     continue
-                curve, sd = epipolar_curve(rig[camera], px, rig[other], _CLICK_SD_PX)
+                curve, sd = epipolar_curve(rig[camera], px, rig[other], CLICK_SD_PX)
                 if len(curve) < 2:
                     continue
                 tangent = np.gradient(curve, axis=0)

@@ -73,6 +73,7 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
                 overlay=f"/overlay/{quote(folder.name)}/{{frame}}",
                 on_frame=turn_to,
                 on_move=None if correction is None else correction.move,
+                on_drag=None if correction is None else correction.drag,
             )
         if correction is not None:
             correction.view = view

@@ -62,6 +62,9 @@ async def videos_page(session: Session) -> None:
         with ui.element("div").classes("row-line"):
             ui.button("Use these cameras", on_click=lambda: _save(session, choices)).props("unelevated")
             ui.label(f"writes {session.path.name}").classes("soft small")
+            if len(project.cameras) > 1:
+                with ui.element("a").props('href="/sync"').classes("plain"):
+                    ui.label("Put them on one clock")
 
 
 def _facts(path: Path) -> VideoFacts | str:

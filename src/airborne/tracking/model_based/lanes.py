@@ -11,10 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from airborne.kernels import kernel
+from airborne.rendering.rows import LANES, f4
 
-LANES = 16  # pixels computed together, as in `rendering.rows`
 STRIP = 8 * LANES  # pixels of a row that are taken at once
-f4 = np.float32
 EDGE = f4(0.01)  # blurred coverage below which a pixel is not used
 
 # planes of a strip's terms: squared residual, its products with the gradients, the mask's gradient, what weighs a pixel

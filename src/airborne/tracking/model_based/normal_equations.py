@@ -13,9 +13,9 @@ from airborne.appearance.lighting import fit_light, flatten_shading, shade_body
 from airborne.kernels import kernel
 from airborne.rendering.drawing import draw_maps
 from airborne.rendering.maps import surface_maps
+from airborne.rendering.rows import LANES
 from airborne.tracking.model_based.blur import blur_planes
 from airborne.tracking.model_based.kernel_arguments import Comparison, Observation
-from airborne.tracking.model_based.lanes import LANES
 from airborne.tracking.model_based.owners import find_owners, mask_box
 from airborne.tracking.model_based.row_equations import add_rows
 from airborne.types import Array

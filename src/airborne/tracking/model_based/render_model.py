@@ -18,12 +18,12 @@ from airborne.cameras import Camera
 from airborne.rendering import Lights, pose_segments
 from airborne.rendering.maps import SurfaceMaps, empty_maps, surface_maps
 from airborne.rendering.packing import pack_lights, pack_view, reduce_view, shift_view
+from airborne.rendering.rows import LANES
 from airborne.rendering.shapes import new_shapes
 from airborne.rendering.srgb import light_from_srgb
 from airborne.tracking.covariance import SHIFT_SD_PX
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom
 from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, PackedBody, Projection, Window
-from airborne.tracking.model_based.lanes import LANES
 from airborne.tracking.model_based.normal_equations import observe
 from airborne.types import Array
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from airborne.kernels import kernel
+from airborne.rendering.rows import LANES, f4
 from airborne.tracking.model_based.blur import RADIUS_PX, RING, blur_row
 from airborne.tracking.model_based.lanes import (
     CHANGE,
     GRADIENT,
-    LANES,
     MINE,
     STRIP,
     SUM_PLANES,
@@ -24,7 +24,6 @@ from airborne.tracking.model_based.lanes import (
     add_channel,
     add_segment,
     begin_terms,
-    f4,
     total_of,
     weigh_pixels,
 )

@@ -1,0 +1,191 @@
+"""The start of players: torso, hips, knees and ankles of one player after the other, clicked in the pictures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from nicegui import ui
+
+from airborne.body.legs import LEG_POINTS, RODS
+from airborne.cameras import Rig
+from airborne.errors import AirborneError, count
+from airborne.io.names import check_column
+from airborne.studio.clicks import Clicked
+from airborne.studio.pages.layout import complain, errors_shown
+from airborne.studio.pages.point_list import PointList
+from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PointsPanel
+from airborne.studio.pictures import ShownTrial
+from airborne.studio.session import Session
+from airborne.studio.starts import player_file, read_player
+from airborne.studio.trial_edits import with_players
+from airborne.studio.view import Mark
+from airborne.types import Array, Mask
+
+_POINTS = ("torso", *LEG_POINTS, "foot_left", "foot_right")
+_NEEDED = _POINTS[:7]
+_HELP = (
+    "Go to the frame where tracking shall start. Click each player's torso, the middle of hips and shoulders, and the "
+    "joints of the legs, in two cameras or more. Who is clicked by the torso alone is not tracked, but hides others."
+)
+
+
+class PlayersPanel(PointsPanel):
+    """One window's clicks of all players in the frame in view; each player has a table of each frame."""
+
+    def __init__(self, session: Session, shown: ShownTrial, rig: Rig, frame: int) -> None:
+        """Begin with the players that the folder has tables of in a frame, or the first one."""
+        super().__init__(session, shown, Clicked((), None, {}), _POINTS[0])
+        self.rig, self.frame = rig, frame
+        self.players: dict[str, Clicked] = {}
+        self.player = "player1"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The points of a player, those that are needed first."""
+        return _POINTS
+
+    @property
+    def file(self) -> str:
+        """The table of the chosen player's clicks in the frame in view."""
+        return player_file(self.player, self.frame)
+
+    async def build(self) -> None:
+        """Lay out the pictures and the list of points."""
+        ui.label(_HELP).classes("help")
+        with ui.element("div").classes("split"):
+            with ui.element("div").classes("wide"):
+                self.build_views(self.frame)
+            with ui.element("div").classes("side"):
+                with ui.element("div").classes("card"):
+                    self.choice = ui.select([], label="player", on_change=lambda event: self.take(event.value))
+                    self.choice.props("outlined dense options-dense")
+                    with ui.element("div").classes("row-line"):
+                        self.new = ui.input("another player's name").props("outlined dense").style("width: 150px")
+                        ui.button("Add", on_click=self.add).props("outline")
+                    self.note = ui.label().classes("small")
+                    self.use = ui.button("Use these players", on_click=self.write).props("unelevated")
+                    ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
+                self.list = PointList(self.shown.names, self.choose)
+        await self.reread()
+
+    async def turn_to(self, frame: int) -> None:
+        """Show the clicks of another frame."""
+        if frame != self.frame:
+            self.frame = frame
+            self.session.go(frame=frame)
+            self.selected = None
+            await self.reread()
+
+    async def reread(self) -> None:
+        """Show the clicks that the tables hold now."""
+        with errors_shown():
+            folder, named = self.session.folder, re.compile(rf"start_(.+)_{self.frame}\.csv")
+            found = [named.fullmatch(path.name) for path in sorted(folder.glob(f"start_*_{self.frame}.csv"))]
+            names = [match[1] for match in found if match is not None and match[1] != "points"]
+            self.players = {name: read_player(folder, name, self.frame) for name in names}
+            self.players.setdefault(self.player, Clicked((), None, {}))
+            self.clicked = self.players[self.player]
+            self.choice.set_options(list(self.players), value=self.player)
+            self.show()
+
+    async def add(self) -> None:
+        """Begin with another player."""
+        try:
+            name = check_column((self.new.value or f"player{len(self.players) + 1}").strip())
+        except ValueError as error:
+            complain(str(error))
+            return
+        self.new.set_value("")
+        self.player = name
+        self.chosen, self.selected = _POINTS[0], None
+        await self.reread()
+
+    async def take(self, name: str | None) -> None:
+        """Choose a player."""
+        if name is not None and name != self.player:
+            self.player, self.clicked = name, self.players[name]
+            self.chosen, self.selected = _POINTS[0], None
+            self.show()
+
+    async def solve(self) -> None:
+        """Show the clicks, and the legs that they give."""
+        self.players[self.player] = self.clicked
+        self.show()
+
+    def write(self) -> None:
+        """Write the players into the trial."""
+        files = {name: player_file(name, self.frame) for name in self.players if self._is_ready(name)}
+        unready = [name for name, clicked in self.players.items() if name not in files and clicked.names]
+        with errors_shown():
+            if not files or unready:
+                missing = unready or list(self.players)
+                raise AirborneError(
+                    f"click the torso and all points of the legs of {', '.join(missing)} in two cameras"
+                )
+            what = f"{count(len(files), 'player')} set"
+            self.session.edit_trial(lambda text: with_players(text, self.frame, files), what)
+            ui.notify("the first poses are written into the trial", type="positive")
+
+    def show(self) -> None:
+        """Show marks, curves, legs and buttons as they are now."""
+        colours = {name: CAMERA_COLOURS[k % len(CAMERA_COLOURS)] for k, name in enumerate(self.players)}
+        marks = list(self._marks(colours[self.player]))
+        legs = [item for name in self.players for item in self._legs(name, colours[name])]
+        self.view.show_over(marks, [*self.epipolar_items(self.chosen, self.rig), *legs], self.selected)
+        ready = [name for name in self.players if self._is_ready(name)]
+        self.note.set_text(f"Ready: {', '.join(ready) or 'nobody yet'}.")
+        self.use.set_visibility(bool(ready))
+        self.list.show(_POINTS, self.chosen, self._off_px)
+
+    def _points(self, name: str) -> dict[str, Array]:
+        """Return the clicked points of a player that two cameras see: (3,) [m]."""
+        clicked = self.players[name]
+        found = {}
+        for point in clicked.names:
+            px = np.stack([clicked.at(point, camera) for camera in self.rig.names])
+            place = self.rig.points_from_px(px)
+            if np.isfinite(place).all():
+                found[point] = place
+        return found
+
+    def _is_ready(self, name: str) -> bool:
+        """Whether all points of a player are clicked, or the torso alone."""
+        points, clicked = set(self._points(name)), self.players[name]
+        seen = {point for point in clicked.names if any(np.isfinite(each).any() for each in _rows(clicked, point))}
+        return points == seen and (points == {"torso"} or points >= set(_NEEDED))
+
+    def _legs(self, name: str, colour: str) -> Iterator[Any]:
+        points = self._points(name)
+        for a, b in RODS:
+            ends = [points[LEG_POINTS[k]] for k in (a, b) if LEG_POINTS[k] in points]
+            if len(ends) == 2:
+                for pane, camera in enumerate(self.shown.names):
+                    line = self.rig[camera].px_from_world(np.array(ends))
+                    if np.isfinite(line).all():
+                        yield {"pane": pane, "points": line.round(1).tolist(), "colour": colour, "width": 2}
+        if "torso" in points:
+            for pane, camera in enumerate(self.shown.names):
+                u, v = self.rig[camera].px_from_world(points["torso"]).tolist()
+                yield {"pane": pane, "points": [[u, v], [u, v]], "colour": colour, "width": 6, "text": name}
+
+    def _marks(self, colour: str) -> Iterator[Mark]:
+        for name in self.clicked.names:
+            to = self.consensus_px(name, self.rig)
+            for pane, camera in enumerate(self.shown.names):
+                u, v = map(float, self.at(name, camera))
+                if np.isfinite(u):
+                    shade = CHOSEN_COLOUR if name == self.chosen else colour
+                    mark: Mark = {"id": f"{name}|{camera}", "pane": pane, "u": u, "v": v, "label": name}
+                    mark["colour"] = shade
+                    yield {**mark, "to": to[pane].tolist()} if np.isfinite(to[pane]).all() else mark
+
+    def _off_px(self, name: str) -> tuple[Mask, Array]:
+        px = self.px(name, self.shown.names)
+        return np.isfinite(px[:, 0]), np.linalg.norm(self.consensus_px(name, self.rig) - px, axis=1)
+
+
+def _rows(clicked: Clicked, point: str) -> list[Array]:
+    return [clicked.at(point, camera) for camera in clicked.px]

@@ -1,0 +1,162 @@
+"""Cameras on one clock: by hand, two of them at the same event, or by the command `sync`."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+from nicegui import ui
+from nicegui.events import KeyEventArguments
+
+from airborne.errors import count
+from airborne.studio.commands import STOPPED, Command
+from airborne.studio.pages.layout import complain, errors_shown, page_frame, work
+from airborne.studio.pictures import ShownTrial
+from airborne.studio.session import Session
+from airborne.studio.trial_edits import with_cameras
+from airborne.studio.view import CameraViews
+from airborne.sync.offsets import fit_line
+
+_LOOK_EVERY_S = 0.5  # at a command that goes on
+_HELP = (
+    "Step each camera to the same event, a foot that lands or a ball that is hit, and press E. "
+    "Several events narrow the offset down: each says it to within half a picture."
+)
+_WAYS = {"motion": "what moves", "flash": "a flash", "sound": "sound", "tracking": "tracking the body"}
+
+
+async def sync_page(session: Session) -> None:
+    """Let the user find the offset of each camera from the first one's clock."""
+    async with page_frame(session, "Videos", "When is each camera?", _HELP):
+        if len(session.project().cameras) < 2:
+            ui.label("Choose two cameras or more first, in the step Videos.").classes("warn")
+            return
+        shown = await work("indexing the videos", session.shown)
+        if shown is not None:
+            _Panel(session, shown).build()
+
+
+class _Panel:
+    """One window's events, of the clock and one other camera."""
+
+    def __init__(self, session: Session, shown: ShownTrial) -> None:
+        self.session, self.shown = session, shown
+        self.other, self.at = 1, [0, 0]  # the other camera's number, and the pictures in view
+        self.events: list[tuple[int, int]] = []  # pictures of the clock and of the other camera
+        self.command: Command | None = None
+
+    def build(self) -> None:
+        """Lay out both pictures, the events and what follows from them."""
+        ui.keyboard(on_key=self.press)
+        with ui.element("div").classes("row-line"):
+            names = dict(enumerate(self.shown.names[1:], start=1))
+            choice = ui.select(names, label="camera", value=1, on_change=lambda event: self.choose(event.value))
+            choice.props("outlined dense options-dense").style("min-width: 160px")
+            ui.button("Same event", on_click=self.add).props("unelevated")
+            ui.button("Take the last back", on_click=self.take_back).props("flat dense")
+            self.use = ui.button("Use this offset", on_click=self.write).props("unelevated")
+            self.says = ui.label().classes("small")
+        with ui.element("div").classes("split"):
+            with ui.element("div").classes("wide"):
+                self.labels = [ui.label().classes("small name")]
+                CameraViews(self.shown, frame=0, camera=0, on_frame=lambda number: self.turn(0, number))
+            self.right = ui.element("div").classes("wide")
+        with ui.element("div").classes("row-line"):
+            ui.label("Or let it be found:").classes("soft")
+            way = ui.select(_WAYS, label="from", value="motion").props("outlined dense options-dense")
+            way.style("min-width: 160px")
+            self.find = ui.button("Find the offsets", on_click=lambda: self.start(way.value)).props("outline")
+            self.output = ui.label().classes("small soft").style("white-space: pre-line")
+        ui.timer(_LOOK_EVERY_S, self.look)
+        self.choose(1)
+
+    def choose(self, other: int) -> None:
+        """Show another camera beside the clock."""
+        self.other, self.events, self.at = other, [], [self.at[0], 0]
+        self.right.clear()
+        with self.right:
+            self.labels = [self.labels[0], ui.label().classes("small name")]
+            CameraViews(self.shown, frame=0, camera=other, on_frame=lambda number: self.turn(1, number))
+        self.show()
+
+    def turn(self, side: int, number: int) -> None:
+        """Note the picture in view."""
+        self.at[side] = number
+        self.show()
+
+    def press(self, event: KeyEventArguments) -> None:
+        """Add an event by key."""
+        if event.action.keydown and event.key == "e":
+            self.add()
+
+    def add(self) -> None:
+        """Say that both pictures show the same event."""
+        self.events.append((self.at[0], self.at[1]))
+        self.show()
+
+    def take_back(self) -> None:
+        """Forget the last event."""
+        self.events = self.events[:-1]
+        self.show()
+
+    def write(self) -> None:
+        """Write the offset into the camera's table."""
+        offset_s, sd_s = self.offset()
+        table = self.session.project().cameras[self.other]
+        cameras = [{"video": each.video} for each in self.session.project().cameras]
+        cameras[self.other] |= {"offset_s": round(offset_s, 6), "offset_sd_s": round(sd_s, 6)}
+        with errors_shown():
+            what = f"{table.name} is {1e3 * offset_s:+.1f} ms off"
+            self.session.edit_trial(lambda text: with_cameras(text, self.session.folder.name, cameras), what)
+            ui.notify(f"written: {what}", type="positive")
+
+    def offset(self) -> tuple[float, float]:
+        """Return what to add to the other camera's times, and its deviation [s]."""
+        here, there = self.shown.sources[0], self.shown.sources[self.other]
+        pairs = [(here.trial_time(self.time(0, a)), self.time(self.other, b)) for a, b in self.events]
+        offsets = [float(a - there.trial_time(b)) + there.offset_s for a, b in pairs]
+        periods = [1 / float(self.shown.indexes[k].facts.image_rate) for k in (0, self.other)]
+        sds = np.full(len(pairs), np.hypot(*periods) / np.sqrt(12))  # an event lies anywhere in its picture's period
+        offset_s, sd_s, *_ = fit_line(np.zeros(len(pairs)), np.array(offsets), sds, with_drift=False)
+        return offset_s, sd_s
+
+    def time(self, camera: int, number: int) -> Fraction:
+        """Return when a camera's picture was taken, since its first."""
+        times, unit = self.shown.indexes[camera].times()
+        return Fraction(int(times[number]), unit)
+
+    def show(self) -> None:
+        """Show pictures' numbers, and what the events say."""
+        for side, camera in enumerate((0, self.other)):
+            if side < len(self.labels):
+                clock = ", the clock" if camera == 0 else ""
+                time_s = float(self.time(camera, self.at[side]))
+                text = f"{self.shown.names[camera]}{clock}: picture {self.at[side]}, {time_s:.3f} s"
+                self.labels[side].set_text(text)
+        self.use.set_visibility(bool(self.events))
+        if not self.events:
+            present = self.shown.sources[self.other].offset_s
+            self.says.set_text(f"The trial has {1e3 * present:+.1f} ms for {self.shown.names[self.other]}.")
+            return
+        offset_s, sd_s = self.offset()
+        text = f"{count(len(self.events), 'event')}: {1e3 * offset_s:+.1f} ms, sd {1e3 * sd_s:.1f} ms"
+        self.says.set_text(text)
+
+    def start(self, way: str) -> None:
+        """Start `airborne sync`."""
+        if self.command is None:
+            self.command = Command(["sync", self.session.path.name, "--by", way], self.session.folder)
+            self.find.disable()
+
+    def look(self) -> None:
+        """Say how the command goes."""
+        if self.command is None:
+            return
+        if self.command.is_running:
+            self.output.set_text(f"{self.command.line}: {self.command.seconds:.0f} s")
+            return
+        command, self.command = self.command, None
+        self.find.enable()
+        self.output.set_text(command.output().strip() if command.code == 0 else "")
+        if command.code not in (0, STOPPED):
+            complain(command.complaint())
