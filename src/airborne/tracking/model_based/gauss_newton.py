@@ -164,7 +164,7 @@ def rises_without(
     view, n = image_buffers(render_model, region, appearance), len(render_model.model.segments)
     rises = np.zeros(len(others))
     comparison, rows_sigma_px = _comparison(render_model, region)
-    view = view.observe(comparison)
+    view = view.prepare(comparison)
 
     def totals(posed: PosedBody, view: ViewBuffers, iterations: int) -> Array:
         args = render_model, posed, view, comparison
@@ -198,7 +198,7 @@ def image_evaluator(
     for region in regions:
         view = image_buffers(render_model, region, appearance)
         comparison, sigma_px = _comparison(render_model, region)
-        views.append(view.observe(comparison))
+        views.append(view.prepare(comparison))
         comparisons.append(comparison)
         rows_sigma_px.append(sigma_px)
     empty_cost = sum(view.empty_cost for view in views)

@@ -53,4 +53,4 @@ class Observation(NamedTuple):
     observed: Any  # (c, H, W)
     background: Any  # (c, H, W)
     certainty: Any  # (H, W) factor 0..1 of each pixel's weight
-    rows: Any = None  # (H, 2 c + 2, W + LANES) of `observe`
+    rows: Any = None  # (H, 2 c + 2, W + LANES) of `prepare_rows`

@@ -24,7 +24,7 @@ from airborne.rendering.srgb import light_from_srgb
 from airborne.tracking.covariance import SHIFT_SD_PX
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom
 from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, PackedBody, Projection, Window
-from airborne.tracking.model_based.normal_equations import observe
+from airborne.tracking.model_based.normal_equations import prepare_rows
 from airborne.types import Array
 
 _TO_SHARE = (np.arange(1024) / 1023).astype(np.float32)  # sRGB as shares of full, for `light_planes`
@@ -114,10 +114,10 @@ class ViewBuffers(NamedTuple):
         """What the image costs without a body, once it is prepared for a comparison."""
         return float(self.observation.rows[:, -1].sum())
 
-    def observe(self, comparison: Comparison) -> ViewBuffers:
+    def prepare(self, comparison: Comparison) -> ViewBuffers:
         """Return the view prepared for a comparison."""
         seen = self.observation
-        return self._replace(observation=observe(seen.observed, seen.background, seen.certainty, comparison))
+        return self._replace(observation=prepare_rows(seen.observed, seen.background, seen.certainty, comparison))
 
     def crop(self, window: Window) -> ViewBuffers:
         """Return a part of the view, prepared for the same comparison; its border is repeated beyond it."""
@@ -173,7 +173,7 @@ def silhouette_buffers(region: Region, posterior: Array, reduction: int, *, taps
     observation = Observation(plane[None], np.zeros((1, *plane.shape), np.float32), np.ones_like(plane))
     size = plane.shape[1], plane.shape[0]
     view = ViewBuffers(packed, K, observation, empty_maps(size), Window(0, 0, *size))
-    return view.observe(Comparison(taps, taps, clip))
+    return view.prepare(Comparison(taps, taps, clip))
 
 
 def reduce_region(region: Region, plane: Array, reduction: int) -> tuple[Camera, NDArray[np.float32]]:
