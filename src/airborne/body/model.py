@@ -238,7 +238,7 @@ class BodyModel:
         if angles.shape != (self.n_joints, 3):
             raise BodyError(f"body '{self.name}' has {self.n_joints} joints, the pose {len(angles)}")
         R, t, root = np.empty((len(self.segments), 3, 3)), np.empty((len(self.segments), 3)), pose.world_from_root
-        R[0], t[0] = root.rotation.as_matrix(), root.translation
+        R[0], t[0] = root.as_matrix()[:3, :3], root.translation
         parent_from_segment = matrix_from_angles(angles)
         for segment, parent in enumerate(self.parents[1:], start=1):
             R[segment] = R[parent] @ parent_from_segment[segment - 1]

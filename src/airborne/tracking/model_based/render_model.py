@@ -124,7 +124,7 @@ class ViewBuffers(NamedTuple):
         x0, y0, x1, y1 = window
         seen, K, light = self.observation, self.K.copy(), self.light
         K[:2, 2] -= x0, y0
-        planes = (np.ascontiguousarray(each[..., y0:y1, x0:x1]) for each in seen[:3])
+        observed, background, certainty = (np.ascontiguousarray(each[..., y0:y1, x0:x1]) for each in seen[:3])
         rows = np.ascontiguousarray(seen.rows[y0:y1, :, x0 : x1 + LANES])
         if isinstance(light, np.ndarray):  # of coordinates from -1 to 1 over the image: of the part's instead
             light = light.copy()
@@ -133,7 +133,7 @@ class ViewBuffers(NamedTuple):
                 light[:, term] *= (high - low) / size
         maps, whole = empty_maps((x1 - x0, y1 - y0)), Window(0, 0, x1 - x0, y1 - y0)
         packed = shift_view(self.packed_view, x0, y0)
-        return ViewBuffers(packed, K, Observation(*planes, rows), maps, whole, light)
+        return ViewBuffers(packed, K, Observation(observed, background, certainty, rows), maps, whole, light)
 
     def projection(self, posed: PosedBody) -> Projection:
         """Project a body to this view; twists are about its root's origin."""
