@@ -41,8 +41,8 @@ import numpy as np
 
 from airborne.kernels import kernel
 from airborne.rendering.maps import SurfaceMaps
-from airborne.tracking.model_based.kernel_arguments import Comparison, Projection, Window
-from airborne.tracking.model_based.normal_equations import observe
+from airborne.tracking.model_based.kernel_arguments import Comparison, Projection
+from airborne.tracking.model_based.normal_equations import prepare_rows
 from airborne.tracking.model_based.row_equations import add_rows
 from airborne.tracking.model_based.twist_equations import Sums
 
@@ -59,8 +59,8 @@ maps = SurfaceMaps(rng.integers(-1, 1, (h, w)).astype(np.int16), nearness, np.ze
 place = Projection(np.zeros((s, 3, 3)), np.zeros((s, 3)), rng.random(18), K, np.zeros(3))
 sums = Sums(np.zeros((s, 6, 6)), np.zeros((s, 6)), np.zeros((s, 6, 3)))
 call = add_rows if sys.argv[1] == "directly" else through_a_caller
-comparison, blocks = Comparison(Window(0, 0, w, h), taps, taps, 0.5), np.zeros((3, 4, s, 6))
-seen = observe(observed, scene, lit[0], comparison)
+comparison, blocks = Comparison(taps, taps, 0.5), np.zeros((3, 4, s, 6))
+seen = prepare_rows(observed, scene, lit[0], comparison)
 call(lit, flat, maps, owner, nearness, place, seen, comparison, sums, blocks)
 print(hashlib.sha256(b"".join(part.tobytes() for part in sums)).hexdigest())
 """

@@ -237,15 +237,13 @@ class BodyModel:
         angles = pose.joint_angles if pose.joint_angles.size else np.zeros((self.n_joints, 3))
         if angles.shape != (self.n_joints, 3):
             raise BodyError(f"body '{self.name}' has {self.n_joints} joints, the pose {len(angles)}")
-        transforms = [pose.world_from_root]
-        for segment, parent, xyz in zip(self.segments[1:], self.parents[1:], angles, strict=True):
-            parent_from_segment = RigidTransform.from_components(segment.joint_m, Rotation.from_euler("XYZ", xyz))
-            transforms.append(transforms[parent] * parent_from_segment)
-        return PosedBody(
-            self,
-            np.stack([p.rotation.as_matrix() for p in transforms]),
-            np.stack([p.translation for p in transforms]),
-        )
+        R, t, root = np.empty((len(self.segments), 3, 3)), np.empty((len(self.segments), 3)), pose.world_from_root
+        R[0], t[0] = root.as_matrix()[:3, :3], root.translation
+        parent_from_segment = matrix_from_angles(angles)
+        for segment, parent in enumerate(self.parents[1:], start=1):
+            R[segment] = R[parent] @ parent_from_segment[segment - 1]
+            t[segment] = t[parent] + R[parent] @ self.joints_m[segment]
+        return PosedBody(self, R, t)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

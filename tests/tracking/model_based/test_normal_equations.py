@@ -13,9 +13,9 @@ from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.blur import RADIUS_PX, blur_planes, gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, root_only
 from airborne.tracking.model_based.kernel_arguments import Comparison, Paint, Projection, Window
-from airborne.tracking.model_based.normal_equations import observe, photometric_equations, silhouette_equations
+from airborne.tracking.model_based.normal_equations import photometric_equations, prepare_rows, silhouette_equations
 from airborne.tracking.model_based.owners import REACH_PX, find_owners, mask_box
-from airborne.tracking.model_based.render_model import RenderModel
+from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers
 from airborne.tracking.model_based.twist_equations import Sums, new_blocks
 from tests.support.scenes import FIGURE, Scene, standing
 
@@ -93,7 +93,7 @@ class SingleView:
         """The equations and the squared residual; the light stays as it was fitted at the truth."""
         render_model, certainty = self._render_model, np.ones(self._region.rgb.shape[:2], np.float32)
         body, projection, comparison, maps = self._common(pose, clip)
-        observation = observe(self._observed, self._background, certainty, comparison)
+        observation = prepare_rows(self._observed, self._background, certainty, comparison)
         paint = Paint(render_model.albedo, render_model.is_faceted)
         sums, blocks = Sums.zero(len(render_model.model.segments)), self._blocks()
         _, total, _ = photometric_equations(
@@ -101,11 +101,26 @@ class SingleView:
         )  # fmt: skip
         return self._map_to_dofs(pose, sums), total
 
+    def view(self):
+        """The view's buffers, with the light that was fitted at the truth, and how it is compared."""
+        size, certainty = self._region.camera.size, np.ones(self._region.rgb.shape[:2], np.float32)
+        comparison = self._common(self.truth, 0.1)[2]
+        rows = prepare_rows(self._observed, self._background, certainty, comparison)
+        K, whole = self._region.camera.K, Window(0, 0, *size)
+        return ViewBuffers(self._region.packed_view, K, rows, empty_maps(size), whole, self._light), comparison
+
+    def cost(self, view, comparison, pose):
+        """The robust squared residual of a view or a part of it, less that of the empty scene."""
+        render_model, n = self._render_model, len(self._render_model.model.segments)
+        paint, blocks = Paint(render_model.albedo, render_model.is_faceted), new_blocks(view.whole.x1, view.whole.y1, n)
+        args = render_model.body, view.projection(self.with_pose(pose)), view.observation, comparison, view.maps
+        return photometric_equations(*args, paint, view.light, 0, Sums.zero(n), blocks)[0]
+
     def silhouette(self, pose):
         """The equations against the true mask, as probabilities."""
         mask = (self._render_model.draw_parts(self.with_pose(self.truth), self._region) >= 0).astype(np.float32)
         body, projection, comparison, maps = self._common(pose, 0.5)
-        observation = observe(mask[None], np.zeros((1, *mask.shape), np.float32), np.ones_like(mask), comparison)
+        observation = prepare_rows(mask[None], np.zeros((1, *mask.shape), np.float32), np.ones_like(mask), comparison)
         sums, blocks = Sums.zero(len(self._render_model.model.segments)), self._blocks()
         silhouette_equations(body, projection, observation, comparison, maps, sums, blocks)
         return self._map_to_dofs(pose, sums)
@@ -113,7 +128,7 @@ class SingleView:
     def _common(self, pose, clip):
         posed, region, taps = self.with_pose(pose), self._region, gaussian_taps(1.2)
         projection = Projection(posed.R, posed.t, region.packed_view, region.camera.K, posed.t[0])
-        comparison = Comparison(Window(0, 0, *region.camera.size), taps, taps, clip)
+        comparison = Comparison(taps, taps, clip)
         return self._render_model.body, projection, comparison, empty_maps(region.camera.size)
 
     def _blocks(self):
@@ -181,6 +196,22 @@ def test_step_goes_back_to_where_the_body_is(single_view, kind):
         after = (d + step) / STEP
         left.append(after @ (sums.curvature * np.outer(STEP, STEP)) @ after / (d @ sums.curvature @ d))
     assert np.median(left) < 0.25
+
+
+def test_part_of_a_view_around_the_body_tells_poses_apart_as_the_whole_does(single_view):
+    view, comparison = single_view.view()
+    rim = 2 * RADIUS_PX + 1
+    poses = [single_view.truth, *(single_view.moved(d) for d in offsets(4, 1.0, seed=3))]
+    whole = [single_view.cost(view, comparison, pose) for pose in poses]
+    boxes = []
+    for pose in poses:
+        single_view.cost(view, comparison, pose)
+        boxes.append(mask_box(view.maps.part))
+    (x0, y0), (x1, y1) = np.min(boxes, axis=0)[:2] - rim, np.max(boxes, axis=0)[2:] + rim
+    box = max(x0, 0), max(y0, 0), min(x1, view.whole.x1), min(y1, view.whole.y1)
+    assert box != tuple(view.whole)
+    part = view.crop(Window(*map(int, box)))
+    np.testing.assert_allclose([single_view.cost(part, comparison, pose) for pose in poses], whole, rtol=1e-3)
 
 
 def test_large_residuals_weigh_less(single_view):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from airborne.kernels import kernel
@@ -11,6 +13,7 @@ RING = 2 * RADIUS_PX + 1  # rows that a blur needs at once
 _LEAST_TAP = 1e-5  # less is below the rounding of what is blurred, 8 bits
 
 
+@lru_cache(maxsize=64)
 def gaussian_taps(sigma_px: float) -> np.ndarray:
     """Return the five taps of a Gaussian, centre first: the four on either side are equal and are stored once."""
     taps = np.exp(-0.5 * (np.arange(RADIUS_PX + 1) / sigma_px) ** 2)

@@ -79,6 +79,8 @@ class DegreesOfFreedom:
 
         H (d, d), g (d,) in units of the noise's variance.
         """
+        if not self.moves_joints and prior is None:
+            return np.linalg.solve(H + np.diag(self._damping), g)
         rows, depth = self._overlap_residuals(pose)
         H, g = H + np.diag(self._damping) + rows.T @ rows, g - rows.T @ depth
         if prior is not None:
@@ -129,8 +131,8 @@ class DegreesOfFreedom:
 
     def _segments(self, pose: Pose) -> tuple[Array, Array]:
         """Return the segments in the world, R (segments, 3, 3) and t (segments, 3) [m]."""
-        root, joints = pose.world_from_root, angles_of(pose, self.model.n_joints)
-        R, t = pose_segments(self.model, root.rotation.as_matrix()[None], root.translation[None], joints[None])
+        root, joints = pose.world_from_root.as_matrix()[None], angles_of(pose, self.model.n_joints)
+        R, t = pose_segments(self.model, root[:, :3, :3], root[:, :3, 3], joints[None])
         return R[0], t[0]
 
     def _overlap_residuals(self, pose: Pose) -> tuple[Array, Array]:

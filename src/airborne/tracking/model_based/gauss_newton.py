@@ -101,7 +101,7 @@ def fit_silhouettes(
             sums, totals, blocks = Sums.zero(n), np.array([empty_cost, 0.0, 0.0]), []
             for view in views:
                 blocks.append(_blocks(view, n))
-                comparison = Comparison(view.whole, taps, taps, _CLIP_MASK)
+                comparison = Comparison(taps, taps, _CLIP_MASK)
                 args = render_model.body, view.projection(posed), view.observation, comparison, view.maps
                 totals += np.array(silhouette_equations(*args, sums, blocks[-1]))
             return map_to_dofs(
@@ -163,21 +163,21 @@ def rises_without(
     """
     view, n = image_buffers(render_model, region, appearance), len(render_model.model.segments)
     rises = np.zeros(len(others))
-    comparison, rows_sigma_px = _comparison(render_model, view, region)
-    view = view.observe(comparison)
+    comparison, rows_sigma_px = _comparison(render_model, region)
+    view = view.prepare(comparison)
 
-    def totals(posed: PosedBody, window: Window, iterations: int) -> Array:
-        args = render_model, posed, view, comparison._replace(window=window)
+    def totals(posed: PosedBody, view: ViewBuffers, iterations: int) -> Array:
+        args = render_model, posed, view, comparison
         return _add_image_equations(*args, iterations=iterations, sums=Sums.zero(n), blocks=_blocks(view, n))
 
-    _, total, weight = totals(posed, view.whole, 3)
+    _, total, weight = totals(posed, view, 3)
     noise = max(4 * np.pi * _FINE_SIGMA_PX * rows_sigma_px * total / weight, 1e-9) if weight > 0 else 1.0
     drawn = view.maps.part
     owner = np.where(drawn < 0, -1, render_model.segment_of_part[drawn])
     for k, (segment, other) in enumerate(others.items()):
         if (owner == segment).any():
-            window = _window_around(owner == segment, view.whole)
-            rises[k] = 0.5 * (totals(other, window, 0)[0] - totals(posed, window, 0)[0]) / noise
+            part = view.crop(_window_around(owner == segment, view.whole))
+            rises[k] = 0.5 * (totals(other, part, 0)[0] - totals(posed, part, 0)[0]) / noise
     return rises
 
 
@@ -197,8 +197,8 @@ def image_evaluator(
     views, comparisons, rows_sigma_px, shifts = [], [], [], [shift_sds_px(region) for region in regions]
     for region in regions:
         view = image_buffers(render_model, region, appearance)
-        comparison, sigma_px = _comparison(render_model, view, region)
-        views.append(view.observe(comparison))
+        comparison, sigma_px = _comparison(render_model, region)
+        views.append(view.prepare(comparison))
         comparisons.append(comparison)
         rows_sigma_px.append(sigma_px)
     empty_cost = sum(view.empty_cost for view in views)
@@ -216,7 +216,7 @@ def image_evaluator(
             totals += _add_image_equations(
                 render_model, posed, view, comparison, iterations=iterations, sums=sums, blocks=blocks[-1]
             )
-            shifted.append(np.moveaxis(sums.B * shift, 2, 0))
+            shifted.append((sums.B * shift).transpose(2, 0, 1))
             if dofs.moves_joints:
                 shifted.append(_shape_error_gradients(sums.B, posed, view))
         return map_to_dofs(
@@ -254,11 +254,11 @@ def _add_image_equations(
     return np.array(equations_of_known_light(*args, render_model.is_faceted, lamps, ambient, sums, blocks))
 
 
-def _comparison(render_model: RenderModel, view: ViewBuffers, region: Region) -> tuple[Comparison, float]:
-    """Return how the whole of a view is compared, and the sd of the blur along its columns [px]."""
+def _comparison(render_model: RenderModel, region: Region) -> tuple[Comparison, float]:
+    """Return how a region is compared, and the sd of the blur along its columns [px]."""
     sigma_px = max(_FINE_SIGMA_PX * region.aspect, 0.5)
     clip = _CLIP if render_model.lights is None else _CLIP_LIT
-    return Comparison(view.whole, gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma_px), clip), sigma_px
+    return Comparison(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma_px), clip), sigma_px
 
 
 def _shape_error_gradients(B: Array, posed: PosedBody, view: ViewBuffers) -> Array:

@@ -42,7 +42,6 @@ class Projection(NamedTuple):
 class Comparison(NamedTuple):
     """How an image is compared."""
 
-    window: Window  # what of it
     taps_u: Any  # (5,) of the blur along rows
     taps_v: Any  # (5,) along columns
     clip: float  # the residual at which a pixel's weight has fallen to a quarter
@@ -54,4 +53,4 @@ class Observation(NamedTuple):
     observed: Any  # (c, H, W)
     background: Any  # (c, H, W)
     certainty: Any  # (H, W) factor 0..1 of each pixel's weight
-    rows: Any = None  # (H, 2 c + 2, W + LANES) of `observe`
+    rows: Any = None  # (H, 2 c + 2, W + LANES) of `prepare_rows`

@@ -62,10 +62,10 @@ def add_channel(terms, n, given, difference, background, blurred, change, shape,
 
 
 @kernel(fastmath=True, is_inner=True)
-def weigh_pixels(terms, n, blurred, here, depth, given, certainty, empty, near, inverse_clip2):
+def weigh_pixels(terms, n, n_counted, blurred, here, depth, given, certainty, empty, near, inverse_clip2):
     """Weigh n pixels by their residuals and fill in their inverse depth; return their costs, less the empty scene's.
 
-    The inverse depth is `near` (n,), or where that is 0, the mean of what is blurred.
+    Only the first `n_counted` count. The inverse depth is `near` (n,), or where that is 0, the mean of what is blurred.
     """
     cost = f4(0)
     if n < 0 or here < 0 or depth < 0 or certainty < 0 or empty < 0:
@@ -73,8 +73,9 @@ def weigh_pixels(terms, n, blurred, here, depth, given, certainty, empty, near, 
     for x in range(n):
         square = terms[SQUARE + x]
         down = f4(1) / (f4(1) + square * inverse_clip2)
-        cost += given[certainty + x] * square * down - given[empty + x]
-        terms[WEIGHT + x] = given[certainty + x] * down * down if blurred[here + x] >= EDGE else f4(0)
+        cost += given[certainty + x] * square * down - given[empty + x] if x < n_counted else f4(0)
+        is_used = (blurred[here + x] >= EDGE) & (x < n_counted)
+        terms[WEIGHT + x] = given[certainty + x] * down * down if is_used else f4(0)
     for x in range(n):
         mean = blurred[depth + x] / max(blurred[here + x], EDGE)
         terms[NEARNESS + x] = near[x] if near[x] > 0 else mean

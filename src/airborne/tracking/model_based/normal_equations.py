@@ -21,7 +21,7 @@ from airborne.tracking.model_based.row_equations import add_rows
 from airborne.types import Array
 
 
-def observe(observed: Array, background: Array, certainty: Array, comparison: Comparison) -> Observation:
+def prepare_rows(observed: Array, background: Array, certainty: Array, comparison: Comparison) -> Observation:
     """Prepare a view's image for a comparison: (c, H, W) each, certainty (H, W).
 
     Each of its `rows` holds the channels' differences from the background, blurred, the channels of the background,

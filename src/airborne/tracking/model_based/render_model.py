@@ -17,13 +17,14 @@ from airborne.body.symmetry import continuous_axes
 from airborne.cameras import Camera
 from airborne.rendering import Lights, pose_segments
 from airborne.rendering.maps import SurfaceMaps, empty_maps, surface_maps
-from airborne.rendering.packing import pack_lights, pack_view, reduce_view
+from airborne.rendering.packing import pack_lights, pack_view, reduce_view, shift_view
+from airborne.rendering.rows import LANES
 from airborne.rendering.shapes import new_shapes
 from airborne.rendering.srgb import light_from_srgb
 from airborne.tracking.covariance import SHIFT_SD_PX
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom
 from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, PackedBody, Projection, Window
-from airborne.tracking.model_based.normal_equations import observe
+from airborne.tracking.model_based.normal_equations import prepare_rows
 from airborne.types import Array
 
 _TO_SHARE = (np.arange(1024) / 1023).astype(np.float32)  # sRGB as shares of full, for `light_planes`
@@ -105,23 +106,34 @@ class ViewBuffers(NamedTuple):
     K: Array
     observation: Observation
     maps: SurfaceMaps  # workspace
+    whole: Window  # the whole image
     light: Any = None  # (3, LIGHT_TERMS) to be fitted, or lamps (l, 8) and the ambient light
-
-    @property
-    def whole(self) -> Window:
-        """The whole image."""
-        height, width = self.maps.part.shape
-        return Window(0, 0, width, height)
 
     @property
     def empty_cost(self) -> float:
         """What the image costs without a body, once it is prepared for a comparison."""
         return float(self.observation.rows[:, -1].sum())
 
-    def observe(self, comparison: Comparison) -> ViewBuffers:
+    def prepare(self, comparison: Comparison) -> ViewBuffers:
         """Return the view prepared for a comparison."""
         seen = self.observation
-        return self._replace(observation=observe(seen.observed, seen.background, seen.certainty, comparison))
+        return self._replace(observation=prepare_rows(seen.observed, seen.background, seen.certainty, comparison))
+
+    def crop(self, window: Window) -> ViewBuffers:
+        """Return a part of the view, prepared for the same comparison; its border is repeated beyond it."""
+        x0, y0, x1, y1 = window
+        seen, K, light = self.observation, self.K.copy(), self.light
+        K[:2, 2] -= x0, y0
+        observed, background, certainty = (np.ascontiguousarray(each[..., y0:y1, x0:x1]) for each in seen[:3])
+        rows = np.ascontiguousarray(seen.rows[y0:y1, :, x0 : x1 + LANES])
+        if isinstance(light, np.ndarray):  # of coordinates from -1 to 1 over the image: of the part's instead
+            light = light.copy()
+            for term, (low, high, size) in enumerate(((x0, x1, self.whole.x1), (y0, y1, self.whole.y1)), start=4):
+                light[:, 0] += light[:, term] * ((low + high) / size - 1)
+                light[:, term] *= (high - low) / size
+        maps, whole = empty_maps((x1 - x0, y1 - y0)), Window(0, 0, x1 - x0, y1 - y0)
+        packed = shift_view(self.packed_view, x0, y0)
+        return ViewBuffers(packed, K, Observation(observed, background, certainty, rows), maps, whole, light)
 
     def projection(self, posed: PosedBody) -> Projection:
         """Project a body to this view; twists are about its root's origin."""
@@ -144,9 +156,9 @@ def image_buffers(render_model: RenderModel, region: Region, appearance: Appeara
         light[:, 0] = 1
     else:
         light = pack_lights(render_model.lights, region.camera), np.float32(render_model.lights.ambient)
-    maps = empty_maps(region.camera.size)
+    maps, whole = empty_maps(region.camera.size), Window(0, 0, *region.camera.size)
     observation = Observation(observed, background_light, certainty)
-    return ViewBuffers(region.packed_view, region.camera.K, observation, maps, light)
+    return ViewBuffers(region.packed_view, region.camera.K, observation, maps, whole, light)
 
 
 def silhouette_buffers(region: Region, posterior: Array, reduction: int, *, taps: Array, clip: float) -> ViewBuffers:
@@ -159,8 +171,9 @@ def silhouette_buffers(region: Region, posterior: Array, reduction: int, *, taps
     K[1] /= rows
     packed = reduce_view(region.packed_view, (reduction, rows))
     observation = Observation(plane[None], np.zeros((1, *plane.shape), np.float32), np.ones_like(plane))
-    view = ViewBuffers(packed, K, observation, empty_maps((plane.shape[1], plane.shape[0])))
-    return view.observe(Comparison(view.whole, taps, taps, clip))
+    size = plane.shape[1], plane.shape[0]
+    view = ViewBuffers(packed, K, observation, empty_maps(size), Window(0, 0, *size))
+    return view.prepare(Comparison(taps, taps, clip))
 
 
 def reduce_region(region: Region, plane: Array, reduction: int) -> tuple[Camera, NDArray[np.float32]]:

@@ -43,7 +43,7 @@ def add_rows(lit, flat, maps, owner, nearness, projection, observation, comparis
     body.
     """
     firsts, lasts = _columns_of_mask(maps.part)
-    lows, highs, x0, x1, y0, y1 = _columns_to_compare(firsts, lasts, maps.part, comparison.window)
+    lows, highs, x0, x1, y0, y1 = _columns_to_compare(firsts, lasts, maps.part)
     if x1 <= x0:
         return 0.0, 0.0, 0.0
     c, rows, has_owners = len(lit), observation.rows, len(owner) > 0
@@ -82,7 +82,7 @@ def add_rows(lit, flat, maps, owner, nearness, projection, observation, comparis
             if has_owners:
                 _take_owners(owner[v], nearness[v], x0 + a, min(m, x1 - x0 - a), own, near)
             ours = blurred, here, here + width, given, row + 2 * channels * pitch, row + (2 * channels + 1) * pitch
-            cost += weigh_pixels(terms, m, *ours, near, inverse_clip2)
+            cost += weigh_pixels(terms, m, highs[v] - x0 - a, *ours, near, inverse_clip2)
             for b in range(0, m, LANES):
                 if total_of(terms, WEIGHT + b) > 0:
                     block = (v - y0) // BLOCK_PX, (a + b) // LANES
@@ -111,16 +111,16 @@ def _columns_of_mask(part):
 
 
 @kernel(fastmath=True, is_inner=True)
-def _columns_to_compare(firsts, lasts, part, window):
-    """Return the columns of each row that the blurred body changes, within a window, and the box around them."""
+def _columns_to_compare(firsts, lasts, part):
+    """Return the columns of each row that the blurred body changes, off the border, and the box around them."""
     h, w = part.shape
     lows, highs = np.full(h, w, np.int32), np.zeros(h, np.int32)
     x0, x1, y0, y1 = w, 0, h, 0
-    for y in range(max(window.y0, 1), min(window.y1, h - 1)):
+    for y in range(1, h - 1):
         low, high = np.int32(w), np.int32(0)
         for v in range(max(y - RADIUS_PX, 0), min(y + RADIUS_PX + 1, h)):
             low, high = min(low, firsts[v]), max(high, lasts[v])
-        low, high = max(low - RADIUS_PX, max(window.x0, 1)), min(high + RADIUS_PX, min(window.x1, w - 1))
+        low, high = max(low - RADIUS_PX, 1), min(high + RADIUS_PX, w - 1)
         if high > low:
             lows[y], highs[y] = low, high
             x0, x1, y0, y1 = min(x0, low), max(x1, high), min(y0, y), y + 1
