@@ -21,7 +21,7 @@ def test_the_tracker_is_never_more_than_a_few_times_ahead():
         for n in range(30):
             drawing.put(n)
             ahead.append(n + 1 - len(drawn))
-    assert max(ahead) <= 5
+    assert max(ahead) <= 2
     assert len(drawn) == 30
 
 

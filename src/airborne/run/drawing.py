@@ -8,7 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any, Self
 
-_MOST_WAITING = 4  # times: enough to hide the time that one takes, few enough to stay small
+_MOST_WAITING = 2  # times, the one that is being drawn among them: eight cameras of 4K hold 200 MB each time
 
 
 class DrawingThread:
