@@ -6,7 +6,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import SAMPLED, Pose, human18
 from airborne.cameras import Rig, camera_looking_at
-from airborne.studio.dragging import Pin, grip_at, grip_landmark, landmarks_held, landmarks_px, pull, turn_with
+from airborne.studio.dragging import Pin, grip_at, grip_landmark, landmarks_of_grip, landmarks_px, pull, turn_with
 
 SIZE = (640, 480)
 MODEL = human18(1.75, 70.0, outfit=SAMPLED)
@@ -37,7 +37,7 @@ def test_a_wrist_goes_where_it_is_dragged_and_the_other_limbs_stay(rig, taken):
     target = np.add(landmark_px(taken, camera, "wrist_left"), [14.0, -11.0])
     pose = pull(MODEL, taken, taken, [Pin(grip, camera, target)])
     np.testing.assert_allclose(landmark_px(pose, camera, "wrist_left"), target, atol=HERE_PX)
-    still = [NAMES.index(name) for name in NAMES if name not in landmarks_held(MODEL, grip)]
+    still = [NAMES.index(name) for name in NAMES if name not in landmarks_of_grip(MODEL, grip)]
     before, after = (MODEL.with_pose(each).landmarks[still] for each in (taken, pose))
     np.testing.assert_array_equal(before, after)
     assert MODEL.is_within_limits(pose)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image as GifPicture
 
 from airborne.errors import ResultError
@@ -41,19 +42,20 @@ def write_film(
     if path.suffix.lower() not in _WIDEST_PX:
         raise ResultError(f"{path}: films are .mp4 or .gif; name it so")
     index, time_s, series = _read(folder)
-    first, last = index[0] if first is None else first, index[-1] if last is None else last
+    first = int(index[0]) if first is None else first
+    last = int(index[-1]) if last is None else last
     rows = np.flatnonzero((index >= first) & (index <= last))
     if not len(rows):
         raise ResultError(f"{folder} holds frames {index[0]} to {index[-1]}, none of {first} to {last}; give others")
     with ExitStack() as stack:
         readers = [stack.enter_context(reader) for reader in _open(folder, len(index))]
-        pictures = _draw(readers, rows, time_s, series, _WIDEST_PX[path.suffix.lower()])
+        pictures = _draw(readers, rows, time_s=time_s, series=series, width=_WIDEST_PX[path.suffix.lower()])
         rate = readers[0].index.facts.frame_rate
-        _write(path, _count_frames(pictures, len(rows), progress), rate)
+        _write(path, _report(pictures, len(rows), progress), rate)
     return len(rows)
 
 
-def _read(folder: Path) -> tuple[Array, Array, dict[str, Array]]:
+def _read(folder: Path) -> tuple[NDArray[np.int64], Array, dict[str, Array]]:
     """Return frames (n,), times (n,) [s] and curves, name -> (n,) [m]."""
     if holds_players(folder):
         motion = read_players_run(folder)
@@ -77,7 +79,7 @@ def _open(folder: Path, n: int) -> list[ImageReader]:
 
 
 def _draw(
-    readers: Sequence[ImageReader], rows: Array, time_s: Array, series: dict[str, Array], width: int
+    readers: Sequence[ImageReader], rows: NDArray[np.integer], *, time_s: Array, series: dict[str, Array], width: int
 ) -> Iterator[Image]:
     """Yield the film's pictures (h, w, 3), all of one size."""
     sizes = [reader.index.facts.size for reader in readers]
@@ -128,7 +130,7 @@ def _cycle(n: int) -> list[tuple[int, int, int]]:
     return [_COLOURS[k % len(_COLOURS)] for k in range(n)]
 
 
-def _count_frames(pictures: Iterator[Image], n: int, progress: Progress | None) -> Iterator[Image]:
+def _report(pictures: Iterator[Image], n: int, progress: Progress | None) -> Iterator[Image]:
     for done, picture in enumerate(pictures, start=1):
         yield picture
         if progress is not None:

@@ -92,7 +92,7 @@ def pull(model: BodyModel, pose: Pose, taken: Pose, pins: Sequence[Pin]) -> Pose
     return descend(evaluate(pose), evaluate, _RULE, most_steps=_MOST_STEPS, least_gain=_LEAST_GAIN).best.pose
 
 
-def landmarks_held(model: BodyModel, grip: Grip) -> list[str]:
+def landmarks_of_grip(model: BodyModel, grip: Grip) -> list[str]:
     """Return the landmarks that follow a grip: a limb's, or those of the trunk, which carries all the others."""
     moved = {(column - 3) // 3 for column in grip.free.tolist() if column >= 6}
     if not moved:

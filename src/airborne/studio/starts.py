@@ -67,7 +67,7 @@ def pose_of(model: BodyModel, start: dict[str, Any]) -> Pose:
     return pose_by_hand(model, root, start.get("joint_angles_deg", {})).pose
 
 
-def start_of(model: BodyModel, frame: int, pose: Pose) -> dict[str, Any]:
+def start_from_pose(model: BodyModel, frame: int, pose: Pose) -> dict[str, Any]:
     """Return the [start] of a pose: position, quaternion, and the angles of joints that are not straight."""
     root = pose.world_from_root
     quaternion = root.rotation.as_quat().round(6).tolist()

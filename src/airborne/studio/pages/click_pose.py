@@ -24,7 +24,7 @@ from airborne.studio.starts import (
     read_points,
     read_pose,
     standing_pose,
-    start_of,
+    start_from_pose,
     write_start,
 )
 from airborne.studio.view import Drag, Mark
@@ -135,7 +135,7 @@ class ClickPanel(PointsPanel):
         """Write the clicks' frame and table into the trial, or the pose that was set by hand."""
         start: dict[str, Any] = {"frame": self.frame, "points_px": self.file}
         if self.is_by_hand and self.hand.pose is not None:
-            start = start_of(self.model, self.frame, self.hand.pose)
+            start = start_from_pose(self.model, self.frame, self.hand.pose)
         with errors_shown():
             write_start(self.session, start)
             ui.notify("the first pose is written into the trial", type="positive")

@@ -14,7 +14,7 @@ from airborne.cameras import Camera, read_rig
 from airborne.errors import TrialError
 from airborne.motion.run_folder import CALIBRATION
 from airborne.studio.commands import STOPPED, Command
-from airborne.studio.dragging import landmarks_held, landmarks_px
+from airborne.studio.dragging import landmarks_of_grip, landmarks_px
 from airborne.studio.outlines import run_body, run_motion
 from airborne.studio.pages.layout import complain, errors_shown
 from airborne.studio.pages.pose_hand import PoseHand
@@ -64,7 +64,7 @@ class Correction:
         if self.view is not None:
             is_on = bool(self.switch.value)
             self.view.show_over(
-                self._marks(self.hand.pose, self._clicks_now(frame)) if is_on else [], self.hand.items()
+                self._marks(self.hand.pose, self._clicks_of_key(frame)) if is_on else [], self.hand.items()
             )
 
     def move(self, mark: str, u: float, v: float) -> None:
@@ -74,7 +74,7 @@ class Correction:
 
     async def drag(self, drag: Drag) -> None:
         """Let the body follow the pointer; at the end, write what was moved into the frame's key."""
-        if not await self.hand.follow(self.view, drag) or not drag.has_ended:
+        if self.view is None or not await self.hand.follow(self.view, drag) or not drag.has_ended:
             return
         camera, pose, grip = self.hand.cameras[drag.pane], self.hand.pose, self.hand.grip
         assert pose is not None and grip is not None
@@ -83,7 +83,7 @@ class Correction:
         elif drag.turns:
             self._write_turn(pose)
         else:
-            names = landmarks_held(self.hand.model, grip)
+            names = landmarks_of_grip(self.hand.model, grip)
             clicks = landmarks_px(self.hand.model, pose, camera, names)
             self._write(dict(clicks), camera.name, self.hand.model.segments[grip.segment].name)
 
@@ -146,7 +146,7 @@ class Correction:
             self.view.run_method("refresh")
         self.turn_to(self.session.frame)
 
-    def _clicks_now(self, frame: int) -> dict[str, Any]:
+    def _clicks_of_key(self, frame: int) -> dict[str, Any]:
         """Return the clicks that the frame's key holds: landmark -> camera -> (2,) [px]."""
         keys = self.session.project().tables.get("key", [])
         clicked = next((key.get("points_px") for key in keys if key.get("frame") == frame), None)

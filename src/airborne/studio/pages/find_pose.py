@@ -14,7 +14,7 @@ from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pages.pose_hand import DRAG_HELP, PoseHand
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
-from airborne.studio.starts import pose_of, read_pose, standing_pose, start_of, write_start
+from airborne.studio.starts import pose_of, read_pose, standing_pose, start_from_pose, write_start
 from airborne.studio.view import CameraViews, Drag
 
 _HELP = "The body is looked for where it stands out from the empty scene, which takes a minute or two."
@@ -63,7 +63,7 @@ class FindPanel:
     async def drag(self, drag: Drag) -> None:
         """Let the body follow the pointer."""
         if await self.hand.follow(self.view, drag) and drag.has_ended and self.hand.pose is not None:
-            self.found = start_of(self.model, self.at, self.hand.pose)
+            self.found = start_from_pose(self.model, self.at, self.hand.pose)
             self.controls.note.set_text("The outline is the pose that was set by hand.")
             self.use.set_visibility(True)
             self.turn_to(self.frame)

@@ -103,7 +103,7 @@ class _Panel:
         """Write the offset into the camera's table."""
         offset_s, sd_s = self.offset()
         table = self.session.project().cameras[self.other]
-        cameras = [{"video": each.video} for each in self.session.project().cameras]
+        cameras: list[dict[str, object]] = [{"video": each.video} for each in self.session.project().cameras]
         cameras[self.other] |= {"offset_s": round(offset_s, 6), "offset_sd_s": round(sd_s, 6)}
         with errors_shown():
             what = f"{table.name} is {1e3 * offset_s:+.1f} ms off"
@@ -116,7 +116,8 @@ class _Panel:
         pairs = [(here.trial_time(self.time(0, a)), self.time(self.other, b)) for a, b in self.events]
         offsets = [float(a - there.trial_time(b)) + there.offset_s for a, b in pairs]
         periods = [1 / float(self.shown.indexes[k].facts.image_rate) for k in (0, self.other)]
-        sds = np.full(len(pairs), np.hypot(*periods) / np.sqrt(12))  # an event lies anywhere in its picture's period
+        sd_s = np.hypot(periods[0], periods[1]) / np.sqrt(12)  # an event lies anywhere in its picture's period
+        sds = np.full(len(pairs), sd_s)
         offset_s, sd_s, *_ = fit_line(np.zeros(len(pairs)), np.array(offsets), sds, with_drift=False)
         return offset_s, sd_s
 
