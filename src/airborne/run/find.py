@@ -32,7 +32,7 @@ from airborne.trial.start import StartTable
 from airborne.types import Progress
 from airborne.video import Frames, Recording, VideoFacts, open_recording
 
-Search = TypeVar("Search", StartSearch, PlayersSearch)
+AnySearch = TypeVar("AnySearch", StartSearch, PlayersSearch)
 
 _MOST_IMAGES = 1500  # of each camera that are looked at
 _MOST_BYTES = 4e8  # of decoded pictures that are kept to track back through
@@ -120,7 +120,7 @@ def report_each(recording: Recording, progress: Progress | None) -> Iterator[Fra
         yield frames
 
 
-def take_candidate(trial: Trial, finding: Search, number: int) -> Search:
+def take_candidate(trial: Trial, finding: AnySearch, number: int) -> AnySearch:
     """Put a candidate first."""
     n = len(finding.candidates)
     if not 1 <= number <= n:

@@ -108,9 +108,9 @@ def _describe(finding: PlayersSearch) -> dict[str, Any]:
                 "players": [
                     {
                         "name": start.name,
-                        "told": round(player.told, 3),
+                        "support": round(player.support, 3),
                         "evidence": round(player.evidence, 3),
-                        "joints_m": _rounded(start),
+                        "joints_m": _round_joints(start),
                     }
                     for start, player in zip(each.starts, each.players, strict=True)
                 ],
@@ -141,10 +141,10 @@ def _track_back(trial: Trial, recording: Recording, finding: PlayersSearch) -> t
 
 
 def _with_start(trial: Trial, frame: int, starts: Sequence[PlayerStart]) -> Trial:
-    players = [PlayerTable(name=start.name, joints_m=_rounded(start)) for start in starts]
+    players = [PlayerTable(name=start.name, joints_m=_round_joints(start)) for start in starts]
     return trial.model_copy(update={"start": StartTable(frame=frame, player=players)})
 
 
-def _rounded(start: PlayerStart) -> dict[str, list[float]]:
+def _round_joints(start: PlayerStart) -> dict[str, list[float]]:
     """Return joints to a tenth of a millimetre."""
     return {joint: [round(x, 4) for x in point.tolist()] for joint, point in start.joints_m.items()}

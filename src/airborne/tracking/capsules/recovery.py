@@ -18,12 +18,12 @@ from airborne.tracking.capsules.track import Track, evidence_per_px
 from airborne.tracking.capsules.views import map_evidence, player_regions
 from airborne.types import Array
 from airborne.video import Frames
-from airborne.video.shrink import shrink
+from airborne.video.small import shrink
 
 UNOCCLUDED = 0.05  # probability of a class to be occluded, of somebody of whom nothing is known
 _LOST_S, _EVERY_S = Fraction(1, 4), Fraction(1, 5)  # how long a player is lost before a look, and between looks
 _FARTHEST_M = 4.0  # from where a player was lost, along and across
-_LEAST_TOLD = 1.1  # [nat m2] of somebody, see `tracking.first_pose.players`
+_LEAST_SUPPORT = 1.1  # [nat m2] of somebody, see `tracking.first_pose.players`
 _MOST_POSES = 3  # of each that are tried
 # chosen by hand: of a player's usual evidence, what is as likely another's, and its logistic scale
 _LIKENESS, _LIKENESS_SD = 0.7, 0.05
@@ -54,7 +54,7 @@ def find_again(
     colours = ColourViews.of(views, zone)
     for state in seen:
         colours = colours.without(state)
-    standers = [each for each in find_standers(colours, zone, zone) if each.told[0] > _LEAST_TOLD]
+    standers = [each for each in find_standers(colours, zone, zone) if each.support[0] > _LEAST_SUPPORT]
     fits = [[_fit(track, stander, frames) for stander in standers] for track in lost.values()]
     nats = np.array(
         [[_likeness(track, fit, frames.time_s) for fit in row] for track, row in zip(lost.values(), fits, strict=True)]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 from scipy.spatial import ConvexHull, KDTree
 
-from airborne.appearance.colour_features import colour_features
+from airborne.appearance.pixel_features import colour_features
 from airborne.kernels import kernel
 from airborne.tracking.capsules.equations import N_CAPSULES, N_POINTS, classes_with, pose_state
 from airborne.tracking.capsules.first_frame import average_shape
@@ -130,7 +130,7 @@ class ColourViews:
             left.append(np.where(is_covered, np.int16(-1), colours))
         return ColourViews(self.views, self.cameras, left)
 
-    def tell(self, states: Array) -> Array:
+    def support(self, states: Array) -> Array:
         """Return how much players (n, 35) tell of the colours around them: (n,) [nat m2].
 
         Log-likelihood ratio of the colours given the surface classes, whose colours are the same in all views, to the

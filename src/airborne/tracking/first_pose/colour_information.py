@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 from scipy.spatial import KDTree
 
-from airborne.appearance.colour_features import colour_features
+from airborne.appearance.pixel_features import colour_features
 from airborne.body import BodyModel, PosedBody
 from airborne.cameras import Camera
 from airborne.tracking.first_pose.person import SilhouetteEvidence

@@ -13,19 +13,19 @@ from airborne.errors import TrialError
 from airborne.tracking.capsules.first_frame import FirstFrameFit, fit_first_frame, points_of
 from airborne.tracking.capsules.floor_search import (
     Stander,
-    count_standing,
+    evaluate_grid,
     find_standers,
     lies_in,
-    told_on_grid,
+    sum_support,
 )
 from airborne.tracking.capsules.jumper import JOINTS
 from airborne.tracking.capsules.standing import HEIGHT, KNEES, ColourViews
 from airborne.tracking.capsules.tracker import occluding_capsules
+from airborne.tracking.first_pose.candidates import LEAST_PROBABILITY
 from airborne.tracking.players import PlayerStart
 from airborne.types import Array
 from airborne.video import Frames, View
 
-LEAST_PROBABILITY = 0.95  # of the likeliest candidate, with which it is taken
 _COURT_M = (4.5, 9.0)  # half width and half length (FIVB rules of volleyball, 1.1)
 _NEAR_NET_M = 1.5  # of the net's plane, half of the front zone
 _BEYOND_M = 2.5  # on the other side of the net: who stands there is seen behind the blockers
@@ -33,9 +33,9 @@ _BOTH_SIDES_M = 2.0  # cameras whose mean lies nearer to the net's plane stand o
 _AS_WELL = 0.7  # share of what players tell at most, which counts as much as any
 _MOST_MOMENTS, _MOST_SEARCHED = 8, 3  # that are looked at, and searched until two agree on how many are there
 # chosen on synthetic blocks 3001 to 3008
-_TOLD, _TOLD_SD = 1.1, 0.07  # [nat m2] that are as likely a player as none, and their logistic scale
-_LEAST_TOLD = 1.5  # [nat m2] of a player whose pose is trusted: others were partly hidden, or in the air
-_TOLD_PER_NAT = 0.01  # share of what is told that makes a direction e times likelier
+_SUPPORT, _SUPPORT_SD = 1.1, 0.07  # [nat m2] that are as likely a player as none, and their logistic scale
+_LEAST_SUPPORT = 1.5  # [nat m2] of a player whose pose is trusted: others were partly hidden, or in the air
+_SHARE_PER_NAT = 0.01  # share of the support that makes a direction e times likelier
 _NET_NATS = 3.0  # for facing the net, of players near it
 _LEAST_EVIDENCE = 1.2  # [nat a pixel] of the fitted player
 _DEEPEST = 1.35  # [rad] flexion of knees, beyond which a stance is not trusted
@@ -51,7 +51,7 @@ class FoundPlayer:
 
     joints_m: dict[str, Array]  # joint -> (3,) world [m]
     state: Array  # (35,)
-    told: float  # [nat m2]
+    support: float  # [nat m2]
     evidence: float  # [nat a pixel] of the fit
     is_plausible: bool
 
@@ -90,9 +90,9 @@ class PlayersSearch:
         return len(self.candidates[0].players)
 
     @property
-    def told(self) -> float:
+    def support(self) -> float:
         """What these tell in all [nat m2]."""
-        return sum(player.told for player in self.candidates[0].players)
+        return sum(player.support for player in self.candidates[0].players)
 
     @property
     def is_decided(self) -> bool:
@@ -109,27 +109,28 @@ def find_players(sample: Sequence[Frames], whole: Callable[[int], Frames], *, ne
     sample = [frames for frames in sample if sum(view is not None for view in frames.views) > 1]
     moments = [_Moment.of(frames, near_net=near_net) for frames in sample[:: -(-len(sample) // _MOST_MOMENTS) or 1]]
     findings: list[PlayersSearch] = []
+    complete, most = findings, 0
     for moment in _best_first(moments)[:_MOST_SEARCHED]:
         findings.append(moment.search(whole))
         most = max(finding.n_players for finding in findings)
         complete = [finding for finding in findings if finding.n_players == most]
         if len(complete) > 1 and any(finding.is_decided for finding in complete):
             break
-    if not findings or most == 0:
+    if most == 0:
         where = "at the net" if near_net else "on the court"
         raise TrialError(
             f"[start] is missing, and no player is seen to stand {where}, whose middle must be the world's origin, x "
             "along the net; give [[start.player]] tables"
         )
     decided = (finding for finding in complete if finding.is_decided)
-    return next(decided, max(complete, key=lambda finding: finding.told))
+    return next(decided, max(complete, key=lambda finding: finding.support))
 
 
 def _best_first(moments: Sequence[_Moment]) -> list[_Moment]:
     """Sort moments by what players at the net tell; those in which they tell about as much as ever by time."""
-    told = [moment.told for moment in moments]
-    best = [moment for moment, each in zip(moments, told, strict=True) if each >= _AS_WELL * max(told)]
-    rest = [(each, moment) for moment, each in zip(moments, told, strict=True) if each < _AS_WELL * max(told)]
+    support = [moment.support for moment in moments]
+    best = [moment for moment, each in zip(moments, support, strict=True) if each >= _AS_WELL * max(support)]
+    rest = [(each, moment) for moment, each in zip(moments, support, strict=True) if each < _AS_WELL * max(support)]
     return [*best, *(moment for _, moment in sorted(rest, key=lambda pair: -pair[0]))]
 
 
@@ -150,9 +151,9 @@ class _Moment:
         return cls(frames, ColourViews.of(views, zone), zone, wanted, near_net)
 
     @property
-    def told(self) -> float:
+    def support(self) -> float:
         """What players there may tell in all [nat m2]."""
-        return count_standing(*told_on_grid(self.views, self.wanted))
+        return sum_support(*evaluate_grid(self.views, self.wanted))
 
     def search(self, whole: Callable[[int], Frames]) -> PlayersSearch:
         """Find the players and fit them to the whole pictures."""
@@ -183,7 +184,7 @@ def _fit(standers: Sequence[Stander], others: Sequence[Array], frames: Frames) -
         for i, stander in enumerate(standers):
             beside = [*others, *states[:i], *states[i + 1 :]]
             fits = [_fit_one(state, beside, frames) for state in stander.states[:n]]
-            found[i] = [_found(fit, stander, number) for number, fit in enumerate(fits)]
+            found[i] = [_player_of(fit, stander, number) for number, fit in enumerate(fits)]
             states[i] = found[i][0].state
     return found
 
@@ -193,14 +194,14 @@ def _fit_one(state: Array, others: Sequence[Array], frames: Frames) -> FirstFram
     return fit_first_frame("found", joints_m, frames, occluding_capsules(state, others), looser=_LOOSER)
 
 
-def _found(fit: FirstFrameFit, stander: Stander, number: int) -> FoundPlayer:
+def _player_of(fit: FirstFrameFit, stander: Stander, number: int) -> FoundPlayer:
     evidence, area = fit.fit.owned.sum(axis=(0, 1, 2))
     per_px = float(evidence / area) if area > 0 else 0.0
     stance = stander.stances[number]
     stands = stance[KNEES].mean() < _DEEPEST and stance[HEIGHT] < _HIGHEST_M
-    is_plausible = stander.told[number] > _LEAST_TOLD and per_px > _LEAST_EVIDENCE and stands
+    is_plausible = stander.support[number] > _LEAST_SUPPORT and per_px > _LEAST_EVIDENCE and stands
     joints_m = dict(zip(JOINTS, fit.fit.points, strict=True))
-    return FoundPlayer(joints_m, fit.fit.state, float(stander.told[number]), per_px, bool(is_plausible))
+    return FoundPlayer(joints_m, fit.fit.state, float(stander.support[number]), per_px, bool(is_plausible))
 
 
 def _candidates(
@@ -209,7 +210,7 @@ def _candidates(
     """Combine who is a player and how each stands; the likeliest first."""
     options = []
     for stander, poses in zip(standers, found, strict=True):
-        there = float(expit((stander.told[0] - _TOLD) / _TOLD_SD))
+        there = float(expit((stander.support[0] - _SUPPORT) / _SUPPORT_SD))
         each = [(there * p, player) for p, player in _distinct_poses(poses, near_net=near_net)]
         options.append([option for option in [(1 - there, None), *each] if option[0] > _LEAST_SHOWN / 2])
     candidates = []
@@ -222,8 +223,8 @@ def _candidates(
 
 def _distinct_poses(poses: Sequence[FoundPlayer], *, near_net: bool) -> list[tuple[float, FoundPlayer]]:
     """Return a player's poses with their probabilities, those that the fit made alike as one."""
-    told = np.array([pose.told for pose in poses])
-    nats = told / told.max() / _TOLD_PER_NAT
+    support = np.array([pose.support for pose in poses])
+    nats = support / support.max() / _SHARE_PER_NAT
     if near_net:
         nats = nats + _NET_NATS * np.array([_faces_net(pose) for pose in poses])
     likelihood = np.exp(nats - nats.max())
