@@ -22,7 +22,7 @@ from airborne.cli import app
 from airborne.evaluation import PlayerErrors, PlayersComparison
 from airborne.evaluation.jump_errors import JumpErrors
 from airborne.evaluation.players import PartErrors
-from airborne.export import write_figures
+from airborne.export.figures import write_figures
 from airborne.motion import covariance_file, flight_summary
 from airborne.motion.files import _header
 from airborne.motion.run_folder import SMOOTH_RECORD, figures_of

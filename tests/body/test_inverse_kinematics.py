@@ -148,6 +148,22 @@ def test_left_and_right_exchanged_is_noted():
     assert fit.note is not None and fit.note.startswith("left and right look exchanged: landmarks ")
 
 
+@pytest.mark.parametrize(
+    ("words", "stems"),
+    [(" of the legs", ("hip", "knee", "ankle", "foot")), (" of the arms", ("shoulder", "elbow", "wrist", "hand"))],
+)
+def test_sides_exchanged_on_a_body_of_other_lengths_are_noted(words, stems):
+    person = with_segment_lengths(MODEL, {"thigh": 1.08, "shank": 0.93, "upper_arm": 0.92, "forearm": 1.06})
+    pose = pose_within_limits(np.random.default_rng(3), 0.4)
+    targets = dict(zip([mark.name for mark in person.landmarks], person.with_pose(pose).landmarks, strict=True))
+    assert fit_pose(MODEL, targets).rms_m > 0.01  # another body's
+    assert fit_pose(MODEL, targets).note is None
+    for stem in stems:
+        targets |= {f"{stem}_left": targets[f"{stem}_right"], f"{stem}_right": targets[f"{stem}_left"]}
+    note = fit_pose(MODEL, targets).note
+    assert note is not None and note.startswith(f"left and right{words} look exchanged: landmarks ")
+
+
 def test_mirrored_space_is_noted():
     pose = pose_within_limits(np.random.default_rng(4), 0.4)
     fit = fit_pose(MODEL, {name: place * [-1, 1, 1] for name, place in landmarks(pose, LIMBS).items()})

@@ -1,15 +1,31 @@
 """A person's own body from a trial: what cannot be fitted is refused in one line."""
 
+import csv
+from dataclasses import replace
+
+import cv2
 import numpy as np
 import pytest
 
 from airborne.body import ATHLETE, human18
+from airborne.body.files import read_body
 from airborne.body.outfits import Border
 from airborne.body_fitting.fit import BodyFit
-from airborne.body_fitting.from_trial import PersonFit, _landmarks_of, describe_fit, fit_person
+from airborne.body_fitting.from_trial import (
+    _CELL_PX,
+    _LINE_RGB,
+    PersonFit,
+    _landmarks_of,
+    describe_fit,
+    fit_person,
+)
+from airborne.cameras import Rig
 from airborne.errors import TrialError
+from airborne.synthetic.flight.somersault import somersault_scene
+from airborne.synthetic.throw.writing import write_trial
 from airborne.trial.examples import example_trial
 from airborne.trial.file import Trial, read_trial
+from airborne.trial.keys import KeyTable
 from tests.support.people_seen import four_cameras
 
 
@@ -40,6 +56,43 @@ def test_clicks_of_the_start_and_of_keys_say_where_the_joints_are():
         found = _landmarks_of(trial, forms, rig)
         assert all(np.allclose(found[name], at, atol=1e-6) for name, at in points.items())
     assert _landmarks_of(trial, trial.key[1], rig) == {}
+
+
+def test_a_person_is_fitted_to_the_frames_of_two_keys_and_drawn_over_them(tmp_path):
+    whole = somersault_scene("moving-arms", seed=3)
+    small = tuple(
+        camera.resample(scale=(2, 2), offset=(0.5, 0.5), size=(camera.size[0] // 2, camera.size[1] // 2))
+        for camera in whole.rig
+    )
+    scene = replace(whole, rig=Rig(small), n_pictures=6)
+    write_trial(scene, tmp_path / "trial")
+    with (tmp_path / "trial" / "truth_joints.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    keys = [
+        KeyTable(
+            frame=frame,
+            joints_m={
+                row["joint"]: [round(float(row[axis]), 3) for axis in ("x_m", "y_m", "z_m")]
+                for row in rows
+                if int(row["frame"]) == frame
+            },
+        )
+        for frame in (1, 4)
+    ]
+    trial = read_trial(tmp_path / "trial" / "trial.toml").model_copy(update={"key": keys})
+    person = fit_person(trial, tmp_path / "person.toml", n_frames=2)
+    assert (person.frames, person.notes) == ((1, 4), ())
+    assert person.fit.landmark_rms_m[1] < 0.01
+    assert all(0.95 < ratio < 1.05 for ratio in person.fit.lengths.values())
+    joints, read = (
+        [each.joint_m for each in m.segments] for m in (person.fit.model, read_body(tmp_path / "person.toml"))
+    )
+    np.testing.assert_allclose(read, joints, atol=1e-6)
+    image = cv2.imread(str(person.picture))
+    assert image.shape == (2 * _CELL_PX, 3 * _CELL_PX, 3)  # rows are frames, columns cameras
+    is_line = (image == _LINE_RGB[::-1]).all(axis=2)
+    cells = is_line.reshape(2, _CELL_PX, 3, _CELL_PX).sum(axis=(1, 3))
+    assert (cells > 400).all()  # each cell has the outline
 
 
 def test_no_frames_are_refused(by_hand, tmp_path):

@@ -1,7 +1,6 @@
 import cv2
 
-from airborne.export import MatchingPicture
-from airborne.export.matching import TITLES, _row
+from airborne.export.matching import TITLES, MatchingPicture, _row
 from airborne.tracking import Status
 from tests.support.export_scenes import RIG, SCENE_GREY, frames, posed
 

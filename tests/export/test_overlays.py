@@ -7,8 +7,7 @@ import pytest
 from airborne.body import surface_arrays
 from airborne.cameras import Rig
 from airborne.errors import VideoError
-from airborne.export import OverlayVideos
-from airborne.export.overlays import LONGEST_SIDE_PX
+from airborne.export.overlays import LONGEST_SIDE_PX, OverlayVideos
 from airborne.export.palette import STATUS_RGB
 from airborne.export.views import resample_view
 from airborne.rendering import FLAT, render

@@ -10,11 +10,10 @@ import pytest
 
 from airborne.body.legs import RODS, THIGH_WIDTH_M
 from airborne.cameras import Rig
-from airborne.export import PlayersOverlayVideos
 from airborne.export.broadcast import ACCENT, UNSURE, Height, Heights, Jumper, draw_heights
 from airborne.export.lettering import draw_text, text_width
 from airborne.export.palette import STATUS_RGB
-from airborne.export.players_overlay import GREEN_RGB, rectangle_px
+from airborne.export.players_overlay import GREEN_RGB, PlayersOverlayVideos, rectangle_px
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerStart
 from airborne.video import Frames, View

@@ -5,8 +5,10 @@ import pytest
 
 from airborne.errors import ResultError
 from airborne.evaluation import JointPaths, Truth, compare_joints, compare_motion
-from airborne.export import headline, page, write_figures, write_report
+from airborne.export import headline, page
+from airborne.export.figures import write_figures
 from airborne.export.page import format_value, label
+from airborne.export.report import write_report
 from airborne.motion import Motion, flight_summary, landmarks
 from airborne.motion.run_folder import figures_of
 from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run

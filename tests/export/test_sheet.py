@@ -2,8 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from airborne.export import ContactSheet
-from airborne.export.sheet import BACKGROUND_GREY, N_BUFFERED, _cell
+from airborne.export.sheet import BACKGROUND_GREY, N_BUFFERED, ContactSheet, _cell
 from airborne.export.views import CELL_PX, CROP_MARGIN, crop_camera
 from airborne.tracking import Status
 from tests.support.export_scenes import BALL, BOX, RIG, SCENE_GREY, camera, frames, posed
@@ -43,7 +42,7 @@ def test_memory_stays_flat_and_the_times_evenly_spaced(tmp_path):
         for i in range(150):
             sheet.write(frames(i), posed(BOX, (0.01 * i, 0, 0)), Status.TRACKED)
             assert len(sheet._columns) <= N_BUFFERED
-        held = [int(column.title.split()[1]) for column in sheet._columns]
+        held = [int(column.title.text.split()[1]) for column in sheet._columns]
     assert held[0] == 0
     assert set(np.diff(held)) == {8}
     assert held[-1] > 150 - 2 * 8

@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from airborne.export import write_report
 from airborne.export.film import N_MOMENTS, Film, read_film
+from airborne.export.report import write_report
 from airborne.export.summary import headline
 from airborne.export.viewer import body_viewer
 from airborne.geometry.even_sample import EvenSample

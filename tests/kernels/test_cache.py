@@ -40,24 +40,28 @@ import sys
 import numpy as np
 
 from airborne.kernels import kernel
-from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, Projection, Window
-from airborne.tracking.model_based.twist_equations import Sums, accumulate
+from airborne.rendering.maps import SurfaceMaps
+from airborne.tracking.model_based.kernel_arguments import Comparison, Projection, Window
+from airborne.tracking.model_based.normal_equations import observe
+from airborne.tracking.model_based.row_equations import add_rows
+from airborne.tracking.model_based.twist_equations import Sums
 
 @kernel(fastmath=True)
-def through_a_caller(residual, shape, coverage, owner, nearness, place, seen, window, sums, blocks):
-    return accumulate(residual, shape, coverage, owner, nearness, place, seen, window, sums, blocks)
+def through_a_caller(lit, flat, maps, owner, nearness, place, seen, comparison, sums, blocks):
+    return add_rows(lit, flat, maps, owner, nearness, place, seen, comparison, sums, blocks)
 
 rng = np.random.default_rng(0)
 h, w, s = 40, 50, 3
-residual, shape, coverage, scene, certainty = rng.random((5, 1, h, w)).astype(np.float32)
-owner, nearness = rng.integers(-1, s, (h, w)).astype(np.int16), 1 + coverage
+lit, flat, observed, scene = rng.random((4, 2, h, w)).astype(np.float32)
+owner, nearness = rng.integers(-1, s, (h, w)).astype(np.int16), 1 + lit[0]
 K, taps = np.array([[300.0, 0, 25], [0, 310, 20], [0, 0, 1]]), np.ones(5, np.float32)
+maps = SurfaceMaps(rng.integers(-1, 1, (h, w)).astype(np.int16), nearness, np.zeros((3, h, w), np.float32))
 place = Projection(np.zeros((s, 3, 3)), np.zeros((s, 3)), rng.random(18), K, np.zeros(3))
-seen = Observation(scene, scene, certainty[0])
 sums = Sums(np.zeros((s, 6, 6)), np.zeros((s, 6)), np.zeros((s, 6, 3)))
-call = accumulate if sys.argv[1] == "directly" else through_a_caller
-window, blocks = Comparison(Window(0, 0, w, h), taps, taps, 0.5), np.zeros((3, 4, s, 6))
-call(residual, shape, coverage[0], owner, nearness[0], place, seen, window, sums, blocks)
+call = add_rows if sys.argv[1] == "directly" else through_a_caller
+comparison, blocks = Comparison(Window(0, 0, w, h), taps, taps, 0.5), np.zeros((3, 4, s, 6))
+seen = observe(observed, scene, lit[0], comparison)
+call(lit, flat, maps, owner, nearness, place, seen, comparison, sums, blocks)
 print(hashlib.sha256(b"".join(part.tobytes() for part in sums)).hexdigest())
 """
 

@@ -7,7 +7,8 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
-from airborne.motion import Motion, dataset
+from airborne.motion import Motion
+from airborne.motion.labelled import label_root
 from airborne.tracking import Status
 from tests.support.motions import estimate, run_with_gap
 from tests.support.tolerances import EXACT
@@ -56,7 +57,7 @@ def test_statuses_are_counted():
 @pytest.mark.parametrize("rows", [0, 1, 5])
 def test_dataset_has_time_in_seconds_and_a_unit_on_every_number(rows):
     motion = Motion.collect(run_with_gap(rows, lost=[3], n_joints=1), ("chest",))
-    labelled = dataset(motion, ["tracked"])
+    labelled = label_root(motion, ["tracked"])
     np.testing.assert_array_equal(labelled["time"], motion.time_s)
     assert labelled["time"].attrs["units"] == "s"
     assert labelled.attrs["history"] == ["tracked"]

@@ -39,39 +39,35 @@ def jointed_body():
 
 def test_angles_of_a_steady_somersault_continue_past_half_a_revolution():
     estimates, truth = somersault(turns=2.0)
-    table = root_angles(Motion.collect(estimates))
-    for k, name in enumerate(("somersault", "tilt", "twist")):
-        np.testing.assert_allclose(table[name], np.rad2deg(truth[:, k]), atol=1e3 * ROUNDTRIP)
-        assert table[name].attrs["units"] == "deg"
+    angles = root_angles(Motion.collect(estimates))
+    np.testing.assert_allclose(angles.deg, np.rad2deg(truth), atol=1e3 * ROUNDTRIP)
 
 
 def test_angles_run_on_over_lost_frames():
     estimates, truth = somersault()
     for i in range(10, 16):
         estimates[i] = replace(estimates[i], status=Status.LOST, pose=None, covariance=None)
-    table = root_angles(Motion.collect(estimates))
-    assert np.isnan(table["somersault"][10:16]).all()
-    np.testing.assert_allclose(table["somersault"][16:], np.rad2deg(truth[16:, 0]), atol=1e3 * ROUNDTRIP)
+    angles = root_angles(Motion.collect(estimates))
+    assert np.isnan(angles.deg[10:16]).all()
+    np.testing.assert_allclose(angles.deg[16:], np.rad2deg(truth[16:]), atol=1e3 * ROUNDTRIP)
 
 
 def test_angle_deviations_are_those_of_sampled_rotations():
     item = estimate(2)
     covariance = item.covariance * 1e-3
-    table = root_angles(Motion.collect([replace(item, covariance=covariance)]))
+    angles = root_angles(Motion.collect([replace(item, covariance=covariance)]))
     n = 20000
     vectors = np.random.default_rng(0).multivariate_normal(np.zeros(3), covariance[3:, 3:], size=n)
     R = item.pose.world_from_root.rotation.as_matrix()
     sampled_angles = angles_from_matrix(Rotation.from_rotvec(vectors).as_matrix() @ R)
-    for k, name in enumerate(("somersault", "tilt", "twist")):
-        expected = np.rad2deg(sampled_angles[:, k].std())
-        assert float(table[f"{name}_sd"][0]) == pytest.approx(expected, rel=sampled(n))
+    np.testing.assert_allclose(angles.sd_deg[0], np.rad2deg(sampled_angles.std(axis=0)), rtol=sampled(n))
 
 
 def test_angle_deviations_are_unknown_where_the_covariance_is_infinite_or_missing():
     blind = estimate(0)
     blind.covariance[4, 4] = np.inf
-    table = root_angles(Motion.collect([blind, estimate(1, covariance=False), estimate(2)]))
-    assert np.isnan(table["twist_sd"]).to_numpy().tolist() == [True, True, False]
+    angles = root_angles(Motion.collect([blind, estimate(1, covariance=False), estimate(2)]))
+    assert np.isnan(angles.sd_deg).all(axis=1).tolist() == [True, True, False]
 
 
 def test_angles_near_ninety_degrees_of_tilt_carry_a_sign_and_no_deviation(tmp_path):

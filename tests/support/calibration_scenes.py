@@ -30,7 +30,11 @@ def three_side_by_side() -> Rig:
 
 def wave_board(n: int) -> RigidTransform:
     """A board that is turned and moved in front of the cameras, frame by frame."""
-    t = np.linspace(0, 6, n)
+    return board_at(np.linspace(0, 6, n))
+
+
+def board_at(t: np.ndarray) -> RigidTransform:
+    """The places of the waved board at these times."""
     turn = np.column_stack([0.5 * np.sin(2.1 * t), 0.6 * np.cos(1.7 * t), 0.4 * np.sin(1.3 * t)])
     shift = np.column_stack([0.35 * np.sin(1.9 * t), 0.4 * np.cos(1.1 * t), 1 + 0.3 * np.sin(2.3 * t)])
     facing = Rotation.from_euler("x", -90, degrees=True)

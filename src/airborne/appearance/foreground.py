@@ -46,6 +46,33 @@ def count_colours(rgb, chosen, stride, counts):
     return taken
 
 
+@kernel
+def blend_colours(rgb, chosen, stride, rate, old, out):
+    """Fill out (32, 32, 32) with (1 - rate) old + rate times the shares of the chosen pixels' colours.
+
+    The colours are counted as by `count_colours`. Returns how many pixels were taken; with none, out is not filled.
+    """
+    n_chosen = 0
+    for y in range(chosen.shape[0]):
+        for x in range(chosen.shape[1]):
+            n_chosen += chosen[y, x]
+    taken = n_chosen // stride
+    if taken == 0:
+        return taken
+    keep, scale = np.float32(1 - rate), np.float32(taken / rate)
+    for i in range(BINS_PER_CHANNEL):
+        for j in range(BINS_PER_CHANNEL):
+            for k in range(BINS_PER_CHANNEL):
+                out[i, j, k] = keep * old[i, j, k] * scale
+    count_colours(rgb, chosen, stride, out)
+    share = np.float32(1) / scale
+    for i in range(BINS_PER_CHANNEL):
+        for j in range(BINS_PER_CHANNEL):
+            for k in range(BINS_PER_CHANNEL):
+                out[i, j, k] *= share
+    return taken
+
+
 @kernel(fastmath=True)
 def posterior(rgb, body, background, mean, sd, n_observations, out):
     """Fill out (h, w) with each pixel's probability to be body, at even odds.

@@ -93,12 +93,32 @@ def fit_light(observed, part, normals, albedo, coefficients, iterations, x0, y0,
             normal_matrix[0, 0] += 1e-9
             for p in range(1, LIGHT_TERMS):
                 normal_matrix[p, p] += _RIDGE * trace + 1e-9
-                for r in range(p):
-                    normal_matrix[r, p] = normal_matrix[p, r]
-            solved = np.linalg.solve(normal_matrix, right)
+            _solve(normal_matrix, right)
             for p in range(LIGHT_TERMS):
-                coefficients[k, p] = solved[p]
+                coefficients[k, p] = right[p]
     return sd
+
+
+@kernel(fastmath=True, is_inner=True)
+def _solve(A, b):
+    """Overwrite b (n,) with the solution of A x = b, A (n, n) positive definite by its lower triangle: Cholesky."""
+    n = len(b)
+    for j in range(n):
+        for k in range(j):
+            A[j, j] -= A[j, k] * A[j, k]
+        A[j, j] = np.sqrt(A[j, j])
+        for i in range(j + 1, n):
+            for k in range(j):
+                A[i, j] -= A[i, k] * A[j, k]
+            A[i, j] /= A[j, j]
+    for i in range(n):
+        for k in range(i):
+            b[i] -= A[i, k] * b[k]
+        b[i] /= A[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            b[i] -= A[k, i] * b[k]
+        b[i] /= A[i, i]
 
 
 @kernel(fastmath=True)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.appearance.background import BackgroundModel, BackgroundPixels
-from airborne.appearance.foreground import BINS_PER_CHANNEL, count_colours, posterior
+from airborne.appearance.foreground import BINS_PER_CHANNEL, blend_colours, posterior
 from airborne.cameras import Camera
 
 _COLOUR_RATE = 0.1  # share of the newest frame in the colour histograms
@@ -106,14 +106,14 @@ class Appearance:
 
 def _learn_histogram(histograms: Histograms, region: Region, chosen: NDArray[np.bool_]) -> Histograms:
     """Return the histograms with the region's camera's updated by its chosen pixels (h, w), where these are enough."""
-    counts = np.zeros((BINS_PER_CHANNEL, BINS_PER_CHANNEL, BINS_PER_CHANNEL), np.float32)
     stride = max(1, int(np.count_nonzero(chosen)) // _SAMPLES)
-    taken = count_colours(region.rgb, chosen, stride, counts)
+    new = np.empty((BINS_PER_CHANNEL, BINS_PER_CHANNEL, BINS_PER_CHANNEL), np.float32)
+    old, rate = histograms.get(region.camera.name), _COLOUR_RATE
+    if old is None:
+        old, rate = np.zeros_like(new), 1.0
+    taken = blend_colours(region.rgb, chosen, stride, rate, old, new)
     if taken * stride < _FEWEST:
         return histograms
-    counts /= taken
-    old = histograms.get(region.camera.name)
-    new = counts if old is None else np.asarray(old + _COLOUR_RATE * (counts - old), np.float32)
     return {**histograms, region.camera.name: new}
 
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 import logging
 from io import BytesIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from airborne.body.model import LONGEST_M, Mesh
 from airborne.errors import BodyError
 from airborne.io.text import read_bytes
 from airborne.types import Array
+
+if TYPE_CHECKING:
+    import trimesh
 
 logging.getLogger("trimesh").addHandler(logging.NullHandler())  # it would print a traceback for a damaged file
 _LARGEST_BYTES = 50_000_000  # larger files are refused
@@ -25,6 +28,8 @@ _MOST_PLACES = 3  # of bad edges that a note names
 
 def read_mesh(path: Path, scale: float) -> Mesh:
     """Read a mesh, lengths times scale [m]; raises BodyError for another kind of file, and for no closed surface."""
+    import trimesh
+
     if not path.is_file():
         raise BodyError(f"mesh file {path.name} not found beside the body file")
     try:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from airborne.body.model import BodyModel, Box, Ellipsoid, Mesh, Shape
@@ -94,6 +93,8 @@ def has_flat_sides(shape: Shape) -> bool:
     """Say whether a shape's edges are visible: boxes, and meshes without a gently curved part."""
     if not isinstance(shape, Mesh):
         return isinstance(shape, Box)
+    import trimesh  # here, as only meshes need it
+
     angles = trimesh.Trimesh(shape.vertices_m, shape.faces).face_adjacency_angles
     angles_at_edges = angles[angles > _FLAT_RAD]
     return bool(len(angles_at_edges) and np.all(angles_at_edges > _SHARP_RAD))

@@ -55,7 +55,7 @@ def prepare_views(
     for pose, frames in zip(poses, images, strict=True):
         posed = render_model.with_pose(pose)
         regions = crop_regions([posed], render_model.geometry, frames, margin_px)
-        buffers.append(tuple(image_buffers(render_model, [posed], region, background) for region in regions))
+        buffers.append(tuple(image_buffers(render_model, region, background) for region in regions))
     return tuple(buffers)
 
 
@@ -74,7 +74,5 @@ def compare_fits(
         ]
         for region in crop_regions(bodies, models[1].geometry, frames, 0.0):
             for j, (render_model, posed) in enumerate(zip(models, bodies, strict=True)):
-                totals[j] = totals[j] + misfit(
-                    render_model, posed, image_buffers(render_model, [posed], region, background)
-                )
+                totals[j] = totals[j] + misfit(render_model, posed, image_buffers(render_model, region, background))
     return totals[0].rms_light, totals[1].rms_light

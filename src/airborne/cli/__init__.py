@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,7 +16,7 @@ from airborne.cli.batch import batch_command, new_command
 from airborne.cli.calibrate import calibrate_command
 from airborne.cli.check import check_command
 from airborne.cli.compare import compare_command
-from airborne.cli.console import STOPPED, UNDECIDED, refuse, stop
+from airborne.cli.console import STOPPED, UNDECIDED, refuse, show_notes, stop
 from airborne.cli.convert import convert_command
 from airborne.cli.export import export_command
 from airborne.cli.find import find_command, frame_command
@@ -24,6 +25,7 @@ from airborne.cli.studio import studio_command
 from airborne.cli.sync import sync_command
 from airborne.errors import AirborneError, UndecidedError
 
+_MOST_PIXELS = "150000000"  # of a picture that OpenCV decodes, as of a video's; a file may declare any number
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
 _COMMANDS = {
     "demo": track.demo_command,
@@ -43,6 +45,7 @@ _COMMANDS = {
     "evaluate": results.evaluate_command,
     "export": export_command,
     "bench": track.bench_command,
+    "warm": track.warm_command,
 }
 _SYNTH = {
     "cross": synth.synth_cross_command,
@@ -71,6 +74,8 @@ app.add_typer(_group(_REPRODUCE, "Repeat a paper's experiment: its table beside 
 
 def main() -> None:
     """Run the command line; a user's error is one line on stderr and exit code 2."""
+    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", _MOST_PIXELS)  # read when OpenCV is loaded
+    show_notes()
     try:
         code = app(standalone_mode=False)
         if code == STOPPED:  # typer's answer to Ctrl-C

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from pathlib import Path
 from typing import Annotated, NoReturn
@@ -18,6 +19,20 @@ _SIDES_PX = range(16, 20_001)  # of an image
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Out = Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.")]
+
+
+class _Notes(logging.Handler):
+    """Prints what the code notes as lines on stderr."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        errors.print(f"airborne: {record.getMessage()}", markup=False)
+
+
+def show_notes() -> None:
+    """Let what takes long without progress be told: that kernels are compiled."""
+    log = logging.getLogger("airborne.kernels")
+    log.setLevel(logging.INFO)
+    log.addHandler(_Notes())
 
 
 def refuse(reason: str, code: int = 2) -> NoReturn:

@@ -43,7 +43,7 @@ def synth_somersault_command(
 
     Example: airborne synth somersault -o my-somersault --preset moving-arms --style gym
     """
-    from airborne.export import write_model
+    from airborne.export.models import write_model
     from airborne.synthetic import somersault_scene, write_somersault
 
     with progress("rendering") as report:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -167,14 +168,14 @@ def _describe_results(output: Path) -> str:
 
 
 def _describe(summary: dict, output: Path) -> str:
-    from airborne.export.players_report import players_summary
-
     counts = ", ".join(f"{summary[f'n_{status}']} {status}" for status in ("tracked", "uncertain", "lost"))
     n, rate_hz = summary["n_frames"], summary["rate_hz"]
     lines = [f"{count(n, 'frame')}{f' at {rate_hz:.5g} Hz' if n > 1 else ''}: {counts}"]
     drawn = [path.relative_to(output).as_posix() for path in _overlays(output)]
     look = f"look at the first frame in {', '.join(drawn)}, " if drawn else ""
     if "players" in summary:
+        from airborne.export.players_report import players_summary
+
         lines += players_summary(summary)
         if n == summary["n_lost"]:
             lines.append(f"no player was found in any frame: {look}correct [[start.player]]")
@@ -231,3 +232,15 @@ def bench_command(as_json: Json = False) -> None:
 
     speeds = measure_speed()
     print(json.dumps(speeds) if as_json else "\n".join(f"{name}: {value:.3g}" for name, value in speeds.items()))
+
+
+def warm_command() -> None:
+    """Compile now what the first runs would compile, for machines that are prepared; about a minute, once.
+
+    Example: airborne warm
+    """
+    from airborne.run.warm import warm_kernels
+
+    begun_s = time.monotonic()
+    warm_kernels()
+    print(f"kernels are ready after {time.monotonic() - begun_s:.0f} s")

@@ -5,39 +5,26 @@ For a body with joints also joints.png, and flight.png where every segment has a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from airborne.body import BodyModel
-from airborne.evaluation import DigitisedPoses, Truth
 from airborne.export import panels
-from airborne.export.error_figures import write_digitised, write_errors
 from airborne.io.figures import save_png
 from airborne.motion import Motion, has_inertias, joint_angles, measure_flight, root_angles
 from airborne.motion.joints import main_joints
-from airborne.types import Array
 
 _AXIS_STYLES = (("x", "-", "#0072b2"), ("y", "--", "#cc79a7"), ("z", ":", "#333333"))
 _TWO_SD = "± 2 standard deviations; unseen where thinner than the line"
 
 
-def write_figures(
-    folder: Path,
-    motion: Motion,
-    model: BodyModel,
-    *,
-    truth: Truth | None = None,
-    digitised: DigitisedPoses | None = None,
-    symmetries: Sequence[Array] = (np.eye(3),),
-) -> None:
-    """Write every figure that the data allow into a run's folder.
+def write_figures(folder: Path, motion: Motion, model: BodyModel) -> None:
+    """Write every figure that the data allow into a run's folder; those against a reference are in `error_figures`.
 
-    Always pose.png and score.png; joints.png and flight.png where the body has joints and masses; errors.png and
-    digitised.png where there is a reference. `symmetries` (3, 3) are the body's, the identity among them,
-    as in `evaluation.compare`. Raises ResultError where the motion is another body's.
+    Always pose.png and score.png; joints.png and flight.png where the body has joints and masses. Raises ResultError
+    where the motion is another body's.
     """
     write_pose(folder / "pose.png", motion)
     write_score(folder / "score.png", motion)
@@ -45,10 +32,6 @@ def write_figures(
         write_joints_figure(folder / "joints.png", motion, model)
     if motion.joints and has_inertias(model):
         write_flight_figure(folder / "flight.png", motion, model)
-    if truth is not None:
-        write_errors(folder / "errors.png", motion, truth, symmetries)
-    if digitised is not None:
-        write_digitised(folder / "digitised.png", motion, digitised, symmetries)
 
 
 def write_pose(path: Path, motion: Motion) -> None:
@@ -61,7 +44,7 @@ def pose_figure(motion: Motion) -> Figure:
 
     Lost frames are gaps, shaded; frames in which some direction is unobservable are hatched.
     """
-    table, singular, unobservable = (
+    angles, singular, unobservable = (
         root_angles(motion),
         panels.singular_frames(motion),
         panels.unobservable_frames(motion),
@@ -71,7 +54,7 @@ def pose_figure(motion: Motion) -> Figure:
         left, right = grid[k]
         for axes, label, values, sd, mask in (
             (left, f"{axis} [m]", motion.position[:, k], motion.position_sd[:, k], unobservable[0]),
-            (right, f"{angle} [°]", table[angle].to_numpy(), table[f"{angle}_sd"].to_numpy(), unobservable[1]),
+            (right, f"{angle} [°]", angles.deg[:, k], angles.sd_deg[:, k], unobservable[1]),
         ):
             panels.draw_band(axes, motion.time_s, values, sd)
             panels.draw_estimate(axes, motion, values)

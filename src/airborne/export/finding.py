@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from airborne.appearance.empty_scene import EmptyScene
 from airborne.body import PosedBody
 from airborne.cameras import Camera
+from airborne.export.mosaic import ColumnTitle, write_mosaic
 from airborne.export.palette import ESTIMATE_RGB
-from airborne.export.sheet import cell_figure
 from airborne.export.views import cached_surface_arrays
-from airborne.io.figures import save_png
 from airborne.rendering import FLAT, render
 from airborne.tracking.capsules.surface_colours import class_image
 from airborne.tracking.first_pose.moments import Moment, SourceKey, source_of
@@ -38,7 +37,7 @@ def draw_empty_scene(path: Path, moment: Moment, scenes: Mapping[SourceKey, Empt
         grey = np.repeat((255 * shown).astype(np.uint8)[..., None], 3, axis=2)
         square = [_square_pixels(image, view.camera) for image in (empty, grey, _with_outline(view, posed))]
         rows.append(square)
-    save_png(cell_figure(rows, names, _TITLES, aspect=_ASPECT), path)
+    write_mosaic(path, rows, names, [ColumnTitle(text) for text in _TITLES], aspect=_ASPECT)
 
 
 def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, PosedBody]]) -> None:
@@ -46,7 +45,7 @@ def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, 
     views = [view for view in moment.frames.views if view is not None]
     rows = [[_near(_with_outline(view, posed), view.camera, posed) for view in views] for _, posed in candidates]
     names = [f"{number}: {label}" for number, (label, _) in enumerate(candidates, start=1)]
-    save_png(cell_figure(rows, names, [view.camera.name for view in views], aspect=_ASPECT), path)
+    write_mosaic(path, rows, names, [ColumnTitle(view.camera.name) for view in views], aspect=_ASPECT)
 
 
 def draw_player_candidates(path: Path, frames: Frames, candidates: Sequence[tuple[str, Sequence[Array]]]) -> None:
@@ -56,7 +55,7 @@ def draw_player_candidates(path: Path, frames: Frames, candidates: Sequence[tupl
     boxes = [_box_of(view.camera, [state for _, states in candidates for state in states]) for view in views]
     rows = [[image[box] for image, box in zip(row, boxes, strict=True)] for row in images]
     names = [f"{number}: {label}" for number, (label, _) in enumerate(candidates, start=1)]
-    save_png(cell_figure(rows, names, [view.camera.name for view in views], aspect=_ASPECT), path)
+    write_mosaic(path, rows, names, [ColumnTitle(view.camera.name) for view in views], aspect=_ASPECT)
 
 
 def _with_players(view: View, states: Sequence[Array]) -> Image:

@@ -8,9 +8,8 @@ from typing import Self
 
 from airborne.body import PosedBody
 from airborne.cameras import Camera, Rig
-from airborne.export.sheet import cell_figure
+from airborne.export.mosaic import ColumnTitle, write_mosaic
 from airborne.export.views import cached_surface_arrays, crop_camera, resample_view
-from airborne.io.figures import save_png
 from airborne.rendering import FLAT, mask_picture, match_picture, model_picture, render, through_mask
 from airborne.tracking import Status
 from airborne.types import Image
@@ -34,7 +33,9 @@ class MatchingPicture:
         if self._is_drawn or posed is None or status is not Status.TRACKED:
             return
         rows = [_row(view, camera, posed) for view, camera in zip(frames.views, self._cameras, strict=True)]
-        save_png(cell_figure(rows, [camera.name for camera in self._cameras], TITLES), self._path)
+        write_mosaic(
+            self._path, rows, [camera.name for camera in self._cameras], [ColumnTitle(text) for text in TITLES]
+        )
         self._is_drawn = True
 
     def __enter__(self) -> Self:

@@ -141,7 +141,7 @@ def _intervals(time_s: Array, mask: Mask) -> Iterator[tuple[float, float]]:
 
 def singular_frames(motion: Motion) -> Mask:
     """Say in which frames the root's angles are singular: (n,)."""
-    return root_angles(motion)["is_singular"].to_numpy() & motion.has_pose
+    return root_angles(motion).is_singular & motion.has_pose
 
 
 def unobservable_frames(motion: Motion) -> tuple[Mask, Mask]:

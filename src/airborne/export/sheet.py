@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from airborne.body import PosedBody
 from airborne.cameras import Camera, Rig
-from airborne.export.palette import STATUS_RGB, TEXT_RGB, hex_colour
-from airborne.export.panels import FONT_PT, WIDTH_IN
+from airborne.export.mosaic import ColumnTitle, write_mosaic
+from airborne.export.palette import STATUS_RGB, TEXT_RGB
 from airborne.export.views import cached_surface_arrays, crop_camera, resample_view
 from airborne.geometry.even_sample import EvenSample
-from airborne.io.figures import save_png
 from airborne.rendering import FLAT, render, through_mask
 from airborne.tracking import Status
 from airborne.types import Image
@@ -25,13 +21,11 @@ from airborne.video import Frames, View
 
 _N_COLUMNS = 8  # moments shown
 N_BUFFERED = 32  # columns kept while tracking
-SHEET_DPI = 200  # of a sheet in print
 BACKGROUND_GREY = 205  # around the model
 
 
 class _Column(NamedTuple):
-    title: str
-    colour: str
+    title: ColumnTitle
     cells: list[Image | None]  # one per camera
 
 
@@ -56,10 +50,10 @@ class ContactSheet:
         self._columns.offer(lambda: self._column(frames, posed, status))
 
     def _column(self, frames: Frames, posed: PosedBody, status: Status) -> _Column:
-        title = f"frame {frames.index}\n{float(frames.time_s):.3f} s"
-        colour = hex_colour(STATUS_RGB[status] if status is not Status.TRACKED else TEXT_RGB)
+        rgb = STATUS_RGB[status] if status is not Status.TRACKED else TEXT_RGB
+        title = ColumnTitle(f"frame {frames.index}\n{float(frames.time_s):.3f} s", rgb)
         cells = [_cell(view, camera, posed) for view, camera in zip(frames.views, self._cameras, strict=True)]
-        return _Column(title, colour, cells)
+        return _Column(title, cells)
 
     def __enter__(self) -> Self:
         return self
@@ -71,22 +65,10 @@ class ContactSheet:
         columns = list(self._columns)
         if columns:
             selected = np.linspace(0, len(columns) - 1, min(len(columns), _N_COLUMNS)).round().astype(int)
+            rows = list(zip(*(columns[i].cells for i in selected), strict=True))
+            titles = [columns[i].title for i in selected]
             names = [camera.name for camera in self._cameras]
-            save_png(_sheet_figure([columns[i] for i in selected], names), self._path)
-
-
-def _sheet_figure(columns: Sequence[_Column], names: Sequence[str]) -> Figure:
-    cell_in = (WIDTH_IN - 0.5) / _N_COLUMNS
-    figure = Figure((0.5 + cell_in * len(columns), 0.5 + cell_in * len(names)), dpi=SHEET_DPI)
-    figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.02, wspace=0, hspace=0)
-    grid = figure.subplots(len(names), len(columns), squeeze=False)
-    for k, column in enumerate(columns):
-        grid[0, k].set_title(column.title, fontsize=FONT_PT - 2, color=column.colour)
-        for i, cell in enumerate(column.cells):
-            draw_cell(grid[i, k], cell)
-    for axes, name in zip(grid[:, 0], names, strict=True):
-        axes.set_ylabel(name, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
-    return figure
+            write_mosaic(self._path, rows, names, titles, n_columns=_N_COLUMNS)
 
 
 def _cell(view: View | None, camera: Camera, posed: PosedBody) -> Image | None:
@@ -97,33 +79,3 @@ def _cell(view: View | None, camera: Camera, posed: PosedBody) -> Image | None:
     image = through_mask(resample_view(view, crop), rendering)
     image[~rendering.mask] = BACKGROUND_GREY
     return image
-
-
-def draw_cell(axes: Axes, cell: Image | None) -> None:
-    """Show an image without axes, or say that there is none."""
-    axes.set_xticks([])
-    axes.set_yticks([])
-    for spine in axes.spines.values():
-        spine.set_visible(False)
-    if cell is None:
-        axes.set_box_aspect(1)
-        axes.text(0.5, 0.5, "no picture", ha="center", va="center", fontsize=FONT_PT - 2, transform=axes.transAxes)
-    else:
-        axes.imshow(cell)
-
-
-def cell_figure(
-    rows: Sequence[Sequence[Image | None]], names: Sequence[str], titles: Sequence[str], *, aspect: float = 1.0
-) -> Figure:
-    """Return a figure of report width, images in rows with names, titles above; aspect: height over width of a cell."""
-    cell_in = (WIDTH_IN - 0.5) / len(titles)
-    figure = Figure((WIDTH_IN, 0.4 + aspect * cell_in * len(rows)), dpi=SHEET_DPI)
-    figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.02, wspace=0, hspace=0)
-    grid = figure.subplots(len(rows), len(titles), squeeze=False)
-    for axes, title in zip(grid[0], titles, strict=True):
-        axes.set_title(title, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
-    for i, (row, name) in enumerate(zip(rows, names, strict=True)):
-        for axes, cell in zip(grid[i], row, strict=True):
-            draw_cell(axes, cell)
-        grid[i, 0].set_ylabel(name, fontsize=FONT_PT - 1, color=hex_colour(TEXT_RGB))
-    return figure

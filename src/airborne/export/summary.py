@@ -32,10 +32,10 @@ def headline(motion: Motion) -> dict[str, Any]:
     """
     has_pose = motion.has_pose
     rows = np.flatnonzero(has_pose)
-    table = root_angles(motion)
+    angles = root_angles(motion)
+    somersault, tilt, twist = angles.deg[has_pose].T
     position_sd, rotation_sd = motion.position_sd[has_pose], motion.rotation_sd[has_pose]
     ends = motion.time_s[[0, -1]] if len(motion) else np.full(2, np.nan)
-    tilt = table["tilt"].to_numpy()[has_pose]
     return {
         "n_frames": len(motion),
         "n_tracked": motion.count(Status.TRACKED),
@@ -48,12 +48,12 @@ def headline(motion: Motion) -> dict[str, Any]:
         "median_position_sd_mm": 1e3 * _median(_rms_over_axes(position_sd)),
         "median_rotation_sd_deg": math.degrees(_median(_rms_over_axes(rotation_sd))),
         "range_m": np.ptp(motion.position[has_pose], axis=0).tolist() if len(rows) else [math.nan] * 3,
-        "somersault_rev": _revolutions(table["somersault"].to_numpy()[rows]),
+        "somersault_rev": _revolutions(somersault),
         "tilt_range_deg": [float(tilt.min()), float(tilt.max())] if len(rows) else [math.nan] * 2,
-        "twist_rev": _revolutions(table["twist"].to_numpy()[rows]),
+        "twist_rev": _revolutions(twist),
         "n_position_unobservable": int(np.isinf(position_sd).any(axis=1).sum()),
         "n_rotation_unobservable": int(np.isinf(rotation_sd).any(axis=1).sum()),
-        "n_near_singular": int(table["is_singular"].to_numpy()[rows].sum()),
+        "n_near_singular": int(angles.is_singular[rows].sum()),
         "has_gap": bool(len(rows) and rows[-1] - rows[0] + 1 > len(rows)),
     }
 

@@ -39,9 +39,9 @@ def body_columns(
     """
     columns = {"frame": Column(motion.index), "time_s": Column(motion.time_s, "s"), "status": Column(motion.status)}
     root = root_angles(motion)
-    for name in ROOT_ANGLES:
-        columns[f"{name}_deg"] = Column(root[name].to_numpy(), "deg")
-        columns[f"{name}_deg_sd"] = Column(root[f"{name}_sd"].to_numpy(), "deg")
+    for k, name in enumerate(ROOT_ANGLES):
+        columns[f"{name}_deg"] = Column(root.deg[:, k], "deg")
+        columns[f"{name}_deg_sd"] = Column(root.sd_deg[:, k], "deg")
     columns |= _point_columns([landmark.name for landmark in model.landmarks], points, sd)
     if motion.joints:
         angles_of = joint_angles(motion, model)

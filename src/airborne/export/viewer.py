@@ -14,9 +14,9 @@ from airborne.body import BodyModel
 from airborne.errors import ResultError
 from airborne.export.film import read_film
 from airborne.export.gltf import animation_bytes
-from airborne.export.panels import ANGLES
 from airborne.export.takes import Take, body_take, player_takes
 from airborne.motion import Motion, PlayersMotion, joint_angles, root_angles
+from airborne.motion.angles import ROOT_ANGLES
 from airborne.motion.joints import main_joints
 from airborne.motion.run_folder import FOLDERS, PICTURES
 from airborne.tracking import Status
@@ -67,14 +67,14 @@ def _viewer(
 def _body_groups(motion: Motion, model: BodyModel) -> Iterator[dict[str, Any]]:
     place = [_series(axis, "m", motion.position[:, k], motion.position_sd[:, k]) for k, axis in enumerate("xyz")]
     yield {"name": "position", "series": place}
-    table = root_angles(motion)
-    turns = [_series(name, "°", table[name].to_numpy(), table[f"{name}_sd"].to_numpy()) for name in ANGLES]
+    angles = root_angles(motion)
+    turns = [_series(name, "°", angles.deg[:, k], angles.sd_deg[:, k]) for k, name in enumerate(ROOT_ANGLES)]
     yield {"name": "somersault, tilt, twist", "series": turns}
     if motion.joints:
-        angles = joint_angles(motion, model)
+        angles_of = joint_angles(motion, model)
         bends: dict[str, list] = {}
         for segment, label, sign in main_joints(motion.joints):
-            of_joint = angles.sel(joint=segment, axis="x")
+            of_joint = angles_of.sel(joint=segment, axis="x")
             sd = of_joint["angle_sd"].to_numpy()
             value = np.where(np.isinf(sd), np.nan, sign * of_joint["angle"].to_numpy())
             bends.setdefault(label.split()[0], []).append(_series(label, "°", value, sd))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import logging
 import os
 import pickle
 import sys
@@ -27,6 +28,7 @@ from numba.misc.appdirs import AppDirs
 
 from airborne.kernels.digest import digest_of
 
+_LOG = logging.getLogger(__name__)
 _PYTHON = f"py{sys.version_info.major}{sys.version_info.minor}"
 _KERNELS_OF: dict[Path, list[Dispatcher]] = defaultdict(list)  # by source file
 
@@ -55,6 +57,7 @@ class KernelCache(_Cache):
         try:
             payload = pickle.loads(path.read_bytes())
         except (OSError, EOFError, pickle.UnpicklingError):
+            _say_that_it_compiles()
             return None
         return CompileResult._rebuild(target_context, *payload)
 
@@ -90,6 +93,12 @@ class KernelCache(_Cache):
             return None
         key = repr((normalize_signature(sig), codegen.magic_tuple()))  # types, and the processor
         return Path(self.cache_path, f"{_stem(self._kernel)}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.nbc")
+
+
+@functools.cache
+def _say_that_it_compiles() -> None:
+    """Log it, once a process."""
+    _LOG.info("compiling for this processor, once: up to a minute in all, kept for later runs")
 
 
 def _stem(kernel: Dispatcher) -> str:

@@ -13,7 +13,7 @@ from airborne.motion.joints import JointStatus, joint_angles, joint_statuses, la
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.jump import Jump
 from airborne.motion.jumps.table import write_jumps
-from airborne.motion.motion import Motion, dataset
+from airborne.motion.motion import Motion
 from airborne.motion.players import PlayersMotion, PlayersWriter, read_players, write_players_parquet
 from airborne.motion.tables import write_angles, write_flight, write_joint_angles, write_joints, write_motion_parquet
 
@@ -25,7 +25,6 @@ __all__ = [
     "MotionWriter",
     "PlayersMotion",
     "PlayersWriter",
-    "dataset",
     "drop_rows",
     "flight_summary",
     "has_inertias",

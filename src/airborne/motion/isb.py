@@ -9,10 +9,9 @@ that its angles have the meaning of the right side's.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from airborne.body import BodyModel
 from airborne.geometry.axis_sequences import angles_from_rotation, continue_angles, is_singular, sequence_angles
@@ -21,6 +20,9 @@ from airborne.motion.joints import OPEN_SD_RAD, require_body
 from airborne.motion.motion import Motion
 from airborne.motion.uncertainty import propagate_variances, standard_deviation
 from airborne.types import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _X, _Y, _Z = np.array([0.0, -1, 0]), np.array([0.0, 0, 1]), np.array([-1.0, 0, 0])  # ISB's axes in those of the body
 _WRIST_X, _WRIST_Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])  # palms toward the thighs
@@ -58,6 +60,8 @@ def isb_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
     Of the segments of `human18`; of others NaN, and no sequence. An upper arm's are those against the thorax. Standard
     deviations and singular frames as of `joint_angles`. Raises ResultError for another body's motion.
     """
+    import xarray as xr
+
     require_body(motion, model)
     angles, variance = np.full((2, len(motion), len(motion.joints), 3), np.nan)
     singular, names = np.zeros(angles.shape[:2], bool), [""] * len(motion.joints)

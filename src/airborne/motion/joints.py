@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import StrEnum
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel
@@ -22,6 +22,9 @@ from airborne.geometry.rotations import (
 from airborne.motion.motion import Motion
 from airborne.motion.uncertainty import propagate_variances, standard_deviation
 from airborne.types import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 OPEN_SD_RAD = 0.5  # of an angle that counts as unobserved
 _UNCERTAIN_SD_M = 0.05  # of a landmark; the same as of a whole body
@@ -112,6 +115,8 @@ def joint_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
     the angle, NaN where unknown, and within 5 degrees of y = +-90 (`is_singular`), where x and z are ambiguous.
     Raises ResultError for another body's motion.
     """
+    import xarray as xr
+
     require_body(motion, model)
     radians = continuous_angles(motion)
     matrix = matrix_from_angles(radians)

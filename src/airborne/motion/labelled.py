@@ -1,4 +1,4 @@
-"""Joints, angles and jumps as labelled arrays: time in seconds, joints by name, units in the attributes."""
+"""The root, joints, angles and jumps as labelled arrays: time in seconds, joints by name, units in the attributes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from airborne.body import BodyModel
-from airborne.motion.angles import root_angles
+from airborne.motion.angles import ROOT_ANGLES, root_angles
 from airborne.motion.isb import isb_angles
 from airborne.motion.joints import joint_angles, joint_statuses, landmarks
 from airborne.motion.jumps.jump import Jump
@@ -20,6 +20,30 @@ _METRES = {"units": "m", "frame": "world"}
 _SD = {"units": "m", "of": "root mean square of the three axes"}
 _UNITS = {"_m_s": "m/s", "_m": "m", "_s": "s", "_frame": "frames"}  # by the end of a name; the longest first
 _TEXTS = ("status", "standing_source")
+
+
+def label_root(motion: Motion, history: Sequence[str] = ()) -> xr.Dataset:
+    """Label a motion: coordinate `time` [s], units in the attributes, `history` the operations that led to it."""
+    time, vector, angle = ("time",), ("time", "space"), ("time", "joint", "space")
+    variables = {
+        "status": (time, motion.status, {}),
+        "score": (time, motion.score, {"units": "grey levels"}),
+        "n_views": (time, motion.n_views, {"units": "1"}),
+        "position": (vector, motion.position, {"units": "m", "frame": "world"}),
+        "position_sd": (vector, motion.position_sd, {"units": "m", "frame": "world"}),
+        "quaternion": (("time", "component"), motion.quaternion, {"units": "1", "map": "world_from_root"}),
+        "rotation_sd": (vector, motion.rotation_sd, {"units": "rad", "frame": "world"}),
+        "joint_rotation_sd": (angle, motion.joint_rotation_sd, {"units": "rad", "frame": "segment"}),
+        "joint_angle": (angle, motion.joint_angles, {"units": "rad", "order": "x, y, z, body-fixed"}),
+    }
+    coordinates = {
+        "time": (time, motion.time_s, {"units": "s"}),
+        "frame": (time, motion.index),
+        "space": list("xyz"),
+        "component": list("xyzw"),
+        "joint": list(motion.joints),
+    }
+    return xr.Dataset(variables, coordinates, {"history": list(history)})
 
 
 def label_joints(motion: Motion, model: BodyModel) -> xr.Dataset:
@@ -75,7 +99,16 @@ def label_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
     `isb_angles`. Raises ResultError for another body's motion.
     """
     joints = joint_angles(motion, model).rename(is_singular="joint_is_singular")
-    return root_angles(motion).assign(joints.data_vars).assign(isb_angles(motion, model).data_vars)
+    return _label_root_angles(motion).assign(joints.data_vars).assign(isb_angles(motion, model).data_vars)
+
+
+def _label_root_angles(motion: Motion) -> xr.Dataset:
+    angles, columns = root_angles(motion), dict(enumerate(ROOT_ANGLES))
+    variables: dict = {name: ("time", angles.deg[:, k], {"units": "deg"}) for k, name in columns.items()}
+    variables |= {f"{name}_sd": ("time", angles.sd_deg[:, k], {"units": "deg"}) for k, name in columns.items()}
+    variables["is_singular"] = ("time", angles.is_singular)
+    coordinates = {"time": ("time", motion.time_s, {"units": "s"}), "frame": ("time", motion.index)}
+    return xr.Dataset(variables, coordinates, {"history": ["angles: somersault, tilt, twist, unwrapped"]})
 
 
 def label_jumps(jumps: Sequence[Jump]) -> xr.Dataset:

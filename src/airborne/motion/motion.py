@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -137,27 +136,3 @@ def rigid_transform(R: Array, position: Array) -> RigidTransform:
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = R, position
     return RigidTransform(matrix, normalize=False)
-
-
-def dataset(motion: Motion, history: Sequence[str] = ()) -> xr.Dataset:
-    """Label a motion: coordinate `time` [s], units in the attributes, `history` the operations that led to it."""
-    time, vector, angle = ("time",), ("time", "space"), ("time", "joint", "space")
-    variables = {
-        "status": (time, motion.status, {}),
-        "score": (time, motion.score, {"units": "grey levels"}),
-        "n_views": (time, motion.n_views, {"units": "1"}),
-        "position": (vector, motion.position, {"units": "m", "frame": "world"}),
-        "position_sd": (vector, motion.position_sd, {"units": "m", "frame": "world"}),
-        "quaternion": (("time", "component"), motion.quaternion, {"units": "1", "map": "world_from_root"}),
-        "rotation_sd": (vector, motion.rotation_sd, {"units": "rad", "frame": "world"}),
-        "joint_rotation_sd": (angle, motion.joint_rotation_sd, {"units": "rad", "frame": "segment"}),
-        "joint_angle": (angle, motion.joint_angles, {"units": "rad", "order": "x, y, z, body-fixed"}),
-    }
-    coordinates = {
-        "time": (time, motion.time_s, {"units": "s"}),
-        "frame": (time, motion.index),
-        "space": list("xyz"),
-        "component": list("xyzw"),
-        "joint": list(motion.joints),
-    }
-    return xr.Dataset(variables, coordinates, {"history": list(history)})

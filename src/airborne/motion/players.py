@@ -7,10 +7,9 @@ import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from airborne.errors import ResultError
@@ -21,6 +20,9 @@ from airborne.motion.uncertainty import standard_deviation
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate
 from airborne.types import Array
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _UPPER = np.triu_indices(3)  # of the covariance of a position
 _FARTHEST_M = 1e6  # of a joint: no coordinate beyond it
@@ -217,6 +219,8 @@ def _whole_lines_end(path: Path) -> int:
 
 
 def _table(path: Path, n_bytes: int) -> pd.DataFrame:
+    import pandas as pd
+
     types: dict[Hashable, Any] = {
         name: "category" if name in _TEXTS else int if name in _WHOLE else float for name in PLAYERS_COLUMNS
     }

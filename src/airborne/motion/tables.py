@@ -73,11 +73,11 @@ def write_uncertainty(path: Path, motion: Motion, constant: Array) -> None:
 
 def write_angles(path: Path, motion: Motion) -> None:
     """Write angles.csv: frame, time_s, the three angles and their sd in degrees, is_singular (0 or 1)."""
-    table = root_angles(motion)
+    angles = root_angles(motion)
     columns: dict[str, NDArray] = {"frame": motion.index, "time_s": motion.time_s}
-    columns |= {f"{name}_deg": table[name].to_numpy() for name in ROOT_ANGLES}
-    columns |= {f"{name}_deg_sd": table[f"{name}_sd"].to_numpy() for name in ROOT_ANGLES}
-    _write_csv(path, columns | {"is_singular": table["is_singular"].to_numpy().astype(int)})
+    columns |= {f"{name}_deg": angles.deg[:, k] for k, name in enumerate(ROOT_ANGLES)}
+    columns |= {f"{name}_deg_sd": angles.sd_deg[:, k] for k, name in enumerate(ROOT_ANGLES)}
+    _write_csv(path, columns | {"is_singular": angles.is_singular.astype(int)})
 
 
 def write_joints(path: Path, motion: Motion, model: BodyModel) -> None:

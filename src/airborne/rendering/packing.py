@@ -39,6 +39,14 @@ def shift_view(view: NDArray, x0: float, y0: float) -> NDArray:
     return shifted
 
 
+def reduce_view(view: NDArray, scale: tuple[int, int]) -> NDArray:
+    """Return the packed view (18,) of an image reduced by averaging `scale` columns and rows."""
+    reduced = shift_view(view, (scale[0] - 1) / 2, (scale[1] - 1) / 2)
+    reduced[12::3] *= scale[0]
+    reduced[13::3] *= scale[1]
+    return reduced
+
+
 @lru_cache(maxsize=256)
 def pack_lights(lights: Lights, camera: Camera, *, transposed: bool = False) -> NDArray[np.float32]:
     """Pack the lamps for one camera: position, intensity, axis, cosine of the half angle, in camera axes: (l, 8)."""

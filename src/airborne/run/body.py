@@ -13,9 +13,8 @@ from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
 from airborne.body.files import mesh_files, write_body
 from airborne.calibration.from_points import Calibration
 from airborne.cameras import Camera
-from airborne.export import ContactSheet, MatchingPicture, OverlayVideos, headline, write_figures, write_report
-from airborne.export.overlays import OverlaysAs
-from airborne.export.viewer import body_viewer
+from airborne.export import headline
+from airborne.export.overlays import OverlaysAs, OverlayVideos
 from airborne.motion import (
     Motion,
     MotionWriter,
@@ -151,6 +150,9 @@ class BodyRun:
 
     def artists(self, folder: Path, drawn: OverlaysAs) -> Iterator[AbstractContextManager[Any]]:
         """Return what draws the frames while they are tracked."""
+        from airborne.export.matching import MatchingPicture
+        from airborne.export.sheet import ContactSheet
+
         recording, folder_of = self.recording, videos_of if drawn == "videos" else figures_of
         yield OverlayVideos(folder_of(folder), recording.rig, recording.rate, drawn=drawn)
         yield ContactSheet(figures_of(folder) / "through_mask.png", recording.rig)
@@ -201,6 +203,10 @@ class BodyRun:
 
     def write_report(self, folder: Path, summary: dict[str, Any], motion: Motion) -> None:
         """Draw the figures and write the report."""
+        from airborne.export.figures import write_figures
+        from airborne.export.report import write_report
+        from airborne.export.viewer import body_viewer
+
         write_figures(figures_of(folder), motion, self.model)
         if self.found is not None:
             self.found.draw(folder)

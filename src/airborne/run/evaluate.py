@@ -37,8 +37,10 @@ from airborne.evaluation.agreement_text import agreement_table, methods_text, re
 from airborne.evaluation.variables import (
     headline_series,
 )
-from airborne.export import write_figures, write_json, write_report
+from airborne.export import write_json
 from airborne.export.analysis_figures import write_bland_altman, write_identity
+from airborne.export.error_figures import write_digitised, write_errors
+from airborne.export.report import write_report
 from airborne.export.viewer import body_viewer
 from airborne.io.writing import write_text
 from airborne.motion import run_folder
@@ -78,9 +80,11 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
     with open_results(folder):
         summary = _add_to_summary(folder, comparisons)
         if summary and (folder / run_folder.REPORT).is_file():
-            write_figures(
-                run_folder.figures_of(folder), motion, model, truth=true_poses, digitised=clicked, symmetries=symmetry
-            )
+            figures = run_folder.figures_of(folder)
+            if true_poses is not None:
+                write_errors(figures / "errors.png", motion, true_poses, symmetry)
+            if clicked is not None:
+                write_digitised(figures / "digitised.png", motion, clicked, symmetry)
             write_report(folder, summary, body_viewer(folder, motion, model))
     return comparisons
 

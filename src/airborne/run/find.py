@@ -14,7 +14,6 @@ from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene
 from airborne.body import BodyModel, Pose
 from airborne.errors import TrialError, UndecidedError
 from airborne.export import write_json
-from airborne.export.finding import draw_candidates, draw_empty_scene
 from airborne.geometry.rotations import angles_from_matrix
 from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE, figures_of
 from airborne.run.folder import open_results
@@ -57,6 +56,8 @@ class FoundStart:
 
     def draw(self, folder: Path) -> None:
         """Draw the empty scene, what stands out from it and the body there."""
+        from airborne.export.finding import draw_empty_scene
+
         posed = self.model.with_pose(self.finding.candidates[0].pose)
         draw_empty_scene(figures_of(folder) / "empty_scene.png", self.finding.moment, self.scenes, posed)
 
@@ -131,6 +132,8 @@ def take_candidate(trial: Trial, finding: AnySearch, number: int) -> AnySearch:
 
 def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: Path) -> UndecidedError:
     """Write the candidates and return the error that names them."""
+    from airborne.export.finding import draw_candidates
+
     frame, best = finding.moment.frames.index, finding.candidates[0]
     with open_results(folder):
         write_json(folder / CANDIDATES, _describe(model, finding))

@@ -6,6 +6,8 @@ camera: exchanged files agree with each other's cameras, a mirrored image with i
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from itertools import combinations
 
 import cv2
@@ -51,10 +53,8 @@ def refuse_same_files(trial: Trial) -> None:
 
 def refuse_mix_ups(recording: Recording, model: BodyModel, start: Pose) -> None:
     """Raise MistakesError, naming the cameras, where the start's silhouettes fit the videos of other cameras."""
-    images = [
-        _foreground(recording, source, facts, camera)
-        for source, facts, camera in zip(recording.sources, recording.facts, recording.rig, strict=True)
-    ]
+    with ThreadPoolExecutor(len(recording.rig)) as threads:  # most of the time is the decoders', outside Python's lock
+        images = list(threads.map(partial(_foreground, recording), recording.sources, recording.facts, recording.rig))
     silhouettes = [_silhouette(model, start, camera) for camera in recording.rig]
     findings = mix_ups_in(recording.rig.names, images, silhouettes)
     if findings:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from airborne.calibration.from_points import Calibration
-from airborne.export import PlayersOverlayVideos, write_players_report
 from airborne.export.overlays import OverlaysAs
+from airborne.export.players_overlay import PlayersOverlayVideos
 from airborne.motion import PlayersMotion, PlayersWriter, read_players, write_players_parquet
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.table import jump_row, write_jumps
@@ -121,6 +121,8 @@ class PlayersRun:
 
     def write_report(self, folder: Path, summary: dict[str, Any], motion: PlayersMotion) -> None:
         """Write the report."""
+        from airborne.export.players_report import write_players_report
+
         write_players_report(folder, summary, motion)
 
     def _summary(self, motion: PlayersMotion) -> dict[str, Any]:

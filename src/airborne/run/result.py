@@ -16,8 +16,7 @@ from airborne.errors import AirborneError, ResultError, require_choice
 from airborne.export.figures import flight_figure, joints_figure, pose_figure
 from airborne.export.players_report import heights_figure
 from airborne.motion import Motion, PlayersMotion, measure_flight, measure_jumps
-from airborne.motion.labelled import label_angles, label_joints, label_jumps, label_players
-from airborne.motion.motion import dataset
+from airborne.motion.labelled import label_angles, label_joints, label_jumps, label_players, label_root
 from airborne.motion.run_folder import holds_players, read_body_run, read_players_run, read_summary
 
 _FIGURES = {"joints": joints_figure, "flight": flight_figure}
@@ -90,7 +89,7 @@ class Run:
     @cached_property
     def root(self) -> xr.Dataset:
         """The body's root: `position` (time, space) [m], `quaternion` (time, component), their sd, `score`."""
-        return dataset(self.motion)
+        return label_root(self.motion)
 
     @cached_property
     def joints(self) -> xr.Dataset:

@@ -22,6 +22,7 @@ from airborne.io.folder_lock import sole_writer
 from airborne.motion import Motion, PlayersMotion
 from airborne.motion.run_folder import CALIBRATION, SUMMARY
 from airborne.run.body import BodyRun
+from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart, find_start
 from airborne.run.find_players import FoundPlayers, find_players_start
 from airborne.run.folder import list_tables, prepare_folder, run_identity
@@ -177,6 +178,7 @@ def _track(
         done = subject.read_done(folder) if resume else {}
         writer = stack.enter_context(subject.writer(folder, resume=resume))
         artists = [stack.enter_context(artist) for artist in subject.artists(folder, drawn)] if drawn else []
+        drawing = stack.enter_context(DrawingThread(partial(subject.draw, artists))) if drawn else None
 
         most = 0
 
@@ -195,7 +197,8 @@ def _track(
                     delays_s.append(time.monotonic() - recording.arrival_s)
                 outages.add(observed)
                 subject.keep(observed)
-                subject.draw(artists, observed, estimate)
+                if drawing is not None:
+                    drawing.put(observed, estimate)
                 tick(number)
         except KeyboardInterrupt:
             if not delays_s:  # only a live run ends like this

@@ -73,7 +73,8 @@ def _bounding_points(geometry, R, t):
             _place(R, t, geometry.polygon_segment[p], geometry.corners[n], points[n])
     for n in range(8 * n_ellipsoids):
         e, signs = n // 8, n % 8
-        local[:] = geometry.ellipsoid_centre[e]
+        for i in range(3):
+            local[i] = geometry.ellipsoid_centre[e, i]
         for axis in range(3):
             half = (
                 geometry.ellipsoid_semi_axes[e, axis] if (signs >> axis) & 1 else -geometry.ellipsoid_semi_axes[e, axis]

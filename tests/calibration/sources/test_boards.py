@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -37,6 +38,16 @@ def test_corners_are_where_the_board_has_them(board, turn_deg):
     off = np.linalg.norm(sighting.px - expected[sighting.corner], axis=1)
     assert np.median(off) < 0.4
     assert off.max() < 1.2
+
+
+def test_a_chessboard_that_the_finder_by_sectors_misses_is_found_by_the_other(monkeypatch):
+    monkeypatch.setattr(cv2, "findChessboardCornersSB", lambda grey, size, flags: (False, None))
+    place = facing((10, 20, -15))
+    place = RigidTransform.from_translation(-place.apply(CHESS.corners.mean(axis=0))) * place
+    sighting = board_detector(CHESS)(photographed(CHESS, CAMERA, place))
+    off = np.linalg.norm(sighting.px - CAMERA.px_from_world(place.apply(CHESS.corners))[sighting.corner], axis=1)
+    assert len(sighting.corner) == len(CHESS.corners)
+    assert off.max() < 0.4
 
 
 def test_an_image_without_the_board_shows_nothing():

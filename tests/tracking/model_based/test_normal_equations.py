@@ -12,9 +12,9 @@ from airborne.rendering.maps import empty_maps
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.blur import RADIUS_PX, blur_planes, gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, root_only
-from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, Paint, Projection, Window
-from airborne.tracking.model_based.normal_equations import photometric_equations, silhouette_equations
-from airborne.tracking.model_based.owners import REACH_PX, find_owners, mask_window
+from airborne.tracking.model_based.kernel_arguments import Comparison, Paint, Projection, Window
+from airborne.tracking.model_based.normal_equations import observe, photometric_equations, silhouette_equations
+from airborne.tracking.model_based.owners import REACH_PX, find_owners, mask_box
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.twist_equations import Sums, new_blocks
 from tests.support.scenes import FIGURE, Scene, standing
@@ -58,14 +58,13 @@ def test_blur_leaves_an_even_plane_alone():
     np.testing.assert_allclose(out, 0.7, atol=SINGLE)
 
 
-def test_window_holds_the_mask_and_the_blurs_reach_and_stops_at_the_edge():
+def test_box_holds_the_mask():
     part = np.full((60, 80), -1, np.int16)
-    assert mask_window(part) == (0, 0, 0, 0)
+    assert mask_box(part) == (0, 0, 0, 0)
     part[30, 40] = 0
-    x0, y0, x1, y1 = mask_window(part)
-    assert (40 - x0, x1 - 41, 30 - y0, y1 - 31) == (RADIUS_PX + 3,) * 4
+    assert mask_box(part) == (40, 30, 41, 31)
     part[0, 79] = part[59, 0] = 1
-    assert mask_window(part) == (0, 0, 80, 60)
+    assert mask_box(part) == (0, 0, 80, 60)
 
 
 class SingleView:
@@ -93,8 +92,8 @@ class SingleView:
     def photometric(self, pose, iterations=0, clip=NO_CLIP):
         """The equations and the squared residual; the light stays as it was fitted at the truth."""
         render_model, certainty = self._render_model, np.ones(self._region.rgb.shape[:2], np.float32)
-        observation = Observation(self._observed, self._background, certainty)
         body, projection, comparison, maps = self._common(pose, clip)
+        observation = observe(self._observed, self._background, certainty, comparison)
         paint = Paint(render_model.albedo, render_model.is_faceted)
         sums, blocks = Sums.zero(len(render_model.model.segments)), self._blocks()
         _, total, _ = photometric_equations(
@@ -106,7 +105,7 @@ class SingleView:
         """The equations against the true mask, as probabilities."""
         mask = (self._render_model.draw_parts(self.with_pose(self.truth), self._region) >= 0).astype(np.float32)
         body, projection, comparison, maps = self._common(pose, 0.5)
-        observation = Observation(mask[None], np.zeros((1, *mask.shape), np.float32), np.ones_like(mask))
+        observation = observe(mask[None], np.zeros((1, *mask.shape), np.float32), np.ones_like(mask), comparison)
         sums, blocks = Sums.zero(len(self._render_model.model.segments)), self._blocks()
         silhouette_equations(body, projection, observation, comparison, maps, sums, blocks)
         return self._map_to_dofs(pose, sums)

@@ -236,5 +236,5 @@ def _read_grey_image(path: Path) -> Image:
     except cv2.error:
         grey = None
     if grey is None:
-        raise CalibrationError(f"{path} cannot be read as an image; convert it to PNG or JPEG")
+        raise CalibrationError(f"{path} cannot be read as an image, or is too large for one; convert it to PNG or JPEG")
     return np.asarray(grey, np.uint8)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from airborne.body import BodyModel
 from airborne.constants import GRAVITY_M_S2
@@ -16,6 +16,9 @@ from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
 from airborne.motion.uncertainty import propagate_variances, standard_deviation
 from airborne.types import Array, Triple
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +59,8 @@ def measure_flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr
     A rotation that the images do not constrain counts as uniform over the circle. Raises BodyError where a segment has
     no inertia, ResultError for another body's motion.
     """
+    import xarray as xr
+
     require_body(motion, model)
     missing = [segment.name for segment in model.segments if segment.inertia is None]
     if missing:
@@ -65,16 +70,16 @@ def measure_flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr
         com[row], jacobian = centre_of_mass(model.with_pose(motion.pose(row)))
         variance[row] = propagate_variances(jacobian, limit_rotation_variance(motion.covariance[row]))
     momentum, momentum_variance = angular_momenta(motion, model, window)
-    angles = root_angles(motion)
+    somersault, tilt, twist = root_angles(motion).deg.T
     axes, units = ("time", "space"), "kg m2/s"
     variables = {
         "com": (axes, com, {"units": "m", "frame": "world"}),
         "com_sd": (axes, standard_deviation(variance), {"units": "m", "frame": "world"}),
         "angular_momentum": (axes, momentum, {"units": units, "frame": "world", "about": "centre of mass"}),
         "angular_momentum_sd": (axes, standard_deviation(momentum_variance), {"units": units, "frame": "world"}),
-        "somersault": ("time", angles["somersault"].to_numpy() / 360, {"units": "rev"}),
-        "twist": ("time", angles["twist"].to_numpy() / 360, {"units": "rev"}),
-        "tilt": ("time", angles["tilt"].to_numpy(), {"units": "deg"}),
+        "somersault": ("time", somersault / 360, {"units": "rev"}),
+        "twist": ("time", twist / 360, {"units": "rev"}),
+        "tilt": ("time", tilt, {"units": "deg"}),
     }
     coordinates = {
         "time": ("time", motion.time_s, {"units": "s"}),

@@ -7,6 +7,8 @@ import numpy as np
 from airborne.kernels import kernel
 
 RADIUS_PX = 4  # radius of the blur: three sds of the widest one used
+RING = 2 * RADIUS_PX + 1  # rows that a blur needs at once
+_LEAST_TAP = 1e-5  # less is below the rounding of what is blurred, 8 bits
 
 
 def gaussian_taps(sigma_px: float) -> np.ndarray:
@@ -50,3 +52,31 @@ def blur_planes(planes, taps_u, taps_v, out):
                     + v3 * (rows[y + 1, x] + rows[y + 7, x])
                     + v4 * (rows[y, x] + rows[y + 8, x])
                 )
+
+
+@kernel(fastmath=True, is_inner=True)
+def blur_row(ring, y, taps_u, taps_v, middle, out):
+    """Blur row y of n numbers, planes side by side; `ring` (9, n) holds it at y % 9, and the rows around it too.
+
+    Fills out (n,), but for its ends. Where planes meet, within RADIUS_PX, the result is of both. middle (n,) is
+    overwritten.
+    """
+    n, row, v = len(middle), ring[y % RING], taps_v[0]
+    for x in range(n):
+        middle[x] = v * row[x]
+    for i in range(1, RADIUS_PX + 1):
+        v = taps_v[i]
+        if v < _LEAST_TAP:
+            break
+        above, below = ring[(y - i) % RING], ring[(y + i) % RING]
+        for x in range(n):
+            middle[x] += v * (above[x] + below[x])
+    u0, u1, u2, u3, u4 = taps_u[0], taps_u[1], taps_u[2], taps_u[3], taps_u[4]
+    for x in range(n - 2 * RADIUS_PX):
+        out[x + 4] = (
+            u0 * middle[x + 4]
+            + u1 * (middle[x + 3] + middle[x + 5])
+            + u2 * (middle[x + 2] + middle[x + 6])
+            + u3 * (middle[x + 1] + middle[x + 7])
+            + u4 * (middle[x] + middle[x + 8])
+        )

@@ -88,19 +88,20 @@ def fit_silhouettes(
     taps = gaussian_taps(_COARSE_SIGMA_PX)
     correlated = 4 * np.pi * _COARSE_SIGMA_PX**2
     for reduction, steps in levels:
-        posed = render_model.with_pose(pose)
         views = [
-            silhouette_buffers(render_model, posed, region, posterior=posterior, reduction=reduction)
+            silhouette_buffers(region, posterior, reduction, taps=taps, clip=_CLIP_MASK)
             for region, posterior in zip(regions, posteriors, strict=True)
         ]
-        views = [view for view in views if view.is_visible]
+        empty_cost = sum(view.empty_cost for view in views)
 
-        def evaluate(pose: Pose, _: bool, views: list[ViewBuffers] = views) -> PoseEquations:
+        def evaluate(
+            pose: Pose, _: bool, views: list[ViewBuffers] = views, empty_cost: float = empty_cost
+        ) -> PoseEquations:
             posed, n = render_model.with_pose(pose), len(render_model.model.segments)
-            sums, totals, blocks = Sums.zero(n), np.zeros(3), []
+            sums, totals, blocks = Sums.zero(n), np.array([empty_cost, 0.0, 0.0]), []
             for view in views:
                 blocks.append(_blocks(view, n))
-                comparison = Comparison(view.window, taps, taps, _CLIP_MASK)
+                comparison = Comparison(view.whole, taps, taps, _CLIP_MASK)
                 args = render_model.body, view.projection(posed), view.observation, comparison, view.maps
                 totals += np.array(silhouette_equations(*args, sums, blocks[-1]))
             return map_to_dofs(
@@ -160,26 +161,22 @@ def rises_without(
     others: the same body without each segment. Light and noise are those of the whole body, and only the pixels around
     those that the segment covers are compared: no others change.
     """
-    view, n = image_buffers(render_model, [posed], region, appearance), len(render_model.model.segments)
+    view, n = image_buffers(render_model, region, appearance), len(render_model.model.segments)
     rises = np.zeros(len(others))
-    if not view.is_visible:
-        return rises
-    rows_sigma_px = max(_FINE_SIGMA_PX * region.aspect, 0.5)
-    taps = gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(rows_sigma_px)
+    comparison, rows_sigma_px = _comparison(render_model, view, region)
+    view = view.observe(comparison)
 
     def totals(posed: PosedBody, window: Window, iterations: int) -> Array:
-        part = view._replace(window=window)
-        sums, blocks = Sums.zero(n), _blocks(part, n)
-        args = render_model, posed, part
-        return _add_image_equations(*args, taps=taps, iterations=iterations, sums=sums, blocks=blocks)
+        args = render_model, posed, view, comparison._replace(window=window)
+        return _add_image_equations(*args, iterations=iterations, sums=Sums.zero(n), blocks=_blocks(view, n))
 
-    _, total, weight = totals(posed, view.window, 3)
+    _, total, weight = totals(posed, view.whole, 3)
     noise = max(4 * np.pi * _FINE_SIGMA_PX * rows_sigma_px * total / weight, 1e-9) if weight > 0 else 1.0
     drawn = view.maps.part
     owner = np.where(drawn < 0, -1, render_model.segment_of_part[drawn])
     for k, (segment, other) in enumerate(others.items()):
         if (owner == segment).any():
-            window = _window_around(owner == segment, view.window)
+            window = _window_around(owner == segment, view.whole)
             rises[k] = 0.5 * (totals(other, window, 0)[0] - totals(posed, window, 0)[0]) / noise
     return rises
 
@@ -197,24 +194,27 @@ def image_evaluator(
     The function's second argument says whether the light is fitted for the first time.
     """
     bodies = [render_model.with_pose(pose) for pose in poses]
-    views_and_regions = [(image_buffers(render_model, bodies, region, appearance), region) for region in regions]
-    views_and_regions = [(view, region) for view, region in views_and_regions if view.is_visible]
-    rows_sigma_px = [max(_FINE_SIGMA_PX * region.aspect, 0.5) for _, region in views_and_regions]
-    taps = [(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma)) for sigma in rows_sigma_px]
+    views, comparisons, rows_sigma_px, shifts = [], [], [], [shift_sds_px(region) for region in regions]
+    for region in regions:
+        view = image_buffers(render_model, region, appearance)
+        comparison, sigma_px = _comparison(render_model, view, region)
+        views.append(view.observe(comparison))
+        comparisons.append(comparison)
+        rows_sigma_px.append(sigma_px)
+    empty_cost = sum(view.empty_cost for view in views)
     correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px or [_FINE_SIGMA_PX]))
-    shifts = [shift_sds_px(region) for _, region in views_and_regions]
-    shape_px = [_shape_error_px(view, bodies[0]) for view, _ in views_and_regions] if dofs.moves_joints else []
+    shape_px = [_shape_error_px(view, bodies[0]) for view in views] if dofs.moves_joints else []
     shared = max(correlated, float(np.mean(shape_px or [0.0])))
 
     def evaluate(pose: Pose, is_first: bool) -> PoseEquations:
         posed, n = render_model.with_pose(pose), len(render_model.model.segments)
-        sums, totals, blocks, shifted = Sums.zero(n), np.zeros(3), [], []
-        for (view, _), each_taps, shift in zip(views_and_regions, taps, shifts, strict=True):
+        sums, totals, blocks, shifted = Sums.zero(n), np.array([empty_cost, 0.0, 0.0]), [], []
+        for view, comparison, shift in zip(views, comparisons, shifts, strict=True):
             sums.B[:] = 0
             blocks.append(_blocks(view, n))
             iterations = 3 if is_first else 1
             totals += _add_image_equations(
-                render_model, posed, view, taps=each_taps, iterations=iterations, sums=sums, blocks=blocks[-1]
+                render_model, posed, view, comparison, iterations=iterations, sums=sums, blocks=blocks[-1]
             )
             shifted.append(np.moveaxis(sums.B * shift, 2, 0))
             if dofs.moves_joints:
@@ -239,20 +239,26 @@ def _add_image_equations(
     render_model: RenderModel,
     posed: PosedBody,
     view: ViewBuffers,
+    comparison: Comparison,
     *,
-    taps: tuple[Array, Array],
     iterations: int,
     sums: Sums,
     blocks: Array,
 ) -> Array:
-    """Add one view's equations; return the cost, the weighted squared residual and the weight."""
-    comparison = Comparison(view.window, *taps, _CLIP if render_model.lights is None else _CLIP_LIT)
+    """Add one view's equations; return the cost, less an empty image's, the weighted squared residual, the weight."""
     args = render_model.body, view.projection(posed), view.observation, comparison, view.maps
     if render_model.lights is None:
         paint = Paint(render_model.albedo, render_model.is_faceted)
         return np.array(photometric_equations(*args, paint, view.light, iterations, sums, blocks))
     lamps, ambient = view.light
     return np.array(equations_of_known_light(*args, render_model.is_faceted, lamps, ambient, sums, blocks))
+
+
+def _comparison(render_model: RenderModel, view: ViewBuffers, region: Region) -> tuple[Comparison, float]:
+    """Return how the whole of a view is compared, and the sd of the blur along its columns [px]."""
+    sigma_px = max(_FINE_SIGMA_PX * region.aspect, 0.5)
+    clip = _CLIP if render_model.lights is None else _CLIP_LIT
+    return Comparison(view.whole, gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma_px), clip), sigma_px
 
 
 def _shape_error_gradients(B: Array, posed: PosedBody, view: ViewBuffers) -> Array:
@@ -284,5 +290,4 @@ def _window_around(pixels: NDArray[np.bool_], whole: Window) -> Window:
 
 
 def _blocks(view: ViewBuffers, n_segments: int) -> Array:
-    x0, y0, x1, y1 = view.window
-    return new_blocks(x1 - x0, y1 - y0, n_segments)
+    return new_blocks(view.whole.x1, view.whole.y1, n_segments)

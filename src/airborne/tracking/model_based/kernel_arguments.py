@@ -39,14 +39,6 @@ class Projection(NamedTuple):
     origin: Any  # (3,) [m] of all twists
 
 
-class Observation(NamedTuple):
-    """A view's image, of c channels."""
-
-    observed: Any  # (c, H, W)
-    background: Any  # (c, H, W)
-    certainty: Any  # (H, W) factor 0..1 of each pixel's weight
-
-
 class Comparison(NamedTuple):
     """How an image is compared."""
 
@@ -54,3 +46,12 @@ class Comparison(NamedTuple):
     taps_u: Any  # (5,) of the blur along rows
     taps_v: Any  # (5,) along columns
     clip: float  # the residual at which a pixel's weight has fallen to a quarter
+
+
+class Observation(NamedTuple):
+    """A view's image, of c channels."""
+
+    observed: Any  # (c, H, W)
+    background: Any  # (c, H, W)
+    certainty: Any  # (H, W) factor 0..1 of each pixel's weight
+    rows: Any = None  # (H, 2 c + 2, W + LANES) of `observe`

@@ -5,26 +5,24 @@ from __future__ import annotations
 import numpy as np
 
 from airborne.kernels import kernel
-from airborne.tracking.model_based.blur import RADIUS_PX
 from airborne.tracking.model_based.kernel_arguments import Window
 
 REACH_PX = 3  # an edge matters this far away: most of the blur's weight
-_PAD_PX = RADIUS_PX + 3  # beyond it, the blurred mask is zero
 
 
 @kernel(fastmath=True)
-def mask_window(part):
-    """Return the padded window around the body's pixels of a map of parts (h, w); all 0 where there is none."""
+def mask_box(part):
+    """Return the box x0, y0, x1, y1 around the body's pixels of a map of parts (h, w); all 0 where there is none."""
     h, w = part.shape
-    x0, y0, x1, y1 = w, h, -1, -1
+    x0, y0, x1, y1 = w, h, 0, 0
     for y in range(h):
+        first, last = w, 0
         for x in range(w):
-            if part[y, x] >= 0:
-                x0, x1 = min(x0, x), max(x1, x)
-                y0, y1 = min(y0, y), max(y1, y)
-    if x1 < 0:
-        return Window(0, 0, 0, 0)
-    return Window(max(x0 - _PAD_PX, 0), max(y0 - _PAD_PX, 0), min(x1 + _PAD_PX + 1, w), min(y1 + _PAD_PX + 1, h))
+            is_body = part[y, x] >= 0
+            first, last = min(first, x if is_body else w), max(last, x + 1 if is_body else 0)
+        if last > 0:
+            x0, x1, y0, y1 = min(x0, first), max(x1, last), min(y0, y), y + 1
+    return Window(x0, y0, x1, y1) if x1 > 0 else Window(0, 0, 0, 0)
 
 
 @kernel(fastmath=True)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from airborne.appearance.model import Appearance
 from airborne.body import Pose
+from airborne.body.chain import delta_between
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit
 from airborne.tracking.model_based.gauss_newton import NEAR
 from airborne.tracking.model_based.global_search import SearchRange, search_globally
@@ -13,14 +16,23 @@ from airborne.tracking.model_based.later_frames import regions_near
 from airborne.video import Frames
 
 _N_FITTED = 3  # of the poses found
+_N_CONFIRM = 2  # of the best poses found that lead back to a fit confirm it
+_SAME_M, _SAME_RAD = 0.008, 0.035  # silhouettes and images of a right fit agree this closely
 
 
 def recover(
-    fitter: Fitter, predicted: Sequence[Pose], frames: Frames, appearance: Appearance, *, gap_s: float
+    fitter: Fitter,
+    predicted: Sequence[Pose],
+    frames: Frames,
+    appearance: Appearance,
+    *,
+    gap_s: float,
+    suspect: Pose | None = None,
 ) -> JudgedFit | None:
     """Fit from the poses that a search finds, without a prior; None where no view shows any of them.
 
-    gap_s: the time since the body was last found.
+    gap_s: the time since the body was last found. suspect: a pose fitted here before that may be right; None is
+    returned, too, where the best poses found lead back to it.
     """
     search_range = SearchRange.after(gap_s)
     candidates = search_globally(fitter.render_model, predicted, frames, appearance, search_range=search_range)
@@ -31,7 +43,16 @@ def recover(
     def evidence(pose: Pose) -> float:
         return fitter.agreement(pose, learned).evidence
 
-    poses = [fitter.fit_silhouettes(pose, learned, NEAR, None) for pose in candidates]
+    poses = [fitter.fit_silhouettes(pose, learned, NEAR, None) for pose in candidates[:_N_CONFIRM]]
+    if suspect is not None and all(_is_same(pose, suspect) for pose in poses):
+        return None
+    poses += [fitter.fit_silhouettes(pose, learned, NEAR, None) for pose in candidates[_N_CONFIRM:]]
     best = sorted(poses, key=evidence, reverse=True)[:_N_FITTED]
     fit = max((fitter.fit_images([pose], learned, None) for pose in best), key=lambda fit: evidence(fit.pose))
     return fitter.judge(fit, candidates, learned, None)
+
+
+def _is_same(pose: Pose, other: Pose) -> bool:
+    delta = delta_between(pose, other)
+    rotations = np.linalg.norm(delta[3:].reshape(-1, 3), axis=1)
+    return bool(np.linalg.norm(delta[:3]) < _SAME_M and np.all(rotations < _SAME_RAD))

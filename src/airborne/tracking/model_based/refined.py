@@ -140,7 +140,8 @@ class RefinedTracker:
         found = fit_next(*args, reference=state.reference, prior=prior)
         if found is not None and not found.agreement.is_suspect(state.reference):
             return found
-        recovered = recover(*args, gap_s=gap_s)
+        suspect = None if found is None or found.agreement.is_poor(state.reference) else found.fit.pose
+        recovered = recover(*args, gap_s=gap_s, suspect=suspect)
         if found is None or recovered is None:
             return found or recovered
         return recovered if recovered.agreement.evidence > found.agreement.evidence else found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -18,16 +17,15 @@ from airborne.body.symmetry import continuous_axes
 from airborne.cameras import Camera
 from airborne.rendering import Lights, pose_segments
 from airborne.rendering.maps import SurfaceMaps, empty_maps, surface_maps
-from airborne.rendering.packing import pack_lights, pack_view
+from airborne.rendering.packing import pack_lights, pack_view, reduce_view
 from airborne.rendering.shapes import new_shapes
 from airborne.rendering.srgb import light_from_srgb
 from airborne.tracking.covariance import SHIFT_SD_PX
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom
-from airborne.tracking.model_based.kernel_arguments import Observation, PackedBody, Projection, Window
-from airborne.tracking.model_based.owners import mask_window
+from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, PackedBody, Projection, Window
+from airborne.tracking.model_based.normal_equations import observe
 from airborne.types import Array
 
-_ROOM_PX = 12  # by which a body may move within a window, beyond the blur's radius
 _TO_SHARE = (np.arange(1024) / 1023).astype(np.float32)  # sRGB as shares of full, for `light_planes`
 
 
@@ -88,21 +86,6 @@ class RenderModel:
         surface_maps(self.shapes, self.geometry, posed.R, posed.t, region.packed_view, *maps)
         return maps.part
 
-    def window(self, bodies: Sequence[PosedBody], camera: Camera, packed: Array) -> Window:
-        """Return the part of an image that holds the bodies with room to move; empty where none is visible."""
-        maps = empty_maps(camera.size)
-        windows = []
-        for posed in bodies:
-            surface_maps(self.shapes, self.geometry, posed.R, posed.t, packed, *maps)
-            windows.append(mask_window(maps.part))
-        windows = np.array([window for window in windows if window[2] > window[0]])
-        if not len(windows):
-            return Window(0, 0, 0, 0)
-        (x0, y0), (x1, y1) = windows[:, :2].min(axis=0).tolist(), windows[:, 2:].max(axis=0).tolist()
-        width, height = camera.size
-        room_v = round(_ROOM_PX * camera.K[1, 1] / camera.K[0, 0])
-        return Window(max(x0 - _ROOM_PX, 0), max(y0 - room_v, 0), min(x1 + _ROOM_PX, width), min(y1 + room_v, height))
-
 
 def _symmetry_axes(model: BodyModel) -> dict[int, Array]:
     """Find the end segments that have an axis of symmetry through their joint."""
@@ -122,23 +105,30 @@ class ViewBuffers(NamedTuple):
     K: Array
     observation: Observation
     maps: SurfaceMaps  # workspace
-    window: Window
     light: Any = None  # (3, LIGHT_TERMS) to be fitted, or lamps (l, 8) and the ambient light
 
     @property
-    def is_visible(self) -> bool:
-        """Whether the body is in the image."""
-        x0, y0, x1, y1 = self.window
-        return x1 - x0 >= 3 and y1 - y0 >= 3
+    def whole(self) -> Window:
+        """The whole image."""
+        height, width = self.maps.part.shape
+        return Window(0, 0, width, height)
+
+    @property
+    def empty_cost(self) -> float:
+        """What the image costs without a body, once it is prepared for a comparison."""
+        return float(self.observation.rows[:, -1].sum())
+
+    def observe(self, comparison: Comparison) -> ViewBuffers:
+        """Return the view prepared for a comparison."""
+        seen = self.observation
+        return self._replace(observation=observe(seen.observed, seen.background, seen.certainty, comparison))
 
     def projection(self, posed: PosedBody) -> Projection:
         """Project a body to this view; twists are about its root's origin."""
         return Projection(posed.R, posed.t, self.packed_view, self.K, posed.t[0])
 
 
-def image_buffers(
-    render_model: RenderModel, bodies: Sequence[PosedBody], region: Region, appearance: Appearance
-) -> ViewBuffers:
+def image_buffers(render_model: RenderModel, region: Region, appearance: Appearance) -> ViewBuffers:
     """Prepare a region: in linear light where the lights are unknown, in shares of full sRGB where they are known."""
     mean, sd, n_observations = appearance.background_pixels(region)
     background = np.empty_like(mean)
@@ -154,31 +144,42 @@ def image_buffers(
         light[:, 0] = 1
     else:
         light = pack_lights(render_model.lights, region.camera), np.float32(render_model.lights.ambient)
-    window = render_model.window(bodies, region.camera, region.packed_view)
     maps = empty_maps(region.camera.size)
     observation = Observation(observed, background_light, certainty)
-    return ViewBuffers(region.packed_view, region.camera.K, observation, maps, window, light)
+    return ViewBuffers(region.packed_view, region.camera.K, observation, maps, light)
 
 
-def silhouette_buffers(
-    render_model: RenderModel, posed: PosedBody, region: Region, *, posterior: Array, reduction: int
-) -> ViewBuffers:
-    """Prepare a region and its posterior, reduced."""
-    camera, plane = reduce_region(region, posterior, reduction)
+def silhouette_buffers(region: Region, posterior: Array, reduction: int, *, taps: Array, clip: float) -> ViewBuffers:
+    """Prepare a region and its posterior, reduced, for a comparison of masks."""
+    rows = _rows_of(region, reduction)
+    plane = _reduce_plane(posterior, reduction, rows)
+    K = region.camera.K.copy()
+    K[:2, 2] -= (reduction - 1) / 2, (rows - 1) / 2
+    K[0] /= reduction
+    K[1] /= rows
+    packed = reduce_view(region.packed_view, (reduction, rows))
     observation = Observation(plane[None], np.zeros((1, *plane.shape), np.float32), np.ones_like(plane))
-    packed = pack_view(camera)
-    window = render_model.window([posed], camera, packed)
-    return ViewBuffers(packed, camera.K, observation, empty_maps(camera.size), window)
+    view = ViewBuffers(packed, K, observation, empty_maps((plane.shape[1], plane.shape[0])))
+    return view.observe(Comparison(view.whole, taps, taps, clip))
 
 
 def reduce_region(region: Region, plane: Array, reduction: int) -> tuple[Camera, NDArray[np.float32]]:
     """Reduce a plane (h, w) of a region by averaging areas to about square pixels; return its camera and itself."""
-    rows = max(1, round(reduction * region.aspect))
+    rows = _rows_of(region, reduction)
+    small = _reduce_plane(plane, reduction, rows)
+    middle, size = ((reduction - 1) / 2, (rows - 1) / 2), (small.shape[1], small.shape[0])
+    return region.camera.resample(scale=(reduction, rows), offset=middle, size=size), small
+
+
+def _rows_of(region: Region, reduction: int) -> int:
+    return max(1, round(reduction * region.aspect))
+
+
+def _reduce_plane(plane: Array, reduction: int, rows: int) -> NDArray[np.float32]:
     height, width = plane.shape
     size = (max(width // reduction, 1), max(height // rows, 1))
     small = cv2.resize(plane[: size[1] * rows, : size[0] * reduction], size, interpolation=cv2.INTER_AREA)
-    middle = ((reduction - 1) / 2, (rows - 1) / 2)
-    return region.camera.resample(scale=(reduction, rows), offset=middle, size=size), np.asarray(small, np.float32)
+    return np.asarray(small, np.float32)
 
 
 def shift_sds_px(region: Region) -> Array:

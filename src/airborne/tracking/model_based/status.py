@@ -55,6 +55,10 @@ class MaskAgreement:
         """Whether a global search is worth while."""
         return self.falls_short(reference, _SEARCH)
 
+    def is_poor(self, reference: Reference) -> bool:
+        """Whether the fit is uncertain, and most likely wrong."""
+        return self.falls_short(reference, _UNCERTAIN)
+
     def falls_short(self, reference: Reference, shares: tuple[float, float]) -> bool:
         """Whether precision or recall are below these shares of the reference's."""
         return self.precision < shares[0] * reference.precision or self.recall < shares[1] * reference.recall

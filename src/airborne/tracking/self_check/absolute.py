@@ -78,10 +78,13 @@ def _change(before: View, after: View, chosen: NDArray[np.bool_]) -> Array:
     y0, y1 = max(rows[0] - _SEARCH_PX, 0), min(rows[-1] + 1 + _SEARCH_PX, height)
     x0, x1 = max(columns[0] - _SEARCH_PX, 0), min(columns[-1] + 1 + _SEARCH_PX, width)
     images = (view.crop((int(x0), int(y0), int(x1), int(y1))) for view in (before, after))
-    was, now = (cv2.GaussianBlur(np.asarray(rgb), (0, 0), 1.5).astype(np.float32) for rgb in images)
+    was, now = (cv2.GaussianBlur(np.asarray(rgb), (0, 0), 1.5) for rgb in images)
     inside = chosen[y0:y1, x0:x1]
-    least = np.full(inside.shape, np.inf, np.float32)
-    for dy in range(-_SEARCH_PX, _SEARCH_PX + 1, 2):
-        for dx in range(-_SEARCH_PX, _SEARCH_PX + 1, 2):
-            least = np.minimum(least, np.abs(np.roll(now, (dy, dx), (0, 1)) - was).max(axis=-1))
-    return least[inside]
+    around = cv2.copyMakeBorder(now, *(_SEARCH_PX,) * 4, cv2.BORDER_WRAP)
+    height, width = inside.shape
+    least = np.full(inside.shape, 255, np.uint8)
+    for dy in range(0, 2 * _SEARCH_PX + 1, 2):
+        for dx in range(0, 2 * _SEARCH_PX + 1, 2):
+            red, green, blue = cv2.split(cv2.absdiff(around[dy : dy + height, dx : dx + width], was))
+            least = np.minimum(least, np.maximum(np.maximum(red, green), blue))
+    return least[inside].astype(float)

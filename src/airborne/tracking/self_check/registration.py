@@ -169,18 +169,16 @@ def _search(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array:
 def _refine(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array, sigma: float) -> Array:
     """Step to the least squares of blurred silhouette and foreground, robustly."""
     image, mask = _blur(shown, sigma), _blur(silhouette.mask, sigma)
-    h, w = image.shape
-    y, x = np.mgrid[:h, :w]
     for _ in range(_STEPS):
         drawn = _warp(silhouette, offset, mask)
         gx, gy = cv2.Sobel(drawn, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(drawn, cv2.CV_32F, 0, 1, scale=1 / 8)
-        steep = np.sqrt(gx**2 + gy**2)
-        near = steep > 0.02 * steep.max()
-        grown = drawn + offset[4] * steep
-        r = (image - grown)[near]
-        dx, dy = (x - silhouette.middle[0] - offset[0])[near], (y - silhouette.middle[1] - offset[1])[near]
-        gx, gy = gx[near], gy[near]
-        J = np.stack([-gx, -gy, gx * dy - gy * dx, -gx * dx - gy * dy, steep[near]])
+        steep = np.sqrt(gx * gx + gy * gy)
+        near = np.flatnonzero(steep > 0.02 * steep.max())
+        y, x = np.divmod(near, image.shape[1])
+        gx, gy, steep, drawn_near, image_near = (plane.ravel()[near] for plane in (gx, gy, steep, drawn, image))
+        r = image_near - (drawn_near + offset[4] * steep)
+        dx, dy = x - silhouette.middle[0] - offset[0], y - silhouette.middle[1] - offset[1]
+        J = np.stack([-gx, -gy, gx * dy - gy * dx, -gx * dx - gy * dy, steep])
         weight = 1 / (1 + (r / _CLIP) ** 2) ** 2
         H = (J * weight) @ J.T
         H[np.diag_indices(5)] *= 1 + 1e-6

@@ -1,0 +1,49 @@
+"""The report of a run of players: jumps to quote with their intervals, and nothing where nothing is known."""
+
+import numpy as np
+
+from airborne.export.page import UNKNOWN_TEXT
+from airborne.export.players_report import players_summary, write_players_report
+from airborne.motion import measure_jumps
+from airborne.motion.jumps.table import jump_row
+from tests.support import jumping
+
+COUNTS = {
+    **{"n_tracked": 150, "n_uncertain": 0, "n_lost": 0, "n_fewer_cameras": 0, "n_below_two_cameras": 0},
+    **{"median_sd_mm": 1.7, "median_score": None},
+}
+
+
+def summary_of(jumps) -> dict:
+    """What summary.json holds of a run with these rows of jumps."""
+    return {
+        **{"name": "a jump", "n_frames": 150, "n_tracked": 150, "n_uncertain": 0, "n_lost": 0},
+        **{"start_s": 0.0, "duration_s": 2.5, "rate_hz": 60.0, "players": {"one": COUNTS}, "jumps": jumps},
+        **{"uncertainty": "", "warnings": [], "method": {"method": "blocker"}},
+    }
+
+
+def test_a_jump_is_quoted_by_its_hips_with_its_interval_and_other_heights_follow(tmp_path):
+    motion = jumping.motion_of(jumping.Jumper())
+    (jump,) = measure_jumps(motion)
+    summary = summary_of([jump_row(jump)])
+    hips = jump.hip_height_m
+    quoted = f"{100 * hips.value:.1f} ({100 * hips.low:.1f} to {100 * hips.high:.1f}) cm"
+    counted, first, others = players_summary(summary)
+    assert counted == "one: 150 tracked, 0 uncertain, 0 lost; median sd of a joint 2 mm"
+    assert first == f"one, jump 1: {quoted}, hips over standing (95 % interval)"
+    assert [name in others for name in ("feet", "flight time", "take-off speed")] == [True] * 3
+    page = write_players_report(tmp_path, summary, motion).read_text(encoding="utf-8")
+    assert f"<b>{quoted}</b><span>one, jump 1: hips</span>" in page
+    flight = jump.flight_s
+    assert f"{1000 * flight.value:.0f} ({1000 * flight.low:.0f} to {1000 * flight.high:.0f})" in page
+
+
+def test_a_height_that_nobody_saw_is_unknown_and_uncertain_frames_are_said(tmp_path):
+    motion = jumping.motion_of(jumping.Jumper())
+    (jump,) = measure_jumps(motion)
+    row = {**jump_row(jump), "hip_height_m": np.nan, "n_uncertain": 4}
+    _, first, _ = players_summary(summary_of([row]))
+    assert first.startswith(f"one, jump 1: {UNKNOWN_TEXT}, hips over standing")
+    assert first.endswith("; 4 of its frames are uncertain")
+    assert f"<b>{UNKNOWN_TEXT}</b>" in write_players_report(tmp_path, summary_of([row]), motion).read_text()
