@@ -22,6 +22,7 @@ from airborne.video.small import shrink
 
 UNOCCLUDED = 0.05  # probability of a class to be occluded, of somebody of whom nothing is known
 _LOST_S, _EVERY_S = Fraction(1, 4), Fraction(1, 5)  # how long a player is lost before a look, and between looks
+_RARER = 4  # who is lost for long is looked for once in this share of the time: a look takes a second or two
 _FARTHEST_M = 4.0  # from where a player was lost, along and across
 _LEAST_SUPPORT = 1.1  # [nat m2] of somebody, see `tracking.first_pose.players`
 _MOST_POSES = 3  # of each that are tried
@@ -36,7 +37,9 @@ def is_due(track: Track, time_s: Fraction) -> bool:
     """Return whether a player should be looked for."""
     if track.lost_s is None or time_s - track.lost_s < _LOST_S:
         return False
-    return track.searched_s is None or time_s - track.searched_s >= _EVERY_S
+    if track.searched_s is None or track.searched_s < track.lost_s:
+        return True
+    return time_s - track.searched_s >= max(_EVERY_S, (track.searched_s - track.lost_s) / _RARER)
 
 
 def find_again(
