@@ -132,9 +132,9 @@ def _track_back(trial: Trial, recording: Recording, finding: PlayersSearch) -> t
         if Status.LOST in statuses:
             break
         if statuses == {Status.TRACKED}:
-            joints = [dict(zip(tracker.joints, estimate.points, strict=True)) for estimate in estimates]
             starts = tuple(
-                PlayerStart(name=each.player, joints_m=points) for each, points in zip(estimates, joints, strict=True)
+                PlayerStart(name=each.player, joints_m={**dict(zip(tracker.joints, each.points, strict=True))})
+                for each in estimates
             )
             earliest = frames.index, starts
     return earliest

@@ -119,7 +119,7 @@ class ColourViews:
             warnings.simplefilter("ignore")  # a colour that no pixel has does no harm
             centres, _ = kmeans2(here, min(_N_COLOURS, len(here)), minit="++", rng=rng)
         tree = KDTree(centres)
-        colours = [tree.query(each)[1].astype(np.int16) for each in features]
+        colours = [np.asarray(tree.query(each)[1], np.int16) for each in features]
         return cls(views, np.stack([pack_camera(view.camera) for view in views]), colours)
 
     def without(self, state: Array) -> ColourViews:
@@ -163,9 +163,8 @@ def _shows(view: View, zone: Array) -> NDArray[np.bool_]:
 def _log_ratio(areas: Array) -> Array:
     """Return the ratio (n,) [nat m2] of areas (n, views, classes + 1, colours) [m2]; the last class is none."""
     own, around, whole = areas[:, :, :-1].sum(axis=1), areas[:, :, -1], areas.sum(axis=2)
-    return sum(
-        ((1 if each is not whole else -1) * each * _log_share(each)).sum(axis=(1, 2)) for each in (own, around, whole)
-    )
+    by_class = (own * _log_share(own)).sum(axis=(1, 2)) + (around * _log_share(around)).sum(axis=(1, 2))
+    return by_class - (whole * _log_share(whole)).sum(axis=(1, 2))
 
 
 def _log_share(areas: Array) -> Array:

@@ -173,7 +173,8 @@ def _zones(views: Sequence[View], *, near_net: bool) -> tuple[Array, Array]:
     seen, wanted = np.maximum(ends, _BEYOND_M), np.minimum(ends, _NEAR_NET_M) if near_net else ends
     if y > 0:
         seen, wanted = seen[::-1], wanted[::-1]
-    return tuple(np.array([[-half_width, -zone[0]], [half_width, zone[1]]]) for zone in (seen, wanted))
+    zones = [np.array([[-half_width, -zone[0]], [half_width, zone[1]]]) for zone in (seen, wanted)]
+    return zones[0], zones[1]
 
 
 def _fit(standers: Sequence[Stander], others: Sequence[Array], frames: Frames) -> list[list[FoundPlayer]]:
@@ -190,7 +191,7 @@ def _fit(standers: Sequence[Stander], others: Sequence[Array], frames: Frames) -
 
 
 def _fit_one(state: Array, others: Sequence[Array], frames: Frames) -> FirstFrameFit:
-    joints_m = dict(zip(JOINTS, points_of(state), strict=True))
+    joints_m: dict[str, Array] = dict(zip(JOINTS, points_of(state), strict=True))
     return fit_first_frame("found", joints_m, frames, occluding_capsules(state, others), looser=_LOOSER)
 
 
@@ -200,7 +201,7 @@ def _player_of(fit: FirstFrameFit, stander: Stander, number: int) -> FoundPlayer
     stance = stander.stances[number]
     stands = stance[KNEES].mean() < _DEEPEST and stance[HEIGHT] < _HIGHEST_M
     is_plausible = stander.support[number] > _LEAST_SUPPORT and per_px > _LEAST_EVIDENCE and stands
-    joints_m = dict(zip(JOINTS, fit.fit.points, strict=True))
+    joints_m: dict[str, Array] = dict(zip(JOINTS, fit.fit.points, strict=True))
     return FoundPlayer(joints_m, fit.fit.state, float(stander.support[number]), per_px, bool(is_plausible))
 
 
