@@ -108,9 +108,9 @@ def _describe(finding: PlayersSearch) -> dict[str, Any]:
                 "players": [
                     {
                         "name": start.name,
-                        "information": round(player.information, 3),
+                        "support": round(player.support, 3),
                         "evidence": round(player.evidence, 3),
-                        "joints_m": _joints_of(start),
+                        "joints_m": _round_joints(start),
                     }
                     for start, player in zip(each.starts, each.players, strict=True)
                 ],
@@ -132,19 +132,19 @@ def _track_back(trial: Trial, recording: Recording, finding: PlayersSearch) -> t
         if Status.LOST in statuses:
             break
         if statuses == {Status.TRACKED}:
-            joints = [dict(zip(tracker.joints, estimate.points, strict=True)) for estimate in estimates]
             starts = tuple(
-                PlayerStart(name=each.player, joints_m=points) for each, points in zip(estimates, joints, strict=True)
+                PlayerStart(name=each.player, joints_m={**dict(zip(tracker.joints, each.points, strict=True))})
+                for each in estimates
             )
             earliest = frames.index, starts
     return earliest
 
 
 def _with_start(trial: Trial, frame: int, starts: Sequence[PlayerStart]) -> Trial:
-    players = [PlayerTable(name=start.name, joints_m=_joints_of(start)) for start in starts]
+    players = [PlayerTable(name=start.name, joints_m=_round_joints(start)) for start in starts]
     return trial.model_copy(update={"start": StartTable(frame=frame, player=players)})
 
 
-def _joints_of(start: PlayerStart) -> dict[str, list[float]]:
+def _round_joints(start: PlayerStart) -> dict[str, list[float]]:
     """Return joints to a tenth of a millimetre."""
     return {joint: [round(x, 4) for x in point.tolist()] for joint, point in start.joints_m.items()}

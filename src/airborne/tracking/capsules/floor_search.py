@@ -24,7 +24,7 @@ _KNEES = (0.4, 0.8, 1.2)  # [rad] the crouches on the grid
 _FACING = np.pi  # toward the net, on the grid
 _HEADINGS = (np.pi, 0.0)  # from which a stance is improved
 _APART_M = 0.5  # of two players on the grid
-_LEAST_INFORMATION = 0.7  # [nat m2] on the grid; what tells less is nobody
+_LEAST_SUPPORT = 0.7  # [nat m2] on the grid; what tells less is nobody
 _LEAST_STANDING = 0.9  # [nat m2] on the grid, what is more counts for a moment: ghosts between players tell less
 _MOST_PLAYERS = 16  # of two teams with their substitutes on the floor
 _AS_WELL = 0.95  # share of what the best stance tells, with which another is kept
@@ -36,7 +36,7 @@ _RATE, _LEAST_SHARE = 0.7, 0.03  # of a new mean and spread; least spread, of th
 class Stander:
     """A player who was found standing."""
 
-    information: Array  # (n,) what its stances tell [nat m2], the best first
+    support: Array  # (n,) what its stances tell [nat m2], the best first
     stances: Array  # (n, 18) the same
     states: Array  # (n, 35) of the same
 
@@ -46,15 +46,15 @@ class Stander:
         return self.states[0, :2]
 
 
-def information_on_grid(views: ColourViews, zone: Array) -> tuple[Array, Array]:
+def evaluate_grid(views: ColourViews, zone: Array) -> tuple[Array, Array]:
     """Return stances (n, 18) on a grid of a zone (2, 2) of the floor, and what each tells (n,) [nat m2]."""
     x, y = (np.arange(low, high + _GRID_M / 2, _GRID_M) for low, high in zone.T)
-    information, stances = [], []
+    support, stances = [], []
     for knee in _KNEES:
         stances.append(np.array([stance(a, b, _FACING, knee) for a in x for b in y]))
-        information.append(views.measure_information(states_of(stances[-1])))
-    best = np.argmax(information, axis=0)
-    return np.stack(stances)[best, np.arange(len(best))], np.max(information, axis=0)
+        support.append(views.support(states_of(stances[-1])))
+    best = np.argmax(support, axis=0)
+    return np.stack(stances)[best, np.arange(len(best))], np.max(support, axis=0)
 
 
 def find_standers(views: ColourViews, zone: Array, wanted: Array) -> Iterator[Stander]:
@@ -63,20 +63,20 @@ def find_standers(views: ColourViews, zone: Array, wanted: Array) -> Iterator[St
     The pixels of each are explained and taken away before the next. Those outside the `wanted` zone are only looked at
     as facing the net.
     """
-    stances, information = information_on_grid(views, zone)
+    stances, support = evaluate_grid(views, zone)
     for _ in range(_MOST_PLAYERS):
         while True:
-            best = int(information.argmax())
-            if information[best] < _LEAST_INFORMATION:
+            best = int(support.argmax())
+            if support[best] < _LEAST_SUPPORT:
                 return
-            now = float(views.measure_information(states_of(stances[best : best + 1]))[0])
-            if now >= information[best] - 1e-9:
+            now = float(views.support(states_of(stances[best : best + 1]))[0])
+            if now >= support[best] - 1e-9:
                 break
-            information[best] = now  # others were found since: what is left of it
+            support[best] = now  # others were found since: what is left of it
         stander = _improve(views, _starts(stances[best]) if lies_in(wanted, stances[best, :2]) else stances[best, None])
         yield stander
         views = views.without(stander.states[0])
-        information[best] = 0.0
+        support[best] = 0.0
 
 
 def lies_in(zone: Array, floor_m: Array) -> bool:
@@ -94,7 +94,7 @@ def _improve(views: ColourViews, starts: Array) -> Stander:
     ends = sorted((_climb(views, start) for start in starts), key=lambda end: -end[1])
     ends = [end for end in ends if end[1] > _AS_WELL * ends[0][1]]
     stances = np.array([best for best, _ in ends])
-    return Stander(np.array([information for _, information in ends]), stances, states_of(stances))
+    return Stander(np.array([support for _, support in ends]), stances, states_of(stances))
 
 
 def _climb(views: ColourViews, start: Array) -> tuple[Array, float]:
@@ -103,22 +103,22 @@ def _climb(views: ColourViews, start: Array) -> tuple[Array, float]:
     best, most = start, -np.inf
     for _ in range(_N_ROUNDS):
         drawn = clip_stances(np.vstack([best, mean, mean + sd * rng.standard_normal((_N_DRAWS, len(mean)))]))
-        information = views.measure_information(states_of(drawn)) - implausibility(drawn)
-        order = np.argsort(-information)[:_N_BEST]
-        if information[order[0]] > most:
-            best, most = drawn[order[0]], float(information[order[0]])
+        support = views.support(states_of(drawn)) - implausibility(drawn)
+        order = np.argsort(-support)[:_N_BEST]
+        if support[order[0]] > most:
+            best, most = drawn[order[0]], float(support[order[0]])
         mean = mean + _RATE * (drawn[order].mean(axis=0) - mean)
         sd = np.maximum(sd + _RATE * (drawn[order].std(axis=0) - sd), _LEAST_SHARE * STANCE_SD)
     return best, most
 
 
-def count_standing(stances: Array, information: Array) -> float:
+def sum_support(stances: Array, support: Array) -> float:
     """Return by how much players on a grid tell more than ghosts, in all [nat m2]."""
     total, kept = 0.0, np.empty((0, 2))
-    for i in np.argsort(-information):
-        if information[i] < _LEAST_STANDING:
+    for i in np.argsort(-support):
+        if support[i] < _LEAST_STANDING:
             break
         if np.all(np.linalg.norm(kept - stances[i, :2], axis=1) > _APART_M):
             kept = np.vstack([kept, stances[i, :2]])
-            total += float(information[i]) - _LEAST_STANDING
+            total += float(support[i]) - _LEAST_STANDING
     return total

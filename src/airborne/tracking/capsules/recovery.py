@@ -18,12 +18,13 @@ from airborne.tracking.capsules.track import Track, evidence_per_px
 from airborne.tracking.capsules.views import map_evidence, player_regions
 from airborne.types import Array
 from airborne.video import Frames
-from airborne.video.reduced import shrink
+from airborne.video.small import shrink
 
 UNOCCLUDED = 0.05  # probability of a class to be occluded, of somebody of whom nothing is known
 _LOST_S, _EVERY_S = Fraction(1, 4), Fraction(1, 5)  # how long a player is lost before a look, and between looks
+_RARER = 4  # who is lost for long is looked for once in this share of the time: a look takes a second or two
 _FARTHEST_M = 4.0  # from where a player was lost, along and across
-_LEAST_INFORMATION = 1.1  # [nat m2] of somebody, see `tracking.first_pose.players`
+_LEAST_SUPPORT = 1.1  # [nat m2] of somebody, see `tracking.first_pose.players`
 _MOST_POSES = 3  # of each that are tried
 # chosen by hand: of a player's usual evidence, what is as likely another's, and its logistic scale
 _LIKENESS, _LIKENESS_SD = 0.7, 0.05
@@ -36,7 +37,9 @@ def is_due(track: Track, time_s: Fraction) -> bool:
     """Return whether a player should be looked for."""
     if track.lost_s is None or time_s - track.lost_s < _LOST_S:
         return False
-    return track.searched_s is None or time_s - track.searched_s >= _EVERY_S
+    if track.searched_s is None or track.searched_s < track.lost_s:
+        return True
+    return time_s - track.searched_s >= max(_EVERY_S, (track.searched_s - track.lost_s) / _RARER)
 
 
 def find_again(
@@ -54,7 +57,7 @@ def find_again(
     colours = ColourViews.of(views, zone)
     for state in seen:
         colours = colours.without(state)
-    standers = [each for each in find_standers(colours, zone, zone) if each.information[0] > _LEAST_INFORMATION]
+    standers = [each for each in find_standers(colours, zone, zone) if each.support[0] > _LEAST_SUPPORT]
     fits = [[_fit(track, stander, frames) for stander in standers] for track in lost.values()]
     nats = np.array(
         [[_likeness(track, fit, frames.time_s) for fit in row] for track, row in zip(lost.values(), fits, strict=True)]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 from scipy.spatial import ConvexHull, KDTree
 
-from airborne.appearance.colour_features import features_of
+from airborne.appearance.pixel_features import colour_features
 from airborne.kernels import kernel
 from airborne.tracking.capsules.equations import N_CAPSULES, N_POINTS, classes_with, pose_state
 from airborne.tracking.capsules.first_frame import average_shape
@@ -111,7 +111,7 @@ class ColourViews:
     @classmethod
     def of(cls, views: Sequence[View], zone: Array) -> ColourViews:
         """Sort the colours of what players in a zone of the floor (2, 2), from and to x, y [m], may cover."""
-        features = [features_of(view.rgb) for view in views]
+        features = [colour_features(view.rgb) for view in views]
         here = np.concatenate([each[_shows(view, zone)] for view, each in zip(views, features, strict=True)])
         rng = np.random.default_rng(0)
         here = here[rng.choice(len(here), min(len(here), _MOST_PIXELS), replace=False)]
@@ -119,7 +119,7 @@ class ColourViews:
             warnings.simplefilter("ignore")  # a colour that no pixel has does no harm
             centres, _ = kmeans2(here, min(_N_COLOURS, len(here)), minit="++", rng=rng)
         tree = KDTree(centres)
-        colours = [tree.query(each)[1].astype(np.int16) for each in features]
+        colours = [np.asarray(tree.query(each)[1], np.int16) for each in features]
         return cls(views, np.stack([pack_camera(view.camera) for view in views]), colours)
 
     def without(self, state: Array) -> ColourViews:
@@ -130,7 +130,7 @@ class ColourViews:
             left.append(np.where(is_covered, np.int16(-1), colours))
         return ColourViews(self.views, self.cameras, left)
 
-    def measure_information(self, states: Array) -> Array:
+    def support(self, states: Array) -> Array:
         """Return how much players (n, 35) tell of the colours around them: (n,) [nat m2].
 
         Log-likelihood ratio of the colours given the surface classes, whose colours are the same in all views, to the
@@ -163,9 +163,8 @@ def _shows(view: View, zone: Array) -> NDArray[np.bool_]:
 def _log_ratio(areas: Array) -> Array:
     """Return the ratio (n,) [nat m2] of areas (n, views, classes + 1, colours) [m2]; the last class is none."""
     own, around, whole = areas[:, :, :-1].sum(axis=1), areas[:, :, -1], areas.sum(axis=2)
-    return sum(
-        ((1 if each is not whole else -1) * each * _log_share(each)).sum(axis=(1, 2)) for each in (own, around, whole)
-    )
+    by_class = (own * _log_share(own)).sum(axis=(1, 2)) + (around * _log_share(around)).sum(axis=(1, 2))
+    return by_class - (whole * _log_share(whole)).sum(axis=(1, 2))
 
 
 def _log_share(areas: Array) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 from scipy.spatial import KDTree
 
-from airborne.appearance.colour_features import features_of
+from airborne.appearance.pixel_features import colour_features
 from airborne.body import BodyModel, PosedBody
 from airborne.cameras import Camera
 from airborne.tracking.first_pose.person import SilhouetteEvidence
@@ -33,7 +33,7 @@ class PixelColours:
     def of(cls, silhouettes: SilhouetteEvidence) -> PixelColours:
         """Sort what stands out by its colours."""
         stands_out = [plane > 0 for plane in silhouettes.planes]
-        features = [features_of(image) for image in silhouettes.images]
+        features = [colour_features(image) for image in silhouettes.images]
         pixels = np.concatenate([each[here] for each, here in zip(features, stands_out, strict=True)])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # a colour that no pixel has does no harm

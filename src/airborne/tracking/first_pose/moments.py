@@ -12,7 +12,7 @@ from scipy.special import expit
 from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene, estimate_empty_scene
 from airborne.types import Array
 from airborne.video import Frames, View
-from airborne.video.reduced import shrink
+from airborne.video.small import shrink
 
 _MOST_MOMENTS = 24  # enough for a median, and to meet a body that is seen for a tenth of the time
 

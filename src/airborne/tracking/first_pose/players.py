@@ -13,10 +13,10 @@ from airborne.errors import TrialError
 from airborne.tracking.capsules.first_frame import FirstFrameFit, fit_first_frame, points_of
 from airborne.tracking.capsules.floor_search import (
     Stander,
-    count_standing,
+    evaluate_grid,
     find_standers,
-    information_on_grid,
     lies_in,
+    sum_support,
 )
 from airborne.tracking.capsules.jumper import JOINTS
 from airborne.tracking.capsules.standing import HEIGHT, KNEES, ColourViews
@@ -33,9 +33,9 @@ _BOTH_SIDES_M = 2.0  # cameras whose mean lies nearer to the net's plane stand o
 _AS_WELL = 0.7  # share of what players tell at most, which counts as much as any
 _MOST_MOMENTS, _MOST_SEARCHED = 8, 3  # that are looked at, and searched until two agree on how many are there
 # chosen on synthetic blocks 3001 to 3008
-_INFORMATION, _INFORMATION_SD = 1.1, 0.07  # [nat m2] that are as likely a player as none, and their logistic scale
-_LEAST_INFORMATION = 1.5  # [nat m2] of a player whose pose is trusted: others were partly hidden, or in the air
-_INFORMATION_PER_NAT = 0.01  # share of the information that makes a direction e times likelier
+_SUPPORT, _SUPPORT_SD = 1.1, 0.07  # [nat m2] that are as likely a player as none, and their logistic scale
+_LEAST_SUPPORT = 1.5  # [nat m2] of a player whose pose is trusted: others were partly hidden, or in the air
+_SHARE_PER_NAT = 0.01  # share of the support that makes a direction e times likelier
 _NET_NATS = 3.0  # for facing the net, of players near it
 _LEAST_EVIDENCE = 1.2  # [nat a pixel] of the fitted player
 _DEEPEST = 1.35  # [rad] flexion of knees, beyond which a stance is not trusted
@@ -51,7 +51,7 @@ class FoundPlayer:
 
     joints_m: dict[str, Array]  # joint -> (3,) world [m]
     state: Array  # (35,)
-    information: float  # [nat m2]
+    support: float  # [nat m2]
     evidence: float  # [nat a pixel] of the fit
     is_plausible: bool
 
@@ -90,9 +90,9 @@ class PlayersSearch:
         return len(self.candidates[0].players)
 
     @property
-    def information(self) -> float:
+    def support(self) -> float:
         """What these tell in all [nat m2]."""
-        return sum(player.information for player in self.candidates[0].players)
+        return sum(player.support for player in self.candidates[0].players)
 
     @property
     def is_decided(self) -> bool:
@@ -109,29 +109,28 @@ def find_players(sample: Sequence[Frames], whole: Callable[[int], Frames], *, ne
     sample = [frames for frames in sample if sum(view is not None for view in frames.views) > 1]
     moments = [_Moment.of(frames, near_net=near_net) for frames in sample[:: -(-len(sample) // _MOST_MOMENTS) or 1]]
     findings: list[PlayersSearch] = []
+    complete, most = findings, 0
     for moment in _best_first(moments)[:_MOST_SEARCHED]:
         findings.append(moment.search(whole))
         most = max(finding.n_players for finding in findings)
         complete = [finding for finding in findings if finding.n_players == most]
         if len(complete) > 1 and any(finding.is_decided for finding in complete):
             break
-    if not findings or most == 0:
+    if most == 0:
         where = "at the net" if near_net else "on the court"
         raise TrialError(
             f"[start] is missing, and no player is seen to stand {where}, whose middle must be the world's origin, x "
             "along the net; give [[start.player]] tables"
         )
     decided = (finding for finding in complete if finding.is_decided)
-    return next(decided, max(complete, key=lambda finding: finding.information))
+    return next(decided, max(complete, key=lambda finding: finding.support))
 
 
 def _best_first(moments: Sequence[_Moment]) -> list[_Moment]:
     """Sort moments by what players at the net tell; those in which they tell about as much as ever by time."""
-    information = [moment.information for moment in moments]
-    best = [moment for moment, each in zip(moments, information, strict=True) if each >= _AS_WELL * max(information)]
-    rest = [
-        (each, moment) for moment, each in zip(moments, information, strict=True) if each < _AS_WELL * max(information)
-    ]
+    support = [moment.support for moment in moments]
+    best = [moment for moment, each in zip(moments, support, strict=True) if each >= _AS_WELL * max(support)]
+    rest = [(each, moment) for moment, each in zip(moments, support, strict=True) if each < _AS_WELL * max(support)]
     return [*best, *(moment for _, moment in sorted(rest, key=lambda pair: -pair[0]))]
 
 
@@ -152,9 +151,9 @@ class _Moment:
         return cls(frames, ColourViews.of(views, zone), zone, wanted, near_net)
 
     @property
-    def information(self) -> float:
+    def support(self) -> float:
         """What players there may tell in all [nat m2]."""
-        return count_standing(*information_on_grid(self.views, self.wanted))
+        return sum_support(*evaluate_grid(self.views, self.wanted))
 
     def search(self, whole: Callable[[int], Frames]) -> PlayersSearch:
         """Find the players and fit them to the whole pictures."""
@@ -174,7 +173,8 @@ def _zones(views: Sequence[View], *, near_net: bool) -> tuple[Array, Array]:
     seen, wanted = np.maximum(ends, _BEYOND_M), np.minimum(ends, _NEAR_NET_M) if near_net else ends
     if y > 0:
         seen, wanted = seen[::-1], wanted[::-1]
-    return tuple(np.array([[-half_width, -zone[0]], [half_width, zone[1]]]) for zone in (seen, wanted))
+    zones = [np.array([[-half_width, -zone[0]], [half_width, zone[1]]]) for zone in (seen, wanted)]
+    return zones[0], zones[1]
 
 
 def _fit(standers: Sequence[Stander], others: Sequence[Array], frames: Frames) -> list[list[FoundPlayer]]:
@@ -191,7 +191,7 @@ def _fit(standers: Sequence[Stander], others: Sequence[Array], frames: Frames) -
 
 
 def _fit_one(state: Array, others: Sequence[Array], frames: Frames) -> FirstFrameFit:
-    joints_m = dict(zip(JOINTS, points_of(state), strict=True))
+    joints_m: dict[str, Array] = dict(zip(JOINTS, points_of(state), strict=True))
     return fit_first_frame("found", joints_m, frames, occluding_capsules(state, others), looser=_LOOSER)
 
 
@@ -200,9 +200,9 @@ def _player_of(fit: FirstFrameFit, stander: Stander, number: int) -> FoundPlayer
     per_px = float(evidence / area) if area > 0 else 0.0
     stance = stander.stances[number]
     stands = stance[KNEES].mean() < _DEEPEST and stance[HEIGHT] < _HIGHEST_M
-    is_plausible = stander.information[number] > _LEAST_INFORMATION and per_px > _LEAST_EVIDENCE and stands
-    joints_m = dict(zip(JOINTS, fit.fit.points, strict=True))
-    return FoundPlayer(joints_m, fit.fit.state, float(stander.information[number]), per_px, bool(is_plausible))
+    is_plausible = stander.support[number] > _LEAST_SUPPORT and per_px > _LEAST_EVIDENCE and stands
+    joints_m: dict[str, Array] = dict(zip(JOINTS, fit.fit.points, strict=True))
+    return FoundPlayer(joints_m, fit.fit.state, float(stander.support[number]), per_px, bool(is_plausible))
 
 
 def _candidates(
@@ -211,7 +211,7 @@ def _candidates(
     """Combine who is a player and how each stands; the likeliest first."""
     options = []
     for stander, poses in zip(standers, found, strict=True):
-        there = float(expit((stander.information[0] - _INFORMATION) / _INFORMATION_SD))
+        there = float(expit((stander.support[0] - _SUPPORT) / _SUPPORT_SD))
         each = [(there * p, player) for p, player in _distinct_poses(poses, near_net=near_net)]
         options.append([option for option in [(1 - there, None), *each] if option[0] > _LEAST_SHOWN / 2])
     candidates = []
@@ -224,8 +224,8 @@ def _candidates(
 
 def _distinct_poses(poses: Sequence[FoundPlayer], *, near_net: bool) -> list[tuple[float, FoundPlayer]]:
     """Return a player's poses with their probabilities, those that the fit made alike as one."""
-    information = np.array([pose.information for pose in poses])
-    nats = information / information.max() / _INFORMATION_PER_NAT
+    support = np.array([pose.support for pose in poses])
+    nats = support / support.max() / _SHARE_PER_NAT
     if near_net:
         nats = nats + _NET_NATS * np.array([_faces_net(pose) for pose in poses])
     likelihood = np.exp(nats - nats.max())

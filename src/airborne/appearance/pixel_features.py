@@ -11,7 +11,7 @@ _BLACK = 30.0  # [grey levels] added to all channels: dark pixels have no hue
 _BRIGHTNESS_WEIGHT = 0.5  # of brightness, which shading changes, beside hue
 
 
-def features_of(rgb: NDArray[np.uint8]) -> Array:
+def colour_features(rgb: NDArray[np.uint8]) -> Array:
     """Return by what pixels' colours are sorted: hue and saturation, and brightness with less weight: (..., 3)."""
     level = rgb.astype(float) + _BLACK
     total = level.sum(axis=-1)
