@@ -253,9 +253,7 @@ def run_once(path: Path, n: int) -> None:
         track_trial(trial, Path(name), pictures=False)
     cpu_s = time.process_time() - begun
     peak = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
-    print(
-        [cpu_s, int(peak.split()[1]) / 1e6]
-    )  # of Linux; ru_maxrss would begin with that of the process that started it
+    print([cpu_s, int(peak.split()[1]) / 1e6])  # ru_maxrss would begin with the parent's
 
 
 def exponent(sizes: np.ndarray, costs: np.ndarray, has_fixed_cost: bool) -> float:
