@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 
 _LONGEST = 1200  # characters of a message
+_MOST_SAID = 5  # mistakes of one file in a line
 
 
 class AirborneError(Exception):
@@ -81,8 +82,9 @@ _KIND = re.compile(r"(literal|dict|list|constrained|function)\W.*|str|int|float|
 
 
 def one_line(error: ValidationError, document: Any, model: type[BaseModel]) -> str:
-    """Say a pydantic error's first complaint in one line: where, what, what was given; see `list_mistakes`."""
-    return _count_others(list_mistakes(error, (), document, model))
+    """Say a pydantic error's complaints in one line: where, what, what was given; see `list_mistakes`."""
+    mistakes = list_mistakes(error, (), document, model)
+    return _count_others(["; ".join(mistakes[:_MOST_SAID]), *mistakes[_MOST_SAID:]])
 
 
 def list_mistakes(error: ValidationError, tags: Collection[str], document: Any, model: type[BaseModel]) -> list[str]:

@@ -1,5 +1,8 @@
 """Which trials a batch runs: folders, patterns, tables; names that would clash; the files of `airborne new`."""
 
+from fractions import Fraction
+
+import numpy as np
 import pytest
 
 from airborne.batch.new import write_study
@@ -7,6 +10,7 @@ from airborne.batch.run import plan_tasks
 from airborne.batch.trials import label_names, list_trials
 from airborne.errors import AirborneError
 from airborne.trial.file import read_trial
+from airborne.video import VideoWriter
 
 TRIAL = 'name = "a"\ncamera = []\nlabels = { condition = "dry", day = 2, athlete = "anna" }\n'
 
@@ -91,6 +95,20 @@ def test_new_writes_a_session_and_a_trial_for_each_set_of_videos(tmp_path):
     assert [camera.name for camera in trial.camera] == ["left", "right"]
     assert all(trial.path(camera.video).is_file() for camera in trial.camera)
     assert [each.labels["condition"] for each in list_trials(str(tmp_path / "study"))] == ["dry", "wet"]
+
+
+def test_new_takes_the_fields_of_interlaced_cameras_from_their_files(tmp_path):
+    (tmp_path / "videos").mkdir()
+    for camera, fields in (("left", "top-first"), ("right", "progressive")):
+        path = tmp_path / "videos" / f"1_{camera}.mp4"
+        with VideoWriter(path, size=(64, 48), rate=Fraction(25), fields=fields) as video:
+            for _ in range(3):
+                video.write(np.full((48, 64, 3), 90, np.uint8))
+    study = write_study(tmp_path / "videos", "{number}_{camera}.mp4", tmp_path / "study")
+    assert study.notes == ("left: session.toml gives its fields as top-first, as the file's flags say",)
+    for name in ("calib.toml", "body.toml"):
+        write(tmp_path / "study" / name, "")
+    assert [camera.fields for camera in read_trial(study.trials[0]).camera] == ["top-first", "progressive"]
 
 
 def test_new_leaves_files_that_exist_alone(tmp_path):

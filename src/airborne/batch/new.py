@@ -10,9 +10,10 @@ from pathlib import Path
 
 import tomlkit
 
-from airborne.errors import AirborneError
+from airborne.errors import AirborneError, VideoError
 from airborne.io.names import check_column
 from airborne.io.writing import write_text
+from airborne.video import VideoSource, inspect
 
 SESSION, TRIALS = "session.toml", "trials"  # the file and the folder that are written
 _CAMERA = "camera"  # the word of a pattern that tells the videos of a trial apart
@@ -34,8 +35,9 @@ def write_study(
     """Write session.toml and trials/<name>.toml into a folder, for the videos whose paths below `videos` fit a pattern.
 
     Words in braces, as in "{athlete}_{condition}_{number}_{camera}.mp4", become labels; `{camera}` tells the videos of
-    one trial apart. Paths of calibration and body are as seen from `folder`, and may hold the words. Files that exist
-    are left alone. Raises AirborneError for a pattern that is none, or that fits no video.
+    one trial apart. Paths of calibration and body are as seen from `folder`, and may hold the words. A camera whose
+    first video is flagged as interlaced gets its `fields`. Files that exist are left alone. Raises AirborneError for a
+    pattern that is none, or that fits no video.
     """
     words = _WORD.findall(pattern)
     if _CAMERA not in words or len(words) < 2 or len(set(words)) < len(words):
@@ -51,8 +53,17 @@ def write_study(
     folder.mkdir(parents=True, exist_ok=True)
     from_session = Path(os.path.relpath(videos.absolute(), folder.absolute())).as_posix()
     session = folder / SESSION
-    _write_new(session, _session_text(cameras, f"{from_session}/{pattern}", calibration=calibration, body=body))
+    tables = [
+        {"name": name, "video": f"{from_session}/{pattern}".replace(f"{{{_CAMERA}}}", name)} | _fields(found, name)
+        for name in cameras
+    ]
     files, notes = [], []
+    if not session.exists():
+        interlaced = [table for table in tables if "fields" in table]
+        notes += [
+            f"{t['name']}: {SESSION} gives its fields as {t['fields']}, as the file's flags say" for t in interlaced
+        ]
+    _write_new(session, _session_text(tables, calibration=calibration, body=body))
     for values, by_camera in sorted(found.items()):
         files.append(folder / TRIALS / f"{'_'.join(values)}.toml")
         _write_new(files[-1], _trial_text(dict(zip(labels, values, strict=True))))
@@ -82,14 +93,24 @@ def _match(videos: Path, pattern: str) -> dict[tuple[str, ...], dict[str, Path]]
     return found
 
 
-def _session_text(cameras: Sequence[str], video: str, *, calibration: str, body: str) -> str:
+def _fields(found: Mapping[tuple[str, ...], Mapping[str, Path]], camera: str) -> dict[str, str]:
+    """Return the order of a camera's fields that its first video is flagged with; none of a progressive one."""
+    path = next(by_camera[camera] for by_camera in found.values() if camera in by_camera)
+    try:
+        order = inspect(VideoSource(camera, path)).flagged_order
+    except VideoError:  # what is wrong with a video is said where it is tracked
+        return {}
+    return {} if order == "progressive" else {"fields": order}
+
+
+def _session_text(cameras: Sequence[Mapping[str, str]], *, calibration: str, body: str) -> str:
     document = tomlkit.document()
     document.add(
         tomlkit.comment("What the trials share; paths are relative to this file, {words} are a trial's labels.")
     )
     tables = tomlkit.aot()
-    for name in cameras:
-        tables.append(tomlkit.item({"name": name, "video": video.replace(f"{{{_CAMERA}}}", name)}))
+    for camera in cameras:
+        tables.append(tomlkit.item(dict(camera)))
     document["camera"] = tables
     document["calibration"] = {"file": calibration}
     document["body"] = {"file": body}

@@ -55,6 +55,9 @@ def _columns(folder: Path, summary: Mapping[str, Any]) -> TableRow:
         row |= _highest_jump(summary["jumps"])
     findings = summary.get("self_check") or []
     alarms = [each["sentence"] for each in findings if each["is_alarm"]]
+    alarms += ["no frame is tracked: look at the overlays and at what the report says of the recording"] * (
+        not summary["n_tracked"]
+    )
     row |= {"n_alarms": len(alarms), "findings": "; ".join(alarms), "n_warnings": len(summary["warnings"])}
     return row | {"version": summary["versions"]["airborne"]}
 

@@ -80,7 +80,7 @@ def _change(before: View, after: View, chosen: NDArray[np.bool_]) -> Array:
     images = (view.crop((int(x0), int(y0), int(x1), int(y1))) for view in (before, after))
     was, now = (cv2.GaussianBlur(np.asarray(rgb), (0, 0), 1.5) for rgb in images)
     inside = chosen[y0:y1, x0:x1]
-    around = cv2.copyMakeBorder(now, *(_SEARCH_PX,) * 4, cv2.BORDER_WRAP)
+    around = cv2.copyMakeBorder(now, _SEARCH_PX, _SEARCH_PX, _SEARCH_PX, _SEARCH_PX, cv2.BORDER_WRAP)
     height, width = inside.shape
     least = np.full(inside.shape, 255, np.uint8)
     for dy in range(0, 2 * _SEARCH_PX + 1, 2):
