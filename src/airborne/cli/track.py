@@ -182,6 +182,8 @@ def _describe(summary: dict, output: Path) -> str:
     elif summary["n_frames"] == summary["n_lost"]:
         lines.append(f"the body was found in no frame: {look}correct [start]")
     else:
+        if not summary["n_tracked"]:
+            lines.append(f"no frame is tracked, so that no number here can be relied on: {look}see the notes")
         position, rotation = summary["median_position_sd_mm"], summary["median_rotation_sd_deg"]
         lines.append(
             f"median sd: position {_describe_sd(position, 'mm')}, rotation {_describe_sd(rotation, 'degrees')}; "

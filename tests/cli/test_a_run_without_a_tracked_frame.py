@@ -1,0 +1,15 @@
+"""What the terminal says of a run in which no frame is tracked."""
+
+from airborne.cli.track import _describe
+
+SUMMARY = {
+    **{"n_frames": 5, "n_tracked": 0, "n_uncertain": 3, "n_lost": 2, "rate_hz": 4.0, "warnings": [], "events": []},
+    **{"median_position_sd_mm": 3.6, "median_rotation_sd_deg": 0.15},
+}
+
+
+def test_it_is_said_before_any_number(tmp_path):
+    lines = _describe(SUMMARY, tmp_path).splitlines()
+    assert lines[0] == "5 frames at 4 Hz: 0 tracked, 3 uncertain, 2 lost"
+    assert lines[1] == "no frame is tracked, so that no number here can be relied on: see the notes"
+    assert not any("relied on" in line for line in _describe({**SUMMARY, "n_tracked": 1}, tmp_path).splitlines())
