@@ -270,7 +270,7 @@ def test_command_writes_the_requested_trial(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(
         "airborne.synthetic.write_somersault", lambda folder, **options: asked.append((folder, options))
     )
-    monkeypatch.setattr("airborne.export.write_model", lambda path, body: None)
+    monkeypatch.setattr("airborne.export.models.write_model", lambda path, body: None)
     words = ["--preset", "pike", "--target", "ellipsoids", "--style", "gym", "--seed", "7"]
     monkeypatch.setattr(sys, "argv", ["airborne", "synth", "somersault", "-o", str(tmp_path / "new"), *words])
     with pytest.raises(SystemExit) as ended:
