@@ -127,7 +127,7 @@ def test_body_lit_by_the_right_light_is_what_was_observed():
 def test_a_faceted_part_keeps_its_light_and_a_smooth_one_gets_its_mean_light():
     part, normals, observed = body()
     lit = shade(LIGHT, part, normals)
-    flatten_shading(part, np.array([True, False]), 0, 0, lit)
+    flatten_shading(part, np.array([True, False]), lit)
     np.testing.assert_allclose(lit[:, part == 0], observed[:, part == 0], atol=1e-6)
     mean = observed[:, part == 1].mean(axis=1, keepdims=True)
     np.testing.assert_allclose(lit[:, part == 1], np.broadcast_to(mean, (3, (part == 1).sum())), rtol=1e-4)

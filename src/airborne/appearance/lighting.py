@@ -165,7 +165,7 @@ def shade_body(part, normals, albedo, coefficients, x0, y0, lit):
 
 
 @kernel(fastmath=True)
-def flatten_shading(part, is_faceted, x0, y0, lit):
+def flatten_shading(part, is_faceted, lit):
     """Give every part that is not faceted its mean light: shading does not rotate with a smooth surface.
 
     What is left shows how the image would move with the body; see `shade_body` for the arguments.
@@ -174,14 +174,14 @@ def flatten_shading(part, is_faceted, x0, y0, lit):
     total, count = np.zeros((len(is_faceted), 3), np.float32), np.zeros(len(is_faceted), np.float32)
     for y in range(h):
         for x in range(w):
-            p = part[y + y0, x + x0]
+            p = part[y, x]
             if p >= 0:
                 count[p] += 1
                 for k in range(3):
                     total[p, k] += lit[k, y, x]
     for y in range(h):
         for x in range(w):
-            p = part[y + y0, x + x0]
+            p = part[y, x]
             if p >= 0 and not is_faceted[p]:
                 for k in range(3):
                     lit[k, y, x] = total[p, k] / count[p]

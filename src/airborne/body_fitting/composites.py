@@ -84,10 +84,10 @@ def composite_equations(
     total, weights = _weigh(view, residual)
     coverage, shape = np.empty((1, *part.shape), np.float32), np.empty_like(lit)
     blur_planes(covered[None].astype(np.float32), *_taps(view), coverage)
-    flatten_shading(part, render_model.is_faceted, 0, 0, lit)
+    flatten_shading(part, render_model.is_faceted, lit)
     blur_planes(lit, *_taps(view), shape)
     owner, nearness = np.empty(part.shape, np.int16), np.empty(part.shape, np.float32)
-    find_owners(part, inverse_depth, render_model.segment_of_part, 0, 0, owner, nearness)
+    find_owners(part, inverse_depth, render_model.segment_of_part, owner, nearness)
     n = len(posed.R)
     A, g = np.zeros((n, N_AFFINE, N_AFFINE)), np.zeros((n, N_AFFINE))
     add_affine_equations(

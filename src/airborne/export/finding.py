@@ -59,12 +59,10 @@ def draw_player_candidates(path: Path, frames: Frames, candidates: Sequence[tupl
 
 
 def _with_players(view: View, states: Sequence[Array]) -> Image:
-    image = view.rgb.copy()
+    image = view.rgb
     for state in states:
-        mask = (class_image(state, view.camera, 1.0) >= 0).astype(np.uint8)
-        contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        image = cv2.drawContours(image, contours, -1, ESTIMATE_RGB, 1)
-    return np.asarray(image, np.uint8)
+        image = _outline(image, class_image(state, view.camera, 1.0) >= 0)
+    return image
 
 
 def _box_of(camera: Camera, states: Sequence[Array]) -> tuple[slice, slice]:
@@ -76,9 +74,12 @@ def _box_of(camera: Camera, states: Sequence[Array]) -> tuple[slice, slice]:
 
 
 def _with_outline(view: View, posed: PosedBody) -> Image:
-    mask = render(cached_surface_arrays(posed.model), posed, view.camera, FLAT).mask.astype(np.uint8)
-    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    return np.asarray(cv2.drawContours(view.rgb.copy(), contours, -1, ESTIMATE_RGB, 1), np.uint8)
+    return _outline(view.rgb, render(cached_surface_arrays(posed.model), posed, view.camera, FLAT).mask)
+
+
+def _outline(image: Image, mask: NDArray[np.bool_]) -> Image:
+    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return np.asarray(cv2.drawContours(image.copy(), contours, -1, ESTIMATE_RGB, 1), np.uint8)
 
 
 def _near(image: Image, camera: Camera, posed: PosedBody) -> Image | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from fractions import Fraction
+from itertools import cycle
 from pathlib import Path
 
 import cv2
@@ -106,7 +107,7 @@ def _curves(time_s: Array, series: dict[str, Array], width: int) -> Image:
     low, high = (np.nanmin(values), np.nanmax(values)) if np.isfinite(values).any() else (0.0, 0.0)
     middle, half = (low + high) / 2, max(high - low, _LEAST_RANGE_M) / 2
     x, left = np.linspace(0, width - 1, len(time_s)), em / 2
-    for (name, curve), colour in zip(series.items(), _cycle(len(series)), strict=True):
+    for (name, curve), colour in zip(series.items(), cycle(_COLOURS), strict=False):
         y = height / 2 - (curve - middle) / half * (height / 2 - edge)
         for piece in np.split(np.arange(len(x)), np.flatnonzero(~np.isfinite(y))):
             seen = piece[np.isfinite(y[piece])]
@@ -124,10 +125,6 @@ def _with_cursor(curves: Image, row: int, n: int) -> Image:
     image, x = curves.copy(), round(row / max(n - 1, 1) * (curves.shape[1] - 1))
     cv2.line(image, (x, 0), (x, image.shape[0]), TEXT_RGB, 2)
     return image
-
-
-def _cycle(n: int) -> list[tuple[int, int, int]]:
-    return [_COLOURS[k % len(_COLOURS)] for k in range(n)]
 
 
 def _report(pictures: Iterator[Image], n: int, progress: Progress | None) -> Iterator[Image]:

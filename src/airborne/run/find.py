@@ -71,10 +71,7 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     model = trial.model()
     if len(trial.camera) < 2:
         raise TrialError(f"{trial.name}: [start] is missing; finding the body needs two cameras: give its pose")
-    recording, facts = open_for_look(trial)
-    sample = spread_sample(report_each(recording, progress), recording.n_frames)
-    if not sample:
-        raise past_the_end_error(trial, recording)
+    recording, facts, sample = look_through(trial, progress)
     scenes = empty_scenes(sample)
     if not scenes:
         raise TrialError(
@@ -96,7 +93,16 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     return FoundStart(_with_start(trial, model, frame, pose), model, finding, scenes, facts, note)
 
 
-def open_for_look(trial: Trial) -> tuple[Recording, tuple[VideoFacts, ...]]:
+def look_through(trial: Trial, progress: Progress | None) -> tuple[Recording, tuple[VideoFacts, ...], list[Frames]]:
+    """Open the videos and look at moments spread over them, small; raises TrialError where there are none."""
+    recording, facts = _open_for_look(trial)
+    sample = spread_sample(_report_each(recording, progress), recording.n_frames)
+    if not sample:
+        raise past_the_end_error(trial, recording)
+    return recording, facts, sample
+
+
+def _open_for_look(trial: Trial) -> tuple[Recording, tuple[VideoFacts, ...]]:
     """Open the videos for a look: images are converted only where they are used."""
     cameras = open_cameras(trial)
     start = trial.start.frame
@@ -113,7 +119,7 @@ def open_for_look(trial: Trial) -> tuple[Recording, tuple[VideoFacts, ...]]:
     return recording, cameras.facts
 
 
-def report_each(recording: Recording, progress: Progress | None) -> Iterator[Frames]:
+def _report_each(recording: Recording, progress: Progress | None) -> Iterator[Frames]:
     """Yield the frames, and report how many were."""
     for number, frames in enumerate(recording, start=1):
         if progress is not None:

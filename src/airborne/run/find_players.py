@@ -11,12 +11,10 @@ from airborne.errors import TrialError, UndecidedError
 from airborne.export import write_json
 from airborne.export.finding import draw_player_candidates
 from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE
-from airborne.run.find import frames_up_to, open_for_look, report_each, take_candidate
+from airborne.run.find import frames_up_to, look_through, take_candidate
 from airborne.run.folder import open_results
-from airborne.run.opening import past_the_end_error
 from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
-from airborne.tracking.first_pose.moments import spread_sample
 from airborne.tracking.first_pose.players import PlayersSearch, find_players
 from airborne.tracking.players import PlayerStart
 from airborne.trial.file import Trial
@@ -52,10 +50,7 @@ def find_players_start(
     """
     if len(trial.camera) < 2:
         raise TrialError(f"{trial.name}: [start] is missing; finding players needs two cameras: give [[start.player]]")
-    recording, facts = open_for_look(trial)
-    sample = spread_sample(report_each(recording, progress), recording.n_frames)
-    if not sample:
-        raise past_the_end_error(trial, recording)
+    recording, facts, sample = look_through(trial, progress)
 
     def whole(index: int) -> Frames:
         return next(iter(replace(recording, start=index, stop=index + 1)))

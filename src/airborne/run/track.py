@@ -184,9 +184,7 @@ def _track(
 
         def tick(n_done: int) -> None:
             nonlocal most
-            most = max(
-                most, n_done
-            )  # frames that were gone over in both directions are counted before they are yielded
+            most = max(most, n_done)  # gone over in both directions, frames are counted before they are yielded
             if options.progress is not None:
                 options.progress(most, recording.n_frames)
 

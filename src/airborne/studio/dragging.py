@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose, PosedBody
-from airborne.body.chain import angles_of, clamp_to_limits, delta_between, move_pose, point_jacobian
+from airborne.body.chain import clamp_to_limits, delta_between, move_pose, point_jacobian
 from airborne.cameras import Camera
 from airborne.export.views import cached_surface_arrays
 from airborne.geometry.descent import MarquardtRule, descend
-from airborne.rendering import FLAT, pose_segments, render
+from airborne.rendering import FLAT, render
 from airborne.types import Array
 
 _POINTER_SD_PX = 1.0  # of where a point is held
@@ -155,10 +155,7 @@ class _Iterate:
     def equations(self) -> tuple[float, Array, Array]:
         """Half the squared residuals, their gradient and Gauss-Newton Hessian, of what may move."""
         free = self.pins[-1].grip.free
-        root = self.pose.world_from_root
-        angles = angles_of(self.pose, self.model.n_joints)
-        R, t = pose_segments(self.model, root.rotation.as_matrix()[None], root.translation[None], angles[None])
-        posed = PosedBody(self.model, R[0], t[0])
+        posed = self.model.with_pose(self.pose)
         away = delta_between(self.taken, self.pose)[free] / _FREE_SD
         cost, gradient, hessian = away @ away, away / _FREE_SD, np.eye(len(free)) / _FREE_SD**2
         for pin in self.pins:

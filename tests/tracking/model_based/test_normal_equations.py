@@ -249,6 +249,6 @@ def test_an_edge_moves_with_what_is_in_front():
     part[:, 3:], part[:, 7:] = 0, 1
     nearness = np.select([part == 0, part == 1], [0.2, 0.25]).astype(np.float32)  # part 1 is nearer
     owner, owner_nearness = np.empty((9, 12), np.int16), np.empty((9, 12), np.float32)
-    find_owners(part, nearness, np.array([4, 5], np.int16), 0, 0, owner, owner_nearness)
+    find_owners(part, nearness, np.array([4, 5], np.int16), owner, owner_nearness)
     np.testing.assert_array_equal(owner[4], np.repeat([4, 5], [7 - REACH_PX, 5 + REACH_PX]))
     np.testing.assert_allclose(owner_nearness[4], np.where(owner[4] == 5, 0.25, 0.2), atol=SINGLE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from airborne.studio.session import Session
 from airborne.studio.starts import player_file, read_player
 from airborne.studio.trial_edits import with_players
 from airborne.studio.view import Mark
-from airborne.types import Array, Mask
+from airborne.types import Array
 
 _POINTS = ("torso", *LEG_POINTS, "foot_left", "foot_right")
 _NEEDED = _POINTS[:7]
@@ -139,7 +140,7 @@ class PlayersPanel(PointsPanel):
         ready = [name for name in self.players if self._is_ready(name)]
         self.note.set_text(f"Ready: {', '.join(ready) or 'nobody yet'}.")
         self.use.set_visibility(bool(ready))
-        self.list.show(_POINTS, self.chosen, self._off_px)
+        self.list.show(_POINTS, self.chosen, partial(self.off_px, rig=self.rig))
 
     def _points(self, name: str) -> dict[str, Array]:
         """Return the clicked points of a player that two cameras see: (3,) [m]."""
@@ -182,10 +183,6 @@ class PlayersPanel(PointsPanel):
                     mark: Mark = {"id": f"{name}|{camera}", "pane": pane, "u": u, "v": v, "label": name}
                     mark["colour"] = shade
                     yield {**mark, "to": to[pane].tolist()} if np.isfinite(to[pane]).all() else mark
-
-    def _off_px(self, name: str) -> tuple[Mask, Array]:
-        px = self.px(name, self.shown.names)
-        return np.isfinite(px[:, 0]), np.linalg.norm(self.consensus_px(name, self.rig) - px, axis=1)
 
 
 def _rows(clicked: Clicked, point: str) -> list[Array]:

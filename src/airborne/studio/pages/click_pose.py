@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,6 @@ from airborne.studio.starts import (
     write_start,
 )
 from airborne.studio.view import Drag, Mark
-from airborne.types import Array, Mask
 
 _NEEDED = ("hip_left", "hip_right", "shoulder_left", "shoulder_right")
 _HELP = (
@@ -147,7 +147,7 @@ class ClickPanel(PointsPanel):
         self.view.show_over(marks, items, self.selected)
         self.note.set_text(self.says or f"No landmark is clicked in frame {self.frame} yet.")
         self.use.set_visibility(bool(self.outline))
-        self.list.show(self.names, self.chosen, self._off_px)
+        self.list.show(self.names, self.chosen, partial(self.off_px, rig=self.rig))
 
     def _marks(self) -> Iterator[Mark]:
         for name in self.clicked.names:
@@ -166,8 +166,3 @@ class ClickPanel(PointsPanel):
                         "holds": True,
                     }
                     yield {**mark, "to": to[pane].tolist()} if np.isfinite(to[pane]).all() else mark
-
-    def _off_px(self, name: str) -> tuple[Mask, Array]:
-        """Say of a landmark whether it is clicked, and how far from where the cameras agree, in each camera [px]."""
-        px = self.px(name, self.shown.names)
-        return np.isfinite(px[:, 0]), np.linalg.norm(self.consensus_px(name, self.rig) - px, axis=1)

@@ -253,10 +253,10 @@ class DigitisePanel(PointsPanel):
 
     def _off_px(self, name: str) -> tuple[Mask, Array]:
         """Say in which cameras a point is clicked; with the help, how far from where the cameras agree [px]."""
+        if self.rig is not None:
+            return self.off_px(name, self.rig)
         px = self.px(name, self.shown.names)
-        if self.rig is None:
-            return np.isfinite(px[:, 0]), np.full(len(px), np.nan)
-        return np.isfinite(px[:, 0]), np.linalg.norm(self.consensus_px(name, self.rig) - px, axis=1)
+        return np.isfinite(px[:, 0]), np.full(len(px), np.nan)
 
     def _set_then(self, event) -> None:
         self.then = event.value

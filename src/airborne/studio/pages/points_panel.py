@@ -16,7 +16,7 @@ from airborne.studio.pages.layout import Latest, complain, errors_shown
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.view import CameraViews, Drag, Item
-from airborne.types import Array
+from airborne.types import Array, Mask
 
 CAMERA_COLOURS = ("#56b4e9", "#e69f00", "#cc79a7", "#009e73", "#0072b2", "#d55e00")  # in order
 CHOSEN_COLOUR = "#f0e442"
@@ -131,6 +131,11 @@ class PointsPanel:
     def px(self, name: str, cameras: Sequence[str]) -> Array:
         """Return where a point is clicked: (cameras, 2) [px], NaN where it is not."""
         return np.stack([self.at(name, camera) for camera in cameras])
+
+    def off_px(self, name: str, rig: Rig) -> tuple[Mask, Array]:
+        """Say of a point whether it is clicked, and how far from where the cameras agree, in each camera [px]."""
+        px = self.px(name, self.shown.names)
+        return np.isfinite(px[:, 0]), np.linalg.norm(self.consensus_px(name, rig) - px, axis=1)
 
     def consensus_px(self, name: str, rig: Rig) -> Array:
         """Return where the cameras see the point they agree on best: (cameras, 2) [px], NaN with fewer than two."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, CL
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.view import Mark
-from airborne.types import Array, Mask
+from airborne.types import Array
 
 _FILE, _ENDS = "ruler.csv", ("from", "to")
 _HELP = (
@@ -83,7 +84,7 @@ class RulerPanel(PointsPanel):
         places = [self.rig.points_from_px(self.px(name, self.rig.names)) for name in _ENDS]
         items = [*self.epipolar_items(self.chosen, self.rig), *self._line(np.array(places))]
         self.view.show_over(list(self._marks()), items, self.selected)
-        self.list.show(_ENDS, self.chosen, self._off_px)
+        self.list.show(_ENDS, self.chosen, partial(self.off_px, rig=self.rig))
         if not np.isfinite(places).all():
             self.says.set_text("Each end is to be clicked in two cameras.")
             return
@@ -108,7 +109,3 @@ class RulerPanel(PointsPanel):
                     yield {
                         "id": f"{name}|{camera}", "pane": pane, "u": u, "v": v, "label": name, "colour": colour,
                     }  # fmt: skip
-
-    def _off_px(self, name: str) -> tuple[Mask, Array]:
-        px = self.px(name, self.shown.names)
-        return np.isfinite(px[:, 0]), np.linalg.norm(self.consensus_px(name, self.rig) - px, axis=1)

@@ -79,8 +79,8 @@ def implausibility(stances: Array) -> Array:
 
 def states_of(stances: Array) -> Array:
     """Return the states (n, 35) of stances (n, 18): the lower foot stands on the floor, or its height over it."""
-    states = np.zeros((len(stances), N_DOF + len(average_shape(1.0))))
     shape = average_shape(1.0)
+    states = np.zeros((len(stances), N_DOF + len(shape)))
     states[:, N_DOF:] = stances[:, STATURE, None] * shape
     states[:, N_DOF + SHORTS_END], states[:, N_DOF + SOCK_END] = stances[:, SHORTS], stances[:, SOCKS]
     states[:, [0, 1, 3, 4, 5, 6]] = stances[:, [X, Y, HEADING, SIDE, LEAN, BEND]]

@@ -20,6 +20,7 @@ from airborne.tracking.capsules.floor_search import (
 )
 from airborne.tracking.capsules.jumper import JOINTS
 from airborne.tracking.capsules.standing import HEIGHT, KNEES, ColourViews
+from airborne.tracking.capsules.track import evidence_per_px
 from airborne.tracking.capsules.tracker import occluding_capsules
 from airborne.tracking.first_pose.candidates import LEAST_PROBABILITY
 from airborne.tracking.players import PlayerStart
@@ -196,8 +197,7 @@ def _fit_one(state: Array, others: Sequence[Array], frames: Frames) -> FirstFram
 
 
 def _player_of(fit: FirstFrameFit, stander: Stander, number: int) -> FoundPlayer:
-    evidence, area = fit.fit.owned.sum(axis=(0, 1, 2))
-    per_px = float(evidence / area) if area > 0 else 0.0
+    per_px = evidence_per_px(fit.fit.owned)
     stance = stander.stances[number]
     stands = stance[KNEES].mean() < _DEEPEST and stance[HEIGHT] < _HIGHEST_M
     is_plausible = stander.support[number] > _LEAST_SUPPORT and per_px > _LEAST_EVIDENCE and stands

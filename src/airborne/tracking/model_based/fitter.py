@@ -44,9 +44,8 @@ from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
 
-LOST_NATS = (
-    10.0  # what a limb costs that is not where it was expected; of synthetic limbs moved at 7, a third more were wrong
-)
+# what a limb costs that is not where it was expected; of synthetic limbs moved at 7, a third more were wrong
+LOST_NATS = 10.0
 _N_FITTED = 3  # places of a limb that are fitted to the images
 _BESIDE_M2 = 6e-4  # uncovered beside a limb; on synthetic people such limbs hold half of the joints over 0.1 m off
 _FEWEST_VIEWS = 2  # in which something uncovered asks for a limb

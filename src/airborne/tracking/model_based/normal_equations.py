@@ -107,7 +107,7 @@ def _draw(body, projection, maps):
     h, w = maps.part.shape if len(R) > 1 else (0, 0)
     owner, nearness = np.empty((h, w), np.int16), np.empty((h, w), np.float32)
     if len(R) > 1:
-        find_owners(maps.part, maps.inverse_depth, body.segment_of_part, 0, 0, owner, nearness)
+        find_owners(maps.part, maps.inverse_depth, body.segment_of_part, owner, nearness)
     return owner, nearness
 
 
@@ -117,5 +117,5 @@ def _sum_equations(lit, is_faceted, maps, owner, nearness, projection, observati
     flat = lit
     if not is_faceted.all():
         flat = lit.copy()
-        flatten_shading(maps.part, is_faceted, 0, 0, flat)
+        flatten_shading(maps.part, is_faceted, flat)
     return add_rows(lit, flat, maps, owner, nearness, projection, observation, comparison, sums, blocks)

@@ -26,30 +26,28 @@ def mask_box(part):
 
 
 @kernel(fastmath=True)
-def find_owners(part, inverse_depth, segment_of_part, x0, y0, owner, nearness):
+def find_owners(part, inverse_depth, segment_of_part, owner, nearness):
     """Assign each pixel to the segment whose edge moves it: of those within REACH_PX, the one nearest to the camera.
 
-    An occluding contour moves with the surface in front, never with the one behind. part, inverse_depth (H, W) maps of
-    a region; owner (h, w) segment or -1, nearness (h, w) its inverse depth near there [1/m], both of the window at
-    (x0, y0).
+    An occluding contour moves with the surface in front, never with the one behind. part, inverse_depth (h, w) maps of
+    a region; owner (h, w) segment or -1, nearness (h, w) its inverse depth near there [1/m].
     """
     h, w = owner.shape
-    height, width = part.shape
     distance = np.zeros((h, w), np.int16)  # squared, to the edge that owns a pixel; 0 inside
     for y in range(h):
         for x in range(w):
-            p = part[y + y0, x + x0]
+            p = part[y, x]
             owner[y, x] = segment_of_part[p] if p >= 0 else -1
-            nearness[y, x] = inverse_depth[y + y0, x + x0]
-    for v in range(max(y0 - REACH_PX, 0), min(y0 + h + REACH_PX, height)):
-        for u in range(max(x0 - REACH_PX, 0), min(x0 + w + REACH_PX, width)):
+            nearness[y, x] = inverse_depth[y, x]
+    for v in range(h):
+        for u in range(w):
             p = part[v, u]
             if p < 0 or not _is_front_edge(part, inverse_depth, segment_of_part, v, u):
                 continue
             own, near = segment_of_part[p], inverse_depth[v, u]
-            for y in range(max(v - y0 - REACH_PX, 0), min(v - y0 + REACH_PX + 1, h)):
-                for x in range(max(u - x0 - REACH_PX, 0), min(u - x0 + REACH_PX + 1, w)):
-                    d = (v - y0 - y) ** 2 + (u - x0 - x) ** 2
+            for y in range(max(v - REACH_PX, 0), min(v + REACH_PX + 1, h)):
+                for x in range(max(u - REACH_PX, 0), min(u + REACH_PX + 1, w)):
+                    d = (v - y) ** 2 + (u - x) ** 2
                     is_closer = d < distance[y, x] if owner[y, x] == own else near > nearness[y, x]
                     if is_closer:
                         owner[y, x], nearness[y, x], distance[y, x] = own, near, d
