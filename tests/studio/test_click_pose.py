@@ -97,6 +97,7 @@ def drag_trunk(page, pane, by_px, *, held=None):
 def test_a_body_placed_by_hand_goes_where_drags_put_it(rig, folder):
     first, second = np.array([40.0, -18.0]), np.array([-55.0, 6.0])
     with open_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
+        page.wait_for_function("document.querySelector('canvas.view')?.dataset.frame !== undefined")  # it listens
         page.locator("canvas.view").press("End")
         page.get_by_text(f"No landmark is clicked in frame {N_FRAMES - 1} yet.").wait_for()
         page.get_by_role("button", name="Place it by hand").click()
