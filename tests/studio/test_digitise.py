@@ -51,3 +51,29 @@ def test_the_cross_digitised_by_one_person(tmp_path):
     ]
     assert np.sqrt(np.mean(errors_mm**2)) <= 10
     assert np.degrees(np.sqrt(np.mean(np.square(turns)))) <= 3
+
+
+def test_a_click_belongs_to_the_frame_that_it_was_made_in(tmp_path):
+    """Also where it is made before the page has heard of the frame."""
+    folder = tmp_path / "cross"
+    shutil.copytree(THROWN_CROSS, folder)
+    script = """async ([pane, place, frames]) => {
+        const canvas = document.querySelector("canvas.view"), box = canvas.getBoundingClientRect();
+        const [x, y] = canvas.view.toScreen(canvas.view.layout()[pane], ...place);
+        for (const frame of frames) {
+            canvas.view.go(frame);
+            while (canvas.dataset.frame != frame) await new Promise(requestAnimationFrame);
+        }
+        for (const name of ["pointerdown", "pointerup"]) {
+            const at = { clientX: box.left + x, clientY: box.top + y, pointerId: 1, button: 0 };
+            canvas.view["on_" + name](new PointerEvent(name, at));
+        }
+    }"""
+    with open_studio(folder) as address, open_page(address.replace("/?", "/digitise?")) as page:
+        wait_for_frame(page, 0)
+        page.wait_for_function("document.querySelector('canvas.view').view.underway.size == 0")  # the next are here
+        page.evaluate("document.querySelector('canvas.view').setPointerCapture = () => {}")  # no pointer is down
+        page.evaluate(script, [0, [300.0, 200.0], [1, 2, 3]])
+        page.get_by_text("frame 3; 1 click in 1 frame").wait_for()
+    lines = (folder / "digitised_A_1.csv").read_text().splitlines()[1:]
+    assert [int(line.split(",")[0]) for line in lines] == [3]

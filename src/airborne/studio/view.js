@@ -115,6 +115,7 @@ export default {
         if (next >= 0 && next < this.n_frames) await this.load(next).catch(() => {});
       }
     },
+    seen() { return this.shown ? this.shown.frame : this.wanted; }, // what is done here is done to this frame
     // places
     layout() {
       const box = this.canvas.getBoundingClientRect(), n = this.alone < 0 ? this.panes.length : 1;
@@ -285,7 +286,7 @@ export default {
       const { pane, x, y, mark } = this.drag, place = this.layout()[pane], at = this.place(event);
       const from = mark ? [mark.u, mark.v] : this.toVideo(place, x, y);
       const [u, v] = [from[0] + (at.x - x) / place.scale, from[1] + (at.y - y) / place.scale];
-      this.pull = { n: this.drag.n, pane, from, u, v, id: mark ? mark.id : null, turn: event.shiftKey, ended, at: performance.now() };
+      this.pull = { frame: this.seen(), n: this.drag.n, pane, from, u, v, id: mark ? mark.id : null, turn: event.shiftKey, ended, at: performance.now() };
       if (!this.pulling) this.send();
     },
     send() {
@@ -347,11 +348,11 @@ export default {
       this.drag = null;
       if (!drag) return;
       if (drag.moved && drag.holds) return;
-      if (drag.moved && this.dragged) this.$emit("move", { ...this.dragged, frame: this.wanted });
+      if (drag.moved && this.dragged) this.$emit("move", { ...this.dragged, frame: this.seen() });
       else if (!drag.moved && this.picking) { // the server knows whether the mark close by or a new point is meant
         const [u, v] = this.toVideo(this.layout()[drag.pane], at.x, at.y);
-        this.$emit("pick", { pane: drag.pane, u, v, near: drag.mark ? drag.mark.id : null });
-      } else if (!drag.moved && drag.mark) this.$emit("select", { id: drag.mark.id });
+        this.$emit("pick", { frame: this.seen(), pane: drag.pane, u, v, near: drag.mark ? drag.mark.id : null });
+      } else if (!drag.moved && drag.mark) this.$emit("select", { frame: this.seen(), id: drag.mark.id });
       this.draw();
     },
     on_pointerleave() { this.pointer = null; this.draw(); },
@@ -367,14 +368,14 @@ export default {
         const from = this.dragged && this.dragged.id === mark.id ? this.dragged : mark;
         this.dragged = { id: mark.id, u: from.u + du * step, v: from.v + dv * step };
         this.draw();
-        this.$emit("move", { ...this.dragged, frame: this.wanted });
+        this.$emit("move", { ...this.dragged, frame: this.seen() });
       } else if (event.key === "ArrowLeft" || event.key === "ArrowRight")
         this.go(this.wanted + arrows[event.key][0] * (event.shiftKey ? 10 : 1));
       else if (event.key === "," || event.key === ".") this.go(this.wanted + (event.key === "." ? 1 : -1));
       else if (event.key === "Home") this.go(0);
       else if (event.key === "End") this.go(this.n_frames - 1);
       else if (event.key === "c") { this.alone = this.alone + 1 < this.panes.length ? this.alone + 1 : -1; this.draw(); }
-      else if (event.key === "Escape") this.$emit("select", { id: null });
+      else if (event.key === "Escape") this.$emit("select", { frame: this.seen(), id: null });
       else if (event.key === "0") { this.zooms = this.panes.map(() => ({ scale: 1, u: 0, v: 0 })); this.draw(); }
       else return;
       event.preventDefault();

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from inspect import isawaitable
 from typing import Any, TypedDict
 
 from nicegui.element import Element
@@ -72,6 +73,7 @@ class CameraViews(Element, component="view.js", default_classes="view"):
         `overlay` is the address of what lies over each frame, with {frame} in it.
         `on_pick` gets camera number, pixel, and the mark close by if there is one; `on_move` and `on_select` a mark.
         `on_drag` gets the movements of what can be grabbed, and answers each with `follow`.
+        What is done in a picture is done to the frame that it shows: `on_frame` is called with that frame first.
         """
         super().__init__()
         kind = "image" if camera is None else "picture"
@@ -88,6 +90,7 @@ class CameraViews(Element, component="view.js", default_classes="view"):
         self._props["label"] = f"pictures of {', '.join(shown.names)}"
         self._props["picking"] = False
         self.show_over((), ())
+        self._frame, self._turn_to = frame, on_frame
         self._listen("frame", on_frame, lambda args: (int(args["frame"]),))
         self._listen(
             "pick", on_pick, lambda args: (int(args["pane"]), float(args["u"]), float(args["v"]), args["near"])
@@ -101,8 +104,11 @@ class CameraViews(Element, component="view.js", default_classes="view"):
         if handler is None:
             return
 
-        def handle(event: GenericEventArguments) -> Any:
-            return handler(*read(event.args))
+        async def handle(event: GenericEventArguments) -> None:
+            before, self._frame = self._frame, int(event.args["frame"])
+            if name != "frame" and self._frame != before and self._turn_to is not None:  # its note is on the way
+                await _finish(self._turn_to(self._frame))
+            await _finish(handler(*read(event.args)))
 
         self.on(name, handle, throttle=0.1 if name == "frame" else 0.0)
 
@@ -129,6 +135,11 @@ class CameraViews(Element, component="view.js", default_classes="view"):
     def go(self, frame: int) -> None:
         """Show a frame, in every part of the page."""
         self.run_method("show", frame)
+
+
+async def _finish(result: Any) -> None:
+    if isawaitable(result):
+        await result
 
 
 def _read_drag(args: dict) -> Drag:
