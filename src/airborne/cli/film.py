@@ -23,10 +23,10 @@ def film_command(
 
     Example: airborne film results --first 20 --last 60 -o flight.gif
     """
-    from airborne.motion.run_folder import FOLDERS
+    from airborne.motion.run_folder import VIDEOS
     from airborne.run.film import write_film
 
-    path = results / FOLDERS[2] / "film.mp4" if output is None else output
+    path = results / VIDEOS / "film.mp4" if output is None else output
     with progress("drawing") as report:
         n = write_film(results, path, first=first, last=last, progress=report)
     print(f"{path}: {n} frames")

@@ -184,11 +184,12 @@ def _describe(summary: dict, output: Path) -> str:
     else:
         if not summary["n_tracked"]:
             lines.append(f"no frame is tracked, so that no number here can be relied on: {look}see the notes")
-        position, rotation = summary["median_position_sd_mm"], summary["median_rotation_sd_deg"]
-        lines.append(
-            f"median sd: position {_describe_sd(position, 'mm')}, rotation {_describe_sd(rotation, 'degrees')}; "
-            "summary.json says which errors these include"
-        )
+        else:
+            position, rotation = summary["median_position_sd_mm"], summary["median_rotation_sd_deg"]
+            lines.append(
+                f"median sd: position {_describe_sd(position, 'mm')}, rotation {_describe_sd(rotation, 'degrees')}; "
+                "summary.json says which errors these include"
+            )
     if (line := _describe_self_check(summary)) is not None:
         lines.append(line)
     lines += [f"note: {text}" for text in [*summary["warnings"], *summary["events"]]]

@@ -18,7 +18,7 @@ from airborne.export.takes import Take, body_take, player_takes
 from airborne.motion import Motion, PlayersMotion, joint_angles, root_angles
 from airborne.motion.angles import ROOT_ANGLES
 from airborne.motion.joints import main_joints
-from airborne.motion.run_folder import FOLDERS, PICTURES
+from airborne.motion.run_folder import PICTURES, VIDEOS
 from airborne.tracking import Status
 from airborne.types import Array
 
@@ -59,7 +59,7 @@ def _viewer(
         "time_s": time_s[rows].round(6).tolist(),
         "status": status[rows].tolist(),
         "groups": groups,
-        "film": read_film(folder / FOLDERS[2] / PICTURES),
+        "film": read_film(folder / VIDEOS / PICTURES),
         "glb": base64.b64encode(animation_bytes(takes)).decode() if takes else None,
     }
 

@@ -20,31 +20,31 @@ CALIBRATION, BODY = "calib.toml", "body.toml"
 SMOOTH_RECORD = "smooth.json"
 CANDIDATES, CANDIDATES_PICTURE = "candidates.json", "candidates.png"  # of a start that is undecided
 PICTURES = "pictures.json"  # beside the videos: some of their pictures
-FOLDERS = ("tables", "figures", "videos")
-ANGLES, JOINT_ANGLES, FLIGHT = (f"{FOLDERS[0]}/{name}.csv" for name in ("angles", "joint_angles", "flight"))
+FOLDERS = TABLES, FIGURES, VIDEOS = "tables", "figures", "videos"
+ANGLES, JOINT_ANGLES, FLIGHT = (f"{TABLES}/{name}.csv" for name in ("angles", "joint_angles", "flight"))
 _COUNTS = {"name", "n_frames", "n_tracked", "n_uncertain", "n_lost"}  # that every summary holds
 _TELLING = ("matching.png", "heights.png", "through_mask.png", "pose.png")  # figures that tell most of a run
 
 
 def tables_of(folder: Path) -> Path:
     """Return where a run's further tables lie, made if need be."""
-    return _create(folder / FOLDERS[0])
+    return _create(folder / TABLES)
 
 
 def figures_of(folder: Path) -> Path:
     """Return where a run's figures lie, made if need be."""
-    return _create(folder / FOLDERS[1])
+    return _create(folder / FIGURES)
 
 
 def list_figures(folder: Path) -> list[Path]:
     """List a run's figures, that first which tells most of it."""
-    found = sorted((folder / FOLDERS[1]).glob("*.png"))
+    found = sorted((folder / FIGURES).glob("*.png"))
     return sorted(found, key=lambda path: _TELLING.index(path.name) if path.name in _TELLING else len(_TELLING))
 
 
 def videos_of(folder: Path) -> Path:
     """Return where a run's videos lie, made if need be."""
-    return _create(folder / FOLDERS[2])
+    return _create(folder / VIDEOS)
 
 
 def _create(folder: Path) -> Path:

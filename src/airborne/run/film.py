@@ -16,7 +16,7 @@ from PIL import Image as GifPicture
 from airborne.errors import ResultError
 from airborne.export.lettering import draw_text, text_width
 from airborne.export.palette import TEXT_RGB
-from airborne.motion.run_folder import FOLDERS, holds_players, read_body_run, read_players_run
+from airborne.motion.run_folder import VIDEOS, holds_players, read_body_run, read_players_run
 from airborne.types import Array, Image, Progress
 from airborne.video import VideoSource, VideoWriter
 from airborne.video.seeking import ImageReader, index_images
@@ -68,7 +68,7 @@ def _read(folder: Path) -> tuple[NDArray[np.int64], Array, dict[str, Array]]:
 
 
 def _open(folder: Path, n: int) -> list[ImageReader]:
-    paths = sorted((folder / FOLDERS[2]).glob("overlay_*.mp4"))
+    paths = sorted((folder / VIDEOS).glob("overlay_*.mp4"))
     if not paths:
         raise ResultError(f"{folder} has no videos of overlays; track again without --no-pictures")
     sources = [VideoSource(path.stem.removeprefix("overlay_"), path) for path in paths]
