@@ -41,6 +41,7 @@ _EXCHANGED = {  # what may have the wrong side: in words, and the stems of the l
 }
 _LEAST_WIDTH_M = 0.02  # second principal sd: landmarks on a line leave the rotation about it open
 _SHARES = np.linspace(-0.96, 0.96, 7)  # of a joint's half range: where a limb's search starts
+_FIRST_STEPS, _N_GO_ON = 5, 2  # of a limb: from every start; starts that go on: half the time of all, RMS + 0.1 mm
 _N_RESTARTS, _WORTHWHILE_SHARE = 3, 0.95  # restarts of the limbs, while each brings the cost below this share
 
 
@@ -93,8 +94,7 @@ def _describe_exchange(problem: LandmarkProblem) -> str | None:
         problem = replace(problem, model=with_segment_lengths(problem.model, lengths))
     except BodyError:  # lengths of no person
         pass
-    as_named_m = _fit(problem, None)[2]
-    if as_named_m <= _SUSPECT_M:
+    if (as_named_m := _fit(problem, None)[2]) <= _SUSPECT_M:
         return None
     others_m = {}
     for words, stems in _EXCHANGED.items():
@@ -103,9 +103,10 @@ def _describe_exchange(problem: LandmarkProblem) -> str | None:
             names.index(_other_side(name)) if own else i
             for i, (name, own) in enumerate(zip(names, is_of_pair, strict=True))
         ]
-        others_m[words] = _fit(replace(problem, targets=problem.targets[other]), None)[2] if any(is_of_pair) else np.inf
-    best = min(others_m, key=others_m.__getitem__)
-    if others_m[best] >= _EXCHANGED_SHARE * as_named_m:
+        if any(is_of_pair):
+            others_m[words] = _fit(replace(problem, targets=problem.targets[other]), None, n_restarts=0)[2]
+    best = min(others_m, key=others_m.__getitem__, default=None)
+    if best is None or others_m[best] >= _EXCHANGED_SHARE * as_named_m:
         return None
     return (
         f"left and right{best} look exchanged: landmarks {as_named_m * 1e3:.0f} mm off as named, "
@@ -156,7 +157,7 @@ def _trunk_ratios(model: BodyModel, core: Array) -> dict[str, list[Array]]:
     return ratios
 
 
-def _fit(problem: LandmarkProblem, start: Pose | None) -> tuple[Pose, Array, float]:
+def _fit(problem: LandmarkProblem, start: Pose | None, *, n_restarts: int = _N_RESTARTS) -> tuple[Pose, Array, float]:
     """Return the pose, each landmark's distance (landmarks,) [m] and their RMS, targets only [m]."""
     n_joints = len(problem.model.segments) - 1
     if start is None:
@@ -168,7 +169,7 @@ def _fit(problem: LandmarkProblem, start: Pose | None) -> tuple[Pose, Array, flo
         state = PoseState(root.rotation.as_matrix(), root.translation, problem.prior)
     everything = np.ones(6 + 3 * n_joints, bool)
     state, cost = minimise(problem, state, everything)
-    for _ in range(_N_RESTARTS if start is None else 0):
+    for _ in range(n_restarts if start is None else 0):
         again, cost_again = minimise(problem, _fit_limbs(problem, state), everything)
         if cost_again > _WORTHWHILE_SHARE * cost:
             break
@@ -233,7 +234,9 @@ def _fit_limb(problem: LandmarkProblem, state: PoseState, top: int) -> PoseState
         best = np.unravel_index(np.argmin(costs[:, :, spin]), costs[:, :, spin].shape)
         starts.append(replace(state, angles=angles[:, :, spin][best]))
     free = _variables(model, [*girdle, *limb], root=False)
-    return min((minimise(alone, start, free, COARSE_GAIN) for start in starts), key=lambda result: result[1])[0]
+    tried = [minimise(alone, start, free, COARSE_GAIN, most_steps=_FIRST_STEPS) for start in starts]
+    best = sorted(tried, key=lambda result: result[1])[:_N_GO_ON]
+    return min((minimise(alone, start, free, COARSE_GAIN) for start, _ in best), key=lambda result: result[1])[0]
 
 
 def _rms(distance: Array) -> float:

@@ -66,14 +66,19 @@ class PoseState:
 
 
 def minimise(
-    problem: LandmarkProblem, state: PoseState, free: NDArray[np.bool_], least_gain: float = _FINE_GAIN
+    problem: LandmarkProblem,
+    state: PoseState,
+    free: NDArray[np.bool_],
+    least_gain: float = _FINE_GAIN,
+    *,
+    most_steps: int = _MOST_STEPS,
 ) -> tuple[PoseState, float]:
     """Minimise the cost over the free variables (6 + 3 joints,); return the state and its cost."""
 
     def evaluate(state: PoseState) -> _Iterate:
         return _Iterate(problem, state, free)
 
-    best = descend(evaluate(state), evaluate, _DAMPING, most_steps=_MOST_STEPS, least_gain=least_gain).best
+    best = descend(evaluate(state), evaluate, _DAMPING, most_steps=most_steps, least_gain=least_gain).best
     return best.state, best.equations[0]
 
 
