@@ -21,9 +21,12 @@ from airborne.motion import Motion, PlayersMotion, read_motion
 from airborne.motion.run_folder import BODY, CALIBRATION, MOTION, holds_players, read_players_run
 from airborne.rendering import FLAT, render
 from airborne.tracking import Status
+from airborne.tracking.image_regions import bounding_points
+from airborne.types import Array
 
 _COLOURS = {status.value: hex_colour(rgb) for status, rgb in STATUS_RGB.items()}
 _LIMBS = ("hip", "knee", "ankle", "foot")  # in order down a leg
+_RIM_PX = 2  # about the body, so that no outline runs along the border of what is drawn
 _MOST_DIGITS = 10  # of a frame's number
 _PATH_COLOUR = "rgba(255,255,255,0.55)"
 
@@ -43,17 +46,28 @@ def outline_items(
     `step` is how many pixels of the video one of the outline has; `grab` lets the body be taken there.
     """
     surface = cached_surface_arrays(posed.model)
-    items = []
+    corners, items = bounding_points(posed, surface), []
     for pane, camera in enumerate(cameras):
         width, height = camera.size
         drawn = camera.without_distortion().resample(scale=(step, step), size=(-(-width // step), -(-height // step)))
-        mask = render(surface, posed, drawn, FLAT).mask.astype(np.uint8)
-        contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+        drawing = render(surface, posed, drawn, FLAT, region=_region_around(drawn.px_from_world(corners)))
+        mask, corner = drawing.mask.astype(np.uint8), drawing.region[:2]
+        if not mask.size:
+            continue
+        contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE, offset=corner)
         for contour in contours:
             line = camera.distort_px(step * cv2.approxPolyDP(contour, 0.7, True)[:, 0].astype(float))
             item = {"pane": pane, "points": _round(line), "colour": colour, "width": 2, "closed": True}
             items.append({**item, "grab": True} if grab else item)
     return items
+
+
+def _region_around(px: Array) -> tuple[int, int, int, int] | None:
+    """Return x0, y0, x1, y1 around points (n, 2) [px]; None, the whole picture, where one is behind the camera."""
+    if not np.isfinite(px).all():
+        return None
+    (x0, y0), (x1, y1) = np.floor(px.min(axis=0)) - _RIM_PX, np.ceil(px.max(axis=0)) + _RIM_PX
+    return int(x0), int(y0), int(x1), int(y1)
 
 
 def run_overlay(run: Path, frame: int, cameras: Sequence[str]) -> dict[str, Any]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager
 from pathlib import Path
+from threading import Event
 from typing import Any
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, JSONResponse, Response
 
 from airborne import export
@@ -32,12 +34,14 @@ def add_routes(app: FastAPI, session: Session) -> None:
     """Add the routes of a session; every name in an address is one of a list, none is a path."""
 
     @app.get("/image/{camera}/{frame}")
-    async def image(camera: int, frame: int) -> Response:
-        return await _answer(lambda: _jpeg(session, camera, frame))
+    async def image(request: Request, camera: int, frame: int) -> Response:
+        async with _waiting(request) as is_wanted:
+            return await _answer(lambda: _jpeg(session, camera, frame, is_wanted))
 
     @app.get("/picture/{camera}/{number}")
-    async def own_picture(camera: int, number: int) -> Response:
-        return await _answer(lambda: _picture(session, camera, number))
+    async def own_picture(request: Request, camera: int, number: int) -> Response:
+        async with _waiting(request) as is_wanted:
+            return await _answer(lambda: _picture(session, camera, number, is_wanted))
 
     @app.get("/thumbnail/{name}")
     async def first_picture(name: str) -> Response:
@@ -91,6 +95,23 @@ async def _answer(make: Callable[[], Response]) -> Response:
         return Response(reason, status_code=404, media_type="text/plain")
 
 
+@asynccontextmanager
+async def _waiting(request: Request) -> AsyncIterator[Callable[[], bool]]:
+    """Give what says whether the browser still waits for an answer: it gives up what a jump has overtaken."""
+    has_gone = Event()
+
+    async def watch() -> None:
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
+        has_gone.set()
+
+    watcher = asyncio.create_task(watch())
+    try:
+        yield lambda: not has_gone.is_set()
+    finally:
+        watcher.cancel()
+
+
 def _json(value: Any) -> Response:
     return JSONResponse(value, headers={"cache-control": "no-store"})
 
@@ -99,19 +120,19 @@ def _mesh(run: Path, part: int) -> Response:
     return Response(part_stl(run_body(run), part), media_type="model/stl", headers={"cache-control": "no-store"})
 
 
-def _jpeg(session: Session, camera: int, frame: int) -> Response:
+def _jpeg(session: Session, camera: int, frame: int, is_wanted: Callable[[], bool]) -> Response:
     shown = session.shown()
     if not (0 <= camera < len(shown.sources) and 0 <= frame < len(shown.clock)):
         return Response(status_code=404)
-    return _picture(session, camera, int(shown.clock.images[frame, camera]))
+    return _picture(session, camera, int(shown.clock.images[frame, camera]), is_wanted)
 
 
-def _picture(session: Session, camera: int, number: int) -> Response:
+def _picture(session: Session, camera: int, number: int, is_wanted: Callable[[], bool]) -> Response:
     """Return a picture of a camera by its number in the file."""
     shown = session.shown()
     if not (0 <= camera < len(shown.sources) and number < len(shown.indexes[camera])):
         return Response(status_code=404)
-    jpeg = None if number < 0 else session.pictures.jpeg(shown.sources[camera], number)
+    jpeg = None if number < 0 else session.pictures.jpeg(shown.sources[camera], number, is_wanted)
     if jpeg is None:
         return Response(status_code=204)  # this camera has no picture then
     return Response(jpeg, media_type="image/jpeg", headers=_KEEP)
