@@ -9,9 +9,13 @@ from scipy.spatial.transform import RigidTransform
 from airborne.body import Pose
 from airborne.body.files import read_body
 from airborne.cameras import Rig, camera_looking_at
-from airborne.motion import read_players
-from airborne.studio.outlines import outline_items, run_curves, run_overlay, run_rows
+from airborne.motion import MotionWriter, read_players
+from airborne.studio import run_curves as run_curves_module
+from airborne.studio.outlines import outline_items, run_overlay
+from airborne.studio.run_curves import run_curves
+from airborne.studio.runs import count_rows
 from airborne.studio.stage import part_stl
+from tests.support.motions import run_with_gap
 from tests.support.places import THROWN_CROSS
 from tests.support.players_trial import rig, write_run
 
@@ -52,6 +56,22 @@ def test_curves_of_players_are_of_what_is_lowest(tmp_path):
     assert set(curves["status"]) <= {"tracked", "uncertain", "lost"}
 
 
+def test_curves_of_a_long_run_keep_what_stands_out(tmp_path, monkeypatch):
+    with MotionWriter(tmp_path / "motion.csv") as writer:
+        for each in run_with_gap(101, lost=(50,)):
+            writer.append(each)
+    whole = run_curves(tmp_path)
+    monkeypatch.setattr(run_curves_module, "_MOST_POINTS", 20)
+    thin = run_curves(tmp_path)
+    assert len(thin["frame"]) <= 22
+    assert (thin["frame"][0], thin["frame"][-1]) == (0, 100)
+    assert "lost" in thin["status"]
+    for a, b in zip(whole["series"], thin["series"], strict=True):
+        values = [each for each in a["value"] if each is not None]
+        assert (min(b["value"]), max(b["value"])) == (min(values), max(values))
+        assert len(b["sd"]) == len(b["value"]) == len(thin["frame"]) == len(thin["time_s"])
+
+
 def test_a_part_of_a_body_is_a_mesh_in_its_segment(cross):
     stl = part_stl(cross, 1)
     corners = np.frombuffer(stl[84:], np.dtype([("normal", "<3f4"), ("corners", "<9f4"), ("rest", "<u2")]))["corners"]
@@ -59,6 +79,11 @@ def test_a_part_of_a_body_is_a_mesh_in_its_segment(cross):
 
 
 def test_rows_of_a_run_are_counted_while_it_goes_on(tmp_path):
-    assert run_rows(tmp_path) == (0, None)
-    (tmp_path / "motion.csv").write_text("frame,time_s\n4,0.1\n6,0.2\n8,0")
-    assert run_rows(tmp_path) == (2, 6)
+    assert count_rows(tmp_path) == (0, None)
+    path = tmp_path / "motion.csv"
+    with MotionWriter(path) as writer:
+        for number, estimate in enumerate(run_with_gap(), start=1):
+            writer.append(estimate)
+            assert count_rows(tmp_path) == (number, estimate.index)
+    path.write_bytes(path.read_bytes() + b"99,0.3")
+    assert count_rows(tmp_path) == (number, estimate.index)

@@ -9,13 +9,12 @@ from urllib.parse import quote
 import numpy as np
 from nicegui import ui
 
-from airborne.cameras import read_rig
-from airborne.motion.run_folder import CALIBRATION, holds_players
-from airborne.studio.outlines import run_body, run_motion
+from airborne.motion.run_folder import holds_players
 from airborne.studio.pages.correct import Correction
-from airborne.studio.pages.layout import complain, in_thread, page_frame, work
+from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
+from airborne.studio.runs import run_body, run_rig, run_rows
 from airborne.studio.session import Session
 from airborne.studio.stage import BodyOnStage, draw_cameras
 from airborne.studio.view import CameraViews, Curves
@@ -62,8 +61,9 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
 
     def turn_to(frame: int) -> None:
         session.go(frame=frame)
-        for show in bodies:
-            show(frame)
+        with errors_shown():
+            for show in bodies:
+                show(frame)
 
     with ui.element("div").classes("split"):
         with ui.element("div").classes("wide"):
@@ -84,17 +84,15 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
 
 async def _stage(folder: Path) -> Callable[[int], None]:
     """Build the scene of a run of one body; return what shows a frame in it."""
-    motion = await in_thread(run_motion, folder)
+    rows = await in_thread(run_rows, folder)
     model = await in_thread(run_body, folder)
-    rig, path = read_rig(folder / CALIBRATION), motion.position[motion.has_pose]
+    path = rows.position[np.isfinite(rows.position).all(axis=1)]
     near = {"middle": path.mean(axis=0), "away_m": _AROUND_M + float(np.ptp(path, axis=0).max())} if len(path) else {}
-    scene = draw_cameras(rig, path=motion.position, **near)
+    scene = draw_cameras(run_rig(folder), path=rows.position, **near)
     body = BodyOnStage(scene, model, f"/mesh/{quote(folder.name)}/{{part}}")
-    rows = {int(frame): row for row, frame in enumerate(motion.index) if motion.has_pose[row]}
 
     def show(frame: int) -> None:
-        row = rows.get(frame)
-        body.show(None if row is None else motion.pose(row))
+        body.show(run_rows(folder).pose(frame))
 
     return show
 
@@ -105,8 +103,8 @@ def _jump(session: Session, name: str, status: Status) -> None:
     if holds_players(folder):
         complain("players have a status each; step through the strip below the curves")
         return
-    motion = run_motion(folder)
-    frames = motion.index[motion.status == status.value]
+    rows = run_rows(folder)
+    frames = rows.index[rows.status == status.value]
     if not len(frames):
         ui.notify(f"no frame is {status.value}")
         return
