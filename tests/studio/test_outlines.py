@@ -12,7 +12,7 @@ from airborne.cameras import Rig, camera_looking_at
 from airborne.motion import MotionWriter, read_players
 from airborne.studio import run_curves as run_curves_module
 from airborne.studio.outlines import outline_items, run_overlay
-from airborne.studio.run_curves import run_curves
+from airborne.studio.run_curves import describe_distance, run_curves
 from airborne.studio.runs import count_rows
 from airborne.studio.stage import part_stl
 from tests.support.motions import run_with_gap
@@ -47,6 +47,28 @@ def test_players_have_lines_down_both_legs_in_each_camera(tmp_path):
     hip = motion.points[3, 0, motion.joints.index("hip_left")]
     assert first["points"][0] == pytest.approx(rig()["right"].px_from_world(hip), abs=0.01)
     assert run_overlay(run, 99, ("right", "left"))["items"] == []
+
+
+def test_another_run_is_drawn_in_its_own_colour_and_said_to_be_as_far_as_it_is(tmp_path):
+    run, other, body = write_run(tmp_path / "run"), write_run(tmp_path / "other"), tmp_path / "body"
+    overlay = run_overlay(run, 3, ("right", "left"), colour="#cc79a7")
+    assert {item["colour"] for item in overlay["items"]} == {"#cc79a7"}
+    table = (other / "joints.csv").read_text().splitlines()
+    columns = table[0].split(",")
+    frame, joint, x = (columns.index(name) for name in ("frame", "joint", "x_m"))
+    row = next(
+        k for k, line in enumerate(table) if line.split(",")[frame] == "5" and line.split(",")[joint] == "hip_left"
+    )
+    cells = table[row].split(",")
+    cells[x] = str(float(cells[x]) + 0.25)
+    table[row] = ",".join(cells)
+    (other / "joints.csv").write_text("\n".join(table) + "\n")
+    assert describe_distance(run, other).endswith("median 0 mm, at most 250 mm, in frame 5")
+    body.mkdir()
+    with MotionWriter(body / "motion.csv") as writer:
+        writer.append(run_with_gap()[0])
+    assert describe_distance(run, body) == "they share no frame"
+    assert describe_distance(body, body) == "roots: median 0 mm, at most 0 mm, in frame 0"
 
 
 def test_curves_of_players_are_of_what_is_lowest(tmp_path):

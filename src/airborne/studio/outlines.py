@@ -23,6 +23,7 @@ from airborne.tracking.image_regions import bounding_points
 from airborne.types import Array
 
 _COLOURS = {status.value: hex_colour(rgb) for status, rgb in STATUS_RGB.items()}
+BESIDE_COLOUR = "#cc79a7"  # of another run that is laid over the one in view
 _RIM_PX = 2  # about the body, so that no outline runs along the border of what is drawn
 
 
@@ -58,10 +59,13 @@ def _region_around(px: Array) -> tuple[int, int, int, int] | None:
     return int(x0), int(y0), int(x1), int(y1)
 
 
-def run_overlay(run: Path, frame: int, cameras: Sequence[str]) -> dict[str, Any]:
-    """Return what a run says of a frame: items over the cameras' pictures, and a label."""
+def run_overlay(run: Path, frame: int, cameras: Sequence[str], *, colour: str | None = None) -> dict[str, Any]:
+    """Return what a run says of a frame: items over the cameras' pictures, and a label.
+
+    Items have the colours of statuses, or that which is given.
+    """
     if holds_players(run):
-        return _players_overlay(run_players(run), run_rig(run).select(cameras).cameras, frame)
+        return _players_overlay(run_players(run), run_rig(run).select(cameras).cameras, frame, colour)
     rows = run_rows(run)
     row = rows.row(frame)
     if row is None:
@@ -71,10 +75,12 @@ def run_overlay(run: Path, frame: int, cameras: Sequence[str]) -> dict[str, Any]
     if pose is None:
         return {"items": [], "label": label}
     shown = run_rig(run).select(cameras).cameras
-    return {"items": outline_items(run_body(run).with_pose(pose), shown, _COLOURS[status]), "label": label}
+    return {"items": outline_items(run_body(run).with_pose(pose), shown, colour or _COLOURS[status]), "label": label}
 
 
-def _players_overlay(motion: PlayersMotion, cameras: Sequence[Camera], frame: int) -> dict[str, Any]:
+def _players_overlay(
+    motion: PlayersMotion, cameras: Sequence[Camera], frame: int, colour: str | None
+) -> dict[str, Any]:
     rows = np.flatnonzero(motion.index == frame)
     if not len(rows):
         return {"items": [], "label": f"frame {frame}"}
@@ -84,7 +90,7 @@ def _players_overlay(motion: PlayersMotion, cameras: Sequence[Camera], frame: in
         if status == Status.LOST.value:
             continue
         joints_m = dict(zip(motion.joints, motion.points[row, player], strict=True))
-        items += legs_items(name, joints_m, cameras, _COLOURS[status])
+        items += legs_items(name, joints_m, cameras, colour or _COLOURS[status])
     return {"items": items, "label": f"frame {frame}   {motion.time_s[row]:.3f} s"}
 
 

@@ -16,8 +16,9 @@ from fastapi.responses import FileResponse, JSONResponse, Response
 from airborne import export
 from airborne.errors import AirborneError, ResultError
 from airborne.export.pictures import thumbnail
+from airborne.studio.calibrating import find_picture
 from airborne.studio.guard import FILE_POLICY
-from airborne.studio.outlines import run_overlay
+from airborne.studio.outlines import BESIDE_COLOUR, run_overlay
 from airborne.studio.project import list_runs, list_videos
 from airborne.studio.run_curves import run_curves
 from airborne.studio.runs import run_body
@@ -54,16 +55,20 @@ def add_routes(app: FastAPI, session: Session) -> None:
         return Response(_CURVES.read_text(encoding="utf-8"), media_type="text/javascript", headers=_KEEP)
 
     @app.get("/overlay/{run}/{frame}")
-    async def overlay(run: str, frame: int) -> Response:
-        return await _answer(lambda: _json(_overlay(session, run, frame)))
+    async def overlay(run: str, frame: int, beside: str = "") -> Response:
+        return await _answer(lambda: _json(_overlay(session, run, frame, beside)))
 
     @app.get("/curves/{run}")
-    async def curves(run: str) -> Response:
-        return await _answer(lambda: _json(run_curves(find_run(session.folder, run))))
+    async def curves(run: str, beside: str = "") -> Response:
+        return await _answer(lambda: _json(_curves(session.folder, run, beside)))
 
     @app.get("/mesh/{run}/{part}")
     async def mesh(run: str, part: int) -> Response:
         return await _answer(lambda: _mesh(find_run(session.folder, run), part))
+
+    @app.get("/calibration/{name}")
+    async def calibration(name: str) -> Response:
+        return await _answer(lambda: _calibration(session.folder, name))
 
     @app.get("/file/{run}/{name:path}")
     async def file(run: str, name: str) -> Response:
@@ -82,10 +87,21 @@ def find_run(folder: Path, name: str) -> Path:
     return run
 
 
-def _overlay(session: Session, name: str, frame: int) -> dict[str, Any]:
-    """Return what a run draws over a frame; nothing where it has not begun."""
-    run = _find_run(session.folder, name)
-    return run_overlay(run, frame, session.shown().names) if run is not None else {"items": [], "label": ""}
+def _overlay(session: Session, name: str, frame: int, beside: str) -> dict[str, Any]:
+    """Return what a run, and another one beside it, draw over a frame; nothing where it has not begun."""
+    run, cameras = _find_run(session.folder, name), session.shown().names
+    if run is None:
+        return {"items": [], "label": ""}
+    own = run_overlay(run, frame, cameras)
+    if not beside:
+        return own
+    other = run_overlay(find_run(session.folder, beside), frame, cameras, colour=BESIDE_COLOUR)
+    return {"items": [*other["items"], *own["items"]], "label": own["label"]}
+
+
+def _curves(folder: Path, name: str, beside: str) -> dict[str, Any]:
+    own = run_curves(find_run(folder, name))
+    return {**own, "beside": run_curves(find_run(folder, beside))} if beside else own
 
 
 async def _answer(make: Callable[[], Response]) -> Response:
@@ -149,6 +165,11 @@ def _thumbnail(folder: Path, name: str) -> Response:
     first = next(decode(source, facts))
     jpeg = thumbnail(rgb_from_decoded(first, facts), _THUMBNAIL_PX)
     return Response(jpeg, media_type="image/jpeg", headers=_KEEP)
+
+
+def _calibration(folder: Path, name: str) -> Response:
+    path = find_picture(folder, name)
+    return Response(status_code=404) if path is None else FileResponse(path, headers=_KEEP)
 
 
 def _file(run: Path, name: str) -> Response:

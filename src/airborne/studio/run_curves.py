@@ -54,6 +54,32 @@ def run_curves(run: Path) -> dict[str, Any]:
     }
 
 
+def describe_distance(run: Path, other: Path) -> str:
+    """Say how far two runs are apart, in the frames, players and joints that both have."""
+    (own, a), (frames, b) = _points(run), _points(other)
+    names = [name for name in a if name in b]
+    common, rows, others = np.intersect1d(own, frames, return_indices=True)
+    if not len(common) or not names:
+        return "they share no frame"
+    far_m = np.stack([np.linalg.norm(a[name][rows] - b[name][others], axis=1) for name in names], axis=1)
+    far_m = np.where(np.isfinite(far_m), far_m, -1.0).max(axis=1)
+    if far_m.max() < 0:
+        return "no frame is tracked in both"
+    median, most, frame = np.median(far_m[far_m >= 0]), far_m.max(), int(common[far_m.argmax()])
+    what = "roots" if names == [""] else "joints that are furthest apart"
+    return f"{what}: median {1e3 * median:.0f} mm, at most {1e3 * most:.0f} mm, in frame {frame}"
+
+
+def _points(run: Path) -> tuple[NDArray[np.int64], dict[str, Array]]:
+    """Return a run's frames (n,), and by name where its points are, (n, 3) [m]: a body's root, players' joints."""
+    if not holds_players(run):
+        rows = run_rows(run)
+        return rows.index, {"": rows.position}
+    motion = run_players(run)
+    pairs = [(p, j) for p in range(len(motion.players)) for j in range(len(motion.joints))]
+    return motion.index, {f"{motion.players[p]} {motion.joints[j]}": motion.points[:, p, j] for p, j in pairs}
+
+
 def _lower_legs(motion: PlayersMotion) -> tuple[Sequence[str], Array]:
     """Return how high the lower of each player's legs is, and which joint of it: (n, players) [m]."""
     limb = next((limb for limb in reversed(LIMBS) if {f"{limb}_left", f"{limb}_right"} <= set(motion.joints)), None)

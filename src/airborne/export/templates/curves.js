@@ -3,7 +3,8 @@ const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00
 const STATUS = { tracked: "#009e73", uncertain: "#e69f00", lost: "#d55e00" };
 const STRIP = 12, LEFT = 58, RIGHT = 10, TOP = 20, BOTTOM = 18, FONT = "11px system-ui, sans-serif";
 
-// data: {frame, time_s, status, series: [{name, unit, value, sd}]}; null where nothing is known
+// data: {frame, time_s, status, series: [{name, unit, value, sd}]}; null where nothing is known. What another run has,
+// {beside: {frame, series}}, is drawn with dashes.
 export function drawCurves(canvas, data, now) {
   const box = canvas.getBoundingClientRect(), ratio = window.devicePixelRatio || 1;
   if (!box.width) return;
@@ -38,13 +39,21 @@ function drawStill(pen, box, data) {
   const { frame, status, series } = data, { first, last } = spanOf(data);
   const width = box.width - LEFT - RIGHT, bottom = box.height - BOTTOM - STRIP - 4, height = bottom - TOP;
   const x = (each) => LEFT + ((each - first) / (last - first)) * width;
-  const [low, high] = rangeOf(series), y = (value) => bottom - ((value - low) / (high - low)) * height;
+  const others = data.beside ? data.beside.series : [];
+  const [low, high] = rangeOf([...series, ...others]), y = (value) => bottom - ((value - low) / (high - low)) * height;
   drawAxes(pen, low, high, y, box.width, series.length ? series[0].unit : "");
   series.forEach((each, k) => drawCurve(pen, each, COLOURS[k % COLOURS.length], frame, x, y));
+  pen.save();
+  pen.beginPath();
+  pen.rect(LEFT, 0, width, bottom);
+  pen.clip();
+  pen.setLineDash([6, 4]);
+  others.forEach((each, k) => drawCurve(pen, { value: each.value }, COLOURS[k % COLOURS.length], data.beside.frame, x, y));
+  pen.restore();
   for (const name of ["tracked", "uncertain", "lost"]) { // the worst of the frames that share a column is drawn last
     pen.fillStyle = STATUS[name];
     frame.forEach((each, k) => {
-      const wide = Math.min(Math.max(1.5, width / (last - first)), LEFT + width + 1.5 - x(each));
+      const wide = Math.min(Math.max(1.5, width / (last - first) + 0.7), LEFT + width + 1.5 - x(each));
       if (status[k] === name) pen.fillRect(x(each), bottom + 4, wide, STRIP);
     });
   }

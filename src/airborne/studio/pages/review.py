@@ -10,10 +10,12 @@ import numpy as np
 from nicegui import ui
 
 from airborne.motion.run_folder import holds_players
+from airborne.studio.outlines import BESIDE_COLOUR
 from airborne.studio.pages.correct import Correction
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
+from airborne.studio.run_curves import describe_distance
 from airborne.studio.runs import run_body, run_rig, run_rows
 from airborne.studio.session import Session
 from airborne.studio.stage import BodyOnStage, draw_cameras
@@ -37,13 +39,21 @@ async def review_page(session: Session) -> None:
         names = [each.name for each in runs]
 
         async def change() -> None:
+            others = [name for name in names if name != choice.value]
+            if beside.value not in ("", *others):
+                beside.set_options(["", *others], value="")  # which calls this again
+                return
+            beside.set_options(["", *others])
             content.clear()
             with content:
-                await _show_run(session, shown, session.folder / choice.value)
+                await _show_run(session, shown, session.folder / choice.value, beside.value)
 
         with ui.element("div").classes("row-line"):
             choice = ui.select(names, label="run", value=names[0], on_change=change)
             choice.props("outlined dense options-dense").style("min-width: 180px")
+            beside = ui.select([""], label="over it", value="", on_change=change)
+            beside.props("outlined dense options-dense").style("min-width: 150px")
+            beside.set_visibility(len(names) > 1)
             jumps = ui.element("div").classes("row-line")
         content = ui.element("div").classes("split").style("flex-direction: column")
         with jumps:
@@ -52,7 +62,7 @@ async def review_page(session: Session) -> None:
         await change()
 
 
-async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
+async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: str) -> None:
     bodies: list[Callable[[int], None]] = []
     correction = None if holds_players(folder) else Correction(session, shown, folder)
     if correction is not None:
@@ -65,12 +75,18 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
             for show in bodies:
                 show(frame)
 
+    query = f"?beside={quote(beside)}" if beside else ""
+    if beside:
+        with ui.element("div").classes("row-line small"), errors_shown():
+            ui.element("span").style(f"width: 16px; border-top: 3px solid {BESIDE_COLOUR}")
+            ui.label(beside).classes("name")
+            ui.label(await in_thread(describe_distance, folder, session.folder / beside)).classes("soft")
     with ui.element("div").classes("split"):
         with ui.element("div").classes("wide"):
             view = CameraViews(
                 shown,
                 frame=session.frame,
-                overlay=f"/overlay/{quote(folder.name)}/{{frame}}",
+                overlay=f"/overlay/{quote(folder.name)}/{{frame}}{query}",
                 on_frame=turn_to,
                 on_move=None if correction is None else correction.move,
                 on_drag=None if correction is None else correction.drag,
@@ -79,7 +95,7 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
             correction.view = view
             with ui.element("div").classes("side"):
                 bodies.append(await _stage(folder))
-    Curves(f"/curves/{quote(folder.name)}", frame=session.frame)
+    Curves(f"/curves/{quote(folder.name)}{query}", frame=session.frame)
 
 
 async def _stage(folder: Path) -> Callable[[int], None]:
