@@ -1,19 +1,20 @@
 """How long the studio makes its user wait, in a real browser: stepping, jumping, dragging, opening long videos.
 
-    python benchmarks/speed/studio.py [--minutes 10] [--steps 60] [--rows]
+    python benchmarks/speed/studio.py [short] [long] [many] [--minutes 10] [--steps 60] [--rows]
 
-A person moves before three 1080p cameras that show moving noise; a run's outlines lie over the pictures. Times are the
-browser's, from the key or the pointer to the finished drawing, on the page Track, which has no 3D scene: a browser
-without a graphics card draws that for seconds. Memory is what the server's process holds. They are wall times: the load
-of the machine is printed beside them. `--rows` appends to benchmarks/results/studio.csv.
+`short`: a person moves before three 1080p cameras that show moving noise; a run's outlines lie over the pictures. Times
+are the browser's, from the key or the pointer to the finished drawing, on the page Track, which has no 3D scene: a
+browser without a graphics card draws that for seconds. `long`: the first picture of four long videos. `many`: 50 runs,
+one of a person over 200,000 frames, one of 20 players. Memory is what the server's process holds. They are wall times:
+the load of the machine is printed beside them. `--rows` appends to benchmarks/results/studio.csv.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import resource
+import shutil
 import sys
 import tempfile
 import time
@@ -28,11 +29,14 @@ import numpy as np
 from rows import append
 
 from airborne.cameras import Rig, camera_looking_at, write_pose2sim
+from airborne.motion import PlayersWriter
+from airborne.tracking import Status
+from airborne.tracking.players import PlayerEstimate
 from airborne.video import VideoWriter
 from tests.support.person_run import PERSON_TABLE, write_person_run
 from tests.support.studio import at_pixel, open_page, open_studio, wait_for_frame
 
-SIZE, RATE, NOISE = (1920, 1080), 50, 8
+SIZE, SMALL, RATE, NOISE = (1920, 1080), (640, 360), 50, 8
 PLACES = {"left": [3.0, -4.0, 1.5], "right": [-4.0, -3.0, 1.2], "behind": [0.5, 5.0, 1.4]}
 ARM = """() => { // the outline's outermost point at the height of the left forearm, in the first picture
     const { points } = document.querySelector("canvas.view").view.nowItems().find((each) => each.pane === 0);
@@ -42,14 +46,15 @@ ARM = """() => { // the outline's outermost point at the height of the left fore
     return [u - 4, at];
 }"""
 N_JUMPS, N_DRAGS, DRAG_PX = 20, 3, 300.0
-LONG = "four 1080p videos of {:g} min"
+N_MANY, N_RUNS, N_TEAM_FRAMES = 200_000, 50, 3000
+LONG, MANY = "four 1080p videos of {:g} min", "50 runs, of 200,000 frames, of 20 players"
 FLOORS = {"step": 80, "jump": 300, "drag": 50, "release": 150, "open": 2000, "memory": 1000}
 
 
-def write_second(path: Path) -> None:
+def write_second(path: Path, size: tuple[int, int]) -> None:
     """Write a second of a coarse pattern that moves, under noise: 8 Mbit or so."""
     rng = np.random.default_rng(0)
-    coarse = rng.integers(60, 190, (SIZE[1] // 24, SIZE[0] // 24, 3), dtype=np.uint8)
+    coarse = rng.integers(60, 190, (size[1] // 24, size[0] // 24, 3), dtype=np.uint8)
     image = np.kron(coarse, np.ones((24, 24, 1), np.uint8))
     grain = rng.integers(0, NOISE, image.shape, dtype=np.uint8)
     with VideoWriter(path, size=(image.shape[1], image.shape[0]), rate=Fraction(RATE)) as writer:
@@ -191,7 +196,6 @@ def measure_short(folder: Path, second: Path, steps: int) -> dict[str, list[floa
 def measure_long(folder: Path, second: Path, minutes: float) -> dict[str, list[float]]:
     """Measure the first picture of four long videos, and memory after jumps through them."""
     write_trial(folder, second, ["a", "b", "c", "d"], round(60 * minutes))
-    (folder / "calib.toml").unlink(missing_ok=True)
     with open_studio(folder) as address, open_page(address) as page:
         page.get_by_text("Use these cameras").wait_for()
         begun = time.monotonic()
@@ -202,39 +206,106 @@ def measure_long(folder: Path, second: Path, minutes: float) -> dict[str, list[f
         return {"open": [taken_ms], "long jump": jumps_ms, "memory": [server()[0]]}
 
 
+def measure_many(folder: Path, second: Path) -> dict[str, list[float]]:
+    """Measure Review and Results of a folder with 50 runs, one of them of 200,000 frames, one of 20 players."""
+    write_trial(folder, second, list(PLACES), N_MANY // RATE)
+    write_run(folder, RATE)
+    runs = folder / "results"
+    for k in range(N_RUNS - 2):
+        shutil.copytree(runs, folder / f"short{k}")
+    header, *lines = (runs / "motion.csv").read_text().splitlines()
+    (runs / "covariance.bin").unlink()  # 26 kB a frame
+    with (runs / "motion.csv").open("w") as file:
+        file.write(header + "\n")
+        for k in range(N_MANY):
+            file.write(f"{k},{k / RATE!r},{lines[k % RATE].split(',', 2)[2]}\n")
+    write_team(folder / "team", runs)
+    found = {}
+    with open_studio(folder) as address, open_page(address) as page:
+        base = address.split("?")[0]
+        for name in ("results", "team"):
+            os.utime(folder / name)  # the newest is shown first
+            begun = time.monotonic()
+            page.goto(base + "review")
+            wait_for_frame(page, 0)
+            page.wait_for_function("Number(document.querySelector('canvas.curves')?.dataset.frames) > 0")
+            found |= {f"{name}: Review open": [1e3 * (time.monotonic() - begun)]}
+            found |= {f"{name}: step": step_ms(page, 20), f"{name}: jump": jump_ms(page, N_TEAM_FRAMES)}
+            page.evaluate("document.querySelector('canvas.view').view.go(0)")
+            wait_for_frame(page, 0)
+        begun = time.monotonic()
+        page.goto(base + "results")
+        page.get_by_text("short0").first.wait_for()
+        return {**found, "Results open": [1e3 * (time.monotonic() - begun)], "many, memory": [server()[0]]}
+
+
+def write_team(run: Path, like: Path) -> None:
+    """Write a run of 20 players who move."""
+    run.mkdir()
+    shutil.copyfile(like / "calib.toml", run / "calib.toml")
+    joints = tuple(f"{limb}_{side}" for limb in ("hip", "knee", "ankle", "foot") for side in ("left", "right"))
+    leg = np.array([[0.0, 0, 1.0], [0, 0, 0.5], [0, 0, 0.1], [0.2, 0, 0]])
+    home = np.random.default_rng(0).uniform([-2, -2, 0], [2, 2, 0.1], (20, 1, 3)) + np.repeat(leg, 2, axis=0)
+    facts = {"covariance": np.broadcast_to(1e-4 * np.eye(3), (8, 3, 3)), "score": 1.0, "n_views": 3}
+    with PlayersWriter(run / "joints.csv", joints) as writer:
+        for k in range(N_TEAM_FRAMES):
+            points = home + np.array([0.3 * np.sin(0.05 * k), 0, 0])
+            time_s = Fraction(k, RATE)
+            writer.append(
+                [
+                    PlayerEstimate(
+                        index=k, time_s=time_s, player=f"player{n}", points=each, status=Status.TRACKED, **facts
+                    )
+                    for n, each in enumerate(points)
+                ]
+            )
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="*", choices=["short", "long", "many"], default=["short", "long", "many"])
     parser.add_argument("--minutes", type=float, default=10.0, help="of the long videos")
     parser.add_argument("--steps", type=int, default=60)
     parser.add_argument("--rows", action="store_true", help="append to benchmarks/results/studio.csv")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=Path.home()) as name:
-        second = Path(name) / "second.mp4"
-        write_second(second)
-        before = os.getloadavg()[0]
-        found = measure_short(Path(name) / "short", second, given.steps)
-        found |= measure_long(Path(name) / "long", second, given.minutes)
-    load = f"load {before:.1f} to {os.getloadavg()[0]:.1f} of {os.cpu_count()} cores"
-    print(json.dumps({"load": load, **{key: np.round(value, 1).tolist() for key, value in found.items()}}))
-    rows = [
-        {
-            "data": LONG.format(given.minutes) if key in ("open", "long jump", "memory") else "three 1080p cameras",
-            "method": load,
-            "metric": f"{key}, {'95th percentile' if len(values) > 1 else 'once'}",
-            "unit": "MB" if key == "memory" else "ms",
-            "value": float(np.percentile(values, 95)),
-            "n": len(values),
-            "floor": FLOORS.get(key, FLOORS["jump"] if key == "long jump" else ""),
-            "interval": f"median {np.median(values):.3g}",
+        folder = Path(name)
+        write_second(folder / "second.mp4", SIZE)
+        write_second(folder / "small.mp4", SMALL)
+        ways = {
+            "short": ("three 1080p cameras", lambda: measure_short(folder / "s", folder / "second.mp4", given.steps)),
+            "long": (
+                LONG.format(given.minutes),
+                lambda: measure_long(folder / "l", folder / "second.mp4", given.minutes),
+            ),
+            "many": (MANY, lambda: measure_many(folder / "m", folder / "small.mp4")),
         }
-        for key, values in found.items()
-    ]
-    if given.rows:
-        append("studio", rows)
-    else:
-        for row in rows:
-            print(f"{row['metric']:<30}{row['value']:>8.1f} {row['unit']}  floor {row['floor']}  {row['interval']}")
+        for part in given.parts:
+            data, measure = ways[part]
+            before = os.getloadavg()[0]
+            found = measure()
+            load = f"load {before:.1f} to {os.getloadavg()[0]:.1f} of {os.cpu_count()} cores"
+            rows = [make_row(data, load, key, values) for key, values in found.items()]
+            print(data, load, flush=True)
+            for row in rows:
+                print(f"{row['metric']:<38}{row['value']:>8.1f} {row['unit']}  floor {row['floor']}  {row['interval']}")
+            if given.rows:
+                append("studio", rows)
+
+
+def make_row(data: str, load: str, key: str, values: list[float]) -> dict[str, object]:
+    """Return what is kept of a measurement; its kind is the key's last word."""
+    return {
+        "data": data,
+        "method": load,
+        "metric": f"{key}, {'95th percentile' if len(values) > 1 else 'once'}",
+        "unit": "MB" if key.endswith("memory") else "ms",
+        "value": float(np.percentile(values, 95)),
+        "n": len(values),
+        "floor": FLOORS.get(key.split()[-1], ""),
+        "interval": f"median {np.median(values):.3g}",
+    }
 
 
 if __name__ == "__main__":

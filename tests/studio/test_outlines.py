@@ -9,9 +9,13 @@ from scipy.spatial.transform import RigidTransform
 from airborne.body import Pose
 from airborne.body.files import read_body
 from airborne.cameras import Rig, camera_looking_at
-from airborne.motion import read_players
-from airborne.studio.outlines import outline_items, run_curves, run_overlay, run_rows
+from airborne.motion import MotionWriter, read_players
+from airborne.studio import run_curves as run_curves_module
+from airborne.studio.outlines import outline_items, run_overlay
+from airborne.studio.run_curves import describe_distance, run_curves
+from airborne.studio.runs import count_rows
 from airborne.studio.stage import part_stl
+from tests.support.motions import run_with_gap
 from tests.support.places import THROWN_CROSS
 from tests.support.players_trial import rig, write_run
 
@@ -45,11 +49,49 @@ def test_players_have_lines_down_both_legs_in_each_camera(tmp_path):
     assert run_overlay(run, 99, ("right", "left"))["items"] == []
 
 
+def test_another_run_is_drawn_in_its_own_colour_and_said_to_be_as_far_as_it_is(tmp_path):
+    run, other, body = write_run(tmp_path / "run"), write_run(tmp_path / "other"), tmp_path / "body"
+    overlay = run_overlay(run, 3, ("right", "left"), colour="#cc79a7")
+    assert {item["colour"] for item in overlay["items"]} == {"#cc79a7"}
+    table = (other / "joints.csv").read_text().splitlines()
+    columns = table[0].split(",")
+    frame, joint, x = (columns.index(name) for name in ("frame", "joint", "x_m"))
+    row = next(
+        k for k, line in enumerate(table) if line.split(",")[frame] == "5" and line.split(",")[joint] == "hip_left"
+    )
+    cells = table[row].split(",")
+    cells[x] = str(float(cells[x]) + 0.25)
+    table[row] = ",".join(cells)
+    (other / "joints.csv").write_text("\n".join(table) + "\n")
+    assert describe_distance(run, other).endswith("median 0 mm, at most 250 mm, in frame 5")
+    body.mkdir()
+    with MotionWriter(body / "motion.csv") as writer:
+        writer.append(run_with_gap()[0])
+    assert describe_distance(run, body) == "they share no frame"
+    assert describe_distance(body, body) == "roots: median 0 mm, at most 0 mm, in frame 0"
+
+
 def test_curves_of_players_are_of_what_is_lowest(tmp_path):
     curves = run_curves(write_run(tmp_path / "run"))
     assert curves["frame"] == list(range(12))
     assert [each["name"].split(":")[0] for each in curves["series"]] == ["Anna", "number 7"]
     assert set(curves["status"]) <= {"tracked", "uncertain", "lost"}
+
+
+def test_curves_of_a_long_run_keep_what_stands_out(tmp_path, monkeypatch):
+    with MotionWriter(tmp_path / "motion.csv") as writer:
+        for each in run_with_gap(101, lost=(50,)):
+            writer.append(each)
+    whole = run_curves(tmp_path)
+    monkeypatch.setattr(run_curves_module, "_MOST_POINTS", 20)
+    thin = run_curves(tmp_path)
+    assert len(thin["frame"]) <= 22
+    assert (thin["frame"][0], thin["frame"][-1]) == (0, 100)
+    assert "lost" in thin["status"]
+    for a, b in zip(whole["series"], thin["series"], strict=True):
+        values = [each for each in a["value"] if each is not None]
+        assert (min(b["value"]), max(b["value"])) == (min(values), max(values))
+        assert len(b["sd"]) == len(b["value"]) == len(thin["frame"]) == len(thin["time_s"])
 
 
 def test_a_part_of_a_body_is_a_mesh_in_its_segment(cross):
@@ -59,6 +101,11 @@ def test_a_part_of_a_body_is_a_mesh_in_its_segment(cross):
 
 
 def test_rows_of_a_run_are_counted_while_it_goes_on(tmp_path):
-    assert run_rows(tmp_path) == (0, None)
-    (tmp_path / "motion.csv").write_text("frame,time_s\n4,0.1\n6,0.2\n8,0")
-    assert run_rows(tmp_path) == (2, 6)
+    assert count_rows(tmp_path) == (0, None)
+    path = tmp_path / "motion.csv"
+    with MotionWriter(path) as writer:
+        for number, estimate in enumerate(run_with_gap(), start=1):
+            writer.append(estimate)
+            assert count_rows(tmp_path) == (number, estimate.index)
+    path.write_bytes(path.read_bytes() + b"99,0.3")
+    assert count_rows(tmp_path) == (number, estimate.index)

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from airborne.errors import VideoError
 from airborne.studio.pictures import Pictures, _Store
 from airborne.trial.cameras import CameraTable
 from airborne.video import VideoSource
@@ -31,6 +32,11 @@ def test_pictures_of_any_number_come_as_jpeg(source):
     for number in (0, 29, 3, 4, 5, 0):
         image = cv2.imdecode(np.frombuffer(pictures.jpeg(source, number), np.uint8), cv2.IMREAD_COLOR)
         assert image[5, 5].tolist() == pytest.approx([2 * number] * 3, abs=2)
+
+
+def test_a_picture_that_nobody_waits_for_is_not_decoded(source):
+    with pytest.raises(VideoError, match="nobody waits for image 20"):
+        Pictures().jpeg(source, 20, lambda: False)
 
 
 def test_a_trial_is_shown_with_its_sizes_and_clock(source, tmp_path):

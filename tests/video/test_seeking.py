@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airborne.errors import VideoError
-from airborne.video import VideoSource, inspect, open_recording
+from airborne.video import VideoSource, inspect, open_recording, seeking
 from airborne.video.decoding import decode, rgb_from_decoded
 from airborne.video.fields import fill_rows
 from airborne.video.seeking import ImageReader, index_images, match_images
@@ -53,8 +53,9 @@ def sources(tmp_path_factory):
     return list(clips(tmp_path_factory.mktemp("clips")))
 
 
-def test_every_image_in_any_order_is_the_one_that_decoding_in_order_gives(sources):
+def test_every_image_in_any_order_is_the_one_that_decoding_in_order_gives(sources, monkeypatch):
     rng = np.random.default_rng(0)
+    monkeypatch.setattr(seeking, "_KEPT_BYTES", 0)  # two frames: these clips would be kept whole
     for source in sources:
         facts = inspect(source)
         images = [(image.time_s, whole_image(image, facts)) for image in decode(source, facts)]
@@ -63,6 +64,26 @@ def test_every_image_in_any_order_is_the_one_that_decoding_in_order_gives(source
         with ImageReader(source, index) as reader:
             for number in [*range(3), *rng.permutation(len(images)), len(images) - 1]:
                 assert np.array_equal(reader.image(int(number)), images[number][1]), (source.name, number)
+
+
+def test_steps_back_decode_nothing_again(sources):
+    source = sources[0]
+    index = index_images(source)
+    with ImageReader(source, index) as reader:
+        images = [reader.image(number) for number in range(len(index))]
+        reader._step = lambda: pytest.fail("a frame is decoded again")
+        for number in reversed(range(len(index))):
+            assert np.array_equal(reader.image(number), images[number])
+
+
+def test_an_image_that_nobody_waits_for_is_left_and_found_later(tmp_path):
+    source = VideoSource("a", h264(tmp_path / "a.mp4", textured(24), options={"g": "30", "bf": "0"}))
+    index = index_images(source)
+    with ImageReader(source, index) as reader, ImageReader(source, index) as other:
+        patience = iter([True, True, True])
+        assert not reader.go_to(15, lambda: next(patience, False))
+        assert reader._current is not None and 0 < reader._current[0] < index.ticks[15]
+        assert np.array_equal(reader.image(15), other.image(15))
 
 
 def test_a_number_that_is_not_there_is_refused(sources):

@@ -7,7 +7,6 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +26,7 @@ from airborne.body_fitting.fit import BodyFit, BodyObservation, fit_body, measur
 from airborne.cameras import Rig
 from airborne.cameras.detections import landmarks_from_points
 from airborne.errors import BodyError, TrialError
+from airborne.export.pictures import encode_png
 from airborne.export.views import crop_camera, resample_view
 from airborne.rendering import FLAT, render
 from airborne.run.detections import landmarks_over_time
@@ -210,9 +210,7 @@ def _contact_sheet(fit: BodyFit, frames: Sequence[Frames]) -> bytes:
     rows = []
     for each, pose in zip(frames, fit.poses, strict=True):
         rows.append(np.concatenate([_cell(each, i, fit.model, pose) for i in range(len(each.views))], axis=1))
-    is_written, png = cv2.imencode(".png", np.concatenate(rows)[..., ::-1])
-    assert is_written, "an image in memory can be written as PNG"
-    return png.tobytes()
+    return encode_png(np.concatenate(rows))
 
 
 def _cell(frames: Frames, camera: int, model: BodyModel, pose: Pose) -> NDArray[np.uint8]:

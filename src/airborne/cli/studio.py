@@ -12,7 +12,7 @@ import typer
 def studio_command(
     path: Annotated[Path, typer.Argument(help="A folder of videos, or a trial's TOML file.")] = Path(),
     demo: Annotated[
-        bool, typer.Option("--demo", help="Open a copy of the bundled example, airborne-studio-demo.")
+        bool, typer.Option("--demo", help="A guided walk through a copy of the bundled example, airborne-studio-demo.")
     ] = False,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on this computer; 0 takes a free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the browser.")] = True,
@@ -23,7 +23,8 @@ def studio_command(
     """
     from airborne.studio import open_studio
 
-    open_studio(_copy_example(Path("airborne-studio-demo")) if demo else path, port=port, browser=browser)
+    folder = _copy_example(Path("airborne-studio-demo")) if demo else path
+    open_studio(folder, port=port, browser=browser, is_guided=demo)
 
 
 def _copy_example(folder: Path) -> Path:

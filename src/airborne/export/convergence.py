@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from airborne.export import panels
 from airborne.export.palette import ESTIMATE_RGB, hex_colour
+from airborne.export.pictures import encode_png
 from airborne.io.figures import save_png
 from airborne.types import Array, Image
 
@@ -77,4 +78,4 @@ def write_sequences(path: Path, rows: Sequence[tuple[str, Sequence[Image]]]) -> 
         for j, image in enumerate(images):
             left = j * (width + _GAP_PX)
             sheet[top + _TITLE_PX : top + _TITLE_PX + height, left : left + width] = image
-    path.write_bytes(cv2.imencode(".png", sheet[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes())
+    path.write_bytes(encode_png(sheet, is_small=True))

@@ -11,6 +11,7 @@ import numpy as np
 
 from airborne.export.lettering import draw_text, text_width
 from airborne.export.palette import TEXT_RGB
+from airborne.export.pictures import encode_png
 from airborne.io.writing import explain_full_disk
 from airborne.types import Image
 
@@ -61,7 +62,7 @@ def write_mosaic(
             x = left + j * (width + _GAP_PX)
             _fill_cell(page[y : y + height, x : x + width], image)
     with explain_full_disk(path):
-        path.write_bytes(cv2.imencode(".png", page[..., ::-1])[1].tobytes())
+        path.write_bytes(encode_png(page))
 
 
 def _write_lines(image: Image, title: ColumnTitle) -> None:

@@ -18,6 +18,7 @@ from airborne.body import PosedBody
 from airborne.cameras import Camera, Rig
 from airborne.export.film import Film
 from airborne.export.palette import STATUS_RGB
+from airborne.export.pictures import encode_png
 from airborne.export.views import cached_surface_arrays, resample_view
 from airborne.io.names import file_stem
 from airborne.io.writing import explain_full_disk
@@ -45,7 +46,7 @@ class _Still:
 
     def write(self, image: Image) -> None:
         with explain_full_disk(self.path):
-            self.path.write_bytes(cv2.imencode(".png", image[..., ::-1])[1].tobytes())
+            self.path.write_bytes(encode_png(image))
 
 
 class CameraVideos:

@@ -168,7 +168,7 @@ def _parse(path: Path) -> tuple[tuple[str, ...], list[Estimate]]:
         rows = list(csv.reader(data.decode().splitlines()))
     except (UnicodeDecodeError, csv.Error) as error:
         raise ResultError(f"{path} is not a text table ({error}); expected the motion.csv of a run") from error
-    joints = _joints_of(path, rows[0] if rows else [])
+    joints = joints_of(path, rows[0] if rows else [])
     header, estimates = _header(joints), []
     covariances = read_covariances(
         path.with_name(COVARIANCE_FILE), len(rows[1:]) if joints else 0, size=6 + 3 * len(joints)
@@ -188,7 +188,8 @@ def _parse(path: Path) -> tuple[tuple[str, ...], list[Estimate]]:
     return joints, estimates
 
 
-def _joints_of(path: Path, header: list[str]) -> tuple[str, ...]:
+def joints_of(path: Path, header: list[str]) -> tuple[str, ...]:
+    """Return the joints whose angles a motion.csv holds, by its header. Raises ResultError for another table."""
     fixed = _header(())
     joints = tuple(name.removesuffix("_x_rad") for name in header[len(fixed) :: 3])
     if header != _header(joints):
@@ -196,6 +197,15 @@ def _joints_of(path: Path, header: list[str]) -> tuple[str, ...]:
         problem = f"has no column {', '.join(missing[:3])}" if missing else "has its columns in another order"
         raise ResultError(f"{path} {problem if header else 'is empty'}; expected the motion.csv of a run; track again")
     return joints
+
+
+def parse_line(path: Path, line: bytes, joints: tuple[str, ...]) -> Estimate:
+    """Return the estimate of one line of a motion.csv, without the covariances of joints. Raises ResultError."""
+    cells = line.decode(errors="replace").rstrip("\r\n").split(",")
+    try:
+        return _estimate(dict(zip(_header(joints), cells, strict=True)), len(joints), None)
+    except (ValueError, ZeroDivisionError) as error:
+        raise ResultError(f"{path}: the row of frame {cells[0][:20]}: {error}; track again") from None
 
 
 def _estimate(row: dict[str, str], n_joints: int, full: NDArray[np.float64] | None) -> Estimate:

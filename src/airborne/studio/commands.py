@@ -26,14 +26,14 @@ class Command:
         self._out: bytes = b""
         self._log = folder / FOLDER / f"{words[0]}.log"
         self._log.parent.mkdir(exist_ok=True)
-        self._file = self._log.open("w+b")
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", _RUN, *words],
-            cwd=folder,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=self._file,
-        )
+        with self._log.open("wb") as log:
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", _RUN, *words],
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=log,
+            )
 
     @property
     def is_running(self) -> bool:
@@ -64,9 +64,11 @@ class Command:
 
     def complaint(self) -> str:
         """Return the last line of an ended command's errors."""
-        self._file.seek(0)
-        lines = self._file.read().decode(errors="replace").strip().splitlines()
-        return lines[-1].removeprefix("airborne: ") if lines else f"it ended with the code {self.code}"
+        return self.progress().removeprefix("airborne: ") or f"it ended with the code {self.code}"
+
+    def progress(self) -> str:
+        """Return the last line of what it says beside its output."""
+        return self._log.read_text(errors="replace").strip().rpartition("\n")[2]
 
     def stop(self) -> None:
         """Stop it as Ctrl-C does, and wait for its end."""

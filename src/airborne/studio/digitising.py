@@ -14,7 +14,7 @@ from airborne.body import BodyModel
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, ResultError
 from airborne.evaluation import DigitisedPoints, box_ends, read_clicked_frames
-from airborne.motion import Motion
+from airborne.motion.rows import MotionRows
 from airborne.studio.clicks import Clicked
 from airborne.types import Array
 
@@ -121,10 +121,10 @@ def record_text(who: Repetition) -> str:
     return json.dumps({"operator": who.operator, "repetition": who.number, "epipolar_help": True}) + "\n"
 
 
-def joint_paths_text(table: DigitisedPoints, rig: Rig, motion: Motion) -> str:
+def joint_paths_text(table: DigitisedPoints, rig: Rig, rows: MotionRows) -> str:
     """Triangulate the clicks of a person's landmarks, as `evaluate --joints` reads them; frames that were tracked."""
     points = rig.points_from_px(table.px)  # (n, points, 3)
-    time_s = dict(zip(motion.index.tolist(), motion.time_s.tolist(), strict=True))
+    time_s = dict(zip(rows.index.tolist(), rows.time_s.tolist(), strict=True))
     lines = ["time_s,joint,x_m,y_m,z_m"]
     for frame, row in zip(table.index.tolist(), points, strict=True):
         for name, (x, y, z) in zip(table.points, row.tolist(), strict=True):

@@ -1,4 +1,4 @@
-"""Pictures of videos as JPEG, in any order: kept in a cache of bounded size, the next ones made ahead."""
+"""Pictures of videos as JPEG, in any order, kept in a cache of bounded size. Which come next, the browser knows."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from threading import Lock
 
+from airborne.errors import VideoError
 from airborne.export.pictures import encode_jpeg
 from airborne.trial.cameras import CameraTable
+from airborne.types import Image
 from airborne.video import VideoSource
 from airborne.video.seeking import ImageIndex, ImageReader, TrialClock, index_images, match_images
 
-_MOST_BYTES = 100_000_000  # of JPEG that are kept
-_AHEAD = 4  # pictures made beyond the one that was asked for
+_MOST_BYTES = 40_000_000  # of JPEG that are kept for other windows; the browser keeps its own
 _MOST_OPEN = 32  # files
+_INDEXING = 2  # files at once: four threads take three times the CPU time of one, waiting for the interpreter
 
 Key = tuple[VideoSource, int]
 
@@ -68,34 +70,21 @@ class _Video:
     """One file: its index and its reader, for one thread at a time."""
 
     def __init__(self, source: VideoSource) -> None:
-        self._source, self._lock, self._ahead = source, Lock(), Lock()
+        self._source, self._lock = source, Lock()
         self._reader: ImageReader | None = None
-        self._wanted = -1
 
     def index(self) -> ImageIndex:
         """List the file's images, once."""
         with self._lock:
             return self._open().index
 
-    def fetch(self, store: _Store, number: int) -> bytes | None:
-        """Return a picture, made where the store does not hold it."""
-        key = (self._source, number)
+    def decode(self, number: int, is_wanted: Callable[[], bool]) -> Image | None:
+        """Decode an image; None where it is damaged. Raises VideoError where nobody wants it any more."""
         with self._lock:
-            is_there, jpeg = store.find(key)
-            if not is_there:
-                image = self._open().image(number)
-                jpeg = None if image is None else encode_jpeg(image)
-                store.add(key, jpeg)
-            return jpeg
-
-    def look_ahead(self, store: _Store, number: int) -> None:
-        """Make the pictures after one, until another is asked for."""
-        self._wanted = number
-        with self._ahead:
-            for later in range(number + 1, min(number + 1 + _AHEAD, len(self.index()))):
-                if self._wanted != number:
-                    return
-                self.fetch(store, later)
+            reader = self._open()
+            if not (is_wanted() and reader.go_to(number, is_wanted)):
+                raise VideoError(f"{self._source.name}: nobody waits for image {number} any more")
+            return reader.image(number, is_exact=False)
 
     def close(self) -> None:
         """Close the file."""
@@ -116,28 +105,27 @@ class Pictures:
         """Open nothing yet."""
         self._store, self._lock = _Store(_MOST_BYTES), Lock()
         self._videos: OrderedDict[VideoSource, _Video] = OrderedDict()
-        self._helpers = ThreadPoolExecutor(2, thread_name_prefix="look-ahead")
 
     def index(self, source: VideoSource) -> ImageIndex:
         """Return when each image of a file is shown. Raises VideoError."""
         return self._video(source).index()
 
-    def jpeg(self, source: VideoSource, number: int) -> bytes | None:
-        """Return an image of a file, None where it is damaged; those after it are then made ahead.
+    def jpeg(self, source: VideoSource, number: int, is_wanted: Callable[[], bool] = lambda: True) -> bytes | None:
+        """Return an image of a file, None where it is damaged.
 
-        Raises VideoError for a number that is not there.
+        Raises VideoError for a number that is not there, and where it is no longer wanted before it is decoded.
         """
-        video = self._video(source)
         is_there, jpeg = self._store.find((source, number))
         if not is_there:
-            jpeg = video.fetch(self._store, number)
-        self._helpers.submit(video.look_ahead, self._store, number)
+            image = self._video(source).decode(number, is_wanted)
+            jpeg = None if image is None else encode_jpeg(image)
+            self._store.add((source, number), jpeg)
         return jpeg
 
     def show(self, tables: tuple[CameraTable, ...], source_of: Callable[[CameraTable], VideoSource]) -> ShownTrial:
         """Match the images of a trial's cameras. Raises VideoError."""
         sources = tuple(map(source_of, tables))
-        with ThreadPoolExecutor(len(sources)) as readers:
+        with ThreadPoolExecutor(_INDEXING) as readers:
             indexes = tuple(readers.map(self.index, sources))
         return ShownTrial(tables, sources, indexes, match_images(sources, indexes))
 
@@ -145,6 +133,7 @@ class Pictures:
         with self._lock:
             video = self._videos.pop(source, None) or _Video(source)
             self._videos[source] = video
-            if len(self._videos) > _MOST_OPEN:
-                self._helpers.submit(self._videos.popitem(last=False)[1].close)
+            oldest = self._videos.popitem(last=False)[1] if len(self._videos) > _MOST_OPEN else None
+        if oldest is not None:
+            oldest.close()
         return video

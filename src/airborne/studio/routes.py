@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager
 from pathlib import Path
+from threading import Event
 from typing import Any
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, JSONResponse, Response
 
 from airborne import export
 from airborne.errors import AirborneError, ResultError
 from airborne.export.pictures import thumbnail
+from airborne.studio.calibrating import find_picture
 from airborne.studio.guard import FILE_POLICY
-from airborne.studio.outlines import run_body, run_curves, run_overlay
+from airborne.studio.outlines import BESIDE_COLOUR, run_overlay
 from airborne.studio.project import list_runs, list_videos
+from airborne.studio.run_curves import run_curves
+from airborne.studio.runs import run_body
 from airborne.studio.session import Session
 from airborne.studio.stage import part_stl
 from airborne.video import VideoSource
@@ -32,12 +37,14 @@ def add_routes(app: FastAPI, session: Session) -> None:
     """Add the routes of a session; every name in an address is one of a list, none is a path."""
 
     @app.get("/image/{camera}/{frame}")
-    async def image(camera: int, frame: int) -> Response:
-        return await _answer(lambda: _jpeg(session, camera, frame))
+    async def image(request: Request, camera: int, frame: int) -> Response:
+        async with _waiting(request) as is_wanted:
+            return await _answer(lambda: _jpeg(session, camera, frame, is_wanted))
 
     @app.get("/picture/{camera}/{number}")
-    async def own_picture(camera: int, number: int) -> Response:
-        return await _answer(lambda: _picture(session, camera, number))
+    async def own_picture(request: Request, camera: int, number: int) -> Response:
+        async with _waiting(request) as is_wanted:
+            return await _answer(lambda: _picture(session, camera, number, is_wanted))
 
     @app.get("/thumbnail/{name}")
     async def first_picture(name: str) -> Response:
@@ -48,16 +55,20 @@ def add_routes(app: FastAPI, session: Session) -> None:
         return Response(_CURVES.read_text(encoding="utf-8"), media_type="text/javascript", headers=_KEEP)
 
     @app.get("/overlay/{run}/{frame}")
-    async def overlay(run: str, frame: int) -> Response:
-        return await _answer(lambda: _json(_overlay(session, run, frame)))
+    async def overlay(run: str, frame: int, beside: str = "") -> Response:
+        return await _answer(lambda: _json(_overlay(session, run, frame, beside)))
 
     @app.get("/curves/{run}")
-    async def curves(run: str) -> Response:
-        return await _answer(lambda: _json(run_curves(find_run(session.folder, run))))
+    async def curves(run: str, beside: str = "") -> Response:
+        return await _answer(lambda: _json(_curves(session.folder, run, beside)))
 
     @app.get("/mesh/{run}/{part}")
     async def mesh(run: str, part: int) -> Response:
         return await _answer(lambda: _mesh(find_run(session.folder, run), part))
+
+    @app.get("/calibration/{name}")
+    async def calibration(name: str) -> Response:
+        return await _answer(lambda: _calibration(session.folder, name))
 
     @app.get("/file/{run}/{name:path}")
     async def file(run: str, name: str) -> Response:
@@ -76,10 +87,21 @@ def find_run(folder: Path, name: str) -> Path:
     return run
 
 
-def _overlay(session: Session, name: str, frame: int) -> dict[str, Any]:
-    """Return what a run draws over a frame; nothing where it has not begun."""
-    run = _find_run(session.folder, name)
-    return run_overlay(run, frame, session.shown().names) if run is not None else {"items": [], "label": ""}
+def _overlay(session: Session, name: str, frame: int, beside: str) -> dict[str, Any]:
+    """Return what a run, and another one beside it, draw over a frame; nothing where it has not begun."""
+    run, cameras = _find_run(session.folder, name), session.shown().names
+    if run is None:
+        return {"items": [], "label": ""}
+    own = run_overlay(run, frame, cameras)
+    if not beside:
+        return own
+    other = run_overlay(find_run(session.folder, beside), frame, cameras, colour=BESIDE_COLOUR)
+    return {"items": [*other["items"], *own["items"]], "label": own["label"]}
+
+
+def _curves(folder: Path, name: str, beside: str) -> dict[str, Any]:
+    own = run_curves(find_run(folder, name))
+    return {**own, "beside": run_curves(find_run(folder, beside))} if beside else own
 
 
 async def _answer(make: Callable[[], Response]) -> Response:
@@ -91,6 +113,23 @@ async def _answer(make: Callable[[], Response]) -> Response:
         return Response(reason, status_code=404, media_type="text/plain")
 
 
+@asynccontextmanager
+async def _waiting(request: Request) -> AsyncIterator[Callable[[], bool]]:
+    """Give what says whether the browser still waits for an answer: it gives up what a jump has overtaken."""
+    has_gone = Event()
+
+    async def watch() -> None:
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
+        has_gone.set()
+
+    watcher = asyncio.create_task(watch())
+    try:
+        yield lambda: not has_gone.is_set()
+    finally:
+        watcher.cancel()
+
+
 def _json(value: Any) -> Response:
     return JSONResponse(value, headers={"cache-control": "no-store"})
 
@@ -99,19 +138,19 @@ def _mesh(run: Path, part: int) -> Response:
     return Response(part_stl(run_body(run), part), media_type="model/stl", headers={"cache-control": "no-store"})
 
 
-def _jpeg(session: Session, camera: int, frame: int) -> Response:
+def _jpeg(session: Session, camera: int, frame: int, is_wanted: Callable[[], bool]) -> Response:
     shown = session.shown()
     if not (0 <= camera < len(shown.sources) and 0 <= frame < len(shown.clock)):
         return Response(status_code=404)
-    return _picture(session, camera, int(shown.clock.images[frame, camera]))
+    return _picture(session, camera, int(shown.clock.images[frame, camera]), is_wanted)
 
 
-def _picture(session: Session, camera: int, number: int) -> Response:
+def _picture(session: Session, camera: int, number: int, is_wanted: Callable[[], bool]) -> Response:
     """Return a picture of a camera by its number in the file."""
     shown = session.shown()
     if not (0 <= camera < len(shown.sources) and number < len(shown.indexes[camera])):
         return Response(status_code=404)
-    jpeg = None if number < 0 else session.pictures.jpeg(shown.sources[camera], number)
+    jpeg = None if number < 0 else session.pictures.jpeg(shown.sources[camera], number, is_wanted)
     if jpeg is None:
         return Response(status_code=204)  # this camera has no picture then
     return Response(jpeg, media_type="image/jpeg", headers=_KEEP)
@@ -126,6 +165,11 @@ def _thumbnail(folder: Path, name: str) -> Response:
     first = next(decode(source, facts))
     jpeg = thumbnail(rgb_from_decoded(first, facts), _THUMBNAIL_PX)
     return Response(jpeg, media_type="image/jpeg", headers=_KEEP)
+
+
+def _calibration(folder: Path, name: str) -> Response:
+    path = find_picture(folder, name)
+    return Response(status_code=404) if path is None else FileResponse(path, headers=_KEEP)
 
 
 def _file(run: Path, name: str) -> Response:

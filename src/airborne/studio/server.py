@@ -46,9 +46,9 @@ _PAGES = {
 }
 
 
-def serve(path: Path, *, port: int, browser: bool) -> None:
+def serve(path: Path, *, port: int, browser: bool, is_guided: bool) -> None:
     """Serve a folder, or one of its trials, until the process is stopped. Raises AirborneError."""
-    session = Session(*find_trial(path))
+    session = Session(*find_trial(path), is_guided=is_guided)
     port, token = _free_port(port), secrets.token_urlsafe(24)
     here = session.place.page if session.place.page in _PAGES else "/"
     address = f"http://{_HOST}:{port}{here}?token={token}"

@@ -26,10 +26,10 @@ _T = TypeVar("_T")
 class Session:
     """One opened folder; everything that lasts is in its files, all else is computed from them anew."""
 
-    def __init__(self, folder: Path, path: Path) -> None:
+    def __init__(self, folder: Path, path: Path, *, is_guided: bool = False) -> None:
         """Open a folder and a trial in it, which may not be there yet. Raises AirborneError for links out of it."""
         refuse_outer_links(folder)
-        self.folder, self.path = folder, path
+        self.folder, self.path, self.is_guided = folder, path, is_guided
         self.pictures, self.editor = Pictures(), Editor(folder)
         self.place = read_place(folder)
         self.commands: dict[str, Command] = {}  # that were started here, by what they do

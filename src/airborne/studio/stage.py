@@ -19,6 +19,7 @@ from airborne.types import Array
 
 _CAMERA_COLOUR, _PATH_COLOUR = "#1f2429", "#0072b2"
 _FROM = np.array([0.7, -0.9, 0.55])  # the side and height from which the scene is seen first
+_MOST_LINES = 500  # of a path: each is an object of the scene
 _FRUSTUM_SHARE = 0.12  # of the distance between camera and middle
 
 
@@ -33,7 +34,7 @@ def draw_cameras(
         for camera in rig:
             _frustum(scene, camera, _FRUSTUM_SHARE * reach)
         if path is not None:
-            pairs = [(a, b) for a, b in pairwise(path) if np.isfinite([a, b]).all()]
+            pairs = [(a, b) for a, b in pairwise(path[:: len(path) // _MOST_LINES + 1]) if np.isfinite([a, b]).all()]
             _lines(scene, pairs, _PATH_COLOUR)
     x, y, z = map(float, middle + (away_m or reach) * _FROM)
     scene.move_camera(x, y, z, look_at_x=middle[0], look_at_y=middle[1], look_at_z=middle[2], duration=0)

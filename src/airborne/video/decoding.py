@@ -142,10 +142,10 @@ def decode(source: VideoSource, facts: VideoFacts) -> Generator[DecodedImage]:
                 yield DecodedImage(time_s + j / facts.image_rate, frame, parity)
 
 
-def rgb_from_decoded(image: DecodedImage, facts: VideoFacts) -> Image:
-    """Convert an image to sRGB (h, w, 3), a field with its own rows only."""
+def rgb_from_decoded(image: DecodedImage, facts: VideoFacts, *, is_exact: bool = True) -> Image:
+    """Convert an image to sRGB (h, w, 3), a field with its own rows only; see `rgb_from_frame`."""
     frame = image.frame if image.parity is None else field_frame(image.frame, image.parity)
-    return rgb_from_frame(frame, short_side=min(facts.size), rotation_deg=facts.rotation_deg)
+    return rgb_from_frame(frame, short_side=min(facts.size), rotation_deg=facts.rotation_deg, is_exact=is_exact)
 
 
 @contextmanager

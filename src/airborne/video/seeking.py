@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from fractions import Fraction
@@ -30,6 +31,7 @@ from airborne.video.decoding import (
 from airborne.video.fields import fill_rows
 
 _REORDERED = 20  # frames: more than any codec sends before or after the place where it shows them
+_KEPT_BYTES, _FEWEST_KEPT = 32_000_000, 2  # of a file's decoded frames, to step back: ten of 1080p
 _MOST_FRAMES = 5_000_000  # of a trial: 28 hours at 50 Hz
 
 
@@ -134,36 +136,66 @@ def _nearest(times: NDArray[np.object_], clock: NDArray[np.object_], half: int) 
 
 
 class ImageReader:
-    """Decodes any image of a file; images in order cost one decoding each. Not for several threads at once."""
+    """Decodes any image of a file; images in order, or a few steps back, cost one decoding each or none.
+
+    Not for several threads at once.
+    """
 
     def __init__(self, source: VideoSource, index: ImageIndex) -> None:
         """Open nothing yet; call `close` at the end."""
         self._source, self.index = source, index
         self._stack = ExitStack()
+        self._container: InputContainer | None = None
         self._stream: VideoStream | None = None
         self._frames: Iterator[tuple[int, av.VideoFrame]] = iter(())
         self._current: tuple[int, av.VideoFrame] | None = None  # the last that was decoded
+        width, height = index.facts.size
+        self._passed: deque[tuple[int, av.VideoFrame]] = deque(  # those before it, and itself
+            maxlen=max(_FEWEST_KEPT, _KEPT_BYTES // (width * height * 3 // 2))
+        )
 
-    def image(self, number: int) -> Image | None:
+    def image(self, number: int, *, is_exact: bool = True) -> Image | None:
         """Return an image (h, w, 3) sRGB as the file holds it, a field with rows between its own filled in.
 
-        None where it is damaged. Raises VideoError for a number that is not there.
+        None where it is damaged. `is_exact` as in `rgb_from_frame`. Raises VideoError for a number that is not there.
         """
-        if not 0 <= number < len(self.index):
-            raise VideoError(f"{self._source.name}: there is no image {number}; the last is {len(self.index) - 1}")
+        self.go_to(number)
         facts = self.index.facts
         row, j = divmod(number, len(facts.parities))
-        frame = self._frame_at(row)
+        frame = self._find(int(self.index.ticks[row]))
         if frame is None:
             return None
         parity = facts.parities[j]
-        rgb = rgb_from_decoded(DecodedImage(Fraction(0), frame, parity), facts)
+        rgb = rgb_from_decoded(DecodedImage(Fraction(0), frame, parity), facts, is_exact=is_exact)
         return rgb if parity is None else fill_rows(rgb, parity, facts.size[1])
+
+    def go_to(self, number: int, is_wanted: Callable[[], bool] = lambda: True) -> bool:
+        """Decode up to an image for as long as it is wanted; say whether it was reached, or is known to be damaged.
+
+        Raises VideoError for a number that is not there.
+        """
+        if not 0 <= number < len(self.index):
+            raise VideoError(f"{self._source.name}: there is no image {number}; the last is {len(self.index) - 1}")
+        row = number // len(self.index.facts.parities)
+        ticks, near = int(self.index.ticks[row]), int(self.index.ticks[max(0, row - _REORDERED)])
+        if self._find(ticks) is not None:
+            return True
+        begin = min(self._key_before(ticks), int(self.index.ticks[max(0, row - 1)]))  # decoding goes on from there
+        if self._current is None or not begin <= self._current[0] <= ticks:
+            self._go_before(ticks)
+        while self._current is not None and self._current[0] < ticks:
+            if not is_wanted():
+                return False
+            if self._stream is not None:  # far from the place, frames that no other is predicted from are left out
+                self._stream.codec_context.skip_frame = "NONREF" if self._current[0] < near else "DEFAULT"
+            self._step()
+        return True
 
     def close(self) -> None:
         """Close the file."""
         self._stack.close()
-        self._stream, self._frames, self._current = None, iter(()), None
+        self._container, self._stream, self._frames, self._current = None, None, iter(()), None
+        self._passed.clear()
 
     def __enter__(self) -> Self:
         return self
@@ -171,15 +203,13 @@ class ImageReader:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _frame_at(self, row: int) -> av.VideoFrame | None:
-        ticks, near = int(self.index.ticks[row]), int(self.index.ticks[max(0, row - _REORDERED)])
-        if self._current is None or not self._key_before(ticks) <= self._current[0] <= ticks:
-            self._go_before(ticks)
-        while self._current is not None and self._current[0] < ticks:
-            if self._stream is not None:  # far from the place, frames that no other is predicted from are left out
-                self._stream.codec_context.skip_frame = "NONREF" if self._current[0] < near else "DEFAULT"
-            self._current = next(self._frames, None)
-        return self._current[1] if self._current is not None and self._current[0] == ticks else None
+    def _find(self, ticks: int) -> av.VideoFrame | None:
+        return next((frame for each, frame in self._passed if each == ticks), None)
+
+    def _step(self) -> None:
+        self._current = next(self._frames, None)
+        if self._current is not None:
+            self._passed.append(self._current)
 
     def _key_before(self, ticks: int) -> int:
         row = bisect_right(self.index.keys, ticks)
@@ -195,14 +225,16 @@ class ImageReader:
         self._begin(None)
 
     def _begin(self, key: int | None) -> None:
-        """Open the file anew, at a key frame or at the start, and decode one frame."""
-        self.close()
-        container, stream = _open(self._source, self._stack)
-        self._stream = stream
+        """Begin at a key frame, or anew at the start, and decode one frame."""
+        if key is None or self._container is None or self._stream is None:
+            self.close()
+            self._container, self._stream = _open(self._source, self._stack)
+        container, stream = self._container, self._stream
+        stream.codec_context.skip_frame = "DEFAULT"
         if key is not None:
             container.seek(key + self.index.first, stream=stream, backward=True)
         self._frames = self._decode(container, stream, self.index.first if key is None else key + self.index.first)
-        self._current = next(self._frames, None)
+        self._step()
 
     def _decode(
         self, container: InputContainer, stream: VideoStream, start: int

@@ -8,7 +8,8 @@ line lies in front of it; the centre line lies half on either side.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Literal
@@ -32,6 +33,13 @@ _PAINT_SD_M = 0.01  # of a court's lines
 _RISE_SD_M = 0.006  # uniform over 0 to 2 cm
 _BAND_SD_M = 0.02  # of a side band or an antenna along the net, and of an antenna across it
 _POST_SD_M = 0.15  # uniform over 0.5 to 1 m
+_CLICKED_BEST = re.compile(r"(corner_.*_outer|attack_.*_inner_rear|centre_.*_inner_.*|net_.*|antenna_.*)")
+_CROSSWISE = (
+    *(f"corner_{half}_{{}}_outer" for half in ("near", "far")),
+    *(f"attack_{half}_{{}}_inner_rear" for half in ("near", "far")),
+    *(f"centre_{{}}_inner_{half}" for half in ("near", "far")),
+    *(f"net_{{}}_{end}" for end in ("top", "bottom")),
+)  # points with a left and a right one, between which a line runs
 _MOST_NAMES = 3  # suggested for a misspelt one
 
 
@@ -63,6 +71,18 @@ def court_points(net: Net | float = "men") -> dict[str, ScenePoint]:
         for name, position, sd in _net_points(side, height):
             points[name] = _point((sign_x * position[0], *position[1:]), sd)
     return points
+
+
+def surveyed_points(net: Net | float) -> dict[str, Array]:
+    """Return the points of a court that are clicked best, each once: name -> (3,) [m]."""
+    return {name: point.position_m for name, point in court_points(net).items() if _CLICKED_BEST.fullmatch(name)}
+
+
+def court_lines(points: Mapping[str, Array]) -> list[Array]:
+    """Return the lines of a court, and of its net, between those of its points that are there: each (2, 3) [m]."""
+    pairs = [(f"corner_near_{side}_outer", f"corner_far_{side}_outer") for side in ("left", "right")]
+    pairs += [(name.format("left"), name.format("right")) for name in _CROSSWISE]
+    return [np.stack([points[a], points[b]]) for a, b in pairs if a in points and b in points]
 
 
 def closest_names(name: str, names: dict[str, ScenePoint]) -> str:

@@ -1,41 +1,63 @@
 // Curves over time with bands of two standard deviations, and a strip that says how each frame went; one cursor.
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000", "#8a6d00"];
 const STATUS = { tracked: "#009e73", uncertain: "#e69f00", lost: "#d55e00" };
-const STRIP = 12, LEFT = 58, RIGHT = 10, TOP = 20, BOTTOM = 18;
+const STRIP = 12, LEFT = 58, RIGHT = 10, TOP = 20, BOTTOM = 18, FONT = "11px system-ui, sans-serif";
 
-// data: {frame, time_s, status, series: [{name, unit, value, sd}]}; null where nothing is known
+// data: {frame, time_s, status, series: [{name, unit, value, sd}]}; null where nothing is known. What another run has,
+// {beside: {frame, series}}, is drawn with dashes.
 export function drawCurves(canvas, data, now) {
   const box = canvas.getBoundingClientRect(), ratio = window.devicePixelRatio || 1;
   if (!box.width) return;
-  Object.assign(canvas, { width: Math.round(box.width * ratio), height: Math.round(box.height * ratio) });
+  const [width, height] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
+  let still = canvas.still; // all but the cursor, drawn once
+  if (!still || still.data !== data || still.image.width !== width || still.image.height !== height) {
+    const image = Object.assign(document.createElement("canvas"), { width, height });
+    still = canvas.still = { data, image };
+    const pen = image.getContext("2d");
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    if (data && data.frame.length) drawStill(pen, box, data);
+  }
+  Object.assign(canvas, { width, height });
   const pen = canvas.getContext("2d");
+  pen.drawImage(still.image, 0, 0);
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-  pen.clearRect(0, 0, box.width, box.height);
   if (!data || !data.frame.length) return;
+  const { first, last } = spanOf(data), row = data.frame.indexOf(now);
+  const at = LEFT + ((Math.max(first, Math.min(last, now)) - first) / (last - first)) * (box.width - LEFT - RIGHT);
+  pen.strokeStyle = "#1f2429";
+  pen.beginPath();
+  pen.moveTo(at, TOP - 4);
+  pen.lineTo(at, box.height - BOTTOM + 2);
+  pen.stroke();
+  const time = row < 0 ? "" : `   ${data.time_s[row].toFixed(3)} s   ${data.status[row]}`;
+  pen.fillStyle = "#5d666f";
+  pen.font = FONT;
+  pen.fillText(`frame ${now}${time}`, LEFT, box.height - 4);
+}
+
+function drawStill(pen, box, data) {
   const { frame, status, series } = data, { first, last } = spanOf(data);
   const width = box.width - LEFT - RIGHT, bottom = box.height - BOTTOM - STRIP - 4, height = bottom - TOP;
   const x = (each) => LEFT + ((each - first) / (last - first)) * width;
-  const [low, high] = rangeOf(series), y = (value) => bottom - ((value - low) / (high - low)) * height;
+  const others = data.beside ? data.beside.series : [];
+  const [low, high] = rangeOf([...series, ...others]), y = (value) => bottom - ((value - low) / (high - low)) * height;
   drawAxes(pen, low, high, y, box.width, series.length ? series[0].unit : "");
   series.forEach((each, k) => drawCurve(pen, each, COLOURS[k % COLOURS.length], frame, x, y));
+  pen.save();
+  pen.beginPath();
+  pen.rect(LEFT, 0, width, bottom);
+  pen.clip();
+  pen.setLineDash([6, 4]);
+  others.forEach((each, k) => drawCurve(pen, { value: each.value }, COLOURS[k % COLOURS.length], data.beside.frame, x, y));
+  pen.restore();
   for (const name of ["tracked", "uncertain", "lost"]) { // the worst of the frames that share a column is drawn last
     pen.fillStyle = STATUS[name];
     frame.forEach((each, k) => {
-      const wide = Math.min(Math.max(1.5, width / (last - first)), LEFT + width + 1.5 - x(each));
+      const wide = Math.min(Math.max(1.5, width / (last - first) + 0.7), LEFT + width + 1.5 - x(each));
       if (status[k] === name) pen.fillRect(x(each), bottom + 4, wide, STRIP);
     });
   }
   drawLegend(pen, series);
-  const at = x(Math.max(first, Math.min(last, now))), row = frame.indexOf(now);
-  pen.strokeStyle = "#1f2429";
-  pen.beginPath();
-  pen.moveTo(at, TOP - 4);
-  pen.lineTo(at, bottom + STRIP + 6);
-  pen.stroke();
-  const time = row < 0 ? "" : `   ${data.time_s[row].toFixed(3)} s   ${status[row]}`;
-  pen.fillStyle = "#5d666f";
-  pen.textAlign = "left";
-  pen.fillText(`frame ${now}${time}`, LEFT, box.height - 4);
 }
 
 // The frame at a place of the pointer.
@@ -56,7 +78,7 @@ function rangeOf(series) {
 }
 
 function drawAxes(pen, low, high, y, width, unit) {
-  pen.font = "11px system-ui, sans-serif";
+  pen.font = FONT;
   pen.textAlign = "right";
   const rough = (high - low) / 4, power = 10 ** Math.floor(Math.log10(rough));
   const step = power * [1, 2, 5, 10].find((each) => each * power >= rough);

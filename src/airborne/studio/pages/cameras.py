@@ -6,9 +6,12 @@ from pathlib import Path
 
 from nicegui import ui
 
+from airborne.calibration.sources.court import Net
 from airborne.cameras import Rig, read_rig
 from airborne.errors import AirborneError
+from airborne.studio.calibrating import NETS, court_text
 from airborne.studio.clicks import list_surveys
+from airborne.studio.pages.calibrate import CalibratePanel
 from airborne.studio.pages.control_points import ControlPointsPanel
 from airborne.studio.pages.layout import errors_shown, in_thread, page_frame, work
 from airborne.studio.session import Session
@@ -16,8 +19,8 @@ from airborne.studio.stage import draw_cameras
 
 _ENDINGS = (".toml", ".txt", ".xcp", ".yml", ".yaml", ".csv")
 _HELP = (
-    "Open the calibration of any program, or click surveyed points: six in each camera at least, spread over the space "
-    "in which the body moves. Each residual is drawn ten times as long as soon as a camera is determined."
+    "Open the calibration of any program, or click surveyed points or those of a court: six in each camera at least, "
+    "spread over the space in which the body moves. Residuals are drawn ten times as long. Or calibrate with a board."
 )
 
 
@@ -38,10 +41,12 @@ async def cameras_page(session: Session) -> None:
         if not files and not surveys and not table:
             ui.label(
                 "The folder holds neither a calibration of these cameras nor a table of surveyed points "
-                "(point,x_m,y_m,z_m); put one there, then reload this page."
+                "(point,x_m,y_m,z_m). Put one there and reload this page; or click the points of a court, or calibrate "
+                "with a board or a wand."
             ).classes("warn")
-            return
-        _chooser(session, files, surveys, table)
+        with ui.element("div").classes("row-line"):
+            _chooser(session, files, surveys, table)
+            CalibratePanel(session, shown).build()
         if table.get("control_points"):
             panel = await ControlPointsPanel.open(session, shown, str(table["control_points"]))
             if panel is not None:
@@ -61,16 +66,24 @@ def _chooser(session: Session, files: list[str], surveys: list[str], table: dict
             session.set_table("calibration", {key: name, other: None}, f"calibration by {name}")
             ui.navigate.reload()
 
-    with ui.element("div").classes("row-line"):
-        for key, names, label in (("file", files, "calibration file"), ("control_points", surveys, "surveyed points")):
-            if names:
-                present = table.get(key)
-                ui.select(
-                    names,
-                    label=label,
-                    value=present if present in names else None,
-                    on_change=lambda event, key=key: use(key, event.value),
-                ).props("outlined dense options-dense").style("min-width: 260px")
+    def use_court(net: Net) -> None:
+        name = f"court_{net}.csv"
+        with errors_shown():
+            if not (session.folder / name).exists():
+                session.edit(name, court_text(net), "points of a court")
+            use("control_points", name)
+
+    for key, names, label in (("file", files, "calibration file"), ("control_points", surveys, "surveyed points")):
+        if names:
+            present = table.get(key)
+            ui.select(
+                names,
+                label=label,
+                value=present if present in names else None,
+                on_change=lambda event, key=key: use(key, event.value),
+            ).props("outlined dense options-dense").style("min-width: 220px")
+    court = ui.select(NETS, label="volleyball court", on_change=lambda event: use_court(event.value))
+    court.props("outlined dense options-dense").style("min-width: 200px")
 
 
 def _list_calibrations(folder: Path, wanted: set[str]) -> list[str]:

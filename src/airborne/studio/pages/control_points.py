@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from nicegui import ui
 
 from airborne.calibration.from_points import Calibration, calibrate
+from airborne.calibration.sources.court import court_lines
 from airborne.errors import AirborneError
 from airborne.studio.clicks import Clicked, count_clicked, read_clicked
 from airborne.studio.pages.layout import complain, errors_shown
@@ -14,10 +17,11 @@ from airborne.studio.pages.points_panel import CHOSEN_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import FEWEST_POINTS
 from airborne.studio.session import Session
-from airborne.studio.view import Mark
+from airborne.studio.view import Item, Mark
 from airborne.types import Array, Mask
 
 _CLICKED, _PREDICTED = "#56b4e9", "#c8cdd3"
+_LINE_POINTS = 60  # of a court's line, which a lens bends
 
 
 class ControlPointsPanel(PointsPanel):
@@ -91,7 +95,8 @@ class ControlPointsPanel(PointsPanel):
     def show(self) -> None:
         """Show marks and lists as they are now."""
         marks = [mark for pane, camera in enumerate(self.shown.names) for mark in self._marks(pane, camera)]
-        self.view.show_over(sorted(marks, key=lambda mark: mark.get("colour") != CHOSEN_COLOUR), (), self.selected)
+        lines = [item for pane, camera in enumerate(self.shown.names) for item in self._court(pane, camera)]
+        self.view.show_over(sorted(marks, key=lambda mark: mark.get("colour") != CHOSEN_COLOUR), lines, self.selected)
         self.list.show(self.clicked.names, self.chosen, self._off_px)
         self.state.refresh()
 
@@ -109,6 +114,17 @@ class ControlPointsPanel(PointsPanel):
                 label = f"{name}?" if name == self.chosen else ""
                 marks.append({"pane": pane, "u": to[0], "v": to[1], "label": label, "colour": _PREDICTED})
         return marks
+
+    def _court(self, pane: int, camera: str) -> Iterator[Item]:
+        """Draw the lines of a court as a solved camera sees them, where its points have their names."""
+        fit = self.fits.get(camera, (b"", ""))[1]
+        assert self.clicked.world is not None
+        for ends in court_lines(dict(zip(self.clicked.names, self.clicked.world, strict=True))):
+            if isinstance(fit, Calibration):
+                own = fit.rig[camera]
+                px = own.px_from_world(ends[0] + np.linspace(0, 1, _LINE_POINTS)[:, None] * (ends[1] - ends[0]))
+                inside = np.isfinite(px).all(axis=1) & (abs(px / own.size - 0.5) < 1).all(axis=1)
+                yield {"pane": pane, "points": px[inside].round(1).tolist(), "colour": _PREDICTED, "width": 1.0}
 
     def predict(self, camera: str) -> Array | None:
         """Return where a solved camera sees every point: (n, 2) [px]."""

@@ -10,15 +10,15 @@ import numpy as np
 from nicegui import ui
 
 from airborne.body import Pose
-from airborne.cameras import Camera, read_rig
+from airborne.cameras import Camera
 from airborne.errors import TrialError
-from airborne.motion.run_folder import CALIBRATION
-from airborne.studio.commands import STOPPED, Command
+from airborne.studio.commands import Command
 from airborne.studio.dragging import landmarks_of_grip, landmarks_px
-from airborne.studio.outlines import run_body, run_motion
-from airborne.studio.pages.layout import complain, errors_shown
+from airborne.studio.pages.command_watch import CommandWatch
+from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pages.pose_hand import PoseHand
 from airborne.studio.pictures import ShownTrial
+from airborne.studio.runs import run_body, run_rig, run_rows
 from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_clicks, with_key
 from airborne.studio.view import CameraViews, Drag, Mark
@@ -27,7 +27,6 @@ from airborne.trial.settings import KEY_METHODS
 from airborne.types import Array
 
 _JOINT_COLOUR, _CLICK_COLOUR = "#ffffff", "#f0e442"
-_LOOK_EVERY_S = 0.5  # at a run that goes on
 
 
 class Correction:
@@ -37,8 +36,7 @@ class Correction:
         """Begin with nothing to grab, until the switch is on."""
         self.session, self.shown, self.folder = session, shown, folder
         self.view: CameraViews | None = None
-        self.command: Command | None = None
-        cameras = read_rig(folder / CALIBRATION).select(shown.names).cameras
+        cameras = run_rig(folder).select(shown.names).cameras
         self.hand = PoseHand(run_body(folder), cameras, lambda pose: self._marks(pose, {}))
 
     def build(self) -> None:
@@ -46,18 +44,16 @@ class Correction:
         with ui.element("div").classes("row-line"):
             self.switch = ui.switch("Correct", on_change=lambda: self.turn_to(self.session.frame))
             self.again = ui.button("Track again around it", on_click=self.track).props("unelevated")
-            self.says = ui.label().classes("small soft")
+            self.watch = CommandWatch(self.session, "track", self.show_anew, words="tracking")
+            self.watch.buttons = [self.again]
         self.again.set_visibility(False)
-        ui.timer(_LOOK_EVERY_S, self.look)
 
     def turn_to(self, frame: int) -> None:
         """Show the body of a frame and its joints, to be grabbed."""
         if self.view is None:
             return
         with errors_shown():
-            motion = run_motion(self.folder)
-            rows = np.flatnonzero((motion.index == frame) & motion.has_pose)
-            self.hand.place(motion.pose(rows[0]) if self.switch.value and len(rows) else None)
+            self.hand.place(run_rows(self.folder).pose(frame) if self.switch.value else None)
             self._show(frame)
 
     def _show(self, frame: int) -> None:
@@ -115,33 +111,18 @@ class Correction:
             if trial.track.method not in KEY_METHODS:
                 raise TrialError(f"method '{trial.track.method}' reads no corrections; use {', '.join(KEY_METHODS)}")
             self.session.edit_trial(change, what)
-            self.says.set_text(what + sd)
+            self.watch.says.set_text(what + sd)
             self.again.set_visibility(True)
         self._show(frame)
 
     def track(self) -> None:
         """Track again what the corrections touch, as `airborne track --resume` does."""
-        running = self.session.commands.get("track")
-        if running is not None and running.is_running:
-            complain("a run is being tracked; wait for its end, or stop it in the step Track")
-            return
-        words = ["track", self.session.path.name, "-o", self.folder.name, "--resume"]
-        self.command = self.session.commands["track"] = Command(words, self.session.folder)
+        self.watch.start("track", self.session.path.name, "-o", self.folder.name, "--resume")
         self.again.set_visibility(False)
 
-    def look(self) -> None:
-        """Say how the tracking goes, and show what came of it."""
-        if self.command is None:
-            return
-        if self.command.is_running:
-            self.says.set_text(f"tracking again, {self.command.seconds:.0f} s")
-            return
-        command, self.command = self.command, None
-        if command.code in (0, STOPPED):
-            self.says.set_text("tracked again" if command.code == 0 else "stopped")
-        else:
-            self.says.set_text("")
-            complain(command.complaint())
+    def show_anew(self, command: Command) -> None:
+        """Show what came of it."""
+        self.watch.says.set_text("tracked again")
         if self.view is not None:
             self.view.run_method("refresh")
         self.turn_to(self.session.frame)

@@ -28,12 +28,12 @@ from airborne.studio.digitising import (
     record_text,
     set_frame,
 )
-from airborne.studio.outlines import run_motion
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
+from airborne.studio.runs import run_rows
 from airborne.studio.session import Session
 from airborne.studio.view import Item, Mark
 from airborne.types import Array, Mask
@@ -215,7 +215,7 @@ class DigitisePanel(PointsPanel):
         path = self.session.folder / self.file
         if self.model is not None and self.model.has_joints:
             paths = path.with_name(f"{path.stem}_joints.csv")
-            self.session.edit(paths.name, joint_paths_text(self.table, self.session.rig(), run_motion(run)), "joints")
+            self.session.edit(paths.name, joint_paths_text(self.table, self.session.rig(), run_rows(run)), "joints")
             return assess(run, None, None, paths)["joints"].describe()
         return assess(run, None, path)["digitised"].describe()
 

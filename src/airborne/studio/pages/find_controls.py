@@ -12,13 +12,12 @@ from nicegui import ui
 
 from airborne.io.text import read_json
 from airborne.motion.run_folder import CANDIDATES
-from airborne.studio.commands import STOPPED, Command
-from airborne.studio.pages.layout import complain, in_thread
+from airborne.studio.commands import Command
+from airborne.studio.pages.command_watch import CommandWatch
 from airborne.studio.session import Session
 from airborne.studio.writing import FOLDER
 
 _UNDECIDED = 3  # the exit code of `airborne find`
-_LOOK_EVERY_S = 0.5  # at a search that goes on
 
 
 @dataclass(eq=False)
@@ -33,61 +32,37 @@ class FindControls:
     def build(self) -> None:
         """Lay out the buttons, the choices, and the line that says what was found."""
         with ui.element("div").classes("row-line"):
-            self.find = ui.button("Find it", on_click=self.search).props("unelevated")
-            self.spinner = ui.spinner()
-            self.seconds = ui.label().classes("small")
-            self.halt = ui.button("Stop", on_click=self.stop).props("flat dense")
+            find = ui.button("Find it", on_click=self.search).props("unelevated")
+            self.watch = CommandWatch(
+                self.session,
+                "find",
+                self.take,
+                words=f"looking for the {self.what}",
+                codes=(0, _UNDECIDED),
+                again=True,
+            )
+            self.watch.buttons = [find]
         self.choices = ui.refreshable(self._list_candidates)
         self.choices()
         self.note = ui.label().classes("small")
-        self.timer = ui.timer(_LOOK_EVERY_S, self.watch, active="find" in self.session.commands)
-        self._show_search()
 
     def search(self) -> None:
         """Start `airborne find`."""
-        command = self.session.commands.get("find")
-        if command is not None and command.is_running:
-            return
-        words = ["find", self.session.path.name, "-o", f"{FOLDER}/find", "--json"]
-        self.session.commands["find"] = Command(words, self.session.folder)
-        self.timer.activate()
-        self._show_search()
+        self.watch.start("find", self.session.path.name, "-o", f"{FOLDER}/find", "--json")
 
-    async def stop(self) -> None:
-        """Stop the search."""
-        command = self.session.commands.get("find")
-        if command is not None:
-            await in_thread(command.stop)
-
-    async def watch(self) -> None:
-        """Look whether the search has ended, and show what it found."""
-        command = self.session.commands.get("find")
-        self._show_search()
-        if command is None or command.is_running:
-            return
-        self.timer.deactivate()
+    async def take(self, command: Command) -> None:
+        """Show what the search has found."""
         if command.code == 0:
             found = json.loads(command.output())
             self.candidates = ()
             self.note.set_text(found["note"])
             await self.show(found)
-        elif command.code == _UNDECIDED:
+        else:
             document = read_json(self.session.folder / FOLDER / "find" / CANDIDATES)
             self.candidates = tuple({**each, "frame": document["frame"]} for each in document["candidates"])
             self.note.set_text("The pictures do not decide between these; choose the right one.")
             await self.show(self.candidates[0])
-        elif command.code != STOPPED:
-            complain(command.complaint())
         self.choices.refresh()
-
-    def _show_search(self) -> None:
-        """Show the buttons that the search has now."""
-        command = self.session.commands.get("find")
-        is_running = command is not None and command.is_running
-        self.find.set_visibility(not is_running)
-        for each in (self.spinner, self.seconds, self.halt):
-            each.set_visibility(is_running)
-        self.seconds.set_text(f"looking for the {self.what}: {command.seconds:.0f} s" if command is not None else "")
 
     def _list_candidates(self) -> None:
         for number, each in enumerate(self.candidates, start=1):

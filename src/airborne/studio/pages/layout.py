@@ -10,6 +10,7 @@ from typing import TypeVar, cast
 from nicegui import Client, run, ui
 
 from airborne.errors import AirborneError
+from airborne.studio.guide import next_task
 from airborne.studio.project import steps
 from airborne.studio.session import Session
 
@@ -64,6 +65,7 @@ async def page_frame(
         if known[0] != (stamp := session.stamp):
             known[0] = stamp
             rail.refresh()
+            guide.refresh()
             for tell in changed:
                 await tell()
 
@@ -79,13 +81,15 @@ async def page_frame(
         with ui.element("nav").classes("rail").props("aria-label=steps"):
             rail = ui.refreshable(lambda: _rail(session, here))
             rail()
-        await look()
         ui.timer(_LOOK_EVERY_S, look)
         ui.keyboard(on_key=lambda event: _key(event, sheet, move), ignore=["input", "select", "textarea"])
         with ui.element("div").classes("main" if scrolls else "main still"):  # the page has a <main> already
             ui.html(f"<h1>{title}</h1>", sanitize=False)
             if text:
                 ui.label(text).classes("help")
+            guide = ui.refreshable(lambda: _guide(session, here))
+            guide()
+            await look()
             await ui.context.client.connected()
             yield changed
 
@@ -109,6 +113,18 @@ def _rail(session: Session, here: str) -> None:
             ui.label("✓" if step.state == "ready" else str(number)).classes("number")
             ui.label(step.name).classes("title")
             ui.label(step.says).classes("says")
+
+
+def _guide(session: Session, here: str) -> None:
+    """Show what to do here in the guided walk."""
+    if not session.is_guided:
+        return
+    task, following = next_task(session.project(), here)
+    with ui.element("div").classes("guide"):
+        ui.html(task, sanitize=False)
+        if following is not None:
+            with ui.element("a").props(f'href="{following.address}"').classes("plain"):
+                ui.label(f"Next: {following.name} →")
 
 
 def _sheet() -> ui.dialog:

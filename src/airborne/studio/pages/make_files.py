@@ -10,72 +10,54 @@ from nicegui import ui
 from airborne.errors import AirborneError
 from airborne.motion.run_folder import FOLDERS
 from airborne.run.export import EXPORT_FORMATS
-from airborne.studio.commands import STOPPED, Command
-from airborne.studio.pages.layout import complain, errors_shown
+from airborne.studio.commands import Command
+from airborne.studio.pages.command_watch import CommandWatch
+from airborne.studio.pages.layout import errors_shown
 from airborne.studio.session import Session
-
-_LOOK_EVERY_S = 0.5  # at a command that goes on
 
 
 class Making:
-    """One run's buttons; the commands belong to this window."""
+    """One run's buttons."""
 
     def __init__(self, session: Session, folder: Path) -> None:
         """Lay them out, with links to what is there."""
-        self._session, self._folder = session, folder
-        self._command: Command | None = None
+        self._folder = folder
         ui.label("For other programs").classes("soft")
         with ui.element("div").classes("row-line"):
             self._formats = ui.select(list(EXPORT_FORMATS), label="formats", value=["c3d"], multiple=True)
             self._formats.props("outlined dense options-dense").style("min-width: 160px")
-            self._buttons = [ui.button("Export", on_click=self.export).props("outline")]
+            buttons = [ui.button("Export", on_click=self.export).props("outline")]
             if any((folder / FOLDERS[2]).glob("overlay_*.mp4")):
-                self._film()
-            self._says = ui.label().classes("small soft")
+                buttons.append(self._film())
+            self._watch = CommandWatch(session, f"files of {folder.name}", self.tell, words="working")
+            self._watch.buttons = buttons
         self._links = ui.refreshable(self._list_files)
         self._links()
-        ui.timer(_LOOK_EVERY_S, self.look)
 
     def export(self) -> None:
         """Start `airborne export`."""
         with errors_shown():
             if not self._formats.value:
                 raise AirborneError("choose a format, such as c3d")
-            self._start("export", self._folder.name, *(f"--{kind}" for kind in self._formats.value))
+            self._watch.start("export", self._folder.name, *(f"--{kind}" for kind in self._formats.value))
 
     def film(self) -> None:
         """Start `airborne film`."""
         path = f"{self._folder.name}/{FOLDERS[2]}/film.{self._kind.value}"
         ends = [("--first", self._first.value), ("--last", self._last.value)]
         words = [word for name, value in ends if value is not None for word in (name, str(int(value)))]
-        self._start("film", self._folder.name, "-o", path, *words)
+        self._watch.start("film", self._folder.name, "-o", path, *words)
 
-    def look(self) -> None:
-        """Say how a command goes."""
-        if self._command is None:
-            return
-        if self._command.is_running:
-            self._says.set_text(f"{self._command.line}: {self._command.seconds:.0f} s")
-            return
-        command, self._command = self._command, None
-        for button in self._buttons:
-            button.enable()
-        self._says.set_text("done" if command.code == 0 else "")
-        if command.code not in (0, STOPPED):
-            complain(command.complaint())
+    def tell(self, command: Command) -> None:
+        """Show what was made."""
+        self._watch.says.set_text(f"done: {command.line}")
         self._links.refresh()
 
-    def _film(self) -> None:
+    def _film(self) -> ui.button:
         self._first = ui.number("first frame", min=0, precision=0).props("outlined dense").style("width: 110px")
         self._last = ui.number("last frame", min=0, precision=0).props("outlined dense").style("width: 110px")
         self._kind = ui.select(["mp4", "gif"], label="film", value="mp4").props("outlined dense options-dense")
-        self._buttons.append(ui.button("Make a film", on_click=self.film).props("outline"))
-
-    def _start(self, *words: str) -> None:
-        if self._command is None:
-            self._command = Command(words, self._session.folder)
-            for button in self._buttons:
-                button.disable()
+        return ui.button("Make a film", on_click=self.film).props("outline")
 
     def _list_files(self) -> None:
         made = sorted([*(self._folder / "export").glob("*"), *(self._folder / FOLDERS[2]).glob("film.*")])

@@ -9,6 +9,7 @@ from urllib.parse import quote
 from nicegui import ui
 
 from airborne.errors import ResultError, count
+from airborne.export.methods_text import describe_methods
 from airborne.motion.run_folder import REPORT, note_if_unfinished, read_summary
 from airborne.run.folder import list_tables
 from airborne.studio.pages.layout import page_frame
@@ -78,6 +79,8 @@ def _numbers(summary: dict[str, Any]) -> None:
                 ui.label(finding["sentence"]).classes("bad small" if finding["is_alarm"] else "soft small")
     for text in summary.get("warnings") or []:
         ui.label(text).classes("warn small")
+    with ui.expansion("For a methods section").props("dense"):
+        ui.label(describe_methods(summary)).classes("small").style("max-width: 90ch; user-select: text")
 
 
 def _link(folder: Path, name: str, text: str) -> None:

@@ -9,13 +9,14 @@ from urllib.parse import quote
 import numpy as np
 from nicegui import ui
 
-from airborne.cameras import read_rig
-from airborne.motion.run_folder import CALIBRATION, holds_players
-from airborne.studio.outlines import run_body, run_motion
+from airborne.motion.run_folder import holds_players
+from airborne.studio.outlines import BESIDE_COLOUR
 from airborne.studio.pages.correct import Correction
-from airborne.studio.pages.layout import complain, in_thread, page_frame, work
+from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
+from airborne.studio.run_curves import describe_distance
+from airborne.studio.runs import run_body, run_rig, run_rows
 from airborne.studio.session import Session
 from airborne.studio.stage import BodyOnStage, draw_cameras
 from airborne.studio.view import CameraViews, Curves
@@ -38,13 +39,21 @@ async def review_page(session: Session) -> None:
         names = [each.name for each in runs]
 
         async def change() -> None:
+            others = [name for name in names if name != choice.value]
+            if beside.value not in ("", *others):
+                beside.set_options(["", *others], value="")  # which calls this again
+                return
+            beside.set_options(["", *others])
             content.clear()
             with content:
-                await _show_run(session, shown, session.folder / choice.value)
+                await _show_run(session, shown, session.folder / choice.value, beside.value)
 
         with ui.element("div").classes("row-line"):
             choice = ui.select(names, label="run", value=names[0], on_change=change)
             choice.props("outlined dense options-dense").style("min-width: 180px")
+            beside = ui.select([""], label="over it", value="", on_change=change)
+            beside.props("outlined dense options-dense").style("min-width: 150px")
+            beside.set_visibility(len(names) > 1)
             jumps = ui.element("div").classes("row-line")
         content = ui.element("div").classes("split").style("flex-direction: column")
         with jumps:
@@ -53,7 +62,7 @@ async def review_page(session: Session) -> None:
         await change()
 
 
-async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
+async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: str) -> None:
     bodies: list[Callable[[int], None]] = []
     correction = None if holds_players(folder) else Correction(session, shown, folder)
     if correction is not None:
@@ -62,15 +71,22 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
 
     def turn_to(frame: int) -> None:
         session.go(frame=frame)
-        for show in bodies:
-            show(frame)
+        with errors_shown():
+            for show in bodies:
+                show(frame)
 
+    query = f"?beside={quote(beside)}" if beside else ""
+    if beside:
+        with ui.element("div").classes("row-line small"), errors_shown():
+            ui.element("span").style(f"width: 16px; border-top: 3px solid {BESIDE_COLOUR}")
+            ui.label(beside).classes("name")
+            ui.label(await in_thread(describe_distance, folder, session.folder / beside)).classes("soft")
     with ui.element("div").classes("split"):
         with ui.element("div").classes("wide"):
             view = CameraViews(
                 shown,
                 frame=session.frame,
-                overlay=f"/overlay/{quote(folder.name)}/{{frame}}",
+                overlay=f"/overlay/{quote(folder.name)}/{{frame}}{query}",
                 on_frame=turn_to,
                 on_move=None if correction is None else correction.move,
                 on_drag=None if correction is None else correction.drag,
@@ -79,22 +95,20 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path) -> None:
             correction.view = view
             with ui.element("div").classes("side"):
                 bodies.append(await _stage(folder))
-    Curves(f"/curves/{quote(folder.name)}", frame=session.frame)
+    Curves(f"/curves/{quote(folder.name)}{query}", frame=session.frame)
 
 
 async def _stage(folder: Path) -> Callable[[int], None]:
     """Build the scene of a run of one body; return what shows a frame in it."""
-    motion = await in_thread(run_motion, folder)
+    rows = await in_thread(run_rows, folder)
     model = await in_thread(run_body, folder)
-    rig, path = read_rig(folder / CALIBRATION), motion.position[motion.has_pose]
+    path = rows.position[np.isfinite(rows.position).all(axis=1)]
     near = {"middle": path.mean(axis=0), "away_m": _AROUND_M + float(np.ptp(path, axis=0).max())} if len(path) else {}
-    scene = draw_cameras(rig, path=motion.position, **near)
+    scene = draw_cameras(run_rig(folder), path=rows.position, **near)
     body = BodyOnStage(scene, model, f"/mesh/{quote(folder.name)}/{{part}}")
-    rows = {int(frame): row for row, frame in enumerate(motion.index) if motion.has_pose[row]}
 
     def show(frame: int) -> None:
-        row = rows.get(frame)
-        body.show(None if row is None else motion.pose(row))
+        body.show(run_rows(folder).pose(frame))
 
     return show
 
@@ -105,8 +119,8 @@ def _jump(session: Session, name: str, status: Status) -> None:
     if holds_players(folder):
         complain("players have a status each; step through the strip below the curves")
         return
-    motion = run_motion(folder)
-    frames = motion.index[motion.status == status.value]
+    rows = run_rows(folder)
+    frames = rows.index[rows.status == status.value]
     if not len(frames):
         ui.notify(f"no frame is {status.value}")
         return

@@ -9,15 +9,15 @@ from nicegui import ui
 from nicegui.events import KeyEventArguments
 
 from airborne.errors import count
-from airborne.studio.commands import STOPPED, Command
-from airborne.studio.pages.layout import complain, errors_shown, page_frame, work
+from airborne.studio.commands import Command
+from airborne.studio.pages.command_watch import CommandWatch
+from airborne.studio.pages.layout import errors_shown, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_cameras
 from airborne.studio.view import CameraViews
 from airborne.sync.offsets import fit_line
 
-_LOOK_EVERY_S = 0.5  # at a command that goes on
 _HELP = (
     "Step each camera to the same event, a foot that lands or a ball that is hit, and press E. "
     "Several events narrow the offset down: each says it to within half a picture."
@@ -43,7 +43,6 @@ class _Panel:
         self.session, self.shown = session, shown
         self.other, self.at = 1, [0, 0]  # the other camera's number, and the pictures in view
         self.events: list[tuple[int, int]] = []  # pictures of the clock and of the other camera
-        self.command: Command | None = None
 
     def build(self) -> None:
         """Lay out both pictures, the events and what follows from them."""
@@ -65,9 +64,10 @@ class _Panel:
             ui.label("Or let it be found:").classes("soft")
             way = ui.select(_WAYS, label="from", value="motion").props("outlined dense options-dense")
             way.style("min-width: 160px")
-            self.find = ui.button("Find the offsets", on_click=lambda: self.start(way.value)).props("outline")
-            self.output = ui.label().classes("small soft").style("white-space: pre-line")
-        ui.timer(_LOOK_EVERY_S, self.look)
+            find = ui.button("Find the offsets", on_click=lambda: self.start(way.value)).props("outline")
+            self.watch = CommandWatch(self.session, "sync", self.tell, words="looking for the offsets")
+            self.watch.buttons = [find]
+            self.watch.says.style("white-space: pre-line")
         self.choose(1)
 
     def choose(self, other: int) -> None:
@@ -145,19 +145,8 @@ class _Panel:
 
     def start(self, way: str) -> None:
         """Start `airborne sync`."""
-        if self.command is None:
-            self.command = Command(["sync", self.session.path.name, "--by", way], self.session.folder)
-            self.find.disable()
+        self.watch.start("sync", self.session.path.name, "--by", way)
 
-    def look(self) -> None:
-        """Say how the command goes."""
-        if self.command is None:
-            return
-        if self.command.is_running:
-            self.output.set_text(f"{self.command.line}: {self.command.seconds:.0f} s")
-            return
-        command, self.command = self.command, None
-        self.find.enable()
-        self.output.set_text(command.output().strip() if command.code == 0 else "")
-        if command.code not in (0, STOPPED):
-            complain(command.complaint())
+    def tell(self, command: Command) -> None:
+        """Show what it has found."""
+        self.watch.says.set_text(command.output().strip())

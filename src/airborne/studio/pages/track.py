@@ -12,10 +12,10 @@ from airborne.errors import AirborneError, TrialError, count
 from airborne.io.names import check_name
 from airborne.motion.run_folder import MOTION, SUMMARY
 from airborne.studio.commands import STOPPED, Command
-from airborne.studio.outlines import run_rows
 from airborne.studio.pages.layout import complain, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import is_inside, list_runs
+from airborne.studio.runs import count_rows
 from airborne.studio.session import Session
 from airborne.studio.view import CameraViews
 
@@ -120,7 +120,7 @@ class _Panel:
             complain(str(error))
             return
         words = ["track", self.session.path.name, "-o", self.folder.name, *options]
-        self.n_before = run_rows(self.folder)[0] if "--resume" in options else 0
+        self.n_before = count_rows(self.folder)[0] if "--resume" in options else 0
         self.session.commands["track"] = Command(words, self.session.folder)
         self.n_done = -1
         self._show_buttons()
@@ -136,7 +136,7 @@ class _Panel:
         if anew:
             self.view.set_overlay(self._overlay)
             self._show_buttons()
-        n_done, newest = await in_thread(run_rows, self.folder)
+        n_done, newest = await in_thread(count_rows, self.folder)
         command = self._command
         if command is not None and command.is_running:
             self._say_progress(command, n_done)

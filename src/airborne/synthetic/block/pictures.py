@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from airborne.body import PosedBody, SurfaceArrays, surface_arrays
 from airborne.cameras import Camera
+from airborne.export.pictures import encode_jpeg
 from airborne.rendering import Lamp, Lights, render
 from airborne.rendering.shapes import new_shapes
 from airborne.synthetic.block.court import Layer, draw_clutter, hall_image, net_layer
@@ -236,7 +237,6 @@ def _record(
     expose(patch, gain, pool[v : v + height, u : u + width], out)
     if not quality:
         return out
-    _, coded = cv2.imencode(".jpg", cv2.cvtColor(out, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality])
-    decoded = cv2.imdecode(coded, cv2.IMREAD_COLOR)
+    decoded = cv2.imdecode(np.frombuffer(encode_jpeg(out, quality), np.uint8), cv2.IMREAD_COLOR)
     assert decoded is not None, "what was just encoded"
     return np.asarray(cv2.cvtColor(decoded, cv2.COLOR_BGR2RGB), np.uint8)

@@ -1,0 +1,57 @@
+"""A paragraph for a methods section, from the summary of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from airborne.errors import count
+
+_FITTED = "by fitting a coloured three-dimensional model of the body to the images of all cameras, frame by frame"
+_COMPARED = "by moving a coloured three-dimensional model of the body until its pictures and the images differ least"
+_WAYS = {
+    **dict.fromkeys(("refined", "joint", "hierarchical"), _FITTED),
+    **dict.fromkeys(("stepping", "simplex"), _COMPARED),
+    "blocker": "by fitting a model of each player's legs to the images of all cameras, frame by frame",
+}
+_PARTICLES = "with particle filters on the colours of the players' legs"
+
+
+def describe_methods(summary: Mapping[str, Any]) -> str:
+    """Return what was done and how sure its results are, in sentences; what the summary does not hold is left out."""
+    versions, method = summary.get("versions") or {}, (summary.get("method") or {}).get("method", "unknown")
+    cameras, players = summary.get("cameras") or [], summary.get("players") or {}
+    what = f"The motion of {count(len(players), 'player')}" if players else "The motion"
+    text = [
+        f"{what} was measured from the videos of {count(len(cameras), 'calibrated camera')}, without markers, with "
+        f"Airborne {versions.get('airborne', '')} (method '{method}'), {_WAYS.get(method, _PARTICLES)}."
+    ]
+    errors = [each["calibration_rms_px"] for each in cameras if each.get("calibration_rms_px") is not None]
+    if errors:
+        text.append(f"The calibration left residuals of {_span(errors, '.2f')} px RMS in the cameras.")
+    times = count(summary["n_frames"], "image time")
+    rate = f" at {summary['rate_hz']:.5g} Hz" if summary.get("rate_hz") else ""
+    tracked, unsure, lost = (summary[f"n_{status}"] for status in ("tracked", "uncertain", "lost"))
+    text.append(f"At {times}{rate}, {count(tracked, 'pose')} were tracked, {unsure} were uncertain and {lost} lost.")
+    sds = [
+        f"{summary[key]:.1f} {unit} in {name}"
+        for key, unit, name in (
+            ("median_position_sd_mm", "mm", "position"),
+            ("median_rotation_sd_deg", "°", "orientation"),
+        )
+        if isinstance(summary.get(key), float)
+    ]
+    joints = [each["median_sd_mm"] for each in players.values() if each.get("median_sd_mm") is not None]
+    if joints:
+        sds.append(f"{_span(joints, '.0f')} mm for a player's joints")
+    if sds:
+        text.append(f"Median standard deviations were {' and '.join(sds)}. {summary.get('uncertainty', '')}".strip())
+    alarms = [each["sentence"] for each in summary.get("self_check") or [] if each["is_alarm"]]
+    text += [f"The run's check of itself reported: {each.rstrip('.')}." for each in alarms]
+    others = ", ".join(f"{name} {number}" for name, number in versions.items() if name != "airborne")
+    return " ".join([*text, *([f"Versions: {others}."] if others else [])])
+
+
+def _span(values: Sequence[float], form: str) -> str:
+    low, high = format(min(values), form), format(max(values), form)
+    return low if low == high else f"{low} to {high}"

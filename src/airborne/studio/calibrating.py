@@ -1,0 +1,90 @@
+"""What a calibration can be made from in a folder: boards and wands that were filmed, or a volleyball court."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from airborne.calibration.sources.boards import read_board
+from airborne.calibration.sources.court import Net, surveyed_points
+from airborne.cameras.formats.dltdv import read_xypts
+from airborne.cameras.formats.options import FileOptions
+from airborne.errors import AirborneError
+from airborne.studio.project import Project, is_inside, list_videos
+
+SOURCES, CALIBRATED = "calibration_sources.toml", "calib_studio.toml"  # what is written, and what comes of it
+REPORT = "calib_studio_report"  # the command's folder of pictures
+NETS: dict[Net, str] = {"men": "men, 2.43 m", "women": "women, 2.24 m"}
+
+
+def list_boards(folder: Path) -> list[str]:
+    """List the files of a folder that describe a board."""
+    return [path.name for path in sorted(folder.glob("*.toml")) if _is_readable(lambda path=path: read_board(path))]
+
+
+def list_wands(folder: Path) -> list[str]:
+    """List the tables of a folder that hold the tracks of markers in several cameras."""
+    options = FileOptions()
+    tables = sorted(folder.glob("*.csv"))
+    return [path.name for path in tables if _is_readable(lambda path=path: read_xypts(path, options))]
+
+
+def _is_readable(read: Any) -> bool:
+    try:
+        read()
+    except (AirborneError, OSError, ValueError):
+        return False
+    return True
+
+
+def guess_video(project: Project, camera: str) -> str:
+    """Return the video of a folder in which a camera may have filmed the board: one that has its name, not its own."""
+    own = {each.video for each in project.cameras}
+    names = [path.name for path in list_videos(project.folder)]
+    found = [name for name in names if camera.lower() in name.lower() and name not in own]
+    return (found or [next(each.video for each in project.cameras if each.name == camera)])[0]
+
+
+def board_text(columns: int, rows: int, square_mm: float, marker_mm: float, dictionary: str) -> str:
+    """Return the file of a board; without markers it is a chessboard, of so many inner corners."""
+    table: dict[str, Any] = {"columns": columns, "rows": rows, "square_m": round(square_mm / 1000, 6)}
+    if marker_mm:
+        table |= {"kind": "charuco", "marker_m": round(marker_mm / 1000, 6), "dictionary": dictionary}
+    else:
+        table["kind"] = "chessboard"
+    return tomlkit.dumps(table)
+
+
+def sources_text(project: Project, source: Mapping[str, Any], medium: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the file of sources for `airborne calibrate`: its table [board] or [wand], and what each camera has."""
+    document = tomlkit.document()
+    cameras = tomlkit.aot()
+    for camera in project.cameras:
+        table = tomlkit.table()
+        table.update({"name": camera.calibrated_as or camera.name, **medium[camera.name]})
+        cameras.append(table)
+    document.add("camera", cameras)
+    for head, values in source.items():
+        document.add(head, tomlkit.item(dict(values)))
+    return tomlkit.dumps(document)
+
+
+def court_text(net: Net) -> str:
+    """Return the table of a court's points, to be clicked."""
+    rows = [",".join([name, *(f"{value:g}" for value in at)]) for name, at in surveyed_points(net).items()]
+    return "\n".join(["point,x_m,y_m,z_m", *rows]) + "\n"
+
+
+def find_picture(folder: Path, name: str) -> Path | None:
+    """Return a picture of the last calibration's report; None where there is none of that name."""
+    found = [path for path in list_pictures(folder) if path.name == name]
+    return found[0] if found else None
+
+
+def list_pictures(folder: Path) -> list[Path]:
+    """List the pictures of the last calibration's report: where each camera saw points, and how far off they are."""
+    report = folder / REPORT
+    return sorted(report.glob("residuals_*.png")) if is_inside(folder, report) else []

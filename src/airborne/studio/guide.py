@@ -1,0 +1,28 @@
+"""The guided walk of `airborne studio --demo`: what to do at each step with the thrown cross."""
+
+from __future__ import annotations
+
+from airborne.studio.project import Project, StudioStep, steps
+
+_TO_DO = {
+    "Videos": "Three cameras filmed a wooden cross that was thrown. Their files are ticked, and hold two fields in a "
+    "picture, which doubles the images. Press <b>Use these cameras</b>.",
+    "Cameras": "Points of known places hung in the scene. Choose <b>control_points.csv</b> as surveyed points: their "
+    "clicks are in it, and each camera is solved at once. Drag one and watch its residual.",
+    "Body": "The cross was measured. Choose <b>cross.toml</b> as body file, and press <b>Use this body</b>.",
+    "First pose": "Press <b>Find it</b>, wait some seconds, look whether the outline lies on the cross in all three "
+    "pictures, and press <b>Use this pose</b>.",
+    "Track": "Press <b>Track</b> and watch the outline follow the cross.",
+    "Review": "Step with the arrow keys through the throw: pictures, curves and the scene go together.",
+    "Digitise": "Here a person clicks points, to compare with. Nothing is needed for the report: go to Results.",
+    "Results": "Open the report. It is one file, to be sent or printed. That was the walk; now open a folder of yours.",
+}
+
+
+def next_task(project: Project, here: str) -> tuple[str, StudioStep | None]:
+    """Return what is to be done at a step of the walk, as HTML, and where it goes on once that is done."""
+    way = steps(project)
+    own = next(number for number, step in enumerate(way) if step.name == here)
+    is_done = way[own].state == "ready" or here == "Digitise"
+    following = way[own + 1] if is_done and own + 1 < len(way) else None
+    return _TO_DO[here], following

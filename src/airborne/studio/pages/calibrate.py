@@ -1,0 +1,142 @@
+"""Cameras calibrated from what was filmed: a board or a wand, by the command `calibrate`; its pictures and findings."""
+
+from __future__ import annotations
+
+from typing import Any
+from urllib.parse import quote
+
+from nicegui import ui
+
+from airborne.calibration.sources.boards import DICTIONARIES, read_board
+from airborne.errors import AirborneError
+from airborne.studio.calibrating import (
+    CALIBRATED,
+    REPORT,
+    SOURCES,
+    board_text,
+    guess_video,
+    list_boards,
+    list_pictures,
+    list_wands,
+    sources_text,
+)
+from airborne.studio.commands import Command
+from airborne.studio.pages.command_watch import CommandWatch
+from airborne.studio.pages.layout import errors_shown
+from airborne.studio.pictures import ShownTrial
+from airborne.studio.project import list_videos
+from airborne.studio.session import Session
+
+_BOARD, _SAID = "board.toml", "report.txt"  # what is written: a new board, and what the command said
+_HELP = (
+    "Each camera films the board close by, in every corner of its picture and tilted; then two cameras at once, until "
+    "all are linked. Or wave a wand of two markers and have them tracked. In the pictures below, points should cover "
+    "each camera's image, and arrows point in all directions."
+)
+
+
+class CalibratePanel:
+    """One window's choice of a board or a wand; the calibration itself belongs to all windows."""
+
+    def __init__(self, session: Session, shown: ShownTrial) -> None:
+        """Begin with what the folder holds."""
+        self.session, self.shown, self.is_new = session, shown, False
+        self.videos = {name: guess_video(session.project(), name) for name in shown.names}
+
+    def build(self) -> None:
+        """Lay out the button that opens it, both ways, and what came of it."""
+        folder = self.session.folder
+        boards, wands = list_boards(folder), list_wands(folder)
+        with ui.dialog() as dialog, ui.card().style("max-width: min(1100px, 92vw)"):
+            ui.html("<h2>Calibrate with a board or a wand</h2>", sanitize=False)
+            ui.label(_HELP).classes("help small")
+            with ui.element("div").classes("row-line"):
+                self.board = ui.select(boards, label="board", value=boards[0] if boards else None)
+                self.board.props("outlined dense options-dense").style("min-width: 180px")
+                self._video_choices()
+            self._board_form()
+            with ui.element("div").classes("row-line"):
+                board = ui.button("Calibrate with the board", on_click=self.use_board).props("unelevated")
+                buttons = [board]
+                if wands:
+                    self.wand = ui.select(wands, label="tracks of a wand", value=wands[0])
+                    self.wand.props("outlined dense options-dense").style("min-width: 180px")
+                    self.length = ui.number("its length [m]", min=0.05, max=10, value=0.5, step=0.001)
+                    self.length.props("outlined dense").style("width: 120px")
+                    wand = ui.button("Calibrate with the wand", on_click=self.use_wand).props("unelevated")
+                    buttons.append(wand)
+                self.watch = CommandWatch(self.session, "calibrate", self.take, words="calibrating")
+                self.watch.buttons = buttons
+            self.results = ui.refreshable(self._show_results)
+            self.results()
+        dialog.on("hide", lambda: ui.navigate.reload() if self.is_new else None)
+        ui.button("With a board or a wand", on_click=dialog.open).props("outline")
+
+    def use_board(self) -> None:
+        """Start the calibration with a board."""
+        with errors_shown():
+            if self.board.value is None:
+                raise AirborneError("describe the board first: columns, rows and the size of a square")
+            media = {name: {"video": video} for name, video in self.videos.items()}
+            self._start({"board": {"file": self.board.value}}, media)
+
+    def use_wand(self) -> None:
+        """Start the calibration with a wand."""
+        with errors_shown():
+            media = {name: {"size": list(size)} for name, size in self.shown.sizes.items()}
+            self._start({"wand": {"file": self.wand.value, "length_m": float(self.length.value or 0)}}, media)
+
+    def take(self, command: Command) -> None:
+        """Use the calibration that was made."""
+        with errors_shown():
+            values = {"file": CALIBRATED, "control_points": None}
+            self.session.set_table("calibration", values, f"calibration by {CALIBRATED}")
+        (self.session.folder / REPORT / _SAID).write_text(command.output(), encoding="utf-8")
+        self.is_new = True
+        self.results.refresh()
+
+    def _start(self, source: dict[str, Any], media: dict[str, dict[str, Any]]) -> None:
+        self.session.edit(SOURCES, sources_text(self.session.project(), source, media), "sources of a calibration")
+        self.watch.start("calibrate", SOURCES, "-o", CALIBRATED)
+
+    def _video_choices(self) -> None:
+        names = [path.name for path in list_videos(self.session.folder)]
+        for camera in self.shown.names:
+            choice = ui.select(names, label=f"{camera} films it in", value=self.videos[camera])
+            choice.bind_value(self.videos, camera)
+            choice.props("outlined dense options-dense").style("min-width: 150px")
+
+    def _board_form(self) -> None:
+        with ui.element("div").classes("row-line"):
+            numbers = [
+                ui.number(label, value=value, min=0, step=step).props("outlined dense").style("width: 110px")
+                for label, value, step in (
+                    ("columns", 7, 1),
+                    ("rows", 5, 1),
+                    ("square [mm]", 40, 0.1),
+                    ("marker [mm]", 30, 0.1),
+                )
+            ]
+            dictionary = ui.select(list(DICTIONARIES), label="dictionary", value="DICT_4X4_50")
+            dictionary.props("outlined dense options-dense").style("min-width: 170px")
+
+            def write() -> None:
+                columns, rows, square_mm, marker_mm = (float(each.value or 0) for each in numbers)
+                with errors_shown():
+                    text = board_text(int(columns), int(rows), square_mm, marker_mm, str(dictionary.value))
+                    self.session.edit(_BOARD, text, "board described")
+                    read_board(self.session.folder / _BOARD)
+                    self.board.set_options(list_boards(self.session.folder), value=_BOARD)
+
+            ui.button("Describe a new board", on_click=write).props("outline")
+        ui.label("A chessboard has no markers, 0 mm, and its inner corners are counted.").classes("soft small")
+
+    def _show_results(self) -> None:
+        """Show what the last calibration said, and where each camera saw points."""
+        text = self.session.folder / REPORT / _SAID
+        if text.is_file():
+            ui.label(text.read_text(encoding="utf-8", errors="replace")).classes("report")
+        with ui.element("div").classes("files"):
+            for path in list_pictures(self.session.folder):
+                picture = ui.element("img").props(f"src=/calibration/{quote(path.name)}?{path.stat().st_mtime_ns}")
+                picture._props["alt"] = f"where points were seen: {path.stem.removeprefix('residuals_')}"

@@ -1,0 +1,97 @@
+"""A run's curves over its frames, no finer than a screen shows them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.errors import ResultError
+from airborne.motion import PlayersMotion
+from airborne.motion.run_folder import holds_players
+from airborne.studio.runs import run_players, run_rows
+from airborne.tracking import Status
+from airborne.types import Array
+
+LIMBS = ("hip", "knee", "ankle", "foot")  # in order down a leg
+_MOST_POINTS = 4000  # of a curve: more than a screen has columns
+_FROM_GOOD = np.array([Status.TRACKED.value, Status.UNCERTAIN.value, Status.LOST.value])  # to bad
+
+
+def run_curves(run: Path) -> dict[str, Any]:
+    """Return a run's curves: times, frames, statuses, and series with their standard deviations.
+
+    Of a long run several frames share a point: the least and the greatest of their values, the worst of their statuses.
+    """
+    if holds_players(run):
+        motion = run_players(run)
+        index, time_s, status = motion.index, motion.time_s, motion.status
+        names, values = _lower_legs(motion)
+        sd = np.empty((len(index), 0))
+    else:
+        rows = run_rows(run)
+        index, time_s, status = rows.index, rows.time_s, rows.status[:, None]
+        names, values, sd = ["x", "y", "z"], rows.position, rows.position_sd
+    worst = (status[..., None] == _FROM_GOOD).argmax(axis=-1).max(axis=1, initial=0)
+    if len(index) > _MOST_POINTS:
+        starts = np.arange(0, len(index), -(-2 * len(index) // _MOST_POINTS))
+        middles = np.append((starts[:-1] + starts[1:]) // 2, len(index) - 1)
+        ends = [np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts)]
+        shown = _interleave(starts, middles)
+        index, time_s, values = index[shown], time_s[shown], _interleave(*ends)
+        sd, worst = np.fmax.reduceat(sd, starts).repeat(2, axis=0), np.maximum.reduceat(worst, starts).repeat(2)
+    return {
+        "frame": index.tolist(),
+        "time_s": time_s.tolist(),
+        "status": _FROM_GOOD[worst].tolist(),
+        "series": [
+            {"name": name, "unit": "m", "value": _plain(values[:, k]), "sd": _plain(sd[:, k]) if sd.shape[1] else []}
+            for k, name in enumerate(names)
+        ],
+    }
+
+
+def describe_distance(run: Path, other: Path) -> str:
+    """Say how far two runs are apart, in the frames, players and joints that both have."""
+    (own, a), (frames, b) = _points(run), _points(other)
+    names = [name for name in a if name in b]
+    common, rows, others = np.intersect1d(own, frames, return_indices=True)
+    if not len(common) or not names:
+        return "they share no frame"
+    far_m = np.stack([np.linalg.norm(a[name][rows] - b[name][others], axis=1) for name in names], axis=1)
+    far_m = np.where(np.isfinite(far_m), far_m, -1.0).max(axis=1)
+    if far_m.max() < 0:
+        return "no frame is tracked in both"
+    median, most, frame = np.median(far_m[far_m >= 0]), far_m.max(), int(common[far_m.argmax()])
+    what = "roots" if names == [""] else "joints that are furthest apart"
+    return f"{what}: median {1e3 * median:.0f} mm, at most {1e3 * most:.0f} mm, in frame {frame}"
+
+
+def _points(run: Path) -> tuple[NDArray[np.int64], dict[str, Array]]:
+    """Return a run's frames (n,), and by name where its points are, (n, 3) [m]: a body's root, players' joints."""
+    if not holds_players(run):
+        rows = run_rows(run)
+        return rows.index, {"": rows.position}
+    motion = run_players(run)
+    pairs = [(p, j) for p in range(len(motion.players)) for j in range(len(motion.joints))]
+    return motion.index, {f"{motion.players[p]} {motion.joints[j]}": motion.points[:, p, j] for p, j in pairs}
+
+
+def _lower_legs(motion: PlayersMotion) -> tuple[Sequence[str], Array]:
+    """Return how high the lower of each player's legs is, and which joint of it: (n, players) [m]."""
+    limb = next((limb for limb in reversed(LIMBS) if {f"{limb}_left", f"{limb}_right"} <= set(motion.joints)), None)
+    if limb is None:
+        raise ResultError("the run holds no legs; track again")
+    lower = [motion.joints.index(f"{limb}_{side}") for side in ("left", "right")]
+    return [f"{name}: lower {limb}" for name in motion.players], np.min(motion.points[:, :, lower, 2], axis=2)
+
+
+def _interleave(first: NDArray, second: NDArray) -> NDArray:
+    return np.stack([first, second], axis=1).reshape(-1, *first.shape[1:])
+
+
+def _plain(values: Iterable[float]) -> list[float | None]:
+    return [round(float(value), 5) if np.isfinite(value) else None for value in values]

@@ -1,0 +1,80 @@
+"""Runs as they are looked at: read once, and what a run that goes on has added since."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from functools import lru_cache
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from airborne.body import BodyModel
+from airborne.body.files import read_body
+from airborne.cameras import Rig, read_rig
+from airborne.errors import ResultError
+from airborne.motion import PlayersMotion
+from airborne.motion.rows import MotionRows, read_rows
+from airborne.motion.run_folder import BODY, CALIBRATION, JOINTS, MOTION, read_players_run
+
+_MOST_KEPT = 8  # runs
+_rows: OrderedDict[Path, tuple[Any, MotionRows]] = OrderedDict()  # run -> stamp of its file, and what was read then
+_rows_lock = Lock()
+
+
+def run_rows(run: Path) -> MotionRows:
+    """Return the frames of a run of one body so far. Raises ResultError."""
+    with _rows_lock:
+        stamp, known = _rows.pop(run, (None, None))
+        now = _stamp(run / MOTION)
+        if known is None or stamp != now:
+            known = read_rows(run / MOTION, known)
+        _rows[run] = now, known
+        if len(_rows) > _MOST_KEPT:
+            _rows.popitem(last=False)
+        return known
+
+
+def count_rows(run: Path) -> tuple[int, int | None]:
+    """Return how many frames a run of one body holds so far, and which is the newest; none before it has begun."""
+    try:
+        rows = run_rows(run)
+    except ResultError:
+        return 0, None
+    return len(rows), rows.newest
+
+
+def run_body(run: Path) -> BodyModel:
+    """Return the body of a run."""
+    return _read_body(run / BODY, _stamp(run / BODY))
+
+
+def run_rig(run: Path) -> Rig:
+    """Return the cameras of a run."""
+    return _read_rig(run / CALIBRATION, _stamp(run / CALIBRATION))
+
+
+def run_players(run: Path) -> PlayersMotion:
+    """Return the motion of a run of players. Raises ResultError."""
+    return _read_players(run, _stamp(run / JOINTS))
+
+
+@lru_cache(maxsize=_MOST_KEPT)
+def _read_body(path: Path, stamp: Any) -> BodyModel:
+    return read_body(path)
+
+
+@lru_cache(maxsize=_MOST_KEPT)
+def _read_rig(path: Path, stamp: Any) -> Rig:
+    return read_rig(path)
+
+
+@lru_cache(maxsize=2)  # of 20 players, 100 MB each
+def _read_players(run: Path, stamp: Any) -> PlayersMotion:
+    return read_players_run(run)
+
+
+def _stamp(path: Path) -> Any:
+    try:
+        return path.stat().st_mtime_ns, path.stat().st_size
+    except OSError:
+        return None

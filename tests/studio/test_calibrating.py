@@ -1,0 +1,92 @@
+"""What the step Cameras writes: files that `calibrate` reads, and a court's points to be clicked."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from airborne.calibration.from_points import calibrate
+from airborne.calibration.sources.boards import read_board
+from airborne.calibration.sources.court import court_lines, court_points, surveyed_points
+from airborne.calibration.sources.files import read_sources
+from airborne.cameras import camera_looking_at
+from airborne.errors import CalibrationError
+from airborne.studio.calibrating import (
+    REPORT,
+    board_text,
+    court_text,
+    find_picture,
+    guess_video,
+    list_boards,
+    list_wands,
+    sources_text,
+)
+from airborne.studio.clicks import read_clicked
+from airborne.studio.project import find_trial, read_project
+
+TRIAL = '[[camera]]\nname = "left"\nvideo = "a.mp4"\n[[camera]]\nname = "right"\nvideo = "b.mp4"\ncalibrated_as = "R"\n'
+
+
+@pytest.fixture
+def project(tmp_path):
+    (tmp_path / "trial.toml").write_text(TRIAL)
+    for name in ("a.mp4", "b.mp4", "board_LEFT.mp4"):
+        (tmp_path / name).write_bytes(b"video")
+    return read_project(*find_trial(tmp_path))
+
+
+def test_boards_and_wands_are_found_by_what_is_in_the_files(project):
+    folder = project.folder
+    (folder / "board.toml").write_text(board_text(7, 5, 40.0, 30.0, "DICT_5X5_50"))
+    (folder / "chess.toml").write_text(board_text(7, 5, 25.5, 0, "DICT_4X4_50"))
+    (folder / "wand.csv").write_text("pt1_cam1_X,pt1_cam1_Y,pt1_cam2_X,pt1_cam2_Y\n1,2,3,4\n")
+    (folder / "other.csv").write_text("point,x_m\nA,1\n")
+    assert list_boards(folder) == ["board.toml", "chess.toml"]
+    assert list_wands(folder) == ["wand.csv"]
+    board, chess = read_board(folder / "board.toml"), read_board(folder / "chess.toml")
+    assert (board.kind, board.square_m, board.marker_m, board.dictionary) == ("charuco", 0.04, 0.03, "DICT_5X5_50")
+    assert (chess.kind, chess.columns, chess.square_m) == ("chessboard", 7, 0.0255)
+
+
+def test_sources_name_the_cameras_as_the_trial_looks_for_them(project):
+    (project.folder / "board.toml").write_text(board_text(7, 5, 40.0, 30.0, "DICT_4X4_50"))
+    videos = {name: {"video": guess_video(project, name)} for name in ("left", "right")}
+    assert videos == {"left": {"video": "board_LEFT.mp4"}, "right": {"video": "b.mp4"}}
+    path = project.folder / "sources.toml"
+    path.write_text(sources_text(project, {"board": {"file": "board.toml"}}, videos))
+    sources = read_sources(path)
+    assert (sources.names, sources.kinds) == (["left", "R"], ["board"])
+    wand = {"wand": {"file": "wand.csv", "length_m": 0.5}}
+    text = sources_text(project, wand, {name: {"size": [640, 480]} for name in videos})
+    assert tomllib.loads(text)["camera"][1] == {"name": "R", "size": [640, 480]}
+
+
+def test_a_court_is_calibrated_by_its_clicked_points(tmp_path):
+    path = tmp_path / "court_women.csv"
+    path.write_text(court_text("women"))
+    clicked = read_clicked(path)
+    assert clicked.world[clicked.names.index("net_left_top")] == pytest.approx([-4.5, 0, 2.25])
+    camera = camera_looking_at("a", [-8, -17, 6], [0, -1, 1], focal_px=1100, size=(1920, 1080))
+    for name, at in zip(clicked.names, clicked.world, strict=True):
+        clicked = clicked.click(name, "a", camera.px_from_world(at))
+    found = calibrate(clicked.control_points(["a"]), {"a": camera.size}).rig["a"]
+    assert np.linalg.norm(found.centre - camera.centre) < 0.02
+
+
+def test_lines_run_between_points_that_are_there():
+    points = surveyed_points("men")
+    assert set(points) <= set(court_points("men"))
+    assert not any(name.startswith("post") for name in points)
+    assert len(court_lines(points)) == 10
+    (line,) = court_lines({name: points[name] for name in ("net_left_top", "net_right_top", "antenna_left_top")})
+    assert np.ptp(line, axis=0) == pytest.approx([9, 0, 0])
+    with pytest.raises(CalibrationError, match="net = 5"):
+        surveyed_points(5.0)
+
+
+def test_only_pictures_of_the_report_are_found(tmp_path):
+    (tmp_path / REPORT).mkdir()
+    (tmp_path / REPORT / "residuals_a.png").write_bytes(b"png")
+    (tmp_path / "secret.png").write_bytes(b"png")
+    assert find_picture(tmp_path, "residuals_a.png") == tmp_path / REPORT / "residuals_a.png"
+    assert find_picture(tmp_path, "../secret.png") is None
