@@ -24,8 +24,8 @@ from airborne.motion.smoothing.segments import MIN_FRAMES, SmoothedPaths, finite
 from airborne.types import Array
 
 PRIOR_SD = (10.0, 100.0, 1000.0)  # of value, velocity, acceleration at first [unit, unit/s, ...], over scale: weak
-# of the smooth errors' correlation, chosen on synthetic somersaults 71 and 72: with 0.03 s less is smoothed, with 0.07 s
-# joints of a pike err more
+# of the smooth errors' correlation, chosen on synthetic somersaults 71 and 72: with 0.03 s less is smoothed, with
+# 0.07 s joints of a pike err more
 ERROR_S = 0.05
 _WHITE_SHARES = (0.003, 0.03, 0.3)  # of the error's variance, that are tried
 _LOG_DENSITY = (-6.0, 12.0)  # search range: powers of ten of q over the scale of the errors [unit2/s5]
