@@ -28,7 +28,7 @@ from airborne.tracking.players import PlayerStart
 
 _RIGHT_M, _ELSEWHERE_M = 0.08, 0.3  # mean errors of the legs
 _RATE, _N_FRAMES = 30, 66
-_LEAVES, _RETURNS, _WHILE_AWAY = 12, 45, 3  # frames; of those while away, every third is looked at
+_LEAVES, _RETURNS, _WHILE_AWAY = 12, 45, 1
 
 
 def verdict(seed: int) -> tuple[str, float]:

@@ -17,10 +17,11 @@ def elsewhere(before, after):
     return lambda t: first(0.0) if t * 50 < AWAY.stop else second(0.0)
 
 
-def run(hall: Hall):
-    tracker = Blocker(hall.starts())
+def run(hall: Hall, n_frames=BACK):
+    """Track the first player of a hall."""
+    tracker = Blocker(hall.starts()[:1])
     state, steps = tracker.init(), []
-    for index in range(BACK):
+    for index in range(n_frames):
         state, estimates = tracker.step(state, hall.frames(index))
         steps.append(estimates)
     return [list(each) for each in zip(*steps, strict=True)]
@@ -34,6 +35,15 @@ def test_a_player_who_was_out_of_sight_is_found_again_where_it_came_back():
     assert estimates[-1].status is not Status.LOST
     off_m = np.linalg.norm(estimates[-1].points - hall.truth("a", BACK - 1), axis=1)
     assert off_m[:6].mean() < 0.05
+
+
+def test_a_team_mate_who_stood_there_before_is_not_taken_for_a_player_who_left():
+    stays, leaves = hop((1.1, -0.6), heading=np.pi, late_s=9), hop((0.0, -0.6), heading=np.pi, late_s=9)
+    far = hop((0.0, -60.0), heading=np.pi, late_s=9)
+    hall = Hall({"a": lambda t: leaves(t) if t * 50 < AWAY.start else far(t), "mate": stays})
+    (estimates,) = run(hall, AWAY.stop)
+    assert [each.status for each in estimates[6:]] == [Status.LOST] * (AWAY.stop - 6)
+    assert not any(each.note for each in estimates)
 
 
 def test_identities_are_those_that_fit_all_of_the_lost_best():

@@ -2,24 +2,31 @@
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from scipy.stats import norm
 
-from airborne.motion.free_fall import GENERIC_NOISE, noise_covariance
 from airborne.motion.smoothing import kalman_smoother
 from airborne.motion.smoothing.kalman import (
+    ERROR_S,
     PRIOR_SD,
     kalman_filter,
-    maximum_likelihood_density,
+    maximum_likelihood,
     measurement_noise,
     rts_smoother,
     state_space_model,
 )
 from tests.support.tolerances import ROUNDTRIP
 
-RATE = 60.0
+RATE, WHITE_SHARE = 60.0, 0.2
 
 
-def dense(t, z, variance, density):
+def error_covariance(t, variance, white_share=WHITE_SHARE):
+    """The covariance of a tracker's errors at times t: white, and a Matern process of order 3/2."""
+    lag = np.sqrt(3) * np.abs(t[:, None] - t) / ERROR_S
+    correlation = (1 - white_share) * (1 + lag) * np.exp(-lag) + white_share * np.eye(len(t))
+    return np.sqrt(variance[:, None] * variance) * correlation
+
+
+def dense(t, z, variance, density, white_share=WHITE_SHARE):
     """The posterior of value, velocity, acceleration at all times, by one solve of the whole joint Gaussian."""
     n = len(t)
     mean, K = np.array([z[0], 0.0, 0.0]), np.zeros((3 * n, 3 * n))
@@ -35,9 +42,10 @@ def dense(t, z, variance, density):
         means.append(F @ means[-1])
     seen = np.flatnonzero(np.isfinite(z))
     mean, at = np.concatenate(means), 3 * seen
-    S = K[np.ix_(at, at)] + noise_covariance(t[seen], variance[seen], noise=GENERIC_NOISE)
+    S = K[np.ix_(at, at)] + error_covariance(t[seen], variance[seen], white_share)
     gain = np.linalg.solve(S, K[at]).T
-    evidence = multivariate_normal(mean[at], S).logpdf(z[seen])
+    L = np.linalg.cholesky(S)
+    evidence = norm.logpdf(np.linalg.solve(L, z[seen] - mean[at])).sum() - np.log(np.diag(L)).sum()
     return mean + gain @ (z[seen] - mean[at]), K - gain @ K[at], evidence
 
 
@@ -54,38 +62,61 @@ def test_mean_covariance_and_likelihood_are_those_of_a_dense_solve():
     t, z, variance = problem()
     for density in (10.0, 1e4):
         mean, K, evidence = dense(t, z, variance, density)
-        steps = state_space_model(t, z[:, None], measurement_noise(variance[:, None, None]), density)
+        noise = measurement_noise(variance[:, None, None])
+        steps = state_space_model(t, z[:, None], noise, density, white_share=WHITE_SHARE)
         result, P = rts_smoother(steps, z[:, None])
         period = np.median(np.diff(t))
         scale = period ** -np.arange(3)
         assert result[:, :3] * scale == pytest.approx(mean.reshape(-1, 3), rel=1e-5, abs=1e-6)
         sd = np.sqrt(np.diagonal(P, axis1=1, axis2=2)[:, :3]) * scale
         assert sd == pytest.approx(np.sqrt(np.diag(K)).reshape(-1, 3), rel=1e-5)
-        assert kalman_filter(steps, z[:, None])[-1] == pytest.approx(evidence, rel=1e-6)
+        fit = kalman_filter(steps, z[:, None])
+        constant = np.isfinite(z).sum() * np.log(2 * np.pi)
+        assert -0.5 * (fit.squares + fit.log_determinant + constant) == pytest.approx(evidence, rel=1e-6)
 
 
 def test_axes_that_do_not_share_noise_are_smoothed_as_if_alone():
     t, z, variance = problem()
     both, own = np.stack([z, z], axis=1), measurement_noise(variance[:, None, None])
     shared = measurement_noise(variance[:, None, None] * np.eye(2))
-    density = maximum_likelihood_density(t, z[:, None], own)
-    assert maximum_likelihood_density(t, both, shared) == pytest.approx(density, rel=0.1)
-    alone = rts_smoother(state_space_model(t, z[:, None], own, density), z[:, None])[0]
-    together = rts_smoother(state_space_model(t, both, shared, density), both)[0]
+    density, share = maximum_likelihood(t, z[:, None], own)
+    assert maximum_likelihood(t, both, shared) == pytest.approx((density, share), rel=0.1)
+    alone = rts_smoother(state_space_model(t, z[:, None], own, density, white_share=share), z[:, None])[0]
+    together = rts_smoother(state_space_model(t, both, shared, density, white_share=share), both)[0]
     assert together[:, :4:2] == pytest.approx(alone[:, :2], abs=ROUNDTRIP)
 
 
-def test_the_strength_of_the_jerk_is_the_likeliest():
+@pytest.mark.parametrize(("factor", "scales"), [(1.0, (0.3, 0.6, 0.8, 1.0)), (100.0, np.geomspace(1e-3, 1.0, 31))])
+def test_the_strength_of_the_jerk_is_the_likeliest_with_errors_of_the_likeliest_size(factor, scales):
     t, z, variance = problem()
-    density = maximum_likelihood_density(t, z[:, None], measurement_noise(variance[:, None, None]))
-    costs = [-dense(t, z, variance, factor * density)[2] for factor in (0.5, 1.0, 2.0)]
+    variance *= factor
+    density, share = maximum_likelihood(t, z[:, None], measurement_noise(variance[:, None, None]))
+    costs = [
+        min(-dense(t, z, scale * variance, times * scale * density, share)[2] for scale in scales)
+        for times in (0.3, 1.0, 3.0)
+    ]
     assert costs[1] == min(costs)
+
+
+def test_how_much_too_wide_the_stated_deviations_are_does_not_matter():
+    t, z, variance = problem()
+    wide, wider = (kalman_smoother(t, z[:, None], factor * variance[:, None, None]) for factor in (4.0, 100.0))
+    assert wider.value == pytest.approx(wide.value, abs=5e-4)
+    assert wider.velocity == pytest.approx(wide.velocity, abs=2e-2)
+    assert np.all(wider.value_sd > 3 * wide.value_sd)  # what was stated stays said
+
+
+def test_a_fast_motion_is_not_taken_for_errors_larger_than_those_stated():
+    t = np.arange(24) / RATE
+    z = 0.5 * np.maximum(np.sin(np.pi * (t - 0.05) / 0.12), 0.0) * (t < 0.17)
+    result = kalman_smoother(t, z[:, None], np.full((24, 1, 1), 0.02**2))
+    assert result.value[:, 0] == pytest.approx(z, abs=0.03)
 
 
 def test_free_fall_is_recovered_inside_a_flight():
     rng, t = np.random.default_rng(3), np.arange(36) / RATE
     sd = 0.005
-    noise = np.linalg.cholesky(noise_covariance(t, np.full(36, sd**2), noise=GENERIC_NOISE)) @ rng.normal(size=(36, 3))
+    noise = np.linalg.cholesky(error_covariance(t, np.full(36, sd**2))) @ rng.normal(size=(36, 3))
     fall = np.stack([0.5 * t, 0 * t, 1 + 3 * t - 9.81 / 2 * t**2], axis=1)
     result = kalman_smoother(t, fall + noise, np.broadcast_to(sd**2 * np.eye(3), (36, 3, 3)))
     assert result.acceleration[:, 2].mean() == pytest.approx(-9.81, abs=3 * result.acceleration_sd[:, 2].mean())
@@ -98,7 +129,7 @@ def test_deviations_are_correct_for_paths_of_the_model():
     t, T, sd = np.arange(n) / RATE, 1 / RATE, 0.01
     F = np.array([[1, T, T * T / 2], [0, 1, T], [0, 0, 1]])
     Q = 2e3 * np.array([[T**5 / 20, T**4 / 8, T**3 / 6], [T**4 / 8, T**3 / 3, T**2 / 2], [T**3 / 6, T**2 / 2, T]])
-    root, noise = np.linalg.cholesky(Q), np.linalg.cholesky(noise_covariance(t, np.full(n, sd**2), noise=GENERIC_NOISE))
+    root, noise = np.linalg.cholesky(Q), np.linalg.cholesky(error_covariance(t, np.full(n, sd**2)))
     for _ in range(40):
         states = [np.array([0.0, 1.0, -5.0])]
         for _ in range(n - 1):

@@ -1,12 +1,18 @@
-"""Players who are lost, looked for again: who stands there, and whose colours and place these are."""
+"""Players who are lost, looked for again: who stands there, and whose colours and place these are.
+
+Team-mates wear the same, so that places decide most: who stood elsewhere while the player was still tracked is a
+bystander, and stays one from look to look.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from airborne.tracking.capsules.dynamics import N_FREE, N_SLIDING
 from airborne.tracking.capsules.fit import JumperFit, JumperPrior, fit_jumper
@@ -14,7 +20,7 @@ from airborne.tracking.capsules.floor_search import Stander, find_standers
 from airborne.tracking.capsules.jumper import N_DOF
 from airborne.tracking.capsules.kernel_arguments import NOBODY
 from airborne.tracking.capsules.standing import ColourViews
-from airborne.tracking.capsules.track import Track, evidence_per_px
+from airborne.tracking.capsules.track import Bystander, Track, evidence_per_px
 from airborne.tracking.capsules.views import map_evidence, player_regions
 from airborne.types import Array
 from airborne.video import Frames
@@ -26,10 +32,15 @@ _RARER = 4  # who is lost for long is looked for once in this share of the time:
 _FARTHEST_M = 4.0  # from where a player was lost, along and across
 _LEAST_SUPPORT = 1.1  # [nat m2] of somebody, see `tracking.first_pose.players`
 _MOST_POSES = 3  # of each that are tried
-# chosen by hand: of a player's usual evidence, what is as likely another's, and its logistic scale
-_LIKENESS, _LIKENESS_SD = 0.7, 0.05
-_PLACE_SD_M, _SPEED_SD_M_S = 0.5, 1.0  # how far a player is from where it was lost
+# of a player's usual evidence, what is as likely another's, and its logistic scale; chosen on synthetic blocks 6100 to
+# 6107: players themselves have 0.65 or more, team-mates in the same dress 0.1 to 0.4 less, opponents less than zero
+_LIKENESS, _LIKENESS_SD = 0.6, 0.15
+_PLACE_SD_M, _SPEED_SD_M_S, _MOST_SD_M = 0.3, 1.0, 2.0  # how far people are from where they were, chosen by hand
+_NEWCOMERS_PER_M2 = 0.001  # that a look shows: one in ten looks over 8 m x 8 m has one, and half of those lost are back
 _LEAST_PROBABILITY = 0.95  # of an identity that is taken
+_BYSTANDER = 0.5  # probability to be a lost player, below which somebody is a bystander
+_REMEMBERED_S = 2  # how long a bystander who is not seen is remembered
+_MOST_NATS = 6.0  # against a place, beyond which nobody is tried
 _POSE_SD = np.array([0.15] * 3 + [0.5] * 5 + [0.5, 0.4, 0.4, 0.5, 0.4] * 2 + [0.03] * N_SLIDING)  # [m, rad]
 
 
@@ -42,34 +53,82 @@ def is_due(track: Track, time_s: Fraction) -> bool:
     return time_s - track.searched_s >= max(_EVERY_S, (track.searched_s - track.lost_s) / _RARER)
 
 
-def find_again(
-    lost: Mapping[str, Track], seen: Sequence[Array], frames: Frames
-) -> tuple[dict[str, JumperFit], set[str]]:
-    """Look for lost players among those who stand there, without those who are `seen`, states (35,).
+class Look(NamedTuple):
+    """What a look for lost players shows."""
 
-    Returns the fits of those who are found, and who may be there but could be two.
-    """
-    views = [shrink(view) for view in frames.views if view is not None]
-    if len(views) < 2:
-        return {}, set()
+    fits: dict[str, JumperFit]  # of those who are found
+    unclear: set[str]  # who may be there, but could be two
+    bystanders: tuple[Bystander, ...]
+
+
+def find_again(lost: Mapping[str, Track], seen: Sequence[Array], frames: Frames) -> Look:
+    """Look for lost players among those who stand there, without those who are `seen`, states (35,)."""
     places = np.array([track.state[:2] for track in lost.values()])
     zone = np.array([places.min(axis=0) - _FARTHEST_M, places.max(axis=0) + _FARTHEST_M])
+    known = _bystanders(lost, zone)
+    standers = _standers(frames, seen, zone)
+    floor_m = np.array([stander.floor_m for stander in standers]).reshape(-1, 2)
+    places_nats = np.array([_place_nats(place, since_s, floor_m, frames.time_s) for place, since_s in known])
+    lost_nats = np.array(
+        [_place_nats(track.state[:2], track.lost_s, floor_m, frames.time_s) for track in lost.values()]
+    )
+    others = _claim(places_nats.reshape(len(known), len(standers)), lost_nats)
+    nats, fits = np.full(lost_nats.shape, -np.inf), {}
+    for i, track in enumerate(lost.values()):
+        for j in set(range(len(standers))) - set(others):
+            if lost_nats[i, j] > -_MOST_NATS:
+                fits[i, j] = _fit(track, standers[j], frames)
+                nats[i, j] = lost_nats[i, j] + _colour_nats(track, fits[i, j])
+    probability = identity_probabilities(nats)
+    found, unclear, taken = {}, set(), set()
+    for i, name in enumerate(lost):
+        if len(standers) and probability[i].max() >= _LEAST_PROBABILITY:
+            best = int(probability[i].argmax())
+            found[name] = fits[i, best]
+            taken.add(best)
+        elif probability[i].sum() >= _LEAST_PROBABILITY:
+            unclear.add(name)
+    now = [
+        Bystander(place, frames.time_s)
+        for j, place in enumerate(floor_m)
+        if j not in taken and probability[:, j].sum() < _BYSTANDER
+    ]
+    unseen = [each for k, each in enumerate(known) if k not in others.values()]
+    kept = [each for each in unseen if frames.time_s - each.time_s < _REMEMBERED_S]
+    return Look(found, unclear, (*now, *kept))
+
+
+def _standers(frames: Frames, seen: Sequence[Array], zone: Array) -> list[Stander]:
+    """Find who stands in a zone, without those who are seen."""
+    views = [shrink(view) for view in frames.views if view is not None]
+    if len(views) < 2:
+        return []
     colours = ColourViews.of(views, zone)
     for state in seen:
         colours = colours.without(state)
-    standers = [each for each in find_standers(colours, zone, zone) if each.support[0] > _LEAST_SUPPORT]
-    fits = [[_fit(track, stander, frames) for stander in standers] for track in lost.values()]
-    nats = np.array(
-        [[_likeness(track, fit, frames.time_s) for fit in row] for track, row in zip(lost.values(), fits, strict=True)]
-    ).reshape(len(lost), len(standers))
-    probability = identity_probabilities(nats)
-    found, unclear = {}, set()
-    for i, name in enumerate(lost):
-        if len(standers) and probability[i].max() >= _LEAST_PROBABILITY:
-            found[name] = fits[i][int(probability[i].argmax())]
-        elif probability[i].sum() >= _LEAST_PROBABILITY:
-            unclear.add(name)
-    return found, unclear
+    return [each for each in find_standers(colours, zone, zone) if each.support[0] > _LEAST_SUPPORT]
+
+
+def _bystanders(lost: Mapping[str, Track], zone: Array) -> tuple[Bystander, ...]:
+    """Return who was there before: as remembered, or as the last sight of the player shows who was lost first."""
+    remembered = [track.bystanders for track in lost.values() if track.bystanders is not None]
+    if remembered:
+        return max(remembered, key=lambda each: max((one.time_s for one in each), default=Fraction(0)))
+    sightings = [track.sighting for track in lost.values() if track.sighting is not None]
+    if not sightings:
+        return ()
+    first = min(sightings, key=lambda each: each.frames.time_s)
+    return tuple(
+        Bystander(stander.floor_m, first.frames.time_s) for stander in _standers(first.frames, first.states, zone)
+    )
+
+
+def _claim(bystanders: Array, lost: Array) -> dict[int, int]:
+    """Return which standers are bystanders, and which: nats (bystanders, standers) and (lost, standers) of places."""
+    gains = np.maximum(np.vstack([bystanders, lost]), 0.0)
+    rows, standers = linear_sum_assignment(gains, maximize=True)
+    pairs = zip(rows.tolist(), standers.tolist(), strict=True)
+    return {stander: row for row, stander in pairs if row < len(bystanders) and gains[row, stander] > 0}
 
 
 def identity_probabilities(nats: Array) -> Array:
@@ -94,12 +153,18 @@ def _are_different(chosen: Sequence[int]) -> bool:
     return len(set(taken)) == len(taken)
 
 
-def _likeness(track: Track, fit: JumperFit, time_s: Fraction) -> float:
-    """Return by how much a fit is rather the lost player than another [nat]: its colours, and how far it is away."""
-    away_m = float(np.linalg.norm(fit.state[:2] - track.state[:2]))
-    sd_m = _PLACE_SD_M + _SPEED_SD_M_S * float(time_s - (track.lost_s or time_s))
+def _place_nats(floor_m: Array, since_s: Fraction | None, places_m: Array, time_s: Fraction) -> Array:
+    """Return by how much people at places (n, 2) are rather somebody who was at one (2,) than newcomers: (n,) [nat]."""
+    elapsed_s = float(time_s - (since_s if since_s is not None else time_s))
+    sd_m = min(_PLACE_SD_M + _SPEED_SD_M_S * elapsed_s, _MOST_SD_M)
+    squares = ((places_m - floor_m) ** 2).sum(axis=1) / sd_m**2
+    return -0.5 * squares - np.log(2 * np.pi * sd_m**2 * _NEWCOMERS_PER_M2)
+
+
+def _colour_nats(track: Track, fit: JumperFit) -> float:
+    """Return by how much a fit has rather the colours of the lost player than those of another [nat]."""
     share = evidence_per_px(fit.owned) / track.reference_evidence
-    return (share - _LIKENESS) / _LIKENESS_SD - 0.5 * (away_m / sd_m) ** 2
+    return (min(share, 1.0) - _LIKENESS) / _LIKENESS_SD
 
 
 def _fit(track: Track, stander: Stander, frames: Frames) -> JumperFit:

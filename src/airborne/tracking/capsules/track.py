@@ -4,11 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 from airborne.tracking.capsules.dynamics import GaussianState
 from airborne.tracking.capsules.surface_colours import SurfaceColours
 from airborne.tracking.capsules.views import EvidenceTable, MapScale
 from airborne.types import Array
+from airborne.video import Frames
+
+
+class Sighting(NamedTuple):
+    """A time at which players were tracked."""
+
+    frames: Frames
+    states: tuple[Array, ...]  # (35,) of each
+
+
+class Bystander(NamedTuple):
+    """Somebody who is none of the lost players."""
+
+    floor_m: Array  # (2,) where he was last
+    time_s: Fraction
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +42,9 @@ class Track:
     scale: MapScale
     reference_evidence: float  # running reference of the evidence per pixel [nat]
     lost_s: Fraction | None = None  # since when the player is lost
+    sighting: Sighting | None = None  # the last in which the player was tracked
     searched_s: Fraction | None = None  # of the last look for a lost player
+    bystanders: tuple[Bystander, ...] | None = None  # known since a look for a lost player
     is_unclear: bool = False  # that look left open who is meant, which was said
 
 

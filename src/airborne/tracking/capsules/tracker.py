@@ -22,7 +22,7 @@ from airborne.tracking.capsules.surface_colours import (
     occlusion_chance,
     update_colours,
 )
-from airborne.tracking.capsules.track import Track, evidence_per_px
+from airborne.tracking.capsules.track import Sighting, Track, evidence_per_px
 from airborne.tracking.capsules.views import EvidenceTable, map_evidence, player_regions
 from airborne.tracking.estimate import Status
 from airborne.tracking.players import PlayerEstimate, PlayerStart, lost_player_estimate
@@ -81,20 +81,27 @@ class Blocker:
         self, tracks: dict[str, Track], estimates: dict[str, PlayerEstimate], frames: Frames
     ) -> tuple[dict[str, Track], tuple[PlayerEstimate, ...]]:
         """Look for the players who have been lost for a while."""
+        sighting = Sighting(
+            frames, tuple(tracks[name].state for name, each in estimates.items() if each.status is not Status.LOST)
+        )
         for name, estimate in estimates.items():
             lost_s = (tracks[name].lost_s or frames.time_s) if estimate.status is Status.LOST else None
             tracks[name] = replace(tracks[name], lost_s=lost_s)
-        lost = {name: track for name, track in tracks.items() if is_due(track, frames.time_s)}
-        if lost:
+            if estimate.status is Status.TRACKED:
+                tracks[name] = replace(tracks[name], sighting=sighting, bystanders=None)
+        lost = {name: track for name, track in tracks.items() if track.lost_s is not None}
+        if any(is_due(track, frames.time_s) for track in lost.values()):
             seen = [track.state for track in tracks.values() if track.lost_s is None]
-            found, unclear = find_again(lost, seen, frames)
+            look = find_again(lost, seen, frames)
             for name, track in lost.items():
-                is_unclear = name in unclear
+                is_unclear = name in look.unclear
                 note = "not taken up again: two could be meant" if is_unclear and not track.is_unclear else ""
-                tracks[name] = replace(track, searched_s=frames.time_s, is_unclear=is_unclear)
+                tracks[name] = replace(
+                    track, searched_s=frames.time_s, is_unclear=is_unclear, bystanders=look.bystanders
+                )
                 estimates[name] = replace(estimates[name], note=note)
-                if name in found:
-                    tracks[name], estimates[name] = _take_up(name, tracks[name], found[name], frames)
+                if name in look.fits:
+                    tracks[name], estimates[name] = _take_up(name, tracks[name], look.fits[name], frames)
         return tracks, tuple(estimates.values())
 
     def _first(self, frames: Frames) -> tuple[dict[str, Track], tuple[PlayerEstimate, ...]]:

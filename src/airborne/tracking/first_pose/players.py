@@ -36,7 +36,8 @@ _MOST_MOMENTS, _MOST_SEARCHED = 8, 3  # that are looked at, and searched until t
 # chosen on synthetic blocks 3001 to 3008
 _SUPPORT, _SUPPORT_SD = 1.1, 0.07  # [nat m2] that are as likely a player as none, and their logistic scale
 _LEAST_SUPPORT = 1.5  # [nat m2] of a player whose pose is trusted: others were partly hidden, or in the air
-_SHARE_PER_NAT = 0.01  # share of the support that makes a direction e times likelier
+_SHARE_PER_NAT = 0.01  # share of the support that makes a pose e times likelier
+_EVIDENCE_PER_NAT = 0.03  # the same of the fit's evidence; chosen on synthetic blocks 3101 to 3124
 _NET_NATS = 3.0  # for facing the net, of players near it
 _LEAST_EVIDENCE = 1.2  # [nat a pixel] of the fitted player
 _DEEPEST = 1.35  # [rad] flexion of knees, beyond which a stance is not trusted
@@ -123,8 +124,7 @@ def find_players(sample: Sequence[Frames], whole: Callable[[int], Frames], *, ne
             f"[start] is missing, and no player is seen to stand {where}, whose middle must be the world's origin, x "
             "along the net; give [[start.player]] tables"
         )
-    decided = (finding for finding in complete if finding.is_decided)
-    return next(decided, max(complete, key=lambda finding: finding.support))
+    return max(complete, key=lambda finding: (finding.is_decided, finding.support))
 
 
 def _best_first(moments: Sequence[_Moment]) -> list[_Moment]:
@@ -224,8 +224,8 @@ def _candidates(
 
 def _distinct_poses(poses: Sequence[FoundPlayer], *, near_net: bool) -> list[tuple[float, FoundPlayer]]:
     """Return a player's poses with their probabilities, those that the fit made alike as one."""
-    support = np.array([pose.support for pose in poses])
-    nats = support / support.max() / _SHARE_PER_NAT
+    support, evidence = np.array([(pose.support, pose.evidence) for pose in poses]).T
+    nats = support / support.max() / _SHARE_PER_NAT + evidence / max(evidence.max(), 1e-9) / _EVIDENCE_PER_NAT
     if near_net:
         nats = nats + _NET_NATS * np.array([_faces_net(pose) for pose in poses])
     likelihood = np.exp(nats - nats.max())
