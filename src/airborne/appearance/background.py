@@ -21,18 +21,12 @@ class BackgroundPixels(NamedTuple):
 
     mean: NDArray[np.float32]  # (h, w, 3)
     sd: NDArray[np.float32]  # (h, w)
-    n_observations: NDArray[np.uint8]  # (h, w)
-
-    def copy(self) -> BackgroundPixels:
-        """Copy the arrays."""
-        return BackgroundPixels(self.mean.copy(), self.sd.copy(), self.n_observations.copy())
+    n_observations: NDArray[np.float32]  # (h, w)
 
 
-_UNKNOWN = BackgroundPixels(
-    np.zeros((_TILE_PX, _TILE_PX, 3), np.float32),
-    np.full((_TILE_PX, _TILE_PX), START_SD, np.float32),
-    np.zeros((_TILE_PX, _TILE_PX), np.uint8),
-)
+_Tile = NDArray[np.float32]  # (h, w, 5): a pixel's mean (3), sd, number of observations, in one array to be copied fast
+_UNKNOWN: _Tile = np.zeros((_TILE_PX, _TILE_PX, 5), np.float32)
+_UNKNOWN[..., 3] = START_SD
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,24 +36,21 @@ class BackgroundModel:
     A region is its first pixel (x, y) and its size (height, width).
     """
 
-    tiles: Mapping[tuple[int, int], BackgroundPixels] = field(default_factory=dict)  # by row and column; none: unknown
+    tiles: Mapping[tuple[int, int], _Tile] = field(default_factory=dict)  # by row and column; none: unknown
 
     def crop(self, corner: tuple[int, int], size: tuple[int, int]) -> BackgroundPixels:
         """Copy what is known of a region."""
-        pixels = BackgroundPixels(
-            np.empty((*size, 3), np.float32), np.empty(size, np.float32), np.empty(size, np.uint8)
-        )
+        known = np.empty((*size, 5), np.float32)
         for at, in_region, in_tile in _tiles_of(corner, size):
-            for region, tile in zip(pixels, self.tiles.get(at, _UNKNOWN), strict=True):
-                region[in_region] = tile[in_tile]
-        return pixels
+            known[in_region] = self.tiles.get(at, _UNKNOWN)[in_tile]
+        return BackgroundPixels(known[..., :3], known[..., 3], known[..., 4])
 
     def learn(self, rgb: NDArray[np.uint8], covered: NDArray[np.bool_], corner: tuple[int, int]) -> BackgroundModel:
         """Learn from a region's image rgb (h, w, 3); covered (h, w) where the body may be."""
         learned = dict(self.tiles)
         for at, in_region, in_tile in _tiles_of(corner, covered.shape):
             learned[at] = self.tiles.get(at, _UNKNOWN).copy()
-            update_background(rgb[in_region], covered[in_region], *(each[in_tile] for each in learned[at]))
+            update_background(rgb[in_region], covered[in_region], learned[at][in_tile])
         return BackgroundModel(learned)
 
 
@@ -83,28 +74,31 @@ def _tiles_of(corner: tuple[int, int], size: tuple[int, int]) -> Iterator[tuple[
 
 
 # one signature for whole images and for regions of them: rounding is the same whichever a process meets first
-@kernel(signature="(u1[:,:,:], b1[:,:], f4[:,:,:], f4[:,:], u1[:,:])", fastmath=True)
-def update_background(rgb, covered, mean, sd, n_observations):
-    """Learn from one image: rgb (h, w, 3) uint8, covered (h, w) bool where the body may be; the rest in place."""
+@kernel(signature="(u1[:,:,:], b1[:,:], f4[:,:,:])", fastmath=True)
+def update_background(rgb, covered, known):
+    """Learn from one image: rgb (h, w, 3) uint8, covered (h, w) bool where the body may be; known (h, w, 5) in place.
+
+    A pixel's five numbers are its mean (3) and sd, in grey levels, and how often it was observed.
+    """
     h, w, _ = rgb.shape
     for y in range(h):
         for x in range(w):
             if covered[y, x]:
                 continue
-            n = n_observations[y, x]
+            n = int(known[y, x, 4])
             if n == 0:
                 for k in range(3):
-                    mean[y, x, k] = rgb[y, x, k]
+                    known[y, x, k] = rgb[y, x, k]
             else:
                 rate = max(np.float32(1.0) / (n + 1), np.float32(_MIN_RATE))
                 d2 = np.float32(0)
                 for k in range(3):
-                    d = rgb[y, x, k] - mean[y, x, k]
-                    mean[y, x, k] += rate * d
+                    d = rgb[y, x, k] - known[y, x, k]
+                    known[y, x, k] += rate * d
                     d2 += d * d
-                variance = sd[y, x] * sd[y, x]
-                sd[y, x] = np.sqrt(max(variance + rate * (d2 / 3 - variance), np.float32(4.0)))
-            n_observations[y, x] = min(n + 1, 250)
+                variance = known[y, x, 3] * known[y, x, 3]
+                known[y, x, 3] = np.sqrt(max(variance + rate * (d2 / 3 - variance), np.float32(4.0)))
+            known[y, x, 4] = min(n + 1, 250)
 
 
 @kernel(fastmath=True)

@@ -146,11 +146,16 @@ def body_like(rgb: NDArray[np.uint8], part: NDArray[np.int16], colours: NDArray[
     inside = part >= 0
     if not inside.any() or inside.all():
         return inside
-    background = np.median(observed[~inside], axis=0)
-    to_body = np.linalg.norm(observed - own[part], axis=-1)
-    alike = inside & (to_body < np.linalg.norm(observed - background, axis=-1))
+    background, to_body2, to_background2 = ~inside, np.zeros(part.shape, np.float32), np.zeros(part.shape, np.float32)
+    for channel, own_channel in zip(observed, own, strict=True):
+        to_body2 += (channel - own_channel[part]) ** 2
+        to_background2 += (channel - np.median(channel[background])) ** 2
+    alike = inside & (to_body2 < to_background2)
     return alike if np.count_nonzero(alike) > 0.1 * np.count_nonzero(inside) else inside
 
 
-def _chromaticity(rgb: NDArray) -> NDArray[np.floating]:
-    return rgb / (np.sum(rgb, axis=-1, keepdims=True, dtype=float) + 1)
+def _chromaticity(rgb: NDArray) -> list[NDArray[np.float32]]:
+    """Return each channel's share of the sum of all three, which hardly depends on the light: 3 arrays (...)."""
+    channels = [rgb[..., k].astype(np.float32) for k in range(3)]
+    total = channels[0] + channels[1] + channels[2] + 1
+    return [channel / total for channel in channels]

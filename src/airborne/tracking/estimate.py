@@ -38,6 +38,7 @@ class Estimate:
     pose: Pose | None
     covariance: Array | None
     n_views: int  # cameras with an image that shows the body
+    mask_shares: tuple[float, float] | None = None  # precision and recall of its mask, by what was learned before
     moved: tuple[int, ...] = ()  # first segments of limbs found away from where they had been followed to
 
 

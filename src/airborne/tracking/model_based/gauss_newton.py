@@ -87,6 +87,7 @@ def fit_silhouettes(
     """Move the body until its masks agree with the posteriors (h, w) of the regions, from coarse to fine."""
     taps = gaussian_taps(_COARSE_SIGMA_PX)
     correlated = 4 * np.pi * _COARSE_SIGMA_PX**2
+    converged = _CONVERGED if dofs.moves_joints else _CONVERGED_STIFF
     for reduction, steps in levels:
         views = [
             silhouette_buffers(region, posterior, reduction, taps=taps, clip=_CLIP_MASK)
@@ -117,7 +118,7 @@ def fit_silhouettes(
                 shared=_PATCH * correlated if dofs.moves_joints else correlated,
             )
 
-        pose, _ = descend_pose(evaluate, dofs, pose, prior, most_steps=steps, overstep=1.0)
+        pose, _ = descend_pose(evaluate, dofs, pose, prior, most_steps=steps, overstep=1.0, tolerance=converged)
     return pose
 
 

@@ -44,8 +44,12 @@ def search_globally(
     appearance: Appearance,
     *,
     search_range: SearchRange,
+    thrift: int = 1,
 ) -> list[Pose]:
-    """Return the best poses with the guesses' joints and moved roots, best first; the guesses if no view shows any."""
+    """Return the best poses with the guesses' joints and moved roots, best first; the guesses if no view shows any.
+
+    thrift divides the numbers of proposals.
+    """
     bodies = [render_model.with_pose(guess) for guess in guesses]
     margin_px = min(2.5 * search_range.position_sd_m, _MOST_REGION_M) * _px_per_m(guesses[0], frames)
     regions = [r for r in crop_regions(bodies, render_model.geometry, frames, margin_px) if appearance.has_colours(r)]
@@ -57,8 +61,8 @@ def search_globally(
     R, t = np.stack([body.R for body in bodies]), np.stack([body.t for body in bodies])
     width = np.array([search_range.position_sd_m] * 3 + [search_range.rotation_sd_rad] * 3)
     for number, (n_proposals, n_survivors) in enumerate(_ROUNDS):
-        steps = ndtri(latin_hypercube(6, n_proposals, seed=number)) * width / 2**number
-        parents = np.arange(n_proposals) % len(origin)
+        steps = ndtri(latin_hypercube(6, n_proposals // thrift, seed=number)) * width / 2**number
+        parents = np.arange(n_proposals // thrift) % len(origin)
         moved = np.concatenate(
             [deltas[parents, :3] + steps[:, :3], _compose_rotations(steps[:, 3:], deltas[parents, 3:])], axis=1
         )

@@ -15,6 +15,9 @@ from airborne.tracking.model_based.global_search import SearchRange, search_glob
 from airborne.tracking.model_based.later_frames import regions_near
 from airborne.video import Frames
 
+# divides the proposals of a search about a fit that may be right: on seven synthetic throws as many of 840 starts up to
+# 0.3 m and 30 degrees off led back, and errors stayed
+_THRIFT = 4
 _N_FITTED = 3  # of the poses found
 _N_CONFIRM = 2  # of the best poses found that lead back to a fit confirm it
 _SAME_M, _SAME_RAD = 0.008, 0.035  # silhouettes and images of a right fit agree this closely
@@ -35,7 +38,14 @@ def recover(
     returned, too, where the best poses found lead back to it.
     """
     search_range = SearchRange.after(gap_s)
-    candidates = search_globally(fitter.render_model, predicted, frames, appearance, search_range=search_range)
+    candidates = search_globally(
+        fitter.render_model,
+        predicted,
+        frames,
+        appearance,
+        search_range=search_range,
+        thrift=1 if suspect is None else _THRIFT,
+    )
     learned = regions_near(fitter, candidates, frames, appearance)
     if not learned.regions:
         return None

@@ -113,11 +113,13 @@ class RefinedTracker:
             return replace(state, past=past, covariance=estimate.covariance)
         posed = self.render_model.with_pose(estimate.pose)
         regions = crop_regions([posed], self.render_model.geometry, frames, MARGIN_PX)
-        learned = LearnedRegions.of(regions, learn_appearance(self.render_model, posed, regions, state.appearance))
+        appearance = learn_appearance(self.render_model, posed, regions, state.appearance)
         reference = state.reference
-        if learned.regions:
-            reference = reference.update(self._fitter.agreement(estimate.pose, learned))
-        return RefinedState(past, learned.appearance, reference, estimate.covariance)
+        if state.past and estimate.mask_shares is not None:
+            reference = reference.update(*estimate.mask_shares)
+        elif (learned := LearnedRegions.of(regions, appearance)).regions:  # nothing was known of colours before
+            reference = reference.update(*self._fitter.agreement(estimate.pose, learned).shares)
+        return RefinedState(past, appearance, reference, estimate.covariance)
 
     def turn(self, state: RefinedState) -> RefinedState:
         """Return the state from which the body is tracked back in time: the past is as it would be met then."""
@@ -223,6 +225,7 @@ class RefinedTracker:
             pose=fit.pose,
             covariance=covariance,
             n_views=agreement.n_views,
+            mask_shares=agreement.shares,
             moved=found.moved,
         )
 

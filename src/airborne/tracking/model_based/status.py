@@ -31,11 +31,11 @@ class Reference:
     recall: float = 0.9
     is_learned: bool = False  # from frames of this recording
 
-    def update(self, agreement: MaskAgreement) -> Reference:
-        """Return the reference updated by the newest frame."""
+    def update(self, precision: float, recall: float) -> Reference:
+        """Return the reference updated by the newest frame's."""
         return Reference(
-            (1 - _REFERENCE_RATE) * self.precision + _REFERENCE_RATE * agreement.precision,
-            (1 - _REFERENCE_RATE) * self.recall + _REFERENCE_RATE * agreement.recall,
+            (1 - _REFERENCE_RATE) * self.precision + _REFERENCE_RATE * precision,
+            (1 - _REFERENCE_RATE) * self.recall + _REFERENCE_RATE * recall,
             True,
         )
 
@@ -50,6 +50,11 @@ class MaskAgreement:
     n_views: int  # views in which the body is visible
     misplaced: tuple[int, ...] = ()  # segments of misplaced limbs
     n_views_of: NDArray[np.int64] | None = None  # (segments,) views that show each; None where no joint moves
+
+    @property
+    def shares(self) -> tuple[float, float]:
+        """Precision and recall."""
+        return self.precision, self.recall
 
     def is_suspect(self, reference: Reference) -> bool:
         """Whether a global search is worth while."""
