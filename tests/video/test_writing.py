@@ -96,3 +96,17 @@ def test_what_a_killed_run_left_can_be_played(tmp_path):
     frames = [f.views[0].rgb.mean() for f in read(tmp_path / "a.mp4", (64, 48)) if f.views[0]]
     assert len(frames) >= 50
     assert np.allclose(frames, np.arange(len(frames)), atol=2)
+
+
+@pytest.mark.parametrize("fields", ["progressive", "top-first"])
+def test_colours_stay_where_they_are(tmp_path, fields):
+    """A red spot as bright as what surrounds it, which only the chroma planes show."""
+    y, x = np.mgrid[:240, :320]
+    spot = np.exp(-((x - 150.3) ** 2 + (y - 120.0) ** 2) / 72)
+    image = np.rint(90 + spot[..., None] * [90, -46, 0]).astype(np.uint8)
+    with VideoWriter(tmp_path / "spot.mp4", size=(320, 240), rate=Fraction(25), fields=fields, crf=5) as writer:
+        writer.write(image)
+    for frames in read(tmp_path / "spot.mp4", (320, 240)):
+        rgb = frames.views[0].rgb
+        red = np.maximum(rgb[..., 0].astype(float) - rgb[..., 1] - 8, 0)
+        assert abs(np.average(np.broadcast_to(np.arange(320), red.shape), weights=red) - 150.3) < 0.1

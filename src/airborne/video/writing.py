@@ -23,6 +23,7 @@ from airborne.video.pixels import frame_from_rgb, matrix_for, weave_frame
 _N_THREADS = 4  # fixed: the encoder's output depends on it
 _FRAGMENTED = {"movflags": "frag_keyframe+empty_moov+default_base_moof", "flush_packets": "1"}
 _BT709, _SMPTE170M = 1, 6  # colour matrix tags (ITU-T H.273)
+_CHROMA_IN_THE_MIDDLE = "chromaloc=1"  # of its 2 x 2 pixels, as FFmpeg averages them; unsaid, H.264's lies to the left
 _CODED_FIELD_ORDER = {"top-first": 2, "bottom-first": 3}  # FFmpeg's AV_FIELD_TT, AV_FIELD_BB
 
 
@@ -58,9 +59,8 @@ class VideoWriter:
         self._unfinished = path.with_suffix(f".part{path.suffix}") if path.is_file() else path
         self._time_base = 1 / Fraction(rate)
         self._container = av.open(f"file:{self._unfinished.absolute()}", "w", format="mp4", options=_FRAGMENTED)
-        self._stream = self._container.add_stream(
-            "libx264", rate=rate, options={"crf": str(crf), "preset": preset, "bf": "0"}
-        )
+        options = {"crf": str(crf), "preset": preset, "bf": "0", "x264-params": _CHROMA_IN_THE_MIDDLE}
+        self._stream = self._container.add_stream("libx264", rate=rate, options=options)
         codec = self._stream.codec_context
         codec.width, codec.height, codec.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
         codec.gop_size = round(rate) or 1
