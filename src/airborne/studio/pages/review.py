@@ -56,14 +56,14 @@ async def review_page(session: Session) -> None:
             beside.props("outlined dense options-dense").style("min-width: 150px")
             beside.set_visibility(len(names) > 1)
             jumps = ui.element("div").classes("row-line")
+        says = ui.label().classes("small")
+        says.bind_visibility_from(says, "text")
         content = ui.element("div").classes("split").style("flex-direction: column")
         with jumps:
             ui.button("next uncertain", on_click=lambda: _jump(session, choice.value, Status.UNCERTAIN)).props("flat")
             ui.button("next lost", on_click=lambda: _jump(session, choice.value, Status.LOST)).props("flat")
-            ui.button("which camera disagrees?", on_click=lambda: _blame(session, shown, choice.value, says)).props(
-                "flat"
-            )
-            says = ui.label().classes("small")
+            blame = ui.button("which camera disagrees?", on_click=lambda: _blame(session, shown, choice.value, says))
+            blame.props("flat")
         await change()
 
 
