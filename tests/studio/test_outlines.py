@@ -10,9 +10,9 @@ from airborne.body import Pose
 from airborne.body.files import read_body
 from airborne.cameras import Rig, camera_looking_at
 from airborne.motion import MotionWriter, read_players
-from airborne.studio import run_curves as run_curves_module
+from airborne.studio import curve_data
+from airborne.studio.curve_data import describe_distance, run_curves
 from airborne.studio.outlines import outline_items, player_colours, run_overlay
-from airborne.studio.run_curves import describe_distance, run_curves
 from airborne.studio.runs import count_rows
 from airborne.studio.stage import part_stl
 from tests.support.motions import run_with_gap
@@ -90,7 +90,7 @@ def test_curves_of_a_long_run_keep_what_stands_out(tmp_path, monkeypatch):
         for each in run_with_gap(101, lost=(50,)):
             writer.append(each)
     whole = run_curves(tmp_path)
-    monkeypatch.setattr(run_curves_module, "_MOST_POINTS", 20)
+    monkeypatch.setattr(curve_data, "_MOST_POINTS", 20)
     thin = run_curves(tmp_path)
     assert len(thin["frame"]) <= 22
     assert (thin["frame"][0], thin["frame"][-1]) == (0, 100)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from airborne.body import Pose
 from airborne.errors import ResultError
-from airborne.motion.files import joints_of, parse_line
+from airborne.motion.files import joints_in_header, parse_line
 from airborne.tracking import Status
 from airborne.types import Array
 
@@ -82,7 +82,7 @@ def read_rows(path: Path, known: MotionRows | None = None) -> MotionRows:
         raise ResultError(f"{path} cannot be read ({error.strerror}); expected the motion.csv of a run") from error
     with file:
         inode, header = path.stat().st_ino, file.readline()
-        joints = joints_of(path, header.decode(errors="replace").rstrip("\r\n").split(","))
+        joints = joints_in_header(path, header.decode(errors="replace").rstrip("\r\n").split(","))
         if known is not None and known.joints == joints and known.file[0] == inode:
             file.seek(known.end - len(known.file[1]))
             known = known if file.read(len(known.file[1])) == known.file[1] else None

@@ -9,7 +9,7 @@ from typing import Any
 import tomlkit
 
 from airborne.calibration.sources.boards import read_board
-from airborne.calibration.sources.court import Net, surveyed_points
+from airborne.calibration.sources.court import Net, survey_points
 from airborne.cameras.formats.dltdv import read_xypts
 from airborne.cameras.formats.options import FileOptions
 from airborne.errors import AirborneError
@@ -48,7 +48,7 @@ def guess_video(project: Project, camera: str) -> str:
     return (found or [next(each.video for each in project.cameras if each.name == camera)])[0]
 
 
-def board_text(columns: int, rows: int, square_mm: float, marker_mm: float, dictionary: str) -> str:
+def board_text(columns: int, rows: int, square_mm: float, *, marker_mm: float, dictionary: str) -> str:
     """Return the file of a board; without markers it is a chessboard, of so many inner corners."""
     table: dict[str, Any] = {"columns": columns, "rows": rows, "square_m": round(square_mm / 1000, 6)}
     if marker_mm:
@@ -74,7 +74,7 @@ def sources_text(project: Project, source: Mapping[str, Any], medium: Mapping[st
 
 def court_text(net: Net) -> str:
     """Return the table of a court's points, to be clicked."""
-    rows = [",".join([name, *(f"{value:g}" for value in at)]) for name, at in surveyed_points(net).items()]
+    rows = [",".join([name, *(f"{value:g}" for value in at)]) for name, at in survey_points(net).items()]
     return "\n".join(["point,x_m,y_m,z_m", *rows]) + "\n"
 
 

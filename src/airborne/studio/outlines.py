@@ -16,7 +16,7 @@ from airborne.export.views import cached_surface_arrays
 from airborne.motion import PlayersMotion
 from airborne.motion.run_folder import holds_players
 from airborne.rendering import FLAT, render
-from airborne.studio.run_curves import LIMBS
+from airborne.studio.curve_data import LIMBS
 from airborne.studio.runs import run_body, run_players, run_rig, run_rows
 from airborne.tracking import Status
 from airborne.tracking.image_regions import bounding_points

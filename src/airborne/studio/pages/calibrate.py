@@ -123,7 +123,8 @@ class CalibratePanel:
             def write() -> None:
                 columns, rows, square_mm, marker_mm = (float(each.value or 0) for each in numbers)
                 with errors_shown():
-                    text = board_text(int(columns), int(rows), square_mm, marker_mm, str(dictionary.value))
+                    more = {"marker_mm": marker_mm, "dictionary": str(dictionary.value)}
+                    text = board_text(int(columns), int(rows), square_mm, **more)
                     self.session.edit(_BOARD, text, "board described")
                     read_board(self.session.folder / _BOARD)
                     self.board.set_options(list_boards(self.session.folder), value=_BOARD)

@@ -10,13 +10,13 @@ import numpy as np
 from nicegui import ui
 
 from airborne.motion.run_folder import holds_players
+from airborne.studio.curve_data import describe_distance
 from airborne.studio.disagreement import look_for_disagreement
 from airborne.studio.outlines import BESIDE_COLOUR
 from airborne.studio.pages.correct import Correction
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
-from airborne.studio.run_curves import describe_distance
 from airborne.studio.runs import run_body, run_rig, run_rows
 from airborne.studio.session import Session
 from airborne.studio.stage import BodyOnStage, draw_cameras
