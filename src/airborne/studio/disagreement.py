@@ -72,7 +72,7 @@ def edge_shift(camera: str, seen: Sequence[tuple[Image, Sequence[Array]]]) -> Ed
     scale = max(1.0, seen[0][0].shape[1] / _WIDE_PX)
     reach = round(_REACH_PX * scale)
     samples = [(image, *_sample(outline, image.shape, reach)) for image, outline in seen]
-    points, normals = (np.concatenate([each[k] for each in samples]) for k in (1, 2))
+    points, normals = (np.concatenate(each) for each in zip(*(each[1:] for each in samples), strict=True))
     if len(points) < _FEWEST_POINTS * len(seen):
         return None
     profiles = np.concatenate([_edge_profiles(*each, reach) for each in samples if len(each[1])])
