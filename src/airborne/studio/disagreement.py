@@ -21,12 +21,12 @@ from airborne.studio.runs import run_body, run_rig, run_rows
 from airborne.types import Array, Image
 
 _REACH_PX = 12  # how far an edge is looked for, in a picture 1000 px wide; more in larger ones
-_WIDE_PX = 1000
+_WIDE_PX = 1000  # of the pictures for which the numbers here are
 _AROUND = 3  # frames on either side, which show the same
 _MOST_POINTS = 400  # of an outline
 _FEWEST_POINTS = 40  # that tell a shift
 _STRETCHES = 8  # of the outline, each of which is left out once
-_STANDS_OUT = 3.0  # standard deviations, and
+_STANDS_OUT = 3.0  # standard deviations: one time in a thousand by chance
 _TIMES_OTHERS = 2.0  # as far as the median of the other cameras, which show the body's own error
 _LEAST_PX = 1.5  # [px] in a picture 1000 px wide: no outline fits better
 
