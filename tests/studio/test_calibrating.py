@@ -10,7 +10,7 @@ from airborne.calibration.sources.boards import read_board
 from airborne.calibration.sources.court import court_lines, court_points, survey_points
 from airborne.calibration.sources.files import read_sources
 from airborne.cameras import camera_looking_at
-from airborne.errors import CalibrationError
+from airborne.errors import CalibrationError, TrialError
 from airborne.studio.calibrating import (
     REPORT,
     board_text,
@@ -18,8 +18,11 @@ from airborne.studio.calibrating import (
     find_picture,
     guess_video,
     list_boards,
+    list_pictures,
     list_wands,
+    read_report,
     sources_text,
+    write_report,
 )
 from airborne.studio.clicks import read_clicked
 from airborne.studio.project import find_trial, read_project
@@ -90,3 +93,19 @@ def test_only_pictures_of_the_report_are_found(tmp_path):
     (tmp_path / "secret.png").write_bytes(b"png")
     assert find_picture(tmp_path, "residuals_a.png") == tmp_path / REPORT / "residuals_a.png"
     assert find_picture(tmp_path, "../secret.png") is None
+
+
+def test_what_a_calibration_said_is_kept_in_the_folder_only(tmp_path):
+    folder, other = tmp_path / "trial", tmp_path / "other"
+    for each in (folder / REPORT, other):
+        each.mkdir(parents=True)
+    assert read_report(folder) == ""
+    write_report(folder, "camera seen\n")
+    assert read_report(folder) == "camera seen\n"
+    (folder / REPORT / "report.txt").unlink()
+    (folder / REPORT).rmdir()
+    (folder / REPORT).symlink_to(other)
+    (other / "residuals_a.png").write_bytes(b"png")
+    with pytest.raises(TrialError, match="leads out of the folder"):
+        write_report(folder, "")
+    assert list_pictures(folder) == []
