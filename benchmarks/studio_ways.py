@@ -1,6 +1,6 @@
 """From a folder with only videos and what was surveyed to a report, in a real browser, by clicks and keys alone.
 
-    python benchmarks/studio_ways.py block_jump|somersault_1 RECORDING [--port-folder F] [--rows]
+    python benchmarks/studio_ways.py block_jump|somersault_1 RECORDING [--rows]
 
 Every click is a pixel off (one sd, right and down), at the truth's place. The result is compared with that of the
 prepared trial in the recording's folder, tracked with the same code: RMS distances from the truth. Prints JSON: clicks,

@@ -7,10 +7,10 @@ import pytest
 
 from airborne.calibration.from_points import calibrate
 from airborne.calibration.sources.boards import read_board
-from airborne.calibration.sources.court import court_lines, court_points, surveyed_points
+from airborne.calibration.sources.court import court_lines, court_points, survey_points
 from airborne.calibration.sources.files import read_sources
 from airborne.cameras import camera_looking_at
-from airborne.errors import CalibrationError
+from airborne.errors import CalibrationError, TrialError
 from airborne.studio.calibrating import (
     REPORT,
     board_text,
@@ -18,8 +18,11 @@ from airborne.studio.calibrating import (
     find_picture,
     guess_video,
     list_boards,
+    list_pictures,
     list_wands,
+    read_report,
     sources_text,
+    write_report,
 )
 from airborne.studio.clicks import read_clicked
 from airborne.studio.project import find_trial, read_project
@@ -37,8 +40,8 @@ def project(tmp_path):
 
 def test_boards_and_wands_are_found_by_what_is_in_the_files(project):
     folder = project.folder
-    (folder / "board.toml").write_text(board_text(7, 5, 40.0, 30.0, "DICT_5X5_50"))
-    (folder / "chess.toml").write_text(board_text(7, 5, 25.5, 0, "DICT_4X4_50"))
+    (folder / "board.toml").write_text(board_text(7, 5, 40.0, marker_mm=30.0, dictionary="DICT_5X5_50"))
+    (folder / "chess.toml").write_text(board_text(7, 5, 25.5, marker_mm=0, dictionary="DICT_4X4_50"))
     (folder / "wand.csv").write_text("pt1_cam1_X,pt1_cam1_Y,pt1_cam2_X,pt1_cam2_Y\n1,2,3,4\n")
     (folder / "other.csv").write_text("point,x_m\nA,1\n")
     assert list_boards(folder) == ["board.toml", "chess.toml"]
@@ -49,7 +52,7 @@ def test_boards_and_wands_are_found_by_what_is_in_the_files(project):
 
 
 def test_sources_name_the_cameras_as_the_trial_looks_for_them(project):
-    (project.folder / "board.toml").write_text(board_text(7, 5, 40.0, 30.0, "DICT_4X4_50"))
+    (project.folder / "board.toml").write_text(board_text(7, 5, 40.0, marker_mm=30.0, dictionary="DICT_4X4_50"))
     videos = {name: {"video": guess_video(project, name)} for name in ("left", "right")}
     assert videos == {"left": {"video": "board_LEFT.mp4"}, "right": {"video": "b.mp4"}}
     path = project.folder / "sources.toml"
@@ -74,14 +77,14 @@ def test_a_court_is_calibrated_by_its_clicked_points(tmp_path):
 
 
 def test_lines_run_between_points_that_are_there():
-    points = surveyed_points("men")
+    points = survey_points("men")
     assert set(points) <= set(court_points("men"))
     assert not any(name.startswith("post") for name in points)
     assert len(court_lines(points)) == 10
     (line,) = court_lines({name: points[name] for name in ("net_left_top", "net_right_top", "antenna_left_top")})
     assert np.ptp(line, axis=0) == pytest.approx([9, 0, 0])
     with pytest.raises(CalibrationError, match="net = 5"):
-        surveyed_points(5.0)
+        survey_points(5.0)
 
 
 def test_only_pictures_of_the_report_are_found(tmp_path):
@@ -90,3 +93,19 @@ def test_only_pictures_of_the_report_are_found(tmp_path):
     (tmp_path / "secret.png").write_bytes(b"png")
     assert find_picture(tmp_path, "residuals_a.png") == tmp_path / REPORT / "residuals_a.png"
     assert find_picture(tmp_path, "../secret.png") is None
+
+
+def test_what_a_calibration_said_is_kept_in_the_folder_only(tmp_path):
+    folder, other = tmp_path / "trial", tmp_path / "other"
+    for each in (folder / REPORT, other):
+        each.mkdir(parents=True)
+    assert read_report(folder) == ""
+    write_report(folder, "camera seen\n")
+    assert read_report(folder) == "camera seen\n"
+    (folder / REPORT / "report.txt").unlink()
+    (folder / REPORT).rmdir()
+    (folder / REPORT).symlink_to(other)
+    (other / "residuals_a.png").write_bytes(b"png")
+    with pytest.raises(TrialError, match="leads out of the folder"):
+        write_report(folder, "")
+    assert list_pictures(folder) == []

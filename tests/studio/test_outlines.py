@@ -10,9 +10,9 @@ from airborne.body import Pose
 from airborne.body.files import read_body
 from airborne.cameras import Rig, camera_looking_at
 from airborne.motion import MotionWriter, read_players
-from airborne.studio import run_curves as run_curves_module
-from airborne.studio.outlines import outline_items, run_overlay
-from airborne.studio.run_curves import describe_distance, run_curves
+from airborne.studio import curve_data
+from airborne.studio.curve_data import describe_distance, run_curves
+from airborne.studio.outlines import outline_items, player_colours, run_overlay
 from airborne.studio.runs import count_rows
 from airborne.studio.stage import part_stl
 from tests.support.motions import run_with_gap
@@ -71,6 +71,13 @@ def test_another_run_is_drawn_in_its_own_colour_and_said_to_be_as_far_as_it_is(t
     assert describe_distance(body, body) == "roots: median 0 mm, at most 0 mm, in frame 0"
 
 
+def test_players_have_colours_by_their_side_of_the_net():
+    colours = player_colours({"a": -1.0, "b": 2.0, "c": -3.0, "d": 0.5})
+    assert len(set(colours.values())) == 4
+    assert list(colours) == ["a", "c", "b", "d"]
+    assert player_colours({"b": 2.0})["b"] == colours["b"]
+
+
 def test_curves_of_players_are_of_what_is_lowest(tmp_path):
     curves = run_curves(write_run(tmp_path / "run"))
     assert curves["frame"] == list(range(12))
@@ -83,7 +90,7 @@ def test_curves_of_a_long_run_keep_what_stands_out(tmp_path, monkeypatch):
         for each in run_with_gap(101, lost=(50,)):
             writer.append(each)
     whole = run_curves(tmp_path)
-    monkeypatch.setattr(run_curves_module, "_MOST_POINTS", 20)
+    monkeypatch.setattr(curve_data, "_MOST_POINTS", 20)
     thin = run_curves(tmp_path)
     assert len(thin["frame"]) <= 22
     assert (thin["frame"][0], thin["frame"][-1]) == (0, 100)

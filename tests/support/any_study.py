@@ -19,10 +19,10 @@ from airborne.cameras import write_rig
 from airborne.motion import MotionWriter
 from airborne.run.result import Run
 from airborne.studio.clicks import count_clicked, list_surveys, read_clicked
+from airborne.studio.curve_data import run_curves
 from airborne.studio.outlines import run_overlay
 from airborne.studio.place import read_place
 from airborne.studio.project import list_bodies, list_runs, read_project, steps
-from airborne.studio.run_curves import run_curves
 from airborne.studio.runs import run_body, run_rows
 from airborne.studio.session import Session
 from airborne.studio.stage import part_stl

@@ -168,7 +168,7 @@ def _parse(path: Path) -> tuple[tuple[str, ...], list[Estimate]]:
         rows = list(csv.reader(data.decode().splitlines()))
     except (UnicodeDecodeError, csv.Error) as error:
         raise ResultError(f"{path} is not a text table ({error}); expected the motion.csv of a run") from error
-    joints = joints_of(path, rows[0] if rows else [])
+    joints = joints_in_header(path, rows[0] if rows else [])
     header, estimates = _header(joints), []
     covariances = read_covariances(
         path.with_name(COVARIANCE_FILE), len(rows[1:]) if joints else 0, size=6 + 3 * len(joints)
@@ -188,7 +188,7 @@ def _parse(path: Path) -> tuple[tuple[str, ...], list[Estimate]]:
     return joints, estimates
 
 
-def joints_of(path: Path, header: list[str]) -> tuple[str, ...]:
+def joints_in_header(path: Path, header: list[str]) -> tuple[str, ...]:
     """Return the joints whose angles a motion.csv holds, by its header. Raises ResultError for another table."""
     fixed = _header(())
     joints = tuple(name.removesuffix("_x_rad") for name in header[len(fixed) :: 3])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from airborne.body import Pose
 from airborne.errors import ResultError
-from airborne.motion.files import joints_of, parse_line
+from airborne.motion.files import joints_in_header, parse_line
 from airborne.tracking import Status
 from airborne.types import Array
 
@@ -82,7 +82,7 @@ def read_rows(path: Path, known: MotionRows | None = None) -> MotionRows:
         raise ResultError(f"{path} cannot be read ({error.strerror}); expected the motion.csv of a run") from error
     with file:
         inode, header = path.stat().st_ino, file.readline()
-        joints = joints_of(path, header.decode(errors="replace").rstrip("\r\n").split(","))
+        joints = joints_in_header(path, header.decode(errors="replace").rstrip("\r\n").split(","))
         if known is not None and known.joints == joints and known.file[0] == inode:
             file.seek(known.end - len(known.file[1]))
             known = known if file.read(len(known.file[1])) == known.file[1] else None
@@ -103,21 +103,17 @@ def read_rows(path: Path, known: MotionRows | None = None) -> MotionRows:
                 raise ResultError(f"{path}: the row of frame {cells[0][:20]!r}: {error}; track again") from None
             starts.append(begin)
             begin += len(last)
-    own = (
-        np.array(frames, np.int64),
-        np.array(statuses, np.str_),
-        np.array(numbers).reshape(-1, len(_NUMBERS)),
-        np.array(starts, np.int64),
-    )
-    newest = int(own[0][-1]) if len(own[0]) else None
+    index, places, status = np.array(frames, np.int64), np.array(starts, np.int64), np.array(statuses, np.str_)
+    values = np.array(numbers).reshape(-1, len(_NUMBERS))
     if known is not None:
-        if newest is None:
+        if not len(index):
             return known
-        olds = known.index, known.status, known.numbers, known.starts
-        own = tuple(np.concatenate(pair) for pair in zip(olds, own, strict=True))
-    order = np.argsort(own[0], kind="stable")
-    index, status, values, places = (column[order] for column in own)
-    return MotionRows(path, joints, index, status, values, places, begin, newest, (inode, last))
+        index, places = np.append(known.index, index), np.append(known.starts, places)
+        status, values = np.append(known.status, status), np.concatenate([known.numbers, values])
+    newest, order = int(index[-1]) if len(index) else None, np.argsort(index, kind="stable")
+    return MotionRows(
+        path, joints, index[order], status[order], values[order], places[order], begin, newest, (inode, last)
+    )
 
 
 def _whole_lines(file: Iterator[bytes]) -> Iterator[bytes]:

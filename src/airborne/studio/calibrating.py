@@ -9,26 +9,28 @@ from typing import Any
 import tomlkit
 
 from airborne.calibration.sources.boards import read_board
-from airborne.calibration.sources.court import Net, surveyed_points
+from airborne.calibration.sources.court import Net, survey_points
 from airborne.cameras.formats.dltdv import read_xypts
 from airborne.cameras.formats.options import FileOptions
-from airborne.errors import AirborneError
+from airborne.errors import AirborneError, TrialError
+from airborne.io.writing import replace_text
 from airborne.studio.project import Project, is_inside, list_videos
 
 SOURCES, CALIBRATED = "calibration_sources.toml", "calib_studio.toml"  # what is written, and what comes of it
-REPORT = "calib_studio_report"  # the command's folder of pictures
+REPORT, _SAID = "calib_studio_report", "report.txt"  # the command's folder of pictures, and what it said
 NETS: dict[Net, str] = {"men": "men, 2.43 m", "women": "women, 2.24 m"}
 
 
 def list_boards(folder: Path) -> list[str]:
     """List the files of a folder that describe a board."""
-    return [path.name for path in sorted(folder.glob("*.toml")) if _is_readable(lambda path=path: read_board(path))]
+    files = [path for path in sorted(folder.glob("*.toml")) if is_inside(folder, path)]
+    return [path.name for path in files if _is_readable(lambda path=path: read_board(path))]
 
 
 def list_wands(folder: Path) -> list[str]:
     """List the tables of a folder that hold the tracks of markers in several cameras."""
     options = FileOptions()
-    tables = sorted(folder.glob("*.csv"))
+    tables = [path for path in sorted(folder.glob("*.csv")) if is_inside(folder, path)]
     return [path.name for path in tables if _is_readable(lambda path=path: read_xypts(path, options))]
 
 
@@ -48,7 +50,7 @@ def guess_video(project: Project, camera: str) -> str:
     return (found or [next(each.video for each in project.cameras if each.name == camera)])[0]
 
 
-def board_text(columns: int, rows: int, square_mm: float, marker_mm: float, dictionary: str) -> str:
+def board_text(columns: int, rows: int, square_mm: float, *, marker_mm: float, dictionary: str) -> str:
     """Return the file of a board; without markers it is a chessboard, of so many inner corners."""
     table: dict[str, Any] = {"columns": columns, "rows": rows, "square_m": round(square_mm / 1000, 6)}
     if marker_mm:
@@ -74,7 +76,7 @@ def sources_text(project: Project, source: Mapping[str, Any], medium: Mapping[st
 
 def court_text(net: Net) -> str:
     """Return the table of a court's points, to be clicked."""
-    rows = [",".join([name, *(f"{value:g}" for value in at)]) for name, at in surveyed_points(net).items()]
+    rows = [",".join([name, *(f"{value:g}" for value in at)]) for name, at in survey_points(net).items()]
     return "\n".join(["point,x_m,y_m,z_m", *rows]) + "\n"
 
 
@@ -86,5 +88,18 @@ def find_picture(folder: Path, name: str) -> Path | None:
 
 def list_pictures(folder: Path) -> list[Path]:
     """List the pictures of the last calibration's report: where each camera saw points, and how far off they are."""
-    report = folder / REPORT
-    return sorted(report.glob("residuals_*.png")) if is_inside(folder, report) else []
+    return [path for path in sorted((folder / REPORT).glob("residuals_*.png")) if is_inside(folder, path)]
+
+
+def read_report(folder: Path) -> str:
+    """Return what the last calibration said; empty where there is none."""
+    path = folder / REPORT / _SAID
+    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() and is_inside(folder, path) else ""
+
+
+def write_report(folder: Path, text: str) -> None:
+    """Keep what a calibration said beside its pictures. Raises TrialError where that leads out of the folder."""
+    path = folder / REPORT / _SAID
+    if not is_inside(folder, path):
+        raise TrialError(f"{path} is a link that leads out of the folder; remove it")
+    replace_text(path, text, is_durable=False)

@@ -10,7 +10,7 @@ _TO_DO = {
     "Cameras": "Points of known places hung in the scene. Choose <b>control_points.csv</b> as surveyed points: their "
     "clicks are in it, and each camera is solved at once. Drag one and watch its residual.",
     "Body": "The cross was measured. Choose <b>cross.toml</b> as body file, and press <b>Use this body</b>.",
-    "First pose": "Press <b>Find it</b>, wait some seconds, look whether the outline lies on the cross in all three "
+    "First pose": "Press <b>Find it</b>, wait, look whether the outline lies on the cross in all three "
     "pictures, and press <b>Use this pose</b>.",
     "Track": "Press <b>Track</b> and watch the outline follow the cross.",
     "Review": "Step with the arrow keys through the throw: pictures, curves and the scene go together.",

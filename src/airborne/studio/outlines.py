@@ -16,13 +16,14 @@ from airborne.export.views import cached_surface_arrays
 from airborne.motion import PlayersMotion
 from airborne.motion.run_folder import holds_players
 from airborne.rendering import FLAT, render
-from airborne.studio.run_curves import LIMBS
+from airborne.studio.curve_data import LIMBS
 from airborne.studio.runs import run_body, run_players, run_rig, run_rows
 from airborne.tracking import Status
 from airborne.tracking.image_regions import bounding_points
 from airborne.types import Array
 
 _COLOURS = {status.value: hex_colour(rgb) for status, rgb in STATUS_RGB.items()}
+_TEAM_COLOURS = (("#56b4e9", "#009e73", "#0072b2"), ("#e69f00", "#d55e00", "#cc79a7"))  # before and behind the net
 BESIDE_COLOUR = "#cc79a7"  # of another run that is laid over the one in view
 _RIM_PX = 2  # about the body, so that no outline runs along the border of what is drawn
 
@@ -92,6 +93,18 @@ def _players_overlay(
         joints_m = dict(zip(motion.joints, motion.points[row, player], strict=True))
         items += legs_items(name, joints_m, cameras, colour or _COLOURS[status])
     return {"items": items, "label": f"frame {frame}   {motion.time_s[row]:.3f} s"}
+
+
+def player_colours(y_m: Mapping[str, float]) -> dict[str, str]:
+    """Return a colour for each player, cool before the net (y < 0) and warm behind it, by where each stands."""
+    teams: tuple[list[str], list[str]] = ([], [])
+    for name, y in y_m.items():
+        teams[int(y > 0)].append(name)
+    return {
+        name: colours[number % len(colours)]
+        for team, colours in zip(teams, _TEAM_COLOURS, strict=True)
+        for number, name in enumerate(team)
+    }
 
 
 def legs_items(

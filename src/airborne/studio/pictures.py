@@ -122,6 +122,10 @@ class Pictures:
             self._store.add((source, number), jpeg)
         return jpeg
 
+    def image(self, source: VideoSource, number: int) -> Image | None:
+        """Return an image of a file (h, w, 3) sRGB, None where it is damaged. Raises VideoError as `jpeg` does."""
+        return self._video(source).decode(number, lambda: True)
+
     def show(self, tables: tuple[CameraTable, ...], source_of: Callable[[CameraTable], VideoSource]) -> ShownTrial:
         """Match the images of a trial's cameras. Raises VideoError."""
         sources = tuple(map(source_of, tables))

@@ -17,10 +17,10 @@ from airborne import export
 from airborne.errors import AirborneError, ResultError
 from airborne.export.pictures import thumbnail
 from airborne.studio.calibrating import find_picture
+from airborne.studio.curve_data import run_curves
 from airborne.studio.guard import FILE_POLICY
 from airborne.studio.outlines import BESIDE_COLOUR, run_overlay
 from airborne.studio.project import list_runs, list_videos
-from airborne.studio.run_curves import run_curves
 from airborne.studio.runs import run_body
 from airborne.studio.session import Session
 from airborne.studio.stage import part_stl

@@ -73,7 +73,7 @@ def court_points(net: Net | float = "men") -> dict[str, ScenePoint]:
     return points
 
 
-def surveyed_points(net: Net | float) -> dict[str, Array]:
+def survey_points(net: Net | float) -> dict[str, Array]:
     """Return the points of a court that are clicked best, each once: name -> (3,) [m]."""
     return {name: point.position_m for name, point in court_points(net).items() if _CLICKED_BEST.fullmatch(name)}
 

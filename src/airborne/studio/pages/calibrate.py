@@ -11,14 +11,15 @@ from airborne.calibration.sources.boards import DICTIONARIES, read_board
 from airborne.errors import AirborneError
 from airborne.studio.calibrating import (
     CALIBRATED,
-    REPORT,
     SOURCES,
     board_text,
     guess_video,
     list_boards,
     list_pictures,
     list_wands,
+    read_report,
     sources_text,
+    write_report,
 )
 from airborne.studio.commands import Command
 from airborne.studio.pages.command_watch import CommandWatch
@@ -27,7 +28,7 @@ from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_videos
 from airborne.studio.session import Session
 
-_BOARD, _SAID = "board.toml", "report.txt"  # what is written: a new board, and what the command said
+_BOARD = "board.toml"  # of a new one
 _HELP = (
     "Each camera films the board close by, in every corner of its picture and tilted; then two cameras at once, until "
     "all are linked. Or wave a wand of two markers and have them tracked. In the pictures below, points should cover "
@@ -91,7 +92,7 @@ class CalibratePanel:
         with errors_shown():
             values = {"file": CALIBRATED, "control_points": None}
             self.session.set_table("calibration", values, f"calibration by {CALIBRATED}")
-        (self.session.folder / REPORT / _SAID).write_text(command.output(), encoding="utf-8")
+            write_report(self.session.folder, command.output())
         self.is_new = True
         self.results.refresh()
 
@@ -123,7 +124,8 @@ class CalibratePanel:
             def write() -> None:
                 columns, rows, square_mm, marker_mm = (float(each.value or 0) for each in numbers)
                 with errors_shown():
-                    text = board_text(int(columns), int(rows), square_mm, marker_mm, str(dictionary.value))
+                    more = {"marker_mm": marker_mm, "dictionary": str(dictionary.value)}
+                    text = board_text(int(columns), int(rows), square_mm, **more)
                     self.session.edit(_BOARD, text, "board described")
                     read_board(self.session.folder / _BOARD)
                     self.board.set_options(list_boards(self.session.folder), value=_BOARD)
@@ -133,9 +135,8 @@ class CalibratePanel:
 
     def _show_results(self) -> None:
         """Show what the last calibration said, and where each camera saw points."""
-        text = self.session.folder / REPORT / _SAID
-        if text.is_file():
-            ui.label(text.read_text(encoding="utf-8", errors="replace")).classes("report")
+        if text := read_report(self.session.folder):
+            ui.label(text).classes("report")
         with ui.element("div").classes("files"):
             for path in list_pictures(self.session.folder):
                 picture = ui.element("img").props(f"src=/calibration/{quote(path.name)}?{path.stat().st_mtime_ns}")

@@ -15,9 +15,10 @@ from airborne.cameras import Rig
 from airborne.errors import AirborneError, count
 from airborne.io.names import check_column
 from airborne.studio.clicks import Clicked
+from airborne.studio.outlines import player_colours
 from airborne.studio.pages.layout import complain, errors_shown
 from airborne.studio.pages.point_list import PointList
-from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PointsPanel
+from airborne.studio.pages.points_panel import CHOSEN_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.starts import player_file, read_player
@@ -133,7 +134,8 @@ class PlayersPanel(PointsPanel):
 
     def show(self) -> None:
         """Show marks, curves, legs and buttons as they are now."""
-        colours = {name: CAMERA_COLOURS[k % len(CAMERA_COLOURS)] for k, name in enumerate(self.players)}
+        places = {name: next(iter(self._points(name).values()), np.zeros(3)) for name in self.players}
+        colours = player_colours({name: float(at[1]) for name, at in places.items()})
         marks = list(self._marks(colours[self.player]))
         legs = [item for name in self.players for item in self._legs(name, colours[name])]
         self.view.show_over(marks, [*self.epipolar_items(self.chosen, self.rig), *legs], self.selected)

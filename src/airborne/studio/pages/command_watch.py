@@ -11,7 +11,7 @@ from airborne.studio.commands import STOPPED, Command
 from airborne.studio.pages.layout import complain, in_thread
 from airborne.studio.session import Session
 
-_LOOK_EVERY_S = 0.5
+_LOOK_EVERY_S = 0.5  # at a command that goes on
 
 
 class CommandWatch:

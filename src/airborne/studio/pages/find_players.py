@@ -9,10 +9,9 @@ from nicegui import ui
 
 from airborne.cameras import Rig
 from airborne.errors import count
-from airborne.studio.outlines import legs_items
+from airborne.studio.outlines import legs_items, player_colours
 from airborne.studio.pages.find_controls import FindControls
 from airborne.studio.pages.layout import errors_shown
-from airborne.studio.pages.points_panel import CAMERA_COLOURS
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_players
@@ -52,8 +51,9 @@ class FindPlayersPanel:
         self.frame = frame
         self.session.go(frame=frame)
         cameras, items = self.rig.select(self.shown.names).cameras, []
-        for number, (name, joints_m) in enumerate(self.joints_m.items() if frame == self.at else ()):
-            items += legs_items(name, joints_m, cameras, CAMERA_COLOURS[number % len(CAMERA_COLOURS)])
+        colours = player_colours({name: next(iter(each.values()))[1] for name, each in self.joints_m.items()})
+        for name, joints_m in self.joints_m.items() if frame == self.at else ():
+            items += legs_items(name, joints_m, cameras, colours[name])
         self.view.show_over((), items)
 
     async def show_found(self, each: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from typing import TypeVar, cast
 
-from nicegui import Client, run, ui
+from nicegui import Client, app, run, ui
 
 from airborne.errors import AirborneError
 from airborne.studio.guide import next_task
@@ -159,7 +159,7 @@ async def in_thread(function: Callable[..., _T], *arguments: object) -> _T:
     try:
         return cast(_T, await run.io_bound(function, *arguments))
     finally:
-        if client.id not in Client.instances:
+        if client.id not in Client.instances or app.is_stopping:  # it would get None
             raise asyncio.CancelledError
 
 

@@ -10,12 +10,13 @@ import numpy as np
 from nicegui import ui
 
 from airborne.motion.run_folder import holds_players
+from airborne.studio.curve_data import describe_distance
+from airborne.studio.disagreement import look_for_disagreement
 from airborne.studio.outlines import BESIDE_COLOUR
 from airborne.studio.pages.correct import Correction
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
-from airborne.studio.run_curves import describe_distance
 from airborne.studio.runs import run_body, run_rig, run_rows
 from airborne.studio.session import Session
 from airborne.studio.stage import BodyOnStage, draw_cameras
@@ -55,11 +56,28 @@ async def review_page(session: Session) -> None:
             beside.props("outlined dense options-dense").style("min-width: 150px")
             beside.set_visibility(len(names) > 1)
             jumps = ui.element("div").classes("row-line")
+        says = ui.label().classes("small")
+        says.bind_visibility_from(says, "text")
         content = ui.element("div").classes("split").style("flex-direction: column")
         with jumps:
             ui.button("next uncertain", on_click=lambda: _jump(session, choice.value, Status.UNCERTAIN)).props("flat")
             ui.button("next lost", on_click=lambda: _jump(session, choice.value, Status.LOST)).props("flat")
+            blame = ui.button("which camera disagrees?", on_click=lambda: _blame(session, shown, choice.value, says))
+            blame.props("flat")
         await change()
+
+
+async def _blame(session: Session, shown: ShownTrial, name: str, says: ui.label) -> None:
+    """Say which camera disagrees with the run about the frame in view."""
+    folder, frame = session.folder / name, session.frame
+    if holds_players(folder):
+        complain("players have no outline to compare; this is for a run of one body")
+        return
+    text = await work(
+        "comparing edges with outlines", lambda: look_for_disagreement(folder, frame, shown, session.pictures)
+    )
+    if text is not None:
+        says.set_text(f"Frame {frame}: {text}.")
 
 
 async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: str) -> None:
