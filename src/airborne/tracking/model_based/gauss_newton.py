@@ -20,6 +20,8 @@ from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, P
 from airborne.tracking.model_based.kernel_arguments import Comparison, Paint, Window
 from airborne.tracking.model_based.normal_equations import (
     equations_of_known_light,
+    fill_costs,
+    fill_costs_of_known_light,
     photometric_equations,
     silhouette_equations,
 )
@@ -31,6 +33,7 @@ from airborne.tracking.model_based.render_model import (
     shift_sds_px,
     silhouette_buffers,
 )
+from airborne.tracking.model_based.shape_error import shape_error_gradients, shape_error_px
 from airborne.tracking.model_based.twist_equations import Sums, new_blocks
 from airborne.types import Array
 
@@ -43,13 +46,11 @@ _FINE_SIGMA_PX = 1.2  # of a full frame
 _CLIP = 0.1  # linear light, 0..1: a residual this large has a quarter of the weight
 _CLIP_LIT = 0.5  # the same under known lights, where no shadow or highlight has to be left out
 _CLIP_MASK = 0.5  # the same, of a mask
-_PATCH = 8.0  # by this factor more pixels of a person are taken for body, or not, together; chosen as _SHAPE_WIDTH_M
+_PATCH = 8.0  # by this factor more pixels of a person are body, or not, together; chosen as `shape_error`'s width
 _OVERSTEP = 1.6  # robust weights and the refitted light make each step too short by about this factor
 _MOST_STEPS = 12  # at each level of a body with joints
 _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
 _CONVERGED, _CONVERGED_STIFF = 1 / 3, 1  # squared length of the last step, in sds, for each degree of freedom
-SHAPE_SD_M = 0.007  # model error: how far a person's segment lies from the ellipsoid that fits its image
-_SHAPE_WIDTH_M = 0.075  # along which that error is the same; chosen on synthetic somersaults
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,23 +163,22 @@ def rises_without(
     others: the same body without each segment. Light and noise are those of the whole body, and only the pixels around
     those that the segment covers are compared: no others change.
     """
-    view, n = image_buffers(render_model, region, appearance), len(render_model.model.segments)
-    rises = np.zeros(len(others))
     comparison, rows_sigma_px = _comparison(render_model, region)
-    view = view.prepare(comparison)
-
-    def totals(posed: PosedBody, view: ViewBuffers, iterations: int) -> Array:
-        args = render_model, posed, view, comparison
-        return _add_image_equations(*args, iterations=iterations, sums=Sums.zero(n), blocks=_blocks(view, n))
-
-    _, total, weight = totals(posed, view, 3)
+    view, n = image_buffers(render_model, region, appearance).prepare(comparison), len(render_model.model.segments)
+    sums, blocks = Sums.zero(n), _blocks(view, n)
+    args = render_model, posed, view, comparison
+    _, total, weight = _add_image_equations(*args, iterations=3, sums=sums, blocks=blocks)
     noise = max(4 * np.pi * _FINE_SIGMA_PX * rows_sigma_px * total / weight, 1e-9) if weight > 0 else 1.0
-    drawn = view.maps.part
+    drawn, rises = view.maps.part, np.zeros(len(others))
     owner = np.where(drawn < 0, -1, render_model.segment_of_part[drawn])
+    costs = _pixel_costs(*args)
     for k, (segment, other) in enumerate(others.items()):
         if (owner == segment).any():
-            part = view.crop(_window_around(owner == segment, view.whole))
-            rises[k] = 0.5 * (totals(other, part, 0)[0] - totals(posed, part, 0)[0]) / noise
+            drawn, changed = (_window_around(owner == segment, view.whole, n_px) for n_px in (2 * RADIUS_PX, RADIUS_PX))
+            without = _pixel_costs(render_model, other, view.crop(drawn), comparison)
+            x0, y0, x1, y1 = changed
+            part = without[y0 - drawn.y0 : y1 - drawn.y0, x0 - drawn.x0 : x1 - drawn.x0]
+            rises[k] = 0.5 * float((part - costs[y0:y1, x0:x1]).sum()) / noise
     return rises
 
 
@@ -204,7 +204,7 @@ def image_evaluator(
         rows_sigma_px.append(sigma_px)
     empty_cost = sum(view.empty_cost for view in views)
     correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px or [_FINE_SIGMA_PX]))
-    shape_px = [_shape_error_px(view, bodies[0]) for view in views] if dofs.moves_joints else []
+    shape_px = [shape_error_px(view, bodies[0]) for view in views] if dofs.moves_joints else []
     shared = max(correlated, float(np.mean(shape_px or [0.0])))
 
     def evaluate(pose: Pose, is_first: bool) -> PoseEquations:
@@ -219,7 +219,7 @@ def image_evaluator(
             )
             shifted.append((sums.B * shift).transpose(2, 0, 1))
             if dofs.moves_joints:
-                shifted.append(_shape_error_gradients(sums.B, posed, view))
+                shifted.append(shape_error_gradients(sums.B, posed, view))
         return map_to_dofs(
             render_model,
             dofs,
@@ -255,6 +255,19 @@ def _add_image_equations(
     return np.array(equations_of_known_light(*args, render_model.is_faceted, lamps, ambient, sums, blocks))
 
 
+def _pixel_costs(
+    render_model: RenderModel, posed: PosedBody, view: ViewBuffers, comparison: Comparison
+) -> NDArray[np.float32]:
+    """Return the robust squared residual of each pixel of a view (h, w), in the light that was fitted or is known."""
+    costs = np.empty(view.maps.part.shape, np.float32)
+    args = render_model.body, view.projection(posed), view.observation, comparison
+    if render_model.lights is None:
+        fill_costs(*args, view.maps, Paint(render_model.albedo, render_model.is_faceted), view.light, costs)
+    else:
+        fill_costs_of_known_light(*args, *view.light, costs)
+    return costs
+
+
 def _comparison(render_model: RenderModel, region: Region) -> tuple[Comparison, float]:
     """Return how a region is compared, and the sd of the blur along its columns [px]."""
     sigma_px = max(_FINE_SIGMA_PX * region.aspect, 0.5)
@@ -262,29 +275,9 @@ def _comparison(render_model: RenderModel, region: Region) -> tuple[Comparison, 
     return Comparison(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma_px), clip), sigma_px
 
 
-def _shape_error_gradients(B: Array, posed: PosedBody, view: ViewBuffers) -> Array:
-    """Return the gradients' error because a person's segments are not ellipsoids: (2 segments, segments, 6).
-
-    Each segment's image may lie beside the rendered one by SHAPE_SD_M, right or down, in each view independently.
-    """
-    n = len(B)
-    depth_m = posed.t @ view.packed_view[6:9] + view.packed_view[11]
-    sd_px = SHAPE_SD_M * np.array([view.K[0, 0], view.K[1, 1]]) / np.maximum(depth_m, 0.1)[:, None]  # (segments, 2)
-    rows = np.zeros((n, 2, n, 6))
-    rows[np.arange(n), :, np.arange(n)] = np.swapaxes(B[..., :2], 1, 2) * sd_px[..., None]
-    return rows.reshape(2 * n, n, 6)
-
-
-def _shape_error_px(view: ViewBuffers, posed: PosedBody) -> float:
-    """Return how many pixels of a view have their shape error in common."""
-    depth_m = max(float(posed.t[0] @ view.packed_view[6:9] + view.packed_view[11]), 0.1)
-    return float(view.K[0, 0] * view.K[1, 1]) * (_SHAPE_WIDTH_M / depth_m) ** 2
-
-
-def _window_around(pixels: NDArray[np.bool_], whole: Window) -> Window:
-    """Return the part of a window, with a rim, in which the blurred residual changes as some pixels (H, W) do."""
+def _window_around(pixels: NDArray[np.bool_], whole: Window, rim: int) -> Window:
+    """Return the part of a window around some pixels (H, W), with a rim [px]."""
     rows, columns = np.flatnonzero(pixels.any(axis=1)), np.flatnonzero(pixels.any(axis=0))
-    rim = 2 * RADIUS_PX + 1
     x0, x1 = max(int(columns[0]) - rim, whole.x0), min(int(columns[-1]) + rim + 1, whole.x1)
     y0, y1 = max(int(rows[0]) - rim, whole.y0), min(int(rows[-1]) + rim + 1, whole.y1)
     return Window(x0, y0, x1, y1)
