@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +54,15 @@ _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start 
 _CONVERGED, _CONVERGED_STIFF = 1 / 3, 1  # squared length of the last step, in sds, for each degree of freedom
 
 
+class ImageView(NamedTuple):
+    """A view's image, prepared for the comparison with a body."""
+
+    buffers: ViewBuffers
+    comparison: Comparison
+    noise_px: float  # how many pixels share their noise
+    shift_sds_px: Array  # (3,) of `shift_sds_px`
+
+
 @dataclass(frozen=True, slots=True)
 class Fit:
     """Where a fit ended."""
@@ -61,6 +71,7 @@ class Fit:
     dofs: DegreesOfFreedom
     equations: PoseEquations  # before the last step
     rms_light: float  # blurred residual, linear light 0..1
+    views: Sequence[ImageView]  # what was compared
 
     def objective(self, noise: float, prior: PosePrior | None) -> float:
         """Return minus the log-posterior before the last step, for a given variance of the noise."""
@@ -136,7 +147,8 @@ def fit_images(
 
     Of several starts, the one that ends in the best agreement with images and prior is returned.
     """
-    evaluate, correlated = image_evaluator(render_model, poses, regions, appearance, dofs=dofs)
+    views = image_views(render_model, regions, appearance)
+    evaluate, correlated = image_evaluator(render_model, poses, views, dofs=dofs)
     most_steps, converged = (_MOST_STEPS, _CONVERGED) if dofs.moves_joints else (_MOST_STEPS_STIFF, _CONVERGED_STIFF)
     ends = [
         descend_pose(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, tolerance=converged)
@@ -144,31 +156,29 @@ def fit_images(
     ]
     noise = min(equations.noise for _, equations in ends)
     pose, best = min(ends, key=lambda end: end[1].objective(noise, dofs.prior_cost(end[1].pose, prior)))
-    return Fit(pose, dofs, best, (best.noise / correlated) ** 0.5)
+    return Fit(pose, dofs, best, (best.noise / correlated) ** 0.5, views)
 
 
 def linearise_images(
     render_model: RenderModel, pose: Pose, regions: Sequence[Region], appearance: Appearance, *, dofs: DegreesOfFreedom
 ) -> PoseEquations:
     """Return the normal equations of the images at one pose, without moving it."""
-    evaluate, _ = image_evaluator(render_model, [pose], regions, appearance, dofs=dofs)
+    evaluate, _ = image_evaluator(render_model, [pose], image_views(render_model, regions, appearance), dofs=dofs)
     return evaluate(pose, True)
 
 
 def rises_without(
-    render_model: RenderModel, posed: PosedBody, others: Mapping[int, PosedBody], region: Region, appearance: Appearance
+    render_model: RenderModel, posed: PosedBody, others: Mapping[int, PosedBody], image: ImageView
 ) -> Array:
     """Return by how much minus the log-likelihood of one image rises as each of some segments is taken away: (k,).
 
     others: the same body without each segment. Light and noise are those of the whole body, and only the pixels around
     those that the segment covers are compared: no others change.
     """
-    comparison, rows_sigma_px = _comparison(render_model, region)
-    view, n = image_buffers(render_model, region, appearance).prepare(comparison), len(render_model.model.segments)
-    sums, blocks = Sums.zero(n), _blocks(view, n)
+    view, comparison, n = image.buffers, image.comparison, len(render_model.model.segments)
     args = render_model, posed, view, comparison
-    _, total, weight = _add_image_equations(*args, iterations=3, sums=sums, blocks=blocks)
-    noise = max(4 * np.pi * _FINE_SIGMA_PX * rows_sigma_px * total / weight, 1e-9) if weight > 0 else 1.0
+    _, total, weight = _add_image_equations(*args, iterations=3, sums=Sums.zero(n), blocks=_blocks(view, n))
+    noise = max(image.noise_px * total / weight, 1e-9) if weight > 0 else 1.0
     drawn, rises = view.maps.part, np.zeros(len(others))
     owner = np.where(drawn < 0, -1, render_model.segment_of_part[drawn])
     costs = _pixel_costs(*args)
@@ -182,35 +192,35 @@ def rises_without(
     return rises
 
 
+def image_views(render_model: RenderModel, regions: Sequence[Region], appearance: Appearance) -> list[ImageView]:
+    """Prepare the images of regions."""
+    clip = _CLIP if render_model.lights is None else _CLIP_LIT
+    views = []
+    for region in regions:
+        sigma_px = max(_FINE_SIGMA_PX * region.aspect, 0.5)  # along the columns
+        comparison = Comparison(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma_px), clip)
+        buffers = image_buffers(render_model, region, appearance).prepare(comparison)
+        views.append(ImageView(buffers, comparison, 4 * np.pi * _FINE_SIGMA_PX * sigma_px, shift_sds_px(region)))
+    return views
+
+
 def image_evaluator(
-    render_model: RenderModel,
-    poses: Sequence[Pose],
-    regions: Sequence[Region],
-    appearance: Appearance,
-    *,
-    dofs: DegreesOfFreedom,
+    render_model: RenderModel, poses: Sequence[Pose], views: Sequence[ImageView], *, dofs: DegreesOfFreedom
 ) -> tuple[Callable[[Pose, bool], PoseEquations], float]:
     """Return the normal equations as a function of poses near the given ones, and how many pixels share their noise.
 
     The function's second argument says whether the light is fitted for the first time.
     """
     bodies = [render_model.with_pose(pose) for pose in poses]
-    views, comparisons, rows_sigma_px, shifts = [], [], [], [shift_sds_px(region) for region in regions]
-    for region in regions:
-        view = image_buffers(render_model, region, appearance)
-        comparison, sigma_px = _comparison(render_model, region)
-        views.append(view.prepare(comparison))
-        comparisons.append(comparison)
-        rows_sigma_px.append(sigma_px)
-    empty_cost = sum(view.empty_cost for view in views)
-    correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px or [_FINE_SIGMA_PX]))
-    shape_px = [shape_error_px(view, bodies[0]) for view in views] if dofs.moves_joints else []
+    empty_cost = sum(view.buffers.empty_cost for view in views)
+    correlated = float(np.mean([view.noise_px for view in views] or [4 * np.pi * _FINE_SIGMA_PX**2]))
+    shape_px = [shape_error_px(view.buffers, bodies[0]) for view in views] if dofs.moves_joints else []
     shared = max(correlated, float(np.mean(shape_px or [0.0])))
 
     def evaluate(pose: Pose, is_first: bool) -> PoseEquations:
         posed, n = render_model.with_pose(pose), len(render_model.model.segments)
         sums, totals, blocks, shifted = Sums.zero(n), np.array([empty_cost, 0.0, 0.0]), [], []
-        for view, comparison, shift in zip(views, comparisons, shifts, strict=True):
+        for view, comparison, _, shift in views:
             sums.B[:] = 0
             blocks.append(_blocks(view, n))
             iterations = 3 if is_first else 1
@@ -266,13 +276,6 @@ def _pixel_costs(
     else:
         fill_costs_of_known_light(*args, *view.light, costs)
     return costs
-
-
-def _comparison(render_model: RenderModel, region: Region) -> tuple[Comparison, float]:
-    """Return how a region is compared, and the sd of the blur along its columns [px]."""
-    sigma_px = max(_FINE_SIGMA_PX * region.aspect, 0.5)
-    clip = _CLIP if render_model.lights is None else _CLIP_LIT
-    return Comparison(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma_px), clip), sigma_px
 
 
 def _window_around(pixels: NDArray[np.bool_], whole: Window, rim: int) -> Window:
