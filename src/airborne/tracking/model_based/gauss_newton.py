@@ -51,7 +51,7 @@ _PATCH = 8.0  # by this factor more pixels of a person are body, or not, togethe
 _OVERSTEP = 1.6  # robust weights and the refitted light make each step too short by about this factor
 _MOST_STEPS = 12  # at each level of a body with joints
 _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
-_CONVERGED, _CONVERGED_STIFF = 1 / 3, 1  # squared length of the last step, in sds, for each degree of freedom
+_CONVERGED, _CONVERGED_STIFF = 1 / 3, 1  # squared length of the last step, in sds, a degree of freedom; masks too
 
 
 class ImageView(NamedTuple):
