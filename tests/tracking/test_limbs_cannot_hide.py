@@ -5,6 +5,7 @@ import pytest
 
 from airborne.tracking.model_based.degrees_of_freedom import limbs_of
 from airborne.tracking.model_based.fitter import Fitter, LearnedRegions
+from airborne.tracking.model_based.gauss_newton import image_views
 from airborne.tracking.model_based.support import count_views, mark_unobserved, widen_unseen
 from airborne.tracking.model_based.uncovered import area_beside, find_uncovered_pixels
 from tests.support.people import HUMAN
@@ -57,7 +58,8 @@ def test_joints_of_a_limb_beside_which_something_stands_uncovered_are_worth_one_
 
 def test_views_show_the_limbs_of_the_true_pose(frame):
     regions, _ = frame.views(frame.truth)
-    counts = count_views(frame.render_model, frame.truth, regions, frame.appearance)
+    views = image_views(frame.render_model, regions, frame.appearance)
+    counts = count_views(frame.render_model, frame.truth, views)
     long = [NAMES.index(f"{name}_{side}") for name in ("thigh", "shank", "forearm") for side in ("left", "right")]
     assert np.all(counts[long] >= 2)
 
@@ -65,7 +67,8 @@ def test_views_show_the_limbs_of_the_true_pose(frame):
 def test_no_view_shows_a_forearm_where_there_is_none(frame):
     wrong = fold(frame.truth, "upper_arm_left", FOLDS["upper_arm_left"])
     regions, _ = frame.views(wrong)
-    counts = count_views(frame.render_model, wrong, regions, frame.appearance)
+    views = image_views(frame.render_model, regions, frame.appearance)
+    counts = count_views(frame.render_model, wrong, views)
     assert counts[NAMES.index("forearm_left")] < 2
 
 

@@ -154,7 +154,7 @@ def body_like(rgb: NDArray[np.uint8], part: NDArray[np.int16], colours: NDArray[
     return alike if np.count_nonzero(alike) > 0.1 * np.count_nonzero(inside) else inside
 
 
-def _chromaticity(rgb: NDArray) -> list[NDArray[np.float32]]:
+def _chromaticity(rgb: NDArray) -> list[NDArray[np.floating]]:
     """Return each channel's share of the sum of all three, which hardly depends on the light: 3 arrays (...)."""
     channels = [rgb[..., k].astype(np.float32) for k in range(3)]
     total = channels[0] + channels[1] + channels[2] + 1

@@ -19,12 +19,11 @@ _RATE_ROWS = 5  # rows before a gap whose mean angular rate is carried across it
 def matrix_from_angles(angles: Array) -> Array:
     """Build rotation matrices (..., 3, 3), body to world, from somersault, tilt, twist (..., 3) [rad]."""
     (cx, cy, cz), (sx, sy, sz) = (np.moveaxis(f(np.asarray(angles, float)), -1, 0) for f in (np.cos, np.sin))
-    rows = [
-        [cy * cz, -cy * sz, sy],
-        [cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, -sx * cy],
-        [sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    R = np.empty((*cx.shape, 3, 3))  # filled: stacking takes up to twice as long
+    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = cy * cz, -cy * sz, sy
+    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, -sx * cy
+    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy
+    return R
 
 
 def angles_from_matrix(R: Array) -> Array:

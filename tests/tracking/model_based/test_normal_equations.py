@@ -8,12 +8,21 @@ from scipy.ndimage import correlate1d, gaussian_filter
 
 from airborne.appearance.lighting import LIGHT_FROM_SRGB, LIGHT_TERMS, light_planes
 from airborne.body.chain import move_pose
+from airborne.rendering.lights import FLAT
 from airborne.rendering.maps import empty_maps
+from airborne.rendering.packing import pack_lights
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.blur import RADIUS_PX, blur_planes, gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, root_only
 from airborne.tracking.model_based.kernel_arguments import Comparison, Paint, Projection, Window
-from airborne.tracking.model_based.normal_equations import photometric_equations, prepare_rows, silhouette_equations
+from airborne.tracking.model_based.normal_equations import (
+    equations_of_known_light,
+    fill_costs,
+    fill_costs_of_known_light,
+    photometric_equations,
+    prepare_rows,
+    silhouette_equations,
+)
 from airborne.tracking.model_based.owners import REACH_PX, find_owners, mask_box
 from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers
 from airborne.tracking.model_based.twist_equations import Sums, new_blocks
@@ -116,6 +125,21 @@ class SingleView:
         args = render_model.body, view.projection(self.with_pose(pose)), view.observation, comparison, view.maps
         return photometric_equations(*args, paint, view.light, 0, Sums.zero(n), blocks)[0]
 
+    def costs_by_pixel(self, view, comparison, pose):
+        """Each pixel's robust squared residual, and the equations' cost: in the fitted light, then an even one."""
+        render_model, n = self._render_model, len(self._render_model.model.segments)
+        lamps, ambient = pack_lights(FLAT, self._region.camera), np.float32(FLAT.ambient)
+        args = render_model.body, view.projection(self.with_pose(pose)), view.observation, comparison
+        equal_light, sums = (render_model.is_faceted, lamps, ambient), (Sums.zero(n), self._blocks())
+        expected = [
+            self.cost(view, comparison, pose),
+            equations_of_known_light(*args, view.maps, *equal_light, *sums)[0],
+        ]
+        costs = np.empty((2, *view.maps.part.shape), np.float32)
+        fill_costs(*args, view.maps, Paint(render_model.albedo, render_model.is_faceted), view.light, costs[0])
+        fill_costs_of_known_light(*args, lamps, ambient, costs[1])
+        return costs, expected
+
     def silhouette(self, pose):
         """The equations against the true mask, as probabilities."""
         mask = (self._render_model.draw_parts(self.with_pose(self.truth), self._region) >= 0).astype(np.float32)
@@ -212,6 +236,13 @@ def test_part_of_a_view_around_the_body_tells_poses_apart_as_the_whole_does(sing
     assert box != tuple(view.whole)
     part = view.crop(Window(*map(int, box)))
     np.testing.assert_allclose([single_view.cost(part, comparison, pose) for pose in poses], whole, rtol=1e-3)
+
+
+def test_costs_of_pixels_sum_to_the_cost_of_the_equations(single_view):
+    view, comparison = single_view.view()
+    pose = single_view.moved(offsets(1, 4.0, seed=4)[0])
+    got, expected = single_view.costs_by_pixel(view, comparison, pose)
+    assert [costs.sum() - view.empty_cost for costs in got] == pytest.approx(expected, rel=1e-3)
 
 
 def test_large_residuals_weigh_less(single_view):

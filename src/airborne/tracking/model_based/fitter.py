@@ -26,6 +26,7 @@ from airborne.tracking.model_based.gauss_newton import (
     fit_images,
     fit_silhouettes,
     image_evaluator,
+    image_views,
 )
 from airborne.tracking.model_based.global_search import region_evidence
 from airborne.tracking.model_based.learning import learn_missing_backgrounds
@@ -136,8 +137,8 @@ class Fitter:
     def weigh(self, poses: Sequence[Pose], learned: LearnedRegions) -> Array:
         """Return minus the log-likelihood of the images in each pose, by the noise of the best one: (n,) [nat]."""
         appearance = self._complete(poses[0], learned)
-        args = self.render_model, poses, learned.regions, appearance
-        evaluate, _ = image_evaluator(*args, dofs=self.stages[-1])
+        views = image_views(self.render_model, learned.regions, appearance)
+        evaluate, _ = image_evaluator(self.render_model, poses, views, dofs=self.stages[-1])
         equations = [evaluate(pose, True) for pose in poses]
         noise = min(each.noise for each in equations)
         return np.array([each.objective(noise, 0.0) for each in equations])
@@ -154,7 +155,7 @@ class Fitter:
         """Judge a fit as it is."""
         misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
         segments = tuple(int(segment) for limb in misplaced for segment in limb)
-        n_views_of = count_views(self.render_model, fit.pose, learned.regions, self._complete(fit.pose, learned))
+        n_views_of = count_views(self.render_model, fit.pose, fit.views)
         for limb in self._limbs_beside_uncovered(fit.pose, learned):  # it may be there: no better than one view
             n_views_of[limb] = np.minimum(n_views_of[limb], 1)
         return JudgedFit(fit, replace(self.agreement(fit.pose, learned), misplaced=segments, n_views_of=n_views_of))

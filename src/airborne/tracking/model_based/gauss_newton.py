@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, P
 from airborne.tracking.model_based.kernel_arguments import Comparison, Paint, Window
 from airborne.tracking.model_based.normal_equations import (
     equations_of_known_light,
+    fill_costs,
+    fill_costs_of_known_light,
     photometric_equations,
     silhouette_equations,
 )
@@ -31,6 +34,7 @@ from airborne.tracking.model_based.render_model import (
     shift_sds_px,
     silhouette_buffers,
 )
+from airborne.tracking.model_based.shape_error import shape_error_gradients, shape_error_px
 from airborne.tracking.model_based.twist_equations import Sums, new_blocks
 from airborne.types import Array
 
@@ -43,13 +47,20 @@ _FINE_SIGMA_PX = 1.2  # of a full frame
 _CLIP = 0.1  # linear light, 0..1: a residual this large has a quarter of the weight
 _CLIP_LIT = 0.5  # the same under known lights, where no shadow or highlight has to be left out
 _CLIP_MASK = 0.5  # the same, of a mask
-_PATCH = 8.0  # by this factor more pixels of a person are taken for body, or not, together; chosen as _SHAPE_WIDTH_M
+_PATCH = 8.0  # by this factor more pixels of a person are body, or not, together; chosen as `shape_error`'s width
 _OVERSTEP = 1.6  # robust weights and the refitted light make each step too short by about this factor
 _MOST_STEPS = 12  # at each level of a body with joints
 _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
-_CONVERGED, _CONVERGED_STIFF = 1 / 3, 1  # squared length of the last step, in sds, for each degree of freedom
-SHAPE_SD_M = 0.007  # model error: how far a person's segment lies from the ellipsoid that fits its image
-_SHAPE_WIDTH_M = 0.075  # along which that error is the same; chosen on synthetic somersaults
+_CONVERGED, _CONVERGED_STIFF = 1 / 3, 1  # squared length of the last step, in sds, a degree of freedom; masks too
+
+
+class ImageView(NamedTuple):
+    """A view's image, prepared for the comparison with a body."""
+
+    buffers: ViewBuffers
+    comparison: Comparison
+    noise_px: float  # how many pixels share their noise
+    shift_sds_px: Array  # (3,) of `shift_sds_px`
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +71,7 @@ class Fit:
     dofs: DegreesOfFreedom
     equations: PoseEquations  # before the last step
     rms_light: float  # blurred residual, linear light 0..1
+    views: Sequence[ImageView]  # what was compared
 
     def objective(self, noise: float, prior: PosePrior | None) -> float:
         """Return minus the log-posterior before the last step, for a given variance of the noise."""
@@ -135,7 +147,8 @@ def fit_images(
 
     Of several starts, the one that ends in the best agreement with images and prior is returned.
     """
-    evaluate, correlated = image_evaluator(render_model, poses, regions, appearance, dofs=dofs)
+    views = image_views(render_model, regions, appearance)
+    evaluate, correlated = image_evaluator(render_model, poses, views, dofs=dofs)
     most_steps, converged = (_MOST_STEPS, _CONVERGED) if dofs.moves_joints else (_MOST_STEPS_STIFF, _CONVERGED_STIFF)
     ends = [
         descend_pose(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, tolerance=converged)
@@ -143,74 +156,71 @@ def fit_images(
     ]
     noise = min(equations.noise for _, equations in ends)
     pose, best = min(ends, key=lambda end: end[1].objective(noise, dofs.prior_cost(end[1].pose, prior)))
-    return Fit(pose, dofs, best, (best.noise / correlated) ** 0.5)
+    return Fit(pose, dofs, best, (best.noise / correlated) ** 0.5, views)
 
 
 def linearise_images(
     render_model: RenderModel, pose: Pose, regions: Sequence[Region], appearance: Appearance, *, dofs: DegreesOfFreedom
 ) -> PoseEquations:
     """Return the normal equations of the images at one pose, without moving it."""
-    evaluate, _ = image_evaluator(render_model, [pose], regions, appearance, dofs=dofs)
+    evaluate, _ = image_evaluator(render_model, [pose], image_views(render_model, regions, appearance), dofs=dofs)
     return evaluate(pose, True)
 
 
 def rises_without(
-    render_model: RenderModel, posed: PosedBody, others: Mapping[int, PosedBody], region: Region, appearance: Appearance
+    render_model: RenderModel, posed: PosedBody, others: Mapping[int, PosedBody], image: ImageView
 ) -> Array:
     """Return by how much minus the log-likelihood of one image rises as each of some segments is taken away: (k,).
 
     others: the same body without each segment. Light and noise are those of the whole body, and only the pixels around
     those that the segment covers are compared: no others change.
     """
-    view, n = image_buffers(render_model, region, appearance), len(render_model.model.segments)
-    rises = np.zeros(len(others))
-    comparison, rows_sigma_px = _comparison(render_model, region)
-    view = view.prepare(comparison)
-
-    def totals(posed: PosedBody, view: ViewBuffers, iterations: int) -> Array:
-        args = render_model, posed, view, comparison
-        return _add_image_equations(*args, iterations=iterations, sums=Sums.zero(n), blocks=_blocks(view, n))
-
-    _, total, weight = totals(posed, view, 3)
-    noise = max(4 * np.pi * _FINE_SIGMA_PX * rows_sigma_px * total / weight, 1e-9) if weight > 0 else 1.0
-    drawn = view.maps.part
+    view, comparison, n = image.buffers, image.comparison, len(render_model.model.segments)
+    args = render_model, posed, view, comparison
+    _, total, weight = _add_image_equations(*args, iterations=3, sums=Sums.zero(n), blocks=_blocks(view, n))
+    noise = max(image.noise_px * total / weight, 1e-9) if weight > 0 else 1.0
+    drawn, rises = view.maps.part, np.zeros(len(others))
     owner = np.where(drawn < 0, -1, render_model.segment_of_part[drawn])
+    costs = _pixel_costs(*args)
     for k, (segment, other) in enumerate(others.items()):
         if (owner == segment).any():
-            part = view.crop(_window_around(owner == segment, view.whole))
-            rises[k] = 0.5 * (totals(other, part, 0)[0] - totals(posed, part, 0)[0]) / noise
+            drawn, changed = (_window_around(owner == segment, view.whole, n_px) for n_px in (2 * RADIUS_PX, RADIUS_PX))
+            without = _pixel_costs(render_model, other, view.crop(drawn), comparison)
+            x0, y0, x1, y1 = changed
+            part = without[y0 - drawn.y0 : y1 - drawn.y0, x0 - drawn.x0 : x1 - drawn.x0]
+            rises[k] = 0.5 * float((part - costs[y0:y1, x0:x1]).sum()) / noise
     return rises
 
 
+def image_views(render_model: RenderModel, regions: Sequence[Region], appearance: Appearance) -> list[ImageView]:
+    """Prepare the images of regions."""
+    clip = _CLIP if render_model.lights is None else _CLIP_LIT
+    views = []
+    for region in regions:
+        sigma_px = max(_FINE_SIGMA_PX * region.aspect, 0.5)  # along the columns
+        comparison = Comparison(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma_px), clip)
+        buffers = image_buffers(render_model, region, appearance).prepare(comparison)
+        views.append(ImageView(buffers, comparison, 4 * np.pi * _FINE_SIGMA_PX * sigma_px, shift_sds_px(region)))
+    return views
+
+
 def image_evaluator(
-    render_model: RenderModel,
-    poses: Sequence[Pose],
-    regions: Sequence[Region],
-    appearance: Appearance,
-    *,
-    dofs: DegreesOfFreedom,
+    render_model: RenderModel, poses: Sequence[Pose], views: Sequence[ImageView], *, dofs: DegreesOfFreedom
 ) -> tuple[Callable[[Pose, bool], PoseEquations], float]:
     """Return the normal equations as a function of poses near the given ones, and how many pixels share their noise.
 
     The function's second argument says whether the light is fitted for the first time.
     """
     bodies = [render_model.with_pose(pose) for pose in poses]
-    views, comparisons, rows_sigma_px, shifts = [], [], [], [shift_sds_px(region) for region in regions]
-    for region in regions:
-        view = image_buffers(render_model, region, appearance)
-        comparison, sigma_px = _comparison(render_model, region)
-        views.append(view.prepare(comparison))
-        comparisons.append(comparison)
-        rows_sigma_px.append(sigma_px)
-    empty_cost = sum(view.empty_cost for view in views)
-    correlated = 4 * np.pi * _FINE_SIGMA_PX * float(np.mean(rows_sigma_px or [_FINE_SIGMA_PX]))
-    shape_px = [_shape_error_px(view, bodies[0]) for view in views] if dofs.moves_joints else []
+    empty_cost = sum(view.buffers.empty_cost for view in views)
+    correlated = float(np.mean([view.noise_px for view in views] or [4 * np.pi * _FINE_SIGMA_PX**2]))
+    shape_px = [shape_error_px(view.buffers, bodies[0]) for view in views] if dofs.moves_joints else []
     shared = max(correlated, float(np.mean(shape_px or [0.0])))
 
     def evaluate(pose: Pose, is_first: bool) -> PoseEquations:
         posed, n = render_model.with_pose(pose), len(render_model.model.segments)
         sums, totals, blocks, shifted = Sums.zero(n), np.array([empty_cost, 0.0, 0.0]), [], []
-        for view, comparison, shift in zip(views, comparisons, shifts, strict=True):
+        for view, comparison, _, shift in views:
             sums.B[:] = 0
             blocks.append(_blocks(view, n))
             iterations = 3 if is_first else 1
@@ -219,7 +229,7 @@ def image_evaluator(
             )
             shifted.append((sums.B * shift).transpose(2, 0, 1))
             if dofs.moves_joints:
-                shifted.append(_shape_error_gradients(sums.B, posed, view))
+                shifted.append(shape_error_gradients(sums.B, posed, view))
         return map_to_dofs(
             render_model,
             dofs,
@@ -255,36 +265,22 @@ def _add_image_equations(
     return np.array(equations_of_known_light(*args, render_model.is_faceted, lamps, ambient, sums, blocks))
 
 
-def _comparison(render_model: RenderModel, region: Region) -> tuple[Comparison, float]:
-    """Return how a region is compared, and the sd of the blur along its columns [px]."""
-    sigma_px = max(_FINE_SIGMA_PX * region.aspect, 0.5)
-    clip = _CLIP if render_model.lights is None else _CLIP_LIT
-    return Comparison(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma_px), clip), sigma_px
+def _pixel_costs(
+    render_model: RenderModel, posed: PosedBody, view: ViewBuffers, comparison: Comparison
+) -> NDArray[np.float32]:
+    """Return the robust squared residual of each pixel of a view (h, w), in the light that was fitted or is known."""
+    costs = np.empty(view.maps.part.shape, np.float32)
+    args = render_model.body, view.projection(posed), view.observation, comparison
+    if render_model.lights is None:
+        fill_costs(*args, view.maps, Paint(render_model.albedo, render_model.is_faceted), view.light, costs)
+    else:
+        fill_costs_of_known_light(*args, *view.light, costs)
+    return costs
 
 
-def _shape_error_gradients(B: Array, posed: PosedBody, view: ViewBuffers) -> Array:
-    """Return the gradients' error because a person's segments are not ellipsoids: (2 segments, segments, 6).
-
-    Each segment's image may lie beside the rendered one by SHAPE_SD_M, right or down, in each view independently.
-    """
-    n = len(B)
-    depth_m = posed.t @ view.packed_view[6:9] + view.packed_view[11]
-    sd_px = SHAPE_SD_M * np.array([view.K[0, 0], view.K[1, 1]]) / np.maximum(depth_m, 0.1)[:, None]  # (segments, 2)
-    rows = np.zeros((n, 2, n, 6))
-    rows[np.arange(n), :, np.arange(n)] = np.swapaxes(B[..., :2], 1, 2) * sd_px[..., None]
-    return rows.reshape(2 * n, n, 6)
-
-
-def _shape_error_px(view: ViewBuffers, posed: PosedBody) -> float:
-    """Return how many pixels of a view have their shape error in common."""
-    depth_m = max(float(posed.t[0] @ view.packed_view[6:9] + view.packed_view[11]), 0.1)
-    return float(view.K[0, 0] * view.K[1, 1]) * (_SHAPE_WIDTH_M / depth_m) ** 2
-
-
-def _window_around(pixels: NDArray[np.bool_], whole: Window) -> Window:
-    """Return the part of a window, with a rim, in which the blurred residual changes as some pixels (H, W) do."""
+def _window_around(pixels: NDArray[np.bool_], whole: Window, rim: int) -> Window:
+    """Return the part of a window around some pixels (H, W), with a rim [px]."""
     rows, columns = np.flatnonzero(pixels.any(axis=1)), np.flatnonzero(pixels.any(axis=0))
-    rim = 2 * RADIUS_PX + 1
     x0, x1 = max(int(columns[0]) - rim, whole.x0), min(int(columns[-1]) + rim + 1, whole.x1)
     y0, y1 = max(int(rows[0]) - rim, whole.y0), min(int(rows[-1]) + rim + 1, whole.y1)
     return Window(x0, y0, x1, y1)

@@ -76,6 +76,8 @@ def search_limb(
 
 def limb_distance(model: BodyModel, pose: Pose, other: Pose, limb: NDArray[np.int64]) -> float:
     """Return how far apart a limb's joints and landmarks are in two poses, at most [m]."""
+    if pose is other:
+        return 0.0
     is_mark = np.isin([model.index_of(landmark.segment) for landmark in model.landmarks], limb)
     bodies = [model.with_pose(each) for each in (pose, other)]
     points = [np.concatenate([body.t[limb], body.landmarks[is_mark]]) for body in bodies]

@@ -86,8 +86,54 @@ def photometric_equations(body, projection, observation, comparison, maps, paint
 def equations_of_known_light(body, projection, observation, comparison, maps, is_faceted, lamps, ambient, sums, blocks):
     """Add one view's equations under known lights, in shares of full sRGB; lamps (l, 8), ambient as in `draw_maps`."""
     owner, nearness = _draw(body, projection, maps)
-    h, w = maps.part.shape
-    part, segment = np.empty((h, w), np.int16), np.empty((h, w), np.int16)
+    _, lit = _light_by_lamps(body, projection, lamps, ambient, *maps.part.shape)
+    return _sum_equations(lit, is_faceted, maps, owner, nearness, projection, observation, comparison, sums, blocks)
+
+
+@kernel(fastmath=True)
+def fill_costs(body, projection, observation, comparison, maps, paint, light, costs):
+    """Fill costs (H, W) with the robust squared residual of each pixel, in the light that was fitted (3, LIGHT_TERMS).
+
+    The residual is that of `photometric_equations`, but for the image's border.
+    """
+    R, t, view = projection.R, projection.t, projection.packed_view
+    surface_maps(body.shapes, body.geometry, R, t, view, maps.part, maps.inverse_depth, maps.normals)
+    lit = np.empty(maps.normals.shape, np.float32)
+    shade_body(maps.part, maps.normals, paint.albedo, light, 0, 0, lit)
+    _fill_costs(lit, maps.part, observation, comparison, costs)
+
+
+@kernel(fastmath=True)
+def fill_costs_of_known_light(body, projection, observation, comparison, lamps, ambient, costs):
+    """Fill costs (H, W) with the robust squared residual of each pixel, as `equations_of_known_light` has it."""
+    part, lit = _light_by_lamps(body, projection, lamps, ambient, *costs.shape)
+    _fill_costs(lit, part, observation, comparison, costs)
+
+
+@kernel(fastmath=True)
+def _fill_costs(lit, part, observation, comparison, costs):
+    c, h, w = lit.shape
+    change, blurred = np.empty(lit.shape, np.float32), np.empty(lit.shape, np.float32)
+    for k in range(c):
+        for y in range(h):
+            for x in range(w):
+                is_body = part[y, x] >= 0
+                change[k, y, x] = lit[k, y, x] - observation.background[k, y, x] if is_body else np.float32(0)
+    blur_planes(change, comparison.taps_u, comparison.taps_v, blurred)
+    inverse_clip2 = np.float32(1 / comparison.clip**2)
+    for y in range(h):
+        row = observation.rows[y]
+        for x in range(w):
+            square = np.float32(0)
+            for k in range(c):
+                square += (row[k, x] - blurred[k, y, x]) ** 2
+            costs[y, x] = row[2 * c, x] * square / (np.float32(1) + square * inverse_clip2)
+
+
+@kernel(fastmath=True)
+def _light_by_lamps(body, projection, lamps, ambient, h, w):
+    """Draw a view under known lights; return the map of parts (h, w) and the body's colours (3, h, w), full being 1."""
+    part, segment = np.full((h, w), -1, np.int16), np.empty((h, w), np.int16)
     inverse_depth, colour = np.empty((h, w), np.float32), np.zeros((h, w, 3), np.float32)
     R, t, view = projection.R, projection.t, projection.packed_view
     draw_maps(body.shapes, body.geometry, R, t, view, lamps, ambient, part, segment, inverse_depth, colour)
@@ -96,7 +142,7 @@ def equations_of_known_light(body, projection, observation, comparison, maps, is
         for y in range(h):
             for x in range(w):
                 lit[k, y, x] = min(colour[y, x, k] * np.float32(1 / 255), np.float32(1))
-    return _sum_equations(lit, is_faceted, maps, owner, nearness, projection, observation, comparison, sums, blocks)
+    return part, lit
 
 
 @kernel(fastmath=True)

@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.appearance.model import Appearance, Region
 from airborne.body import BodyModel, Pose, PosedBody
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
-from airborne.tracking.model_based.gauss_newton import rises_without
+from airborne.tracking.model_based.gauss_newton import ImageView, rises_without
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
@@ -20,22 +19,21 @@ _STRONG_NATS = 3.0  # a view shows a segment where it is 20 times likelier with 
 _ONE_VIEW_SD_M = 0.1  # of the far end of a segment that one view alone shows
 
 
-def count_views(
-    render_model: RenderModel, pose: Pose, regions: Sequence[Region], appearance: Appearance
-) -> NDArray[np.int64]:
+def count_views(render_model: RenderModel, pose: Pose, views: Sequence[ImageView]) -> NDArray[np.int64]:
     """Count the views that show each segment: (segments,); those of the trunk are shown by all.
 
     A view shows a segment if the image is clearly less likely without it: there the background is seen, or another
     segment behind, of perhaps the same colour.
     """
     posed, segments = render_model.with_pose(pose), np.flatnonzero(limb_of_segment(render_model.model) >= 0)
-    counts = np.full(len(posed.R), len(regions))
+    counts = np.full(len(posed.R), len(views))
     counts[segments] = 0
-    for region in regions:
-        R, t = region.packed_view[:9].reshape(3, 3), region.packed_view[9:12]
+    for view in views:
+        packed = view.buffers.packed_view
+        R, t = packed[:9].reshape(3, 3), packed[9:12]
         behind = -R.T @ t - _BEHIND_M * R[2]
         others = {int(segment): _without(posed, int(segment), behind) for segment in segments}
-        counts[segments] += rises_without(render_model, posed, others, region, appearance) > _STRONG_NATS
+        counts[segments] += rises_without(render_model, posed, others, view) > _STRONG_NATS
     return counts
 
 
