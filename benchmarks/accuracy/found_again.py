@@ -1,7 +1,7 @@
 """Measure how often players out of sight for a second are found again: `python benchmarks/accuracy/found_again.py`.
 
 30 synthetic blocks of two blockers, dressed as their team-mates are; in half of the scenes both leave, in the others
-one (about 12 minutes of CPU); `--quick` takes 2, `--seeds 6100-6109` others, and neither writes rows. Right is a mean
+one (about 35 minutes of CPU); `--quick` takes 2, `--seeds 6100-6109` others, and neither writes rows. Right is a mean
 error of the legs up to 80 mm at the end, 0.7 s after the return; wrong is who is said to be 0.3 m elsewhere.
 """
 
@@ -28,7 +28,7 @@ from airborne.tracking.players import PlayerStart
 
 _RIGHT_M, _ELSEWHERE_M = 0.08, 0.3  # mean errors of the legs
 _RATE, _N_FRAMES = 30, 66
-_LEAVES, _RETURNS, _WHILE_AWAY = 12, 45, 1
+_LEAVES, _RETURNS = 12, 45  # frames
 
 
 def verdict(seed: int) -> tuple[str, float]:
@@ -38,7 +38,7 @@ def verdict(seed: int) -> tuple[str, float]:
     without = replace(scene, players=tuple(player for player in scene.players if player not in away))
     frames = chain(
         block_frames(scene, range(_LEAVES)),
-        block_frames(without, range(_LEAVES, _RETURNS, _WHILE_AWAY)),
+        block_frames(without, range(_LEAVES, _RETURNS)),
         block_frames(scene, range(_RETURNS, _N_FRAMES)),
     )
     given = {name: joints for name, joints in noisy_starts(scene).items() if "hip_left" in joints}
