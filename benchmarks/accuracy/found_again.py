@@ -2,7 +2,8 @@
 
 30 synthetic blocks of two blockers, dressed as their team-mates are; in half of the scenes both leave, in the others
 one (about 35 minutes of CPU); `--quick` takes 2, `--seeds 6100-6109` others, and neither writes rows. Right is a mean
-error of the legs up to 80 mm at the end, 0.7 s after the return; wrong is who is said to be 0.3 m elsewhere.
+error of the legs up to 80 mm at the end, 0.7 s after the return, of those who left; wrong is anybody who is said to be
+0.3 m elsewhere.
 """
 
 from __future__ import annotations
@@ -55,9 +56,8 @@ def verdict(seed: int) -> tuple[str, float]:
         truth = np.array([joints[joint][0] for joint in tracker.joints[:8]])
         off_m = float(np.linalg.norm(estimate.points[:8] - truth, axis=1).mean())
         is_lost = estimate.status is Status.LOST
-        words.append(
-            "undecided" if is_lost else "right" if off_m <= _RIGHT_M else "wrong" if off_m > _ELSEWHERE_M else "off"
-        )
+        is_near = off_m <= (_RIGHT_M if player in away else _ELSEWHERE_M)
+        words.append("undecided" if is_lost else "right" if is_near else "wrong" if off_m > _ELSEWHERE_M else "off")
         print(f"{scene.name}, {player.name}: {words[-1]}, {1e3 * off_m:.0f} mm off, {cpu_s:.1f} s; {notes}", flush=True)
     worst = next((word for word in ("wrong", "undecided", "off") if word in words), "right")
     return worst, cpu_s
