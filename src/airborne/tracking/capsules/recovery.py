@@ -71,9 +71,10 @@ def find_again(lost: Mapping[str, Track], seen: Sequence[Array], frames: Frames)
     nats = np.array([_place_nats(track.state[:2], track.lost_s, floor_m, now_s) for track in lost.values()])
     claimed = _claim(of_known, nats)
     nats[:, list(claimed)] = -np.inf
+    nats[nats < -_MOST_NATS] = -np.inf
     fits = {}
     for i, track in enumerate(lost.values()):
-        for j in np.flatnonzero(nats[i] > -_MOST_NATS):
+        for j in np.flatnonzero(np.isfinite(nats[i])):
             fits[i, j] = _fit(track, standers[j], frames)
             nats[i, j] += _colour_nats(track, fits[i, j])
     probability = identity_probabilities(nats)
@@ -124,13 +125,13 @@ def _claim(bystanders: Array, lost: Array) -> dict[int, int]:
 def identity_probabilities(nats: Array) -> Array:
     """Return the probability (lost, standers) that a lost player is a stander: nats (lost, standers), 0 nats for none.
 
-    No two lost players are the same stander.
+    No two lost players are the same stander; -inf nats: impossible.
     """
-    n_lost, n_standers = nats.shape
-    choices = [chosen for chosen in product(range(-1, n_standers), repeat=n_lost) if _are_different(chosen)]
+    options = ([-1, *np.flatnonzero(np.isfinite(row))] for row in nats)
+    choices = [chosen for chosen in product(*options) if _are_different(chosen)]
     scores = np.array([sum(nats[i, j] for i, j in enumerate(chosen) if j >= 0) for chosen in choices])
     weights = np.exp(scores - scores.max())
-    probability = np.zeros((n_lost, n_standers))
+    probability = np.zeros(nats.shape)
     for chosen, weight in zip(choices, weights / weights.sum(), strict=True):
         for i, j in enumerate(chosen):
             if j >= 0:
