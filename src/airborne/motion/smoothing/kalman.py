@@ -92,7 +92,7 @@ def maximum_likelihood(time_s: Array, values: Array, noise: MeasurementNoise) ->
 
     Rows that are not observed in all directions only count where there are hardly others.
     """
-    observed = np.where(noise.unobserved.any(axis=1)[:, None], np.nan, values)
+    observed = np.where(np.any(noise.unobserved, axis=1, keepdims=True), np.nan, values)
     values = observed if finite_rows(observed).sum() >= MIN_FRAMES else values
     n_values = max(int(np.isfinite(values).sum()) - 3 * values.shape[1], 1)  # less what the weak first state takes
 
@@ -166,9 +166,10 @@ def kalman_filter(model: StateSpaceModel, values: Array) -> FilterResult:
     H = np.linalg.solve(root, model.H)
     white = np.linalg.solve(root, values[..., None])[..., 0]
     is_measured = finite_rows(values)
-    *states, squares, logs = _filter_kernel(model.F, model.Q, H, white, is_measured, model.mean, model.P)
+    results = _filter_kernel(model.F, model.Q, H, white, is_measured, model.mean, model.P)
+    before, P_before, mean, P, squares, logs = results
     whitened = 2 * np.log(np.diagonal(root, axis1=1, axis2=2)[is_measured]).sum()
-    return FilterResult(*states, float(squares), float(logs + whitened))
+    return FilterResult(before, P_before, mean, P, float(squares), float(logs + whitened))
 
 
 @kernel

@@ -33,7 +33,7 @@ _FARTHEST_M = 4.0  # from where a player was lost, along and across
 _LEAST_SUPPORT = 1.1  # [nat m2] of somebody, see `tracking.first_pose.players`
 _MOST_POSES = 3  # of each that are tried
 # of a player's usual evidence, what is as likely another's, and its logistic scale; chosen on synthetic blocks 6100 to
-# 6107: players themselves have 0.65 or more, team-mates in the same dress 0.1 to 0.4 less, opponents less than zero
+# 6102: players themselves have 0.65 or more, team-mates in the same dress 0.1 to 0.4 less, opponents less than zero
 _LIKENESS, _LIKENESS_SD = 0.6, 0.15
 _PLACE_SD_M, _SPEED_SD_M_S, _MOST_SD_M = 0.3, 1.0, 2.0  # how far people are from where they were, chosen by hand
 _NEWCOMERS_PER_M2 = 0.001  # that a look shows: one in ten looks over 8 m x 8 m has one, and half of those lost are back
@@ -53,7 +53,7 @@ def is_due(track: Track, time_s: Fraction) -> bool:
     return time_s - track.searched_s >= max(_EVERY_S, (track.searched_s - track.lost_s) / _RARER)
 
 
-class Look(NamedTuple):
+class Recovery(NamedTuple):
     """What a look for lost players shows."""
 
     fits: dict[str, JumperFit]  # of those who are found
@@ -61,41 +61,32 @@ class Look(NamedTuple):
     bystanders: tuple[Bystander, ...]
 
 
-def find_again(lost: Mapping[str, Track], seen: Sequence[Array], frames: Frames) -> Look:
+def find_again(lost: Mapping[str, Track], seen: Sequence[Array], frames: Frames) -> Recovery:
     """Look for lost players among those who stand there, without those who are `seen`, states (35,)."""
     places = np.array([track.state[:2] for track in lost.values()])
     zone = np.array([places.min(axis=0) - _FARTHEST_M, places.max(axis=0) + _FARTHEST_M])
-    known = _bystanders(lost, zone)
-    standers = _standers(frames, seen, zone)
+    known, standers, now_s = _bystanders(lost, zone), _standers(frames, seen, zone), frames.time_s
     floor_m = np.array([stander.floor_m for stander in standers]).reshape(-1, 2)
-    places_nats = np.array([_place_nats(place, since_s, floor_m, frames.time_s) for place, since_s in known])
-    lost_nats = np.array(
-        [_place_nats(track.state[:2], track.lost_s, floor_m, frames.time_s) for track in lost.values()]
-    )
-    others = _claim(places_nats.reshape(len(known), len(standers)), lost_nats)
-    nats, fits = np.full(lost_nats.shape, -np.inf), {}
+    of_known = np.array([_place_nats(*each, floor_m, now_s) for each in known]).reshape(len(known), len(standers))
+    nats = np.array([_place_nats(track.state[:2], track.lost_s, floor_m, now_s) for track in lost.values()])
+    claimed = _claim(of_known, nats)
+    nats[:, list(claimed)] = -np.inf
+    nats[nats < -_MOST_NATS] = -np.inf
+    fits = {}
     for i, track in enumerate(lost.values()):
-        for j in set(range(len(standers))) - set(others):
-            if lost_nats[i, j] > -_MOST_NATS:
-                fits[i, j] = _fit(track, standers[j], frames)
-                nats[i, j] = lost_nats[i, j] + _colour_nats(track, fits[i, j])
+        for j in np.flatnonzero(np.isfinite(nats[i])):
+            fits[i, j] = _fit(track, standers[j], frames)
+            nats[i, j] += _colour_nats(track, fits[i, j])
     probability = identity_probabilities(nats)
-    found, unclear, taken = {}, set(), set()
+    found, unclear, is_other = {}, set(), probability.sum(axis=0) < _BYSTANDER
     for i, name in enumerate(lost):
         if len(standers) and probability[i].max() >= _LEAST_PROBABILITY:
-            best = int(probability[i].argmax())
-            found[name] = fits[i, best]
-            taken.add(best)
+            found[name] = fits[i, int(probability[i].argmax())]
         elif probability[i].sum() >= _LEAST_PROBABILITY:
             unclear.add(name)
-    now = [
-        Bystander(place, frames.time_s)
-        for j, place in enumerate(floor_m)
-        if j not in taken and probability[:, j].sum() < _BYSTANDER
-    ]
-    unseen = [each for k, each in enumerate(known) if k not in others.values()]
-    kept = [each for each in unseen if frames.time_s - each.time_s < _REMEMBERED_S]
-    return Look(found, unclear, (*now, *kept))
+    now = [Bystander(place, now_s) for place in floor_m[is_other]]
+    unseen = [each for k, each in enumerate(known) if k not in claimed.values()]
+    return Recovery(found, unclear, (*now, *(each for each in unseen if now_s - each.time_s < _REMEMBERED_S)))
 
 
 def _standers(frames: Frames, seen: Sequence[Array], zone: Array) -> list[Stander]:
@@ -134,13 +125,13 @@ def _claim(bystanders: Array, lost: Array) -> dict[int, int]:
 def identity_probabilities(nats: Array) -> Array:
     """Return the probability (lost, standers) that a lost player is a stander: nats (lost, standers), 0 nats for none.
 
-    No two lost players are the same stander.
+    No two lost players are the same stander; -inf nats: impossible.
     """
-    n_lost, n_standers = nats.shape
-    choices = [chosen for chosen in product(range(-1, n_standers), repeat=n_lost) if _are_different(chosen)]
+    options = ([-1, *np.flatnonzero(np.isfinite(row))] for row in nats)
+    choices = [chosen for chosen in product(*options) if _are_different(chosen)]
     scores = np.array([sum(nats[i, j] for i, j in enumerate(chosen) if j >= 0) for chosen in choices])
     weights = np.exp(scores - scores.max())
-    probability = np.zeros((n_lost, n_standers))
+    probability = np.zeros(nats.shape)
     for chosen, weight in zip(choices, weights / weights.sum(), strict=True):
         for i, j in enumerate(chosen):
             if j >= 0:

@@ -70,9 +70,8 @@ class Blocker:
         expected = {name: _predict_track(track, frames.time_s) for name, track in state.items()}
         tracks, estimates = {}, []
         for name, track in state.items():
-            occluders = occluding_capsules(
-                expected[name][1], [each for other, (_, each) in expected.items() if other != name]
-            )
+            others = [each for other, (_, each) in expected.items() if other != name and state[other].lost_s is None]
+            occluders = occluding_capsules(expected[name][1], others)
             tracks[name], estimate = _track_player(name, track, frames, predicted=expected[name], occluders=occluders)
             estimates.append(estimate)
         return self._look_for_lost(tracks, {each.player: each for each in estimates}, frames)

@@ -92,9 +92,9 @@ class PlayersSearch:
         return len(self.candidates[0].players)
 
     @property
-    def support(self) -> float:
-        """What these tell in all [nat m2]."""
-        return sum(player.support for player in self.candidates[0].players)
+    def weakest_evidence(self) -> float:
+        """The least evidence [nat a pixel] of their fits."""
+        return min((player.evidence for player in self.candidates[0].players), default=0.0)
 
     @property
     def is_decided(self) -> bool:
@@ -124,7 +124,7 @@ def find_players(sample: Sequence[Frames], whole: Callable[[int], Frames], *, ne
             f"[start] is missing, and no player is seen to stand {where}, whose middle must be the world's origin, x "
             "along the net; give [[start.player]] tables"
         )
-    return max(complete, key=lambda finding: (finding.is_decided, finding.support))
+    return max(complete, key=lambda finding: (finding.is_decided, finding.weakest_evidence))
 
 
 def _best_first(moments: Sequence[_Moment]) -> list[_Moment]:
