@@ -39,6 +39,7 @@ from airborne.tracking.model_based.misplaced_limbs import (
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
 from airborne.tracking.model_based.support import count_views
+from airborne.tracking.model_based.turned_pelvis import turn_pelvis
 from airborne.tracking.model_based.uncovered import area_beside, find_uncovered_pixels
 from airborne.types import Array
 
@@ -146,7 +147,8 @@ class Fitter:
         """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it."""
         if not self.moves_joints:
             return JudgedFit(fit, self.agreement(fit.pose, learned))
-        refitted, limbs = self._refit_limbs(fit, guesses, learned, prior), limbs_of(self.model)
+        freed, prior = self._refit_body(fit, learned, prior)
+        refitted, limbs = self._refit_limbs(freed, guesses, learned, prior), limbs_of(self.model)
         moved = [limb for limb in limbs if limb_distance(self.model, fit.pose, refitted.pose, limb) > DISTINCT_M]
         return replace(self.assess(refitted, learned), moved=tuple(int(limb[0]) for limb in moved))
 
@@ -199,6 +201,22 @@ class Fitter:
             fit, prior = search(limb, fit, prior)
         return fit
 
+    def _refit_body(self, fit: Fit, learned: LearnedRegions, prior: PosePrior | None) -> tuple[Fit, PosePrior | None]:
+        """Where limbs are lost, fit everything again, freer of what was expected; return the better fit and prior."""
+        if prior is None or not (
+            find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
+            or self._limbs_beside_uncovered(fit.pose, learned)
+        ):
+            return fit, prior
+        poses = [fit.pose, *turn_pelvis(self.model, fit.pose)]
+        best = int(np.argmax([self.agreement(pose, learned).evidence for pose in poses]))
+        starts = [fit.pose, poses[best]] if best else [fit.pose]
+        loose = prior.loosen()
+        fits = [
+            self.fit_images([self.fit_silhouettes(start, learned, NEAR, loose)], learned, loose) for start in starts
+        ]
+        return self._best_place(fit, fits, learned, prior=prior, widened=loose)
+
     def _refit_limb(
         self,
         fit: Fit,
@@ -221,12 +239,24 @@ class Fitter:
         poses.sort(key=lambda pose: self.agreement(pose, learned).evidence, reverse=True)
         widened = None if prior is None else prior.widen(dofs.columns)
         fits = [self.fit_images([pose], learned, widened) for pose in poses[:_N_FITTED]]
-        misfit = min(each.equations.misfit for each in (fit, *fits))
-        costs = [self.place_cost(each, learned, misfit, widened) + LOST_NATS for each in fits]
+        return self._best_place(fit, fits, learned, prior=prior, widened=widened)
+
+    def _best_place(
+        self,
+        fit: Fit,
+        others: Sequence[Fit],
+        learned: LearnedRegions,
+        *,
+        prior: PosePrior | None,
+        widened: PosePrior | None,
+    ) -> tuple[Fit, PosePrior | None]:
+        """Return a fit, or another that is better though it is not where it was expected, each with its prior."""
+        misfit = min(each.equations.misfit for each in (fit, *others))
+        costs = [self.place_cost(each, learned, misfit, widened) + LOST_NATS for each in others]
         stays = self.place_cost(fit, learned, misfit, prior)
         stays = min(stays, self.place_cost(fit, learned, misfit, widened) + LOST_NATS)
         best = int(np.argmin(costs))
-        return (fits[best], widened) if costs[best] < stays else (fit, prior)
+        return (others[best], widened) if costs[best] < stays else (fit, prior)
 
     def _n_views_uncovered(self, pose: Pose, learned: LearnedRegions) -> int:
         """Count the views in which something like a limb stands out that the body does not cover."""
