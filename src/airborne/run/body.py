@@ -81,7 +81,6 @@ class BodyRun:
     start: Pose
     found: FoundStart | None = None  # where the start was looked for
     keys: Mapping[int, PoseEvidence] = field(default_factory=dict)  # of later frames, in the order of time
-    is_fitted: bool = False  # a preset, to the first frames
     kept: KeptFrames = field(default_factory=KeptFrames)  # grows while the run is tracked
 
     table = MOTION
@@ -136,7 +135,7 @@ class BodyRun:
         if body.preset is None or self.keys:
             return self
         fitted = fit_first_frame(self.model, pose, first, mass_kg=body.mass_kg)
-        return self if fitted is None else replace(self, model=fitted[0], start=fitted[1], is_fitted=True)
+        return self if fitted is None else replace(self, model=fitted[0], start=fitted[1])
 
     def track(
         self,
@@ -206,7 +205,7 @@ class BodyRun:
             self.start,
             self.kept,
             self.calibration,
-            is_preset=self.trial.body.file is None and not self.is_fitted,
+            is_preset=self.trial.body.file is None,
         )
         motion = checked.motion
         revise_motion(folder / self.table, motion)
