@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.body import SAMPLED, human18
-from airborne.body_fitting.first_frame import fit_first_frame
+from airborne.body_fitting.first_frame import fit_preset
 from airborne.tracking.image_regions import reduce_frames
 from tests.body_fitting.test_fit import GIRTHS, MASS_KG, STATURE_M, axes, moving, person
 from tests.support.scenes import CAMERAS, Scene
@@ -20,7 +20,7 @@ def frames():
 
 
 def test_girths_come_nearer_and_the_mass_stays(frames):
-    fitted = fit_first_frame(GIVEN, POSE, frames, mass_kg=MASS_KG)
+    fitted = fit_preset(GIVEN, POSE, frames, mass_kg=MASS_KG)
     assert fitted is not None
     model, _ = fitted
     segments = [name if name in ("torso", "chest") else f"{name}_left" for name in GIRTHS]
@@ -35,4 +35,4 @@ def test_girths_come_nearer_and_the_mass_stays(frames):
 
 def test_body_too_small_to_show_its_parts_is_not_fitted(frames):
     small = reduce_frames(frames, GIVEN.with_pose(POSE), 20.0)
-    assert fit_first_frame(GIVEN, POSE, small, mass_kg=MASS_KG) is None
+    assert fit_preset(GIVEN, POSE, small, mass_kg=MASS_KG) is None

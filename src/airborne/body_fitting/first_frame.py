@@ -11,9 +11,7 @@ _LEVELS_PX_PER_M = (150.0,)  # the pose is found already: no coarser images are 
 _LANDMARK_WEIGHT = 0.25  # 5 cm: the landmarks come from the same images, with a body of other lengths
 
 
-def fit_first_frame(
-    model: BodyModel, pose: Pose, frames: Frames, *, mass_kg: float | None
-) -> tuple[BodyModel, Pose] | None:
+def fit_preset(model: BodyModel, pose: Pose, frames: Frames, *, mass_kg: float | None) -> tuple[BodyModel, Pose] | None:
     """Fit a body's shape and clothes to frames in which its pose was found; None where they do not show all of it."""
     landmarks = {mark.name: at for mark, at in zip(model.landmarks, model.with_pose(pose).landmarks, strict=True)}
     try:

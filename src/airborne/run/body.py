@@ -11,7 +11,7 @@ from typing import Any
 
 from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
 from airborne.body.files import mesh_files, write_body
-from airborne.body_fitting.first_frame import fit_first_frame
+from airborne.body_fitting.first_frame import fit_preset
 from airborne.calibration.from_points import Calibration
 from airborne.cameras import Camera
 from airborne.export import headline
@@ -124,17 +124,17 @@ class BodyRun:
             found = tracker.search(tracker.init(), first)
             if found.pose is not None:
                 seen = replace(self, model=sample_body_colours(self.model, found.pose, first))
-                seen = seen._fit_preset(found.pose, first) if found.status is Status.TRACKED else seen
+                seen = seen._fit_shape(found.pose, first) if found.status is Status.TRACKED else seen
         if not is_seen(seen.model.with_pose(self.start), [view.camera for view in first.views if view is not None]):
             self.recording.events.append(OUT_OF_SIGHT)
         return seen
 
-    def _fit_preset(self, pose: Pose, first: Frames) -> BodyRun:
+    def _fit_shape(self, pose: Pose, first: Frames) -> BodyRun:
         """Return a preset fitted to the person in the first frames; with keys as it is, which are about its lengths."""
         body = self.trial.body
         if body.preset is None or self.keys:
             return self
-        fitted = fit_first_frame(self.model, pose, first, mass_kg=body.mass_kg)
+        fitted = fit_preset(self.model, pose, first, mass_kg=body.mass_kg)
         return self if fitted is None else replace(self, model=fitted[0], start=fitted[1])
 
     def track(
