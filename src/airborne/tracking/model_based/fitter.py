@@ -147,8 +147,7 @@ class Fitter:
         """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it."""
         if not self.moves_joints:
             return JudgedFit(fit, self.agreement(fit.pose, learned))
-        freed, prior = self._refit_body(fit, learned, prior)
-        refitted, limbs = self._refit_limbs(freed, guesses, learned, prior), limbs_of(self.model)
+        refitted, limbs = self._refit_limbs(fit, guesses, learned, prior), limbs_of(self.model)
         moved = [limb for limb in limbs if limb_distance(self.model, fit.pose, refitted.pose, limb) > DISTINCT_M]
         return replace(self.assess(refitted, learned), moved=tuple(int(limb[0]) for limb in moved))
 
@@ -178,7 +177,7 @@ class Fitter:
     def _refit_limbs(self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> Fit:
         """Search for the limbs that cover what is unlike the body, or beside which, or anywhere, what is stands out.
 
-        None is searched for again before another has moved.
+        None is searched for again before another has moved. Before the first, the whole body is fitted again.
         """
         limbs, tried = limbs_of(self.model), set[int]()
 
@@ -191,10 +190,13 @@ class Fitter:
             tried.add(int(limb[0]))
             return moved, prior
 
-        for limb in find_misplaced_limbs(self.render_model, fit.pose, *learned.views):
-            fit, prior = search(limb, fit, prior)
-        for limb in self._limbs_beside_uncovered(fit.pose, learned):
-            fit, prior = search(limb, fit, prior)
+        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
+        if misplaced or self._limbs_beside_uncovered(fit.pose, learned):
+            fit, prior = self._refit_body(fit, learned, prior)
+            for limb in find_misplaced_limbs(self.render_model, fit.pose, *learned.views):
+                fit, prior = search(limb, fit, prior)
+            for limb in self._limbs_beside_uncovered(fit.pose, learned):
+                fit, prior = search(limb, fit, prior)
         for limb in limbs:
             if self._n_views_uncovered(fit.pose, learned) < _FEWEST_VIEWS:
                 break
@@ -202,11 +204,8 @@ class Fitter:
         return fit
 
     def _refit_body(self, fit: Fit, learned: LearnedRegions, prior: PosePrior | None) -> tuple[Fit, PosePrior | None]:
-        """Where limbs are lost, fit everything again, freer of what was expected; return the better fit and prior."""
-        if prior is None or not (
-            find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
-            or self._limbs_beside_uncovered(fit.pose, learned)
-        ):
+        """Fit everything again, freer of what was expected; return the better fit, with its prior."""
+        if prior is None:
             return fit, prior
         poses = [fit.pose, *turn_pelvis(self.model, fit.pose)]
         best = int(np.argmax([self.agreement(pose, learned).evidence for pose in poses]))
