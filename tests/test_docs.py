@@ -17,7 +17,6 @@ from typer.testing import CliRunner
 from airborne.body import files as bodies
 from airborne.body.files import read_body
 from airborne.body.human import BALL_LIMITS_DEG, HINGE_LIMITS_DEG, PARENTS
-from airborne.body_fitting.from_trial import PICTURE
 from airborne.cli import app
 from airborne.evaluation import PlayerErrors, PlayersComparison
 from airborne.evaluation.jump_errors import JumpErrors
@@ -29,6 +28,7 @@ from airborne.motion.run_folder import SMOOTH_RECORD, figures_of
 from airborne.run import smooth
 from airborne.run.body import write_tables
 from airborne.run.evaluate import assess
+from airborne.run.own_body import PICTURE
 from airborne.run.track import track_trial
 from airborne.trial.body import BodyTable
 from airborne.trial.calibration import CalibrationTable

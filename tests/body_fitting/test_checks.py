@@ -13,8 +13,8 @@ from airborne.body_fitting.checks import (
     person_of_shares,
     points_of_lengths,
 )
-from airborne.body_fitting.clicks import Clicks
 from airborne.errors import BodyError
+from airborne.run.body_clicks import Clicks
 
 BODY = human18(1.7, 65.0)
 POINTS = points_of_lengths(BODY)

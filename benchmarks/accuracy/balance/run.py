@@ -21,10 +21,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from rows import ROOT, append
 
 from airborne.body.files import read_body
-from airborne.body_fitting.from_trial import fit_person
 from airborne.evaluation import compare_joints, landmark_of, read_joint_paths
 from airborne.run.detections import landmarks_over_time
 from airborne.run.opening import open_trial
+from airborne.run.own_body import fit_person
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
 

@@ -212,7 +212,7 @@ def fit_body_command(
 
     Example: airborne fit-body trial.toml -o person.toml
     """
-    from airborne.body_fitting.from_trial import describe_fit, fit_person
+    from airborne.run.own_body import describe_fit, fit_person
     from airborne.trial.file import read_trial
 
     with progress("reading and fitting") as report:

@@ -11,7 +11,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
 
-from airborne.body_fitting.from_trial import PersonFit, fit_person
 from airborne.calibration import (
     Calibration,
     RigCalibration,
@@ -27,6 +26,7 @@ from airborne.motion.smoothing.smoother import Smoothing
 from airborne.run.evaluate import Comparisons, assess
 from airborne.run.export import EXPORT_FORMATS, ExportResult
 from airborne.run.export import export_run as write_export
+from airborne.run.own_body import PersonFit, fit_person
 from airborne.run.result import Run
 from airborne.run.smooth import SmoothRun, smooth_run
 from airborne.run.track import track_trial

@@ -11,6 +11,7 @@ from typing import Any
 
 from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
 from airborne.body.files import mesh_files, write_body
+from airborne.body_fitting.first_frame import fit_preset
 from airborne.calibration.from_points import Calibration
 from airborne.cameras import Camera
 from airborne.export import headline
@@ -50,7 +51,7 @@ from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
 from airborne.tracking import Estimate
 from airborne.tracking.both_directions import track_between_keys
-from airborne.tracking.estimate import unknown_segments
+from airborne.tracking.estimate import Status, unknown_segments
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.methods import sample_body_colours, tracker_of
 from airborne.tracking.revision import track_with_revision
@@ -112,15 +113,29 @@ class BodyRun:
             shutil.copyfile(self.trial.path(file), folder / BODY)
 
     def see(self, first: Frames) -> BodyRun:
-        """Return the body with the colours that the first frames show; an event says where they do not show it."""
+        """Return the body with the colours, and a preset with the shape, that the first frames show.
+
+        An event says where they do not show it.
+        """
         model = sample_body_colours(self.model, self.start, first)
+        seen = replace(self, model=model)
         if self.model.needs_colours:  # once more where the first frames show the body to be
             tracker = tracker_of(self.trial.settings, model, self.start)
             found = tracker.search(tracker.init(), first)
-            model = model if found.pose is None else sample_body_colours(self.model, found.pose, first)
-        if not is_seen(model.with_pose(self.start), [view.camera for view in first.views if view is not None]):
+            if found.pose is not None:
+                seen = replace(self, model=sample_body_colours(self.model, found.pose, first))
+                seen = seen._fit_shape(found.pose, first) if found.status is Status.TRACKED else seen
+        if not is_seen(seen.model.with_pose(self.start), [view.camera for view in first.views if view is not None]):
             self.recording.events.append(OUT_OF_SIGHT)
-        return replace(self, model=model)
+        return seen
+
+    def _fit_shape(self, pose: Pose, first: Frames) -> BodyRun:
+        """Return a preset fitted to the person in the first frames; with keys as it is, which are about its lengths."""
+        body = self.trial.body
+        if body.preset is None or self.keys:
+            return self
+        fitted = fit_preset(self.model, pose, first, mass_kg=body.mass_kg)
+        return self if fitted is None else replace(self, model=fitted[0], start=fitted[1])
 
     def track(
         self,

@@ -14,7 +14,7 @@ from airborne.run.keys import read_key
 from airborne.run.landmarks import read_joint_positions, read_pixels
 from airborne.tracking.first_pose import FirstPose, fit_to_detections, fit_to_pixels, fit_to_points, pose_by_hand
 from airborne.tracking.first_pose.evidence_fit import join_evidence
-from airborne.tracking.model_based.refined import FIRST_POSE_SD
+from airborne.tracking.model_based.degrees_of_freedom import FIRST_POSE_SD
 from airborne.trial.file import Trial
 from airborne.trial.keys import KeyTable
 

@@ -127,7 +127,6 @@ def _run_alone(subject: Subject[Found, AnyMotion], options: _Options, connection
     identity = run_identity(subject.trial, live=options.live)
     goes_on = prepare_folder(folder, identity, subject.table, resume=options.resume, overwrite=options.overwrite)
     write_pose2sim(folder / CALIBRATION, recording.rig)
-    subject.copy_inputs(folder)
     read_s = time.monotonic()
     subject, delays_s = _track(subject, options, resume=goes_on)
     connection.close()
@@ -175,6 +174,7 @@ def _track(
         if first is None:
             raise past_the_end_error(subject.trial, recording)
         subject = subject.see(first)
+        subject.copy_inputs(folder)
         done = subject.read_done(folder) if resume else {}
         writer = stack.enter_context(subject.writer(folder, resume=resume))
         artists = [stack.enter_context(artist) for artist in subject.artists(folder, drawn)] if drawn else []

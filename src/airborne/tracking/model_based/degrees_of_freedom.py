@@ -25,6 +25,7 @@ _OVERLAP_SD_M = 0.01  # sd of how far segments may pass through each other, beyo
 _LIMIT_ROUNDS = 3  # of finding which limits a step reaches
 _BEYOND_RAD = 1e-6  # rounding
 WIDE_SD = 1.5  # [m, rad]
+FIRST_POSE_SD = (0.1, 0.3, 0.5)  # of a first pose set by hand: root's position [m], its rotation, joints [rad]
 _DAMPING_SD_M, _DAMPING_SD_RAD = 0.5, 1.0  # hold what the images do not show
 
 
@@ -41,6 +42,10 @@ class PosePrior:
         sd = self.sd.copy()
         sd[columns] = WIDE_SD
         return replace(self, sd=sd)
+
+    def loosen(self) -> PosePrior:
+        """Return the prior with sds as of a first pose, where they are smaller."""
+        return replace(self, sd=np.maximum(self.sd, np.repeat(FIRST_POSE_SD, [3, 3, len(self.sd) - 6])))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -40,6 +40,7 @@ from airborne.tracking.model_based.misplaced_limbs import (
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
 from airborne.tracking.model_based.support import count_views
+from airborne.tracking.model_based.turned_pelvis import turn_pelvis
 from airborne.tracking.model_based.uncovered import area_beside, find_uncovered_pixels
 from airborne.types import Array
 
@@ -177,7 +178,7 @@ class Fitter:
     def _refit_limbs(self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> Fit:
         """Search for the limbs that cover what is unlike the body, or beside which, or anywhere, what is stands out.
 
-        None is searched for again before another has moved.
+        None is searched for again before another has moved. Before the first, the whole body is fitted again.
         """
         limbs, tried = limbs_of(self.model), set[int]()
 
@@ -190,15 +191,31 @@ class Fitter:
             tried.add(int(limb[0]))
             return moved, prior
 
-        for limb in find_misplaced_limbs(self.render_model, fit.pose, *learned.views):
-            fit, prior = search(limb, fit, prior)
-        for limb in self._limbs_beside_uncovered(fit.pose, learned):
-            fit, prior = search(limb, fit, prior)
+        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
+        if misplaced or self._limbs_beside_uncovered(fit.pose, learned):
+            fit, prior = self._refit_body(fit, learned, prior)
+            for limb in find_misplaced_limbs(self.render_model, fit.pose, *learned.views):
+                fit, prior = search(limb, fit, prior)
+            for limb in self._limbs_beside_uncovered(fit.pose, learned):
+                fit, prior = search(limb, fit, prior)
         for limb in limbs:
             if self._n_views_uncovered(fit.pose, learned) < _FEWEST_VIEWS:
                 break
             fit, prior = search(limb, fit, prior)
         return fit
+
+    def _refit_body(self, fit: Fit, learned: LearnedRegions, prior: PosePrior | None) -> tuple[Fit, PosePrior | None]:
+        """Fit everything again, freer of what was expected; return the better fit, with its prior."""
+        if prior is None:
+            return fit, prior
+        poses = [fit.pose, *turn_pelvis(self.model, fit.pose)]
+        best = int(np.argmax([self.agreement(pose, learned).evidence for pose in poses]))
+        starts = [fit.pose, poses[best]] if best else [fit.pose]
+        loose = prior.loosen()
+        fits = [
+            self.fit_images([self.fit_silhouettes(start, learned, NEAR, loose)], learned, loose) for start in starts
+        ]
+        return self._best_place(fit, fits, learned, prior=prior, widened=loose)
 
     def _refit_limb(
         self,
@@ -222,12 +239,24 @@ class Fitter:
         poses.sort(key=lambda pose: self.agreement(pose, learned).evidence, reverse=True)
         widened = None if prior is None else prior.widen(dofs.columns)
         fits = [self.fit_images([pose], learned, widened) for pose in poses[:_N_FITTED]]
-        misfit = min(each.equations.misfit for each in (fit, *fits))
-        costs = [self.place_cost(each, learned, misfit, widened) + LOST_NATS for each in fits]
+        return self._best_place(fit, fits, learned, prior=prior, widened=widened)
+
+    def _best_place(
+        self,
+        fit: Fit,
+        others: Sequence[Fit],
+        learned: LearnedRegions,
+        *,
+        prior: PosePrior | None,
+        widened: PosePrior | None,
+    ) -> tuple[Fit, PosePrior | None]:
+        """Return a fit, or another that is better though it is not where it was expected, each with its prior."""
+        misfit = min(each.equations.misfit for each in (fit, *others))
+        costs = [self.place_cost(each, learned, misfit, widened) + LOST_NATS for each in others]
         stays = self.place_cost(fit, learned, misfit, prior)
         stays = min(stays, self.place_cost(fit, learned, misfit, widened) + LOST_NATS)
         best = int(np.argmin(costs))
-        return (fits[best], widened) if costs[best] < stays else (fit, prior)
+        return (others[best], widened) if costs[best] < stays else (fit, prior)
 
     def _n_views_uncovered(self, pose: Pose, learned: LearnedRegions) -> int:
         """Count the views in which something like a limb stands out that the body does not cover."""

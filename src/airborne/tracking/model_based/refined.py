@@ -21,7 +21,13 @@ from airborne.tracking.estimate import Estimate, Status, lost_estimate
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.first_pose.evidence_fit import join_evidence
 from airborne.tracking.image_regions import crop_regions, reduce_frames, share_in_view
-from airborne.tracking.model_based.degrees_of_freedom import WIDE_SD, PosePrior, joints_of, limbs_of
+from airborne.tracking.model_based.degrees_of_freedom import (
+    FIRST_POSE_SD,
+    WIDE_SD,
+    PosePrior,
+    joints_of,
+    limbs_of,
+)
 from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegions, Order
 from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
@@ -47,7 +53,6 @@ PREDICTIONS: dict[str, tuple[Callable[[predictors.PoseHistory, Fraction], Pose],
 }
 # sds of a predicted pose: at once, and its growth by unknown acceleration [per s²]
 _EXPECTED_SD = (0.05, 30.0), (0.15, 150.0), (0.08, 120.0)  # root's position [m], root's rotation [rad], joints [rad]
-FIRST_POSE_SD = (0.1, 0.3, 0.5)  # the same of a first pose set by hand: [m], [rad], [rad]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,7 +11,9 @@ from airborne.body import ATHLETE, human18
 from airborne.body.files import read_body
 from airborne.body.outfits import Border
 from airborne.body_fitting.fit import BodyFit
-from airborne.body_fitting.from_trial import (
+from airborne.cameras import Rig
+from airborne.errors import TrialError
+from airborne.run.own_body import (
     _CELL_PX,
     _LINE_RGB,
     PersonFit,
@@ -19,8 +21,6 @@ from airborne.body_fitting.from_trial import (
     describe_fit,
     fit_person,
 )
-from airborne.cameras import Rig
-from airborne.errors import TrialError
 from airborne.synthetic.flight.somersault import somersault_scene
 from airborne.synthetic.throw.writing import write_trial
 from airborne.trial.examples import example_trial

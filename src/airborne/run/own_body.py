@@ -21,7 +21,6 @@ from airborne.body_fitting.checks import (
     person_of_shares,
     points_of_lengths,
 )
-from airborne.body_fitting.clicks import Clicks
 from airborne.body_fitting.fit import BodyFit, BodyObservation, fit_body, measure_lengths
 from airborne.cameras import Rig
 from airborne.cameras.detections import landmarks_from_points
@@ -29,6 +28,7 @@ from airborne.errors import BodyError, TrialError
 from airborne.export.pictures import encode_png
 from airborne.export.views import crop_camera, resample_view
 from airborne.rendering import FLAT, render
+from airborne.run.body_clicks import Clicks
 from airborne.run.detections import landmarks_over_time
 from airborne.run.landmarks import read_joint_positions, triangulate_clicks
 from airborne.run.opening import Opened, open_trial
