@@ -20,6 +20,7 @@ from airborne.tracking.model_based.degrees_of_freedom import (
     root_only,
 )
 from airborne.tracking.model_based.gauss_newton import (
+    FAR,
     NEAR,
     Fit,
     PyramidLevels,
@@ -123,7 +124,7 @@ class Fitter:
         for level in levels:
             for dofs in self._stages_at(level[0]):
                 args = self.render_model, pose, learned.regions, learned.posteriors
-                pose = fit_silhouettes(*args, levels=[level], dofs=dofs, prior=prior)
+                pose = fit_silhouettes(*args, levels=[level], dofs=dofs, prior=prior, goes_on=levels is FAR)
         return pose
 
     def fit_images(self, poses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> Fit:

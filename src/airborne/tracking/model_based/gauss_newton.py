@@ -95,11 +95,15 @@ def fit_silhouettes(
     levels: PyramidLevels,
     dofs: DegreesOfFreedom,
     prior: PosePrior | None = None,
+    goes_on: bool = False,
 ) -> Pose:
-    """Move the body until its masks agree with the posteriors (h, w) of the regions, from coarse to fine."""
+    """Move the body until its masks agree with the posteriors (h, w) of the regions, from coarse to fine.
+
+    Steps end early where they gain next to nothing, unless `goes_on`: a start may be far off.
+    """
     taps = gaussian_taps(_COARSE_SIGMA_PX)
     correlated = 4 * np.pi * _COARSE_SIGMA_PX**2
-    converged = _CONVERGED if dofs.moves_joints else _CONVERGED_STIFF
+    converged = 0.0 if goes_on else _CONVERGED if dofs.moves_joints else _CONVERGED_STIFF
     for reduction, steps in levels:
         views = [
             silhouette_buffers(region, posterior, reduction, taps=taps, clip=_CLIP_MASK)
