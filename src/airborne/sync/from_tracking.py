@@ -32,7 +32,7 @@ from airborne.video import Frames, Recording
 
 _LEAST_FRAMES = 8  # moments at which the body must be tracked to estimate lags
 _MOST_PASSES = 4  # over the recording, with silhouettes
-_CONVERGED_SDS = 0.3  # a step of theirs below this share of its sd ends the iteration
+_CONVERGED_SDS = 0.15  # a step of theirs below this share of its sd ends the iteration
 _MOMENTS_PER_PERIOD = np.arange(-3, 4) / 2  # that an image may show [its period]
 
 
