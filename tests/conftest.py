@@ -21,7 +21,7 @@ def pytest_addoption(parser):
 
 
 def pytest_sessionstart(session):
-    """Compile the kernels of a fresh clone once, on two cores, before two workers each do so."""
+    """Compile the kernels of a fresh clone once, before each worker does so."""
     config = session.config
     is_controller = config.getoption("numprocesses", None) and not hasattr(config, "workerinput")
     if is_controller and not any((ROOT / "src").rglob("*.nbc")) and "NUMBA_CACHE_DIR" not in os.environ:

@@ -101,6 +101,12 @@ def test_there_are_as_many_workers_as_memory_holds():
     assert cluster.count_workers("auto") >= cluster.count_workers("1GB") >= 1
 
 
+@pytest.fixture
+def impatient(monkeypatch):
+    monkeypatch.setattr(cluster, "_CONNECT_S", 1)  # nobody answers: the time it takes is the time it waits
+
+
+@pytest.mark.usefixtures("impatient")
 def test_no_scheduler_at_an_address_is_one_line():
     with pytest.raises(AirborneError, match="no scheduler answers at tcp"), open_client("tcp://127.0.0.1:1", 1, "auto"):
         pass
@@ -161,6 +167,7 @@ def check_batches(season, scheduler, tmp_path, capsys):
     assert "good: leave alone" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("impatient")
 def test_a_batch_that_cannot_start_exits_with_2(tmp_path, season, capsys):
     assert in_process("batch", tmp_path / "nothing", "-o", tmp_path / "out") == 2
     assert in_process("batch", season, "-o", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:1") == 2
