@@ -35,6 +35,7 @@ class VideoSource:
     fields: FieldOrderOption = "progressive"
     offset_s: Fraction | float = 0  # added to this camera's times [s]
     drift_ppm: Fraction | float = 0  # by how much its clock is slow, in millionths
+    exposure_s: float = 0.0  # of each image, about its time [s]
 
     def __post_init__(self) -> None:
         if self.fields not in get_args(FieldOrderOption):
