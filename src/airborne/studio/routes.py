@@ -14,6 +14,7 @@ from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, JSONResponse, Response
 
 from airborne import export
+from airborne.body import BodyModel
 from airborne.errors import AirborneError, ResultError
 from airborne.export.pictures import thumbnail
 from airborne.studio.calibrating import find_picture
@@ -64,7 +65,11 @@ def add_routes(app: FastAPI, session: Session) -> None:
 
     @app.get("/mesh/{run}/{part}")
     async def mesh(run: str, part: int) -> Response:
-        return await _answer(lambda: _mesh(find_run(session.folder, run), part))
+        return await _answer(lambda: _mesh(run_body(find_run(session.folder, run)), part))
+
+    @app.get("/body/mesh/{part}")
+    async def body_mesh(part: int) -> Response:
+        return await _answer(lambda: _mesh(session.project().model(), part))
 
     @app.get("/calibration/{name}")
     async def calibration(name: str) -> Response:
@@ -134,8 +139,8 @@ def _json(value: Any) -> Response:
     return JSONResponse(value, headers={"cache-control": "no-store"})
 
 
-def _mesh(run: Path, part: int) -> Response:
-    return Response(part_stl(run_body(run), part), media_type="model/stl", headers={"cache-control": "no-store"})
+def _mesh(model: BodyModel, part: int) -> Response:
+    return Response(part_stl(model, part), media_type="model/stl", headers={"cache-control": "no-store"})
 
 
 def _jpeg(session: Session, camera: int, frame: int, is_wanted: Callable[[], bool]) -> Response:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Awaitable, Callable, Iterable
 from itertools import pairwise
 
 import numpy as np
 from nicegui import ui
 from nicegui.elements.scene.objects.group import Group
 from nicegui.elements.scene.scene import Scene
+from nicegui.elements.scene.scene_object3d import Object3D
+from nicegui.events import GenericEventArguments
+from scipy.spatial.transform import RigidTransform, Rotation
 from trimesh.exchange.stl import export_stl
 
 from airborne.body import BodyModel, Pose
@@ -20,6 +23,7 @@ from airborne.types import Array
 _CAMERA_COLOUR, _PATH_COLOUR = "#1f2429", "#0072b2"
 _FROM = np.array([0.7, -0.9, 0.55])  # the side and height from which the scene is seen first
 _MOST_LINES = 500  # of a path: each is an object of the scene
+_MOVE_EVERY_S = 0.05  # while handles are dragged: the outlines of three views take half of it
 _FRUSTUM_SHARE = 0.12  # of the distance between camera and middle
 
 
@@ -65,6 +69,27 @@ class BodyOnStage:
             if posed is not None:
                 x, y, z = map(float, posed.t[k])
                 group.move(x, y, z).rotate_R(posed.R[k].tolist())
+
+
+class Gizmo(Object3D, component="gizmo.js"):
+    """Handles about a point of a scene: arrows along the world's axes, rings about the body's own; see `gizmo.js`."""
+
+    def __init__(self, scene: Scene, size_m: float, on_move: Callable[[RigidTransform, bool], Awaitable[None]]) -> None:
+        """Draw the handles; `on_move` gets where they were brought, `world_from_root`, and whether they were let go."""
+        with scene:
+            super().__init__(scene.id, size_m)
+
+        async def handle(event: GenericEventArguments) -> None:
+            turn = Rotation.from_quat(event.args["quaternion"])
+            root = RigidTransform.from_components(event.args["position"], turn)
+            await on_move(root, bool(event.args["ended"]))
+
+        scene.on("gizmo", handle, throttle=_MOVE_EVERY_S)
+
+    def place(self, world_from_root: RigidTransform) -> None:
+        """Bring the handles to a body's root."""
+        x, y, z = map(float, world_from_root.translation)
+        self.move(x, y, z).rotate_R(world_from_root.rotation.as_matrix().tolist())
 
 
 def part_stl(model: BodyModel, number: int) -> bytes:
