@@ -30,7 +30,10 @@ from airborne.video.decoding import decode, inspect, rgb_from_decoded
 
 _WORKERS = ThreadPoolExecutor(4, thread_name_prefix="answers")  # more would only hold more pictures at once
 _THUMBNAIL_PX = 240  # wide
-_CURVES = Path(export.__file__).parent / "templates" / "curves.js"  # drawn alike in the report
+_SCRIPTS = (  # that components import
+    Path(export.__file__).parent / "templates" / "curves.js",  # drawn alike in the report
+    Path(__file__).with_name("view_drawing.js"),
+)
 _KEEP = {"cache-control": "private, max-age=3600"}
 
 
@@ -51,9 +54,11 @@ def add_routes(app: FastAPI, session: Session) -> None:
     async def first_picture(name: str) -> Response:
         return await _answer(lambda: _thumbnail(session.folder, name))
 
-    @app.get("/parts/curves.js")
-    async def curves_script() -> Response:
-        return Response(_CURVES.read_text(encoding="utf-8"), media_type="text/javascript", headers=_KEEP)
+    @app.get("/parts/{name}")
+    async def script(name: str) -> Response:
+        path = next((path for path in _SCRIPTS if path.name == name), None)
+        headers = {"cache-control": "no-store"}  # another version may be served at the same address
+        return FileResponse(path, media_type="text/javascript", headers=headers) if path else Response(status_code=404)
 
     @app.get("/overlay/{run}/{frame}")
     async def overlay(run: str, frame: int, beside: str = "") -> Response:
