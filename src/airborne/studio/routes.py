@@ -152,7 +152,9 @@ def _jpeg(session: Session, camera: int, frame: int, is_wanted: Callable[[], boo
     shown = session.shown()
     if not (0 <= camera < len(shown.sources) and 0 <= frame < len(shown.clock)):
         return Response(status_code=404)
-    return _picture(session, camera, int(shown.clock.images[frame, camera]), is_wanted)
+    answer = _picture(session, camera, int(shown.clock.images[frame, camera]), is_wanted)
+    answer.headers["x-time-s"] = repr(float(shown.clock.times_s[frame]))
+    return answer
 
 
 def _picture(session: Session, camera: int, number: int, is_wanted: Callable[[], bool]) -> Response:

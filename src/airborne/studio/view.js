@@ -74,7 +74,8 @@ export default {
     show(frame) { this.go(frame); },
     async fetchPane(pane, frame, signal) {
       const answer = await fetch(pane.url.replace("{frame}", frame), { signal });
-      return answer.status === 200 ? createImageBitmap(await answer.blob()) : null;
+      const picture = answer.status === 200 ? await createImageBitmap(await answer.blob()) : null;
+      return { picture, time_s: answer.headers.get("x-time-s") };
     },
     async fetchOverlay(frame, signal) {
       if (!this.overlay) return { items: [] };
@@ -85,7 +86,10 @@ export default {
       if (!this.cache.has(frame)) {
         const stop = new AbortController(), { signal } = stop;
         const parts = [this.fetchOverlay(frame, signal), ...this.panes.map((pane) => this.fetchPane(pane, frame, signal))];
-        const all = Promise.all(parts).then(([overlay, ...pictures]) => ({ frame, overlay, pictures }));
+        const all = Promise.all(parts).then(([overlay, ...answers]) => {
+          const time_s = answers[0]?.time_s ?? null; // the same for all panes
+          return { frame, overlay, pictures: answers.map((each) => each.picture), time_s: time_s === null ? null : Number(time_s) };
+        });
         this.cache.set(frame, all);
         this.underway.set(frame, stop);
         all.catch(() => this.cache.get(frame) === all && this.cache.delete(frame)).finally(() => this.underway.delete(frame));
@@ -112,6 +116,7 @@ export default {
       this.canvas.dataset.frame = frame;
       this.canvas.dataset.ms = (performance.now() - begun).toFixed(1);
       this.$emit("frame", { frame });
+      window.dispatchEvent(new CustomEvent("airborne-shown", { detail: { frame, time_s: loaded.time_s, from: this } }));
       for (let k = 1; k <= AHEAD && this.wanted === frame; k++) {
         const next = frame + k * direction;
         if (next >= 0 && next < this.n_frames) await this.load(next).catch(() => {});
@@ -259,6 +264,7 @@ export default {
       else if (event.key === "," || event.key === ".") this.go(this.wanted + (event.key === "." ? 1 : -1));
       else if (event.key === "Home") this.go(0);
       else if (event.key === "End") this.go(this.n_frames - 1);
+      else if (event.key === " ") window.dispatchEvent(new CustomEvent("airborne-play", { detail: { from: this } }));
       else if (event.key === "c") { this.alone = this.alone + 1 < this.panes.length ? this.alone + 1 : -1; this.draw(); }
       else if (event.key === "Escape") this.$emit("select", { frame: this.seen(), id: null });
       else if (event.key === "0") { this.zooms = this.panes.map(() => ({ scale: 1, u: 0, v: 0 })); this.draw(); }

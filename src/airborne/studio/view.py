@@ -99,6 +99,7 @@ class CameraViews(Element, component="view.js", default_classes="view"):
         self._listen("select", on_select, lambda args: (args["id"],))
         self._props["follows"] = on_drag is not None
         self._listen("drag", on_drag, lambda args: (_read_drag(args),))
+        FrameBar(self, n_frames, min(frame, n_frames - 1))
 
     def _listen(self, name: str, handler: Callable[..., Any] | None, read: Callable[[dict], tuple]) -> None:
         if handler is None:
@@ -153,6 +154,15 @@ def _read_drag(args: dict) -> Drag:
         turns=bool(args["turn"]),
         has_ended=bool(args["ended"]),
     )
+
+
+class FrameBar(Element, component="frames.js"):
+    """The bar below a view, by which its frames are played and chosen."""
+
+    def __init__(self, view: CameraViews, n_frames: int, frame: int) -> None:
+        """Begin at a frame."""
+        super().__init__()
+        self._props |= {"view": view.id, "n_frames": n_frames, "start": frame}
 
 
 class Curves(Element, component="curves.js", default_classes="curves"):
