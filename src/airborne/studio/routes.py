@@ -93,7 +93,7 @@ def find_run(folder: Path, name: str) -> Path:
     """Return a run of the folder by its name; raises ResultError."""
     run = _find_run(folder, name)
     if run is None:
-        raise ResultError(f"there is no run {name}")
+        raise ResultError(f"there is no run {name} any more; reload this page")
     return run
 
 

@@ -21,7 +21,8 @@ from airborne.export.part_meshes import part_colour, segment_mesh
 from airborne.types import Array
 
 _CAMERA_COLOUR, _PATH_COLOUR = "#1f2429", "#0072b2"
-_FROM = np.array([0.7, -0.9, 0.55])  # the side and height from which the scene is seen first
+FROM = np.array([0.7, -0.9, 0.55])  # the side and height from which the scene is seen first
+_ALL_IN_VIEW = 1.4  # times a sphere's radius: from so far, along `FROM`, three.js's 75 degrees hold it with a margin
 _MOST_LINES = 500  # of a path: each is an object of the scene
 _MOVE_EVERY_S = 0.05  # while handles are dragged: the outlines of three views take half of it
 _FRUSTUM_SHARE = 0.12  # of the distance between camera and middle
@@ -30,19 +31,29 @@ _FRUSTUM_SHARE = 0.12  # of the distance between camera and middle
 def draw_cameras(
     rig: Rig, path: Array | None = None, *, middle: Array | None = None, away_m: float | None = None
 ) -> Scene:
-    """Show cameras and a path (n, 3) [m], NaN leaves gaps; seen from `away_m` beside the `middle` (3,) [m]."""
-    centres = np.stack([camera.centre for camera in rig])
-    middle = middle_of_view(rig) if middle is None else middle
-    reach = float(np.median(np.linalg.norm(centres - middle, axis=1)))
+    """Show cameras and a path (n, 3) [m], NaN leaves gaps; seen from `away_m` beside the `middle` (3,) [m].
+
+    Without these it shows all cameras and what they look at.
+    """
+    centres, looked_at = np.stack([camera.centre for camera in rig]), middle_of_view(rig)
+    reach = float(np.median(np.linalg.norm(centres - looked_at, axis=1)))
+    if middle is None or away_m is None:
+        middle, away_m = overview(np.vstack([centres, looked_at]))
     with ui.scene(grid=(60, 60), background_color="#f6f7f8").style("width: 100%; flex: 1; min-height: 180px") as scene:
         for camera in rig:
             _frustum(scene, camera, _FRUSTUM_SHARE * reach)
         if path is not None:
             pairs = [(a, b) for a, b in pairwise(path[:: len(path) // _MOST_LINES + 1]) if np.isfinite([a, b]).all()]
             _lines(scene, pairs, _PATH_COLOUR)
-    x, y, z = map(float, middle + (away_m or reach) * _FROM)
+    x, y, z = map(float, middle + away_m * FROM)
     scene.move_camera(x, y, z, look_at_x=middle[0], look_at_y=middle[1], look_at_z=middle[2], duration=0)
     return scene
+
+
+def overview(points: Array) -> tuple[Array, float]:
+    """Return the middle of points (n, 3) [m] and how many times `FROM` beside it all of them are in view."""
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    return middle, _ALL_IN_VIEW * float(np.linalg.norm(points - middle, axis=1).max())
 
 
 class BodyOnStage:
