@@ -65,8 +65,8 @@ def add_routes(app: FastAPI, session: Session) -> None:
         return await _answer(lambda: _json(_overlay(session, run, frame, beside)))
 
     @app.get("/curves/{run}")
-    async def curves(run: str, beside: str = "") -> Response:
-        return await _answer(lambda: _json(_curves(session.folder, run, beside)))
+    async def curves(run: str, beside: str = "", of: str = "") -> Response:
+        return await _answer(lambda: _json(_curves(session.folder, run, beside, of)))
 
     @app.get("/mesh/{run}/{part}")
     async def mesh(run: str, part: int) -> Response:
@@ -109,9 +109,9 @@ def _overlay(session: Session, name: str, frame: int, beside: str) -> dict[str, 
     return {"items": [*other["items"], *own["items"]], "label": own["label"]}
 
 
-def _curves(folder: Path, name: str, beside: str) -> dict[str, Any]:
-    own = run_curves(find_run(folder, name))
-    return {**own, "beside": run_curves(find_run(folder, beside))} if beside else own
+def _curves(folder: Path, name: str, beside: str, what: str) -> dict[str, Any]:
+    own = run_curves(find_run(folder, name), what)
+    return {**own, "beside": run_curves(find_run(folder, beside), what)} if beside else own
 
 
 async def _answer(make: Callable[[], Response]) -> Response:

@@ -172,3 +172,8 @@ class Curves(Element, component="curves.js", default_classes="curves"):
         """Show what an address gives, with the cursor at a frame."""
         super().__init__()
         self._props["url"], self._props["start"] = url, frame
+
+    def show(self, url: str) -> None:
+        """Show what another address gives."""
+        self._props["url"] = url
+        self.update()
