@@ -12,7 +12,7 @@ from airborne.cameras import Rig, camera_looking_at
 from airborne.errors import ResultError
 from airborne.motion import MotionWriter, read_players
 from airborne.studio import curve_data
-from airborne.studio.curve_data import describe_distance, list_curves, run_curves
+from airborne.studio.curve_data import curve_kinds, describe_distance, run_curves
 from airborne.studio.outlines import outline_items, player_colours, run_overlay
 from airborne.studio.runs import count_rows
 from airborne.studio.stage import part_stl
@@ -106,7 +106,7 @@ def test_curves_show_the_columns_of_a_run_s_tables_and_of_one_joint(cross, tmp_p
     with MotionWriter(tmp_path / "motion.csv") as writer:
         for each in run_with_gap(4, lost=(2,)):
             writer.append(each)
-    assert list_curves(tmp_path) == {"": "position"}
+    assert curve_kinds(tmp_path) == {"": "position"}
     (tmp_path / "tables").mkdir()
     names = ("somersault", "tilt", "twist")
     header = ",".join(["frame", "time_s", *(f"{name}_deg" for name in names), *(f"{name}_deg_sd" for name in names)])

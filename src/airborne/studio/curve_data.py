@@ -28,7 +28,7 @@ _OF_JOINT = (JOINT_ANGLES, "", "°", {f"{axis}_deg": axis for axis in "xyz"})
 _FROM_GOOD = np.array([Status.TRACKED.value, Status.UNCERTAIN.value, Status.LOST.value])  # to bad
 
 
-def list_curves(run: Path) -> dict[str, str]:
+def curve_kinds(run: Path) -> dict[str, str]:
     """Return what a run's curves can show: its name in an address, and in words."""
     if holds_players(run):
         return {"": "how high the feet are"}
@@ -40,7 +40,7 @@ def list_curves(run: Path) -> dict[str, str]:
 def run_curves(run: Path, what: str = "") -> dict[str, Any]:
     """Return a run's curves: times, frames, statuses, and series with their standard deviations.
 
-    `what` is one of `list_curves`; raises ResultError for another.
+    `what` is one of `curve_kinds`; raises ResultError for another.
     Of a long run several frames share a point: the least and the greatest of their values, the worst of their statuses.
     """
     unit = "m"

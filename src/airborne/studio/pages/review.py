@@ -10,7 +10,7 @@ import numpy as np
 from nicegui import ui
 
 from airborne.motion.run_folder import holds_players
-from airborne.studio.curve_data import describe_distance, list_curves
+from airborne.studio.curve_data import curve_kinds, describe_distance
 from airborne.studio.disagreement import look_for_disagreement
 from airborne.studio.outlines import BESIDE_COLOUR
 from airborne.studio.pages.correct import Correction
@@ -88,7 +88,7 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: s
         if correction is not None:
             correction.build()
             bodies.append(correction.turn_to)
-        kinds = await in_thread(list_curves, folder)
+        kinds = await in_thread(curve_kinds, folder)
         kind = ui.select(kinds, label="curves", value="", on_change=lambda: curves.show(address + quote(kind.value)))
         kind.props("outlined dense options-dense").style("min-width: 180px")
         kind.set_visibility(len(kinds) > 1)
