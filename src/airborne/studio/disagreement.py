@@ -76,7 +76,7 @@ def edge_shift(camera: str, seen: Sequence[tuple[Image, Sequence[Array]]]) -> Ed
         return None
     scale = max(1.0, seen[0][0].shape[1] / _WIDE_PX)
     reach = round(_REACH_PX * scale)
-    found = [(np.zeros(2), _match(seen, reach))]
+    found: list[tuple[Array, _Match | None]] = [(np.zeros(2), _match(seen, reach))]
     small = _match([_shrink(image, outline) for image, outline in seen], reach)
     if small is not None:
         start = _SMALLER * small.px
