@@ -121,7 +121,19 @@ def drag_handle(page, axis, *, turns):
     page.mouse.down()
     page.mouse.move(*at[1], steps=6)
     page.mouse.up()
-    page.wait_for_timeout(500)
+
+
+def use_pose(page, folder, before):
+    """Write the pose that is shown until it is another than before, and stays; return it."""
+    last = before
+    for _ in range(60):
+        page.get_by_role("button", name="Use this pose").click()
+        page.wait_for_timeout(250)
+        start = read_trial(folder / "trial.toml").start
+        if start == last != before:
+            return start
+        last = start
+    raise AssertionError("the pose does not change")
 
 
 def test_a_body_placed_by_hand_goes_where_drags_put_it(rig, folder):
@@ -140,22 +152,16 @@ def test_a_body_placed_by_hand_goes_where_drags_put_it(rig, folder):
         before = read_trial(folder / "trial.toml").start
         page.get_by_role("button", name="Move and turn it in 3D").click()
         drag_handle(page, [0, 0, 1], turns=False)
-        page.get_by_role("button", name="Use this pose").click()
-        page.wait_for_timeout(500)
-        lifted = read_trial(folder / "trial.toml").start
+        lifted = use_pose(page, folder, before)
         drag_handle(page, [0, 1, 0], turns=True)
-        page.get_by_role("button", name="Use this pose").click()
-        page.wait_for_timeout(500)
-        turned = read_trial(folder / "trial.toml").start
+        turned = use_pose(page, folder, lifted)
         drag_trunk(page, 0, (25.0, 0.0), held="Shift")
-        page.get_by_role("button", name="Use this pose").click()
-        page.wait_for_timeout(500)
+        after = use_pose(page, folder, turned)
     np.testing.assert_allclose(np.array(lifted.position_m)[:2], before.position_m[:2], atol=1e-4)
     assert lifted.position_m[2] > before.position_m[2] + MOVED_M
     np.testing.assert_allclose(turned.position_m, lifted.position_m, atol=1e-4)
     axis = turned.rotation.as_rotvec()
     assert abs(axis[1]) > TURNED and np.abs(axis[[0, 2]]).max() < 1e-3
-    after = read_trial(folder / "trial.toml").start
     assert before.frame == N_FRAMES - 1 and before.points_px is None
     standing = standing_pose(human18(1.75, 70.0, outfit=SAMPLED), rig).world_from_root.translation
     moved_px = rig["a"].px_from_world(np.array(before.position_m)) - rig["a"].px_from_world(standing)
