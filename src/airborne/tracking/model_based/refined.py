@@ -104,7 +104,7 @@ class RefinedTracker:
             found = self._search_first(frames)
         else:
             found = self._search_later(state, frames)
-        if found is not None and state.past:
+        if found is not None and state.past and not self._fitter.moves_joints:
             found = replace(found, fit=fit_exposed(self.render_model, found.fit, self._motion(state.past, frames)))
         return self._estimate(frames, found, state.reference)
 
