@@ -25,6 +25,24 @@ TRUNK = """pane => {
         return (1 - share) * Math.min(...all) + share * Math.max(...all);
     });
 }"""
+GIZMO = """() => {
+    const scene = getElement(Number(document.querySelector(".nicegui-scene").id.slice(1)));
+    return [...scene.objects.values()].map((each) => each.component).find((each) => each?.handles && each.mesh.parent);
+}"""
+HANDLE = """([axis, turns]) => { // where on the page a handle is, and where it is dragged to
+    const gizmo = (GIZMO)(), { camera, renderer } = gizmo.view, box = renderer.domElement.getBoundingClientRect();
+    const spot = (...at) => {
+        const { x, y } = gizmo.mesh.position.clone().set(...at).multiplyScalar(gizmo.size)
+            .add(gizmo.mesh.position).project(camera);
+        return [box.left + (box.width * (1 + x)) / 2, box.top + (box.height * (1 - y)) / 2];
+    };
+    const others = [axis[1], axis[2], axis[0]], round = (angle) => {
+        const third = [axis[2], axis[0], axis[1]];
+        return spot(...[0, 1, 2].map((n) => 0.7 * (Math.cos(angle) * others[n] + Math.sin(angle) * third[n])));
+    };
+    if (turns) return [round(0.8), round(1.3)];
+    return [spot(...axis.map((a) => 0.9 * a)), spot(...axis.map((a) => 1.3 * a))];
+}""".replace("GIZMO", GIZMO)
 LANDMARKS = ("hip_left", "hip_right", "shoulder_left", "shoulder_right", "knee_left", "knee_right")
 TRIAL = """name = "person"
 camera = [{ name = "a", video = "a.mp4" }, { name = "b", video = "b.mp4" }]
@@ -94,6 +112,30 @@ def drag_trunk(page, pane, by_px, *, held=None):
         page.wait_for_function(f"document.querySelector('canvas.view').view.{what} === null")
 
 
+def drag_handle(page, axis, *, turns):
+    """Drag a handle of the 3D scene by 40 px, along its arrow or around its ring."""
+    page.wait_for_selector(".nicegui-scene")
+    page.wait_for_function(f"() => ({GIZMO})() !== undefined")
+    at = page.evaluate(HANDLE, [axis, turns])
+    page.mouse.move(*at[0])
+    page.mouse.down()
+    page.mouse.move(*at[1], steps=6)
+    page.mouse.up()
+
+
+def use_pose(page, folder, before):
+    """Write the pose that is shown until it is another than before, and stays; return it."""
+    last = before
+    for _ in range(60):
+        page.get_by_role("button", name="Use this pose").click()
+        page.wait_for_timeout(250)
+        start = read_trial(folder / "trial.toml").start
+        if start == last != before:
+            return start
+        last = start
+    raise AssertionError("the pose does not change")
+
+
 def test_a_body_placed_by_hand_goes_where_drags_put_it(rig, folder):
     first, second = np.array([40.0, -18.0]), np.array([-55.0, 6.0])
     with open_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
@@ -108,14 +150,22 @@ def test_a_body_placed_by_hand_goes_where_drags_put_it(rig, folder):
         page.get_by_role("button", name="Use this pose").click()
         page.get_by_text("the first pose is written into the trial").wait_for()
         before = read_trial(folder / "trial.toml").start
+        page.get_by_role("button", name="Move and turn it in 3D").click()
+        drag_handle(page, [0, 0, 1], turns=False)
+        lifted = use_pose(page, folder, before)
+        drag_handle(page, [0, 1, 0], turns=True)
+        turned = use_pose(page, folder, lifted)
         drag_trunk(page, 0, (25.0, 0.0), held="Shift")
-        page.get_by_role("button", name="Use this pose").click()
-        page.wait_for_timeout(500)
-    after = read_trial(folder / "trial.toml").start
+        after = use_pose(page, folder, turned)
+    np.testing.assert_allclose(np.array(lifted.position_m)[:2], before.position_m[:2], atol=1e-4)
+    assert lifted.position_m[2] > before.position_m[2] + MOVED_M
+    np.testing.assert_allclose(turned.position_m, lifted.position_m, atol=1e-4)
+    axis = turned.rotation.as_rotvec()
+    assert abs(axis[1]) > TURNED and np.abs(axis[[0, 2]]).max() < 1e-3
     assert before.frame == N_FRAMES - 1 and before.points_px is None
     standing = standing_pose(human18(1.75, 70.0, outfit=SAMPLED), rig).world_from_root.translation
     moved_px = rig["a"].px_from_world(np.array(before.position_m)) - rig["a"].px_from_world(standing)
     np.testing.assert_allclose(moved_px, first, atol=NEAR_PX)  # the second drag has kept what the first one set
     assert np.linalg.norm(np.array(before.position_m) - standing) > MOVED_M
-    assert before.rotation.magnitude() < 1e-6 < TURNED < after.rotation.magnitude()
-    np.testing.assert_allclose(after.position_m, before.position_m, atol=1e-4)
+    assert before.rotation.magnitude() < 1e-6 < TURNED < (turned.rotation.inv() * after.rotation).magnitude()
+    np.testing.assert_allclose(after.position_m, turned.position_m, atol=1e-4)

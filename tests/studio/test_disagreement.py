@@ -32,7 +32,7 @@ def seen_from(camera, rng, shift=(0.0, 0.0)):
     return image, [np.array(item["points"]) for item in items]
 
 
-@pytest.mark.parametrize("shift", [(0.0, 0.0), (6.0, -3.0)])
+@pytest.mark.parametrize("shift", [(0.0, 0.0), (6.0, -3.0), (33.0, 14.0), (-20.0, -29.0)])
 def test_a_shift_is_measured_within_its_deviation(shift):
     rng = np.random.default_rng(4)
     found = edge_shift("a", [seen_from(CAMERA, rng, shift) for _ in range(3)])

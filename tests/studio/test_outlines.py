@@ -9,9 +9,10 @@ from scipy.spatial.transform import RigidTransform
 from airborne.body import Pose
 from airborne.body.files import read_body
 from airborne.cameras import Rig, camera_looking_at
+from airborne.errors import ResultError
 from airborne.motion import MotionWriter, read_players
 from airborne.studio import curve_data
-from airborne.studio.curve_data import describe_distance, run_curves
+from airborne.studio.curve_data import curve_kinds, describe_distance, run_curves
 from airborne.studio.outlines import outline_items, player_colours, run_overlay
 from airborne.studio.runs import count_rows
 from airborne.studio.stage import part_stl
@@ -99,6 +100,33 @@ def test_curves_of_a_long_run_keep_what_stands_out(tmp_path, monkeypatch):
         values = [each for each in a["value"] if each is not None]
         assert (min(b["value"]), max(b["value"])) == (min(values), max(values))
         assert len(b["sd"]) == len(b["value"]) == len(thin["frame"]) == len(thin["time_s"])
+
+
+def test_curves_show_the_columns_of_a_run_s_tables_and_of_one_joint(cross, tmp_path):
+    with MotionWriter(tmp_path / "motion.csv") as writer:
+        for each in run_with_gap(4, lost=(2,)):
+            writer.append(each)
+    assert curve_kinds(tmp_path) == {"": "position"}
+    (tmp_path / "tables").mkdir()
+    names = ("somersault", "tilt", "twist")
+    header = ",".join(["frame", "time_s", *(f"{name}_deg" for name in names), *(f"{name}_deg_sd" for name in names)])
+    (tmp_path / "tables" / "angles.csv").write_text(
+        f"{header}\n0,0,1,2,3,.1,.2,.3\n3,0.06,4,5,,.4,.5,\n9,1,0,0,0,0,0,0\n"
+    )
+    somersault, _, twist = run_curves(tmp_path, "rotation")["series"]
+    assert (somersault["name"], somersault["unit"]) == ("somersault", "°")
+    assert (somersault["value"], somersault["sd"]) == ([1, None, None, 4], [0.1, None, None, 0.4])
+    assert twist["value"] == [3, None, None, None]
+    header = "frame,time_s,joint,x_deg,y_deg,z_deg,x_deg_sd,y_deg_sd,z_deg_sd"
+    rows = "".join(
+        f"{k},0,{name},{k + turn},0,0,1,1,1\n" for k in range(4) for name, turn in (("hip", 10), ("knee", 20))
+    )
+    (tmp_path / "tables" / "joint_angles.csv").write_text(f"{header}\n{rows}")
+    assert run_curves(tmp_path, "joint:knee")["series"][0]["value"] == [20, 21, 22, 23]
+    with pytest.raises(ResultError, match="no curve is called height; reload this page"):
+        run_curves(tmp_path, "height")
+    with pytest.raises(ResultError, match=r"tables/flight.csv cannot be read; track again"):
+        run_curves(tmp_path, "com")
 
 
 def test_a_part_of_a_body_is_a_mesh_in_its_segment(cross):

@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from airborne.errors import VideoError
+from airborne.studio import image_lists
+from airborne.studio.image_lists import read_or_list
 from airborne.studio.pictures import Pictures, _Store
 from airborne.trial.cameras import CameraTable
 from airborne.video import VideoSource
@@ -27,24 +29,38 @@ def source(tmp_path):
     return VideoSource("a", write_clip(tmp_path / "a.mkv", numbered(30)))
 
 
-def test_pictures_of_any_number_come_as_jpeg(source):
-    pictures = Pictures()
+def test_pictures_of_any_number_come_as_jpeg(source, tmp_path):
+    pictures = Pictures(tmp_path)
     for number in (0, 29, 3, 4, 5, 0):
         image = cv2.imdecode(np.frombuffer(pictures.jpeg(source, number), np.uint8), cv2.IMREAD_COLOR)
         assert image[5, 5].tolist() == pytest.approx([2 * number] * 3, abs=2)
 
 
-def test_a_picture_that_nobody_waits_for_is_not_decoded(source):
+def test_a_picture_that_nobody_waits_for_is_not_decoded(source, tmp_path):
     with pytest.raises(VideoError, match="nobody waits for image 20"):
-        Pictures().jpeg(source, 20, lambda: False)
+        Pictures(tmp_path).jpeg(source, 20, lambda: False)
 
 
 def test_a_trial_is_shown_with_its_sizes_and_clock(source, tmp_path):
     tables = (CameraTable(name="a", video="a.mkv"), CameraTable(name="b", video="a.mkv", offset_s=0.1))
-    shown = Pictures().show(
+    shown = Pictures(tmp_path).show(
         tables, lambda table: VideoSource(table.name, tmp_path / table.video, offset_s=table.offset_s)
     )
     assert shown.sizes == {"a": (64, 48), "b": (64, 48)}
     assert len(shown.clock) == 35
     assert shown.clock.images[7].tolist() == [7, 2]
     assert shown.clock.images[34].tolist() == [-1, 29]
+
+
+def test_a_list_of_images_is_read_off_a_file_once_and_anew_when_the_file_is_another(source, tmp_path, monkeypatch):
+    first = read_or_list(tmp_path, source)
+    monkeypatch.setattr(image_lists, "index_images", lambda source: pytest.fail("listed again"))
+    again = read_or_list(tmp_path, source)
+    assert np.array_equal(first.ticks, again.ticks) and np.array_equal(first.keys, again.keys)
+    assert (first.first, first.tick_s, first.facts) == (again.first, again.tick_s, again.facts)
+    monkeypatch.undo()
+    kept = next((tmp_path / image_lists.LISTS).glob("*.npz"))
+    kept.write_bytes(kept.read_bytes()[:200])
+    assert len(read_or_list(tmp_path, source)) == 30  # what was torn is listed again
+    write_clip(source.path, numbered(12))
+    assert len(read_or_list(tmp_path, source)) == 12

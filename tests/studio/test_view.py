@@ -68,6 +68,17 @@ def test_the_frame_shown_is_the_one_asked_for(address):
             for pane, number in enumerate(expected(frame)):
                 if number is not None:
                     assert read_number(page, pane) == number, (key, frame, pane)
+        page.get_by_label("all frames").fill("31")
+        wait_for_frame(page, 31)
+        page.get_by_label("frame in view").fill("54")
+        page.get_by_label("frame in view").press("Enter")
+        wait_for_frame(page, 54)
+        assert read_number(page, 0) == 54
+        page.get_by_text("of 59, 2.160 s").wait_for()
+        canvas.press(" ")
+        page.get_by_label("stop").wait_for()
+        wait_for_frame(page, N - 1)
+        page.get_by_label("play").wait_for()
     assert {request.split("/")[2] for request in requests} == {address.split("/")[2]}
 
 

@@ -86,6 +86,27 @@ def test_an_image_that_nobody_waits_for_is_left_and_found_later(tmp_path):
         assert np.array_equal(reader.image(15), other.image(15))
 
 
+def test_a_jump_decodes_only_what_its_image_is_predicted_from(sources, monkeypatch):
+    source = next(each for each in sources if each.name == "long groups")
+    index = index_images(source)
+    width, height = index.facts.size
+    monkeypatch.setattr(seeking, "_KEPT_BYTES", 12 * width * height)  # eight frames
+    with ImageReader(source, index) as reader, ImageReader(source, index) as other:
+        whole = [other.image(number) for number in range(70)]
+        steps = []
+        step = reader._step
+        reader._step = lambda: (steps.append(1), step())
+        assert np.array_equal(reader.image(60), whole[60])
+        assert len(steps) < 40
+        patience = iter([True] * 8)
+        assert not reader.go_to(40, lambda: next(patience, False))
+        for number in (20, 30, 61, 62, 61, 59, 57):
+            assert np.array_equal(reader.image(number), whole[number]), number
+        n_steps = len(steps)
+        assert np.array_equal(reader.image(55), whole[55])
+        assert len(steps) == n_steps  # a step back has kept those before it
+
+
 def test_a_number_that_is_not_there_is_refused(sources):
     reader = ImageReader(sources[0], index_images(sources[0]))
     with pytest.raises(VideoError, match="there is no image 20; the last is 19"):

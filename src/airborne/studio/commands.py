@@ -7,12 +7,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 
 from airborne.studio.writing import FOLDER
 
 _RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
 STOPPED = 130  # the exit code of a command that was stopped
+_numbers = count(1)  # of the commands: two exports may run at once
 _PATIENCE_S = 10.0  # for a process that was told to stop
 
 
@@ -24,7 +26,7 @@ class Command:
         self.words = tuple(words)
         self.started_s = time.monotonic()
         self._out: bytes = b""
-        self._log = folder / FOLDER / f"{words[0]}.log"
+        self._log = folder / FOLDER / f"{words[0]}_{next(_numbers)}.log"
         self._log.parent.mkdir(exist_ok=True)
         with self._log.open("wb") as log:
             self._process = subprocess.Popen(

@@ -11,21 +11,39 @@ from numpy.typing import NDArray
 
 from airborne.errors import ResultError
 from airborne.motion import PlayersMotion
-from airborne.motion.run_folder import holds_players
-from airborne.studio.runs import run_players, run_rows
+from airborne.motion.run_folder import ANGLES, FLIGHT, JOINT_ANGLES, holds_players
+from airborne.studio.runs import run_body, run_players, run_rows
 from airborne.tracking import Status
 from airborne.types import Array
 
 LIMBS = ("hip", "knee", "ankle", "foot")  # in order down a leg
 _MOST_POINTS = 4000  # of a curve: more than a screen has columns
+_JOINT = "joint:"  # before a joint's name, in what curves show
+_TABLES = {  # what curves show besides: the table, words, unit, columns and their names
+    "rotation": (ANGLES, "rotation", "°", {f"{name}_deg": name for name in ("somersault", "tilt", "twist")}),
+    "com": (FLIGHT, "centre of mass", "m", {f"com_{axis}_m": axis for axis in "xyz"}),
+    "momentum": (FLIGHT, "angular momentum", "kg m²/s", {f"L_{axis}_kg_m2_s": axis for axis in "xyz"}),
+}
+_OF_JOINT = (JOINT_ANGLES, "", "°", {f"{axis}_deg": axis for axis in "xyz"})
 _FROM_GOOD = np.array([Status.TRACKED.value, Status.UNCERTAIN.value, Status.LOST.value])  # to bad
 
 
-def run_curves(run: Path) -> dict[str, Any]:
+def curve_kinds(run: Path) -> dict[str, str]:
+    """Return what a run's curves can show: its name in an address, and in words."""
+    if holds_players(run):
+        return {"": "how high the feet are"}
+    found = {"": "position", **{name: words for name, (file, words, *_) in _TABLES.items() if (run / file).is_file()}}
+    limbs = run_body(run).segments[1:] if (run / JOINT_ANGLES).is_file() else ()
+    return found | {f"{_JOINT}{limb.name}": limb.name.replace("_", " ") for limb in limbs}
+
+
+def run_curves(run: Path, what: str = "") -> dict[str, Any]:
     """Return a run's curves: times, frames, statuses, and series with their standard deviations.
 
+    `what` is one of `curve_kinds`; raises ResultError for another.
     Of a long run several frames share a point: the least and the greatest of their values, the worst of their statuses.
     """
+    unit = "m"
     if holds_players(run):
         motion = run_players(run)
         index, time_s, status = motion.index, motion.time_s, motion.status
@@ -35,6 +53,8 @@ def run_curves(run: Path) -> dict[str, Any]:
         rows = run_rows(run)
         index, time_s, status = rows.index, rows.time_s, rows.status[:, None]
         names, values, sd = ["x", "y", "z"], rows.position, rows.position_sd
+        if what:
+            names, unit, values, sd = _read_series(run, what, index)
     worst = (status[..., None] == _FROM_GOOD).argmax(axis=-1).max(axis=1, initial=0)
     if len(index) > _MOST_POINTS:
         starts = np.arange(0, len(index), -(-2 * len(index) // _MOST_POINTS))
@@ -48,10 +68,31 @@ def run_curves(run: Path) -> dict[str, Any]:
         "time_s": time_s.tolist(),
         "status": _FROM_GOOD[worst].tolist(),
         "series": [
-            {"name": name, "unit": "m", "value": _plain(values[:, k]), "sd": _plain(sd[:, k]) if sd.shape[1] else []}
+            {"name": name, "unit": unit, "value": _plain(values[:, k]), "sd": _plain(sd[:, k]) if sd.shape[1] else []}
             for k, name in enumerate(names)
         ],
     }
+
+
+def _read_series(run: Path, what: str, index: NDArray[np.int64]) -> tuple[list[str], str, Array, Array]:
+    """Read columns of a run's tables: names, unit, values and deviations (n, columns), NaN where a frame has none."""
+    joint = what.removeprefix(_JOINT) if what.startswith(_JOINT) else None
+    if what not in _TABLES and joint is None:
+        raise ResultError(f"no curve is called {what}; reload this page")
+    file, _, unit, columns = _TABLES.get(what, _OF_JOINT)
+    found = np.full((len(index), 2 * len(columns)), np.nan)
+    try:
+        with (run / file).open(encoding="utf-8") as lines:
+            header = next(lines).rstrip("\n").split(",")
+            at = [header.index(name) for name in (*columns, *(f"{name}_sd" for name in columns))]
+            for line in lines:
+                cells = line.rstrip("\n").split(",")
+                row = int(np.searchsorted(index, frame := int(cells[0])))
+                if joint in (None, cells[2]) and row < len(index) and index[row] == frame:
+                    found[row] = [float(cells[k] or "nan") for k in at]
+    except (OSError, ValueError, IndexError, StopIteration):
+        raise ResultError(f"{run.name}/{file} cannot be read; track again") from None
+    return list(columns.values()), unit, found[:, : len(columns)], found[:, len(columns) :]
 
 
 def describe_distance(run: Path, other: Path) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -21,6 +22,7 @@ from airborne.studio.runs import run_body, run_rig, run_rows
 from airborne.types import Array, Image
 
 _REACH_PX = 12  # how far an edge is looked for, in a picture 1000 px wide; more in larger ones
+_SMALLER = 4  # times: images in which larger shifts are looked for, four times the reach and the reach again
 _WIDE_PX = 1000  # of the pictures for which the numbers here are
 _AROUND = 3  # frames on either side, which show the same
 _MOST_POINTS = 400  # of an outline
@@ -66,23 +68,55 @@ def look_for_disagreement(run: Path, frame: int, shown: ShownTrial, pictures: Pi
 
 
 def edge_shift(camera: str, seen: Sequence[tuple[Image, Sequence[Array]]]) -> EdgeShift | None:
-    """Measure the shift of a body's outlines in images (h, w, 3), in each closed lines (n, 2) [px]; None if short."""
+    """Measure the shift of a body's outlines in images (h, w, 3), in each closed lines (n, 2) [px]; None if short.
+
+    A shift beyond the reach is found in smaller images first; what lies on the stronger edges is taken.
+    """
     if not seen:
         return None
     scale = max(1.0, seen[0][0].shape[1] / _WIDE_PX)
     reach = round(_REACH_PX * scale)
+    found: list[tuple[Array, _Match | None]] = [(np.zeros(2), _match(seen, reach))]
+    small = _match([_shrink(image, outline) for image, outline in seen], reach)
+    if small is not None:
+        start = _SMALLER * small.px
+        found.append((start, _match([(image, [line + start for line in outline]) for image, outline in seen], reach)))
+    matches = [(start, match) for start, match in found if match is not None]
+    if not matches:
+        return None
+    start, best = max(matches, key=lambda each: each[1].strength)
+    sd = float(np.hypot(best.sd_px, 0.3 * scale))  # on a grid of whole pixels, refined to a third of one
+    px = start + best.px
+    far = float(np.linalg.norm(px))
+    return EdgeShift(camera, px, sd, far > max(_STANDS_OUT * sd, _LEAST_PX * scale))
+
+
+class _Match(NamedTuple):
+    """Where outlines lie on the strongest edges."""
+
+    px: Array  # (2,) shift [px]
+    sd_px: float
+    strength: float  # of the edges there, in those of the edges around
+
+
+def _match(seen: Sequence[tuple[Image, Sequence[Array]]], reach: int) -> _Match | None:
+    """Shift outlines over images by `reach` at most; None where they are short."""
     samples = [(image, *_sample(outline, image.shape, reach)) for image, outline in seen]
     points, normals = (np.concatenate(each) for each in zip(*(each[1:] for each in samples), strict=True))
     if len(points) < _FEWEST_POINTS * len(seen):
         return None
     profiles = np.concatenate([_edge_profiles(*each, reach) for each in samples if len(each[1])])
-    whole = _best_shift(profiles, normals, reach)
+    whole, strength = _best_shift(profiles, normals, reach)
     stretch = np.arange(len(points)) * _STRETCHES // len(points)
-    parts = np.stack([_best_shift(profiles[stretch != k], normals[stretch != k], reach) for k in range(_STRETCHES)])
+    parts = np.stack([_best_shift(profiles[stretch != k], normals[stretch != k], reach)[0] for k in range(_STRETCHES)])
     variance = (_STRETCHES - 1) / _STRETCHES * np.sum((parts - parts.mean(axis=0)) ** 2)
-    sd = float(np.sqrt(variance / 2 + (0.3 * scale) ** 2))  # on a grid of whole pixels, refined to a third of one
-    far = float(np.linalg.norm(whole))
-    return EdgeShift(camera, whole, sd, far > max(_STANDS_OUT * sd, _LEAST_PX * scale))
+    return _Match(whole, float(np.sqrt(variance / 2)), strength)
+
+
+def _shrink(image: Image, outline: Sequence[Array]) -> tuple[Image, list[Array]]:
+    """Return a smaller image, and the outline in it."""
+    small = cv2.resize(image, None, fx=1 / _SMALLER, fy=1 / _SMALLER, interpolation=cv2.INTER_AREA)
+    return np.asarray(small, np.uint8), [(line + 0.5) / _SMALLER - 0.5 for line in outline]
 
 
 def describe_shifts(shifts: Sequence[EdgeShift]) -> str:
@@ -124,8 +158,8 @@ def _edge_profiles(image: Image, points: Array, normals: Array, reach: int) -> A
     return edges / (edges.mean(axis=1, keepdims=True) + 10.0)  # each point has one voice; flat stretches next to none
 
 
-def _best_shift(profiles: Array, normals: Array, reach: int) -> Array:
-    """Return the shift (2,) [px] at which the outline lies on the strongest edges."""
+def _best_shift(profiles: Array, normals: Array, reach: int) -> tuple[Array, float]:
+    """Return the shift (2,) [px] at which the outline lies on the strongest edges, and how strong they are."""
     steps = np.arange(-reach, reach + 1)
     shifts = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     across = np.clip(shifts @ normals.T, -reach, reach - 1e-6) + reach  # (shifts, n)
@@ -134,7 +168,8 @@ def _best_shift(profiles: Array, normals: Array, reach: int) -> Array:
     score = ((1 - share) * profiles[rows, low] + share * profiles[rows, low + 1]).sum(axis=1)
     score = cv2.GaussianBlur(score.reshape(len(steps), len(steps)), (0, 0), 1.0)
     v, u = np.unravel_index(int(score.argmax()), score.shape)
-    return np.array([steps[u] + _vertex(score[v], int(u)), steps[v] + _vertex(score[:, u], int(v))])
+    best = np.array([steps[u] + _vertex(score[v], int(u)), steps[v] + _vertex(score[:, u], int(v))])
+    return best, float(score[v, u]) / len(normals)
 
 
 def _vertex(score: Array, k: int) -> float:

@@ -6,14 +6,16 @@ from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from threading import Lock
 
 from airborne.errors import VideoError
 from airborne.export.pictures import encode_jpeg
+from airborne.studio.image_lists import read_or_list
 from airborne.trial.cameras import CameraTable
 from airborne.types import Image
 from airborne.video import VideoSource
-from airborne.video.seeking import ImageIndex, ImageReader, TrialClock, index_images, match_images
+from airborne.video.seeking import ImageIndex, ImageReader, TrialClock, match_images
 
 _MOST_BYTES = 40_000_000  # of JPEG that are kept for other windows; the browser keeps its own
 _MOST_OPEN = 32  # files
@@ -69,8 +71,8 @@ class _Store:
 class _Video:
     """One file: its index and its reader, for one thread at a time."""
 
-    def __init__(self, source: VideoSource) -> None:
-        self._source, self._lock = source, Lock()
+    def __init__(self, source: VideoSource, memory: Path) -> None:
+        self._source, self._memory, self._lock = source, memory, Lock()
         self._reader: ImageReader | None = None
 
     def index(self) -> ImageIndex:
@@ -94,16 +96,16 @@ class _Video:
 
     def _open(self) -> ImageReader:
         if self._reader is None:
-            self._reader = ImageReader(self._source, index_images(self._source))
+            self._reader = ImageReader(self._source, read_or_list(self._memory, self._source))
         return self._reader
 
 
 class Pictures:
     """The pictures of any number of videos; for any number of threads."""
 
-    def __init__(self) -> None:
-        """Open nothing yet."""
-        self._store, self._lock = _Store(_MOST_BYTES), Lock()
+    def __init__(self, memory: Path) -> None:
+        """Open nothing yet; when the videos' images are shown is remembered in a folder."""
+        self._memory, self._store, self._lock = memory, _Store(_MOST_BYTES), Lock()
         self._videos: OrderedDict[VideoSource, _Video] = OrderedDict()
 
     def index(self, source: VideoSource) -> ImageIndex:
@@ -135,7 +137,7 @@ class Pictures:
 
     def _video(self, source: VideoSource) -> _Video:
         with self._lock:
-            video = self._videos.pop(source, None) or _Video(source)
+            video = self._videos.pop(source, None) or _Video(source, self._memory)
             self._videos[source] = video
             oldest = self._videos.popitem(last=False)[1] if len(self._videos) > _MOST_OPEN else None
         if oldest is not None:

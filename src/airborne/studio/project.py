@@ -48,7 +48,7 @@ class Project:
     def source(self, camera: CameraTable) -> VideoSource:
         """Return a camera's video; raises TrialError for one outside the opened folder."""
         path = self.file(camera.video)
-        return VideoSource(camera.name, path, camera.fields, camera.offset_s, camera.drift_ppm)
+        return VideoSource(camera.name, path, camera.fields, camera.offset_s, camera.drift_ppm, camera.exposure_s)
 
     def file(self, name: str) -> Path:
         """Return the path of a file that the trial names; raises TrialError for one outside the opened folder."""

@@ -14,6 +14,7 @@ from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, JSONResponse, Response
 
 from airborne import export
+from airborne.body import BodyModel
 from airborne.errors import AirborneError, ResultError
 from airborne.export.pictures import thumbnail
 from airborne.studio.calibrating import find_picture
@@ -29,7 +30,10 @@ from airborne.video.decoding import decode, inspect, rgb_from_decoded
 
 _WORKERS = ThreadPoolExecutor(4, thread_name_prefix="answers")  # more would only hold more pictures at once
 _THUMBNAIL_PX = 240  # wide
-_CURVES = Path(export.__file__).parent / "templates" / "curves.js"  # drawn alike in the report
+_SCRIPTS = (  # that components import
+    Path(export.__file__).parent / "templates" / "curves.js",  # drawn alike in the report
+    Path(__file__).with_name("view_drawing.js"),
+)
 _KEEP = {"cache-control": "private, max-age=3600"}
 
 
@@ -50,21 +54,27 @@ def add_routes(app: FastAPI, session: Session) -> None:
     async def first_picture(name: str) -> Response:
         return await _answer(lambda: _thumbnail(session.folder, name))
 
-    @app.get("/parts/curves.js")
-    async def curves_script() -> Response:
-        return Response(_CURVES.read_text(encoding="utf-8"), media_type="text/javascript", headers=_KEEP)
+    @app.get("/parts/{name}")
+    async def script(name: str) -> Response:
+        path = next((path for path in _SCRIPTS if path.name == name), None)
+        headers = {"cache-control": "no-store"}  # another version may be served at the same address
+        return FileResponse(path, media_type="text/javascript", headers=headers) if path else Response(status_code=404)
 
     @app.get("/overlay/{run}/{frame}")
     async def overlay(run: str, frame: int, beside: str = "") -> Response:
         return await _answer(lambda: _json(_overlay(session, run, frame, beside)))
 
     @app.get("/curves/{run}")
-    async def curves(run: str, beside: str = "") -> Response:
-        return await _answer(lambda: _json(_curves(session.folder, run, beside)))
+    async def curves(run: str, beside: str = "", of: str = "") -> Response:
+        return await _answer(lambda: _json(_curves(session.folder, run, beside, of)))
 
     @app.get("/mesh/{run}/{part}")
     async def mesh(run: str, part: int) -> Response:
-        return await _answer(lambda: _mesh(find_run(session.folder, run), part))
+        return await _answer(lambda: _mesh(run_body(find_run(session.folder, run)), part))
+
+    @app.get("/body/mesh/{part}")
+    async def body_mesh(part: int) -> Response:
+        return await _answer(lambda: _mesh(session.project().model(), part))
 
     @app.get("/calibration/{name}")
     async def calibration(name: str) -> Response:
@@ -83,7 +93,7 @@ def find_run(folder: Path, name: str) -> Path:
     """Return a run of the folder by its name; raises ResultError."""
     run = _find_run(folder, name)
     if run is None:
-        raise ResultError(f"there is no run {name}")
+        raise ResultError(f"there is no run {name} any more; reload this page")
     return run
 
 
@@ -99,9 +109,9 @@ def _overlay(session: Session, name: str, frame: int, beside: str) -> dict[str, 
     return {"items": [*other["items"], *own["items"]], "label": own["label"]}
 
 
-def _curves(folder: Path, name: str, beside: str) -> dict[str, Any]:
-    own = run_curves(find_run(folder, name))
-    return {**own, "beside": run_curves(find_run(folder, beside))} if beside else own
+def _curves(folder: Path, name: str, beside: str, what: str) -> dict[str, Any]:
+    own = run_curves(find_run(folder, name), what)
+    return {**own, "beside": run_curves(find_run(folder, beside), what)} if beside else own
 
 
 async def _answer(make: Callable[[], Response]) -> Response:
@@ -134,15 +144,17 @@ def _json(value: Any) -> Response:
     return JSONResponse(value, headers={"cache-control": "no-store"})
 
 
-def _mesh(run: Path, part: int) -> Response:
-    return Response(part_stl(run_body(run), part), media_type="model/stl", headers={"cache-control": "no-store"})
+def _mesh(model: BodyModel, part: int) -> Response:
+    return Response(part_stl(model, part), media_type="model/stl", headers={"cache-control": "no-store"})
 
 
 def _jpeg(session: Session, camera: int, frame: int, is_wanted: Callable[[], bool]) -> Response:
     shown = session.shown()
     if not (0 <= camera < len(shown.sources) and 0 <= frame < len(shown.clock)):
         return Response(status_code=404)
-    return _picture(session, camera, int(shown.clock.images[frame, camera]), is_wanted)
+    answer = _picture(session, camera, int(shown.clock.images[frame, camera]), is_wanted)
+    answer.headers["x-time-s"] = repr(float(shown.clock.times_s[frame]))
+    return answer
 
 
 def _picture(session: Session, camera: int, number: int, is_wanted: Callable[[], bool]) -> Response:

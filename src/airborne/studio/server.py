@@ -7,12 +7,15 @@ import secrets
 import socket
 import webbrowser
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from pathlib import Path
+from threading import Thread
 
 from nicegui import app, ui
 from nicegui.server import Server
 
 from airborne.errors import AirborneError
+from airborne.studio.curve_data import run_curves
 from airborne.studio.guard import Guard
 from airborne.studio.pages.body import body_page
 from airborne.studio.pages.cameras import cameras_page
@@ -24,7 +27,7 @@ from airborne.studio.pages.ruler import ruler_page
 from airborne.studio.pages.sync import sync_page
 from airborne.studio.pages.track import track_page
 from airborne.studio.pages.videos import videos_page
-from airborne.studio.project import find_trial
+from airborne.studio.project import find_trial, list_runs
 from airborne.studio.routes import add_routes
 from airborne.studio.session import Session
 
@@ -59,6 +62,7 @@ def serve(path: Path, *, port: int, browser: bool, is_guided: bool) -> None:
     app.add_middleware(Guard, token=token, port=port)
 
     async def announce() -> None:
+        Thread(target=_read_ahead, args=(session,), daemon=True).start()  # while the browser opens
         while not Server.instance.started:
             await asyncio.sleep(_SOON_S)
         print(f"airborne studio: {address}\nCtrl-C ends it", flush=True)
@@ -80,6 +84,14 @@ def serve(path: Path, *, port: int, browser: bool, is_guided: bool) -> None:
         reconnect_timeout=_PATIENCE_S,
         favicon=_STYLE.with_name("icon.svg"),
     )
+
+
+def _read_ahead(session: Session) -> None:
+    """Read what takes long of a long recording: when its pictures are shown, and the newest run."""
+    with suppress(AirborneError, OSError):
+        session.shown()
+        for run in list_runs(session.folder)[:1]:
+            run_curves(run)
 
 
 def _page(url: str, build: Callable[[Session], Awaitable[None]], session: Session) -> Callable[[], Awaitable[None]]:

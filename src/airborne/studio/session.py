@@ -15,7 +15,7 @@ from airborne.studio.pictures import Pictures, ShownTrial
 from airborne.studio.place import LastView, read_place, write_place
 from airborne.studio.project import Project, read_project
 from airborne.studio.trial_edits import with_table
-from airborne.studio.writing import Editor, read_if_there, refuse_outer_links
+from airborne.studio.writing import FOLDER, Editor, read_if_there, refuse_outer_links
 from airborne.trial.body import BodyTable
 from airborne.trial.calibration import CalibrationTable
 from airborne.trial.file import Trial
@@ -30,7 +30,7 @@ class Session:
         """Open a folder and a trial in it, which may not be there yet. Raises AirborneError for links out of it."""
         refuse_outer_links(folder)
         self.folder, self.path, self.is_guided = folder, path, is_guided
-        self.pictures, self.editor = Pictures(), Editor(folder)
+        self.pictures, self.editor = Pictures(folder / FOLDER), Editor(folder)
         self.place = read_place(folder)
         self.commands: dict[str, Command] = {}  # that were started here, by what they do
         self._known: dict[str, tuple[Hashable, Any]] = {}

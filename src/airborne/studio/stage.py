@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Awaitable, Callable, Iterable
 from itertools import pairwise
 
 import numpy as np
 from nicegui import ui
 from nicegui.elements.scene.objects.group import Group
 from nicegui.elements.scene.scene import Scene
+from nicegui.elements.scene.scene_object3d import Object3D
+from nicegui.events import GenericEventArguments
+from scipy.spatial.transform import RigidTransform, Rotation
 from trimesh.exchange.stl import export_stl
 
 from airborne.body import BodyModel, Pose
@@ -18,27 +21,39 @@ from airborne.export.part_meshes import part_colour, segment_mesh
 from airborne.types import Array
 
 _CAMERA_COLOUR, _PATH_COLOUR = "#1f2429", "#0072b2"
-_FROM = np.array([0.7, -0.9, 0.55])  # the side and height from which the scene is seen first
+FROM = np.array([0.7, -0.9, 0.55])  # the side and height from which the scene is seen first
+_ALL_IN_VIEW = 1.4  # times a sphere's radius: from so far, along `FROM`, three.js's 75 degrees hold it with a margin
 _MOST_LINES = 500  # of a path: each is an object of the scene
+_MOVE_EVERY_S = 0.05  # while handles are dragged: the outlines of three views take half of it
 _FRUSTUM_SHARE = 0.12  # of the distance between camera and middle
 
 
 def draw_cameras(
     rig: Rig, path: Array | None = None, *, middle: Array | None = None, away_m: float | None = None
 ) -> Scene:
-    """Show cameras and a path (n, 3) [m], NaN leaves gaps; seen from `away_m` beside the `middle` (3,) [m]."""
-    centres = np.stack([camera.centre for camera in rig])
-    middle = middle_of_view(rig) if middle is None else middle
-    reach = float(np.median(np.linalg.norm(centres - middle, axis=1)))
+    """Show cameras and a path (n, 3) [m], NaN leaves gaps; seen from `away_m` beside the `middle` (3,) [m].
+
+    Without these it shows all cameras and what they look at.
+    """
+    centres, looked_at = np.stack([camera.centre for camera in rig]), middle_of_view(rig)
+    reach = float(np.median(np.linalg.norm(centres - looked_at, axis=1)))
+    if middle is None or away_m is None:
+        middle, away_m = overview(np.vstack([centres, looked_at]))
     with ui.scene(grid=(60, 60), background_color="#f6f7f8").style("width: 100%; flex: 1; min-height: 180px") as scene:
         for camera in rig:
             _frustum(scene, camera, _FRUSTUM_SHARE * reach)
         if path is not None:
             pairs = [(a, b) for a, b in pairwise(path[:: len(path) // _MOST_LINES + 1]) if np.isfinite([a, b]).all()]
             _lines(scene, pairs, _PATH_COLOUR)
-    x, y, z = map(float, middle + (away_m or reach) * _FROM)
+    x, y, z = map(float, middle + away_m * FROM)
     scene.move_camera(x, y, z, look_at_x=middle[0], look_at_y=middle[1], look_at_z=middle[2], duration=0)
     return scene
+
+
+def overview(points: Array) -> tuple[Array, float]:
+    """Return the middle of points (n, 3) [m] and how many times `FROM` beside it all of them are in view."""
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    return middle, _ALL_IN_VIEW * float(np.linalg.norm(points - middle, axis=1).max())
 
 
 class BodyOnStage:
@@ -65,6 +80,27 @@ class BodyOnStage:
             if posed is not None:
                 x, y, z = map(float, posed.t[k])
                 group.move(x, y, z).rotate_R(posed.R[k].tolist())
+
+
+class Gizmo(Object3D, component="gizmo.js"):
+    """Handles about a point of a scene: arrows along the world's axes, rings about the body's own; see `gizmo.js`."""
+
+    def __init__(self, scene: Scene, size_m: float, on_move: Callable[[RigidTransform, bool], Awaitable[None]]) -> None:
+        """Draw the handles; `on_move` gets where they were brought, `world_from_root`, and whether they were let go."""
+        with scene:
+            super().__init__(scene.id, size_m)
+
+        async def handle(event: GenericEventArguments) -> None:
+            turn = Rotation.from_quat(event.args["quaternion"])
+            root = RigidTransform.from_components(event.args["position"], turn)
+            await on_move(root, bool(event.args["ended"]))
+
+        scene.on("gizmo", handle, throttle=_MOVE_EVERY_S)
+
+    def place(self, world_from_root: RigidTransform) -> None:
+        """Bring the handles to a body's root."""
+        x, y, z = map(float, world_from_root.translation)
+        self.move(x, y, z).rotate_R(world_from_root.rotation.as_matrix().tolist())
 
 
 def part_stl(model: BodyModel, number: int) -> bytes:

@@ -1,10 +1,11 @@
 // One canvas with every camera's picture at one frame and all that lies over it, drawn in one stroke.
 // Pixels are the video's own: (0, 0) is the centre of the top-left one.
+import drawing from "/parts/view_drawing.js";
+
 const KEPT_FRAMES = 16; // decoded, for all cameras
 const AHEAD = 4; // frames fetched in the direction of travel
 const GRAB_PX = 9; // on the screen: how near a mark must be to be grabbed
 const STILL_PX = 3; // a pointer that moves less has clicked
-const LOUPE = 8; // times as large as the video
 const GAP = 4; // between pictures
 
 export default {
@@ -67,12 +68,14 @@ export default {
     },
   },
   methods: {
+    ...drawing,
     // frames
     refresh() { this.cache.clear(); this.go(this.wanted, true); },
     show(frame) { this.go(frame); },
     async fetchPane(pane, frame, signal) {
       const answer = await fetch(pane.url.replace("{frame}", frame), { signal });
-      return answer.status === 200 ? createImageBitmap(await answer.blob()) : null;
+      const picture = answer.status === 200 ? await createImageBitmap(await answer.blob()) : null;
+      return { picture, time_s: answer.headers.get("x-time-s") };
     },
     async fetchOverlay(frame, signal) {
       if (!this.overlay) return { items: [] };
@@ -83,7 +86,10 @@ export default {
       if (!this.cache.has(frame)) {
         const stop = new AbortController(), { signal } = stop;
         const parts = [this.fetchOverlay(frame, signal), ...this.panes.map((pane) => this.fetchPane(pane, frame, signal))];
-        const all = Promise.all(parts).then(([overlay, ...pictures]) => ({ frame, overlay, pictures }));
+        const all = Promise.all(parts).then(([overlay, ...answers]) => {
+          const time_s = answers[0]?.time_s ?? null; // the same for all panes
+          return { frame, overlay, pictures: answers.map((each) => each.picture), time_s: time_s === null ? null : Number(time_s) };
+        });
         this.cache.set(frame, all);
         this.underway.set(frame, stop);
         all.catch(() => this.cache.get(frame) === all && this.cache.delete(frame)).finally(() => this.underway.delete(frame));
@@ -110,6 +116,7 @@ export default {
       this.canvas.dataset.frame = frame;
       this.canvas.dataset.ms = (performance.now() - begun).toFixed(1);
       this.$emit("frame", { frame });
+      window.dispatchEvent(new CustomEvent("airborne-shown", { detail: { frame, time_s: loaded.time_s, from: this } }));
       for (let k = 1; k <= AHEAD && this.wanted === frame; k++) {
         const next = frame + k * direction;
         if (next >= 0 && next < this.n_frames) await this.load(next).catch(() => {});
@@ -143,123 +150,6 @@ export default {
       const zoom = this.zooms[i], pane = this.panes[i];
       zoom.u = Math.max(0, Math.min(zoom.u, pane.width * (1 - 1 / zoom.scale)));
       zoom.v = Math.max(0, Math.min(zoom.v, pane.height * (1 - 1 / zoom.scale)));
-    },
-    // drawing
-    draw() {
-      if (!this.canvas) return;
-      const box = this.canvas.getBoundingClientRect(), ratio = window.devicePixelRatio || 1;
-      if (!box.width || !this.panes.length) return;
-      const [width, height] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
-      if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
-      const pen = this.pens;
-      pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-      pen.fillStyle = "#16191d";
-      pen.fillRect(0, 0, box.width, box.height);
-      this.layout().forEach((place, i) => place.w && this.drawPane(pen, place, i));
-    },
-    drawPane(pen, place, i) {
-      pen.save();
-      pen.beginPath();
-      pen.rect(place.x, place.y, place.w, place.h);
-      pen.clip();
-      this.drawPicture(pen, place, i);
-      this.drawOver(pen, place, i);
-      if (this.picking && this.pointer && this.pointer.pane === i) this.drawLoupe(pen, place, i);
-      pen.restore();
-      const overlay = this.shown && this.shown.overlay;
-      const text = this.panes[i].name + (i === 0 && overlay && overlay.label ? "   " + overlay.label : "");
-      this.write(pen, text, place.x + 8, place.y + 18, "#ffffff");
-    },
-    drawPicture(pen, place, i) {
-      const pane = this.panes[i], picture = this.shown && this.shown.pictures[i];
-      pen.fillStyle = "#2a2f36";
-      pen.fillRect(place.x, place.y, place.w, place.h);
-      const [x, y] = this.toScreen(place, -0.5, -0.5);
-      pen.imageSmoothingEnabled = place.scale < 3;
-      if (picture) pen.drawImage(picture, x, y, pane.width * place.scale, pane.height * place.scale);
-      else if (this.shown) this.write(pen, "no picture", place.x + place.w / 2 - 30, place.y + place.h / 2, "#c8cdd3");
-    },
-    drawOver(pen, place, i) {
-      const lines = [...((this.shown && this.shown.overlay.items) || []), ...this.nowItems()];
-      for (const item of lines) if (item.pane === i) this.drawItem(pen, place, item);
-      this.labels = [];
-      for (const mark of this.nowMarks()) if (mark.pane === i) this.drawMark(pen, place, mark);
-    },
-    nowMarks() { return (this.live || this).marks || []; },
-    nowItems() { return (this.live || this).items || []; },
-    trace(pen, place, item) {
-      pen.beginPath();
-      item.points.forEach((point, k) => pen[k ? "lineTo" : "moveTo"](...this.toScreen(place, ...point)));
-      if (item.closed) pen.closePath();
-    },
-    drawItem(pen, place, item) {
-      this.trace(pen, place, item);
-      if (item.fill) { pen.fillStyle = item.fill; pen.fill(); }
-      if (item.colour) { pen.strokeStyle = item.colour; pen.lineWidth = item.width || 1.5; pen.stroke(); }
-      if (item.text) this.write(pen, item.text, ...this.toScreen(place, ...item.points[0]), item.colour);
-    },
-    drawMark(pen, place, mark) {
-      const [u, v] = this.dragged && this.dragged.id === mark.id ? [this.dragged.u, this.dragged.v] : [mark.u, mark.v];
-      const [x, y] = this.toScreen(place, u, v), chosen = mark.id === this.selected, r = chosen ? 9 : 6;
-      for (const [colour, width] of [["rgba(0,0,0,0.6)", 3.5], [mark.colour, 1.5]]) {
-        pen.strokeStyle = colour;
-        pen.lineWidth = width;
-        pen.beginPath();
-        for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
-          pen.moveTo(x + 2 * dx, y + 2 * dy);
-          pen.lineTo(x + r * dx, y + r * dy);
-        }
-        if (chosen) { pen.moveTo(x + 12, y); pen.arc(x, y, 12, 0, 2 * Math.PI); }
-        if (mark.to) { // ten times the residual
-          pen.moveTo(x, y);
-          pen.lineTo(x + 10 * (mark.to[0] - u) * place.scale, y + 10 * (mark.to[1] - v) * place.scale);
-        }
-        pen.stroke();
-      }
-      const box = [x + 9, y - 19, 7 * (mark.label || "").length, 14]; // a label that would hide another is left out
-      const hides = ([left, top, width, height]) =>
-        box[0] < left + width && left < box[0] + box[2] && box[1] < top + height && top < box[1] + box[3];
-      if (!chosen && this.labels.some(hides)) return;
-      this.labels.push(box);
-      this.write(pen, mark.label || "", x + 9, y - 7, mark.colour);
-    },
-    drawLoupe(pen, place, i) {
-      const picture = this.shown && this.shown.pictures[i];
-      if (!picture) return;
-      const side = Math.min(150, place.w / 3), { x, y } = this.pointer, [u, v] = this.toVideo(place, x, y);
-      const left = x - place.x > place.w / 2 ? place.x + 6 : place.x + place.w - side - 6, top = place.y + place.h - side - 6;
-      const times = Math.max(LOUPE * place.fit, 2 * place.scale, 4), across = side / times;
-      pen.save();
-      pen.beginPath();
-      pen.rect(left, top, side, side);
-      pen.clip();
-      pen.fillStyle = "#000";
-      pen.fillRect(left, top, side, side);
-      pen.imageSmoothingEnabled = false;
-      const near = { x: left, y: top, scale: times, u0: u + 0.5 - across / 2, v0: v + 0.5 - across / 2 };
-      const [px, py] = this.toScreen(near, -0.5, -0.5);
-      pen.drawImage(picture, px, py, picture.width * times, this.panes[i].height * times);
-      this.drawOver(pen, near, i);
-      pen.strokeStyle = "rgba(255,255,255,0.9)";
-      pen.lineWidth = 1;
-      pen.strokeRect(left + 0.5, top + 0.5, side - 1, side - 1);
-      pen.beginPath();
-      for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
-        pen.moveTo(left + side / 2 + 4 * dx, top + side / 2 + 4 * dy);
-        pen.lineTo(left + side / 2 + 20 * dx, top + side / 2 + 20 * dy);
-      }
-      pen.stroke();
-      this.write(pen, `${u.toFixed(1)}, ${v.toFixed(1)}`, left + 5, top + side - 6, "#ffffff");
-      pen.restore();
-    },
-    write(pen, text, x, y, colour) {
-      if (!text) return;
-      pen.font = "12px system-ui, sans-serif";
-      pen.lineWidth = 3;
-      pen.strokeStyle = "rgba(0,0,0,0.75)";
-      pen.strokeText(text, x, y);
-      pen.fillStyle = colour || "#ffffff";
-      pen.fillText(text, x, y);
     },
     // hands
     place(event) {
@@ -374,6 +264,7 @@ export default {
       else if (event.key === "," || event.key === ".") this.go(this.wanted + (event.key === "." ? 1 : -1));
       else if (event.key === "Home") this.go(0);
       else if (event.key === "End") this.go(this.n_frames - 1);
+      else if (event.key === " ") window.dispatchEvent(new CustomEvent("airborne-play", { detail: { from: this } }));
       else if (event.key === "c") { this.alone = this.alone + 1 < this.panes.length ? this.alone + 1 : -1; this.draw(); }
       else if (event.key === "Escape") this.$emit("select", { frame: this.seen(), id: null });
       else if (event.key === "0") { this.zooms = this.panes.map(() => ({ scale: 1, u: 0, v: 0 })); this.draw(); }

@@ -99,6 +99,7 @@ class CameraViews(Element, component="view.js", default_classes="view"):
         self._listen("select", on_select, lambda args: (args["id"],))
         self._props["follows"] = on_drag is not None
         self._listen("drag", on_drag, lambda args: (_read_drag(args),))
+        FrameBar(self, n_frames, min(frame, n_frames - 1))
 
     def _listen(self, name: str, handler: Callable[..., Any] | None, read: Callable[[dict], tuple]) -> None:
         if handler is None:
@@ -155,6 +156,15 @@ def _read_drag(args: dict) -> Drag:
     )
 
 
+class FrameBar(Element, component="frames.js"):
+    """The bar below a view, by which its frames are played and chosen."""
+
+    def __init__(self, view: CameraViews, n_frames: int, frame: int) -> None:
+        """Begin at a frame."""
+        super().__init__()
+        self._props |= {"view": view.id, "n_frames": n_frames, "start": frame}
+
+
 class Curves(Element, component="curves.js", default_classes="curves"):
     """Curves of a run over its frames; its cursor and the views' are one."""
 
@@ -162,3 +172,8 @@ class Curves(Element, component="curves.js", default_classes="curves"):
         """Show what an address gives, with the cursor at a frame."""
         super().__init__()
         self._props["url"], self._props["start"] = url, frame
+
+    def show(self, url: str) -> None:
+        """Show what another address gives."""
+        self._props["url"] = url
+        self.update()

@@ -75,7 +75,7 @@ class Editor:
 
     def _replace(self, path: Path, text: str | None) -> None:
         if not path.resolve().is_relative_to(self.folder.resolve()) or path.is_symlink():
-            raise TrialError(f"{path} leads out of {self.folder}; nothing is written there")
+            raise TrialError(f"{path} leads out of {self.folder}; nothing is written there: remove the link")
         _keep(self.folder / FOLDER / "versions", path)
         if text is None:
             path.unlink(missing_ok=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -46,7 +47,7 @@ def _reduce_view(view: View | None, body: PosedBody, most_px_per_m: float) -> Vi
     rgb = cv2.resize(view.rgb[: n * height, : n * width], (width, height), interpolation=cv2.INTER_AREA)
     middle = (n - 1) / 2
     camera = view.camera.resample(scale=(n, n), offset=(middle, middle), size=(width, height))
-    return View(camera, np.asarray(rgb, np.uint8), view.delay_s)
+    return replace(view, camera=camera, image=np.asarray(rgb, np.uint8))
 
 
 def share_in_view(body: PosedBody, geometry: SurfaceArrays, frames: Frames) -> float:
@@ -130,6 +131,7 @@ def _region(view: View, points: NDArray, margin_px: float) -> Region | None:
         view_rgb=view.rgb,
         source=(camera.name, camera.K.tobytes()),
         packed_view=shift_view(packed, x0, y0),
+        exposure_s=view.exposure_s,
     )
 
 

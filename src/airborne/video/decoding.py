@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -35,6 +35,7 @@ class VideoSource:
     fields: FieldOrderOption = "progressive"
     offset_s: Fraction | float = 0  # added to this camera's times [s]
     drift_ppm: Fraction | float = 0  # by how much its clock is slow, in millionths
+    exposure_s: float = 0.0  # of each image, about its time [s]
 
     def __post_init__(self) -> None:
         if self.fields not in get_args(FieldOrderOption):
@@ -160,9 +161,16 @@ def _open(source: VideoSource) -> Iterator[tuple[InputContainer, VideoStream]]:
 
 
 def intact_frames(
-    container: InputContainer, stream: VideoStream, *, size: tuple[int, int] | None
+    container: InputContainer,
+    stream: VideoStream,
+    *,
+    size: tuple[int, int] | None,
+    before_packet: Callable[[av.Packet], None] = lambda packet: None,
 ) -> Iterator[tuple[int, av.VideoFrame]]:
-    """Yield (ticks since the first image, frame) for every intact frame, of `size` if given."""
+    """Yield (ticks since the first image, frame) for every intact frame, of `size` if given.
+
+    `before_packet` is called with each packet before it is decoded.
+    """
     first, last, step = None, None, 1
     first_stamp = None  # of the packets: when a damaged beginning would have been shown
     is_damaged = False
@@ -173,6 +181,7 @@ def intact_frames(
             if packet.is_keyframe:
                 key_stamps.add(packet.pts)
             step = packet.duration or step
+        before_packet(packet)
         try:
             frames = stream.decode(packet)
         except FFmpegError:

@@ -33,6 +33,7 @@ class View:
     camera: Camera  # without distortion: the image is undistorted
     image: Image | LazyImage  # (h, w, 3) sRGB, converted or not yet
     delay_s: float = 0.0  # how much later it was taken than the time of its `Frames` [s]
+    exposure_s: float = 0.0  # for which it was exposed about that time; 0: at once, or unknown [s]
 
     @property
     def rgb(self) -> Image:

@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from statistics import median
 from threading import Condition, Event, Thread
@@ -193,7 +193,10 @@ class LiveRecording:
     def _view(
         self, k: int, arrival: _Arrival | None, undistortion: Undistortion, conversions: ConversionCache
     ) -> View | None:
-        return None if arrival is None else lazy_view(arrival.image, self._facts(k), undistortion, conversions)
+        if arrival is None:
+            return None
+        view = lazy_view(arrival.image, self._facts(k), undistortion, conversions)
+        return replace(view, exposure_s=self.cameras[k].source.exposure_s)
 
     def _next(self, last_s: Fraction | None, period_s: Fraction) -> tuple[Fraction, list[_Arrival | None]] | None:
         """Wait for the newest complete time after `last_s`, and take its images; None at the end."""

@@ -80,7 +80,8 @@ class Recording:
                     return
                 images = [cursor.image_at(time_s) for cursor in cursors]
                 if index >= self.start and (index - self.start) % self.every == 0:
-                    views = parallel(partial(self._view, time_s=time_s), images, self.facts, undistortions, conversions)
+                    args = images, self.sources, self.facts, undistortions, conversions
+                    views = parallel(partial(self._view, time_s=time_s), *args)
                     yield Frames(index, time_s, tuple(views))
 
     def _undistortions(self, camera: Camera, facts: VideoFacts) -> dict[int | None, Undistortion]:
@@ -91,6 +92,7 @@ class Recording:
     def _view(
         self,
         image: DecodedImage | None,
+        source: VideoSource,
         facts: VideoFacts,
         undistortions: dict[int | None, Undistortion],
         conversions: ConversionCache,
@@ -101,11 +103,12 @@ class Recording:
             return None
         delay_s = float(image.time_s - time_s)
         if self.is_lazy:
-            return replace(lazy_view(image, facts, undistortions[image.parity], conversions), delay_s=delay_s)
+            view = lazy_view(image, facts, undistortions[image.parity], conversions)
+            return replace(view, delay_s=delay_s, exposure_s=source.exposure_s)
         rgb = rgb_from_decoded(image, facts)
         if image.parity is not None and self.fields_as == "interpolated":
             rgb = fill_rows(rgb, image.parity, facts.size[1])
-        return replace(undistortions[image.parity].view(rgb), delay_s=delay_s)
+        return replace(undistortions[image.parity].view(rgb), delay_s=delay_s, exposure_s=source.exposure_s)
 
     def _decode_on_clock(self, source: VideoSource, facts: VideoFacts) -> Generator[DecodedImage]:
         """Yield a camera's images on the trial's clock, and note every gap and an early end."""
@@ -169,6 +172,7 @@ def open_recording(
     ordered = tuple(sources[by_name[name]] for name in rig.names)
     ordered_facts = tuple(facts[by_name[name]] if facts else inspect(sources[by_name[name]]) for name in rig.names)
     check_sizes(ordered, rig, ordered_facts)
+    _check_exposures(ordered, ordered_facts)
     _check_overlap(ordered, ordered_facts)
     recording = Recording(ordered, ordered_facts, rig, fields_as, every, start, stop, lazy)
     recording.events.extend(_notes(ordered, ordered_facts))
@@ -183,6 +187,16 @@ def check_sizes(sources: Sequence[VideoSource], rig: Rig, facts: Sequence[VideoF
             raise VideoError(
                 f"{source.name}: {source.path} is {actual} px, but the calibration's camera is {expected} px; "
                 "give the video that was calibrated, or the calibration of this size"
+            )
+
+
+def _check_exposures(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> None:
+    """Raise VideoError where an image would be exposed for longer than the time to the next."""
+    for source, fact in zip(sources, facts, strict=True):
+        if source.exposure_s * fact.image_rate > 1:
+            raise VideoError(
+                f"{source.name}: exposure_s is {source.exposure_s:g}, but the next image follows after "
+                f"{float(1 / fact.image_rate):.4g} s; give the shutter's time in seconds (1/500 s is 0.002)"
             )
 
 

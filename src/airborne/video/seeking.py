@@ -30,7 +30,6 @@ from airborne.video.decoding import (
 )
 from airborne.video.fields import fill_rows
 
-_REORDERED = 20  # frames: more than any codec sends before or after the place where it shows them
 _KEPT_BYTES, _FEWEST_KEPT = 32_000_000, 2  # of a file's decoded frames, to step back: ten of 1080p
 _MOST_FRAMES = 5_000_000  # of a trial: 28 hours at 50 Hz
 
@@ -149,10 +148,10 @@ class ImageReader:
         self._stream: VideoStream | None = None
         self._frames: Iterator[tuple[int, av.VideoFrame]] = iter(())
         self._current: tuple[int, av.VideoFrame] | None = None  # the last that was decoded
+        self._whole_from = 0  # [ticks]; before it, frames that no other is predicted from are left out
         width, height = index.facts.size
-        self._passed: deque[tuple[int, av.VideoFrame]] = deque(  # those before it, and itself
-            maxlen=max(_FEWEST_KEPT, _KEPT_BYTES // (width * height * 3 // 2))
-        )
+        self._n_kept = max(_FEWEST_KEPT, _KEPT_BYTES // (width * height * 3 // 2))
+        self._passed: deque[tuple[int, av.VideoFrame]] = deque(maxlen=self._n_kept)  # those before it, and itself
 
     def image(self, number: int, *, is_exact: bool = True) -> Image | None:
         """Return an image (h, w, 3) sRGB as the file holds it, a field with rows between its own filled in.
@@ -177,17 +176,19 @@ class ImageReader:
         if not 0 <= number < len(self.index):
             raise VideoError(f"{self._source.name}: there is no image {number}; the last is {len(self.index) - 1}")
         row = number // len(self.index.facts.parities)
-        ticks, near = int(self.index.ticks[row]), int(self.index.ticks[max(0, row - _REORDERED)])
+        ticks = int(self.index.ticks[row])
         if self._find(ticks) is not None:
             return True
+        near = int(self.index.ticks[max(0, row - self._n_kept)])
+        is_back = self._current is not None and near <= 2 * ticks - self._current[0] < ticks  # then more of them follow
+        was_left_out = self._current is not None and self._current[0] < ticks < self._whole_from
+        self._whole_from = near if is_back else ticks
         begin = min(self._key_before(ticks), int(self.index.ticks[max(0, row - 1)]))  # decoding goes on from there
-        if self._current is None or not begin <= self._current[0] <= ticks:
+        if self._current is None or was_left_out or not begin <= self._current[0] <= ticks:
             self._go_before(ticks)
         while self._current is not None and self._current[0] < ticks:
             if not is_wanted():
                 return False
-            if self._stream is not None:  # far from the place, frames that no other is predicted from are left out
-                self._stream.codec_context.skip_frame = "NONREF" if self._current[0] < near else "DEFAULT"
             self._step()
         return True
 
@@ -230,7 +231,6 @@ class ImageReader:
             self.close()
             self._container, self._stream = _open(self._source, self._stack)
         container, stream = self._container, self._stream
-        stream.codec_context.skip_frame = "DEFAULT"
         if key is not None:
             container.seek(key + self.index.first, stream=stream, backward=True)
         self._frames = self._decode(container, stream, self.index.first if key is None else key + self.index.first)
@@ -243,8 +243,14 @@ class ImageReader:
         if not len(self.index.keys):
             yield from intact_frames(container, stream, size=self.index.facts.size_before_rotation)
             return
+
+        def leave_out(packet: av.Packet) -> None:
+            is_before = packet.pts is not None and packet.pts - self.index.first < self._whole_from
+            stream.codec_context.skip_frame = "NONREF" if is_before else "DEFAULT"
+
         first: int | None = None
-        for ticks, frame in intact_frames(container, stream, size=self.index.facts.size_before_rotation):
+        size = self.index.facts.size_before_rotation
+        for ticks, frame in intact_frames(container, stream, size=size, before_packet=leave_out):
             first = (frame.pts or 0) - ticks if first is None else first
             if ticks + first >= start:
                 yield ticks + first - self.index.first, frame

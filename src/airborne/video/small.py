@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 
@@ -16,10 +18,9 @@ def shrink(view: View) -> View:
     columns = max(1, round(camera.size[0] / _WIDTH_PX))
     rows = max(1, round(columns * camera.K[1, 1] / camera.K[0, 0]))
     if columns == rows == 1:
-        return View(camera, rgb, view.delay_s)
+        return replace(view, image=rgb)
     size = camera.size[0] // columns, camera.size[1] // rows
     small = cv2.resize(rgb[: size[1] * rows, : size[0] * columns], size, interpolation=cv2.INTER_AREA)
     middle = ((columns - 1) / 2, (rows - 1) / 2)
-    return View(
-        camera.resample(scale=(columns, rows), offset=middle, size=size), np.asarray(small, np.uint8), view.delay_s
-    )
+    own = camera.resample(scale=(columns, rows), offset=middle, size=size)
+    return replace(view, camera=own, image=np.asarray(small, np.uint8))

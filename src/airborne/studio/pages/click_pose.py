@@ -16,6 +16,7 @@ from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, PointsPanel
 from airborne.studio.pages.pose_hand import DRAG_HELP, PoseHand
+from airborne.studio.pages.pose_stage import PoseStage
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.starts import (
@@ -74,6 +75,7 @@ class ClickPanel(PointsPanel):
                     self.use = ui.button("Use this pose", on_click=self.write).props("unelevated")
                     ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
                     ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
+                    self.stage = PoseStage(self.rig, self.hand, self.take_pose)
                 self.list = PointList(self.shown.names, self.choose)
         self.show()
         await self.reread()
@@ -95,10 +97,14 @@ class ClickPanel(PointsPanel):
         """Let the body follow the pointer; a click that is dragged is moved at the end."""
         did_move = await self.hand.follow(self.view, drag)
         if did_move and drag.has_ended and drag.mark is None:
-            self.is_by_hand, self.says, self.outline = True, "The pose was set by hand.", self.hand.items()
-            self.show()
+            self.take_pose()
         elif drag.has_ended and drag.mark is not None:
             await self.move(drag.mark, *drag.px)
+
+    def take_pose(self) -> None:
+        """Show the pose that the hand holds, which is not fitted to the clicks."""
+        self.is_by_hand, self.says, self.outline = True, "The pose was set by hand.", self.hand.items()
+        self.show()
 
     async def turn_to(self, frame: int) -> None:
         """Show the clicks of another frame."""
@@ -148,6 +154,7 @@ class ClickPanel(PointsPanel):
         self.view.show_over(marks, items, self.selected)
         self.note.set_text(self.says or f"No landmark is clicked in frame {self.frame} yet.")
         self.use.set_visibility(bool(self.outline))
+        self.stage.show(self.hand.pose if self.outline else None)
         self.list.show(self.names, self.chosen, partial(self.off_px, rig=self.rig))
 
     def _marks(self) -> Iterator[Mark]:

@@ -12,6 +12,7 @@ from airborne.cameras import Rig
 from airborne.studio.pages.find_controls import FindControls
 from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pages.pose_hand import DRAG_HELP, PoseHand
+from airborne.studio.pages.pose_stage import PoseStage
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.starts import pose_of, read_pose, standing_pose, start_from_pose, write_start
@@ -45,6 +46,7 @@ class FindPanel:
                 self.controls.build()
                 ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
                 self.use = ui.button("Use this pose", on_click=self.write).props("unelevated")
+                self.stage = PoseStage(self.rig, self.hand, self.take_pose)
         self.use.set_visibility(False)
         if (stored := read_pose(self.session, self.model)) is not None:
             await self.draw(*stored)
@@ -55,6 +57,7 @@ class FindPanel:
         self.frame = frame
         self.session.go(frame=frame)
         self.view.show_over((), self.hand.items() if frame == self.at else ())
+        self.stage.show(self.hand.pose if frame == self.at else None)
 
     async def begin_by_hand(self) -> None:
         """Show the body upright where the cameras look, to be dragged."""
@@ -62,7 +65,12 @@ class FindPanel:
 
     async def drag(self, drag: Drag) -> None:
         """Let the body follow the pointer."""
-        if await self.hand.follow(self.view, drag) and drag.has_ended and self.hand.pose is not None:
+        if await self.hand.follow(self.view, drag) and drag.has_ended:
+            self.take_pose()
+
+    def take_pose(self) -> None:
+        """Show the pose that the hand holds, ready to be used."""
+        if self.hand.pose is not None:
             self.found = start_from_pose(self.model, self.at, self.hand.pose)
             self.controls.note.set_text("The outline is the pose that was set by hand.")
             self.use.set_visibility(True)

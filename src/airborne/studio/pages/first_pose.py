@@ -61,6 +61,8 @@ async def _build_either(
         if choice.value == _CLICK:
             changed.append(click.reread)
 
-    choice = ui.toggle([_CLICK, _FIND], value=_CLICK, on_change=build).props("dense no-caps")
+    choice = (
+        ui.toggle([_CLICK, _FIND], value=_CLICK, on_change=build).props("dense no-caps").style("align-self: flex-start")
+    )
     area = ui.element("div").style("display: contents")
     await build()

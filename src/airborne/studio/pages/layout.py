@@ -21,6 +21,7 @@ _KEYS = {
     "← →": "one frame back or on; with Shift ten",
     ", .": "one frame back or on, also while a point is chosen",
     "Home End": "first and last frame",
+    "Space": "play, stop",
     "wheel": "zoom where the pointer is",
     "drag": "move the picture, a point, or the body where it is outlined",
     "Shift+drag": "turn the body",

@@ -10,7 +10,7 @@ import numpy as np
 from nicegui import ui
 
 from airborne.motion.run_folder import holds_players
-from airborne.studio.curve_data import describe_distance
+from airborne.studio.curve_data import curve_kinds, describe_distance
 from airborne.studio.disagreement import look_for_disagreement
 from airborne.studio.outlines import BESIDE_COLOUR
 from airborne.studio.pages.correct import Correction
@@ -24,7 +24,7 @@ from airborne.studio.view import CameraViews, Curves
 from airborne.tracking import Status
 
 _AROUND_M = 2.0  # how far from the path the scene is looked at from
-_HELP = "Step through the run: pictures, curves and scene share one frame. Bands are two standard deviations."
+_HELP = "Pictures, curves and scene share one frame. Bands are two standard deviations."
 
 
 async def review_page(session: Session) -> None:
@@ -83,9 +83,15 @@ async def _blame(session: Session, shown: ShownTrial, name: str, says: ui.label)
 async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: str) -> None:
     bodies: list[Callable[[int], None]] = []
     correction = None if holds_players(folder) else Correction(session, shown, folder)
-    if correction is not None:
-        correction.build()
-        bodies.append(correction.turn_to)
+    address = f"/curves/{quote(folder.name)}?beside={quote(beside)}&of="
+    with ui.element("div").classes("row-line"):
+        if correction is not None:
+            correction.build()
+            bodies.append(correction.turn_to)
+        kinds = await in_thread(curve_kinds, folder)
+        kind = ui.select(kinds, label="curves", value="", on_change=lambda: curves.show(address + quote(kind.value)))
+        kind.props("outlined dense options-dense").style("min-width: 180px")
+        kind.set_visibility(len(kinds) > 1)
 
     def turn_to(frame: int) -> None:
         session.go(frame=frame)
@@ -113,7 +119,7 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: s
             correction.view = view
             with ui.element("div").classes("side"):
                 bodies.append(await _stage(folder))
-    Curves(f"/curves/{quote(folder.name)}{query}", frame=session.frame)
+    curves = Curves(address, frame=session.frame)
 
 
 async def _stage(folder: Path) -> Callable[[int], None]:

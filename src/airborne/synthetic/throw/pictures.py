@@ -27,7 +27,7 @@ from airborne.types import Array
 from airborne.video import Frames, View
 
 _BODY_SAMPLES, _BACKGROUND_SAMPLES = 3, 2  # supersampling of a pixel's side
-_EXPOSURE_SAMPLES = 3  # times within an exposure
+_FEWEST_SAMPLES, _SAMPLE_S = 3, 0.001  # times within an exposure: at least so many, no further apart
 _SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))  # (8, 3) of a box's corners
 _SHARED_NOISE = 0.9  # share of the noise's variance that the three channels have in common
 
@@ -62,13 +62,13 @@ def scene_frames(scene: Scene) -> Iterator[Frames]:
         return
     backgrounds = [background(scene, camera) for camera in scene.rig]
     cameras = [[camera.field(p) for p in (0, 1)] if scene.is_interlaced else [camera] for camera in scene.rig]
-    offsets = (np.arange(_EXPOSURE_SAMPLES) - (_EXPOSURE_SAMPLES - 1) / 2) / _EXPOSURE_SAMPLES * scene.exposure_s
+    n = max(_FEWEST_SAMPLES, int(np.ceil(scene.exposure_s / _SAMPLE_S)))
+    offsets = (np.arange(n) - (n - 1) / 2) / n * scene.exposure_s
     times = np.array([float(scene.time_s(i)) for i in range(scene.n_recorded)])
     offsets_s = scene.time_offsets_s or (0.0,) * len(scene.rig)
     flights = {offset: scene.flight((times[:, None] + offsets + offset).ravel()) for offset in sorted(set(offsets_s))}
     for index in range(scene.n_recorded):
-        first = index * _EXPOSURE_SAMPLES
-        moments = range(first, first + _EXPOSURE_SAMPLES)
+        moments = range(index * n, (index + 1) * n)
         bodies = {offset: [scene.body.with_pose(flight.pose(k)) for k in moments] for offset, flight in flights.items()}
         parity = scene.parity(index) if scene.is_interlaced else 0
         rows = slice(parity, None, 2) if scene.is_interlaced else slice(None)

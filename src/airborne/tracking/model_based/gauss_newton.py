@@ -61,6 +61,7 @@ class ImageView(NamedTuple):
     comparison: Comparison
     noise_px: float  # how many pixels share their noise
     shift_sds_px: Array  # (3,) of `shift_sds_px`
+    exposure_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +73,7 @@ class Fit:
     equations: PoseEquations  # before the last step
     rms_light: float  # blurred residual, linear light 0..1
     views: Sequence[ImageView]  # what was compared
+    prior: PosePrior | None  # what was expected
 
     def objective(self, noise: float, prior: PosePrior | None) -> float:
         """Return minus the log-posterior before the last step, for a given variance of the noise."""
@@ -151,7 +153,18 @@ def fit_images(
 
     Of several starts, the one that ends in the best agreement with images and prior is returned.
     """
-    views = image_views(render_model, regions, appearance)
+    return fit_views(render_model, poses, image_views(render_model, regions, appearance), dofs=dofs, prior=prior)
+
+
+def fit_views(
+    render_model: RenderModel,
+    poses: Sequence[Pose],
+    views: Sequence[ImageView],
+    *,
+    dofs: DegreesOfFreedom,
+    prior: PosePrior | None,
+) -> Fit:
+    """Do the same with images that are prepared."""
     evaluate, correlated = image_evaluator(render_model, poses, views, dofs=dofs)
     most_steps, converged = (_MOST_STEPS, _CONVERGED) if dofs.moves_joints else (_MOST_STEPS_STIFF, _CONVERGED_STIFF)
     ends = [
@@ -160,7 +173,7 @@ def fit_images(
     ]
     noise = min(equations.noise for _, equations in ends)
     pose, best = min(ends, key=lambda end: end[1].objective(noise, dofs.prior_cost(end[1].pose, prior)))
-    return Fit(pose, dofs, best, (best.noise / correlated) ** 0.5, views)
+    return Fit(pose, dofs, best, (best.noise / correlated) ** 0.5, views, prior)
 
 
 def linearise_images(
@@ -204,7 +217,8 @@ def image_views(render_model: RenderModel, regions: Sequence[Region], appearance
         sigma_px = max(_FINE_SIGMA_PX * region.aspect, 0.5)  # along the columns
         comparison = Comparison(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma_px), clip)
         buffers = image_buffers(render_model, region, appearance).prepare(comparison)
-        views.append(ImageView(buffers, comparison, 4 * np.pi * _FINE_SIGMA_PX * sigma_px, shift_sds_px(region)))
+        noise_px = 4 * np.pi * _FINE_SIGMA_PX * sigma_px
+        views.append(ImageView(buffers, comparison, noise_px, shift_sds_px(region), region.exposure_s))
     return views
 
 
@@ -224,7 +238,7 @@ def image_evaluator(
     def evaluate(pose: Pose, is_first: bool) -> PoseEquations:
         posed, n = render_model.with_pose(pose), len(render_model.model.segments)
         sums, totals, blocks, shifted = Sums.zero(n), np.array([empty_cost, 0.0, 0.0]), [], []
-        for view, comparison, _, shift in views:
+        for view, comparison, _, shift, _ in views:
             sums.B[:] = 0
             blocks.append(_blocks(view, n))
             iterations = 3 if is_first else 1

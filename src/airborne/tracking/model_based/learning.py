@@ -8,17 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.appearance.model import Appearance, Region
-from airborne.body import PosedBody
+from airborne.body import Pose, PosedBody
+from airborne.tracking.model_based.exposure import Motion, bodies_in_exposure
 from airborne.tracking.model_based.render_model import RenderModel
 
 
 def learn_appearance(
-    render_model: RenderModel, posed: PosedBody, regions: Sequence[Region], appearance: Appearance
+    render_model: RenderModel, pose: Pose, motion: Motion, regions: Sequence[Region], appearance: Appearance
 ) -> Appearance:
-    """Learn colours and backgrounds from regions that show a body."""
+    """Learn colours and backgrounds from regions that show a body: where it was all the time, and never."""
     for region in regions:
-        mask = _mask(render_model, posed, region)
-        appearance = appearance.learn_colours(region, mask).learn_background(region, mask)
+        args = region.exposure_s, region.packed_view, region.camera.K
+        bodies = bodies_in_exposure(render_model, pose, motion, *args)
+        masks = np.array([_mask(render_model, body, region) for body in bodies])
+        ever, always = masks.any(axis=0), masks.all(axis=0)
+        appearance = appearance.learn_colours(region, ever, body=always).learn_background(region, ever)
     return appearance
 
 

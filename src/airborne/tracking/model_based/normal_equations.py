@@ -86,7 +86,7 @@ def photometric_equations(body, projection, observation, comparison, maps, paint
 def equations_of_known_light(body, projection, observation, comparison, maps, is_faceted, lamps, ambient, sums, blocks):
     """Add one view's equations under known lights, in shares of full sRGB; lamps (l, 8), ambient as in `draw_maps`."""
     owner, nearness = _draw(body, projection, maps)
-    _, lit = _light_by_lamps(body, projection, lamps, ambient, *maps.part.shape)
+    _, lit = light_by_lamps(body, projection, lamps, ambient, *maps.part.shape)
     return _sum_equations(lit, is_faceted, maps, owner, nearness, projection, observation, comparison, sums, blocks)
 
 
@@ -96,17 +96,14 @@ def fill_costs(body, projection, observation, comparison, maps, paint, light, co
 
     The residual is that of `photometric_equations`, but for the image's border.
     """
-    R, t, view = projection.R, projection.t, projection.packed_view
-    surface_maps(body.shapes, body.geometry, R, t, view, maps.part, maps.inverse_depth, maps.normals)
-    lit = np.empty(maps.normals.shape, np.float32)
-    shade_body(maps.part, maps.normals, paint.albedo, light, 0, 0, lit)
-    _fill_costs(lit, maps.part, observation, comparison, costs)
+    part, lit = light_fitted(body, projection, maps, paint, light)
+    _fill_costs(lit, part, observation, comparison, costs)
 
 
 @kernel(fastmath=True)
 def fill_costs_of_known_light(body, projection, observation, comparison, lamps, ambient, costs):
     """Fill costs (H, W) with the robust squared residual of each pixel, as `equations_of_known_light` has it."""
-    part, lit = _light_by_lamps(body, projection, lamps, ambient, *costs.shape)
+    part, lit = light_by_lamps(body, projection, lamps, ambient, *costs.shape)
     _fill_costs(lit, part, observation, comparison, costs)
 
 
@@ -131,7 +128,17 @@ def _fill_costs(lit, part, observation, comparison, costs):
 
 
 @kernel(fastmath=True)
-def _light_by_lamps(body, projection, lamps, ambient, h, w):
+def light_fitted(body, projection, maps, paint, light):
+    """Draw a view in a fitted light (3, LIGHT_TERMS); return the map of parts (h, w), the body's colours (3, h, w)."""
+    R, t, view = projection.R, projection.t, projection.packed_view
+    surface_maps(body.shapes, body.geometry, R, t, view, maps.part, maps.inverse_depth, maps.normals)
+    lit = np.empty(maps.normals.shape, np.float32)
+    shade_body(maps.part, maps.normals, paint.albedo, light, 0, 0, lit)
+    return maps.part, lit
+
+
+@kernel(fastmath=True)
+def light_by_lamps(body, projection, lamps, ambient, h, w):
     """Draw a view under known lights; return the map of parts (h, w) and the body's colours (3, h, w), full being 1."""
     part, segment = np.full((h, w), -1, np.int16), np.empty((h, w), np.int16)
     inverse_depth, colour = np.empty((h, w), np.float32), np.zeros((h, w, 3), np.float32)

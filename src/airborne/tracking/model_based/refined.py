@@ -28,6 +28,7 @@ from airborne.tracking.model_based.degrees_of_freedom import (
     joints_of,
     limbs_of,
 )
+from airborne.tracking.model_based.exposure import Motion, fit_exposed
 from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegions, Order
 from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
@@ -103,6 +104,8 @@ class RefinedTracker:
             found = self._search_first(frames)
         else:
             found = self._search_later(state, frames)
+        if found is not None and state.past and not self._fitter.moves_joints:
+            found = replace(found, fit=fit_exposed(self.render_model, found.fit, self._motion(state.past, frames)))
         return self._estimate(frames, found, state.reference)
 
     def learn(self, state: RefinedState, frames: Frames, estimate: Estimate) -> RefinedState:
@@ -118,7 +121,8 @@ class RefinedTracker:
             return replace(state, past=past, covariance=estimate.covariance)
         posed = self.render_model.with_pose(estimate.pose)
         regions = crop_regions([posed], self.render_model.geometry, frames, MARGIN_PX)
-        appearance = learn_appearance(self.render_model, posed, regions, state.appearance)
+        motion = self._motion(before, frames)
+        appearance = learn_appearance(self.render_model, estimate.pose, motion, regions, state.appearance)
         reference = state.reference
         if state.past and estimate.mask_shares is not None:
             reference = reference.update(*estimate.mask_shares)
@@ -189,6 +193,10 @@ class RefinedTracker:
         if found is None or recovered is None:
             return found or recovered
         return recovered if recovered.agreement.evidence > found.agreement.evidence else found
+
+    def _motion(self, past: predictors.PoseHistory, frames: Frames) -> Motion:
+        """Return how the body moves about the time of some frames, by where it was before."""
+        return lambda pose, s: self._predict[0]((*past, (frames.time_s, pose)), frames.time_s + Fraction(s))
 
     def _search_at_key(self, state: RefinedState, frames: Frames, evidence: PoseEvidence) -> JudgedFit | None:
         """Fit from the pose that the evidence gives, which a lost limb's prediction cannot hold back."""
