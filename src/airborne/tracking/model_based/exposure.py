@@ -2,7 +2,8 @@
 
 What the exposure changes, the mean of composites along the body's motion less the composite of its middle, is taken
 off the image. The rest shows the middle, as sharp as if the body had stood. The change depends on the pose: it is found
-anew after each fit. Of people, shape errors outweigh it: synthetic somersaults exposed for 8 ms were tracked no better.
+anew after each fit. Only for things: people's shape errors outweigh it, and synthetic somersaults exposed for 8 ms were
+tracked no better.
 """
 
 from __future__ import annotations
