@@ -7,7 +7,7 @@ import pytest
 
 from airborne.rendering.packing import pack_view
 from airborne.synthetic.throw.pictures import scene_frames
-from airborne.tracking.model_based.exposure import bodies_in_exposure
+from airborne.tracking.model_based.exposure import Exposure, bodies_in_exposure
 from airborne.tracking.model_based.refined import RefinedTracker
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.tracker import step
@@ -46,11 +46,11 @@ def test_poses_of_an_exposure_lie_evenly_about_its_middle():
         return pose.move(velocity * s, np.zeros(3))
 
     camera = SCENE.rig.cameras[0]
-    seen = pack_view(camera), camera.K
-    bodies = bodies_in_exposure(body, pose, move, EXPOSURE_S, *seen)
+    exposure = Exposure(EXPOSURE_S, pack_view(camera), camera.K)
+    bodies = bodies_in_exposure(body, pose, move, exposure)
     along_m = np.array([each.t[0] - body.with_pose(pose).t[0] for each in bodies])[:, 0]
     assert len(bodies) > 2
     assert along_m.mean() == pytest.approx(0, abs=1e-12)
     assert np.diff(along_m) == pytest.approx(3.0 * EXPOSURE_S / len(bodies))
-    still = bodies_in_exposure(body, pose, lambda pose, s: pose, EXPOSURE_S, *seen)
+    still = bodies_in_exposure(body, pose, lambda pose, s: pose, exposure)
     assert len(still) == 1

@@ -80,9 +80,10 @@ class Recording:
                     return
                 images = [cursor.image_at(time_s) for cursor in cursors]
                 if index >= self.start and (index - self.start) % self.every == 0:
-                    args = images, self.sources, self.facts, undistortions, conversions
-                    views = parallel(partial(self._view, time_s=time_s), *args)
-                    yield Frames(index, time_s, tuple(views))
+                    views = parallel(partial(self._view, time_s=time_s), images, self.facts, undistortions, conversions)
+                    pairs = zip(views, self.sources, strict=True)
+                    exposed = (view and replace(view, exposure_s=source.exposure_s) for view, source in pairs)
+                    yield Frames(index, time_s, tuple(exposed))
 
     def _undistortions(self, camera: Camera, facts: VideoFacts) -> dict[int | None, Undistortion]:
         """Return the undistortion of each kind of image in the file: whole (None), top field (0), bottom field (1)."""
@@ -92,7 +93,6 @@ class Recording:
     def _view(
         self,
         image: DecodedImage | None,
-        source: VideoSource,
         facts: VideoFacts,
         undistortions: dict[int | None, Undistortion],
         conversions: ConversionCache,
@@ -103,12 +103,11 @@ class Recording:
             return None
         delay_s = float(image.time_s - time_s)
         if self.is_lazy:
-            view = lazy_view(image, facts, undistortions[image.parity], conversions)
-            return replace(view, delay_s=delay_s, exposure_s=source.exposure_s)
+            return replace(lazy_view(image, facts, undistortions[image.parity], conversions), delay_s=delay_s)
         rgb = rgb_from_decoded(image, facts)
         if image.parity is not None and self.fields_as == "interpolated":
             rgb = fill_rows(rgb, image.parity, facts.size[1])
-        return replace(undistortions[image.parity].view(rgb), delay_s=delay_s, exposure_s=source.exposure_s)
+        return replace(undistortions[image.parity].view(rgb), delay_s=delay_s)
 
     def _decode_on_clock(self, source: VideoSource, facts: VideoFacts) -> Generator[DecodedImage]:
         """Yield a camera's images on the trial's clock, and note every gap and an early end."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,14 +23,22 @@ from airborne.tracking.model_based.normal_equations import light_by_lamps, light
 from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers
 from airborne.types import Array
 
-Motion = Callable[[Pose, float], Pose]  # a pose -> that so many seconds later
+Extrapolation = Callable[[Pose, float], Pose]  # a pose -> that so many seconds later
 
 _ROUNDS, _OVERSTEP = 3, 2.0  # on throws exposed for 8 and 16 ms, five rounds gain little more; alone each goes a third
 _LEAST_PX = 1.0  # of motion in an exposure that is worth it
 _STEP_PX, _MOST_POSES = 2.0, 8  # between poses along the motion: no more than the comparison's blur hides
 
 
-def fit_exposed(render_model: RenderModel, fit: Fit, motion: Motion) -> Fit:
+class Exposure(NamedTuple):
+    """For how long a view is exposed, and where its camera is."""
+
+    s: float
+    packed_view: Array  # (18,) of `pack_view`
+    K: Array  # (3, 3) [px]
+
+
+def fit_exposed(render_model: RenderModel, fit: Fit, motion: Extrapolation) -> Fit:
     """Fit again to what the images would show if the body had stood while they were exposed."""
     seen, pose = fit.views, fit.pose
     for _ in range(_ROUNDS):
@@ -42,13 +51,13 @@ def fit_exposed(render_model: RenderModel, fit: Fit, motion: Motion) -> Fit:
 
 
 def _still_images(
-    render_model: RenderModel, images: Sequence[ImageView], pose: Pose, motion: Motion
+    render_model: RenderModel, images: Sequence[ImageView], pose: Pose, motion: Extrapolation
 ) -> list[ImageView] | None:
     """Return the images as they would be if the body had stood at a pose; None where it hardly moves in any."""
     middle, stilled, is_any = render_model.with_pose(pose), [], False
     for image in images:
-        exposed = image.exposure_s, image.buffers.packed_view, image.buffers.K
-        bodies = bodies_in_exposure(render_model, pose, motion, *exposed)
+        exposure = Exposure(image.exposure_s, image.buffers.packed_view, image.buffers.K)
+        bodies = bodies_in_exposure(render_model, pose, motion, exposure)
         if len(bodies) > 1:
             is_any, image = True, _still_image(render_model, image, middle, bodies)
         stilled.append(image)
@@ -56,9 +65,10 @@ def _still_images(
 
 
 def bodies_in_exposure(
-    render_model: RenderModel, pose: Pose, motion: Motion, exposure_s: float, packed_view: Array, K: Array
+    render_model: RenderModel, pose: Pose, motion: Extrapolation, exposure: Exposure
 ) -> list[PosedBody]:
     """Return the body evenly along its motion while a view is exposed; that of the middle where it hardly moves."""
+    exposure_s, packed_view, K = exposure
     if exposure_s:
         points = []
         for s in (-exposure_s / 2, exposure_s / 2):

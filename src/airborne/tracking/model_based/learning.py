@@ -9,17 +9,22 @@ from numpy.typing import NDArray
 
 from airborne.appearance.model import Appearance, Region
 from airborne.body import Pose, PosedBody
-from airborne.tracking.model_based.exposure import Motion, bodies_in_exposure
+from airborne.tracking.model_based.exposure import Exposure, Extrapolation, bodies_in_exposure
 from airborne.tracking.model_based.render_model import RenderModel
 
 
 def learn_appearance(
-    render_model: RenderModel, pose: Pose, motion: Motion, regions: Sequence[Region], appearance: Appearance
+    render_model: RenderModel,
+    pose: Pose,
+    regions: Sequence[Region],
+    appearance: Appearance,
+    *,
+    motion: Extrapolation,
 ) -> Appearance:
     """Learn colours and backgrounds from regions that show a body: where it was all the time, and never."""
     for region in regions:
-        args = region.exposure_s, region.packed_view, region.camera.K
-        bodies = bodies_in_exposure(render_model, pose, motion, *args)
+        exposure = Exposure(region.exposure_s, region.packed_view, region.camera.K)
+        bodies = bodies_in_exposure(render_model, pose, motion, exposure)
         masks = np.array([_mask(render_model, body, region) for body in bodies])
         ever, always = masks.any(axis=0), masks.all(axis=0)
         appearance = appearance.learn_colours(region, ever, body=always).learn_background(region, ever)

@@ -28,7 +28,7 @@ from airborne.tracking.model_based.degrees_of_freedom import (
     joints_of,
     limbs_of,
 )
-from airborne.tracking.model_based.exposure import Motion, fit_exposed
+from airborne.tracking.model_based.exposure import Extrapolation, fit_exposed
 from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegions, Order
 from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
@@ -122,7 +122,7 @@ class RefinedTracker:
         posed = self.render_model.with_pose(estimate.pose)
         regions = crop_regions([posed], self.render_model.geometry, frames, MARGIN_PX)
         motion = self._motion(before, frames)
-        appearance = learn_appearance(self.render_model, estimate.pose, motion, regions, state.appearance)
+        appearance = learn_appearance(self.render_model, estimate.pose, regions, state.appearance, motion=motion)
         reference = state.reference
         if state.past and estimate.mask_shares is not None:
             reference = reference.update(*estimate.mask_shares)
@@ -194,7 +194,7 @@ class RefinedTracker:
             return found or recovered
         return recovered if recovered.agreement.evidence > found.agreement.evidence else found
 
-    def _motion(self, past: predictors.PoseHistory, frames: Frames) -> Motion:
+    def _motion(self, past: predictors.PoseHistory, frames: Frames) -> Extrapolation:
         """Return how the body moves about the time of some frames, by where it was before."""
         return lambda pose, s: self._predict[0]((*past, (frames.time_s, pose)), frames.time_s + Fraction(s))
 
