@@ -103,6 +103,7 @@ def _describe(finding: PlayersSearch) -> dict[str, Any]:
                 "players": [
                     {
                         "name": start.name,
+                        "probability": round(player.probability, 3),
                         "support": round(player.support, 3),
                         "evidence": round(player.evidence, 3),
                         "joints_m": _round_joints(start),
