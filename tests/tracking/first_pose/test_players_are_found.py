@@ -46,16 +46,17 @@ def test_players_are_taken_only_where_the_legs_of_every_one_are_likely_right():
         assert replace(found(), candidates=(replace(best, players=players),)).is_decided == is_decided
 
 
-def test_legs_that_reach_down_from_the_air_or_are_far_from_their_stance_are_likely_wrong():
+def test_legs_that_reach_down_from_the_air_or_far_from_their_stance_or_ill_seen_are_likely_wrong():
     player = found().candidates[0].players[0]
     longer, straight = player.state.copy(), player.state.copy()
     longer[[N_DOF + THIGH, N_DOF + SHANK]] += 0.05
     straight[[11, 16]] = 0.1
-    likely = probability_right(player.state, 0.04)
+    likely = probability_right(player.state, 0.03, 2.0)
     for less_likely in (
-        probability_right(longer, 0.04),
-        probability_right(straight, 0.04),
-        probability_right(player.state, 0.2),
+        probability_right(longer, 0.03, 2.0),
+        probability_right(straight, 0.03, 2.0),
+        probability_right(player.state, 0.2, 2.0),
+        probability_right(player.state, 0.03, 0.8),
     ):
         assert less_likely < 0.5 < likely
 

@@ -33,18 +33,20 @@ _BEYOND_M = 2.5  # on the other side of the net: who stands there is seen behind
 _BOTH_SIDES_M = 2.0  # cameras whose mean lies nearer to the net's plane stand on both sides
 _AS_WELL = 0.7  # share of what players tell at most, which counts as much as any
 _MOST_MOMENTS, _MOST_SEARCHED = 8, 5  # that are looked at, and searched until one decides and two agree on how many
-# chosen on synthetic blocks 3001 to 3008
-_SUPPORT, _SUPPORT_SD = 1.1, 0.07  # [nat m2] that are as likely a player as none, and their logistic scale
+# [nat m2] that are as likely a player as none, and their logistic scale: of synthetic blocks 3001 to 3008, 3201 to 3250
+# and 3301 to 3315 players told 1.1 or more, and in 160 moments nobody else at the net told over 0.8
+_SUPPORT, _SUPPORT_SD = 0.95, 0.05
 _SHARE_PER_NAT = 0.01  # share of the support that makes a pose e times likelier
 _EVIDENCE_PER_NAT = 0.03  # the same of the fit's evidence; chosen on synthetic blocks 3101 to 3124
 _NET_NATS = 3.0  # for facing the net, of players near it
 _LEAST_EVIDENCE = 1.2  # [nat a pixel] of the fitted player
 # a logistic regression (Platt 1999) of whether the legs lie within 80 mm: nats of a constant, of the length of thigh
 # and shank [m], of how far the knees are straighter than a player's who waits [rad], of the fit's way from its stance
-# [m], of hips and knees that are not alike [rad]; 276 players of synthetic blocks 3201 to 3250, of whom 13 % did not
-_RIGHT_NATS = np.array([76.8, -76.6, -35.7, -55.0, -9.8])
+# [m], of hips and knees that are not alike [rad], of what the evidence lacks of a player's who is well seen [nat a
+# pixel]; 276 players of synthetic blocks 3201 to 3250, of whom 13 % lay farther away
+_RIGHT_NATS = np.array([79.2, -75.2, -46.0, -77.1, -12.5, -9.4])
+_WAITING, _WELL_SEEN = 0.5, 1.8  # [rad] flexion of knees, [nat a pixel]; chosen on the same
 _HIPS, _KNEES = [8, 13], [11, 16]  # columns of a state: flexion
-_WAITING = 0.5  # [rad] knees' flexion of a player who waits
 _ALIKE_M = 0.06  # mean distance of the legs' joints, below which poses are the same
 _LOOSER = 3.0  # than joints set by hand
 _MOST_CANDIDATES, _LEAST_SHOWN = 8, 0.01  # number and share of those that are listed
@@ -130,13 +132,16 @@ def find_players(sample: Sequence[Frames], whole: Callable[[int], Frames], *, ne
     return max(complete, key=lambda finding: (finding.is_decided, finding.candidates[0].probability))
 
 
-def probability_right(state: Array, way_m: float) -> float:
-    """Return the probability that the legs of a fit (35,) lie within 80 mm: `way_m` from where they were found."""
+def probability_right(state: Array, way_m: float, evidence: float) -> float:
+    """Return the probability that the legs of a fit (35,) lie within 80 mm.
+
+    It lies `way_m` from the stance where it began, and has this evidence [nat a pixel].
+    """
     leg_m = state[N_DOF + THIGH] + state[N_DOF + SHANK]  # feet in the air seem to reach the floor on longer legs
     knees, hips = state[_KNEES], state[_HIPS]
     straighter = max(_WAITING - knees.mean(), 0.0)
     unlike = abs(knees[0] - knees[1]) + abs(hips[0] - hips[1])
-    return float(expit(_RIGHT_NATS @ [1.0, leg_m, straighter, way_m, unlike]))
+    return float(expit(_RIGHT_NATS @ [1.0, leg_m, straighter, way_m, unlike, max(_WELL_SEEN - evidence, 0.0)]))
 
 
 def _best_first(moments: Sequence[_Moment]) -> list[_Moment]:
@@ -211,13 +216,9 @@ def _fit_one(state: Array, others: Sequence[Array], frames: Frames) -> FirstFram
 def _player_of(fit: FirstFrameFit, stander: Stander, number: int) -> FoundPlayer:
     joints_m: dict[str, Array] = dict(zip(JOINTS, fit.fit.points, strict=True))
     way_m = np.linalg.norm(fit.fit.points - points_of(stander.states[number]), axis=1)[:-1].mean()
-    return FoundPlayer(
-        joints_m,
-        fit.fit.state,
-        float(stander.support[number]),
-        evidence_per_px(fit.fit.owned),
-        probability_right(fit.fit.state, float(way_m)),
-    )
+    state, evidence = fit.fit.state, evidence_per_px(fit.fit.owned)
+    probability = probability_right(state, float(way_m), evidence)
+    return FoundPlayer(joints_m, state, float(stander.support[number]), evidence, probability)
 
 
 def _candidates(
