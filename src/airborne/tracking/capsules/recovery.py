@@ -39,7 +39,9 @@ _LIKENESS, _LIKENESS_SD = 0.6, 0.15
 # of a difference of two players' fits to one stander. Of 26 pairs of synthetic blocks 6200 to 6225 right fits had 178
 # nats more than exchanged ones, sd 105, of which 33 from look to look: 2 * 178 / 105^2, of normal distributions
 _WHO_PER_NAT = 0.032
-_PLACE_SD_M, _SPEED_SD_M_S, _MOST_SD_M = 0.3, 1.0, 2.0  # how far people are from where they were, chosen by hand
+# how far people are from where they were: of synthetic blocks 6200 to 6229 players move 0.17 m a second (root mean
+# square, each axis); 0.3 is more, as who leaves walks
+_PLACE_SD_M, _SPEED_SD_M_S, _MOST_SD_M = 0.3, 0.3, 2.0
 _NEWCOMERS_PER_M2 = 0.001  # that a look shows: one in ten looks over 8 m x 8 m has one, and half of those lost are back
 _LEAST_PROBABILITY = 0.95  # of an identity that is taken
 _BYSTANDER = 0.5  # probability to be a lost player, below which somebody is a bystander
