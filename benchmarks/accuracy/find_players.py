@@ -55,7 +55,7 @@ def verdict(seed: int) -> tuple[str, float]:
         truth[player.name] = np.array([joints[joint][0] for joint in _LEGS])
     print(f"{scene.name}: frame {index}: {best.probability:.3f}, {cpu_s:.1f} s: ", end="")
     for player in best.players:
-        print(f"[support {player.support:.2f}, evidence {player.evidence:.2f}, {player.is_plausible}] ", end="")
+        print(f"[support {player.support:.2f}, evidence {player.evidence:.2f}, {player.probability:.3f}] ", end="")
     return _judge(truth, best.starts, is_decided=finding.is_decided), cpu_s
 
 

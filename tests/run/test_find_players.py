@@ -59,8 +59,8 @@ def test_players_without_a_start_are_found_and_tracked_from_the_first_frame(path
 
 def sure(finding, probability=0.99):
     best = finding.candidates[0]
-    players = tuple(replace(player, is_plausible=True) for player in best.players)
-    return replace(finding, candidates=(replace(best, players=players, probability=probability),))
+    players = tuple(replace(player, evidence=2.0, probability=1.0) for player in best.players)
+    return replace(finding, candidates=(replace(best, players=players, share=probability),))
 
 
 def test_find_prints_a_start_that_a_trial_can_have(path, finding, tmp_path, monkeypatch, capsys):

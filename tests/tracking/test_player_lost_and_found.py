@@ -4,7 +4,7 @@ import numpy as np
 
 from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
-from airborne.tracking.capsules.recovery import identity_probabilities
+from airborne.tracking.capsules.recovery import colour_nats, identity_probabilities
 from tests.support.jumping_scenes import Hall, hop
 
 AWAY = range(3, 23)  # frames at 50 a second
@@ -56,6 +56,18 @@ def test_identities_are_those_that_fit_all_of_the_lost_best():
 def test_two_who_could_both_be_meant_are_not_told_apart():
     probability = identity_probabilities(np.array([[6.0, 6.1]]))
     assert probability.max() < 0.95 < probability.sum()
+
+
+def test_of_two_who_were_lost_together_the_fits_to_the_same_pixels_tell_who_is_who():
+    share = np.ones((2, 2))  # both are seen as well as ever, in whoever stands there
+    unlike, alike = np.array([[600.0, 500.0], [500.0, 520.0]]), np.array([[600.0, 510.0], [590.0, 520.0]])
+    assert np.diag(identity_probabilities(4 + colour_nats(share, unlike))).min() > 0.95
+    assert np.diag(identity_probabilities(4 + colour_nats(share, alike))).max() < 0.95
+
+
+def test_one_who_was_lost_alone_has_nobody_to_be_compared_with():
+    share, total = np.array([[0.9, -np.inf]]), np.array([[300.0, -np.inf]])
+    np.testing.assert_allclose(colour_nats(share, total), [[2.0, -np.inf]], atol=1e-12)
 
 
 def test_nobody_like_a_lost_player_is_nobody():

@@ -82,7 +82,7 @@ def _ask_for_help(trial: Trial, finding: PlayersSearch, folder: Path) -> Undecid
     if best.is_plausible:
         n = len(finding.candidates)
         reason = (
-            f"who stands there in frame {frame}, and which way; the likeliest of {n} is so by {best.probability:.0%}"
+            f"who stands there in frame {frame}, and how; the likeliest of {n} is right by {best.probability:.0%}"
         )
     else:
         reason = f"nobody is seen well in frame {frame}; check [calibration], whose world must be the court's"
@@ -103,6 +103,7 @@ def _describe(finding: PlayersSearch) -> dict[str, Any]:
                 "players": [
                     {
                         "name": start.name,
+                        "probability": round(player.probability, 3),
                         "support": round(player.support, 3),
                         "evidence": round(player.evidence, 3),
                         "joints_m": _round_joints(start),

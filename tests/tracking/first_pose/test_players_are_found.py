@@ -1,5 +1,6 @@
 """Players who stand are found in single images, without anything set by hand."""
 
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -8,9 +9,9 @@ import pytest
 
 from airborne.errors import TrialError
 from airborne.tracking.capsules.first_frame import points_of
-from airborne.tracking.capsules.jumper import JOINTS
+from airborne.tracking.capsules.jumper import JOINTS, N_DOF, SHANK, THIGH
 from airborne.tracking.capsules.standing import stance, states_of
-from airborne.tracking.first_pose.players import PlayersSearch, find_players
+from airborne.tracking.first_pose.players import PlayersSearch, find_players, probability_right
 from tests.support.jumping_scenes import Hall, hop
 
 AT_NET = {"left": (-0.1, -0.7), "right": (0.9, -0.6)}
@@ -35,7 +36,29 @@ def test_the_candidates_probabilities_are_those_of_alternatives():
     candidates = found().candidates
     assert found().is_decided == (candidates[0].is_plausible and candidates[0].probability >= 0.95)
     assert sum(candidate.probability for candidate in candidates) < 1 + 1e-9
-    assert all(a.probability >= b.probability for a, b in pairwise(candidates))
+    assert all(a.share >= b.share for a, b in pairwise(candidates))
+
+
+def test_players_are_taken_only_where_the_legs_of_every_one_are_likely_right():
+    best = found().candidates[0]
+    for probability, is_decided in ((0.99, True), (0.6, False)):
+        players = (replace(best.players[0], probability=0.99), replace(best.players[1], probability=probability))
+        assert replace(found(), candidates=(replace(best, players=players),)).is_decided == is_decided
+
+
+def test_legs_that_reach_down_from_the_air_or_far_from_their_stance_or_ill_seen_are_likely_wrong():
+    player = found().candidates[0].players[0]
+    longer, straight = player.state.copy(), player.state.copy()
+    longer[[N_DOF + THIGH, N_DOF + SHANK]] += 0.05
+    straight[[11, 16]] = 0.1
+    likely = probability_right(player.state, 0.03, 2.0)
+    for less_likely in (
+        probability_right(longer, 0.03, 2.0),
+        probability_right(straight, 0.03, 2.0),
+        probability_right(player.state, 0.2, 2.0),
+        probability_right(player.state, 0.03, 0.8),
+    ):
+        assert less_likely < 0.5 < likely
 
 
 def test_nobody_at_the_net_is_said():
