@@ -160,7 +160,7 @@ def _angular_velocities(rotations: Array, time_s: Array, row: int, rows: NDArray
     powers = np.vander(offset / scale, min(3, len(rows)), increasing=True)
     inverse = np.linalg.pinv(powers)
     weights, left = inverse[1] / scale, np.eye(len(rows)) - powers @ inverse
-    value, distance = np.tensordot(weights, vectors, axes=1), np.tensordot(left, vectors, axes=1)
+    value, distance = np.tensordot(weights, vectors, axes=1), np.einsum("ij,jsk->isk", left, vectors)
     return _AngularVelocities(value, rows, weights, vectors, distance, np.diagonal(left))
 
 
