@@ -117,6 +117,20 @@ def test_correct_deviations_contain_two_thirds_of_the_errors():
     assert result.within_2sd == pytest.approx(0.954, abs=sampled(result.n))
 
 
+def test_deviations_of_single_frames_leave_out_what_lasts():
+    covariance, rng = small_covariance(MODEL, sd=5e-3), np.random.default_rng(0)
+    motion = run(covariance=covariance)
+    points, sd = landmarks(motion, MODEL)
+    noisy = points + sd[..., None] * rng.normal(size=points.shape)
+    lasting = np.broadcast_to(np.diag([0.05**2] * 3 + [0.0] * 3), (len(motion), 6, 6))
+    result = compare_joints(
+        replace(motion, lasting=lasting), MODEL, JointPaths(names=MARKS, time_s=TIMES, points=noisy)
+    )
+    assert result.coverage.within_50 > 0.99
+    assert result.coverage_by_frame.within_80 == pytest.approx(0.8, abs=sampled(result.coverage_by_frame.n))
+    assert "single frames" in result.describe()
+
+
 def test_numbers_go_to_json_without_nan():
     result = compare_joints(run(), MODEL, replace(paths(), time_s=TIMES[:1], points=paths().points[:1]))
     values = result.to_dict()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
+from airborne.tracking.model_based import gauss_newton
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior
 from airborne.tracking.model_based.fitter import Fitter, LearnedRegions
 from airborne.tracking.model_based.turned_pelvis import turn_pelvis
@@ -65,3 +66,11 @@ def test_pelvis_that_is_turned_turns_back(frame, fitter):
     held, judged = judge_held(frame, fitter, turn_pelvis(HUMAN, frame.truth)[-1])
     assert frame.off_mm(held.pose, LEGS) > 60
     assert frame.off_mm(judged.fit.pose, LEGS) < 10
+
+
+def test_pelvis_turns_back_though_no_step_leads_there(frame, fitter, monkeypatch):
+    monkeypatch.setattr(gauss_newton, "_MOST_STEPS", 1)
+    monkeypatch.setattr(Fitter, "fit_silhouettes", lambda fitter, pose, learned, levels, prior: pose)
+    held, judged = judge_held(frame, fitter, turn_pelvis(HUMAN, frame.truth)[-1])
+    assert frame.off_mm(held.pose, LEGS) > 60
+    assert frame.off_mm(judged.fit.pose, LEGS) < 20

@@ -200,7 +200,7 @@ def _second_moments(tensor: Array) -> Array:
 
 
 def _landmarks(v: Mapping[str, float]) -> tuple[Landmark, ...]:
-    limbs = []
+    limbs, ears = [], (v["Ls6L"] + v["Ls7L"]) / 2  # half way from beneath the nose to above the ears
     for side, arm, leg in (("left", "a", "j"), ("right", "b", "k")):
         ball = v[f"L{leg}8L"] * np.array([0, -np.cos(FOOT_SLOPE_RAD), -np.sin(FOOT_SLOPE_RAD)])
         positions = {name: (segment, np.zeros(3)) for name, segment in _JOINT_LANDMARKS.items()}
@@ -213,7 +213,7 @@ def _landmarks(v: Mapping[str, float]) -> tuple[Landmark, ...]:
         Landmark("pelvis", "pelvis", np.array([0, 0, -v["Ls2L"]])),
         Landmark("torso", "torso", np.zeros(3)),
         Landmark("neck", "head", np.zeros(3)),
-        Landmark("head", "head", np.array([0, 0, v["Ls8L"] / 2])),
+        Landmark("head", "head", np.array([0, 0, ears])),
     )
 
 

@@ -64,6 +64,7 @@ class JointComparison:
     not_compared: tuple[str, ...]  # markers without a landmark, and landmarks without a marker
     calibration: SdCalibration  # errors against the landmarks' reported deviations
     coverage: Coverage  # the same without each landmark's constant offset in its segment
+    coverage_by_frame: Coverage  # of those errors by the deviations of single frames, without what lasts all run long
     better_shift_s: float  # added to the reference's times, this would clearly agree better; whole periods, or 0
     better_mean_without_offset_mm: float  # the error with that shift
 
@@ -99,6 +100,9 @@ class JointComparison:
             )
         if self.coverage.n:
             lines.append(self.coverage.describe())
+            lines.append(
+                f"by the deviations of single frames, without lasting ones: {self.coverage_by_frame.describe()}"
+            )
         lines.append(f"joints tracked: {self.share_tracked:.0%}; of these more than 100 mm off: {self.n_far}")
         if self.not_compared:
             lines.append(f"not compared: {', '.join(self.not_compared)}")
@@ -142,6 +146,7 @@ def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> J
     R = _rotations(motion, model, columns)
     frames, rows = frames[has_pose], rows[has_pose]
     pairs = _Pairs(measured[frames], reference.points[rows], R[frames])
+    sd_by_frame = landmarks(replace(motion, lasting=None), model)[1][:, columns]
     is_known = np.asarray(np.isfinite(pairs.error).all(axis=-1))
     if not is_known.any():
         raise ResultError("the reference has no number where the motion has a pose; give the joints of this recording")
@@ -168,7 +173,8 @@ def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> J
         n_far=int(np.sum(np.linalg.norm(tracked.error, axis=-1) > _FAR_M)),
         not_compared=(*not_compared, *(name for name in names if name not in joints)),
         calibration=sd_calibration(pairs.error[is_known], np.repeat(sd[frames][is_known][:, None], 3, axis=1)),
-        coverage=coverage_of(_without_offset(pairs), np.repeat(sd[frames][..., None], 3, axis=2)),
+        coverage=_coverage(pairs, sd[frames]),
+        coverage_by_frame=_coverage(pairs, sd_by_frame[frames]),
         better_shift_s=shift_s,
         better_mean_without_offset_mm=shifted_mm,
     )
@@ -220,11 +226,11 @@ def _errors(pairs: _Pairs, columns: list[int]) -> JointErrors:
     )
 
 
-def _without_offset(pairs: _Pairs) -> Array:
-    """Return the errors (n, l, 3) [m] in the segments' axes, less each landmark's mean."""
+def _coverage(pairs: _Pairs, sd: Array) -> Coverage:
+    """Count the errors in the segments' axes, less each landmark's mean, by their deviations (n, l) [m]."""
     local = np.einsum("nlji,nlj->nli", pairs.R, pairs.error)
     n = np.isfinite(local).all(axis=-1, keepdims=True).sum(axis=0)
-    return local - np.nansum(local, axis=0) / np.maximum(n, 1)
+    return coverage_of(local - np.nansum(local, axis=0) / np.maximum(n, 1), np.repeat(sd[..., None], 3, axis=2))
 
 
 def _mean_about(error: Array) -> float:

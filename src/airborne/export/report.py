@@ -244,5 +244,6 @@ def _flight_table(flight: Mapping[str, Any]) -> HtmlTable:
             GRAVITY_M_S2,
         )
     )
+    rows.append(("standard deviation of the fitted one [m/s²]", flight["fitted_gravity_sd_m_s2"], ""))
     rows.append(("distance of the centre of mass from a free fall [mm], RMS", flight["ballistic_rms_mm"], ""))
     return HtmlTable(rows)

@@ -6,12 +6,13 @@ import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
 from airborne.body.files import mesh_files, write_body
-from airborne.body_fitting.first_frame import fit_preset
+from airborne.body_fitting.first_frames import EVERY, N_FRAMES, fit_preset
 from airborne.calibration.from_points import Calibration
 from airborne.cameras import Camera
 from airborne.export import headline
@@ -124,18 +125,31 @@ class BodyRun:
             found = tracker.search(tracker.init(), first)
             if found.pose is not None:
                 seen = replace(self, model=sample_body_colours(self.model, found.pose, first))
-                seen = seen._fit_shape(found.pose, first) if found.status is Status.TRACKED else seen
+                seen = seen._fit_shape()
         if not is_seen(seen.model.with_pose(self.start), [view.camera for view in first.views if view is not None]):
             self.recording.events.append(OUT_OF_SIGHT)
         return seen
 
-    def _fit_shape(self, pose: Pose, first: Frames) -> BodyRun:
-        """Return a preset fitted to the person in the first frames; with keys as it is, which are about its lengths."""
+    def _fit_shape(self) -> BodyRun:
+        """Return a preset fitted to the person in some of the first frames, those where it is tracked.
+
+        With keys, which are about its lengths, the body stays as it is.
+        """
         body = self.trial.body
         if body.preset is None or self.keys:
             return self
-        fitted = fit_preset(self.model, pose, first, mass_kg=body.mass_kg)
-        return self if fitted is None else replace(self, model=fitted[0], start=fitted[1])
+        tracker = tracker_of(self.trial.settings, self.model, self.start)
+        estimates = track_frames(tracker, islice(self.recording, N_FRAMES), lambda estimate: None)
+        found = [
+            (frames, estimate.pose)
+            for frames, estimate in islice(estimates, 0, None, EVERY)
+            if estimate.pose is not None and estimate.status is Status.TRACKED
+        ]
+        fitted = fit_preset(self.model, found, mass_kg=body.mass_kg) if found else None
+        if fitted is None:
+            return self
+        index, pose = found[0][0].index, found[0][1]
+        return replace(self, model=fitted, start=pose if index == self.recording.start else self.start)
 
     def track(
         self,

@@ -8,7 +8,7 @@ from concurrent.futures import ProcessPoolExecutor
 from itertools import islice
 from pathlib import Path
 
-from airborne.body_fitting.first_frame import fit_preset
+from airborne.body_fitting.first_frames import fit_preset
 from airborne.run.players_tracker import compile_kernels
 from airborne.run.track import track_trial
 from airborne.synthetic import scene_frames, somersault_scene
@@ -38,7 +38,7 @@ def _track_bodies() -> None:
     scene = somersault_scene("moving-arms", target="ellipsoids")
     frames = list(islice(scene_frames(scene), _N_FRAMES))
     model = sample_body_colours(scene.model, start_pose(scene), frames[0])
-    fit_preset(model, start_pose(scene), frames[0], mass_kg=None)
+    fit_preset(model, [(frames[0], start_pose(scene))], mass_kg=None)
     tracker = tracker_of(Settings(), model, start_pose(scene))
     state = tracker.init()
     for each in frames:

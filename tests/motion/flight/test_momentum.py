@@ -129,12 +129,25 @@ def test_momentum_is_linear_in_the_rates():
 
 def test_momentum_deviations_are_those_of_sampled_poses():
     rng, covariance, n = np.random.default_rng(4), small_covariance(MODEL, sd=3e-3), 300
-    poses = swinging(MODEL, np.arange(6) / 50)
-    _, variance = angular_momenta(motion_of(MODEL, poses, covariance=covariance), MODEL)
-    drawn = [
-        angular_momenta(motion_of(MODEL, [shaken(rng, pose, covariance) for pose in poses]), MODEL)[0] for _ in range(n)
-    ]
-    np.testing.assert_allclose(np.sqrt(variance), np.std(drawn, axis=0), rtol=sampled(n))  # at the ends and inside
+    poses = swinging(MODEL, np.arange(8) / 50)
+    runs = [[shaken(rng, pose, covariance) for pose in poses] for _ in range(n)]
+    values = [angular_momenta(motion_of(MODEL, run), MODEL)[0] for run in runs]
+    stated = [angular_momenta(motion_of(MODEL, run, covariance=covariance), MODEL)[1] for run in runs[:20]]
+    sd = np.sqrt(np.mean(stated, axis=0))
+    np.testing.assert_allclose(sd, np.std(values, axis=0), rtol=sampled(n))  # at the ends and inside
+
+
+def test_errors_of_joints_that_stay_the_same_hardly_widen_the_momentum():
+    covariance, poses = small_covariance(MODEL, sd=3e-3), swinging(MODEL, np.arange(60) / 200)
+    joints_alone = np.where(np.arange(len(covariance)) < 6, 1e-6, 1.0)
+    covariance = covariance * np.outer(joints_alone, joints_alone)
+    off = [shaken(np.random.default_rng(4), pose, covariance) for pose in poses]  # all by the same
+    value, variance = angular_momenta(motion_of(MODEL, off, rate_hz=200, covariance=covariance), MODEL)
+    exact, _ = angular_momenta(motion_of(MODEL, poses, rate_hz=200), MODEL)
+    shaken_apart = [shaken(rng, pose, covariance) for rng in [np.random.default_rng(5)] for pose in poses]
+    _, apart = angular_momenta(motion_of(MODEL, shaken_apart, rate_hz=200, covariance=covariance), MODEL)
+    assert np.mean(np.abs(value - exact) < 2 * np.sqrt(variance)) > 0.85
+    assert np.median(np.sqrt(variance)) < 0.3 * np.median(np.sqrt(apart))
 
 
 def test_momentum_never_reaches_across_a_lost_frame():

@@ -1,9 +1,11 @@
 """Pixels that err together, as a person is no set of ellipsoids, say less of a pose than as many independent ones."""
 
+import numpy as np
 import pytest
 
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, root_only
 from airborne.tracking.model_based.gauss_newton import linearise_images
+from airborne.tracking.model_based.shape_error import SHAPE_SD_M, shape_error_gradients
 from tests.support.people import FOCAL_PX, HUMAN
 from tests.tracking.test_misplaced_limb import LearnedFrame
 
@@ -23,3 +25,12 @@ def test_pixels_within_a_limbs_width_share_their_error_where_joints_move(frame, 
     regions, _ = frame.views(frame.truth)
     equations = linearise_images(frame.render_model, frame.truth, regions, frame.appearance, dofs=dofs(HUMAN))
     assert equations.misfit / equations.noise == pytest.approx(shared_px / BLURRED_PX, rel=0.1)
+
+
+@pytest.mark.parametrize("n_views", [1, 4])
+def test_segment_lies_beside_its_ellipsoid_alike_however_many_views_show_it(n_views):
+    root = np.random.default_rng(3).normal(size=(6, 6))
+    A = n_views * root @ root.T
+    rows, inverse = shape_error_gradients(A[None]).reshape(-1, 6), np.linalg.inv(A)
+    sd_m = np.array([SHAPE_SD_M] * 3 + [0.0] * 3)
+    np.testing.assert_allclose(inverse @ rows.T @ rows @ inverse, np.diag(sd_m**2), atol=1e-9)

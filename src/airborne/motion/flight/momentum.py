@@ -6,6 +6,7 @@ translation of the whole body does not change the angular momentum about its cen
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,25 +69,59 @@ def angular_momenta(motion: Motion, model: BodyModel, window: int = WINDOW) -> t
     Angular velocities at a frame are the slopes, at its time, of parabolas through the rotations of the `window`
     nearest frames of the same unbroken stretch, shifted inward near its ends (two frames: a line; one: NaN). Lost
     frames, missing times and rotations over 2 rad end a fit. The variances are of first order in the poses of all
-    frames of the fit, whose errors are taken as independent.
+    frames of the fit. How much of each rotation's variance differs from frame to frame is told by its distances from
+    the parabolas; the rest of the error is the same in all frames of a fit.
     """
     rotations = np.concatenate([motion.R[:, None], matrix_from_angles(motion.joint_angles)], axis=1)
+    fits = {
+        int(row): fit
+        for stretch in _stretches(motion)
+        for row in stretch
+        if (fit := _angular_velocities(rotations, motion.time_s, row, _window(stretch, row, window))) is not None
+    }
+    covariance = np.array([_rotation_covariance(*each) for each in zip(motion.covariance, motion.R, strict=True)])
+    shares = _independent_shares(list(fits.values()), covariance)
     value, variance = np.full((2, len(motion), 3), np.nan)
-    for stretch in _stretches(motion):
-        for row in stretch:
-            rates = _angular_velocities(rotations, motion.time_s, row, _window(stretch, row, window))
-            if rates is None:
-                continue
-            R = model.with_pose(motion.pose(row)).R
-            value[row] = angular_momentum(model, R, rates.value)
-            if np.isnan(motion.covariance[rates.rows, 3:, 3:]).all(axis=(1, 2)).any():
-                continue  # a frame without any covariance
-            total = np.zeros(3)
-            for other, gradient in _gradients(model, R, rates, row):
-                gradient[:, :3] = gradient[:, :3] @ motion.R[other].T  # the root's errors are in world axes
-                total = total + propagate_variances(gradient, limit_rotation_variance(motion.covariance[other])[3:, 3:])
-            variance[row] = total
+    for row, fit in fits.items():
+        R = model.with_pose(motion.pose(row)).R
+        value[row] = angular_momentum(model, R, fit.value)
+        if np.isnan(covariance[fit.rows]).all(axis=(1, 2)).any():
+            continue  # a frame without any covariance
+        gradients = dict(_gradients(model, R, fit, row))
+        variance[row] = propagate_variances(
+            sum(gradients.values()) * np.sqrt(np.maximum(1 - shares[row], 0)), covariance[row]
+        )
+        for other, gradient in gradients.items():
+            variance[row] += propagate_variances(gradient * np.sqrt(shares[other]), covariance[other])
     return value, variance
+
+
+def _rotation_covariance(covariance: Array, R: Array) -> Array:
+    """Return the covariance (3 segments, 3 segments) of all rotations, the root's too in its own axes, bounded."""
+    own = limit_rotation_variance(covariance)[3:, 3:]
+    own[:3] = R.T @ own[:3]
+    own[:, :3] = own[:, :3] @ R
+    return own
+
+
+def _independent_shares(fits: Sequence[_AngularVelocities], covariance: Array) -> Array:
+    """Return which share of each rotation's variance is independent from frame to frame: (n, 3 segments).
+
+    covariance (n, 3 segments, 3 segments) as stated. There is one share of the frames that show a rotation and another
+    of those that do not, as if one more squared distance had been as large as stated; above 1 where they are larger.
+    """
+    stated = np.diagonal(covariance, axis1=1, axis2=2)
+    is_open = stated > 0.99 * _UNOBSERVED_ROTATION_SD_RAD**2
+    shares = np.ones_like(stated)
+    for of_kind in (is_open, ~is_open & (stated > 0)):
+        squared, freedom = np.ones((2, stated.shape[1]))
+        for fit in fits:
+            counts, variance = of_kind[fit.rows], stated[fit.rows]
+            squares = fit.distance.reshape(variance.shape) ** 2
+            squared += np.sum(squares / np.where(counts, variance, np.inf), axis=0)
+            freedom += np.sum(fit.freedom[:, None] * counts, axis=0)
+        shares = np.where(of_kind, squared / freedom, shares)
+    return shares
 
 
 def limit_rotation_variance(covariance: Array) -> Array:
@@ -105,6 +140,8 @@ class _AngularVelocities:
     rows: NDArray[np.intp]  # (m,) the frames of the fit
     weights: Array  # (m,) [1/s]
     rotation_vectors: Array  # (m, segments, 3) from the frame to those frames, own axes [rad]
+    distance: Array  # (m, segments, 3) of these from the parabola [rad]
+    freedom: Array  # (m,) share of a variance that is left in them
 
 
 def _angular_velocities(rotations: Array, time_s: Array, row: int, rows: NDArray[np.intp]) -> _AngularVelocities | None:
@@ -120,8 +157,11 @@ def _angular_velocities(rotations: Array, time_s: Array, row: int, rows: NDArray
         return None
     offset = time_s[rows] - time_s[row]
     scale = np.ptp(offset)  # keeps the powers of similar size
-    weights = np.linalg.pinv(np.vander(offset / scale, min(3, len(rows)), increasing=True))[1] / scale
-    return _AngularVelocities(np.tensordot(weights, vectors, axes=1), rows, weights, vectors)
+    powers = np.vander(offset / scale, min(3, len(rows)), increasing=True)
+    inverse = np.linalg.pinv(powers)
+    weights, left = inverse[1] / scale, np.eye(len(rows)) - powers @ inverse
+    value, distance = np.tensordot(weights, vectors, axes=1), np.einsum("ij,jsk->isk", left, vectors)
+    return _AngularVelocities(value, rows, weights, vectors, distance, np.diagonal(left))
 
 
 def _gradients(model: BodyModel, R: Array, rates: _AngularVelocities, row: int):

@@ -20,6 +20,8 @@ from airborne.types import Array, Triple
 if TYPE_CHECKING:
     import xarray as xr
 
+_MOST_CORRELATED = 0.99  # of consecutive residuals: more would leave less than one of 200 independent
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightSummary:
@@ -36,6 +38,7 @@ class FlightSummary:
     angular_momentum_kg_m2_s: Triple  # mean over the frames, world axes, about the centre of mass
     angular_momentum_spread_kg_m2_s: Triple  # standard deviation over the frames
     fitted_gravity_m_s2: float  # downward acceleration of the best-fitting parabola of the centre of mass
+    fitted_gravity_sd_m_s2: float  # by the distances from it, each of which depends on the one before
     ballistic_rms_mm: float  # of the centre of mass from the best parabola of 9.81 m/s2
 
     def to_dict(self) -> dict:
@@ -96,7 +99,7 @@ def flight_summary(motion: Motion, model: BodyModel, window: int = WINDOW) -> Fl
     rows = np.flatnonzero(motion.has_pose)
     momentum = table["angular_momentum"].to_numpy()
     momentum = momentum[np.isfinite(momentum).all(axis=-1)]
-    gravity, rms = _fit_parabola(motion.time_s[rows], table["com"].to_numpy()[rows])
+    gravity, gravity_sd, rms = _fit_parabola(motion.time_s[rows], table["com"].to_numpy()[rows])
     tilt = table["tilt"].to_numpy()[rows]
     return FlightSummary(
         n_poses=len(rows),
@@ -108,20 +111,29 @@ def flight_summary(motion: Motion, model: BodyModel, window: int = WINDOW) -> Fl
             momentum.std(axis=0, ddof=1) if len(momentum) > 1 else np.full(3, np.nan)
         ),
         fitted_gravity_m_s2=gravity,
+        fitted_gravity_sd_m_s2=gravity_sd,
         ballistic_rms_mm=1e3 * rms,
     )
 
 
-def _fit_parabola(time_s: Array, com: Array) -> tuple[float, float]:
-    """Return the best-fitting downward acceleration of a path (n, 3), and the RMS residual of free fall [m]."""
+def _fit_parabola(time_s: Array, com: Array) -> tuple[float, float, float]:
+    """Return the best-fitting downward acceleration of a path (n, 3), its sd, and the RMS residual of free fall [m].
+
+    The sd takes the heights' residuals for a first-order autoregressive process (Bartlett 1935): where each is r times
+    the one before, n of them say as much as n (1 - r) / (1 + r) independent ones. NaN for fewer than four poses.
+    """
     if len(time_s) < 4:
-        return np.nan, np.nan
+        return np.nan, np.nan, np.nan
     t = time_s - time_s.mean()
-    gravity = -2 * float(np.polynomial.Polynomial.fit(t, com[:, 2], 2).convert().coef[2])
+    powers = np.vander(t, 3)
+    curvature = np.linalg.lstsq(powers, com[:, 2], rcond=None)[0]
+    height = com[:, 2] - powers @ curvature
+    r = float(np.clip(height[1:] @ height[:-1] / max(height @ height, 1e-30), 0, _MOST_CORRELATED))
+    variance = height @ height / (len(t) - 3) * np.linalg.inv(powers.T @ powers)[0, 0] * (1 + r) / (1 - r)
     without_gravity = com + [0, 0, 0.5 * GRAVITY_M_S2] * t[:, None] ** 2
-    line = np.vander(t, 2)
+    line = powers[:, 1:]
     residual = without_gravity - line @ np.linalg.lstsq(line, without_gravity, rcond=None)[0]
-    return gravity, float(np.sqrt(np.mean(np.sum(residual**2, axis=-1))))
+    return -2 * float(curvature[0]), 2 * float(np.sqrt(variance)), float(np.sqrt(np.mean(np.sum(residual**2, axis=-1))))
 
 
 def _change(values: Array) -> float:

@@ -246,8 +246,8 @@ def image_evaluator(
                 render_model, posed, view, comparison, iterations=iterations, sums=sums, blocks=blocks[-1]
             )
             shifted.append((sums.B * shift).transpose(2, 0, 1))
-            if dofs.moves_joints:
-                shifted.append(shape_error_gradients(sums.B, posed, view))
+        if dofs.moves_joints:
+            shifted.append(shape_error_gradients(sums.A))
         return map_to_dofs(
             render_model,
             dofs,
