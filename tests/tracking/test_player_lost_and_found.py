@@ -1,5 +1,7 @@
 """Players who are out of sight for a while are found again, each as who it is; where two could be meant, it is said."""
 
+from itertools import product
+
 import numpy as np
 
 from airborne.tracking import Status
@@ -51,6 +53,26 @@ def test_identities_are_those_that_fit_all_of_the_lost_best():
     probability = identity_probabilities(nats)
     assert probability[0, 1] > 0.95 and probability[1, 0] > 0.95
     assert probability.sum(axis=0).max() < 1 + 1e-12
+
+
+def test_probabilities_are_sums_over_all_assignments():
+    nats = np.random.default_rng(7).normal(0, 3, (3, 4))
+    nats[0, 2] = -np.inf
+    expected, total = np.zeros(nats.shape), 0.0
+    for chosen in product(range(-1, 4), repeat=3):
+        taken = [j for j in chosen if j >= 0]
+        if len(set(taken)) == len(taken):
+            weight = np.exp(sum(nats[i, j] for i, j in enumerate(chosen) if j >= 0))
+            total += weight
+            for i, j in enumerate(chosen):
+                if j >= 0:
+                    expected[i, j] += weight
+    np.testing.assert_allclose(identity_probabilities(nats), expected / total, atol=1e-12)
+
+
+def test_a_dozen_who_are_lost_together_are_told_apart():
+    nats = np.where(np.eye(12) > 0, 9.0, 1.0)
+    assert np.diag(identity_probabilities(nats)).min() > 0.95
 
 
 def test_two_who_could_both_be_meant_are_not_told_apart():

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -132,23 +131,32 @@ def _claim(bystanders: Array, lost: Array) -> dict[int, int]:
 def identity_probabilities(nats: Array) -> Array:
     """Return the probability (lost, standers) that a lost player is a stander: nats (lost, standers), 0 nats for none.
 
-    No two lost players are the same stander; -inf nats: impossible.
+    No two lost players are the same stander; -inf nats: impossible. All assignments are summed player by player, over
+    the sets of standers that are taken: a dozen players in the dark have too many to be listed.
     """
-    options = ([-1, *np.flatnonzero(np.isfinite(row))] for row in nats)
-    choices = [chosen for chosen in product(*options) if _are_different(chosen)]
-    scores = np.array([sum(nats[i, j] for i, j in enumerate(chosen) if j >= 0) for chosen in choices])
-    weights = np.exp(scores - scores.max())
+    odds, nobody = np.exp(nats), frozenset[int]()
+    options = [[(None, 1.0), *((int(j), float(row[j])) for j in np.flatnonzero(row))] for row in odds]
+    before: list[dict[frozenset[int], float]] = [{nobody: 1.0}]  # taken by the players before -> sum of weights
+    for choices in options:
+        before.append({})
+        for taken, weight in before[-2].items():
+            for j, odd in choices:
+                if j not in taken:
+                    now = taken if j is None else taken | {j}
+                    before[-1][now] = before[-1].get(now, 0.0) + weight * odd
+    after = dict.fromkeys(before[-1], 1.0)  # sum of weights of the players from here on
     probability = np.zeros(nats.shape)
-    for chosen, weight in zip(choices, weights / weights.sum(), strict=True):
-        for i, j in enumerate(chosen):
-            if j >= 0:
-                probability[i, j] += weight
-    return probability
-
-
-def _are_different(chosen: Sequence[int]) -> bool:
-    taken = [j for j in chosen if j >= 0]
-    return len(set(taken)) == len(taken)
+    for i in reversed(range(len(options))):
+        later, after = after, dict.fromkeys(before[i], 0.0)
+        for taken, weight in before[i].items():
+            for j, odd in options[i]:
+                if j is None:
+                    after[taken] += later[taken]
+                elif j not in taken:
+                    onward = odd * later[taken | {j}]
+                    after[taken] += onward
+                    probability[i, j] += weight * onward
+    return probability / after[nobody]
 
 
 def _place_nats(floor_m: Array, since_s: Fraction | None, places_m: Array, time_s: Fraction) -> Array:
