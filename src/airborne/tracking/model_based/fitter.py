@@ -42,7 +42,7 @@ from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
 from airborne.tracking.model_based.support import count_views
 from airborne.tracking.model_based.turned_pelvis import turn_pelvis
-from airborne.tracking.model_based.uncovered import area_beside, find_uncovered_pixels
+from airborne.tracking.model_based.uncovered import find_uncovered
 from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
@@ -82,6 +82,16 @@ class JudgedFit:
     fit: Fit
     agreement: MaskAgreement
     moved: tuple[int, ...] = ()  # first segments of the limbs that were found away from where they were expected
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _MaskFaults:
+    """A fit, and where its mask and the images do not go together."""
+
+    fit: Fit
+    misplaced: Sequence[NDArray[np.int64]]  # limbs that cover pixels unlike the body
+    beside: Sequence[NDArray[np.int64]]  # limbs beside which more than a rim stands uncovered, in two views
+    n_views_uncovered: int  # in which something like a limb stands out that the body does not cover
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,16 +159,19 @@ class Fitter:
         """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it."""
         if not self.moves_joints:
             return JudgedFit(fit, self.agreement(fit.pose, learned))
-        refitted, limbs = self._refit_limbs(fit, guesses, learned, prior), limbs_of(self.model)
-        moved = [limb for limb in limbs if limb_distance(self.model, fit.pose, refitted.pose, limb) > DISTINCT_M]
-        return replace(self.assess(refitted, learned), moved=tuple(int(limb[0]) for limb in moved))
+        faults, limbs = self._refit_limbs(fit, guesses, learned, prior), limbs_of(self.model)
+        moved = [limb for limb in limbs if limb_distance(self.model, fit.pose, faults.fit.pose, limb) > DISTINCT_M]
+        return replace(self._assess(faults, learned), moved=tuple(int(limb[0]) for limb in moved))
 
     def assess(self, fit: Fit, learned: LearnedRegions) -> JudgedFit:
         """Judge a fit as it is."""
-        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
-        segments = tuple(int(segment) for limb in misplaced for segment in limb)
-        n_views_of = count_views(self.render_model, fit.pose, fit.views)
-        for limb in self._limbs_beside_uncovered(fit.pose, learned):  # it may be there: no better than one view
+        return self._assess(self._find_faults(fit, learned), learned)
+
+    def _assess(self, faults: _MaskFaults, learned: LearnedRegions) -> JudgedFit:
+        fit = faults.fit
+        segments = tuple(int(segment) for limb in faults.misplaced for segment in limb)
+        n_views_of = count_views(self.render_model, fit.pose, fit.views, fit.equations.noise_of_views)
+        for limb in faults.beside:  # it may be there: no better than one view
             n_views_of[limb] = np.minimum(n_views_of[limb], 1)
         return JudgedFit(fit, replace(self.agreement(fit.pose, learned), misplaced=segments, n_views_of=n_views_of))
 
@@ -176,34 +189,40 @@ class Fitter:
         posed = self.render_model.with_pose(pose)
         return learn_missing_backgrounds(self.render_model, posed, learned.regions, learned.appearance)
 
-    def _refit_limbs(self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> Fit:
+    def _refit_limbs(
+        self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None
+    ) -> _MaskFaults:
         """Search for the limbs that cover what is unlike the body, or beside which, or anywhere, what is stands out.
 
         None is searched for again before another has moved. Before the first, the whole body is fitted again.
         """
-        limbs, tried = limbs_of(self.model), set[int]()
+        tried = set[int]()
 
-        def search(limb: NDArray[np.int64], fit: Fit, prior: PosePrior | None) -> tuple[Fit, PosePrior | None]:
+        def search(
+            limb: NDArray[np.int64], faults: _MaskFaults, prior: PosePrior | None
+        ) -> tuple[_MaskFaults, PosePrior | None]:
             if int(limb[0]) in tried:
-                return fit, prior
-            moved, prior = self._refit_limb(fit, limb, guesses, learned, prior=prior)
-            if moved is not fit:
+                return faults, prior
+            moved, prior = self._refit_limb(faults.fit, limb, guesses, learned, prior=prior)
+            if moved is not faults.fit:
                 tried.clear()
+                faults = self._find_faults(moved, learned)
             tried.add(int(limb[0]))
-            return moved, prior
+            return faults, prior
 
-        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
-        if misplaced or self._limbs_beside_uncovered(fit.pose, learned):
-            fit, prior = self._refit_body(fit, learned, prior)
-            for limb in find_misplaced_limbs(self.render_model, fit.pose, *learned.views):
-                fit, prior = search(limb, fit, prior)
-            for limb in self._limbs_beside_uncovered(fit.pose, learned):
-                fit, prior = search(limb, fit, prior)
-        for limb in limbs:
-            if self._n_views_uncovered(fit.pose, learned) < _FEWEST_VIEWS:
+        faults = self._find_faults(fit, learned)
+        if faults.misplaced or faults.beside:
+            refitted, prior = self._refit_body(fit, learned, prior)
+            faults = faults if refitted is fit else self._find_faults(refitted, learned)
+            for limb in faults.misplaced:
+                faults, prior = search(limb, faults, prior)
+            for limb in faults.beside:
+                faults, prior = search(limb, faults, prior)
+        for limb in limbs_of(self.model):
+            if faults.n_views_uncovered < _FEWEST_VIEWS:
                 break
-            fit, prior = search(limb, fit, prior)
-        return fit
+            faults, prior = search(limb, faults, prior)
+        return faults
 
     def _refit_body(self, fit: Fit, learned: LearnedRegions, prior: PosePrior | None) -> tuple[Fit, PosePrior | None]:
         """Fit everything again, freer of what was expected; return the better fit, with its prior."""
@@ -259,17 +278,12 @@ class Fitter:
         best = int(np.argmin(costs))
         return (others[best], widened) if costs[best] < stays else (fit, prior)
 
-    def _n_views_uncovered(self, pose: Pose, learned: LearnedRegions) -> int:
-        """Count the views in which something like a limb stands out that the body does not cover."""
-        posed = self.render_model.with_pose(pose)
-        uncovered = find_uncovered_pixels(self.render_model, posed, learned.regions, learned.posteriors)
-        return sum(bool(each.any()) for each in uncovered)
-
-    def _limbs_beside_uncovered(self, pose: Pose, learned: LearnedRegions) -> list[NDArray[np.int64]]:
-        """Return the limbs beside which more than a rim stands uncovered, in two views."""
-        beside_m2 = area_beside(self.render_model, self.render_model.with_pose(pose), *learned.views)
-        limbs = limbs_of(self.model)
-        return [limb for limb in limbs if np.sum(beside_m2[:, limb].sum(axis=1) > _BESIDE_M2) >= _FEWEST_VIEWS]
+    def _find_faults(self, fit: Fit, learned: LearnedRegions) -> _MaskFaults:
+        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
+        pixels, beside_m2 = find_uncovered(self.render_model, self.render_model.with_pose(fit.pose), *learned.views)
+        of_limb = ((limb, beside_m2[:, limb].sum(axis=1)) for limb in limbs_of(self.model))
+        beside = [limb for limb, areas_m2 in of_limb if np.sum(areas_m2 > _BESIDE_M2) >= _FEWEST_VIEWS]
+        return _MaskFaults(fit, misplaced, beside, sum(bool(each.any()) for each in pixels))
 
     def _stages_at(self, reduction: int) -> list[DegreesOfFreedom]:
         trunk, everything = self.stages[0], self.stages[-1]

@@ -86,7 +86,7 @@ def photometric_equations(body, projection, observation, comparison, maps, paint
 def equations_of_known_light(body, projection, observation, comparison, maps, is_faceted, lamps, ambient, sums, blocks):
     """Add one view's equations under known lights, in shares of full sRGB; lamps (l, 8), ambient as in `draw_maps`."""
     owner, nearness = _draw(body, projection, maps)
-    _, lit = _light_by_lamps(body, projection, lamps, ambient, *maps.part.shape)
+    lit = _light_by_lamps(body, projection, lamps, ambient, maps.part)
     return _sum_equations(lit, is_faceted, maps, owner, nearness, projection, observation, comparison, sums, blocks)
 
 
@@ -104,10 +104,10 @@ def fill_costs(body, projection, observation, comparison, maps, paint, light, co
 
 
 @kernel(fastmath=True)
-def fill_costs_of_known_light(body, projection, observation, comparison, lamps, ambient, costs):
+def fill_costs_of_known_light(body, projection, observation, comparison, maps, lamps, ambient, costs):
     """Fill costs (H, W) with the robust squared residual of each pixel, as `equations_of_known_light` has it."""
-    part, lit = _light_by_lamps(body, projection, lamps, ambient, *costs.shape)
-    _fill_costs(lit, part, observation, comparison, costs)
+    lit = _light_by_lamps(body, projection, lamps, ambient, maps.part)
+    _fill_costs(lit, maps.part, observation, comparison, costs)
 
 
 @kernel(fastmath=True)
@@ -131,9 +131,11 @@ def _fill_costs(lit, part, observation, comparison, costs):
 
 
 @kernel(fastmath=True)
-def _light_by_lamps(body, projection, lamps, ambient, h, w):
-    """Draw a view under known lights; return the map of parts (h, w) and the body's colours (3, h, w), full being 1."""
-    part, segment = np.full((h, w), -1, np.int16), np.empty((h, w), np.int16)
+def _light_by_lamps(body, projection, lamps, ambient, part):
+    """Draw a view under known lights, filling part (h, w); return the body's colours (3, h, w), full being 1."""
+    h, w = part.shape
+    part[:] = -1
+    segment = np.empty((h, w), np.int16)
     inverse_depth, colour = np.empty((h, w), np.float32), np.zeros((h, w, 3), np.float32)
     R, t, view = projection.R, projection.t, projection.packed_view
     draw_maps(body.shapes, body.geometry, R, t, view, lamps, ambient, part, segment, inverse_depth, colour)
@@ -142,7 +144,7 @@ def _light_by_lamps(body, projection, lamps, ambient, h, w):
         for y in range(h):
             for x in range(w):
                 lit[k, y, x] = min(colour[y, x, k] * np.float32(1 / 255), np.float32(1))
-    return part, lit
+    return lit
 
 
 @kernel(fastmath=True)

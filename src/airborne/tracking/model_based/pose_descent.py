@@ -34,6 +34,7 @@ class PoseEquations:
     noise: float  # mean square of the weighted residual, times how many pixels share it
     misfit: float  # the same where the shape is wrong, too: a pose is weighed against its prior by this
     shared: float  # pixels that err together where the shape is wrong
+    noise_of_views: Sequence[float]  # `noise` of each image; none of masks
 
     def covariance(self) -> Array:
         """Return the covariance (d, d) of the free degrees of freedom."""
@@ -59,6 +60,7 @@ def map_to_dofs(
     totals: Array,
     correlated: float,
     shared: float,
+    noise_of_views: Sequence[float] = (),
 ) -> PoseEquations:
     """Map the segments' equations through the chain of joints.
 
@@ -72,7 +74,7 @@ def map_to_dofs(
     residual = total / weight if weight > 0 else 1.0
     rows = [each.reshape(-1, *J.shape[:2]) for each in blocks] + list(shifted)
     noise, misfit = float(correlated * residual), float(shared * residual)
-    return PoseEquations(pose, A, g, J, rows, float(cost), noise, misfit, shared)
+    return PoseEquations(pose, A, g, J, rows, float(cost), noise, misfit, shared, noise_of_views)
 
 
 @dataclass(frozen=True, eq=False)
