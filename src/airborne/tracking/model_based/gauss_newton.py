@@ -42,7 +42,7 @@ from airborne.types import Array
 PyramidLevels = Sequence[tuple[int, int]]
 
 # reduction of the image, iterations
-FAR, NEAR, CLOSE = ((8, 5), (4, 4), (2, 3)), ((4, 2), (2, 2)), ((2, 2),)
+FAR, NEAR, CLOSE = ((8, 5), (4, 4), (2, 3)), ((4, 2), (2, 2)), ((2, 1),)
 _COARSE_SIGMA_PX = 1.2  # of the reduced image
 _FINE_SIGMA_PX = 1.2  # of a full frame
 _CLIP = 0.1  # linear light, 0..1: a residual this large has a quarter of the weight
@@ -50,6 +50,8 @@ _CLIP_LIT = 0.5  # the same under known lights, where no shadow or highlight has
 _CLIP_MASK = 0.5  # the same, of a mask
 _PATCH = 8.0  # by this factor more pixels of a person are body, or not, together; chosen as `shape_error`'s width
 _OVERSTEP = 1.6  # robust weights and the refitted light make each step too short by about this factor
+# the same of a rigid body, of its position and of its rotation: least errors on six synthetic throws
+_OVERSTEP_STIFF = np.repeat([2.0, 1.3], 3)
 _MOST_STEPS = 12  # at each level of a body with joints
 _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
 _CONVERGED, _CONVERGED_STIFF = 1 / 3, 1  # squared length of the last step, in sds, a degree of freedom; masks too
@@ -154,9 +156,12 @@ def fit_images(
     """
     views = image_views(render_model, regions, appearance)
     evaluate, correlated = image_evaluator(render_model, poses, views, dofs=dofs)
-    most_steps, converged = (_MOST_STEPS, _CONVERGED) if dofs.moves_joints else (_MOST_STEPS_STIFF, _CONVERGED_STIFF)
+    if dofs.moves_joints:
+        most_steps, converged, overstep = _MOST_STEPS, _CONVERGED, _OVERSTEP
+    else:
+        most_steps, converged, overstep = _MOST_STEPS_STIFF, _CONVERGED_STIFF, _OVERSTEP_STIFF
     ends = [
-        descend_pose(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, tolerance=converged)
+        descend_pose(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=overstep, tolerance=converged)
         for pose in poses
     ]
     noise = min(equations.noise for _, equations in ends)

@@ -84,6 +84,7 @@ class _Iterate:
     equations: PoseEquations
     dofs: DegreesOfFreedom
     prior: PosePrior | None
+    overstep: float | Array  # (d,) factor on the step
 
     @property
     def misfit(self) -> float:
@@ -92,7 +93,7 @@ class _Iterate:
 
     @cached_property
     def delta(self) -> Array:
-        """The whole step: (d,)."""
+        """The whole step, without overstep: (d,)."""
         equations = self.equations
         return self.dofs.solve_step(equations.pose, equations.A / self.misfit, equations.g / self.misfit, self.prior)
 
@@ -101,8 +102,8 @@ class _Iterate:
         return self.equations.objective(reference.misfit, self.dofs.prior_cost(self.equations.pose, self.prior))
 
     def step(self, share: float) -> tuple[Pose, float]:
-        """Return the pose after a share of the step, and the decrease that the images predict of the whole."""
-        pose = self.dofs.update(self.equations.pose, share * self.delta)
+        """Return the pose after a share of the step, and the decrease that the images predict without overstep."""
+        pose = self.dofs.update(self.equations.pose, share * self.overstep * self.delta)
         return pose, 0.5 * float(self.delta @ self.equations.A @ self.delta) / self.misfit
 
 
@@ -113,21 +114,21 @@ def descend_pose(
     prior: PosePrior | None,
     *,
     most_steps: int,
-    overstep: float,
+    overstep: float | Array,
     tolerance: float = 0.0,
 ) -> tuple[Pose, PoseEquations]:
     """Step downhill; return where the last step leads, which is not evaluated any more, and the equations before it.
 
-    evaluate takes a pose, and whether it is the first. tolerance: squared length of the last step, in sds of the pose,
-    for each degree of freedom.
+    evaluate takes a pose, and whether it is the first. overstep (d,): by how much steps are too short. tolerance:
+    squared length of the last step, in sds of the pose, for each degree of freedom.
     """
     descent = descend(
-        _Iterate(evaluate(pose, True), dofs, prior),
-        lambda pose: _Iterate(evaluate(pose, False), dofs, prior),
-        BacktrackingRule(overstep, _SHORTER, _LEAST_SHARE),
+        _Iterate(evaluate(pose, True), dofs, prior, overstep),
+        lambda pose: _Iterate(evaluate(pose, False), dofs, prior, overstep),
+        BacktrackingRule(1.0, _SHORTER, _LEAST_SHARE),
         most_steps=most_steps - 1,
         least_predicted=(0.5 * tolerance * len(dofs.columns), 0.0),
         slack=_SLACK,
     )
     best = descent.best
-    return best.equations.pose if descent.n_losses else best.step(overstep)[0], best.equations
+    return best.equations.pose if descent.n_losses else best.step(1.0)[0], best.equations
