@@ -57,6 +57,20 @@ def test_joints_of_a_limb_beside_which_something_stands_uncovered_are_worth_one_
     assert min(most["wrong"]) <= 1
 
 
+def test_fit_in_which_no_limb_moves_is_looked_through_once(frame, monkeypatch):
+    looked_through = []
+
+    def find(*args):
+        looked_through.append(args)
+        return find_uncovered(*args)
+
+    monkeypatch.setattr("airborne.tracking.model_based.fitter.find_uncovered", find)
+    fitter = Fitter.of(frame.render_model, "refined", fixed_shape=False)
+    learned = LearnedRegions(*frame.views(frame.truth), frame.appearance)
+    judged = fitter.judge(fitter.fit_images([frame.truth], learned, None), [frame.truth], learned, None)
+    assert len(looked_through) == 1 and not judged.moved
+
+
 def views_that_show(frame, pose):
     regions, _ = frame.views(pose)
     views = image_views(frame.render_model, regions, frame.appearance)

@@ -50,7 +50,7 @@ _CLIP_LIT = 0.5  # the same under known lights, where no shadow or highlight has
 _CLIP_MASK = 0.5  # the same, of a mask
 _PATCH = 8.0  # by this factor more pixels of a person are body, or not, together; chosen as `shape_error`'s width
 _OVERSTEP = 1.6  # robust weights and the refitted light make each step too short by about this factor
-# the same of a rigid body, of its position and of its rotation: least errors on six synthetic throws
+# the same of a rigid body in unknown light, of its position and its rotation: least errors on six synthetic throws
 _OVERSTEP_STIFF = np.repeat([2.0, 1.3], 3)
 _MOST_STEPS = 12  # at each level of a body with joints
 _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
@@ -156,10 +156,8 @@ def fit_images(
     """
     views = image_views(render_model, regions, appearance)
     evaluate, correlated = image_evaluator(render_model, poses, views, dofs=dofs)
-    if dofs.moves_joints:
-        most_steps, converged, overstep = _MOST_STEPS, _CONVERGED, _OVERSTEP
-    else:
-        most_steps, converged, overstep = _MOST_STEPS_STIFF, _CONVERGED_STIFF, _OVERSTEP_STIFF
+    most_steps, converged = (_MOST_STEPS, _CONVERGED) if dofs.moves_joints else (_MOST_STEPS_STIFF, _CONVERGED_STIFF)
+    overstep = _OVERSTEP if dofs.moves_joints or render_model.lights is not None else _OVERSTEP_STIFF
     ends = [
         descend_pose(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=overstep, tolerance=converged)
         for pose in poses
