@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -23,6 +24,7 @@ from airborne.tracking.model_based.gauss_newton import (
     FAR,
     NEAR,
     Fit,
+    ImageView,
     PyramidLevels,
     fit_images,
     fit_silhouettes,
@@ -34,9 +36,11 @@ from airborne.tracking.model_based.learning import learn_missing_backgrounds
 from airborne.tracking.model_based.left_right_swap import swap_limbs
 from airborne.tracking.model_based.misplaced_limbs import (
     DISTINCT_M,
+    drop_same_places,
     find_misplaced_limbs,
     limb_distance,
     search_limb,
+    with_limb,
 )
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
@@ -124,8 +128,7 @@ class Fitter:
 
     def agreement(self, pose: Pose, learned: LearnedRegions) -> MaskAgreement:
         """Compare a pose's mask with the images."""
-        posed = self.render_model.with_pose(pose)
-        return mask_agreement(self.render_model, posed, learned.regions, learned.posteriors)
+        return mask_agreement(self.render_model, self.render_model.with_pose(pose), *learned.views)
 
     def fit_silhouettes(
         self, pose: Pose, learned: LearnedRegions, levels: PyramidLevels, prior: PosePrior | None
@@ -139,17 +142,15 @@ class Fitter:
 
     def fit_images(self, poses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> Fit:
         """Fit the images from several poses; return the best fit."""
-        appearance = self._complete(poses[0], learned)
+        views = self._views(poses[0], learned)
         *before, last = self.stages if self.order == "hierarchical" else self.stages[-1:]
         for dofs in before:
-            fit = fit_images(self.render_model, poses, learned.regions, appearance, dofs=dofs, prior=prior)
-            poses = [fit.pose]
-        return fit_images(self.render_model, poses, learned.regions, appearance, dofs=last, prior=prior)
+            poses = [fit_images(self.render_model, poses, views, dofs=dofs, prior=prior).pose]
+        return fit_images(self.render_model, poses, views, dofs=last, prior=prior)
 
     def weigh(self, poses: Sequence[Pose], learned: LearnedRegions) -> Array:
         """Return minus the log-likelihood of the images in each pose, by the noise of the best one: (n,) [nat]."""
-        appearance = self._complete(poses[0], learned)
-        views = image_views(self.render_model, learned.regions, appearance)
+        views = self._views(poses[0], learned)
         evaluate, _ = image_evaluator(self.render_model, poses, views, dofs=self.stages[-1])
         equations = [evaluate(pose, True) for pose in poses]
         noise = min(each.noise for each in equations)
@@ -184,10 +185,11 @@ class Fitter:
         evidence = self.agreement(fit.equations.pose, learned).evidence
         return fit.objective(misfit, prior) - evidence / fit.equations.shared
 
-    def _complete(self, pose: Pose, learned: LearnedRegions) -> Appearance:
-        """Return the appearance with a background in every region."""
+    def _views(self, pose: Pose, learned: LearnedRegions) -> list[ImageView]:
+        """Prepare the images, with a background in every region, for a fit."""
         posed = self.render_model.with_pose(pose)
-        return learn_missing_backgrounds(self.render_model, posed, learned.regions, learned.appearance)
+        appearance = learn_missing_backgrounds(self.render_model, posed, learned.regions, learned.appearance)
+        return [view.with_own_light() for view in _prepare_views(self.render_model, learned, appearance)]
 
     def _refit_limbs(
         self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None
@@ -258,7 +260,8 @@ class Fitter:
         ]
         poses.sort(key=lambda pose: self.agreement(pose, learned).evidence, reverse=True)
         widened = None if prior is None else prior.widen(dofs.columns)
-        fits = [self.fit_images([pose], learned, widened) for pose in poses[:_N_FITTED]]
+        best = drop_same_places(self.model, poses[:_N_FITTED], limb)
+        fits = [self.fit_images([pose], learned, widened) for pose in best]
         return self._best_place(fit, fits, learned, prior=prior, widened=widened)
 
     def _best_place(
@@ -292,8 +295,6 @@ class Fitter:
         return [trunk] * (reduction >= _TRUNK_AT) + [everything] * (reduction <= _TRUNK_AT)
 
 
-def with_limb(pose: Pose, other: Pose, limb: NDArray[np.int64]) -> Array:
-    """Return the joint angles of a pose, with one limb's from another pose."""
-    angles = pose.joint_angles.copy()
-    angles[limb - 1] = other.joint_angles[limb - 1]
-    return angles
+@lru_cache(maxsize=2)  # while a limb is looked for, the same images are fitted again and again
+def _prepare_views(render_model: RenderModel, learned: LearnedRegions, appearance: Appearance) -> list[ImageView]:
+    return image_views(render_model, learned.regions, appearance)

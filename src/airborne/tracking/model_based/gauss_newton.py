@@ -65,6 +65,12 @@ class ImageView(NamedTuple):
     noise_px: float  # how many pixels share their noise
     shift_sds_px: Array  # (3,) of `shift_sds_px`
 
+    def with_own_light(self) -> ImageView:
+        """Return the view with a light of its own, for a fit to change."""
+        light = self.buffers.light
+        own = light.copy() if isinstance(light, np.ndarray) else light
+        return self._replace(buffers=self.buffers._replace(light=own))
+
 
 @dataclass(frozen=True, slots=True)
 class Fit:
@@ -144,17 +150,12 @@ def fit_silhouettes(
 def fit_images(
     render_model: RenderModel,
     poses: Sequence[Pose],
-    regions: Sequence[Region],
-    appearance: Appearance,
+    views: Sequence[ImageView],
     *,
     dofs: DegreesOfFreedom,
     prior: PosePrior | None = None,
 ) -> Fit:
-    """Move the body until the composite of body and background agrees with the images; return its covariance too.
-
-    Of several starts, the one that ends in the best agreement with images and prior is returned.
-    """
-    views = image_views(render_model, regions, appearance)
+    """Move the body until body and background agree with the images; of several starts, return the best end."""
     evaluate, correlated = image_evaluator(render_model, poses, views, dofs=dofs)
     most_steps, converged = (_MOST_STEPS, _CONVERGED) if dofs.moves_joints else (_MOST_STEPS_STIFF, _CONVERGED_STIFF)
     overstep = _OVERSTEP if dofs.moves_joints or render_model.lights is not None else _OVERSTEP_STIFF
@@ -176,7 +177,7 @@ def linearise_images(
 
 
 def rises_without(
-    render_model: RenderModel, posed: PosedBody, others: Mapping[int, PosedBody], image: ImageView, noise: float
+    render_model: RenderModel, posed: PosedBody, others: Mapping[int, PosedBody], image: ImageView, *, noise: float
 ) -> Array:
     """Return by how much minus the log-likelihood of one image rises as each of some segments is taken away: (k,).
 

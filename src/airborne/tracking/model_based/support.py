@@ -35,7 +35,7 @@ def count_views(
         R, t = packed[:9].reshape(3, 3), packed[9:12]
         behind = -R.T @ t - _BEHIND_M * R[2]
         others = {int(segment): _without(posed, int(segment), behind) for segment in segments}
-        counts[segments] += rises_without(render_model, posed, others, view, noise) > _STRONG_NATS
+        counts[segments] += rises_without(render_model, posed, others, view, noise=noise) > _STRONG_NATS
     return counts
 
 
