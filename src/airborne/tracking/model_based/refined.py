@@ -43,7 +43,6 @@ from airborne.video import Frames
 
 _MOST_PX_PER_M = 220.0  # of a body with joints
 _HISTORY = 3  # poses that predict
-_LEARN_EACH = 8  # frames at first; then every second one teaches: a fifth of the time, for what hardly changes
 _OBSERVED_SD_RAD, _UNOBSERVED_VARIANCE = 0.1, 1e6  # a rotation with a larger sd than this is hardly extrapolated
 _LEAST_IN_VIEW = 0.4  # of the body, in the view that shows most of it; with less, the estimate is uncertain
 
@@ -64,7 +63,6 @@ class RefinedState:
     appearance: Appearance = field(default_factory=Appearance)
     reference: Reference = field(default_factory=Reference)
     covariance: Array | None = None  # of the last estimated pose
-    n_frames: int = 0  # in which the body was tracked
 
 
 class RefinedTracker:
@@ -118,16 +116,15 @@ class RefinedTracker:
         past = (*before, (frames.time_s, estimate.pose))[-_HISTORY:]
         if estimate.status is not Status.TRACKED and state.past:
             return replace(state, past=past, covariance=estimate.covariance)
-        appearance, reference = state.appearance, state.reference
+        posed = self.render_model.with_pose(estimate.pose)
+        regions = crop_regions([posed], self.render_model.geometry, frames, MARGIN_PX)
+        appearance = learn_appearance(self.render_model, posed, regions, state.appearance)
+        reference = state.reference
         if state.past and estimate.mask_shares is not None:
             reference = reference.update(*estimate.mask_shares)
-        if state.n_frames < _LEARN_EACH or state.n_frames % 2:
-            posed = self.render_model.with_pose(estimate.pose)
-            regions = crop_regions([posed], self.render_model.geometry, frames, MARGIN_PX)
-            appearance = learn_appearance(self.render_model, posed, regions, appearance)
-            if reference is state.reference and (learned := LearnedRegions.of(regions, appearance)).regions:
-                reference = reference.update(*self._fitter.agreement(estimate.pose, learned).shares)
-        return RefinedState(past, appearance, reference, estimate.covariance, state.n_frames + 1)
+        elif (learned := LearnedRegions.of(regions, appearance)).regions:  # nothing was known of colours before
+            reference = reference.update(*self._fitter.agreement(estimate.pose, learned).shares)
+        return RefinedState(past, appearance, reference, estimate.covariance)
 
     def turn(self, state: RefinedState) -> RefinedState:
         """Return the state from which the body is tracked back in time: the past is as it would be met then."""
