@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -66,6 +65,8 @@ class LearnedRegions:
     regions: Sequence[Region]
     posteriors: Sequence[Array]  # (h, w) each pixel's probability to be body
     appearance: Appearance
+    # images prepared by an appearance: where a limb is looked for, they are fitted again and again
+    prepared: dict[Appearance, Sequence[ImageView]] = field(default_factory=dict)
 
     @property
     def views(self) -> tuple[Sequence[Region], Sequence[Array]]:
@@ -189,7 +190,9 @@ class Fitter:
         """Prepare the images, with a background in every region, for a fit."""
         posed = self.render_model.with_pose(pose)
         appearance = learn_missing_backgrounds(self.render_model, posed, learned.regions, learned.appearance)
-        return [view.with_own_light() for view in _prepare_views(self.render_model, learned, appearance)]
+        if appearance not in learned.prepared:
+            learned.prepared[appearance] = image_views(self.render_model, learned.regions, appearance)
+        return [view.with_own_light() for view in learned.prepared[appearance]]
 
     def _refit_limbs(
         self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None
@@ -293,8 +296,3 @@ class Fitter:
         if self.order == "joint" or not self.moves_joints:
             return [everything]
         return [trunk] * (reduction >= _TRUNK_AT) + [everything] * (reduction <= _TRUNK_AT)
-
-
-@lru_cache(maxsize=2)  # while a limb is looked for, the same images are fitted again and again
-def _prepare_views(render_model: RenderModel, learned: LearnedRegions, appearance: Appearance) -> list[ImageView]:
-    return image_views(render_model, learned.regions, appearance)
