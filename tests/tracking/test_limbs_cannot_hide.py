@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from airborne.tracking.model_based.degrees_of_freedom import limbs_of
+from airborne.tracking.model_based.degrees_of_freedom import all_joints, limbs_of
 from airborne.tracking.model_based.fitter import Fitter, LearnedRegions
-from airborne.tracking.model_based.gauss_newton import image_views
+from airborne.tracking.model_based.gauss_newton import image_evaluator, image_views
 from airborne.tracking.model_based.support import count_views, mark_unobserved, widen_unseen
-from airborne.tracking.model_based.uncovered import area_beside, find_uncovered_pixels
+from airborne.tracking.model_based.uncovered import find_uncovered
 from tests.support.people import HUMAN
 from tests.tracking.test_misplaced_limb import FOLDS, LearnedFrame, fold
 
@@ -22,7 +22,7 @@ def frame():
 def uncovered_px(frame, pose):
     render_model = frame.render_model
     posed = render_model.with_pose(pose)
-    return [int(each.sum()) for each in find_uncovered_pixels(render_model, posed, *frame.views(pose))]
+    return [int(each.sum()) for each in find_uncovered(render_model, posed, *frame.views(pose)).pixels]
 
 
 def test_nothing_stands_out_of_the_true_pose(frame):
@@ -38,7 +38,8 @@ def test_what_stands_uncovered_is_measured_and_has_a_nearest_segment(frame):
     render_model = frame.render_model
     wrong = fold(frame.truth, "thigh_right", FOLDS["thigh_right"])
     beside_m2, of_truth_m2 = (
-        area_beside(render_model, render_model.with_pose(pose), *frame.views(pose)) for pose in (wrong, frame.truth)
+        find_uncovered(render_model, render_model.with_pose(pose), *frame.views(pose)).beside_m2
+        for pose in (wrong, frame.truth)
     )
     assert of_truth_m2.max() == 0
     per_m2 = np.array(uncovered_px(frame, wrong))
@@ -56,19 +57,36 @@ def test_joints_of_a_limb_beside_which_something_stands_uncovered_are_worth_one_
     assert min(most["wrong"]) <= 1
 
 
-def test_views_show_the_limbs_of_the_true_pose(frame):
-    regions, _ = frame.views(frame.truth)
+def test_fit_in_which_no_limb_moves_is_looked_through_once(frame, monkeypatch):
+    looked_through = []
+
+    def find(*args):
+        looked_through.append(args)
+        return find_uncovered(*args)
+
+    monkeypatch.setattr("airborne.tracking.model_based.fitter.find_uncovered", find)
+    fitter = Fitter.of(frame.render_model, "refined", fixed_shape=False)
+    learned = LearnedRegions(*frame.views(frame.truth), frame.appearance)
+    judged = fitter.judge(fitter.fit_images([frame.truth], learned, None), [frame.truth], learned, None)
+    assert len(looked_through) == 1 and not judged.moved
+
+
+def views_that_show(frame, pose):
+    regions, _ = frame.views(pose)
     views = image_views(frame.render_model, regions, frame.appearance)
-    counts = count_views(frame.render_model, frame.truth, views)
+    evaluate, _ = image_evaluator(frame.render_model, [pose], views, dofs=all_joints(HUMAN))
+    return count_views(frame.render_model, pose, views, evaluate(pose, True).noise_of_views)
+
+
+def test_views_show_the_limbs_of_the_true_pose(frame):
+    counts = views_that_show(frame, frame.truth)
     long = [NAMES.index(f"{name}_{side}") for name in ("thigh", "shank", "forearm") for side in ("left", "right")]
     assert np.all(counts[long] >= 2)
 
 
 def test_no_view_shows_a_forearm_where_there_is_none(frame):
     wrong = fold(frame.truth, "upper_arm_left", FOLDS["upper_arm_left"])
-    regions, _ = frame.views(wrong)
-    views = image_views(frame.render_model, regions, frame.appearance)
-    counts = count_views(frame.render_model, wrong, views)
+    counts = views_that_show(frame, wrong)
     assert counts[NAMES.index("forearm_left")] < 2
 
 

@@ -80,11 +80,12 @@ class Appearance:
             background_histograms=_learn_histogram(self.background_histograms, region, clear),
         )
 
-    def learn_background(self, region: Region, mask: NDArray[np.bool_]) -> Appearance:
-        """Learn the background wherever the body is not: in the whole view at first, in the region from then on."""
+    def learn_background(self, region: Region, mask: NDArray[np.bool_], *, whole_view: bool = True) -> Appearance:
+        """Learn the background wherever the body is not: at first in the whole view, else in the region alone."""
         covered = cv2.dilate(mask.astype(np.uint8), _kernel(_CLEAR_PX, region.aspect)) > 0
-        if self.has_background(region):
-            background = self.backgrounds[region.source].learn(region.rgb, covered, region.corner)
+        if self.has_background(region) or not whole_view:
+            known = self.backgrounds.get(region.source, BackgroundModel())
+            background = known.learn(region.rgb, covered, region.corner)
         else:
             everywhere = np.zeros(region.view_rgb.shape[:2], bool)
             region.crop(everywhere)[:] = covered

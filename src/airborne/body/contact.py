@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from airborne.body.model import BodyModel, Ellipsoid, Pose
+from airborne.kernels import kernel
 from airborne.types import Array
 
 FLESH_M = 0.015  # two segments may overlap by this
@@ -103,15 +104,44 @@ def _depths(
 
     To first order: an ellipsoid wider by the sphere's radius against the sphere's centre.
     """
-    own = contact.sphere_segment
-    centre = (np.einsum("mij,mj->mi", R[own], contact.sphere_centre) + t[own])[pairs[0]]
-    other = contact.ellipsoid_segment
-    axes = (R[other] @ contact.ellipsoid_axes)[pairs[1]]
-    middle = (np.einsum("eij,ej->ei", R[other], contact.ellipsoid_centre) + t[other])[pairs[1]]
-    local = np.einsum("kji,kj->ki", axes, centre - middle)
-    reach = contact.ellipsoid_semi_axes[pairs[1]] + contact.sphere_radius[pairs[0], None]
-    level = np.maximum(np.linalg.norm(local / reach, axis=1), 1e-6)
-    slope = local / reach**2 / level[:, None]
-    steepness = np.maximum(np.linalg.norm(slope, axis=1), 1e-9)
-    depth = np.minimum((1 - level) / steepness, reach.min(axis=1))
-    return depth, np.einsum("kij,kj->ki", axes, slope / steepness[:, None]), centre
+    n = len(pairs[0])
+    depth, normal, centre = np.empty(n), np.empty((n, 3)), np.empty((n, 3))
+    spheres = contact.sphere_segment, contact.sphere_centre, contact.sphere_radius
+    ellipsoids = contact.ellipsoid_segment, contact.ellipsoid_centre, contact.ellipsoid_axes
+    _fill_depths(*pairs, *spheres, *ellipsoids, contact.ellipsoid_semi_axes, R, t, depth, normal, centre)
+    return depth, normal, centre
+
+
+@kernel
+def _fill_depths(
+    spheres, ellipsoids, own, sphere_centre, radius, other, middle, axes, semi_axes, R, t, depth, normal, centre
+):
+    """Fill in what `_depths` returns."""
+    away, slope = np.empty(3), np.empty(3)
+    for k in range(len(spheres)):
+        m, e = spheres[k], ellipsoids[k]
+        a, b, least = own[m], other[e], np.inf
+        for i in range(3):
+            centre[k, i], away[i] = t[a, i], t[a, i] - t[b, i]
+            for j in range(3):
+                part = R[a, i, j] * sphere_centre[m, j]
+                centre[k, i] += part
+                away[i] += part - R[b, i, j] * middle[e, j]
+        level, steepness = 0.0, 0.0
+        for j in range(3):  # along the ellipsoid's axes
+            reach, local = semi_axes[e, j] + radius[m], 0.0
+            for p in range(3):
+                for q in range(3):
+                    local += axes[e, p, j] * R[b, q, p] * away[q]
+            slope[j] = local / reach**2
+            level += (local / reach) ** 2
+            steepness += slope[j] ** 2
+            least = min(least, reach)
+        level, steepness = max(np.sqrt(level), 1e-6), np.sqrt(steepness)
+        steepness = max(steepness / level, 1e-9)
+        depth[k] = min((1 - level) / steepness, least)
+        for i in range(3):
+            normal[k, i] = 0.0
+            for p in range(3):
+                for j in range(3):
+                    normal[k, i] += R[b, i, p] * axes[e, p, j] * slope[j] / (level * steepness)

@@ -11,6 +11,7 @@ SHIFT_SD_PX = 0.12  # of a full frame: light and edges that are not quite as mod
 _LEVER_M = 0.3  # the length that makes metres and radians comparable
 _JOINT_RANGE_RAD = 1.0  # sd of a joint's rotation that images do not show: that of a range of +-100 degrees
 _MOST_SWEEPS = 30  # of the iteration
+_NO_ANGLE = 1e-34  # squared tangent of a rotation that changes no digit
 _UNOBSERVED_SD_M = 0.15  # a direction with a larger sd than this, at the lever's length, counts as unobserved
 
 
@@ -50,7 +51,7 @@ def eigen_decomposition(matrix):
     By Jacobi's rotations: for matrices of this size as fast as LAPACK, and the same to the last bit in every process,
     however many threads a linear algebra library may run.
     """
-    A, V = matrix.copy(), np.eye(len(matrix))
+    A, V = matrix.copy(), np.eye(len(matrix))  # V: an eigenvector a row, so that rows alone are rotated
     d = len(A)
     for _ in range(_MOST_SWEEPS):
         off, on = 0.0, 0.0
@@ -62,19 +63,23 @@ def eigen_decomposition(matrix):
             break
         for p in range(d - 1):
             for q in range(p + 1, d):
-                if A[p, q] == 0:
+                if A[p, q] * A[p, q] <= _NO_ANGLE * abs(A[p, p] * A[q, q]):
                     continue
                 theta = (A[q, q] - A[p, p]) / (2 * A[p, q])
                 t = 1 / (abs(theta) + np.sqrt(theta * theta + 1))
                 t = t if theta >= 0 else -t
                 c = 1 / np.sqrt(t * t + 1)
                 s = t * c
+                first, second, of_first, of_second = A[p], A[q], V[p], V[q]
                 for k in range(d):
-                    A[k, p], A[k, q] = c * A[k, p] - s * A[k, q], s * A[k, p] + c * A[k, q]
+                    first[k], second[k] = c * first[k] - s * second[k], s * first[k] + c * second[k]
                 for k in range(d):
-                    A[p, k], A[q, k] = c * A[p, k] - s * A[q, k], s * A[p, k] + c * A[q, k]
-                    V[k, p], V[k, q] = c * V[k, p] - s * V[k, q], s * V[k, p] + c * V[k, q]
-    return np.diag(A).copy(), V
+                    of_first[k], of_second[k] = c * of_first[k] - s * of_second[k], s * of_first[k] + c * of_second[k]
+                on_p, on_q = c * first[p] - s * first[q], s * second[p] + c * second[q]
+                for k in range(d):
+                    A[k, p], A[k, q] = first[k], second[k]
+                A[p, p], A[q, q], A[p, q], A[q, p] = on_p, on_q, 0.0, 0.0
+    return np.diag(A).copy(), V.T.copy()
 
 
 @kernel

@@ -137,7 +137,7 @@ class SingleView:
         ]
         costs = np.empty((2, *view.maps.part.shape), np.float32)
         fill_costs(*args, view.maps, Paint(render_model.albedo, render_model.is_faceted), view.light, costs[0])
-        fill_costs_of_known_light(*args, lamps, ambient, costs[1])
+        fill_costs_of_known_light(*args, view.maps, lamps, ambient, costs[1])
         return costs, expected
 
     def silhouette(self, pose):

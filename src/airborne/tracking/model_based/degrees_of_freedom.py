@@ -7,6 +7,8 @@ mapped through the chain: H = sum J' A J, so that the pixels cost the same for 6
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,18 +88,8 @@ class DegreesOfFreedom:
         """
         if not self.moves_joints and prior is None:
             return np.linalg.solve(H + np.diag(self._damping), g)
-        rows, depth = self._overlap_residuals(pose)
-        H, g = H + np.diag(self._damping) + rows.T @ rows, g - rows.T @ depth
-        if prior is not None:
-            precision = 1 / prior.sd[self.columns] ** 2
-            H[np.diag_indices(len(g))] += precision
-            g -= precision * delta_between(prior.expected, pose)[self.columns]
-            rows, away = self.rest_residuals(pose)
-            H, g = H + rows.T @ rows, g - rows.T @ away
-            if prior.evidence is not None:
-                rows, away = prior.evidence.residuals(pose)
-                rows = rows[:, self.columns]
-                H, g = H + rows.T @ rows, g - rows.T @ away
+        of_prior = _linearise_prior(self, pose, prior)
+        H, g = H + np.diag(self._damping) + of_prior.H, g + of_prior.g
         delta = np.linalg.solve(H, g)
         for _ in range(_LIMIT_ROUNDS):
             rows, targets = self._walls(pose, delta)
@@ -108,23 +100,12 @@ class DegreesOfFreedom:
 
     def prior_cost(self, pose: Pose, prior: PosePrior | None) -> float:
         """Return minus the log prior: half the squared distances, in sds, beyond the possible and to the expected."""
-        if not self.moves_joints:
-            possible = np.zeros(0)
-        else:
-            excess = self.model.limits.excess(_rotations(self.model, pose))
-            depth = overlaps(contact_model(self.model), *self._segments(pose)).depth_m
-            possible = np.concatenate([excess.ravel() / _LIMIT_SD_RAD, depth / _OVERLAP_SD_M])
-        if prior is None:
-            return 0.5 * float(possible @ possible)
-        away = delta_between(prior.expected, pose)[self.columns] / prior.sd[self.columns]
-        rest = self.rest_residuals(pose)[1]
-        known = np.zeros(0) if prior.evidence is None else prior.evidence.residuals(pose)[1]
-        return 0.5 * float(away @ away + rest @ rest + possible @ possible + known @ known)
+        return _linearise_prior(self, pose, prior).cost if self.moves_joints or prior is not None else 0.0
 
     def rest_residuals(self, pose: Pose) -> tuple[Array, Array]:
         """Return how far limited joints are from the zero pose, in half ranges: rows (k, d), values (k,)."""
         limits, R = self.model.limits, _rotations(self.model, pose)
-        away = limits.coordinates(R) - limits.nearest(limits.coordinates(np.eye(3)))
+        away = limits.coordinates(R) - _straight(self.model)
         used = np.isfinite(limits.half_rad) & (limits.half_rad > 0)
         joints, axes = np.nonzero(used)
         jacobian = swing_twist_jacobian(limits.relative(R))
@@ -134,21 +115,14 @@ class DegreesOfFreedom:
         rows[np.arange(len(joints))[:, None], columns] = jacobian[joints, axes] / sd[:, None]
         return rows[:, self.columns], away[joints, axes] / sd
 
-    def _segments(self, pose: Pose) -> tuple[Array, Array]:
-        """Return the segments in the world, R (segments, 3, 3) and t (segments, 3) [m]."""
-        root, joints = pose.world_from_root.as_matrix()[None], angles_of(pose, self.model.n_joints)
-        R, t = pose_segments(self.model, root[:, :3, :3], root[:, :3, 3], joints[None])
-        return R[0], t[0]
-
     def _overlap_residuals(self, pose: Pose) -> tuple[Array, Array]:
         """Return how deep segments pass through each other, in sds: rows (k, d), values (k,)."""
-        if not self.moves_joints:
-            return np.zeros((0, len(self.columns))), np.zeros(0)
-        R, t = self._segments(pose)
-        found = overlaps(contact_model(self.model), R, t)
+        root, joints = pose.world_from_root.as_matrix()[None], angles_of(pose, self.model.n_joints)
+        R, t = pose_segments(self.model, root[:, :3, :3], root[:, :3, 3], joints[None])
+        found = overlaps(contact_model(self.model), R[0], t[0])
         if not len(found.depth_m):
             return np.zeros((0, len(self.columns))), np.zeros(0)
-        posed = PosedBody(self.model, R, t)
+        posed = PosedBody(self.model, R[0], t[0])
         sphere, other = (point_jacobian(posed, found.segments[:, k], found.point) for k in (0, 1))
         rows = -np.einsum("ki,kij->kj", found.normal, sphere - other)
         return rows[:, self.columns] / _OVERLAP_SD_M, found.depth_m / _OVERLAP_SD_M
@@ -162,6 +136,8 @@ class DegreesOfFreedom:
         bound = limits.nearest(after)
         beyond = np.linalg.norm(after - bound, axis=1)
         joints = np.flatnonzero(beyond > _BEYOND_RAD)
+        if not len(joints):
+            return np.zeros((0, len(self.columns))), np.zeros(0)
         normal = (after - bound)[joints] / beyond[joints, None]
         relative = limits.relative(_rotations(self.model, pose))
         rows = np.zeros((len(joints), 6 + 3 * len(after)))
@@ -170,6 +146,43 @@ class DegreesOfFreedom:
         rows[np.arange(len(joints))[:, None], columns] = np.einsum("ki,kij->kj", normal, jacobian)
         targets = np.einsum("ki,ki->k", normal, bound[joints] - swing_twist_from_matrix(relative[joints]))
         return rows[:, self.columns] / _LIMIT_SD_RAD, targets / _LIMIT_SD_RAD
+
+
+class _LinearPrior(NamedTuple):
+    """A prior about a pose, to second order: minus its logarithm there, and the normal equations of a step."""
+
+    cost: float
+    H: Array  # (d, d)
+    g: Array  # (d,)
+
+
+@lru_cache(maxsize=8)  # a descent asks for the cost of a pose, and then for the step from it
+def _linearise_prior(dofs: DegreesOfFreedom, pose: Pose, prior: PosePrior | None) -> _LinearPrior:
+    """Linearise what is possible and what is expected; joints' limits, which are walls, add to the cost alone."""
+    d = len(dofs.columns)
+    cost, residuals, precision, g = 0.0, [], np.zeros(d), np.zeros(d)
+    if dofs.moves_joints:
+        excess = dofs.model.limits.excess(_rotations(dofs.model, pose)).ravel() / _LIMIT_SD_RAD
+        cost = 0.5 * float(excess @ excess)
+        residuals.append(dofs._overlap_residuals(pose))
+    if prior is not None:
+        precision = 1 / prior.sd[dofs.columns] ** 2
+        away = delta_between(prior.expected, pose)[dofs.columns]
+        cost, g = cost + 0.5 * float(away @ (precision * away)), -precision * away
+        residuals.append(dofs.rest_residuals(pose))
+        if prior.evidence is not None:
+            rows, values = prior.evidence.residuals(pose)
+            residuals.append((rows[:, dofs.columns], values))
+    H = np.diag(precision)
+    for rows, values in residuals:
+        cost, H, g = cost + 0.5 * float(values @ values), H + rows.T @ rows, g - rows.T @ values
+    return _LinearPrior(cost, H, g)
+
+
+@lru_cache(maxsize=16)
+def _straight(model: BodyModel) -> Array:
+    """Return the coordinates of the zero pose, within the joints' limits: (joints, 3) [rad]."""
+    return model.limits.nearest(model.limits.coordinates(np.eye(3)))
 
 
 def root_only(model: BodyModel) -> DegreesOfFreedom:

@@ -17,7 +17,7 @@ import numpy as np
 from airborne.body import Pose, PosedBody
 from airborne.body.chain import delta_between, move_pose
 from airborne.tracking.image_regions import bounding_points
-from airborne.tracking.model_based.gauss_newton import Fit, ImageView, fit_views
+from airborne.tracking.model_based.gauss_newton import Fit, ImageView, fit_images
 from airborne.tracking.model_based.kernel_arguments import Paint
 from airborne.tracking.model_based.normal_equations import light_by_lamps, light_fitted
 from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers
@@ -45,7 +45,7 @@ def fit_exposed(render_model: RenderModel, fit: Fit, motion: Extrapolation) -> F
         views = _still_images(render_model, seen, pose, motion)
         if views is None:
             return fit
-        fit = fit_views(render_model, [pose], views, dofs=fit.dofs, prior=fit.prior)
+        fit = fit_images(render_model, [pose], views, dofs=fit.dofs, prior=fit.prior)
         pose = move_pose(pose, _OVERSTEP * delta_between(pose, fit.pose))
     return replace(fit, pose=pose)
 
@@ -98,9 +98,9 @@ def _composite_change(render_model: RenderModel, body: PosedBody, view: ViewBuff
     args = render_model.body, view.projection(body)
     if render_model.lights is None:
         paint = Paint(render_model.albedo, render_model.is_faceted)
-        part, lit = light_fitted(*args, view.maps, paint, view.light)
+        lit = light_fitted(*args, view.maps, paint, view.light)
     else:
-        part, lit = light_by_lamps(*args, *view.light, *view.maps.part.shape)
-    change, is_body = np.zeros_like(lit), part >= 0
+        lit = light_by_lamps(*args, *view.light, view.maps.part)
+    change, is_body = np.zeros_like(lit), view.maps.part >= 0
     change[:, is_body] = lit[:, is_body] - view.observation.background[:, is_body]
     return change

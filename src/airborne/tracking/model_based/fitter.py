@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -23,6 +23,7 @@ from airborne.tracking.model_based.gauss_newton import (
     FAR,
     NEAR,
     Fit,
+    ImageView,
     PyramidLevels,
     fit_images,
     fit_silhouettes,
@@ -34,15 +35,17 @@ from airborne.tracking.model_based.learning import learn_missing_backgrounds
 from airborne.tracking.model_based.left_right_swap import swap_limbs
 from airborne.tracking.model_based.misplaced_limbs import (
     DISTINCT_M,
+    drop_same_places,
     find_misplaced_limbs,
     limb_distance,
     search_limb,
+    with_limb,
 )
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
 from airborne.tracking.model_based.support import count_views
 from airborne.tracking.model_based.turned_pelvis import turn_pelvis
-from airborne.tracking.model_based.uncovered import area_beside, find_uncovered_pixels
+from airborne.tracking.model_based.uncovered import find_uncovered
 from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
@@ -62,6 +65,8 @@ class LearnedRegions:
     regions: Sequence[Region]
     posteriors: Sequence[Array]  # (h, w) each pixel's probability to be body
     appearance: Appearance
+    # images prepared by an appearance: where a limb is looked for, they are fitted again and again
+    prepared: dict[Appearance, Sequence[ImageView]] = field(default_factory=dict)
 
     @property
     def views(self) -> tuple[Sequence[Region], Sequence[Array]]:
@@ -82,6 +87,16 @@ class JudgedFit:
     fit: Fit
     agreement: MaskAgreement
     moved: tuple[int, ...] = ()  # first segments of the limbs that were found away from where they were expected
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _MaskFaults:
+    """A fit, and where its mask and the images do not go together."""
+
+    fit: Fit
+    misplaced: Sequence[NDArray[np.int64]]  # limbs that cover pixels unlike the body
+    beside: Sequence[NDArray[np.int64]]  # limbs beside which more than a rim stands uncovered, in two views
+    n_views_uncovered: int  # in which something like a limb stands out that the body does not cover
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,8 +129,7 @@ class Fitter:
 
     def agreement(self, pose: Pose, learned: LearnedRegions) -> MaskAgreement:
         """Compare a pose's mask with the images."""
-        posed = self.render_model.with_pose(pose)
-        return mask_agreement(self.render_model, posed, learned.regions, learned.posteriors)
+        return mask_agreement(self.render_model, self.render_model.with_pose(pose), *learned.views)
 
     def fit_silhouettes(
         self, pose: Pose, learned: LearnedRegions, levels: PyramidLevels, prior: PosePrior | None
@@ -129,17 +143,15 @@ class Fitter:
 
     def fit_images(self, poses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> Fit:
         """Fit the images from several poses; return the best fit."""
-        appearance = self._complete(poses[0], learned)
+        views = self._views(poses[0], learned)
         *before, last = self.stages if self.order == "hierarchical" else self.stages[-1:]
         for dofs in before:
-            fit = fit_images(self.render_model, poses, learned.regions, appearance, dofs=dofs, prior=prior)
-            poses = [fit.pose]
-        return fit_images(self.render_model, poses, learned.regions, appearance, dofs=last, prior=prior)
+            poses = [fit_images(self.render_model, poses, views, dofs=dofs, prior=prior).pose]
+        return fit_images(self.render_model, poses, views, dofs=last, prior=prior)
 
     def weigh(self, poses: Sequence[Pose], learned: LearnedRegions) -> Array:
         """Return minus the log-likelihood of the images in each pose, by the noise of the best one: (n,) [nat]."""
-        appearance = self._complete(poses[0], learned)
-        views = image_views(self.render_model, learned.regions, appearance)
+        views = self._views(poses[0], learned)
         evaluate, _ = image_evaluator(self.render_model, poses, views, dofs=self.stages[-1])
         equations = [evaluate(pose, True) for pose in poses]
         noise = min(each.noise for each in equations)
@@ -149,16 +161,19 @@ class Fitter:
         """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it."""
         if not self.moves_joints:
             return JudgedFit(fit, self.agreement(fit.pose, learned))
-        refitted, limbs = self._refit_limbs(fit, guesses, learned, prior), limbs_of(self.model)
-        moved = [limb for limb in limbs if limb_distance(self.model, fit.pose, refitted.pose, limb) > DISTINCT_M]
-        return replace(self.assess(refitted, learned), moved=tuple(int(limb[0]) for limb in moved))
+        faults, limbs = self._refit_limbs(fit, guesses, learned, prior), limbs_of(self.model)
+        moved = [limb for limb in limbs if limb_distance(self.model, fit.pose, faults.fit.pose, limb) > DISTINCT_M]
+        return replace(self._assess(faults, learned), moved=tuple(int(limb[0]) for limb in moved))
 
     def assess(self, fit: Fit, learned: LearnedRegions) -> JudgedFit:
         """Judge a fit as it is."""
-        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
-        segments = tuple(int(segment) for limb in misplaced for segment in limb)
-        n_views_of = count_views(self.render_model, fit.pose, fit.views)
-        for limb in self._limbs_beside_uncovered(fit.pose, learned):  # it may be there: no better than one view
+        return self._assess(self._find_faults(fit, learned), learned)
+
+    def _assess(self, faults: _MaskFaults, learned: LearnedRegions) -> JudgedFit:
+        fit = faults.fit
+        segments = tuple(int(segment) for limb in faults.misplaced for segment in limb)
+        n_views_of = count_views(self.render_model, fit.pose, fit.views, fit.equations.noise_of_views)
+        for limb in faults.beside:  # it may be there: no better than one view
             n_views_of[limb] = np.minimum(n_views_of[limb], 1)
         return JudgedFit(fit, replace(self.agreement(fit.pose, learned), misplaced=segments, n_views_of=n_views_of))
 
@@ -171,39 +186,48 @@ class Fitter:
         evidence = self.agreement(fit.equations.pose, learned).evidence
         return fit.objective(misfit, prior) - evidence / fit.equations.shared
 
-    def _complete(self, pose: Pose, learned: LearnedRegions) -> Appearance:
-        """Return the appearance with a background in every region."""
+    def _views(self, pose: Pose, learned: LearnedRegions) -> list[ImageView]:
+        """Prepare the images, with a background in every region, for a fit."""
         posed = self.render_model.with_pose(pose)
-        return learn_missing_backgrounds(self.render_model, posed, learned.regions, learned.appearance)
+        appearance = learn_missing_backgrounds(self.render_model, posed, learned.regions, learned.appearance)
+        if appearance not in learned.prepared:
+            learned.prepared[appearance] = image_views(self.render_model, learned.regions, appearance)
+        return [view.with_own_light() for view in learned.prepared[appearance]]
 
-    def _refit_limbs(self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> Fit:
+    def _refit_limbs(
+        self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None
+    ) -> _MaskFaults:
         """Search for the limbs that cover what is unlike the body, or beside which, or anywhere, what is stands out.
 
         None is searched for again before another has moved. Before the first, the whole body is fitted again.
         """
-        limbs, tried = limbs_of(self.model), set[int]()
+        tried = set[int]()
 
-        def search(limb: NDArray[np.int64], fit: Fit, prior: PosePrior | None) -> tuple[Fit, PosePrior | None]:
+        def search(
+            limb: NDArray[np.int64], faults: _MaskFaults, prior: PosePrior | None
+        ) -> tuple[_MaskFaults, PosePrior | None]:
             if int(limb[0]) in tried:
-                return fit, prior
-            moved, prior = self._refit_limb(fit, limb, guesses, learned, prior=prior)
-            if moved is not fit:
+                return faults, prior
+            moved, prior = self._refit_limb(faults.fit, limb, guesses, learned, prior=prior)
+            if moved is not faults.fit:
                 tried.clear()
+                faults = self._find_faults(moved, learned)
             tried.add(int(limb[0]))
-            return moved, prior
+            return faults, prior
 
-        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
-        if misplaced or self._limbs_beside_uncovered(fit.pose, learned):
-            fit, prior = self._refit_body(fit, learned, prior)
-            for limb in find_misplaced_limbs(self.render_model, fit.pose, *learned.views):
-                fit, prior = search(limb, fit, prior)
-            for limb in self._limbs_beside_uncovered(fit.pose, learned):
-                fit, prior = search(limb, fit, prior)
-        for limb in limbs:
-            if self._n_views_uncovered(fit.pose, learned) < _FEWEST_VIEWS:
+        faults = self._find_faults(fit, learned)
+        if faults.misplaced or faults.beside:
+            refitted, prior = self._refit_body(fit, learned, prior)
+            faults = faults if refitted is fit else self._find_faults(refitted, learned)
+            for limb in faults.misplaced:
+                faults, prior = search(limb, faults, prior)
+            for limb in faults.beside:
+                faults, prior = search(limb, faults, prior)
+        for limb in limbs_of(self.model):
+            if faults.n_views_uncovered < _FEWEST_VIEWS:
                 break
-            fit, prior = search(limb, fit, prior)
-        return fit
+            faults, prior = search(limb, faults, prior)
+        return faults
 
     def _refit_body(self, fit: Fit, learned: LearnedRegions, prior: PosePrior | None) -> tuple[Fit, PosePrior | None]:
         """Fit everything again, freer of what was expected; return the better fit, with its prior."""
@@ -239,7 +263,8 @@ class Fitter:
         ]
         poses.sort(key=lambda pose: self.agreement(pose, learned).evidence, reverse=True)
         widened = None if prior is None else prior.widen(dofs.columns)
-        fits = [self.fit_images([pose], learned, widened) for pose in poses[:_N_FITTED]]
+        best = drop_same_places(self.model, poses[:_N_FITTED], limb)
+        fits = [self.fit_images([pose], learned, widened) for pose in best]
         return self._best_place(fit, fits, learned, prior=prior, widened=widened)
 
     def _best_place(
@@ -259,27 +284,15 @@ class Fitter:
         best = int(np.argmin(costs))
         return (others[best], widened) if costs[best] < stays else (fit, prior)
 
-    def _n_views_uncovered(self, pose: Pose, learned: LearnedRegions) -> int:
-        """Count the views in which something like a limb stands out that the body does not cover."""
-        posed = self.render_model.with_pose(pose)
-        uncovered = find_uncovered_pixels(self.render_model, posed, learned.regions, learned.posteriors)
-        return sum(bool(each.any()) for each in uncovered)
-
-    def _limbs_beside_uncovered(self, pose: Pose, learned: LearnedRegions) -> list[NDArray[np.int64]]:
-        """Return the limbs beside which more than a rim stands uncovered, in two views."""
-        beside_m2 = area_beside(self.render_model, self.render_model.with_pose(pose), *learned.views)
-        limbs = limbs_of(self.model)
-        return [limb for limb in limbs if np.sum(beside_m2[:, limb].sum(axis=1) > _BESIDE_M2) >= _FEWEST_VIEWS]
+    def _find_faults(self, fit: Fit, learned: LearnedRegions) -> _MaskFaults:
+        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
+        pixels, beside_m2 = find_uncovered(self.render_model, self.render_model.with_pose(fit.pose), *learned.views)
+        of_limb = ((limb, beside_m2[:, limb].sum(axis=1)) for limb in limbs_of(self.model))
+        beside = [limb for limb, areas_m2 in of_limb if np.sum(areas_m2 > _BESIDE_M2) >= _FEWEST_VIEWS]
+        return _MaskFaults(fit, misplaced, beside, sum(bool(each.any()) for each in pixels))
 
     def _stages_at(self, reduction: int) -> list[DegreesOfFreedom]:
         trunk, everything = self.stages[0], self.stages[-1]
         if self.order == "joint" or not self.moves_joints:
             return [everything]
         return [trunk] * (reduction >= _TRUNK_AT) + [everything] * (reduction <= _TRUNK_AT)
-
-
-def with_limb(pose: Pose, other: Pose, limb: NDArray[np.int64]) -> Array:
-    """Return the joint angles of a pose, with one limb's from another pose."""
-    angles = pose.joint_angles.copy()
-    angles[limb - 1] = other.joint_angles[limb - 1]
-    return angles

@@ -26,6 +26,7 @@ from airborne.tracking.model_based.normal_equations import (
     photometric_equations,
     silhouette_equations,
 )
+from airborne.tracking.model_based.owners import box_segments
 from airborne.tracking.model_based.pose_descent import PoseEquations, descend_pose, map_to_dofs
 from airborne.tracking.model_based.render_model import (
     RenderModel,
@@ -41,7 +42,7 @@ from airborne.types import Array
 PyramidLevels = Sequence[tuple[int, int]]
 
 # reduction of the image, iterations
-FAR, NEAR, CLOSE = ((8, 5), (4, 4), (2, 3)), ((4, 2), (2, 2)), ((2, 2),)
+FAR, NEAR, CLOSE = ((8, 5), (4, 4), (2, 3)), ((4, 2), (2, 2)), ((2, 1),)
 _COARSE_SIGMA_PX = 1.2  # of the reduced image
 _FINE_SIGMA_PX = 1.2  # of a full frame
 _CLIP = 0.1  # linear light, 0..1: a residual this large has a quarter of the weight
@@ -49,6 +50,8 @@ _CLIP_LIT = 0.5  # the same under known lights, where no shadow or highlight has
 _CLIP_MASK = 0.5  # the same, of a mask
 _PATCH = 8.0  # by this factor more pixels of a person are body, or not, together; chosen as `shape_error`'s width
 _OVERSTEP = 1.6  # robust weights and the refitted light make each step too short by about this factor
+# the same of a rigid body in unknown light, of its position and its rotation: least errors on six synthetic throws
+_OVERSTEP_STIFF = np.repeat([2.0, 1.3], 3)
 _MOST_STEPS = 12  # at each level of a body with joints
 _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
 _CONVERGED, _CONVERGED_STIFF = 1 / 3, 1  # squared length of the last step, in sds, a degree of freedom; masks too
@@ -62,6 +65,12 @@ class ImageView(NamedTuple):
     noise_px: float  # how many pixels share their noise
     shift_sds_px: Array  # (3,) of `shift_sds_px`
     exposure_s: float
+
+    def with_own_light(self) -> ImageView:
+        """Return the view with a light of its own, for a fit to change."""
+        light = self.buffers.light
+        own = light.copy() if isinstance(light, np.ndarray) else light
+        return self._replace(buffers=self.buffers._replace(light=own))
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,32 +152,17 @@ def fit_silhouettes(
 def fit_images(
     render_model: RenderModel,
     poses: Sequence[Pose],
-    regions: Sequence[Region],
-    appearance: Appearance,
+    views: Sequence[ImageView],
     *,
     dofs: DegreesOfFreedom,
     prior: PosePrior | None = None,
 ) -> Fit:
-    """Move the body until the composite of body and background agrees with the images; return its covariance too.
-
-    Of several starts, the one that ends in the best agreement with images and prior is returned.
-    """
-    return fit_views(render_model, poses, image_views(render_model, regions, appearance), dofs=dofs, prior=prior)
-
-
-def fit_views(
-    render_model: RenderModel,
-    poses: Sequence[Pose],
-    views: Sequence[ImageView],
-    *,
-    dofs: DegreesOfFreedom,
-    prior: PosePrior | None,
-) -> Fit:
-    """Do the same with images that are prepared."""
+    """Move the body until body and background agree with the images; of several starts, return the best end."""
     evaluate, correlated = image_evaluator(render_model, poses, views, dofs=dofs)
     most_steps, converged = (_MOST_STEPS, _CONVERGED) if dofs.moves_joints else (_MOST_STEPS_STIFF, _CONVERGED_STIFF)
+    overstep = _OVERSTEP if dofs.moves_joints or render_model.lights is not None else _OVERSTEP_STIFF
     ends = [
-        descend_pose(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=_OVERSTEP, tolerance=converged)
+        descend_pose(evaluate, dofs, pose, prior, most_steps=most_steps, overstep=overstep, tolerance=converged)
         for pose in poses
     ]
     noise = min(equations.noise for _, equations in ends)
@@ -185,27 +179,24 @@ def linearise_images(
 
 
 def rises_without(
-    render_model: RenderModel, posed: PosedBody, others: Mapping[int, PosedBody], image: ImageView
+    render_model: RenderModel, posed: PosedBody, others: Mapping[int, PosedBody], image: ImageView, *, noise: float
 ) -> Array:
     """Return by how much minus the log-likelihood of one image rises as each of some segments is taken away: (k,).
 
-    others: the same body without each segment. Light and noise are those of the whole body, and only the pixels around
-    those that the segment covers are compared: no others change.
+    others: the same body without each segment. Light and noise are those of the whole body as it was fitted, and only
+    the pixels around those that the segment covers are compared: no others change.
     """
-    view, comparison, n = image.buffers, image.comparison, len(render_model.model.segments)
-    args = render_model, posed, view, comparison
-    _, total, weight = _add_image_equations(*args, iterations=3, sums=Sums.zero(n), blocks=_blocks(view, n))
-    noise = max(image.noise_px * total / weight, 1e-9) if weight > 0 else 1.0
-    drawn, rises = view.maps.part, np.zeros(len(others))
-    owner = np.where(drawn < 0, -1, render_model.segment_of_part[drawn])
-    costs = _pixel_costs(*args)
+    view, comparison, rises = image.buffers, image.comparison, np.zeros(len(others))
+    costs = _pixel_costs(render_model, posed, view, comparison)
+    boxes = np.zeros((len(render_model.model.segments), 4), np.int64)
+    box_segments(view.maps.part, render_model.segment_of_part, boxes)
     for k, (segment, other) in enumerate(others.items()):
-        if (owner == segment).any():
-            drawn, changed = (_window_around(owner == segment, view.whole, n_px) for n_px in (2 * RADIUS_PX, RADIUS_PX))
+        if boxes[segment, 2] > 0:
+            drawn, changed = (_widen(boxes[segment], view.whole, n_px) for n_px in (2 * RADIUS_PX, RADIUS_PX))
             without = _pixel_costs(render_model, other, view.crop(drawn), comparison)
             x0, y0, x1, y1 = changed
             part = without[y0 - drawn.y0 : y1 - drawn.y0, x0 - drawn.x0 : x1 - drawn.x0]
-            rises[k] = 0.5 * float((part - costs[y0:y1, x0:x1]).sum()) / noise
+            rises[k] = 0.5 * float((part - costs[y0:y1, x0:x1]).sum()) / max(noise, 1e-9)
     return rises
 
 
@@ -238,13 +229,16 @@ def image_evaluator(
     def evaluate(pose: Pose, is_first: bool) -> PoseEquations:
         posed, n = render_model.with_pose(pose), len(render_model.model.segments)
         sums, totals, blocks, shifted = Sums.zero(n), np.array([empty_cost, 0.0, 0.0]), [], []
-        for view, comparison, _, shift, _ in views:
+        noise_of_views = []
+        for view, comparison, noise_px, shift, _ in views:
             sums.B[:] = 0
             blocks.append(_blocks(view, n))
             iterations = 3 if is_first else 1
-            totals += _add_image_equations(
+            of_view = _add_image_equations(
                 render_model, posed, view, comparison, iterations=iterations, sums=sums, blocks=blocks[-1]
             )
+            totals += of_view
+            noise_of_views.append(float(noise_px * of_view[1] / of_view[2]) if of_view[2] > 0 else 1.0)
             shifted.append((sums.B * shift).transpose(2, 0, 1))
         if dofs.moves_joints:
             shifted.append(shape_error_gradients(sums.A))
@@ -259,6 +253,7 @@ def image_evaluator(
             totals=totals,
             correlated=correlated,
             shared=shared,
+            noise_of_views=noise_of_views,
         )
 
     return evaluate, correlated
@@ -292,16 +287,14 @@ def _pixel_costs(
     if render_model.lights is None:
         fill_costs(*args, view.maps, Paint(render_model.albedo, render_model.is_faceted), view.light, costs)
     else:
-        fill_costs_of_known_light(*args, *view.light, costs)
+        fill_costs_of_known_light(*args, view.maps, *view.light, costs)
     return costs
 
 
-def _window_around(pixels: NDArray[np.bool_], whole: Window, rim: int) -> Window:
-    """Return the part of a window around some pixels (H, W), with a rim [px]."""
-    rows, columns = np.flatnonzero(pixels.any(axis=1)), np.flatnonzero(pixels.any(axis=0))
-    x0, x1 = max(int(columns[0]) - rim, whole.x0), min(int(columns[-1]) + rim + 1, whole.x1)
-    y0, y1 = max(int(rows[0]) - rim, whole.y0), min(int(rows[-1]) + rim + 1, whole.y1)
-    return Window(x0, y0, x1, y1)
+def _widen(box: NDArray[np.int64], whole: Window, rim: int) -> Window:
+    """Return a box x0, y0, x1, y1 as a part of a window, with a rim [px]."""
+    x0, y0, x1, y1 = box.tolist()
+    return Window(max(x0 - rim, whole.x0), max(y0 - rim, whole.y0), min(x1 + rim, whole.x1), min(y1 + rim, whole.y1))
 
 
 def _blocks(view: ViewBuffers, n_segments: int) -> Array:

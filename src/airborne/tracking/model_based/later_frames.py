@@ -32,11 +32,18 @@ def fit_next(
     reference: Reference,
     prior: PosePrior | None,
 ) -> JudgedFit | None:
-    """Fit from the predicted pose of most evidence; None where no view shows any of them."""
+    """Fit from the first predicted pose that agrees with the images, or else from the one of most evidence.
+
+    None where no view shows any of them.
+    """
     learned = regions_near(fitter, predicted, frames, appearance)
     if not learned.regions:
         return None
-    judged = [(pose, fitter.agreement(pose, learned)) for pose in predicted]
+    judged = []
+    for pose in predicted:
+        judged.append((pose, fitter.agreement(pose, learned)))
+        if not judged[-1][1].is_suspect(reference):
+            break
     expected, agreement = max(judged, key=lambda each: each[1].evidence)
     levels = NEAR if fitter.moves_joints or agreement.is_suspect(reference) else CLOSE
     fit = fitter.fit_images([fitter.fit_silhouettes(expected, learned, levels, prior)], learned, prior)

@@ -34,10 +34,10 @@ def learn_appearance(
 def learn_missing_backgrounds(
     render_model: RenderModel, posed: PosedBody, regions: Sequence[Region], appearance: Appearance
 ) -> Appearance:
-    """Give every region a background model: where none has been learned, this image outside the mask."""
+    """Give every region a background model: where none has been learned, its image outside the mask."""
     for region in regions:
         if not appearance.has_background(region):
-            appearance = appearance.learn_background(region, _mask(render_model, posed, region))
+            appearance = appearance.learn_background(region, _mask(render_model, posed, region), whole_view=False)
     return appearance
 
 

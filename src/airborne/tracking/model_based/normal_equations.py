@@ -86,7 +86,7 @@ def photometric_equations(body, projection, observation, comparison, maps, paint
 def equations_of_known_light(body, projection, observation, comparison, maps, is_faceted, lamps, ambient, sums, blocks):
     """Add one view's equations under known lights, in shares of full sRGB; lamps (l, 8), ambient as in `draw_maps`."""
     owner, nearness = _draw(body, projection, maps)
-    _, lit = light_by_lamps(body, projection, lamps, ambient, *maps.part.shape)
+    lit = light_by_lamps(body, projection, lamps, ambient, maps.part)
     return _sum_equations(lit, is_faceted, maps, owner, nearness, projection, observation, comparison, sums, blocks)
 
 
@@ -96,15 +96,15 @@ def fill_costs(body, projection, observation, comparison, maps, paint, light, co
 
     The residual is that of `photometric_equations`, but for the image's border.
     """
-    part, lit = light_fitted(body, projection, maps, paint, light)
-    _fill_costs(lit, part, observation, comparison, costs)
+    lit = light_fitted(body, projection, maps, paint, light)
+    _fill_costs(lit, maps.part, observation, comparison, costs)
 
 
 @kernel(fastmath=True)
-def fill_costs_of_known_light(body, projection, observation, comparison, lamps, ambient, costs):
+def fill_costs_of_known_light(body, projection, observation, comparison, maps, lamps, ambient, costs):
     """Fill costs (H, W) with the robust squared residual of each pixel, as `equations_of_known_light` has it."""
-    part, lit = light_by_lamps(body, projection, lamps, ambient, *costs.shape)
-    _fill_costs(lit, part, observation, comparison, costs)
+    lit = light_by_lamps(body, projection, lamps, ambient, maps.part)
+    _fill_costs(lit, maps.part, observation, comparison, costs)
 
 
 @kernel(fastmath=True)
@@ -129,18 +129,20 @@ def _fill_costs(lit, part, observation, comparison, costs):
 
 @kernel(fastmath=True)
 def light_fitted(body, projection, maps, paint, light):
-    """Draw a view in a fitted light (3, LIGHT_TERMS); return the map of parts (h, w), the body's colours (3, h, w)."""
+    """Draw a view in a fitted light (3, LIGHT_TERMS), filling its maps; return the body's colours (3, h, w)."""
     R, t, view = projection.R, projection.t, projection.packed_view
     surface_maps(body.shapes, body.geometry, R, t, view, maps.part, maps.inverse_depth, maps.normals)
     lit = np.empty(maps.normals.shape, np.float32)
     shade_body(maps.part, maps.normals, paint.albedo, light, 0, 0, lit)
-    return maps.part, lit
+    return lit
 
 
 @kernel(fastmath=True)
-def light_by_lamps(body, projection, lamps, ambient, h, w):
-    """Draw a view under known lights; return the map of parts (h, w) and the body's colours (3, h, w), full being 1."""
-    part, segment = np.full((h, w), -1, np.int16), np.empty((h, w), np.int16)
+def light_by_lamps(body, projection, lamps, ambient, part):
+    """Draw a view under known lights, filling part (h, w); return the body's colours (3, h, w), full being 1."""
+    h, w = part.shape
+    part[:] = -1
+    segment = np.empty((h, w), np.int16)
     inverse_depth, colour = np.empty((h, w), np.float32), np.zeros((h, w, 3), np.float32)
     R, t, view = projection.R, projection.t, projection.packed_view
     draw_maps(body.shapes, body.geometry, R, t, view, lamps, ambient, part, segment, inverse_depth, colour)
@@ -149,7 +151,7 @@ def light_by_lamps(body, projection, lamps, ambient, h, w):
         for y in range(h):
             for x in range(w):
                 lit[k, y, x] = min(colour[y, x, k] * np.float32(1 / 255), np.float32(1))
-    return part, lit
+    return lit
 
 
 @kernel(fastmath=True)

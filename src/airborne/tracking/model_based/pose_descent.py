@@ -34,6 +34,7 @@ class PoseEquations:
     noise: float  # mean square of the weighted residual, times how many pixels share it
     misfit: float  # the same where the shape is wrong, too: a pose is weighed against its prior by this
     shared: float  # pixels that err together where the shape is wrong
+    noise_of_views: Sequence[float]  # `noise` of each image; none of masks
 
     def covariance(self) -> Array:
         """Return the covariance (d, d) of the free degrees of freedom."""
@@ -59,6 +60,7 @@ def map_to_dofs(
     totals: Array,
     correlated: float,
     shared: float,
+    noise_of_views: Sequence[float] = (),
 ) -> PoseEquations:
     """Map the segments' equations through the chain of joints.
 
@@ -72,7 +74,7 @@ def map_to_dofs(
     residual = total / weight if weight > 0 else 1.0
     rows = [each.reshape(-1, *J.shape[:2]) for each in blocks] + list(shifted)
     noise, misfit = float(correlated * residual), float(shared * residual)
-    return PoseEquations(pose, A, g, J, rows, float(cost), noise, misfit, shared)
+    return PoseEquations(pose, A, g, J, rows, float(cost), noise, misfit, shared, noise_of_views)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +84,7 @@ class _Iterate:
     equations: PoseEquations
     dofs: DegreesOfFreedom
     prior: PosePrior | None
+    overstep: float | Array  # (d,) factor on the step
 
     @property
     def misfit(self) -> float:
@@ -90,7 +93,7 @@ class _Iterate:
 
     @cached_property
     def delta(self) -> Array:
-        """The whole step: (d,)."""
+        """The whole step, without overstep: (d,)."""
         equations = self.equations
         return self.dofs.solve_step(equations.pose, equations.A / self.misfit, equations.g / self.misfit, self.prior)
 
@@ -99,8 +102,8 @@ class _Iterate:
         return self.equations.objective(reference.misfit, self.dofs.prior_cost(self.equations.pose, self.prior))
 
     def step(self, share: float) -> tuple[Pose, float]:
-        """Return the pose after a share of the step, and the decrease that the images predict of the whole."""
-        pose = self.dofs.update(self.equations.pose, share * self.delta)
+        """Return the pose after a share of the step, and the decrease that the images predict without overstep."""
+        pose = self.dofs.update(self.equations.pose, share * self.overstep * self.delta)
         return pose, 0.5 * float(self.delta @ self.equations.A @ self.delta) / self.misfit
 
 
@@ -111,21 +114,21 @@ def descend_pose(
     prior: PosePrior | None,
     *,
     most_steps: int,
-    overstep: float,
+    overstep: float | Array,
     tolerance: float = 0.0,
 ) -> tuple[Pose, PoseEquations]:
     """Step downhill; return where the last step leads, which is not evaluated any more, and the equations before it.
 
-    evaluate takes a pose, and whether it is the first. tolerance: squared length of the last step, in sds of the pose,
-    for each degree of freedom.
+    evaluate takes a pose, and whether it is the first. overstep (d,): by how much steps are too short. tolerance:
+    squared length of the last step, in sds of the pose, for each degree of freedom.
     """
     descent = descend(
-        _Iterate(evaluate(pose, True), dofs, prior),
-        lambda pose: _Iterate(evaluate(pose, False), dofs, prior),
-        BacktrackingRule(overstep, _SHORTER, _LEAST_SHARE),
+        _Iterate(evaluate(pose, True), dofs, prior, overstep),
+        lambda pose: _Iterate(evaluate(pose, False), dofs, prior, overstep),
+        BacktrackingRule(1.0, _SHORTER, _LEAST_SHARE),
         most_steps=most_steps - 1,
         least_predicted=(0.5 * tolerance * len(dofs.columns), 0.0),
         slack=_SLACK,
     )
     best = descent.best
-    return best.equations.pose if descent.n_losses else best.step(overstep)[0], best.equations
+    return best.equations.pose if descent.n_losses else best.step(1.0)[0], best.equations

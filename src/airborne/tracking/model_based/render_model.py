@@ -30,7 +30,7 @@ from airborne.types import Array
 _TO_SHARE = (np.arange(1024) / 1023).astype(np.float32)  # sRGB as shares of full, for `light_planes`
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RenderModel:
     """A body prepared for the kernels; its workspace serves one thread."""
 

@@ -19,21 +19,23 @@ _STRONG_NATS = 3.0  # a view shows a segment where it is 20 times likelier with 
 _ONE_VIEW_SD_M = 0.1  # of the far end of a segment that one view alone shows
 
 
-def count_views(render_model: RenderModel, pose: Pose, views: Sequence[ImageView]) -> NDArray[np.int64]:
+def count_views(
+    render_model: RenderModel, pose: Pose, views: Sequence[ImageView], noise_of_views: Sequence[float]
+) -> NDArray[np.int64]:
     """Count the views that show each segment: (segments,); those of the trunk are shown by all.
 
-    A view shows a segment if the image is clearly less likely without it: there the background is seen, or another
-    segment behind, of perhaps the same colour.
+    views: as they were fitted, with the noise that was left of each. A view shows a segment if the image is clearly
+    less likely without it: there the background is seen, or another segment behind, of perhaps the same colour.
     """
     posed, segments = render_model.with_pose(pose), np.flatnonzero(limb_of_segment(render_model.model) >= 0)
     counts = np.full(len(posed.R), len(views))
     counts[segments] = 0
-    for view in views:
+    for view, noise in zip(views, noise_of_views, strict=True):
         packed = view.buffers.packed_view
         R, t = packed[:9].reshape(3, 3), packed[9:12]
         behind = -R.T @ t - _BEHIND_M * R[2]
         others = {int(segment): _without(posed, int(segment), behind) for segment in segments}
-        counts[segments] += rises_without(render_model, posed, others, view) > _STRONG_NATS
+        counts[segments] += rises_without(render_model, posed, others, view, noise=noise) > _STRONG_NATS
     return counts
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -19,25 +20,20 @@ _WIDTH_M = 0.03  # thinner things are no limb
 _AREA_M2 = 0.03 * 0.09  # a forearm seen end on and half covered
 
 
-def find_uncovered_pixels(
+class Uncovered(NamedTuple):
+    """What stands out in each of v regions, as wide as a limb, and is not covered."""
+
+    pixels: list[NDArray[np.bool_]]  # (h, w) of each region: of patches that are large enough for a limb
+    beside_m2: Array  # (v, segments) [m²] nearest to each segment, smaller patches too
+
+
+def find_uncovered(
     render_model: RenderModel, posed: PosedBody, regions: Sequence[Region], posteriors: Sequence[Array]
-) -> list[NDArray[np.bool_]]:
-    """Return for each region which pixels (h, w) are like the body, not covered, wide and large enough for a limb."""
-    return [
-        _in_one_view(render_model, posed, region, posterior)[0]
-        for region, posterior in zip(regions, posteriors, strict=True)
-    ]
-
-
-def area_beside(
-    render_model: RenderModel, posed: PosedBody, regions: Sequence[Region], posteriors: Sequence[Array]
-) -> Array:
-    """Return how much stands uncovered, as wide as a limb, nearest to each segment: (views, segments) [m²].
-
-    Smaller patches count than those that `find_uncovered_pixels` returns.
-    """
+) -> Uncovered:
+    """Find what is like the body and not covered, wide enough for a limb."""
     views = zip(regions, posteriors, strict=True)
-    return np.array([_in_one_view(render_model, posed, *view)[1] for view in views]).reshape(-1, len(posed.R))
+    found = [_in_one_view(render_model, posed, *view) for view in views]
+    return Uncovered([each[0] for each in found], np.array([each[1] for each in found]).reshape(-1, len(posed.R)))
 
 
 def _in_one_view(
