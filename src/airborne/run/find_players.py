@@ -81,9 +81,7 @@ def _ask_for_help(trial: Trial, finding: PlayersSearch, folder: Path) -> Undecid
         )
     if best.is_plausible:
         n = len(finding.candidates)
-        reason = (
-            f"who stands there in frame {frame}, and how; the likeliest of {n} is right by {best.probability:.0%}"
-        )
+        reason = f"who stands there in frame {frame}, and how; the likeliest of {n} is right by {best.probability:.0%}"
     else:
         reason = f"nobody is seen well in frame {frame}; check [calibration], whose world must be the court's"
     return UndecidedError(
