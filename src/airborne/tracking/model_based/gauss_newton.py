@@ -7,26 +7,22 @@ Far out, the blurred mask is fitted to the blurred probability of each pixel to 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.appearance.model import Appearance, Region
 from airborne.body import Pose, PosedBody
-from airborne.tracking.model_based.blur import RADIUS_PX, gaussian_taps
+from airborne.tracking.model_based.blur import gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, PosePrior
-from airborne.tracking.model_based.kernel_arguments import Comparison, Paint, Window
+from airborne.tracking.model_based.kernel_arguments import Comparison, Paint
 from airborne.tracking.model_based.normal_equations import (
     equations_of_known_light,
-    fill_costs,
-    fill_costs_of_known_light,
     photometric_equations,
     silhouette_equations,
 )
-from airborne.tracking.model_based.owners import box_segments
 from airborne.tracking.model_based.pose_descent import PoseEquations, descend_pose, map_to_dofs
 from airborne.tracking.model_based.render_model import (
     RenderModel,
@@ -50,7 +46,7 @@ _CLIP_LIT = 0.5  # the same under known lights, where no shadow or highlight has
 _CLIP_MASK = 0.5  # the same, of a mask
 _PATCH = 8.0  # by this factor more pixels of a person are body, or not, together; chosen as `shape_error`'s width
 _OVERSTEP = 1.6  # robust weights and the refitted light make each step too short by about this factor
-# the same of a rigid body in unknown light, of its position and its rotation: least errors on six synthetic throws
+# the same of a rigid body in unknown light, of its position and its rotation: least errors on seven throws
 _OVERSTEP_STIFF = np.repeat([2.0, 1.3], 3)
 _MOST_STEPS = 12  # at each level of a body with joints
 _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
@@ -178,28 +174,6 @@ def linearise_images(
     return evaluate(pose, True)
 
 
-def rises_without(
-    render_model: RenderModel, posed: PosedBody, others: Mapping[int, PosedBody], image: ImageView, *, noise: float
-) -> Array:
-    """Return by how much minus the log-likelihood of one image rises as each of some segments is taken away: (k,).
-
-    others: the same body without each segment. Light and noise are those of the whole body as it was fitted, and only
-    the pixels around those that the segment covers are compared: no others change.
-    """
-    view, comparison, rises = image.buffers, image.comparison, np.zeros(len(others))
-    costs = _pixel_costs(render_model, posed, view, comparison)
-    boxes = np.zeros((len(render_model.model.segments), 4), np.int64)
-    box_segments(view.maps.part, render_model.segment_of_part, boxes)
-    for k, (segment, other) in enumerate(others.items()):
-        if boxes[segment, 2] > 0:
-            drawn, changed = (_widen(boxes[segment], view.whole, n_px) for n_px in (2 * RADIUS_PX, RADIUS_PX))
-            without = _pixel_costs(render_model, other, view.crop(drawn), comparison)
-            x0, y0, x1, y1 = changed
-            part = without[y0 - drawn.y0 : y1 - drawn.y0, x0 - drawn.x0 : x1 - drawn.x0]
-            rises[k] = 0.5 * float((part - costs[y0:y1, x0:x1]).sum()) / max(noise, 1e-9)
-    return rises
-
-
 def image_views(render_model: RenderModel, regions: Sequence[Region], appearance: Appearance) -> list[ImageView]:
     """Prepare the images of regions."""
     clip = _CLIP if render_model.lights is None else _CLIP_LIT
@@ -276,25 +250,6 @@ def _add_image_equations(
         return np.array(photometric_equations(*args, paint, view.light, iterations, sums, blocks))
     lamps, ambient = view.light
     return np.array(equations_of_known_light(*args, render_model.is_faceted, lamps, ambient, sums, blocks))
-
-
-def _pixel_costs(
-    render_model: RenderModel, posed: PosedBody, view: ViewBuffers, comparison: Comparison
-) -> NDArray[np.float32]:
-    """Return the robust squared residual of each pixel of a view (h, w), in the light that was fitted or is known."""
-    costs = np.empty(view.maps.part.shape, np.float32)
-    args = render_model.body, view.projection(posed), view.observation, comparison
-    if render_model.lights is None:
-        fill_costs(*args, view.maps, Paint(render_model.albedo, render_model.is_faceted), view.light, costs)
-    else:
-        fill_costs_of_known_light(*args, view.maps, *view.light, costs)
-    return costs
-
-
-def _widen(box: NDArray[np.int64], whole: Window, rim: int) -> Window:
-    """Return a box x0, y0, x1, y1 as a part of a window, with a rim [px]."""
-    x0, y0, x1, y1 = box.tolist()
-    return Window(max(x0 - rim, whole.x0), max(y0 - rim, whole.y0), min(x1 + rim, whole.x1), min(y1 + rim, whole.y1))
 
 
 def _blocks(view: ViewBuffers, n_segments: int) -> Array:
