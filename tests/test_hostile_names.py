@@ -79,7 +79,8 @@ def as_toml(name):
 
 
 def files_below(folder):
-    return sorted(str(path) for path in folder.rglob("*"))
+    """All files but what the studio remembers in the folder that it has open."""
+    return sorted(str(path) for path in folder.rglob("*") if ".airborne" not in path.parts)
 
 
 def answers(text, path):

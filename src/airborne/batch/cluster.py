@@ -170,7 +170,7 @@ def do_tasks(
             if future.status == "finished":
                 try:
                     yield future.result()
-                except CancelledError:  # the scheduler went between
+                except (CancelledError, OSError):  # the scheduler went between
                     return
             elif future.status == "error":
                 yield TaskOutcome(names[str(future.key)], "failed", _describe_end(future.exception()))

@@ -173,6 +173,8 @@ def _track(
         first = next(frames, None)
         if first is None:
             raise past_the_end_error(subject.trial, recording)
+        if options.progress is not None:
+            options.progress(0, recording.n_frames)  # seeing a person takes seconds
         subject = subject.see(first)
         subject.copy_inputs(folder)
         done = subject.read_done(folder) if resume else {}
