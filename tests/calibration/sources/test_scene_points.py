@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.calibration.bundle import FreeParameters, adjust
+from airborne.calibration.sources import scene_points
 from airborne.calibration.sources.court import court_points
 from airborne.calibration.sources.scene_points import initial_rig_from_points, scene_source
 from tests.support import wand_waving as waving
@@ -39,6 +40,17 @@ def test_exact_points_give_exact_cameras():
     start = initial_rig_from_points(points, waving.SIZES)
     found = adjust(start, [scene_source(start.names, points, name="court")], FreeParameters()).rig
     assert off_m(found).max() < 1e-6
+
+
+def test_slopes_of_a_step_are_differences():
+    step, world = np.full(7, 0.04), np.random.default_rng(5).normal((0, 0, 1), 1, (20, 3))
+    slopes = scene_points.step_jacobian(scene_points.step_camera(RIG["cam1"], step), step, world)
+    ends = [
+        [scene_points.step_camera(RIG["cam1"], step + sign * 1e-6 * one).px_from_world(world) for sign in (1, -1)]
+        for one in np.eye(7)
+    ]
+    differences = np.stack([(after - before).ravel() / 2e-6 for after, before in ends], axis=-1)
+    np.testing.assert_allclose(slopes, differences, atol=1e-5)
 
 
 def test_a_known_lens_is_kept_and_four_points_are_enough():

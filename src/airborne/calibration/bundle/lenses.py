@@ -1,10 +1,11 @@
-"""Projection and its Jacobian, for cameras of both lens models. Arrays only."""
+"""Projection and its Jacobian, for cameras of both lens models, as arrays."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airborne.cameras.camera import Camera
 from airborne.cameras.distortion import distort, distort_fisheye, radial_factor
 from airborne.types import Array
 
@@ -62,6 +63,32 @@ def cross_matrices(v: Array) -> Array:
     m = np.zeros((len(v), 3, 3))
     m[:, 2, 1], m[:, 0, 2], m[:, 1, 0] = v[:, 0], v[:, 1], v[:, 2]
     return m - np.swapaxes(m, 1, 2)
+
+
+def left_jacobian(rotation: Array) -> Array:
+    """Return the derivative (3, 3) of `exp(rotation)`'s own small rotation by the rotation vector (3,)."""
+    angle, K = np.linalg.norm(rotation), cross_matrices(rotation[None])[0]
+    if angle < 1e-6:
+        return np.eye(3) + K / 2
+    return np.eye(3) + (1 - np.cos(angle)) / angle**2 * K + (angle - np.sin(angle)) / angle**3 * K @ K
+
+
+def project_by_camera(camera: Camera, world: Array) -> tuple[Array, Array, Array]:
+    """Return one camera's pixels of points (n, 3) [m], and their derivatives as in `project_with_jacobian`."""
+    n, R = len(world), camera.camera_from_world.rotation.as_matrix()
+    return project_with_jacobian(
+        np.broadcast_to(R, (n, 3, 3)),
+        camera.centre,
+        np.broadcast_to(intrinsics_of(camera), (n, 12)),
+        is_fisheye=np.full(n, camera.lens == "fisheye"),
+        world=world,
+    )
+
+
+def intrinsics_of(camera: Camera) -> Array:
+    """Return a camera's fx, fy, cx, cy [px] and eight lens terms, 0 where its lens has fewer: (12,)."""
+    K, terms = camera.K, np.pad(camera.distortion, (0, 8 - len(camera.distortion)))
+    return np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2], *terms])
 
 
 def _distort(xy: Array, terms: Array, is_fisheye: NDArray[np.bool_]) -> Array:

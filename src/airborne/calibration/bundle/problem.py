@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.bundle.lenses import N_PARAMETERS
+from airborne.calibration.bundle.lenses import N_PARAMETERS, intrinsics_of
 from airborne.calibration.bundle.source import FreeParameters, Source
 from airborne.cameras.camera import Camera, Rig
 from airborne.types import Array, Ints
@@ -124,12 +124,7 @@ def initial_state(rig: Rig, sources: Sequence[Source], problem: Problem) -> Stat
     state = State(
         R=np.stack([c.camera_from_world.rotation.as_matrix() for c in rig]),
         centre=np.stack([c.centre for c in rig]),
-        intrinsics=np.stack(
-            [
-                [c.K[0, 0], c.K[1, 1], c.K[0, 2], c.K[1, 2], *np.pad(c.distortion, (0, 8 - len(c.distortion)))]
-                for c in rig
-            ]
-        ),
+        intrinsics=np.stack([intrinsics_of(c) for c in rig]),
         target_R=np.concatenate([np.zeros((0, 3, 3)), *(t.rotation.as_matrix() for t in targets)]),
         target_t=np.concatenate([np.zeros((0, 3)), *(t.translation for t in targets)]),
         points=np.concatenate([np.zeros((0, 3)), *(s.points for s in sources)]).astype(float),

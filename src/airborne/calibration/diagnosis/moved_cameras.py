@@ -9,8 +9,8 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.calibration.bundle.lenses import project_with_jacobian
-from airborne.cameras.camera import Camera, Rig
+from airborne.calibration.bundle.lenses import project_by_camera
+from airborne.cameras.camera import Rig
 from airborne.cameras.consensus import triangulate_consensus
 from airborne.cameras.finding import Finding
 from airborne.types import Array
@@ -145,25 +145,10 @@ def _track(rig: Rig, others: Sequence[str], name: str, px: Array) -> _Track:
     points = triangulate_consensus(rig.select(others), others_px, np.ones(others_px.shape[:-1])).points
     own = px[:, :, rig.names.index(name)]
     moment, point = np.nonzero(np.isfinite(points).all(axis=-1) & np.isfinite(own).all(axis=-1))
-    projected, jacobian = _project(rig[name], points[moment, point])
+    projected, jacobian, _ = project_by_camera(rig[name], points[moment, point])
     residual = own[moment, point] - projected
     is_valid = np.isfinite(residual).all(axis=1)
-    return _Track(moment[is_valid], residual[is_valid], jacobian[is_valid])
-
-
-def _project(camera: Camera, points: Array) -> tuple[Array, Array]:
-    n = len(points)
-    R = camera.camera_from_world.rotation.as_matrix()
-    terms = np.pad(camera.distortion, (0, 8 - len(camera.distortion)))
-    intrinsics = np.array([camera.K[0, 0], camera.K[1, 1], camera.K[0, 2], camera.K[1, 2], *terms])
-    px, jacobian, _ = project_with_jacobian(
-        np.broadcast_to(R, (n, 3, 3)),
-        np.broadcast_to(camera.centre, (n, 3)),
-        np.broadcast_to(intrinsics, (n, 12)),
-        is_fisheye=np.full(n, camera.lens == "fisheye"),
-        world=points,
-    )
-    return px, jacobian[:, :, :6]
+    return _Track(moment[is_valid], residual[is_valid], jacobian[is_valid, :, :6])
 
 
 def _blocks(moment: NDArray[np.integer]) -> Iterator[NDArray[np.integer]]:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import dual_annealing, least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.bundle.lenses import cross_matrices, project_with_jacobian
+from airborne.calibration.bundle.lenses import left_jacobian, project_with_jacobian
 from airborne.cameras.camera import Camera, Lens
 from airborne.cameras.distortion import distort, distort_fisheye, undistort, undistort_fisheye
 from airborne.types import Array
@@ -224,15 +224,7 @@ def _slopes_of_step(start: Pinhole, model: PinholeModel, world: Array) -> Callab
             world=world,
         )
         by_camera[:, :, 6] += by_camera[:, :, 7]  # square pixels
-        by_camera[:, :, :3] = by_camera[:, :, :3] @ _left_jacobian(step[:3])
+        by_camera[:, :, :3] = by_camera[:, :, :3] @ left_jacobian(step[:3])
         return by_camera.reshape(2 * n, -1)[:, own]
 
     return slopes
-
-
-def _left_jacobian(rotation: Array) -> Array:
-    """Return the derivative (3, 3) of `exp(rotation)`'s own small rotation by the rotation vector (3,)."""
-    angle, K = np.linalg.norm(rotation), cross_matrices(rotation[None])[0]
-    if angle < 1e-6:
-        return np.eye(3) + K / 2
-    return np.eye(3) + (1 - np.cos(angle)) / angle**2 * K + (angle - np.sin(angle)) / angle**3 * K @ K

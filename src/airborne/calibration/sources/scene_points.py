@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from airborne.calibration.bundle.lenses import cross_matrices, left_jacobian, project_by_camera
 from airborne.calibration.bundle.source import Lengths, Source
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras.camera import Camera, Rig
@@ -139,19 +140,42 @@ def _residual(camera: Camera, world: Array, px: Array) -> Array:
 
 def _refine_camera(camera: Camera, world: Array, px: Array, *, is_focal_free: bool) -> Camera:
     """Refine the pose, and the focal length if it is free, by robust least squares."""
-
-    def apply_step(step: Array) -> Camera:
-        pose_step = RigidTransform.from_components(step[3:6], Rotation.from_rotvec(step[:3]))
-        K = camera.K.copy()
-        K[[0, 1], [0, 1]] *= (
-            np.exp(np.clip(step[6], -_LARGEST_LOG_CHANGE, _LARGEST_LOG_CHANGE)) if is_focal_free else 1.0
-        )
-        return replace(camera, K=K, camera_from_world=pose_step * camera.camera_from_world)
-
-    free = 7 if is_focal_free and 2 * len(world) >= 7 else 6
+    n_free = 7 if is_focal_free and 2 * len(world) >= 7 else 6
 
     def residual(step: Array) -> Array:
-        return (_residual(apply_step(np.append(step, 0.0)), world, px) / _SCALE_PX).ravel()
+        return (_residual(step_camera(camera, step), world, px) / _SCALE_PX).ravel()
 
-    fit = least_squares(residual, np.zeros(free), loss="cauchy", x_scale="jac", max_nfev=100)
-    return min((camera, apply_step(np.append(fit.x, 0.0))), key=lambda each: _misfit(each, world, px))
+    def jacobian(step: Array) -> Array:
+        return -step_jacobian(step_camera(camera, step), step, world)[:, :n_free] / _SCALE_PX
+
+    fit = least_squares(
+        residual,
+        np.zeros(n_free),
+        jacobian,  # pyright: ignore[reportArgumentType]
+        loss="cauchy",
+        x_scale="jac",
+        max_nfev=100,
+    )
+    return min((camera, step_camera(camera, fit.x)), key=lambda each: _misfit(each, world, px))
+
+
+def step_camera(camera: Camera, step: Array) -> Camera:
+    """Return the camera after a step (6 or 7,): a rotation vector [rad] and a shift of the points in its axes [m].
+
+    The seventh is a change of the focal length's logarithm.
+    """
+    pose_step = RigidTransform.from_components(step[3:6], Rotation.from_rotvec(step[:3]))
+    K = camera.K.copy()
+    K[[0, 1], [0, 1]] *= np.exp(np.clip(step[6:7].sum(), -_LARGEST_LOG_CHANGE, _LARGEST_LOG_CHANGE))
+    return replace(camera, K=K, camera_from_world=pose_step * camera.camera_from_world)
+
+
+def step_jacobian(camera: Camera, step: Array, world: Array) -> Array:
+    """Return the derivatives (2 n, 7) of the pixels of points (n, 3) [m] by the step that led to the camera."""
+    pose = camera.camera_from_world
+    _, by_camera, by_world = project_by_camera(camera, world)
+    by_xyz = by_world @ pose.rotation.as_matrix().T
+    rotated = pose.apply(world) - step[3:6]
+    by_focal = by_camera[:, :, 6:8] @ np.diag(camera.K)[:2, None]
+    by_step = [-by_xyz @ cross_matrices(rotated) @ left_jacobian(step[:3]), by_xyz, by_focal]
+    return np.concatenate(by_step, axis=2).reshape(2 * len(world), 7)

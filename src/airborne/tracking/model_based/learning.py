@@ -25,8 +25,8 @@ def learn_appearance(
     for region in regions:
         exposure = Exposure(region.exposure_s, region.packed_view, region.camera.K)
         bodies = bodies_in_exposure(render_model, pose, motion, exposure)
-        masks = np.array([_mask(render_model, body, region) for body in bodies])
-        ever, always = masks.any(axis=0), masks.all(axis=0)
+        masks = [_mask(render_model, body, region) for body in bodies]
+        ever, always = np.logical_or.reduce(masks), np.logical_and.reduce(masks)
         appearance = appearance.learn_colours(region, ever, body=always).learn_background(region, ever)
     return appearance
 
