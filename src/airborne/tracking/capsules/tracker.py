@@ -23,6 +23,7 @@ from airborne.tracking.capsules.surface_colours import (
     update_colours,
 )
 from airborne.tracking.capsules.track import Sighting, Track, evidence_per_px
+from airborne.tracking.capsules.unseen_legs import find_unseen_legs, free_leg
 from airborne.tracking.capsules.views import EvidenceTable, map_evidence, player_regions
 from airborne.tracking.estimate import Status
 from airborne.tracking.players import PlayerEstimate, PlayerStart, lost_player_estimate
@@ -171,9 +172,18 @@ def _track_player(
     if not regions:
         return replace(track, filtered=expected, time_s=frames.time_s), lost_player_estimate(name, frames, len(JOINTS))
     region_maps = map_evidence(regions, [track.tables[region.view] for region in regions], track.scale)
-    information = np.linalg.inv(expected.covariance[:N_FREE, :N_FREE])
-    prior = JumperPrior(expected.free, information, _contact_points(track.state), np.full(N_POINTS, _SLIP_SD_M))
-    fitted = fit_jumper(state, prior, region_maps, occluders)
+
+    def fit(expected: GaussianState) -> JumperFit:
+        information = np.linalg.inv(expected.covariance[:N_FREE, :N_FREE])
+        prior = JumperPrior(expected.free, information, _contact_points(track.state), np.full(N_POINTS, _SLIP_SD_M))
+        return fit_jumper(np.concatenate([expected.free, state[N_FREE:]]), prior, region_maps, occluders)
+
+    fitted = fit(expected)
+    for leg in find_unseen_legs(fitted.owned, track.reference_evidence):
+        freed = free_leg(expected, fitted.state, leg)
+        again = fit(freed)
+        if again.nats > fitted.nats:
+            expected, fitted = freed, again
     evidence = evidence_per_px(fitted.owned)
     if evidence < max(_LOST_SHARE * track.reference_evidence, _LEAST_EVIDENCE):
         return replace(track, filtered=expected, time_s=frames.time_s), lost_player_estimate(name, frames, len(JOINTS))
@@ -184,7 +194,8 @@ def _track_player(
     n_views = _n_unoccluded(occlusion, views)
     occlusion = limit_occlusion(occlusion, views)
     estimate = _estimate(name, frames, track, fitted=fitted, n_views=n_views)
-    if evidence < _LEAST_SHARE * track.reference_evidence:
+    has_unseen = len(find_unseen_legs(fitted.owned, track.reference_evidence)) > 0
+    if has_unseen or evidence < _LEAST_SHARE * track.reference_evidence:
         estimate = replace(estimate, status=Status.UNCERTAIN)
     elif estimate.status is Status.TRACKED:
         reference = track.reference_evidence + _REFERENCE_RATE * (evidence - track.reference_evidence)
