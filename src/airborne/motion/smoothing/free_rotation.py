@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -39,6 +40,14 @@ _LONGEST_GAP_S = 0.5  # in a stretch, beyond any that may be filled
 _MOMENTUM_UNIT = 10.0  # [kg m2/s] a step of the fit
 
 
+class _Masses(NamedTuple):
+    """The masses of a body and their motion at n times, about the centre of mass, in the root's axes."""
+
+    time_s: Array  # (n,)
+    inertia: Array  # (n, 3, 3) [kg m2]
+    momentum: Array  # (n, 3) [kg m2/s] of the joints' motion alone
+
+
 def conserve_momentum(rotations: SmoothedRotations, motion: Motion, model: BodyModel) -> SmoothedRotations:
     """Let the root turn with a constant angular momentum wherever its body, jointed and with masses, falls freely.
 
@@ -48,7 +57,8 @@ def conserve_momentum(rotations: SmoothedRotations, motion: Motion, model: BodyM
     if not (motion.joints and has_inertias(model)):
         return rotations
     for rows in _flights(rotations, motion, model):
-        flight = _fit_flight(model, motion.time_s[rows], motion.R[rows], *_smooth_joints(motion, rows))
+        masses = _mass_distribution(model, motion.time_s[rows], *_smooth_joints(motion, rows))
+        flight = _fit_flight(masses, motion.R[rows])
         if flight is not None:
             names = ("R", "velocity", "acceleration")
             changed = {name: getattr(rotations, name).copy() for name in names}
@@ -85,16 +95,14 @@ def _smooth_joints(motion: Motion, rows: slice) -> tuple[Array, Array]:
     return R, np.einsum("njki,njk->nji", R, np.stack([joint.velocity for joint in joints], axis=1))
 
 
-def _fit_flight(
-    model: BodyModel, time_s: Array, tracked: Array, joint_R: Array, rates: Array
-) -> tuple[Array, Array, Array] | None:
+def _fit_flight(masses: _Masses, tracked: Array) -> tuple[Array, Array, Array] | None:
     """Return orientations (n, 3, 3) nearest to those tracked, angular velocities and accelerations; None if far off."""
-    inertia, momentum = _mass_distribution(model, joint_R, rates)
+    time_s, inertia, momentum = masses
     is_tracked = np.isfinite(tracked).all(axis=(1, 2))
 
     def fly(x: Array) -> tuple[Array, Array]:
         start = Rotation.from_rotvec(x[:3]).as_matrix() @ tracked[0]
-        return _integrate(start, _MOMENTUM_UNIT * x[3:], time_s, inertia, momentum)
+        return _integrate(start, _MOMENTUM_UNIT * x[3:], masses)
 
     def distances(x: Array) -> Array:
         return _vectors(fly(x)[0][is_tracked] @ tracked[is_tracked].swapaxes(1, 2)) / _TRACKED_SD_RAD
@@ -112,24 +120,24 @@ def _fit_flight(
     return R, velocity, np.gradient(velocity, time_s, axis=0)
 
 
-def _mass_distribution(model: BodyModel, joint_R: Array, rates: Array) -> tuple[Array, Array]:
-    """Return the inertia (n, 3, 3) [kg m2] and the momentum of the joints' motion (n, 3) [kg m2/s], root's axes."""
+def _mass_distribution(model: BodyModel, time_s: Array, joint_R: Array, rates: Array) -> _Masses:
     n, n_segments = len(joint_R), len(model.segments)
     R = np.broadcast_to(np.eye(3), (n, n_segments, 3, 3)).copy()
     for segment, parent in enumerate(model.parents[1:], start=1):
         R[:, segment] = R[:, parent] @ joint_R[:, segment - 1]
     unit = np.zeros((3, n, n_segments, 3))
     unit[range(3), :, 0, range(3)] = 1.0
-    return np.moveaxis(angular_momentum(model, R, unit), 0, -1), angular_momentum(
-        model, R, np.concatenate([np.zeros((n, 1, 3)), rates], axis=1)
-    )
+    joints_alone = np.concatenate([np.zeros((n, 1, 3)), rates], axis=1)
+    inertia = np.moveaxis(angular_momentum(model, R, unit), 0, -1)
+    return _Masses(time_s, inertia, angular_momentum(model, R, joints_alone))
 
 
-def _integrate(start: Array, L: Array, time_s: Array, inertia: Array, momentum: Array) -> tuple[Array, Array]:
+def _integrate(start: Array, L: Array, masses: _Masses) -> tuple[Array, Array]:
     """Turn a body from its first orientation, by Runge and Kutta: R (n, 3, 3), angular velocities (n, 3), world axes.
 
     Between frames, inertia and momentum are interpolated.
     """
+    time_s, inertia, momentum = masses
     inverse = np.linalg.inv(inertia)
     half_inverse, half = np.linalg.inv((inertia[1:] + inertia[:-1]) / 2), (momentum[1:] + momentum[:-1]) / 2
 
