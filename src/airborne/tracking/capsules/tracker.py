@@ -194,8 +194,7 @@ def _track_player(
     n_views = _n_unoccluded(occlusion, views)
     occlusion = limit_occlusion(occlusion, views)
     estimate = _estimate(name, frames, track, fitted=fitted, n_views=n_views)
-    has_unseen = len(find_unseen_legs(fitted.owned, track.reference_evidence)) > 0
-    if has_unseen or evidence < _LEAST_SHARE * track.reference_evidence:
+    if evidence < _LEAST_SHARE * track.reference_evidence:
         estimate = replace(estimate, status=Status.UNCERTAIN)
     elif estimate.status is Status.TRACKED:
         reference = track.reference_evidence + _REFERENCE_RATE * (evidence - track.reference_evidence)
@@ -264,6 +263,7 @@ def _estimate(name: str, frames: Frames, track: Track, *, fitted: JumperFit, n_v
     covariance += length_jacobian @ track.shape_covariance @ length_jacobian.swapaxes(1, 2)
     sd = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 3)
     is_certain = n_views >= 2 and sd[: len(JOINTS) - 3].max() < _UNCERTAIN_SD_M
+    is_certain = is_certain and not len(find_unseen_legs(fitted.owned, track.reference_evidence))
     return PlayerEstimate(
         player=name,
         index=frames.index,
