@@ -177,7 +177,7 @@ def _body_run(folder: Path) -> _Run:
         out: Path, smoothing: Smoothing, events: Events, progress: Progress | None
     ) -> tuple[dict[str, xr.Dataset], tuple[str, ...]]:
         times = [event.time_s for event in events[""]]
-        root = smooth_root(motion, smoothing, times)
+        root = smooth_root(motion, model, smoothing, times)
         joints = smooth_landmarks(motion, model, smoothing, times, progress=progress)
         write_smooth_motion(out / MOTION, root)
         write_smooth_joints(out / JOINTS, joints)

@@ -12,7 +12,7 @@ from airborne.body import Pose
 from airborne.errors import BodyError, ResultError
 from airborne.motion import flight_summary, has_inertias, measure_flight, write_flight
 from airborne.motion.flight.momentum import centre_of_mass
-from airborne.motion.flight.momentum_table import _fit_parabola
+from airborne.motion.flight.momentum_table import fit_parabola
 from tests.support.motions import figure, motion_of, shaken, small_covariance, swinging
 from tests.support.tolerances import EXACT, ROUNDTRIP, sampled
 
@@ -70,7 +70,7 @@ def test_deviation_of_the_fitted_gravity_is_that_of_paths_whose_errors_resemble_
     rng, time_s, n = np.random.default_rng(5), np.arange(80) / 60, 300
     error = lfilter([1.0], [1.0, -0.7], 0.003 * rng.normal(size=(n, len(time_s))), axis=1)
     paths = np.stack([np.zeros_like(error), np.zeros_like(error), error - 9.81 / 2 * time_s**2], axis=-1)
-    gravity, sd, _ = np.transpose([_fit_parabola(time_s, path) for path in paths])
+    gravity, sd, _ = np.transpose([fit_parabola(time_s, path) for path in paths])
     assert np.median(sd) == pytest.approx(np.std(gravity), rel=sampled(n))
     assert np.mean(np.abs(gravity - 9.81) < 2 * sd) > 0.88
 

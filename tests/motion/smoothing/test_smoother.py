@@ -38,7 +38,7 @@ def swing(sd=3e-3, lost=()):
 @pytest.mark.parametrize("smoothing", [BUTTERWORTH, Smoothing(method="kalman")], ids=lambda smoothing: smoothing.method)
 def test_a_bodys_root_comes_nearer_to_the_truth_in_position_and_orientation(smoothing):
     true, noisy = swing(sd=0.02)
-    result = smooth_root(noisy, smoothing, [])
+    result = smooth_root(noisy, BODY, smoothing, [])
     place = result["position"].to_numpy() - true.position
     assert np.std(place) < 0.8 * np.std(noisy.position - true.position)
     R = Rotation.from_quat(result["quaternion"].to_numpy()).as_matrix()
@@ -47,21 +47,21 @@ def test_a_bodys_root_comes_nearer_to_the_truth_in_position_and_orientation(smoo
 
 def test_free_fall_is_found_in_the_roots_acceleration():
     _, noisy = swing()
-    result = smooth_root(noisy, Smoothing(method="kalman"), [])
+    result = smooth_root(noisy, BODY, Smoothing(method="kalman"), [])
     assert float(result["acceleration"].sel(space="z").mean()) == pytest.approx(-9.81, abs=0.3)
 
 
 def test_everything_has_its_unit_and_the_history_says_what_was_done():
     _, noisy = swing()
     smoothing = Smoothing(method="butterworth", cutoff_hz=6, fill_s=0.1)
-    result = smooth_root(noisy, smoothing, [0.4])
+    result = smooth_root(noisy, BODY, smoothing, [0.4])
     units = {name: result[name].attrs.get("units") for name in result if name.startswith(("pos", "vel", "acc", "ang"))}
     assert units["velocity"] == "m/s"
     assert units["angular_acceleration_sd"] == "rad/s2"
     assert None not in units.values()
     history = " ".join(result.attrs["history"])
     assert "Butterworth" in history and "6 Hz" in history and "up to 0.1 s" in history and "0.4000 s" in history
-    assert "gaps are not filled" in smooth_root(noisy, BUTTERWORTH, []).attrs["history"]
+    assert "gaps are not filled" in smooth_root(noisy, BODY, BUTTERWORTH, []).attrs["history"]
 
 
 def test_landmarks_and_the_centre_of_mass_are_smoothed():
@@ -90,8 +90,8 @@ def test_joints_are_smoothed_as_rotations_and_their_angles_run_on(tmp_path):
 
 def test_lost_frames_stay_lost_and_filled_ones_say_so():
     _, noisy = swing(lost=(20, 21))
-    assert np.isnan(smooth_root(noisy, BUTTERWORTH, [])["position"].to_numpy()[20:22]).all()
-    filled = smooth_root(noisy, replace(BUTTERWORTH, fill_s=0.05), [])
+    assert np.isnan(smooth_root(noisy, BODY, BUTTERWORTH, [])["position"].to_numpy()[20:22]).all()
+    filled = smooth_root(noisy, BODY, replace(BUTTERWORTH, fill_s=0.05), [])
     assert np.flatnonzero(filled["is_filled"].to_numpy()).tolist() == [20, 21]
     assert np.isfinite(filled["position"].to_numpy()).all()
     assert filled["status"].to_numpy()[20] == "lost"
@@ -119,8 +119,8 @@ def test_the_kalman_smoother_needs_covariances():
     _, noisy = swing()
     blind = replace(noisy, covariance=np.full_like(noisy.covariance, np.nan))
     with pytest.raises(ResultError, match="states no covariances"):
-        smooth_root(blind, Smoothing(method="kalman"), [])
-    assert np.isnan(smooth_root(blind, BUTTERWORTH, [])["position_sd"].to_numpy()).all()
+        smooth_root(blind, BODY, Smoothing(method="kalman"), [])
+    assert np.isnan(smooth_root(blind, BODY, BUTTERWORTH, [])["position_sd"].to_numpy()).all()
 
 
 @pytest.mark.parametrize("n", [0, 1, 3])
@@ -129,7 +129,7 @@ def test_hardly_any_frame_gives_no_numbers_and_no_error(n):
     estimates = Motion.collect([], noisy.joints)
     rows = {name: rows[:n] for name in estimates.__slots__ if isinstance(rows := getattr(noisy, name), np.ndarray)}
     few = replace(estimates, **rows)
-    result = smooth_root(few, BUTTERWORTH, [])
+    result = smooth_root(few, BODY, BUTTERWORTH, [])
     assert result.sizes["time"] == n
     assert np.isnan(result["position"].to_numpy()).all()
 

@@ -99,7 +99,7 @@ def flight_summary(motion: Motion, model: BodyModel, window: int = WINDOW) -> Fl
     rows = np.flatnonzero(motion.has_pose)
     momentum = table["angular_momentum"].to_numpy()
     momentum = momentum[np.isfinite(momentum).all(axis=-1)]
-    gravity, gravity_sd, rms = _fit_parabola(motion.time_s[rows], table["com"].to_numpy()[rows])
+    gravity, gravity_sd, rms = fit_parabola(motion.time_s[rows], table["com"].to_numpy()[rows])
     tilt = table["tilt"].to_numpy()[rows]
     return FlightSummary(
         n_poses=len(rows),
@@ -116,7 +116,7 @@ def flight_summary(motion: Motion, model: BodyModel, window: int = WINDOW) -> Fl
     )
 
 
-def _fit_parabola(time_s: Array, com: Array) -> tuple[float, float, float]:
+def fit_parabola(time_s: Array, com: Array) -> tuple[float, float, float]:
     """Return the best-fitting downward acceleration of a path (n, 3), its sd, and the RMS residual of free fall [m].
 
     The sd takes the heights' residuals for a first-order autoregressive process (Bartlett 1935): where each is r times

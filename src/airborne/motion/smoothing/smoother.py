@@ -33,6 +33,7 @@ from airborne.motion.smoothing import (
     smooth_stretches,
     spline_smoother,
 )
+from airborne.motion.smoothing.free_rotation import conserve_momentum
 from airborne.types import Array, Progress
 
 _LONGEST_FILL_S = 0.5  # of a gap that may be filled
@@ -94,29 +95,24 @@ class Smoothing:
         return [f"smoothing: {text}", fill, ends]
 
 
-def smooth_root(motion: Motion, smoothing: Smoothing, boundaries_s: Sequence[float]) -> xr.Dataset:
+def smooth_root(motion: Motion, model: BodyModel, smoothing: Smoothing, boundaries_s: Sequence[float]) -> xr.Dataset:
     """Smooth a body's root: position, velocity, acceleration; orientation, angular velocity and acceleration.
 
     The position is smoothed with the position's covariance, the orientation with the mean variance of its rotation
-    vector; angular velocities are in world axes. Somersault, tilt and twist are those of the smooth orientation.
+    vector; the Kalman smoother conserves the angular momentum of free flights. Angular velocities are in world axes.
     """
-    _require_covariances(smoothing, motion.position, motion.covariance[:, :3, :3])
+    smooth, of_position, fill_s = smoothing.smoother(), motion.covariance[:, :3, :3], smoothing.fill_s
+    variance = _mean_variance(motion.covariance[:, 3:6, 3:6])
+    _require_covariances(smoothing, motion.position, of_position)
     position = smooth_stretches(
-        smoothing.smoother(),
-        motion.time_s,
-        motion.position,
-        motion.covariance[:, :3, :3],
-        boundaries_s=boundaries_s,
-        fill_s=smoothing.fill_s,
+        smooth, motion.time_s, motion.position, of_position, boundaries_s=boundaries_s, fill_s=fill_s
     )
-    rotation = smooth_rotations(
-        smoothing.smoother(),
-        motion.time_s,
-        motion.R,
-        _mean_variance(motion.covariance[:, 3:6, 3:6]),
-        boundaries_s=boundaries_s,
-        fill_s=smoothing.fill_s,
-    )
+    rotation = smooth_rotations(smooth, motion.time_s, motion.R, variance, boundaries_s=boundaries_s, fill_s=fill_s)
+    history, filtered = smoothing.history(boundaries_s), rotation
+    if smoothing.method == "kalman":
+        rotation = conserve_momentum(filtered, motion, model)
+    if rotation is not filtered:
+        history.append("in free flight the root turns with a constant angular momentum")
     space, radians = ("time", "space"), unwrap(angles_from_matrix(rotation.R), motion.time_s)
     quaternion = continuous_quaternions(rotation.R)
     variables: dict = _position_variables(position, space)
@@ -130,7 +126,7 @@ def smooth_root(motion: Motion, smoothing: Smoothing, boundaries_s: Sequence[flo
         "is_filled": ("time", position.is_filled),
     }
     coordinates = _coordinates(motion.time_s, motion.index) | {"space": list("xyz"), "component": list("xyzw")}
-    return xr.Dataset(variables, coordinates, {"history": smoothing.history(boundaries_s)})
+    return xr.Dataset(variables, coordinates, {"history": history})
 
 
 def smooth_landmarks(
@@ -285,8 +281,7 @@ def _coordinates(time_s: Array, index: NDArray[np.int64]) -> dict:
     return {"time": ("time", time_s, {"units": "s"}), "frame": ("time", index)}
 
 
-def _mean_variance(covariance: Array) -> Array:
-    """Return the mean variance over the axes (n,) of covariances (n, 3, 3)."""
+def _mean_variance(covariance: Array) -> Array:  # (n, 3, 3) -> (n,), over the axes
     return np.diagonal(covariance, axis1=1, axis2=2).mean(axis=1)
 
 

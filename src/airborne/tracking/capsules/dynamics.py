@@ -25,7 +25,7 @@ _ACCELERATION_SD = _CORRELATION * np.array(  # [m/s2], [rad/s2]
 )
 # of the hips in the air, about free fall: the limbs move about the centre of mass
 _AIRBORNE_SD = _CORRELATION * 8.0
-_FIRST_SPEED_SD = np.array([1.0] * 3 + [2.0] * 15)  # [m/s], [rad/s]
+FIRST_SPEED_SD = np.array([1.0] * 3 + [2.0] * 15)  # [m/s], [rad/s]
 # chosen by hand; at a hundredth of it the joints err by 22.1 mm, not 18.8: blocker_variants.csv, clothes that stay
 _SLIDING_SD = np.array([0.02, 0.20, 0.03, 0.05])  # per sqrt(s): [m], shares, shares, [m]
 _SLIDING_RETURN_RATE = 1.2  # [1/s] decay to the first frame's values
@@ -53,7 +53,7 @@ def state_at_rest(free: Array, covariance: Array) -> GaussianState:
     """Return a state at rest: free (22,), covariance (22, 22)."""
     full_covariance = np.zeros((N_FILTERED, N_FILTERED))
     full_covariance[:N_FREE, :N_FREE] = covariance
-    full_covariance[N_FREE:, N_FREE:] = np.diag(_FIRST_SPEED_SD**2)
+    full_covariance[N_FREE:, N_FREE:] = np.diag(FIRST_SPEED_SD**2)
     return GaussianState(np.concatenate([free, np.zeros(N_DOF)]), full_covariance)
 
 

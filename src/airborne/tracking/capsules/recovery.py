@@ -21,6 +21,7 @@ from airborne.tracking.capsules.jumper import N_DOF
 from airborne.tracking.capsules.kernel_arguments import NOBODY
 from airborne.tracking.capsules.standing import ColourViews
 from airborne.tracking.capsules.track import Bystander, Track, evidence_per_px
+from airborne.tracking.capsules.unseen_legs import LEG_SD_RAD
 from airborne.tracking.capsules.views import map_evidence, player_regions
 from airborne.types import Array
 from airborne.video import Frames
@@ -46,7 +47,7 @@ _LEAST_PROBABILITY = 0.95  # of an identity that is taken
 _BYSTANDER = 0.5  # probability to be a lost player, below which somebody is a bystander
 _REMEMBERED_S = 2  # how long a bystander who is not seen is remembered
 _MOST_NATS = 6.0  # against a place, beyond which nobody is tried
-_POSE_SD = np.array([0.15] * 3 + [0.5] * 5 + [0.5, 0.4, 0.4, 0.5, 0.4] * 2 + [0.03] * N_SLIDING)  # [m, rad]
+_POSE_SD = np.array([0.15] * 3 + [0.5] * 5 + [*LEG_SD_RAD] * 2 + [0.03] * N_SLIDING)  # [m, rad]
 
 
 def is_due(track: Track, time_s: Fraction) -> bool:

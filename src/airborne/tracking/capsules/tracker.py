@@ -23,6 +23,7 @@ from airborne.tracking.capsules.surface_colours import (
     update_colours,
 )
 from airborne.tracking.capsules.track import Sighting, Track, evidence_per_px
+from airborne.tracking.capsules.unseen_legs import find_unseen_legs, free_leg
 from airborne.tracking.capsules.views import EvidenceTable, map_evidence, player_regions
 from airborne.tracking.estimate import Status
 from airborne.tracking.players import PlayerEstimate, PlayerStart, lost_player_estimate
@@ -171,9 +172,18 @@ def _track_player(
     if not regions:
         return replace(track, filtered=expected, time_s=frames.time_s), lost_player_estimate(name, frames, len(JOINTS))
     region_maps = map_evidence(regions, [track.tables[region.view] for region in regions], track.scale)
-    information = np.linalg.inv(expected.covariance[:N_FREE, :N_FREE])
-    prior = JumperPrior(expected.free, information, _contact_points(track.state), np.full(N_POINTS, _SLIP_SD_M))
-    fitted = fit_jumper(state, prior, region_maps, occluders)
+
+    def fit(expected: GaussianState) -> JumperFit:
+        information = np.linalg.inv(expected.covariance[:N_FREE, :N_FREE])
+        prior = JumperPrior(expected.free, information, _contact_points(track.state), np.full(N_POINTS, _SLIP_SD_M))
+        return fit_jumper(np.concatenate([expected.free, state[N_FREE:]]), prior, region_maps, occluders)
+
+    fitted = fit(expected)
+    for leg in find_unseen_legs(fitted.owned, track.reference_evidence):
+        freed = free_leg(expected, fitted.state, leg)
+        again = fit(freed)
+        if again.nats > fitted.nats:
+            expected, fitted = freed, again
     evidence = evidence_per_px(fitted.owned)
     if evidence < max(_LOST_SHARE * track.reference_evidence, _LEAST_EVIDENCE):
         return replace(track, filtered=expected, time_s=frames.time_s), lost_player_estimate(name, frames, len(JOINTS))
@@ -253,6 +263,7 @@ def _estimate(name: str, frames: Frames, track: Track, *, fitted: JumperFit, n_v
     covariance += length_jacobian @ track.shape_covariance @ length_jacobian.swapaxes(1, 2)
     sd = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 3)
     is_certain = n_views >= 2 and sd[: len(JOINTS) - 3].max() < _UNCERTAIN_SD_M
+    is_certain = is_certain and not len(find_unseen_legs(fitted.owned, track.reference_evidence))
     return PlayerEstimate(
         player=name,
         index=frames.index,
