@@ -65,6 +65,6 @@ def test_person_who_is_uncertain_in_the_first_frame_is_fitted_in_those_after(mon
 
     monkeypatch.setattr(body, "track_frames", track)
     trial = SimpleNamespace(body=SimpleNamespace(preset="human18", mass_kg=MASS_KG), settings=Settings())
-    run = BodyRun(trial, Clip(), None, DRESSED, POSE)._fit_shape()
+    run = BodyRun(trial, Clip(), None, DRESSED, POSE)._fit_shape(SCENE.frames(0))
     assert girths_off(run.model) < 0.5 * girths_off(DRESSED)
     assert run.start is POSE

@@ -65,6 +65,7 @@ class _LandmarkTable(_Strict):
     name: str
     segment: str
     position_m: _Position = [0.0, 0.0, 0.0]
+    is_joint: bool = False
 
 
 class _LimitsTable(_Strict):
@@ -93,7 +94,9 @@ def read_body(path: Path) -> BodyModel:
     """Read a body file; raises BodyError, naming the file and what is wrong, for anything unusable."""
     table = _read_table(path)
     segments = tuple(_segment(segment, path) for segment in table.segment)
-    landmarks = tuple(Landmark(mark.name, mark.segment, np.array(mark.position_m)) for mark in table.landmark)
+    landmarks = tuple(
+        Landmark(mark.name, mark.segment, np.array(mark.position_m), mark.is_joint) for mark in table.landmark
+    )
     try:
         return BodyModel(table.name, segments, landmarks)
     except BodyError as error:
@@ -224,7 +227,7 @@ def body_toml(model: BodyModel) -> str:
             ]
     for mark in _own_landmarks(model):
         lines += ["", "[[landmark]]", f"name = {_text(mark.name)}", f"segment = {_text(mark.segment)}"]
-        lines += [f"position_m = {_numbers(mark.position_m)}"]
+        lines += [f"position_m = {_numbers(mark.position_m)}", *["is_joint = true"] * mark.is_joint]
     return "\n".join(lines) + "\n"
 
 

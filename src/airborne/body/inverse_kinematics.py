@@ -265,8 +265,7 @@ def _check(problem: LandmarkProblem, names: list[str], *, has_start: bool) -> No
 def _carriers(model: BodyModel, landmark: int) -> list[int]:
     """Return the segments in which a landmark is fixed: its own, and at the segment's origin the parent too."""
     own = model.index_of(model.landmarks[landmark].segment)
-    at_origin = not np.any(model.landmarks[landmark].position_m) and own > 0
-    return [own, int(model.parents[own])] if at_origin else [own]
+    return [own, int(model.parents[own])] if model.landmarks[landmark].at_joint and own > 0 else [own]
 
 
 def _core_chains(model: BodyModel) -> list[set[int]]:

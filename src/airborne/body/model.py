@@ -94,6 +94,12 @@ class Landmark:
     name: str
     segment: str
     position_m: Array  # (3,) segment's frame [m]
+    is_joint: bool = False  # it stands for the segment's joint, also where it lies beside
+
+    @property
+    def at_joint(self) -> bool:
+        """Whether it stands for the segment's joint."""
+        return self.is_joint or not self.position_m.any()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

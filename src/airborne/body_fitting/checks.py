@@ -128,7 +128,7 @@ def points_of_lengths(model: BodyModel) -> dict[str, list[str]]:
         at_ends = [
             stem_of(mark.name)
             for mark in model.landmarks
-            if mark.segment == segment.name or (mark.segment in children and not mark.position_m.any())
+            if mark.segment == segment.name or (mark.segment in children and mark.at_joint)
         ]
         is_limb = segment.name.endswith(("_left", "_right")) and len(at_ends) > 1
         ends = at_ends if is_limb or not children else map(stem_of, CORE)  # the trunk is measured as a whole

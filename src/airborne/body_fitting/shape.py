@@ -61,7 +61,7 @@ def shape_parameters(model: BodyModel) -> tuple[ShapeParameter, ...]:
 
 def joint_width_m(model: BodyModel, name: str) -> float:
     """Return how far apart the hips' or shoulders' joints are that a segment carries on either side [m]; else 0."""
-    owners = [mark.segment for mark in model.landmarks if mark.name in CORE and not mark.position_m.any()]
+    owners = [mark.segment for mark in model.landmarks if mark.name in CORE and mark.at_joint]
     x_m = [segment.joint_m[0] for segment in model.segments if segment.parent == name and segment.name in owners]
     return float(np.ptp(x_m)) if len(x_m) > 1 else 0.0
 

@@ -53,17 +53,19 @@ def landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
     """Return the body's landmarks (n, landmarks, 3) world [m], and their sd (n, landmarks) [m].
 
     The standard deviation is the root mean square over the axes, to first order, through every joint that moves the
-    point: infinite where an unobserved direction moves it, NaN where unknown. Raises ResultError for another body.
+    point, or the joint that it stands for: infinite where an unobserved direction moves it, NaN where unknown. Raises
+    ResultError for another body.
     """
     require_body(motion, model)
     owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])
     points = np.full((len(motion), len(owners), 3), np.nan)
-    variance = np.full(points.shape, np.nan)
+    variance, at_joint = np.full(points.shape, np.nan), _at_joint(model)
     covariance = motion.total_covariance
     for row in np.flatnonzero(motion.has_pose):
         posed = model.with_pose(motion.pose(row))
         points[row] = posed.landmarks
-        variance[row] = propagate_variances(point_jacobian(posed, owners, points[row]), covariance[row])
+        moved = np.where(at_joint[:, None], posed.t[owners], points[row])
+        variance[row] = propagate_variances(point_jacobian(posed, owners, moved), covariance[row])
     return points, standard_deviation(variance.mean(axis=-1))
 
 
@@ -83,8 +85,12 @@ def joint_statuses(motion: Motion, model: BodyModel, sd: Array) -> NDArray[np.st
 def _carriers(model: BodyModel) -> NDArray[np.int64]:
     """Return the segment whose joint moves each landmark, the parent of a segment for its origin: (landmarks,)."""
     owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])
-    at_origin = np.array([not np.any(landmark.position_m) for landmark in model.landmarks])
-    return np.where(at_origin & (owners > 0), model.parents[owners], owners)
+    return np.where(_at_joint(model) & (owners > 0), model.parents[owners], owners)
+
+
+def _at_joint(model: BodyModel) -> NDArray[np.bool_]:
+    """Return which landmarks stand for their segments' joints: (landmarks,)."""
+    return np.array([landmark.at_joint for landmark in model.landmarks])
 
 
 def _is_strained(motion: Motion, model: BodyModel) -> NDArray[np.bool_]:

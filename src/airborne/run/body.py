@@ -13,6 +13,7 @@ from typing import Any
 from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
 from airborne.body.files import mesh_files, write_body
 from airborne.body_fitting.first_frames import EVERY, N_FRAMES, fit_preset
+from airborne.body_fitting.landmark_places import place_landmarks
 from airborne.calibration.from_points import Calibration
 from airborne.cameras import Camera
 from airborne.export import headline
@@ -59,6 +60,7 @@ from airborne.tracking.revision import track_with_revision
 from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
+from airborne.types import Array
 from airborne.video import Frames, Recording
 from airborne.video.rereading import Rereading
 
@@ -82,6 +84,7 @@ class BodyRun:
     start: Pose
     found: FoundStart | None = None  # where the start was looked for
     keys: Mapping[int, PoseEvidence] = field(default_factory=dict)  # of later frames, in the order of time
+    points: Mapping[str, Array] = field(default_factory=dict)  # landmark -> (3,) world [m], as the start marks them
     kept: KeptFrames = field(default_factory=KeptFrames)  # grows while the run is tracked
 
     table = MOTION
@@ -94,7 +97,7 @@ class BodyRun:
         found_notes = () if found is None else (found.note,)
         keys, missed = keys_of_frames(trial, model, opened.recording)
         opened.recording.events.extend([*model.notes, *found_notes, *first.notes, *missed])
-        return cls(trial, opened.recording, opened.calibration, model, first.pose, found, keys)
+        return cls(trial, opened.recording, opened.calibration, model, first.pose, found, keys, first.points)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -125,15 +128,16 @@ class BodyRun:
             found = tracker.search(tracker.init(), first)
             if found.pose is not None:
                 seen = replace(self, model=sample_body_colours(self.model, found.pose, first))
-                seen = seen._fit_shape()
+                seen = seen._fit_shape(first)
         if not is_seen(seen.model.with_pose(self.start), [view.camera for view in first.views if view is not None]):
             self.recording.events.append(OUT_OF_SIGHT)
         return seen
 
-    def _fit_shape(self) -> BodyRun:
+    def _fit_shape(self, first: Frames) -> BodyRun:
         """Return a preset fitted to the person in some of the first frames, those where it is tracked.
 
-        With keys, which are about its lengths, the body stays as it is.
+        Its landmarks lie where the points of the start mark them. With keys, which are about its lengths, the body
+        stays as it is.
         """
         body = self.trial.body
         if body.preset is None or self.keys:
@@ -149,7 +153,12 @@ class BodyRun:
         if fitted is None:
             return self
         index, pose = found[0][0].index, found[0][1]
-        return replace(self, model=fitted, start=pose if index == self.recording.start else self.start)
+        start = pose if index == self.recording.start else self.start
+        if self.points:
+            tracker = tracker_of(self.trial.settings, fitted, start)
+            at_first = tracker.search(tracker.init(), first).pose
+            fitted = fitted if at_first is None else place_landmarks(fitted, at_first, self.points)
+        return replace(self, model=fitted, start=start)
 
     def track(
         self,

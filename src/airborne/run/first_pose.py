@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -48,4 +49,4 @@ def _add_lone_clicks(trial: Trial, model: BodyModel, rig: Rig, first: FirstPose,
     evidence = read_key(trial, clicks, model, rig=rig, facts=())
     sds = np.repeat(FIRST_POSE_SD, [3, 3, 3 * model.n_joints])
     note = f"start.points_px: {', '.join(names)} clicked in one camera: placed across its line of sight alone"
-    return FirstPose(join_evidence(first.pose, sds, evidence), (*first.notes, note))
+    return replace(first, pose=join_evidence(first.pose, sds, evidence), notes=(*first.notes, note))

@@ -69,7 +69,7 @@ def grip_landmark(model: BodyModel, name: str) -> Grip:
     """Take a body at a landmark; at a joint, the segment that ends there."""
     landmark = next(each for each in model.landmarks if each.name == name)
     own = model.index_of(landmark.segment)
-    if own and not np.any(landmark.position_m):
+    if own and landmark.at_joint:
         parent = int(model.parents[own])
         return Grip(parent, model.joints_m[own], _columns_that_follow(model, parent))
     return Grip(own, np.asarray(landmark.position_m, float), _columns_that_follow(model, own))

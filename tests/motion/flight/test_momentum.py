@@ -1,5 +1,7 @@
 """Momentum is that of the masses in motion, and constant where nothing acts on the body."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -148,6 +150,19 @@ def test_errors_of_joints_that_stay_the_same_hardly_widen_the_momentum():
     _, apart = angular_momenta(motion_of(MODEL, shaken_apart, rate_hz=200, covariance=covariance), MODEL)
     assert np.mean(np.abs(value - exact) < 2 * np.sqrt(variance)) > 0.85
     assert np.median(np.sqrt(variance)) < 0.3 * np.median(np.sqrt(apart))
+
+
+def test_joint_that_two_frames_do_not_show_goes_on_as_smoothly_as_in_the_others():
+    poses, covariance = swinging(MODEL, np.arange(20) / 50), small_covariance(MODEL)
+    motion = motion_of(MODEL, poses, covariance=covariance)
+    hidden = motion.covariance.copy()
+    hidden[9:11, 6:9] = hidden[9:11, :, 6:9] = 0
+    hidden[9:11, [6, 7, 8], [6, 7, 8]] = np.inf
+    shown_sd, hidden_sd = (
+        np.sqrt(angular_momenta(replace(motion, covariance=each), MODEL)[1]) for each in (motion.covariance, hidden)
+    )
+    beside = [7, 8, 11, 12]
+    assert np.median(hidden_sd[beside]) < 3 * np.median(shown_sd[beside])
 
 
 def test_momentum_never_reaches_across_a_lost_frame():

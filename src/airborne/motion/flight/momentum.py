@@ -107,20 +107,24 @@ def _rotation_covariance(covariance: Array, R: Array) -> Array:
 def _independent_shares(fits: Sequence[_AngularVelocities], covariance: Array) -> Array:
     """Return which share of each rotation's variance is independent from frame to frame: (n, 3 segments).
 
-    covariance (n, 3 segments, 3 segments) as stated. There is one share of the frames that show a rotation and another
-    of those that do not, as if one more squared distance had been as large as stated; above 1 where they are larger.
+    covariance (n, 3 segments, 3 segments) as stated. There is one share of the frames that show a rotation, as if one
+    more squared distance had been as large as stated, and another of those that do not, as if one more had been as
+    large as of those that do; above 1 where they are larger.
     """
     stated = np.diagonal(covariance, axis1=1, axis2=2)
     is_open = stated > 0.99 * _UNOBSERVED_ROTATION_SD_RAD**2
-    shares = np.ones_like(stated)
-    for of_kind in (is_open, ~is_open & (stated > 0)):
-        squared, freedom = np.ones((2, stated.shape[1]))
+    is_shown = ~is_open & (stated > 0)
+    shares, usual = np.ones_like(stated), np.ones(stated.shape[1])
+    for of_kind in (is_shown, is_open):
+        squared, freedom = usual.copy(), np.ones(stated.shape[1])
         for fit in fits:
             counts, variance = of_kind[fit.rows], stated[fit.rows]
             squares = fit.distance.reshape(variance.shape) ** 2
             squared += np.sum(squares / np.where(counts, variance, np.inf), axis=0)
             freedom += np.sum(fit.freedom[:, None] * counts, axis=0)
         shares = np.where(of_kind, squared / freedom, shares)
+        mean = np.sum(shares * stated * is_shown, axis=0) / np.maximum(is_shown.sum(axis=0), 1)
+        usual = np.where(is_shown.any(axis=0), mean / _UNOBSERVED_ROTATION_SD_RAD**2, 1.0)
     return shares
 
 

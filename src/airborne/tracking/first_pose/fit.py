@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import chain
 
 import numpy as np
@@ -33,6 +33,7 @@ class FirstPose:
 
     pose: Pose
     notes: tuple[str, ...] = ()  # what the user should know, one line each
+    points: Mapping[str, Array] = field(default_factory=dict)  # landmark -> (3,) world [m], those that were given
 
 
 def pose_by_hand(
@@ -63,7 +64,7 @@ def fit_to_detections(model: BodyModel, rig: Rig, where: str, detections: Detect
     first = fit_to_pixels(
         model, rig, where, names=confident.points, px=confident.px[0], weights=confident.visibility[0]
     )
-    return FirstPose(first.pose, (*detections.notes, *first.notes))
+    return replace(first, notes=(*detections.notes, *first.notes))
 
 
 def fit_to_pixels(
@@ -81,7 +82,7 @@ def fit_to_pixels(
         if out.any()
     ]
     first = fit_to_points(model, where, names, agreed.points)
-    return FirstPose(first.pose, (*left_out, *first.notes))
+    return replace(first, notes=(*left_out, *first.notes))
 
 
 def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Array) -> FirstPose:
@@ -102,7 +103,8 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
         f"{where}: no place of {missing}; there the first pose is as near to straight as it can be" if missing else "",
         f"{where}: {fit.note}" if fit.note else "",
     ]
-    return FirstPose(fit.pose, tuple(note for note in notes if note))
+    given = {name: point for name, point in targets.items() if np.isfinite(point).all()}
+    return FirstPose(fit.pose, tuple(note for note in notes if note), given)
 
 
 def check_landmark_names(model: BodyModel, where: str, names: Sequence[str]) -> None:

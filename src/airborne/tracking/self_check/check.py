@@ -17,6 +17,7 @@ from airborne.tracking.self_check.empty_scenes import EmptyScenes
 from airborne.tracking.self_check.free_flight import excess, fall
 from airborne.tracking.self_check.nuisances import (
     biases,
+    first_bias,
     n_parameters,
     nuisances_of,
     prior_covariance,
@@ -79,17 +80,25 @@ def self_check(run: RunEquations, model: BodyModel, rig: Rig, path: TrackedPath)
     diagnosis = Diagnosis((), np.zeros(len(run.prior)), run.prior)
     if run.says_causes:
         diagnosis = name_causes(run.solution, nuisances_of(rig), run.prior)
-    K = errors.by_parameter
-    constant = K @ diagnosis.covariance @ np.swapaxes(K, 1, 2)
-    mean = errors.shown(diagnosis.theta) if diagnosis.has_alarm else K @ diagnosis.theta
-    constant = constant + mean[:, :, None] * mean[:, None, :]
-    added = _positive(constant - K @ shift_covariance(rig) @ np.swapaxes(K, 1, 2))
+    constant = _constant_errors(errors, diagnosis, len(run.prior))
+    if model.has_joints:  # the covariances of its frames hold that its shape is wrong
+        added = _constant_errors(errors, diagnosis, first_bias(rig))
+    else:
+        K = errors.by_parameter
+        added = _positive(constant - K @ shift_covariance(rig) @ np.swapaxes(K, 1, 2))
     covariance = added[:, :3, :3] + path.covariance[rows, :3, :3]
     is_seen = (evidence.is_seen.sum(axis=1) > 1) & np.isfinite(covariance).all(axis=(1, 2)) & (not model.has_joints)
     elsewhere = np.zeros(len(rows), bool)
     shown = errors.shown(diagnosis.theta)[is_seen, :3]
     elsewhere[is_seen] = lies_elsewhere(shown, errors.noise[is_seen, :3, :3], covariance[is_seen])
     return SelfCheck(diagnosis, path.index[rows], constant, added, elsewhere)
+
+
+def _constant_errors(errors: PoseErrors, diagnosis: Diagnosis, n: int) -> Array:
+    """Return the covariance (m, 6, 6) of the pose's errors by the first n parameters."""
+    K = errors.by_parameter[:, :, :n]
+    mean = errors.shown(diagnosis.theta) if diagnosis.has_alarm else K @ diagnosis.theta[:n]
+    return K @ diagnosis.covariance[:n, :n] @ np.swapaxes(K, 1, 2) + mean[:, :, None] * mean[:, None, :]
 
 
 def doubts(

@@ -85,7 +85,7 @@ def twists(rig: Rig, camera_index: int, root: Array, velocity: Array) -> Array:
 def biases(rig: Rig, camera_index: int) -> Array:
     """Return how the offset found in one view changes by the parameters beside the twists: (4, n_parameters)."""
     D = np.zeros((N_SIMILARITY, n_parameters(rig)))
-    first = 2 + _PER_CAMERA * len(rig) + N_SIMILARITY * camera_index
+    first = first_bias(rig) + N_SIMILARITY * camera_index
     D[:, first : first + N_SIMILARITY] = np.eye(N_SIMILARITY)
     return D
 
@@ -94,9 +94,14 @@ def shift_covariance(rig: Rig) -> Array:
     """Return the part of the parameters' covariance that the tracker's own covariances hold: shifted images."""
     variance = np.zeros(n_parameters(rig))
     for i, camera in enumerate(rig):
-        first = 2 + _PER_CAMERA * len(rig) + N_SIMILARITY * i
+        first = first_bias(rig) + N_SIMILARITY * i
         variance[first : first + 2] = SHIFT_SD_PX**2 + camera.shift_sd_px**2
     return np.diag(variance)
+
+
+def first_bias(rig: Rig) -> int:
+    """Return the first of the parameters that are no causes: what each view's silhouette is off all run long."""
+    return 2 + _PER_CAMERA * len(rig)
 
 
 def _camera_twists(camera: Camera, root: Array, velocity: Array) -> Array:
@@ -117,6 +122,7 @@ def prior_covariance(rig: Rig, calibrated: Mapping[str, Array], body_sd: float, 
 
     calibrated: of the cameras that the calibration knows, the covariance (7, 7) of turn, place [in camera axes] and
     focal length [share]. Where it knows none, the cameras' common motion counts for nothing: poses are in their world.
+    That goes for the place of its origin, too.
     """
     covariance = np.zeros((n_parameters(rig),) * 2)
     covariance[0, 0], covariance[1, 1] = body_sd**2, (_SURVEYED_SD if calibrated else _WORLD_SD) ** 2
@@ -127,11 +133,11 @@ def prior_covariance(rig: Rig, calibrated: Mapping[str, Array], body_sd: float, 
         if camera.name in calibrated:
             known = slice(block.start, block.start + 7)
             covariance[known, known] = calibrated[camera.name]
-    bias = np.arange(2 + _PER_CAMERA * len(rig), len(covariance))
+    bias = np.arange(first_bias(rig), len(covariance))
     covariance[bias, bias] = np.tile((_PERSON_BIAS_SD if is_person else _BIAS_SD) ** 2, len(rig))
     times = np.arange(len(rig)) * _PER_CAMERA + 9
     covariance[np.ix_(times, times)] -= _CAMERA_SD["time_s"] ** 2 / len(rig)  # the clock is theirs together
-    return covariance if calibrated else _without_common_motion(covariance, rig)
+    return covariance if calibrated else _about_middle(_without_common_motion(covariance, rig), rig)
 
 
 def widen(prior: Array, nuisance: Nuisance) -> Array:
@@ -149,6 +155,18 @@ def _without_common_motion(covariance: Array, rig: Rig) -> Array:
     unit = np.linalg.qr(common / sd[:, None])[0]
     covariance[np.ix_(rows, rows)] = sd[:, None] * (np.eye(len(rows)) - unit @ unit.T) * sd
     return covariance
+
+
+def _about_middle(covariance: Array, rig: Rig) -> Array:
+    """Return the covariance for a world that is usually larger about the cameras' middle, not about its origin."""
+    row = np.zeros(len(covariance))
+    row[1], middle = 1.0, np.mean([camera.centre for camera in rig], axis=0)
+    for i, camera in enumerate(rig):
+        first = 2 + _PER_CAMERA * i + 3
+        row[first : first + 3] = -camera.camera_from_world.rotation.apply(middle)
+    variance, others = covariance[1, 1], covariance.copy()
+    others[1, 1] = 0
+    return others + variance * np.outer(row, row)
 
 
 def _common_motion(camera: Camera) -> Array:
