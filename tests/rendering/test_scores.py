@@ -171,6 +171,6 @@ def test_a_reduced_pixel_is_centred_at_the_middle_of_the_pixels_it_averages(scal
 def test_sums_over_the_mask_count_its_pixels():
     shapes, posed = posed_random(MIXTURE, 1)
     target = pack_targets(VIEWS, LIGHTS)
-    sums = colour_sums(shapes, target, posed.R[None], posed.t[None], with_chroma=False)
+    sums = colour_sums(shapes, target, posed.R[None], posed.t[None], rule=RULES["raw"])
     assert sums[0, :, 0].tolist() == [render(shapes, posed, c, FLAT).mask.sum() for c in CAMERAS]
     assert np.isfinite(scores_from_sums(sums, RULES["raw"])).all()

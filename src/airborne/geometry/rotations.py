@@ -18,7 +18,8 @@ _RATE_ROWS = 5  # rows before a gap whose mean angular rate is carried across it
 
 def matrix_from_angles(angles: Array) -> Array:
     """Build rotation matrices (..., 3, 3), body to world, from somersault, tilt, twist (..., 3) [rad]."""
-    (cx, cy, cz), (sx, sy, sz) = (np.moveaxis(f(np.asarray(angles, float)), -1, 0) for f in (np.cos, np.sin))
+    c, s = np.cos(angles), np.sin(angles)
+    cx, cy, cz, sx, sy, sz = c[..., 0], c[..., 1], c[..., 2], s[..., 0], s[..., 1], s[..., 2]
     R = np.empty((*cx.shape, 3, 3))  # filled: stacking takes up to twice as long
     R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = cy * cz, -cy * sz, sy
     R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, -sx * cy

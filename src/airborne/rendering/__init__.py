@@ -5,7 +5,7 @@ from airborne.rendering.evidence import EvidenceMaps, evidence_maps, mask_eviden
 from airborne.rendering.kinematics import pose_segments
 from airborne.rendering.lights import FLAT, Lamp, Lights
 from airborne.rendering.pictures import mask_picture, match_picture, model_picture, through_mask
-from airborne.rendering.scores import RULES, ScoreRule, colour_sums, score, scores_from_sums
+from airborne.rendering.scores import RULES, ScoreRule, colour_sums, missed_pixels, score, scores_from_sums
 from airborne.rendering.targets import Targets, pack_targets
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "mask_evidence",
     "mask_picture",
     "match_picture",
+    "missed_pixels",
     "model_picture",
     "pack_targets",
     "pose_segments",

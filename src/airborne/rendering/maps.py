@@ -17,16 +17,16 @@ class SurfaceMaps(NamedTuple):
 
     part: NDArray[np.int16]  # (h, w)
     inverse_depth: NDArray[np.float32]  # (h, w) [1/m]
-    normals: NDArray[np.float32]  # (3, h, w)
+    normals: NDArray[np.float32]  # (3, h, w); (3, 0, 0) where they are not asked for
 
 
-def empty_maps(size: tuple[int, int]) -> SurfaceMaps:
+def empty_maps(size: tuple[int, int], *, with_normals: bool = True) -> SurfaceMaps:
     """Allocate the maps of a view of (width, height)."""
     width, height = size
     return SurfaceMaps(
         np.empty((height, width), np.int16),
         np.empty((height, width), np.float32),
-        np.zeros((3, height, width), np.float32),
+        np.zeros((3, height, width) if with_normals else (3, 0, 0), np.float32),
     )
 
 
@@ -37,14 +37,15 @@ def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
     shapes: a workspace of `new_shapes(geometry)`; R (s, 3, 3), t (s, 3) [m] world from segment; view (18,) packed.
     part (h, w) int16: index into BodyModel.parts, -1 where there is none; inverse_depth (h, w) float32 [1/m], 0 where
     there is none, and for an ellipsoid that of the plane in which its outline lies, because only the outline's motion
-    changes the image; normals (3, h, w) float32: outward unit normals in camera axes, unchanged where there is none.
+    changes the image; normals (3, h, w) float32: outward unit normals in camera axes;
+    unchanged where there is none, or not drawn.
     """
     height, width = part.shape
     part[:] = -1
     inverse_depth[:] = 0
     pose_shapes(shapes, geometry, R, t)
     row_start, row_stop, ends, curves = list_spans(shapes, geometry, view, width, height)
-    row = new_row(width)
+    row, with_normals = new_row(width), normals.size > 0
     n_ellipsoids = len(geometry.ellipsoid_part)
     for v in range(height):
         start, stop = row_start[v], row_stop[v]
@@ -64,6 +65,8 @@ def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
                 else:
                     part[v, u] = geometry.polygon_part[shape - n_ellipsoids]
                     inverse_depth[v, u] = w
+                if not with_normals:
+                    continue
                 x, y, z = row[at + NX], row[at + NY], row[at + NZ]
                 length = np.sqrt(x * x + y * y + z * z)
                 normals[0, v, u], normals[1, v, u], normals[2, v, u] = x / length, y / length, z / length

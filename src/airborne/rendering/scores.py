@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import SurfaceArrays
+from airborne.kernels import kernel
 from airborne.rendering.evidence import mask_evidence
-from airborne.rendering.shapes import new_shapes
+from airborne.rendering.shapes import Shapes, new_shapes
 from airborne.rendering.sums import CHROMA_ERROR, COLOURED, CROSS, ERROR, MODEL, PIXELS, SUMS, sum_hypotheses
 from airborne.rendering.targets import Targets
 from airborne.rendering.threads import in_threads
@@ -39,47 +40,67 @@ RULES = {
 
 
 def score(
-    geometry: SurfaceArrays, targets: Targets, R: Array, t: Array, *, rule: ScoreRule = RULES["raw"], threads: int = 1
+    geometry: SurfaceArrays,
+    targets: Targets,
+    R: Array,
+    t: Array,
+    *,
+    rule: ScoreRule = RULES["raw"],
+    shapes: Shapes | None = None,
+    threads: int = 1,
 ) -> Array:
     """Score n hypotheses against the views: (n,) [grey levels], smaller is better, infinite where no pixel is covered.
 
     R (n, s, 3, 3), t (n, s, 3) [m]: world from segment. Raw: sqrt(sum |RGB_observed - RGB_model|^2 / 3 pixels) over
     the model's mask, so a difference of d in each channel scores d. Normalised: the same of 255 RGB / (R + G + B),
-    dark pixels left out; it does not depend on the lights. The result is the same for any number of threads.
+    dark pixels left out; it does not depend on the lights. The result is the same for any number of threads. One
+    thread may be given a workspace of `new_shapes`, which takes as long as half a hypothesis.
     """
-    if rule.counts_missed:
-        assert targets.foreground is not None, "the rule counts missed foreground: give `pack_targets` the evidence"
-    sums = colour_sums(geometry, targets, R, t, with_chroma=rule.normalised > 0, threads=threads)
-    missed = None
-    if rule.counts_missed and targets.foreground is not None:
-        inside = mask_evidence(geometry, targets.foreground, R, t, threads=threads)
-        missed = np.maximum(targets.foreground.totals - inside, 0)
-    return scores_from_sums(sums, rule, missed)
+    sums = colour_sums(geometry, targets, R, t, rule=rule, shapes=shapes, threads=threads)
+    return scores_from_sums(sums, rule, missed_pixels(geometry, targets, R, t, rule=rule, threads=threads))
+
+
+def missed_pixels(
+    geometry: SurfaceArrays, targets: Targets, R: Array, t: Array, *, rule: ScoreRule, threads: int = 1
+) -> NDArray[np.float64] | None:
+    """Count the foreground outside the mask of each hypothesis in each view: (n, views); None if it does not count."""
+    if not rule.counts_missed:
+        return None
+    assert targets.foreground is not None, "the rule counts missed foreground: give `pack_targets` the evidence"
+    inside = mask_evidence(geometry, targets.foreground, R, t, threads=threads)
+    return np.maximum(targets.foreground.totals - inside, 0)
 
 
 def colour_sums(
-    geometry: SurfaceArrays, targets: Targets, R: Array, t: Array, *, with_chroma: bool, threads: int = 1
+    geometry: SurfaceArrays,
+    targets: Targets,
+    R: Array,
+    t: Array,
+    *,
+    rule: ScoreRule,
+    shapes: Shapes | None = None,
+    threads: int = 1,
 ) -> NDArray[np.float64]:
     """Sum over the mask of each hypothesis in each view: (n, views, SUMS), columns as named in `sums`.
 
-    With r = observed - model over the channels: pixels, sum r^2, sum r model, sum model^2; with chroma also the
-    number of coloured pixels and their sum of squared differences.
+    With r = observed - model over the channels: pixels, sum r^2, sum r model, sum model^2; of chroma the number of
+    coloured pixels and their sum of squared differences. What the rule does not use is zero.
     """
     R, t = np.ascontiguousarray(R, float), np.ascontiguousarray(t, float)
     out = np.empty((len(R), len(targets.views), SUMS))
 
     def fill(part: slice) -> None:
         sum_hypotheses(
-            new_shapes(geometry),
+            shapes or new_shapes(geometry),
             geometry,
             R[part],
             t[part],
             targets.views,
             targets.sizes,
-            targets.lights,
+            targets.lights if rule.normalised < 1 else None,
             targets.ambient,
             targets.images,
-            with_chroma,
+            rule.normalised > 0,
             out[part],
         )
 
@@ -91,29 +112,31 @@ def scores_from_sums(sums: Array, rule: ScoreRule, missed: Array | None = None) 
     """Turn sums (n, views, SUMS), and the missed pixels (n, views), into scores (n,) [grey levels].
 
     The fitted gain is the least-squares a of |observed - a model|^2, kept within GAINS: |observed - a model|^2 is
-    sum r^2 - (a - 1) (2 sum r model - (a - 1) sum model^2).
+    sum r^2 - (a - 1) (2 sum r model - (a - 1) sum model^2). Errors are pooled over pixels or views.
     """
-    raw = sums[..., ERROR]
-    if rule.fits_gain:
-        change = np.clip(sums[..., CROSS] / np.maximum(sums[..., MODEL], 1e-9), GAINS[0] - 1, GAINS[1] - 1)
-        raw = np.maximum(raw - change * (2 * sums[..., CROSS] - change * sums[..., MODEL]), 0)
-    result = np.zeros(len(sums))
-    if rule.normalised < 1:
-        result += (1 - rule.normalised) * _rms(raw, sums[..., PIXELS], rule, missed)
-    if rule.normalised > 0:
-        result += rule.normalised * _rms(sums[..., CHROMA_ERROR], sums[..., COLOURED], rule, missed)
-    return result
+    if missed is None:
+        missed = np.zeros(sums.shape[:2])
+    return _pool(sums, missed, rule.normalised, rule.fits_gain, rule.pool == "views")
 
 
-def _rms(error: Array, pixels: Array, rule: ScoreRule, missed: Array | None) -> Array:
-    """Pool squared errors (n, views) over pixels or views; infinite where a hypothesis shows no pixel."""
-    is_covered = pixels.sum(axis=1) > 0
-    if missed is not None:
-        error, pixels = error + 3 * MISSED_GREY**2 * missed, pixels + missed
-    if rule.pool == "pixels":
-        rms = np.sqrt(error.sum(axis=1) / np.maximum(3 * pixels.sum(axis=1), 1))
-    else:
-        counted = pixels > 0
-        per_view = np.sqrt(error / np.maximum(3 * pixels, 1))
-        rms = per_view.sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
-    return np.where(is_covered, rms, np.inf)
+@kernel
+def _pool(sums, missed, normalised, fits_gain, is_by_view):
+    out = np.zeros(len(sums))
+    for h in range(len(sums)):
+        for share, of_error, of_pixels in ((1 - normalised, ERROR, PIXELS), (normalised, CHROMA_ERROR, COLOURED)):
+            if share == 0:
+                continue
+            squares, pixels, n_covered, mean, n_views = 0.0, 0.0, 0.0, 0.0, 0
+            for i in range(sums.shape[1]):
+                error = sums[h, i, of_error]
+                if fits_gain and of_error == ERROR:
+                    cross, model = sums[h, i, CROSS], sums[h, i, MODEL]
+                    change = min(max(cross / max(model, 1e-9), GAINS[0] - 1), GAINS[1] - 1)
+                    error = max(error - change * (2 * cross - change * model), 0.0)
+                error += 3 * MISSED_GREY**2 * missed[h, i]
+                counted = sums[h, i, of_pixels] + missed[h, i]
+                squares, pixels, n_covered = squares + error, pixels + counted, n_covered + sums[h, i, of_pixels]
+                mean, n_views = mean + np.sqrt(error / max(3 * counted, 1.0)), n_views + (counted > 0)
+            rms = mean / max(n_views, 1) if is_by_view else np.sqrt(squares / max(3 * pixels, 1.0))
+            out[h] += share * rms if n_covered > 0 else np.inf
+    return out

@@ -193,7 +193,7 @@ def _outline_ellipsoid(centre, axes, outline, surface, rows, view, height):
     return True
 
 
-@kernel(fastmath=True, is_inner=True)
+@kernel(fastmath=True, is_inner=True, inline="always")
 def _outline_polygon(shapes, s, p, start, stop, view, height):
     """Outline one convex polygon; False where it faces away, or no row meets it."""
     m0, m1, m2 = _rotate(view, shapes.normals[p, 0], shapes.normals[p, 1], shapes.normals[p, 2])

@@ -30,7 +30,7 @@ PIXELS, ERROR, CROSS, MODEL, COLOURED, CHROMA_ERROR, SUMS = 0, 1, 2, 3, 4, 5, 6
 
 @kernel(fastmath=True, is_inner=True)
 def _compare_row(row, n_blocks, lights, ambient, x, x_step, y, y_step, images, offset, totals):
-    """Light the blocks of a row, add their differences from the image to `totals` (SUMS * LANES,), empty them."""
+    """Light the blocks of a row and add their differences from the image to `totals` (SUMS * LANES,)."""
     for b in range(n_blocks):
         block = row[b * BLOCK : b * BLOCK + BLOCK]
         light_block(block, lights, x, x_step, y, y_step)
@@ -46,8 +46,6 @@ def _compare_row(row, n_blocks, lights, ambient, x, x_step, y, y_step, images, o
             totals[ERROR * LANES + j] += on * (r0 * r0 + r1 * r1 + r2 * r2)
             totals[CROSS * LANES + j] += r0 * m0 + r1 * m1 + r2 * m2
             totals[MODEL * LANES + j] += m0 * m0 + m1 * m1 + m2 * m2
-            block[W + j] = f4(0)
-            block[SHADE + j] = f4(0)
         x += f4(LANES) * x_step
         y += f4(LANES) * y_step
 
@@ -69,12 +67,22 @@ def _compare_chroma_row(row, n_blocks, images, offset, totals):
             totals[CHROMA_ERROR * LANES + j] += on * (r0 * r0 + r1 * r1 + r2 * r2)
 
 
+@kernel(fastmath=True, is_inner=True)
+def _empty_row(row, n_blocks):
+    for b in range(n_blocks):
+        block = row[b * BLOCK : b * BLOCK + BLOCK]
+        for j in range(LANES):
+            block[W + j] = f4(0)
+            block[SHADE + j] = f4(0)
+
+
 @kernel(fastmath=True)
 def sum_hypotheses(shapes, geometry, R, t, views, sizes, lights, ambient, images, with_chroma, out):
-    """Fill `out` (n, views, SUMS) for the hypotheses R (n, s, 3, 3), t (n, s, 3) [m].
+    """Fill `out` (n, views, SUMS) for the hypotheses R (n, s, 3, 3), t (n, s, 3) [m]; sums not asked for are zero.
 
     `shapes` is the thread's workspace; `views` (v, 18); `sizes` (v, 3): pixels a row, rows, offset in
-    `images`, which holds, view by view and row by row, blocks of 16 reds, 16 greens, 16 blues; `lights` (v, l, 8).
+    `images`, which holds, view by view and row by row, blocks of 16 reds, 16 greens, 16 blues; `lights` (v, l, 8), or
+    None: no light, and chroma alone.
     """
     row = new_row(_largest_width(sizes))
     totals = np.empty(SUMS * LANES, np.float32)
@@ -92,13 +100,15 @@ def sum_hypotheses(shapes, geometry, R, t, views, sizes, lights, ambient, images
                 if stop == start:
                     continue
                 first, last = block_range(ends, start, stop)
-                draw_row(row, shapes.outline, shapes.surface, ends, curves, start, stop, v, first)
+                draw_row(row, shapes.outline, shapes.surface, ends, curves, start, stop, v, first, lights)
                 u, n_blocks, at = first * LANES, last - first + 1, offset + 3 * LANES * (v * blocks + first)
                 x = f4(view[VIEW_K] * u + view[VIEW_K + 1] * v + view[VIEW_K + 2])
                 y = f4(view[VIEW_K + 3] * u + view[VIEW_K + 4] * v + view[VIEW_K + 5])
                 if with_chroma:
                     _compare_chroma_row(row, n_blocks, images, at, totals)
-                _compare_row(row, n_blocks, lights[i], ambient, x, x_step, y, y_step, images, at, totals)
+                if lights is not None:
+                    _compare_row(row, n_blocks, lights[i], ambient, x, x_step, y, y_step, images, at, totals)
+                _empty_row(row, n_blocks)
             for k in range(SUMS):
                 total = 0.0
                 for j in range(LANES):

@@ -144,8 +144,8 @@ def test_variables_are_set_in_the_order_given():
     evaluated = []
 
     def score(x):
-        evaluated.append(int(np.flatnonzero(x[0] != start)[0]) if (x[0] != start).any() else None)
-        return np.zeros(1)
+        evaluated.extend(int(np.flatnonzero(row != start)[0]) if (row != start).any() else None for row in x)
+        return np.zeros(len(x))
 
     start = np.zeros(3)
     minimise_by_stepping(score, start, [np.ones(3)], v_rule="v_sym", order=(2, 0, 1))

@@ -48,7 +48,7 @@ def v_literal(before: float, lowest: float, after: float, last: float) -> float:
     down, up = before - lowest, last - after
     if not 0 < down + up < np.inf:
         return 0.0
-    return float(np.clip((up - (after - lowest)) / (down + up), -1, 1))
+    return min(max((up - (after - lowest)) / (down + up), -1.0), 1.0)
 
 
 class _Line:
@@ -60,14 +60,19 @@ class _Line:
 
     def __call__(self, k: int) -> float:
         if k not in self.values:
-            x = self._x.copy()
-            x[self._variable] += k * self._step
-            self.values[k] = float(self._score(x[None])[0])
+            self.evaluate(k)
         return self.values[k]
+
+    def evaluate(self, *ks: int) -> None:
+        """Evaluate the score at several numbers of steps at once."""
+        x = np.repeat(self._x[None], len(ks), axis=0)
+        x[:, self._variable] += np.array(ks) * self._step
+        self.values.update(zip(ks, self._score(x).tolist(), strict=True))
 
 
 def _minimum_on_line(line: _Line, v_rule: VRule) -> float:
     """Return where the score is lowest, in steps from 0."""
+    line.evaluate(-1, 0, 1)
     way = 1 if line(1) < line(-1) else -1
     k = 0
     while k < _MOST_STEPS and (line(way * (k + 1)) < line(way * k) or line(way * (k + 2)) < line(way * (k + 1))):

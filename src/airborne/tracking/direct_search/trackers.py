@@ -18,8 +18,21 @@ from airborne.appearance.model import Appearance
 from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
 from airborne.cameras import Camera
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
-from airborne.rendering import FLAT, Lights, ScoreRule, Targets, colour_sums, pack_targets, render, score
+from airborne.rendering import (
+    FLAT,
+    RULES,
+    Lights,
+    ScoreRule,
+    Targets,
+    colour_sums,
+    missed_pixels,
+    pack_targets,
+    render,
+    score,
+    scores_from_sums,
+)
 from airborne.rendering.packing import shift_view
+from airborne.rendering.shapes import new_shapes
 from airborne.rendering.sums import PIXELS
 from airborne.tracking.covariance import SHIFT_SD_PX, covariance_of
 from airborne.tracking.direct_search.stepping import Objective, VRule, minimise_by_stepping
@@ -94,6 +107,7 @@ class DirectTracker:
         notices_loss: bool = True,
     ) -> None:
         self._model, self._geometry = model, surface_arrays(model)
+        self._shapes = new_shapes(self._geometry)
         self._start, self._search, self._rule, self._lights = start, search, rule, lights
         self._scale, self._predict, self._notices_loss = scale, predict, notices_loss
         self._at_origin = model.with_pose(replace(start, world_from_root=RigidTransform.identity()))
@@ -106,12 +120,12 @@ class DirectTracker:
         """Find the body in the frames, without learning from them."""
         start = self._predict(state.past, frames.time_s) if state.past else self._start
         observed, cameras = self._targets(state, start, frames)
-        if not len(observed.views) or not np.isfinite(self._objective(observed)(_vector(start)[None])[0]):
+        objective, first = self._objective(observed), _vector(start)
+        if not len(observed.views) or not np.isfinite(objective(first[None])[0]):
             return lost_estimate(frames.index, frames.time_s)
-        objective = self._objective(observed)
-        best = self._search.run(objective, _vector(start))
+        best = self._search.run(objective, first)
         value = float(objective(best[None])[0])
-        sums = colour_sums(self._geometry, observed, *self._pose_segments(best[None]), with_chroma=False)
+        sums = colour_sums(self._geometry, observed, *self._pose_segments(best[None]), rule=RULES["raw"])
         pixels = sums[0, :, PIXELS]
         status = _status(value, state.scores if self._notices_loss else ())
         if status is Status.LOST:
@@ -141,7 +155,8 @@ class DirectTracker:
         return DirectState(past, scores, appearance)
 
     def _objective(self, observed: Targets) -> Objective:
-        return lambda vectors: score(self._geometry, observed, *self._pose_segments(vectors), rule=self._rule)
+        args, options = (self._geometry, observed), {"rule": self._rule, "shapes": self._shapes}
+        return lambda vectors: score(*args, *self._pose_segments(vectors), **options)
 
     def _pose_segments(self, vectors: Array) -> tuple[Array, Array]:
         """Pose the segments by vectors (n, 6): R (n, s, 3, 3), t (n, s, 3)."""
@@ -184,21 +199,17 @@ class DirectTracker:
         posed = self._model.with_pose(pose)
         rows, columns = np.triu_indices(6)
         i, j = np.eye(6)[rows] * _PROBE, np.eye(6)[columns] * _PROBE
-        squared = self._score_squares(observed, posed, np.concatenate([i + j, i - j, j - i, -i - j])).reshape(4, -1)
-        gradient = self._gradient(observed, posed)
+        steps, back = np.unique(np.concatenate([i + j, i - j, j - i, -i - j]), axis=0, return_inverse=True)
+        args = self._geometry, observed, *_move_body(posed, steps)
+        squared = score(*args, rule=self._rule)[back.ravel()].reshape(4, -1) ** 2
+        gradient, *shifted = self._gradients(observed, cameras, posed)
         if not (np.isfinite(squared).all() and np.isfinite(gradient).all()):  # at the images' edge
             return self._embed(np.diag(np.full(6, np.inf)))
         curvature = np.zeros((6, 6))
         second = (squared[0] - squared[1] - squared[2] + squared[3]) / (4 * _PROBE[rows] * _PROBE[columns])
         curvature[rows, columns] = curvature[columns, rows] = second
-        score_covariance = np.zeros((6, 6))
-        for number, camera in enumerate(cameras):
-            sd_px = np.hypot(SHIFT_SD_PX, camera.shift_sd_px) / self._scale
-            for x0, y0 in ((sd_px, 0), (0, sd_px)):
-                views = observed.views.copy()
-                views[number] = shift_view(views[number], x0, y0)
-                change = np.nan_to_num(self._gradient(replace(observed, views=views), posed) - gradient)
-                score_covariance += np.outer(change, change)
+        changes = np.nan_to_num(shifted - gradient)
+        score_covariance = changes.T @ changes
         likelihood = pixels / (2 * max(value, 1e-3) ** 2)
         shared = max(_SHARED_NOISE_PX / self._scale**2, 1)
         covariance = covariance_of(
@@ -210,16 +221,36 @@ class DirectTracker:
         """Embed the covariance of the root (6, 6) in that of all degrees of freedom; the joints do not move."""
         return np.pad(covariance, (0, self._model.n_dofs - 6))
 
-    def _gradient(self, observed: Targets, posed: PosedBody) -> Array:
-        steps = np.diag(_PROBE)
-        squared = self._score_squares(observed, posed, np.concatenate([steps, -steps])).reshape(2, 6)
-        return (squared[0] - squared[1]) / (2 * _PROBE)
+    def _gradients(self, observed: Targets, cameras: Sequence[Camera], posed: PosedBody) -> Array:
+        """Differentiate the squared score: of the images, then of each shifted by its sd, right and down: (n, 6)."""
+        n = len(cameras)
+        shifts_px = [np.hypot(SHIFT_SD_PX, camera.shift_sd_px) / self._scale for camera in cameras]
+        shifted = [
+            shift_view(view, *shift)
+            for view, px in zip(observed.views, shifts_px, strict=True)
+            for shift in ((px, 0), (0, px))
+        ]
+        own = np.concatenate([np.arange(n), np.repeat(np.arange(n), 2)])
+        views, sizes, lights = np.vstack([observed.views, shifted]), observed.sizes[own], observed.lights[own]
+        R, t = _move_body(posed, np.concatenate([np.diag(_PROBE), -np.diag(_PROBE)]))
+        images = replace(observed, views=views, sizes=sizes, lights=lights)
+        sums = colour_sums(self._geometry, images, R, t, rule=self._rule)
+        missed = missed_pixels(self._geometry, observed, R, t, rule=self._rule)
+        gradients = []
+        for k in range(1 + 2 * n):
+            chosen = np.arange(n)
+            if k:
+                chosen[(k - 1) // 2] = n + k - 1
+            squared = scores_from_sums(sums[:, chosen], self._rule, missed).reshape(2, 6) ** 2
+            gradients.append((squared[0] - squared[1]) / (2 * _PROBE))
+        return np.array(gradients)
 
-    def _score_squares(self, observed: Targets, posed: PosedBody, deltas: Array) -> Array:
-        """Return the squared score (n,) of a body moved by deltas (n, 6)."""
-        moved = [posed.move(delta) for delta in deltas]
-        R, t = np.stack([p.R for p in moved]), np.stack([p.t for p in moved])
-        return score(self._geometry, observed, R, t, rule=self._rule) ** 2
+
+def _move_body(posed: PosedBody, deltas: Array) -> tuple[Array, Array]:
+    """Move a body by deltas (n, 6), as `PosedBody.move` does: R (n, s, 3, 3), t (n, s, 3)."""
+    R = Rotation.from_rotvec(deltas[:, 3:]).as_matrix()
+    t = (posed.t - posed.t[0]) @ np.swapaxes(R, 1, 2) + posed.t[0] + deltas[:, None, :3]
+    return R[:, None] @ posed.R, t
 
 
 def _status(value: float, scores: Sequence[float]) -> Status:

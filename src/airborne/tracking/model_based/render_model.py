@@ -83,7 +83,7 @@ class RenderModel:
 
     def draw_parts(self, posed: PosedBody, region: Region) -> NDArray[np.int16]:
         """Draw which part each pixel of a region shows: (h, w), -1 where none."""
-        maps = empty_maps(region.camera.size)
+        maps = empty_maps(region.camera.size, with_normals=False)
         surface_maps(self.shapes, self.geometry, posed.R, posed.t, region.packed_view, *maps)
         return maps.part
 
@@ -172,7 +172,7 @@ def silhouette_buffers(region: Region, posterior: Array, reduction: int, *, taps
     packed = reduce_view(region.packed_view, (reduction, rows))
     observation = Observation(plane[None], np.zeros((1, *plane.shape), np.float32), np.ones_like(plane))
     size = plane.shape[1], plane.shape[0]
-    view = ViewBuffers(packed, K, observation, empty_maps(size), Window(0, 0, *size))
+    view = ViewBuffers(packed, K, observation, empty_maps(size, with_normals=False), Window(0, 0, *size))
     return view.prepare(Comparison(taps, taps, clip))
 
 
