@@ -1,4 +1,4 @@
-"""When each frame of a file is shown: off its packets, or off the table that has them all, in a hundredth of the time."""
+"""When each frame of a file is shown: off its packets, or in a hundredth of the time off its own table."""
 
 from __future__ import annotations
 
