@@ -35,8 +35,8 @@ from airborne.trial.calibration import CalibrationTable
 from airborne.trial.cameras import CameraTable
 from airborne.trial.file import Trial, read_trial
 from airborne.trial.keys import KeyTable
-from airborne.trial.masks import MaskTable
 from airborne.trial.lights import LampTable, LightsTable
+from airborne.trial.masks import MaskTable
 from airborne.trial.players import PlayerTable
 from airborne.trial.settings import PLAYERS_METHODS, BodySettings, ParticleSettings
 from airborne.trial.start import StartTable

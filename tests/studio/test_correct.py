@@ -95,10 +95,14 @@ def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked
         wait_for_mark(page, f"{name}|{rig.names[CAMERA]}", later[0])
         turn_by_hand(page, rig.cameras[CAMERA].px_from_world(before.position[TURNED]))
         page.get_by_text(f"body turned, frame {TURNED}").first.wait_for()
+        page.get_by_role("button", name="Leave it out").click()  # the first camera, of the frame in view
+        page.get_by_text(f"{rig.names[0]} left out of frames {TURNED} to {TURNED}").first.wait_for()
         page.get_by_role("button", name="Track again around it").click()
         page.get_by_text("tracked again", exact=True).wait_for(timeout=5 * MINUTE)
     key, turned = read_toml(folder / "trial.toml")["key"]
     assert turned["frame"] == TURNED
+    assert read_toml(folder / "trial.toml")["mask"] == [{"camera": rig.names[0], "first": TURNED, "last": TURNED}]
+    assert f"{rig.names[0]}: no image at 1 of {LAST} frames" in (run / "summary.json").read_text()
     was, now = Rotation.from_quat(before.quaternion[TURNED]), Rotation.from_quat(turned["quaternion_xyzw"])
     assert np.radians(2) < (was.inv() * now).magnitude() < np.radians(40)
     assert key["frame"] == FRAME

@@ -29,7 +29,7 @@ _HELP = "Pictures, curves and scene share one frame. Bands are two standard devi
 
 async def review_page(session: Session) -> None:
     """Show a run."""
-    async with page_frame(session, "Review", "Is it right?", _HELP):
+    async with page_frame(session, "Review", "Is it right?", _HELP) as changed:
         runs = list_runs(session.folder)
         if not runs:
             ui.label("There is no run yet; see the step Track.").classes("warn")
@@ -47,7 +47,8 @@ async def review_page(session: Session) -> None:
             beside.set_options(["", *others])
             content.clear()
             with content:
-                await _show_run(session, shown, session.folder / choice.value, beside.value)
+                correction = await _show_run(session, shown, session.folder / choice.value, beside.value)
+            changed[:] = [] if correction is None else [correction.reread]
 
         with ui.element("div").classes("row-line"):
             choice = ui.select(names, label="run", value=names[0], on_change=change)
@@ -80,7 +81,8 @@ async def _blame(session: Session, shown: ShownTrial, name: str, says: ui.label)
         says.set_text(f"Frame {frame}: {text}.")
 
 
-async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: str) -> None:
+async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: str) -> Correction | None:
+    """Lay a run out; return what corrects it."""
     bodies: list[Callable[[int], None]] = []
     correction = None if holds_players(folder) else Correction(session, shown, folder)
     address = f"/curves/{quote(folder.name)}?beside={quote(beside)}&of="
@@ -120,6 +122,7 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: s
             with ui.element("div").classes("side"):
                 bodies.append(await _stage(folder))
     curves = Curves(address, frame=session.frame)
+    return correction
 
 
 async def _stage(folder: Path) -> Callable[[int], None]:
