@@ -36,6 +36,7 @@ from airborne.trial.cameras import CameraTable
 from airborne.trial.file import Trial, read_trial
 from airborne.trial.keys import KeyTable
 from airborne.trial.lights import LampTable, LightsTable
+from airborne.trial.masks import MaskTable
 from airborne.trial.players import PlayerTable
 from airborne.trial.settings import PLAYERS_METHODS, BodySettings, ParticleSettings
 from airborne.trial.start import StartTable
@@ -132,7 +133,7 @@ def test_every_command_has_a_page_of_help_with_an_example_that_exists(name):
 
 def test_help_shows_square_brackets():
     text = CliRunner().invoke(app, ["track", "--help"]).output
-    assert "what changed [[key]] tables touch" in " ".join(text.replace("│", " ").split())
+    assert "what changed [[key]] and [[mask]] tables touch" in " ".join(text.replace("│", " ").split())
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -179,6 +180,7 @@ MODELS = {
     "`[body]`": BodyTable,
     "`[start]`": StartTable,
     "`[[key]]`": KeyTable,
+    "`[[mask]]`": MaskTable,
     "`[[start.player]]`": PlayerTable,
     "`[lights]`": LightsTable,
     "`[[lights.lamp]]`": LampTable,

@@ -11,6 +11,7 @@ from airborne.run.track import track_trial
 from airborne.tracking.model_based.refined import RefinedTracker
 from airborne.trial.file import Trial, read_trial
 from airborne.trial.keys import KeyTable
+from airborne.trial.masks import MaskTable
 
 LAST = 13
 
@@ -48,12 +49,15 @@ def poses(folder) -> dict[int, tuple[str, ...]]:
     }
 
 
-def searched(monkeypatch) -> set[int]:
+def searched(monkeypatch, views: dict[int, list[bool]] | None = None) -> set[int]:
+    """The frames that are searched from now on, and which cameras had an image there."""
     frames: set[int] = set()
     search = RefinedTracker.search
 
     def noted(self, state, observed):
         frames.add(observed.index)
+        if views is not None:
+            views[observed.index] = [view is not None for view in observed.views]
         return search(self, state, observed)
 
     monkeypatch.setattr(RefinedTracker, "search", noted)
@@ -84,6 +88,22 @@ def test_a_key_past_the_last_one_touches_what_follows(cross, thrown_cross, run, 
     keys = [key(thrown_cross, 4, sd_m=0.002), key(thrown_cross, 8), key(thrown_cross, 11)]
     track_trial(cross(*keys), run, resume=True, pictures=False)
     assert found == {9, 10, 11, 12}
+
+
+def test_a_camera_is_left_out_of_the_frames_of_a_mask_which_are_tracked_again(cross, thrown_cross, run, monkeypatch):
+    views: dict[int, list[bool]] = {}
+    found = searched(monkeypatch, views)
+    keys = [key(thrown_cross, 4, sd_m=0.002), key(thrown_cross, 8), key(thrown_cross, 11)]
+    before = poses(run)
+    masked = cross(*keys).model_copy(update={"mask": [MaskTable(camera="cam2", first=5, last=6)]})
+    summary = track_trial(masked, run, resume=True, pictures=False).summary
+    assert found == {5, 6, 7}
+    assert views == {5: [True, False, True], 6: [True, False, True], 7: [True, True, True]}
+    assert "cam2: no image at 2 of 13 frames: frames 5 to 6" in summary["events"]
+    assert all(poses(run)[frame] == before[frame] for frame in (*range(5), *range(8, LAST)))
+    found.clear()
+    track_trial(cross(*keys), run, resume=True, pictures=False)
+    assert found == {5, 6, 7}
 
 
 def test_a_record_without_keys_is_that_of_a_run_without_keys(cross, tmp_path, monkeypatch):

@@ -34,6 +34,14 @@ def test_a_changed_key_touches_the_frames_between_its_neighbours(new, stretches)
     assert stretches_of(OLD, new) == stretches
 
 
+@pytest.mark.parametrize(
+    ("masked", "stretch"),
+    [((22, 25), (20, 40)), ((0, 3), (-math.inf, 20)), ((20, 41), (0, 60)), ((61, 90), (60, math.inf))],
+)
+def test_a_changed_mask_touches_the_frames_between_the_keys_around_it(masked, stretch):
+    assert stretches_of(OLD, OLD, [masked]) == [stretch]
+
+
 def test_rows_that_are_dropped_are_gone_and_the_others_stay_to_the_byte(tmp_path):
     path = write(tmp_path / "motion.csv", run_with_gap(6, lost=[2]))
     before = path.read_bytes().splitlines()

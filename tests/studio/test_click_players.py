@@ -60,14 +60,15 @@ def test_players_are_clicked_and_a_length_is_measured(rig, folder):
         wait_for_frame(page, 0)
         for name, point in LEGS.items():
             click_everywhere(user, rig, name, point)
-        page.get_by_text("Ready: player1.").wait_for()
+        page.get_by_text("Ready to be used: player1.").wait_for()
         page.get_by_label("another player's name").fill("passer")
         user.press("Add")
         page.locator(".point.here", has_text="torso").wait_for()  # the new player's list
         click_everywhere(user, rig, "torso", LEGS["torso"] + ASIDE)
-        page.get_by_text("Ready: passer, player1.").wait_for()
+        page.get_by_text("Ready to be used: passer, player1.").wait_for()
         user.press("Use these players")
         page.get_by_text("the first poses are written into the trial").wait_for()
+        page.get_by_text("The trial's start, frame 0: passer, player1.").wait_for()  # also where nobody was clicked
         page.goto(address.split("?")[0] + "ruler")
         wait_for_frame(page, 0)
         click_everywhere(user, rig, "from", LEGS["ankle_left"])

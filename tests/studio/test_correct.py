@@ -37,6 +37,14 @@ def wait_for_mark(page, mark, u):
     page.wait_for_function(script, arg=[mark, float(u)])
 
 
+def times_smaller(page):
+    """How many times smaller than its video each picture is."""
+    return page.evaluate("""() => {
+        const { shown, panes } = document.querySelector("canvas.view").view;
+        return shown.pictures.map((picture, pane) => panes[pane].width / picture.width);
+    }""")
+
+
 def turn_by_hand(page, middle_px):
     """Drag the end of the body that is farthest from its middle, with Shift."""
     script = """([pane, u0, v0]) => {
@@ -65,6 +73,12 @@ def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked
     with open_studio(folder / "trial.toml") as address, open_page(address.replace("/?", "/review?")) as page:
         wait_for_frame(page, 0)
         go_home(page)
+        assert min(times_smaller(page)) >= 2  # pictures are no larger than they are drawn
+        page.mouse.move(*at_pixel(page, 0, 200, 160))
+        page.mouse.wheel(0, -1200)
+        page.wait_for_function("document.querySelector('canvas.view').view.shown.shrinks[0] === 1")
+        assert times_smaller(page)[0] == 1
+        page.locator("canvas.view").press("0")
         page.get_by_role("switch", name="Correct").click()
         for frame in range(1, FRAME + 1):
             page.locator("canvas.view").press(".")
@@ -81,10 +95,14 @@ def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked
         wait_for_mark(page, f"{name}|{rig.names[CAMERA]}", later[0])
         turn_by_hand(page, rig.cameras[CAMERA].px_from_world(before.position[TURNED]))
         page.get_by_text(f"body turned, frame {TURNED}").first.wait_for()
+        page.get_by_role("button", name="Leave it out").click()  # the first camera, of the frame in view
+        page.get_by_text(f"{rig.names[0]} left out of frames {TURNED} to {TURNED}").first.wait_for()
         page.get_by_role("button", name="Track again around it").click()
         page.get_by_text("tracked again", exact=True).wait_for(timeout=5 * MINUTE)
     key, turned = read_toml(folder / "trial.toml")["key"]
     assert turned["frame"] == TURNED
+    assert read_toml(folder / "trial.toml")["mask"] == [{"camera": rig.names[0], "first": TURNED, "last": TURNED}]
+    assert f"{rig.names[0]}: no image at 1 of {LAST} frames" in (run / "summary.json").read_text()
     was, now = Rotation.from_quat(before.quaternion[TURNED]), Rotation.from_quat(turned["quaternion_xyzw"])
     assert np.radians(2) < (was.inv() * now).magnitude() < np.radians(40)
     assert key["frame"] == FRAME

@@ -12,7 +12,7 @@ from airborne.cameras import Rig, camera_looking_at
 from airborne.errors import ResultError
 from airborne.motion import MotionWriter, read_players
 from airborne.studio import curve_data
-from airborne.studio.curve_data import curve_kinds, describe_distance, run_curves
+from airborne.studio.curve_data import curve_kinds, describe_distance, run_curves, run_momenta
 from airborne.studio.outlines import outline_items, player_colours, run_overlay
 from airborne.studio.runs import count_rows
 from airborne.studio.stage import part_stl
@@ -123,6 +123,15 @@ def test_curves_show_the_columns_of_a_run_s_tables_and_of_one_joint(cross, tmp_p
     )
     (tmp_path / "tables" / "joint_angles.csv").write_text(f"{header}\n{rows}")
     assert run_curves(tmp_path, "joint:knee")["series"][0]["value"] == [20, 21, 22, 23]
+    assert run_momenta(tmp_path) is None
+    header = [f"com_{axis}_m" for axis in "xyz"] + [f"L_{axis}_kg_m2_s" for axis in "xyz"]
+    header = ",".join(["frame", *header, *(f"{name}_sd" for name in header)])
+    (tmp_path / "tables" / "flight.csv").write_text(f"{header}\n1,0,0,1,30,0,40,,,,1,1,1\n3,0,0,1,,,,,,,,,\n")
+    momenta = run_momenta(tmp_path)
+    com_m, L, sd = momenta.at(1)
+    assert (com_m.tolist(), L.tolist(), sd, momenta.greatest) == ([0, 0, 1], [30, 0, 40], 1.0, 50.0)
+    assert momenta.at(0) is None and momenta.at(3) is None and momenta.at(99) is None
+    (tmp_path / "tables" / "flight.csv").unlink()
     with pytest.raises(ResultError, match="no curve is called height; reload this page"):
         run_curves(tmp_path, "height")
     with pytest.raises(ResultError, match=r"tables/flight.csv cannot be read; track again"):

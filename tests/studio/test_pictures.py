@@ -17,11 +17,11 @@ def test_the_store_forgets_what_was_asked_for_longest_ago():
     store = _Store(most_bytes=100)
     source = VideoSource("a", "unused")
     for number in range(4):
-        store.add((source, number), bytes(40))
-        store.find((source, 0))
-    assert [store.find((source, number))[0] for number in range(4)] == [True, False, False, True]
-    store.add((source, 0), None)  # damaged: known, and no bytes
-    assert store.find((source, 0)) == (True, None)
+        store.add((source, number, 1), bytes(40))
+        store.find((source, 0, 1))
+    assert [store.find((source, number, 1))[0] for number in range(4)] == [True, False, False, True]
+    store.add((source, 0, 1), None)  # damaged: known, and no bytes
+    assert store.find((source, 0, 1)) == (True, None)
 
 
 @pytest.fixture
@@ -36,9 +36,17 @@ def test_pictures_of_any_number_come_as_jpeg(source, tmp_path):
         assert image[5, 5].tolist() == pytest.approx([2 * number] * 3, abs=2)
 
 
+def test_a_picture_may_be_smaller_and_shows_the_same(source, tmp_path):
+    pictures = Pictures(tmp_path)
+    for shrink in (1, 2, 4):
+        image = cv2.imdecode(np.frombuffer(pictures.jpeg(source, 7, shrink), np.uint8), cv2.IMREAD_COLOR)
+        assert image.shape == (48 // shrink, 64 // shrink, 3)
+        assert image[5, 5].tolist() == pytest.approx([14] * 3, abs=2)
+
+
 def test_a_picture_that_nobody_waits_for_is_not_decoded(source, tmp_path):
     with pytest.raises(VideoError, match="nobody waits for image 20"):
-        Pictures(tmp_path).jpeg(source, 20, lambda: False)
+        Pictures(tmp_path).jpeg(source, 20, is_wanted=lambda: False)
 
 
 def test_a_trial_is_shown_with_its_sizes_and_clock(source, tmp_path):

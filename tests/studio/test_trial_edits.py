@@ -4,7 +4,7 @@ import pytest
 
 from airborne.errors import TrialError
 from airborne.io.text import parse_toml
-from airborne.studio.trial_edits import with_cameras, with_clicks, with_key, with_table
+from airborne.studio.trial_edits import with_cameras, with_clicks, with_key, with_mask, with_table, without_mask
 
 TEXT = """# filmed on a Sunday
 name = "throw"
@@ -72,6 +72,19 @@ def test_a_key_that_says_more_keeps_it():
 def test_a_key_whose_clicks_are_in_a_table_of_their_own_is_left_alone():
     with pytest.raises(TrialError, match=r"has its clicks in clicks.csv; correct them there"):
         with_clicks(f'{TEXT}\n[[key]]\nframe = 9\npoints_px = "clicks.csv"\n', 9, "left", {"wrist_left": (1, 2)})
+
+
+def test_masks_are_added_and_taken_away_beside_what_stands_there():
+    text = with_mask(with_mask(TEXT, "left", 3, 9), "right", 5, 5)
+    assert parse_toml(text)["mask"] == [
+        {"camera": "left", "first": 3, "last": 9},
+        {"camera": "right", "first": 5, "last": 5},
+    ]
+    text = without_mask(text, 0)
+    assert parse_toml(text)["mask"] == [{"camera": "right", "first": 5, "last": 5}]
+    assert parse_toml(without_mask(text, 0)) == parse_toml(TEXT)
+    with pytest.raises(TrialError, match="the trial has 1 masks"):
+        without_mask(text, 1)
 
 
 @pytest.mark.parametrize(

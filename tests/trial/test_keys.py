@@ -26,6 +26,13 @@ def trial(*keys, **tables) -> Trial:
     return Trial(**{**HEAD, "key": list(keys), **tables})
 
 
+def test_a_mask_names_a_camera_of_the_trial_and_frames_in_order():
+    with pytest.raises(AirborneError, match=r"\[\[mask\]\]: no camera above; there are:"):
+        trial(mask=[{"camera": "above", "first": 3, "last": 5}])
+    with pytest.raises(AirborneError, match="last = 3 lies before first = 5; exchange them"):
+        trial(mask=[{"camera": THREE[0].name, "first": 5, "last": 3}])
+
+
 def evidence(**key):
     return read_keys(trial({"frame": 9, **key}), MODEL, RIG, ())[9]
 

@@ -49,7 +49,10 @@ def track_command(
     output: Out,
     *,
     resume: Annotated[
-        bool, typer.Option(help="Resume a run that was stopped, or track again what changed [[key]] tables touch.")
+        bool,
+        typer.Option(
+            help="Resume a run that was stopped, or track again what changed [[key]] and [[mask]] tables touch."
+        ),
     ] = False,
     overwrite: Annotated[bool, typer.Option(help="Replace the run that the folder holds.")] = False,
     first_frame: Annotated[

@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -54,8 +54,9 @@ def prepare_folder(
     """Prepare a run's folder; return whether it holds rows of its `table` from which to resume.
 
     Whoever calls it is the folder's `sole_writer`. `overwrite` removes the run that the folder holds, finished or not.
-    A run of other keys alone loses the rows that these touch, which are then tracked again. Raises ResultError for a
-    folder that holds something else, a run with neither `resume` nor `overwrite`, or a run of other inputs.
+    A run of one body that differs in keys and masks alone loses the rows that these touch, which are then tracked
+    again. Raises ResultError for a folder that holds something else, a run with neither `resume` nor `overwrite`, or a
+    run of other inputs.
     """
     rows, record = folder / table, folder / RUN_RECORD
     foreign = {path.name for path in folder.iterdir()} - {LOCK, f"{RUN_RECORD}.part", *_BEFORE_A_RUN}
@@ -73,10 +74,11 @@ def prepare_folder(
         write_json(record, identity)
         return False
     first = {frame: digest for frame, digest in identity["keys"].items() if digest == START}
-    recorded = {"keys": first, **read_record(record)}  # older records have no keys
+    recorded = {"keys": first, "masks": [], **read_record(record)}  # older records have neither
     changed = [name for name in identity if recorded.get(name) != identity[name]]
-    if changed == ["keys"]:
-        again = stretches_of(recorded["keys"], identity["keys"])
+    if table == MOTION and changed and set(changed) <= {"keys", "masks"}:
+        masks = [mask for mask in (*recorded["masks"], *identity["masks"]) if _is_changed(mask, recorded, identity)]
+        again = stretches_of(recorded["keys"], identity["keys"], [(mask["first"], mask["last"]) for mask in masks])
         drop_rows(rows, lambda frame: any(before < frame < after for before, after in again))
         write_json(record, identity)
     elif changed:
@@ -84,19 +86,26 @@ def prepare_folder(
     return True
 
 
-def stretches_of(old: Mapping[str, str], new: Mapping[str, str]) -> list[tuple[float, float]]:
-    """Return what changed keys touch: between which frames, both outside, is tracked again.
+def _is_changed(mask: dict[str, Any], *identities: Mapping[str, Any]) -> bool:
+    return not all(mask in identity["masks"] for identity in identities)
 
-    Keys are digests by their frames, the start's among them: those that stay the same bound the stretches.
+
+def stretches_of(
+    old: Mapping[str, str], new: Mapping[str, str], masked: Sequence[tuple[int, int]] = ()
+) -> list[tuple[float, float]]:
+    """Return what changed keys, and changed masks, touch: between which frames, both outside, is tracked again.
+
+    Keys are digests by their frames, the start's among them: those that stay the same bound the stretches. Masks are
+    the first and last frame of each that changed.
     """
     same = [int(frame) for frame in new if old.get(frame) == new[frame]]
-    moved = [int(frame) for frame in {*old, *new} if old.get(frame) != new.get(frame)]
+    moved = [(int(frame), int(frame)) for frame in {*old, *new} if old.get(frame) != new.get(frame)]
     return [
         (
-            max((each for each in same if each < frame), default=-math.inf),
-            min((each for each in same if each > frame), default=math.inf),
+            max((each for each in same if each < first), default=-math.inf),
+            min((each for each in same if each > last), default=math.inf),
         )
-        for frame in moved
+        for first, last in (*moved, *masked)
     ]
 
 
@@ -132,6 +141,7 @@ def run_identity(trial: Trial, *, live: bool = False) -> dict[str, Any]:
     settings = {
         "inputs": input_hashes(trial, live=live),
         "keys": _key_digests(trial),
+        "masks": [mask.model_dump() for mask in trial.mask],
         "settings": trial.track.model_dump(),
         "version": __version__,
     }

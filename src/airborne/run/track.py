@@ -73,6 +73,8 @@ def track_trial(
         raise ResultError("a live run cannot be resumed: its frames are gone; track into a new folder")
     if live and not trial.has_players:
         raise ResultError('--live is for players; this trial has no body preset = "legs"')
+    if live and trial.mask:
+        raise ResultError("a live run does not know its frames beforehand; remove [[mask]]")
     if live and first_frame:
         raise ResultError("a live run has no first frame to come back to; leave --live or --first-frame out")
     if overwrite and resume:

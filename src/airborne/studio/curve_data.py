@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +94,34 @@ def _read_series(run: Path, what: str, index: NDArray[np.int64]) -> tuple[list[s
     except (OSError, ValueError, IndexError, StopIteration):
         raise ResultError(f"{run.name}/{file} cannot be read; track again") from None
     return list(columns.values()), unit, found[:, : len(columns)], found[:, len(columns) :]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Momenta:
+    """The angular momentum about the centre of mass in each frame of a run."""
+
+    index: NDArray[np.int64]  # (n,) frames, ascending
+    com_m: Array  # (n, 3) centres of mass, NaN where not known
+    L: Array  # (n, 3) [kg m²/s]
+    L_sd: Array  # (n, 3)
+    greatest: float  # of all [kg m²/s]
+
+    def at(self, frame: int) -> tuple[Array, Array, float] | None:
+        """Return the centre of mass (3,), the momentum (3,) and its size's standard deviation; None where not known."""
+        row = int(np.searchsorted(self.index, frame))
+        if row >= len(self.index) or self.index[row] != frame or not np.isfinite([self.com_m[row], self.L[row]]).all():
+            return None
+        L, sd = self.L[row], np.nan_to_num(self.L_sd[row])
+        return self.com_m[row], L, float(np.linalg.norm(L * sd) / max(float(np.linalg.norm(L)), 1e-9))
+
+
+def run_momenta(run: Path) -> Momenta | None:
+    """Return the angular momenta of a run of one body; None where it has no table of them. Raises ResultError."""
+    if not (run / FLIGHT).is_file():
+        return None
+    index = run_rows(run).index
+    (_, _, com_m, _), (_, _, L, L_sd) = (_read_series(run, what, index) for what in ("com", "momentum"))
+    return Momenta(index, com_m, L, L_sd, float(np.nanmax(np.linalg.norm(L, axis=1), initial=1e-9)))
 
 
 def describe_distance(run: Path, other: Path) -> str:

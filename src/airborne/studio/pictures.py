@@ -10,7 +10,7 @@ from pathlib import Path
 from threading import Lock
 
 from airborne.errors import VideoError
-from airborne.export.pictures import encode_jpeg
+from airborne.export.pictures import encode_jpeg, thumbnail
 from airborne.studio.image_lists import read_or_list
 from airborne.trial.cameras import CameraTable
 from airborne.types import Image
@@ -21,7 +21,9 @@ _MOST_BYTES = 40_000_000  # of JPEG that are kept for other windows; the browser
 _MOST_OPEN = 32  # files
 _INDEXING = 2  # files at once: four threads take three times the CPU time of one, waiting for the interpreter
 
-Key = tuple[VideoSource, int]
+SHRINKS = (1, 2, 4)  # times smaller than the video, as pictures are asked for
+
+Key = tuple[VideoSource, int, int]  # a video, its image's number, and how many times smaller
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,16 +114,18 @@ class Pictures:
         """Return when each image of a file is shown. Raises VideoError."""
         return self._video(source).index()
 
-    def jpeg(self, source: VideoSource, number: int, is_wanted: Callable[[], bool] = lambda: True) -> bytes | None:
-        """Return an image of a file, None where it is damaged.
+    def jpeg(
+        self, source: VideoSource, number: int, shrink: int = 1, is_wanted: Callable[[], bool] = lambda: True
+    ) -> bytes | None:
+        """Return an image of a file, one of `SHRINKS` times smaller; None where it is damaged.
 
         Raises VideoError for a number that is not there, and where it is no longer wanted before it is decoded.
         """
-        is_there, jpeg = self._store.find((source, number))
+        is_there, jpeg = self._store.find((source, number, shrink))
         if not is_there:
             image = self._video(source).decode(number, is_wanted)
-            jpeg = None if image is None else encode_jpeg(image)
-            self._store.add((source, number), jpeg)
+            jpeg = None if image is None else _encode(image, shrink)
+            self._store.add((source, number, shrink), jpeg)
         return jpeg
 
     def image(self, source: VideoSource, number: int) -> Image | None:
@@ -143,3 +147,7 @@ class Pictures:
         if oldest is not None:
             oldest.close()
         return video
+
+
+def _encode(image: Image, shrink: int) -> bytes:
+    return encode_jpeg(image) if shrink == 1 else thumbnail(image, image.shape[1] // shrink)

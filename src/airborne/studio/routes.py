@@ -21,6 +21,7 @@ from airborne.studio.calibrating import find_picture
 from airborne.studio.curve_data import run_curves
 from airborne.studio.guard import FILE_POLICY
 from airborne.studio.outlines import BESIDE_COLOUR, run_overlay
+from airborne.studio.pictures import SHRINKS
 from airborne.studio.project import list_runs, list_videos
 from airborne.studio.runs import run_body
 from airborne.studio.session import Session
@@ -41,14 +42,14 @@ def add_routes(app: FastAPI, session: Session) -> None:
     """Add the routes of a session; every name in an address is one of a list, none is a path."""
 
     @app.get("/image/{camera}/{frame}")
-    async def image(request: Request, camera: int, frame: int) -> Response:
+    async def image(request: Request, camera: int, frame: int, shrink: int = 1) -> Response:
         async with _waiting(request) as is_wanted:
-            return await _answer(lambda: _jpeg(session, camera, frame, is_wanted))
+            return await _answer(lambda: _jpeg(session, camera, frame, shrink=shrink, is_wanted=is_wanted))
 
     @app.get("/picture/{camera}/{number}")
-    async def own_picture(request: Request, camera: int, number: int) -> Response:
+    async def own_picture(request: Request, camera: int, number: int, shrink: int = 1) -> Response:
         async with _waiting(request) as is_wanted:
-            return await _answer(lambda: _picture(session, camera, number, is_wanted))
+            return await _answer(lambda: _picture(session, camera, number, shrink=shrink, is_wanted=is_wanted))
 
     @app.get("/thumbnail/{name}")
     async def first_picture(name: str) -> Response:
@@ -148,21 +149,22 @@ def _mesh(model: BodyModel, part: int) -> Response:
     return Response(part_stl(model, part), media_type="model/stl", headers={"cache-control": "no-store"})
 
 
-def _jpeg(session: Session, camera: int, frame: int, is_wanted: Callable[[], bool]) -> Response:
+def _jpeg(session: Session, camera: int, frame: int, *, shrink: int, is_wanted: Callable[[], bool]) -> Response:
     shown = session.shown()
     if not (0 <= camera < len(shown.sources) and 0 <= frame < len(shown.clock)):
         return Response(status_code=404)
-    answer = _picture(session, camera, int(shown.clock.images[frame, camera]), is_wanted)
+    number = int(shown.clock.images[frame, camera])
+    answer = _picture(session, camera, number, shrink=shrink, is_wanted=is_wanted)
     answer.headers["x-time-s"] = repr(float(shown.clock.times_s[frame]))
     return answer
 
 
-def _picture(session: Session, camera: int, number: int, is_wanted: Callable[[], bool]) -> Response:
+def _picture(session: Session, camera: int, number: int, *, shrink: int, is_wanted: Callable[[], bool]) -> Response:
     """Return a picture of a camera by its number in the file."""
     shown = session.shown()
-    if not (0 <= camera < len(shown.sources) and number < len(shown.indexes[camera])):
+    if not (0 <= camera < len(shown.sources) and number < len(shown.indexes[camera]) and shrink in SHRINKS):
         return Response(status_code=404)
-    jpeg = None if number < 0 else session.pictures.jpeg(shown.sources[camera], number, is_wanted)
+    jpeg = None if number < 0 else session.pictures.jpeg(shown.sources[camera], number, shrink, is_wanted)
     if jpeg is None:
         return Response(status_code=204)  # this camera has no picture then
     return Response(jpeg, media_type="image/jpeg", headers=_KEEP)

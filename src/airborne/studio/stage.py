@@ -25,6 +25,7 @@ FROM = np.array([0.7, -0.9, 0.55])  # the side and height from which the scene i
 _ALL_IN_VIEW = 1.4  # times a sphere's radius: from so far, along `FROM`, three.js's 75 degrees hold it with a margin
 _MOST_LINES = 500  # of a path: each is an object of the scene
 _MOVE_EVERY_S = 0.05  # while handles are dragged: the outlines of three views take half of it
+_SHAFT_M, _HEAD_M = 0.012, 0.12  # an arrow's thickness, and the length of its head
 _FRUSTUM_SHARE = 0.12  # of the distance between camera and middle
 
 
@@ -80,6 +81,25 @@ class BodyOnStage:
             if posed is not None:
                 x, y, z = map(float, posed.t[k])
                 group.move(x, y, z).rotate_R(posed.R[k].tolist())
+
+
+class Arrow:
+    """An arrow in a scene, from any place along any vector."""
+
+    def __init__(self, scene: Scene, colour: str) -> None:
+        """Draw it, hidden."""
+        with scene, scene.group().visible(False) as self._group:  # along y, a metre long
+            scene.cylinder(_SHAFT_M, _SHAFT_M, 1 - _HEAD_M).move(y=(1 - _HEAD_M) / 2).material(colour)
+            scene.cylinder(0, 3 * _SHAFT_M, _HEAD_M).move(y=1 - _HEAD_M / 2).material(colour)
+
+    def show(self, start_m: Array, along_m: Array) -> None:
+        """Show it from a place (3,) [m] along a vector (3,) [m]; a vector without a direction hides it."""
+        length = float(np.linalg.norm(along_m))
+        self._group.visible(bool(length > _SHAFT_M))
+        if length > _SHAFT_M:
+            turn = Rotation.align_vectors(along_m[None], [[0.0, 1.0, 0.0]])[0]
+            x, y, z = map(float, start_m)
+            self._group.move(x, y, z).rotate_R(turn.as_matrix().tolist()).scale(1, length, 1)
 
 
 class Gizmo(Object3D, component="gizmo.js"):

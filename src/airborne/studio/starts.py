@@ -12,10 +12,12 @@ from airborne.body import BodyModel, Pose
 from airborne.body.chain import angles_of
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, TrialError
+from airborne.run.players_tracker import player_starts
 from airborne.studio.clicks import Clicked, read_clicked
 from airborne.studio.session import Session
 from airborne.studio.stage import middle_of_view
 from airborne.tracking.first_pose import fit_to_pixels, pose_by_hand
+from airborne.tracking.players import PlayerStart
 
 POSE_COLOUR = "#f0e442"
 _BY_HAND = ("position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg")
@@ -49,6 +51,15 @@ def player_file(player: str, frame: int) -> str:
 def read_player(folder: Path, player: str, frame: int) -> Clicked:
     """Read a player's points clicked in a frame. Raises CalibrationError."""
     return read_clicked(folder / player_file(player, frame))
+
+
+def read_players(session: Session, rig: Rig) -> tuple[int, dict[str, PlayerStart]]:
+    """Return the frame and the players of the start that the trial has; nobody where it has none."""
+    try:
+        trial = session.project().trial()
+        return trial.start.frame, {start.name: start for start in player_starts(trial, rig)}
+    except AirborneError:
+        return 0, {}
 
 
 def read_pose(session: Session, model: BodyModel) -> tuple[int, Pose] | None:

@@ -77,6 +77,27 @@ def with_key(text: str, frame: int, values: Mapping[str, Any]) -> str:
     return tomlkit.dumps(document)
 
 
+def with_mask(text: str, camera: str, first: int, last: int) -> str:
+    """Return a trial's text with a camera left out from the first to the last frame."""
+    document = _parse(text)
+    mask = tomlkit.table()
+    mask.update({"camera": camera, "first": first, "last": last})
+    document.setdefault("mask", tomlkit.aot()).append(mask)
+    return tomlkit.dumps(document)
+
+
+def without_mask(text: str, number: int) -> str:
+    """Return a trial's text without one of its masks, counted from 0."""
+    document = _parse(text)
+    masks = document.get("mask", [])
+    if not 0 <= number < len(masks):
+        raise TrialError(f"the trial has {len(masks)} masks; reload this page")
+    del masks[number]
+    if not masks:
+        del document["mask"]
+    return tomlkit.dumps(document)
+
+
 def with_players(text: str, frame: int, start_of: Mapping[str, Mapping[str, Any]]) -> str:
     """Return a trial's text whose start is these players: name -> its `points_px` or `joints_m`."""
     document = _parse(text)

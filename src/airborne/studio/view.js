@@ -7,6 +7,7 @@ const AHEAD = 4; // frames fetched in the direction of travel
 const GRAB_PX = 9; // on the screen: how near a mark must be to be grabbed
 const STILL_PX = 3; // a pointer that moves less has clicked
 const GAP = 4; // between pictures
+const SHRINKS = [4, 2]; // times smaller than the video, as the server has pictures
 
 export default {
   template: `<canvas class="view" tabindex="0" role="img" :aria-label="label"></canvas>`,
@@ -71,9 +72,15 @@ export default {
     ...drawing,
     // frames
     refresh() { this.cache.clear(); this.go(this.wanted, true); },
+    sharpen() { // what is drawn larger than it was fetched is fetched anew
+      if (this.shown && this.shrinks().some((n, i) => n < this.shown.shrinks[i]) && this.sharpened !== this.shown) {
+        this.sharpened = this.shown;
+        this.refresh();
+      }
+    },
     show(frame) { this.go(frame); },
-    async fetchPane(pane, frame, signal) {
-      const answer = await fetch(pane.url.replace("{frame}", frame), { signal });
+    async fetchPane(pane, frame, shrink, signal) {
+      const answer = await fetch(`${pane.url.replace("{frame}", frame)}&shrink=${shrink}`, { signal });
       const picture = answer.status === 200 ? await createImageBitmap(await answer.blob()) : null;
       return { picture, time_s: answer.headers.get("x-time-s") };
     },
@@ -82,13 +89,17 @@ export default {
       const answer = await fetch(this.overlay.replace("{frame}", frame), { cache: "no-store", signal });
       return answer.ok ? answer.json() : { items: [] };
     },
+    shrinks() { // by how many times each picture may be smaller and still be as large as it is drawn; whole for the loupe
+      const ratio = window.devicePixelRatio || 1;
+      return this.layout().map(({ w, scale }) => this.picking ? 1 : SHRINKS.find((n) => w === 0 || n * scale * ratio <= 1) || 1);
+    },
     load(frame) {
       if (!this.cache.has(frame)) {
-        const stop = new AbortController(), { signal } = stop;
-        const parts = [this.fetchOverlay(frame, signal), ...this.panes.map((pane) => this.fetchPane(pane, frame, signal))];
+        const stop = new AbortController(), { signal } = stop, shrinks = this.shrinks();
+        const parts = [this.fetchOverlay(frame, signal), ...this.panes.map((pane, i) => this.fetchPane(pane, frame, shrinks[i], signal))];
         const all = Promise.all(parts).then(([overlay, ...answers]) => {
           const time_s = answers[0]?.time_s ?? null; // the same for all panes
-          return { frame, overlay, pictures: answers.map((each) => each.picture), time_s: time_s === null ? null : Number(time_s) };
+          return { frame, overlay, shrinks, pictures: answers.map((each) => each.picture), time_s: time_s === null ? null : Number(time_s) };
         });
         this.cache.set(frame, all);
         this.underway.set(frame, stop);

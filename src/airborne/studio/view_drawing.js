@@ -13,6 +13,7 @@ export default {
     pen.fillStyle = "#16191d";
     pen.fillRect(0, 0, box.width, box.height);
     this.layout().forEach((place, i) => place.w && this.drawPane(pen, place, i));
+    this.sharpen();
   },
   drawPane(pen, place, i) {
     pen.save();

@@ -21,6 +21,7 @@ from airborne.trial.calibration import CalibrationTable
 from airborne.trial.cameras import CameraTable
 from airborne.trial.keys import KeyTable
 from airborne.trial.lights import LightsTable
+from airborne.trial.masks import MaskTable
 from airborne.trial.session import join_session
 from airborne.trial.settings import (
     BODY_METHODS,
@@ -46,6 +47,7 @@ class Trial(SettingsTable):
     body: BodyTable
     start: StartTable = Field(default_factory=lambda: StartTable(find=True))
     key: list[KeyTable] = []  # what is known of the pose at later frames
+    mask: list[MaskTable] = []  # cameras that are left out of some frames
     lights: LightsTable | None = None
     track: TrackSettings = Field(default_factory=BodySettings, validate_default=True)
 
@@ -99,14 +101,14 @@ class Trial(SettingsTable):
         return self
 
     @model_validator(mode="after")
-    def _check_clicks(self) -> Trial:
+    def _check_cameras(self) -> Trial:
         names = [camera.name for camera in self.camera]
         tables = [forms.points_px for forms in (self.start, *self.start.player, *self.key)]
         inline = [table for table in tables if isinstance(table, dict)]
         clicked = {camera for table in inline for by_camera in table.values() for camera in by_camera}
-        unknown = sorted(clicked - set(names))
-        if unknown:
-            raise ValueError(f"points_px: no camera {', '.join(unknown)}; there are: {', '.join(names)}")
+        for table, cameras in (("points_px", clicked), ("[[mask]]", {mask.camera for mask in self.mask})):
+            if unknown := sorted(cameras - set(names)):
+                raise ValueError(f"{table}: no camera {', '.join(unknown)}; there are: {', '.join(names)}")
         return self
 
     @model_validator(mode="after")
@@ -285,4 +287,6 @@ def _select_cameras(path: Path, trial: Trial, cameras: Sequence[str]) -> Trial:
         raise TrialError(f"--cameras names {', '.join(twice)} twice; name each camera once")
     mend = [name for name in trial.calibration.mend if name in cameras]
     calibration = trial.calibration.model_copy(update={"mend": mend})
-    return trial.model_copy(update={"camera": [by_name[name] for name in cameras], "calibration": calibration})
+    masks = [mask for mask in trial.mask if mask.camera in cameras]
+    chosen = {"camera": [by_name[name] for name in cameras], "mask": masks, "calibration": calibration}
+    return trial.model_copy(update=chosen)

@@ -36,11 +36,16 @@ class VideoSource:
     offset_s: Fraction | float = 0  # added to this camera's times [s]
     drift_ppm: Fraction | float = 0  # by how much its clock is slow, in millionths
     exposure_s: float = 0.0  # of each image, about its time [s]
+    left_out: tuple[tuple[int, int], ...] = ()  # frames of the trial without it: first and last of each stretch
 
     def __post_init__(self) -> None:
         if self.fields not in get_args(FieldOrderOption):
             allowed = ", ".join(get_args(FieldOrderOption))
             raise VideoError(f"{self.name}: fields = '{self.fields}' is unknown; use one of: {allowed}")
+
+    def is_left_out(self, frame: int) -> bool:
+        """Whether the camera is not used at a frame of the trial."""
+        return any(first <= frame <= last for first, last in self.left_out)
 
     def trial_time(self, time_s: Fraction) -> Fraction:
         """Convert a time since the file's first image to the trial's clock [s].

@@ -29,7 +29,7 @@ class Recording:
 
     The first camera is the clock: index and time are those of its frames (or fields), continued at its rate over
     images that it lost and past its end, until every camera has ended. Another camera gives the image nearest in
-    time, if within half of the clock's period, else None; its `View` states the delay.
+    time, if within half of the clock's period, else None, as where it is left out; its `View` states the delay.
     """
 
     sources: tuple[VideoSource, ...]  # in the rig's order
@@ -78,7 +78,8 @@ class Recording:
             for index, time_s in enumerate(times):
                 if self.stop is not None and index >= self.stop:
                     return
-                images = [cursor.image_at(time_s) for cursor in cursors]
+                pairs = zip(cursors, self.sources, strict=True)
+                images = [None if source.is_left_out(index) else cursor.image_at(time_s) for cursor, source in pairs]
                 if index >= self.start and (index - self.start) % self.every == 0:
                     views = parallel(partial(self._view, time_s=time_s), images, self.facts, undistortions, conversions)
                     pairs = zip(views, self.sources, strict=True)

@@ -29,8 +29,10 @@ from airborne.video.decoding import (
     rgb_from_decoded,
 )
 from airborne.video.fields import fill_rows
+from airborne.video.sample_table import frames_of_packets, frames_of_table
 
 _KEPT_BYTES, _FEWEST_KEPT = 32_000_000, 2  # of a file's decoded frames, to step back: ten of 1080p
+_MOST_IN_64_BITS = 2**61  # of which sums and differences fit too
 _MOST_FRAMES = 5_000_000  # of a trial: 28 hours at 50 Hz
 
 
@@ -60,22 +62,31 @@ class ImageIndex:
 
 
 def index_images(source: VideoSource) -> ImageIndex:
-    """List a file's images by its packets; a file whose packets have no times is decoded once. Raises VideoError."""
+    """List a file's images by its own table of them, else by its packets; where these have no times, decode it once.
+
+    Raises VideoError.
+    """
     facts = inspect(source)
     with ExitStack() as stack:
         container, stream = _open(source, stack)
-        tick_s = stream.time_base or Fraction(1, 1_000_000)
-        shown = (packet for packet in container.demux(stream) if packet.size and not packet.is_discard)
-        stamps = [(packet.pts, packet.is_keyframe) for packet in shown]
-    timed = [(stamp, is_key) for stamp, is_key in stamps if stamp is not None]
-    if len(timed) == len(stamps):
-        keys = np.array(sorted({stamp for stamp, is_key in timed if is_key}), np.int64)
-        ticks = np.array(sorted({stamp for stamp, _ in timed}), np.int64)
+        tick_s, frames = stream.time_base or Fraction(1, 1_000_000), frames_of_table(source.path, container, stream)
+    if frames is None:
+        with ExitStack() as stack:
+            container, stream = _open(source, stack)
+            frames = frames_of_packets(container.demux(stream))
+    if frames is not None:
+        ticks, keys = _ascending(frames[:, 0]), _ascending(frames[frames[:, 1] > 0, 0])
         return ImageIndex(facts, ticks - ticks[0], keys - ticks[0], int(ticks[0]), tick_s)
     with ExitStack() as stack:
         container, stream = _open(source, stack)
         ticks = np.array([n for n, _ in intact_frames(container, stream, size=facts.size_before_rotation)], np.int64)
     return ImageIndex(facts, ticks, np.zeros(0, np.int64), 0, tick_s)
+
+
+def _ascending(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return each stamp once, in order: `np.unique` takes five times as long."""
+    stamps = np.sort(stamps)
+    return stamps[np.append(True, np.diff(stamps) > 0)[: len(stamps)]]
 
 
 class TrialClock(NamedTuple):
@@ -97,18 +108,18 @@ def match_images(sources: Sequence[VideoSource], indexes: Sequence[ImageIndex]) 
     period_s = 1 / indexes[0].facts.image_rate
     per_unit = [pace / unit for pace, (_, unit) in zip(paces, images, strict=True)]
     scale = 2 * lcm(*(each.denominator for each in (period_s, *starts, *per_unit)))
-    times = [
-        np.array(numbers, object) * int(each * scale) + int(start * scale)  # whole numbers of any size: exact
-        for (numbers, _), each, start in zip(images, per_unit, starts, strict=True)
-    ]
-    period, last = int(period_s * scale), max(each[-1] for each in times)
+    steps = [(int(each * scale), int(start * scale)) for each, start in zip(per_unit, starts, strict=True)]
+    ends = [int(numbers[-1]) * step + abs(begin) for (numbers, _), (step, begin) in zip(images, steps, strict=True)]
+    whole = np.int64 if max(ends) < _MOST_IN_64_BITS else object  # numbers of any size: exact
+    times = [numbers.astype(whole) * step + begin for (numbers, _), (step, begin) in zip(images, steps, strict=True)]
+    period, last = int(period_s * scale), max(int(each[-1]) for each in times)
     if last - times[0][0] > _MOST_FRAMES * period:
         raise VideoError(
             f"{sources[0].name}: over {_MOST_FRAMES} frames to its end or another's; convert the videos again"
         )
-    clock = np.array(_clock(times[0].tolist(), period, last), object)
-    matched = [_nearest(each, clock, period // 2) for each in times]
-    return TrialClock((clock / scale).astype(float), np.stack(matched, axis=1))
+    clock = _clock(times[0].tolist(), period, last)
+    matched = [_nearest(each, np.array(clock, whole), period // 2) for each in times]
+    return TrialClock(np.array([time / scale for time in clock]), np.stack(matched, axis=1))
 
 
 def _clock(own: Sequence[int], period: int, last: int) -> list[int]:
@@ -121,7 +132,7 @@ def _clock(own: Sequence[int], period: int, last: int) -> list[int]:
     return clock
 
 
-def _nearest(times: NDArray[np.object_], clock: NDArray[np.object_], half: int) -> NDArray[np.int64]:
+def _nearest(times: NDArray, clock: NDArray, half: int) -> NDArray[np.int64]:
     """Return the number of the image nearest to each time of the clock, the later of two; -1 beyond half a period."""
     later = (
         np.searchsorted(times, clock, side="right").clip(1, len(times) - 1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,19 +15,20 @@ from airborne.cameras import Rig
 from airborne.errors import AirborneError, count
 from airborne.io.names import check_column
 from airborne.studio.clicks import Clicked
-from airborne.studio.outlines import player_colours
+from airborne.studio.outlines import legs_items, player_colours
 from airborne.studio.pages.layout import complain, errors_shown
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CHOSEN_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
-from airborne.studio.starts import player_file, read_player
+from airborne.studio.starts import player_file, read_player, read_players
 from airborne.studio.trial_edits import with_players
 from airborne.studio.view import Mark
 from airborne.types import Array
 
 _POINTS = ("torso", *LEG_POINTS, "foot_left", "foot_right")
 _NEEDED = _POINTS[:7]
+_STORED_COLOUR = "#f5f6f7"  # of players whom the trial has
 _HELP = (
     "Go to the frame where tracking shall start. Click each player's torso, the middle of hips and shoulders, and the "
     "joints of the legs, in two cameras or more. Who is clicked by the torso alone is not tracked, but hides others."
@@ -42,6 +43,7 @@ class PlayersPanel(PointsPanel):
         super().__init__(session, shown, Clicked((), None, {}), _POINTS[0])
         self.rig, self.frame = rig, frame
         self.players: dict[str, Clicked] = {}
+        self.start_frame, self.starts = read_players(session, rig)  # that the trial has
         self.player = "player1"
 
     @property
@@ -90,6 +92,7 @@ class PlayersPanel(PointsPanel):
             self.players = {name: read_player(folder, name, self.frame) for name in names}
             self.players.setdefault(self.player, Clicked((), None, {}))
             self.clicked = self.players[self.player]
+            self.start_frame, self.starts = read_players(self.session, self.rig)
             self.choice.set_options(list(self.players), value=self.player)
             self.show()
 
@@ -138,11 +141,21 @@ class PlayersPanel(PointsPanel):
         colours = player_colours({name: float(at[1]) for name, at in places.items()})
         marks = list(self._marks(colours[self.player]))
         legs = [item for name in self.players for item in self._legs(name, colours[name])]
-        self.view.show_over(marks, [*self.epipolar_items(self.chosen, self.rig), *legs], self.selected)
         ready = [name for name in self.players if self._is_ready(name)]
-        self.note.set_text(f"Ready: {', '.join(ready) or 'nobody yet'}.")
+        stored = self._stored_legs(ready) if self.frame == self.start_frame else ()
+        self.view.show_over(marks, [*self.epipolar_items(self.chosen, self.rig), *stored, *legs], self.selected)
+        own = f"The trial's start, frame {self.start_frame}: {', '.join(self.starts)}. " if self.starts else ""
+        self.note.set_text(f"{own}Ready to be used: {', '.join(ready) or 'nobody clicked yet'}.")
         self.use.set_visibility(bool(ready))
         self.list.show(_POINTS, self.chosen, partial(self.off_px, rig=self.rig))
+
+    def _stored_legs(self, ready: Sequence[str]) -> Iterator[Any]:
+        """Yield the legs of the players whom the trial has and who are not clicked here."""
+        cameras = self.rig.select(self.shown.names).cameras
+        for name, start in self.starts.items():
+            if name not in ready and start.has_legs:
+                joints_m = {joint: at.tolist() for joint, at in start.joints_m.items()}
+                yield from legs_items(name, joints_m, cameras, _STORED_COLOUR)
 
     def _points(self, name: str) -> dict[str, Array]:
         """Return the clicked points of a player that two cameras see: (3,) [m]."""

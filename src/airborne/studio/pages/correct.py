@@ -16,6 +16,7 @@ from airborne.studio.commands import Command
 from airborne.studio.dragging import landmarks_of_grip, landmarks_px
 from airborne.studio.pages.command_watch import CommandWatch
 from airborne.studio.pages.layout import errors_shown
+from airborne.studio.pages.mask_cameras import MaskPanel
 from airborne.studio.pages.pose_hand import PoseHand
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.runs import run_body, run_rig, run_rows
@@ -47,6 +48,8 @@ class Correction:
             self.watch = CommandWatch(self.session, "track", self.show_anew, words="tracking")
             self.watch.buttons = [self.again]
         self.again.set_visibility(False)
+        self.masks = MaskPanel(self.session, self.shown, self._note_change)
+        self.masks.area.bind_visibility_from(self.switch, "value")
 
     def turn_to(self, frame: int) -> None:
         """Show the body of a frame and its joints, to be grabbed."""
@@ -56,12 +59,16 @@ class Correction:
             self.hand.place(run_rows(self.folder).pose(frame) if self.switch.value else None)
             self._show(frame)
 
+    async def reread(self) -> None:
+        """Show what the trial holds now: undo or another window may have changed it."""
+        self.masks.list.refresh()
+        self._show(self.session.frame)
+
     def _show(self, frame: int) -> None:
         if self.view is not None:
             is_on = bool(self.switch.value)
-            self.view.show_over(
-                self._marks(self.hand.pose, self._clicks_of_key(frame)) if is_on else [], self.hand.items()
-            )
+            marks = self._marks(self.hand.pose, self._clicks_of_key(frame)) if is_on else []
+            self.view.show_over(marks, [*self.masks.items(frame), *self.hand.items()])
 
     def move(self, mark: str, u: float, v: float) -> None:
         """Write where a joint is as a click of the frame's key."""
@@ -111,9 +118,13 @@ class Correction:
             if trial.track.method not in KEY_METHODS:
                 raise TrialError(f"method '{trial.track.method}' reads no corrections; use {', '.join(KEY_METHODS)}")
             self.session.edit_trial(change, what)
-            self.watch.says.set_text(what + sd)
-            self.again.set_visibility(True)
-        self._show(frame)
+            self._note_change(what + sd)
+
+    def _note_change(self, what: str) -> None:
+        """Say what was written, and offer to track again."""
+        self.watch.says.set_text(what)
+        self.again.set_visibility(True)
+        self._show(self.session.frame)
 
     def track(self) -> None:
         """Track again what the corrections touch, as `airborne track --resume` does."""

@@ -8,9 +8,10 @@ from urllib.parse import quote
 
 import numpy as np
 from nicegui import ui
+from nicegui.elements.scene.scene import Scene
 
 from airborne.motion.run_folder import holds_players
-from airborne.studio.curve_data import curve_kinds, describe_distance
+from airborne.studio.curve_data import Momenta, curve_kinds, describe_distance, run_momenta
 from airborne.studio.disagreement import look_for_disagreement
 from airborne.studio.outlines import BESIDE_COLOUR
 from airborne.studio.pages.correct import Correction
@@ -19,17 +20,18 @@ from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
 from airborne.studio.runs import run_body, run_rig, run_rows
 from airborne.studio.session import Session
-from airborne.studio.stage import BodyOnStage, draw_cameras
+from airborne.studio.stage import Arrow, BodyOnStage, draw_cameras
 from airborne.studio.view import CameraViews, Curves
 from airborne.tracking import Status
 
+_MOMENTUM_COLOUR, _LONGEST_M = "#d55e00", 1.0  # its arrow's length where it is greatest in the run
 _AROUND_M = 2.0  # how far from the path the scene is looked at from
 _HELP = "Pictures, curves and scene share one frame. Bands are two standard deviations."
 
 
 async def review_page(session: Session) -> None:
     """Show a run."""
-    async with page_frame(session, "Review", "Is it right?", _HELP):
+    async with page_frame(session, "Review", "Is it right?", _HELP) as changed:
         runs = list_runs(session.folder)
         if not runs:
             ui.label("There is no run yet; see the step Track.").classes("warn")
@@ -47,7 +49,8 @@ async def review_page(session: Session) -> None:
             beside.set_options(["", *others])
             content.clear()
             with content:
-                await _show_run(session, shown, session.folder / choice.value, beside.value)
+                correction = await _show_run(session, shown, session.folder / choice.value, beside.value)
+            changed[:] = [] if correction is None else [correction.reread]
 
         with ui.element("div").classes("row-line"):
             choice = ui.select(names, label="run", value=names[0], on_change=change)
@@ -80,7 +83,8 @@ async def _blame(session: Session, shown: ShownTrial, name: str, says: ui.label)
         says.set_text(f"Frame {frame}: {text}.")
 
 
-async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: str) -> None:
+async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: str) -> Correction | None:
+    """Lay a run out; return what corrects it."""
     bodies: list[Callable[[int], None]] = []
     correction = None if holds_players(folder) else Correction(session, shown, folder)
     address = f"/curves/{quote(folder.name)}?beside={quote(beside)}&of="
@@ -118,11 +122,12 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: s
         if correction is not None:
             correction.view = view
             with ui.element("div").classes("side"):
-                bodies.append(await _stage(folder))
+                bodies += await _stage(folder, session)
     curves = Curves(address, frame=session.frame)
+    return correction
 
 
-async def _stage(folder: Path) -> Callable[[int], None]:
+async def _stage(folder: Path, session: Session) -> list[Callable[[int], None]]:
     """Build the scene of a run of one body; return what shows a frame in it."""
     rows = await in_thread(run_rows, folder)
     model = await in_thread(run_body, folder)
@@ -134,7 +139,32 @@ async def _stage(folder: Path) -> Callable[[int], None]:
     def show(frame: int) -> None:
         body.show(run_rows(folder).pose(frame))
 
-    return show
+    return [show, MomentumArrow(folder, session, scene).show]
+
+
+class MomentumArrow:
+    """The angular momentum at the frame in view: an arrow at the centre of mass, and its size in words."""
+
+    def __init__(self, folder: Path, session: Session, scene: Scene) -> None:
+        """Read the run's table once the page is there; a long one takes its time."""
+        self._folder, self._session = folder, session
+        self._momenta: Momenta | None = None
+        self._arrow, self._says = Arrow(scene, _MOMENTUM_COLOUR), ui.label().classes("small soft")
+        ui.timer(0, self._read, once=True)
+
+    async def _read(self) -> None:
+        with errors_shown():
+            self._momenta = await in_thread(run_momenta, self._folder)
+            self.show(self._session.frame)
+
+    def show(self, frame: int) -> None:
+        """Show a frame's."""
+        if self._momenta is None:
+            return
+        com_m, L, sd = self._momenta.at(frame) or (np.zeros(3), np.zeros(3), 0.0)
+        self._arrow.show(com_m, L / self._momenta.greatest * _LONGEST_M)
+        size = float(np.linalg.norm(L))
+        self._says.set_text(f"arrow: angular momentum {size:.3g} ± {sd:.3g} kg m²/s" if size else "")
 
 
 def _jump(session: Session, name: str, status: Status) -> None:

@@ -1,0 +1,83 @@
+"""Cameras that are left out of some frames: which, from when to when, written into the trial as [[mask]] tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from nicegui import ui
+
+from airborne.errors import TrialError
+from airborne.studio.pages.layout import errors_shown
+from airborne.studio.pictures import ShownTrial
+from airborne.studio.session import Session
+from airborne.studio.trial_edits import with_mask, without_mask
+from airborne.studio.view import Item
+
+_VEIL = "#16191dcc"  # over a picture that is left out
+_KEYS = {"camera", "first", "last"}
+
+
+class MaskPanel:
+    """One window's row of what is left out."""
+
+    def __init__(self, session: Session, shown: ShownTrial, on_change: Callable[[str], None]) -> None:
+        """Lay it out; `on_change` is called with what was written."""
+        self.session, self.shown, self._on_change = session, shown, on_change
+        with ui.element("div").classes("row-line") as self.area:
+            self.camera = ui.select(shown.names, label="leave a camera out", value=shown.names[0])
+            self.camera.props("outlined dense options-dense").style("min-width: 150px")
+            last = len(shown.clock) - 1
+            self.first, self.last = (
+                ui.number(label, min=0, max=last, precision=0).props("outlined dense").style("width: 110px")
+                for label in ("from frame", "to frame")
+            )
+            ui.button("Leave it out", on_click=self.add).props("outline")
+            self.list = ui.refreshable(self._list)
+            self.list()
+
+    @property
+    def masks(self) -> list[tuple[int, dict[str, Any]]]:
+        """The masks of the trial's file, numbered as they stand there."""
+        tables = enumerate(self.session.project().tables.get("mask", []))
+        return [(number, mask) for number, mask in tables if isinstance(mask, dict) and mask.keys() >= _KEYS]
+
+    def items(self, frame: int) -> list[Item]:
+        """Return a veil over each picture that is left out of a frame."""
+        left_out = {mask["camera"] for _, mask in self.masks if mask["first"] <= frame <= mask["last"]}
+        items: list[Item] = []
+        for pane, (name, (width, height)) in enumerate(self.shown.sizes.items()):
+            if name in left_out:
+                corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]
+                items.append({"pane": pane, "points": corners, "closed": True, "fill": _VEIL})
+                items.append({"pane": pane, "points": [[0.45 * width, 0.5 * height]], "text": "left out"})
+        return items
+
+    def add(self) -> None:
+        """Leave the chosen camera out; without frames, of the one in view."""
+        first, last = (
+            self.session.frame if number.value is None else int(number.value) for number in (self.first, self.last)
+        )
+        camera = str(self.camera.value)
+        with errors_shown():
+            if last < first:
+                raise TrialError(f"the last frame, {last}, lies before the first, {first}; exchange them")
+            what = f"{camera} left out of frames {first} to {last}"
+            self._edit(lambda text: with_mask(text, camera, first, last), what)
+
+    def remove(self, number: int, camera: str) -> None:
+        """Use a camera again."""
+        with errors_shown():
+            self._edit(lambda text: without_mask(text, number), f"{camera} used again")
+
+    def _edit(self, change: Callable[[str], str], what: str) -> None:
+        self.session.edit_trial(change, what)
+        self.list.refresh()
+        self._on_change(what)
+
+    def _list(self) -> None:
+        for number, mask in self.masks:
+            text = f"{mask['camera']}: {mask['first']} to {mask['last']}  ✕"
+            button = ui.button(text, on_click=partial(self.remove, number, str(mask["camera"])))
+            button.props("flat dense no-caps").tooltip("use it again")
