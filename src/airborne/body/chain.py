@@ -8,7 +8,6 @@ of poses are over the same numbers in the same order.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,24 +93,37 @@ def _segment_jacobians(parents, R, t, origin):
     n = len(R)
     jacobian = np.zeros((n, 6, 3 + 3 * n))
     for segment in range(n):
+        _point_columns(parents, R, t, segment, origin, jacobian[segment])
         joint = segment
         while True:  # from the segment to the root, which rotates about the world's axes
-            x, y, z = origin[0] - t[joint, 0], origin[1] - t[joint, 1], origin[2] - t[joint, 2]
             for a in range(3):
-                column = 3 + 3 * joint + a
-                i, j, k = R[joint, 0, a], R[joint, 1, a], R[joint, 2, a]
-                if joint == 0:
-                    i, j, k = 1.0 * (a == 0), 1.0 * (a == 1), 1.0 * (a == 2)
-                jacobian[segment, 0, column] = j * z - k * y
-                jacobian[segment, 1, column] = k * x - i * z
-                jacobian[segment, 2, column] = i * y - j * x
-                jacobian[segment, 3, column], jacobian[segment, 4, column], jacobian[segment, 5, column] = i, j, k
+                for b in range(3):
+                    jacobian[segment, 3 + b, 3 + 3 * joint + a] = R[joint, b, a] if joint else 1.0 * (a == b)
             if joint == 0:
                 break
             joint = parents[joint]
-        for a in range(3):
-            jacobian[segment, a, a] = 1.0
     return jacobian
+
+
+@kernel(is_inner=True)
+def _point_columns(parents, R, t, segment, point, jacobian):
+    """Write a point's derivatives by the root and by the joints of a segment and its ancestors; the others stay."""
+    joint = segment
+    while True:
+        x, y, z = point[0] - t[joint, 0], point[1] - t[joint, 1], point[2] - t[joint, 2]
+        for a in range(3):
+            column = 3 + 3 * joint + a
+            i, j, k = R[joint, 0, a], R[joint, 1, a], R[joint, 2, a]
+            if joint == 0:
+                i, j, k = 1.0 * (a == 0), 1.0 * (a == 1), 1.0 * (a == 2)
+            jacobian[0, column] = j * z - k * y
+            jacobian[1, column] = k * x - i * z
+            jacobian[2, column] = i * y - j * x
+        if joint == 0:
+            break
+        joint = parents[joint]
+    for a in range(3):
+        jacobian[a, a] = 1.0
 
 
 def point_jacobian(posed: PosedBody, segment: int | NDArray[np.integer], points: Array) -> Array:
@@ -120,34 +132,24 @@ def point_jacobian(posed: PosedBody, segment: int | NDArray[np.integer], points:
     The root gives I and w x (p - t_root), the joint of an ancestor k, or of the segment itself, a x (p - t_k) for each
     axis a of segment k; other joints give 0. `segment` holds indices, one for all points or one each.
     """
-    segment, points = np.asarray(segment), np.asarray(points, float)
-    shape = np.broadcast_shapes(segment.shape, points.shape[:-1])
-    axes = np.concatenate([np.eye(3)[None], posed.R[1:]])  # (segments, 3, 3): columns are the axes of rotation
-    lever = points[..., None, :] - posed.t  # (..., segments, 3)
-    derivatives = np.cross(np.swapaxes(axes, -1, -2), lever[..., None, :])  # (..., segments, axis, 3)
-    is_carried = np.concatenate([np.ones((len(axes), 1), bool), _is_carried(posed.model)], axis=1)[segment]
-    derivatives = np.where(is_carried[..., None, None], derivatives, 0.0)
-    columns = np.moveaxis(derivatives.reshape(*shape, 3 * len(axes), 3), -1, -2)
-    return np.concatenate([np.broadcast_to(np.eye(3), (*shape, 3, 3)), columns], axis=-1)
+    points = np.asarray(points, float)
+    shape = np.broadcast_shapes(np.shape(segment), points.shape[:-1])
+    owners = np.array(np.broadcast_to(segment, shape), np.int64).ravel()
+    flat = np.array(np.broadcast_to(points, (*shape, 3))).reshape(-1, 3)
+    return _point_jacobians(posed.model.parents, posed.R, posed.t, owners, flat).reshape(*shape, 3, -1)
+
+
+@kernel
+def _point_jacobians(parents, R, t, segments, points):
+    jacobian = np.zeros((len(points), 3, 3 + 3 * len(R)))
+    for row in range(len(points)):
+        _point_columns(parents, R, t, segments[row], points[row], jacobian[row])
+    return jacobian
 
 
 def angles_of(pose: Pose, n_joints: int) -> Array:
     """Return the joint angles (joints, 3) of a pose, where an empty array stands for straight joints."""
     return np.asarray(pose.joint_angles, float) if pose.joint_angles.size else np.zeros((n_joints, 3))
-
-
-def _is_carried(model: BodyModel) -> NDArray[np.bool_]:
-    """Say which segments each joint carries along: (segments, joints); joint k belongs to segment k + 1."""
-    return _is_descendant(tuple(model.parents.tolist()))
-
-
-@lru_cache(maxsize=64)
-def _is_descendant(parents: tuple[int, ...]) -> NDArray[np.bool_]:
-    carried = np.zeros((len(parents), len(parents)), bool)
-    for segment, parent in enumerate(parents[1:], start=1):
-        carried[segment] = carried[parent]
-        carried[segment, segment] = True
-    return carried[:, 1:]
 
 
 def angles_near(matrix: Array, near: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,6 +16,7 @@ from airborne.geometry.descent import MarquardtRule, descend
 from airborne.geometry.joint_rotations import compose_rotation_vectors, rotation_vectors_between
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.geometry.swing_twist import swing_twist_jacobian
+from airborne.kernels import kernel
 from airborne.types import Array
 
 _JOINT_SD_RAD = 1.0  # prior sd of a joint's rotation about neutral
@@ -144,14 +146,30 @@ def _forward_kinematics(model: BodyModel, state: PoseState, rotations: Array) ->
 
     rotations (..., joints, 3, 3): the state's angles as matrices.
     """
-    R, t = (
-        [np.broadcast_to(state.R, (*rotations.shape[:-3], 3, 3))],
-        [np.broadcast_to(state.t, (*rotations.shape[:-3], 3))],
+    shape, n = rotations.shape[:-3], len(model.segments)
+    R, t = _place_segments(
+        model.parents, model.joints_m, state.R, state.t, rotations.reshape(math.prod(shape), n - 1, 3, 3)
     )
-    for index, (segment, parent) in enumerate(zip(model.segments[1:], model.parents[1:], strict=True)):
-        t.append(t[parent] + R[parent] @ segment.joint_m)
-        R.append(R[parent] @ rotations[..., index, :, :])
-    return np.stack(R, axis=-3), np.stack(t, axis=-2)
+    return R.reshape(*shape, n, 3, 3), t.reshape(*shape, n, 3)
+
+
+@kernel
+def _place_segments(parents, joints_m, root_R, root_t, rotations):
+    n = len(parents)
+    R, t = np.empty((len(rotations), n, 3, 3)), np.empty((len(rotations), n, 3))
+    for row in range(len(rotations)):
+        R[row, 0], t[row, 0] = root_R, root_t
+        for segment in range(1, n):
+            parent, at, own = R[row, parents[segment]], joints_m[segment], rotations[row, segment - 1]
+            for a in range(3):
+                t[row, segment, a] = t[row, parents[segment], a] + (
+                    parent[a, 0] * at[0] + parent[a, 1] * at[1] + parent[a, 2] * at[2]
+                )
+                for b in range(3):
+                    R[row, segment, a, b] = (
+                        parent[a, 0] * own[0, b] + parent[a, 1] * own[1, b] + parent[a, 2] * own[2, b]
+                    )
+    return R, t
 
 
 def landmark_positions(problem: LandmarkProblem, state: PoseState) -> Array:

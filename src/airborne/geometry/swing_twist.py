@@ -15,7 +15,7 @@ _SMALL = 1e-6  # sine of the swing below which its rotation vector is taken as i
 
 def swing_twist_from_matrix(R: Array) -> Array:
     """Read the coordinates (..., 3) [rad] off rotations (..., 3, 3)."""
-    x, y, z = np.moveaxis(R[..., :, 2], -1, 0)
+    x, y, z = R[..., 0, 2], R[..., 1, 2], R[..., 2, 2]
     sine = np.hypot(x, y)
     scale = np.where(sine < _SMALL, 1.0, np.arctan2(sine, z) / np.maximum(sine, _SMALL))
     twist = np.arctan2(R[..., 1, 0] - R[..., 0, 1], R[..., 0, 0] + R[..., 1, 1])
@@ -41,7 +41,7 @@ def rotation_of(coordinates: Array) -> Array:
 
 def swing_twist_jacobian(R: Array) -> Array:
     """Differentiate the coordinates by a rotation vector in the rotated axes, R exp(v): (..., 3, 3)."""
-    x, y, z = np.moveaxis(R[..., :, 2], -1, 0)
+    x, y, z = R[..., 0, 2], R[..., 1, 2], R[..., 2, 2]
     sine = np.hypot(x, y)
     is_small = sine < _SMALL
     safe = np.where(is_small, 1.0, sine)
