@@ -77,6 +77,7 @@ def test_points_of_one_segment_move_as_the_segment_does():
     for segment, jacobian in enumerate(segment_jacobians(posed, origin)):
         by_segment = jacobian[:3] - np.cross(points[..., None, :] - origin, jacobian[3:].T).swapaxes(-1, -2)
         np.testing.assert_allclose(point_jacobian(posed, segment, points), by_segment, atol=EXACT)
+    assert point_jacobian(posed, [], np.zeros((0, 3))).shape == (0, *jacobian[:3].shape)
 
 
 def test_body_in_one_piece_has_the_six_columns_of_a_rigid_body():

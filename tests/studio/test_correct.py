@@ -12,7 +12,7 @@ from airborne.motion import read_motion
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
 from tests.support.places import THROWN_CROSS
-from tests.support.studio import MINUTE, at_pixel, go_home, open_page, open_studio, wait_for_frame
+from tests.support.studio import MINUTE, at_pixel, go_home, open_page, open_studio, wait_for_frame, wait_for_still_scene
 
 FRAME, TURNED, LAST, CAMERA, DRAGGED_PX = 3, 4, 6, 1, (16.0, -12.0)
 
@@ -73,6 +73,7 @@ def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked
     with open_studio(folder / "trial.toml") as address, open_page(address.replace("/?", "/review?")) as page:
         wait_for_frame(page, 0)
         go_home(page)
+        still = wait_for_still_scene(page)
         assert min(times_smaller(page)) >= 2  # pictures are no larger than they are drawn
         page.mouse.move(*at_pixel(page, 0, 200, 160))
         page.mouse.wheel(0, -1200)
@@ -83,6 +84,7 @@ def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked
         for frame in range(1, FRAME + 1):
             page.locator("canvas.view").press(".")
             wait_for_frame(page, frame)
+        assert wait_for_still_scene(page) > still  # drawn when the body moved, and not all the time
         wait_for_mark(page, f"{name}|{rig.names[CAMERA]}", u)
         page.mouse.move(*at_pixel(page, CAMERA, u, v))
         page.mouse.down()

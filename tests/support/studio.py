@@ -98,6 +98,21 @@ def wait_for_frame(page, frame: int) -> None:
     page.wait_for_function("frame => document.querySelector('canvas.view')?.dataset.frame == frame", arg=str(frame))
 
 
+def wait_for_still_scene(page) -> int:
+    """Wait until the 3D scene is no longer drawn; return how often it was."""
+    script = """async () => {
+        const canvas = document.querySelector("canvas:not(.view)");
+        const scene = getElement(Number(canvas.closest("[id^=c]").id.slice(1)));
+        const drawn = () => scene.renderer.info.render.frame;
+        for (let before = -1; drawn() !== before; ) {
+            before = drawn();
+            await new Promise((done) => setTimeout(done, 500));
+        }
+        return drawn();
+    }"""
+    return page.evaluate(script)
+
+
 def at_pixel(page, pane: int, u: float, v: float) -> tuple[float, float]:
     """Return where on the page a pixel of a camera's picture is."""
     script = """([pane, u, v]) => {

@@ -136,7 +136,8 @@ def point_jacobian(posed: PosedBody, segment: int | NDArray[np.integer], points:
     shape = np.broadcast_shapes(np.shape(segment), points.shape[:-1])
     owners = np.array(np.broadcast_to(segment, shape), np.int64).ravel()
     flat = np.array(np.broadcast_to(points, (*shape, 3))).reshape(-1, 3)
-    return _point_jacobians(posed.model.parents, posed.R, posed.t, owners, flat).reshape(*shape, 3, -1)
+    jacobian = _point_jacobians(posed.model.parents, posed.R, posed.t, owners, flat)
+    return jacobian.reshape(*shape, *jacobian.shape[1:])
 
 
 @kernel

@@ -41,6 +41,7 @@ def draw_cameras(
     if middle is None or away_m is None:
         middle, away_m = overview(np.vstack([centres, looked_at]))
     with ui.scene(grid=(60, 60), background_color="#f6f7f8").style("width: 100%; flex: 1; min-height: 180px") as scene:
+        Redraw(scene.id)
         for camera in rig:
             _frustum(scene, camera, _FRUSTUM_SHARE * reach)
         if path is not None:
@@ -100,6 +101,10 @@ class Arrow:
             turn = Rotation.align_vectors(along_m[None], [[0.0, 1.0, 0.0]])[0]
             x, y, z = map(float, start_m)
             self._group.move(x, y, z).rotate_R(turn.as_matrix().tolist()).scale(1, length, 1)
+
+
+class Redraw(Object3D, component="redraw.js"):
+    """Lets the scene around it be drawn only when something in it has changed; see `redraw.js`."""
 
 
 class Gizmo(Object3D, component="gizmo.js"):
