@@ -26,6 +26,7 @@ from airborne.motion.flight.momentum_table import fit_parabola, has_inertias
 from airborne.motion.motion import Motion
 from airborne.motion.smoothing.butterworth import butterworth_smoother, is_evenly_sampled
 from airborne.motion.smoothing.rotations import SmoothedRotations, smooth_rotations
+from airborne.motion.smoothing.segments import finite_rows
 from airborne.types import Array
 
 _FREE_M_S2 = 2.5  # of the fitted gravity from 9.81, and its sd: free fall, as in `flight.phases`
@@ -70,7 +71,7 @@ def conserve_momentum(rotations: SmoothedRotations, motion: Motion, model: BodyM
 
 def _flights(rotations: SmoothedRotations, motion: Motion, model: BodyModel) -> Iterator[slice]:
     """Yield the smoothed stretches in which the centre of mass falls freely."""
-    is_known = np.isfinite(rotations.R).all(axis=(1, 2))
+    is_known = finite_rows(rotations.R.reshape(-1, 9))
     label = np.where(is_known, rotations.segment, -1)
     for rows in np.split(np.arange(len(label)), np.flatnonzero(np.diff(label)) + 1):
         posed, time_s = rows[motion.has_pose[rows]], motion.time_s[rows]
@@ -98,7 +99,7 @@ def _smooth_joints(motion: Motion, rows: slice) -> tuple[Array, Array]:
 def _fit_flight(masses: _Masses, tracked: Array) -> tuple[Array, Array, Array] | None:
     """Return orientations (n, 3, 3) nearest to those tracked, angular velocities and accelerations; None if far off."""
     time_s, inertia, momentum = masses
-    is_tracked = np.isfinite(tracked).all(axis=(1, 2))
+    is_tracked = finite_rows(tracked.reshape(-1, 9))
 
     def fly(x: Array) -> tuple[Array, Array]:
         start = Rotation.from_rotvec(x[:3]).as_matrix() @ tracked[0]
