@@ -39,6 +39,7 @@ _TRACKED_SD_RAD = np.radians(5.0)  # of tracked orientations; further ones count
 _MOST_OFF = 1.5  # median distance of tracked orientations from a flight's, in these sds; the same have up to 0.8
 _LONGEST_GAP_S = 0.5  # in a stretch, beyond any that may be filled
 _MOMENTUM_UNIT = 10.0  # [kg m2/s] a step of the fit
+_TOLERANCE = 1e-6  # of the fit: a millionth of its numbers, and of its cost
 
 
 class _Masses(NamedTuple):
@@ -112,9 +113,8 @@ def _fit_flight(masses: _Masses, tracked: Array) -> tuple[Array, Array, Array] |
     R, w = tracked[pairs], _vectors(tracked[pairs + 1] @ tracked[pairs].swapaxes(1, 2)) / np.diff(time_s)[pairs, None]
     spin = np.einsum("nij,nkj,nk->ni", inertia[pairs], R, w) + momentum[pairs]
     L = np.median(np.einsum("nij,nj->ni", R, spin), axis=0)
-    fit = least_squares(
-        lambda x: distances(x).ravel(), np.concatenate([np.zeros(3), L / _MOMENTUM_UNIT]), loss="soft_l1"
-    )
+    x = np.concatenate([np.zeros(3), L / _MOMENTUM_UNIT])
+    fit = least_squares(lambda x: distances(x).ravel(), x, loss="soft_l1", xtol=_TOLERANCE, ftol=_TOLERANCE)
     if np.median(np.linalg.norm(distances(fit.x), axis=1)) > _MOST_OFF:
         return None
     R, velocity = fly(fit.x)
