@@ -26,6 +26,7 @@ from airborne.motion.flight.momentum_table import fit_parabola, has_inertias
 from airborne.motion.motion import Motion
 from airborne.motion.smoothing.butterworth import butterworth_smoother, is_evenly_sampled
 from airborne.motion.smoothing.rotations import SmoothedRotations, smooth_rotations
+from airborne.motion.smoothing.segments import finite_rows
 from airborne.types import Array
 
 _FREE_M_S2 = 2.5  # of the fitted gravity from 9.81, and its sd: free fall, as in `flight.phases`
@@ -38,6 +39,7 @@ _TRACKED_SD_RAD = np.radians(5.0)  # of tracked orientations; further ones count
 _MOST_OFF = 1.5  # median distance of tracked orientations from a flight's, in these sds; the same have up to 0.8
 _LONGEST_GAP_S = 0.5  # in a stretch, beyond any that may be filled
 _MOMENTUM_UNIT = 10.0  # [kg m2/s] a step of the fit
+_TOLERANCE = 1e-6  # of the fit: a millionth of its numbers, and of its cost
 
 
 class _Masses(NamedTuple):
@@ -70,7 +72,7 @@ def conserve_momentum(rotations: SmoothedRotations, motion: Motion, model: BodyM
 
 def _flights(rotations: SmoothedRotations, motion: Motion, model: BodyModel) -> Iterator[slice]:
     """Yield the smoothed stretches in which the centre of mass falls freely."""
-    is_known = np.isfinite(rotations.R).all(axis=(1, 2))
+    is_known = finite_rows(rotations.R.reshape(-1, 9))
     label = np.where(is_known, rotations.segment, -1)
     for rows in np.split(np.arange(len(label)), np.flatnonzero(np.diff(label)) + 1):
         posed, time_s = rows[motion.has_pose[rows]], motion.time_s[rows]
@@ -98,7 +100,7 @@ def _smooth_joints(motion: Motion, rows: slice) -> tuple[Array, Array]:
 def _fit_flight(masses: _Masses, tracked: Array) -> tuple[Array, Array, Array] | None:
     """Return orientations (n, 3, 3) nearest to those tracked, angular velocities and accelerations; None if far off."""
     time_s, inertia, momentum = masses
-    is_tracked = np.isfinite(tracked).all(axis=(1, 2))
+    is_tracked = finite_rows(tracked.reshape(-1, 9))
 
     def fly(x: Array) -> tuple[Array, Array]:
         start = Rotation.from_rotvec(x[:3]).as_matrix() @ tracked[0]
@@ -111,9 +113,8 @@ def _fit_flight(masses: _Masses, tracked: Array) -> tuple[Array, Array, Array] |
     R, w = tracked[pairs], _vectors(tracked[pairs + 1] @ tracked[pairs].swapaxes(1, 2)) / np.diff(time_s)[pairs, None]
     spin = np.einsum("nij,nkj,nk->ni", inertia[pairs], R, w) + momentum[pairs]
     L = np.median(np.einsum("nij,nj->ni", R, spin), axis=0)
-    fit = least_squares(
-        lambda x: distances(x).ravel(), np.concatenate([np.zeros(3), L / _MOMENTUM_UNIT]), loss="soft_l1"
-    )
+    x = np.concatenate([np.zeros(3), L / _MOMENTUM_UNIT])
+    fit = least_squares(lambda x: distances(x).ravel(), x, loss="soft_l1", xtol=_TOLERANCE, ftol=_TOLERANCE)
     if np.median(np.linalg.norm(distances(fit.x), axis=1)) > _MOST_OFF:
         return None
     R, velocity = fly(fit.x)

@@ -23,7 +23,7 @@ from airborne.tracking.capsules.surface_colours import (
     update_colours,
 )
 from airborne.tracking.capsules.track import Sighting, Track, evidence_per_px
-from airborne.tracking.capsules.unseen_legs import find_unseen_legs, free_leg
+from airborne.tracking.capsules.unseen_legs import LEAST_GAIN, find_unseen_legs, free_leg
 from airborne.tracking.capsules.views import EvidenceTable, map_evidence, player_regions
 from airborne.tracking.estimate import Status
 from airborne.tracking.players import PlayerEstimate, PlayerStart, lost_player_estimate
@@ -179,14 +179,14 @@ def _track_player(
         return fit_jumper(np.concatenate([expected.free, state[N_FREE:]]), prior, region_maps, occluders)
 
     fitted = fit(expected)
-    for leg in find_unseen_legs(fitted.owned, track.reference_evidence):
+    evidence, reference = evidence_per_px(fitted.owned), track.reference_evidence
+    if evidence < max(_LOST_SHARE * reference, _LEAST_EVIDENCE):
+        return replace(track, filtered=expected, time_s=frames.time_s), lost_player_estimate(name, frames, len(JOINTS))
+    for leg in find_unseen_legs(fitted.owned, reference):
         freed = free_leg(expected, fitted.state, leg)
         again = fit(freed)
-        if again.nats > fitted.nats:
-            expected, fitted = freed, again
-    evidence = evidence_per_px(fitted.owned)
-    if evidence < max(_LOST_SHARE * track.reference_evidence, _LEAST_EVIDENCE):
-        return replace(track, filtered=expected, time_s=frames.time_s), lost_player_estimate(name, frames, len(JOINTS))
+        if again.nats > fitted.nats + LEAST_GAIN and leg not in find_unseen_legs(again.owned, reference):
+            expected, fitted, evidence = freed, again, evidence_per_px(again.owned)
     filtered = update(expected, fitted.state[:N_FREE], np.linalg.inv(fitted.information))
     views = [region.view for region in regions]
     track = replace(track, time_s=frames.time_s, filtered=filtered, state=fitted.state)
@@ -194,11 +194,10 @@ def _track_player(
     n_views = _n_unoccluded(occlusion, views)
     occlusion = limit_occlusion(occlusion, views)
     estimate = _estimate(name, frames, track, fitted=fitted, n_views=n_views)
-    if evidence < _LEAST_SHARE * track.reference_evidence:
+    if evidence < _LEAST_SHARE * reference:
         estimate = replace(estimate, status=Status.UNCERTAIN)
     elif estimate.status is Status.TRACKED:
-        reference = track.reference_evidence + _REFERENCE_RATE * (evidence - track.reference_evidence)
-        track = replace(track, reference_evidence=reference)
+        track = replace(track, reference_evidence=reference + _REFERENCE_RATE * (evidence - reference))
         if frames.time_s - track.colours_updated_s >= COLOUR_UPDATE_S:
             colours = update_colours(replace(track.colours, occlusion=occlusion), track.state, regions, occluders)
             return replace(track, colours=colours, colours_updated_s=frames.time_s, tables=_tables(colours)), estimate

@@ -11,7 +11,8 @@ from airborne.types import Array
 
 # of a player's usual evidence per pixel, that a leg's own have. In synthetic blocks 6300 to 6304 legs within 80 mm had
 # 0.18 or more, 99 of 100 of them 0.4, legs that were 150 mm off less than -0.1, but one on its way there
-_LEAST_SHARE = 0.2
+_LEAST_SHARE = 0.1
+LEAST_GAIN = 10.0  # [nat] of a leg that was found elsewhere: there 60 or more, where it was right all along up to 1
 LEG_SD_RAD = np.array([0.5, 0.4, 0.4, 0.5, 0.4])  # of a leg of which nothing is known: hip, knee, ankle
 _MIRROR = np.array([1.0, -1.0, -1.0, 1.0, 1.0])  # from one leg's angles to the other's
 
