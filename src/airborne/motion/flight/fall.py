@@ -69,7 +69,7 @@ def _noise(residual: Array, freedom: int) -> float:
     return float(np.sqrt(squares / freedom * (1 + r) / (1 - r)))
 
 
-def unsupported_rows(time_s: Array, height_m: Array, variance: Array) -> NDArray[np.intp]:
+def flight_rows(time_s: Array, height_m: Array, variance: Array) -> NDArray[np.intp]:
     """Return the longest run of rows in which a path's heights (n,) [m] do not clearly fall slower than in flight.
 
     None where it is shorter than 0.4 s.

@@ -11,7 +11,7 @@ from airborne.body import BodyModel
 from airborne.constants import GRAVITY_M_S2
 from airborne.errors import BodyError
 from airborne.motion.angles import root_angles
-from airborne.motion.flight.fall import UNKNOWN_SD_M, fit_fall, unsupported_rows
+from airborne.motion.flight.fall import UNKNOWN_SD_M, fit_fall, flight_rows
 from airborne.motion.flight.momentum import WINDOW, angular_momenta, centre_of_mass, limit_rotation_variance
 from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
@@ -121,7 +121,7 @@ def _as_it_falls(motion: Motion, com: Array, variance: Array) -> tuple[Array, Ar
     """Return the centre of mass and its variances (n, 3), moved to where it falls best; as given without a fall."""
     posed = np.flatnonzero(motion.has_pose)
     height, stated = com[posed, 2], np.nan_to_num(variance[posed, 2], nan=UNKNOWN_SD_M**2)
-    rows = posed[unsupported_rows(motion.time_s[posed], height, stated)] if len(posed) > 1 else posed[:0]
+    rows = posed[flight_rows(motion.time_s[posed], height, stated)] if len(posed) > 1 else posed[:0]
     if not len(rows):
         return com, variance
     fall = fit_fall(motion.time_s[rows], com[rows], motion.R[rows])
