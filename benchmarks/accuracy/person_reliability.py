@@ -79,6 +79,8 @@ def rows_of(data: str, found: JointComparison) -> list[dict]:
         {**common, "metric": "held by the 80 % interval", "unit": "", "value": held.within_80},
         {**common, "metric": "held by the 95 % interval", "unit": "", "value": held.within_95,
          "floor": "0.88..0.99"},
+        {**common, "metric": "ECE of the errors with constant offsets", "unit": "",
+         "value": found.coverage_with_offset.ece, "floor": 0.08},
         {**common, "metric": "ECE", "unit": "", "value": held.ece, "floor": 0.08},
         {**common, "metric": "ECE by single frames' deviations", "unit": "", "value": found.coverage_by_frame.ece},
     ]  # fmt: skip

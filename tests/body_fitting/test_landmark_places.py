@@ -57,6 +57,13 @@ def test_left_and_right_share_what_is_seen_of_either():
     assert 0 < places["hip_left"][2] < 0.5 * lone["hip_left"][2]
 
 
+def test_point_far_off_is_a_mistake_and_moves_nothing():
+    far = {"knee_left": np.array([0.0, 0.2, 0.0])}
+    moved = place_landmarks(MODEL, POSE, points_beside(far))
+    for mark, before in zip(moved.landmarks, MODEL.landmarks, strict=True):
+        np.testing.assert_allclose(mark.position_m, before.position_m, atol=ROUNDTRIP)
+
+
 def test_moved_joint_still_stands_for_its_joint(tmp_path):
     moved = place_landmarks(MODEL, POSE, points_beside(HIGH_HIPS))
     write_body(tmp_path / "body.toml", moved)

@@ -111,6 +111,10 @@ def test_correct_deviations_contain_two_thirds_of_the_errors():
     motion = run(covariance=covariance)
     points, sd = landmarks(motion, MODEL)
     noisy = points + sd[..., None] * rng.normal(size=points.shape)
+    whole = compare_joints(
+        motion, MODEL, JointPaths(names=MARKS, time_s=TIMES, points=noisy + np.array([0.0, 0.0, 0.02]))
+    )
+    assert whole.coverage_with_offset.within_95 < whole.coverage.within_95
     result = compare_joints(motion, MODEL, JointPaths(names=MARKS, time_s=TIMES, points=noisy)).calibration
     assert result.n == 30 * 5 * 3
     assert result.within_1sd == pytest.approx(0.683, abs=sampled(result.n))

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
-from airborne.body import Pose
+from airborne.body import Pose, human18
+from airborne.body.shaping import half_widths_m
 from airborne.errors import ResultError
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.motion import joint_angles, landmarks, write_joint_angles
+from airborne.motion.joints import PLACE_SHARE
 from tests.support.motions import figure, motion_of, shaken, small_covariance, swinging
 from tests.support.tolerances import EXACT, ROUNDTRIP, sampled
 
@@ -31,7 +33,19 @@ def test_landmark_deviations_are_those_of_sampled_poses():
     _, sd = landmarks(motion_of(MODEL, [pose], covariance=covariance), MODEL)
     n = 1500
     points = np.array([MODEL.with_pose(shaken(rng, pose, covariance)).landmarks for _ in range(n)])
-    np.testing.assert_allclose(sd[0], np.sqrt(points.var(axis=0).mean(axis=-1)), rtol=sampled(n))
+    by_pose = np.sqrt(sd[0] ** 2 - (PLACE_SHARE * half_widths_m(MODEL)) ** 2)
+    np.testing.assert_allclose(by_pose, np.sqrt(points.var(axis=0).mean(axis=-1)), rtol=sampled(n))
+
+
+def test_joint_of_a_person_is_known_no_better_than_its_place_between_two_segments():
+    model = human18(1.7, 60.0)
+    pose = Pose(world_from_root=RigidTransform.identity(), joint_angles=np.zeros((model.n_joints, 3)))
+    _, sd = landmarks(motion_of(model, [pose], covariance=np.zeros((model.n_dofs, model.n_dofs))), model)
+    sds = dict(zip([mark.name for mark in model.landmarks], sd[0], strict=True))
+    shape = dict(zip([segment.name for segment in model.segments], PLACE_SHARE * half_widths_m(model), strict=True))
+    assert sds["hip_left"] == pytest.approx((shape["pelvis"] + shape["thigh_left"]) / 2)
+    assert sds["hand_left"] == pytest.approx(shape["hand_left"])
+    assert sds["wrist_left"] < sds["knee_left"] < sds["hip_left"] < 0.01
 
 
 def test_unobserved_rotation_affects_only_its_descendants():

@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Part, Pose, Segment
+from airborne.body.shaping import half_widths_m
 from airborne.geometry.rotations import angles_from_matrix
 from airborne.motion import (
     Motion,
@@ -20,6 +21,7 @@ from airborne.motion import (
     write_joints,
     write_motion_parquet,
 )
+from airborne.motion.joints import PLACE_SHARE
 from airborne.tracking import Status
 from tests.support.motions import estimate, figure, motion_of, run_with_gap, somersault, swinging
 from tests.support.places import ROOT
@@ -115,9 +117,11 @@ def test_joint_deviation_grows_with_the_distance_from_the_root(tmp_path):
     estimates, _ = somersault(2, variance=(1e-6, 1e-4))
     write_joints(tmp_path / "joints.csv", Motion.collect(estimates, ("head",)), jointed_body())
     trunk, head = rows_of(tmp_path / "joints.csv")[:2]
-    assert float(trunk["sd_m"]) == pytest.approx(1e-3, rel=ROUNDTRIP)
+    own, of_head = PLACE_SHARE * half_widths_m(jointed_body())  # where a joint lies in its segments
+    assert float(trunk["sd_m"]) == pytest.approx(np.hypot(1e-3, own), rel=ROUNDTRIP)
     # two of the three axes move with the rotation: per-axis variance 1e-6 + 2/3 * 0.6^2 * 1e-4
-    assert float(head["sd_m"]) == pytest.approx(np.sqrt(1e-6 + 2 / 3 * 0.36 * 1e-4), rel=ROUNDTRIP)
+    expected = np.sqrt(1e-6 + 2 / 3 * 0.36 * 1e-4 + ((own + of_head) / 2) ** 2)
+    assert float(head["sd_m"]) == pytest.approx(expected, rel=ROUNDTRIP)
 
 
 def test_joint_deviation_is_that_of_sampled_poses(tmp_path):
@@ -130,7 +134,7 @@ def test_joint_deviation_is_that_of_sampled_poses(tmp_path):
     moves = np.random.default_rng(0).multivariate_normal(np.zeros(6), covariance[:6, :6], size=n)
     offset = item.pose.world_from_root.rotation.apply([0, 0, 0.6])
     heads = moves[:, :3] + Rotation.from_rotvec(moves[:, 3:6]).apply(offset)
-    expected = np.sqrt(heads.var(axis=0).mean())
+    expected = np.sqrt(heads.var(axis=0).mean() + (PLACE_SHARE * half_widths_m(jointed_body()).mean()) ** 2)
     assert float(rows_of(tmp_path / "joints.csv")[1]["sd_m"]) == pytest.approx(expected, rel=sampled(n))
 
 

@@ -77,6 +77,26 @@ def length_axis(model: BodyModel, segment: str) -> int:
     return int(np.argmax(extent)) if extent.any() else 2
 
 
+def half_size_m(part: Part) -> Array:
+    """Return half the size of a part along its segment's axes: (3,) [m]."""
+    shape = part.shape
+    if isinstance(shape, Ellipsoid):
+        half = shape.semi_axes_m
+    else:
+        half = shape.size_m / 2 if isinstance(shape, Box) else np.ptp(shape.vertices_m, axis=0) / 2
+    return np.abs(part.segment_from_part.rotation.as_matrix()) @ half
+
+
+def half_widths_m(model: BodyModel) -> Array:
+    """Return half the mean width of each segment across its length: (segments,) [m]; 0 without parts."""
+    half_widths = np.zeros(len(model.segments))
+    for index, segment in enumerate(model.segments):
+        if segment.parts:
+            half = np.max([half_size_m(part) for part in segment.parts], axis=0)
+            half_widths[index] = np.delete(half, length_axis(model, segment.name)).mean()
+    return half_widths
+
+
 def _scale(model: BodyModel, scales: Mapping[str, float | tuple[float, float]], *, along: bool) -> BodyModel:
     factors = _per_segment(model, scales)
     shape, position = {}, {}

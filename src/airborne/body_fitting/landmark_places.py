@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from airborne.body import BodyModel, Pose
+from airborne.body import BodyModel, Landmark, Pose
 from airborne.body_fitting.fit import JOINT_SD_M
 from airborne.tracking.first_pose import LANDMARK_WEIGHTS
 from airborne.types import Array
@@ -19,6 +19,7 @@ from airborne.types import Array
 # of a given point and of the fitted pose there: on eight synthetic people 18 to 25 mm lose nothing where the joints are
 # those of the body, and gain most where they lie 20 or 30 mm beside
 _POINT_SD_M = 0.02
+_FARTHEST = 3.8  # sds of a point farther off than another definition is: 3 in a thousand normal errors in space
 _MIRROR = np.array([-1.0, 1.0, 1.0])  # x is the subject's left
 
 
@@ -26,7 +27,8 @@ def place_landmarks(model: BodyModel, pose: Pose, points: Mapping[str, Array]) -
     """Return the body with its landmarks moved toward points (3,) [m] of their names at a pose, left and right alike.
 
     How far another definition may lie is the sd of a point that a fit gives a landmark's weight; each shift is the
-    expected one for what is seen of it. The pelvis, without a point of its own, lies midway between the hips.
+    expected one for what is seen of it, and points that lie farther off are mistakes. The pelvis, without a point of
+    its own, lies midway between the hips.
     """
     hips = [points[name] for name in ("hip_left", "hip_right") if name in points]
     given = {"pelvis": np.mean(hips, axis=0), **points} if len(hips) == 2 else points
@@ -34,27 +36,27 @@ def place_landmarks(model: BodyModel, pose: Pose, points: Mapping[str, Array]) -
     shifts = {
         mark.name: posed.R[model.index_of(mark.segment)].T @ (given[mark.name] - at)
         for mark, at in zip(model.landmarks, posed.landmarks, strict=True)
-        if mark.name in given
+        if mark.name in given and np.linalg.norm(given[mark.name] - at) < _FARTHEST * _sd_m(mark.name)
     }
-    return replace(
-        model,
-        landmarks=tuple(
-            replace(
-                mark,
-                position_m=mark.position_m + _expected_shift(mark.name, shifts),
-                is_joint=mark.at_joint,
-            )
-            if mark.name in shifts
-            else mark
-            for mark in model.landmarks
-        ),
-    )
+    return replace(model, landmarks=tuple(_move(mark, shifts) for mark in model.landmarks))
 
 
-def _expected_shift(name: str, shifts: Mapping[str, Array]) -> Array:
-    """Return a landmark's shift (3,) [m], given what is seen of all of them."""
+def _move(mark: Landmark, shifts: Mapping[str, Array]) -> Landmark:
+    """Return a landmark moved by what is expected, given what is seen of it and of its counterpart."""
+    name = mark.name
     other = name.replace("_left", "_right") if name.endswith("_left") else name.replace("_right", "_left")
-    sides = [shifts[name], *([_MIRROR * shifts[other]] if other in shifts else [])]
-    n = len({name, other} & set(shifts))
-    definition = JOINT_SD_M**2 / LANDMARK_WEIGHTS.get(name, 1.0)
-    return np.mean(sides, axis=0) * definition / (definition + _POINT_SD_M**2 / n)
+    sides = [sign * shifts[each] for each, sign in ((name, 1.0), (other, _MIRROR)) if each in shifts]
+    if not sides:
+        return mark
+    definition, n = _definition_variance(name), len({name, other} & set(shifts))
+    shift = np.mean(sides, axis=0) * definition / (definition + _POINT_SD_M**2 / n)
+    return replace(mark, position_m=mark.position_m + shift, is_joint=mark.at_joint)
+
+
+def _definition_variance(name: str) -> float:
+    return JOINT_SD_M**2 / LANDMARK_WEIGHTS.get(name, 1.0)
+
+
+def _sd_m(name: str) -> float:
+    """Return how far a point lies from a landmark along each axis, as a rule [m]."""
+    return float(np.sqrt(_definition_variance(name) + _POINT_SD_M**2))

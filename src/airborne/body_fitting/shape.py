@@ -8,10 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from airborne.body import BodyModel, Box, Ellipsoid, Part
+from airborne.body import BodyModel
 from airborne.body.inverse_kinematics import CORE
 from airborne.body.outfits import Border, extent_m, with_borders
-from airborne.body.shaping import length_axis, with_girths, with_joint_widths, with_segment_lengths
+from airborne.body.shaping import half_size_m, length_axis, with_girths, with_joint_widths, with_segment_lengths
 from airborne.body_fitting.clothes import stem_of
 from airborne.types import Array
 
@@ -40,7 +40,7 @@ def shape_parameters(model: BodyModel) -> tuple[ShapeParameter, ...]:
         stem = stem_of(segment.name)
         if not segment.parts or stem in {parameter.stem for parameter in parameters}:
             continue
-        half = np.max([_half_m(part) for part in segment.parts], axis=0)
+        half = np.max([half_size_m(part) for part in segment.parts], axis=0)
         along = length_axis(model, segment.name)
         is_end = all(child.parent != segment.name for child in model.segments)
         across = [axis for axis in range(3) if axis != along]
@@ -131,13 +131,3 @@ def girths_of(parameters: Sequence[ShapeParameter], shape: Array) -> dict[str, t
             for axis in (0, 1) if parameter.axis is None else (parameter.axis,):
                 own[axis] = float(np.exp(value))
     return {stem: (across[0], across[1]) for stem, across in factors.items()}
-
-
-def _half_m(part: Part) -> Array:
-    """Return half the size of a part along its segment's axes: (3,) [m]."""
-    shape = part.shape
-    if isinstance(shape, Ellipsoid):
-        half = shape.semi_axes_m
-    else:
-        half = shape.size_m / 2 if isinstance(shape, Box) else np.ptp(shape.vertices_m, axis=0) / 2
-    return np.abs(part.segment_from_part.rotation.as_matrix()) @ half

@@ -21,11 +21,11 @@ class Coverage:
     ece: float  # expected calibration error: the mean distance of the three shares from what they state
     n: int  # errors with a finite standard deviation
 
-    def describe(self) -> str:
-        """Return the numbers in a line."""
+    def describe(self, errors: str) -> str:
+        """Return the numbers of what they were counted for in a line."""
         return (
             f"intervals of 50, 80, 95% hold {self.within_50:.0%}, {self.within_80:.0%}, {self.within_95:.0%} of the "
-            f"errors without offset (ECE {self.ece:.3f}), n = {self.n}"
+            f"{errors} (ECE {self.ece:.3f}), n = {self.n}"
         )
 
 

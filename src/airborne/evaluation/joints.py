@@ -63,6 +63,7 @@ class JointComparison:
     n_far: int  # joints whose own status is tracked and that are more than 100 mm off
     not_compared: tuple[str, ...]  # markers without a landmark, and landmarks without a marker
     calibration: SdCalibration  # errors against the landmarks' reported deviations
+    coverage_with_offset: Coverage  # of those errors
     coverage: Coverage  # the same without each landmark's constant offset in its segment
     coverage_by_frame: Coverage  # of those errors by the deviations of single frames, without what lasts all run long
     better_shift_s: float  # added to the reference's times, this would clearly agree better; whole periods, or 0
@@ -99,10 +100,10 @@ class JointComparison:
                 f"within 2 sd {share.within_2sd:.0%} (95%), n = {share.n}"
             )
         if self.coverage.n:
-            lines.append(self.coverage.describe())
-            lines.append(
-                f"by the deviations of single frames, without lasting ones: {self.coverage_by_frame.describe()}"
-            )
+            lines.append(self.coverage_with_offset.describe("errors"))
+            lines.append(self.coverage.describe("errors without offset"))
+            by_frame = self.coverage_by_frame.describe("errors without offset")
+            lines.append(f"by the deviations of single frames, without lasting ones: {by_frame}")
         lines.append(f"joints tracked: {self.share_tracked:.0%}; of these more than 100 mm off: {self.n_far}")
         if self.not_compared:
             lines.append(f"not compared: {', '.join(self.not_compared)}")
@@ -173,6 +174,7 @@ def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> J
         n_far=int(np.sum(np.linalg.norm(tracked.error, axis=-1) > _FAR_M)),
         not_compared=(*not_compared, *(name for name in names if name not in joints)),
         calibration=sd_calibration(pairs.error[is_known], np.repeat(sd[frames][is_known][:, None], 3, axis=1)),
+        coverage_with_offset=coverage_of(pairs.error, np.repeat(sd[frames][..., None], 3, axis=2)),
         coverage=_coverage(pairs, sd[frames]),
         coverage_by_frame=_coverage(pairs, sd_by_frame[frames]),
         better_shift_s=shift_s,

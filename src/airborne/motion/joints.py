@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.body.chain import nearest_angles, point_jacobian
+from airborne.body.shaping import half_widths_m
 from airborne.errors import ResultError
 from airborne.geometry.rotations import (
     angles_from_matrix,
@@ -28,6 +29,10 @@ if TYPE_CHECKING:
 
 OPEN_SD_RAD = 0.5  # of an angle that counts as unobserved
 _UNCERTAIN_SD_M = 0.05  # of a landmark; the same as of a whole body
+# how far a person's joint lies beside its place, along each axis, as a share of the half width of the segments that
+# meet there: the least with which 80 % of the errors of each kind of joint lie within two frames' sds, on eleven
+# synthetic people, lengths 4 % and girths 12 % off
+PLACE_SHARE = 0.05
 _STRAINED_RAD, _STRAINED_FRAMES = np.radians(3.0), 3  # beyond a limit by more than its sd, in so many frames on end
 
 
@@ -53,8 +58,8 @@ def landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
     """Return the body's landmarks (n, landmarks, 3) world [m], and their sd (n, landmarks) [m].
 
     The standard deviation is the root mean square over the axes, to first order, through every joint that moves the
-    point, or the joint that it stands for: infinite where an unobserved direction moves it, NaN where unknown. Raises
-    ResultError for another body.
+    point, or the joint that it stands for, and by where that lies within a person: infinite where an unobserved
+    direction moves it, NaN where unknown. Raises ResultError for another body.
     """
     require_body(motion, model)
     owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])
@@ -66,7 +71,15 @@ def landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
         points[row] = posed.landmarks
         moved = np.where(at_joint[:, None], posed.t[owners], points[row])
         variance[row] = propagate_variances(point_jacobian(posed, owners, moved), covariance[row])
-    return points, standard_deviation(variance.mean(axis=-1))
+    return points, standard_deviation(variance.mean(axis=-1) + _place_variance(model, owners))
+
+
+def _place_variance(model: BodyModel, owners: NDArray[np.int64]) -> Array:
+    """Return the variance of each landmark's place within its segment, a joint's within both: (landmarks,) [m2]."""
+    if not model.has_joints:
+        return np.zeros(len(owners))
+    sds = PLACE_SHARE * half_widths_m(model)
+    return ((sds[owners] + sds[_carriers(model)]) / 2) ** 2
 
 
 def joint_statuses(motion: Motion, model: BodyModel, sd: Array) -> NDArray[np.str_]:

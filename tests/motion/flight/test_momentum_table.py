@@ -12,7 +12,7 @@ from airborne.body import Pose
 from airborne.errors import BodyError, ResultError
 from airborne.motion import flight_summary, has_inertias, measure_flight, write_flight
 from airborne.motion.flight.momentum import centre_of_mass
-from airborne.motion.flight.momentum_table import fit_parabola
+from airborne.motion.flight.momentum_table import _fit_parabola
 from tests.support.motions import figure, motion_of, shaken, small_covariance, swinging
 from tests.support.tolerances import EXACT, ROUNDTRIP, sampled
 
@@ -70,9 +70,36 @@ def test_deviation_of_the_fitted_gravity_is_that_of_paths_whose_errors_resemble_
     rng, time_s, n = np.random.default_rng(5), np.arange(80) / 60, 300
     error = lfilter([1.0], [1.0, -0.7], 0.003 * rng.normal(size=(n, len(time_s))), axis=1)
     paths = np.stack([np.zeros_like(error), np.zeros_like(error), error - 9.81 / 2 * time_s**2], axis=-1)
-    gravity, sd, _ = np.transpose([fit_parabola(time_s, path) for path in paths])
+    gravity, sd, _ = np.transpose([_fit_parabola(time_s, path, np.tile(np.eye(3), (80, 1, 1))) for path in paths])
     assert np.median(sd) == pytest.approx(np.std(gravity), rel=sampled(n))
     assert np.mean(np.abs(gravity - 9.81) < 2 * sd) > 0.88
+
+
+def heavier_behind(model, offset_m):
+    """The model with the centre of mass of its root moved so that the whole body's is by (3,) [m] elsewhere."""
+    mass = sum(segment.inertia.mass_kg for segment in model.segments)
+    root = model.segments[0]
+    moved = replace(root.inertia, centre_m=root.inertia.centre_m + mass / root.inertia.mass_kg * np.asarray(offset_m))
+    return replace(model, segments=(replace(root, inertia=moved), *model.segments[1:]))
+
+
+def test_centre_of_mass_of_a_somersault_is_moved_to_where_it_falls():
+    off_m, covariance = np.array([0.0, 0.015, -0.01]), small_covariance(MODEL)
+    poses = falling(turns=0.4)
+    off = heavier_behind(MODEL, off_m)
+    motion = motion_of(off, poses, covariance=covariance)
+    true = np.array([centre_of_mass(MODEL.with_pose(pose))[0] for pose in poses])
+    before = np.array([centre_of_mass(off.with_pose(pose))[0] for pose in poses])
+    error, rise = measure_flight(motion, off)["com"].to_numpy() - true, (before - true).std(axis=0).max()
+    assert error.std(axis=0).max() < 0.1 * rise
+    summary = flight_summary(motion, off)
+    assert abs(summary.fitted_gravity_m_s2 - 9.81) < min(2 * summary.fitted_gravity_sd_m_s2 + 0.02, 0.1)
+
+
+def test_centre_of_mass_of_a_fall_without_a_turn_stays():
+    motion = motion_of(MODEL, falling(turns=0.0), covariance=small_covariance(MODEL))
+    expected = [centre_of_mass(MODEL.with_pose(motion.pose(row)))[0] for row in range(len(motion))]
+    np.testing.assert_allclose(measure_flight(motion, MODEL)["com"], expected, atol=ROUNDTRIP)
 
 
 @pytest.mark.parametrize("lost", [range(21), range(1, 21), range(2, 21)])

@@ -11,6 +11,7 @@ from airborne.body import BodyModel
 from airborne.constants import GRAVITY_M_S2
 from airborne.errors import BodyError
 from airborne.motion.angles import root_angles
+from airborne.motion.flight.fall import UNKNOWN_SD_M, fit_fall, flight_rows
 from airborne.motion.flight.momentum import WINDOW, angular_momenta, centre_of_mass, limit_rotation_variance
 from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
@@ -19,8 +20,6 @@ from airborne.types import Array, Triple
 
 if TYPE_CHECKING:
     import xarray as xr
-
-_MOST_CORRELATED = 0.99  # of consecutive residuals: more would leave less than one of 200 independent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +53,8 @@ def has_inertias(model: BodyModel) -> bool:
 def measure_flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr.Dataset:
     """Measure a body in flight, frame by frame, with standard deviations to first order.
 
-    - `com` (time, space) [m]: the centre of mass in the world
+    - `com` (time, space) [m]: the centre of mass in the world; where the body falls freely and turns, it is moved in
+      the root's frame to where it falls best (see `fit_fall`)
     - `angular_momentum` (time, space) [kg m2/s]: about the centre of mass, world axes; rates are slopes of
       parabolas over `window` frames, never across a lost frame (see `angular_momenta`)
     - `somersault`, `twist` [rev] and `tilt` [deg] of the root, as in `root_angles`
@@ -72,6 +72,7 @@ def measure_flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr
     for row in np.flatnonzero(motion.has_pose):
         com[row], jacobian = centre_of_mass(model.with_pose(motion.pose(row)))
         variance[row] = propagate_variances(jacobian, limit_rotation_variance(motion.covariance[row]))
+    com, variance = _as_it_falls(motion, com, variance)
     momentum, momentum_variance = angular_momenta(motion, model, window)
     somersault, tilt, twist = root_angles(motion).deg.T
     axes, units = ("time", "space"), "kg m2/s"
@@ -99,7 +100,7 @@ def flight_summary(motion: Motion, model: BodyModel, window: int = WINDOW) -> Fl
     rows = np.flatnonzero(motion.has_pose)
     momentum = table["angular_momentum"].to_numpy()
     momentum = momentum[np.isfinite(momentum).all(axis=-1)]
-    gravity, gravity_sd, rms = fit_parabola(motion.time_s[rows], table["com"].to_numpy()[rows])
+    gravity, gravity_sd, rms = _fit_parabola(motion.time_s[rows], table["com"].to_numpy()[rows], motion.R[rows])
     tilt = table["tilt"].to_numpy()[rows]
     return FlightSummary(
         n_poses=len(rows),
@@ -116,24 +117,33 @@ def flight_summary(motion: Motion, model: BodyModel, window: int = WINDOW) -> Fl
     )
 
 
-def fit_parabola(time_s: Array, com: Array) -> tuple[float, float, float]:
+def _as_it_falls(motion: Motion, com: Array, variance: Array) -> tuple[Array, Array]:
+    """Return the centre of mass and its variances (n, 3), moved to where it falls best; as given without a fall."""
+    posed = np.flatnonzero(motion.has_pose)
+    height, stated = com[posed, 2], np.nan_to_num(variance[posed, 2], nan=UNKNOWN_SD_M**2)
+    rows = posed[flight_rows(motion.time_s[posed], height, stated)] if len(posed) > 1 else posed[:0]
+    if not len(rows):
+        return com, variance
+    fall = fit_fall(motion.time_s[rows], com[rows], motion.R[rows])
+    if not fall.is_free:
+        return com, variance
+    added = np.einsum("nij,jk,nik->ni", motion.R, fall.offset_covariance, motion.R)
+    return com + motion.R @ fall.offset_m, variance + added
+
+
+def _fit_parabola(time_s: Array, com: Array, R: Array) -> tuple[float, float, float]:
     """Return the best-fitting downward acceleration of a path (n, 3), its sd, and the RMS residual of free fall [m].
 
-    The sd takes the heights' residuals for a first-order autoregressive process (Bartlett 1935): where each is r times
-    the one before, n of them say as much as n (1 - r) / (1 + r) independent ones. NaN for fewer than four poses.
+    NaN for fewer than four poses.
     """
     if len(time_s) < 4:
         return np.nan, np.nan, np.nan
+    fall = fit_fall(time_s, com, R)
     t = time_s - time_s.mean()
-    powers = np.vander(t, 3)
-    curvature = np.linalg.lstsq(powers, com[:, 2], rcond=None)[0]
-    height = com[:, 2] - powers @ curvature
-    r = float(np.clip(height[1:] @ height[:-1] / max(height @ height, 1e-30), 0, _MOST_CORRELATED))
-    variance = height @ height / (len(t) - 3) * np.linalg.inv(powers.T @ powers)[0, 0] * (1 + r) / (1 - r)
     without_gravity = com + [0, 0, 0.5 * GRAVITY_M_S2] * t[:, None] ** 2
-    line = powers[:, 1:]
+    line = np.vander(t, 2)
     residual = without_gravity - line @ np.linalg.lstsq(line, without_gravity, rcond=None)[0]
-    return -2 * float(curvature[0]), 2 * float(np.sqrt(variance)), float(np.sqrt(np.mean(np.sum(residual**2, axis=-1))))
+    return fall.gravity_m_s2, fall.gravity_sd_m_s2, float(np.sqrt(np.mean(np.sum(residual**2, axis=-1))))
 
 
 def _change(values: Array) -> float:

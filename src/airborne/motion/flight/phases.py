@@ -10,6 +10,14 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.constants import GRAVITY_M_S2
+from airborne.motion.flight.fall import (
+    FEWEST_OF_SPAN,
+    SPAN_S,
+    SUPPORTED_M_S2,
+    UNKNOWN_SD_M,
+    is_free_fall,
+    local_accelerations,
+)
 from airborne.motion.flight.momentum_table import has_inertias, measure_flight
 from airborne.motion.free_fall import GENERIC_NOISE, combine_sides, noise_covariance, side_likelihood
 from airborne.motion.jumps.heights import measure_jumps
@@ -19,15 +27,10 @@ from airborne.motion.smoothing import crossings
 from airborne.motion.uncertainty import standard_deviation
 from airborne.types import Array
 
-_WINDOW_S = 0.16  # of the parabolas that measure the acceleration
-_FREE_M_S2, _MOST_M_S2 = 2.5, 5.5  # deviation from free fall: of any flight, and with noise
-_SUPPORTED_M_S2 = -5.0  # a body that falls clearly slower is supported
 _SHORTEST_S = 0.1  # of a flight: about its peak a body falls 1 cm in it
-# of a flight from which the centre of mass is found; frames in it; ridge
-_SPAN_S, _FEWEST_OF_SPAN, _REGULARISATION = 0.4, 8, 0.05
+_REGULARISATION = 0.05  # ridge of the point that falls most freely
 _SEEK_S, _GRID_S = 0.12, 1 / 480  # search window of an event about the threshold, and its grid
 _CONTACT_S = 0.15  # of contact that is used
-_UNKNOWN_SD_M = 0.02  # of a height without a covariance
 _FEWEST = 4  # known frames of contact that an event needs
 
 
@@ -63,10 +66,10 @@ def ballistic_point(motion: Motion) -> Array:
     posed = np.flatnonzero(motion.has_pose)
     for first in posed:
         rows = posed[
-            (motion.time_s[posed] >= motion.time_s[first]) & (motion.time_s[posed] <= motion.time_s[first] + _SPAN_S)
+            (motion.time_s[posed] >= motion.time_s[first]) & (motion.time_s[posed] <= motion.time_s[first] + SPAN_S)
         ]
         t = motion.time_s[rows] - motion.time_s[first]
-        if len(rows) < _FEWEST_OF_SPAN or t[-1] < 0.9 * _SPAN_S:
+        if len(rows) < FEWEST_OF_SPAN or t[-1] < 0.9 * SPAN_S:
             continue
         without_gravity = motion.position[rows] + 0.5 * GRAVITY_M_S2 * t[:, None] ** 2 * np.array([0.0, 0.0, 1.0])
         line = np.kron(np.stack([np.ones_like(t), t], axis=1), np.eye(3))
@@ -109,31 +112,16 @@ def find_flight_events(time_s: Array, height_m: Array, variance: Array) -> tuple
     is_known = np.isfinite(height_m)
     time_s, height_m = time_s[is_known], height_m[is_known]
     is_stated = np.isfinite(variance[is_known]) & (variance[is_known] > 0)
-    variance = np.where(is_stated, variance[is_known], _UNKNOWN_SD_M**2)
+    variance = np.where(is_stated, variance[is_known], UNKNOWN_SD_M**2)
     if len(time_s) < 2 * _FEWEST:
         return ()
-    acceleration, sd = _accelerations(time_s, height_m, variance)
-    is_free = np.abs(acceleration + GRAVITY_M_S2) <= np.minimum(_FREE_M_S2 + 2 * sd, _MOST_M_S2)
+    acceleration, sd = local_accelerations(time_s, height_m, variance)
+    is_free = is_free_fall(acceleration, sd)
     events: list[Event] = []
-    for start, stop in _spans_below(time_s, acceleration - 2 * sd - _SUPPORTED_M_S2):
+    for start, stop in _spans_below(time_s, acceleration - 2 * sd - SUPPORTED_M_S2):
         if _longest_run_s(time_s, is_free & (time_s >= start) & (time_s <= stop)) >= _SHORTEST_S:
             events += _most_likely_events(time_s, height_m, variance, start_s=start, stop_s=stop)
     return tuple(events)
-
-
-def _accelerations(time_s: Array, height_m: Array, variance: Array) -> tuple[Array, Array]:
-    """Return the acceleration of the best parabola about each time [m/s2] and its sd; NaN near ends and gaps."""
-    acceleration, sd = np.full((2, len(time_s)), np.nan)
-    period = float(np.median(np.diff(time_s)))
-    for k, at in enumerate(time_s):
-        rows = np.flatnonzero(np.abs(time_s - at) <= _WINDOW_S / 2 + 1e-9)
-        u = time_s[rows] - at
-        if len(rows) < 5 or u[0] > -_WINDOW_S / 2 + period or u[-1] < _WINDOW_S / 2 - period:
-            continue
-        hat = np.linalg.pinv(np.vander(u, 3))[0]
-        acceleration[k] = 2 * hat @ height_m[rows]
-        sd[k] = 2 * np.sqrt(hat @ noise_covariance(u, variance[rows], noise=GENERIC_NOISE) @ hat)
-    return acceleration, sd
 
 
 def _spans_below(time_s: Array, values: Array) -> list[tuple[float, float]]:

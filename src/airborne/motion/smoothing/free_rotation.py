@@ -19,17 +19,17 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from airborne.body import BodyModel
-from airborne.constants import GRAVITY_M_S2
 from airborne.geometry.rotations import matrix_from_angles
+from airborne.motion.flight.fall import fit_fall
 from airborne.motion.flight.momentum import angular_momentum, centre_of_mass
-from airborne.motion.flight.momentum_table import fit_parabola, has_inertias
+from airborne.motion.flight.momentum_table import has_inertias
 from airborne.motion.motion import Motion
 from airborne.motion.smoothing.butterworth import butterworth_smoother, is_evenly_sampled
 from airborne.motion.smoothing.rotations import SmoothedRotations, smooth_rotations
 from airborne.motion.smoothing.segments import finite_rows
 from airborne.types import Array
 
-_FREE_M_S2 = 2.5  # of the fitted gravity from 9.81, and its sd: free fall, as in `flight.phases`
+_MOST_SD_M_S2 = 2.5  # of a flight's fitted gravity: more tells nothing of whether it is free, as in `flight.fall`
 _FEWEST = 12  # frames of a flight, twice the numbers that are fitted
 # of the joints' low-pass: trunks hardly move, but are tracked to and fro against the pelvis. Chosen on synthetic
 # somersaults 71 and 72, arms and pikes: with 2 Hz of all, angular velocities err by 30 to 55 % of the tracked ones,
@@ -80,8 +80,8 @@ def _flights(rotations: SmoothedRotations, motion: Motion, model: BodyModel) -> 
         if len(posed) < _FEWEST or label[rows[0]] < 0 or not is_even:
             continue
         com = np.array([centre_of_mass(model.with_pose(motion.pose(row)))[0] for row in posed])
-        gravity, sd, _ = fit_parabola(motion.time_s[posed], com)
-        if abs(gravity - GRAVITY_M_S2) < _FREE_M_S2 and sd < _FREE_M_S2:
+        fall = fit_fall(motion.time_s[posed], com, motion.R[posed])
+        if fall.is_free and fall.gravity_sd_m_s2 < _MOST_SD_M_S2:
             yield slice(int(rows[0]), int(rows[-1]) + 1)
 
 
