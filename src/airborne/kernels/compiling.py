@@ -44,7 +44,7 @@ def kernel(
         "forceinline": False,
         "inline": inline,
         "no_cpython_wrapper": is_inner,
-        "no_cfunc_wrapper": is_inner,
+        "no_cfunc_wrapper": True,  # no kernel is given to a library in C
     }
     compiled: Any = njit(pipeline_class=_Compiler, **options)(function)
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
