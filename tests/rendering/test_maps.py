@@ -26,3 +26,14 @@ def test_surface_maps_are_the_rendering_with_normals_that_point_at_the_camera():
     visible = normals[:, v, u].T
     np.testing.assert_allclose(np.linalg.norm(visible, axis=1), 1, rtol=SOLVED)
     assert np.all(np.sum(visible * rays, axis=1) < 1e-3)
+
+
+def test_parts_and_depths_are_the_same_without_normals():
+    shapes, posed = posed_random(["ellipsoid", "box", "mesh", "slab"], 1)
+    seen_by = camera(turn=0.7)
+    drawn, plain = empty_maps(seen_by.size), empty_maps(seen_by.size, with_normals=False)
+    for maps in (drawn, plain):
+        surface_maps(new_shapes(shapes), shapes, posed.R, posed.t, pack_view(seen_by), *maps)
+    assert plain.normals.size == 0
+    for with_normals, without in zip(drawn[:2], plain[:2], strict=True):
+        np.testing.assert_array_equal(with_normals, without)

@@ -22,10 +22,11 @@ _KERNEL = np.array([0.25, 0.5, 0.25], np.float32)  # a colour also counts in its
 
 
 @kernel
-def count_colours(rgb, chosen, stride, counts):
+def count_colours(rgb, chosen, stride, counts, reach=1):
     """Add the colours of the chosen pixels to counts (32, 32, 32), each blurred over the 27 bins around it.
 
-    rgb (h, w, 3) uint8, chosen (h, w) bool; every `stride`-th chosen pixel is taken. Returns how many.
+    rgb (h, w, 3) uint8, chosen (h, w) bool; every `stride`-th chosen pixel is taken. Returns how many. With a `reach`
+    of 0 each is blurred over the 9 bins of its own red alone, at half the weight.
     """
     h, w, _ = rgb.shape
     n_chosen, taken = 0, 0
@@ -38,7 +39,7 @@ def count_colours(rgb, chosen, stride, counts):
                 continue
             taken += 1
             r, g, b = rgb[y, x, 0] >> 3, rgb[y, x, 1] >> 3, rgb[y, x, 2] >> 3
-            for i in range(-1, 2):
+            for i in range(-reach, reach + 1):
                 for j in range(-1, 2):
                     for k in range(-1, 2):
                         ri, gj, bk = min(max(r + i, 0), 31), min(max(g + j, 0), 31), min(max(b + k, 0), 31)
@@ -46,7 +47,7 @@ def count_colours(rgb, chosen, stride, counts):
     return taken
 
 
-@kernel
+@kernel(fastmath=True)
 def blend_colours(rgb, chosen, stride, rate, old, out):
     """Fill out (32, 32, 32) with (1 - rate) old + rate times the shares of the chosen pixels' colours.
 
@@ -59,17 +60,15 @@ def blend_colours(rgb, chosen, stride, rate, old, out):
     taken = n_chosen // stride
     if taken == 0:
         return taken
-    keep, scale = np.float32(1 - rate), np.float32(taken / rate)
+    counts = np.zeros_like(out)
+    count_colours(rgb, chosen, stride, counts, 0)  # red is blurred below, for all pixels at once
+    keep, share, last = np.float32(1 - rate), np.float32(rate / taken), BINS_PER_CHANNEL - 1
     for i in range(BINS_PER_CHANNEL):
+        before, own, after = counts[max(i - 1, 0)], counts[i], counts[min(i + 1, last)]
         for j in range(BINS_PER_CHANNEL):
             for k in range(BINS_PER_CHANNEL):
-                out[i, j, k] = keep * old[i, j, k] * scale
-    count_colours(rgb, chosen, stride, out)
-    share = np.float32(1) / scale
-    for i in range(BINS_PER_CHANNEL):
-        for j in range(BINS_PER_CHANNEL):
-            for k in range(BINS_PER_CHANNEL):
-                out[i, j, k] *= share
+                count = own[j, k] + _HALF * (before[j, k] + after[j, k])
+                out[i, j, k] = keep * old[i, j, k] + share * count
     return taken
 
 

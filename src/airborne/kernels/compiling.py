@@ -8,6 +8,7 @@ the two differ in the last digits. So a kernel here keeps its copies to itself.
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from typing import Any
 
@@ -43,7 +44,7 @@ def kernel(
         "forceinline": False,
         "inline": inline,
         "no_cpython_wrapper": is_inner,
-        "no_cfunc_wrapper": is_inner,
+        "no_cfunc_wrapper": True,  # no kernel is given to a library in C
     }
     compiled: Any = njit(pipeline_class=_Compiler, **options)(function)
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
@@ -74,13 +75,35 @@ class _Library(JITCodeLibrary):
         return self._shared_module
 
 
+class _InnerLibrary(_Library):
+    """What other kernels copy of one that only they call: no machine code is made of it."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        # where Numba writes down, for every kernel, the address of its environment
+        environments = [str(each) for each in self._final_module.global_variables if each.name.startswith(_ENVIRONMENT)]
+        module = llvm.parse_assembly("\n".join(environments))
+        module.data_layout = self._codegen._data_layout
+        self._codegen._add_module(module)
+        self._codegen._engine.finalize_object()
+        self._finalized = True
+
+
 _SHARED = llvm.Linkage.linkonce_odr
+_ENVIRONMENT = "_ZN08NumbaEnv"
 
 
 class _Compiler(Compiler):
     """Numba's compiler, with libraries of our own."""
 
     def compile_extra(self, func: Callable) -> Any:
-        self.state.library = _Library(self.state.targetctx.codegen(), func.__qualname__)
+        library = _InnerLibrary if self.state.flags.no_cpython_wrapper else _Library
+        self.state.library = library(self.state.targetctx.codegen(), func.__qualname__)
         self.state.library.enable_object_caching()
-        return super().compile_extra(func)
+        collects = gc.isenabled()
+        gc.disable()  # it would go through Numba's trees again and again: a fifth of the time
+        try:
+            return super().compile_extra(func)
+        finally:
+            if collects:
+                gc.enable()

@@ -44,8 +44,8 @@ def blur_planes(planes, taps_u, taps_v, out):
                     + u4 * (padded[x] + padded[x + 8])
                 )
         for y in range(RADIUS_PX):
-            rows[y] = rows[RADIUS_PX]
-            rows[h + RADIUS_PX + y] = rows[h + RADIUS_PX - 1]
+            for x in range(w):
+                rows[y, x], rows[h + RADIUS_PX + y, x] = rows[RADIUS_PX, x], rows[h + RADIUS_PX - 1, x]
         for y in range(h):
             for x in range(w):
                 out[k, y, x] = (

@@ -9,16 +9,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from airborne.appearance.lighting import fit_light, flatten_shading, shade_body
+from airborne.appearance.lighting import LIGHT_TERMS, fit_light, flatten_shading, shade_body
 from airborne.kernels import kernel
 from airborne.rendering.drawing import draw_maps
-from airborne.rendering.maps import surface_maps
+from airborne.rendering.maps import SurfaceMaps, surface_maps
 from airborne.rendering.rows import LANES
 from airborne.tracking.model_based.blur import blur_planes
-from airborne.tracking.model_based.kernel_arguments import Comparison, Observation
+from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, PackedBody, Paint, Projection
 from airborne.tracking.model_based.owners import find_owners, mask_box
 from airborne.tracking.model_based.row_equations import add_rows
+from airborne.tracking.model_based.twist_equations import Sums
 from airborne.types import Array
+
+_NO_PAINT = Paint(np.zeros((0, 3), np.float32), np.zeros(0, np.bool_))
+_NO_LIGHT = np.zeros((3, LIGHT_TERMS), np.float32)
 
 
 def prepare_rows(observed: Array, background: Array, certainty: Array, comparison: Comparison) -> Observation:
@@ -48,38 +52,46 @@ def _fill_rows(observed, background, certainty, taps_u, taps_v, inverse_clip2, r
         for k in range(c):
             for x in range(w):
                 rows[y, k, x] = blurred[k, y, x]
+                rows[y, c + k, x] = background[k, y, x]
                 cost[x] += blurred[k, y, x] * blurred[k, y, x]
-            rows[y, c + k, :w] = background[k, y]
-        rows[y, 2 * c, :w] = certainty[y]
         for x in range(w):
+            rows[y, 2 * c, x] = certainty[y, x]
             cost[x] *= certainty[y, x] / (np.float32(1) + cost[x] * inverse_clip2)
 
 
-@kernel(fastmath=True)
-def silhouette_equations(body, projection, observation, comparison, maps, sums, blocks):
+def silhouette_equations(
+    body: PackedBody,
+    projection: Projection,
+    observation: Observation,
+    comparison: Comparison,
+    maps: SurfaceMaps,
+    sums: Sums,
+    blocks: Array,
+) -> tuple[float, float, float]:
     """Add one view's equations of `blurred posterior - blurred mask`.
 
     The observed plane is the posterior (1, H, W), each pixel's probability to be body; the background is black.
     """
-    owner, nearness = _draw(body, projection, maps)
-    lit = np.empty((0, 1, 1), np.float32)
-    return add_rows(lit, lit, maps, owner, nearness, projection, observation, comparison, sums, blocks)
+    args = body, projection, observation, comparison, maps
+    return photometric_equations(*args, _NO_PAINT, _NO_LIGHT, 0, sums, blocks)
 
 
 @kernel(fastmath=True)
 def photometric_equations(body, projection, observation, comparison, maps, paint, light, iterations, sums, blocks):
     """Add one view's equations of `blurred observed - blurred composite`, in linear light.
 
-    light (3, LIGHT_TERMS): the view's fitted light, refitted in place by `iterations` of reweighting.
+    light (3, LIGHT_TERMS): the view's fitted light, refitted in place by `iterations` of reweighting. Without paint,
+    the equations of a mask: what they share is compiled once.
     """
     owner, nearness = _draw(body, projection, maps)
-    x0, y0, x1, y1 = mask_box(maps.part)
-    fit_light(observation.observed, maps.part, maps.normals, paint.albedo, light, iterations, x0, y0, x1, y1)
-    lit = np.empty(maps.normals.shape, np.float32)
-    shade_body(maps.part, maps.normals, paint.albedo, light, x0, y0, lit[:, y0:y1, x0:x1])
-    return _sum_equations(
-        lit, paint.is_faceted, maps, owner, nearness, projection, observation, comparison, sums, blocks
-    )
+    lit = np.empty((0, 1, 1), np.float32)
+    if len(paint.albedo):
+        x0, y0, x1, y1 = mask_box(maps.part)
+        fit_light(observation.observed, maps.part, maps.normals, paint.albedo, light, iterations, x0, y0, x1, y1)
+        lit = np.empty(maps.normals.shape, np.float32)
+        shade_body(maps.part, maps.normals, paint.albedo, light, x0, y0, lit[:, y0:y1, x0:x1])
+    flat = _flatten(lit, maps.part, paint.is_faceted)
+    return add_rows(lit, flat, maps, owner, nearness, projection, observation, comparison, sums, blocks)
 
 
 @kernel(fastmath=True)
@@ -87,7 +99,8 @@ def equations_of_known_light(body, projection, observation, comparison, maps, is
     """Add one view's equations under known lights, in shares of full sRGB; lamps (l, 8), ambient as in `draw_maps`."""
     owner, nearness = _draw(body, projection, maps)
     lit = light_by_lamps(body, projection, lamps, ambient, maps.part)
-    return _sum_equations(lit, is_faceted, maps, owner, nearness, projection, observation, comparison, sums, blocks)
+    flat = _flatten(lit, maps.part, is_faceted)
+    return add_rows(lit, flat, maps, owner, nearness, projection, observation, comparison, sums, blocks)
 
 
 @kernel(fastmath=True)
@@ -154,7 +167,7 @@ def light_by_lamps(body, projection, lamps, ambient, part):
     return lit
 
 
-@kernel(fastmath=True)
+@kernel(fastmath=True, is_inner=True)
 def _draw(body, projection, maps):
     """Draw the maps of a view; return the segment that owns each pixel and its inverse depth, (0, 0) of one segment."""
     R, t, view = projection.R, projection.t, projection.packed_view
@@ -166,11 +179,11 @@ def _draw(body, projection, maps):
     return owner, nearness
 
 
-@kernel(fastmath=True)
-def _sum_equations(lit, is_faceted, maps, owner, nearness, projection, observation, comparison, sums, blocks):
-    """Compare the image with the lit body (3, H, W) in front of the background."""
+@kernel(fastmath=True, is_inner=True)
+def _flatten(lit, part, is_faceted):
+    """Return the lit body's colours (c, H, W) as they move with it."""
     flat = lit
     if not is_faceted.all():
         flat = lit.copy()
-        flatten_shading(maps.part, is_faceted, flat)
-    return add_rows(lit, flat, maps, owner, nearness, projection, observation, comparison, sums, blocks)
+        flatten_shading(part, is_faceted, flat)
+    return flat

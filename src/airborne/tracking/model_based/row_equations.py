@@ -32,7 +32,7 @@ from airborne.tracking.model_based.twist_equations import BLOCK_PX
 _PAD = LANES // 2  # columns of a row before the first that is compared, and after the last
 
 
-@kernel(fastmath=True)
+@kernel(fastmath=True, is_inner=True)
 def add_rows(lit, flat, maps, owner, nearness, projection, observation, comparison, sums, blocks):
     """Add one view's normal equations for the twist of each segment about the projection's origin: A twist = g.
 
@@ -172,8 +172,8 @@ def _take_owners(owner, nearness, first, n, own, near):
     """Copy the owners of n pixels of a row and their inverse depths; none owns what follows."""
     own[:] = -1
     near[:] = 0
-    own[:n] = owner[first : first + n]
-    near[:n] = nearness[first : first + n]
+    for x in range(n):
+        own[x], near[x] = owner[first + x], nearness[first + x]
 
 
 @kernel(fastmath=True, is_inner=True)
