@@ -19,6 +19,7 @@ from airborne.errors import AirborneError, ResultError
 from airborne.export.pictures import thumbnail
 from airborne.studio.calibrating import find_picture
 from airborne.studio.curve_data import run_curves
+from airborne.studio.field_order import ORDERS, order_jpeg
 from airborne.studio.guard import FILE_POLICY
 from airborne.studio.outlines import BESIDE_COLOUR, run_overlay
 from airborne.studio.pictures import SHRINKS
@@ -62,6 +63,10 @@ def add_routes(app: FastAPI, session: Session) -> None:
     @app.get("/thumbnail/{name}")
     async def first_picture(name: str) -> Response:
         return await _answer(lambda: _thumbnail(session.folder, name))
+
+    @app.get("/fields/{order}/{name}")
+    async def fields(order: str, name: str) -> Response:
+        return await _answer(lambda: _fields(session.folder, name, order))
 
     @app.get("/parts/{name}")
     async def script(name: str) -> Response:
@@ -179,8 +184,19 @@ def _picture(session: Session, camera: int, number: int, wish: Wish) -> Response
     return Response(jpeg, media_type="image/jpeg", headers=_KEEP)
 
 
+def _find_video(folder: Path, name: str) -> Path | None:
+    return next((path for path in list_videos(folder) if path.name == name), None)
+
+
+def _fields(folder: Path, name: str, order: str) -> Response:
+    path = _find_video(folder, name)
+    if path is None or order not in ORDERS:
+        return Response(status_code=404)
+    return Response(order_jpeg(path, order), media_type="image/jpeg", headers=_KEEP)
+
+
 def _thumbnail(folder: Path, name: str) -> Response:
-    path = next((path for path in list_videos(folder) if path.name == name), None)
+    path = _find_video(folder, name)
     if path is None:
         return Response(status_code=404)
     source = VideoSource(name, path)

@@ -18,6 +18,8 @@ from airborne.body import BodyModel, Pose
 from airborne.cameras import Camera, Rig
 from airborne.errors import ResultError
 from airborne.export.part_meshes import part_colour, segment_mesh
+from airborne.export.views import cached_surface_arrays
+from airborne.tracking.image_regions import bounding_points
 from airborne.types import Array
 
 _CAMERA_COLOUR, _PATH_COLOUR = "#1f2429", "#0072b2"
@@ -40,14 +42,29 @@ def draw_cameras(
     reach = float(np.median(np.linalg.norm(centres - looked_at, axis=1)))
     if middle is None or away_m is None:
         middle, away_m = overview(np.vstack([centres, looked_at]))
-    with ui.scene(grid=(60, 60), background_color="#f6f7f8").style("width: 100%; flex: 1; min-height: 180px") as scene:
+    with _scene(middle, away_m) as scene:
         for camera in rig:
             _frustum(scene, camera, _FRUSTUM_SHARE * reach)
         if path is not None:
             pairs = [(a, b) for a, b in pairwise(path[:: len(path) // _MOST_LINES + 1]) if np.isfinite([a, b]).all()]
             _lines(scene, pairs, _PATH_COLOUR)
-    x, y, z = map(float, middle + away_m * FROM)
-    scene.move_camera(x, y, z, look_at_x=middle[0], look_at_y=middle[1], look_at_z=middle[2], duration=0)
+    return scene
+
+
+def draw_body(model: BodyModel, address: str) -> None:
+    """Show a body in its zero pose on the floor; `address` gives the mesh of each part, with {part} in it."""
+    pose = Pose(world_from_root=RigidTransform.identity(), joint_angles=np.zeros((model.n_joints, 3)))
+    corners = bounding_points(model.with_pose(pose), cached_surface_arrays(model))
+    lift = np.array([0.0, 0.0, -corners[:, 2].min()])
+    pose, (middle, away_m) = pose.move(lift, np.zeros(3)), overview(corners + lift)
+    BodyOnStage(_scene(middle, away_m), model, address).show(pose)
+
+
+def _scene(middle: Array, away_m: float) -> Scene:
+    """Build an empty scene that is seen from `away_m` beside its middle (3,) [m]."""
+    scene = ui.scene(grid=(60, 60), background_color="#f6f7f8").style("width: 100%; flex: 1; min-height: 180px")
+    (x, y, z), (u, v, w) = (map(float, each) for each in (middle + away_m * FROM, middle))
+    scene.move_camera(x, y, z, look_at_x=u, look_at_y=v, look_at_z=w, duration=0)
     return scene
 
 
