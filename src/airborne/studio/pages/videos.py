@@ -114,7 +114,8 @@ def _show_orders(choice: _Choice) -> None:
     with ui.element("div").classes("row-line"):
         for order in ORDERS:
             with ui.element("figure").style("margin: 0; width: 47%"):
-                picture = ui.element("img").props(f"src=/fields/{order}/{quote(choice.video)}").style("width: 100%; height: auto")
+                picture = ui.element("img").props(f"src=/fields/{order}/{quote(choice.video)}")
+                picture.style("width: 100%; height: auto")
                 picture._props["alt"] = f"{choice.video}, {_FIELDS[order]}"
                 ui.label(_FIELDS[order].removeprefix("two fields, ")).classes("small")
 
