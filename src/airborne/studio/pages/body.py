@@ -43,9 +43,16 @@ async def body_page(session: Session) -> None:
             await scene.refresh()
 
         changed.append(show_anew)
-        if session.project().table("calibration"):
-            with ui.element("a").props('href="/ruler"').classes("plain"):
-                ui.label("Measure a length in the pictures")
+        with ui.element("div").classes("row-line"):
+            if session.project().cameras:
+                _link("/thing", "Describe a thing of solids")
+            if session.project().table("calibration"):
+                _link("/ruler", "Measure a length in the pictures")
+
+
+def _link(address: str, text: str) -> None:
+    with ui.element("a").props(f'href="{address}"').classes("plain"):
+        ui.label(text)
 
 
 def _thing_card(session: Session, bodies: dict[str, BodyModel], table: dict[str, Any]) -> None:
