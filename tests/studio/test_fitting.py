@@ -5,7 +5,7 @@ import shutil
 
 import numpy as np
 
-from airborne.studio.fitting import fit_pose
+from airborne.studio.fitting import fit_to_frame
 from airborne.studio.session import Session
 from airborne.studio.starts import read_pose
 from tests.support.places import THROWN_CROSS
@@ -22,7 +22,7 @@ def test_poses_beside_the_body_are_fitted_to_the_pictures_of_their_frame(tmp_pat
         row = next(row for row in csv.DictReader(file) if int(row["field"]) == frame)
     true_m = [float(row[f"{axis}_m"]) for axis in "xyz"]
     for pose in (start, start.move(np.array([0.02, -0.015, 0.01]), np.array([0.0, 0.03, 0.0]))):
-        fitted = fit_pose(session, model, frame, pose)
+        fitted = fit_to_frame(session, model, frame, pose)
         assert np.linalg.norm(fitted.world_from_root.translation - true_m) < NEAR_M
         assert np.linalg.norm(pose.world_from_root.translation - true_m) > NEAR_M
     assert (folder / "trial.toml").read_bytes() == before

@@ -15,7 +15,7 @@ from airborne.trial.start import StartTable
 _RUN = "fit"  # of one frame, in the folder of what the studio remembers
 
 
-def fit_pose(session: Session, model: BodyModel, frame: int, pose: Pose) -> Pose:
+def fit_to_frame(session: Session, model: BodyModel, frame: int, pose: Pose) -> Pose:
     """Return the pose at which the trial's method finds the body from a pose in a frame. Raises AirborneError."""
     start = StartTable(**start_from_pose(model, frame, pose))
     trial = session.project().trial()

@@ -36,6 +36,7 @@ _SCRIPTS = (  # that components import
     Path(export.__file__).parent / "templates" / "curves.js",  # drawn alike in the report
     *(Path(__file__).with_name(name) for name in ("view_drawing.js", "view_frames.js")),
 )
+_EXAMPLES = Path(__file__).with_name("examples")  # pictures of each step, which a test draws
 _KEEP = {"cache-control": "private, max-age=3600"}
 
 
@@ -51,12 +52,14 @@ def add_routes(app: FastAPI, session: Session) -> None:
     """Add the routes of a session; every name in an address is one of a list, none is a path."""
 
     @app.get("/image/{camera}/{frame}")
-    async def image(request: Request, camera: int, frame: int, shrink: int = 1, near: bool = False) -> Response:
+    async def image(request: Request, camera: int, frame: int, *, shrink: int = 1, near: bool = False) -> Response:
         async with _waiting(request) as is_wanted:
             return await _answer(lambda: _jpeg(session, camera, frame, Wish(shrink, near, is_wanted)))
 
     @app.get("/picture/{camera}/{number}")
-    async def own_picture(request: Request, camera: int, number: int, shrink: int = 1, near: bool = False) -> Response:
+    async def own_picture(
+        request: Request, camera: int, number: int, *, shrink: int = 1, near: bool = False
+    ) -> Response:
         async with _waiting(request) as is_wanted:
             return await _answer(lambda: _picture(session, camera, number, Wish(shrink, near, is_wanted)))
 
@@ -67,6 +70,11 @@ def add_routes(app: FastAPI, session: Session) -> None:
     @app.get("/fields/{order}/{name}")
     async def fields(order: str, name: str) -> Response:
         return await _answer(lambda: _fields(session.folder, name, order))
+
+    @app.get("/example/{name}")
+    async def example(name: str) -> Response:
+        path = next((path for path in _EXAMPLES.glob("*.jpg") if path.name == name), None)
+        return FileResponse(path, headers=_KEEP) if path else Response(status_code=404)
 
     @app.get("/parts/{name}")
     async def script(name: str) -> Response:

@@ -34,7 +34,7 @@ async def body_page(session: Session) -> None:
             if bodies:
                 _thing_card(session, bodies, table)
             _person_card(session, table)
-            _measured_card(session, table)
+            _measurements_card(session, table)
             _players_card(session)
             scene = ui.refreshable(_show_body)
             await scene(session)
@@ -85,7 +85,7 @@ def _person_card(session: Session, table: dict[str, Any]) -> None:
         ui.button("Use this person", on_click=save).props("unelevated")
 
 
-def _measured_card(session: Session, table: dict[str, Any]) -> None:
+def _measurements_card(session: Session, table: dict[str, Any]) -> None:
     files = list_measurements(session.folder)
     if not files:
         return

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from airborne.studio.fitting import fit_pose
+from airborne.studio.fitting import fit_to_frame
 from airborne.studio.outlines import BESIDE_COLOUR, outline_items
 from airborne.studio.pages.layout import complain, work
 from airborne.studio.pages.pose_hand import PoseHand
@@ -31,7 +31,7 @@ class FitButton:
         if before is None:
             complain("place the body by hand first, let it be found, or click its landmarks")
             return
-        after = await work("fitting the body", lambda: fit_pose(self.session, hand.model, frame, before))
+        after = await work("fitting the body", lambda: fit_to_frame(self.session, hand.model, frame, before))
         if after is not None and hand.pose is before:
             hand.place(after)
             hand.before = outline_items(hand.model.with_pose(before), hand.cameras, BESIDE_COLOUR)
