@@ -27,6 +27,7 @@ FROM = np.array([0.7, -0.9, 0.55])  # the side and height from which the scene i
 _ALL_IN_VIEW = 1.4  # times a sphere's radius: from so far, along `FROM`, three.js's 75 degrees hold it with a margin
 _MOST_LINES = 500  # of a path: each is an object of the scene
 _MOVE_EVERY_S = 0.05  # while handles are dragged: the outlines of three views take half of it
+_POINT_M = 0.03  # radius of a point in a scene
 _SHAFT_M, _HEAD_M = 0.012, 0.12  # an arrow's thickness, and the length of its head
 _FRUSTUM_SHARE = 0.12  # of the distance between camera and middle
 
@@ -49,6 +50,14 @@ def draw_cameras(
             pairs = [(a, b) for a, b in pairwise(path[:: len(path) // _MOST_LINES + 1]) if np.isfinite([a, b]).all()]
             _lines(scene, pairs, _PATH_COLOUR)
     return scene
+
+
+def draw_rays(scene: Scene, camera: Camera, points: Array, colour: str) -> None:
+    """Add points (n, 3) [m] to a scene, and the rays by which a camera sees them."""
+    _lines(scene, [(camera.centre, point) for point in points], colour)
+    with scene:
+        for x, y, z in points.tolist():
+            scene.sphere(_POINT_M).move(x, y, z).material(_CAMERA_COLOUR)
 
 
 def draw_body(model: BodyModel, address: str) -> None:
