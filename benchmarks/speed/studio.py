@@ -45,6 +45,11 @@ ARM = """() => { // the outline's outermost point at the height of the left fore
     const [u, at] = arm.reduce((a, b) => a[0] > b[0] ? a : b);
     return [u - 4, at];
 }"""
+GO = """frame => {
+    const canvas = document.querySelector("canvas.view");
+    delete canvas.dataset.coarseMs;
+    canvas.view.go(frame);
+}"""
 N_JUMPS, N_DRAGS, DRAG_PX = 20, 3, 300.0
 N_MANY, N_RUNS, N_TEAM_FRAMES = 200_000, 50, 3000
 LONG, MANY = "four 1080p videos of {:g} min", "50 runs, of 200,000 frames, of 20 players"
@@ -110,15 +115,19 @@ def step_ms(page, n: int) -> list[float]:
     return taken
 
 
-def jump_ms(page, n_frames: int) -> list[float]:
-    """Jump to frames anywhere; return how long each took."""
-    rng, taken = np.random.default_rng(0), []
+def jump_ms(page, n_frames: int) -> tuple[list[float], list[float], list[float]]:
+    """Jump to frames anywhere; return how long each took, its key frame, and the CPU time of server and browser."""
+    rng, taken, coarse, cpu = np.random.default_rng(0), [], [], []
     for frame in rng.integers(0, n_frames, N_JUMPS).tolist():
-        page.evaluate("frame => document.querySelector('canvas.view').view.go(frame)", frame)
+        begun_ms = used_ms()
+        page.evaluate(GO, frame)
         wait_for_frame(page, frame)
+        cpu.append(used_ms() - begun_ms)
         taken.append(shown_ms(page))
-        page.wait_for_timeout(300)  # someone looks
-    return taken
+        first = page.evaluate("document.querySelector('canvas.view').dataset.coarseMs")
+        coarse.append(taken[-1] if first is None else float(first))
+        page.wait_for_timeout(1000)  # someone looks; pictures ahead are made
+    return taken, coarse, cpu
 
 
 def shown_ms(page) -> float:
@@ -156,17 +165,32 @@ def count_drags(page) -> int:
     return int(page.evaluate("document.querySelector('canvas.view').dataset.drags || 0"))
 
 
-def server() -> tuple[float, float]:
-    """Return the memory [MB] and the CPU time so far [s] of the studio, a child of this process."""
-    pages, ticks = 0, 0
+def descendants() -> list[tuple[bytes, int, int]]:
+    """Return the command, the CPU time [ticks] and the memory [pages] of each process that this one has started."""
+    found, parents = {}, {}
     for status in Path("/proc").glob("[0-9]*/stat"):
         try:
             words = status.read_text().rpartition(")")[2].split()
-            line = status.with_name("cmdline").read_bytes()
+            line, pages = status.with_name("cmdline").read_bytes(), status.with_name("statm").read_text().split()[1]
         except OSError:  # it has ended
             continue
-        if int(words[1]) == os.getpid() and b"studio" in line:
-            pages, ticks = int(status.with_name("statm").read_text().split()[1]), int(words[11]) + int(words[12])
+        pid = int(status.parent.name)
+        found[pid], parents[pid] = (line, int(words[11]) + int(words[12]), int(pages)), int(words[1])
+    own = {os.getpid()}
+    while new := {pid for pid, parent in parents.items() if parent in own} - own:
+        own |= new
+    return [found[pid] for pid in own - {os.getpid()}]
+
+
+def used_ms() -> float:
+    """Return the CPU time so far of studio and browser, without what drives the browser."""
+    ticks = [ticks for line, ticks, _ in descendants() if b"chrom" in line or b"main()" in line]
+    return 1e3 * sum(ticks) / os.sysconf("SC_CLK_TCK")
+
+
+def server() -> tuple[float, float]:
+    """Return the memory [MB] and the CPU time so far [s] of the studio, which this process has started."""
+    _, ticks, pages = next(each for each in descendants() if b"studio" in each[0] and b"main()" in each[0])
     return pages * resource.getpagesize() / 1e6, ticks / os.sysconf("SC_CLK_TCK")
 
 
@@ -179,7 +203,7 @@ def measure_short(folder: Path, second: Path, steps: int) -> dict[str, list[floa
         page.wait_for_timeout(3000)  # what the kernels compile, once
         begun_s = server()[1]
         steps_ms, stepped_s = step_ms(page, steps), server()[1]
-        jumps_ms, jumped_s = jump_ms(page, 20 * RATE), server()[1]
+        jumps = name_jumps("jump", jump_ms(page, 20 * RATE))
         page.goto(address.split("?")[0] + "start")
         page.wait_for_function("document.querySelector('canvas.view')?.dataset.frame !== undefined")
         before_s = server()[1]
@@ -187,10 +211,15 @@ def measure_short(folder: Path, second: Path, steps: int) -> dict[str, list[floa
         dragged_s = server()[1]
     cpu_ms = {
         "step, server's CPU": [1e3 * (stepped_s - begun_s) / steps],
-        "jump, server's CPU": [1e3 * (jumped_s - stepped_s) / N_JUMPS],  # what is made ahead of it too
         "drag, server's CPU": [1e3 * (dragged_s - before_s) / len(drags_ms)],
     }
-    return {"step": steps_ms, "jump": jumps_ms, "drag": drags_ms[5:], "release": releases_ms, **cpu_ms}
+    return {"step": steps_ms, **jumps, "drag": drags_ms[5:], "release": releases_ms, **cpu_ms}
+
+
+def name_jumps(kind: str, measured: tuple[list[float], list[float], list[float]]) -> dict[str, list[float]]:
+    """Name what `jump_ms` returns."""
+    whole, coarse, cpu = measured
+    return {kind: whole, f"{kind}, to the key frame before": coarse, f"{kind}, CPU of server and browser": cpu}
 
 
 def measure_long(folder: Path, second: Path, minutes: float) -> dict[str, list[float]]:
@@ -202,8 +231,8 @@ def measure_long(folder: Path, second: Path, minutes: float) -> dict[str, list[f
         page.goto(address.split("?")[0] + "track")
         wait_for_frame(page, 0)
         taken_ms = 1e3 * (time.monotonic() - begun)
-        jumps_ms = jump_ms(page, round(60 * minutes) * RATE)
-        return {"open": [taken_ms], "long jump": jumps_ms, "memory": [server()[0]]}
+        jumps = name_jumps("long jump", jump_ms(page, round(60 * minutes) * RATE))
+        return {"open": [taken_ms], **jumps, "memory": [server()[0]]}
 
 
 def measure_many(folder: Path, second: Path) -> dict[str, list[float]]:
@@ -227,7 +256,7 @@ def measure_many(folder: Path, second: Path) -> dict[str, list[float]]:
         for name in ("results", "team"):
             os.utime(folder / name)
             found |= {f"{name}: Review open": [review_ms(page, address)]}
-            found |= {f"{name}: step": step_ms(page, 20), f"{name}: jump": jump_ms(page, N_TEAM_FRAMES)}
+            found |= {f"{name}: step": step_ms(page, 20), f"{name}: jump": jump_ms(page, N_TEAM_FRAMES)[0]}
             page.evaluate("document.querySelector('canvas.view').view.go(0)")
             wait_for_frame(page, 0)
         begun = time.monotonic()
@@ -270,7 +299,7 @@ def write_team(run: Path, like: Path) -> None:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("parts", nargs="*", choices=["short", "long", "many"], default=["short", "long", "many"])
+    parser.add_argument("parts", nargs="*", help="short, long, many; without any all of them")
     parser.add_argument("--minutes", type=float, default=10.0, help="of the long videos")
     parser.add_argument("--steps", type=int, default=60)
     parser.add_argument("--rows", action="store_true", help="append to benchmarks/results/studio.csv")
@@ -287,7 +316,7 @@ def main() -> None:
             ),
             "many": (MANY, lambda: measure_many(folder / "m", folder / "small.mp4")),
         }
-        for part in given.parts:
+        for part in given.parts or ways:
             data, measure = ways[part]
             before = os.getloadavg()[0]
             found = measure()

@@ -13,8 +13,8 @@ from tests.support.studio import open_page, open_studio
 SIZE, N = (320, 240), 6
 PAGES = {  # and what is there when a page is built
     "": "Use these cameras", "sync": "Same event", "cameras": "focal length", "body": "Use this person",
-    "ruler": "How long", "start": "Place it by hand", "track": "Track again", "review": "next uncertain",
-    "digitise": "Agreement", "results": "Export",
+    "ruler": "How long", "thing": "Use this thing", "start": "Place it by hand", "track": "Track again",
+    "review": "next uncertain", "digitise": "Agreement", "results": "Export",
 }  # fmt: skip
 TRIAL = f"""name = "person"
 calibration = {{ file = "calib.toml" }}

@@ -1,6 +1,7 @@
 """What the step Cameras writes: files that `calibrate` reads, and a court's points to be clicked."""
 
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,11 @@ from airborne.calibration.from_points import calibrate
 from airborne.calibration.sources.boards import read_board
 from airborne.calibration.sources.court import court_lines, court_points, survey_points
 from airborne.calibration.sources.files import read_sources
+from airborne.calibration.sources.wand import read_wand
 from airborne.cameras import camera_looking_at
+from airborne.cameras.formats.options import FileOptions
 from airborne.errors import CalibrationError, TrialError
+from airborne.evaluation import DigitisedPoints, read_clicked_frames, write_clicked_frames
 from airborne.studio.calibrating import (
     REPORT,
     board_text,
@@ -22,6 +26,7 @@ from airborne.studio.calibrating import (
     list_wands,
     read_report,
     sources_text,
+    wand_text,
     write_report,
 )
 from airborne.studio.clicks import read_clicked
@@ -49,6 +54,20 @@ def test_boards_and_wands_are_found_by_what_is_in_the_files(project):
     board, chess = read_board(folder / "board.toml"), read_board(folder / "chess.toml")
     assert (board.kind, board.square_m, board.marker_m, board.dictionary) == ("charuco", 0.04, 0.03, "DICT_5X5_50")
     assert (chess.kind, chess.columns, chess.square_m) == ("chessboard", 7, 0.0255)
+
+
+def test_clicks_of_a_wand_s_ends_are_its_tracks(project):
+    px = np.arange(24.0).reshape(2, 3, 2, 2) + 0.5  # frames, points, cameras
+    px[:, 1], px[1, 0, 1] = np.nan, np.nan  # a point that is never clicked, and a click that is missing
+    clicks = DigitisedPoints(index=np.array([4, 9]), points=("a", "b", "c"), px=px)
+    write_clicked_frames(project.folder / "digitised_A_1.csv", clicks, ["left", "right"])
+    assert list_wands(project.folder) == ["digitised_A_1.csv"]
+    read = read_clicked_frames(project.folder / "digitised_A_1.csv", ["left", "right"])
+    (project.folder / "wand.csv").write_text(wand_text(project, read))
+    tracks = read_wand(project.folder / "wand.csv", ["left", "R"], FileOptions(), [0.5])
+    assert np.array_equal(tracks.px, px[:, [0, 2]], equal_nan=True)
+    with pytest.raises(TrialError, match="3 points are clicked; expected two"):
+        wand_text(project, replace(clicks, px=np.nan_to_num(px)))
 
 
 def test_sources_name_the_cameras_as_the_trial_looks_for_them(project):

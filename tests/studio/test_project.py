@@ -4,8 +4,10 @@ import shutil
 
 import pytest
 
+from airborne.body import write_measurements
+from airborne.body.anthropometry import measurements_of
 from airborne.errors import TrialError
-from airborne.studio.project import find_trial, read_project, steps
+from airborne.studio.project import find_trial, list_measurements, read_project, steps
 from tests.support.places import THROWN_CROSS
 
 
@@ -53,6 +55,12 @@ def test_a_video_outside_the_folder_is_refused(tmp_path):
     project = read_project(tmp_path / "in", tmp_path / "in" / "trial.toml")
     with pytest.raises(TrialError, match=r"\.\./out\.mp4 lies outside"):
         project.source(project.cameras[0])
+
+
+def test_measurements_of_a_person_are_found_by_what_is_in_the_files(tmp_path):
+    write_measurements(tmp_path / "anna.txt", measurements_of(1.7, 60.0))
+    (tmp_path / "notes.txt").write_text("filmed on Monday\n")
+    assert list_measurements(tmp_path) == ["anna.txt"]
 
 
 def test_a_path_that_is_not_there_is_refused(tmp_path):

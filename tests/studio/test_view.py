@@ -5,7 +5,8 @@ from fractions import Fraction
 import pytest
 
 from airborne.studio.clicks import read_clicked
-from airborne.video import VideoWriter, weave
+from airborne.video import VideoSource, VideoWriter, weave
+from airborne.video.seeking import index_images
 from tests.support.clips import write_clip
 from tests.support.studio import at_pixel, burn_numbers, go_home, open_page, open_studio, read_number, wait_for_frame
 
@@ -20,6 +21,13 @@ camera = [
 ]
 calibration = { control_points = "survey.csv" }
 """
+HOLD_IMAGES = """() => { // all but the first, coarse ones
+    const { fetch } = window;
+    window.held = [];
+    const wait = () => new Promise((go) => held.push(go));
+    window.fetch = (url, options) =>
+        /image.*near/.test(url) || !/image/.test(url) ? fetch(url, options) : wait().then(() => fetch(url, options));
+}"""
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +88,27 @@ def test_the_frame_shown_is_the_one_asked_for(address):
         wait_for_frame(page, N - 1)
         page.get_by_label("play").wait_for()
     assert {request.split("/")[2] for request in requests} == {address.split("/")[2]}
+
+
+def test_until_a_far_frame_is_decoded_the_key_frame_before_it_is_shown_and_said_to_be_none(address, folder):
+    index = index_images(VideoSource("b frames", folder / "b.mp4"))
+    frame = max(range(20, N), key=lambda frame: frame - index.key_before(frame))  # the farthest behind its key frame
+    before = (folder / "survey.csv").read_text()
+    with open_page(address) as page:
+        go_home(page)
+        page.wait_for_function("document.querySelector('canvas.view').view.underway.size == 0")
+        page.evaluate(HOLD_IMAGES)
+        page.evaluate("frame => { document.querySelector('canvas.view').view.go(frame); }", frame)
+        page.wait_for_function("document.querySelector('canvas.view').view.coarse !== null")
+        assert (read_number(page, 0), page.locator("canvas.view").get_attribute("data-frame")) == (
+            index.key_before(frame),
+            "0",
+        )
+        page.mouse.click(*at_pixel(page, 0, 100.0, 120.0))
+        page.evaluate("held.forEach((go) => go())")
+        wait_for_frame(page, frame)
+        assert read_number(page, 0) == frame != index.key_before(frame)
+    assert (folder / "survey.csv").read_text() == before  # what is on its way is not clicked
 
 
 def test_a_click_lands_to_the_tenth_of_a_pixel_and_arrows_move_it_by_one(address, folder):

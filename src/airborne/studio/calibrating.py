@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomlkit
 
 from airborne.calibration.sources.boards import read_board
@@ -13,7 +14,9 @@ from airborne.calibration.sources.court import Net, survey_points
 from airborne.cameras.formats.dltdv import read_xypts
 from airborne.cameras.formats.options import FileOptions
 from airborne.errors import AirborneError, TrialError
+from airborne.evaluation import DigitisedPoints
 from airborne.io.writing import replace_text
+from airborne.studio.digitising import list_repetitions
 from airborne.studio.project import Project, is_inside, list_videos
 
 SOURCES, CALIBRATED = "calibration_sources.toml", "calib_studio.toml"  # what is written, and what comes of it
@@ -28,10 +31,27 @@ def list_boards(folder: Path) -> list[str]:
 
 
 def list_wands(folder: Path) -> list[str]:
-    """List the tables of a folder that hold the tracks of markers in several cameras."""
-    options = FileOptions()
+    """List the tables of a folder that hold the tracks of markers in several cameras, or clicks of a wand's ends."""
+    options, clicked = FileOptions(), [each.file for each in list_repetitions(folder)]
     tables = [path for path in sorted(folder.glob("*.csv")) if is_inside(folder, path)]
-    return [path.name for path in tables if _is_readable(lambda path=path: read_xypts(path, options))]
+    tracks = [path.name for path in tables if _is_readable(lambda path=path: read_xypts(path, options))]
+    return [*tracks, *clicked]
+
+
+def wand_text(project: Project, digitised: DigitisedPoints) -> str:
+    """Return the table of a wand's markers from clicks of its two ends. Raises TrialError for other than two points."""
+    clicked = np.isfinite(digitised.px).all(axis=-1)  # (frames, points, cameras)
+    markers = np.flatnonzero(clicked.any(axis=(0, 2)))
+    if len(markers) != 2:
+        raise TrialError(f"{len(markers)} points are clicked; expected two, the wand's ends, in the step Digitise")
+    names = [camera.calibrated_as or camera.name for camera in project.cameras]
+    lines = ["frame,marker,camera,u_px,v_px"]
+    for row, frame in enumerate(digitised.index.tolist()):
+        for number, marker in enumerate(markers, start=1):
+            for k in np.flatnonzero(clicked[row, marker]):
+                u, v = digitised.px[row, marker, k].tolist()
+                lines.append(f"{frame},{number},{names[k]},{u!r},{v!r}")
+    return "\n".join(lines) + "\n"
 
 
 def _is_readable(read: Any) -> bool:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import ValidationError
 
-from airborne.body import BodyModel
+from airborne.body import BodyModel, read_measurements
 from airborne.body.files import read_body
 from airborne.errors import AirborneError, TrialError
 from airborne.motion.run_folder import JOINTS, MOTION, REPORT, SUMMARY
@@ -21,6 +22,7 @@ from airborne.video import VideoSource
 
 TRIAL = "trial.toml"
 VIDEO_ENDINGS = {".mp4", ".mov", ".avi", ".mkv", ".mts", ".m2ts", ".ts", ".mxf", ".webm", ".m4v", ".mpg", ".dv"}
+_MEASURED = (".txt", ".yml", ".yaml")
 FEWEST_POINTS = 6  # that determine a camera
 StepState = Literal["empty", "ready", "needs you"]
 
@@ -120,6 +122,16 @@ def list_bodies(folder: Path) -> dict[str, BodyModel]:
             found[path.name] = read_body(path)
         except (AirborneError, OSError):
             continue
+    return found
+
+
+def list_measurements(folder: Path) -> list[str]:
+    """List the files of a folder that hold Yeadon's measurements of a person."""
+    found = []
+    for path in sorted(each for ending in _MEASURED for each in folder.glob(f"*{ending}")):
+        with suppress(AirborneError, OSError):
+            read_measurements(path)
+            found.append(path.name)
     return found
 
 

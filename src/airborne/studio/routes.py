@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from pathlib import Path
 from threading import Event
-from typing import Any
+from typing import Any, NamedTuple
 
 from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, JSONResponse, Response
@@ -19,6 +19,7 @@ from airborne.errors import AirborneError, ResultError
 from airborne.export.pictures import thumbnail
 from airborne.studio.calibrating import find_picture
 from airborne.studio.curve_data import run_curves
+from airborne.studio.field_order import ORDERS, order_jpeg
 from airborne.studio.guard import FILE_POLICY
 from airborne.studio.outlines import BESIDE_COLOUR, run_overlay
 from airborne.studio.pictures import SHRINKS
@@ -33,27 +34,47 @@ _WORKERS = ThreadPoolExecutor(4, thread_name_prefix="answers")  # more would onl
 _THUMBNAIL_PX = 240  # wide
 _SCRIPTS = (  # that components import
     Path(export.__file__).parent / "templates" / "curves.js",  # drawn alike in the report
-    Path(__file__).with_name("view_drawing.js"),
+    *(Path(__file__).with_name(name) for name in ("view_drawing.js", "view_frames.js")),
 )
+_EXAMPLES = Path(__file__).with_name("examples")  # pictures of each step, which a test draws
 _KEEP = {"cache-control": "private, max-age=3600"}
+
+
+class Wish(NamedTuple):
+    """How a picture is asked for."""
+
+    shrink: int  # times smaller than the video
+    is_near: bool  # the last key frame before it is enough
+    is_wanted: Callable[[], bool]  # whether the browser still waits
 
 
 def add_routes(app: FastAPI, session: Session) -> None:
     """Add the routes of a session; every name in an address is one of a list, none is a path."""
 
     @app.get("/image/{camera}/{frame}")
-    async def image(request: Request, camera: int, frame: int, shrink: int = 1) -> Response:
+    async def image(request: Request, camera: int, frame: int, *, shrink: int = 1, near: bool = False) -> Response:
         async with _waiting(request) as is_wanted:
-            return await _answer(lambda: _jpeg(session, camera, frame, shrink=shrink, is_wanted=is_wanted))
+            return await _answer(lambda: _jpeg(session, camera, frame, Wish(shrink, near, is_wanted)))
 
     @app.get("/picture/{camera}/{number}")
-    async def own_picture(request: Request, camera: int, number: int, shrink: int = 1) -> Response:
+    async def own_picture(
+        request: Request, camera: int, number: int, *, shrink: int = 1, near: bool = False
+    ) -> Response:
         async with _waiting(request) as is_wanted:
-            return await _answer(lambda: _picture(session, camera, number, shrink=shrink, is_wanted=is_wanted))
+            return await _answer(lambda: _picture(session, camera, number, Wish(shrink, near, is_wanted)))
 
     @app.get("/thumbnail/{name}")
     async def first_picture(name: str) -> Response:
         return await _answer(lambda: _thumbnail(session.folder, name))
+
+    @app.get("/fields/{order}/{name}")
+    async def fields(order: str, name: str) -> Response:
+        return await _answer(lambda: _fields(session.folder, name, order))
+
+    @app.get("/example/{name}")
+    async def example(name: str) -> Response:
+        path = next((path for path in _EXAMPLES.glob("*.jpg") if path.name == name), None)
+        return FileResponse(path, headers=_KEEP) if path else Response(status_code=404)
 
     @app.get("/parts/{name}")
     async def script(name: str) -> Response:
@@ -149,29 +170,41 @@ def _mesh(model: BodyModel, part: int) -> Response:
     return Response(part_stl(model, part), media_type="model/stl", headers={"cache-control": "no-store"})
 
 
-def _jpeg(session: Session, camera: int, frame: int, *, shrink: int, is_wanted: Callable[[], bool]) -> Response:
+def _jpeg(session: Session, camera: int, frame: int, wish: Wish) -> Response:
     shown = session.shown()
     if not (0 <= camera < len(shown.sources) and 0 <= frame < len(shown.clock)):
         return Response(status_code=404)
-    number = int(shown.clock.images[frame, camera])
-    answer = _picture(session, camera, number, shrink=shrink, is_wanted=is_wanted)
+    answer = _picture(session, camera, int(shown.clock.images[frame, camera]), wish)
     answer.headers["x-time-s"] = repr(float(shown.clock.times_s[frame]))
     return answer
 
 
-def _picture(session: Session, camera: int, number: int, *, shrink: int, is_wanted: Callable[[], bool]) -> Response:
+def _picture(session: Session, camera: int, number: int, wish: Wish) -> Response:
     """Return a picture of a camera by its number in the file."""
     shown = session.shown()
-    if not (0 <= camera < len(shown.sources) and number < len(shown.indexes[camera]) and shrink in SHRINKS):
+    if not (0 <= camera < len(shown.sources) and number < len(shown.indexes[camera]) and wish.shrink in SHRINKS):
         return Response(status_code=404)
-    jpeg = None if number < 0 else session.pictures.jpeg(shown.sources[camera], number, shrink, is_wanted)
+    if wish.is_near and number >= 0:
+        number = shown.indexes[camera].key_before(number)
+    jpeg = None if number < 0 else session.pictures.jpeg(shown.sources[camera], number, wish.shrink, wish.is_wanted)
     if jpeg is None:
         return Response(status_code=204)  # this camera has no picture then
     return Response(jpeg, media_type="image/jpeg", headers=_KEEP)
 
 
+def _find_video(folder: Path, name: str) -> Path | None:
+    return next((path for path in list_videos(folder) if path.name == name), None)
+
+
+def _fields(folder: Path, name: str, order: str) -> Response:
+    path = _find_video(folder, name)
+    if path is None or order not in ORDERS:
+        return Response(status_code=404)
+    return Response(order_jpeg(path, order), media_type="image/jpeg", headers=_KEEP)
+
+
 def _thumbnail(folder: Path, name: str) -> Response:
-    path = next((path for path in list_videos(folder) if path.name == name), None)
+    path = _find_video(folder, name)
     if path is None:
         return Response(status_code=404)
     source = VideoSource(name, path)

@@ -25,6 +25,7 @@ from airborne.studio.pages.results import results_page
 from airborne.studio.pages.review import review_page
 from airborne.studio.pages.ruler import ruler_page
 from airborne.studio.pages.sync import sync_page
+from airborne.studio.pages.thing import thing_page
 from airborne.studio.pages.track import track_page
 from airborne.studio.pages.videos import videos_page
 from airborne.studio.project import find_trial, list_runs
@@ -41,6 +42,7 @@ _PAGES = {
     "/cameras": cameras_page,
     "/body": body_page,
     "/ruler": ruler_page,
+    "/thing": thing_page,
     "/start": first_pose_page,
     "/track": track_page,
     "/review": review_page,

@@ -18,6 +18,8 @@ from airborne.body import BodyModel, Pose
 from airborne.cameras import Camera, Rig
 from airborne.errors import ResultError
 from airborne.export.part_meshes import part_colour, segment_mesh
+from airborne.export.views import cached_surface_arrays
+from airborne.tracking.image_regions import bounding_points
 from airborne.types import Array
 
 _CAMERA_COLOUR, _PATH_COLOUR = "#1f2429", "#0072b2"
@@ -25,6 +27,7 @@ FROM = np.array([0.7, -0.9, 0.55])  # the side and height from which the scene i
 _ALL_IN_VIEW = 1.4  # times a sphere's radius: from so far, along `FROM`, three.js's 75 degrees hold it with a margin
 _MOST_LINES = 500  # of a path: each is an object of the scene
 _MOVE_EVERY_S = 0.05  # while handles are dragged: the outlines of three views take half of it
+_POINT_M = 0.03  # radius of a point in a scene
 _SHAFT_M, _HEAD_M = 0.012, 0.12  # an arrow's thickness, and the length of its head
 _FRUSTUM_SHARE = 0.12  # of the distance between camera and middle
 
@@ -40,15 +43,39 @@ def draw_cameras(
     reach = float(np.median(np.linalg.norm(centres - looked_at, axis=1)))
     if middle is None or away_m is None:
         middle, away_m = overview(np.vstack([centres, looked_at]))
-    with ui.scene(grid=(60, 60), background_color="#f6f7f8").style("width: 100%; flex: 1; min-height: 180px") as scene:
-        Redraw(scene.id)
+    with _scene(middle, away_m) as scene:
         for camera in rig:
             _frustum(scene, camera, _FRUSTUM_SHARE * reach)
         if path is not None:
             pairs = [(a, b) for a, b in pairwise(path[:: len(path) // _MOST_LINES + 1]) if np.isfinite([a, b]).all()]
             _lines(scene, pairs, _PATH_COLOUR)
-    x, y, z = map(float, middle + away_m * FROM)
-    scene.move_camera(x, y, z, look_at_x=middle[0], look_at_y=middle[1], look_at_z=middle[2], duration=0)
+    return scene
+
+
+def draw_rays(scene: Scene, camera: Camera, points: Array, colour: str) -> None:
+    """Add points (n, 3) [m] to a scene, and the rays by which a camera sees them."""
+    _lines(scene, [(camera.centre, point) for point in points], colour)
+    with scene:
+        for x, y, z in points.tolist():
+            scene.sphere(_POINT_M).move(x, y, z).material(_CAMERA_COLOUR)
+
+
+def draw_body(model: BodyModel, address: str) -> None:
+    """Show a body in its zero pose on the floor; `address` gives the mesh of each part, with {part} in it."""
+    pose = Pose(world_from_root=RigidTransform.identity(), joint_angles=np.zeros((model.n_joints, 3)))
+    corners = bounding_points(model.with_pose(pose), cached_surface_arrays(model))
+    lift = np.array([0.0, 0.0, -corners[:, 2].min()])
+    pose, (middle, away_m) = pose.move(lift, np.zeros(3)), overview(corners + lift)
+    BodyOnStage(_scene(middle, away_m), model, address).show(pose)
+
+
+def _scene(middle: Array, away_m: float) -> Scene:
+    """Build an empty scene that is seen from `away_m` beside its middle (3,) [m]."""
+    scene = ui.scene(grid=(60, 60), background_color="#f6f7f8").style("width: 100%; flex: 1; min-height: 180px")
+    with scene:
+        Redraw(scene.id)
+    (x, y, z), (u, v, w) = (map(float, each) for each in (middle + away_m * FROM, middle))
+    scene.move_camera(x, y, z, look_at_x=u, look_at_y=v, look_at_z=w, duration=0)
     return scene
 
 

@@ -53,7 +53,7 @@ def read_player(folder: Path, player: str, frame: int) -> Clicked:
     return read_clicked(folder / player_file(player, frame))
 
 
-def read_players(session: Session, rig: Rig) -> tuple[int, dict[str, PlayerStart]]:
+def read_start_players(session: Session, rig: Rig) -> tuple[int, dict[str, PlayerStart]]:
     """Return the frame and the players of the start that the trial has; nobody where it has none."""
     try:
         trial = session.project().trial()

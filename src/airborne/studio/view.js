@@ -1,13 +1,11 @@
 // One canvas with every camera's picture at one frame and all that lies over it, drawn in one stroke.
 // Pixels are the video's own: (0, 0) is the centre of the top-left one.
 import drawing from "/parts/view_drawing.js";
+import frames from "/parts/view_frames.js";
 
-const KEPT_FRAMES = 16; // decoded, for all cameras
-const AHEAD = 4; // frames fetched in the direction of travel
 const GRAB_PX = 9; // on the screen: how near a mark must be to be grabbed
 const STILL_PX = 3; // a pointer that moves less has clicked
 const GAP = 4; // between pictures
-const SHRINKS = [4, 2]; // times smaller than the video, as the server has pictures
 
 export default {
   template: `<canvas class="view" tabindex="0" role="img" :aria-label="label"></canvas>`,
@@ -35,6 +33,7 @@ export default {
     this.alone = -1; // the only camera shown; -1: all
     this.zooms = this.panes.map(() => ({ scale: 1, u: 0, v: 0 })); // v, u: what is moved to the pane's corner
     this.pointer = null;
+    this.coarse = null; // pictures near the frame that is on its way
     this.drag = null;
     this.dragged = null; // a mark on its way
     this.live = null; // {marks, items} in the place of the page's own while the body is dragged
@@ -70,70 +69,7 @@ export default {
   },
   methods: {
     ...drawing,
-    // frames
-    refresh() { this.cache.clear(); this.go(this.wanted, true); },
-    sharpen() { // what is drawn larger than it was fetched is fetched anew
-      if (this.shown && this.shrinks().some((n, i) => n < this.shown.shrinks[i]) && this.sharpened !== this.shown) {
-        this.sharpened = this.shown;
-        this.refresh();
-      }
-    },
-    show(frame) { this.go(frame); },
-    async fetchPane(pane, frame, shrink, signal) {
-      const answer = await fetch(`${pane.url.replace("{frame}", frame)}&shrink=${shrink}`, { signal });
-      const picture = answer.status === 200 ? await createImageBitmap(await answer.blob()) : null;
-      return { picture, time_s: answer.headers.get("x-time-s") };
-    },
-    async fetchOverlay(frame, signal) {
-      if (!this.overlay) return { items: [] };
-      const answer = await fetch(this.overlay.replace("{frame}", frame), { cache: "no-store", signal });
-      return answer.ok ? answer.json() : { items: [] };
-    },
-    shrinks() { // by how many times each picture may be smaller and still be as large as it is drawn; whole for the loupe
-      const ratio = window.devicePixelRatio || 1;
-      return this.layout().map(({ w, scale }) => this.picking ? 1 : SHRINKS.find((n) => w === 0 || n * scale * ratio <= 1) || 1);
-    },
-    load(frame) {
-      if (!this.cache.has(frame)) {
-        const stop = new AbortController(), { signal } = stop, shrinks = this.shrinks();
-        const parts = [this.fetchOverlay(frame, signal), ...this.panes.map((pane, i) => this.fetchPane(pane, frame, shrinks[i], signal))];
-        const all = Promise.all(parts).then(([overlay, ...answers]) => {
-          const time_s = answers[0]?.time_s ?? null; // the same for all panes
-          return { frame, overlay, shrinks, pictures: answers.map((each) => each.picture), time_s: time_s === null ? null : Number(time_s) };
-        });
-        this.cache.set(frame, all);
-        this.underway.set(frame, stop);
-        all.catch(() => this.cache.get(frame) === all && this.cache.delete(frame)).finally(() => this.underway.delete(frame));
-        for (const old of this.cache.keys()) {
-          if (this.cache.size <= KEPT_FRAMES) break;
-          if (old !== frame && old !== this.wanted) this.cache.delete(old);
-        }
-      }
-      return this.cache.get(frame);
-    },
-    async go(frame, silent) {
-      frame = Math.max(0, Math.min(this.n_frames - 1, Math.round(frame)));
-      const direction = Math.sign(frame - this.wanted) || 1;
-      const begun = performance.now();
-      this.wanted = frame;
-      for (const [other, stop] of this.underway) // what was fetched ahead of another place only stands in the way
-        if (Math.abs(other - frame) > AHEAD) { this.cache.delete(other); stop.abort(); }
-      if (!silent && !this.apart) window.dispatchEvent(new CustomEvent("airborne-frame", { detail: { frame, from: this } }));
-      let loaded = null;
-      try { loaded = await this.load(frame); } catch { return; }
-      if (this.wanted !== frame) return;
-      this.shown = loaded;
-      this.draw();
-      this.canvas.dataset.frame = frame;
-      this.canvas.dataset.ms = (performance.now() - begun).toFixed(1);
-      this.$emit("frame", { frame });
-      window.dispatchEvent(new CustomEvent("airborne-shown", { detail: { frame, time_s: loaded.time_s, from: this } }));
-      for (let k = 1; k <= AHEAD && this.wanted === frame; k++) {
-        const next = frame + k * direction;
-        if (next >= 0 && next < this.n_frames) await this.load(next).catch(() => {});
-      }
-    },
-    seen() { return this.shown ? this.shown.frame : this.wanted; }, // what is done here is done to this frame
+    ...frames,
     // places
     layout() {
       const box = this.canvas.getBoundingClientRect(), n = this.alone < 0 ? this.panes.length : 1;
@@ -219,7 +155,7 @@ export default {
     on_pointerdown(event) {
       this.canvas.focus();
       const at = this.place(event);
-      if (at.pane < 0 || event.button !== 0) return;
+      if (at.pane < 0 || event.button !== 0 || this.coarse) return; // what is on its way is not clicked
       this.canvas.setPointerCapture(event.pointerId);
       const mark = this.markAt(at), zoom = this.zooms[at.pane];
       const holds = this.follows && (mark ? mark.holds : this.isOnBody(at));

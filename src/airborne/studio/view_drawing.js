@@ -21,21 +21,27 @@ export default {
     pen.rect(place.x, place.y, place.w, place.h);
     pen.clip();
     this.drawPicture(pen, place, i);
-    this.drawOver(pen, place, i);
-    if (this.picking && this.pointer && this.pointer.pane === i) this.drawLoupe(pen, place, i);
+    if (this.coarse) this.drawVeil(pen, place);
+    else this.drawOver(pen, place, i);
+    if (this.picking && !this.coarse && this.pointer && this.pointer.pane === i) this.drawLoupe(pen, place, i);
     pen.restore();
-    const overlay = this.shown && this.shown.overlay;
+    const overlay = this.shown && !this.coarse && this.shown.overlay;
     const text = this.panes[i].name + (i === 0 && overlay && overlay.label ? "   " + overlay.label : "");
     this.write(pen, text, place.x + 8, place.y + 18, "#ffffff");
   },
   drawPicture(pen, place, i) {
-    const pane = this.panes[i], picture = this.shown && this.shown.pictures[i];
+    const pane = this.panes[i], picture = this.coarse ? this.coarse[i] : this.shown && this.shown.pictures[i];
     pen.fillStyle = "#2a2f36";
     pen.fillRect(place.x, place.y, place.w, place.h);
     const [x, y] = this.toScreen(place, -0.5, -0.5);
     pen.imageSmoothingEnabled = place.scale < 3;
     if (picture) pen.drawImage(picture, x, y, pane.width * place.scale, pane.height * place.scale);
     else if (this.shown) this.write(pen, "no picture", place.x + place.w / 2 - 30, place.y + place.h / 2, "#c8cdd3");
+  },
+  drawVeil(pen, place) { // no one shall take these pictures for the frame's own
+    pen.fillStyle = "rgba(22, 25, 29, 0.45)";
+    pen.fillRect(place.x, place.y, place.w, place.h);
+    this.write(pen, `frame ${this.wanted} is on its way`, place.x + 8, place.y + place.h - 10, "#ffffff");
   },
   drawOver(pen, place, i) {
     const lines = [...((this.shown && this.shown.overlay.items) || []), ...this.nowItems()];

@@ -18,8 +18,6 @@ _N_COMPARED = 64  # packets at the beginning of a file, with its table
 _LARGEST_BYTES = 500_000_000  # of a table: 10 million frames
 _INTO_STBL = (b"mdia", b"minf", b"stbl")
 
-Boxes = dict[bytes, bytes]
-
 
 def frames_of_packets(packets: Iterable[av.Packet]) -> NDArray[np.int64] | None:
     """Return when each frame is shown [ticks], and whether it is a key frame: (n, 2); None where one has no time."""
@@ -113,7 +111,7 @@ def _track_id(header: bytes) -> int:
     return int.from_bytes(header[at : at + 4])
 
 
-def _read_samples(boxes: Boxes) -> NDArray[np.int64] | None:
+def _read_samples(boxes: dict[bytes, bytes]) -> NDArray[np.int64] | None:
     counts, steps = _table(boxes[b"stts"], 2).T
     decoded = np.append(0, np.cumsum(np.repeat(steps, counts)))[:-1]
     n = len(decoded)

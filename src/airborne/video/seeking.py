@@ -50,6 +50,12 @@ class ImageIndex:
         """Return the number of images; each of two fields is one."""
         return len(self.ticks) * len(self.facts.parities)
 
+    def key_before(self, number: int) -> int:
+        """Return the number of the last image up to this one that is decoded without any other; -1 without one."""
+        n = len(self.facts.parities)
+        keys = self.keys[: bisect_right(self.keys, self.ticks[number // n])]
+        return int(np.searchsorted(self.ticks, keys[-1])) * n if len(keys) else -1
+
     def times(self) -> tuple[NDArray[np.int64], int]:
         """Return the time of every image since the first, as `decode` gives it, and how many units a second has."""
         rate, tick_s, n = self.facts.frame_rate, self.tick_s, len(self.facts.parities)

@@ -10,8 +10,9 @@ from airborne.body import BodyModel
 from airborne.errors import AirborneError, count
 from airborne.io.text import parse_editable_toml
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame
-from airborne.studio.project import list_bodies
+from airborne.studio.project import list_bodies, list_measurements
 from airborne.studio.session import Session
+from airborne.studio.stage import draw_body
 from airborne.studio.trial_edits import with_table
 from airborne.trial.body import BodyTable
 from airborne.trial.settings import PLAYERS_METHODS
@@ -26,17 +27,32 @@ async def body_page(session: Session) -> None:
         "A thing needs a body file with its measured solids and colours. "
         "A person is made of stature and mass; the colours are taken from the video."
     )
-    async with page_frame(session, "Body", "What is tracked?", text, scrolls=True):
+    async with page_frame(session, "Body", "What is tracked?", text, scrolls=True) as changed:
         table = session.project().table("body")
         bodies = await in_thread(list_bodies, session.folder)
         with ui.element("div").classes("row-line").style("align-items: stretch"):
             if bodies:
                 _thing_card(session, bodies, table)
             _person_card(session, table)
+            _measurements_card(session, table)
             _players_card(session)
-        if session.project().table("calibration"):
-            with ui.element("a").props('href="/ruler"').classes("plain"):
-                ui.label("Measure a length in the pictures")
+            scene = ui.refreshable(_show_body)
+            await scene(session)
+
+        async def show_anew() -> None:
+            await scene.refresh()
+
+        changed.append(show_anew)
+        with ui.element("div").classes("row-line"):
+            if session.project().cameras:
+                _link("/thing", "Describe a thing of solids")
+            if session.project().table("calibration"):
+                _link("/ruler", "Measure a length in the pictures")
+
+
+def _link(address: str, text: str) -> None:
+    with ui.element("a").props(f'href="{address}"').classes("plain"):
+        ui.label(text)
 
 
 def _thing_card(session: Session, bodies: dict[str, BodyModel], table: dict[str, Any]) -> None:
@@ -67,6 +83,31 @@ def _person_card(session: Session, table: dict[str, Any]) -> None:
             _save(session, {"preset": "human18", "stature_m": stature_m, "mass_kg": mass_kg})
 
         ui.button("Use this person", on_click=save).props("unelevated")
+
+
+def _measurements_card(session: Session, table: dict[str, Any]) -> None:
+    files = list_measurements(session.folder)
+    if not files:
+        return
+    with ui.element("div").classes("card").style("width: 360px"):
+        ui.label("A person who was measured").classes("name")
+        present = table.get("measurements")
+        choice = ui.select(files, label="Yeadon's measurements", value=present if present in files else files[0])
+        choice.props("outlined dense options-dense")
+        ui.button("Use these measurements", on_click=lambda: _save(session, {"measurements": choice.value})).props(
+            "unelevated"
+        )
+
+
+async def _show_body(session: Session) -> None:
+    """Show the trial's body from all sides; players have none."""
+    try:
+        model = await in_thread(session.project().model)
+    except AirborneError:
+        return
+    address = f"/body/mesh/{{part}}?{hash(repr(session.project().table('body')))}"  # another body's parts are others
+    with ui.element("div").style("display: flex; width: 360px; height: 320px"):
+        draw_body(model, address)
 
 
 def _players_card(session: Session) -> None:

@@ -9,6 +9,7 @@ from nicegui import ui
 
 from airborne.calibration.sources.boards import DICTIONARIES, read_board
 from airborne.errors import AirborneError
+from airborne.evaluation import read_clicked_frames
 from airborne.studio.calibrating import (
     CALIBRATED,
     SOURCES,
@@ -19,9 +20,11 @@ from airborne.studio.calibrating import (
     list_wands,
     read_report,
     sources_text,
+    wand_text,
     write_report,
 )
 from airborne.studio.commands import Command
+from airborne.studio.digitising import list_repetitions
 from airborne.studio.pages.command_watch import CommandWatch
 from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pictures import ShownTrial
@@ -31,8 +34,12 @@ from airborne.studio.session import Session
 _BOARD = "board.toml"  # of a new one
 _HELP = (
     "Each camera films the board close by, in every corner of its picture and tilted; then two cameras at once, until "
-    "all are linked. Or wave a wand of two markers and have them tracked. In the pictures below, points should cover "
-    "each camera's image, and arrows point in all directions."
+    "all are linked. Or wave a wand of two markers. In the pictures below, points should cover each camera's image, "
+    "and arrows point in all directions."
+)
+_NO_WAND = (
+    "For a wand, click its two ends in some twenty frames of these videos, in the step Digitise, or put the table of "
+    "its markers here that DLTdv, easyWand or Argus tracked (…xypts.csv)."
 )
 
 
@@ -66,6 +73,8 @@ class CalibratePanel:
                     self.length.props("outlined dense").style("width: 120px")
                     wand = ui.button("Calibrate with the wand", on_click=self.use_wand).props("unelevated")
                     buttons.append(wand)
+                else:
+                    ui.label(_NO_WAND).classes("soft small")
                 self.watch = CommandWatch(self.session, "calibrate", self.take, words="calibrating")
                 self.watch.buttons = buttons
             self.results = ui.refreshable(self._show_results)
@@ -85,7 +94,12 @@ class CalibratePanel:
         """Start the calibration with a wand."""
         with errors_shown():
             media = {name: {"size": list(size)} for name, size in self.shown.sizes.items()}
-            self._start({"wand": {"file": self.wand.value, "length_m": float(self.length.value or 0)}}, media)
+            folder, name = self.session.folder, str(self.wand.value)
+            if name in (each.file for each in list_repetitions(folder)):
+                clicks = read_clicked_frames(folder / name, self.shown.names)
+                name = f"wand_{name}"
+                self.session.edit(name, wand_text(self.session.project(), clicks), "a wand's ends clicked")
+            self._start({"wand": {"file": name, "length_m": float(self.length.value or 0)}}, media)
 
     def take(self, command: Command) -> None:
         """Use the calibration that was made."""

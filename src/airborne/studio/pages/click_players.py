@@ -21,7 +21,7 @@ from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CHOSEN_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
-from airborne.studio.starts import player_file, read_player, read_players
+from airborne.studio.starts import player_file, read_player, read_start_players
 from airborne.studio.trial_edits import with_players
 from airborne.studio.view import Mark
 from airborne.types import Array
@@ -43,7 +43,7 @@ class PlayersPanel(PointsPanel):
         super().__init__(session, shown, Clicked((), None, {}), _POINTS[0])
         self.rig, self.frame = rig, frame
         self.players: dict[str, Clicked] = {}
-        self.start_frame, self.starts = read_players(session, rig)  # that the trial has
+        self.start_frame, self.starts = read_start_players(session, rig)  # that the trial has
         self.player = "player1"
 
     @property
@@ -92,7 +92,7 @@ class PlayersPanel(PointsPanel):
             self.players = {name: read_player(folder, name, self.frame) for name in names}
             self.players.setdefault(self.player, Clicked((), None, {}))
             self.clicked = self.players[self.player]
-            self.start_frame, self.starts = read_players(self.session, self.rig)
+            self.start_frame, self.starts = read_start_players(self.session, self.rig)
             self.choice.set_options(list(self.players), value=self.player)
             self.show()
 
@@ -142,14 +142,14 @@ class PlayersPanel(PointsPanel):
         marks = list(self._marks(colours[self.player]))
         legs = [item for name in self.players for item in self._legs(name, colours[name])]
         ready = [name for name in self.players if self._is_ready(name)]
-        stored = self._stored_legs(ready) if self.frame == self.start_frame else ()
+        stored = self._legs_of_trial(ready) if self.frame == self.start_frame else ()
         self.view.show_over(marks, [*self.epipolar_items(self.chosen, self.rig), *stored, *legs], self.selected)
         own = f"The trial's start, frame {self.start_frame}: {', '.join(self.starts)}. " if self.starts else ""
         self.note.set_text(f"{own}Ready to be used: {', '.join(ready) or 'nobody clicked yet'}.")
         self.use.set_visibility(bool(ready))
         self.list.show(_POINTS, self.chosen, partial(self.off_px, rig=self.rig))
 
-    def _stored_legs(self, ready: Sequence[str]) -> Iterator[Any]:
+    def _legs_of_trial(self, ready: Sequence[str]) -> Iterator[Any]:
         """Yield the legs of the players whom the trial has and who are not clicked here."""
         cameras = self.rig.select(self.shown.names).cameras
         for name, start in self.starts.items():

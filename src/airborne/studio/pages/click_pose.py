@@ -12,6 +12,7 @@ from nicegui import ui
 from airborne.body import BodyModel, Pose
 from airborne.cameras import Rig
 from airborne.studio.clicks import Clicked
+from airborne.studio.pages.fit_pose import FitButton
 from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, PointsPanel
@@ -75,6 +76,7 @@ class ClickPanel(PointsPanel):
                     self.use = ui.button("Use this pose", on_click=self.write).props("unelevated")
                     ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
                     ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
+                    FitButton(self.session, self.hand, lambda: self.frame, self.take_pose)
                     self.stage = PoseStage(self.rig, self.hand, self.take_pose)
                 self.list = PointList(self.shown.names, self.choose)
         self.show()
@@ -101,9 +103,9 @@ class ClickPanel(PointsPanel):
         elif drag.has_ended and drag.mark is not None:
             await self.move(drag.mark, *drag.px)
 
-    def take_pose(self) -> None:
+    def take_pose(self, says: str = "The pose was set by hand.") -> None:
         """Show the pose that the hand holds, which is not fitted to the clicks."""
-        self.is_by_hand, self.says, self.outline = True, "The pose was set by hand.", self.hand.items()
+        self.is_by_hand, self.says, self.outline = True, says, self.hand.items()
         self.show()
 
     async def turn_to(self, frame: int) -> None:

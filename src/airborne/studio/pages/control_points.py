@@ -9,14 +9,16 @@ from nicegui import ui
 
 from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.court import court_lines
+from airborne.cameras import Rig
 from airborne.errors import AirborneError
 from airborne.studio.clicks import Clicked, count_clicked, read_clicked
 from airborne.studio.pages.layout import complain, errors_shown
 from airborne.studio.pages.point_list import PointList
-from airborne.studio.pages.points_panel import CHOSEN_COLOUR, PointsPanel
+from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import FEWEST_POINTS
 from airborne.studio.session import Session
+from airborne.studio.stage import draw_cameras, draw_rays
 from airborne.studio.view import Item, Mark
 from airborne.types import Array, Mask
 
@@ -76,7 +78,25 @@ class ControlPointsPanel(PointsPanel):
                 with ui.element("div").classes("card"):
                     self.state()
                     ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
+                    ui.button("See them in 3D", on_click=self.draw_scene).props("flat dense")
+                    self.scene = ui.element("div").style("height: 260px; display: flex")
+                    self.scene.set_visibility(False)
                 self.list = PointList(self.shown.names, self.choose)
+
+    def draw_scene(self) -> None:
+        """Show the cameras that are solved, the points, and the rays by which each camera sees those clicked in it."""
+        rigs = [fit.rig for _, fit in self.fits.values() if isinstance(fit, Calibration)]
+        if not rigs or self.clicked.world is None:
+            complain(f"no camera is solved yet; click {FEWEST_POINTS} points in one")
+            return
+        self.scene.clear()
+        self.scene.set_visibility(True)
+        cameras = tuple(camera for rig in rigs for camera in rig)
+        with self.scene:
+            scene = draw_cameras(Rig(cameras))
+        for pane, camera in enumerate(cameras):
+            is_clicked = np.isfinite(self.clicked.px[camera.name][:, 0])
+            draw_rays(scene, camera, self.clicked.world[is_clicked], CAMERA_COLOURS[pane % len(CAMERA_COLOURS)])
 
     async def solve(self) -> None:
         """Solve the cameras whose clicks have changed, and show all again."""

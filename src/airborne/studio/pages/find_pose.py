@@ -10,6 +10,7 @@ from nicegui import ui
 from airborne.body import BodyModel, Pose
 from airborne.cameras import Rig
 from airborne.studio.pages.find_controls import FindControls
+from airborne.studio.pages.fit_pose import FitButton
 from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pages.pose_hand import DRAG_HELP, PoseHand
 from airborne.studio.pages.pose_stage import PoseStage
@@ -46,6 +47,7 @@ class FindPanel:
                 self.controls.build()
                 ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
                 self.use = ui.button("Use this pose", on_click=self.write).props("unelevated")
+                FitButton(self.session, self.hand, lambda: self.at, self.take_pose)
                 self.stage = PoseStage(self.rig, self.hand, self.take_pose)
         self.use.set_visibility(False)
         if (stored := read_pose(self.session, self.model)) is not None:
@@ -68,11 +70,11 @@ class FindPanel:
         if await self.hand.follow(self.view, drag) and drag.has_ended:
             self.take_pose()
 
-    def take_pose(self) -> None:
+    def take_pose(self, says: str = "The outline is the pose that was set by hand.") -> None:
         """Show the pose that the hand holds, ready to be used."""
         if self.hand.pose is not None:
             self.found = start_from_pose(self.model, self.at, self.hand.pose)
-            self.controls.note.set_text("The outline is the pose that was set by hand.")
+            self.controls.note.set_text(says)
             self.use.set_visibility(True)
             self.turn_to(self.frame)
 

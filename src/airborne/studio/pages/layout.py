@@ -52,7 +52,7 @@ async def page_frame(
     """
     changed: list[Callable[[], Awaitable[None]]] = []
     ui.colors(primary=_BLUE)
-    sheet, known = _sheet(), [session.stamp]
+    sheet, example, known = _sheet(), _example(here), [session.stamp]
 
     async def move(verb: str) -> None:
         with errors_shown():
@@ -77,6 +77,7 @@ async def page_frame(
         ui.element("div").classes("gap")
         undo = ui.button(icon="undo", on_click=lambda: move("undo")).props("flat round dense aria-label=Undo")
         redo = ui.button(icon="redo", on_click=lambda: move("redo")).props("flat round dense aria-label=Redo")
+        ui.button("An example", on_click=example.open).props("flat dense no-caps")
         ui.button("Keys  ?", on_click=sheet.open).props("flat dense")
     with ui.element("div").classes("body"):
         with ui.element("nav").classes("rail").props("aria-label=steps"):
@@ -133,6 +134,17 @@ def _sheet() -> ui.dialog:
         ui.html("<h2>Keys</h2>", sanitize=False)
         rows = "".join(f"<tr><th><kbd>{key}</kbd></th><td>{what}</td></tr>" for key, what in _KEYS.items())
         ui.html(f'<table class="plain">{rows}</table>', sanitize=False)
+        ui.button("Close", on_click=dialog.close).props("flat")
+    return dialog
+
+
+def _example(here: str) -> ui.dialog:
+    """Lay out a picture of a step that is done well: of the thrown cross."""
+    with ui.dialog() as dialog, ui.card().style("max-width: min(1120px, 94vw)"):
+        ui.html(f"<h2>{here}: the thrown cross</h2>", sanitize=False)
+        name = here.lower().replace(" ", "_")
+        picture = ui.element("img").props(f"src=/example/{name}.jpg loading=lazy").style("width: 100%; height: auto")
+        picture._props["alt"] = f"the step {here}, done for the thrown cross"
         ui.button("Close", on_click=dialog.close).props("flat")
     return dialog
 

@@ -27,6 +27,7 @@ class PoseHand:
         """Begin without a pose; `marks` are those of a pose while it is dragged, None: as they are."""
         self.model, self.cameras, self._marks = model, tuple(cameras), marks
         self.pose: Pose | None = None
+        self.before: list[dict[str, Any]] = []  # the outline of another pose, beside it
         self._taken: Pose | None = None  # the pose when the drag began
         self._grip: Grip | None = None
         self._number = -1  # of the drag
@@ -40,13 +41,14 @@ class PoseHand:
 
     def place(self, pose: Pose | None) -> None:
         """Begin with a pose."""
-        self.pose, self._pins, self._number = pose, {}, -1
+        self.pose, self._pins, self._number, self.before = pose, {}, -1, []
 
     def items(self) -> list[dict[str, Any]]:
         """Return the pose's outline, where it can be grabbed."""
         if self.pose is None:
             return []
-        return outline_items(self.model.with_pose(self.pose), self.cameras, POSE_COLOUR, grab=True)
+        own = outline_items(self.model.with_pose(self.pose), self.cameras, POSE_COLOUR, grab=True)
+        return [*self.before, *own]
 
     async def follow(self, view: CameraViews, drag: Drag) -> bool:
         """Move the body with the pointer; say whether there was anything to move.
@@ -63,7 +65,7 @@ class PoseHand:
             return False, (None, None)
         camera = self.cameras[drag.pane]
         if drag.number != self._number:
-            self._number, self._taken = drag.number, self.pose
+            self._number, self._taken, self.before = drag.number, self.pose, []
             self._grip = self._take(drag, camera)
         if self._grip is None or self._taken is None:
             return False, (None, None)

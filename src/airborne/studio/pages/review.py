@@ -10,7 +10,7 @@ import numpy as np
 from nicegui import ui
 from nicegui.elements.scene.scene import Scene
 
-from airborne.motion.run_folder import holds_players
+from airborne.motion.run_folder import SUMMARY, holds_players, read_summary
 from airborne.studio.curve_data import Momenta, curve_kinds, describe_distance, run_momenta
 from airborne.studio.disagreement import look_for_disagreement
 from airborne.studio.outlines import BESIDE_COLOUR
@@ -87,6 +87,11 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: s
     """Lay a run out; return what corrects it."""
     bodies: list[Callable[[int], None]] = []
     correction = None if holds_players(folder) else Correction(session, shown, folder)
+    with errors_shown():
+        summary = await in_thread(read_summary, folder) if (folder / SUMMARY).is_file() else {}
+        for finding in summary.get("self_check") or []:
+            if finding["is_alarm"]:
+                ui.label(finding["sentence"]).classes("bad small")
     address = f"/curves/{quote(folder.name)}?beside={quote(beside)}&of="
     with ui.element("div").classes("row-line"):
         if correction is not None:

@@ -17,7 +17,7 @@ from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import is_inside, list_runs
 from airborne.studio.runs import count_rows
 from airborne.studio.session import Session
-from airborne.studio.view import CameraViews
+from airborne.studio.view import CameraViews, Curves
 
 _LOOK_EVERY_S = 1.0  # at a run that goes on
 _HELP = (
@@ -62,6 +62,7 @@ class _Panel:
     n_done: int = -1  # frames of the run, when it was looked at last
     n_before: int = 0  # of them, when it was resumed
     ended: Command | None = None  # the run whose end was told
+    curves: Curves | None = None  # once there are frames
 
     def build(self) -> None:
         """Lay out the bar, the pictures, and a look at the run every second."""
@@ -84,6 +85,7 @@ class _Panel:
             )
             self.says = ui.label().classes("small soft")
         self.view = CameraViews(self.shown, frame=self.session.frame, overlay=self._overlay, on_frame=self.turn_to)
+        self.area = ui.element("div").style("display: contents")
         ui.timer(_LOOK_EVERY_S, self.look)
 
     @property
@@ -94,6 +96,10 @@ class _Panel:
     @property
     def _overlay(self) -> str:
         return f"/overlay/{quote(self.folder.name)}/{{frame}}"
+
+    @property
+    def _curves(self) -> str:
+        return f"/curves/{quote(self.folder.name)}?frames={self.n_done}"  # another address for each state of a run
 
     @property
     def _command(self) -> Command | None:
@@ -147,9 +153,19 @@ class _Panel:
             self.n_done = n_done
             self.bar.value = n_done / max(self.n_frames, 1)
             self.view.run_method("refresh")
+            self._show_curves()
             if newest is not None and self._is_running:
                 self.view.go(newest)
             self._show_buttons()
+
+    def _show_curves(self) -> None:
+        """Show how far the run is over its frames, and how each went."""
+        self.area.set_visibility(self.n_done > 0)
+        if self.curves is not None and self.n_done > 0:
+            self.curves.show(self._curves)
+        elif self.n_done > 0:
+            with self.area:
+                self.curves = Curves(self._curves, frame=self.session.frame).style("height: 130px")
 
     def _say_progress(self, command: Command, n_done: int) -> None:
         left = ""

@@ -10,6 +10,7 @@ from nicegui import ui
 
 from airborne.errors import AirborneError
 from airborne.io.names import check_name
+from airborne.studio.field_order import ORDERS
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame
 from airborne.studio.project import Project, list_outer_videos, list_videos
 from airborne.studio.session import Session
@@ -96,9 +97,27 @@ def _card(choice: _Choice, facts: VideoFacts | str) -> None:
         ui.checkbox(choice.video).bind_value(choice, "is_camera").props("dense")
         ui.label(_describe(facts)).classes("soft small")
         ui.input("name of the camera").bind_value(choice, "name").props("dense outlined")
-        ui.select(_FIELDS, label="pictures are").bind_value(choice, "fields").props("dense outlined options-dense")
+        fields = ui.select(_FIELDS, label="pictures are").bind_value(choice, "fields")
+        fields.props("dense outlined options-dense")
         if facts.flagged_order != "progressive":
             ui.label(f"the file's flags say {_FIELDS[facts.flagged_order]}").classes("soft small")
+        orders = ui.refreshable(_show_orders)
+        orders(choice)
+        fields.on_value_change(lambda: orders.refresh())
+
+
+def _show_orders(choice: _Choice) -> None:
+    """Show both orders of a file that is read by fields; the right one is obvious where something moves."""
+    if choice.fields == "progressive":
+        return
+    ui.label("Two neighbouring fields by either order: the right one has the smaller teeth.").classes("soft small")
+    with ui.element("div").classes("row-line"):
+        for order in ORDERS:
+            with ui.element("figure").style("margin: 0; width: 47%"):
+                picture = ui.element("img").props(f"src=/fields/{order}/{quote(choice.video)}")
+                picture.style("width: 100%; height: auto")
+                picture._props["alt"] = f"{choice.video}, {_FIELDS[order]}"
+                ui.label(_FIELDS[order].removeprefix("two fields, ")).classes("small")
 
 
 def _describe(facts: VideoFacts) -> str:

@@ -1,0 +1,149 @@
+"""A thing to be tracked, described in the pictures: solids with sizes, places, and colours taken by a click."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from nicegui import ui
+
+from airborne.body.files import read_body
+from airborne.errors import AirborneError, TrialError
+from airborne.io.names import check_name
+from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
+from airborne.studio.pictures import ShownTrial
+from airborne.studio.project import is_inside
+from airborne.studio.session import Session
+from airborne.studio.things import MESHES, Solid, colour_at, read_thing, thing_text
+from airborne.studio.view import CameraViews
+
+_FILE = "thing.toml"
+_HELP = (
+    "Measure the thing with a ruler: a millimetre wrong here is one in the result. Choose a solid and click it in a "
+    "picture, in even light: that is its colour. Without one it is taken at the first pose."
+)
+_FIELDS = {"size_mm": "lengths [mm]", "centre_mm": "centre [mm]", "turn_deg": "turned about [°]"}
+
+
+async def thing_page(session: Session) -> None:
+    """Let the user describe a thing."""
+    async with page_frame(session, "Body", "What is it made of?", _HELP):
+        shown = await work("indexing the videos", session.shown)
+        if shown is not None:
+            ThingPanel(session, shown).build()
+
+
+class ThingPanel:
+    """One window's thing; it is in its file once it is used."""
+
+    def __init__(self, session: Session, shown: ShownTrial) -> None:
+        """Begin with the thing of the folder, or with a box."""
+        self.session, self.shown = session, shown
+        self.name, self.solids, self.chosen = "thing", [Solid("box")], 0
+        if (session.folder / _FILE).is_file():
+            with errors_shown():
+                self.name, self.solids = read_thing(session.folder / _FILE)
+        inside = (path for path in sorted(session.folder.iterdir()) if is_inside(session.folder, path))
+        self.shapes = ["box", "ellipsoid", *(path.name for path in inside if path.suffix.lower() in MESHES)]
+
+    def build(self) -> None:
+        """Lay out the pictures and the solids."""
+        with ui.element("div").classes("split"):
+            with ui.element("div").classes("wide"):
+                view = CameraViews(
+                    self.shown, frame=self.session.frame, on_frame=self.turn_to, on_pick=self.take_colour
+                )
+                view.start_picking()
+            with ui.element("div").classes("side"), ui.element("div").classes("card"):
+                ui.input("what it is").bind_value(self, "name").props("outlined dense")
+                self.form = ui.refreshable(self._form)
+                self.form()
+                ui.button("Use this thing", on_click=self.write).props("unelevated")
+
+    def turn_to(self, frame: int) -> None:
+        """Note the frame in view."""
+        self.session.go(frame=frame)
+
+    async def take_colour(self, pane: int, u: float, v: float, near: str | None) -> None:
+        """Give the chosen solid the colour that a picture has there."""
+        number = int(self.shown.clock.images[self.session.frame, pane])
+        with errors_shown():
+            image = await in_thread(self.session.pictures.image, self.shown.sources[pane], number)
+            if image is not None:
+                self.change(colour=colour_at(image, u, v))
+                self.form.refresh()
+
+    def change(self, **values: object) -> None:
+        """Change the chosen solid."""
+        self.solids[self.chosen] = replace(self.solids[self.chosen], **values)
+
+    def write(self) -> None:
+        """Write the thing into its file, and the file into the trial."""
+        with errors_shown():
+            try:
+                names = [check_name(solid.name) for solid in self.solids]
+            except ValueError as error:
+                raise TrialError(str(error)) from None
+            if len(set(names)) < len(names):
+                raise TrialError("two solids have the same name; give each its own")
+            self.session.edit(_FILE, thing_text(self.name or "thing", self.solids), "thing described")
+            read_body(self.session.folder / _FILE)
+            others = dict.fromkeys(("preset", "stature_m", "mass_kg", "measurements"))
+            self.session.set_table("body", {"file": _FILE, **others}, "body chosen")
+            ui.notify("the body is written into the trial", type="positive")
+
+    def _form(self) -> None:
+        """Lay out the solids, and what can be changed of the chosen one."""
+        solid = self.solids[self.chosen]
+        names = {number: each.name for number, each in enumerate(self.solids)}
+        with ui.element("div").classes("row-line"):
+            choice = ui.select(names, label="solid", value=self.chosen, on_change=lambda e: self._choose(e.value))
+            choice.props("outlined dense options-dense").style("width: 130px")
+            ui.button("Add", on_click=self._add).props("flat dense")
+            ui.button("Remove", on_click=self._remove).props("flat dense")
+        with ui.element("div").classes("row-line"):
+            name = ui.input("its name", value=solid.name, on_change=lambda e: self.change(name=e.value or ""))
+            name.props("outlined dense").style("width: 110px")
+            shape = ui.select(self.shapes, label="shape", value=solid.shape, on_change=lambda e: self._shape(e.value))
+            shape.props("outlined dense options-dense").style("width: 130px")
+        is_mesh = solid.shape not in ("box", "ellipsoid")
+        if is_mesh:
+            unit = ui.number("its unit [m]", value=solid.scale, min=1e-6, on_change=lambda e: self._number("scale", e))
+            unit.props("outlined dense").style("width: 110px")
+        for key in _FIELDS if not is_mesh else ("centre_mm", "turn_deg"):
+            ui.label(_FIELDS[key]).classes("small soft")
+            with ui.element("div").classes("row-line"):
+                for k, axis in enumerate("xyz"):
+                    value = getattr(solid, key)[k]
+                    number = ui.number(axis, value=value, on_change=lambda e, key=key, k=k: self._number(key, e, k))
+                    number.props(f'outlined dense aria-label="{_FIELDS[key]} {axis}"').style("width: 84px")
+        with ui.element("div").classes("row-line"):
+            if solid.colour is not None:
+                shade = f"rgb({', '.join(map(str, solid.colour))})"
+                ui.element("span").style(f"width: 28px; height: 28px; border-radius: 4px; background: {shade}")
+                ui.label(f"colour {', '.join(map(str, solid.colour))}").classes("small")
+            else:
+                ui.label("colour: taken at the first pose").classes("small soft")
+
+    def _number(self, key: str, event, k: int | None = None) -> None:
+        value = float(event.value or 0)
+        old = getattr(self.solids[self.chosen], key)
+        self.change(**{key: value if k is None else (*old[:k], value, *old[k + 1 :])})
+
+    def _shape(self, shape: str) -> None:
+        self.change(shape=shape)
+        self.form.refresh()
+
+    def _choose(self, number: int) -> None:
+        self.chosen = number
+        self.form.refresh()
+
+    def _add(self) -> None:
+        self.solids.append(replace(self.solids[self.chosen], name=f"solid{len(self.solids) + 1}"))
+        self._choose(len(self.solids) - 1)
+
+    def _remove(self) -> None:
+        if len(self.solids) == 1:
+            complain(AirborneError("a thing has at least one solid; change this one"))
+            return
+        del self.solids[self.chosen]
+        self._choose(0)
