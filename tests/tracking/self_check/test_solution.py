@@ -28,7 +28,7 @@ def test_parameters_and_poses_are_found():
     mean, covariance, _ = solution.posterior(np.eye(2))
     np.testing.assert_allclose(mean, theta, atol=5 * SOLVED)
     assert np.all(np.sqrt(np.diag(covariance)) < 0.01)
-    np.testing.assert_allclose(pose_errors(evidence, weights).shown(mean), poses, atol=5 * SOLVED)
+    np.testing.assert_allclose(pose_errors(evidence, weights).at(mean), poses, atol=5 * SOLVED)
 
 
 def test_a_parameter_without_freedom_stays_zero():

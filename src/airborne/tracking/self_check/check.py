@@ -89,7 +89,7 @@ def self_check(run: RunEquations, model: BodyModel, rig: Rig, path: TrackedPath)
     covariance = added[:, :3, :3] + path.covariance[rows, :3, :3]
     is_seen = (evidence.is_seen.sum(axis=1) > 1) & np.isfinite(covariance).all(axis=(1, 2)) & (not model.has_joints)
     elsewhere = np.zeros(len(rows), bool)
-    shown = errors.shown(diagnosis.theta)[is_seen, :3]
+    shown = errors.at(diagnosis.theta)[is_seen, :3]
     elsewhere[is_seen] = lies_elsewhere(shown, errors.noise[is_seen, :3, :3], covariance[is_seen])
     return SelfCheck(diagnosis, path.index[rows], constant, added, elsewhere)
 
@@ -97,7 +97,7 @@ def self_check(run: RunEquations, model: BodyModel, rig: Rig, path: TrackedPath)
 def _constant_errors(errors: PoseErrors, diagnosis: Diagnosis, n: int) -> Array:
     """Return the covariance (m, 6, 6) of the pose's errors by the first n parameters."""
     K = errors.by_parameter[:, :, :n]
-    mean = errors.shown(diagnosis.theta) if diagnosis.has_alarm else K @ diagnosis.theta[:n]
+    mean = errors.at(diagnosis.theta) if diagnosis.has_alarm else K @ diagnosis.theta[:n]
     return K @ diagnosis.covariance[:n, :n] @ np.swapaxes(K, 1, 2) + mean[:, :, None] * mean[:, None, :]
 
 

@@ -66,7 +66,7 @@ class PoseErrors:
     by_parameter: Array  # (n, 6, k) of a pose tracked by the whole outline
     noise: Array  # (n, 6, 6) covariance of what the silhouettes show
 
-    def shown(self, theta: Array) -> Array:
+    def at(self, theta: Array) -> Array:
         """Return by how much the silhouettes show the poses off, given the parameters (k,): (n, 6)."""
         return self.seen + self.seen_by_parameter @ theta
 
@@ -84,7 +84,7 @@ def solve(evidence: Evidence, wide: Array) -> tuple[NuisanceSolution, Array]:
         theta = solution.posterior(wide)[0]
         errors = pose_errors(evidence, weights)
         residual = evidence.offset - np.einsum("ncak,k->nca", evidence.by_parameter, theta)
-        residual -= np.einsum("ncai,ni->nca", evidence.by_twist, errors.shown(theta))
+        residual -= np.einsum("ncai,ni->nca", evidence.by_twist, errors.at(theta))
         residual *= is_seen[..., None]
         inverse = np.linalg.inv(_pose_information(evidence, weights))
         leverage = np.einsum("ncai,nij,ncaj,nca->nca", evidence.by_twist, inverse, evidence.by_twist, weights)
