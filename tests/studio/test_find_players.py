@@ -39,4 +39,4 @@ def test_where_nobody_stands_the_studio_says_so_and_clicks_are_a_button_away(rig
         user.press("Find it")
         page.get_by_text("no player is seen to stand at the net", exact=False).wait_for()
         user.press("Click the points")
-        page.get_by_text("Ready: nobody yet.").wait_for()
+        page.get_by_text("Ready to be used: nobody clicked yet.").wait_for()

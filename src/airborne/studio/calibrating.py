@@ -18,6 +18,7 @@ from airborne.evaluation import DigitisedPoints
 from airborne.io.writing import replace_text
 from airborne.studio.digitising import list_repetitions
 from airborne.studio.project import Project, is_inside, list_videos
+from airborne.types import Mask
 
 SOURCES, CALIBRATED = "calibration_sources.toml", "calib_studio.toml"  # what is written, and what comes of it
 REPORT, _SAID = "calib_studio_report", "report.txt"  # the command's folder of pictures, and what it said
@@ -40,7 +41,7 @@ def list_wands(folder: Path) -> list[str]:
 
 def wand_text(project: Project, digitised: DigitisedPoints) -> str:
     """Return the table of a wand's markers from clicks of its two ends. Raises TrialError for other than two points."""
-    clicked = np.isfinite(digitised.px).all(axis=-1)  # (frames, points, cameras)
+    clicked: Mask = np.isfinite(digitised.px[..., 0])  # (frames, points, cameras)
     markers = np.flatnonzero(clicked.any(axis=(0, 2)))
     if len(markers) != 2:
         raise TrialError(f"{len(markers)} points are clicked; expected two, the wand's ends, in the step Digitise")

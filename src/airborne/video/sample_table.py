@@ -126,7 +126,8 @@ def _read_samples(boxes: dict[bytes, bytes]) -> NDArray[np.int64] | None:
     keys = _table(boxes[b"stss"], 1)[:, 0] if b"stss" in boxes else np.arange(1, n + 1)  # counted from 1
     if not len(keys):
         return None
-    return np.stack([shown, np.isin(np.arange(1, n + 1), keys)], axis=1)
+    is_key = np.isin(np.arange(1, n + 1), keys).astype(np.int64)
+    return np.stack([shown, is_key], axis=1)
 
 
 def _table(box: bytes, columns: int) -> NDArray[np.int64]:
