@@ -130,6 +130,14 @@ def test_a_click_lands_to_the_tenth_of_a_pixel_and_arrows_move_it_by_one(address
         page.keyboard.press("Control+z")
         page.wait_for_timeout(1500)
         assert read_clicked(folder / "survey.csv").at("P0", "b frames") == pytest.approx([u - 0.2, v - 0.1], abs=0.02)
+        canvas.press("0")
+        page.set_viewport_size({"width": 3840, "height": 2160})  # 4K, all of it enlarged
+        page.wait_for_function("document.querySelector('canvas.view').view.zoom() === 1.5")
+        page.mouse.move(*at_pixel(page, 0, 150, 60))
+        page.mouse.wheel(0, -1200)
+        page.mouse.click(*at_pixel(page, 0, 150.37, 60.62))
+        page.wait_for_timeout(1000)
+        assert read_clicked(folder / "survey.csv").at("P0", "b frames") == pytest.approx([150.37, 60.62], abs=0.06)
 
 
 def test_two_windows_see_the_same(address, folder):

@@ -116,10 +116,9 @@ def wait_for_still_scene(page) -> int:
 def at_pixel(page, pane: int, u: float, v: float) -> tuple[float, float]:
     """Return where on the page a pixel of a camera's picture is."""
     script = """([pane, u, v]) => {
-        const canvas = document.querySelector("canvas.view"), box = canvas.getBoundingClientRect();
-        const view = canvas.view;
+        const { view } = document.querySelector("canvas.view"), box = view.box();
         const [x, y] = view.toScreen(view.layout()[pane], u, v);
-        return [box.left + x, box.top + y];
+        return [box.left + view.zoom() * x, box.top + view.zoom() * y];
     }"""
     return tuple(page.evaluate(script, [pane, u, v]))
 

@@ -70,9 +70,15 @@ export default {
   methods: {
     ...drawing,
     ...frames,
-    // places
+    // places: in the canvas's own CSS px, of which `zoom` of the page's make one on a large screen
+    zoom() { return this.canvas.currentCSSZoom || 1; },
+    ratio() { return (window.devicePixelRatio || 1) * this.zoom(); },
+    box() {
+      const { left, top, width, height } = this.canvas.getBoundingClientRect(), zoom = this.zoom();
+      return { left, top, width: width / zoom, height: height / zoom };
+    },
     layout() {
-      const box = this.canvas.getBoundingClientRect(), n = this.alone < 0 ? this.panes.length : 1;
+      const box = this.box(), n = this.alone < 0 ? this.panes.length : 1;
       let best = { scale: 0 };
       for (let columns = 1; columns <= n; columns++) {
         const rows = Math.ceil(n / columns);
@@ -100,7 +106,7 @@ export default {
     },
     // hands
     place(event) {
-      const box = this.canvas.getBoundingClientRect(), x = event.clientX - box.left, y = event.clientY - box.top;
+      const box = this.box(), zoom = this.zoom(), x = (event.clientX - box.left) / zoom, y = (event.clientY - box.top) / zoom;
       return { x, y, pane: this.paneAt(x, y) };
     },
     markAt({ x, y, pane }) {
@@ -110,7 +116,7 @@ export default {
       return near.sort((a, b) => far(a) - far(b))[0];
     },
     isOnBody({ x, y, pane }) {
-      const pen = this.pens, place = this.layout()[pane], ratio = window.devicePixelRatio || 1;
+      const pen = this.pens, place = this.layout()[pane], ratio = this.ratio();
       return this.nowItems().some((item) => {
         if (!item.grab || item.pane !== pane) return false;
         this.trace(pen, place, item);

@@ -4,7 +4,7 @@ const LOUPE = 8; // times as large as the video
 export default {
   draw() {
     if (!this.canvas) return;
-    const box = this.canvas.getBoundingClientRect(), ratio = window.devicePixelRatio || 1;
+    const box = this.box(), ratio = this.ratio();
     if (!box.width || !this.panes.length) return;
     const [width, height] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
     if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });

@@ -23,7 +23,7 @@ export default {
     return answer.ok ? answer.json() : { items: [] };
   },
   shrinks() { // by how many times each picture may be smaller and still be as large as it is drawn; whole for the loupe
-    const ratio = window.devicePixelRatio || 1;
+    const ratio = this.ratio();
     return this.layout().map(({ w, scale }) => this.picking ? 1 : SHRINKS.find((n) => w === 0 || n * scale * ratio <= 1) || 1);
   },
   load(frame) {

@@ -6,7 +6,7 @@ const STRIP = 12, LEFT = 58, RIGHT = 10, TOP = 20, BOTTOM = 18, FONT = "11px sys
 // data: {frame, time_s, status, series: [{name, unit, value, sd}]}; null where nothing is known. What another run has,
 // {beside: {frame, series}}, is drawn with dashes.
 export function drawCurves(canvas, data, now) {
-  const box = canvas.getBoundingClientRect(), ratio = window.devicePixelRatio || 1;
+  const box = boxOf(canvas), ratio = (window.devicePixelRatio || 1) * box.zoom;
   if (!box.width) return;
   const [width, height] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
   let still = canvas.still; // all but the cursor, drawn once
@@ -62,9 +62,15 @@ function drawStill(pen, box, data) {
 
 // The frame at a place of the pointer.
 export function frameAt(canvas, data, clientX) {
-  const box = canvas.getBoundingClientRect(), { first, last } = spanOf(data);
-  const share = (clientX - box.left - LEFT) / (box.width - LEFT - RIGHT);
+  const box = boxOf(canvas), { first, last } = spanOf(data);
+  const share = ((clientX - box.left) / box.zoom - LEFT) / (box.width - LEFT - RIGHT);
   return Math.round(first + Math.max(0, Math.min(1, share)) * (last - first));
+}
+
+// Where a canvas is on the page; its size in its own CSS px, of which `zoom` of the page's make one.
+function boxOf(canvas) {
+  const { left, width, height } = canvas.getBoundingClientRect(), zoom = canvas.currentCSSZoom || 1;
+  return { left, width: width / zoom, height: height / zoom, zoom };
 }
 
 function spanOf({ frame }) { return { first: frame[0], last: Math.max(frame[frame.length - 1], frame[0] + 1) }; }
