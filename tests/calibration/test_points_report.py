@@ -5,6 +5,7 @@ import pytest
 
 from airborne.calibration.from_points import calibrate
 from airborne.calibration.points_report import describe_points_calibration, points_calibration_to_dict
+from airborne.cameras.finding import Finding
 from tests.support.cameras import restrict_to_cameras
 
 
@@ -26,8 +27,8 @@ def test_the_table_says_why_a_model_was_chosen(calibration):
 
 
 def test_warnings_stand_at_the_end(calibration):
-    doubtful = replace(calibration, warnings=("something is odd",))
-    assert describe_points_calibration(doubtful).splitlines()[-1] == "warning: something is odd"
+    doubtful = replace(calibration, findings=(Finding(kind="odd", what="something is odd", advice="look"),))
+    assert describe_points_calibration(doubtful).splitlines()[-1] == "warning: something is odd: look"
     assert "warning" not in describe_points_calibration(calibration)
 
 

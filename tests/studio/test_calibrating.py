@@ -1,5 +1,6 @@
 """What the step Cameras writes: files that `calibrate` reads, and a court's points to be clicked."""
 
+import json
 import tomllib
 from dataclasses import replace
 
@@ -24,6 +25,7 @@ from airborne.studio.calibrating import (
     list_boards,
     list_pictures,
     list_wands,
+    read_findings,
     read_report,
     sources_text,
     wand_text,
@@ -112,6 +114,18 @@ def test_only_pictures_of_the_report_are_found(tmp_path):
     (tmp_path / "secret.png").write_bytes(b"png")
     assert find_picture(tmp_path, "residuals_a.png") == tmp_path / REPORT / "residuals_a.png"
     assert find_picture(tmp_path, "../secret.png") is None
+
+
+def test_what_a_diagnosis_found_is_told_by_camera(tmp_path):
+    assert read_findings(tmp_path, "calib.toml") == {}
+    (tmp_path / "calib_report").mkdir()
+    found = [(["a"], "turned"), ([], "far"), (["a", "b"], "swapped")]
+    text = json.dumps({"findings": [{"kind": "", "cameras": cameras, "sentence": each} for cameras, each in found]})
+    (tmp_path / "calib_report" / "report.json").write_text(text)
+    assert read_findings(tmp_path, "calib.toml") == {"a": ["turned", "swapped"], "": ["far"], "b": ["swapped"]}
+    (tmp_path / "calib_report" / "report.json").write_text("[]")
+    with pytest.raises(TrialError, match="no report of a calibration"):
+        read_findings(tmp_path, "calib.toml")
 
 
 def test_what_a_calibration_said_is_kept_in_the_folder_only(tmp_path):

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.calibration.diagnosis import check_points, decompose_cameras, warnings_about
+from airborne.calibration.diagnosis import Finding, check_points, check_solutions, decompose_cameras
 from airborne.calibration.intrinsics.common_lens import common_lens_sd
 from airborne.calibration.intrinsics.model_selection import (
     Solution,
@@ -77,7 +77,12 @@ class Calibration:
     held_out_points_m: (
         Array  # (n, 3) [m], triangulated minus surveyed, by cameras fitted without the point; NaN: < 2 views
     )
-    warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]  # what casts doubt on it
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The findings as plain sentences."""
+        return tuple(each.sentence for each in self.findings)
 
     @property
     def held_out_3d_m(self) -> float:
@@ -93,7 +98,7 @@ def calibrate(
     sizes: (width, height) [px] by camera name. Each camera starts from the decomposition of its DLT. Method "lm": least
     squares on the pixels for physical cameras of growing complexity; the simplest that predicts held-out points as well
     as the best is selected. Method "annealing": paper B's seven-parameter camera by simulated annealing, `seed` fixed.
-    Raises CalibrationError where a camera cannot be estimated; what is only doubtful goes to `warnings`.
+    Raises CalibrationError where a camera cannot be estimated; what is only doubtful goes to `findings`.
     """
     if method not in ("lm", "annealing"):
         raise CalibrationError(f"unknown calibration method '{method}'; expected 'lm' or 'annealing'")
@@ -112,7 +117,7 @@ def calibrate(
         method=method,
         fits=tuple(fits),
         held_out_points_m=_point_errors_left_out(points, solutions),
-        warnings=warnings_about(points, sizes, decompositions, solutions),
+        findings=check_solutions(points, sizes, decompositions, solutions),
     )
 
 

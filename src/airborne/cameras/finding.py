@@ -14,6 +14,7 @@ class Finding:
     what: str
     advice: str
     cameras: tuple[str, ...] = ()  # which it concerns; empty: all
+    points: tuple[str, ...] = ()  # of control points, which it concerns; empty: all
 
     @property
     def sentence(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from airborne.cameras.formats.dltdv import read_xypts
 from airborne.cameras.formats.options import FileOptions
 from airborne.errors import AirborneError, TrialError
 from airborne.evaluation import DigitisedPoints
+from airborne.io.text import read_json
 from airborne.io.writing import replace_text
 from airborne.studio.digitising import list_repetitions
 from airborne.studio.project import Project, is_inside, list_videos
@@ -116,6 +118,20 @@ def read_report(folder: Path) -> str:
     """Return what the last calibration said; empty where there is none."""
     path = folder / REPORT / _SAID
     return path.read_text(encoding="utf-8", errors="replace") if path.is_file() and is_inside(folder, path) else ""
+
+
+def read_findings(folder: Path, file: str) -> dict[str, list[str]]:
+    """Return what the diagnosis of a calibration found, by camera, "" for all. Raises TrialError."""
+    path, found = folder / f"{Path(file).stem}_report" / "report.json", defaultdict(list)
+    if not path.is_file() or not is_inside(folder, path):
+        return found
+    try:
+        for each in read_json(path)["findings"]:
+            for camera in each["cameras"] or [""]:
+                found[str(camera)].append(str(each["sentence"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        raise TrialError(f"{path} is no report of a calibration; calibrate again, or remove it") from None
+    return found
 
 
 def write_report(folder: Path, text: str) -> None:

@@ -88,7 +88,9 @@ def test_points_outside_the_image_are_counted_and_named(points, sizes):
 
 def test_one_wrong_click_is_named_and_others_are_not(points, sizes):
     wrong = clicked(points, "cam1", lambda px: px + 12 * np.array([1, -1]) * (np.arange(24)[:, None] == 12))
-    [warning] = warnings_of(wrong, sizes, "cam1")
+    [finding] = calibrate(restrict_to_cameras(wrong, "cam1"), sizes).findings
+    assert (finding.cameras, finding.points) == (("cam1",), ("P13",))
+    warning = finding.sentence
     assert warning.startswith("control point 'P13' misses by 1")
     assert "in camera 'cam1' when left out: check its clicked pixels" in warning
 

@@ -1,8 +1,8 @@
-"""What is wrong with control points: errors where a camera cannot be estimated, plain warnings where it can."""
+"""What is wrong with control points: errors where a camera cannot be estimated, findings where it can."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from scipy.special import fdtrc
@@ -11,6 +11,7 @@ from airborne.calibration.intrinsics.model_selection import Solution, leave_one_
 from airborne.calibration.intrinsics.physical import fit_pinhole
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras.dlt import FEWEST_DLT_POINTS, Decomposition, decompose, fit_dlt
+from airborne.cameras.finding import Finding
 from airborne.errors import CalibrationError
 from airborne.geometry.triangulation import px_from_points
 from airborne.types import Array
@@ -97,35 +98,34 @@ def decompose_cameras(points: ControlPoints) -> dict[str, Decomposition]:
     return decompositions
 
 
-def warnings_about(
+def check_solutions(
     points: ControlPoints,
     sizes: Mapping[str, tuple[int, int]],
     decompositions: Mapping[str, Decomposition],
     solutions: Mapping[str, Solution],
-) -> tuple[str, ...]:
-    """Return plain sentences about what casts doubt on the calibration."""
-    warnings = []
+) -> tuple[Finding, ...]:
+    """Return what casts doubt on the calibration, each with its camera or point."""
+    findings = []
     extent = np.linalg.norm(np.ptp(points.world, axis=0))
     if extent > _LARGE_EXTENT_M:
-        warnings.append(f"the control points span {extent:.0f} m: are they in metres?")
+        what = f"the control points span {extent:.0f} m"
+        findings.append(Finding(kind="units", what=what, advice="are they in metres?"))
     outliers = {camera: find_outliers(solutions[camera]) for camera in points.cameras}
-    warnings += _outlier_warnings(points, outliers)
+    findings += _check_outliers(points, outliers)
     for camera in points.cameras:
         if _is_straight(solutions[camera]):  # else the decomposition says little
-            warnings += _image_warnings(camera, sizes[camera], decompositions[camera])
+            findings += _check_image(camera, sizes[camera], decompositions[camera])
         ratio = flatness(solutions[camera].world)
         if ratio < _FLAT_WARNING:
-            warnings.append(
-                f"the control points of camera '{camera}' are nearly flat (thickness / extent {ratio:.3f}): "
-                "depth and focal length are poorly told apart; spread them more"
-            )
+            what = f"the control points of camera '{camera}' are nearly flat (thickness / extent {ratio:.3f})"
+            advice = "depth and focal length are poorly told apart; spread them more"
+            findings.append(Finding(kind="flat", what=what, advice=advice, cameras=(camera,)))
         rms = np.sqrt(np.mean(np.sum(solutions[camera].residual_px ** 2, axis=1)))
         if rms > _ROUGH_FIT_PX and len(outliers[camera]) in (0, _MOST_OUTLIERS):  # else the named points explain it
-            warnings.append(
-                f"camera '{camera}' fits its control points only to {rms:.1f} px (careful clicks give about 1): "
-                "check its points, their coordinates and the image size"
-            )
-    return tuple(warnings)
+            what = f"camera '{camera}' fits its control points only to {rms:.1f} px (careful clicks give about 1)"
+            advice = "check its points, their coordinates and the image size"
+            findings.append(Finding(kind="misfit", what=what, advice=advice, cameras=(camera,)))
+    return tuple(findings)
 
 
 def _is_straight(solution: Solution) -> bool:
@@ -135,24 +135,29 @@ def _is_straight(solution: Solution) -> bool:
     return bool(rms_px < _BENT * np.sqrt(np.mean(np.sum(solution.residual_px**2, axis=1))))
 
 
-def _image_warnings(camera: str, size: tuple[int, int], decomposition: Decomposition) -> list[str]:
-    warnings = []
+def _check_image(camera: str, size: tuple[int, int], decomposition: Decomposition) -> Iterator[Finding]:
     K, R = decomposition.K, decomposition.R
     middle = (np.array(size) - 1) / 2
     if np.linalg.norm(K[:2, 2] - middle) > _OFF_CENTRE * np.hypot(*size):
-        warnings.append(
-            f"camera '{camera}' looks through pixel ({K[0, 2]:.0f}, {K[1, 2]:.0f}), expected near the middle "
-            f"({middle[0]:.0f}, {middle[1]:.0f}): is {size[0]}×{size[1]} its size, or is the image cropped?"
+        yield Finding(
+            kind="centre",
+            what=f"camera '{camera}' looks through pixel ({K[0, 2]:.0f}, {K[1, 2]:.0f}), expected near the middle "
+            f"({middle[0]:.0f}, {middle[1]:.0f})",
+            advice=f"is {size[0]}×{size[1]} its size, or is the image cropped?",
+            cameras=(camera,),
         )
     if abs(K[0, 0] / K[1, 1] - 1) > _NOT_SQUARE:
-        warnings.append(
-            f"camera '{camera}' seems to have pixels that are not square (focal lengths {K[0, 0]:.0f} and "
-            f"{K[1, 1]:.0f} px): resample its image to square pixels"
+        yield Finding(
+            kind="squeezed",
+            what=f"camera '{camera}' seems to have pixels that are not square (focal lengths {K[0, 0]:.0f} and "
+            f"{K[1, 1]:.0f} px)",
+            advice="resample its image to square pixels",
+            cameras=(camera,),
         )
     level = np.hypot(R[2, 0], R[2, 1])
     if level > 0.5 and -R[1, 2] / level < np.cos(_MOST_ROLL):
-        warnings.append(f"camera '{camera}' comes out on its side or upside down: is world z up?")
-    return warnings
+        what = f"camera '{camera}' comes out on its side or upside down"
+        yield Finding(kind="turned", what=what, advice="is world z up?", cameras=(camera,))
 
 
 def find_outliers(solution: Solution) -> dict[int, float]:
@@ -183,15 +188,14 @@ def find_outliers(solution: Solution) -> dict[int, float]:
     return outliers
 
 
-def _outlier_warnings(points: ControlPoints, outliers: Mapping[str, Mapping[int, float]]) -> list[str]:
+def _check_outliers(points: ControlPoints, outliers: Mapping[str, Mapping[int, float]]) -> Iterator[Finding]:
     errors: dict[str, dict[str, float]] = {}
     for camera, errors_of_camera in outliers.items():
         names = np.array(points.names)[points.is_seen_by(camera)]
         for i, error in errors_of_camera.items():
             errors.setdefault(str(names[i]), {})[camera] = error
-    warnings = []
     for name, by_camera in errors.items():
         misses = " and ".join(f"{error:.1f} px in camera '{camera}'" for camera, error in by_camera.items())
         suspect = "its x_m, y_m, z_m" if len(by_camera) > 1 else "its clicked pixels"
-        warnings.append(f"control point '{name}' misses by {misses} when left out: check {suspect}, or leave it out")
-    return warnings
+        what, advice = f"control point '{name}' misses by {misses} when left out", f"check {suspect}, or leave it out"
+        yield Finding(kind="outlier", what=what, advice=advice, cameras=tuple(by_camera), points=(name,))

@@ -18,6 +18,7 @@ from airborne.studio.calibrating import (
     list_boards,
     list_pictures,
     list_wands,
+    read_findings,
     read_report,
     sources_text,
     wand_text,
@@ -26,7 +27,7 @@ from airborne.studio.calibrating import (
 from airborne.studio.commands import Command
 from airborne.studio.digitising import list_repetitions
 from airborne.studio.pages.command_watch import CommandWatch
-from airborne.studio.pages.layout import errors_shown
+from airborne.studio.pages.layout import errors_shown, show_findings
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_videos
 from airborne.studio.session import Session
@@ -151,7 +152,14 @@ class CalibratePanel:
         """Show what the last calibration said, and where each camera saw points."""
         if text := read_report(self.session.folder):
             ui.label(text).classes("report")
-        with ui.element("div").classes("files"):
-            for path in list_pictures(self.session.folder):
-                picture = ui.element("img").props(f"src=/calibration/{quote(path.name)}?{path.stat().st_mtime_ns}")
-                picture._props["alt"] = f"where points were seen: {path.stem.removeprefix('residuals_')}"
+        with errors_shown():
+            findings = read_findings(self.session.folder, CALIBRATED)
+            show_findings(findings.get("", []))
+            with ui.element("div").classes("files"):
+                for path in list_pictures(self.session.folder):
+                    camera = path.stem.removeprefix("residuals_")
+                    with ui.element("div"):
+                        address = f"/calibration/{quote(path.name)}?{path.stat().st_mtime_ns}"
+                        picture = ui.element("img").props(f"src={address}")
+                        picture._props["alt"] = f"where points were seen: {camera}"
+                        show_findings(findings.get(camera, []))

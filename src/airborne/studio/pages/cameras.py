@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from nicegui import ui
@@ -9,11 +10,11 @@ from nicegui import ui
 from airborne.calibration.sources.court import Net
 from airborne.cameras import Rig, read_rig
 from airborne.errors import AirborneError
-from airborne.studio.calibrating import NETS, court_text
+from airborne.studio.calibrating import NETS, court_text, read_findings
 from airborne.studio.clicks import list_surveys
 from airborne.studio.pages.calibrate import CalibratePanel
 from airborne.studio.pages.control_points import ControlPointsPanel
-from airborne.studio.pages.layout import errors_shown, in_thread, page_frame, work
+from airborne.studio.pages.layout import errors_shown, in_thread, page_frame, show_findings, work
 from airborne.studio.session import Session
 from airborne.studio.stage import draw_cameras
 
@@ -54,7 +55,7 @@ async def cameras_page(session: Session) -> None:
         elif table.get("file"):
             rig = await work("reading the calibration", session.rig)
             if rig is not None:
-                _show_rig(rig)
+                _show_rig(rig, _findings_of(session, str(table["file"])))
 
 
 def _chooser(session: Session, files: list[str], surveys: list[str], table: dict) -> None:
@@ -101,11 +102,21 @@ def _list_calibrations(folder: Path, wanted: set[str]) -> list[str]:
     return found
 
 
-def _show_rig(rig: Rig) -> None:
+def _findings_of(session: Session, file: str) -> dict[str, list[str]]:
+    """Return what the diagnosis of a calibration found, by the trial's own cameras; "" holds what concerns all."""
+    found: dict[str, list[str]] = {}
+    with errors_shown():
+        found = read_findings(session.folder, file)
+    own = {each.name: found.get(each.calibrated_as or each.name, []) for each in session.project().cameras}
+    return {"": found.get("", []), **own}
+
+
+def _show_rig(rig: Rig, findings: Mapping[str, Sequence[str]]) -> None:
     with ui.element("div").classes("split"):
         with ui.element("div").classes("wide"):
             draw_cameras(rig)
         with ui.element("div").classes("side"), ui.element("div").classes("card"):
+            show_findings(findings.get("", ()))
             for camera in rig:
                 x, y, z = camera.centre
                 ui.label(camera.name).classes("name")
@@ -113,3 +124,4 @@ def _show_rig(rig: Rig) -> None:
                     f"at {x:.2f}, {y:.2f}, {z:.2f} m; focal length {camera.K[0, 0]:.0f} px; "
                     f"{camera.size[0]}×{camera.size[1]} px"
                 ).classes("soft small")
+                show_findings(findings.get(camera.name, ()))

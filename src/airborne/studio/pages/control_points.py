@@ -10,9 +10,10 @@ from nicegui import ui
 from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.court import court_lines
 from airborne.cameras import Rig
+from airborne.cameras.finding import Finding
 from airborne.errors import AirborneError
 from airborne.studio.clicks import Clicked, count_clicked, read_clicked
-from airborne.studio.pages.layout import complain, errors_shown
+from airborne.studio.pages.layout import complain, errors_shown, show_findings
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
@@ -117,7 +118,7 @@ class ControlPointsPanel(PointsPanel):
         marks = [mark for pane, camera in enumerate(self.shown.names) for mark in self._marks(pane, camera)]
         lines = [item for pane, camera in enumerate(self.shown.names) for item in self._court(pane, camera)]
         self.view.show_over(sorted(marks, key=lambda mark: mark.get("colour") != CHOSEN_COLOUR), lines, self.selected)
-        self.list.show(self.clicked.names, self.chosen, self._off_px)
+        self.list.show(self.clicked.names, self.chosen, self._off_px, self._findings_of_points())
         self.state.refresh()
 
     def _marks(self, pane: int, camera: str) -> list[Mark]:
@@ -175,6 +176,19 @@ class ControlPointsPanel(PointsPanel):
             with ui.element("div"):
                 ui.label(camera).classes("name")
                 ui.label(text).classes(f"{tone} small")
+                show_findings(each.sentence for each in self._findings(camera) if not each.points)
+
+    def _findings(self, camera: str) -> tuple[Finding, ...]:
+        fit = self.fits.get(camera, (b"", ""))[1]
+        return fit.findings if isinstance(fit, Calibration) else ()
+
+    def _findings_of_points(self) -> dict[str, str]:
+        """Return what was found about points, in all cameras."""
+        found: dict[str, str] = {}
+        for each in (each for camera in self.shown.names for each in self._findings(camera)):
+            for name in each.points:
+                found[name] = f"{found[name]}; {each.sentence}" if name in found else each.sentence
+        return found
 
 
 def _fit(clicked: Clicked, camera: str, sizes: dict[str, tuple[int, int]]) -> Calibration | str:

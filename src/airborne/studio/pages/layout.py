@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from typing import TypeVar, cast
 
@@ -147,6 +147,12 @@ def _example(here: str) -> ui.dialog:
         picture._props["alt"] = f"the step {here}, done for the thrown cross"
         ui.button("Close", on_click=dialog.close).props("flat")
     return dialog
+
+
+def show_findings(sentences: Iterable[str]) -> None:
+    """Show what a diagnosis found, beside what it speaks of."""
+    for sentence in sentences:
+        ui.label(sentence).classes("warn small")
 
 
 @contextmanager

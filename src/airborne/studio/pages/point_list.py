@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -21,14 +21,24 @@ class PointList:
     def __init__(self, cameras: Sequence[str], choose: Callable[[str], Awaitable[None]]) -> None:
         """Begin without rows; `choose` is called with a row's point."""
         self._cameras, self._choose = cameras, choose
-        self._rows: dict[str, tuple[Element, list[Label]]] = {}
+        self._rows: dict[str, tuple[Element, list[Label], Label]] = {}
         self._card = ui.element("div").classes("card points").style("flex: 1; min-height: 120px; overflow-y: auto")
 
-    def show(self, names: Sequence[str], chosen: str, off_px: Callable[[str], tuple[Mask, Array]]) -> None:
-        """Show the points; `off_px` says of one whether it is clicked, and how far off, in each camera [px]."""
+    def show(
+        self,
+        names: Sequence[str],
+        chosen: str,
+        off_px: Callable[[str], tuple[Mask, Array]],
+        findings: Mapping[str, str] | None = None,
+    ) -> None:
+        """Show the points, and below a point what is wrong with it.
+
+        `off_px` says of one whether it is clicked, and how far off, in each camera [px].
+        """
         if list(self._rows) != list(names):
             self._build(names)
-        for name, (row, labels) in self._rows.items():
+        for name, (row, labels, finding) in self._rows.items():
+            finding.set_text((findings or {}).get(name, ""))
             row.classes(replace="point here" if name == chosen else "point")
             for label, is_clicked, off in zip(labels, *off_px(name), strict=True):
                 label.set_text(_NOT_CLICKED if not is_clicked else _CLICKED if np.isnan(off) else f"{off:.1f}")
@@ -45,4 +55,6 @@ class PointList:
                     labels = [ui.label().classes("n") for _ in self._cameras]
                     for label, camera in zip(labels, self._cameras, strict=True):
                         label._props["title"] = f"{camera} [px]"  # a camera's name may hold quotes
-                self._rows[name] = row, labels
+                finding = ui.label().classes("warn small")
+                finding.bind_visibility_from(finding, "text")
+                self._rows[name] = row, labels, finding
