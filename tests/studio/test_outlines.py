@@ -1,6 +1,7 @@
 """What lies over the pictures of a run: outlines where the body is, lines down players' legs; and its curves."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -10,13 +11,16 @@ from airborne.body import Pose
 from airborne.body.files import read_body
 from airborne.cameras import Rig, camera_looking_at
 from airborne.errors import ResultError
-from airborne.motion import MotionWriter, read_players
+from airborne.motion import MotionWriter, joint_statuses, landmarks, read_motion, read_players
+from airborne.motion.files import read_estimates
 from airborne.studio import curve_data
 from airborne.studio.curve_data import curve_kinds, describe_distance, run_curves, run_momenta
 from airborne.studio.outlines import outline_items, player_colours, run_overlay
 from airborne.studio.runs import count_rows
 from airborne.studio.stage import part_stl
+from airborne.studio.strips import FROM_GOOD
 from tests.support.motions import run_with_gap
+from tests.support.person_run import PERSON, write_person_run
 from tests.support.places import THROWN_CROSS
 from tests.support.players_trial import rig, write_run
 
@@ -84,6 +88,29 @@ def test_curves_of_players_are_of_what_is_lowest(tmp_path):
     assert curves["frame"] == list(range(12))
     assert [each["name"].split(":")[0] for each in curves["series"]] == ["Anna", "number 7"]
     assert set(curves["status"]) <= {"tracked", "uncertain", "lost"}
+    assert [(strip["name"], len(strip["rank"])) for strip in curves["strips"]] == [("Anna", 12), ("number 7", 12)]
+
+
+def test_strips_say_how_each_joint_goes_while_the_run_goes_on(tmp_path):
+    camera = camera_looking_at("a", [3, -2, 1.5], [0, 0, 1], focal_px=700, size=(640, 480))
+    run = tmp_path / "run"
+    write_person_run(run, Rig((camera,)), 40, Fraction(50))
+    estimates, joints = read_estimates(run / "motion.csv"), read_motion(run / "motion.csv").joints
+    elbow = 6 + 3 * joints.index("forearm_left")
+    (run / "motion.csv").unlink()
+    with MotionWriter(run / "motion.csv", joints) as writer:
+        for each in estimates[::-1]:  # tracked backward
+            if each.index in (3, 35):
+                each.covariance[elbow, elbow] = 0.3  # of the elbow's turn, in two blocks [rad²]
+            writer.append(each)
+            curves = run_curves(run)
+            assert [len(strip["rank"]) for strip in curves["strips"]] == [40 - each.index] * len(PERSON.landmarks)
+    motion = read_motion(run / "motion.csv")
+    expected = joint_statuses(motion, PERSON, landmarks(motion, PERSON)[1])
+    strips = {strip["name"]: FROM_GOOD[list(map(int, strip["rank"]))].tolist() for strip in curves["strips"]}
+    assert strips == {landmark.name: expected[:, k].tolist() for k, landmark in enumerate(PERSON.landmarks)}
+    assert [k for k, status in enumerate(strips["wrist_left"]) if status != "tracked"] == [3, 35]
+    assert set(strips["knee_right"]) == {"tracked"}
 
 
 def test_curves_of_a_long_run_keep_what_stands_out(tmp_path, monkeypatch):

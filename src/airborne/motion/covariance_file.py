@@ -52,16 +52,17 @@ def write_covariances(path: Path, covariances: Array) -> None:
     path.write_bytes(covariances[:, rows, columns].astype(_FLOAT).tobytes())
 
 
-def read_covariances(path: Path, n: int, *, size: int) -> Array:
-    """Read the first n covariances (n, size, size); rows missing from the file are NaN, all of them without a file.
+def read_covariances(path: Path, n: int, *, size: int, first: int = 0) -> Array:
+    """Read n covariances (n, size, size) from the `first` on.
 
-    Raises ResultError if the file exists and cannot be read.
+    Rows missing from the file are NaN, all of them without a file. Raises ResultError if the file exists and cannot be read.
     """
     covariances, upper = np.full((n, size, size), np.nan), np.triu_indices(size)
     if not path.is_file():
         return covariances
     try:
         with path.open("rb") as file:
+            file.seek(first * _row_bytes(size))
             data = file.read(n * _row_bytes(size))
     except OSError as error:
         raise ResultError(f"{path} cannot be read ({error.strerror}); repair it, or remove it to go without") from None

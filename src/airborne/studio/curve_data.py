@@ -14,6 +14,7 @@ from airborne.errors import ResultError
 from airborne.motion import PlayersMotion
 from airborne.motion.run_folder import ANGLES, FLIGHT, JOINT_ANGLES, holds_players
 from airborne.studio.runs import run_body, run_players, run_rows
+from airborne.studio.strips import run_strips
 from airborne.tracking import Status
 from airborne.types import Array
 
@@ -41,7 +42,8 @@ def curve_kinds(run: Path) -> dict[str, str]:
 def run_curves(run: Path, what: str = "") -> dict[str, Any]:
     """Return a run's curves: times, frames, statuses, and series with their standard deviations.
 
-    `what` is one of `curve_kinds`; raises ResultError for another.
+    `what` is one of `curve_kinds`; raises ResultError for another. A strip is how a joint or a player went: a digit a
+    frame, its place in `strips.FROM_GOOD`.
     Of a long run several frames share a point: the least and the greatest of their values, the worst of their statuses.
     """
     unit = "m"
@@ -56,6 +58,7 @@ def run_curves(run: Path, what: str = "") -> dict[str, Any]:
         names, values, sd = ["x", "y", "z"], rows.position, rows.position_sd
         if what:
             names, unit, values, sd = _read_series(run, what, index)
+    strips, ranks = run_strips(run)
     worst = (status[..., None] == _FROM_GOOD).argmax(axis=-1).max(axis=1, initial=0)
     if len(index) > _MOST_POINTS:
         starts = np.arange(0, len(index), -(-2 * len(index) // _MOST_POINTS))
@@ -64,10 +67,12 @@ def run_curves(run: Path, what: str = "") -> dict[str, Any]:
         shown = _interleave(starts, middles)
         index, time_s, values = index[shown], time_s[shown], _interleave(*ends)
         sd, worst = np.fmax.reduceat(sd, starts).repeat(2, axis=0), np.maximum.reduceat(worst, starts).repeat(2)
+        ranks = np.maximum.reduceat(ranks, starts).repeat(2, axis=0)
     return {
         "frame": index.tolist(),
         "time_s": time_s.tolist(),
         "status": _FROM_GOOD[worst].tolist(),
+        "strips": [{"name": name, "rank": "".join(map(str, ranks[:, k]))} for k, name in enumerate(strips)],
         "series": [
             {"name": name, "unit": unit, "value": _plain(values[:, k]), "sd": _plain(sd[:, k]) if sd.shape[1] else []}
             for k, name in enumerate(names)

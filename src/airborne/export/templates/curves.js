@@ -1,10 +1,11 @@
 // Curves over time with bands of two standard deviations, and a strip that says how each frame went; one cursor.
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000", "#8a6d00"];
-const STATUS = { tracked: "#009e73", uncertain: "#e69f00", lost: "#d55e00" };
-const STRIP = 12, LEFT = 58, RIGHT = 10, TOP = 20, BOTTOM = 18, FONT = "11px system-ui, sans-serif";
+const RANKS = ["tracked", "uncertain", "unknown", "lost"]; // of a joint: unknown is what no picture shows
+const STATUS = { tracked: "#009e73", uncertain: "#e69f00", unknown: "#d55e00", lost: "#d55e00" };
+const STRIP = 12, ROW = 10, LEGIBLE = 8, MOST_NAMES = 6, LEFT = 58, RIGHT = 10, TOP = 20, BOTTOM = 18, FONT = "11px system-ui, sans-serif";
 
 // data: {frame, time_s, status, series: [{name, unit, value, sd}]}; null where nothing is known. What another run has,
-// {beside: {frame, series}}, is drawn with dashes.
+// {beside: {frame, series}}, is drawn with dashes. {strips: [{name, rank}]}: how each joint or player went, a digit a frame.
 export function drawCurves(canvas, data, now) {
   const box = boxOf(canvas), ratio = (window.devicePixelRatio || 1) * box.zoom;
   if (!box.width) return;
@@ -29,7 +30,7 @@ export function drawCurves(canvas, data, now) {
   pen.moveTo(at, TOP - 4);
   pen.lineTo(at, box.height - BOTTOM + 2);
   pen.stroke();
-  const time = row < 0 ? "" : `   ${data.time_s[row].toFixed(3)} s   ${data.status[row]}`;
+  const time = row < 0 ? "" : `   ${data.time_s[row].toFixed(3)} s   ${data.status[row]}${namesOf(data, row)}`;
   pen.fillStyle = "#5d666f";
   pen.font = FONT;
   pen.fillText(`frame ${now}${time}`, LEFT, box.height - 4);
@@ -37,7 +38,10 @@ export function drawCurves(canvas, data, now) {
 
 function drawStill(pen, box, data) {
   const { frame, status, series } = data, { first, last } = spanOf(data);
-  const width = box.width - LEFT - RIGHT, bottom = box.height - BOTTOM - STRIP - 4, height = bottom - TOP;
+  const width = box.width - LEFT - RIGHT, strips = data.strips || [];
+  const thick = Math.max(2, Math.floor(Math.min(ROW, (0.4 * box.height) / Math.max(strips.length, 1))));
+  const top = Math.floor(box.height - BOTTOM - strips.length * thick);
+  const bottom = top - STRIP - 4, height = bottom - TOP;
   const x = (each) => LEFT + ((each - first) / (last - first)) * width;
   const others = data.beside ? data.beside.series : [];
   const [low, high] = rangeOf([...series, ...others]), y = (value) => bottom - ((value - low) / (high - low)) * height;
@@ -50,14 +54,33 @@ function drawStill(pen, box, data) {
   pen.setLineDash([6, 4]);
   others.forEach((each, k) => drawCurve(pen, { value: each.value }, COLOURS[k % COLOURS.length], data.beside.frame, x, y));
   pen.restore();
-  for (const name of ["tracked", "uncertain", "lost"]) { // the worst of the frames that share a column is drawn last
+  const drawStrip = (ranks, y, high) => RANKS.forEach((name, rank) => { // the worst that share a column is drawn last
     pen.fillStyle = STATUS[name];
     frame.forEach((each, k) => {
       const wide = Math.min(Math.max(1.5, width / (last - first) + 0.7), LEFT + width + 1.5 - x(each));
-      if (status[k] === name) pen.fillRect(x(each), bottom + 4, wide, STRIP);
+      if (Number(ranks[k]) === rank) pen.fillRect(x(each), y, wide, high);
     });
-  }
+  });
+  drawStrip(status.map((each) => RANKS.indexOf(each)), bottom + 4, STRIP);
+  strips.forEach((each, k) => {
+    drawStrip(each.rank, top + k * thick + 1, thick - 1);
+    if (thick < LEGIBLE) return;
+    pen.fillStyle = "#5d666f";
+    pen.font = `${thick - 1}px system-ui, sans-serif`;
+    pen.textAlign = "right";
+    pen.fillText(each.name.replaceAll("_", " "), LEFT - 6, top + (k + 1) * thick - 2, LEFT - 8);
+  });
+  pen.font = FONT;
   drawLegend(pen, series);
+}
+
+// Which joints or players are worse than tracked in a row, where not all of them are.
+function namesOf({ status, strips = [] }, row) {
+  if (status[row] === "lost") return "";
+  const of = (rank) => strips.filter((each) => each.rank[row] === String(rank)).map((each) => each.name.replaceAll("_", " "));
+  const told = RANKS.map((name, rank) => [name, rank ? of(rank) : []]).filter(([, names]) => names.length);
+  const list = (names) => names.slice(0, MOST_NAMES).join(", ") + (names.length > MOST_NAMES ? ", ..." : "");
+  return told.map(([name, names]) => `   ${name}: ${list(names)}`).join("");
 }
 
 // The frame at a place of the pointer.

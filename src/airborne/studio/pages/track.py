@@ -159,13 +159,13 @@ class _Panel:
             self._show_buttons()
 
     def _show_curves(self) -> None:
-        """Show how far the run is over its frames, and how each went."""
+        """Show how far the run is over its frames, and how the body and each of its joints went."""
         self.area.set_visibility(self.n_done > 0)
         if self.curves is not None and self.n_done > 0:
             self.curves.show(self._curves)
         elif self.n_done > 0:
             with self.area:
-                self.curves = Curves(self._curves, frame=self.session.frame).style("height: 130px")
+                self.curves = Curves(self._curves, frame=self.session.frame).style("height: 220px")
 
     def _say_progress(self, command: Command, n_done: int) -> None:
         left = ""
