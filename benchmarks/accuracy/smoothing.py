@@ -24,10 +24,11 @@ from airborne.motion.run_folder import read_body_run
 from airborne.motion.smoothing.smoother import Smoothing, smooth_landmarks, smooth_root
 from airborne.run.track import track_trial
 from airborne.synthetic import write_somersault
+from airborne.synthetic.flight.somersault import SomersaultPreset
 from airborne.trial.file import read_trial
 from airborne.types import Array
 
-_SYNTHETIC = (("moving-arms", 81), ("pike", 82))
+_SYNTHETIC: dict[SomersaultPreset, int] = {"moving-arms": 81, "pike": 82}  # and their seeds
 _SAME_TIME_S = 2e-3
 _KALMAN = Smoothing(method="kalman")
 
@@ -100,14 +101,14 @@ def _read(path: Path) -> list[dict[str, str]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("recordings", type=Path, nargs="*", help="folders with trial.toml and truth")
     parser.add_argument("--runs", type=Path, help="where runs lie, or are left")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as made:
         runs = asked.runs or Path(made) / "runs"
         folders = {folder.name: folder for folder in asked.recordings}
-        for preset, seed in _SYNTHETIC:
+        for preset, seed in _SYNTHETIC.items():
             folder = folders[f"{preset}, seed {seed}"] = Path(made) / f"{preset}_{seed}"
             write_somersault(folder, preset=preset, style="gym", seed=seed)
         rows = []

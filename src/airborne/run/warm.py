@@ -7,6 +7,7 @@ import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from airborne.body_fitting.first_frames import fit_preset
 from airborne.run.players_tracker import compile_kernels
@@ -14,6 +15,8 @@ from airborne.run.track import track_trial
 from airborne.synthetic import scene_frames, somersault_scene
 from airborne.synthetic.throw.measurements import start_pose
 from airborne.tracking.methods import Settings, sample_body_colours, tracker_of
+from airborne.tracking.model_based.global_search import SearchRange, search_globally
+from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.tracker import step
 from airborne.trial.examples import example_trial
 from airborne.trial.file import Trial, read_trial
@@ -40,9 +43,11 @@ def _track_bodies() -> None:
     model = sample_body_colours(scene.model, start_pose(scene), frames[0])
     fit_preset(model, [(frames[0], start_pose(scene))], mass_kg=None)
     tracker = tracker_of(Settings(), model, start_pose(scene))
-    state = tracker.init()
+    state: Any = tracker.init()
     for each in frames:
         state, _ = step(tracker, state, each)
+    nearby = SearchRange.after(gap_s=0.0)
+    search_globally(RenderModel.of(model), [start_pose(scene)], frames[0], state.inner.appearance, search_range=nearby)
 
 
 def _track_players() -> None:

@@ -16,12 +16,12 @@ from airborne.tracking.model_based.blur import RADIUS_PX, blur_planes, gaussian_
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, root_only
 from airborne.tracking.model_based.kernel_arguments import Comparison, Paint, Projection, Window
 from airborne.tracking.model_based.normal_equations import (
+    MASK,
     equations_of_known_light,
     fill_costs,
     fill_costs_of_known_light,
     photometric_equations,
     prepare_rows,
-    silhouette_equations,
 )
 from airborne.tracking.model_based.owners import REACH_PX, find_owners, mask_box
 from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers
@@ -146,7 +146,7 @@ class SingleView:
         body, projection, comparison, maps = self._common(pose, 0.5)
         observation = prepare_rows(mask[None], np.zeros((1, *mask.shape), np.float32), np.ones_like(mask), comparison)
         sums, blocks = Sums.zero(len(self._render_model.model.segments)), self._blocks()
-        silhouette_equations(body, projection, observation, comparison, maps, sums, blocks)
+        photometric_equations(body, projection, observation, comparison, maps, *MASK, sums, blocks)
         return self._map_to_dofs(pose, sums)
 
     def _common(self, pose, clip):

@@ -19,9 +19,9 @@ from airborne.tracking.model_based.blur import gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, PosePrior
 from airborne.tracking.model_based.kernel_arguments import Comparison, Paint
 from airborne.tracking.model_based.normal_equations import (
+    MASK,
     equations_of_known_light,
     photometric_equations,
-    silhouette_equations,
 )
 from airborne.tracking.model_based.pose_descent import PoseEquations, descend_pose, map_to_dofs
 from airborne.tracking.model_based.render_model import (
@@ -127,7 +127,7 @@ def fit_silhouettes(
                 blocks.append(_blocks(view, n))
                 comparison = Comparison(taps, taps, _CLIP_MASK)
                 args = render_model.body, view.projection(posed), view.observation, comparison, view.maps
-                totals += np.array(silhouette_equations(*args, sums, blocks[-1]))
+                totals += np.array(photometric_equations(*args, *MASK, sums, blocks[-1]))
             return map_to_dofs(
                 render_model,
                 dofs,

@@ -12,17 +12,16 @@ import numpy as np
 from airborne.appearance.lighting import LIGHT_TERMS, fit_light, flatten_shading, shade_body
 from airborne.kernels import kernel
 from airborne.rendering.drawing import draw_maps
-from airborne.rendering.maps import SurfaceMaps, surface_maps
+from airborne.rendering.maps import surface_maps
 from airborne.rendering.rows import LANES
 from airborne.tracking.model_based.blur import blur_planes
-from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, PackedBody, Paint, Projection
+from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, Paint
 from airborne.tracking.model_based.owners import find_owners, mask_box
 from airborne.tracking.model_based.row_equations import add_rows
-from airborne.tracking.model_based.twist_equations import Sums
 from airborne.types import Array
 
-_NO_PAINT = Paint(np.zeros((0, 3), np.float32), np.zeros(0, np.bool_))
-_NO_LIGHT = np.zeros((3, LIGHT_TERMS), np.float32)
+# of one kernel with the images, so that what they share is compiled once
+MASK = Paint(np.zeros((0, 3), np.float32), np.zeros(0, np.bool_)), np.zeros((3, LIGHT_TERMS), np.float32), 0
 
 
 def prepare_rows(observed: Array, background: Array, certainty: Array, comparison: Comparison) -> Observation:
@@ -59,29 +58,13 @@ def _fill_rows(observed, background, certainty, taps_u, taps_v, inverse_clip2, r
             cost[x] *= certainty[y, x] / (np.float32(1) + cost[x] * inverse_clip2)
 
 
-def silhouette_equations(
-    body: PackedBody,
-    projection: Projection,
-    observation: Observation,
-    comparison: Comparison,
-    maps: SurfaceMaps,
-    sums: Sums,
-    blocks: Array,
-) -> tuple[float, float, float]:
-    """Add one view's equations of `blurred posterior - blurred mask`.
-
-    The observed plane is the posterior (1, H, W), each pixel's probability to be body; the background is black.
-    """
-    args = body, projection, observation, comparison, maps
-    return photometric_equations(*args, _NO_PAINT, _NO_LIGHT, 0, sums, blocks)
-
-
 @kernel(fastmath=True)
 def photometric_equations(body, projection, observation, comparison, maps, paint, light, iterations, sums, blocks):
     """Add one view's equations of `blurred observed - blurred composite`, in linear light.
 
-    light (3, LIGHT_TERMS): the view's fitted light, refitted in place by `iterations` of reweighting. Without paint,
-    the equations of a mask: what they share is compiled once.
+    light (3, LIGHT_TERMS): the view's fitted light, refitted in place by `iterations` of reweighting. With `MASK` in
+    the place of paint, light and iterations, the equations of `blurred posterior - blurred mask`: the observed plane is
+    the posterior (1, H, W), each pixel's probability to be body; the background is black.
     """
     owner, nearness = _draw(body, projection, maps)
     lit = np.empty((0, 1, 1), np.float32)
