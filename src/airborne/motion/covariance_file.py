@@ -55,7 +55,8 @@ def write_covariances(path: Path, covariances: Array) -> None:
 def read_covariances(path: Path, n: int, *, size: int, first: int = 0) -> Array:
     """Read n covariances (n, size, size) from the `first` on.
 
-    Rows missing from the file are NaN, all of them without a file. Raises ResultError if the file exists and cannot be read.
+    Rows missing from the file are NaN, all of them without a file. Raises ResultError if the file exists and cannot be
+    read.
     """
     covariances, upper = np.full((n, size, size), np.nan), np.triu_indices(size)
     if not path.is_file():
