@@ -85,7 +85,7 @@ class _InnerLibrary(_Library):
         module = llvm.parse_assembly("\n".join(environments))
         module.data_layout = self._codegen._data_layout
         self._codegen._add_module(module)
-        self._codegen._engine.finalize_object()
+        self._codegen._engine.finalize_object()  # pyright: ignore[reportCallIssue]
         self._finalized = True
 
 

@@ -140,7 +140,7 @@ def _check_image(camera: str, size: tuple[int, int], decomposition: Decompositio
     middle = (np.array(size) - 1) / 2
     if np.linalg.norm(K[:2, 2] - middle) > _OFF_CENTRE * np.hypot(*size):
         yield Finding(
-            kind="centre",
+            kind="off centre",
             what=f"camera '{camera}' looks through pixel ({K[0, 2]:.0f}, {K[1, 2]:.0f}), expected near the middle "
             f"({middle[0]:.0f}, {middle[1]:.0f})",
             advice=f"is {size[0]}×{size[1]} its size, or is the image cropped?",
