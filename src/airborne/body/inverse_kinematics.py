@@ -98,9 +98,9 @@ def _describe_exchange(problem: LandmarkProblem) -> str | None:
         return None
     others_m = {}
     for words, stems in _EXCHANGED.items():
-        is_of_pair = [name.rpartition("_")[0] in stems and _other_side(name) in names for name in names]
+        is_of_pair = [name.rpartition("_")[0] in stems and other_side(name) in names for name in names]
         other = [
-            names.index(_other_side(name)) if own else i
+            names.index(other_side(name)) if own else i
             for i, (name, own) in enumerate(zip(names, is_of_pair, strict=True))
         ]
         if any(is_of_pair):
@@ -131,7 +131,7 @@ def fit_lengths(model: BodyModel, joints: Array) -> dict[str, float]:
         for a in at_joint:
             for b in (i for i, c in enumerate(carriers) if index in c and i not in at_joint):
                 ratio = np.linalg.norm(joints[:, b] - joints[:, a], axis=-1) / np.linalg.norm(rest[b] - rest[a])
-                for name in {segment.name, _other_side(segment.name)}:
+                for name in {segment.name, other_side(segment.name)}:
                     pairs.setdefault(name, []).append(ratio)
     if set(CORE) <= set(names):
         pairs |= _trunk_ratios(model, joints[:, [names.index(name) for name in CORE]])
@@ -293,6 +293,7 @@ def _variables(model: BodyModel, segments: Iterable[int], *, root: bool = True) 
     return free
 
 
-def _other_side(name: str) -> str:
+def other_side(name: str) -> str:
+    """Return the name of a landmark or segment on the other side; its own where it has no side."""
     stem, _, side = name.rpartition("_")
     return {"left": f"{stem}_right", "right": f"{stem}_left"}.get(side, name)

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from airborne.body import BodyModel, Landmark, Pose
+from airborne.body.inverse_kinematics import other_side
 from airborne.body_fitting.fit import JOINT_SD_M
 from airborne.tracking.first_pose import LANDMARK_WEIGHTS
 from airborne.types import Array
@@ -44,7 +45,7 @@ def place_landmarks(model: BodyModel, pose: Pose, points: Mapping[str, Array]) -
 def _move(mark: Landmark, shifts: Mapping[str, Array]) -> Landmark:
     """Return a landmark moved by what is expected, given what is seen of it and of its counterpart."""
     name = mark.name
-    other = name.replace("_left", "_right") if name.endswith("_left") else name.replace("_right", "_left")
+    other = other_side(name)
     sides = [sign * shifts[each] for each, sign in ((name, 1.0), (other, _MIRROR)) if each in shifts]
     if not sides:
         return mark

@@ -14,8 +14,7 @@ from airborne.errors import ResultError
 from airborne.motion import PlayersMotion
 from airborne.motion.run_folder import ANGLES, FLIGHT, JOINT_ANGLES, holds_players
 from airborne.studio.runs import run_body, run_players, run_rows
-from airborne.studio.strips import run_strips
-from airborne.tracking import Status
+from airborne.studio.strips import FROM_GOOD, ranks_of, run_strips
 from airborne.types import Array
 
 LIMBS = ("hip", "knee", "ankle", "foot")  # in order down a leg
@@ -27,7 +26,6 @@ _TABLES = {  # what curves show besides: the table, words, unit, columns and the
     "momentum": (FLIGHT, "angular momentum", "kg m²/s", {f"L_{axis}_kg_m2_s": axis for axis in "xyz"}),
 }
 _OF_JOINT = (JOINT_ANGLES, "", "°", {f"{axis}_deg": axis for axis in "xyz"})
-_FROM_GOOD = np.array([Status.TRACKED.value, Status.UNCERTAIN.value, Status.LOST.value])  # to bad
 
 
 def curve_kinds(run: Path) -> dict[str, str]:
@@ -59,7 +57,7 @@ def run_curves(run: Path, what: str = "") -> dict[str, Any]:
         if what:
             names, unit, values, sd = _read_series(run, what, index)
     strips, ranks = run_strips(run)
-    worst = (status[..., None] == _FROM_GOOD).argmax(axis=-1).max(axis=1, initial=0)
+    worst = ranks_of(status).max(axis=1, initial=0)
     if len(index) > _MOST_POINTS:
         starts = np.arange(0, len(index), -(-2 * len(index) // _MOST_POINTS))
         middles = np.append((starts[:-1] + starts[1:]) // 2, len(index) - 1)
@@ -71,7 +69,7 @@ def run_curves(run: Path, what: str = "") -> dict[str, Any]:
     return {
         "frame": index.tolist(),
         "time_s": time_s.tolist(),
-        "status": _FROM_GOOD[worst].tolist(),
+        "status": FROM_GOOD[worst].tolist(),
         "strips": [{"name": name, "rank": "".join(map(str, ranks[:, k]))} for k, name in enumerate(strips)],
         "series": [
             {"name": name, "unit": unit, "value": _plain(values[:, k]), "sd": _plain(sd[:, k]) if sd.shape[1] else []}

@@ -28,7 +28,7 @@ def run_strips(run: Path) -> tuple[tuple[str, ...], NDArray[np.int64]]:
     """
     if holds_players(run):
         motion = run_players(run)
-        return motion.players, _ranks(motion.status)
+        return motion.players, ranks_of(motion.status)
     rows = run_rows(run)
     if not rows.joints or len(rows) > _MOST_ROWS or not (run / BODY).is_file():
         return (), np.zeros((len(rows), 0), np.int64)
@@ -53,8 +53,9 @@ def _block_ranks(run: Path, first: int, lines: bytes, joints: tuple[str, ...]) -
     covariance = read_covariances(run / COVARIANCE_FILE, len(motion), size=6 + 3 * len(joints), first=first)
     lasting = read_covariances(run / LASTING_FILE, len(motion), size=6, first=first)
     motion = replace(motion, covariance=covariance, lasting=None if np.isnan(lasting).any() else lasting)
-    return _ranks(joint_statuses(motion, model, landmarks(motion, model)[1]))
+    return ranks_of(joint_statuses(motion, model, landmarks(motion, model)[1]))
 
 
-def _ranks(status: NDArray[np.str_]) -> NDArray[np.int64]:
+def ranks_of(status: NDArray[np.str_]) -> NDArray[np.int64]:
+    """Return the places of statuses in `FROM_GOOD`, of the same shape."""
     return (status[..., None] == FROM_GOOD).argmax(axis=-1)

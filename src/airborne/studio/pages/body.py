@@ -64,7 +64,7 @@ def _thing_card(session: Session, bodies: dict[str, BodyModel], table: dict[str,
         ).props("outlined dense options-dense")
         says = ui.label().classes("soft small")
         says.bind_text_from(choice, "value", lambda name: _describe(bodies[name]))
-        ui.button("Use this body", on_click=lambda: _save(session, {"file": choice.value})).props("unelevated")
+        ui.button("Use this body", on_click=lambda: save_body(session, {"file": choice.value})).props("unelevated")
 
 
 def _person_card(session: Session, table: dict[str, Any]) -> None:
@@ -80,7 +80,7 @@ def _person_card(session: Session, table: dict[str, Any]) -> None:
             if not (_STATURE_M[0] <= stature_m <= _STATURE_M[1] and _MASS_KG[0] <= mass_kg <= _MASS_KG[1]):
                 complain("give a stature in metres, such as 1.75, and a mass in kilograms, such as 70")
                 return
-            _save(session, {"preset": "human18", "stature_m": stature_m, "mass_kg": mass_kg})
+            save_body(session, {"preset": "human18", "stature_m": stature_m, "mass_kg": mass_kg})
 
         ui.button("Use this person", on_click=save).props("unelevated")
 
@@ -94,7 +94,7 @@ def _measurements_card(session: Session, table: dict[str, Any]) -> None:
         present = table.get("measurements")
         choice = ui.select(files, label="Yeadon's measurements", value=present if present in files else files[0])
         choice.props("outlined dense options-dense")
-        ui.button("Use these measurements", on_click=lambda: _save(session, {"measurements": choice.value})).props(
+        ui.button("Use these measurements", on_click=lambda: save_body(session, {"measurements": choice.value})).props(
             "unelevated"
         )
 
@@ -115,7 +115,7 @@ def _players_card(session: Session) -> None:
         ui.label("Players").classes("name")
         text = "Hips, knees and feet of any number of players, such as blockers at the net."
         ui.label(text).classes("soft small")
-        ui.button("Use players", on_click=lambda: _save(session, {"preset": "legs"})).props("unelevated")
+        ui.button("Use players", on_click=lambda: save_body(session, {"preset": "legs"})).props("unelevated")
 
 
 def _describe(model: BodyModel) -> str:
@@ -123,7 +123,8 @@ def _describe(model: BodyModel) -> str:
     return f"{model.name}: {count(len(model.segments), 'segment')}, {count(parts, 'solid')}"
 
 
-def _save(session: Session, values: dict[str, Any]) -> None:
+def save_body(session: Session, values: dict[str, Any]) -> None:
+    """Write another body into the trial, and a method that can track it where the old one cannot."""
     with errors_shown():
         try:
             BodyTable(**values)

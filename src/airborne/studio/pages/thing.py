@@ -9,6 +9,7 @@ from nicegui import ui
 from airborne.body.files import read_body
 from airborne.errors import AirborneError, TrialError
 from airborne.io.names import check_name
+from airborne.studio.pages.body import save_body
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import is_inside
@@ -87,9 +88,7 @@ class ThingPanel:
                 raise TrialError("two solids have the same name; give each its own")
             self.session.edit(_FILE, thing_text(self.name or "thing", self.solids), "thing described")
             read_body(self.session.folder / _FILE)
-            others = dict.fromkeys(("preset", "stature_m", "mass_kg", "measurements"))
-            self.session.set_table("body", {"file": _FILE, **others}, "body chosen")
-            ui.notify("the body is written into the trial", type="positive")
+            save_body(self.session, {"file": _FILE})
 
     def _form(self) -> None:
         """Lay out the solids, and what can be changed of the chosen one."""
