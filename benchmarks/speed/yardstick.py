@@ -25,7 +25,7 @@ from rows import append
 
 from airborne.body import BodyModel, Ellipsoid, Part, Segment, surface_arrays
 from airborne.cameras import Camera
-from airborne.rendering import RULES, Lamp, Lights, pack_targets, pose_segments, score
+from airborne.rendering import RULES, Lamp, Lights, pack_targets, score
 from airborne.run.bench import measure_speed
 from airborne.video import View
 
@@ -79,7 +79,7 @@ def compare(case: str) -> list[dict]:
 
     def ours() -> np.ndarray:
         root = Rotation.from_rotvec(numbers[:, 3:6]).as_matrix()
-        R, t = pose_segments(model, root, numbers[:, :3], numbers[:, 6:].reshape(len(numbers), -1, 3))
+        R, t = model.pose_segments(root, numbers[:, :3], numbers[:, 6:].reshape(len(numbers), -1, 3))
         return score(shapes, target, R, t, rule=RULES["raw"])
 
     difference = np.abs(ours() - yardstick(poses)).max()

@@ -16,7 +16,6 @@ from airborne.geometry.descent import MarquardtRule, descend
 from airborne.geometry.joint_rotations import compose_rotation_vectors, rotation_vectors_between
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.geometry.swing_twist import swing_twist_jacobian
-from airborne.kernels import kernel
 from airborne.types import Array
 
 _JOINT_SD_RAD = 1.0  # prior sd of a joint's rotation about neutral
@@ -116,7 +115,8 @@ def _equations(problem: LandmarkProblem, state: PoseState) -> tuple[float, Array
     """Return half the squared residuals, their gradient and Gauss-Newton Hessian."""
     has_target, scale = problem.is_given, (problem.root_weights / problem.sd_m)[problem.is_given]
     rotations = matrix_from_angles(state.angles)
-    posed = PosedBody(problem.model, *_forward_kinematics(problem.model, state, rotations))
+    R, t = problem.model.pose_segments(state.R, state.t, state.angles[None])
+    posed = PosedBody(problem.model, R[0], t[0])
     own = problem.segments[has_target]
     points = np.einsum("nij,nj->ni", posed.R[own], problem.local[has_target]) + posed.t[own]
     jacobian = point_jacobian(posed, own, points)
@@ -141,41 +141,12 @@ def _equations(problem: LandmarkProblem, state: PoseState) -> tuple[float, Array
     return cost, gradient, hessian
 
 
-def _forward_kinematics(model: BodyModel, state: PoseState, rotations: Array) -> tuple[Array, Array]:
-    """Return world from segment, rotations (..., segments, 3, 3) and translations (..., segments, 3) [m].
-
-    rotations (..., joints, 3, 3): the state's angles as matrices.
-    """
-    shape, n = rotations.shape[:-3], len(model.segments)
-    R, t = _place_segments(
-        model.parents, model.joints_m, state.R, state.t, rotations.reshape(math.prod(shape), n - 1, 3, 3)
-    )
-    return R.reshape(*shape, n, 3, 3), t.reshape(*shape, n, 3)
-
-
-@kernel
-def _place_segments(parents, joints_m, root_R, root_t, rotations):
-    n = len(parents)
-    R, t = np.empty((len(rotations), n, 3, 3)), np.empty((len(rotations), n, 3))
-    for row in range(len(rotations)):
-        R[row, 0], t[row, 0] = root_R, root_t
-        for segment in range(1, n):
-            parent, at, own = R[row, parents[segment]], joints_m[segment], rotations[row, segment - 1]
-            for a in range(3):
-                t[row, segment, a] = t[row, parents[segment], a] + (
-                    parent[a, 0] * at[0] + parent[a, 1] * at[1] + parent[a, 2] * at[2]
-                )
-                for b in range(3):
-                    R[row, segment, a, b] = (
-                        parent[a, 0] * own[0, b] + parent[a, 1] * own[1, b] + parent[a, 2] * own[2, b]
-                    )
-    return R, t
-
-
 def landmark_positions(problem: LandmarkProblem, state: PoseState) -> Array:
     """Return the landmarks' positions: (..., landmarks, 3) world [m]."""
-    R, t = _forward_kinematics(problem.model, state, matrix_from_angles(state.angles))
-    return np.einsum("...nij,nj->...ni", R[..., problem.segments, :, :], problem.local) + t[..., problem.segments, :]
+    shape = state.angles.shape[:-2]
+    R, t = problem.model.pose_segments(state.R, state.t, state.angles.reshape(math.prod(shape), -1, 3))
+    points = np.einsum("hnij,nj->hni", R[:, problem.segments], problem.local) + t[:, problem.segments]
+    return points.reshape(*shape, *problem.local.shape)
 
 
 def landmark_distances(problem: LandmarkProblem, state: PoseState) -> Array:

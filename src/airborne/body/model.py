@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from airborne.body.kinematics import chain_segments
 from airborne.body.limits import FREE, JointLimits
 from airborne.errors import BodyError
 from airborne.geometry.joint_rotations import move_matrix
@@ -243,13 +244,21 @@ class BodyModel:
         angles = pose.joint_angles if pose.joint_angles.size else np.zeros((self.n_joints, 3))
         if angles.shape != (self.n_joints, 3):
             raise BodyError(f"body '{self.name}' has {self.n_joints} joints, the pose {len(angles)}")
-        R, t, root = np.empty((len(self.segments), 3, 3)), np.empty((len(self.segments), 3)), pose.world_from_root
-        R[0], t[0] = root.as_matrix()[:3, :3], root.translation
-        parent_from_segment = matrix_from_angles(angles)
-        for segment, parent in enumerate(self.parents[1:], start=1):
-            R[segment] = R[parent] @ parent_from_segment[segment - 1]
-            t[segment] = t[parent] + R[parent] @ self.joints_m[segment]
-        return PosedBody(self, R, t)
+        root = pose.world_from_root.as_matrix()
+        R, t = self.pose_segments(root[:3, :3], root[:3, 3], angles[None])
+        return PosedBody(self, R[0], t[0])
+
+    def pose_segments(self, root_R: Array, root_t: Array, joint_angles: Array) -> tuple[Array, Array]:
+        """Pose the segments of n hypotheses in the world (forward kinematics): R (n, s, 3, 3), t (n, s, 3) [m].
+
+        root_R (n, 3, 3) or (3, 3), root_t (n, 3) or (3,) [m] world from root; joint_angles (n, s - 1, 3) [rad],
+        successive rotations about the moving x, y and z axes, in the order of the segments.
+        """
+        n, s = len(joint_angles), len(self.segments)
+        R, t = np.empty((n, s, 3, 3)), np.empty((n, s, 3))
+        R[:, 0], t[:, 0] = root_R, root_t
+        chain_segments(self.parents, self.joints_m, np.ascontiguousarray(joint_angles, float), R, t)
+        return R, t
 
 
 @dataclass(frozen=True, slots=True, eq=False)

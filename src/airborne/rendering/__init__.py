@@ -2,7 +2,6 @@
 
 from airborne.rendering.drawing import Rendering, render
 from airborne.rendering.evidence import EvidenceMaps, evidence_maps, mask_evidence
-from airborne.rendering.kinematics import pose_segments
 from airborne.rendering.lights import FLAT, Lamp, Lights
 from airborne.rendering.pictures import mask_picture, match_picture, model_picture, through_mask
 from airborne.rendering.scores import RULES, ScoreRule, colour_sums, missed_pixels, score, scores_from_sums
@@ -25,7 +24,6 @@ __all__ = [
     "missed_pixels",
     "model_picture",
     "pack_targets",
-    "pose_segments",
     "render",
     "score",
     "scores_from_sums",

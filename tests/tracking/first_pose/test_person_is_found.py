@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from airborne.errors import TrialError
-from airborne.rendering import pose_segments
 from airborne.tracking.first_pose import person_candidates
 from airborne.tracking.first_pose.colour_information import PixelColours, colour_classes
 from airborne.tracking.first_pose.moments import empty_scenes, look, spread_sample
@@ -71,7 +70,7 @@ def test_postures_keep_the_limits_of_joints():
 
 def pose_rotations(angles):
     """Joint rotations, parent from segment, of many postures."""
-    R, _ = pose_segments(HUMAN, np.broadcast_to(np.eye(3), (len(angles), 3, 3)), np.zeros((len(angles), 3)), angles)
+    R, _ = HUMAN.pose_segments(np.eye(3), np.zeros(3), angles)
     return np.swapaxes(R[:, HUMAN.parents[1:]], -1, -2) @ R[:, 1:]
 
 

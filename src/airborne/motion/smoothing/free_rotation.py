@@ -19,7 +19,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from airborne.body import BodyModel
-from airborne.geometry.rotations import matrix_from_angles
+from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.motion.flight.fall import fit_fall
 from airborne.motion.flight.momentum import angular_momentum, centre_of_mass
 from airborne.motion.flight.momentum_table import has_inertias
@@ -123,9 +123,7 @@ def _fit_flight(masses: _Masses, tracked: Array) -> tuple[Array, Array, Array] |
 
 def _mass_distribution(model: BodyModel, time_s: Array, joint_R: Array, rates: Array) -> _Masses:
     n, n_segments = len(joint_R), len(model.segments)
-    R = np.broadcast_to(np.eye(3), (n, n_segments, 3, 3)).copy()
-    for segment, parent in enumerate(model.parents[1:], start=1):
-        R[:, segment] = R[:, parent] @ joint_R[:, segment - 1]
+    R, _ = model.pose_segments(np.eye(3), np.zeros(3), angles_from_matrix(joint_R))
     unit = np.zeros((3, n, n_segments, 3))
     unit[range(3), :, 0, range(3)] = 1.0
     joints_alone = np.concatenate([np.zeros((n, 1, 3)), rates], axis=1)

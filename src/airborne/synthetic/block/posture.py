@@ -12,7 +12,6 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Ellipsoid, Pose
 from airborne.body.inertia import segment_inertias
-from airborne.rendering import pose_segments
 from airborne.synthetic.block.legs import LegSizes, leg_angles
 from airborne.types import Array
 
@@ -60,7 +59,7 @@ class Person:
 
     def pose_segments(self, poses: Poses) -> tuple[Array, Array]:
         """Return R (n, s, 3, 3) and t (n, s, 3) of the segments, world from segment."""
-        return pose_segments(self.model, poses.root_R, poses.root_t, poses.joint_angles)
+        return self.model.pose_segments(poses.root_R, poses.root_t, poses.joint_angles)
 
     def centre_of_mass(self, poses: Poses) -> Array:
         """Return the centre of mass: (n, 3) world [m]."""

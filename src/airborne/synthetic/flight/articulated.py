@@ -20,7 +20,6 @@ from scipy.spatial.transform import Rotation
 from airborne.body import BodyModel
 from airborne.constants import FREE_FALL_M_S2
 from airborne.errors import BodyError
-from airborne.rendering import pose_segments
 from airborne.synthetic.flight.rigid import MassProperties, SampledFlight
 from airborne.types import Array
 
@@ -163,8 +162,8 @@ class _Segments:
 
     def mass_distribution(self, angles: Array, rates: Array) -> MassDistribution:
         """Sum up n bodies with joint angles and rates (n, j, 3) [rad, rad/s]."""
-        n, parents = len(angles), self.model.parents[1:]
-        R, t = pose_segments(self.model, np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3)), angles)
+        parents = self.model.parents[1:]
+        R, t = self.model.pose_segments(np.eye(3), np.zeros(3), angles)
         turning = np.einsum("nkij,nkj->nki", R[:, parents], _rates_in_parent(angles, rates))
         w = self.is_carried @ turning  # (n, s, 3)
         v = self.is_carried @ _cross(w[:, parents], t[:, 1:] - t[:, parents])  # of the segments' origins

@@ -13,7 +13,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Pose, PosedBody, SurfaceArrays
 from airborne.cameras import Camera
-from airborne.rendering import EvidenceMaps, evidence_maps, mask_evidence, pose_segments
+from airborne.rendering import EvidenceMaps, evidence_maps, mask_evidence
 from airborne.tracking.first_pose.moments import Moment
 from airborne.tracking.first_pose.rigid_search import roots_of
 from airborne.tracking.model_based.degrees_of_freedom import limbs_of
@@ -109,7 +109,7 @@ class JointedBody:
 
     def segments(self, poses: PoseSet) -> tuple[Array, Array]:
         """Return all segments' rotations (n, s, 3, 3) and origins (n, s, 3) [m]."""
-        return pose_segments(self.model, poses.R, poses.t, poses.angles)
+        return self.model.pose_segments(poses.R, poses.t, poses.angles)
 
     def landmarks(self, poses: PoseSet) -> Array:
         """Return where the landmarks are: (n, landmarks, 3) [m]."""

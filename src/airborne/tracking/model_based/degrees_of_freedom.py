@@ -18,7 +18,6 @@ from airborne.body.chain import angles_of, delta_between, move_pose, point_jacob
 from airborne.body.contact import contact_model, overlaps
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.geometry.swing_twist import swing_twist_from_matrix, swing_twist_jacobian
-from airborne.rendering import pose_segments
 from airborne.tracking.evidence import PoseEvidence
 from airborne.types import Array
 
@@ -118,7 +117,7 @@ class DegreesOfFreedom:
     def _overlap_residuals(self, pose: Pose) -> tuple[Array, Array]:
         """Return how deep segments pass through each other, in sds: rows (k, d), values (k,)."""
         root, joints = pose.world_from_root.as_matrix()[None], angles_of(pose, self.model.n_joints)
-        R, t = pose_segments(self.model, root[:, :3, :3], root[:, :3, 3], joints[None])
+        R, t = self.model.pose_segments(root[:, :3, :3], root[:, :3, 3], joints[None])
         found = overlaps(contact_model(self.model), R[0], t[0])
         if not len(found.depth_m):
             return np.zeros((0, len(self.columns))), np.zeros(0)

@@ -17,7 +17,7 @@ from airborne.body.limits import JointLimits
 from airborne.geometry.joint_rotations import compose_rotation_vectors
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.geometry.sampling import sobol_points
-from airborne.rendering import EvidenceMaps, mask_evidence, pose_segments
+from airborne.rendering import EvidenceMaps, mask_evidence
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
@@ -113,7 +113,7 @@ def _best(
     """Return the n joint angles (n, joints, 3) of most evidence, best first, that have the limb in different places."""
     R = np.broadcast_to(root.rotation.as_matrix(), (len(angles), 3, 3))
     t = np.broadcast_to(root.translation, (len(angles), 3))
-    R, t = pose_segments(render_model.model, R, t, angles)
+    R, t = render_model.model.pose_segments(R, t, angles)
     scores = mask_evidence(render_model.geometry, maps, R, t).sum(axis=1)
     left, best = np.argsort(-scores, kind="stable"), []
     while len(left) and len(best) < n:

@@ -15,7 +15,7 @@ from airborne.appearance.model import Appearance, Region
 from airborne.body import BodyModel, Pose, PosedBody, SurfaceArrays, has_flat_sides, surface_arrays
 from airborne.body.symmetry import continuous_axes
 from airborne.cameras import Camera
-from airborne.rendering import Lights, pose_segments
+from airborne.rendering import Lights
 from airborne.rendering.maps import SurfaceMaps, empty_maps, surface_maps
 from airborne.rendering.packing import pack_lights, pack_view, reduce_view, shift_view
 from airborne.rendering.rows import LANES
@@ -62,7 +62,7 @@ class RenderModel:
         """Pose the body; the same as `BodyModel.with_pose`."""
         root = pose.world_from_root.as_matrix()[None]
         joints = pose.joint_angles if pose.joint_angles.size else np.zeros((self.model.n_joints, 3))
-        R, t = pose_segments(self.model, root[:, :3, :3], root[:, :3, 3], joints[None])
+        R, t = self.model.pose_segments(root[:, :3, :3], root[:, :3, 3], joints[None])
         return PosedBody(self.model, R[0], t[0])
 
     def jacobian(self, posed: PosedBody, dofs: DegreesOfFreedom) -> Array:
