@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from airborne.types import Array
 
 _FEWEST_POINTS = 8  # of a fundamental matrix
+# of those that choose one of the four poses: each triangulates them, which takes most of the time
+_CHEIRALITY_POINTS = 30
 _CONFIDENCE, _MOST_TRIES = 0.9999, 5000  # of finding a sample without outliers; samples drawn at most
 
 
@@ -53,10 +55,12 @@ def fit_epipolar_geometry(px_a: Array, px_b: Array, *, limit_px: float) -> Epipo
 def relative_pose(F: Array, K_a: Array, K_b: Array, *, px_a: Array, px_b: Array) -> RelativePose:
     """Return the pose of camera b with most of the points (n, 2) [px] in front of both cameras."""
     plane_a, plane_b = (cv2.undistortPoints(np.ascontiguousarray(px), K, None) for px, K in ((px_a, K_a), (px_b, K_b)))
-    E = K_b.T @ F @ K_a
-    _, R, t, is_front, homogeneous = cv2.recoverPose(E, plane_a, plane_b, np.eye(3), distanceThresh=np.inf)
-    is_front, points = is_front.ravel() > 0, (homogeneous[:3] / homogeneous[3]).T
+    few = np.linspace(0, len(px_a) - 1, min(len(px_a), _CHEIRALITY_POINTS)).astype(int)
+    _, R, t, _, _ = cv2.recoverPose(K_b.T @ F @ K_a, plane_a[few], plane_b[few], np.eye(3), distanceThresh=np.inf)
+    homogeneous = cv2.triangulatePoints(np.eye(3, 4), np.hstack([R, t]), plane_a, plane_b)
+    points = (homogeneous[:3] / homogeneous[3]).T
     from_b = points + t.T @ R
+    is_front = (points[:, 2] > 0) & (from_b @ R[2] > 0)
     cosine = np.sum(points * from_b, axis=1) / (np.linalg.norm(points, axis=1) * np.linalg.norm(from_b, axis=1))
     parallax = np.arccos(np.clip(cosine[is_front], -1, 1)) if is_front.any() else np.zeros(1)
     return RelativePose(
