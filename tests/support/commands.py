@@ -15,3 +15,15 @@ def in_process(*arguments) -> int:
     finally:
         sys.argv = before
     return 0
+
+
+def refusal(capsys, *arguments) -> str:
+    """Return the one line on stderr of a command that must refuse."""
+    capsys.readouterr()
+    assert in_process(*arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1, err
+    assert err.startswith("airborne: ")
+    assert "Traceback" not in err
+    return err
