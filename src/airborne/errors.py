@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 
+UNDECIDED, STOPPED = 3, 130  # exit codes of the command line beside 2: of an UndecidedError, of Ctrl-C
 _LONGEST = 1200  # characters of a message
 _MOST_SAID = 5  # mistakes of one file in a line
 

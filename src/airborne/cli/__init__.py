@@ -16,7 +16,7 @@ from airborne.cli.batch import batch_command, new_command
 from airborne.cli.calibrate import calibrate_command
 from airborne.cli.check import check_command
 from airborne.cli.compare import compare_command
-from airborne.cli.console import STOPPED, UNDECIDED, refuse, show_notes, stop
+from airborne.cli.console import refuse, show_notes, stop
 from airborne.cli.convert import convert_command
 from airborne.cli.export import export_command
 from airborne.cli.film import film_command
@@ -24,7 +24,7 @@ from airborne.cli.find import find_command, frame_command
 from airborne.cli.smooth import smooth_command
 from airborne.cli.studio import studio_command
 from airborne.cli.sync import sync_command
-from airborne.errors import AirborneError, UndecidedError
+from airborne.errors import STOPPED, UNDECIDED, AirborneError, UndecidedError
 
 _MOST_PIXELS = "150000000"  # of a picture that OpenCV decodes, as of a video's; a file may declare any number
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it

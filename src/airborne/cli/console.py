@@ -9,12 +9,10 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from airborne.errors import AirborneError
+from airborne.errors import STOPPED, AirborneError
 from airborne.io.terminal import errors
 from airborne.io.terminal import progress as progress
 
-STOPPED = 130  # the exit code
-UNDECIDED = 3  # the exit code where the body's start is undecided
 _SIDES_PX = range(16, 20_001)  # of an image
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]

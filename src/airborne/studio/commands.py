@@ -13,7 +13,6 @@ from pathlib import Path
 from airborne.studio.writing import FOLDER
 
 _RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
-STOPPED = 130  # the exit code of a command that was stopped
 _numbers = count(1)  # of the commands: two exports may run at once
 _PATIENCE_S = 10.0  # for a process that was told to stop
 

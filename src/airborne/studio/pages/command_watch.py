@@ -7,7 +7,8 @@ from inspect import isawaitable
 
 from nicegui import ui
 
-from airborne.studio.commands import STOPPED, Command
+from airborne.errors import STOPPED
+from airborne.studio.commands import Command
 from airborne.studio.pages.layout import complain, in_thread
 from airborne.studio.session import Session
 

@@ -10,14 +10,13 @@ from typing import Any
 
 from nicegui import ui
 
+from airborne.errors import UNDECIDED
 from airborne.io.text import read_json
 from airborne.motion.run_folder import CANDIDATES
 from airborne.studio.commands import Command
 from airborne.studio.pages.command_watch import CommandWatch
 from airborne.studio.session import Session
 from airborne.studio.writing import FOLDER
-
-_UNDECIDED = 3  # the exit code of `airborne find`
 
 
 @dataclass(eq=False)
@@ -38,7 +37,7 @@ class FindControls:
                 "find",
                 self.take,
                 words=f"looking for the {self.what}",
-                codes=(0, _UNDECIDED),
+                codes=(0, UNDECIDED),
                 again=True,
             )
             self.watch.buttons = [find]

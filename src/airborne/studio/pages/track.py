@@ -8,10 +8,10 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from airborne.errors import AirborneError, TrialError, count
+from airborne.errors import STOPPED, AirborneError, TrialError, count
 from airborne.io.names import check_name
 from airborne.motion.run_folder import MOTION, SUMMARY
-from airborne.studio.commands import STOPPED, Command
+from airborne.studio.commands import Command
 from airborne.studio.pages.layout import complain, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import is_inside, list_runs
