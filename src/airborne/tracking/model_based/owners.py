@@ -25,18 +25,6 @@ def mask_box(part):
     return Window(x0, y0, x1, y1) if x1 > 0 else Window(0, 0, 0, 0)
 
 
-@kernel
-def box_segments(part, segment_of_part, boxes):
-    """Fill boxes (s, 4), zero before, with x0, y0, x1, y1 around each segment's pixels of a map of parts (h, w)."""
-    for y in range(part.shape[0]):
-        for x in range(part.shape[1]):
-            if part[y, x] >= 0:
-                box = boxes[segment_of_part[part[y, x]]]
-                if box[2] == 0:
-                    box[0], box[1] = x, y
-                box[0], box[2], box[3] = min(box[0], x), max(box[2], x + 1), y + 1
-
-
 @kernel(fastmath=True)
 def find_owners(part, inverse_depth, segment_of_part, owner, nearness):
     """Assign each pixel to the segment whose edge moves it: of those within REACH_PX, the one nearest to the camera.
