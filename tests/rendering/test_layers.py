@@ -13,6 +13,7 @@ from tests.support.scenes import FIGURE, Scene, standing
 def test_second_layer_shows_what_is_behind_the_segment_in_front():
     scene = Scene(FIGURE, standing)
     view = scene.frames(0).views[0]
+    assert view is not None
     posed, geometry, packed = FIGURE.with_pose(scene.start()), surface_arrays(FIGURE), pack_view(view.camera)
     width, height = view.camera.size
     part, segment = np.empty((2, height, width), np.int16), np.empty((2, height, width), np.int16)
