@@ -12,7 +12,7 @@ from tests.support.tolerances import EXACT, SOLVED
 
 MARQUARDT = MarquardtRule(first=1e-3, down=5, up=4, least=1e-9, most=1e8)
 NIELSEN = NielsenRule(first=1e-3, least=1e-12, most=1e8, least_factor=0.1)
-BACKTRACKING = BacktrackingRule(first=1.0, factor=0.4, least=1e-3)
+BACKTRACKING = BacktrackingRule(factor=0.4, least=1e-3)
 EVERY = pytest.mark.parametrize("rule", [MARQUARDT, NIELSEN, BACKTRACKING], ids=lambda rule: type(rule).__name__)
 
 

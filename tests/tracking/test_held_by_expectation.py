@@ -9,6 +9,7 @@ from scipy.spatial.transform import RigidTransform
 from airborne.tracking.model_based import gauss_newton
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior
 from airborne.tracking.model_based.fitter import Fitter, LearnedRegions
+from airborne.tracking.model_based.gauss_newton import Posteriors
 from airborne.tracking.model_based.turned_pelvis import turn_pelvis
 from tests.support.people import HUMAN
 from tests.tracking.test_misplaced_limb import LearnedFrame
@@ -30,7 +31,7 @@ def fitter(frame):
 
 def judge_held(frame, fitter, wrong):
     """The fit that a narrow prior holds at a wrong pose, and what is judged of it."""
-    learned, prior = LearnedRegions(*frame.views(wrong), frame.appearance), PosePrior(wrong, NARROW)
+    learned, prior = LearnedRegions(Posteriors(*frame.views(wrong)), frame.appearance), PosePrior(wrong, NARROW)
     held = fitter.fit_images([wrong], learned, prior)
     return held, fitter.judge(held, [wrong], learned, prior)
 

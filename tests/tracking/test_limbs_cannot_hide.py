@@ -5,7 +5,7 @@ import pytest
 
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, limbs_of
 from airborne.tracking.model_based.fitter import Fitter, LearnedRegions
-from airborne.tracking.model_based.gauss_newton import image_evaluator, image_views
+from airborne.tracking.model_based.gauss_newton import Posteriors, image_evaluator, image_views
 from airborne.tracking.model_based.support import count_views, mark_unobserved, widen_unseen
 from airborne.tracking.model_based.uncovered import find_uncovered
 from tests.support.people import HUMAN
@@ -50,7 +50,7 @@ def test_joints_of_a_limb_beside_which_something_stands_uncovered_are_worth_one_
     fitter = Fitter.of(frame.render_model, "refined", fixed_shape=False)
     most = {}
     for name, pose in (("true", frame.truth), ("wrong", fold(frame.truth, "thigh_right", FOLDS["thigh_right"]))):
-        learned = LearnedRegions(*frame.views(pose), frame.appearance)
+        learned = LearnedRegions(Posteriors(*frame.views(pose)), frame.appearance)
         agreement = fitter.assess(fitter.fit_images([pose], learned, None), learned).agreement
         most[name] = [int(agreement.n_views_of[limb].max()) for limb in limbs_of(HUMAN)]
     assert min(most["true"]) >= 2
@@ -66,7 +66,7 @@ def test_fit_in_which_no_limb_moves_is_looked_through_once(frame, monkeypatch):
 
     monkeypatch.setattr("airborne.tracking.model_based.fitter.find_uncovered", find)
     fitter = Fitter.of(frame.render_model, "refined", fixed_shape=False)
-    learned = LearnedRegions(*frame.views(frame.truth), frame.appearance)
+    learned = LearnedRegions(Posteriors(*frame.views(frame.truth)), frame.appearance)
     judged = fitter.judge(fitter.fit_images([frame.truth], learned, None), [frame.truth], learned, None)
     assert len(looked_through) == 1 and not judged.moved
 

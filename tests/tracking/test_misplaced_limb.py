@@ -11,6 +11,7 @@ from airborne.body.chain import clamp_to_limits
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior, limb_of_segment
 from airborne.tracking.model_based.fitter import Fitter, LearnedRegions
+from airborne.tracking.model_based.gauss_newton import Posteriors
 from airborne.tracking.model_based.global_search import region_evidence
 from airborne.tracking.model_based.misplaced_limbs import find_misplaced_limbs, search_limb
 from airborne.tracking.model_based.render_model import RenderModel
@@ -102,7 +103,7 @@ def test_limbs_that_are_not_where_they_were_expected_are_moved_and_stay(frame, n
     for name in names:
         expected = fold(expected, name, FOLDS[name])
     prior = PosePrior(expected, np.full(HUMAN.n_dofs, 0.1))
-    learned = LearnedRegions(*frame.views(expected), frame.appearance)
+    learned = LearnedRegions(Posteriors(*frame.views(expected)), frame.appearance)
     fitter = Fitter.of(frame.render_model, "refined", fixed_shape=False)
     judged = fitter.judge(fitter.fit_images([expected], learned, prior), [expected], learned, prior)
     for name in names:
@@ -113,7 +114,7 @@ def test_limbs_that_are_not_where_they_were_expected_are_moved_and_stay(frame, n
 def test_limb_that_was_expected_stays_where_one_colour_shows_no_better_place(frame):
     expected = frame.truth
     prior = PosePrior(expected, np.full(HUMAN.n_dofs, 0.1))
-    learned = LearnedRegions(*frame.views(expected), frame.appearance)
+    learned = LearnedRegions(Posteriors(*frame.views(expected)), frame.appearance)
     fitter = Fitter.of(frame.render_model, "refined", fixed_shape=False)
     folded = [fold(expected, name, turn) for name, turn in FOLDS.items()]
     judged = fitter.judge(fitter.fit_images([expected], learned, prior), folded, learned, prior)

@@ -46,8 +46,8 @@ def fit_light(observed, part, normals, albedo, coefficients, iterations, x0, y0,
         return np.float32(1.0)
     n = min(inside, _MOST_SAMPLES)
     share = np.uint64(n / inside * 2**32)
-    rows, confidence = np.empty((n, LIGHT_TERMS), np.float32), np.empty(n, np.float32)
-    values, own = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
+    rows, confidence = np.empty((LIGHT_TERMS, n), np.float32), np.empty(n, np.float32)
+    values, own = np.empty((3, n), np.float32), np.empty((3, n), np.float32)
     i, count = 0, 0
     for y in range(y0, y1):
         for x in range(x0, x1):
@@ -56,39 +56,49 @@ def fit_light(observed, part, normals, albedo, coefficients, iterations, x0, y0,
             scattered = (np.uint64(count) * np.uint64(2654435761)) & np.uint64(0xFFFFFFFF)  # no pattern
             if i < n and (n == inside or scattered < share):
                 confidence[i] = 1 if _is_surrounded(part, normals, y, x) else _BORDER_WEIGHT
-                rows[i, 0] = 1
-                rows[i, 4], rows[i, 5] = _region_coordinates(part, y, x)
+                rows[0, i] = 1
+                rows[4, i], rows[5, i] = _region_coordinates(part, y, x)
                 for k in range(3):
-                    rows[i, k + 1] = normals[k, y, x]
-                    values[i, k] = observed[k, y, x]
-                    own[i, k] = albedo[part[y, x], k]
+                    rows[k + 1, i] = normals[k, y, x]
+                    values[k, i] = observed[k, y, x]
+                    own[k, i] = albedo[part[y, x], k]
                 i += 1
             count += 1
-    error = np.empty(i, np.float32)
+    error, light, weight, weighted = np.empty((4, i), np.float32)
     sd = np.float32(1.0)
     for step in range(iterations + 1):
-        for j in range(i):
-            e = np.float32(0)
-            for k in range(3):
-                light = np.float32(0)
-                for q in range(LIGHT_TERMS):
-                    light += coefficients[k, q] * rows[j, q]
-                e += abs(values[j, k] - own[j, k] * light)
-            error[j] = e
+        error[:] = 0
+        for k in range(3):
+            light[:] = 0
+            for q in range(LIGHT_TERMS):
+                c = coefficients[k, q]
+                for j in range(i):
+                    light[j] += c * rows[q, j]
+            for j in range(i):
+                error[j] += abs(values[k, j] - own[k, j] * light[j])
         sd = np.float32(1.48) * np.median(error) + np.float32(1e-3)
         if step == iterations:
             break
+        half = np.float32(0.5) / sd
         for k in range(3):
             normal_matrix = np.zeros((LIGHT_TERMS, LIGHT_TERMS))
             right = np.zeros(LIGHT_TERMS)
             for j in range(i):
-                q = error[j] / (2 * sd)
-                weight = 1.0 / (1.0 + q * q)
-                weight *= weight * own[j, k] * confidence[j]
-                for p in range(LIGHT_TERMS):
-                    right[p] += weight * rows[j, p] * values[j, k]
-                    for r in range(p + 1):
-                        normal_matrix[p, r] += weight * own[j, k] * rows[j, p] * rows[j, r]
+                q = error[j] * half
+                down = np.float32(1) / (np.float32(1) + q * q)
+                weight[j] = down * down * own[k, j] * confidence[j]
+            for p in range(LIGHT_TERMS):
+                total = 0.0
+                for j in range(i):
+                    total += weight[j] * rows[p, j] * values[k, j]
+                right[p] = total
+                for j in range(i):
+                    weighted[j] = weight[j] * own[k, j] * rows[p, j]
+                for r in range(p + 1):
+                    total = 0.0
+                    for j in range(i):
+                        total += weighted[j] * rows[r, j]
+                    normal_matrix[p, r] = total
             trace = normal_matrix[0, 0]
             normal_matrix[0, 0] += 1e-9
             for p in range(1, LIGHT_TERMS):

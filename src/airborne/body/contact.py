@@ -102,7 +102,8 @@ def _depths(
 ) -> tuple[Array, Array, Array]:
     """Return each pair's overlap (k,) [m], its normal (k, 3) and the sphere's centre (k, 3), in the world.
 
-    To first order: an ellipsoid wider by the sphere's radius against the sphere's centre.
+    To first order: an ellipsoid wider by the sphere's radius against the sphere's centre. The overlap of a pair far
+    apart is minus infinity, without a normal.
     """
     n = len(pairs[0])
     depth, normal, centre = np.empty(n), np.empty((n, 3)), np.empty((n, 3))
@@ -120,13 +121,16 @@ def _fill_depths(
     away, slope = np.empty(3), np.empty(3)
     for k in range(len(spheres)):
         m, e = spheres[k], ellipsoids[k]
-        a, b, least = own[m], other[e], np.inf
+        a, b, least, farthest = own[m], other[e], np.inf, radius[m] + semi_axes[e].max()
         for i in range(3):
             centre[k, i], away[i] = t[a, i], t[a, i] - t[b, i]
             for j in range(3):
                 part = R[a, i, j] * sphere_centre[m, j]
                 centre[k, i] += part
                 away[i] += part - R[b, i, j] * middle[e, j]
+        if away[0] ** 2 + away[1] ** 2 + away[2] ** 2 > farthest**2:
+            depth[k] = -np.inf  # apart, whichever way the ellipsoid lies
+            continue
         level, steepness = 0.0, 0.0
         for j in range(3):  # along the ellipsoid's axes
             reach, local = semi_axes[e, j] + radius[m], 0.0

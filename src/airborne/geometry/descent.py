@@ -88,15 +88,19 @@ class NielsenRule:
 
 @dataclass(frozen=True, slots=True)
 class BacktrackingRule:
-    """The share of the undamped step: the same at every new iterate, shorter after each loss, down to the least."""
+    """The share of the undamped step: the whole at every new iterate, shorter after each loss, down to the least."""
 
-    first: float
     factor: float
     least: float
 
+    @property
+    def first(self) -> float:
+        """The whole step."""
+        return 1.0
+
     def after_gain(self, value: float, ratio: float) -> float:
-        """Return the first share."""
-        return self.first
+        """Return the whole step."""
+        return 1.0
 
     def after_loss(self, value: float, n_losses: int) -> float:
         """Return a smaller share."""

@@ -49,6 +49,15 @@ def motion_between(earlier, later):
 
 
 @kernel
+def rotations_of(angles):
+    """Return the rotations Rx Ry Rz (n, 3, 3) of angles (n, 3) [rad]."""
+    R = np.empty((len(angles), 3, 3))
+    for j in range(len(angles)):
+        _matrix(angles[j], R[j])
+    return R
+
+
+@kernel
 def compose_rotation_vectors(angles, rotation_vectors):
     """Return the angles (n, 3) [rad] of Rx Ry Rz exp(v), on the branch near the old angles (n, 3).
 

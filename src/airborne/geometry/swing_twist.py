@@ -6,8 +6,11 @@ turned right round, a swing of 180 degrees.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from airborne.kernels import kernel
 from airborne.types import Array
 
 _SMALL = 1e-6  # sine of the swing below which its rotation vector is taken as its sine
@@ -15,11 +18,20 @@ _SMALL = 1e-6  # sine of the swing below which its rotation vector is taken as i
 
 def swing_twist_from_matrix(R: Array) -> Array:
     """Read the coordinates (..., 3) [rad] off rotations (..., 3, 3)."""
-    x, y, z = R[..., 0, 2], R[..., 1, 2], R[..., 2, 2]
-    sine = np.hypot(x, y)
-    scale = np.where(sine < _SMALL, 1.0, np.arctan2(sine, z) / np.maximum(sine, _SMALL))
-    twist = np.arctan2(R[..., 1, 0] - R[..., 0, 1], R[..., 0, 0] + R[..., 1, 1])
-    return np.stack([-scale * y, scale * x, twist], axis=-1)
+    R = np.ascontiguousarray(R, float)
+    out = np.empty(R.shape[:-1])
+    _fill_coordinates(R.reshape(-1, 3, 3), out.reshape(-1, 3))
+    return out
+
+
+@kernel
+def _fill_coordinates(R, out):
+    for n in range(len(R)):
+        x, y, z = R[n, 0, 2], R[n, 1, 2], R[n, 2, 2]
+        sine = math.hypot(x, y)
+        scale = 1.0 if sine < _SMALL else math.atan2(sine, z) / sine
+        out[n, 0], out[n, 1] = -scale * y, scale * x
+        out[n, 2] = math.atan2(R[n, 1, 0] - R[n, 0, 1], R[n, 0, 0] + R[n, 1, 1])
 
 
 def rotation_of(coordinates: Array) -> Array:
@@ -41,25 +53,31 @@ def rotation_of(coordinates: Array) -> Array:
 
 def swing_twist_jacobian(R: Array) -> Array:
     """Differentiate the coordinates by a rotation vector in the rotated axes, R exp(v): (..., 3, 3)."""
-    x, y, z = R[..., 0, 2], R[..., 1, 2], R[..., 2, 2]
-    sine = np.hypot(x, y)
-    is_small = sine < _SMALL
-    safe = np.where(is_small, 1.0, sine)
-    scale = np.where(is_small, 1.0, np.arctan2(sine, z) / safe)
-    zero = np.zeros(R.shape[:-1])
-    direction = np.stack([-R[..., :, 1], R[..., :, 0], zero], axis=-1)  # of R e_z, by v: (..., 3, 3)
-    by_sine = (x[..., None] * direction[..., 0, :] + y[..., None] * direction[..., 1, :]) / safe[..., None]
-    by_angle = z[..., None] * by_sine - sine[..., None] * direction[..., 2, :]
-    by_scale = np.where(is_small[..., None], 0.0, (by_angle - scale[..., None] * by_sine) / safe[..., None])
-    a, b = R[..., 1, 0] - R[..., 0, 1], R[..., 0, 0] + R[..., 1, 1]
-    first = np.stack([-R[..., 0, 2], -R[..., 1, 2], b], axis=-1)  # of a, by v
-    second = np.stack([R[..., 1, 2], -R[..., 0, 2], -a], axis=-1)  # of b
-    twist = (b[..., None] * first - a[..., None] * second) / np.maximum(a * a + b * b, _SMALL**2)[..., None]
-    return np.stack(
-        [
-            -scale[..., None] * direction[..., 1, :] - y[..., None] * by_scale,
-            scale[..., None] * direction[..., 0, :] + x[..., None] * by_scale,
-            twist,
-        ],
-        axis=-2,
-    )
+    R = np.ascontiguousarray(R, float)
+    out = np.empty(R.shape)
+    _fill_jacobian(R.reshape(-1, 3, 3), out.reshape(-1, 3, 3))
+    return out
+
+
+@kernel
+def _fill_jacobian(R, out):
+    for n in range(len(R)):
+        x, y, z = R[n, 0, 2], R[n, 1, 2], R[n, 2, 2]
+        sine = math.hypot(x, y)
+        is_small = sine < _SMALL
+        scale = 1.0 if is_small else math.atan2(sine, z) / sine
+        a, b = R[n, 1, 0] - R[n, 0, 1], R[n, 0, 0] + R[n, 1, 1]
+        size2 = max(a * a + b * b, _SMALL**2)
+        for k in range(3):  # by v, of R e_z, of the swing's angle, of a and b
+            by_x = -R[n, 0, 1] if k == 0 else (R[n, 0, 0] if k == 1 else 0.0)
+            by_y = -R[n, 1, 1] if k == 0 else (R[n, 1, 0] if k == 1 else 0.0)
+            by_z = -R[n, 2, 1] if k == 0 else (R[n, 2, 0] if k == 1 else 0.0)
+            by_scale = 0.0
+            if not is_small:
+                by_sine = (x * by_x + y * by_y) / sine
+                by_scale = (z * by_sine - sine * by_z - scale * by_sine) / sine
+            by_a = -R[n, 0, 2] if k == 0 else (-R[n, 1, 2] if k == 1 else b)
+            by_b = R[n, 1, 2] if k == 0 else (-R[n, 0, 2] if k == 1 else -a)
+            out[n, 0, k] = -scale * by_y - y * by_scale
+            out[n, 1, k] = scale * by_x + x * by_scale
+            out[n, 2, k] = (b * by_a - a * by_b) / size2

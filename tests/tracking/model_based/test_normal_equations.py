@@ -12,14 +12,13 @@ from airborne.rendering.lights import FLAT
 from airborne.rendering.maps import empty_maps
 from airborne.rendering.packing import pack_lights
 from airborne.tracking.image_regions import crop_regions
+from airborne.tracking.model_based.absent_segments import absence_costs_in_fitted_light, absence_costs_in_known_light
 from airborne.tracking.model_based.blur import RADIUS_PX, blur_planes, gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, root_only
 from airborne.tracking.model_based.kernel_arguments import Comparison, Paint, Projection, Window
 from airborne.tracking.model_based.normal_equations import (
     MASK,
     equations_of_known_light,
-    fill_costs,
-    fill_costs_of_known_light,
     photometric_equations,
     prepare_rows,
 )
@@ -125,20 +124,27 @@ class SingleView:
         args = render_model.body, view.projection(self.with_pose(pose)), view.observation, comparison, view.maps
         return photometric_equations(*args, paint, view.light, 0, Sums.zero(n), blocks)[0]
 
-    def costs_by_pixel(self, view, comparison, pose):
-        """Each pixel's robust squared residual, and the equations' cost: in the fitted light, then an even one."""
-        render_model, n = self._render_model, len(self._render_model.model.segments)
-        lamps, ambient = pack_lights(FLAT, self._region.camera), np.float32(FLAT.ambient)
-        args = render_model.body, view.projection(self.with_pose(pose)), view.observation, comparison
-        equal_light, sums = (render_model.is_faceted, lamps, ambient), (Sums.zero(n), self._blocks())
-        expected = [
-            self.cost(view, comparison, pose),
-            equations_of_known_light(*args, view.maps, *equal_light, *sums)[0],
-        ]
-        costs = np.empty((2, *view.maps.part.shape), np.float32)
-        fill_costs(*args, view.maps, Paint(render_model.albedo, render_model.is_faceted), view.light, costs[0])
-        fill_costs_of_known_light(*args, view.maps, lamps, ambient, costs[1])
-        return costs, expected
+    def absence_costs(self, pose):
+        """By how much each segment's absence raises the cost, in the fitted light and in an even one: (2, segments).
+
+        First as the kernels find it, then by the equations of the body with that segment behind the camera.
+        """
+        view, comparison = self.view()
+        posed, n = self.with_pose(pose), len(self._render_model.model.segments)
+        paint = Paint(self._render_model.albedo, self._render_model.is_faceted)
+        even = pack_lights(FLAT, self._region.camera), np.float32(FLAT.ambient)
+        args = self._render_model.body, view.projection(posed), view.observation, comparison
+        rises, costs = np.zeros((2, n)), np.empty((2, n + 1))
+        absence_costs_in_fitted_light(*args, paint, view.light, rises[0])
+        absence_costs_in_known_light(*args, *even, rises[1])
+        for absent in range(n + 1):  # at last, none
+            t = posed.t.copy()
+            t[absent:][:1] -= 1e3 * self._region.camera.camera_from_world.rotation.as_matrix()[2]
+            args = args[0], view.projection(posed)._replace(t=t), *args[2:4], view.maps
+            sums = Sums.zero(n), self._blocks()
+            costs[0, absent] = photometric_equations(*args, paint, view.light, 0, *sums)[0]
+            costs[1, absent] = equations_of_known_light(*args, paint.is_faceted, *even, *sums)[0]
+        return rises, costs[:, :-1] - costs[:, -1:]
 
     def silhouette(self, pose):
         """The equations against the true mask, as probabilities."""
@@ -222,27 +228,11 @@ def test_step_goes_back_to_where_the_body_is(single_view, kind):
     assert np.median(left) < 0.25
 
 
-def test_part_of_a_view_around_the_body_tells_poses_apart_as_the_whole_does(single_view):
-    view, comparison = single_view.view()
-    rim = 2 * RADIUS_PX + 1
-    poses = [single_view.truth, *(single_view.moved(d) for d in offsets(4, 1.0, seed=3))]
-    whole = [single_view.cost(view, comparison, pose) for pose in poses]
-    boxes = []
-    for pose in poses:
-        single_view.cost(view, comparison, pose)
-        boxes.append(mask_box(view.maps.part))
-    (x0, y0), (x1, y1) = np.min(boxes, axis=0)[:2] - rim, np.max(boxes, axis=0)[2:] + rim
-    box = max(x0, 0), max(y0, 0), min(x1, view.whole.x1), min(y1, view.whole.y1)
-    assert box != tuple(view.whole)
-    part = view.crop(Window(*map(int, box)))
-    np.testing.assert_allclose([single_view.cost(part, comparison, pose) for pose in poses], whole, rtol=1e-3)
-
-
-def test_costs_of_pixels_sum_to_the_cost_of_the_equations(single_view):
-    view, comparison = single_view.view()
-    pose = single_view.moved(offsets(1, 4.0, seed=4)[0])
-    got, expected = single_view.costs_by_pixel(view, comparison, pose)
-    assert [costs.sum() - view.empty_cost for costs in got] == pytest.approx(expected, rel=1e-3)
+def test_absence_of_a_segment_costs_what_the_equations_of_the_body_without_it_say(figure_view):
+    for pose in (figure_view.truth, figure_view.moved(0.05 * np.ones(len(figure_view.dofs.columns)))):
+        rises, expected = figure_view.absence_costs(pose)
+        assert np.ptp(expected) > 1
+        np.testing.assert_allclose(rises, expected, atol=1e-3 * np.abs(expected).max())
 
 
 def test_large_residuals_weigh_less(single_view):

@@ -17,7 +17,7 @@ from airborne.tracking.first_pose.fit import LANDMARK_WEIGHTS
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, PosePrior, all_joints
 from airborne.types import Array
 
-_RULE = BacktrackingRule(first=1.0, factor=0.5, least=0.05)
+_RULE = BacktrackingRule(factor=0.5, least=0.05)
 _MOST_STEPS = 60  # ten from a far start are usual
 _LEAST_GAIN = 1e-6  # of the cost
 _EXPECTED_WEIGHT = 0.01  # of a landmark's expected place, where the evidence says nothing of it, in the first guess

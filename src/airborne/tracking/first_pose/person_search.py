@@ -29,7 +29,7 @@ from airborne.tracking.first_pose.places import Place
 from airborne.tracking.first_pose.postures import library, limb_postures
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior, all_joints
-from airborne.tracking.model_based.gauss_newton import PyramidLevels, fit_silhouettes
+from airborne.tracking.model_based.gauss_newton import Posteriors, PyramidLevels, fit_silhouettes
 from airborne.tracking.model_based.left_right_swap import swap_limbs
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
@@ -249,12 +249,12 @@ def _swap(person: JointedBody, poses: PoseSet) -> PoseSet:
 
 def _fit(person: JointedBody, moment: Moment, poses: PoseSet, levels: PyramidLevels) -> PoseSet:
     """Fit everything to the silhouettes."""
-    regions, probabilities = _regions(person, moment, poses)
+    masks = Posteriors(*_regions(person, moment, poses))
     dofs, sd = all_joints(person.model), np.full(person.model.n_dofs, _FIT_SD)
 
     def fit(pose: Pose) -> Pose:
         prior = PosePrior(pose, sd)
-        return fit_silhouettes(person.render_model, pose, regions, probabilities, levels=levels, dofs=dofs, prior=prior)
+        return fit_silhouettes(person.render_model, pose, masks, levels=levels, dofs=dofs, prior=prior)
 
     return PoseSet.of([fit(pose) for pose in poses.each()])
 

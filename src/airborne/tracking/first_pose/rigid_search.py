@@ -24,7 +24,7 @@ from airborne.tracking.image_regions import bounding_points, crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import root_only
 from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter
-from airborne.tracking.model_based.gauss_newton import PyramidLevels, fit_silhouettes
+from airborne.tracking.model_based.gauss_newton import Posteriors, PyramidLevels, fit_silhouettes
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
@@ -130,11 +130,8 @@ def log_likelihoods(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> Arra
 
 def _fit(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> list[Pose]:
     """Fit poses to the silhouettes."""
-    regions, probabilities = candidate_regions(thing, moment, poses)
-    dofs = root_only(thing.model)
-    return [
-        fit_silhouettes(thing.render_model, pose, regions, probabilities, levels=_LEVELS, dofs=dofs) for pose in poses
-    ]
+    masks, dofs = Posteriors(*candidate_regions(thing, moment, poses)), root_only(thing.model)
+    return [fit_silhouettes(thing.render_model, pose, masks, levels=_LEVELS, dofs=dofs) for pose in poses]
 
 
 def fit_image(thing: Thing, moment: Moment, pose: Pose) -> Pose:

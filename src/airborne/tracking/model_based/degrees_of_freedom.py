@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from airborne.body import BodyModel, Pose, PosedBody
 from airborne.body.chain import angles_of, delta_between, move_pose, point_jacobian, segment_jacobians
 from airborne.body.contact import contact_model, overlaps
-from airborne.geometry.rotations import matrix_from_angles
+from airborne.geometry.joint_rotations import compose_rotation_vectors, rotations_of
 from airborne.geometry.swing_twist import swing_twist_from_matrix, swing_twist_jacobian
 from airborne.tracking.evidence import PoseEvidence
 from airborne.types import Array
@@ -103,16 +103,12 @@ class DegreesOfFreedom:
 
     def rest_residuals(self, pose: Pose) -> tuple[Array, Array]:
         """Return how far limited joints are from the zero pose, in half ranges: rows (k, d), values (k,)."""
-        limits, R = self.model.limits, _rotations(self.model, pose)
-        away = limits.coordinates(R) - _straight(self.model)
-        used = np.isfinite(limits.half_rad) & (limits.half_rad > 0)
-        joints, axes = np.nonzero(used)
-        jacobian = swing_twist_jacobian(limits.relative(R))
-        rows = np.zeros((len(joints), 6 + 3 * len(R)))
-        columns = 6 + 3 * joints[:, None] + np.arange(3)
-        sd = limits.half_rad[joints, axes]
-        rows[np.arange(len(joints))[:, None], columns] = jacobian[joints, axes] / sd[:, None]
-        return rows[:, self.columns], away[joints, axes] / sd
+        joints, rest = _joint_places(self.model, pose), _rest(self.model)
+        rows = np.zeros((len(rest.joints), self.model.n_dofs))
+        jacobian = swing_twist_jacobian(joints.relative)[rest.joints, rest.axes]
+        rows[np.arange(len(rest.joints))[:, None], rest.columns] = jacobian / rest.sd_rad[:, None]
+        away = joints.coordinates[rest.joints, rest.axes] - rest.straight
+        return rows[:, self.columns], away / rest.sd_rad
 
     def _overlap_residuals(self, pose: Pose) -> tuple[Array, Array]:
         """Return how deep segments pass through each other, in sds: rows (k, d), values (k,)."""
@@ -131,19 +127,21 @@ class DegreesOfFreedom:
         limits = self.model.limits
         if not self.moves_joints or not limits.is_limited.any():
             return np.zeros((0, len(self.columns))), np.zeros(0)
-        after = limits.coordinates(_rotations(self.model, self.update(pose, delta)))
+        angles = angles_of(pose, self.model.n_joints)
+        moved = compose_rotation_vectors(angles, self.embed(delta)[6:].reshape(-1, 3))
+        after = limits.coordinates(rotations_of(moved))
         bound = limits.nearest(after)
         beyond = np.linalg.norm(after - bound, axis=1)
         joints = np.flatnonzero(beyond > _BEYOND_RAD)
         if not len(joints):
             return np.zeros((0, len(self.columns))), np.zeros(0)
         normal = (after - bound)[joints] / beyond[joints, None]
-        relative = limits.relative(_rotations(self.model, pose))
-        rows = np.zeros((len(joints), 6 + 3 * len(after)))
+        here = _joint_places(self.model, pose)
+        rows = np.zeros((len(joints), self.model.n_dofs))
         columns = 6 + 3 * joints[:, None] + np.arange(3)
-        jacobian = swing_twist_jacobian(relative[joints])
+        jacobian = swing_twist_jacobian(here.relative[joints])
         rows[np.arange(len(joints))[:, None], columns] = np.einsum("ki,kij->kj", normal, jacobian)
-        targets = np.einsum("ki,ki->k", normal, bound[joints] - swing_twist_from_matrix(relative[joints]))
+        targets = np.einsum("ki,ki->k", normal, bound[joints] - here.coordinates[joints])
         return rows[:, self.columns] / _LIMIT_SD_RAD, targets / _LIMIT_SD_RAD
 
 
@@ -161,7 +159,8 @@ def _linearise_prior(dofs: DegreesOfFreedom, pose: Pose, prior: PosePrior | None
     d = len(dofs.columns)
     cost, residuals, precision, g = 0.0, [], np.zeros(d), np.zeros(d)
     if dofs.moves_joints:
-        excess = dofs.model.limits.excess(_rotations(dofs.model, pose)).ravel() / _LIMIT_SD_RAD
+        coordinates = _joint_places(dofs.model, pose).coordinates
+        excess = (coordinates - dofs.model.limits.nearest(coordinates)).ravel() / _LIMIT_SD_RAD
         cost = 0.5 * float(excess @ excess)
         residuals.append(dofs._overlap_residuals(pose))
     if prior is not None:
@@ -174,14 +173,42 @@ def _linearise_prior(dofs: DegreesOfFreedom, pose: Pose, prior: PosePrior | None
             residuals.append((rows[:, dofs.columns], values))
     H = np.diag(precision)
     for rows, values in residuals:
+        if not len(values):
+            continue
         cost, H, g = cost + 0.5 * float(values @ values), H + rows.T @ rows, g - rows.T @ values
     return _LinearPrior(cost, H, g)
 
 
+class _JointPlaces(NamedTuple):
+    """Where the joints of a pose are, relative to the centres of their ranges."""
+
+    relative: Array  # (joints, 3, 3)
+    coordinates: Array  # (joints, 3) swing's x and y, twist [rad]
+
+
+@lru_cache(maxsize=8)  # the prior, its step and the walls of a step ask for the same pose
+def _joint_places(model: BodyModel, pose: Pose) -> _JointPlaces:
+    relative = model.limits.relative(rotations_of(angles_of(pose, model.n_joints)))
+    return _JointPlaces(relative, swing_twist_from_matrix(relative))
+
+
+class _Rest(NamedTuple):
+    """The limited coordinates of a body's joints in the zero pose, k of them."""
+
+    joints: NDArray[np.int64]  # (k,)
+    axes: NDArray[np.int64]  # (k,) 0, 1: the swing, 2: the twist
+    columns: NDArray[np.int64]  # (k, 3) of the joint in a delta
+    sd_rad: Array  # (k,) half the range
+    straight: Array  # (k,) [rad] within the limits
+
+
 @lru_cache(maxsize=16)
-def _straight(model: BodyModel) -> Array:
-    """Return the coordinates of the zero pose, within the joints' limits: (joints, 3) [rad]."""
-    return model.limits.nearest(model.limits.coordinates(np.eye(3)))
+def _rest(model: BodyModel) -> _Rest:
+    limits = model.limits
+    joints, axes = np.nonzero(np.isfinite(limits.half_rad) & (limits.half_rad > 0))
+    straight = limits.nearest(limits.coordinates(np.eye(3)))
+    columns = 6 + 3 * joints[:, None] + np.arange(3)
+    return _Rest(joints, axes, columns, limits.half_rad[joints, axes], straight[joints, axes])
 
 
 def root_only(model: BodyModel) -> DegreesOfFreedom:
@@ -234,8 +261,3 @@ def _distance_from_trunk(model: BodyModel) -> NDArray[np.int64]:
     for segment in range(1, len(parents)):
         distance[segment] = 0 if is_trunk[segment] else distance[parents[segment]] + 1
     return distance
-
-
-def _rotations(model: BodyModel, pose: Pose) -> Array:
-    """Return the joints' rotations, parent from segment: (joints, 3, 3)."""
-    return matrix_from_angles(angles_of(pose, model.n_joints))

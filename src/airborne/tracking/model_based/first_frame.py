@@ -22,7 +22,7 @@ def fit_first(fitter: Fitter, start: Pose, frames: Frames, prior: PosePrior | No
     render_model = fitter.render_model
     regions = crop_regions([render_model.with_pose(start)], render_model.geometry, frames, _MARGIN_PX)
     learned = LearnedRegions.of(regions, _learn_first_colours(fitter, start, regions, prior))
-    if not learned.regions:
+    if not learned.masks.regions:
         return None
     poses = [fitter.fit_silhouettes(pose, learned, FAR, prior) for pose in (start, *fitter.swap_limbs(start))]
     fit = fitter.fit_images([*poses, *fitter.swap_limbs(poses[0])], learned, prior)

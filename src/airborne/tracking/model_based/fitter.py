@@ -24,6 +24,7 @@ from airborne.tracking.model_based.gauss_newton import (
     NEAR,
     Fit,
     ImageView,
+    Posteriors,
     PyramidLevels,
     fit_images,
     fit_silhouettes,
@@ -62,22 +63,21 @@ _TRUNK_AT = 4  # images at this reduction show the limbs of a body with joints; 
 class LearnedRegions:
     """The regions of one time whose colours have been learned."""
 
-    regions: Sequence[Region]
-    posteriors: Sequence[Array]  # (h, w) each pixel's probability to be body
+    masks: Posteriors
     appearance: Appearance
     # images prepared by an appearance: where a limb is looked for, they are fitted again and again
     prepared: dict[Appearance, Sequence[ImageView]] = field(default_factory=dict)
 
     @property
     def views(self) -> tuple[Sequence[Region], Sequence[Array]]:
-        """The regions and their posteriors."""
-        return self.regions, self.posteriors
+        """The regions and each pixel's probability (h, w) to be body."""
+        return self.masks.regions, self.masks.planes
 
     @classmethod
     def of(cls, regions: Sequence[Region], appearance: Appearance) -> LearnedRegions:
         """Take those of the regions whose colours have been learned."""
         learned = [region for region in regions if appearance.has_colours(region)]
-        return cls(learned, [appearance.posterior(region) for region in learned], appearance)
+        return cls(Posteriors(learned, [appearance.posterior(region) for region in learned]), appearance)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,7 +137,7 @@ class Fitter:
         """Fit the masks level by level: on the coarser ones, the trunk first."""
         for level in levels:
             for dofs in self._stages_at(level[0]):
-                args = self.render_model, pose, learned.regions, learned.posteriors
+                args = self.render_model, pose, learned.masks
                 pose = fit_silhouettes(*args, levels=[level], dofs=dofs, prior=prior, goes_on=levels is FAR)
         return pose
 
@@ -189,9 +189,9 @@ class Fitter:
     def _views(self, pose: Pose, learned: LearnedRegions) -> list[ImageView]:
         """Prepare the images, with a background in every region, for a fit."""
         posed = self.render_model.with_pose(pose)
-        appearance = learn_missing_backgrounds(self.render_model, posed, learned.regions, learned.appearance)
+        appearance = learn_missing_backgrounds(self.render_model, posed, learned.masks.regions, learned.appearance)
         if appearance not in learned.prepared:
-            learned.prepared[appearance] = image_views(self.render_model, learned.regions, appearance)
+            learned.prepared[appearance] = image_views(self.render_model, learned.masks.regions, appearance)
         return [view.with_own_light() for view in learned.prepared[appearance]]
 
     def _refit_limbs(
@@ -258,7 +258,7 @@ class Fitter:
         expected = [replace(fit.pose, joint_angles=with_limb(fit.pose, guess, limb)) for guess in guesses]
         dofs = joints_of(self.model, limb)
         poses = [
-            fit_silhouettes(self.render_model, pose, *learned.views, levels=NEAR, dofs=dofs)
+            fit_silhouettes(self.render_model, pose, learned.masks, levels=NEAR, dofs=dofs)
             for pose in search_limb(self.render_model, [fit.pose, *expected], limb, region_evidence(*learned.views))
         ]
         poses.sort(key=lambda pose: self.agreement(pose, learned).evidence, reverse=True)

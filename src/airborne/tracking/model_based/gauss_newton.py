@@ -8,7 +8,7 @@ Far out, the blurred mask is fitted to the blurred probability of each pixel to 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +51,24 @@ _OVERSTEP_STIFF = np.repeat([2.0, 1.3], 3)
 _MOST_STEPS = 12  # at each level of a body with joints
 _MOST_STEPS_STIFF = 30  # of a rigid body: its steps are cheap, and a far start may need them
 _CONVERGED, _CONVERGED_STIFF = 1 / 3, 1  # squared length of the last step, in sds, a degree of freedom; masks too
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Posteriors:
+    """Regions and each of their pixels' probability to be body, reduced once for all fits of masks to them."""
+
+    regions: Sequence[Region]
+    planes: Sequence[Array]  # (h, w) each
+    _reduced: dict[int, list[ViewBuffers]] = field(default_factory=dict)
+
+    def reduce(self, reduction: int) -> list[ViewBuffers]:
+        """Return the views at a reduction, as the kernels take them."""
+        if reduction not in self._reduced:
+            self._reduced[reduction] = [
+                silhouette_buffers(region, plane, reduction, taps=gaussian_taps(_COARSE_SIGMA_PX), clip=_CLIP_MASK)
+                for region, plane in zip(self.regions, self.planes, strict=True)
+            ]
+        return self._reduced[reduction]
 
 
 class ImageView(NamedTuple):
@@ -96,15 +114,14 @@ class Fit:
 def fit_silhouettes(
     render_model: RenderModel,
     pose: Pose,
-    regions: Sequence[Region],
-    posteriors: Sequence[Array],
+    posteriors: Posteriors,
     *,
     levels: PyramidLevels,
     dofs: DegreesOfFreedom,
     prior: PosePrior | None = None,
     goes_on: bool = False,
 ) -> Pose:
-    """Move the body until its masks agree with the posteriors (h, w) of the regions, from coarse to fine.
+    """Move the body until its masks agree with the posteriors, from coarse to fine.
 
     Steps end early where they gain next to nothing, unless `goes_on`: a start may be far off.
     """
@@ -112,10 +129,7 @@ def fit_silhouettes(
     correlated = 4 * np.pi * _COARSE_SIGMA_PX**2
     converged = 0.0 if goes_on else _CONVERGED if dofs.moves_joints else _CONVERGED_STIFF
     for reduction, steps in levels:
-        views = [
-            silhouette_buffers(region, posterior, reduction, taps=taps, clip=_CLIP_MASK)
-            for region, posterior in zip(regions, posteriors, strict=True)
-        ]
+        views = posteriors.reduce(reduction)
         empty_cost = sum(view.empty_cost for view in views)
 
         def evaluate(

@@ -37,7 +37,7 @@ def fit_next(
     None where no view shows any of them.
     """
     learned = regions_near(fitter, predicted, frames, appearance)
-    if not learned.regions:
+    if not learned.masks.regions:
         return None
     judged = []
     for pose in predicted:

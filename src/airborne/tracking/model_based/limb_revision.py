@@ -78,13 +78,13 @@ def _fit_back(
 ) -> BackwardFit | None:
     expected = replace(found, joint_angles=with_limb(found, predictors.linear(past, -frames.time_s), limb))
     learned = regions_near(fitter, [expected, found], frames, appearance)
-    if not learned.regions:
+    if not learned.masks.regions:
         return None
     gap_s = float(-frames.time_s - past[-1][0])
     dofs = joints_of(fitter.model, limb)
     prior = prior_of(expected, gap_s)
     widened = None if prior is None else prior.widen(dofs.columns)
-    start = fit_silhouettes(fitter.render_model, expected, *learned.views, levels=NEAR, dofs=dofs, prior=prior)
+    start = fit_silhouettes(fitter.render_model, expected, learned.masks, levels=NEAR, dofs=dofs, prior=prior)
     there, here = fitter.fit_images([start], learned, prior), fitter.fit_images([found], learned, prior_of(found, 0.0))
     misfit = min(each.equations.misfit for each in (there, here))
     costs = [fitter.place_cost(each, learned, misfit, widened) for each in (here, there)]

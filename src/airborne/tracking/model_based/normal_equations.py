@@ -87,43 +87,6 @@ def equations_of_known_light(body, projection, observation, comparison, maps, is
 
 
 @kernel(fastmath=True)
-def fill_costs(body, projection, observation, comparison, maps, paint, light, costs):
-    """Fill costs (H, W) with the robust squared residual of each pixel, in the light that was fitted (3, LIGHT_TERMS).
-
-    The residual is that of `photometric_equations`, but for the image's border.
-    """
-    lit = light_fitted(body, projection, maps, paint, light)
-    _fill_costs(lit, maps.part, observation, comparison, costs)
-
-
-@kernel(fastmath=True)
-def fill_costs_of_known_light(body, projection, observation, comparison, maps, lamps, ambient, costs):
-    """Fill costs (H, W) with the robust squared residual of each pixel, as `equations_of_known_light` has it."""
-    lit = light_by_lamps(body, projection, lamps, ambient, maps.part)
-    _fill_costs(lit, maps.part, observation, comparison, costs)
-
-
-@kernel(fastmath=True)
-def _fill_costs(lit, part, observation, comparison, costs):
-    c, h, w = lit.shape
-    change, blurred = np.empty(lit.shape, np.float32), np.empty(lit.shape, np.float32)
-    for k in range(c):
-        for y in range(h):
-            for x in range(w):
-                is_body = part[y, x] >= 0
-                change[k, y, x] = lit[k, y, x] - observation.background[k, y, x] if is_body else np.float32(0)
-    blur_planes(change, comparison.taps_u, comparison.taps_v, blurred)
-    inverse_clip2 = np.float32(1 / comparison.clip**2)
-    for y in range(h):
-        row = observation.rows[y]
-        for x in range(w):
-            square = np.float32(0)
-            for k in range(c):
-                square += (row[k, x] - blurred[k, y, x]) ** 2
-            costs[y, x] = row[2 * c, x] * square / (np.float32(1) + square * inverse_clip2)
-
-
-@kernel(fastmath=True)
 def light_fitted(body, projection, maps, paint, light):
     """Draw a view in a fitted light (3, LIGHT_TERMS), filling its maps; return the body's colours (3, h, w)."""
     R, t, view = projection.R, projection.t, projection.packed_view

@@ -25,18 +25,6 @@ def mask_box(part):
     return Window(x0, y0, x1, y1) if x1 > 0 else Window(0, 0, 0, 0)
 
 
-@kernel
-def box_segments(part, segment_of_part, boxes):
-    """Fill boxes (s, 4), zero before, with x0, y0, x1, y1 around each segment's pixels of a map of parts (h, w)."""
-    for y in range(part.shape[0]):
-        for x in range(part.shape[1]):
-            if part[y, x] >= 0:
-                box = boxes[segment_of_part[part[y, x]]]
-                if box[2] == 0:
-                    box[0], box[1] = x, y
-                box[0], box[2], box[3] = min(box[0], x), max(box[2], x + 1), y + 1
-
-
 @kernel(fastmath=True)
 def find_owners(part, inverse_depth, segment_of_part, owner, nearness):
     """Assign each pixel to the segment whose edge moves it: of those within REACH_PX, the one nearest to the camera.
@@ -46,17 +34,25 @@ def find_owners(part, inverse_depth, segment_of_part, owner, nearness):
     """
     h, w = owner.shape
     distance = np.zeros((h, w), np.int16)  # squared, to the edge that owns a pixel; 0 inside
+    segment, depth = np.empty((h + 2, w + 2), np.int16), np.empty((h + 2, w + 2), np.float32)  # its border repeated
+    for y in range(h + 2):
+        v = min(max(y - 1, 0), h - 1)
+        for x in range(w):
+            p = part[v, x]
+            segment[y, x + 1] = segment_of_part[p] if p >= 0 else -1
+            depth[y, x + 1] = inverse_depth[v, x]
+        segment[y, 0], segment[y, w + 1] = segment[y, 1], segment[y, w]
+        depth[y, 0], depth[y, w + 1] = depth[y, 1], depth[y, w]
     for y in range(h):
         for x in range(w):
-            p = part[y, x]
-            owner[y, x] = segment_of_part[p] if p >= 0 else -1
-            nearness[y, x] = inverse_depth[y, x]
+            owner[y, x], nearness[y, x] = segment[y + 1, x + 1], inverse_depth[y, x]
+    is_edge = np.empty(w, np.bool_)
     for v in range(h):
+        _find_front_edges(segment, depth, v, is_edge)
         for u in range(w):
-            p = part[v, u]
-            if p < 0 or not _is_front_edge(part, inverse_depth, segment_of_part, v, u):
+            if not is_edge[u]:
                 continue
-            own, near = segment_of_part[p], inverse_depth[v, u]
+            own, near = segment[v + 1, u + 1], inverse_depth[v, u]
             for y in range(max(v - REACH_PX, 0), min(v + REACH_PX + 1, h)):
                 for x in range(max(u - REACH_PX, 0), min(u + REACH_PX + 1, w)):
                     d = (v - y) ** 2 + (u - x) ** 2
@@ -65,15 +61,18 @@ def find_owners(part, inverse_depth, segment_of_part, owner, nearness):
                         owner[y, x], nearness[y, x], distance[y, x] = own, near, d
 
 
-@kernel(fastmath=True)
-def _is_front_edge(part, inverse_depth, segment_of_part, v, u):
-    """Return whether a pixel of the body borders on a segment behind it, or on the background."""
-    height, width = part.shape
-    own, near = segment_of_part[part[v, u]], inverse_depth[v, u]
-    for dv, du in ((0, -1), (0, 1), (-1, 0), (1, 0)):
-        y, x = v + dv, u + du
-        if 0 <= y < height and 0 <= x < width:
-            p = part[y, x]
-            if p < 0 or (segment_of_part[p] != own and inverse_depth[y, x] < near):
-                return True
-    return False
+@kernel(fastmath=True, is_inner=True)
+def _find_front_edges(segment, depth, v, is_edge):
+    """Fill is_edge (w,): where row v of the body borders on a segment behind it, or on the background.
+
+    segment, depth (h + 2, w + 2): of each pixel, with a border around them that repeats their own.
+    """
+    here, above, below = segment[v + 1], segment[v], segment[v + 2]
+    near, near_above, near_below = depth[v + 1], depth[v], depth[v + 2]
+    for x in range(len(is_edge)):
+        own, w = here[x + 1], near[x + 1]
+        left = (here[x] < 0) | ((here[x] != own) & (near[x] < w))
+        right = (here[x + 2] < 0) | ((here[x + 2] != own) & (near[x + 2] < w))
+        up = (above[x + 1] < 0) | ((above[x + 1] != own) & (near_above[x + 1] < w))
+        down = (below[x + 1] < 0) | ((below[x + 1] != own) & (near_below[x + 1] < w))
+        is_edge[x] = (own >= 0) & (left | right | up | down)

@@ -97,13 +97,19 @@ class _Iterate:
         equations = self.equations
         return self.dofs.solve_step(equations.pose, equations.A / self.misfit, equations.g / self.misfit, self.prior)
 
+    @cached_property
+    def next(self) -> Pose:
+        """The pose after the whole step: a descent asks for it to go on, and for where it ends."""
+        return self.dofs.update(self.equations.pose, self.overstep * self.delta)
+
     def cost(self, reference: _Iterate) -> float:
         """Return minus the log-posterior, with the misfit of the reference."""
         return self.equations.objective(reference.misfit, self.dofs.prior_cost(self.equations.pose, self.prior))
 
     def step(self, share: float) -> tuple[Pose, float]:
         """Return the pose after a share of the step, and the decrease that the images predict without overstep."""
-        pose = self.dofs.update(self.equations.pose, share * self.overstep * self.delta)
+        shorter = share * self.overstep * self.delta
+        pose = self.next if share == 1 else self.dofs.update(self.equations.pose, shorter)
         return pose, 0.5 * float(self.delta @ self.equations.A @ self.delta) / self.misfit
 
 
@@ -125,10 +131,10 @@ def descend_pose(
     descent = descend(
         _Iterate(evaluate(pose, True), dofs, prior, overstep),
         lambda pose: _Iterate(evaluate(pose, False), dofs, prior, overstep),
-        BacktrackingRule(1.0, _SHORTER, _LEAST_SHARE),
+        BacktrackingRule(_SHORTER, _LEAST_SHARE),
         most_steps=most_steps - 1,
         least_predicted=(0.5 * tolerance * len(dofs.columns), 0.0),
         slack=_SLACK,
     )
     best = descent.best
-    return best.equations.pose if descent.n_losses else best.step(1.0)[0], best.equations
+    return best.equations.pose if descent.n_losses else best.next, best.equations

@@ -47,7 +47,7 @@ def recover(
         thrift=1 if suspect is None else _THRIFT,
     )
     learned = regions_near(fitter, candidates, frames, appearance)
-    if not learned.regions:
+    if not learned.masks.regions:
         return None
 
     def evidence(pose: Pose) -> float:

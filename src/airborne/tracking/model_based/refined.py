@@ -126,7 +126,7 @@ class RefinedTracker:
         reference = state.reference
         if state.past and estimate.mask_shares is not None:
             reference = reference.update(*estimate.mask_shares)
-        elif (learned := LearnedRegions.of(regions, appearance)).regions:  # nothing was known of colours before
+        elif (learned := LearnedRegions.of(regions, appearance)).masks.regions:  # nothing was known of colours before
             reference = reference.update(*self._fitter.agreement(estimate.pose, learned).shares)
         return RefinedState(past, appearance, reference, estimate.covariance)
 
@@ -138,7 +138,7 @@ class RefinedTracker:
         """Return minus the log-likelihood of the images in each of several poses: (n,) [nat]."""
         frames = self.reduce_frames(frames)
         learned = regions_near(self._fitter, poses, frames, state.appearance)
-        return self._fitter.weigh(poses, learned) if learned.regions else np.zeros(len(poses))
+        return self._fitter.weigh(poses, learned) if learned.masks.regions else np.zeros(len(poses))
 
     def revise(self, records: Sequence[FrameRecord], state: RefinedState) -> dict[int, Estimate]:
         """Return better estimates of earlier records, where limbs that the newest moved have been by then."""

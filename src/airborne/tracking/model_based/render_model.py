@@ -17,8 +17,7 @@ from airborne.body.symmetry import continuous_axes
 from airborne.cameras import Camera
 from airborne.rendering import Lights
 from airborne.rendering.maps import SurfaceMaps, empty_maps, surface_maps
-from airborne.rendering.packing import pack_lights, pack_view, reduce_view, shift_view
-from airborne.rendering.rows import LANES
+from airborne.rendering.packing import pack_lights, pack_view, reduce_view
 from airborne.rendering.shapes import new_shapes
 from airborne.rendering.srgb import light_from_srgb
 from airborne.tracking.covariance import SHIFT_SD_PX
@@ -118,22 +117,6 @@ class ViewBuffers(NamedTuple):
         """Return the view prepared for a comparison."""
         seen = self.observation
         return self._replace(observation=prepare_rows(seen.observed, seen.background, seen.certainty, comparison))
-
-    def crop(self, window: Window) -> ViewBuffers:
-        """Return a part of the view, prepared for the same comparison; its border is repeated beyond it."""
-        x0, y0, x1, y1 = window
-        seen, K, light = self.observation, self.K.copy(), self.light
-        K[:2, 2] -= x0, y0
-        observed, background, certainty = (np.ascontiguousarray(each[..., y0:y1, x0:x1]) for each in seen[:3])
-        rows = np.ascontiguousarray(seen.rows[y0:y1, :, x0 : x1 + LANES])
-        if isinstance(light, np.ndarray):  # of coordinates from -1 to 1 over the image: of the part's instead
-            light = light.copy()
-            for term, (low, high, size) in enumerate(((x0, x1, self.whole.x1), (y0, y1, self.whole.y1)), start=4):
-                light[:, 0] += light[:, term] * ((low + high) / size - 1)
-                light[:, term] *= (high - low) / size
-        maps, whole = empty_maps((x1 - x0, y1 - y0)), Window(0, 0, x1 - x0, y1 - y0)
-        packed = shift_view(self.packed_view, x0, y0)
-        return ViewBuffers(packed, K, Observation(observed, background, certainty, rows), maps, whole, light)
 
     def projection(self, posed: PosedBody) -> Projection:
         """Project a body to this view; twists are about its root's origin."""

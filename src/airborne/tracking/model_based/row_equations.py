@@ -221,7 +221,7 @@ def _add_to_world(segments, projection, sums, blocks):
     for i in range(3):
         for j in range(3):
             R[i, j] = projection.packed_view[3 * i + j]
-    A, B = np.empty((6, 6)), np.empty((6, 3))
+    A, B, T = np.empty((6, 6)), np.empty((6, 3)), np.empty((6, 6))
     for e in range(len(sums.A)):
         k = e * SUM_PLANES
         for i in range(6):
@@ -230,11 +230,15 @@ def _add_to_world(segments, projection, sums, blocks):
                 k += LANES
             for j in range(3):
                 B[i, j] = total_of(segments, e * SUM_PLANES + CHANGE + LANES * (6 * j + i))
+        for p in range(6):  # A R, and from it R' A R, by blocks of 3 by 3
+            for q in range(6):
+                T[p, q] = 0.0
+                for j in range(3):
+                    T[p, q] += A[p, q // 3 * 3 + j] * R[j, q % 3]
         for p in range(6):
             for q in range(6):
                 for i in range(3):
-                    for j in range(3):
-                        sums.A[e, p, q] += R[i, p % 3] * A[p // 3 * 3 + i, q // 3 * 3 + j] * R[j, q % 3]
+                    sums.A[e, p, q] += R[i, p % 3] * T[p // 3 * 3 + i, q]
             for j in range(3):
                 for i in range(3):
                     sums.B[e, p, j] += R[i, p % 3] * B[p // 3 * 3 + i, j]
@@ -243,6 +247,8 @@ def _add_to_world(segments, projection, sums, blocks):
         for column in range(blocks.shape[1]):
             for e in range(blocks.shape[2]):
                 block = blocks[row, column, e]
+                if not block.any():
+                    continue
                 for p in range(6):
                     g[p] = 0.0
                     for i in range(3):

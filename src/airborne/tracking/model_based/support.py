@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose, PosedBody
-from airborne.tracking.model_based.blur import RADIUS_PX
+from airborne.tracking.model_based.absent_segments import absence_costs_in_fitted_light, absence_costs_in_known_light
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
 from airborne.tracking.model_based.gauss_newton import ImageView
-from airborne.tracking.model_based.kernel_arguments import Comparison, Paint, Window
-from airborne.tracking.model_based.normal_equations import fill_costs, fill_costs_of_known_light
-from airborne.tracking.model_based.owners import box_segments
-from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers
+from airborne.tracking.model_based.kernel_arguments import Paint
+from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
-_BEHIND_M = 100.0  # a segment that is taken away goes this far behind the camera
 _STRONG_NATS = 3.0  # a view shows a segment where it is 20 times likelier with it: "strong" (Kass & Raftery 1995)
 _ONE_VIEW_SD_M = 0.1  # of the far end of a segment that one view alone shows
 
@@ -35,11 +31,8 @@ def count_views(
     counts = np.full(len(posed.R), len(views))
     counts[segments] = 0
     for view, noise in zip(views, noise_of_views, strict=True):
-        packed = view.buffers.packed_view
-        R, t = packed[:9].reshape(3, 3), packed[9:12]
-        behind = -R.T @ t - _BEHIND_M * R[2]
-        others = {int(segment): _without(posed, int(segment), behind) for segment in segments}
-        counts[segments] += _rises_without(render_model, posed, others, view, noise=noise) > _STRONG_NATS
+        rises = 0.5 * _absence_costs(render_model, posed, view) / max(noise, 1e-9)
+        counts[segments] += rises[segments] > _STRONG_NATS
     return counts
 
 
@@ -79,48 +72,16 @@ def _length_m(model: BodyModel, segment: int) -> float:
     return max((float(np.linalg.norm(point)) for point in points), default=0.0)
 
 
-def _without(posed: PosedBody, segment: int, place: Array) -> PosedBody:
-    t = posed.t.copy()
-    t[segment] = place
-    return replace(posed, t=t)
+def _absence_costs(render_model: RenderModel, posed: PosedBody, image: ImageView) -> Array:
+    """Return by how much the robust squared residual of an image rises as each segment is taken away: (segments,).
 
-
-def _rises_without(
-    render_model: RenderModel, posed: PosedBody, others: Mapping[int, PosedBody], image: ImageView, *, noise: float
-) -> Array:
-    """Return by how much minus the log-likelihood of one image rises as each of some segments is taken away: (k,).
-
-    others: the same body without each segment. Light and noise are those of the whole body as it was fitted, and only
-    the pixels around those that the segment covers are compared: no others change.
+    The light is that of the whole body as it was fitted, or is known.
     """
-    view, comparison, rises = image.buffers, image.comparison, np.zeros(len(others))
-    costs = _pixel_costs(render_model, posed, view, comparison)
-    boxes = np.zeros((len(render_model.model.segments), 4), np.int64)
-    box_segments(view.maps.part, render_model.segment_of_part, boxes)
-    for k, (segment, other) in enumerate(others.items()):
-        if boxes[segment, 2] > 0:
-            drawn, changed = (_widen(boxes[segment], view.whole, n_px) for n_px in (2 * RADIUS_PX, RADIUS_PX))
-            without = _pixel_costs(render_model, other, view.crop(drawn), comparison)
-            x0, y0, x1, y1 = changed
-            part = without[y0 - drawn.y0 : y1 - drawn.y0, x0 - drawn.x0 : x1 - drawn.x0]
-            rises[k] = 0.5 * float((part - costs[y0:y1, x0:x1]).sum()) / max(noise, 1e-9)
-    return rises
-
-
-def _pixel_costs(
-    render_model: RenderModel, posed: PosedBody, view: ViewBuffers, comparison: Comparison
-) -> NDArray[np.float32]:
-    """Return the robust squared residual of each pixel of a view (h, w), in the light that was fitted or is known."""
-    costs = np.empty(view.maps.part.shape, np.float32)
-    args = render_model.body, view.projection(posed), view.observation, comparison
+    view, rises = image.buffers, np.zeros(len(posed.R))
+    args = render_model.body, view.projection(posed), view.observation, image.comparison
     if render_model.lights is None:
-        fill_costs(*args, view.maps, Paint(render_model.albedo, render_model.is_faceted), view.light, costs)
+        paint = Paint(render_model.albedo, render_model.is_faceted)
+        absence_costs_in_fitted_light(*args, paint, view.light, rises)
     else:
-        fill_costs_of_known_light(*args, view.maps, *view.light, costs)
-    return costs
-
-
-def _widen(box: NDArray[np.int64], whole: Window, rim: int) -> Window:
-    """Return a box x0, y0, x1, y1 as a part of a window, with a rim [px]."""
-    x0, y0, x1, y1 = box.tolist()
-    return Window(max(x0 - rim, whole.x0), max(y0 - rim, whole.y0), min(x1 + rim, whole.x1), min(y1 + rim, whole.y1))
+        absence_costs_in_known_light(*args, *view.light, rises)
+    return rises
