@@ -75,7 +75,7 @@ def _browser_page(is_allowed: Callable[[str], bool] | None, requests: list[str] 
         def note(route):
             if requests is not None:
                 requests.append(route.request.url)
-            if is_allowed(route.request.url):
+            if is_allowed is None or is_allowed(route.request.url):
                 route.continue_()
             else:
                 route.abort()
