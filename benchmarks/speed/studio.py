@@ -33,7 +33,7 @@ from airborne.motion import PlayersWriter
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate
 from airborne.video import VideoWriter
-from tests.support.person_run import PERSON_TABLE, write_person_run
+from tests.support.person_run import PERSON, PERSON_TABLE, write_person_run
 from tests.support.studio import at_pixel, open_page, open_studio, wait_for_frame
 
 SIZE, SMALL, RATE, NOISE = (1920, 1080), (640, 360), 50, 8
@@ -53,6 +53,8 @@ JUMP = """frame => new Promise((done) => { // told by the page: to look at it si
     canvas.view.go(frame);
 })"""
 N_JUMPS, N_DRAGS, DRAG_PX = 20, 3, 300.0
+START = "[start]\nframe = 0\nposition_m = [0.0, 0.0, 1.0]\nquaternion_xyzw = [0.0, 0.0, 0.0, 1.0]\n"
+PLACE = "0.15294658314806603,0.4842854493912971,1.0517079524479056,0.015421024123065537"
 N_MANY, N_RUNS, N_TEAM_FRAMES = 200_000, 50, 3000
 LONG, MANY = "four 1080p videos of {:g} min", "50 runs, of 200,000 frames, of 20 players"
 FLOORS = {"step": 80, "jump": 300, "drag": 50, "release": 150, "open": 2000, "memory": 1000}
@@ -239,6 +241,8 @@ def measure_long(folder: Path, second: Path, minutes: float) -> dict[str, list[f
 def measure_many(folder: Path, second: Path) -> dict[str, list[float]]:
     """Measure Review and Results of a folder with 50 runs, one of them of 200,000 frames, one of 20 players."""
     write_trial(folder, second, list(PLACES), N_MANY // RATE)
+    with (folder / "trial.toml").open("a") as file:
+        file.write(START)
     write_run(folder, RATE)
     runs = folder / "results"
     for k in range(N_RUNS - 2):
@@ -249,6 +253,11 @@ def measure_many(folder: Path, second: Path) -> dict[str, list[float]]:
         file.write(header + "\n")
         for k in range(N_MANY):
             file.write(f"{k},{k / RATE!r},{lines[k % RATE].split(',', 2)[2]}\n")
+    with (runs / "joints.csv").open("w") as file:
+        file.write("frame,time_s,joint,x_m,y_m,z_m,sd_m,status\n")
+        for k in range(N_MANY):
+            status = "uncertain" if k % 5000 == 0 else "tracked"
+            file.writelines(f"{k},{k / RATE!r},{each.name},{PLACE},{status}\n" for each in PERSON.landmarks)
     write_team(folder / "team", runs)
     os.utime(runs)  # the newest is shown first
     with open_studio(folder) as address, open_page(address, is_watched=False) as page:
