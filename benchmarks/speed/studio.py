@@ -33,7 +33,7 @@ from airborne.motion import PlayersWriter
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate
 from airborne.video import VideoWriter
-from tests.support.person_run import PERSON_TABLE, write_person_run
+from tests.support.person_run import PERSON, PERSON_TABLE, write_person_run
 from tests.support.studio import at_pixel, open_page, open_studio, wait_for_frame
 
 SIZE, SMALL, RATE, NOISE = (1920, 1080), (640, 360), 50, 8
@@ -45,12 +45,16 @@ ARM = """() => { // the outline's outermost point at the height of the left fore
     const [u, at] = arm.reduce((a, b) => a[0] > b[0] ? a : b);
     return [u - 4, at];
 }"""
-GO = """frame => {
+JUMP = """frame => new Promise((done) => { // told by the page: to look at it sixty times a second takes its time
     const canvas = document.querySelector("canvas.view");
+    const end = ({ detail }) => detail.frame === frame && done(window.removeEventListener("airborne-shown", end));
     delete canvas.dataset.coarseMs;
+    window.addEventListener("airborne-shown", end);
     canvas.view.go(frame);
-}"""
+})"""
 N_JUMPS, N_DRAGS, DRAG_PX = 20, 3, 300.0
+START = "[start]\nframe = 0\nposition_m = [0.0, 0.0, 1.0]\nquaternion_xyzw = [0.0, 0.0, 0.0, 1.0]\n"
+PLACE = "0.15294658314806603,0.4842854493912971,1.0517079524479056,0.015421024123065537"
 N_MANY, N_RUNS, N_TEAM_FRAMES = 200_000, 50, 3000
 LONG, MANY = "four 1080p videos of {:g} min", "50 runs, of 200,000 frames, of 20 players"
 FLOORS = {"step": 80, "jump": 300, "drag": 50, "release": 150, "open": 2000, "memory": 1000}
@@ -120,8 +124,7 @@ def jump_ms(page, n_frames: int) -> tuple[list[float], list[float], list[float]]
     rng, taken, coarse, cpu = np.random.default_rng(0), [], [], []
     for frame in rng.integers(0, n_frames, N_JUMPS).tolist():
         begun_ms = used_ms()
-        page.evaluate(GO, frame)
-        wait_for_frame(page, frame)
+        page.evaluate(JUMP, frame)
         cpu.append(used_ms() - begun_ms)
         taken.append(shown_ms(page))
         first = page.evaluate("document.querySelector('canvas.view').dataset.coarseMs")
@@ -198,7 +201,7 @@ def measure_short(folder: Path, second: Path, steps: int) -> dict[str, list[floa
     """Measure steps, jumps and drags on a clip of 20 seconds."""
     write_trial(folder, second, list(PLACES), 20)
     rig = write_run(folder, 20 * RATE)
-    with open_studio(folder) as address, open_page(address.replace("/?", "/track?")) as page:
+    with open_studio(folder) as address, open_page(address.replace("/?", "/track?"), is_watched=False) as page:
         wait_for_frame(page, 0)
         page.wait_for_timeout(3000)  # what the kernels compile, once
         begun_s = server()[1]
@@ -225,7 +228,7 @@ def name_jumps(kind: str, measured: tuple[list[float], list[float], list[float]]
 def measure_long(folder: Path, second: Path, minutes: float) -> dict[str, list[float]]:
     """Measure the first picture of four long videos, and memory after jumps through them."""
     write_trial(folder, second, ["a", "b", "c", "d"], round(60 * minutes))
-    with open_studio(folder) as address, open_page(address) as page:
+    with open_studio(folder) as address, open_page(address, is_watched=False) as page:
         page.get_by_text("Use these cameras").wait_for()
         begun = time.monotonic()
         page.goto(address.split("?")[0] + "track")
@@ -238,6 +241,8 @@ def measure_long(folder: Path, second: Path, minutes: float) -> dict[str, list[f
 def measure_many(folder: Path, second: Path) -> dict[str, list[float]]:
     """Measure Review and Results of a folder with 50 runs, one of them of 200,000 frames, one of 20 players."""
     write_trial(folder, second, list(PLACES), N_MANY // RATE)
+    with (folder / "trial.toml").open("a") as file:
+        file.write(START)
     write_run(folder, RATE)
     runs = folder / "results"
     for k in range(N_RUNS - 2):
@@ -248,11 +253,16 @@ def measure_many(folder: Path, second: Path) -> dict[str, list[float]]:
         file.write(header + "\n")
         for k in range(N_MANY):
             file.write(f"{k},{k / RATE!r},{lines[k % RATE].split(',', 2)[2]}\n")
+    with (runs / "joints.csv").open("w") as file:
+        file.write("frame,time_s,joint,x_m,y_m,z_m,sd_m,status\n")
+        for k in range(N_MANY):
+            status = "uncertain" if k % 5000 == 0 else "tracked"
+            file.writelines(f"{k},{k / RATE!r},{each.name},{PLACE},{status}\n" for each in PERSON.landmarks)
     write_team(folder / "team", runs)
     os.utime(runs)  # the newest is shown first
-    with open_studio(folder) as address, open_page(address) as page:
+    with open_studio(folder) as address, open_page(address, is_watched=False) as page:
         found = {"results, for the first time: Review open": [review_ms(page, address)]}
-    with open_studio(folder) as address, open_page(address) as page:
+    with open_studio(folder) as address, open_page(address, is_watched=False) as page:
         for name in ("results", "team"):
             os.utime(folder / name)
             found |= {f"{name}: Review open": [review_ms(page, address)]}

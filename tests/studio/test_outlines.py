@@ -1,5 +1,6 @@
 """What lies over the pictures of a run: outlines where the body is, lines down players' legs; and its curves."""
 
+import os
 from dataclasses import replace
 from fractions import Fraction
 
@@ -13,6 +14,7 @@ from airborne.cameras import Rig, camera_looking_at
 from airborne.errors import ResultError
 from airborne.motion import MotionWriter, joint_statuses, landmarks, read_motion, read_players
 from airborne.motion.files import read_estimates
+from airborne.motion.tables import write_joints
 from airborne.studio import curve_data
 from airborne.studio.curve_data import curve_kinds, describe_distance, run_curves, run_momenta
 from airborne.studio.outlines import outline_items, player_colours, run_overlay
@@ -91,7 +93,7 @@ def test_curves_of_players_are_of_what_is_lowest(tmp_path):
     assert [(strip["name"], len(strip["rank"])) for strip in curves["strips"]] == [("Anna", 12), ("number 7", 12)]
 
 
-def test_strips_say_how_each_joint_goes_while_the_run_goes_on(tmp_path):
+def test_strips_say_how_each_joint_goes_while_the_run_goes_on_and_after_it(tmp_path, monkeypatch):
     camera = camera_looking_at("a", [3, -2, 1.5], [0, 0, 1], focal_px=700, size=(640, 480))
     run = tmp_path / "run"
     write_person_run(run, Rig((camera,)), 40, Fraction(50))
@@ -111,6 +113,24 @@ def test_strips_say_how_each_joint_goes_while_the_run_goes_on(tmp_path):
     assert strips == {landmark.name: expected[:, k].tolist() for k, landmark in enumerate(PERSON.landmarks)}
     assert [k for k, status in enumerate(strips["wrist_left"]) if status != "tracked"] == [3, 35]
     assert set(strips["knee_right"]) == {"tracked"}
+    monkeypatch.setattr("airborne.studio.strips._block_ranks", lambda *_: pytest.fail("computed, not read"))
+    monkeypatch.setattr("airborne.studio.strips._MOST_ROWS", 0)
+    monkeypatch.setattr("airborne.studio.strips._CHUNK", 1000)
+    assert run_curves(run)["strips"] == []
+    write_joints(run / "joints.csv", motion, PERSON)
+    assert run_curves(run)["strips"] == curves["strips"]
+    table = (run / "joints.csv").read_text()
+    for other in (
+        table.rpartition("39,")[0],
+        table.replace("uncertain", "unheard-of", 1),
+        "frame,joint\n",
+        "joint,status\ntorn",
+    ):
+        (run / "joints.csv").write_text(other)
+        assert run_curves(run)["strips"] == []
+    write_joints(run / "joints.csv", motion, PERSON)
+    os.utime(run / "joints.csv", (0, 0))  # older than the motion, which is tracked again
+    assert run_curves(run)["strips"] == []
 
 
 def test_curves_of_a_long_run_keep_what_stands_out(tmp_path, monkeypatch):

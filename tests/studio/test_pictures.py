@@ -1,5 +1,8 @@
 """Pictures are kept within a number of bytes, whatever is looked at, and what is damaged is no picture."""
 
+from concurrent.futures import ThreadPoolExecutor
+from itertools import count
+
 import cv2
 import numpy as np
 import pytest
@@ -47,6 +50,26 @@ def test_a_picture_may_be_smaller_and_shows_the_same(source, tmp_path):
 def test_a_picture_that_nobody_waits_for_is_not_decoded(source, tmp_path):
     with pytest.raises(VideoError, match="nobody waits for image 20"):
         Pictures(tmp_path).jpeg(source, 20, is_wanted=lambda: False)
+
+
+def test_a_key_frame_comes_while_another_image_is_decoded_from_it(tmp_path):
+    path = write_clip(
+        tmp_path / "a.mp4",
+        numbered(30),
+        codec="libx264",
+        pix_fmt="yuv420p",
+        options={"g": "30", "bf": "0", "sc_threshold": "0"},
+    )
+    pictures, source, asked, jpegs = Pictures(tmp_path), VideoSource("a", path), count(), []
+
+    def is_wanted():
+        if next(asked) == 5:  # on the way: the file is held
+            jpegs.append(other.submit(pictures.jpeg, source, 0, 2).result(timeout=20))
+        return True
+
+    with ThreadPoolExecutor(1) as other:
+        pictures.jpeg(source, 20, is_wanted=is_wanted)
+    assert len(jpegs) == 1 and jpegs[0] is not None
 
 
 def test_a_trial_is_shown_with_its_sizes_and_clock(source, tmp_path):

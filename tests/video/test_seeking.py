@@ -107,6 +107,21 @@ def test_a_jump_decodes_only_what_its_image_is_predicted_from(sources, monkeypat
         assert len(steps) == n_steps  # a step back has kept those before it
 
 
+def test_the_key_frame_that_was_passed_on_the_way_is_there_without_decoding(sources):
+    for source in sources[1:]:
+        index = index_images(source)
+        number = max(range(len(index)), key=lambda number: number - index.key_before(number))
+        key = index.key_before(number)
+        with ImageReader(source, index) as reader, ImageReader(source, index) as other:
+            assert reader.key_image(key) is None
+            reader.go_to(number)
+            reader._step = lambda name=source.name: pytest.fail(f"{name}: a frame is decoded")
+            assert np.array_equal(reader.key_image(key), other.image(key, is_exact=False)), source.name
+            assert key == number or reader.key_image(number) is None
+            reader.close()
+            assert reader.key_image(key) is None
+
+
 def test_a_number_that_is_not_there_is_refused(sources):
     reader = ImageReader(sources[0], index_images(sources[0]))
     with pytest.raises(VideoError, match="there is no image 20; the last is 19"):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import islice, pairwise
 from pathlib import Path
+from threading import Lock
 
 import cv2
 import numpy as np
@@ -17,6 +19,8 @@ from airborne.video.pixels import rgb_from_frame
 ORDERS = {"top-first": 1, "bottom-first": 0}  # and the rows of the field that is the later one of its picture
 _N_LOOKED_AT = 25  # pictures from the middle of the file: about a second
 _CROP_PX = (240, 160)  # about what moves most
+_MOST_KEPT = 32  # files
+_decoding = Lock()  # the second order of a file waits for the first
 
 
 def weave_orders(path: Path) -> dict[str, Image]:
@@ -47,8 +51,15 @@ def weave_orders(path: Path) -> dict[str, Image]:
 
 
 def order_jpeg(path: Path, order: str) -> bytes:
-    """Return one of `weave_orders` as a picture. Raises VideoError."""
-    return encode_jpeg(np.ascontiguousarray(weave_orders(path)[order]))
+    """Return one of `weave_orders` as a picture, of which a page asks for both at once. Raises VideoError."""
+    status = path.stat()
+    with _decoding:
+        return _order_jpegs(path, status.st_mtime_ns, status.st_size)[order]
+
+
+@lru_cache(maxsize=_MOST_KEPT)
+def _order_jpegs(path: Path, *stamp: int) -> dict[str, bytes]:
+    return {order: encode_jpeg(np.ascontiguousarray(image)) for order, image in weave_orders(path).items()}
 
 
 def _most_moving(before: Image, after: Image) -> tuple[slice, slice]:

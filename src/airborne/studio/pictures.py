@@ -9,8 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 
+import cv2
+import numpy as np
+
 from airborne.errors import VideoError
-from airborne.export.pictures import encode_jpeg, thumbnail
+from airborne.export.pictures import encode_jpeg
 from airborne.studio.image_lists import read_or_list
 from airborne.trial.cameras import CameraTable
 from airborne.types import Image
@@ -83,7 +86,14 @@ class _Video:
             return self._open().index
 
     def decode(self, number: int, is_wanted: Callable[[], bool]) -> Image | None:
-        """Decode an image; None where it is damaged. Raises VideoError where nobody wants it any more."""
+        """Decode an image; None where it is damaged. Raises VideoError where nobody wants it any more.
+
+        The key frame that another thread has begun with comes at once.
+        """
+        reader = self._reader
+        image = None if reader is None else reader.key_image(number)
+        if image is not None:
+            return image
         with self._lock:
             reader = self._open()
             if not (is_wanted() and reader.go_to(number, is_wanted)):
@@ -150,4 +160,8 @@ class Pictures:
 
 
 def _encode(image: Image, shrink: int) -> bytes:
-    return encode_jpeg(image) if shrink == 1 else thumbnail(image, image.shape[1] // shrink)
+    height, width = image.shape[:2]
+    while shrink > 1:  # by halves, each of which takes a fifth of the time of a quarter
+        shrink, height, width = shrink // 2, height // 2, width // 2
+        image = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8)
+    return encode_jpeg(image)

@@ -1,7 +1,10 @@
 // Which frame a view shows, and how its pictures are fetched. Methods of the component in `view.js`.
 const KEPT_FRAMES = 16; // decoded, for all cameras
 const AHEAD = 4; // frames fetched in the direction of travel
+const SIGN_MS = 100; // after which a view says that a frame is on its way
+const PREVIEW_MS = 300; // and shows the key frames before it: sooner, they would only take the time that the frame needs
 const SHRINKS = [4, 2]; // times smaller than the video, as the server has pictures
+const sleep = (ms) => new Promise((wake) => setTimeout(wake, ms));
 
 export default {
   refresh() { this.cache.clear(); this.go(this.wanted, true); },
@@ -44,28 +47,37 @@ export default {
     }
     return this.cache.get(frame);
   },
-  async preview(frame) { // the last key frames before it: small, and veiled until the frame itself is there
+  async preview(frame, hurries) { // veiled until the frame is there: what was in view, then, small, the last key frames before it
     const { signal } = (this.previewing = new AbortController()), begun = performance.now();
+    if (!hurries) {
+      await sleep(SIGN_MS);
+      if (signal.aborted) return;
+      this.coarse = this.shown.pictures;
+      this.draw();
+      await sleep(PREVIEW_MS - SIGN_MS);
+      if (signal.aborted) return;
+    }
     const answers = await Promise.all(this.panes.map((pane) => this.fetchPane(pane, frame, SHRINKS[0], signal, "&near=true"))).catch(() => null);
-    if (!answers || this.wanted !== frame || this.seen() === frame) return;
+    if (!answers || signal.aborted) return;
     this.coarse = answers.map(({ picture }) => picture);
     this.draw();
     this.canvas.dataset.coarseMs = (performance.now() - begun).toFixed(1);
   },
-  giveUp() { this.coarse = null; this.draw(); },
+  giveUp() { this.previewing?.abort(); this.coarse = null; this.draw(); },
   async go(frame, silent) {
     frame = Math.max(0, Math.min(this.n_frames - 1, Math.round(frame)));
     const direction = Math.sign(frame - this.wanted) || 1;
-    const begun = performance.now();
+    const begun = performance.now(), hurries = this.wanted !== this.seen(); // it overtakes another: a slider is drawn
     this.wanted = frame;
     for (const [other, stop] of this.underway) // what was fetched ahead of another place only stands in the way
       if (Math.abs(other - frame) > AHEAD) { this.cache.delete(other); stop.abort(); }
     if (!silent && !this.apart) window.dispatchEvent(new CustomEvent("airborne-frame", { detail: { frame, from: this } }));
     this.previewing?.abort();
-    if (this.shown && Math.abs(frame - this.shown.frame) > AHEAD && !this.cache.has(frame)) this.preview(frame); // first in the queue
+    if (this.shown && Math.abs(frame - this.shown.frame) > AHEAD && !this.cache.has(frame)) this.preview(frame, hurries); // first in the queue
     let loaded = null;
     try { loaded = await this.load(frame); } catch { return this.wanted === frame && this.giveUp(); }
     if (this.wanted !== frame) return;
+    this.previewing?.abort();
     [this.shown, this.coarse] = [loaded, null];
     this.draw();
     this.canvas.dataset.frame = frame;

@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from fractions import Fraction
 from math import lcm
+from threading import Lock
 from typing import NamedTuple, Self
 
 import av
@@ -154,17 +155,18 @@ def _nearest(times: NDArray, clock: NDArray, half: int) -> NDArray[np.int64]:
 class ImageReader:
     """Decodes any image of a file; images in order, or a few steps back, cost one decoding each or none.
 
-    Not for several threads at once.
+    Not for several threads at once, but for `key_image`.
     """
 
     def __init__(self, source: VideoSource, index: ImageIndex) -> None:
         """Open nothing yet; call `close` at the end."""
         self._source, self.index = source, index
-        self._stack = ExitStack()
+        self._stack, self._converting = ExitStack(), Lock()
         self._container: InputContainer | None = None
         self._stream: VideoStream | None = None
         self._frames: Iterator[tuple[int, av.VideoFrame]] = iter(())
         self._current: tuple[int, av.VideoFrame] | None = None  # the last that was decoded
+        self._key: tuple[int, av.VideoFrame] | None = None  # the last key frame that was decoded
         self._whole_from = 0  # [ticks]; before it, frames that no other is predicted from are left out
         width, height = index.facts.size
         self._n_kept = max(_FEWEST_KEPT, _KEPT_BYTES // (width * height * 3 // 2))
@@ -176,14 +178,17 @@ class ImageReader:
         None where it is damaged. `is_exact` as in `rgb_from_frame`. Raises VideoError for a number that is not there.
         """
         self.go_to(number)
-        facts = self.index.facts
-        row, j = divmod(number, len(facts.parities))
-        frame = self._find(int(self.index.ticks[row]))
-        if frame is None:
-            return None
-        parity = facts.parities[j]
-        rgb = rgb_from_decoded(DecodedImage(Fraction(0), frame, parity), facts, is_exact=is_exact)
-        return rgb if parity is None else fill_rows(rgb, parity, facts.size[1])
+        frame = self._find(self._ticks(number))
+        return None if frame is None else self._convert(number, frame, is_exact=is_exact)
+
+    def key_image(self, number: int) -> Image | None:
+        """Return a key frame's image, not exact, where it is the last that was decoded, else None; decodes nothing.
+
+        While another thread decodes, too.
+        """
+        key = self._key
+        is_it = key is not None and 0 <= number < len(self.index) and key[0] == self._ticks(number)
+        return self._convert(number, key[1], is_exact=False) if key is not None and is_it else None
 
     def go_to(self, number: int, is_wanted: Callable[[], bool] = lambda: True) -> bool:
         """Decode up to an image for as long as it is wanted; say whether it was reached, or is known to be damaged.
@@ -192,8 +197,7 @@ class ImageReader:
         """
         if not 0 <= number < len(self.index):
             raise VideoError(f"{self._source.name}: there is no image {number}; the last is {len(self.index) - 1}")
-        row = number // len(self.index.facts.parities)
-        ticks = int(self.index.ticks[row])
+        row, ticks = number // len(self.index.facts.parities), self._ticks(number)
         if self._find(ticks) is not None:
             return True
         near = int(self.index.ticks[max(0, row - self._n_kept)])
@@ -213,6 +217,7 @@ class ImageReader:
         """Close the file."""
         self._stack.close()
         self._container, self._stream, self._frames, self._current = None, None, iter(()), None
+        self._key = None
         self._passed.clear()
 
     def __enter__(self) -> Self:
@@ -221,6 +226,16 @@ class ImageReader:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _convert(self, number: int, frame: av.VideoFrame, *, is_exact: bool) -> Image:
+        facts = self.index.facts
+        parity = facts.parities[number % len(facts.parities)]
+        with self._converting:
+            rgb = rgb_from_decoded(DecodedImage(Fraction(0), frame, parity), facts, is_exact=is_exact)
+        return rgb if parity is None else fill_rows(rgb, parity, facts.size[1])
+
+    def _ticks(self, number: int) -> int:
+        return int(self.index.ticks[number // len(self.index.facts.parities)])
+
     def _find(self, ticks: int) -> av.VideoFrame | None:
         return next((frame for each, frame in self._passed if each == ticks), None)
 
@@ -228,6 +243,8 @@ class ImageReader:
         self._current = next(self._frames, None)
         if self._current is not None:
             self._passed.append(self._current)
+            if self._current[1].key_frame:
+                self._key = self._current
 
     def _key_before(self, ticks: int) -> int:
         row = bisect_right(self.index.keys, ticks)

@@ -132,13 +132,19 @@ def test_folder_with_something_in_it_is_left_alone_unless_overwritten(tmp_path):
         write_trial(scene, tmp_path / "notes.txt")
 
 
-def test_broken_off_recording_leaves_no_trial_file(tmp_path):
+def test_a_recording_that_is_broken_off_leaves_nothing_new_and_an_earlier_one_whole(tmp_path):
     def stop(done, total):
         raise KeyboardInterrupt
 
+    folder = tmp_path / "new"
     with pytest.raises(KeyboardInterrupt):
-        write_trial(small_scene(n_pictures=2), tmp_path, progress=stop)
-    assert not (tmp_path / "trial.toml").exists()
+        write_trial(small_scene(n_pictures=2), folder, progress=stop)
+    assert not folder.exists()
+    write_trial(small_scene(n_pictures=2), folder)
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(KeyboardInterrupt):
+        write_trial(small_scene(n_pictures=3), folder, overwrite=True, progress=stop)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
 def test_writing_a_preset_writes_its_own_scene(tmp_path, monkeypatch):

@@ -16,7 +16,7 @@ from airborne.synthetic.block.pictures import block_frames
 from airborne.synthetic.block.players import Player
 from airborne.synthetic.block.scene import BlockScene
 from airborne.synthetic.block.truth import TRUTH_JOINTS, jump_truth, noisy_starts, true_joints
-from airborne.synthetic.throw.writing import require_empty
+from airborne.synthetic.throw.writing import fill_folder
 from airborne.types import Array, Progress
 from airborne.video import VideoWriter
 
@@ -25,25 +25,23 @@ _TRUTH_NAMES = {**{landmark: column for column, landmark in TRUTH_JOINTS.items()
 
 
 def write_block(folder: Path, scene: BlockScene, *, overwrite: bool = False, progress: Progress | None = None) -> None:
-    """Record a scene into a folder, which is made; `trial.toml` is written last, so it stands for a whole trial.
+    """Record a scene into a folder, which is made; nothing is left of it where that is broken off.
 
     `<camera>.mp4`, `calib.toml` (the calibrated cameras), `calib_true.toml` where they differ, `first_frame.json` and
     `trial.toml` (the start set by hand), `truth.csv` (the joints of all players) and `players.json` (clothes, and the
     truth of the jumps). `progress` is called after every frame. Raises TrialError for a folder that holds anything,
     unless `overwrite`: then files of these names are replaced.
     """
-    require_empty(folder, overwrite)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "trial.toml").unlink(missing_ok=True)
-    starts = noisy_starts(scene)
-    write_pose2sim(folder / "calib.toml", scene.calibrated_rig)
-    if scene.difficulty.calibration_error_px > 0:
-        write_pose2sim(folder / "calib_true.toml", scene.rig)
-    _write_json(folder / "first_frame.json", _first_frame(scene, starts))
-    _write_json(folder / "players.json", [_player_record(player, scene) for player in scene.players])
-    _write_truth(folder / "truth.csv", scene)
-    _write_videos(folder, scene, progress)
-    write_text(folder / "trial.toml", block_toml(scene, starts))
+    with fill_folder(folder, overwrite) as part:
+        starts = noisy_starts(scene)
+        write_pose2sim(part / "calib.toml", scene.calibrated_rig)
+        if scene.difficulty.calibration_error_px > 0:
+            write_pose2sim(part / "calib_true.toml", scene.rig)
+        _write_json(part / "first_frame.json", _first_frame(scene, starts))
+        _write_json(part / "players.json", [_player_record(player, scene) for player in scene.players])
+        _write_truth(part / "truth.csv", scene)
+        _write_videos(part, scene, progress)
+        write_text(part / "trial.toml", block_toml(scene, starts))
 
 
 def block_toml(scene: BlockScene, starts: dict[str, dict[str, Array]]) -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from airborne.synthetic.throw.scene import Scene, ThrowPreset, cross_scene
 from airborne.types import Progress
 from airborne.video import VideoWriter, weave
 
+_TRIAL = "trial.toml"
 _CRF, _NEAR_LOSSLESS_CRF = 16, 2  # of x264; nearly lossless
 
 
@@ -55,7 +57,7 @@ def write_somersault(
 
 
 def write_trial(scene: Scene, folder: Path, *, overwrite: bool = False, progress: Progress | None = None) -> None:
-    """Record a scene into a folder, which is made; `trial.toml` is written last, so it stands for a whole trial.
+    """Record a scene into a folder, which is made; nothing is left of it where that is broken off.
 
     `<camera>.mp4`, `calib_true.toml` (exact), the body's file, `truth.csv` (the root's pose in every picture) and
     `trial.toml` (with a hand-set start). Of a surveyed scene also `control_points.csv` (surveyed exactly, clicked),
@@ -63,22 +65,42 @@ def write_trial(scene: Scene, folder: Path, *, overwrite: bool = False, progress
     landmarks) and `truth_angles.csv`. `progress` is called after every image. Raises
     TrialError for a folder that holds anything, unless `overwrite`: then files of these names are replaced.
     """
+    with fill_folder(folder, overwrite) as part:
+        flight = scene.flight(np.array([float(scene.time_s(i)) for i in range(scene.n_pictures)]))
+        write_pose2sim(part / "calib_true.toml", scene.rig)
+        write_body(part / _body_file_name(scene), scene.model)
+        if scene.is_surveyed:
+            _write_control_points(part / "control_points.csv", scene)
+            _write_digitised(part / "digitised.csv", scene, flight)
+            write_text(part / "lights.json", json.dumps(lights_table(scene), indent=1) + "\n")
+        if _has_joints(scene):
+            _write_landmarks(part / "truth_joints.csv", scene, flight)
+            _write_angles(part / "truth_angles.csv", scene, flight)
+        _write_truth(part / "truth.csv", scene, flight)
+        _write_videos(part, scene, progress)
+        write_text(part / _TRIAL, trial_toml(scene))
+
+
+@contextmanager
+def fill_folder(folder: Path, overwrite: bool) -> Iterator[Path]:
+    """Give a folder to write a trial in; its files become those of `folder` once all are there, `trial.toml` last.
+
+    Where writing ends by an error or by Ctrl-C, nothing is left. Raises TrialError as `require_empty` does.
+    """
     require_empty(folder, overwrite)
+    is_new = not folder.is_dir()
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "trial.toml").unlink(missing_ok=True)
-    flight = scene.flight(np.array([float(scene.time_s(i)) for i in range(scene.n_pictures)]))
-    write_pose2sim(folder / "calib_true.toml", scene.rig)
-    write_body(folder / _body_file_name(scene), scene.model)
-    if scene.is_surveyed:
-        _write_control_points(folder / "control_points.csv", scene)
-        _write_digitised(folder / "digitised.csv", scene, flight)
-        write_text(folder / "lights.json", json.dumps(lights_table(scene), indent=1) + "\n")
-    if _has_joints(scene):
-        _write_landmarks(folder / "truth_joints.csv", scene, flight)
-        _write_angles(folder / "truth_angles.csv", scene, flight)
-    _write_truth(folder / "truth.csv", scene, flight)
-    _write_videos(folder, scene, progress)
-    write_text(folder / "trial.toml", trial_toml(scene))
+    try:
+        with TemporaryDirectory(prefix=".part", dir=folder) as name:
+            yield Path(name)
+            (folder / _TRIAL).unlink(missing_ok=True)
+            for path in sorted(Path(name).iterdir(), key=lambda path: path.name == _TRIAL):
+                path.replace(folder / path.name)
+    except BaseException:
+        if is_new:
+            with suppress(OSError):  # somebody has put something there
+                folder.rmdir()
+        raise
 
 
 def require_empty(folder: Path, overwrite: bool) -> None:
