@@ -1,6 +1,6 @@
 """Pictures are kept within a number of bytes, whatever is looked at, and what is damaged is no picture."""
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from itertools import count
 
 import cv2
@@ -63,13 +63,16 @@ def test_a_key_frame_comes_while_another_image_is_decoded_from_it(tmp_path):
     pictures, source, asked, jpegs = Pictures(tmp_path), VideoSource("a", path), count(), []
 
     def is_wanted():
-        if next(asked) == 5:  # on the way: the file is held
-            jpegs.append(other.submit(pictures.jpeg, source, 0, 2).result(timeout=20))
+        n = next(asked)
+        if n in (0, 5):  # before anything is decoded, and on the way: the file is held by this thread
+            jpegs.append(others.submit(pictures.jpeg, source, 0, {0: 2, 5: 4}[n]))
+        if n == 5:
+            wait(jpegs, timeout=20)
         return True
 
-    with ThreadPoolExecutor(1) as other:
+    with ThreadPoolExecutor(2) as others:
         pictures.jpeg(source, 20, is_wanted=is_wanted)
-    assert len(jpegs) == 1 and jpegs[0] is not None
+        assert [each.done() for each in jpegs] == [True, True] and all(each.result() for each in jpegs)
 
 
 def test_a_trial_is_shown_with_its_sizes_and_clock(source, tmp_path):

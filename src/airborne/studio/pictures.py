@@ -22,6 +22,7 @@ from airborne.video.seeking import ImageIndex, ImageReader, TrialClock, match_im
 
 _MOST_BYTES = 40_000_000  # of JPEG that are kept for other windows; the browser keeps its own
 _MOST_OPEN = 32  # files
+_LOOK_AGAIN_S = 0.02  # while another thread holds a file, whether it has passed the key frame that is asked for
 _INDEXING = 2  # files at once: four threads take three times the CPU time of one, waiting for the interpreter
 
 SHRINKS = (1, 2, 4)  # times smaller than the video, as pictures are asked for
@@ -90,15 +91,20 @@ class _Video:
 
         The key frame that another thread has begun with comes at once.
         """
-        reader = self._reader
-        image = None if reader is None else reader.key_image(number)
-        if image is not None:
-            return image
-        with self._lock:
+        is_mine = False
+        while not is_mine:
+            reader = self._reader
+            image = None if reader is None else reader.key_image(number)
+            if image is not None:
+                return image
+            is_mine = self._lock.acquire(timeout=_LOOK_AGAIN_S)
+        try:
             reader = self._open()
             if not (is_wanted() and reader.go_to(number, is_wanted)):
                 raise VideoError(f"{self._source.name}: nobody waits for image {number} any more")
             return reader.image(number, is_exact=False)
+        finally:
+            self._lock.release()
 
     def close(self) -> None:
         """Close the file."""

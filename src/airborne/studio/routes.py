@@ -31,6 +31,7 @@ from airborne.video import VideoSource
 from airborne.video.decoding import decode, inspect, rgb_from_decoded
 
 _WORKERS = ThreadPoolExecutor(4, thread_name_prefix="answers")  # more would only hold more pictures at once
+_PREVIEWERS = ThreadPoolExecutor(2, thread_name_prefix="previews")  # beside all of those, which may decode for long
 _THUMBNAIL_PX = 240  # wide
 _SCRIPTS = (  # that components import
     Path(export.__file__).parent / "templates" / "curves.js",  # drawn alike in the report
@@ -54,14 +55,16 @@ def add_routes(app: FastAPI, session: Session) -> None:
     @app.get("/image/{camera}/{frame}")
     async def image(request: Request, camera: int, frame: int, *, shrink: int = 1, near: bool = False) -> Response:
         async with _waiting(request) as is_wanted:
-            return await _answer(lambda: _jpeg(session, camera, frame, Wish(shrink, near, is_wanted)))
+            wish = Wish(shrink, near, is_wanted)
+            return await _answer(lambda: _jpeg(session, camera, frame, wish), _PREVIEWERS if near else _WORKERS)
 
     @app.get("/picture/{camera}/{number}")
     async def own_picture(
         request: Request, camera: int, number: int, *, shrink: int = 1, near: bool = False
     ) -> Response:
         async with _waiting(request) as is_wanted:
-            return await _answer(lambda: _picture(session, camera, number, Wish(shrink, near, is_wanted)))
+            wish = Wish(shrink, near, is_wanted)
+            return await _answer(lambda: _picture(session, camera, number, wish), _PREVIEWERS if near else _WORKERS)
 
     @app.get("/thumbnail/{name}")
     async def first_picture(name: str) -> Response:
@@ -136,10 +139,10 @@ def _curves(folder: Path, name: str, beside: str, what: str) -> dict[str, Any]:
     return {**own, "beside": run_curves(find_run(folder, beside), what)} if beside else own
 
 
-async def _answer(make: Callable[[], Response]) -> Response:
+async def _answer(make: Callable[[], Response], workers: ThreadPoolExecutor = _WORKERS) -> Response:
     """Make an answer in a thread; what is not there is a plain line."""
     try:
-        return await asyncio.get_running_loop().run_in_executor(_WORKERS, make)
+        return await asyncio.get_running_loop().run_in_executor(workers, make)
     except (AirborneError, OSError) as error:
         reason = str(error) if isinstance(error, AirborneError) else "it cannot be read"
         return Response(reason, status_code=404, media_type="text/plain")
