@@ -52,6 +52,7 @@ def test_joints_of_a_limb_beside_which_something_stands_uncovered_are_worth_one_
     for name, pose in (("true", frame.truth), ("wrong", fold(frame.truth, "thigh_right", FOLDS["thigh_right"]))):
         learned = LearnedRegions(Posteriors(*frame.views(pose)), frame.appearance)
         agreement = fitter.assess(fitter.fit_images([pose], learned, None), learned).agreement
+        assert agreement.n_views_of is not None
         most[name] = [int(agreement.n_views_of[limb].max()) for limb in limbs_of(HUMAN)]
     assert min(most["true"]) >= 2
     assert min(most["wrong"]) <= 1
