@@ -1,0 +1,91 @@
+"""Registration by light: the offset at which the body's sides, blurred into the empty scene, give the image.
+
+What stands out from a scene reaches further out the brighter the body is against it, for a lens mixes both near the
+outline: silhouettes lie towards the lamps, by 0.2 px at a blur of 0.8 px, which of a late camera is 1 ms. Here the
+mixture itself is modelled, in linear light (Porter & Duff 1984): every side has one light, the body hides the scene.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.rendering.srgb import light_from_srgb
+from airborne.tracking.self_check.registration import N_SIMILARITY, Silhouette, sample_box, to_px, warp_plane
+from airborne.types import Array
+
+_LIGHT = light_from_srgb(np.arange(256.0)).astype(np.float32)
+_FACE_SHARE = 0.02  # of the silhouette that a side covers at least to have a light of its own
+_BLURS_PX = (0.5, 0.8, 1.2, 1.7)  # sds of the image's blur, of which the likeliest is taken
+_TO_MEDIAN = 0.05  # pixels of the body's median light that are added to those of a side
+_CLIP = 0.1  # [linear light] a residual this large has a quarter of the weight
+_STEPS = 6  # at the likeliest blur
+_MOST_PX, _MOST_TURN = 2.0, 0.05  # of one step: shift and width, turn and scale
+
+
+def register_light(silhouette: Silhouette, offset: Array, rgb: NDArray[np.uint8], empty: NDArray[np.uint8]) -> Array:
+    """Refine an offset (4,) of `register` by the light of a body in one piece.
+
+    rgb (H, W, 3): the view's image; empty (h', w', 3): the scene without the body, in the silhouette's box.
+    """
+    x0, y0, x1, y1 = silhouette.box
+    light = sample_box(silhouette, _LIGHT[rgb[y0:y1, x0:x1]])
+    scene = sample_box(silhouette, _LIGHT[empty])
+    faces = _faces(silhouette)
+    offset = np.append(offset / to_px(silhouette), 0.0)  # the last: how much wider the outline is [px]
+    costs = [_step(silhouette, faces, offset, sigma, light, scene)[1] for sigma in _BLURS_PX]
+    sigma = _BLURS_PX[int(np.argmin(costs))]
+    for _ in range(_STEPS):
+        offset = offset + _step(silhouette, faces, offset, sigma, light, scene)[0]
+    return offset[:N_SIMILARITY] * to_px(silhouette)
+
+
+def _faces(silhouette: Silhouette) -> list[NDArray[np.float32]]:
+    """Return the masks (h, w) of the sides that the silhouette shows, by where they face; the last: small ones."""
+    x, y, z = np.rint(silhouette.normals).astype(int)
+    is_body = silhouette.mask > 0
+    facing = np.where(is_body, 9 * x + 3 * y + z, np.iinfo(int).min)
+    labels, counts = np.unique(facing[is_body], return_counts=True)
+    faces = [facing == label for label in labels[counts >= _FACE_SHARE * is_body.sum()]]
+    rest = is_body & ~np.any(faces, axis=0)
+    return [face.astype(np.float32) for face in (*faces, rest) if face.any()]
+
+
+def _step(
+    silhouette: Silhouette,
+    faces: list[NDArray[np.float32]],
+    offset: Array,
+    sigma: float,
+    light: NDArray[np.float32],
+    scene: NDArray[np.float32],
+) -> tuple[Array, float]:
+    """Return a Gauss-Newton step of the offset (5,), the sides' light eliminated, and the cost before it."""
+    sx, sy = silhouette.to_view
+    sigma_y = float(np.hypot(sigma, 0 if sy >= sx else np.sqrt(3) / 4 * sx / sy))  # rows of fields are interpolated
+    shares = np.stack(
+        [cv2.GaussianBlur(warp_plane(silhouette, offset, face), (0, 0), sigma, sigmaY=sigma_y) for face in faces]
+    )
+    covered = shares.sum(axis=0)
+    x0, y0, w, h = cv2.boundingRect((covered > 0.01).astype(np.uint8))
+    window = np.s_[y0 : y0 + h, x0 : x0 + w]
+    shares, covered, light, scene = shares[:, *window], covered[window], light[window], scene[window]
+    gx, gy = (np.stack([cv2.Sobel(share, cv2.CV_32F, i, 1 - i, scale=1 / 8) for share in shares]) for i in (1, 0))
+    steep = np.hypot(gx.sum(axis=0), gy.sum(axis=0))
+    inside = covered > 0.5
+    A, Y = shares[:, inside].T, (light - (1 - covered)[..., None] * scene)[inside]
+    median = np.median(light[inside], axis=0)
+    own = np.linalg.solve(A.T @ A + _TO_MEDIAN * np.eye(len(shares)), A.T @ Y + _TO_MEDIAN * median)
+    body = np.einsum("fhw,fc->hwc", shares, own)
+    by_x, by_y = (np.einsum("fhw,fc->hwc", g, own) - g.sum(axis=0)[..., None] * scene for g in (gx, gy))
+    by_width = steep[..., None] * (body / np.maximum(covered, 0.01)[..., None] - scene)
+    r = light - (body + (1 - covered)[..., None] * scene) - offset[4] * by_width
+    y, x = np.mgrid[y0 : y0 + h, x0 : x0 + w]
+    dx, dy = (x - silhouette.middle[0] - offset[0])[..., None], (y - silhouette.middle[1] - offset[1])[..., None]
+    J = np.stack([-by_x, -by_y, by_x * dy - by_y * dx, -by_x * dx - by_y * dy, by_width]).reshape(5, -1)
+    squared = np.einsum("hwc,hwc->hw", r, r) / _CLIP**2
+    weight = np.repeat((1 / (1 + squared) ** 2).ravel(), 3)
+    H = (J * weight) @ J.T
+    step = np.linalg.solve(H + 1e-6 * np.diag(np.diag(H)) + 1e-9 * np.eye(5), (J * weight) @ r.ravel())
+    most = np.array([_MOST_PX, _MOST_PX, _MOST_TURN, _MOST_TURN, _MOST_PX])
+    return np.clip(step, -most, most), float(np.sum(squared / (1 + squared)))
