@@ -16,7 +16,7 @@ from airborne.tracking.self_check.registration import N_SIMILARITY, Silhouette, 
 from airborne.types import Array
 
 _LIGHT = light_from_srgb(np.arange(256.0)).astype(np.float32)
-_FACE_SHARE = 0.02  # of the silhouette that a side covers at least to have a light of its own
+_SIDE_SHARE = 0.02  # of the silhouette that a side covers at least to have a light of its own
 _BLURS_PX = (0.5, 0.8, 1.2, 1.7)  # sds of the image's blur, of which the likeliest is taken
 _TO_MEDIAN = 0.05  # pixels of the body's median light that are added to those of a side
 _CLIP = 0.1  # [linear light] a residual this large has a quarter of the weight
@@ -32,29 +32,27 @@ def register_light(silhouette: Silhouette, offset: Array, rgb: NDArray[np.uint8]
     x0, y0, x1, y1 = silhouette.box
     light = sample_box(silhouette, _LIGHT[rgb[y0:y1, x0:x1]])
     scene = sample_box(silhouette, _LIGHT[empty])
-    faces = _faces(silhouette)
+    sides = _sides(silhouette)
     offset = np.append(offset / to_px(silhouette), 0.0)  # the last: how much wider the outline is [px]
-    costs = [_step(silhouette, faces, offset, sigma, light, scene)[1] for sigma in _BLURS_PX]
+    costs = [_step(silhouette, sides, offset, sigma, light, scene)[1] for sigma in _BLURS_PX]
     sigma = _BLURS_PX[int(np.argmin(costs))]
     for _ in range(_STEPS):
-        offset = offset + _step(silhouette, faces, offset, sigma, light, scene)[0]
+        offset = offset + _step(silhouette, sides, offset, sigma, light, scene)[0]
     return offset[:N_SIMILARITY] * to_px(silhouette)
 
 
-def _faces(silhouette: Silhouette) -> list[NDArray[np.float32]]:
-    """Return the masks (h, w) of the sides that the silhouette shows, by where they face; the last: small ones."""
-    x, y, z = np.rint(silhouette.normals).astype(int)
-    is_body = silhouette.mask > 0
-    facing = np.where(is_body, 9 * x + 3 * y + z, np.iinfo(int).min)
-    labels, counts = np.unique(facing[is_body], return_counts=True)
-    faces = [facing == label for label in labels[counts >= _FACE_SHARE * is_body.sum()]]
-    rest = is_body & ~np.any(faces, axis=0)
-    return [face.astype(np.float32) for face in (*faces, rest) if face.any()]
+def _sides(silhouette: Silhouette) -> list[NDArray[np.float32]]:
+    """Return the masks (h, w) of the sides that the silhouette shows; the last: small ones."""
+    is_body = silhouette.side >= 0
+    labels, counts = np.unique(silhouette.side[is_body], return_counts=True)
+    sides = [silhouette.side == label for label in labels[counts >= _SIDE_SHARE * is_body.sum()]]
+    rest = is_body & ~np.any(sides, axis=0)
+    return [side.astype(np.float32) for side in (*sides, rest) if side.any()]
 
 
 def _step(
     silhouette: Silhouette,
-    faces: list[NDArray[np.float32]],
+    sides: list[NDArray[np.float32]],
     offset: Array,
     sigma: float,
     light: NDArray[np.float32],
@@ -64,7 +62,7 @@ def _step(
     sx, sy = silhouette.to_view
     sigma_y = float(np.hypot(sigma, 0 if sy >= sx else np.sqrt(3) / 4 * sx / sy))  # rows of fields are interpolated
     shares = np.stack(
-        [cv2.GaussianBlur(warp_plane(silhouette, offset, face), (0, 0), sigma, sigmaY=sigma_y) for face in faces]
+        [cv2.GaussianBlur(warp_plane(silhouette, offset, side), (0, 0), sigma, sigmaY=sigma_y) for side in sides]
     )
     covered = shares.sum(axis=0)
     x0, y0, w, h = cv2.boundingRect((covered > 0.01).astype(np.uint8))

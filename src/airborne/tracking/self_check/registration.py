@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from airborne.body import PosedBody
 from airborne.cameras import Camera
+from airborne.rendering.maps import SurfaceMaps
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
@@ -42,7 +43,7 @@ class Silhouette:
     camera: Camera  # of that image
     mask: NDArray[np.float32]  # (h, w) 0 or 1
     inverse_depth: NDArray[np.float32]  # (h, w) [1/m]
-    normals: NDArray[np.float32]  # (3, h, w) outward, in camera axes
+    side: NDArray[np.int64]  # (h, w) which side of which part; -1 where there is none
     middle: Array  # (2,) [px] of the mask's bounding box
     box: tuple[int, int, int, int]  # x0, y0, x1, y1 of the view's image that it covers
     to_view: Array  # (2,) view pixels a pixel, right and down
@@ -85,7 +86,13 @@ def draw_silhouette(render_model: RenderModel, posed: PosedBody, camera: Camera)
     middle = ((low + high) / 2 - offset) / to_view
     is_whole = bool(np.all(low > 0) and np.all(high < size - 1))
     box = int(x0), int(y0), int(x1), int(y1)
-    return Silhouette(own, mask, maps.inverse_depth, maps.normals, middle, box, to_view, is_whole)
+    return Silhouette(own, mask, maps.inverse_depth, _sides(maps), middle, box, to_view, is_whole)
+
+
+def _sides(maps: SurfaceMaps) -> NDArray[np.int64]:
+    """Return a number for every side of every part, by where it faces: (h, w), -1 where there is none."""
+    x, y, z = np.rint(maps.normals).astype(int)
+    return np.where(maps.part >= 0, 27 * maps.part.astype(int) + 9 * x + 3 * y + z + 13, -1)
 
 
 def _mask_corners(render_model: RenderModel, posed: PosedBody, camera: Camera) -> tuple[Array, Array] | None:
