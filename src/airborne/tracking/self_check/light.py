@@ -7,6 +7,8 @@ mixture itself is modelled, in linear light (Porter & Duff 1984): every side has
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +22,8 @@ _SIDE_SHARE = 0.02  # of the silhouette that a side covers at least to have a li
 _BLURS_PX = (0.5, 0.8, 1.2, 1.7)  # sds of the image's blur, of which the likeliest is taken
 _TO_MEDIAN = 0.05  # pixels of the body's median light that are added to those of a side
 _CLIP = 0.1  # [linear light] a residual this large has a quarter of the weight
-_STEPS = 6  # at the likeliest blur
+_MOST_STEPS, _CONVERGED_PX = 6, 0.02  # at the likeliest blur; a shorter shift is the last
+_MARGIN_PX = 8  # about the silhouette
 _MOST_PX, _MOST_TURN = 2.0, 0.05  # of one step: shift and width, turn and scale
 
 
@@ -32,13 +35,31 @@ def register_light(silhouette: Silhouette, offset: Array, rgb: NDArray[np.uint8]
     x0, y0, x1, y1 = silhouette.box
     light = sample_box(silhouette, _LIGHT[rgb[y0:y1, x0:x1]])
     scene = sample_box(silhouette, _LIGHT[empty])
-    sides = _sides(silhouette)
     offset = np.append(offset / to_px(silhouette), 0.0)  # the last: how much wider the outline is [px]
+    window = _window(silhouette, offset)
+    silhouette, light, scene = _crop(silhouette, window), light[window], scene[window]
+    sides = _sides(silhouette)
     costs = [_step(silhouette, sides, offset, sigma, light, scene)[1] for sigma in _BLURS_PX]
     sigma = _BLURS_PX[int(np.argmin(costs))]
-    for _ in range(_STEPS):
-        offset = offset + _step(silhouette, sides, offset, sigma, light, scene)[0]
+    for _ in range(_MOST_STEPS):
+        step = _step(silhouette, sides, offset, sigma, light, scene)[0]
+        offset = offset + step
+        if np.hypot(step[0], step[1]) < _CONVERGED_PX:
+            break
     return offset[:N_SIMILARITY] * to_px(silhouette)
+
+
+def _window(silhouette: Silhouette, offset: Array) -> tuple[slice, slice]:
+    """Return rows and columns around the silhouette, where it was drawn and at its offset."""
+    both = np.maximum(silhouette.mask, warp_plane(silhouette, offset, silhouette.mask)) > 0
+    x, y, width, height = cv2.boundingRect(both.astype(np.uint8))
+    low, high = np.maximum([y - _MARGIN_PX, x - _MARGIN_PX], 0), (y + height + _MARGIN_PX, x + width + _MARGIN_PX)
+    return slice(low[0], high[0]), slice(low[1], high[1])
+
+
+def _crop(silhouette: Silhouette, window: tuple[slice, slice]) -> Silhouette:
+    middle = silhouette.middle - [window[1].start, window[0].start]
+    return replace(silhouette, mask=silhouette.mask[window], side=silhouette.side[window], middle=middle)
 
 
 def _sides(silhouette: Silhouette) -> list[NDArray[np.float32]]:
@@ -65,20 +86,17 @@ def _step(
         [cv2.GaussianBlur(warp_plane(silhouette, offset, side), (0, 0), sigma, sigmaY=sigma_y) for side in sides]
     )
     covered = shares.sum(axis=0)
-    x0, y0, w, h = cv2.boundingRect((covered > 0.01).astype(np.uint8))
-    window = np.s_[y0 : y0 + h, x0 : x0 + w]
-    shares, covered, light, scene = shares[:, *window], covered[window], light[window], scene[window]
     gx, gy = (np.stack([cv2.Sobel(share, cv2.CV_32F, i, 1 - i, scale=1 / 8) for share in shares]) for i in (1, 0))
     steep = np.hypot(gx.sum(axis=0), gy.sum(axis=0))
     inside = covered > 0.5
     A, Y = shares[:, inside].T, (light - (1 - covered)[..., None] * scene)[inside]
     median = np.median(light[inside], axis=0)
     own = np.linalg.solve(A.T @ A + _TO_MEDIAN * np.eye(len(shares)), A.T @ Y + _TO_MEDIAN * median)
-    body = np.einsum("fhw,fc->hwc", shares, own)
-    by_x, by_y = (np.einsum("fhw,fc->hwc", g, own) - g.sum(axis=0)[..., None] * scene for g in (gx, gy))
+    body = np.tensordot(shares, own, (0, 0))
+    by_x, by_y = (np.tensordot(g, own, (0, 0)) - g.sum(axis=0)[..., None] * scene for g in (gx, gy))
     by_width = steep[..., None] * (body / np.maximum(covered, 0.01)[..., None] - scene)
     r = light - (body + (1 - covered)[..., None] * scene) - offset[4] * by_width
-    y, x = np.mgrid[y0 : y0 + h, x0 : x0 + w]
+    y, x = np.mgrid[: light.shape[0], : light.shape[1]]
     dx, dy = (x - silhouette.middle[0] - offset[0])[..., None], (y - silhouette.middle[1] - offset[1])[..., None]
     J = np.stack([-by_x, -by_y, by_x * dy - by_y * dx, -by_x * dx - by_y * dy, by_width]).reshape(5, -1)
     squared = np.einsum("hwc,hwc->hw", r, r) / _CLIP**2
