@@ -39,7 +39,7 @@ def picture(upper, front, blur_px):
         light[side] = brightness
     light = cv2.resize(cv2.GaussianBlur(light, (0, 0), FINE * blur_px), SIZE, interpolation=cv2.INTER_AREA)
     noise = 3 * np.random.default_rng(0).standard_normal((*light.shape, 3))
-    return np.clip(np.rint(srgb_from_light(light)[..., None] + noise), 0, 255).astype(np.uint8)
+    return np.clip(np.rint(srgb_from_light(np.asarray(light, float))[..., None] + noise), 0, 255).astype(np.uint8)
 
 
 EMPTY = np.full((SIZE[1], SIZE[0], 3), np.rint(srgb_from_light(np.array([SCENE]))), np.uint8)
