@@ -88,7 +88,7 @@ def test_nothing_wrong_raises_no_alarm():
         ({"model": larger(1.06)}, "body", "scale", 1 / 1.06 - 1),
         ({"rig": turned(1.5)}, "cam1", "turn_deg", 1.5),
         ({"rig": zoomed(1.06)}, "cam1", "focal", 1 / 1.06 - 1),
-        ({"late_s": 0.04}, "cam1", "time_s", 0.04),
+        ({"late_s": 0.02}, "cam1", "time_s", 0.02),
     ],
 )
 def test_what_is_wrong_is_named_first_with_its_size(wrong, subject, kind, value):

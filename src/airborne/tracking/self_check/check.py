@@ -15,6 +15,7 @@ from airborne.tracking.self_check.absolute import has_stayed, lies_elsewhere, sp
 from airborne.tracking.self_check.causes import Diagnosis, name_causes
 from airborne.tracking.self_check.empty_scenes import EmptyScenes
 from airborne.tracking.self_check.free_flight import excess, fall
+from airborne.tracking.self_check.light import register_light
 from airborne.tracking.self_check.nuisances import (
     biases,
     first_bias,
@@ -194,6 +195,8 @@ def _gather(
             evidence.edge_by_parameter[i, j] = outline.edge @ columns + outline.edge_by_offset @ shifts
             scene = empty.behind(j, view, silhouette) if silhouette.is_whole else None
             offset = None if scene is None else register(silhouette, foreground(view.rgb, scene, silhouette))
+            if offset is not None and scene is not None and not render_model.model.has_joints:
+                offset = register_light(silhouette, offset, view.rgb, scene)
             if offset is not None:
                 evidence.offset[i, j], evidence.by_twist[i, j], evidence.is_seen[i, j] = offset, outline.by_twist, True
                 evidence.by_parameter[i, j] = outline.by_twist @ columns + shifts

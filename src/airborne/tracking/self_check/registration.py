@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from airborne.body import PosedBody
 from airborne.cameras import Camera
+from airborne.rendering.maps import SurfaceMaps
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
@@ -42,6 +43,7 @@ class Silhouette:
     camera: Camera  # of that image
     mask: NDArray[np.float32]  # (h, w) 0 or 1
     inverse_depth: NDArray[np.float32]  # (h, w) [1/m]
+    side: NDArray[np.int64]  # (h, w) which side of which part; -1 where there is none
     middle: Array  # (2,) [px] of the mask's bounding box
     box: tuple[int, int, int, int]  # x0, y0, x1, y1 of the view's image that it covers
     to_view: Array  # (2,) view pixels a pixel, right and down
@@ -84,7 +86,13 @@ def draw_silhouette(render_model: RenderModel, posed: PosedBody, camera: Camera)
     middle = ((low + high) / 2 - offset) / to_view
     is_whole = bool(np.all(low > 0) and np.all(high < size - 1))
     box = int(x0), int(y0), int(x1), int(y1)
-    return Silhouette(own, mask, maps.inverse_depth, middle, box, to_view, is_whole)
+    return Silhouette(own, mask, maps.inverse_depth, _sides(maps), middle, box, to_view, is_whole)
+
+
+def _sides(maps: SurfaceMaps) -> NDArray[np.int64]:
+    """Return a number for every side of every part, by where it faces: (h, w), -1 where there is none."""
+    x, y, z = np.rint(maps.normals).astype(int)
+    return np.where(maps.part >= 0, 27 * maps.part.astype(int) + 9 * x + 3 * y + z + 13, -1)
 
 
 def _mask_corners(render_model: RenderModel, posed: PosedBody, camera: Camera) -> tuple[Array, Array] | None:
@@ -104,14 +112,18 @@ def foreground(rgb: NDArray[np.uint8], empty: NDArray[np.uint8], silhouette: Sil
     x0, y0, x1, y1 = silhouette.box
     d = rgb[y0:y1, x0:x1].astype(np.float32) - empty
     share = 1 - np.exp(-np.einsum("hwc,hwc->hw", d, d) / np.float32(_NOISE_GREY**2 * 3))
-    width, height = silhouette.camera.size
+    return sample_box(silhouette, share)
+
+
+def sample_box(silhouette: Silhouette, plane: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Sample what fills the silhouette's box in the view, (h', w') or (h', w', k), at the silhouette's pixels."""
     sx, sy = silhouette.to_view
     if sx > 1:
-        share = cv2.blur(share, (int(sx), max(1, round(sy))))
+        plane = np.asarray(cv2.blur(plane, (int(sx), max(1, round(sy)))), np.float32)
     # pixel (i, j) of the silhouette lies at sx i + (sx - 1) / 2 of the box
     M = np.array([[sx, 0, (sx - 1) / 2], [0, sy, (sy - 1) / 2]])
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    warped = cv2.warpAffine(share, M, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+    warped = cv2.warpAffine(plane, M, silhouette.camera.size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(warped, np.float32)
 
 
@@ -124,23 +136,24 @@ def register(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array | None
         return None
     offset = np.append(_search(silhouette, shown), 0.0)  # the last: how much wider the outline is [px]
     for sigma in _SIGMA_PX:
-        offset = _refine(silhouette, shown, offset, sigma)
+        offset = refine_offset(silhouette, shown, offset, sigma)
     length = float(max(np.ptp(np.nonzero(silhouette.mask), axis=1)))
     if not np.all(np.abs(offset[:N_SIMILARITY]) < _FARTHEST * [length, length, 1, 1]):
         return None
-    overlap = _correlation(_warp(silhouette, offset, _blur(silhouette.mask, 1.2)), _blur(shown, 1.2))
-    return offset[:N_SIMILARITY] * _to_px(silhouette) if overlap > _LEAST_OVERLAP else None
+    overlap = _correlation(warp_plane(silhouette, offset, blur(silhouette.mask, 1.2)), blur(shown, 1.2))
+    return offset[:N_SIMILARITY] * to_px(silhouette) if overlap > _LEAST_OVERLAP else None
 
 
 def outline_of(silhouette: Silhouette, posed: PosedBody) -> SilhouetteOutline:
     """Differentiate a silhouette's outline."""
     C, B = _outline_derivatives(silhouette, posed)
-    to_px = _to_px(silhouette)
+    in_view = to_px(silhouette)
     by_twist = np.linalg.lstsq(B.T, C.T, rcond=1e-6)[0][:N_SIMILARITY]
-    return SilhouetteOutline(by_twist * to_px[:, None], C @ C.T, C @ B[:N_SIMILARITY].T / to_px)
+    return SilhouetteOutline(by_twist * in_view[:, None], C @ C.T, C @ B[:N_SIMILARITY].T / in_view)
 
 
-def _to_px(silhouette: Silhouette) -> Array:
+def to_px(silhouette: Silhouette) -> Array:
+    """Return what an offset (4,) in the silhouette's pixels is multiplied by to be one in the view's."""
     return np.array([silhouette.to_view[0], silhouette.to_view[0], 1, 1])
 
 
@@ -155,7 +168,9 @@ def _search(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array:
     for turn in _TURNS:
         for scale in _SCALES:
             candidate = np.array([0.0, 0.0, turn, np.log(scale), 0.0])
-            template = cv2.resize(_warp(silhouette, candidate, silhouette.mask), size, interpolation=cv2.INTER_AREA)
+            template = cv2.resize(
+                warp_plane(silhouette, candidate, silhouette.mask), size, interpolation=cv2.INTER_AREA
+            )
             scores = cv2.matchTemplate(padded, template, cv2.TM_CCOEFF_NORMED)
             _, score, _, (x, y) = cv2.minMaxLoc(scores)
             if turn == 0 and np.isclose(scale, 1) and scores[pad, pad] + _LEAST_GAIN > score:
@@ -166,11 +181,21 @@ def _search(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array:
     return best
 
 
-def _refine(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array, sigma: float) -> Array:
-    """Step to the least squares of blurred silhouette and foreground, robustly."""
-    image, mask = _blur(shown, sigma), _blur(silhouette.mask, sigma)
+def refine_offset(
+    silhouette: Silhouette,
+    shown: NDArray[np.float32],
+    offset: Array,
+    sigma: float,
+    *,
+    certainty: NDArray[np.float32] | None = None,
+) -> Array:
+    """Step to the least squares of blurred silhouette and foreground, robustly; certainty (h, w) weighs the pixels.
+
+    offset (5,): shift, turn, scale and how much wider the outline is [px of the silhouette].
+    """
+    image, mask = blur(shown, sigma), blur(silhouette.mask, sigma)
     for _ in range(_STEPS):
-        drawn = _warp(silhouette, offset, mask)
+        drawn = warp_plane(silhouette, offset, mask)
         gx, gy = cv2.Sobel(drawn, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(drawn, cv2.CV_32F, 0, 1, scale=1 / 8)
         steep = np.sqrt(gx * gx + gy * gy)
         near = np.flatnonzero(steep > 0.02 * steep.max())
@@ -179,7 +204,7 @@ def _refine(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array, s
         r = image_near - (drawn_near + offset[4] * steep)
         dx, dy = x - silhouette.middle[0] - offset[0], y - silhouette.middle[1] - offset[1]
         J = np.stack([-gx, -gy, gx * dy - gy * dx, -gx * dx - gy * dy, steep])
-        weight = 1 / (1 + (r / _CLIP) ** 2) ** 2
+        weight = 1 / (1 + (r / _CLIP) ** 2) ** 2 * (1 if certainty is None else certainty.ravel()[near])
         H = (J * weight) @ J.T
         H[np.diag_indices(5)] *= 1 + 1e-6
         H[4, 4] += 1e-9
@@ -191,7 +216,7 @@ def _refine(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array, s
     return offset
 
 
-def _warp(silhouette: Silhouette, offset: Array, plane: NDArray[np.float32]) -> NDArray[np.float32]:
+def warp_plane(silhouette: Silhouette, offset: Array, plane: NDArray[np.float32]) -> NDArray[np.float32]:
     """Shift, turn and scale a plane (h, w) about the silhouette's middle."""
     c, s = np.exp(offset[3]) * np.array([np.cos(offset[2]), np.sin(offset[2])])
     A = np.array([[c, -s], [s, c]])
@@ -203,7 +228,7 @@ def _warp(silhouette: Silhouette, offset: Array, plane: NDArray[np.float32]) -> 
 def _outline_derivatives(silhouette: Silhouette, posed: PosedBody) -> tuple[Array, Array]:
     """Return how the m pixels of the outline change by a twist of the body (6, m), and by offset and width (5, m)."""
     camera = silhouette.camera
-    mask = _blur(silhouette.mask, _SIGMA_PX[-1])
+    mask = blur(silhouette.mask, _SIGMA_PX[-1])
     gx, gy = cv2.Sobel(mask, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(mask, cv2.CV_32F, 0, 1, scale=1 / 8)
     near = (np.hypot(gx, gy) > 0.05 * np.hypot(gx, gy).max()) & (silhouette.mask > 0)
     y, x = np.nonzero(near)
@@ -222,7 +247,8 @@ def _outline_derivatives(silhouette: Silhouette, posed: PosedBody) -> tuple[Arra
     return C, np.asarray(np.stack([gx, gy, gy * dx - gx * dy, gx * dx + gy * dy, -np.hypot(gx, gy)]), float)
 
 
-def _blur(plane: NDArray[np.float32], sigma: float) -> NDArray[np.float32]:
+def blur(plane: NDArray[np.float32], sigma: float) -> NDArray[np.float32]:
+    """Blur a plane (h, w), or (h, w, k), by a Gaussian [px]."""
     return np.asarray(cv2.GaussianBlur(plane, (0, 0), sigma), np.float32)
 
 

@@ -1,0 +1,120 @@
+"""Registration by light: the offset at which the body's sides, blurred into the empty scene, give the image.
+
+What stands out from a scene reaches further out the brighter the body is against it, for a lens mixes both near the
+outline: silhouettes lie towards the lamps, by 0.2 px at a blur of 0.8 px, which of a late camera is 1 ms. Here the
+mixture itself is modelled, in linear light (Porter & Duff 1984): every side has one light, the body hides the scene.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.rendering.srgb import light_from_srgb
+from airborne.tracking.self_check.registration import N_SIMILARITY, Silhouette, blur, sample_box, to_px, warp_plane
+from airborne.types import Array, Ints
+
+_LIGHT = light_from_srgb(np.arange(256.0)).astype(np.float32)
+_SIDE_SHARE = 0.02  # of the silhouette that a side covers at least to have a light of its own
+_BLURS_PX = (0.5, 0.8, 1.2, 1.7)  # sds of the image's blur, of which the likeliest is taken
+_TO_MEDIAN = 0.05  # pixels of the body's median light that are added to those of a side
+_CLIP = 0.1  # [linear light] a residual this large has a quarter of the weight
+_MOST_STEPS, _CONVERGED_PX = 6, 0.02  # at the likeliest blur; a shorter shift is the last
+_LEAST_MIXED = 0.01  # of a share times the rest of the pixel, at the widest blur: near an edge
+_MARGIN_PX = 8  # about the silhouette
+_MOST_PX, _MOST_TURN = 2.0, 0.05  # of one step: shift and width, turn and scale
+
+
+def register_light(silhouette: Silhouette, offset: Array, rgb: NDArray[np.uint8], empty: NDArray[np.uint8]) -> Array:
+    """Refine an offset (4,) of `register` by the light of a body in one piece.
+
+    rgb (H, W, 3): the view's image; empty (h', w', 3): the scene without the body, in the silhouette's box.
+    """
+    x0, y0, x1, y1 = silhouette.box
+    light = sample_box(silhouette, _LIGHT[rgb[y0:y1, x0:x1]])
+    scene = sample_box(silhouette, _LIGHT[empty])
+    offset = np.append(offset / to_px(silhouette), 0.0)  # the last: how much wider the outline is [px]
+    window = _window(silhouette, offset)
+    silhouette, light, scene = _crop(silhouette, window), light[window], scene[window]
+    sides = _sides(silhouette)
+    near = _near_edges(silhouette, sides, offset)
+    costs = [_step(silhouette, sides, offset, sigma, near, light, scene)[1] for sigma in _BLURS_PX]
+    sigma = _BLURS_PX[int(np.argmin(costs))]
+    for _ in range(_MOST_STEPS):
+        step = _step(silhouette, sides, offset, sigma, near, light, scene)[0]
+        offset = offset + step
+        if np.hypot(step[0], step[1]) < _CONVERGED_PX:
+            break
+    return offset[:N_SIMILARITY] * to_px(silhouette)
+
+
+def _window(silhouette: Silhouette, offset: Array) -> tuple[slice, slice]:
+    """Return rows and columns around the silhouette, where it was drawn and at its offset."""
+    both = np.maximum(silhouette.mask, warp_plane(silhouette, offset, silhouette.mask)) > 0
+    x, y, width, height = cv2.boundingRect(both.astype(np.uint8))
+    low, high = np.maximum([y - _MARGIN_PX, x - _MARGIN_PX], 0), (y + height + _MARGIN_PX, x + width + _MARGIN_PX)
+    return slice(low[0], high[0]), slice(low[1], high[1])
+
+
+def _crop(silhouette: Silhouette, window: tuple[slice, slice]) -> Silhouette:
+    middle = silhouette.middle - [window[1].start, window[0].start]
+    return replace(silhouette, mask=silhouette.mask[window], side=silhouette.side[window], middle=middle)
+
+
+def _near_edges(silhouette: Silhouette, sides: list[NDArray[np.float32]], offset: Array) -> tuple[Ints, Ints]:
+    """Return rows and columns (n,) of the pixels that the widest blur mixes of sides, or a side and the scene."""
+    shares = [blur(warp_plane(silhouette, offset, side), _BLURS_PX[-1]) for side in sides]
+    mixed = np.max([share * (1 - share) for share in shares], axis=0)
+    rows, columns = np.nonzero(mixed > _LEAST_MIXED)
+    return rows, columns
+
+
+def _sides(silhouette: Silhouette) -> list[NDArray[np.float32]]:
+    """Return the masks (h, w) of the sides that the silhouette shows; the last: small ones."""
+    is_body = silhouette.side >= 0
+    labels, counts = np.unique(silhouette.side[is_body], return_counts=True)
+    sides = [silhouette.side == label for label in labels[counts >= _SIDE_SHARE * is_body.sum()]]
+    rest = is_body & ~np.any(sides, axis=0)
+    return [side.astype(np.float32) for side in (*sides, rest) if side.any()]
+
+
+def _step(
+    silhouette: Silhouette,
+    sides: list[NDArray[np.float32]],
+    offset: Array,
+    sigma: float,
+    near: tuple[Ints, Ints],
+    light: NDArray[np.float32],
+    scene: NDArray[np.float32],
+) -> tuple[Array, float]:
+    """Return a Gauss-Newton step of the offset (5,), the sides' light eliminated, and the cost before it.
+
+    light, scene (h, w, 3) are compared in the pixels `near`.
+    """
+    sx, sy = silhouette.to_view
+    sigma_y = float(np.hypot(sigma, 0 if sy >= sx else np.sqrt(3) / 4 * sx / sy))  # rows of fields are interpolated
+    shares = np.stack(
+        [cv2.GaussianBlur(warp_plane(silhouette, offset, side), (0, 0), sigma, sigmaY=sigma_y) for side in sides]
+    )
+    gx, gy = (np.stack([cv2.Sobel(share, cv2.CV_32F, i, 1 - i, scale=1 / 8) for share in shares]) for i in (1, 0))
+    y, x = near
+    shares, gx, gy, light, scene = shares[:, y, x], gx[:, y, x], gy[:, y, x], light[y, x], scene[y, x]
+    covered, sides_gx, sides_gy = (each.sum(axis=0)[:, None] for each in (shares, gx, gy))
+    inside = covered[:, 0] > 0.5
+    A, Y = shares[:, inside].T, (light - (1 - covered) * scene)[inside]
+    median = np.median(light[inside], axis=0)
+    own = np.linalg.solve(A.T @ A + _TO_MEDIAN * np.eye(len(shares)), A.T @ Y + _TO_MEDIAN * median)
+    body, by_x, by_y = shares.T @ own, gx.T @ own - sides_gx * scene, gy.T @ own - sides_gy * scene
+    by_width = np.hypot(sides_gx, sides_gy) * (body / np.maximum(covered, 0.01) - scene)
+    r = light - (body + (1 - covered) * scene) - offset[4] * by_width
+    dx, dy = (x - silhouette.middle[0] - offset[0])[:, None], (y - silhouette.middle[1] - offset[1])[:, None]
+    J = np.stack([-by_x, -by_y, by_x * dy - by_y * dx, -by_x * dx - by_y * dy, by_width]).reshape(5, -1)
+    squared = np.einsum("nc,nc->n", r, r) / _CLIP**2
+    weight = np.repeat(1 / (1 + squared) ** 2, 3)
+    H = (J * weight) @ J.T
+    step = np.linalg.solve(H + 1e-6 * np.diag(np.diag(H)) + 1e-9 * np.eye(5), (J * weight) @ r.ravel())
+    most = np.array([_MOST_PX, _MOST_PX, _MOST_TURN, _MOST_TURN, _MOST_PX])
+    return np.clip(step, -most, most), float(np.sum(squared / (1 + squared)))
