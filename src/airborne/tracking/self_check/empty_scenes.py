@@ -1,4 +1,4 @@
-"""The empty scene of each camera (and field): the median picture over frames in which the body is elsewhere."""
+"""The empty scene of each camera (and field): at every pixel the median of the pictures in which it shows no body."""
 
 from __future__ import annotations
 
@@ -15,8 +15,11 @@ from airborne.tracking.self_check.registration import Silhouette
 from airborne.video import Frames, View
 
 _FEWEST = 4  # images of one camera from which the empty scene can be told
-_REDUCTION = 8  # of the maps of how often the body covers a pixel
-_MOST_COVERED = 0.45  # share of the images in which a pixel may be covered, for the median to show the scene
+_FEWEST_BARE = 3  # images in which a pixel shows no body, for their median to show the scene: one may be wrong
+_REDUCTION = (
+    4  # of the maps of what the body covers; they are a cell wider, as the drawn body is not quite the true one
+)
+_CELL = np.ones((3, 3), np.uint8)
 _MOST_HIDDEN = 0.15  # share of a silhouette whose scene is not shown
 
 
@@ -25,7 +28,7 @@ class EmptyScenes:
 
     def __init__(self, kept: Iterable[Frames], render_model: RenderModel, path: TrackedPath) -> None:
         self._images: dict[tuple[int, bytes], list[NDArray[np.uint8]]] = {}
-        self._covered: dict[tuple[int, bytes], NDArray[np.float32]] = {}
+        self._covered: dict[tuple[int, bytes], list[NDArray[np.uint8]]] = {}
         for frames in kept:
             row = path.row(frames.index)
             for number, view in enumerate(frames.views):
@@ -34,12 +37,13 @@ class EmptyScenes:
                 source = number, view.camera.K.tobytes()
                 self._images.setdefault(source, []).append(view.rgb)
                 width, height = (max(1, n // _REDUCTION) for n in view.camera.size)
-                covered = self._covered.setdefault(source, np.zeros((height, width), np.float32))
-                if row is None:
-                    continue
-                small = view.camera.resample(scale=(_REDUCTION, _REDUCTION), size=(width, height))
-                posed = render_model.with_pose(path.pose_after(row, view.delay_s))
-                covered += render_model.draw(posed, small).part >= 0
+                covered = np.zeros((height, width), np.uint8)
+                if row is not None:
+                    small = view.camera.resample(scale=(_REDUCTION, _REDUCTION), size=(width, height))
+                    posed = render_model.with_pose(path.pose_after(row, view.delay_s))
+                    is_covered = (render_model.draw(posed, small).part >= 0).astype(np.uint8)
+                    covered = np.asarray(cv2.dilate(is_covered, _CELL), np.uint8)
+                self._covered.setdefault(source, []).append(covered)
 
     def behind(self, number: int, view: View, silhouette: Silhouette) -> NDArray[np.uint8] | None:
         """Return the empty scene in a silhouette's box (h, w, 3); None where too few images show it."""
@@ -48,23 +52,35 @@ class EmptyScenes:
         if len(images) < _FEWEST:
             return None
         x0, y0, x1, y1 = silhouette.box
-        share = np.asarray(self._covered[source] / len(images), np.float32)
-        share = cv2.resize(share, view.camera.size, interpolation=cv2.INTER_NEAREST)
+        rows, columns = np.arange(y0, y1) // _REDUCTION, np.arange(x0, x1) // _REDUCTION
+        small = np.stack(self._covered[source])
+        rows, columns = np.minimum(rows, small.shape[1] - 1), np.minimum(columns, small.shape[2] - 1)
+        covered = small[:, rows[:, None], columns]
         height, width = silhouette.mask.shape
-        share = cv2.resize(share[y0:y1, x0:x1], (width, height), interpolation=cv2.INTER_NEAREST)
-        if np.mean(share[silhouette.mask > 0] > _MOST_COVERED) > _MOST_HIDDEN:
+        n_covered = np.asarray(covered.sum(axis=0), np.float32)
+        n_covered = cv2.resize(n_covered, (width, height), interpolation=cv2.INTER_NEAREST)
+        if np.mean(n_covered[silhouette.mask > 0] > len(images) - _FEWEST_BARE) > _MOST_HIDDEN:
             return None
-        return _upper_median([image[y0:y1, x0:x1] for image in images])
+        return _upper_median(_without_body(np.stack([image[y0:y1, x0:x1] for image in images]), covered > 0))
 
 
-def _upper_median(images: list[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """Return the median of images of the same shape; of an even number, the upper of the two in the middle.
+def _without_body(images: NDArray[np.uint8], covered: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Blank images (n, h, w, 3), in place, where they are covered (n, h, w), black and white by turns.
+
+    As many are then below the others' median as above it, but for one below; `_upper_median` still finds it.
+    """
+    is_white = np.cumsum(covered, axis=0, dtype=np.uint8)[covered] % 2 == 0
+    images[covered] = np.where(is_white, np.uint8(255), np.uint8(0))[:, None]
+    return images
+
+
+def _upper_median(ranked: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return the median of images (n, h, w, 3), which are ranked in place; of an even number, the upper middle one.
 
     Whole images are exchanged, as in a bubble sort: twenty times faster than NumPy's partition along them.
     """
-    ranked, middle = np.stack(images), len(images) // 2
-    lower = np.empty_like(ranked[0])
-    for last in range(len(images) - 1, middle - 1, -1):
+    middle, lower = len(ranked) // 2, np.empty_like(ranked[0])
+    for last in range(len(ranked) - 1, middle - 1, -1):
         for low, high in pairwise(ranked[: last + 1]):
             np.minimum(low, high, out=lower)
             np.maximum(low, high, out=high)
