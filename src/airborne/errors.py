@@ -66,6 +66,11 @@ def count(n: int, noun: str) -> str:
     return f"{n} {noun if n == 1 else f'{noun}s'}"
 
 
+def count_of(n: int, total: int, noun: str) -> str:
+    """Return a part of a number with its noun and verb, as 1 of 3 frames is, 2 of 3 frames are."""
+    return f"{n} of {count(total, noun)} {'is' if n == 1 else 'are'}"
+
+
 def require_choice(value: str, choices: Collection[str], what: str) -> None:
     """Raise AirborneError, listing the choices, where a value is none of them; `what` says what it is."""
     if value not in choices:
@@ -76,6 +81,12 @@ _PLAIN = {
     "extra_forbidden": "unknown key",
     "float_parsing": "expected a number",
     "int_parsing": "expected a whole number",
+}
+_BOUNDS = {  # pydantic's kinds of error: where it keeps the bound, and how it is said
+    "greater_than_equal": ("ge", "expected {:g} or more"),
+    "greater_than": ("gt", "expected more than {:g}"),
+    "less_than_equal": ("le", "expected {:g} or less"),
+    "less_than": ("lt", "expected less than {:g}"),
 }
 
 
@@ -113,6 +124,8 @@ def _name_steps(one: ErrorDetails, tags: Collection[str], document: Any) -> tupl
         if isinstance(step, int) and isinstance(document, dict) and steps:
             name = document.get("name")
             steps[-1] += f" '{name[:60]}':" if name and isinstance(name, str) else f" {step + 1}:"
+        elif isinstance(step, int) and steps:
+            steps[-1] += f", value {step + 1}"
         else:
             steps.append(text)
     if one["type"] == "union_tag_invalid":
@@ -137,8 +150,12 @@ def _describe_place(place: tuple[str, ...], errors: Sequence[ErrorDetails], mode
         if alike:
             return f"{where}: unknown key; did you mean {alike[0]}?"
     said = ", or ".join(dict.fromkeys(map(_phrase, errors)))
-    given = "" if isinstance(first["input"], dict) else f" (found {str(first['input'])[:60]!r})"
+    given = "" if isinstance(first["input"], dict) else f" (found {_quote(first['input'])})"
     return f"{where}{': ' if where else ''}{said}{given}"
+
+
+def _quote(value: Any) -> str:
+    return str(value)[:60] if isinstance(value, int | float) else repr(str(value)[:60])
 
 
 def _list_keys(model: type[BaseModel], loc: Sequence[int | str]) -> list[str]:
@@ -169,5 +186,8 @@ def _phrase(one: ErrorDetails) -> str:
     if one["type"] == "union_tag_invalid":
         limits = one.get("ctx", {})
         return f"expected {limits['expected_tags']} (found {limits['tag']!r})"
+    if one["type"] in _BOUNDS:
+        name, words = _BOUNDS[one["type"]]
+        return words.format(one.get("ctx", {})[name])
     said = one["msg"].removeprefix("Value error, ").replace("Input should be", "expected")
     return _PLAIN.get(one["type"], said)

@@ -120,7 +120,7 @@ def test_file_holds_segments_parts_positions_and_colours(tmp_path):
         (
             "size_m = [0.1, 0.2, 0.4]",
             "size_m = [0.1, 0.2, nan]",
-            "part 'upper': size_m.2: expected a finite",
+            "part 'upper': size_m, value 3: expected a finite",
         ),
         ("size_m = [0.1, 0.2, 0.4]", "size_m = [0.1, 0.2]", "segment 'thigh': part 'upper': size_m"),
         ("size_m = [0.1, 0.2, 0.4]", "", "part 'upper' is a box and needs size_m"),

@@ -56,7 +56,7 @@ def test_a_run_without_faults_warns_of_nothing():
 @pytest.mark.parametrize(
     ("kwargs", "words"),
     [
-        ({"lost": (0,)}, "1 of 20 frames are lost"),
+        ({"lost": (0,)}, "1 of 20 frames is lost"),
         ({"uncertain": (1, 2)}, "2 of 20 frames are uncertain"),
         ({"unseen": (5,)}, "its standard deviation is infinite"),
         ({"lost": (7,)}, "off by whole turns"),

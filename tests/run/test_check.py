@@ -50,7 +50,7 @@ def test_every_mistake_of_the_tables_is_listed(folder, capsys, monkeypatch):
     with pytest.raises(SystemExit) as stopped:
         main()
     assert stopped.value.code == 2
-    assert len(capsys.readouterr().err.splitlines()) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 3  # and that the rest follows
 
 
 def test_every_unusable_file_is_listed(folder):

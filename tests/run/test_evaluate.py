@@ -117,6 +117,19 @@ def test_agreement_of_joints_is_reported_in_tables_figures_and_a_paragraph(run, 
     assert contents_of(run) == before
 
 
+def test_a_second_reference_leaves_the_results_of_the_first(run, tmp_path):
+    truth = shutil.copyfile(run / "motion.csv", tmp_path / "truth.csv")
+    for references in ({"joints": run.parent / "higher.csv"}, {"truth": truth}, {"truth": truth}):
+        evaluate_agreement(run, out=tmp_path, **references)
+    with (tmp_path / "tables/agreement.csv").open() as file:
+        rows = [(row["against"], row["variable"]) for row in csv.DictReader(file)]
+    assert {against for against, _ in rows} == {"the joints", "the truth"}
+    assert len(set(rows)) == len(rows)
+    text = (tmp_path / "agreement_methods.txt").read_text()
+    assert [text.count(head) for head in ("Against the joints:", "Against the truth:", "References")] == [1, 1, 1]
+    assert "bias -10.00" in text
+
+
 def test_each_number_of_the_table_has_its_interval(run, tmp_path):
     evaluate_agreement(run, joints=run.parent / "higher.csv", out=tmp_path)
     with (tmp_path / "tables/agreement.csv").open() as file:

@@ -110,11 +110,12 @@ def test_until_a_far_frame_is_decoded_the_key_frame_before_it_is_shown_and_said_
         assert read_number(page, 0) == frame != index.key_before(frame)
         assert page.evaluate("document.querySelector('canvas.view').view.coarse") is None
         page.evaluate("held.length = 0")
-        page.evaluate("frames => frames.forEach((n) => document.querySelector('canvas.view').view.go(n))", [0, N - 1])
+        other = frame + 12  # the last frame is where the page may have been opened: it is there already
+        page.evaluate("frames => frames.forEach((n) => document.querySelector('canvas.view').view.go(n))", [0, other])
         page.wait_for_function("document.querySelector('canvas.view').view.coarse !== null")
-        assert read_number(page, 0) == index.key_before(N - 1)  # one jump overtakes another: at once
+        assert read_number(page, 0) == index.key_before(other)  # one jump overtakes another: at once
         page.evaluate("held.forEach((go) => go())")
-        wait_for_frame(page, N - 1)
+        wait_for_frame(page, other)
     assert (folder / "survey.csv").read_text() == before  # what is on its way is not clicked
 
 

@@ -143,7 +143,7 @@ def test_the_shared_clip_is_read_as_it_is(shared_data):
         (
             "knee_left = [-0.72, 0.0, 0.5]",
             'knee_left = [-0.72, 0.0, "a"]',
-            "knee_left.2: expected a number (found",
+            "knee_left, value 3: expected a number (found",
         ),
         ("hip_left = [-0.72, 0.0, 0.9]", "hip_left = [-0.72, 0.0, 0.05]", "a hip lies lower than an ankle"),
         ("ankle_left = [-0.72, 0.0, 0.1]", "ankle_left = [-0.72, 0.0, -0.35]", "0.35 m under the floor"),

@@ -112,7 +112,8 @@ def open_calibration(path: str | Path) -> CalibrationFile:
     except tomllib.TOMLDecodeError as error:
         first = text.strip().splitlines()[0][:40]
         content = f"as TOML, {_short(error)}" if path.suffix.lower() == ".toml" else f"it begins with {first!r}"
-        raise CalibrationError(f"{where} is no calibration ({content}); {_EXPECTED}") from None
+        mend = f'; say control_points = "{path.name}"' if {"point", "x_m"} <= set(first.split(",")) else ""
+        raise CalibrationError(f"{where} is no calibration ({content}); {_EXPECTED}{mend}") from None
     if isinstance(document.get("cameras"), dict):
         return CalibrationFile("caliscope", where, partial(rig_from_caliscope, document, where))
     return CalibrationFile("pose2sim", where, partial(rig_from_tables, document, where))

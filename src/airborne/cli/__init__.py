@@ -89,7 +89,8 @@ def main() -> None:
             print(message, end="")
             sys.exit(2)
         message = message.replace("Value error, ", "").replace("Input should be", "expected a number")
-        refuse(f"{' '.join(message.split()).rstrip('.')}; see {context.command_path if context else 'airborne'} --help")
+        command = context.command_path if context else "airborne"
+        refuse(f"{' '.join(message.split()).rstrip('.?')}; see {command} --help")
     except (KeyboardInterrupt, typer.Abort):
         stop()
     except UndecidedError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -25,12 +26,12 @@ _ICC = {
 
 
 def write_agreements(path: Path, agreements: Mapping[str, Sequence[Agreement]]) -> None:
-    """Write agreement.csv, one row per variable and reference; empty where unknown."""
+    """Write agreement.csv, one row per variable and reference; empty where unknown. Other references stay."""
     _write(path, [{"against": name} | _agreement(row) for name, rows in agreements.items() for row in rows])
 
 
 def write_repeatability(path: Path, repeatabilities: Mapping[str, Sequence[Repeatability]]) -> None:
-    """Write repeatability.csv, one row per variable and kind of repetition; empty where unknown."""
+    """Write repeatability.csv, one row per variable and kind of repetition; empty where unknown. Others stay."""
     _write(path, [{"between": name} | _repeatability(row) for name, rows in repeatabilities.items() for row in rows])
 
 
@@ -65,8 +66,22 @@ def _with_interval(name: str, measured: Measurement) -> Row:
 
 
 def _write(path: Path, rows: Sequence[Row]) -> None:
-    lines = [",".join(rows[0]), *(",".join(_text(value) for value in row.values()) for row in rows)]
+    """Write rows after those that the table holds of other comparisons."""
+    columns = list(rows[0])
+    compared = {row[columns[0]] for row in rows}
+    earlier = [row for row in _earlier_rows(path, columns) if row[0] not in compared]
+    lines = [",".join(columns), *(",".join(map(_text, row)) for row in [*earlier, *(row.values() for row in rows)])]
     write_text(path, "\n".join(lines) + "\n")
+
+
+def _earlier_rows(path: Path, columns: list[str]) -> list[list[str]]:
+    """Return the rows of a table that has these columns; none of any other file."""
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            head, *rows = csv.reader(file)
+    except (OSError, ValueError, csv.Error):
+        return []
+    return [row for row in rows if len(row) == len(columns)] if head == columns else []
 
 
 def _text(value: object) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
 
 from airborne.evaluation.agreement import Agreement
 from airborne.evaluation.columns import align_columns
@@ -20,6 +21,9 @@ _REFERENCES = (
     "Zou GY (2013) Confidence interval estimation for the Bland-Altman limits of agreement with multiple observations "
     "per individual. Stat Methods Med Res 22:630-642.",
 )
+
+_Row = TypeVar("_Row")
+_AGAINST, _BETWEEN = "Against ", "Between "  # how paragraphs of results begin
 
 
 def agreement_table(rows: Sequence[Agreement]) -> str:
@@ -48,11 +52,16 @@ def methods_text(
     agreements: Mapping[str, Sequence[Agreement]],
     repeatabilities: Mapping[str, Sequence[Repeatability]],
     versions: Mapping[str, str],
+    earlier: str = "",
 ) -> str:
     """Return a paragraph for a methods section, its results, and its references; numbers with 95 % intervals.
 
-    `agreements` and `repeatabilities` hold the headline variables by what they were compared with.
+    `agreements` and `repeatabilities` hold the headline variables by what they were compared with. Of an `earlier`
+    text, the results of comparisons with something else stay.
     """
+    results = _results_of(earlier)
+    results |= _paragraphs(_AGAINST, agreements, _agreement_sentence)
+    results |= _paragraphs(_BETWEEN, repeatabilities, _repeat_sentence)
     software = ", ".join(f"{name} {version}" for name, version in versions.items())
     text = [
         "Agreement was computed with Airborne ("
@@ -62,7 +71,7 @@ def methods_text(
         "left out within 5 degrees of 90 degrees of tilt. Frames were matched in time to within a tenth of a period; "
         "frames without a measurement were left out."
     ]
-    if agreements:
+    if any(head.startswith(_AGAINST) for head in results):
         text.append(
             "Bias is the mean of measured minus reference. The 95 % limits of agreement are bias ± 1.96 standard "
             "deviations of a single difference, the variance being the sum of that between and that within individuals "
@@ -72,7 +81,7 @@ def methods_text(
             "(McGraw and Wong 1996). SEM is the square root of the two-way residual mean square, and the minimal "
             "detectable change 1.96 sqrt(2) SEM."
         )
-    if repeatabilities:
+    if any(head.startswith(_BETWEEN) for head in results):
         text.append(
             "Repeatability is the standard deviation within moments, over all measurements of a moment, and its "
             "coefficient 1.96 sqrt(2) times that (Bland and Altman 1999)."
@@ -81,12 +90,18 @@ def methods_text(
         "As neighbouring frames err alike, intervals rest on the effective number of frames, n / (1 + 2 sum of the "
         "autocorrelations of the differences)."
     )
-    lines = [" ".join(text), ""]
-    for against, rows in agreements.items():
-        lines += [f"Against {against}:", *(_agreement_sentence(row) for row in rows), ""]
-    for ways, rows in repeatabilities.items():
-        lines += [f"Between {ways}:", *(_repeat_sentence(row) for row in rows), ""]
-    return "\n".join([*lines, "References", *_REFERENCES]) + "\n"
+    return "\n\n".join([" ".join(text), *results.values(), "\n".join(["References", *_REFERENCES])]) + "\n"
+
+
+def _paragraphs(begin: str, results: Mapping[str, Sequence[_Row]], say: Callable[[_Row], str]) -> dict[str, str]:
+    heads = {f"{begin}{name}:": rows for name, rows in results.items()}
+    return {head: "\n".join([head, *map(say, rows)]) for head, rows in heads.items()}
+
+
+def _results_of(text: str) -> dict[str, str]:
+    """Return a text's paragraphs of results, by their first lines."""
+    heads = {part: part.partition("\n")[0] for part in text.split("\n\n")}
+    return {head: part for part, head in heads.items() if head.startswith((_AGAINST, _BETWEEN)) and head.endswith(":")}
 
 
 def _agreement_sentence(row: Agreement) -> str:

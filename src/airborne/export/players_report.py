@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from airborne.errors import count_of
 from airborne.export import panels
 from airborne.export.page import UNKNOWN_TEXT, render_report
 from airborne.export.palette import STATUS_RGB, hex_colour
@@ -92,9 +93,9 @@ def players_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
             yield f"{name} was found in no frame: nothing was measured."
             continue
         if player["n_lost"]:
-            yield f"{name}: {player['n_lost']} of {n} frames are lost; they hold no numbers."
+            yield f"{name}: {count_of(player['n_lost'], n, 'frame')} lost; they hold no numbers."
         if player["n_uncertain"]:
-            yield f"{name}: {player['n_uncertain']} of {n} frames are uncertain; look at them before use."
+            yield f"{name}: {count_of(player['n_uncertain'], n, 'frame')} uncertain; look at them before use."
         if player["n_below_two_cameras"]:
             yield (
                 f"{name}: {player['n_below_two_cameras']} of {n} frames rest on fewer than two cameras, so that depth "
@@ -111,9 +112,11 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
         yield f"{name}: {counts}; median sd of a joint {UNKNOWN_TEXT if sd_mm is None else f'{sd_mm:.0f} mm'}"
     for jump in summary["jumps"]:
         hips, *others = (_interval_cm(jump, what) for what in _HEIGHTS)
-        warning = f"; {jump['n_uncertain']} of its frames are uncertain" if jump["n_uncertain"] else ""
+        n = jump["n_uncertain"]
+        warning = f"; {n} of its frames {'is' if n == 1 else 'are'} uncertain" if n else ""
         yield f"{jump['player']}, jump {jump['jump']}: {hips}, hips over standing (95 % interval){warning}"
-        yield "  by other definitions: " + ", ".join(f"{n} {cm}" for n, cm in zip(_HEIGHTS[1:], others, strict=True))
+        pairs = zip(_HEIGHTS[1:], others, strict=True)
+        yield "  by other definitions: " + ", ".join(f"{what} {height}" for what, height in pairs)
     yield from _drop_notes(summary)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from airborne.errors import count_of
 from airborne.io.writing import replace_text
 from airborne.motion import Motion, root_angles
 from airborne.tracking import Status
@@ -64,9 +65,9 @@ def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
     if not n_posed:
         yield "The body was found in no frame: this run measured nothing."
     elif head["n_lost"]:
-        yield f"{head['n_lost']} of {n} frames are lost; they hold no numbers."
+        yield f"{count_of(head['n_lost'], n, 'frame')} lost; they hold no numbers."
     if head["n_uncertain"]:
-        yield f"{head['n_uncertain']} of {n} frames are uncertain; look at them in the overlay videos before use."
+        yield f"{count_of(head['n_uncertain'], n, 'frame')} uncertain; look at them in the overlay videos before use."
     for what in ("position", "rotation"):
         if head[f"n_{what}_unobservable"]:
             yield (

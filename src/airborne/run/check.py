@@ -62,7 +62,7 @@ def check_trial(path: Path, report: Callable[[str], None] = lambda line: None) -
         return checks
     checks.mistakes += [f"{path.name}: {mistake}" for mistake in list_wrong_names(trial)]
     facts = _check_videos(checks, trial)
-    checks.attempt(lambda: refuse_same_files(trial), lambda _: "videos: no file twice")
+    checks.attempt(lambda: refuse_same_files(trial), lambda _: "videos: each camera has a file of its own")
     _check_files(checks, trial, facts)
     if not checks.mistakes:
         _check_start(checks, trial, tuple(facts.values()))
@@ -143,7 +143,7 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
         elif first is not None:
             checks.attempt(
                 lambda: refuse_mix_ups(recording, model, first.pose),
-                lambda _: "videos: none fits another camera better",
+                lambda _: "videos: each fits its own camera best",
             )
     for event in recording.events:
         checks.add(f"note: {event}")

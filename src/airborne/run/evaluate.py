@@ -112,6 +112,9 @@ def _add_to_summary(folder: Path, comparisons: Comparisons) -> dict:
     return summary
 
 
+_METHODS = "agreement_methods.txt"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class AgreementReport:
     """Agreement by reference that the run was compared with; repeatability by what was repeated."""
@@ -154,7 +157,8 @@ def evaluate_agreement(
 
     `repeats` are folders of other runs of the same trial; `operators` files of points that other people clicked in the
     pictures of `digitised`. Writes agreement.csv, repeatability.csv, figures and a methods paragraph into the run's
-    folder, or into `out`. Raises ResultError where something is no run, cannot be read, or is of another recording.
+    folder, or into `out`, where results of earlier comparisons with something else stay. Raises ResultError where
+    something is no run, cannot be read, or is of another recording.
     """
     if operators and digitised is None:
         raise ResultError("clicks of other people are compared with the first person's; give those as --digitised")
@@ -199,9 +203,17 @@ def evaluate_agreement(
             {name: [row for row in rows if row.name in first] for name, rows in agreements.items()},
             {name: [row for row in rows if row.name in first] for name, rows in repeatable.items()},
             versions(),
+            _read_earlier(out / _METHODS),
         )
-        write_text(out / "agreement_methods.txt", text)
-    return AgreementReport(agreements, repeatable, first, out, (*files, "agreement_methods.txt"))
+        write_text(out / _METHODS, text)
+    return AgreementReport(agreements, repeatable, first, out, (*files, _METHODS))
+
+
+def _read_earlier(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return ""
 
 
 def _check_different(option: str, paths: Sequence[Path], wanted: str) -> None:

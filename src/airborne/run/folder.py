@@ -82,8 +82,23 @@ def prepare_folder(
         drop_rows(rows, lambda frame: any(before < frame < after for before, after in again))
         write_json(record, identity)
     elif changed:
-        raise ResultError(f"{folder} holds another run (other {', other '.join(changed)}); track into another folder")
+        differences = "; ".join(_describe_change(name, recorded, identity) for name in changed)
+        raise ResultError(
+            f"{folder} holds another run ({differences}); "
+            "go on with its options and files, or track into another folder"
+        )
     return True
+
+
+def _describe_change(name: str, recorded: Mapping[str, Any], identity: Mapping[str, Any]) -> str:
+    """Name what differs between two identities: the settings with their values there and now, the input files."""
+    before, now = recorded.get(name), identity[name]
+    if not (isinstance(before, dict) and isinstance(now, dict)):
+        return f"{name} {before}, now {now}" if isinstance(now, str) else f"other {name}"
+    differing = [key for key in {**before, **now} if before.get(key) != now.get(key)]
+    if name == "settings":
+        return "; ".join(f"{key} = {before.get(key)}, now {now.get(key)}" for key in differing)
+    return f"other {', '.join(differing)}" if name == "inputs" else f"other {name}"
 
 
 def _is_changed(mask: dict[str, Any], *identities: Mapping[str, Any]) -> bool:
