@@ -42,6 +42,7 @@ _HELP = (
     "Click the chosen point in each camera; C shows one camera alone. Grey marks say where your own clicks before and "
     "after let the point be expected. Leave the epipolar help off where a run shall be compared without bias."
 )
+_EMPTY = "There are no points to click yet. Name one below, such as one end of the body, and press Add."
 _PREDICTED = "#c8cdd3"
 _AFTER = {"point": "the next point", "frame": "the next frame", "stay": "nothing"}
 
@@ -104,7 +105,7 @@ class DigitisePanel(PointsPanel):
             with ui.element("div").classes("side"):
                 with ui.element("div").classes("card"):
                     self._build_who()
-                self.list = PointList(self.shown.names, self.choose)
+                self.list = PointList(self.shown.names, self.choose, empty=_EMPTY)
                 with ui.element("div").classes("card"):
                     self._build_points()
                     self._build_comparison()

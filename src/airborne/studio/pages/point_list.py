@@ -18,11 +18,12 @@ _NOT_CLICKED, _CLICKED = "–", "•"
 class PointList:
     """Rows that stay the same elements while what they say changes, so that no click on them is lost."""
 
-    def __init__(self, cameras: Sequence[str], choose: Callable[[str], Awaitable[None]]) -> None:
-        """Begin without rows; `choose` is called with a row's point."""
-        self._cameras, self._choose = cameras, choose
+    def __init__(self, cameras: Sequence[str], choose: Callable[[str], Awaitable[None]], *, empty: str = "") -> None:
+        """Begin without rows; `choose` is called with a row's point, `empty` stands where there are no points."""
+        self._cameras, self._choose, self._empty = cameras, choose, empty
         self._rows: dict[str, tuple[Element, list[Label], Label]] = {}
         self._card = ui.element("div").classes("card points").style("flex: 1; min-height: 120px; overflow-y: auto")
+        self._build(())
 
     def show(
         self,
@@ -47,6 +48,8 @@ class PointList:
         self._card.clear()
         self._rows = {}
         with self._card:
+            if not names:
+                ui.label(self._empty).classes("soft small")
             for name in names:
                 with ui.element("button").classes("point") as row:
                     row.on("click", partial(self._choose, name), args=[])
