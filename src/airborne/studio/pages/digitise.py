@@ -120,8 +120,8 @@ class DigitisePanel(PointsPanel):
             change.props("flat dense")
         self.note = ui.label().classes("small")
         with ui.element("div").classes("row-line"):
-            then = ui.select(_AFTER, label="after a click choose", value=self.then, on_change=self._set_then)
-            then.props("outlined dense options-dense").style("width: 130px")
+            then = ui.select(_AFTER, label="after a click", value=self.then, on_change=self._set_then)
+            then.props("outlined dense options-dense").style("width: 150px")
             ui.switch("epipolar help", value=False, on_change=lambda event: self.set_help(bool(event.value)))
 
     def _build_points(self) -> None:
