@@ -30,7 +30,7 @@ async def body_page(session: Session) -> None:
     async with page_frame(session, "Body", "What is tracked?", text, scrolls=True) as changed:
         table = session.project().table("body")
         bodies = await in_thread(list_bodies, session.folder)
-        with ui.element("div").classes("row-line").style("align-items: stretch"):
+        with ui.element("div").classes("row-line").style("align-items: flex-start"):
             if bodies:
                 _thing_card(session, bodies, table)
             _person_card(session, table)
