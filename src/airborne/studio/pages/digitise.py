@@ -39,8 +39,8 @@ from airborne.studio.view import Item, Mark
 from airborne.types import Array, Mask
 
 _HELP = (
-    "Click the chosen point in each camera; C shows one camera alone. Grey marks say where your own clicks before and "
-    "after let the point be expected. Leave the epipolar help off where a run shall be compared without bias."
+    "Click the chosen point in each camera; C shows one camera alone. Grey marks show where to expect the point, "
+    "from your own clicks before and after. For an unbiased comparison with a run, leave the epipolar help off."
 )
 _EMPTY = "There are no points to click yet. Name one below, such as one end of the body, and press Add."
 _PREDICTED = "#c8cdd3"
